@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, cast
+from typing import Literal, NamedTuple, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,7 @@ from tfarm.synthesis.worst_case import WITHOUT_BOX, WorstCase
 Objective = Literal["damping", "margin", "residual", "cost"]
 LoopKind = Literal["sampled", "continuous"]
 
-GAIN_OBJECTIVES = ("damping", "margin", "residual", "cost")
+GAIN_OBJECTIVES: tuple[Objective, ...] = get_args(Objective)
 FLAT_WITHIN = 0.01  # gains whose value is worse by less than this share bound the flat part
 AT_BOUND = 1e-3  # share of an axis: an optimum so near to its end is where the bound is
 SIMPLEX_SIZE = 2.0**-8  # of a step of the grid: its first size
@@ -191,7 +191,7 @@ def _first_that_holds(
 
 
 def _widened(
-    judge: Judge, arm: Arm, bounds: dict[str, Bounds], free: dict[str, bool], held: HubFeedback
+    judge: Worst, arm: Arm, bounds: dict[str, Bounds], free: dict[str, bool], held: HubFeedback
 ) -> tuple[dict[str, Bounds], _Best]:
     """The best gains, and the bounds widened wherever they lie on one that is free: only what is new is searched."""
     best = _best(judge, arm, bounds, held)
@@ -226,7 +226,7 @@ def _axes(arm: Arm, bounds: dict[str, Bounds]) -> tuple[GainAxis, GainAxis]:
     return searched_rates(bounds["K1"], rate_unit(arm)), GainAxis(*bounds["K2"])
 
 
-def _best(judge: Judge, arm: Arm, bounds: dict[str, Bounds], held: HubFeedback) -> _Best:
+def _best(judge: Worst, arm: Arm, bounds: dict[str, Bounds], held: HubFeedback) -> _Best:
     """The best gains that hold.  Raises ConvergenceError where none are stable."""
     axes, effort = _axes(arm, bounds), judge.effort(bounds["K2"])
     values, score = judge.landscape(axes, effort)

@@ -12,7 +12,7 @@ from tfarm.arm import Law
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.records import record
 from tfarm.synthesis.law_slopes import Clock, changes
-from tfarm.synthesis.sampled import REAL_ANGLE
+from tfarm.synthesis.sampled import REAL_ANGLE, disk_of
 from tfarm.synthesis.structures import Slope
 
 Sloped = tuple[Real, Real]  # values (m,) and slopes (m, n)
@@ -71,9 +71,8 @@ class LoopCurve:
             f = 1 / abs(apart)
             slope = -(f[:, None] ** 2) * (apart.conj() / abs(apart))[:, None]
         else:
-            across = 1.0 - L
-            f = -2 * abs(apart) / np.maximum(abs(across), LEAST_SIZE)
-            slope = f[:, None] * (1 / apart + 1 / across)[:, None]
+            f = -disk_of(L)
+            slope = f[:, None] * (1 / apart + 1 / (1.0 - L))[:, None]
         padded = np.r_[-np.inf, f, -np.inf]
         (peaks,) = np.nonzero((f >= padded[:-2]) & (f >= padded[2:]))
         at = np.asarray(peaks[np.argsort(-f[peaks], kind="stable")[:PEAKS_SEEN]])

@@ -24,6 +24,7 @@ from tfarm.arm import Arm, Law
 from tfarm.arrays import Real
 from tfarm.records import record
 from tfarm.spectrum import modes as natural_modes
+from tfarm.spectrum.scales import first_frequency
 
 Numbers = NDArray[Any]  # real, or complex for a derivative
 
@@ -115,8 +116,8 @@ class Structure:
 
 def usual_angle_gain(arm: Arm, period: float) -> float:
     """Kp [input/rad]: the angle answers at a tenth of the first frequency, or of a radian a sample if that is less."""
-    first = float(natural_modes(arm, 1).natural_frequency[-1])
-    return float(f"{arm.turned_inertia * (ANGLE_SPEED * min(first, 1 / period)) ** 2:.3g}")
+    speed = ANGLE_SPEED * min(first_frequency(arm), 1 / period)
+    return float(f"{arm.turned_inertia * speed**2:.3g}")
 
 
 def _rate_gain(arm: Arm, Kp: float) -> float:
@@ -137,8 +138,6 @@ def _pd(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
 
 
 def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
-    first = float(natural_modes(arm, 1).natural_frequency[-1])
-
     def entries(c: Numbers) -> tuple[Entry, ...]:
         K1, pole, w, a, b = c
         num = np.polymul([K1 + Kp / pole, Kp], [1.0, 2 * a * w, w * w])
@@ -147,7 +146,7 @@ def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
 
     names = ("K1", "pole_rad_s", "notch_rad_s", "notch_zero_damping", "notch_pole_damping")
     start = np.array(
-        [_rate_gain(arm, Kp), 2 / period, min(first, 1 / period), 0.1, 0.7]
+        [_rate_gain(arm, Kp), 2 / period, min(first_frequency(arm), 1 / period), 0.1, 0.7]
     )  # a derivative as fast as samples tell
     most = np.array([np.inf, 2 / period, 2 / period, np.inf, np.inf])
     return Structure("PD+notch", names, start, (True,) * 5, most, entries)
@@ -181,13 +180,11 @@ def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
 
 
 def _strain_rate(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
-    first = float(natural_modes(arm, 1).natural_frequency[-1])
-
     def entries(c: Numbers) -> tuple[Entry, ...]:
         _, g, pole = c
         return (*_servo_entries(Kp, c), Entry("root_moment", np.array([g, 0.0]), np.array([1 / pole, 1.0])))
 
-    start = np.array([_rate_gain(arm, Kp), 0.1 * arm.input_per_torque / first, 2 / period])
+    start = np.array([_rate_gain(arm, Kp), 0.1 * arm.input_per_torque / first_frequency(arm), 2 / period])
     most = np.array([np.inf, np.inf, 2 / period])
     return Structure("strain-rate", ("K1", "gain_s", "pole_rad_s"), start, (True, False, True), most, entries)
 

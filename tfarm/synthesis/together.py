@@ -79,10 +79,6 @@ class Worst:
         """Whether the loop of every arm is stable by the verdict of its kind."""
         return all(judge.holds(law) for judge in self.judges)
 
-    def value(self, law: HubFeedback, score: float) -> float:
-        """The objective of a law of that score, on the arm that has it."""
-        return max(self.judges, key=lambda judge: score_of(judge, law)).value(law, score)
-
     def values(self, law: HubFeedback) -> list[float]:
         """The objective of a law on each arm."""
         return [judge.value(law, score_of(judge, law)) for judge in self.judges]

@@ -15,7 +15,7 @@ from tfarm.arm import MOMENT_GAIN, Arm
 from tfarm.dsp import Chain, Converters, Scenario, Simulation
 from tfarm.dsp.scenarios import torque_unit
 from tfarm.errors import ConvergenceError
-from tfarm.spectrum import modes
+from tfarm.spectrum.scales import first_frequency
 from tfarm.tuner.bound import lq_bound
 from tfarm.tuner.constants import best_constant
 from tfarm.tuner.controller import TunedGain, judged, tip_off
@@ -109,8 +109,7 @@ def tried_loops(arm: Arm, chain: Chain, quantised: Chain | None = None) -> list[
     if own:
         dampings = [0.0, *(float(f"{share * own:.3g}") for share in DAMPING_SHARES)]
     else:
-        first = float(modes(arm, 1).natural_frequency[-1])
-        dampings = [float(f"{2 * zeta / first:.1g}") for zeta in GIVEN_RATIOS]
+        dampings = [float(f"{2 * zeta / first_frequency(arm):.1g}") for zeta in GIVEN_RATIOS]
     others = {f"payload {each:g} kg": arm.having(payload_mass=each) for each in payloads}
     others |= {f"hub {share - 1:+.0%}": arm.having(hub_inertia=share * arm.hub_inertia) for share in HUB_SHARES}
     others |= {f"C = {C:g} s": arm.having(damping=C) for C in dampings}
