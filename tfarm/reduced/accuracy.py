@@ -157,8 +157,7 @@ def _samples(low: float, high: float, poles: Real) -> Real:
     share = (1 - np.cos(np.linspace(0, np.pi, BETWEEN_POLES + 2)[1:-1])) / 2
     between = (knots[:-1, None] + np.diff(knots)[:, None] * share).ravel()
     w = np.concatenate([np.geomspace(low, high, count), np.linspace(low, high, EVEN_SAMPLES), crowd, between])
-    w = np.clip(np.unique(w), low, high)
-    return np.unique(w)
+    return np.unique(np.clip(w, low, high))
 
 
 def _errors(model: PartialFractions, w: Real, exact: Complex, size: Real) -> Real:

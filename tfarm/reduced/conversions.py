@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import os
 import re
+from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 MAT_HEADER = b"MATLAB 5.0 MAT-file, written by tfarm"  # SciPy's own has the date in it: same inputs, same bytes
 HEADER_TEXT = 116  # bytes that a MAT-file begins with and that nobody reads, before its version
 WRITTEN_BY = ": written by tfarm."  # ends the first line of every script
+ONE: Any = np.ones(1)  # the polynomial
 MAT_POINTS = 1000  # of the exact response in the file, even in ln w
 
 
@@ -45,7 +47,7 @@ def transfer_function(reduced: ReducedModel) -> control.TransferFunction:
     single = [np.array([1.0, -pole]) for pole in model.single]
     delay = [np.array([model.arm.damping, 1.0])] if model.relaxation is not None else []
     denominators = [*rigid, *pairs, *single, *delay]
-    whole = _product(denominators)
+    whole = reduce(np.polymul, denominators, ONE)
     n1, n0 = model.numerators
     numerators = []
     for row in range(len(model.outputs)):
@@ -55,8 +57,8 @@ def transfer_function(reduced: ReducedModel) -> control.TransferFunction:
         parts += [model.relaxation[row : row + 1]] if model.relaxation is not None else []
         total = model.static[row] * whole
         for place, part in enumerate(parts):
-            others = np.polymul(part, _product(denominators[:place] + denominators[place + 1 :]))
-            total = np.polyadd(total, others)
+            others = reduce(np.polymul, denominators[:place] + denominators[place + 1 :], ONE)
+            total = np.polyadd(total, np.polymul(part, others))
         numerators.append([total])
     return control.TransferFunction(
         numerators,
@@ -161,10 +163,3 @@ sys.Name = '{name}';
 exact.Name = '{name}, exact';
 clear here data
 """
-
-
-def _product(polynomials: list[Any]) -> Any:
-    product = np.ones(1)
-    for polynomial in polynomials:
-        product = np.polymul(product, polynomial)
-    return product

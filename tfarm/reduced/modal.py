@@ -20,8 +20,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.outputs import OUTPUTS, Output
-from tfarm.exact.system import System, system_of
-from tfarm.exact.values import expansions_at_zero
+from tfarm.exact.system import System
 from tfarm.response import Wanted, transfer
 from tfarm.spectrum import Modes, modes
 from tfarm.spectrum.damped import DampedModes, all_damped_modes, single_zeros
@@ -69,14 +68,14 @@ def modal_model(
     """
     G = transfer(arm, outputs, x=x)
     count = whole("count", count, 0, MOST_MODELLED, f"a whole number of flexible modes, 0 to {MOST_MODELLED}")
-    k, share = G.system, 0.0 if x is None else x / arm.length
+    k, share = G.system, G.share
     wanted = [proper(k, each, share) for each in G.rows]
     table = modes(arm, max(1, int(count)))
     flexible = slice(int(arm.has_rigid_mode), int(arm.has_rigid_mode) + int(count))
     collocated = OUTPUTS["root_moment" if arm.is_locked else "hub_angle"]
     p, r, single, alone = _poles_and_residues(arm, table, k, [*wanted, collocated], share, branches)
     p, r = p[:count], r[:, :count]
-    expansion = np.array(expansions_at_zero(k, wanted, share))
+    expansion = G.expansion
     return ModalModel(
         arm=arm,
         rows=G.rows,
@@ -103,9 +102,8 @@ def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None)
     model, C = modal_model(arm, outputs, count, x), arm.damping
     if C == 0:
         raise ParameterError(key="link.damping", value=C, remedy="without damping nothing relaxes; take modal_model")
-    share = 0.0 if x is None else x / arm.length
-    expansion = np.array(expansions_at_zero(system_of(arm, wanted=model.rows), model.rows, share))
-    slope = expansion[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
+    exact = transfer(arm, model.rows, x=x).expansion
+    slope = exact[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
     if model.single_residues is not None:
         slope = slope + (model.single_residues / model.single**2).sum(axis=1)
     return replace(model, static=model.static + slope / C, relaxation=-slope / C)

@@ -101,12 +101,11 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
 
 def _remainders(G: TransferFunction, inside: PartialFractions, high: float, frequencies: Real) -> _Remainders:
     """Samples over the band.  Below high/100 the point S = 0 says all there is to say."""
-    k, share = G.system, 0.0 if G.x is None else G.x / G.arm.length
     w = high * np.sin(np.linspace(REMAINDER_FROM, np.pi / 2, REMAINDER_POINTS))
     w = w[distance(w, frequencies) > BESIDE_POLE * w]
     S, power = -(w**2), np.array([[each.power] for each in G.rows])
     bases = [each.base for each in G.rows]
-    at_zero = np.array(expansions_at_zero(k, bases, share))
+    at_zero = np.array(expansions_at_zero(G.system, bases, G.share))
     by_S = ((at_zero[:, 0] != 0) | (power[:, 0] > 0))[:, None]
     square = inside.natural_frequency**2
     p = inside.eigenvalues[:, 0]

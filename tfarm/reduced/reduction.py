@@ -6,7 +6,6 @@ This is the one door out of exactness.  What comes through carries its band, its
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -22,6 +21,7 @@ from tfarm.errors import MISSING, ConvergenceError, ParameterError
 from tfarm.exact.outputs import Output
 from tfarm.records import record
 from tfarm.response import Wanted, transfer
+from tfarm.response.frequency import known_band
 from tfarm.spectrum import modes
 
 from .accuracy import EXACT_ROUNDING, Ruler
@@ -40,6 +40,7 @@ MOST_STATES = 400  # states: where the search for a model within an error ends
 MOST_TAILS = 12  # pairs of poles above the band: more fit rounding
 LEAST_FALL = 0.5  # of the error, or more, goes with 2.25 times the modes, even where it falls as 1/n; less is its floor
 COUNTS_TRIED = 3  # numbers of modes from the one that a rough measure finds on, measured in full
+REDUCTION_BAND = "two frequencies in rad/s, 0 < low < high, such as 0.1,1000"  # what is asked for
 WIDEST_BAND = 1e12  # its ends' ratio: what is wider was mistyped
 POLE_IS_MODE = 1e-6  # relative gap within which a pole of the model is a mode of the arm
 
@@ -133,7 +134,7 @@ def reduce(
     """
     rows = transfer(arm, outputs, x=x).rows
     names = tuple(each.name for each in rows)
-    low, high = _band(band)
+    band = known_band(band, REDUCTION_BAND, WIDEST_BAND)
     if len(set(names)) < len(names):
         raise ParameterError(key="outputs", value=names, remedy="name each output once")
     if method is not None and method not in get_args(Reduction):
@@ -144,7 +145,7 @@ def reduce(
     if (order is None) == (error is None):
         remedy = "give either an order (a number of states) or an error"
         raise ParameterError(key="order", value=MISSING if order is None else order, remedy=remedy)
-    bench = _Bench(arm, rows, (low, high), x, method)
+    bench = _Bench(arm, rows, band, x, method)
     return bench.of_order(order) if order is not None else bench.within(_error(error))
 
 
@@ -263,17 +264,6 @@ def first_mode_lacking(model: PartialFractions) -> tuple[int, float]:
     has = (abs(model.natural_frequency[:, None] - omega) <= POLE_IS_MODE * omega).any(axis=0)
     first = int(np.argmin(has))
     return first + 1, float(omega[first])
-
-
-def _band(band: Any) -> tuple[float, float]:
-    remedy = "two frequencies in rad/s, 0 < low < high, such as 0.1,1000"
-    try:
-        low, high = (float(edge) for edge in band)
-    except (TypeError, ValueError):
-        raise ParameterError(key="band", value=band, remedy=remedy) from None
-    if not 0 < low < high < math.inf or high / low > WIDEST_BAND:
-        raise ParameterError(key="band", value=(low, high), remedy=remedy)
-    return low, high
 
 
 def _error(error: Any) -> float:

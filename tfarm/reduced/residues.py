@@ -37,18 +37,14 @@ def undamped_residues(table: Modes, wanted: Sequence[Output], k: System, x: floa
     c b, with c the output of the mode and b its hub participation (its root moment where the hub is locked).
     `x` is a share of the length.
     """
-    omega = table.natural_frequency[table.index > 0]
+    omega, powers = table.natural_frequency[table.index > 0], np.array([[each.power] for each in wanted])
     if isinstance(k, ElementChain):
-        powers = np.array([[each.power] for each in wanted])
         return np.asarray((_of_chain(k, wanted, 1j * omega, x)[0] * 2j * omega / (1j * omega) ** powers).real)
     close = np.r_[False, np.diff(omega) < CLOSE_FREQUENCIES * omega[1:], False]
-    by_shapes = close[:-1] | close[1:]
-    if any(not each.is_at_end for each in wanted):
-        by_shapes[:] = True
+    by_shapes = close[:-1] | close[1:] | any(not each.is_at_end for each in wanted)
     products = np.empty((len(wanted), omega.size))
     if not by_shapes.all():
         residues, doubtful = end_residues(k, wanted, 1j * omega)
-        powers = np.array([[each.power] for each in wanted])
         products[:] = (residues * 2j * omega / (1j * omega) ** powers).real
         by_shapes |= doubtful
     if by_shapes.any():

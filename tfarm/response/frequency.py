@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import INPUT_UNITS, Arm
+from tfarm.arm import Arm
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.exact.outputs import Output
@@ -26,6 +26,7 @@ from tfarm.spectrum import modes
 
 from .transfer import TransferFunction, transfer
 
+BODE_BAND = "two frequencies in rad/s, the lower first: (1.0, 1000.0)"  # what is asked for
 RESONANCES_SHOWN = 10  # flexible modes in a band, unless told
 EVEN_PER_DECADE = 120  # points of the even grid
 PER_ROOT_DECADE = 12  # points a decade of distance, on each side of a pole or zero
@@ -97,7 +98,7 @@ class Bode:
     @property
     def gain_unit(self) -> str:
         """SI unit of the response, e.g. N m/(N m)."""
-        given = "rad" if self.arm.is_locked else INPUT_UNITS[self.arm.input]
+        given = self.arm.input_unit
         return f"{self.row.unit}/{f'({given})' if ' ' in given else given}"
 
     @property
@@ -134,7 +135,7 @@ def bode(
     """
     G = transfer(arm, output, x=x, input=input)
     arm, (row,) = G.arm, G.rows
-    band = resonant_band(arm) if band is None else _known_band(band)
+    band = resonant_band(arm) if band is None else known_band(band, BODE_BAND)
     G.must_be_of_the_hub("a Bode plot, with its zeros,")
     if not np.any(G(1j * np.geomspace(*band, 3))):
         return _no_motion(arm, row, G.x, band)
@@ -169,14 +170,14 @@ def _upper(roots: Complex) -> Complex:
     return roots[(roots.imag >= 0) & (roots != 0)]
 
 
-def _known_band(band: tuple[float, float]) -> tuple[float, float]:
-    """The two ends of a band.  Raises ParameterError for what is none."""
+def known_band(band: tuple[float, float], remedy: str, widest: float = math.inf) -> tuple[float, float]:
+    """The two ends of a band, not farther apart than `widest` times.  Raises ParameterError for what is none."""
     try:
         low, high = map(float, band)
     except (TypeError, ValueError):
         low = high = math.nan
-    if not 0 < low < high < math.inf:
-        raise ParameterError(key="band", value=band, remedy="two frequencies in rad/s, the lower first: (1.0, 1000.0)")
+    if not 0 < low < high < math.inf or high / low > widest:
+        raise ParameterError(key="band", value=band, remedy=remedy)
     return low, high
 
 

@@ -115,10 +115,9 @@ def _numerator(k: System, wanted: Output, x: float) -> tuple[int, Function]:
 def _of_one_link(k: Coefficients, quantity: str, *, at_tip: bool) -> tuple[int, Function]:
     """Order of the zero at s = 0 of the free response's quantity, and the quantity over s to that order."""
     s = Jet.variable(0.0, 6)
-    if at_tip:
-        series = dict(zip(("Phi", "M", "Q"), low_frequency_tip(k, s), strict=True))[quantity]
-    else:
-        series = dict(zip(("theta", "M", "Q", "W", "Y", "drive"), low_frequency(k, s), strict=True))[quantity]
+    names = ("Phi", "M", "Q") if at_tip else ("theta", "M", "Q", "W", "Y", "drive")
+    every = low_frequency_tip(k, s) if at_tip else low_frequency(k, s)
+    series = dict(zip(names, every, strict=True))[quantity]
     order = next(n for n, coefficient in enumerate(series.c) if coefficient != 0)
 
     def function(s: Complex) -> Analytic:

@@ -25,7 +25,7 @@ from tfarm.exact.values import (
     differentiate_outputs,
     digits_of,
     evaluate_outputs,
-    expansion_at_zero,
+    expansions_at_zero,
     kernel_table,
 )
 
@@ -88,14 +88,10 @@ class TransferFunction:
         if not asked:
             raise ParameterError(key="outputs", value=outputs, remedy="name at least one output")
         self.rows: tuple[Output, ...] = tuple(output(each) for each in asked)
-        self._k = system_of(arm, wanted=self.rows) if self.load is None else chain_of(arm)
-        self._table = kernel_table(self._k, self.rows)
+        # the exact system that it is read from
+        self.system: System = system_of(arm, wanted=self.rows) if self.load is None else chain_of(arm)
+        self._table = kernel_table(self.system, self.rows)
         self.x = self._place(x)
-
-    @property
-    def system(self) -> System:
-        """The exact system that it is read from."""
-        return self._k
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -145,7 +141,7 @@ class TransferFunction:
         """dG/ds at a complex scalar or array, by the same formulas carried as power series."""
         self.must_be_of_the_hub("a derivative")
         points = _finite(s)
-        flat = differentiate_outputs(self._k, self.rows, points.ravel(), self._share)
+        flat = differentiate_outputs(self.system, self.rows, points.ravel(), self.share)
         return self._shaped(flat.reshape(len(self.outputs), *points.shape))
 
     def digits(self, s: complex, digits: int) -> Any:
@@ -157,7 +153,7 @@ class TransferFunction:
         digits = whole("digits", digits, 1, most, f"a whole number of digits from 1 to {most}")
         self.must_be_of_the_hub("digits")
         point = complex(_finite(s))
-        pairs = [digits_of(self._k, wanted, point, digits, self._share) for wanted in self.rows]
+        pairs = [digits_of(self.system, wanted, point, digits, self.share) for wanted in self.rows]
         return pairs[0] if self.is_single else pairs
 
     def frequency_response(self, omega: ArrayLike) -> control.FrequencyResponseData:
@@ -171,20 +167,20 @@ class TransferFunction:
         )
 
     def _values(self, s: Complex) -> Complex:
-        if self.load is not None and isinstance(self._k, ElementChain):
+        if self.load is not None and isinstance(self.system, ElementChain):
             of_load = np.empty((len(self.rows), s.size), complex)
             for row, each in enumerate(self.rows):
-                balls = (loaded_value(self._k, self.load, each, complex(at), self._share) for at in s)
+                balls = (loaded_value(self.system, self.load, each, complex(at), self.share) for at in s)
                 of_load[row] = [nearest_float(ball) for ball in balls]
             return of_load
         if self.method != "closed-form":
-            return slow_values(self.method, self.arm, self._k, self.rows, s, self._share)
+            return slow_values(self.method, self.arm, self.system, self.rows, s, self.share)
         if s.size <= POINTS_AT_ONCE:
-            return evaluate_outputs(self._k, self.rows, self._table, s, self._share)
+            return evaluate_outputs(self.system, self.rows, self._table, s, self.share)
         values = np.empty((len(self.outputs), s.size), complex)
         for start in range(0, s.size, POINTS_AT_ONCE):
             part = slice(start, start + POINTS_AT_ONCE)
-            values[:, part] = evaluate_outputs(self._k, self.rows, self._table, s[part], self._share)
+            values[:, part] = evaluate_outputs(self.system, self.rows, self._table, s[part], self.share)
         return values
 
     def _shaped(self, values: Complex) -> Any:
@@ -194,19 +190,20 @@ class TransferFunction:
     # ------------------------------------------------------------ s = 0, poles and zeros
 
     @cached_property
-    def _expansion(self) -> NDArray[np.float64]:
+    def expansion(self) -> NDArray[np.float64]:
+        """Coefficients (outputs, 4) of s^-2, s^-1, 1 and s at s = 0."""
         self.must_be_of_the_hub("an expansion at s = 0")
-        return np.array([expansion_at_zero(self._k, wanted, self._share) for wanted in self.rows])
+        return np.array(expansions_at_zero(self.system, self.rows, self.share))
 
     @property
     def rigid_body(self) -> Any:
         """The coefficient of 1/s^2 at s = 0: the arm turning as a rigid body."""
-        return self._shaped_real(self._expansion[:, 0])
+        return self._shaped_real(self.expansion[:, 0])
 
     @property
     def static(self) -> Any:
         """The constant term of the expansion at s = 0: the static gain where the output is finite there."""
-        return self._shaped_real(self._expansion[:, 2])
+        return self._shaped_real(self.expansion[:, 2])
 
     def _shaped_real(self, values: NDArray[np.float64]) -> Any:
         return float(values[0]) if self.is_single else values
@@ -227,7 +224,7 @@ class TransferFunction:
         self.must_be_of_the_hub("zeros")
         if not self.is_single:
             raise ParameterError(key="outputs", value=self.outputs, remedy="ask for the zeros of one output at a time")
-        return zeros_of(self.arm, self.rows[0], positive("up_to", up_to, A_FREQUENCY), self._share)
+        return zeros_of(self.arm, self.rows[0], positive("up_to", up_to, A_FREQUENCY), self.share)
 
     # ------------------------------------------------------------ inside
 
@@ -238,7 +235,8 @@ class TransferFunction:
             raise ParameterError(key="input", value=self._input, remedy=remedy)
 
     @property
-    def _share(self) -> float:
+    def share(self) -> float:
+        """The place `x` as a share of the length; 0 of outputs that have their own."""
         return 0.0 if self.x is None else self.x / self.arm.length
 
     def _place(self, x: float | None) -> float | None:
