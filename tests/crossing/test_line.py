@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.optimize.elementwise import find_root
 
 from tfarm.crossing import Crossings, brackets, confirmed, counts_over, crossed, intervals, joined, zeros_between
+from tfarm.crossing.line import LAST_BIT
 
 CURVES = {
     "axis": (lambda x: 1j * x, np.linspace(1e-3, 40.0, 4001), lambda s: s.real > 0),
@@ -68,6 +70,7 @@ def test_intervals_are_where_nothing_is_beyond():
     assert joined([(0.0, 1.0), (1.0, 2.0), (3.0, 4.0)]) == [(0.0, 2.0), (3.0, 4.0)]
 
 
+@pytest.mark.parametrize("unit", [1.0, 1e6])
 @pytest.mark.parametrize(
     ("A", "B", "ends", "crossings", "windows"),
     [
@@ -82,14 +85,15 @@ def test_intervals_are_where_nothing_is_beyond():
         ([1, 3, 3, 1], [1], (-np.inf, np.inf), [(8, 2), (-1, -1), (3, 1), (3 + 1e-12, -1)], [(-1, 8)]),  # torn
     ],
 )
-def test_windows_are_those_of_routh_and_hurwitz(A, B, ends, crossings, windows):
-    """No count is given: the roots themselves say in which gap there is none beyond the axis."""
-    found = Crossings.of((gain, 1.0, change) for gain, change in crossings)
+def test_windows_are_those_of_routh_and_hurwitz(A, B, ends, crossings, windows, unit):
+    """No count is given: the roots themselves say in which gap there is none beyond the axis.  Gains have any unit."""
+    found = Crossings.of((unit * gain, 1.0, change) for gain, change in crossings)
 
     def is_stable(gain):
-        return bool((np.roots(np.polyadd(A, gain * np.array(B))).real < 0).all())
+        return bool((np.roots(np.polyadd(A, gain / unit * np.array(B))).real < 0).all())
 
-    assert confirmed(found, *ends, is_stable) == [pytest.approx(each, rel=1e-15) for each in windows]
+    wanted = [pytest.approx((unit * low, unit * high), rel=1e-15) for low, high in windows]
+    assert confirmed(found, unit * ends[0], unit * ends[1], is_stable) == wanted
 
 
 HARD = (  # functions of x, each with one change of sign in (0, 3)
@@ -117,6 +121,28 @@ def test_zeros_are_the_closed_ones_to_the_last_bit_and_soon(number, most):
     found = zeros_between(f, np.zeros(number), np.full(number, 3.0))
     np.testing.assert_allclose(found, ZEROS[:number], rtol=0, atol=4 * np.finfo(float).eps)
     assert len(asked) <= most
+
+
+@pytest.mark.parametrize(
+    ("f", "low"),
+    [
+        *((each, 0.0) for each in HARD),
+        (lambda x: x**3 - 27.0 * (1 - 2e-16), 0.0),  # in the last bit before the upper end
+        (lambda x: np.sign(x - 1e-3), -3.0),  # far smaller than its bracket
+    ],
+)
+def test_every_place_that_is_asked_for_is_that_of_another_chandrupatla(f, low):
+    """SciPy's, from the same two ends, the upper one 3, and with as narrow a last bracket."""
+    ours, theirs, width = [], [], 3.0 - low
+
+    def asked(by):
+        return lambda x: by.append(float(x[0])) or f(x)
+
+    zeros_between(asked(ours), np.array([low]), np.array([3.0]))
+    limits = {"xatol": 2 * LAST_BIT * width, "xrtol": 2 * LAST_BIT, "fatol": 0.0, "frtol": 0.0}
+    find_root(asked(theirs), (np.array([3.0]), np.array([low])), tolerances=limits)
+    assert len(ours) == len(theirs)
+    np.testing.assert_allclose(ours, theirs, rtol=1e-14)
 
 
 def test_no_bracket_has_no_zero():

@@ -98,13 +98,16 @@ def test_an_upright_side_is_approached_from_the_columns_beside_it():
     assert flat == pytest.approx([4.9])
 
 
-def test_columns_laid_to_both_sides_of_an_edge_are_never_the_edge_nor_in_its_rounding():
-    """A side at 4 among columns a billionth of it to either side, after as many rounds as a picture takes."""
-    across = [1.0, 4.0 * (1 - 1e-9), 4.0 * (1 + 1e-9), 9.0]
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_columns_laid_to_both_sides_of_an_edge_are_never_the_edge_nor_in_its_rounding(unit):
+    """A side at 4 among columns a billionth of it to either side, after as many rounds as a picture takes.
+
+    Whatever unit the gain has: what is told apart is a share of it.
+    """
+    across = [1.0 * unit, 4.0 * (1 - 1e-9) * unit, 4.0 * (1 + 1e-9) * unit, 9.0 * unit]
     for _ in range(20):
-        inside = [each for each in across if each < 4.0]
+        inside = [each for each in across if each < 4.0 * unit]
         box = piece(inside, [2.0] * len(inside), [8.0] * len(inside))
-        across = sorted({*across, *wanted(box, across)})
-    nearest = abs(np.array(across) / 4.0 - 1.0).min()
-    assert 1e-13 < nearest < 1e-9
-    assert np.diff(across).min() > 1e-12
+        across = sorted({*across, *wanted(box, across, lambda x, y: (x / unit + 1j * y) / 10)})
+    assert 1e-13 < abs(np.array(across) / unit / 4.0 - 1.0).min() < 1e-9
+    assert np.diff(across).min() > 1e-12 * unit

@@ -119,6 +119,19 @@ def test_halves_meet_across_the_longer_side_and_make_up_the_box(box, low, high):
     assert (one.im_max, two.im_min) == ((box.im_max, box.im_min) if wide else (cut, cut))
 
 
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_all_zeros_of_a_box_are_found_in_any_unit_of_time(unit):
+    """Nearest to 0 one a millionth of the box away, and nothing of its size is taken for rounding."""
+    zeros, box = np.array([2.0 + 3.0j, 2.0 - 3.0j, -1.0, 1e-5]), np.array([-5.0, 5.0, -4.0, 4.0])
+
+    def function(s):
+        at = polynomial(*zeros)(s / unit)
+        return Analytic(at.value, at.slope / unit, at.scale)
+
+    found = zeros_in_box(function, Box(*(unit * box)), np.empty(0, complex))
+    assert np.sort_complex(found / unit) == pytest.approx(np.sort_complex(zeros), rel=1e-10)
+
+
 def test_a_zero_of_high_order_is_there_as_often():
     found = zeros_in_box(polynomial(1.3, 1.3, 1.3, -0.7), Box(-1.0, 2.0, -1.0, 1.0), np.empty(0, complex))
     assert np.sort(found.real) == pytest.approx([-0.7, 1.3, 1.3, 1.3], rel=1e-4)

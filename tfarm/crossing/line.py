@@ -107,11 +107,11 @@ def zeros_between(f: Callable[[Real], Real], low: Real, high: Real) -> Real:
         x1, f1 = x, y
         best = np.where(abs(f1) < abs(f2), x1, x2)
         width, wanted = abs(x2 - x1), narrow + LAST_BIT * abs(best)
-        least = np.where(width > 2 * wanted, wanted / np.where(width > 0, width, 1.0), 0.5)
+        with np.errstate(all="ignore"):  # of points that coincide, or have one value, nothing is used
+            least = np.where(width > 2 * wanted, wanted / width, 0.5)
+            share = np.clip(_parabolic((x1, x2, x3), (f1, f2, f3)), least, 1 - least)
         if ((least == 0.5) | (f1 == 0)).all():
             break
-        with np.errstate(all="ignore"):  # of points that coincide, or have one value, nothing is used
-            share = np.clip(_parabolic((x1, x2, x3), (f1, f2, f3)), least, 1 - least)
     return np.asarray(best)
 
 
@@ -141,16 +141,16 @@ def with_dips(places: Real, parts: Parts, known: tuple[Complex, Complex]) -> tup
     Each dip is searched by golden section, all at once.
     """
     h = _share(*known)
-    size, inner = abs(h), np.arange(1, h.size - 1)
-    is_dip = (size[inner] <= size[inner - 1]) & (size[inner] <= size[inner + 1]) & (size[inner] > ROUNDED)
-    at = inner[is_dip & (h[inner] * h[inner - 1] > 0) & (h[inner] * h[inner + 1] > 0)]
-    low, high, sign = places[at - 1], places[at + 1], np.sign(h[at])
+    inner, sign = h[1:-1], np.sign(h[1:-1])
+    lower = np.minimum(sign * h[:-2], sign * h[2:])  # of the neighbours: below 0 where one has the other sign
+    before = np.flatnonzero((abs(inner) <= lower) & (abs(inner) > ROUNDED))
+    low, high, sign = places[before], places[before + 2], sign[before]
     found: list[Real] = []
-    for _ in range(DIP_STEPS if at.size else 0):
+    for _ in range(DIP_STEPS if before.size else 0):
         left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-        ends = np.split(np.tile(sign, 2) * _share(*parts(np.r_[left, right])), 2)
-        found += [left[ends[0] < -ROUNDED], right[ends[1] < -ROUNDED]]
-        is_left = ends[0] < ends[1]
+        at_left, at_right = np.split(np.tile(sign, 2) * _share(*parts(np.r_[left, right])), 2)
+        is_left = at_left < at_right
+        found.append(np.where(is_left, left, right)[np.minimum(at_left, at_right) < -ROUNDED])
         low, high = np.where(is_left, low, left), np.where(is_left, right, high)
     more = np.concatenate([places[:0], *found])
     if not more.size:

@@ -40,8 +40,8 @@ def confirmed(found: Crossings, low: float, high: float, is_stable: Callable[[fl
     """
     gains = found.within(low, high).gain
     edges = np.r_[low, gains[np.r_[True, np.diff(gains) > SAME_EDGE * abs(gains[1:])][: gains.size]], high]
-    farthest = abs(edges[np.isfinite(edges)]).max(initial=0.0) or 1.0  # nothing crosses beyond: any distance would do
-    inner = np.clip(edges, -2 * farthest, 2 * farthest)
+    beyond = 2 * (abs(edges[np.isfinite(edges)]).max(initial=0.0) or 1.0)  # where nothing crosses: any would do
+    inner = np.clip(edges, -beyond, beyond)
     middles = (inner[1:] + inner[:-1]) / 2
     counts = found.passed(middles)  # the same up to a constant
     stable = [i for i in np.flatnonzero(counts == counts.min()) if is_stable(float(middles[i]))]

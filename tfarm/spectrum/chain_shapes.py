@@ -40,7 +40,7 @@ class ChainShapes:
         if not np.isfinite(self._factor).all():
             worst = float(omega[~np.isfinite(self._factor)][0])
             raise ConvergenceError(f"the mode at {worst:.10g} rad/s has no shape of its own: a double one", worst, 0.0)
-        tip, theta = self(np.ones(1))[..., 0], self.theta()
+        tip, theta = self.tip(), self.theta()
         motion = np.where(abs(tip[0]) > NO_MOTION * abs(tip[1]), tip[0], np.where(tip[1] != 0, tip[1], theta))
         self._factor = self._factor * np.where(motion < 0, -1.0, 1.0)
         self._forget()
@@ -59,6 +59,10 @@ class ChainShapes:
     def _forget(self) -> None:
         """Let go of motions that were found in another scale, or of other modes."""
         self.__dict__.pop("_moving", None)
+
+    def tip(self) -> Real:
+        """W, Psi, M, Q of each mode at the tip, (4, modes)."""
+        return self.states((Place(Fraction(1)),))[0][..., 0]
 
     def theta(self) -> Real:
         """Hub angle of each mode, 0 of a hub that is held."""
@@ -93,7 +97,7 @@ class ChainShapes:
         for share, body in bodies:
             W, Psi = self.states((Place(share, "inner"),))[0][:2, :, 0]
             parts += [(np.array([float(body.mass)]), W[None]), (np.array([float(body.inertia)]), Psi[None])]
-        W, Psi = self.states((Place(Fraction(1)),))[0][:2, :, 0]
+        W, Psi, *_ = self.tip()
         ends = (
             (chain.tip_mass, W + float(chain.offset) * Psi),
             (chain.tip_inertia, Psi),
@@ -106,7 +110,7 @@ class ChainShapes:
         nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
         position = Fraction(1)
         for each in self.chain.segments:
-            S = self.omega.max(initial=0.0) ** 2
+            S = self.omega.max() ** 2
             waves = (float(each.g) * S) ** 0.25 + math.sqrt(S * float(each.a + each.b))
             panels = 2 + math.ceil(waves / PANEL_WAVES)
             start = position - each.length

@@ -69,7 +69,7 @@ def neighbours_of(zeros: Complex) -> Neighbours:
     number, each = min(NEIGHBOURS, flat.size), np.arange(flat.size)[:, None]
     if flat.size <= FEW_ZEROS:
         away = abs(flat[:, None] - flat)
-        which = np.argpartition(away, number - 1, axis=1)[:, :number]
+        which = np.argsort(away, axis=1)[:, :number]
     else:
         from scipy.spatial import cKDTree  # takes a third of a second to load, and most tables are short
 

@@ -196,11 +196,10 @@ def all_damped_modes(undamped: Modes, companies: tuple[int, ...] = COMPANY) -> D
 
     Raises ConvergenceError if a branch is lost, or two arrive at one eigenvalue.
     """
-    count = int(undamped.index.max(initial=0))
-    found = _followed_once(undamped.arm, undamped.theory, count, companies) if count else None
+    found = _followed_once(undamped.arm, undamped.theory, int(undamped.index.max()), companies)
     if isinstance(found, ConvergenceError):
         raise found.with_traceback(None)  # else the frames of every search for it stay
-    return found if found is not None and found.undamped == undamped else Branches(companies)(undamped)
+    return found if found.undamped == undamped else Branches(companies)(undamped)
 
 
 @lru_cache(maxsize=LISTS_KEPT)  # loops, plants and simulations of one page ask for the same modes some ninety times

@@ -49,7 +49,7 @@ def arm_sensitivities(k: Coefficients, shapes: Shapes) -> dict[str, Real]:
         part = shapes.part(block.start, block.stop)
         x, weight = part.quadrature()
         W, Psi, M, Q = part(x)
-        tip, theta, square = part(np.ones(1))[..., 0], part.theta(), part.omega**2
+        tip, theta, square = part.tip(), part.theta(), part.omega**2
         potential = (M**2 @ weight, sigma * Q**2 @ weight, (Q * (Psi + sigma * Q)) @ weight)
         kinetic = [float(k.g) * W**2 @ weight, float(k.a) * Psi**2 @ weight]
         for held, motion in ((k.tip_mass, tip[0]), (k.tip_inertia, tip[1]), (k.hub_inertia, theta)):
@@ -140,7 +140,7 @@ def _hub(arm: Arm, shapes: ChainShapes) -> Doubled:
 def _payload(arm: Arm, shapes: ChainShapes) -> Doubled:
     """Of the payload: it moves by W + e Psi."""
     chain, square = shapes.chain, shapes.omega**2
-    W, Psi, _, Q = shapes.states((Place(Fraction(1)),))[0][..., 0]
+    W, Psi, _, Q = shapes.tip()
     motions = (("mass", chain.tip_mass, W + float(chain.offset) * Psi), ("inertia", chain.tip_inertia, Psi))
     found = {
         f"payload_{name}": -float(held) * motion**2 if math.isfinite(held) else np.zeros_like(motion)

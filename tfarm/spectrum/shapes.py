@@ -79,6 +79,10 @@ class Shapes:
             yield slice(first, last)
             first = last
 
+    def tip(self) -> Real:
+        """W, Psi, M, Q of each mode at the tip, (4, modes)."""
+        return self(np.array([1.0]))[..., 0]
+
     def theta(self) -> Real:
         """Hub angle of each mode; from the hub's own balance where its inertia leads, so that no digit is lost."""
         root = self(np.zeros(1))[..., 0]
@@ -92,7 +96,7 @@ class Shapes:
     @property
     def panels(self) -> int:
         """Panels of 0..1 that are short against every wave of these modes."""
-        fastest = max((abs(wave.t).max(initial=0.0) for wave in (self._one, self._two)), default=0.0)
+        fastest = max(abs(self._one.t).max(), abs(self._two.t).max())
         return LEAST_PANELS + math.ceil(fastest / PANEL_WAVES)
 
     def quadrature(self) -> tuple[Real, Real]:
@@ -118,7 +122,7 @@ class Shapes:
         """What moves: W and Psi at the points of `quadrature`, its weights; the ends' finite inertias and motions."""
         x, weight = self.quadrature()
         W, Psi, _, _ = self(x)
-        tip, k = self(np.ones(1))[..., 0], self.k
+        tip, k = self.tip(), self.k
         ends = ((k.tip_mass, tip[0]), (k.tip_inertia, tip[1]), (k.hub_inertia, self.theta()))
         return W, Psi, weight, [(float(inertia), motion) for inertia, motion in ends if math.isfinite(inertia)]
 
@@ -143,7 +147,7 @@ class Shapes:
         S = self._S[high]
         if not S.size:
             return np.empty((4, 0), complex)
-        root, tip = self._basis(np.zeros(1))[..., 0], self._basis(np.ones(1))[..., 0]
+        root, tip = self._basis(np.array([0.0, 1.0])).transpose(3, 0, 1, 2)
         hub = EndCondition.of(self.k.hub_inertia)
         tip_mass, shear, tip_inertia, moment = tip_condition(self.k, S)
         drive = float(hub.rest) + float(hub.inertia) * S
@@ -168,7 +172,7 @@ class Shapes:
         parts = [self.part(block.start, block.stop) for block in self.blocks()]
         self._scale(1.0 / np.sqrt(np.concatenate([part.masses() for part in parts])))
         self._orthogonalise()
-        tip, theta = self(np.ones(1))[..., 0], self.theta()
+        tip, theta = self.tip(), self.theta()
         motion = np.where(
             abs(tip[0]) > NO_MOTION * abs(tip[1]), tip[0], np.where(abs(tip[1]) > NO_MOTION * abs(theta), tip[1], theta)
         )

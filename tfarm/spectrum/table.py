@@ -177,7 +177,7 @@ class Modes:
     def orthogonality(self) -> float:
         """The largest entry of (modal mass matrix - identity), over the flexible modes: rounding, if all is well."""
         mass = self._shapes.mass_matrix()
-        return float(abs(mass - np.eye(len(mass))).max(initial=0.0))
+        return float(abs(mass - np.eye(len(mass))).max())
 
     # ------------------------------------------------------------ sensitivities
 
