@@ -23,7 +23,7 @@ from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.exact.system import System
 from tfarm.response import Wanted, transfer
 from tfarm.spectrum import Modes, modes
-from tfarm.spectrum.damped import DampedModes, all_damped_modes, single_zeros
+from tfarm.spectrum.damped import DampedModes, all_damped_modes, entered, single_zeros
 
 from .partial_fractions import PartialFractions
 from .remainder import slow_remainder
@@ -200,7 +200,7 @@ def _poles_and_residues(
         single = np.array(single_zeros(table))  # of the motor's circuit
     else:
         damped = branches(table)
-        p, single = damped.eigenvalues[table.index > 0], damped.single
+        p, single = damped.eigenvalues[table.index > 0], np.r_[damped.single, entered(damped)]
     residues, doubtful = end_residues(k, wanted, p.ravel(), share)
     doubtful = doubtful | (isinstance(k, Coefficients) and any(not each.is_at_end for each in wanted))
     if doubtful.any():

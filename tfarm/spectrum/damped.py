@@ -13,6 +13,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from tfarm.arm import Arm, Theory
 from tfarm.arrays import LEAST_SIZE, Complex, Real
@@ -24,11 +25,12 @@ from tfarm.exact.system import System
 from tfarm.records import record
 
 from .box import Box
-from .complete_box import complete_box
+from .complete_box import TOWARD_SINGULAR, complete_box
 from .complex_shapes import mode_field
 from .continuation import Node, follow
 from .correction import Member, improved
 from .enclose import Disc, disjoint, enclosed, proven_count
+from .scales import first_frequency
 from .search import LISTS_KEPT
 from .table import Modes, modes
 
@@ -39,6 +41,7 @@ MANY_MODES = 30  # of more one number in company is tried, as each step takes lo
 BESIDE_DISC = 1e-12  # how far a listed eigenvalue may be from its disc, of its size (more beside its own partner)
 FIRST_STEP_IN_C = 0.01  # the first step in C, over 1/w of the highest mode
 FIRST_SHARE = 1e-3  # of all damping; of the lowest frequency, what a zero that friction makes may be: it is known there
+SLOWEST, REAL_POINTS = 1e-6, 300  # of the lowest frequency, and how many: signs read on the negative real axis
 LAST_STEPS = 3  # of Newton's method from zeros right to SETTLED_CORRECTION: all digits, and once more
 
 
@@ -263,6 +266,30 @@ class Branches:
             return nodes[-1].zeros if C == 0 else polished(member(k), nodes[-1].zeros)
         assert lost is not None
         raise lost
+
+
+def entered(damped: DampedModes) -> Real:
+    """Real eigenvalues (n,) [1/s] right of -1/C, or nearer than the last mode, that the record has not.
+
+    Where nothing weighs at the hub its friction brings one in from -inf, and a dashpot at clamp or joint does: it
+    continues from no mode.  Others may be of modes beyond the record.
+    """
+    k = damped.undamped.system
+    if isinstance(k, Coefficients):
+        return np.empty(0)
+    lowest, last = first_frequency(damped.undamped.arm), float(damped.natural_frequency.max())
+    reach = TOWARD_SINGULAR / k.damping if k.damping else last
+    at = -np.geomspace(min(SLOWEST * lowest, reach / 2), reach, REAL_POINTS)
+    function = member(k).function
+
+    def signed(s: Real) -> Real:
+        value, _, scale = function(s + 0j)
+        return np.asarray((value * np.exp(1j * scale.imag)).real)
+
+    known = np.sort(-np.r_[damped.eigenvalues[damped.is_overdamped].real.ravel(), damped.single])
+    sides, passed = np.sign(signed(at)), np.searchsorted(known, -at)
+    new = np.flatnonzero((sides[1:] * sides[:-1] < 0) & (np.diff(passed) == 0))
+    return np.array([brentq(lambda s: float(signed(np.array([s]))[0]), at[n + 1], at[n], xtol=1e-300) for n in new])
 
 
 def level_of(k: System) -> float:
