@@ -293,3 +293,11 @@ def test_a_frozen_guard_leaves_a_hundredth_off_each_end_but_0(lab, monkeypatch):
     share = 1 - RADIUS_SHARE
     assert (from_zero.lo, from_zero.hi) == (0.0, pytest.approx(0.6 * (1 - share)))
     assert (between.lo, between.hi) == (pytest.approx(0.2 + 0.4 * share), pytest.approx(0.6 - 0.4 * share))
+
+
+def test_a_frozen_guard_is_the_window_nearest_to_a_best_gain_that_lies_in_none(lab, monkeypatch):
+    """By their middles: 0.5 is nearer to 2 than 5 is, and farther from 3.5."""
+    monkeypatch.setattr(guard, "constant_windows", lambda loop: [(0.0, 1.0), (4.0, 6.0)])
+    loops = [sampled_loop(lab, HubFeedback(K1=0.3, K2=1.0), count=2)]
+    assert guard._frozen(loops, 2.0).hi == pytest.approx(RADIUS_SHARE)
+    assert guard._frozen(loops, 3.5).lo == pytest.approx(4.0 + 2 * (1 - RADIUS_SHARE))

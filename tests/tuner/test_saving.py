@@ -1,7 +1,9 @@
 """A tuner's file: there and back to the last bit, and everything else refused in one line."""
 
 import json
+import math
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -28,6 +30,14 @@ def test_there_and_back(tuning, tmp_path):
     assert to_text(again) == to_text(saved)
     result = tuning.trial.with_network(again.network, again.gain().guard)
     np.testing.assert_array_equal(result.K, tuning.training.result.K)
+
+
+def test_without_a_guard_any_gain_from_0_on_comes_back(tuning, tmp_path):
+    saved = replace(tuning.saved(), guard_kind="none", lo=0.0, hi=math.inf)
+    save_tuner(saved, tmp_path / "free.json")
+    again = load_tuner(tmp_path / "free.json")
+    assert (again.guard_kind, again.lo, again.hi) == ("none", 0.0, math.inf)
+    assert again.gain().guard == (0.0, math.inf)
 
 
 def change(name, value):

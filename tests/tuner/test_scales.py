@@ -1,6 +1,7 @@
 """What the tuner takes from the arm: ranges of converters, units of its cost, the arms it is tried on, its shapers."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -51,3 +52,9 @@ def test_the_papers_arm_keeps_the_papers():
     ]  # fmt: skip
     converters = quantised_chain(lab, Chain()).converters
     assert (converters.moment_range, converters.torque_range, plan_of(lab, Chain()).scale) == (20.0, 10.0, 1.0)
+
+
+@pytest.mark.parametrize("rise", [0.5, 2.0])
+def test_a_trial_lasts_three_slews(rise):
+    chain = Chain(slew=replace(Chain().slew, rise_time=rise))
+    assert plan_of(tfarm.load("sasaki2012-lab"), chain).duration == 3 * rise

@@ -104,6 +104,21 @@ def test_the_verdict_on_the_best_momentum_and_rate(lab):
     assert "beyond the paper's quartiles" in map_verdict([results, moved(-0.5)])
 
 
+def test_the_verdict_is_by_medians_and_quartiles_of_the_seeds(lab):
+    """Of five seeds the third, and the second and fourth, whatever the highest cost is."""
+    (one,) = run_study(lab, plans_of("curves", replace(BASE, trials=1, guard="none"), 1))
+
+    def group(alpha, *costs):
+        plan = replace(BASE, learning=replace(BASE.learning, alpha=alpha))
+        return [replace(one, plan=plan, cost=float(cost)) for cost in costs]
+
+    paper, low, high = group(0.6, 5, 1, 3, 4, 90), group(0.1, 2, 2, 2.5, 80, 80), group(0.2, 0, 0, 9, 9, 9)
+    start = f"(alpha_c, eta_c) = {PAPER_PAIR}: median cost 4 (quartiles 3, 5), rank 2 of 3; best (0.1, 0.8) with"
+    assert map_verdict([high, paper, low]) == f"{start} 2.5, beyond the paper's quartiles"
+    low = group(0.1, 3, 3, 3, 80, 80)
+    assert map_verdict([high, paper, low]) == f"{start} 3, within the paper's quartiles"
+
+
 def test_one_seed_is_a_study_too(lab):
     """Each point has then one cost, and its quartiles are that."""
     (one,) = run_study(lab, plans_of("curves", BASE, 1))
