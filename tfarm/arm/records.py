@@ -8,19 +8,16 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
-from typing import Literal, TypeVar, get_args
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 from tfarm.arm.link import Link
-from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring, brief_repr
+from tfarm.arm.rig import Attachment, brief_repr
 from tfarm.arm.texts import plain_name, plain_texts
 from tfarm.arm.theories import THEORIES, Theory
-from tfarm.arm.turning import Turning
+from tfarm.arm.turning import INPUT_UNITS, INPUTS, Input, Turning
 from tfarm.errors import ParameterError, did_you_mean, shown
 
-Input = Literal["hub_torque", "motor_voltage", "motor_current", "hub_angle"]
-INPUTS: tuple[Input, ...] = get_args(Input)
-INPUT_UNITS = {"hub_torque": "N m", "motor_voltage": "V", "motor_current": "A", "hub_angle": "rad"}
 MOST_PARTS = 64  # segments, and attachments: more than any rig has, and 64 equal pieces are a check of the chain
 FLATTEST = 1e-3  # arm's length over a segment's radius of gyration: below it the units are mixed up
 LENGTH_ROUNDING = 1e-12  # of the length: what a person's sum of up to 64 decimal lengths may differ from ours
@@ -37,20 +34,6 @@ class Arm(Turning):
     The `gauge` reads what the law feeds back as the root moment.  `theory` is one of `THEORIES`; `input` one of
     `INPUTS`, what drives the hub.
     """
-
-    link: Link
-    hub: Hub
-    payload: Payload = field(default_factory=Payload)
-    name: str = "arm"
-    assumptions: tuple[str, ...] = field(default=(), repr=False)
-    outer: tuple[Link, ...] = ()
-    clamp: RotarySpring = field(default_factory=RotarySpring)
-    joint: RotarySpring = field(default_factory=RotarySpring)
-    motor: Motor | None = None
-    attachments: tuple[Attachment, ...] = ()
-    gauge: Gauge = field(default_factory=Gauge)
-    theory: Theory = "timoshenko"
-    input: Input = "hub_torque"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", plain_name(self.name))
@@ -96,26 +79,6 @@ class Arm(Turning):
             raise ParameterError(key="hub.inertia", value=self.hub.inertia, remedy=remedy)
 
     @property
-    def links(self) -> tuple[Link, ...]:
-        """The segments, from the hub outwards."""
-        return (self.link, *self.outer)
-
-    @property
-    def length(self) -> float:
-        """L [m], from the clamp to the tip."""
-        return math.fsum(link.length for link in self.links)
-
-    @property
-    def reach(self) -> float:
-        """r + L [m], from the axis to the tip: a rigid arm turned by theta has moved its tip by (r + L) theta."""
-        return self.hub.radius + self.length
-
-    @property
-    def centre_distance(self) -> float:
-        """r + L + e [m], from the axis to the payload's centre of mass."""
-        return self.reach + self.payload.offset
-
-    @property
     def own_mass(self) -> float:
         """rho A L [kg], of the link itself, all segments."""
         return math.fsum(link.rhoA * link.length for link in self.links)
@@ -143,6 +106,16 @@ class Arm(Turning):
         if motor is not None:
             losses += [motor.rotor_friction, motor.back_emf_constant * (self.input == "motor_voltage")]
         return not any(losses)
+
+    @property
+    def is_reactive(self) -> bool:
+        """Whether nothing dissipates and the input acts at once: at s = i w all but odd powers of s is real."""
+        return self.is_undamped and not self.input_lags
+
+    @property
+    def is_told_by_lyapunov(self) -> bool:
+        """Whether, besides, the gauge reads the hub's moment: then a theorem tells every mode under any law."""
+        return self.is_reactive and self.reads_hub_moment
 
     @property
     def is_uniform(self) -> bool:
@@ -236,13 +209,7 @@ class Arm(Turning):
     @property
     def elastic(self) -> Arm:
         """The same with C = 0 in every segment."""
-        if self.has_elastic_link:
-            return self
-        return replace(
-            self,
-            link=replace(self.link, damping=0.0),
-            outer=tuple(replace(link, damping=0.0) for link in self.outer),
-        )
+        return self if self.has_elastic_link else self.having(damping=0.0)
 
     @property
     def lossless_hub(self) -> Arm:

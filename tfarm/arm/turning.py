@@ -1,41 +1,58 @@
-"""A rig that turns as a rigid body, seen from its hub: inertias, what the input gives, what friction takes."""
+"""The parts of a rig, and what they are that turn as a rigid body, seen from the hub: inertias, input, friction."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import Literal, get_args
 
-from tfarm.arm.theories import WITH_ROTARY_INERTIA
+from tfarm.arm.link import Link
+from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring
+from tfarm.arm.theories import WITH_ROTARY_INERTIA, Theory
 
-if TYPE_CHECKING:
-    from tfarm.arm.link import Link
-    from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring
-    from tfarm.arm.theories import Theory
+Input = Literal["hub_torque", "motor_voltage", "motor_current", "hub_angle"]
+INPUTS: tuple[Input, ...] = get_args(Input)
+INPUT_UNITS = {"hub_torque": "N m", "motor_voltage": "V", "motor_current": "A", "hub_angle": "rad"}
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Turning:
-    """The properties of `Arm` that are those of a rigid body on a motor."""
+    """The parts of an `Arm`, and its properties that are those of a rigid body on a motor."""
 
-    __slots__ = ()
+    link: Link
+    hub: Hub
+    payload: Payload = field(default_factory=Payload)
+    name: str = "arm"
+    assumptions: tuple[str, ...] = field(default=(), repr=False)
+    outer: tuple[Link, ...] = ()
+    clamp: RotarySpring = field(default_factory=RotarySpring)
+    joint: RotarySpring = field(default_factory=RotarySpring)
+    motor: Motor | None = None
+    attachments: tuple[Attachment, ...] = ()
+    gauge: Gauge = field(default_factory=Gauge)
+    theory: Theory = "timoshenko"
+    input: Input = "hub_torque"
 
-    if TYPE_CHECKING:
-        hub: Hub
-        motor: Motor | None
-        payload: Payload
-        gauge: Gauge
-        attachments: tuple[Attachment, ...]
-        clamp: RotarySpring
-        joint: RotarySpring
-        theory: Theory
-        input: str
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """The segments, from the hub outwards."""
+        return (self.link, *self.outer)
 
-        @property
-        def links(self) -> tuple[Link, ...]: ...
-        @property
-        def centre_distance(self) -> float: ...
-        @property
-        def is_undamped(self) -> bool: ...
+    @property
+    def length(self) -> float:
+        """L [m], from the clamp to the tip."""
+        return math.fsum(link.length for link in self.links)
+
+    @property
+    def reach(self) -> float:
+        """r + L [m], from the axis to the tip: a rigid arm turned by theta has moved its tip by (r + L) theta."""
+        return self.hub.radius + self.length
+
+    @property
+    def centre_distance(self) -> float:
+        """r + L + e [m], from the axis to the payload's centre of mass."""
+        return self.reach + self.payload.offset
 
     @property
     def total_inertia(self) -> float:
@@ -90,16 +107,6 @@ class Turning:
     def input_lags(self) -> bool:
         """Whether the input is a voltage behind an inductance, whose torque comes late."""
         return self.input == "motor_voltage" and self.motor is not None and self.motor.inductance > 0
-
-    @property
-    def is_reactive(self) -> bool:
-        """Whether nothing dissipates and the input acts at once: at s = i w all but odd powers of s is real."""
-        return self.is_undamped and not self.input_lags
-
-    @property
-    def is_told_by_lyapunov(self) -> bool:
-        """Whether, besides, the gauge reads the hub's moment: then a theorem tells every mode under any law."""
-        return self.is_reactive and self.reads_hub_moment
 
     @property
     def loses_at_hub_alone(self) -> bool:
