@@ -19,7 +19,7 @@ import numpy as np
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace, block_of
 from tfarm.arm.checks import check_fields, not_negative, number, positive
 from tfarm.arm.feedback import AT_HUB, GAINS, ON, HubFeedback
-from tfarm.arm.records import INPUTS
+from tfarm.arm.turning import INPUTS
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError, did_you_mean, must_be_known
 from tfarm.records import record
@@ -79,9 +79,6 @@ class Law:
             raise ParameterError(key="period", value=sorted(known), remedy=remedy)
         object.__setattr__(self, "period", known.pop() if known else None)
         object.__setattr__(self, "references", tuple(self.references))
-        self._check()
-
-    def _check(self) -> None:
         if isinstance(self.sign, bool) or self.sign not in (-1, 1):
             raise ParameterError(key="sign", value=self.sign, remedy="-1 (v = -C y, the default) or 1 (v = C y)")
         if self.input is not None:

@@ -41,7 +41,13 @@ class Link:
         if self.slenderness > SLENDEREST:
             remedy = f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units"
             raise ParameterError(key="link.length", value=self.length, remedy=remedy)
-        self._check_cowper()
+        nu = self.poissons_ratio  # which Cowper's factor is a function of; the margins allow for a rounded G
+        if self.section.shear_factor is None and not -1 + 1e-9 <= nu <= 0.5 + 1e-12:
+            remedy = (
+                f"with this Young's modulus it means a Poisson's ratio of {nu:.4g}, outside (-1, 0.5]; "
+                "mend it, or give link.section.shear_factor for a material that is not isotropic"
+            )
+            raise ParameterError(key="link.shear_modulus", value=self.shear_modulus, remedy=remedy)
 
     @classmethod
     def isotropic(
@@ -68,16 +74,6 @@ class Link:
             section=section,
             damping=damping,
         )
-
-    def _check_cowper(self) -> None:
-        """Cowper's factor holds for isotropic materials; the margins allow for a rounded G."""
-        nu = self.poissons_ratio
-        if self.section.shear_factor is None and not -1 + 1e-9 <= nu <= 0.5 + 1e-12:
-            remedy = (
-                f"with this Young's modulus it means a Poisson's ratio of {nu:.4g}, outside (-1, 0.5]; "
-                "mend it, or give link.section.shear_factor for a material that is not isotropic"
-            )
-            raise ParameterError(key="link.shear_modulus", value=self.shear_modulus, remedy=remedy)
 
     @property
     def poissons_ratio(self) -> float:

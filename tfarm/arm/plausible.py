@@ -19,6 +19,15 @@ LIGHTEST = 25.0  # kg/m^3; light foam has 30, and in g/cm^3 everything is below 
 DENSEST = 25_000.0  # kg/m^3; osmium has 22,600
 LONGEST_ARM = 100.0  # m; the arm of the space station has 17
 MOST_DAMPED = 0.1  # damping ratio of the clamped link; rubber has about 0.05
+MODULUS = (SOFTEST, "softer than any rubber; it is taken in Pa, not in GPa",
+           STIFFEST, "stiffer than diamond; it is taken in Pa")  # fmt: skip
+USUAL = {  # of a segment: between what, and what is said below and above that
+    "youngs_modulus": MODULUS,
+    "shear_modulus": MODULUS,
+    "density": (LIGHTEST, "lighter than foam; it is taken in kg/m^3, not in g/cm^3",
+                DENSEST, "denser than osmium; it is taken in kg/m^3"),
+    "length": (0.0, "", LONGEST_ARM, "longer than any arm; it is taken in m, not in mm"),
+}  # fmt: skip
 HEAVIEST = 1e5  # times the link's own mass or inertia
 FARTHEST_OFFSET = 10.0  # times the link's length; a hub's radius and a payload's offset are a fraction of it
 YIELDING = 10.0  # times the link's own flexibility L/(3 EI); a clamp that is meant to hold has a tenth of it
@@ -41,18 +50,10 @@ def _segment(key: str, link: Link, length: float) -> Iterator[str]:
 
     Material, size, and the damping ratio C w/2 of the clamped arm in its first mode, w = (b/L)^2 sqrt(EI / rhoA).
     """
-    for name in ("youngs_modulus", "shear_modulus"):
+    for name, (least, below, most, above) in USUAL.items():
         value = getattr(link, name)
-        if value < SOFTEST:
-            yield f"{key}.{name} = {shown(value)}: softer than any rubber; it is taken in Pa, not in GPa"
-        elif value > STIFFEST:
-            yield f"{key}.{name} = {shown(value)}: stiffer than diamond; it is taken in Pa"
-    if link.density < LIGHTEST:
-        yield f"{key}.density = {shown(link.density)}: lighter than foam; it is taken in kg/m^3, not in g/cm^3"
-    elif link.density > DENSEST:
-        yield f"{key}.density = {shown(link.density)}: denser than osmium; it is taken in kg/m^3"
-    if link.length > LONGEST_ARM:
-        yield f"{key}.length = {shown(link.length)}: longer than any arm; it is taken in m, not in mm"
+        if not least <= value <= most:
+            yield f"{key}.{name} = {shown(value)}: {below if value < least else above}"
     sides = link.section.dimensions or (("second_moment", math.sqrt(12) * link.section.radius_of_gyration),)
     for name, side in sides:
         if name != "inner_diameter" and side > length:

@@ -41,14 +41,6 @@ class Measured:
             given = getattr(self, name)
             if given is not None:
                 object.__setattr__(self, name, np.atleast_1d(np.asarray(given, dtype=kind)))
-        self._check()
-
-    @property
-    def name(self) -> str:
-        """What is measured, as the command line has it: tip_acceleration/hub_angle."""
-        return f"{self.output}/{self.input}"
-
-    def _check(self) -> None:
         for name in ("values", "sigma", "coherence"):
             held = getattr(self, name)
             if held is not None and held.shape != self.omega.shape:
@@ -75,6 +67,11 @@ class Measured:
             if not self.coherence.any():
                 remedy = "0 everywhere: nothing was measured; leave it out"
                 raise ParameterError(key="coherence", value=0.0, remedy=remedy)
+
+    @property
+    def name(self) -> str:
+        """What is measured, as the command line has it: tip_acceleration/hub_angle."""
+        return f"{self.output}/{self.input}"
 
 
 def must_be_measured(measured: object) -> None:

@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -37,7 +37,7 @@ from tfarm.tuner.lyapunov import CommonLyapunov
 from tfarm.tuner.sector import RADIUS_SHARE, MovingGain
 
 GuardKind = Literal["time-varying", "frozen", "none"]
-GUARD_KINDS = ("time-varying", "frozen", "none")
+GUARD_KINDS: tuple[GuardKind, ...] = get_args(GuardKind)
 
 INSIDE = 0.8  # of half the width: how far the best constant gain may be from the middle
 MOST_GAIN = 10.0  # where the frozen interval has no upper end

@@ -43,9 +43,6 @@ class Network:
                 raise ParameterError(key=name, value=odd, remedy="every weight and scale is a finite number")
             value.setflags(write=False)
             object.__setattr__(self, name, value)
-        self._check_shapes()
-
-    def _check_shapes(self) -> None:
         remedy = f"W1 is (hidden, 6 or 7), hidden from 1 to {MOST_HIDDEN}, with as many columns as scales"
         inputs = (PAPER_INPUTS, PAPER_INPUTS + 1)
         if self.W1.ndim != 2 or self.W1.shape[1] not in inputs or not 1 <= self.W1.shape[0] <= MOST_HIDDEN:

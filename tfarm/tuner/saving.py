@@ -57,10 +57,10 @@ class TunerFile(StrictTable):
     period: Annotated[Finite, Field(gt=0)]
     K1: Finite
     Kp: Annotated[Finite, Field(ge=0)] = 0.0  # absent in files of tuners without a servo
-    signals: Literal["vibration", "total"]
+    signals: Reading
     a: Annotated[Finite, Field(ge=0)]
     b: Annotated[Finite, Field(ge=0)]
-    guard_kind: Literal["time-varying", "frozen", "none"]
+    guard_kind: GuardKind
     guard: Annotated[list[Annotated[Finite, Field(ge=0)]], Field(min_length=2, max_length=2)] | None
     scales: Annotated[list[Finite], Field(min_length=6, max_length=7)]
     W1: Annotated[

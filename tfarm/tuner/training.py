@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -55,10 +55,12 @@ class Learning:
     enough: float = 0.0
 
     def __post_init__(self) -> None:
-        wanted = {"mode": ("trial", "online"), "rule": tuple(RULE_NUMBERS), "sensitivity": ("one-step", "whole")}
-        for key, choices in wanted.items():
-            must_be_known(key, getattr(self, key), choices)
-        self._check_rates()
+        for key, kind in {"mode": Mode, "rule": Rule, "sensitivity": Sensitivity}.items():
+            must_be_known(key, getattr(self, key), get_args(kind))
+        for rate in np.atleast_1d(np.asarray(self.eta, dtype=float)).ravel():
+            if not 0.0 < rate < math.inf:
+                remedy = "a learning rate is positive and finite, 0.8 in the paper"
+                raise ParameterError(key="eta", value=float(rate), remedy=remedy)
         momentum = not_negative("alpha", self.alpha, "the momentum factor lies in [0, 1)")
         if not momentum < 1.0:
             raise ParameterError(
@@ -66,12 +68,6 @@ class Learning:
             )
         positive("clip", self.clip, "the norm that a gradient is cut to is positive and finite")
         not_negative("enough", self.enough, "the error to stop at is zero or positive, in N m")
-
-    def _check_rates(self) -> None:
-        remedy = "a learning rate is positive and finite, 0.8 in the paper"
-        for rate in np.atleast_1d(np.asarray(self.eta, dtype=float)).ravel():
-            if not 0.0 < rate < math.inf:
-                raise ParameterError(key="eta", value=float(rate), remedy=remedy)
 
     def rates(self, size: int) -> Real:
         """The learning rate of each of `size` weights."""

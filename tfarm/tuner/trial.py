@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import get_args
 
 import numpy as np
 
@@ -205,7 +206,7 @@ def slew_trial(
 
     Raises ParameterError for an arm that cannot turn, a hub without inertia, and numbers out of range.
     """
-    must_be_known("signals", signals, ("vibration", "total"))
+    must_be_known("signals", signals, get_args(Reading))
     Kp = not_negative("Kp", Kp, ANGLE_REMEDY)
     K1 = usual_rate_gain(known or arm, Kp) if K1 is None else K1
     rate_gain = number("K1", K1, "the hub rate gain is a finite number of N m s/rad")
