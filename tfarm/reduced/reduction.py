@@ -158,6 +158,7 @@ class _Bench:
         self.arm, self.rows, self.band, self.x = arm, rows, band, x
         self.fixed = modal_model(arm, rows, 0, x).order
         self.inside = modes_in(arm, band[1])
+        self.most = (MOST_STATES - self.fixed) // 2  # pairs of poles
         self.by_modes = method != "aaa"
         self.by_aaa = method != "modal" and arm.is_undamped and not arm.input_lags
         self.ruler = Ruler(arm, rows, band, x)
@@ -182,7 +183,7 @@ class _Bench:
 
     def within(self, error: float) -> ReducedModel:
         """The smallest model whose measured error is within that one."""
-        tried, most = [self._few_poles(error)], self._most()
+        tried, most = [self._few_poles(error)], self.most
         if self.arm.damping:
             tried.append(self._few_modes(error, relaxed_model, most))
             most = most if tried[-1] is None else tried[-1].model.index.size
@@ -190,9 +191,9 @@ class _Bench:
             tried.append(self._few_modes(error, modal_model, most))
         found = [each for each in tried if each is not None]
         if not found and self.arm.damping:
-            found = [each for each in [self._few_modes(error, slow_model, self._most() - SLOW_PAIRS)] if each]
+            found = [each for each in [self._few_modes(error, slow_model, self.most - SLOW_PAIRS)] if each]
         if not found:
-            best = self.of_order(2 * min(self.inside + MOST_TAILS, self._most()) + self.fixed)
+            best = self.of_order(2 * min(self.inside + MOST_TAILS, self.most) + self.fixed)
             message = (
                 f"found no model of up to {MOST_STATES} states within {error:g} from {self.band[0]:g} to "
                 f"{self.band[1]:g} rad/s; order {best.order} has {best.worst_error:.2g}: allow more, or narrow the band"
@@ -204,7 +205,7 @@ class _Bench:
         """The smallest model by AAA, if one will do."""
         if not self.by_aaa:
             return None
-        for pairs in range(self.inside + 1, min(self.inside + MOST_TAILS, self._most()) + 1):
+        for pairs in range(self.inside + 1, min(self.inside + MOST_TAILS, self.most) + 1):
             model = rational_model(self.arm, self.rows, pairs, self.band[1], self.x)
             if self.ruler.rough(model) <= error:
                 measured = self._measured(model, "aaa", "")
@@ -241,9 +242,6 @@ class _Bench:
         accuracy = self.ruler.measure(model)
         number, frequency = first_mode_lacking(model)
         return ReducedModel(model, method, self.band, accuracy.worst, accuracy.at, number, frequency, note)
-
-    def _most(self) -> int:
-        return (MOST_STATES - self.fixed) // 2
 
     def _pairs(self, order: object) -> int:
         """Flexible pairs of poles in a model of so many states."""

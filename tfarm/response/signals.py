@@ -25,8 +25,9 @@ from tfarm.exact.outputs import output as known_output
 from tfarm.exact.system import System
 from tfarm.exact.values import expansions_at_zero
 from tfarm.records import record
-from tfarm.spectrum import modes
+from tfarm.spectrum.scales import first_frequency
 
+RELATIVE = ("Y", "Phi")  # quantities relative to the hub: differences
 SERIES_BELOW = 3e-3  # of the slowest frequency: there as many digits are left as a series of REST_TERMS terms has
 REST_TERMS = 8  # of that series: the next is below 1e-20 of the first
 
@@ -97,7 +98,7 @@ class Signals:
 
         There W and x theta are nearly one, and the direct difference has lost (s/w1)^2 of its digits.
         """
-        relative = [n for n, each in enumerate(self.outputs) if each.quantity in ("Y", "Phi")]
+        relative = [n for n, each in enumerate(self.outputs) if each.quantity in RELATIVE]
         slow = np.flatnonzero(abs(s) < SERIES_BELOW * self._slowest) if relative else np.empty(0, np.int64)
         if not slow.size:
             return
@@ -108,20 +109,16 @@ class Signals:
     @cached_property
     def _slowest(self) -> float:
         """A frequency [rad/s] within which the power series at rest converge."""
-        damping = [1.0 / each for each in (self.arm.damping,) if each]
-        singles = [1.0 / self.arm.rate_loss * self.arm.turned_inertia] if self.arm.rate_loss else []
-        first = float(modes(self.arm.elastic.lossless_hub, 1).natural_frequency[-1])
-        return min([first, *damping, *(1.0 / each for each in singles)])
+        times = (self.arm.damping, self.arm.rate_loss and self.arm.turned_inertia / self.arm.rate_loss)
+        return min([first_frequency(self.arm.lossless_hub), *(1.0 / each for each in times if each)])
 
     @cached_property
     def _series(self) -> dict[int, Real]:
         """Power series at rest, coefficients from s^-2 on, of outputs relative to the hub."""
         assert isinstance(self.system, ElementChain)
-        found = {}
-        for n, (wanted, share) in enumerate(zip(self.outputs, self.places, strict=True)):
-            if wanted.quantity in ("Y", "Phi"):
-                found[n] = np.array(series_at_zero(self.system, [wanted], share, REST_TERMS)[0])
-        return found
+        relative = [n for n, each in enumerate(self.outputs) if each.quantity in RELATIVE]
+        series = {n: series_at_zero(self.system, [self.outputs[n]], self.places[n], REST_TERMS) for n in relative}
+        return {n: np.array(found[0]) for n, found in series.items()}
 
     def values(self, s: NDArray[Any]) -> Complex:
         """The transfer functions (signals, ...) at s; infinite at their poles."""

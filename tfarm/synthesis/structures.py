@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -131,10 +132,8 @@ def _servo_entries(Kp: float, c: Numbers) -> tuple[Entry, Entry]:
 
 
 def _pd(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
-    def entries(c: Numbers) -> tuple[Entry, ...]:
-        return _servo_entries(Kp, c)
-
-    return Structure("PD", ("K1",), np.array([_rate_gain(arm, Kp)]), (True,), np.array([np.inf]), entries)
+    start = np.array([_rate_gain(arm, Kp)])
+    return Structure("PD", ("K1",), start, (True,), np.array([np.inf]), partial(_servo_entries, Kp))
 
 
 def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
