@@ -1,7 +1,7 @@
-"""What a locus whose branches end may not hide: unstable poles that are on none of them.
+"""What the branches of a locus may hide: a crossing there and back between two values, unstable poles on none of them.
 
 Along a gain the crossing engine knows every crossing of the imaginary axis, whoever crosses it (`lines`).  Along a
-parameter of the arm the poles of a few loops are counted in a box.
+parameter of the arm, where branches end, the poles of a few loops are counted in a box.
 """
 
 from __future__ import annotations

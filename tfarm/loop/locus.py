@@ -55,7 +55,7 @@ class Locus:
     motor's circuit).  The mirror image of a branch is left out, unless the two meet on the real axis and part there:
     then it is a branch of its own, with Im s < 0 where they are a pair.  A branch that comes to -1/C, or meets a zero
     that nobody follows, ends there (`ends`), and is NaN beyond.  `crossings` are those of the imaginary axis, ascending
-    along the way; where a branch has ended, those of poles on no branch too.
+    along the way: along a gain of a damped arm all there are below the highest branch, else those of the branches.
     """
 
     arm: Arm
@@ -142,7 +142,8 @@ def _traced(wanted: Variation, gain: Real, branches: int, rounds: int) -> Locus:
         gain, every = np.r_[gain, more][order], np.concatenate([every, added], axis=1)[:, order]
     rows = _rows(every, kept)
     found = branch_crossings(variation, gain, rows, lowest)
-    if np.isnan(every[: 2 * branches]).any():
+    is_solved = variation.is_of_gains and not variation.arm.is_reactive  # there and back between two values is seen too
+    if is_solved or np.isnan(every[: 2 * branches]).any():
         found = with_others(variation, gain, rows, found)
     return Locus(wanted.arm, wanted.law, wanted.vary, gain, rows, mode, found)
 
