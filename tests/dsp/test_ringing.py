@@ -52,3 +52,17 @@ def test_the_slew_of_a_stiff_arm_gets_twenty_points_a_period():
     fine = simulator.finer(records).linear(HubFeedback(K1=1.0, K2=0.0))
     np.testing.assert_allclose(fine.at_samples.root_moment, run.at_samples.root_moment, rtol=0, atol=1e-9)
     assert fine.between.t.size == records * run.t.size
+
+
+def test_a_mode_takes_twenty_points_a_period_the_samples_among_them():
+    """Of the lab arm 2.5 Hz in 100 samples a second, and none where nothing is seen."""
+    lab, chain = tfarm.load("sasaki2012-lab"), Chain()
+    simulator = Simulator(lab, chain, scenario("slew", lab, chain, 1.2), count=3)
+    run = simulator.linear(HubFeedback(K1=0.3, K2=0.3))
+    frequency = tfarm.modes(lab, 3).natural_frequency[1:] / (2 * np.pi)
+    points = np.ceil(POINTS_A_PERIOD * frequency / 100)  # a sample's, itself among them
+    height = float(np.ptp(run.at_samples.root_moment))
+    needed = [records_between(simulator, run, {"root_moment": each}) for each in (1e9, height, 0.0)]
+    assert needed[0] == 0
+    assert needed[1] + 1 in points
+    assert needed[2] + 1 == points[-1]
