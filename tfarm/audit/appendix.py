@@ -6,10 +6,9 @@ from functools import cache
 
 import sympy as sp
 
-from .dimensions import mismatch
+from .dimensions import PAPER_UNITS, mismatch
 from .formulas import Expression, clauses, difference, jet_parts, parsed, remainder, sides, symbol, symbols
 from .motion import LAPLACE
-from .units import PAPER_UNITS
 
 Y_TERMS = (
     "Delta_k1/Delta*exp(lambda_1*x) + Delta_k2/Delta*exp(lambda_2*x)"
@@ -121,11 +120,6 @@ def solves(text: str, stiffness: str = STIFFNESS) -> str:
             rest = sp.rem(sp.numer(sp.together(top)), on_waves, l)
             left.append(rest * k)
     return remainder(*left)
-
-
-def solves_damped(text: str) -> str:
-    """The corrected waves in (8) and (9), for the bending stiffness of a text."""
-    return solves(WAVES_MENDED, text)
 
 
 def is_dispersion(text: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 
 from . import appendix as a
 from .numbers import BEAM_DIGITS, disagreement
@@ -13,7 +14,7 @@ DAMPING_CLAIM = Claim(  # C, which (1)-(14) lack
     equation="(1)-(14): damping C",
     printed=a.STIFFNESS_PRINTED,
     corrected=a.STIFFNESS,
-    check=a.solves_damped,
+    check=partial(a.solves, a.WAVES_MENDED),
     evidence="The waves of the appendix, mended, in (8) and (9) with this bending stiffness (SymPy): with C they "
     "solve (9) only if E I carries 1 + C s, in (2), (3), (5) 1 + C d/dt. Without damping (1)-(14) stand as they "
     "are: C appears in the appendix and Table 1 only.",

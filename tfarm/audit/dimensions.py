@@ -1,16 +1,21 @@
-"""A small checker of dimensions: every sum must add like to like, every exponential must be of a pure number."""
+"""A small checker of dimensions: every sum must add like to like, every exponential must be of a pure number.
+
+A dimension is a product of powers of kg, m and s, as SymPy has it; those of what stands in the paper's formulas are as
+its equations need them.
+"""
 
 from __future__ import annotations
 
-from fractions import Fraction
+from typing import Any
 
 import sympy as sp
 
-from .formulas import Expression
+from .formulas import Expression, jet_parts, sides
 
-Dimension = tuple[Fraction, Fraction, Fraction]  # powers of kg, m, s
-PURE_NUMBER: Dimension = (Fraction(0), Fraction(0), Fraction(0))
-BASE = {"kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1), "N": (1, 1, -2), "Pa": (1, -1, -2), "1": (0, 0, 0)}
+Dimension = Any  # sympy comes without types
+
+KG, METRE, SECOND = sp.symbols("kg m s", positive=True)  # so that the root of a square is the unit itself
+UNITS = {"kg": KG, "m": METRE, "s": SECOND, "N": KG * METRE / SECOND**2, "Pa": KG / (METRE * SECOND**2)}
 
 
 class MismatchError(Exception):
@@ -18,23 +23,28 @@ class MismatchError(Exception):
 
 
 def unit_dimension(text: str) -> Dimension:
-    """The dimension of a unit such as "kg/m^3" or "N m s"."""
-    total = PURE_NUMBER
-    over = 1
-    for token in text.replace("/", " / ").split():
-        if token == "/":
-            over = -1
-            continue
-        name, _, power = token.partition("^")
-        exponent = over * int(power or 1)
-        total = _plus(total, *(Fraction(exponent * n) for n in BASE[name]))
-    return total
+    """The dimension of a unit such as "kg/m^3" or "N m s"; of no unit that of a pure number."""
+    return sp.parse_expr(text.replace("^", "**").replace(" ", "*") or "1", local_dict=UNITS)
+
+
+NEEDED = {
+    "L": "m", "A": "m^2", "rho": "kg/m^3", "E": "Pa", "C": "s", "I_c": "kg m^2", "m": "kg", "kappa": "1", "G": "Pa",
+    "I": "m^4", "I_h": "kg m^2",
+}  # fmt: skip
+OTHERS = {
+    "s": "1/s", "x": "m", "pm": "1", "u": "N m", "U": "N m s", "K1": "N m s", "K2": "1", "a1": "1", "a2": "1",
+    "a3": "1", "lambda_1": "1/m", "lambda_2": "1/m", "lambda_": "1/m", "k1": "m s", "k2": "m s", "k3": "m s",
+    "k4": "m s",
+}  # fmt: skip
+FIELD_UNITS = {"y": "m", "phi": "1", "theta": "1", "V": "N m", "Y": "m s", "Phi": "s", "Theta": "s"}
+PAPER_UNITS: dict[str, Dimension] = {name: unit_dimension(text) for name, text in (NEEDED | OTHERS).items()}
 
 
 def spelled(dimension: Dimension) -> str:
     """A dimension in SI base units."""
-    powers = zip(("kg", "m", "s"), dimension, strict=True)
-    return " ".join(name if n == 1 else f"{name}^{n}" for name, n in powers if n) or "1"
+    powers = dimension.as_powers_dict()
+    each = ((name, powers[UNITS[name]]) for name in ("kg", "m", "s"))
+    return " ".join(name if n == 1 else f"{name}^{n}" for name, n in each if n) or "1"
 
 
 def dimension(f: Expression, units: dict[str, Dimension]) -> Dimension | None:
@@ -42,34 +52,20 @@ def dimension(f: Expression, units: dict[str, Dimension]) -> Dimension | None:
     if f.is_Symbol:
         return units[f.name]
     if f.is_number:
-        return None if f == 0 else PURE_NUMBER
+        return None if f == 0 else sp.Integer(1)
     if f.is_Add:
         return _like([dimension(each, units) for each in f.args])
     if f.is_Mul:
-        return _product([dimension(each, units) for each in f.args])
+        factors = [dimension(each, units) for each in f.args]
+        return None if None in factors else sp.Mul(*factors)
     if f.is_Pow:
-        base = dimension(f.base, units) or PURE_NUMBER
-        power = Fraction(int(f.exp.p), int(f.exp.q))
-        return (base[0] * power, base[1] * power, base[2] * power)
+        return (dimension(f.base, units) or sp.Integer(1)) ** f.exp
     if isinstance(f, sp.exp):
-        return _like([dimension(f.args[0], units), PURE_NUMBER])
+        return _like([dimension(f.args[0], units), sp.Integer(1)])
     if f.func.__name__ == "integral":  # over x
         inside = dimension(f.args[0], units)
-        return None if inside is None else _plus(inside, *(Fraction(n) for n in BASE["m"]))
+        return None if inside is None else inside * METRE
     raise TypeError(f"no dimension of {f}")
-
-
-def _plus(a: Dimension, *b: Fraction) -> Dimension:
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
-
-
-def _product(factors: list[Dimension | None]) -> Dimension | None:
-    total = PURE_NUMBER
-    for factor in factors:
-        if factor is None:
-            return None
-        total = _plus(total, *factor)
-    return total
 
 
 def _like(found: list[Dimension | None]) -> Dimension | None:
@@ -85,4 +81,25 @@ def mismatch(f: Expression, units: dict[str, Dimension]) -> str:
         dimension(f, units)
     except MismatchError as found:
         return str(found)
+    return "0"
+
+
+def units_in(f: Expression, units: dict[str, Dimension]) -> dict[str, Dimension]:
+    """The dimension of every symbol of an expression; a derivative's is its field's by x and t."""
+    found = dict(units)
+    for s in f.free_symbols:
+        parts = jet_parts(s)
+        if parts and s.name not in units:
+            field, i, j, _ = parts
+            found[s.name] = unit_dimension(FIELD_UNITS[field]) / METRE**i / SECOND**j
+    return found
+
+
+def unlike(text: str, units: dict[str, Dimension]) -> str:
+    """What does not add up in a text's equations: "0" if all sides and sums are of one dimension."""
+    for left, right in sides(text).items():
+        rest = left - right
+        found = mismatch(rest, units_in(rest, units))
+        if found != "0":
+            return found
     return "0"

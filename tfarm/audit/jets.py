@@ -13,7 +13,7 @@ AT_ROOT = "(0,t)"
 
 def d_dx(f: Expression) -> Expression:
     """Total derivative by the running x; values at the ends do not move."""
-    moving = [(s, integral_parts) for s in f.free_symbols if (integral_parts := jet_parts(s)) and not integral_parts[3]]
+    moving = [(s, parts) for s in f.free_symbols if (parts := jet_parts(s)) and not parts[3]]
     return sp.diff(f, x) + sum(sp.diff(f, s) * jet(field, i + 1, j) for s, (field, i, j, _) in moving)
 
 
@@ -25,7 +25,7 @@ def d_dt(f: Expression) -> Expression:
 
 
 def _d_dt(f: Expression) -> Expression:
-    moving = [(s, integral_parts) for s in f.free_symbols if (integral_parts := jet_parts(s)) and s.name != "a1"]
+    moving = [(s, parts) for s in f.free_symbols if (parts := jet_parts(s)) and s.name != "a1"]
     return sum((sp.diff(f, s) * jet(field, i, j + 1, at) for s, (field, i, j, at) in moving), sp.Integer(0))
 
 

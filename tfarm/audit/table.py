@@ -6,12 +6,11 @@ import math
 from functools import partial
 
 from .appendix import LAMBDA
-from .dimensions import Dimension, mismatch, spelled, unit_dimension
+from .dimensions import NEEDED, PAPER_UNITS, Dimension, mismatch, spelled, unit_dimension, unlike
 from .formulas import clauses, parsed
 from .motion import TIME
 from .rows import Claim
 from .typesetting import in_words
-from .units import NEEDED, PAPER_UNITS, unlike
 
 ALUMINIUM_DENSITIES = (2550.0, 2900.0)  # kg/m^3: alloys from aluminium-lithium to those rich in copper and zinc
 PRINTED_E = 6.8944e10  # Pa, as printed

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import sympy as sp
 
-from .dimensions import Dimension, spelled, unit_dimension
+from .dimensions import PAPER_UNITS, Dimension, spelled, unit_dimension
 from .energy import CONTROL_LAW
 from .formulas import clauses, difference, jet, parsed, remainder, sides, symbol, symbols
 from .rows import Claim
 from .typesetting import in_words
-from .units import PAPER_UNITS
 
 INCREMENT = "dw = -eta_c*g + alpha_c*dw_before"
 UPDATE_PRINTED = "w_next = w - dw"
