@@ -12,7 +12,9 @@ import sympy as sp
 
 from .formulas import Expression, clauses, jet, parsed, remainder, sides, symbol, symbols
 from .jets import d_dt, integral_parts, unbalanced
+from .loop import growth_text, pumped_text
 from .motion import solved_motion
+from .rows import Claim
 
 KINETIC = "rho*A*(y_t + x*theta_t)^2 + rho*I*(phi_t + theta_t)^2"
 POTENTIAL = "E*I*phi_x^2 + kappa*G*A*(phi - y_x)^2"
@@ -157,3 +159,77 @@ def is_varied_decay(text: str) -> str:
     law_rate = with_law(rate(energy_of(V)).subs(a3, a1), CONTROL_LAW)
     moving = sp.diff(energy_of(V).subs(a3, a1), a1) * sp.diff(weight, symbol("K2")) * K2_t
     return unbalanced((law_rate + moving - value).subs(a1, weight))
+
+
+ENERGY_CLAIMS = (  # the energy, its rate, the law and what is said to follow from it
+    Claim(
+        equation="(15)",
+        printed=V_PRINTED,
+        corrected=V,
+        check=is_total_energy,
+        evidence="With a1 = a2 = a3 = 1 the energy of hub, arm and payload changes by u theta_t only (SymPy, "
+        "integration by parts for every motion). The print leaves the power that flows into the payload: it holds "
+        "for m = I_c = 0, as in Table 1. The payload's weight must be a1 for (18).",
+    ),
+    Claim(
+        equation="(16)",
+        printed=RATE,
+        check=is_derivative,
+        evidence="The time derivative of (15) as printed (SymPy). With (15) mended, (16) and (17) gain "
+        "a1 (m w_t w_tt + I_c psi_t psi_tt) at the tip; (V depends on t only: dV/dt).",
+    ),
+    Claim(
+        equation="(17)",
+        printed=SUBSTITUTED_PRINTED,
+        corrected=SUBSTITUTED,
+        check=is_substituted,
+        evidence="(16) with the accelerations of (1), (2) and (3) (SymPy); theta does not depend on x. The text "
+        'before it, "substituting (1) into (2)", should read (1)-(3) into (16).',
+    ),
+    Claim(
+        equation="(18)",
+        printed=POWER_FLOW_PRINTED,
+        corrected=POWER_FLOW,
+        check=is_power,
+        evidence="Integrated by parts with payload and a1, a2, a3 free (SymPy): dV/dt is theta_t (a2 u + (a2 - a1) "
+        "M(0)) plus (a3 - a1) times the rate of the strain energy, which has no sign. So a3 = a1 is needed, and "
+        "the factor is a2 - a1. The print holds for no other weights than a1 = a2 = a3.",
+    ),
+    Claim(
+        equation="(19)",
+        printed=CONTROL_LAW_PRINTED,
+        corrected=CONTROL_LAW,
+        check=are_proven_gains,
+        evidence="dV/dt <= 0 needs a1/a2 = 1 - K2 > 0 (SymPy): K1 > 0 and K2 < 1, negative K2 included; "
+        "K2 >= 1 is not covered, and K2 > 1 is unstable at C = 0. The sign is that of the moment E I phi'(0).",
+        measured=growth_text,
+    ),
+    Claim(
+        equation="(20)",
+        printed=DECAY_PRINTED,
+        corrected=DECAY,
+        check=is_decay,
+        evidence="(19) in the true dV/dt (SymPy). K is not defined before (20). Semidefinite: theta itself is "
+        "neither in V nor in (19), so the angle is not regulated, and this alone proves stability of the motion, "
+        "not that it dies out.",
+    ),
+    Claim(
+        equation="(18)-(20): damping C > 0",
+        printed=DAMPED_LAW_PRINTED,
+        corrected=DAMPED_LAW,
+        check=is_damped_decay,
+        evidence="With E (1 + C d/dt) in (2), (3), (5), dV/dt = -a2 K1 theta_t^2 - a1 C integral(E I phi_xt^2) "
+        "needs the moment with its damping part; what a strain gauge gives, E I phi', leaves a term of no sign "
+        "(SymPy). The paper's section 3 is for C = 0.",
+    ),
+    Claim(
+        equation="(18)-(20): constant gains, varied by the tuner",
+        printed=VARIED_DECAY,
+        corrected=VARIED_DECAY + "; K2_t = 0",
+        check=is_varied_decay,
+        evidence="The weights of the proof follow the gain, a1 = a2 (1 - K2): when K2 varies, dV/dt gains -a2 K2_t "
+        "times the energy of arm and payload (SymPy), positive whenever K2 falls. So the proof holds for constant "
+        "gains (and for K2 that never falls), while the tuner moves K at every sample.",
+        measured=pumped_text,
+    ),
+)

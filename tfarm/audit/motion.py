@@ -110,8 +110,7 @@ def solved_motion() -> tuple[dict[Expression, Expression], ...]:
     return arm, tip, hub
 
 
-CHECKS: dict[int, Callable[[str], str]] = {number: partial(is_transform, number) for number in LAPLACE}
-CHECKS |= {
+CHECKS: dict[int, Callable[[str], str]] = {number: partial(is_transform, number) for number in LAPLACE} | {
     1: partial(along_arm, "y"),
     2: partial(along_arm, "phi"),
     3: at_hub,

@@ -8,7 +8,7 @@ from typing import Any
 from tfarm.columns import Table
 
 from .appendix_rows import APPENDIX_CLAIMS, DAMPING_CLAIM
-from .energy_rows import ENERGY_CLAIMS
+from .energy import ENERGY_CLAIMS
 from .motion import MOTION_CLAIMS
 from .rows import AUDIT_COLUMNS, AuditRow, Claim
 from .table import TABLE_CLAIMS
