@@ -70,6 +70,8 @@ def test_a_regions_corner_halves_the_sides_beside_it():
     assert wanted(roof, across) == pytest.approx([2.35, 6.25])
     tip = piece([-1.0, 9.0], [-1.0, 3.0], [6.0, 3.0])  # its upper and lower side end in one point, named twice
     assert wanted(tip, [-1.0, 9.0]) == pytest.approx([3.5])
+    flat = piece([-1.0, 9.0], [-1.0, 3.0], [3.0, 3.0])  # along one of its sides
+    assert wanted(flat, [-1.0, 9.0]) == pytest.approx([3.5])
 
 
 def test_corners_outside_the_picture_are_not_seen():
