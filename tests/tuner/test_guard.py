@@ -301,3 +301,20 @@ def test_a_frozen_guard_is_the_window_nearest_to_a_best_gain_that_lies_in_none(l
     loops = [sampled_loop(lab, HubFeedback(K1=0.3, K2=1.0), count=2)]
     assert guard._frozen(loops, 2.0).hi == pytest.approx(RADIUS_SHARE)
     assert guard._frozen(loops, 3.5).lo == pytest.approx(4.0 + 2 * (1 - RADIUS_SHARE))
+
+
+@pytest.mark.parametrize(
+    ("best", "radius", "middle"),
+    [
+        (0.2, lambda m: m, 1.0),  # 0.2 is 0.8 of the radius off the middle of 0.2 ... 1.8
+        (0.9, lambda m: m, 2.0 * 60 / 61),  # the last one that is tried
+        (0.6, lambda m: min(m, 1.6 - m), 1.6 - 48 / 61),  # as wide as the widest that is tried, at 48/61
+        (0.0, lambda m: 0.01, 2.0 / 61),  # near enough nowhere: as near as can be
+        (0.5, lambda m: 0.0, None),
+    ],
+)
+def test_the_middle_of_the_default_sector_by_closed_forms(monkeypatch, best, radius, middle):
+    """Of sixty that are tried in 0 ... 2 the widest that holds the best gain, shifted as far as it goes on widening."""
+    monkeypatch.setattr(guard, "constant_windows", lambda loop: [(0.0, 2.0)])
+    found = guard._middle(SimpleNamespace(loop=None, radius=radius), best)
+    assert found == (None if middle is None else pytest.approx(middle, abs=2.0 / 61 / 2**11))

@@ -54,6 +54,34 @@ def test_each_weight_may_have_its_own_rate(trial, guards):
         train(trial, network, guard, Learning(eta=rates[:-1]), 1)
 
 
+def dynamic_by_hand(trial, guard, seed, trials, eta, alpha=0.6, clip=0.5):
+    """A trial that costs more than the last accepted one is taken back, its step halved; others lengthen it again."""
+    network, change, share, costs = initial_network(seed), 0.0, 1.0, []
+    for _ in range(trials):
+        costs.append(trial.with_network(network, guard.limits).cost)
+        if costs[-1] == min(costs):
+            accepted, share = network, min(1.0, 1.2 * share)
+            _, gradient = trial.gradient(network, guard.limits)
+            gradient *= min(1.0, clip / np.linalg.norm(gradient))
+        else:
+            change, share = 0.0, share / 2
+        change = -share * eta * gradient + alpha * change
+        network = accepted.with_weights(accepted.weights + change)
+    return np.array(costs), accepted
+
+
+@pytest.mark.parametrize(("kind", "eta"), [("frozen", 6.0), ("none", 30.0)])
+def test_the_dynamic_rule_takes_back_what_costs_more(trial, guards, kind, eta):
+    """So often, and some of it because the loop ran away, that how the step shrinks and grows is seen."""
+    costs, network = dynamic_by_hand(trial, guards[kind], 1, 30, eta)
+    taken_back = costs > np.minimum.accumulate(costs)
+    assert (5 < taken_back.sum() < 25, np.isinf(costs).any()) == (True, kind == "none")
+    training = train(trial, initial_network(1), guards[kind], Learning(eta=eta), 30)
+    np.testing.assert_allclose(training.costs, costs, rtol=1e-9)
+    np.testing.assert_allclose(training.network.weights, network.weights, rtol=1e-7)
+    assert training.stopped is None
+
+
 @pytest.mark.parametrize("kind", ["time-varying", "frozen", "none"])
 def test_the_dynamic_rule_ends_with_its_lowest_cost(trial, guards, kind):
     training = train(trial, initial_network(2), guards[kind], Learning(), 60)

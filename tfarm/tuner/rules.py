@@ -97,7 +97,7 @@ def learn_by_trials(
         copied(weights, kept)
         if rule == BACKTRACKING_RULE:
             copied(gradient, slope)
-            share = min(1.0, SHARE_GROWS * share) if best < np.inf else 1.0
+            share = min(1.0, SHARE_GROWS * share)
             best = cost
         _step(weights, change, gradient, steps, share)
     if rule == BACKTRACKING_RULE:
