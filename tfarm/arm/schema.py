@@ -61,12 +61,10 @@ def _in_one_line(problems: Sequence[ErrorDetails], alone: bool) -> ParameterErro
 
 def _key(place: Sequence[str | int], alone: bool) -> str:
     """The TOML key of a pydantic location, with the number of a [[table]] counted from 1."""
-    if place[0] == "link" and len(place) > 1:
-        number = () if alone else (int(place[1]) + 1,)
-        return ".".join(map(str, ("link", *number, *_without_shape(place)[1:])))
-    if place[0] == "attachment" and len(place) > 1:
-        return ".".join(map(str, ("attachment", int(place[1]) + 1, *place[2:])))
-    return ".".join(map(str, place))
+    if place[0] not in ("link", "attachment") or len(place) == 1:
+        return ".".join(map(str, place))
+    number = () if alone and place[0] == "link" else (int(place[1]) + 1,)
+    return ".".join(map(str, (place[0], *number, *_without_shape(place)[1:])))
 
 
 def _without_shape(place: Sequence[str | int]) -> tuple[str, ...]:

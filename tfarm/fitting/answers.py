@@ -148,7 +148,7 @@ def resonances(fit: Fit) -> list[tuple[float | None, float | None, float]]:
     """
     found = {}
     for each in fit.solution.problem.responses:
-        peaks = features_of(each.data, each.noise.sigma).peaks
+        _, peaks = features_of(each.data, each.noise.sigma)
         (before, _), (after, ratio) = (_own_peaks(arm, each.data) for arm in (fit.before, fit.arm))
         places = dict(match(np.log(peaks), np.log(after)))
         earlier = dict(match(np.log(after), np.log(before)))

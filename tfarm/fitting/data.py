@@ -74,6 +74,11 @@ class Measured:
         return f"{self.output}/{self.input}"
 
 
+def in_parts(values: Complex) -> Real:
+    """Real parts, then imaginary ones, along the last axis: (..., n) becomes (..., 2 n)."""
+    return np.concatenate([values.real, values.imag], axis=-1)
+
+
 def must_be_measured(measured: object) -> None:
     """Raise ParameterError where a path or anything else stands in the place of a measured response."""
     if not isinstance(measured, Measured):

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from tfarm.arrays import Complex, Real
-from tfarm.records import record
 from tfarm.response.signals import Signals
 
-from .aligned import aligned
 from .around import NUDGE, Around, drive_behind, under_drive
 from .data import Measured
+from .resonances import aligned
 
 PEAK_PROMINENCE = 0.35  # of ln |H|: what stands out by a factor of 1.4 is a peak, if the noise is below a quarter
 NOISY = 4.0  # deviations of the noise
@@ -23,17 +22,8 @@ ZERO_STEPS = 6  # of Newton's method from a grid's point
 UNMATCHED_PEAK = 0.25  # of ln w: what a peak that is matched with nothing costs
 
 
-@dataclass(frozen=True)
-@record
-class Features:
-    """Peaks and dips [rad/s] of a response, ascending."""
-
-    peaks: Real
-    dips: Real
-
-
-def features_of(data: Measured, sigma: Real) -> Features:
-    """Those of a measured response that stand out of its noise."""
+def features_of(data: Measured, sigma: Real) -> tuple[Real, Real]:
+    """Dips and peaks [rad/s] of a measured response, ascending: those that stand out of its noise."""
     from scipy.signal import find_peaks  # here, because it takes half a second to load
 
     level = np.log(np.maximum(abs(data.values), np.finfo(float).tiny))
@@ -44,7 +34,7 @@ def features_of(data: Measured, sigma: Real) -> Features:
         near = np.array([np.median(noise[max(0, n - 3) : n + 4]) for n in at])
         return np.asarray(data.omega[at[how["prominences"] > NOISY * near]] if at.size else np.empty(0))
 
-    return Features(found(level), found(-level))
+    return found(-level), found(level)
 
 
 def near_zeros(here: Around, data: Measured) -> list[tuple[Real, Real]]:

@@ -22,7 +22,7 @@ from tfarm.exact.outputs import OUTPUTS
 from tfarm.response.signals import Signals
 
 from .around import Around, drive_behind, under_drive
-from .data import Measured
+from .data import Measured, in_parts
 from .noise import Noise
 from .parameters import COORDINATE_STEP, Parameter
 from .reading import check_signal
@@ -218,8 +218,7 @@ def walled(residuals: Callable[[Real], Real]) -> Callable[[Real], Real]:
 
 def _parts(values: Complex, one: Response) -> Real:
     """Real and imaginary parts, one behind the other, of what was measured."""
-    kept = values[..., np.isfinite(one.noise.sigma)]
-    return np.concatenate([kept.real, kept.imag], axis=-1)
+    return in_parts(values[..., np.isfinite(one.noise.sigma)])
 
 
 def check_signals(arm: Arm, data: Sequence[Measured]) -> None:

@@ -22,8 +22,7 @@ from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.response.answers import HERTZ
 
-from .aligned import aligned
-from .data import Measured
+from .data import Measured, in_parts
 
 PROMINENCE = math.log(2)  # a peak is twice what is around it
 CLEAR_OF_NOISE = 5.0  # deviations of the noise that it stands above
@@ -72,6 +71,33 @@ def matched_peaks(measured: Real, own: Real, band: tuple[float, float]) -> tuple
     return aligned(abs(np.log(measured)[:, None] - np.log(own)), UNPAIRED, alone)
 
 
+def aligned(gaps: Real, measured_alone: float, own_alone: Real) -> tuple[list[tuple[int, int]], float]:
+    """Pairs of places in both rows, in order, of the least cost in sum, and that cost.
+
+    A pair costs its entry of `gaps` (measured, own); one left alone `measured_alone`, or its own of `own_alone` (own,).
+    """
+    n, m = gaps.shape
+    cost, ways = np.zeros((n + 1, m + 1)), np.zeros((n + 1, m + 1), dtype=int)
+    cost[1:, 0], cost[0, 1:] = measured_alone * np.arange(1, n + 1), np.cumsum(own_alone)
+    ways[1:, 0], ways[0, 1:] = 1, 2
+    for i in range(1, n + 1):
+        for j in range(1, m + 1):
+            choices = (
+                cost[i - 1, j - 1] + gaps[i - 1, j - 1],
+                cost[i - 1, j] + measured_alone,
+                cost[i, j - 1] + own_alone[j - 1],
+            )
+            ways[i, j] = int(np.argmin(choices))
+            cost[i, j] = choices[ways[i, j]]
+    pairs, i, j = [], n, m
+    while i or j:
+        way = ways[i, j]
+        if way == 0:
+            pairs.append((i - 1, j - 1))
+        i, j = i - (way != 2), j - (way != 1)
+    return pairs[::-1], float(cost[-1, -1])
+
+
 def peaks_among(poles: Complex) -> Real:
     """|s| (n,) [rad/s], ascending, of those poles that make a peak."""
     upper = poles[(poles.imag > 0) & (-poles.real < WIDEST_PEAK * abs(poles))]
@@ -111,19 +137,16 @@ def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
         return None
     s, w = 1j * omega, float(data.omega[place])
 
-    def parts(z: Complex) -> Real:
-        return np.concatenate([z.real * weight, z.imag * weight])
-
     def residuals(x: Real) -> Real:
-        return parts(_model(x, s, w, background)[0] - values)
+        return in_parts((_model(x, s, w, background)[0] - values) * weight)
 
     def slopes(x: Real) -> Real:
-        return np.array([parts(column) for column in _model(x, s, w, background)[1]]).T
+        return in_parts(np.array(_model(x, s, w, background)[1]) * weight).T
 
     half = max(_half_width(data, place), (omega[-1] - omega[0]) / (4 * omega.size))
     x = np.zeros(4 + background)
     x[:2] = half, w
-    linear, *_ = np.linalg.lstsq(slopes(x)[:, 2:], parts(values), rcond=None)
+    linear, *_ = np.linalg.lstsq(slopes(x)[:, 2:], in_parts(values * weight), rcond=None)
     x[2:] = linear
     found = least_squares(residuals, x, jac=slopes, method="lm", x_scale="jac")
     sigma_p, w_p = found.x[:2]

@@ -16,9 +16,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 
+from .data import in_parts
 from .features import features_of, match, near_zeros
 from .model import Problem
 from .ringing import ring_residuals
@@ -86,7 +87,7 @@ class Starts:
         rows, misfit = [np.empty((0, self._free))], [np.empty(0)]
         here = self.problem.around(point)
         for each, features in zip(self.problem.responses, self._features, strict=True):
-            for measured, (w, slopes) in zip((features.dips, features.peaks), near_zeros(here, each.data), strict=True):
+            for measured, (w, slopes) in zip(features, near_zeros(here, each.data), strict=True):
                 pairs = match(np.log(measured), np.log(w) + shift)
                 rows.append(np.array([slopes[:, j] for _, j in pairs]).reshape(-1, self._free))
                 misfit.append(np.array([np.log(measured[i] / w[j]) for i, j in pairs]))
@@ -115,10 +116,10 @@ class Starts:
 
         def residuals(x: Real) -> Real:
             pairs = zip(thin.computed(x), thin.responses, strict=True)
-            return np.concatenate([_both(np.log(H / each.data.values)) for H, each in pairs])
+            return np.concatenate([in_parts(np.log(H / each.data.values)) for H, each in pairs])
 
         def jacobian(x: Real) -> Real:
-            return np.concatenate([_both(dH / H).T for H, dH in thin.slopes(x)])
+            return np.concatenate([in_parts(dH / H).T for H, dH in thin.slopes(x)])
 
         found = least_squares(
             residuals,
@@ -166,8 +167,3 @@ def thinned(problem: Problem, most: int) -> Problem:
         )
         responses.append(replace(each, data=data, noise=replace(each.noise, sigma=each.noise.sigma[kept])))
     return replace(problem, responses=tuple(responses))
-
-
-def _both(values: Complex) -> Real:
-    """Real parts, then imaginary ones."""
-    return np.concatenate([values.real, values.imag], axis=-1)

@@ -56,11 +56,6 @@ class Ruler:
             w = self._clear(np.union1d(w, self._dips(w)))
         self.w, (self._values, self._size) = w, self._exact(w)
 
-    @classmethod
-    def of(cls, model: PartialFractions, band: tuple[float, float]) -> Ruler:
-        """The ruler of a model's arm and outputs."""
-        return cls(model.arm, model.rows, band, model.x)
-
     def norm(self, w: Real) -> Real:
         """|G| + |w dG/dw| (outputs, w) of the exact arm at w [rad/s], 1-D, off its natural frequencies."""
         return norm(self.G, w, self.G(1j * w), self._poles)

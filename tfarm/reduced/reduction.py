@@ -103,7 +103,7 @@ class ReducedModel:
         if not ((w >= self.band[0]) & (w <= self.band[1])).all():
             remedy = f"the error is known from {self.band[0]:g} to {self.band[1]:g} rad/s; stay in this band"
             raise ParameterError(key="omega", value=omega, remedy=remedy)
-        return self.errors[:, None] * Ruler.of(self.model, self.band).norm(w)
+        return self.errors[:, None] * Ruler(self.arm, self.model.rows, self.band, self.model.x).norm(w)
 
     def matrices(self) -> Matrices:
         """A, B, C, D as NumPy arrays (see `PartialFractions.matrices`)."""
