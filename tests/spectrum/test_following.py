@@ -226,6 +226,23 @@ def test_zeros_that_part_are_not_paired():
         assert _exchange(family, nodes, np.array([True, False]), at) == is_pair
 
 
+def test_two_that_meet_where_the_function_grows_beyond_any_number_are_paired_without_a_warning():
+    def exact(C):
+        return np.array([-1.0, -3.0, -1.2 + 0.15 * C, -9.0], complex)
+
+    def family(C):
+        function = with_zeros(exact(C))
+
+        def grown(s):
+            value, slope, scale = function(s)
+            return Analytic(value, slope, scale + 1e4 * C)
+
+        return Member(grown)
+
+    nodes = [Node(0.0, exact(0.0).reshape(2, 2))]
+    assert _exchange(family, nodes, np.array([True, False]), 1.0) in (True, False)  # pytest makes a warning an error
+
+
 def test_the_next_real_zero_is_looked_for_on_both_sides():
     """Its sign is that of the mantissa turned by the exponent, which jumps by i pi here."""
 

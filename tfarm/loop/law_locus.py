@@ -24,12 +24,13 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum.box import Box, newton, zeros_in_box
+from tfarm.spectrum.scales import first_frequency
 
 from .answers import law_answer
 from .crossings import BranchCrossing, crossing_answers, in_words
 from .damping import NO_PART
 from .frequencies import band_of, grid
-from .law_loop import LawLoop
+from .law_loop import NEAREST_TO_ORIGIN, LawLoop
 from .law_map import law_crossings
 from .law_poles import law_box, starting_points_of
 from .variation import ARM_PARAMETERS, must_be_way
@@ -188,6 +189,12 @@ class Family:
         pole = pole.real if abs(pole.imag) <= NO_PART * abs(pole) else pole
         return pole if abs(pole - start) <= room and (pole.imag != 0) == (start.imag != 0) else None
 
+    def at_rest(self, value: float) -> float:
+        """D/s^n at s = 0, real, up to a positive factor: a real pole passes through 0 where it changes its sign."""
+        beside = NEAREST_TO_ORIGIN * first_frequency(self.at(value).arm) * np.array([1.0, -1.0])
+        found = self.at(value).function(beside + 0j)
+        return float((found.value * np.exp(1j * found.scale.imag)).real.mean())
+
     def pole_near(self, value: float, start: complex) -> complex:
         """The pole at a value that Newton's method finds from a start.  Raises ConvergenceError where it finds none."""
         found = newton(self.at(value).function, np.array([start]))
@@ -251,13 +258,20 @@ def _crossings(family: Family, values: Real, branches: Complex, box: Box) -> tup
 
 
 def _crossed(family: Family, values: Real, poles: Complex) -> tuple[float, float]:
-    """The value between two at which a branch is on the axis, and the frequency there."""
+    """The value between two at which a branch is on the axis, and the frequency there.
+
+    A pole next to 0 has no digits, and two that meet beside it no way: there it is the value at which s = 0 is one.
+    """
+    low, high = (float(value) for value in values)
+    known = CROSSING_KNOWN * max(abs(low), abs(high))
+    if not poles.imag.all() and family.at_rest(low) * family.at_rest(high) < 0:
+        return float(brentq(family.at_rest, low, high, xtol=known)), 0.0
 
     def pole(value: float) -> complex:
-        share = (value - values[0]) / (values[1] - values[0])
+        share = (value - low) / (high - low)
         return family.pole_near(value, complex(poles[0] + share * (poles[1] - poles[0])))
 
-    at = float(brentq(lambda value: pole(value).real, values[0], values[1], xtol=CROSSING_KNOWN * abs(values).max()))
+    at = float(brentq(lambda value: pole(value).real, low, high, xtol=known))
     return at, abs(pole(at).imag)
 
 

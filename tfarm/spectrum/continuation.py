@@ -179,7 +179,7 @@ def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: f
         if near in (np.inf, zeros[i, 1 - j].real):
             continue
         both = np.array([zero, near])
-        with np.errstate(divide="ignore", invalid="ignore"):  # a double zero has no slope: nothing is known of its way
+        with np.errstate(all="ignore"):  # a double zero has no slope, next to -1/C D may grow beyond any number
             move = -(there(both).value / here(both).slope * np.exp(there(both).scale - here(both).scale)).real
         if not (move[1] - move[0]) / (near - zero.real) <= -CLOSING_SHARE:
             continue
