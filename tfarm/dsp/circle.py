@@ -5,17 +5,20 @@ function of the plant is
 
     H(z) = z^-d [ g0/z + x sum over poles of (r_j/p_j) a_j/(z - b_j) + the rigid body's terms in 1/x ]
 
-so a pole that has settled before the sample weighs nothing, and x^k F(z) = x^k (1 + gains . H), k the
-order of the pole at z = 1, is analytic on the circle and outside.  On an arc it stays in a disc about its value in the
-middle, for 1/(z - b) changes by h/(|z - b| (|z - b| - h)) at most over h.  Where no disc holds 0, the phase between
-neighbouring middles is known without doubt, and half the circle gives the count (the argument principle).  Arcs whose
-disc holds 0 are cut.
+so a pole that has settled before the sample weighs nothing.  Of a slow one, as friction at the hub makes it, the share
+in g0 nearly cancels that in the sum: both are taken as one, (r_j/p_j) (a_j - 1 + (b_j - a_j)/z)/(z - b_j).
+
+x^k F(z) = x^k (1 + gains . H), k the order of the pole at z = 1, is analytic on the circle and outside.  On an arc it
+stays in a disc about its value in the middle, for 1/(z - b) changes by h/(|z - b| (|z - b| - h)) at most over h.  Where
+no disc holds 0, the phase between neighbouring middles is known without doubt, and half the circle gives the count (the
+argument principle).  Arcs whose disc holds 0 are cut.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Generic
 
 import numpy as np
@@ -28,6 +31,7 @@ from tfarm.dsp.loop import ANGLE_ROW, RATE_ROW, SampledLoop
 from tfarm.records import record
 
 MACHINE_EPS = float(np.finfo(float).eps)  # of a float64, times the counts of operations beside it
+SLOW = 0.1  # |p| T below which a pole is slow: its two parts are then more than ten times their sum
 ARCS = 64  # of half the circle to begin with
 SHORTEST_ARC = 1e-13  # rad: no arc is cut further, as its ends are known to a few last bits
 PIECES_OF_ARC = 4  # into which one is cut that is too long
@@ -150,24 +154,24 @@ class Circle(Generic[SampledKind]):
     def _parts(self, low: Real, high: Real) -> Discs:
         """x, and what each gain multiplies in F times x^n, on arcs: discs (1 + gains, arcs)."""
         arcs = _Arcs(low, high)
-        sums = self._sums(low, high)
-        found = [arcs.x, *(self._output(row, arcs, sums[row]) for row in range(len(self.orders)))]
+        sums, slow = self._sums(arcs), self._slow_sums(arcs)
+        found = [arcs.x, *(self._output(row, arcs, sums[row], slow[row]) for row in range(len(self.orders)))]
         if isinstance(self.loop, SampledLoop) and self.loop.differences:
             a, T = self.loop.smoothing, self.loop.chain.sampling.period
             rate = found[1 + ANGLE_ROW] * (arcs.turned(0) + arcs.turned(1).times(-a)).inverse().times((1 - a) / T)
             found[1 + RATE_ROW] = rate if self.orders[ANGLE_ROW] else rate * arcs.x
         return Discs(np.array([each.middle for each in found]), np.array([each.radius for each in found]))
 
-    def _output(self, row: int, arcs: _Arcs, poles: Discs) -> Discs:
-        """x^n times an output's pulse transfer function, n its order at z = 1; `poles`: the sum over its poles."""
+    def _output(self, row: int, arcs: _Arcs, poles: Discs, slow: Discs) -> Discs:
+        """x^n times an output's pulse transfer function, n its order at z = 1; `poles`, `slow`: sums over its poles."""
         plant, pulse = self.loop.plant, self.loop.pulse
         T, f = pulse.sampling.period, pulse.sampling.fraction
         twice, once = plant.rigid[row]
         order = 2 if twice else int(once != 0.0)
         x, late = arcs.x, arcs.turned(1)
-        at_rest = float(plant.static[row] - (plant.residues[row] / plant.poles).real.sum())
+        at_rest = float(plant.static[row] - (plant.residues[row] / plant.poles)[~self.is_slow].real.sum())
         sums = poles * x
-        held = Discs(sums.middle, sums.radius + self.missing[row]) + late.times(at_rest)
+        held = Discs(sums.middle, sums.radius + self.missing[row]) + late.times(at_rest) + slow
         total = power(x, order) * held
         push = arcs.turned(0).times((1 - f) * T) + late.times(f * T)
         if twice:  # then there is no 1/s beside it: of an arm that turns freely nothing at the hub is lost
@@ -192,12 +196,30 @@ class Circle(Generic[SampledKind]):
             np.c_[old.middle[:, ~rough], new.middle][:, order], np.c_[old.radius[:, ~rough], new.radius][:, order]
         )
 
-    def _sums(self, low: Real, high: Real) -> Discs:
-        """sum over poles of (r/p) a/(z - b) on arcs: discs (outputs, arcs)."""
+    @cached_property
+    def is_slow(self) -> NDArray[np.bool_]:
+        """Which poles hardly decay in a sample, as that of friction at the hub."""
+        return np.asarray(self.kept & (abs(self.loop.plant.poles) * self.loop.chain.sampling.period < SLOW))
+
+    def _sums(self, arcs: _Arcs) -> Discs:
+        """sum over all poles but slow ones of (r/p) a/(z - b) on arcs: discs (outputs, arcs)."""
+        plant, sampling, which = self.loop.plant, self.loop.chain.sampling, self.kept & ~self.is_slow
+        p = plant.poles[which]
+        remaining = (1 - sampling.fraction) * sampling.period
+        return self._summed(arcs, p, plant.residues[:, which] / p * np.exp(p * remaining))
+
+    def _slow_sums(self, arcs: _Arcs) -> Discs:
+        """sum over slow poles of (r/p) (a - 1 + (b - a)/z)/(z - b), all that they give: discs (outputs, arcs)."""
         plant, sampling = self.loop.plant, self.loop.chain.sampling
-        p, T = plant.poles[self.kept], sampling.period
+        p, T, f = plant.poles[self.is_slow], sampling.period, sampling.fraction
+        at_rest = plant.residues[:, self.is_slow] / p
+        now, late = at_rest * np.expm1(p * ((1 - f) * T)), at_rest * np.exp(p * ((1 - f) * T)) * np.expm1(p * (f * T))
+        return self._summed(arcs, p, now) + self._summed(arcs, p, late) * arcs.turned(1)
+
+    def _summed(self, arcs: _Arcs, p: Complex, weights: Complex) -> Discs:
+        """sum over poles p of weight/(z - b) on arcs: discs (outputs, arcs)."""
+        low, high, T = arcs.low, arcs.high, self.loop.chain.sampling.period
         b, room = np.exp(p * T), np.maximum(-np.expm1(p.real * T), ON_IT)
-        weights = plant.residues[:, self.kept] / p * np.exp(p * ((1 - sampling.fraction) * T))
         blur = MACHINE_EPS * (4 + abs(p * T))
         middles, radii = [], []
         for some in np.array_split(np.arange(low.size), 1 + low.size * p.size // TERMS_AT_A_TIME):
