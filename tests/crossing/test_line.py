@@ -68,6 +68,8 @@ def test_intervals_are_where_nothing_is_beyond():
     assert intervals(found, -3.0, 5.0, -2.0, 1) == []
     assert intervals(Crossings.of([(np.inf, 1.0, 2)]), -1.0, 1.0, 0.0, 0) == [(-1.0, 1.0)]
     assert joined([(0.0, 1.0), (1.0, 2.0), (3.0, 4.0)]) == [(0.0, 2.0), (3.0, 4.0)]
+    far = Crossings.of([(10.0, 1.0, -2), (11.0, 1.0, 2)])
+    assert intervals(far, 0.0, 12.0, 0.0, 2) == [(10.0, 11.0)]
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1e6])
@@ -142,11 +144,12 @@ def test_every_place_that_is_asked_for_is_that_of_another_chandrupatla(f, low):
     def asked(by):
         return lambda x: by.append(float(x[0])) or f(x)
 
-    zeros_between(asked(ours), np.array([low]), np.array([3.0]))
+    found = zeros_between(asked(ours), np.array([low]), np.array([3.0]))
     limits = {"xatol": 2 * LAST_BIT * width, "xrtol": 2 * LAST_BIT, "fatol": 0.0, "frtol": 0.0}
-    find_root(asked(theirs), (np.array([3.0]), np.array([low])), tolerances=limits)
+    other = find_root(asked(theirs), (np.array([3.0]), np.array([low])), tolerances=limits)
     assert len(ours) == len(theirs)
     np.testing.assert_allclose(ours, theirs, rtol=1e-14)
+    np.testing.assert_array_equal(found, other.x)
 
 
 def test_no_bracket_has_no_zero():

@@ -79,11 +79,10 @@ def brackets(h: Real) -> tuple[tuple[Whole, ...], Whole]:
     """
     sign = np.sign(h)
     if (sign == 0).any():
-        count = h.shape[-1]
-        following = np.where(sign != 0, np.arange(count), count)
+        last = h.shape[-1] - 1
+        following = np.where(sign != 0, np.arange(last + 1), last)
         following = np.minimum.accumulate(following[..., ::-1], axis=-1)[..., ::-1]
-        ended = np.concatenate([sign, np.zeros((*h.shape[:-1], 1))], axis=-1)
-        sign = np.take_along_axis(ended, following, axis=-1)
+        sign = np.take_along_axis(sign, following, axis=-1)
     before = np.nonzero(sign[..., 1:] * sign[..., :-1] < 0)
     return before, np.where(sign[before] > 0, 2, -2)
 
