@@ -62,7 +62,8 @@ def test_trial_and_gradient_are_those_of_plain_numpy(signals):
 )
 def test_a_trial_is_that_of_the_simulator(chain):
     trial, network = slew_trial(LAB, chain, K1=K1, Kp=KP), initial_network(3)
-    record, gain = trial.with_network(network, SECTOR), TunedGain(network, SECTOR, K1, "vibration", KP)
+    record = trial.with_network(network, SECTOR)
+    gain = TunedGain(network, SECTOR, HubFeedback(K1=K1, Kp=KP), "vibration")
     other = simulated(Simulator(LAB, trial.loop.chain, trial.task, count=6), gain, trial.cost)
     np.testing.assert_allclose(other.K, record.K, atol=1e-10)
     np.testing.assert_allclose(other.e, record.e, atol=1e-9)

@@ -51,7 +51,7 @@ def test_a_trial_is_that_of_the_simulator(lab, inputs, signals, chain):
     """The tuner as a controller of `tfarm.dsp.Simulator`, which knows nothing of this room."""
     trial, network = slew_trial(lab, chain, signals=signals), initial_network(3, scales=np.full(inputs, 1.3))
     record = trial.with_network(network, SECTOR)
-    gain = TunedGain(network, SECTOR, 0.3, signals)
+    gain = TunedGain(network, SECTOR, HubFeedback(K1=0.3), signals)
     other = simulated(Simulator(lab, trial.loop.chain, trial.task, count=6), gain, trial.cost)
     np.testing.assert_allclose(other.K, record.K, atol=1e-11)
     np.testing.assert_allclose(other.e, record.e, atol=1e-10)

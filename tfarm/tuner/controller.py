@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
@@ -17,23 +16,20 @@ from tfarm.tuner.trial import Cost, Record, Trial
 
 @dataclass
 class TunedGain:
-    """K for each measurement; it remembers u, e, x and K of the two samples before, and forgets them at sample 0."""
+    """K for each measurement; it remembers u, e, x and K of the two samples before, and forgets them at sample 0.
+
+    `servo` is the law beside the moment.
+    """
 
     network: Network
     guard: Limits
-    K1: float
+    servo: HubFeedback
     signals: Reading
-    Kp: float = 0.0
     _past: list[tuple[float, float, float, float]] = field(default_factory=list, init=False)
-
-    @cached_property
-    def servo(self) -> HubFeedback:
-        """The law beside the moment."""
-        return HubFeedback(K1=self.K1, Kp=self.Kp)
 
     def run(self, simulator: Simulator) -> Simulation:
         """The loop of a simulator under the servo and this gain."""
-        return simulator.gain_schedule(self.K1, self, Kp=self.Kp)
+        return simulator.gain_schedule(self.servo.K1, self, Kp=self.servo.Kp)
 
     def __call__(self, m: Measurement) -> float:
         """The gain at this sample."""

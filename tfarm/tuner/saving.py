@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, ValidationError
 
+from tfarm.arm import HubFeedback
 from tfarm.arm.declared import StrictTable
 from tfarm.dsp.chain import Reading
 from tfarm.errors import MISSING, ParameterError, TfarmError
@@ -46,7 +47,8 @@ class SavedTuner:
 
     def gain(self) -> TunedGain:
         """The controller."""
-        return TunedGain(self.network, Limits(self.lo, self.hi), self.K1, self.signals, self.Kp)
+        servo = HubFeedback(K1=self.K1, Kp=self.Kp)
+        return TunedGain(self.network, Limits(self.lo, self.hi), servo, self.signals)
 
 
 class TunerFile(StrictTable):
