@@ -34,8 +34,7 @@ SOMEWHERE = 0.37 + 0.73j  # 1/s: a response that is not 0 throughout is not 0 th
 class RatioRoots:
     """Poles and zeros [1/s] of a ratio with |Im s| <= `up_to` [rad/s], those at s = 0 apart: complete in these ranges.
 
-    `common` are those that both signals have, which cancel; at s = 0 the ratio goes as s^`at_zero`.  `pole_width` and
-    `zero_width` are the ranges of Re s that were searched.
+    `common` are those that both signals have, which cancel; at s = 0 the ratio goes as s^`at_zero`.
     """
 
     poles: Complex
@@ -43,8 +42,6 @@ class RatioRoots:
     common: Complex
     at_zero: int
     up_to: float
-    pole_width: tuple[float, float]
-    zero_width: tuple[float, float]
 
     @property
     def resonances(self) -> Complex:
@@ -102,8 +99,8 @@ class Ratio:
 
     def roots(self, up_to: float) -> RatioRoots:
         """Poles and zeros with |Im s| <= up_to [rad/s], as each transfer function has them, complete."""
-        all_zeros, all_poles = self.above.zeros(up_to=up_to), self.poles(up_to)
-        given_poles, given_zeros = (each.values[each.values != 0] for each in (all_poles, all_zeros))
+        every = self.poles(up_to).values, self.above.zeros(up_to=up_to).values
+        given_poles, given_zeros = (roots[roots != 0] for roots in every)
         poles, zeros = without_cancelled(given_poles, given_zeros)
         orders = Signals(self.driven, (self.output,)).orders[0]
         under = Signals(self.arm, (self.input,)).orders[0] if self.below is not None else self.above.system.at_rest
@@ -113,8 +110,6 @@ class Ratio:
             common=np.array([pole for pole in given_poles if pole not in poles], complex),
             at_zero=orders - under,
             up_to=up_to,
-            pole_width=(all_poles.box[0], all_poles.box[1]),
-            zero_width=(all_zeros.box[0], all_zeros.box[1]),
         )
 
     def poles(self, up_to: float) -> Roots:

@@ -107,11 +107,10 @@ class SampledJudge:
         return -score if self.objective == "damping" else score
 
     def _scores(self, points: Real, z: Complex) -> Real:
-        if self.objective == "damping":
-            return -self.damping(z)
-        if self.objective == "margin":
-            return -self._disks(points) - TIE * self.damping(z)
-        return self.residual(points) if self.objective == "residual" else self.cost(points)
+        if self.objective in ("residual", "cost"):
+            return self.residual(points) if self.objective == "residual" else self.cost(points)
+        damping = first_damping(z, self._higher)
+        return -damping if self.objective == "damping" else -self._disks(points) - TIE * damping
 
     # ------------------------------------------------------------ matrices and poles
 
@@ -133,10 +132,6 @@ class SampledJudge:
         start, by_held, by_each = self._parts
         across, up = points[..., None, None] * by_each[:, None]
         return np.asarray(start + share * (by_held + (across + up)))
-
-    def damping(self, z: Complex) -> Real:
-        """The least damping ratio of the oscillating poles of the first modes, of closed-loop poles (gains, n)."""
-        return first_damping(z, self._higher)
 
     @cached_property
     def _higher(self) -> list[complex]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from tfarm.dsp.brief import SampledBrief
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.stability import Stability
 from tfarm.records import record
+from tfarm.synthesis.continuous import ContinuousJudge
+from tfarm.synthesis.sampled import SampledJudge
 from tfarm.synthesis.search import Bounds, Effort, GainAxis, Score
 
 _One = TypeVar("_One")
@@ -37,23 +39,7 @@ class OnArm:
     sampled: SampledBrief
 
 
-class Judge(Protocol):
-    """What both gains of the plane are worth in a loop, the others held."""
-
-    def effort(self, up: Bounds) -> Effort:
-        """How fine a grid its objective needs."""
-
-    def landscape(self, axes: tuple[GainAxis, GainAxis], effort: Effort) -> tuple[Real, Score]:
-        """Scores over the grid, inf where not stable, and the score to refine with."""
-
-    def score(self, points: Real) -> Real:
-        """What is minimised, at points (2, n) of the plane."""
-
-    def holds(self, law: HubFeedback) -> bool:
-        """Whether the loop is stable by the verdict of its kind."""
-
-    def value(self, law: HubFeedback, score: float) -> float:
-        """The objective of a law of that score."""
+Judge = ContinuousJudge | SampledJudge  # what both gains of the plane are worth in a loop of an arm, the others held
 
 
 @dataclass(frozen=True)
