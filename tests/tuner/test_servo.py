@@ -162,7 +162,7 @@ def test_files_say_the_servo_and_old_ones_have_none(tuning, tmp_path):
     content = json.loads((tmp_path / "servo.json").read_text())
     del content["Kp"]
     (tmp_path / "old.json").write_text(json.dumps(content))
-    assert load_tuner(tmp_path / "old.json").gain().Kp == 0.0
+    assert load_tuner(tmp_path / "old.json").gain().servo.Kp == 0.0
 
 
 def test_the_command_says_where_the_tip_ends(capsys):
