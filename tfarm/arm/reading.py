@@ -44,7 +44,11 @@ def load(name_or_path: str | os.PathLike[str]) -> Arm:
 
 def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
     """The parsed TOML behind a preset's name or a path, and the file's name: for rooms with tables of their own."""
-    name, is_named = _text_of(name_or_path), isinstance(name_or_path, str)
+    is_named = not isinstance(name_or_path, os.PathLike)
+    name: object = name_or_path if is_named else os.fspath(name_or_path)
+    if not isinstance(name, str) or not name.strip() or "\0" in name:
+        remedy = f"give a preset ({', '.join(presets())}) or a path"
+        raise ParameterError(key="arm", value=name, remedy=remedy)
     if is_named and name in presets():
         data, name = PRESETS.joinpath(f"{name}.toml").read_bytes(), f"{name}.toml"
     elif is_named and not ({"/", "\\", os.sep} & set(name) or name.endswith(".toml") or os.path.lexists(name)):
@@ -56,14 +60,6 @@ def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], s
         return _table_of(data), name
     except ParameterError as error:
         raise error.in_file(name) from None
-
-
-def _text_of(name_or_path: object) -> str:
-    name = os.fspath(name_or_path) if isinstance(name_or_path, os.PathLike) else name_or_path
-    if not isinstance(name, str) or not name.strip() or "\0" in name:
-        remedy = f"give a preset ({', '.join(presets())}) or a path"
-        raise ParameterError(key="arm", value=name, remedy=remedy)
-    return name
 
 
 def decoded(data: bytes, remedy: str) -> str:
@@ -98,12 +94,10 @@ def _check(text: str) -> None:
     """Refuse what tomllib takes seconds for: a long line, one of many dots, and brackets in brackets in brackets."""
     lines = text.split("\n")
     for i, line in enumerate(lines, 1):
-        if len(line) > LONGEST_LINE:
-            remedy = f"{len(line)} characters in a line; at most {LONGEST_LINE}"
-            raise ParameterError(key=f"line {i}", value=line, remedy=remedy)
-        if line.count(".") > MOST_DOTS:
-            remedy = f"{line.count('.')} dots in a line; at most {MOST_DOTS}"
-            raise ParameterError(key=f"line {i}", value=line, remedy=remedy)
+        for number, what, most in ((len(line), "characters", LONGEST_LINE), (line.count("."), "dots", MOST_DOTS)):
+            if number > most:
+                remedy = f"{number} {what} in a line; at most {most}"
+                raise ParameterError(key=f"line {i}", value=line, remedy=remedy)
     depth = 0
     for bracket in re.finditer(r"[\[\]{}]", text):
         depth = depth + 1 if bracket[0] in "[{" else max(depth - 1, 0)

@@ -20,7 +20,7 @@ def reduced_answer(reduced: ReducedModel) -> dict[str, Any]:
     poles = [[float(p.real), float(p.imag)] for p in model.eigenvalues.ravel()]
     poles += [[float(pole), 0.0] for pole in model.single]
     poles += [[-1 / model.arm.damping, 0.0]] if model.relaxation is not None else []
-    answer: dict[str, Any] = {
+    return {
         "arm": model.arm.name,
         "method": reduced.method,
         "order": reduced.order,
@@ -33,10 +33,7 @@ def reduced_answer(reduced: ReducedModel) -> dict[str, Any]:
         "first_mode_lacking_rad_s": reduced.lacking_frequency,
         "first_mode_lacking_hz": reduced.lacking_frequency / (2 * math.pi),
         "note": reduced.note,
-    }
-    if model.x is not None:
-        answer["x"] = model.x
-    return answer | {
+        **({} if model.x is None else {"x": model.x}),
         "input": model.input,
         "input_unit": G.input_unit,
         "inputs": [model.input],

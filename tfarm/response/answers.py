@@ -25,23 +25,28 @@ def response_answer(G: TransferFunction, s: np.ndarray[Any, Any], digits: int | 
         value: list[Any] = [list(G.digits(complex(point), digits)) for point in s]
     else:
         value = [[float(v.real), float(v.imag)] for v in G(s)]
-    answer: dict[str, Any] = {
+    return {
         "arm": G.arm.name,
         "input": G.input,
         "input_unit": G.input_unit,
         "output": G.outputs[0],
         "unit": G.units[0],
         "method": G.method,
+        **({} if G.x is None else {"x": G.x}),
+        "s": [[float(p.real), float(p.imag)] for p in s],
+        "value": value,
     }
-    if G.x is not None:
-        answer["x"] = G.x
-    return answer | {"s": [[float(p.real), float(p.imag)] for p in s], "value": value}
 
 
 def by_methods_answer(G: TransferFunction, s: np.ndarray[Any, Any]) -> dict[str, Any]:
     """One output at s by each method, and by what share of its size each differs from the closed form."""
-    answer: dict[str, Any] = {"arm": G.arm.name, "output": G.outputs[0], "unit": G.units[0]}
-    return answer | {"s": [[float(p.real), float(p.imag)] for p in s], **roads_answer(G.by_methods(s))}
+    return {
+        "arm": G.arm.name,
+        "output": G.outputs[0],
+        "unit": G.units[0],
+        "s": [[float(p.real), float(p.imag)] for p in s],
+        **roads_answer(G.by_methods(s)),
+    }
 
 
 def points_table(answer: dict[str, Any]) -> Table:
