@@ -9,6 +9,7 @@ from tfarm.errors import (
     ParameterError,
     TfarmError,
     did_you_mean,
+    naming,
 )
 
 
@@ -21,6 +22,16 @@ def test_a_parameter_error_names_file_key_value_and_remedy():
     assert str(error().in_file("my arm.toml")) == "my arm.toml: link.length = -1.0: a length is positive"
     assert str(error(value=MISSING)) == "link.length is missing: a length is positive"
     assert str(error(value=True)) == "link.length = true: a length is positive"
+
+
+@pytest.mark.parametrize(("own", "told"), [(None, "arm.toml: link"), ("c.mat", "c.mat: link")])
+def test_what_is_read_of_a_file_is_refused_with_its_name_unless_another_is_meant(own, told):
+    with pytest.raises(ParameterError) as refused, naming("arm.toml"):
+        raise error(file=own)
+    assert str(refused.value).startswith(told)
+    assert refused.value.__suppress_context__
+    with pytest.raises(ConvergenceError), naming("arm.toml"):
+        raise ConvergenceError("stopped", 1.0, 0.0)
 
 
 def test_a_parameter_error_is_a_value_error_of_tfarm():

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from enum import Enum
 from functools import partial
 from typing import Any, Final
@@ -44,6 +45,15 @@ class ParameterError(TfarmError, ValueError):
     def in_file(self, file: str | os.PathLike[str]) -> ParameterError:
         """The same error, with the file it was found in."""
         return type(self)(key=self.key, value=self.value, remedy=self.remedy, file=file)
+
+
+@contextmanager
+def naming(file: str | os.PathLike[str]) -> Iterator[None]:
+    """What is refused inside of this is refused with the name of the file, unless it names one."""
+    try:
+        yield
+    except ParameterError as error:
+        raise (error if error.file else error.in_file(file)) from None
 
 
 class ConvergenceError(TfarmError):

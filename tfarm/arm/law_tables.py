@@ -24,7 +24,7 @@ from pydantic import Field
 from tfarm.arm.declared import StrictTable, validated
 from tfarm.arm.law import Law
 from tfarm.arm.reading import load_tables
-from tfarm.errors import MISSING, ParameterError, close_to, must_be_known
+from tfarm.errors import MISSING, ParameterError, close_to, must_be_known, naming
 from tfarm.files import read_mat
 
 LAW_TABLE = "law"  # the table's name
@@ -79,10 +79,8 @@ def load_law(name_or_path: str | os.PathLike[str]) -> Law | None:
     Raises ParameterError for an unknown key, a wrong type or a value that cannot be, naming the file.
     """
     tables, file = load_tables(name_or_path)
-    try:
+    with naming(file):
         return law_of_table(tables[LAW_TABLE], Path(file).parent) if LAW_TABLE in tables else None
-    except ParameterError as error:
-        raise error.in_file(file) from None
 
 
 def law_of_table(table: Any, folder: Path) -> Law:

@@ -13,7 +13,7 @@ from importlib.resources import files
 from typing import Any
 
 from tfarm.arm.records import Arm
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import ParameterError, did_you_mean, naming
 from tfarm.files import read_file
 
 PRESETS = files("tfarm.arm") / "presets"
@@ -36,10 +36,8 @@ def load(name_or_path: str | os.PathLike[str]) -> Arm:
     from tfarm.arm.schema import arm_of_table  # here, because pydantic takes a while to import
 
     table, file = load_tables(name_or_path)
-    try:
+    with naming(file):
         return arm_of_table(table)
-    except ParameterError as error:
-        raise error.in_file(file) from None
 
 
 def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
@@ -56,10 +54,8 @@ def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], s
         raise ParameterError(key="arm", value=name, remedy=remedy)
     else:
         data = read_file(name, MOST_ARM_BYTES, key="arm", what="a .toml file")
-    try:
+    with naming(name):
         return _table_of(data), name
-    except ParameterError as error:
-        raise error.in_file(name) from None
 
 
 def decoded(data: bytes, remedy: str) -> str:

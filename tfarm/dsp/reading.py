@@ -11,7 +11,7 @@ from tfarm.arm.declared import TomlTable, validated
 from tfarm.arm.reading import load_tables
 from tfarm.arm.tables import ArmTable
 from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import ParameterError, did_you_mean, naming
 
 OF_AN_ARM = (*ArmTable.model_fields, "law")
 
@@ -50,10 +50,8 @@ def load_chain(name_or_path: str | os.PathLike[str]) -> Chain:
     Raises ParameterError for an unknown key, a wrong type or a value that cannot be.
     """
     tables, file = load_tables(name_or_path)
-    try:
+    with naming(file):
         return chain_of_tables(tables)
-    except ParameterError as error:
-        raise error.in_file(file) from None
 
 
 def chain_of_tables(tables: Mapping[str, Any]) -> Chain:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import INPUTS
 from tfarm.arrays import Complex, Real
-from tfarm.errors import MISSING, ParameterError, did_you_mean
+from tfarm.errors import MISSING, ParameterError, did_you_mean, naming
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.files import read_file
 
@@ -61,7 +61,7 @@ def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Meas
     if re.sub(r"#\d+$", "", name).lower().endswith(UFF):
         return _of_uff(name, output, input)
     sheet = read_sheet(path, key=f"{output}/{input}")
-    try:
+    with naming(name):
         omega, values = _frequencies(sheet), _values(sheet)
         return Measured(
             output=output,
@@ -74,8 +74,6 @@ def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Meas
             source=name,
             digest=sheet.digest,
         )
-    except ParameterError as error:
-        raise error.in_file(name) from None
 
 
 def measured_of(
@@ -183,7 +181,7 @@ def _of_uff(name: str, output: str, input: str) -> Measured:
     """The response of a UFF file: the one it has, or that of the number behind a # (from 1, as they stand there)."""
     path, _, number = name.partition("#")
     data = read_file(path, MOST_RECORD_BYTES, key=f"{output}/{input}", what="a .uff file")
-    try:
+    with naming(path):
         found = _responses(path)
         if not found:
             remedy = "the file holds no frequency response function (type 58, function 4)"
@@ -201,8 +199,6 @@ def _of_uff(name: str, output: str, input: str) -> Measured:
         return Measured(
             output=output, input=input, omega=omega[kept], values=values[kept], source=name, digest=digest_of(data)
         )
-    except ParameterError as error:
-        raise error.in_file(path) from None
 
 
 def _responses(path: str) -> list[dict[str, Any]]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tfarm.arrays import Real
-from tfarm.errors import MISSING, ParameterError, did_you_mean
+from tfarm.errors import MISSING, ParameterError, did_you_mean, naming
 from tfarm.files import read_mat
 from tfarm.records import record
 
@@ -72,7 +72,7 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
         sheet = read_sheet(name, key="record")
         held, digest = dict(zip(sheet.names, sheet.values, strict=True)), sheet.digest
         units = dict(zip(sheet.names, sheet.units, strict=True))
-    try:
+    with naming(name):
         for each in TIMES:
             if units.get(each, "") not in ("", "s"):
                 raise ParameterError(key=f"unit of {each}", value=units[each], remedy="times are in seconds")
@@ -84,8 +84,6 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
         start, period, jitter = _clock(columns.pop(given[0]))
         if not columns:
             raise ParameterError(key="signals", value=MISSING, remedy="a column of times and nothing beside it")
-    except ParameterError as error:
-        raise error.in_file(name) from None
     return Recording(signals=columns, start=start, period=period, jitter=jitter, source=name, digest=digest)
 
 

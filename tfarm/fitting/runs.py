@@ -24,7 +24,7 @@ from tfarm.dsp.chain import TIME_ROUNDING, Chain
 from tfarm.dsp.results import modes_for, simulation_of
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulation import Simulation
-from tfarm.errors import ParameterError
+from tfarm.errors import ParameterError, naming
 from tfarm.records import record
 
 from .recording import read_recording
@@ -119,14 +119,12 @@ def load_run(name_or_path: str | os.PathLike[str]) -> MeasuredRun | None:
     tables, file = load_tables(name_or_path)
     if "measured" not in tables:
         return None
-    try:
+    with naming(file):
         table = validated(RunTable, tables["measured"], "measured")
         found = read_recording(Path(file).parent / table.file)
         led = found.signal(LED_BY, "measured.file")
         if not {ANGLE_COLUMN, MOMENT_COLUMN} & set(found.signals):
             remedy = f"has neither {ANGLE_COLUMN} [rad] nor {MOMENT_COLUMN} [N m] beside {LED_BY} [rad]"
             raise ParameterError(key="measured.file", value=table.file, remedy=remedy)
-    except ParameterError as error:
-        raise error if error.file else error.in_file(file) from None
     angle, moment = (found.signals.get(name, np.empty(0)) for name in (ANGLE_COLUMN, MOMENT_COLUMN))
     return MeasuredRun(found.times - found.start, led, angle, moment, table.source)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm.reading import decoded
 from tfarm.arrays import Real
-from tfarm.errors import MISSING, ParameterError
+from tfarm.errors import MISSING, ParameterError, naming
 from tfarm.files import read_file
 from tfarm.records import record
 
@@ -65,10 +65,8 @@ def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
     number; naming `key` where the file cannot be read.
     """
     data = read_file(path, MOST_RECORD_BYTES, key=key, what="a .csv file")
-    try:
+    with naming(path):
         return sheet_of(data)
-    except ParameterError as error:
-        raise error.in_file(path) from None
 
 
 def sheet_of(data: bytes) -> Sheet:
