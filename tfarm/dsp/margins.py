@@ -88,8 +88,10 @@ def delay_margin(loop: AnySampled) -> DelayMargin:
     for i in range(1, MOST_STEPS + 1):
         if i * step > LONGEST_DELAY_SAMPLES:
             break
-        if grows(i * step):
-            return DelayMargin(float(brentq(log_radius, (i - 1) * step, i * step, xtol=DELAY_KNOWN)), False)
+        low, high = (i - 1) * step, i * step
+        if grows(high) and log_radius(high) >= 0:  # a pole on the circle but for rounding is on either side
+            is_between = log_radius(low) < 0
+            return DelayMargin(float(brentq(log_radius, low, high, xtol=DELAY_KNOWN)) if is_between else low, False)
     return DelayMargin(min(MOST_STEPS * step, LONGEST_DELAY_SAMPLES), True)
 
 

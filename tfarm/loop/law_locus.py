@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -30,9 +31,10 @@ from .answers import law_answer
 from .crossings import BranchCrossing, crossing_answers, in_words
 from .damping import NO_PART
 from .frequencies import band_of, grid
-from .law_loop import NEAREST_TO_ORIGIN, LawLoop
+from .law_loop import LawLoop
 from .law_map import law_crossings
 from .law_poles import law_box, starting_points_of
+from .resting import NEAREST_TO_ORIGIN
 from .variation import ARM_PARAMETERS, must_be_way
 
 MOST_LAW_LOCUS_POINTS = 5000  # values: at each all poles of a box are found
@@ -239,11 +241,14 @@ def _crossings(family: Family, values: Real, branches: Complex, box: Box) -> tup
     """
     found, sign = [], float(np.sign(values[-1] - values[0]))
     for number, row in enumerate(branches):
-        side = np.where(abs(row.real) <= NO_PART * abs(row), 0, np.sign(row.real))
-        for n in np.flatnonzero(side[1:] * side[:-1] < 0):
-            each = _crossed(family, values[n : n + 2], row[n : n + 2])
-            way = "unstable" if side[n + 1] > 0 else "stable"
-            found.append(BranchCrossing(gain=each[0], omega=each[1], branch=number, direction=way))
+        side = np.where(abs(row.real) <= NO_PART * abs(row), 0, np.sign(row.real))  # NaN where it is in no box
+        for low, high in pairwise(np.flatnonzero(side != 0)):
+            if not side[low] * side[high] < 0 or np.isnan(row[low : high + 1]).any():
+                continue
+            on_it = values[low + 1], abs(row[low + 1].imag)  # where a value between them is the crossing
+            at, omega = on_it if high > low + 1 else _crossed(family, values[low : high + 1], row[low : high + 1])
+            way = "unstable" if side[high] > 0 else "stable"
+            found.append(BranchCrossing(gain=float(at), omega=float(omega), branch=number, direction=way))
     if not family.is_of_arm and family.vary != "delay":
         loop, ascending, band, seen = family.own, np.sort(values), box.im_max, tuple(found)
         omega, span = np.asarray(grid(loop.arm, band)), float(ascending[-1] - ascending[0])

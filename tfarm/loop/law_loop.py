@@ -24,9 +24,10 @@ from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum.scales import first_frequency
 
+from .resting import NEAREST_TO_ORIGIN, resting_zeros
+
 FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: how far right an improper law is looked at
 UNDISPERSED = 1e11  # of w1: where waves are no longer dispersed
-NEAREST_TO_ORIGIN = 1e-12  # of w1: where the function, its zeros at 0 divided out, is taken for its value at 0
 FALL_FACTOR = 0.5  # L must fall by this there, from one to the next
 ALMOST_ZERO = 1e-200  # 1/s: where it is seen whether a signal is fed back at all, also by a law that vanishes at rest
 NO_ORDER = 99  # of a zero at s = 0, of what is not fed back: above that of any part
@@ -80,14 +81,19 @@ class LawLoop:
 
     @cached_property
     def zeros_at_origin(self) -> int:
-        """How often D vanishes at s = 0, taken as the least of its terms."""
+        """How often D vanishes at s = 0: as the least of its terms does, and more often where these cancel."""
         integrators = int((self.law.poles == 0).sum())
         terms = [self.k.at_rest + integrators]
         numerators, _ = self.law.polynomials(np.array([ALMOST_ZERO + 0j]))
         for row, order in enumerate(self.signals.orders):
             if abs(numerators[row, 0]) > 0:
                 terms.append(order + self._order_of(row))
-        return min(terms)
+        return min(terms) + self.resting_zeros
+
+    @cached_property
+    def resting_zeros(self) -> int:
+        """How many poles are at s = 0 because the law takes off exactly what holds the rig at rest."""
+        return resting_zeros(self.loop_function, first_frequency(self.arm))
 
     def _order_of(self, row: int) -> int:
         """How often p_i vanishes at s = 0: those zeros of its parts, and integrators of the others."""

@@ -112,19 +112,25 @@ def law_map(arm: Arm, law: AnyLaw, vary: tuple[str, str], x: Real, y: Real, band
     columns = [
         law_crossings(own.under(law.having(vary[0], float(value))), vary[1], y, omega, known, band) for value in x
     ]
-    gains, start = np.concatenate([y[:0], *(each.gain for each in columns)]), x.size // 2
-    at = int(np.argmax(abs(y[:, None] - gains).min(axis=1))) if gains.size else y.size // 2  # farthest from a crossing
+    at = _farthest(y, np.concatenate([y[:0], *(each.gain for each in columns)]))
     row = law.having(vary[1], float(y[at]))
     if is_counted:
         there = [unstable_below(own.under(row.having(vary[0], float(value))), band) for value in x]
     else:
         across = law_crossings(own.under(row), vary[0], x, omega, known, band)
+        is_resting = own.under(row.having(vary[0], float(x[x.size // 2]))).resting_zeros
+        start = _farthest(x, across.gain) if is_resting else x.size // 2
         begin = unstable_below(own.under(row.having(vary[0], float(x[start]))), band)
         (there,) = counts_over(x, [across], float(x[start]), np.array([begin]))
     counts = counts_over(y, columns, float(y[at]), np.asarray(there))
     found = LawMap(own.arm, law, vary, x, y, counts.T.copy(), band, columns)
     _must_hold_at_corners(own, found)
     return found
+
+
+def _farthest(values: Real, crossings: Real) -> int:
+    """Which of the values is farthest from all crossings; the middle one where there are none."""
+    return int(np.argmax(abs(values[:, None] - crossings).min(axis=1))) if crossings.size else values.size // 2
 
 
 def _must_hold_at_corners(loop: LawLoop, found: LawMap) -> None:
@@ -160,6 +166,8 @@ def unstable_below(loop: LawLoop, band: float) -> int:
     Else by the winding number around that half of the box alone.  Raises ConvergenceError where one is on the axis, to
     working precision.
     """
+    if loop.resting_zeros:
+        raise ConvergenceError("a pole is at s = 0, neither stable nor not: take other values", loop, 0.0)
     if loop.arm.least_damping:
         found = law_poles_below(loop, band, LISTED_LEFT)
         must_be_off_axis(found.moving[found.moving.real <= MARGIN_OF_ZERO * abs(found.moving)])

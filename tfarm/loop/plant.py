@@ -19,8 +19,10 @@ from tfarm.exact.values import expansions_at_zero
 from tfarm.records import record
 from tfarm.spectrum.correction import Member
 from tfarm.spectrum.damped import member
-from tfarm.spectrum.scales import check_gains, most_gain
+from tfarm.spectrum.scales import check_gains, first_frequency, most_gain
 from tfarm.spectrum.search import ARMS_KEPT
+
+from .resting import resting_zeros
 
 SMALLEST_NORMAL = float(np.finfo(float).tiny)  # a smaller double has not all its digits
 
@@ -122,6 +124,11 @@ class Loop:
             return False
         is_even = not any(self.law.row) or (self.is_reactive and not self.law.K1)
         return is_even or (self.is_told_by_theorem and not self.takes_energy)
+
+    @cached_property
+    def resting_zeros(self) -> int:
+        """How many poles are at s = 0 because the law takes off exactly what holds the rig at rest."""
+        return 0 if self.arm.has_rigid_mode else resting_zeros(self.loop_function, first_frequency(self.arm))
 
     @property
     def member(self) -> Member:

@@ -18,7 +18,7 @@ from tfarm.arm.checks import whole
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
-from tfarm.exact.characteristic import zeros_at_origin
+from tfarm.exact.characteristic import Analytic, deflated, off_rest, zeros_at_origin
 from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.spectrum.box import TRIED_HEIGHTS, Box, complete
@@ -159,9 +159,15 @@ def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = TRIED_HE
     """
     if loop.freed is not loop and loop.freed.is_lossless:  # with its poles at 0 and on the axis where they belong
         return replace(poles_below(loop.freed, height, factors), loop=loop)
-    at_zero = zeros_at_origin(loop.k, loop.gains)
+    resting = loop.resting_zeros
+    at_zero = zeros_at_origin(loop.k, loop.gains) + resting
     starts, known = starting_points(loop, STARTS_REACH * height), slow_poles(loop, SLOW_SHARE * height)
-    function = loop.member.function
+    whole = loop.member.function
+
+    def function(s: Complex) -> Analytic:
+        s = off_rest(s) if resting else s
+        return deflated(*whole(s), s, resting)
+
     found, box = complete(function, lambda height: box_of(loop, height), height, starts, known, factors)
     # without losses the function is even in s: a simple zero is its own mirror image, its real part is rounding
     on_axis = loop.is_lossless & (abs(found.real) <= AXIS_SHARE * abs(found))
