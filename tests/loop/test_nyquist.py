@@ -7,7 +7,7 @@ import pytest
 
 import tfarm
 from tfarm import Hub, HubFeedback, Payload
-from tfarm.loop.nyquist import poles_on_axis
+from tfarm.loop.nyquist import compressed, poles_on_axis
 from tfarm.loop.plant import Loop
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -26,3 +26,12 @@ def test_the_loop_function_has_a_pole_at_rest_where_it_grows_without_bound(name,
     near = abs(loop.loop_function(1j * 1e-4 * np.array([10.0, 1.0])))
     grows = bool(near[1] > 5 * near[0])
     assert (0.0 in poles_on_axis(loop, 1000.0)) == grows
+
+
+def test_the_plane_is_drawn_in_a_disc():
+    """r at r/(1 + r), its direction kept: back again r/(1 - r); what is infinite at 1."""
+    L = np.array([0.0, 0.3 - 0.4j, -1.0, 7j, -1e8 + 1e8j])
+    drawn = compressed(L)
+    assert (abs(drawn) < 1).all()
+    np.testing.assert_allclose(drawn / (1 - abs(drawn)), L, rtol=1e-7)
+    assert compressed(np.array([complex(np.inf, 3.0)])).tolist() == [1.0]

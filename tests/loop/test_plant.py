@@ -20,7 +20,6 @@ ARM = tfarm.load("sasaki2012")
     [
         (math.inf, HubFeedback(K1=0.3), "there is no loop"),
         (0.0, HubFeedback(K1=0.3, K2=0.1), "an algebraic loop"),
-        (0.1, HubFeedback(K1=-5e-310), "has not all its digits"),
     ],
 )
 def test_where_there_is_no_loop(inertia: float, law, words: str) -> None:
