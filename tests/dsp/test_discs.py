@@ -2,10 +2,14 @@
 
 import math
 
+import mpmath
 import numpy as np
 import pytest
 
-from tfarm.dsp.circle import Discs
+import tfarm
+from tfarm.arm import HubFeedback
+from tfarm.dsp import Chain, sampled_loop
+from tfarm.dsp.circle import Circle, Discs, _Arcs
 from tfarm.dsp.law_circle import on_discs
 from tfarm.dsp.law_polynomials import Polynomial
 from tfarm.dsp.shown import Figure
@@ -54,3 +58,20 @@ ONE = Discs(np.array([1.0 + 0j]), np.array([0.1]))
 )
 def test_a_figure_is_sharp_in_the_digits_that_are_proven(figure, sharp):
     assert [digits for digits in (3, 4, 5) if figure.is_sharp(digits)] == sharp
+
+
+def test_a_disc_about_a_point_is_as_wide_as_rounding_next_to_a_pole_too():
+    """The sum of r/(z - e^{pT}) with forty digits, z from 1e-9 rad beside a pole on."""
+    arm, T = tfarm.load("sasaki2012-lab"), 0.01
+    loop = sampled_loop(arm, HubFeedback(), Chain(), count=3)
+    plant = loop.plant
+    q = np.angle(loop.pulse.multipliers[0]) + np.array([1e-9, 1e-5, 0.3])
+    circle = Circle(loop, np.ones(plant.poles.size, bool), np.zeros(3))
+    found = circle._summed(_Arcs(q, q), plant.poles, plant.residues)
+    with mpmath.workdps(40):
+        z = [mpmath.expj(mpmath.mpf(each)) for each in q]
+        b = [mpmath.exp(mpmath.mpc(each) * T) for each in plant.poles]
+        for row, n in np.ndindex(found.middle.shape):
+            exact = mpmath.fsum(r / (z[n] - each) for r, each in zip(plant.residues[row].tolist(), b, strict=True))
+            assert abs(found.middle[row, n] - exact) <= found.radius[row, n]
+    assert (found.radius < 1e-4 * abs(found.middle)).all()

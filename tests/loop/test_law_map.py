@@ -140,3 +140,10 @@ def test_a_map_whose_counts_do_not_hold_at_its_corners_is_refused(monkeypatch):
     monkeypatch.setattr(module, "unstable_below", other)
     with pytest.raises(ConvergenceError, match=r"at gain = 20, hub_angle.den.1 = 3 .* ask for a smaller range"):
         law_map(LAB, LAW, ("gain", "hub_angle.den.1"), np.array([1.0, 5.0, 20.0]), np.array([0.5, 1.0, 3.0]))
+
+
+def test_where_two_poles_meet_at_rest_their_count_goes_on_as_the_lag_says():
+    """J s^2 + g (1 - 0.1 s): one pole right of the axis for g < 0, and both for g > 0."""
+    law, gains = Law({"hub_angle": ([-0.1, 1.0], [1e-3, 1.0])}), np.array([-0.02, 0.02])
+    found = tfarm.map(LAB, np.array([1e-3, 2e-3]), gains, law=law, vary=("hub_angle.den.0", "gain"))
+    assert found.unstable.tolist() == [[1, 1], [2, 2]]

@@ -46,12 +46,13 @@ def test_the_loop_function_is_made_of_transfer_functions(seed: int) -> None:
 
 
 @pytest.mark.parametrize("K2", [-4.0, 0.0, 0.5, 1.2])
-def test_slow_torque_turns_the_effective_inertia(K2: float) -> None:
-    """The slow real pole tends to -K1/J_eff as K1 -> 0."""
-    misses = []
+@pytest.mark.parametrize("radius", [0.0, 0.2])
+def test_slow_torque_turns_the_effective_inertia(K2: float, radius: float) -> None:
+    """The slow real pole tends to -K1/J_eff as K1 -> 0; a gauge on a hub's rim does not read all that the hub turns."""
+    arm, misses = replace(ARM, hub=replace(ARM.hub, radius=radius)), []
     for K1 in (1e-2, 1e-3):
-        slow = poles_of_gains(ARM, HubFeedback(K1=K1, K2=K2), 6).moving
+        slow = poles_of_gains(arm, HubFeedback(K1=K1, K2=K2), 6).moving
         slow = slow[abs(slow).argmin()].real
-        misses.append(abs(slow * effective_inertia(ARM, HubFeedback(K2=K2)) / -K1 - 1))
+        misses.append(abs(slow * effective_inertia(arm, HubFeedback(K2=K2)) / -K1 - 1))
     assert misses[1] < 1e-3
     assert misses[1] < misses[0] / 30 or misses[1] < 1e-12

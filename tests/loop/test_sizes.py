@@ -106,3 +106,11 @@ def test_a_crossing_at_0_is_at_0_and_not_below_it(name):
 )
 def test_a_leading_coefficient_is_asked_about_at_0_where_it_passes_there(name, limits, asked):
     assert asked_at(name, limits) == asked
+
+
+def test_models_that_nothing_damps_are_not_unstable_by_rounding():
+    """Their poles are at up to 6e4 rad/s, and right of the axis by some last digits."""
+    arm = tfarm.load("stocky-steel").having(damping=0.0)
+    found = tfarm.spill(arm, Law({"hub_angle": 1.0, "root_moment": 0.3}), 4)
+    assert found.rightmost.real.max() > 0
+    assert found.unstable.tolist() == [0] * 4
