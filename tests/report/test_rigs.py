@@ -1,6 +1,7 @@
 """Pages of rigs: every part is in a table and in the sketch, hub-locked frequencies stand beside the free ones."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from matplotlib.patches import Rectangle
 
 import tfarm
 from tfarm import plots
-from tfarm.arm import written_unit
+from tfarm.arm import Gauge, written_unit
 from tfarm.dsp.regions import sampled_map
 from tfarm.plots.sketch import sketch
 from tfarm.plots.style import blank
@@ -39,6 +40,18 @@ def test_every_number_of_the_file_stands_in_the_table_of_parameters(name):
         numbers += [arm.motor.resistance, arm.motor.torque_constant, arm.motor.gear_ratio, arm.motor.rotor_inertia]
     assert set(numbers) - {0.0} <= set(shown.values())
     assert values_of(derived)["total inertia about the axis"] == arm.total_inertia
+
+
+def test_the_gauge_stands_there_where_it_is_not_at_the_root_and_a_cut_off_where_the_theory_has_one():
+    """The second pair of waves travels in Timoshenko's theory alone (tests/spectrum/test_beyond_the_box.py)."""
+    rig = RIGS["bench-rig"]
+    for arm in (rig, replace(rig, gauge=Gauge(x=0.013)), rig.under("rayleigh")):
+        section = arm_section(arm)
+        _, given, derived = section.blocks
+        assert values_of(given).get("strain gauge: place from the clamp", 0.0) == arm.gauge.x
+        said = [fact.label for fact in section.facts] + list(values_of(derived))
+        assert any("shear cut-off" in each for each in said) == (arm.theory == "timoshenko")
+        assert ("no shear cut-off" in derived.caption) == (arm.theory == "rayleigh")
 
 
 def test_the_sketch_has_each_segment_where_it_is_and_the_payload_at_its_centre():

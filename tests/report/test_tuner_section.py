@@ -27,7 +27,7 @@ from tfarm.report.writing import _write_pages
 from tfarm.tuner import Learning, Plan, initial_network, train, tried_loops, tune
 from tfarm.tuner import overview as study_module
 from tfarm.tuner import tuning as tuning_room
-from tfarm.tuner.overview import NOMINAL, CostMap, tuner_study
+from tfarm.tuner.overview import CostMap, tuner_study
 
 LAB = tfarm.load("sasaki2012-lab")
 SEEDS = 3
@@ -104,7 +104,7 @@ def test_the_table_of_comparison_is_the_rows(small):
     data, section = small
     shown = values_of(blocks_of(section)["tune-comparison"]) | values_of(blocks_of(section)["tune-residual"])
     assert shown["condition"] == [row.condition for row in data.rows]
-    assert shown["condition"][0] == NOMINAL
+    assert shown["condition"][0] == "as trained"
     assert f"seed {data.tuning.plan.seed}." in blocks_of(section)["tune-comparison"].caption
     for key in ("without", "best_constant", "own_constant", "tuner", "bound", "ZV", "EI"):
         assert shown[f"{key}_cost"] == [getattr(row, key).cost for row in data.rows]

@@ -7,7 +7,7 @@ import pytest
 
 import tfarm
 from tests.odd_arms import odd_arms
-from tfarm.dsp import Chain, sampled_loop
+from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.spectrum.scales import default_gains
 from tfarm.tuner.comparison import quantised_chain, tried_loops
 from tfarm.tuner.overview import plan_of
@@ -50,6 +50,11 @@ def test_the_papers_arm_keeps_the_papers():
         "payload 0.1 kg", "payload 0.25 kg", "payload 0.5 kg", "hub -20%", "hub +20%", "C = 0 s", "C = 1e-05 s",
         "C = 0.001 s",
     ]  # fmt: skip
+    assert names[2:4] == ["one sample of delay", "quantised, one sample of delay"]
+    late = Chain(sampling=Sampling(delay_samples=0.5))
+    assert [each.name for each in tried_loops(lab, late)][2:4] == [
+        each.replace("one", "one more") for each in names[2:4]
+    ]
     converters = quantised_chain(lab, Chain()).converters
     assert (converters.moment_range, converters.torque_range, plan_of(lab, Chain()).scale) == (20.0, 10.0, 1.0)
 

@@ -14,7 +14,7 @@ from typing import TypeVar
 from tfarm.arm.link import Link
 from tfarm.arm.rig import Attachment, brief_repr
 from tfarm.arm.texts import plain_name, plain_texts
-from tfarm.arm.theories import THEORIES, Theory
+from tfarm.arm.theories import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Theory
 from tfarm.arm.turning import INPUT_UNITS, INPUTS, Input, Turning
 from tfarm.errors import ParameterError, did_you_mean, shown
 
@@ -176,8 +176,16 @@ class Arm(Turning):
 
     @property
     def shear_cutoff(self) -> float:
-        """sqrt(kGA/rhoI) [rad/s], above which both pairs of waves travel; of several segments the lowest."""
+        """sqrt(kGA/rhoI) [rad/s], above which both pairs of waves travel; of several segments the lowest.
+
+        A theory without shear or without rotary inertia has but one that ever travels (`has_cutoff`).
+        """
         return min(math.sqrt(link.kGA / link.rhoI) for link in self.links)
+
+    @property
+    def has_cutoff(self) -> bool:
+        """Whether its waves change at `shear_cutoff`: they do in Timoshenko's theory alone."""
+        return self.theory in WITH_SHEAR and self.theory in WITH_ROTARY_INERTIA
 
     def having(self, **numbers: float) -> Arm:
         """The arm with other numbers: of `ADJUSTABLE`, by name, in SI units.  Raises ParameterError as its parts do.

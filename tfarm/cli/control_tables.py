@@ -22,8 +22,8 @@ def print_poles(answer: dict[str, Any]) -> None:
     print(f"all poles with {left:.6g} < Re s < {right:.6g} and |Im s| < {top:.6g} ({proven}),")
     print(f"{answer['unstable']} of them unstable")
     if answer["ends_at_shear_cutoff"]:
-        print(f"no more lie below the shear cut-off, {answer['shear_cutoff_rad_s']:.6g} rad/s, where the list ends;")
-        print("--count goes on above it, into shear, which this model hardly damps")
+        print(f"no more lie below sqrt(kGA/rhoI), {answer['shear_cutoff_rad_s']:.6g} rad/s, where the list ends;")
+        print("--count goes on above it, in Timoshenko's theory into shear, which that hardly damps")
     print(answer["sign_convention"])
 
 

@@ -56,10 +56,7 @@ def print_modes(answer: dict[str, Any]) -> None:
         proven = "proven" if "proven_complete_in_box" in answer else "by winding number"
         print(f"{answer['eigenvalues_in_box']} eigenvalues with Re s from {left:.6g} to {right:.6g} 1/s and")
         print(f"Im s from {low:.6g} to {high:.6g} rad/s, all listed ({proven}). Beyond the box there are more:")
-        if "-1/C" in answer["box_note"]:
-            print("shear is undamped, so lightly damped modes exist above any box; real ones accumulate at -1/C.")
-        else:
-            print("these are ever less damped, as no segment is (C = 0).")
+        print(f"{answer['box_note'].partition(': ')[2]}.")
         for each in answer.get("circuit_eigenvalues", ()):
             print(f"One more, {each:.8g} 1/s, belongs to no mode: it is the motor's circuit.")
         if "damped_note" in answer:

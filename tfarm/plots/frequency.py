@@ -72,7 +72,9 @@ def draw_magnitude(data: Bode, *, ax: Axes, is_small: bool = False, label: str =
     if np.any(data.rigid):
         ax.plot(data.omega, abs(data.rigid), color=GREY, lw=1.0, ls=(0, (4, 3)), zorder=1.5, label="rigid arm")
     _mark_roots(data, ax)
-    if data.band[0] < data.arm.shear_cutoff < data.band[1]:  # where the second pair of waves begins to travel
+    if (
+        data.arm.has_cutoff and data.band[0] < data.arm.shear_cutoff < data.band[1]
+    ):  # where the second pair of waves begins to travel
         ax.axvline(data.arm.shear_cutoff, color=ORANGE, lw=1.0, ls="-.", label="shear cut-off")
     ax.set_xlabel("angular frequency [rad/s]")
     ax.yaxis.set_minor_formatter(NullFormatter())

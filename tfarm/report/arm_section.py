@@ -9,11 +9,12 @@ from tfarm.arm import Arm, implausible, input_words
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant, singly, unit
 from tfarm.plots.sketch import draw_arm
-from tfarm.report.rig_tables import QuantityRow, derived_rows, given_rows
+from tfarm.report.rig_tables import QuantityRow, cutoff_rows, derived_rows, given_rows
 from tfarm.report.sections import Fact, PageSection, Picture
 
 HEADLINE_MODES = 3  # natural frequencies among the headline numbers, the rigid body's 0 not shown
 MOST_POISSON = 0.5  # of an isotropic material; a larger E/2G - 1 is none's ratio
+ONE_PAIR = "In this theory one pair of the beam's waves decays along it at any frequency: there is no shear cut-off."
 BELOW_CUTOFF = "Below the shear cut-off one pair of the beam's waves decays along it, above it both pairs travel."
 GIVEN_CAPTION = (
     "What the arm's file says, in SI units. An infinite hub inertia locks the hub, an infinite payload mass pins "
@@ -67,14 +68,15 @@ def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
     slenderness = arm.link.slenderness if arm.is_uniform else arm.length / arm.link.section.radius_of_gyration
     depth = f"depth/length {significant(math.sqrt(12) / slenderness, 3)} as a rectangle"
     lossless = "none: resonances are infinite" if arm.is_undamped else "none in the link: hub, clamp or joint lose"
+    differs = "of the most damped segment" * (len({link.damping for link in arm.links}) > 1)
     numbered = zip(modes.index, modes.natural_frequency, strict=True)
     return (
         *(frequency(f"natural frequency {number}", omega, 8) for number, omega in numbered if number > 0),
         Fact(label="total inertia J about the hub", value=inertia, unit="kg m²", beside=how),
         Fact(label="slenderness L/√(I/A)", value=significant(slenderness, 5), beside=depth),
-        frequency("shear cut-off √(κGA/ρI)", arm.shear_cutoff, 6),
+        *([frequency("shear cut-off √(κGA/ρI)", arm.shear_cutoff, 6)] * arm.has_cutoff),
         Fact(label="mass of the link", value=significant(arm.own_mass, 5), unit="kg"),
-        Fact(label="damping C", value=plain(arm.damping), unit="s", beside="" if arm.damping else lossless),
+        Fact(label="damping C", value=plain(arm.damping), unit="s", beside=differs if arm.damping else lossless),
     )
 
 
@@ -102,8 +104,9 @@ def _picture(arm: Arm) -> Picture:
 
 def derived_table(arm: Arm) -> Table:
     """What follows from the parameters alone."""
+    waves = BELOW_CUTOFF if arm.has_cutoff else ONE_PAIR
     if not arm.is_uniform:
-        return _table("derived", "What follows from them", BELOW_CUTOFF, derived_rows(arm), digits=8)
+        return _table("derived", "What follows from them", waves, derived_rows(arm), digits=8)
     link, J = arm.link, arm.total_inertia
     ratio = ("Poisson's ratio of an isotropic material", "E/2G − 1", link.poissons_ratio, "")
     isotropic = [ratio] if -1 < link.poissons_ratio <= MOST_POISSON else []
@@ -115,12 +118,11 @@ def derived_table(arm: Arm) -> Table:
         ("radius of gyration", "√(I/A)", link.section.radius_of_gyration, "m"),
         ("slenderness", "L/√(I/A)", link.slenderness, ""),
         ("total inertia about the hub", "J", J, "kg m^2"),
-        ("shear cut-off", "√(κGA/ρI)", arm.shear_cutoff, "rad/s"),
-        ("shear cut-off", "", arm.shear_cutoff / (2 * math.pi), "Hz"),
+        *cutoff_rows(arm),
     ]
     if arm.has_rigid_mode and not arm.is_locked:
         rows.insert(7, ("root moment per torque at rest", "−(J − I_h)/J", -(J - arm.hub.inertia) / J, "N m/(N m)"))
-    return _table("derived", "What follows from them", BELOW_CUTOFF, rows, digits=8)
+    return _table("derived", "What follows from them", waves, rows, digits=8)
 
 
 def _table(stem: str, title: str, caption: str, rows: list[QuantityRow], digits: int = 10) -> Table:

@@ -9,23 +9,22 @@ import numpy as np
 from tfarm.arm import Arm
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant
+from tfarm.report.words import typeset
 from tfarm.spectrum import DampedModes, Modes, damped_modes, modes
-from tfarm.spectrum.answers import DAMPED_MODE_COLUMNS
+from tfarm.spectrum.answers import DAMPED_MODE_COLUMNS, beyond_the_box
 
 DAMPED_CAPTION = (
     "Eigenvalues of the arm with its own damping, C = {C} s, each continued from the undamped mode of its number. "
     "Each is enclosed in a disc of 12 digits that holds exactly one. All {count} eigenvalues with {left} < Re s < "
     "{right} 1/s and |Im s| < {top} rad/s are listed (conjugates counted{rigid}): the argument principle in ball "
-    "arithmetic counts those in this box. {outside}Beyond any such box there are more: shear is undamped in this "
-    "model, so lightly damped modes exist at ever higher frequency, and the slow real eigenvalues of overdamped "
-    "bending modes accumulate at −1/C = {limit} 1/s."
+    "arithmetic counts those in this box. {outside}Beyond any such box there are more: {beyond}."
 )
 NO_C_CAPTION = (
     "Eigenvalues of the rig with what its hub, clamp and joint lose (C = {C} in the link), each continued from the "
     "undamped mode of its number. Each is enclosed in a disc of 12 digits that holds exactly one. All {count} "
     "eigenvalues with {left} < Re s < {right} 1/s and |Im s| < {top} rad/s are listed (conjugates counted{rigid}): the "
     "argument principle in ball arithmetic counts those in this box. {outside}Beyond any such box there are more, at "
-    "ever higher frequency."
+    "ever higher frequency: {beyond}."
 )
 NOT_LISTED = "Modes above {last} are not listed: their branches cannot be told apart. "
 OUTSIDE_NOTE = (
@@ -54,7 +53,7 @@ def damped_table(undamped: Modes) -> Table:
     arm = undamped.arm
     damped = proven_damped_modes(arm, int(undamped.index[-1]))
     C, box = arm.damping, damped.box
-    edges = {"left": box.re_min, "right": box.re_max, "top": box.im_max, "limit": -1 / C if C else 0.0}
+    edges = {"left": box.re_min, "right": box.re_max, "top": box.im_max}
     resisted = damped.single.size - len(damped.others)
     rigid = ", with 0 twice" if arm.has_rigid_mode else ""
     if arm.has_rigid_mode and resisted:
@@ -72,6 +71,7 @@ def damped_table(undamped: Modes) -> Table:
             count=damped.count,
             rigid=rigid,
             outside=("" if inside.all() else OUTSIDE_NOTE) + left_out,
+            beyond=typeset(beyond_the_box(arm)),
             **words,
         ),
         columns=(

@@ -11,7 +11,7 @@ import numpy as np
 
 from tfarm.arm import Arm, HubFeedback, written_unit
 from tfarm.columns import Column, Table
-from tfarm.digits import plain, scientific, significant, singly
+from tfarm.digits import how_many, plain, scientific, significant, singly
 from tfarm.dsp import Chain, Simulation, Verdict, analyse
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.dsp.closed import verdict_on
@@ -137,7 +137,7 @@ def chain_told(arm: Arm, chain: Chain) -> str:
     """What stands between the law and the rig, every part that is not ideal."""
     sampling, converters, actuator = chain.sampling, chain.converters, chain.actuator
     told = [f"sampled every {in_ms(chain)} ms"]
-    told += [f"{plain(sampling.delay_samples)} samples late"] * bool(sampling.delay_samples)
+    told += [f"{how_many(sampling.delay_samples, 'sample')} late"] * bool(sampling.delay_samples)
     if not math.isinf(sampling.antialias_corner):
         told.append(f"through an anti-alias filter at {plain(sampling.antialias_corner)} rad/s")
     told += [f"an encoder of {converters.encoder_counts} counts a turn"] * (converters.encoder_counts is not None)

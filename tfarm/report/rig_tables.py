@@ -36,6 +36,7 @@ def given_rows(arm: Arm) -> list[QuantityRow]:
             for place, (name, symbol, value, unit) in enumerate(parts)
             if value or not place
         ]
+    rows += [("strain gauge: place from the clamp", "x", arm.gauge.x, "m")] * bool(arm.gauge.x)
     payload = arm.payload
     rows += [("payload mass", "m", payload.mass, "kg"), ("payload inertia", "I_c", payload.inertia, "kg m^2")]
     return rows + [("payload's centre beyond the tip", "e", payload.offset, "m")] * bool(payload.offset)
@@ -101,5 +102,14 @@ def derived_rows(arm: Arm) -> list[QuantityRow]:
         rows.append(("input for a torque of 1 N m", "", arm.input_per_torque, unit_of(MOMENT_GAIN, arm)))
     if arm.rate_loss:
         rows.append((f"what the losses at the hub add to {RATE_GAIN}", "", arm.rate_loss, unit_of(RATE_GAIN, arm)))
-    rows.append(("shear cut-off, of several segments the lowest", "√(κGA/ρI)", arm.shear_cutoff, "rad/s"))
-    return [*rows, ("shear cut-off", "", arm.shear_cutoff / (2 * math.pi), "Hz")]
+    return [*rows, *cutoff_rows(arm)]
+
+
+def cutoff_rows(arm: Arm) -> list[QuantityRow]:
+    """The shear cut-off, of an arm whose theory has one."""
+    lowest = ", of several segments the lowest" * bool(arm.outer)
+    rows = [
+        (f"shear cut-off{lowest}", "√(κGA/ρI)", arm.shear_cutoff, "rad/s"),
+        ("shear cut-off", "", arm.shear_cutoff / (2 * math.pi), "Hz"),
+    ]
+    return rows * arm.has_cutoff

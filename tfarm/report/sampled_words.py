@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, unit_of
 from tfarm.comparing.regions import StableRegions, stable_regions
 from tfarm.crossing import Window
-from tfarm.digits import plain, scientific, significant
+from tfarm.digits import how_many, plain, scientific, significant
 from tfarm.dsp import Analysis, Verdict, analyse
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.margins import around
@@ -124,7 +124,7 @@ def chain_words(arm: Arm, chain: Chain) -> str:
     sampling = chain.sampling
     told = [f"every {in_ms(chain)} ms"]
     if sampling.delay_samples:
-        told.append(f"{plain(sampling.delay_samples)} samples of delay")
+        told.append(f"{how_many(sampling.delay_samples, 'sample')} of delay")
     if not math.isinf(sampling.antialias_corner):
         told.append(f"an anti-alias filter at {plain(sampling.antialias_corner)} rad/s")
     if chain.converters.hub_rate == "difference":

@@ -27,7 +27,15 @@ from tfarm.report.tuner_words import (
     tuner_in_short,
 )
 from tfarm.report.words import typeset, upper
-from tfarm.tuner.overview import COARSE, CURVE_SEEDS, MAP_SEEDS, MAP_TRIALS, NOMINAL, TunerStudy, tuner_study
+from tfarm.tuner.overview import (
+    AS_TRAINED,
+    CURVE_SEEDS,
+    MAP_SEEDS,
+    MAP_TRIALS,
+    QUANTISED_AND_LATE,
+    TunerStudy,
+    tuner_study,
+)
 
 TUNER_TITLE = "The gain tuner: does a self-tuning gain help?"
 NOT_WITHOUT_DAMPING = (
@@ -137,12 +145,12 @@ def _slew_picture(data: TunerStudy) -> Picture:
         stem="tune-slew",
         title="The slew without and with the tuner",
         caption=(
-            f"Root moment, tip and motor over an ideal chain (the paper's Figures 4 and 6). {_residuals(data, 0)} The "
-            "dotted line is the end of the slew; dashed, the rigid arm."
+            f"Root moment, tip and motor with ideal converters (the paper's Figures 4 and 6). {_residuals(data, 0)} "
+            "The dotted line is the end of the slew; dashed, the rigid arm."
             f"{resolution_words(data.slews.values())}"
         ),
         alt=f"Root moment, tip and motor torque of the slew. {_residuals(data, 0)}",
-        figure=draw_responses(data.arm, data.slews, "the slew, ideal chain"),
+        figure=draw_responses(data.arm, data.slews, "the slew, ideal converters"),
         data=_signals(data, 0, "tune-slew-data"),
     )
 
@@ -168,14 +176,14 @@ def _coarse_picture(data: TunerStudy) -> Picture:
             f"{clipped_words(data.coarse)}{resolution_words(data.coarse.values())}"
         ),
         alt=f"The slew with converters and delay. {_residuals(data, 1)}",
-        figure=draw_responses(data.arm, data.coarse, "the slew, converters and one sample of delay"),
+        figure=draw_responses(data.arm, data.coarse, f"the slew, converters and {how_many(delay, 'sample')} of delay"),
         data=_signals(data, 1, "tune-dsp-data"),
     )
 
 
 def _residuals(data: TunerStudy, which: int) -> str:
     """What is left after the slew, from the table's rows: as trained, or with converters and delay."""
-    row = next(row for row in data.rows if row.condition == (NOMINAL, COARSE)[which])
+    row = data.rows[(AS_TRAINED, QUANTISED_AND_LATE)[which]]
     return (
         f"Left after the slew: {significant(row.without.residual, 3)} N m rms without moment feedback, "
         f"{significant(row.tuner.residual, 3)} N m with the tuner, {significant(row.best_constant.residual, 3)} N m "

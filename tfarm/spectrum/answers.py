@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tfarm.arm import WITH_SHEAR, Arm
 from tfarm.arrays import Real
 from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
 from tfarm.digits import DOUBLE_DIGITS, aligned, general, kept_digits, lined, significant, singly, within
@@ -21,8 +22,11 @@ from .table import FEWEST_LISTED, Modes, compare_theories, hub_locked
 SHAPE_DIGITS = 10  # in a report's files, of what shapes are needed for: these differ by 1e-14 between processors
 EIGENVALUE_ERROR = 2e-14  # of its size: what a float64 may be off (tests: 1e-14 to 50 digits, 64 eps in closed form)
 SMALL_RATIO = 1e-3  # a damping ratio below this has less than three digits in five decimals
-IN_THE_BOX = "complete in the box; lightly damped shear modes exist above any box, real eigenvalues accumulate at -1/C"
-IN_THE_BOX_WITHOUT_C = "complete in the box; above it there are more, ever less damped, as no segment is (C = 0)"
+LESS_DAMPED = "they are ever less damped, as no segment is (C = 0)"
+OF_SHEAR = "shear is undamped in this model, so lightly damped modes exist at ever higher frequency"
+OF_ELASTIC = "segments without damping have lightly damped modes at ever higher frequency"
+OF_BENDING = "in this theory, which leaves out shear, all of them are overdamped from some frequency on"
+ACCUMULATE = "the slow real eigenvalues of overdamped bending modes accumulate at -1/C"
 LOCKED_NOTE = (
     "hub locked: the frequencies with the hub held still. A hub that dry friction holds, as it mostly does once a slew "
     "is over, rings there and not at the free ones: a measured number near this column says that the hub stood still."
@@ -141,9 +145,19 @@ def _undamped(modes: Modes, digits: int | None, method: Method) -> list[Column]:
     return [*columns[:3], locked, *columns[3:]]
 
 
+def beyond_the_box(arm: Arm) -> str:
+    """What the eigenvalues of a damped arm are that lie beyond any box."""
+    if arm.has_elastic_link:
+        return LESS_DAMPED
+    dampings = {link.damping for link in arm.links}
+    light = OF_SHEAR if arm.theory in WITH_SHEAR else OF_BENDING if all(dampings) else OF_ELASTIC
+    most = " of the most damped segment" * (len(dampings) > 1)
+    return f"{light}, and {ACCUMULATE}{most}, {-1 / arm.damping:.6g} 1/s"
+
+
 def _damped_answer(damped: DampedModes) -> dict[str, Any]:
     """The box of the eigenvalues, and what of them is in no row."""
-    note = IN_THE_BOX if damped.undamped.arm.damping else IN_THE_BOX_WITHOUT_C
+    note = f"complete in the box; beyond it there are more: {beyond_the_box(damped.undamped.arm)}"
     answer: dict[str, Any] = {"box": list(damped.box), "eigenvalues_in_box": damped.count, "box_note": note}
     if damped.others:
         answer["circuit_eigenvalues"] = list(damped.others)

@@ -13,7 +13,6 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from tfarm.arm import Arm, Theory
 from tfarm.arrays import LEAST_SIZE, Complex, Real
@@ -274,6 +273,8 @@ def entered(damped: DampedModes) -> Real:
     Where nothing weighs at the hub its friction brings one in from -inf, and a dashpot at clamp or joint does: it
     continues from no mode.  Others may be of modes beyond the record.
     """
+    from scipy.optimize import brentq  # takes half a second to load, and no undamped arm comes here
+
     k = damped.undamped.system
     if isinstance(k, Coefficients):
         return np.empty(0)

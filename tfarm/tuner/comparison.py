@@ -91,17 +91,18 @@ def quantised_chain(arm: Arm, chain: Chain) -> Chain:
 
 
 def tried_loops(arm: Arm, chain: Chain, quantised: Chain | None = None) -> list[NamedLoop]:
-    """The trained condition, converters and delay, then the arms that it was not trained on.
+    """The trained condition, converters, delay, and both; then the arms that it was not trained on.
 
     `quantised` is the chain with converters, that of `quantised_chain` if it is not given.
     """
     quantised = quantised_chain(arm, chain) if quantised is None else quantised
     sampling = replace(chain.sampling, delay_samples=chain.sampling.delay_samples + COMPUTER_DELAY)
+    late = f"one {'more ' * bool(chain.sampling.delay_samples)}sample of delay"
     listed = [
         NamedLoop("as trained", arm, chain),
         NamedLoop("quantised", arm, quantised),
-        NamedLoop("one sample of delay", arm, replace(chain, sampling=sampling)),
-        NamedLoop("quantised, one sample of delay", arm, replace(quantised, sampling=sampling)),
+        NamedLoop(late, arm, replace(chain, sampling=sampling)),
+        NamedLoop(f"quantised, {late}", arm, replace(quantised, sampling=sampling)),
     ]
     mass, own = arm.payload_mass, arm.damping
     masses = [share * mass for share in PAYLOAD_SHARES] if mass else [share * arm.own_mass for share in ADDED_MASSES]

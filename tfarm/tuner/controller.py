@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tfarm.arm import HubFeedback
+from tfarm.arm import FED_BACK, HubFeedback
 from tfarm.dsp import Measurement, Simulation, Simulator
 from tfarm.dsp.chain import Reading
 from tfarm.tuner.kernel import Limits
@@ -44,10 +44,13 @@ class TunedGain:
 
 
 def judged(simulation: Simulation, cost: Cost, signals: Reading) -> Record:
-    """A simulation's x, u, e and cost: x from the moment that the arm has, e from the torque that leaves the DAC."""
+    """A simulation's x, u, e and cost: x before the converters, as a trial has it, e from the torque after them.
+
+    So x has passed the anti-alias filter where there is one, but none of the ADC's steps.
+    """
     task, done = simulation.scenario, simulation.torque.size
     rest = 0.0 if signals == "total" else task.feedforward[:done]
-    x = simulation.at_samples.root_moment - task.rigid_moment[:done]
+    x = simulation.measured[:, FED_BACK.index("root_moment")] - task.rigid_moment[:done]
     e = simulation.torque - rest
     K = np.zeros(done) if simulation.gain is None else simulation.gain
     total = float(task.period * np.sum(cost.a * x**2 + cost.b * e**2) / 2)

@@ -36,8 +36,7 @@ LEARNT: tuple[tuple[str, str, Rule, GuardKind], ...] = (
     ("default_no_guard", "default, no guard", "dynamic", "none"),
     ("plain", "(21) as printed, no guard", "plain", "none"),
 )
-NOMINAL = "as trained"  # the first row of the comparison
-COARSE = "quantised, one sample of delay"  # its last row of the arm itself
+AS_TRAINED, QUANTISED_AND_LATE = 0, 3  # rows of the comparison, which begins with those of the arm itself
 
 
 @dataclass(frozen=True)
@@ -135,7 +134,7 @@ def tuner_study(arm: Arm, chain: Chain) -> TunerStudy:
         tuning=tuning,
         slews=_simulated(tuning, ideal),
         constant=tuning.trial.simulator(chain=ideal).linear(tuning.constant),
-        coarse=_simulated(tuning, next(each.chain for each in listed if each.name == COARSE)),
+        coarse=_simulated(tuning, listed[QUANTISED_AND_LATE].chain),
         curves=tuple(_curves(tuning, *each) for each in LEARNT),
         cost_map=_cost_map(tuning),
         rows=tuple(rows),
