@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback
 from tfarm.arrays import Real
 from tfarm.dsp.chain import Chain
+from tfarm.dsp.converters import quantisers
 from tfarm.dsp.curves import resolved
+from tfarm.dsp.kernel import AMPLIFIER, STEP
 from tfarm.dsp.measurement import Measurement
 from tfarm.dsp.scenarios import scenario
 from tfarm.dsp.simulate import Simulator
@@ -43,10 +45,7 @@ class StripChart:
     @property
     def step(self) -> float:
         """One step of the ADC [N m]."""
-        c = self.simulation.chain.converters
-        assert c.moment_range is not None
-        assert c.moment_bits is not None
-        return 2 * c.moment_range / 2**c.moment_bits
+        return float(quantisers(self.simulation.chain)[AMPLIFIER, STEP])
 
     @property
     def limit(self) -> float:
