@@ -32,8 +32,7 @@ from tfarm.arm.reading import load, presets
 from tfarm.arm.records import Arm, must_be_arm, must_turn
 from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring
 from tfarm.arm.sections import Section
-from tfarm.arm.theories import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Theory
-from tfarm.arm.turning import INPUT_UNITS, INPUTS, Input
+from tfarm.arm.turning import INPUT_UNITS, INPUTS, THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Input, Theory
 from tfarm.arm.writing import to_toml
 
 __all__ = [

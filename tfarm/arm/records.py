@@ -14,8 +14,7 @@ from typing import TypeVar
 from tfarm.arm.link import Link
 from tfarm.arm.rig import Attachment, brief_repr
 from tfarm.arm.texts import plain_name, plain_texts
-from tfarm.arm.theories import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Theory
-from tfarm.arm.turning import INPUT_UNITS, INPUTS, Input, Turning
+from tfarm.arm.turning import INPUT_UNITS, INPUTS, THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Input, Theory, Turning
 from tfarm.errors import ParameterError, did_you_mean, shown
 
 MOST_PARTS = 64  # segments, and attachments: more than any rig has, and 64 equal pieces are a check of the chain

@@ -10,8 +10,7 @@ from pydantic_core import ErrorDetails
 
 from tfarm.arm.records import MOST_PARTS, Arm
 from tfarm.arm.tables import ARM_TABLES, SHAPE_TABLES, ArmTable
-from tfarm.arm.theories import THEORIES
-from tfarm.arm.turning import INPUTS
+from tfarm.arm.turning import INPUTS, THEORIES
 from tfarm.errors import MISSING, ParameterError, did_you_mean
 
 LOOP_TABLES = ("sampling", "converters", "actuator", "slew", "law")  # of the loop: others read them

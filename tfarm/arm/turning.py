@@ -9,11 +9,14 @@ from typing import Literal, get_args
 
 from tfarm.arm.link import Link
 from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring
-from tfarm.arm.theories import WITH_ROTARY_INERTIA, Theory
 
 Input = Literal["hub_torque", "motor_voltage", "motor_current", "hub_angle"]
 INPUTS: tuple[Input, ...] = get_args(Input)
 INPUT_UNITS = {"hub_torque": "N m", "motor_voltage": "V", "motor_current": "A", "hub_angle": "rad"}
+Theory = Literal["timoshenko", "shear", "rayleigh", "euler-bernoulli"]  # of the beam
+THEORIES: tuple[Theory, ...] = get_args(Theory)
+WITH_ROTARY_INERTIA: tuple[Theory, ...] = ("timoshenko", "rayleigh")
+WITH_SHEAR: tuple[Theory, ...] = ("timoshenko", "shear")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -174,10 +174,8 @@ def _model(x: Real, s: Complex, w: float, background: int) -> tuple[Complex, lis
 def _half_width(data: Measured, place: int) -> float:
     """Half the width [rad/s] of a peak where it has lost 3 dB, to the nearer side."""
     size, limit = abs(data.values), abs(data.values[place]) / math.sqrt(2)
-    below = np.flatnonzero(size < limit)
-    if not below.size:
-        return float(data.omega[-1] - data.omega[0])
-    return float(abs(data.omega[below] - data.omega[place]).min())
+    away = abs(data.omega - data.omega[place])
+    return float(away[size < limit].min(initial=data.omega[-1] - data.omega[0]))
 
 
 def _around(data: Measured, place: int) -> slice:
