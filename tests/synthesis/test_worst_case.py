@@ -11,10 +11,9 @@ from tests.synthesis.held_loop import HeldLoop
 from tfarm import HubFeedback
 from tfarm.arm import Hub
 from tfarm.synthesis import arms
-from tfarm.synthesis.arms import ArmBox, varied, worst_inside
 from tfarm.synthesis.chosen import design
 from tfarm.synthesis.sampled import RESERVE
-from tfarm.synthesis.worst_case import MUCH_WORSE
+from tfarm.synthesis.worst_case import MUCH_WORSE, ArmBox, varied, worst_inside
 
 LAB, T = tfarm.load("sasaki2012-lab"), 0.01
 SHORT = replace(LAB, link=replace(LAB.link, length=0.8 * LAB.length), name="short")

@@ -10,11 +10,10 @@ from tfarm.arm import TWO_GAINS, Arm
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.synthesis import law_design as laws
-from tfarm.synthesis.arms import ArmBox, NamedArm, arms_of
 from tfarm.synthesis.design import Design, Objective, best_gains, gains_score_on
 from tfarm.synthesis.law_design import LawDesign, law_design
 from tfarm.synthesis.search import Bounds
-from tfarm.synthesis.worst_case import Tell, for_the_worst, same_input
+from tfarm.synthesis.worst_case import ArmBox, NamedArm, Tell, arms_of, for_the_worst, same_input
 
 
 def design(

@@ -27,7 +27,6 @@ from tfarm.loop.plant import Loop
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import record
 from tfarm.spectrum.scales import check_gains, rate_unit, turning_inertia
-from tfarm.synthesis.arms import NamedArm
 from tfarm.synthesis.continuous import ContinuousJudge
 from tfarm.synthesis.sampled import sampled_judges
 from tfarm.synthesis.search import (
@@ -43,7 +42,7 @@ from tfarm.synthesis.search import (
     searched_rates,
 )
 from tfarm.synthesis.together import Judge, OnArm, Worst, in_step, score_of, worst_value
-from tfarm.synthesis.worst_case import WITHOUT_BOX, WorstCase
+from tfarm.synthesis.worst_case import WITHOUT_BOX, NamedArm, WorstCase
 
 Objective = Literal["damping", "margin", "residual", "cost"]
 LoopKind = Literal["sampled", "continuous"]

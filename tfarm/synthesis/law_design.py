@@ -24,13 +24,12 @@ from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_stability import law_stability
 from tfarm.loop.stability import Stability
 from tfarm.records import record
-from tfarm.synthesis.arms import NamedArm
 from tfarm.synthesis.law_judge import LAW_OBJECTIVES, LawJudge, law_judge
 from tfarm.synthesis.minimax import LOST, Pieces, ScoredPoint, minimax
 from tfarm.synthesis.sampled import mode_counts
 from tfarm.synthesis.structures import STRUCTURES, Structure, usual_angle_gain
 from tfarm.synthesis.together import OnArm, in_step, worst_value
-from tfarm.synthesis.worst_case import WITHOUT_BOX, Tell, WorstCase
+from tfarm.synthesis.worst_case import WITHOUT_BOX, NamedArm, Tell, WorstCase
 
 STARTS_EACH = 16  # points about the start, a coefficient
 START_WIDTH = 1.0  # of x: the deviation of these points

@@ -1,8 +1,6 @@
 """The neural gain tuner: a network that sets the moment gain while the arm slews, kept where that is proven stable."""
 
-from tfarm.tuner.bound import lq_bound
 from tfarm.tuner.comparison import compare_controllers, tried_loops
-from tfarm.tuner.constants import BestConstant, best_constant
 from tfarm.tuner.controller import TunedGain, simulated
 from tfarm.tuner.guard import Guard, find_guard
 from tfarm.tuner.network import Network, initial_network
@@ -11,6 +9,7 @@ from tfarm.tuner.shaping import extra_insensitive, shaped_trial, zero_vibration
 from tfarm.tuner.training import Learning, Stopped, Training, train
 from tfarm.tuner.trial import Cost, Record, Trial, residual_rms, slew_trial
 from tfarm.tuner.tuning import Plan, Tuning, tune, tune_answer
+from tfarm.tuner.yardsticks import BestConstant, best_constant, lq_bound
 
 __all__ = [
     "BestConstant",

@@ -30,12 +30,12 @@ from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.files import read_file, write_file
 from tfarm.records import record
-from tfarm.tuner.constants import BestConstant, best_constant
 from tfarm.tuner.guard import Guard, find_guard
 from tfarm.tuner.network import initial_network
 from tfarm.tuner.training import Mode, Rule, Sensitivity, Training, train
 from tfarm.tuner.trial import Trial, residual_rms
 from tfarm.tuner.tuning import Plan, Tuning, trial_of
+from tfarm.tuner.yardsticks import BestConstant, best_constant
 
 TellDone = Callable[[int, int], None]
 

@@ -16,9 +16,7 @@ from tfarm.dsp.scenarios import TRIAL_DURATION, described
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.spectrum.scales import default_gains
-from tfarm.tuner.bound import lq_bound
 from tfarm.tuner.comparison import Outcomes
-from tfarm.tuner.constants import BestConstant, best_constant
 from tfarm.tuner.controller import TunedGain, tip_off
 from tfarm.tuner.guard import GuardKind, find_guard
 from tfarm.tuner.network import PAPER_HIDDEN, PAPER_INPUTS, initial_network
@@ -35,6 +33,7 @@ from tfarm.tuner.trial import (
     usual_rate_gain,
     with_signals,
 )
+from tfarm.tuner.yardsticks import BestConstant, best_constant, lq_bound
 
 BOUND_NOTES = {
     "vibration": "the least cost of any control signal e on this slew, with full state and preview",
