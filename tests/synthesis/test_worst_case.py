@@ -10,7 +10,7 @@ from tests.shell import answer, run
 from tests.synthesis.held_loop import HeldLoop
 from tfarm import HubFeedback
 from tfarm.arm import Hub
-from tfarm.synthesis import arms
+from tfarm.synthesis import worst_case
 from tfarm.synthesis.chosen import design
 from tfarm.synthesis.sampled import RESERVE
 from tfarm.synthesis.worst_case import MUCH_WORSE, ArmBox, varied, worst_inside
@@ -24,7 +24,7 @@ MASSES = (0.1, 0.5)  # kg
 def found():
     """With a few arms tried inside: `test_no_arm_inside_the_box_is_worse` asks at seven of them itself."""
     with pytest.MonkeyPatch.context() as fewer:
-        fewer.setattr(arms, "ARMS_TRIED", 6)
+        fewer.setattr(worst_case, "ARMS_TRIED", 6)
         return design(LAB, K1=(0.1, 30.0), K2=(-0.6, 0.95), also=[SHORT], ranges={"payload.mass": MASSES})
 
 
@@ -97,7 +97,7 @@ NARROW = ("sasaki2012-lab", "--K1", "0.1,2", "--K2=-0.1,0.1")
 
 
 def test_the_answer_names_every_arm(capsys, monkeypatch):
-    monkeypatch.setattr(arms, "ARMS_TRIED", 4)  # inside: whether one is worse is not asked here
+    monkeypatch.setattr(worst_case, "ARMS_TRIED", 4)  # inside: whether one is worse is not asked here
     code, out, err = run(capsys, "design", *NARROW, "--modes", "1", "--range", "payload.mass=0.0,0.2")
     assert (code, err) == (0, "")
     assert "payload.mass = 0.2" in out
