@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm.checks import LARGEST_NUMBER, number
+from tfarm.arm.choices import INPUT_UNITS
 from tfarm.arm.records import Arm
-from tfarm.arm.turning import INPUT_UNITS
 from tfarm.errors import ParameterError
 
 

@@ -8,9 +8,9 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
+from tfarm.arm.choices import INPUTS, THEORIES
 from tfarm.arm.records import MOST_PARTS, Arm
 from tfarm.arm.tables import ARM_TABLES, SHAPE_TABLES, ArmTable
-from tfarm.arm.turning import INPUTS, THEORIES
 from tfarm.errors import MISSING, ParameterError, did_you_mean
 
 LOOP_TABLES = ("sampling", "converters", "actuator", "slew", "law")  # of the loop: others read them
