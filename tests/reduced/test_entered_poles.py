@@ -53,3 +53,9 @@ def test_the_sampled_loop_of_few_modes_is_that_of_many():
 @pytest.mark.parametrize("inertia", [1e-3, 0.1])
 def test_a_hub_that_weighs_something_has_none(inertia):
     assert not entered(damped_modes(modes(rubbing(inertia, 5.0), 6))).size
+
+
+def test_a_segment_next_to_massless_is_no_warning():
+    """On the negative axis its waves hardly swing: what D grows by from one s to the next is beyond any number."""
+    first = replace(LAB.link, length=0.3, density=1e-9, damping=0.0)
+    assert not entered(damped_modes(modes(replace(LAB, link=first, outer=(LAB.link,)), 6))).size

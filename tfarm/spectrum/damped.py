@@ -18,7 +18,14 @@ from tfarm.arm import Arm, Theory
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
-from tfarm.exact.characteristic import NO_GAINS, Gains, as_column, quick_characteristics, zeros_at_origin
+from tfarm.exact.characteristic import (
+    NO_GAINS,
+    Gains,
+    as_column,
+    loop_parts,
+    quick_characteristics,
+    zeros_at_origin,
+)
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.system import System
 from tfarm.records import record
@@ -281,11 +288,10 @@ def entered(damped: DampedModes) -> Real:
     lowest, last = first_frequency(damped.undamped.arm), float(damped.natural_frequency.max())
     reach = TOWARD_SINGULAR / k.damping if k.damping else last
     at = -np.geomspace(min(SLOWEST * lowest, reach / 2), reach, REAL_POINTS)
-    function = member(k).function
 
     def signed(s: Real) -> Real:
-        value, _, scale = function(s + 0j)
-        return np.asarray((value * np.exp(1j * scale.imag)).real)
+        drive, _, scale = loop_parts(k, s + 0j)
+        return np.asarray((drive * np.exp(1j * scale.imag)).real)
 
     known = np.sort(-np.r_[damped.eigenvalues[damped.is_overdamped].real.ravel(), damped.single])
     sides, passed = np.sign(signed(at)), np.searchsorted(known, -at)
