@@ -1,5 +1,7 @@
 """Zeros in a box: what is no zero must not be found, whatever the function looks like."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,19 @@ from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.spectrum import box as room
 from tfarm.spectrum.box import Box, complete, distinct, newton, winding_number, zeros_in_box
+
+
+UNITS = (2.0**-30, 1.0, 2.0**30)  # of time, which matter nowhere: every tolerance is a share of a size
+
+
+def in_units(function, unit):
+    """The same function of s where that is counted in other units."""
+
+    def scaled(s):
+        at = function(s / unit)
+        return Analytic(at.value, at.slope / unit, at.scale)
+
+    return scaled
 
 
 def polynomial(*zeros, flat=0.0):
@@ -31,12 +46,13 @@ def test_flat_starts_do_not_stand_in_for_zeros_not_yet_found():
     assert np.sort_complex(found) == pytest.approx(np.sort_complex(zeros), rel=1e-12)
 
 
-def test_the_turns_around_a_box_are_the_zeros_in_it_however_near_the_edge():
+@pytest.mark.parametrize("unit", UNITS)
+def test_the_turns_around_a_box_are_the_zeros_in_it_however_near_the_edge(unit):
     zeros = np.array([2.0 + 3.0j, 2.0 - 3.0j, -1.0, -40.0, 9.999, 9.99999, 10.001])
-    box = Box(-50.0, 10.0, -10.0, 10.0)
-    assert winding_number(polynomial(*zeros), box) == box.holds(zeros.astype(complex)).sum() == 6
-    with pytest.raises(ConvergenceError, match="lies on the contour near 10"):
-        winding_number(polynomial(*zeros, 10.0), box)
+    box = Box(-50.0 * unit, 10.0 * unit, -10.0 * unit, 10.0 * unit)
+    assert winding_number(in_units(polynomial(*zeros), unit), box) == box.holds(unit * zeros + 0j).sum() == 6
+    with pytest.raises(ConvergenceError, match=re.escape(f"lies on the contour near {10 * unit:.6g}")):
+        winding_number(in_units(polynomial(*zeros, 10.0), unit), box)
 
 
 def test_a_search_ends(monkeypatch):
@@ -67,15 +83,14 @@ def test_a_box_grows_where_a_zero_lies_on_its_edge():
 EPS = 2.0**-52
 
 
-@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("size", UNITS)
 def test_a_zero_has_all_its_digits_whatever_its_size(size):
     """What ends the steps is a share of |s|, so units of time do not matter: not the zeros, nor how many calls."""
     zeros, calls = np.array([1.0 + 2.0j, 1.0 - 2.0j, -0.37]), []
 
     def function(s):
         calls.append(s.size)
-        at = polynomial(*zeros)(s / size)
-        return Analytic(at.value, at.slope / size, at.scale)
+        return in_units(polynomial(*zeros), size)(s)
 
     found = newton(function, size * zeros * (1 + 0.01j))
     np.testing.assert_allclose(found / size, zeros, rtol=4 * EPS)
@@ -119,22 +134,29 @@ def test_halves_meet_across_the_longer_side_and_make_up_the_box(box, low, high):
     assert (one.im_max, two.im_min) == ((box.im_max, box.im_min) if wide else (cut, cut))
 
 
-@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("unit", UNITS)
 def test_all_zeros_of_a_box_are_found_in_any_unit_of_time(unit):
-    """Nearest to 0 one a millionth of the box away, and nothing of its size is taken for rounding."""
-    zeros, box = np.array([2.0 + 3.0j, 2.0 - 3.0j, -1.0, 1e-5]), np.array([-5.0, 5.0, -4.0, 4.0])
-
-    def function(s):
-        at = polynomial(*zeros)(s / unit)
-        return Analytic(at.value, at.slope / unit, at.scale)
-
-    found = zeros_in_box(function, Box(*(unit * box)), np.empty(0, complex))
+    """One of them a millionth of the box off 0; what is taken for rounding, and so for real, is a share of a size."""
+    zeros = np.array([2.0 + 3.0j, 2.0 - 3.0j, -1.0, 1e-5])
+    function = in_units(polynomial(*zeros), unit)
+    found, box = complete(function, lambda height: Box(-5 * unit, 5 * unit, -height, height), 4 * unit, zeros[:0])
     assert np.sort_complex(found / unit) == pytest.approx(np.sort_complex(zeros), rel=1e-10)
+    assert (found.imag == 0).sum() == 2
+    assert box.im_max == 4 * unit
 
 
-def test_a_zero_of_high_order_is_there_as_often():
-    found = zeros_in_box(polynomial(1.3, 1.3, 1.3, -0.7), Box(-1.0, 2.0, -1.0, 1.0), np.empty(0, complex))
-    assert np.sort(found.real) == pytest.approx([-0.7, 1.3, 1.3, 1.3], rel=1e-4)
+@pytest.mark.parametrize("unit", UNITS)
+def test_a_zero_of_high_order_is_there_as_often(unit):
+    """As a polynomial, next to its zero mere rounding, and as a product, which is exact there."""
+
+    def product(s):
+        a, b = (s - 1.3) ** 3, s + 0.7
+        return Analytic(a * b, a + 3 * (s - 1.3) ** 2 * b, 0 * s)
+
+    box = Box(-unit, 2 * unit, -unit, unit)
+    for function, digits in ((polynomial(1.3, 1.3, 1.3, -0.7), 1e-4), (product, 1e-9)):
+        found = zeros_in_box(in_units(function, unit), box, np.empty(0, complex))
+        assert np.sort(found.real) / unit == pytest.approx([-0.7, 1.3, 1.3, 1.3], rel=digits)
 
 
 def test_a_known_zero_is_taken_as_it_is_and_once():
