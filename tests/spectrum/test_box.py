@@ -10,7 +10,6 @@ from tfarm.exact.characteristic import Analytic
 from tfarm.spectrum import box as room
 from tfarm.spectrum.box import Box, complete, distinct, newton, winding_number, zeros_in_box
 
-
 UNITS = (2.0**-30, 1.0, 2.0**30)  # of time, which matter nowhere: every tolerance is a share of a size
 
 

@@ -183,13 +183,20 @@ def test_a_middle_that_is_not_stable_has_no_lyapunov_function_and_says_so_quietl
 
 @pytest.mark.parametrize("unit", [2.0**-40, 1e-9, 1e9])
 def test_a_proof_does_not_depend_on_the_units_of_the_states(loop, unit):
-    """The same loop with lengths, rates and torques in other units, as a micro-arm or a boom has them: proven alike."""
+    """The same loop with lengths, rates and torques in other units, as a micro-arm or a boom has them.
+
+    Its function is found and proven alike.
+    """
     proof = loop.proof(0.31, 0.63)
     units = unit ** np.linspace(-1.0, 1.0, loop.drive.size)
     low, high = (A * units / units[:, None] for A in (proof.low, proof.high))
     other = replace(proof, low=low, high=high, P=proof.P * units * units[:, None])
     assert other.is_proven()
     assert not replace(other, high=loop.at(1.3) * units / units[:, None]).is_proven()
+    middle, half = loop.at(0.47) * units / units[:, None], np.sqrt(0.16)
+    again = common_lyapunov(middle, half * loop.drive / units, half * loop.sense * units, low, high)
+    assert again is not None
+    assert again.contraction == pytest.approx(proof.contraction, rel=1e-6)
 
 
 # ---------------------------------------------------------------- the guard that is chosen

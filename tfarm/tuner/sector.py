@@ -45,17 +45,21 @@ class MovingGain:
         return self.at(0.0)
 
     @cached_property
+    def _fed_back(self) -> Real:
+        """drive sense^T: what a gain of 1 takes off the matrix."""
+        return self.open - self.at(1.0)
+
+    @cached_property
     def sense(self) -> Real:
         """(n,): the moment read from the states."""
         dropped = len(self.loop.matrix()) - len(self.open)
         kept = self.loop.pulse.integrals_at + 2 - dropped  # the torque of the sample before: there the drive is 1
-        return (self.open - self.at(1.0))[kept]
+        return np.asarray(self._fed_back[kept])
 
     @cached_property
     def drive(self) -> Real:
         """(n,): what a torque of 1 adds to the states."""
-        change = self.open - self.at(1.0)
-        return np.asarray(change @ self.sense / (self.sense @ self.sense))
+        return np.asarray(self._fed_back @ self.sense / (self.sense @ self.sense))
 
     def at(self, K: float) -> Real:
         """The closed-loop matrix at a gain."""
