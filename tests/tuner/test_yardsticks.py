@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from tfarm.tuner import best_constant, constants
+from tfarm.tuner import best_constant, yardsticks
 
 
 def best_of(monkeypatch, cost, windows):
@@ -15,7 +15,7 @@ def best_of(monkeypatch, cost, windows):
         tried.append(K)
         return SimpleNamespace(cost=cost(K))
 
-    monkeypatch.setattr(constants, "constant_windows", lambda loop: windows)
+    monkeypatch.setattr(yardsticks, "constant_windows", lambda loop: windows)
     return best_constant(SimpleNamespace(loop=None, with_constant=with_constant)), tried
 
 
