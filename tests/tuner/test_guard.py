@@ -1,12 +1,13 @@
 """The guard: sectors against the circle criterion by transfer functions, switching, exact proofs, empty guards."""
 
+import re
 from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.linalg import solve_discrete_lyapunov
+from scipy.linalg import eigh, solve_discrete_lyapunov
 
 import tfarm
 from tests.dsp.roads import aliased_loop
@@ -212,7 +213,11 @@ def test_the_default_sector(lab):
     assert 0.08 < margin / (guard.hi - guard.lo) < 0.12
     for proof in guard.proofs:
         assert proof.is_proven()
-    assert "proven for any K(t)" in guard.sentence
+    ends = [(A.T @ proof.P @ A, proof.P) for proof in guard.proofs for A in (proof.low, proof.high)]
+    slowest = np.sqrt(max(eigh(*each, eigvals_only=True)[-1] for each in ends))
+    ((sector, shrinks),) = re.findall(r"^(.*): proven for any K\(t\), shrinking by (.*) a sample", guard.sentence)
+    assert sector == f"[{guard.lo:.4g}, {guard.hi:.4g}]"
+    assert float(shrinks) == pytest.approx(1 - slowest, rel=0.05)  # two digits
 
 
 def test_a_best_gain_of_nothing_gets_a_sector_from_zero(lab):

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 import tfarm
+from tfarm.columns import TERMINAL
 from tfarm.dsp import Chain, Sampling
 from tfarm.errors import ParameterError
-from tfarm.tuner import Plan, studies, tune
+from tfarm.tuner import Cost, Plan, studies, tune
 from tfarm.tuner.guard import find_guard
 from tfarm.tuner.overview import CostMap
-from tfarm.tuner.studies import PAPER_PAIR, map_verdict, plans_of, run_study, study_answer
+from tfarm.tuner.studies import PAPER_PAIR, Finished, map_verdict, plans_of, run_study, study_answer
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +40,27 @@ def test_learning_curves_have_their_median_and_quartiles(lab):
     five = [replace(one, costs=[cost, cost + 10.0]) for cost in (5.0, 1.0, 4.0, 2.0)]
     curve = study_answer("curves", [*five, replace(one, costs=[3.0])], 5)
     assert [curve[key] for key in ("lower_quartile", "median", "upper_quartile")] == [[2, 12], [3, 14], [4, 15]]
+
+
+def test_a_group_is_summed_up_over_its_seeds():
+    """Five made-up runs of each of two plans; of the second one has run away."""
+    costs, gains, residuals = [5.0, 1.0, 3.0, 4.0, 2.0], [0.1, 0.2, 0.5, 0.4, 0.3], [9.0, 7.0, 8.0, 6.0, 5.0]
+    first = [
+        Finished(BASE, [cost], cost, residual, gain, False, gain < 0.25, 0.7, 3.5)
+        for cost, gain, residual in zip(costs, gains, residuals, strict=True)
+    ]
+    second = [replace(each, plan=replace(BASE, cost=Cost(a=4.0)), cost=each.cost + 2.0) for each in first]
+    second[3] = replace(second[3], cost=np.inf, stopped=True)
+    one, two = study_answer("weights", first + second, 5)["groups"]
+    assert [one[key] for key in ("cost_median", "cost_quartiles", "cost_best", "cost_worst")] == [3.0, [2.0, 4.0], 1, 5]
+    assert [two[key] for key in ("cost_median", "cost_quartiles", "cost_best", "cost_worst")] == [5, [4, 7], 3, np.inf]
+    assert [one[key] for key in ("below_best_constant", "diverged", "died")] == [3, 0, 2]
+    assert [two[key] for key in ("below_best_constant", "diverged", "died")] == [1, 1, 2]
+    assert (one["mean_gain_median"], one["residual_median"], one["a"], two["a"]) == (0.3, 7.0, 1.0, 4.0)
+    assert (one["best_constant_gain"], one["best_constant_cost"]) == (0.7, 3.5)
+    shown = {column.title: column.cells for column in study_answer("weights", first + second, 5)["groups"].on(TERMINAL)}
+    assert shown["below best constant"] == ["3 of 5", "1 of 5"]
+    assert {"a"} == {"a", "b", "alpha", "eta", "rule", "mode", "inputs", "sensitivity"} & set(shown)  # what differs
 
 
 def test_a_study_on_the_ground_of_a_tuning_is_the_same_and_finds_no_guard_again(lab, monkeypatch):
