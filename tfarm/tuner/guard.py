@@ -207,7 +207,7 @@ def _larger(loop: SampledLoop) -> Iterator[SampledLoop]:
         if number <= count:
             return
         try:
-            more = sampled_loop(arm, loop.gains.having(MOMENT_GAIN, 1.0), loop.chain, count=number)
+            more = loop.with_modes(number)
         except ConvergenceError:
             continue
         yield more
@@ -230,7 +230,7 @@ def _remedy(loop: SampledLoop, kind: str) -> str:
 
 def _has_guard(arm: Arm, loop: SampledLoop, kind: str) -> bool:
     try:
-        first = sampled_loop(arm, loop.gains.having(MOMENT_GAIN, 1.0), loop.chain, count=loop.plant.count)
+        first = sampled_loop(arm, loop.gains, loop.chain, count=loop.plant.count)
         if not constant_windows(first):
             return False
         loops = list(_larger(first))
