@@ -41,6 +41,8 @@ def test_the_scales_of_the_tuner_are_the_arms_own(name):
     assert max(loads) <= 2 * (arm.payload.mass or arm.link.rhoA * arm.link.length)
     shares = sorted(e.link.damping / arm.link.damping for key, e in conditioned.items() if key.startswith("C ="))
     assert shares == pytest.approx([0.0, 0.1, 10.0])
+    hubs = [conditioned[f"hub {share}"].hub.inertia / arm.hub.inertia for share in ("-20%", "+20%")]
+    assert hubs == pytest.approx([0.8, 1.2], rel=1e-15)
 
 
 def test_the_papers_arm_keeps_the_papers():
@@ -57,6 +59,16 @@ def test_the_papers_arm_keeps_the_papers():
     ]
     converters = quantised_chain(lab, Chain()).converters
     assert (converters.moment_range, converters.torque_range, plan_of(lab, Chain()).scale) == (20.0, 10.0, 1.0)
+
+
+@pytest.mark.parametrize(("hub", "wanted"), [(0.1, [1e-5, 1e-3]), (1e-3, [5e-6, 5e-4])])
+def test_an_arm_without_damping_is_tried_with_two_dampings_of_its_first_mode(hub, wanted):
+    """0.0358 and 3.58 per cent of critical, but that C is rounded to one digit."""
+    arm = tfarm.load("sasaki2012").having(hub_inertia=hub)
+    given = [each.arm for each in tried_loops(arm, Chain()) if each.name.startswith("C =")]
+    assert [each.damping for each in given] == wanted
+    ratios = [tfarm.damped_modes(tfarm.modes(each, 1)).damping_ratio[-1] for each in given]
+    assert ratios == pytest.approx([3.575e-4, 3.575e-2], rel=0.1)
 
 
 @pytest.mark.parametrize("rise", [0.5, 2.0])
