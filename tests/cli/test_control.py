@@ -187,5 +187,5 @@ def test_a_list_of_poles_that_ends_at_the_shear_cut_off_says_so(capsys, tmp_path
     found = answer(capsys, "poles", str(file), "--K1", "300")
     assert found["ends_at_shear_cutoff"] is True
     assert found["box"][3] <= found["shear_cutoff_rad_s"]
-    assert "shear cut-off" in run(capsys, "poles", str(file), "--K1", "300")[1]
+    assert "no more lie below sqrt(kGA/rhoI)" in run(capsys, "poles", str(file), "--K1", "300")[1]
     assert answer(capsys, "poles", str(file), "--K1", "300", "--count", "10")["ends_at_shear_cutoff"] is False
