@@ -7,6 +7,7 @@ from scipy.linalg import expm
 
 import tfarm
 from tests.dsp.roads import aliased, aliased_loop, durbin
+from tests.odd_arms import odd_arms
 from tests.strategies import arm_of
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, pulse_transfer, sampled_loop
@@ -193,3 +194,12 @@ def test_a_filter_is_for_what_does_not_drift(lab):
         assert moment == plain(s)[1]
     with pytest.raises(ParameterError, match="filtered output = 'hub_angle'"):
         with_filter(plain, [2], 90.0)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.4])
+def test_slopes_at_z_1_are_those_of_differences_beside_it(delay):
+    """Of an arm that cannot drift, by the differences of two steps and Richardson's rule."""
+    H = pulse_transfer(odd_arms()["pinned"], ["hub_angle", "root_moment"], Sampling(delay_samples=delay), count=4)
+    h = 1e-4
+    one, two = (((H(1 + n * h) - H(1 - n * h)) / (2 * n * h)).real for n in (1, 2))
+    np.testing.assert_allclose(H.slopes_at_one, (4 * one - two) / 3, rtol=1e-6)

@@ -1,6 +1,7 @@
 """Nothing is told by how large a number is in its unit: sensors, panels, slow pairs, gains near the smallest double."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,9 +11,10 @@ from tfarm import HubFeedback, Law
 from tfarm.errors import ConvergenceError
 from tfarm.loop import panels, positions
 from tfarm.loop.law_locus import Family
+from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_map import asked_at
 from tfarm.loop.lines import along, crossing_at_zero, line_crossings
-from tfarm.loop.margins import minus_loop
+from tfarm.loop.margins import dense, minus_loop
 from tfarm.loop.plant import Loop
 from tfarm.loop.regions import _crossings_along_K2
 from tfarm.spectrum.box import Box
@@ -114,3 +116,23 @@ def test_models_that_nothing_damps_are_not_unstable_by_rounding():
     found = tfarm.spill(arm, Law({"hub_angle": 1.0, "root_moment": 0.3}), 4)
     assert found.rightmost.real.max() > 0
     assert found.unstable.tolist() == [0] * 4
+    assert found.driven.size == 0
+
+
+def test_a_law_that_differentiates_the_angle_is_one_on_the_rate():
+    """(a s^2 + b s + c) of the angle is (a s + b) of the rate and c of the angle, over one denominator."""
+    den, s = [0.01, 1.0], np.array([0.3 + 2j, 40j, 5.0])
+    improper = Law({"hub_angle": ([0.1, 1.0, 2.0], den)})
+    proper = Law({"hub_rate": ([0.1, 1.0], den), "hub_angle": ([2.0], den)})
+    one, other = (LawLoop(LAB, law).loop_function(s) for law in (improper, proper))
+    np.testing.assert_allclose(one, other, rtol=1e-12)
+
+
+def test_margins_look_at_what_is_narrow_in_the_law_itself():
+    """A notch a ten-millionth wide."""
+    w, ratio = 40.0, 1e-7
+    law = Law({"hub_rate": ([0.3, 0.0, 0.3 * w * w], [1.0, 2 * ratio * w, w * w])})
+    omega = dense(
+        SimpleNamespace(loop=LawLoop(LAB, law), band=100.0, poles=SimpleNamespace(values=np.empty(0, complex)))
+    )
+    assert (abs(omega - w) <= 2 * ratio * w).sum() > 5
