@@ -9,9 +9,11 @@ import tfarm
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.loop import loci as room
+from tfarm.loop.ended import with_others
 from tfarm.loop.loci import held_branches, loci
 from tfarm.loop.locus import locus
 from tfarm.loop.reduced_locus import reduced_locus
+from tfarm.loop.variation import Variation
 
 LAB = tfarm.load("sasaki2012-lab")
 HELD = replace(LAB, hub=replace(LAB.hub, stiffness=2.0))
@@ -62,3 +64,14 @@ def test_ten_digits_of_its_size_are_shown():
     pole = np.array([-0.123456789012345 + 98.7654321098765j, 0.0])
     assert held_branches(pole) == pytest.approx([-0.12345679 + 98.76543211j, 0.0], rel=1e-15)
     assert abs(held_branches(1e5 * pole) - 1e5 * held_branches(pole)).max() <= 1e-15 * 1e7
+
+
+def test_a_crossing_is_known_by_its_gain_and_its_frequency():
+    """One of another frequency at the same gain, or of another gain at the same frequency, is another one."""
+    variation, gain = Variation(LAB, HubFeedback(K1=0.3, K2=0.3), "K2"), np.linspace(-1.0, 2.0, 4)
+    branches = np.full((1, 4), -1.0 + 100j)
+    true = with_others(variation, gain, branches, ())
+    assert len(true) > 0
+    first = replace(true[0], branch=0)
+    for seen, number in ((first, 0), (replace(first, omega=0.5 * first.omega), 1), (replace(first, gain=0.5), 1)):
+        assert len(with_others(variation, gain, branches, (seen,))) == len(true) + number
