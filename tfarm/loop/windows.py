@@ -171,7 +171,7 @@ def holds_undamped(loop: Loop) -> bool:
     if not (law.K1 > 0 and low < law.K2 < high):
         return False
     small = np.array([STATIC_AT * float(modes(loop.arm, 1).natural_frequency[-1])], dtype=complex)
-    return bool(law.Kp >= 0 or (1 + loop.loop_function(small)[0]).real > 0)
+    return bool((1 + loop.loop_function(small)[0]).real > 0)
 
 
 def _with_proven_ends(loop: Loop, name: str, pair: Window, limits: Window) -> Window:
