@@ -226,9 +226,10 @@ def test_zeros_that_part_are_not_paired():
         assert _exchange(family, nodes, np.array([True, False]), at) == is_pair
 
 
-def test_two_that_meet_where_the_function_grows_beyond_any_number_are_paired_without_a_warning():
+@pytest.mark.parametrize("drift", [0.0, 0.1, -0.1])
+def test_two_that_meet_where_the_function_grows_beyond_any_number_are_paired_without_a_warning(drift):
     def exact(C):
-        return np.array([-1.0, -3.0, -1.2 + 0.15 * C, -9.0], complex)
+        return np.array([-1.0 + drift * C, -3.0, -1.2 + 0.15 * C, -9.0], complex)
 
     def family(C):
         function = with_zeros(exact(C))

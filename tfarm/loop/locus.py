@@ -30,7 +30,7 @@ from .branches import MAY_PASS_ORIGIN, NOBODY, Stretch, followed, ordered
 from .crossings import BranchCrossing, branch_crossings, in_words
 from .ended import with_others
 from .lines import static_crossings
-from .variation import Evaluator, Variation, free_of_loss, member_of, must_be_way
+from .variation import Evaluator, Variation, free_of_loss, member_of, must_be_way, must_keep_losing
 
 MOST_LOCUS_POINTS = 100_000  # values, those between that make it round among them
 MOST_BRANCHES = 200  # as many modes are followed
@@ -104,6 +104,7 @@ def locus(arm: Arm, law: HubFeedback, vary: str, start: float, stop: float, poin
     must_be_way(start, stop)
     for value in (start, stop):
         variation.at(value)
+    must_keep_losing(variation, start, stop)
     if vary == "all" and law == HubFeedback():
         one_of = f"{', '.join(NAMES[:-1])} or {NAMES[-1]}"
         raise ParameterError(key="vary", value="all", remedy=f"every gain is 0: give {one_of} to be scaled")

@@ -108,11 +108,28 @@ def must_be_way(start: float, stop: float) -> None:
         raise ParameterError(key="to", value=stop, remedy="the range is empty: a locus runs to another value")
 
 
+def must_keep_losing(variation: Variation, start: float, stop: float) -> None:
+    """Raise ParameterError for a way on which a hub that weighs nothing loses nothing: there D loses its highest power.
+
+    A real pole passes through infinity where the rate gain takes off what the hub loses.
+    """
+    arm = variation.arm
+    if not (variation.is_of_gains and arm.rate_loss and arm.lossless_hub.has_massless_hub):
+        return
+    for key, value in (("from", start), ("to", stop)):
+        if variation.at(value).law[RATE_GAIN] <= -arm.rate_loss:
+            remedy = f"with hub.inertia = 0 a pole passes through infinity at {RATE_GAIN} = {-arm.rate_loss:.6g}"
+            raise ParameterError(key=key, value=value, remedy=f"{remedy}: stay above it, or give the hub an inertia")
+
+
 def free_of_loss(arm: Arm) -> tuple[Arm, HubFeedback]:
     """An arm whose hub loses less, and the law that takes as much beside any other: a rate gain.
 
     That is b + N^2 b_m and the back-EMF.  Behind an inductance it is the back-EMF alone: friction acts at once.
+    Not of a hub that weighs nothing: without its friction the moment would be fed back in an algebraic loop.
     """
+    if arm.lossless_hub.has_massless_hub:
+        return arm, NO_FEEDBACK
     if arm.motor is None or not arm.input_lags:
         return arm.lossless_hub, NO_FEEDBACK.having(RATE_GAIN, arm.rate_loss)
     motor = replace(arm.motor, back_emf_constant=0.0)

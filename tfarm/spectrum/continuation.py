@@ -181,7 +181,8 @@ def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: f
         both = np.array([zero, near])
         with np.errstate(all="ignore"):  # a double zero has no slope, next to -1/C D may grow beyond any number
             move = -(there(both).value / here(both).slope * np.exp(there(both).scale - here(both).scale)).real
-        if not (move[1] - move[0]) / (near - zero.real) <= -CLOSING_SHARE:
+            closing = (move[0] - move[1]) / (near - zero.real)
+        if not closing >= CLOSING_SHARE:
             continue
         m, n = np.unravel_index(np.nanargmin(abs(zeros - near)), zeros.shape)
         meeting = sorted(both, key=abs)
