@@ -38,7 +38,8 @@ def test_the_scales_of_the_tuner_are_the_arms_own(name):
     assert (plan.cost.a * plan.scale**2, plan.cost.b * plan.scale**2) == pytest.approx((1.0, 2.6))
     conditioned = {each.name: each.arm for each in tried_loops(arm, chain)}
     loads = [each.payload.mass for key, each in conditioned.items() if key.startswith("payload")]
-    assert max(loads) <= 2 * (arm.payload.mass or arm.link.rhoA * arm.link.length)
+    of_mass, wanted = (arm.payload.mass, [0.5, 1.5, 2.0]) if arm.payload.mass else (arm.own_mass, [0.06, 0.15, 0.3])
+    assert loads == pytest.approx([share * of_mass for share in wanted], rel=0.05)  # two digits
     shares = sorted(e.link.damping / arm.link.damping for key, e in conditioned.items() if key.startswith("C ="))
     assert shares == pytest.approx([0.0, 0.1, 10.0])
     hubs = [conditioned[f"hub {share}"].hub.inertia / arm.hub.inertia for share in ("-20%", "+20%")]
