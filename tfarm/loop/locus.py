@@ -12,7 +12,8 @@ law there are poles that continue from no mode, infinitely many with a delay; so
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,7 +121,28 @@ def rounded(found: Locus) -> Locus:
 
 
 def _traced(wanted: Variation, gain: Real, branches: int, rounds: int) -> Locus:
-    """The locus at these values, and at those between that so many rounds find to be needed."""
+    """The locus at these values, and at those between that so many rounds find to be needed: from either end.
+
+    What cannot be followed one way, as a pole that passes through 0 in the wake of another, often can the other way.
+    """
+    try:
+        return _traced_along(wanted, gain, branches, rounds)
+    except ConvergenceError:
+        with suppress(ConvergenceError):
+            back = _traced_along(wanted, gain[::-1], branches, rounds)
+            if not np.isnan(back.branches).any():  # a branch that ended would begin on the way
+                return _turned(back)
+        raise
+
+
+def _turned(found: Locus) -> Locus:
+    """The same locus the other way."""
+    other = {"stable": "unstable", "unstable": "stable"}
+    crossings = tuple(replace(each, direction=other[each.direction]) for each in reversed(found.crossings))
+    return replace(found, gain=found.gain[::-1], branches=found.branches[:, ::-1], crossings=crossings)
+
+
+def _traced_along(wanted: Variation, gain: Real, branches: int, rounds: int) -> Locus:
     freed, loss = free_of_loss(wanted.arm)
     variation = Variation(freed, wanted.law, wanted.vary, loss)
     cut, lowest = followed(variation, float(gain[0]), float(gain[-1]), branches + 1)
