@@ -14,6 +14,7 @@ from tfarm.dsp.margins import whole_loop
 
 LAB = tfarm.load("sasaki2012-lab")
 BRAKED = replace(LAB, hub=replace(LAB.hub, friction=0.01))  # its slow pole is at -b/J = -0.015 1/s
+LOOSE = replace(LAB, hub=replace(LAB.hub, friction=1e-7))
 SPRUNG = replace(LAB, hub=replace(LAB.hub, stiffness=1e-3))  # and here a slow pair, of the hub on its spring
 CHAINS = {
     "plain": Chain(),
@@ -25,7 +26,7 @@ GAINS = HubFeedback(K1=0.3, K2=0.3, Kp=1.0)
 
 
 @pytest.mark.parametrize("chain", CHAINS.values(), ids=CHAINS)
-@pytest.mark.parametrize("arm", [BRAKED, SPRUNG], ids=["friction", "spring"])
+@pytest.mark.parametrize("arm", [BRAKED, LOOSE, SPRUNG], ids=["friction", "hardly any", "spring"])
 def test_discs_hold_the_pulse_transfer_functions(arm, chain):
     """x^n H at a point of each arc, by `PulseTransfer`."""
     loop = whole_loop(arm, GAINS, chain)
@@ -44,7 +45,8 @@ def test_discs_hold_the_pulse_transfer_functions(arm, chain):
 
 @pytest.mark.parametrize("chain", CHAINS.values(), ids=CHAINS)
 @pytest.mark.parametrize("law", [GAINS, replace(GAINS, Kp=0.01), LEAD], ids=["PD", "soft", "lead"])
-def test_a_verdict_on_a_hub_with_friction_is_proven(chain, law):
-    verdict = verdict_on(BRAKED, law, chain)
+@pytest.mark.parametrize("arm", [BRAKED, LOOSE], ids=["friction", "hardly any"])
+def test_a_verdict_on_a_hub_with_friction_is_proven(arm, chain, law):
+    verdict = verdict_on(arm, law, chain)
     assert verdict.is_settled
     assert verdict.is_stable == (np.abs(np.linalg.eigvals(verdict.loop.reduced_matrix())).max() < 1)

@@ -6,7 +6,11 @@ function of the plant is
     H(z) = z^-d [ g0/z + x sum over poles of (r_j/p_j) a_j/(z - b_j) + the rigid body's terms in 1/x ]
 
 so a pole that has settled before the sample weighs nothing.  Of a slow one, as friction at the hub makes it, the share
-in g0 nearly cancels that in the sum: both are taken as one, (r_j/p_j) (a_j - 1 + (b_j - a_j)/z)/(z - b_j).
+in g0 nearly cancels that in the sum: both are taken as one, (r_j/p_j) (a_j - 1 + (b_j - a_j)/z)/(z - b_j).  So are
+that pole p and the integral of the rate of a braked hub, R/s - R/(s - p) of the angle with R = 1/b large:
+
+    x H(z) = -R p (c0 + c1/z + c2/z^2)/(z - e^{pT}),  c0 = t^2 phi(p t), t = (1 - f) T,
+    c2 = (f T)^2 e^{pT} phi(-p f T),  c0 + c1 + c2 = T (e^{pT} - 1)/p,  phi(u) = (e^u - 1 - u)/u^2
 
 x^k F(z) = x^k (1 + gains . H), k the order of the pole at z = 1, is analytic on the circle and outside.  On an arc it
 stays in a disc about its value in the middle, for 1/(z - b) changes by h/(|z - b| (|z - b| - h)) at most over h.  Where
@@ -16,6 +20,7 @@ argument principle).  Arcs whose disc holds 0 are cut.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -32,6 +37,7 @@ from tfarm.records import record
 
 MACHINE_EPS = float(np.finfo(float).eps)  # of a float64, times the counts of operations beside it
 SLOW = 0.1  # |p| T below which a pole is slow: its two parts are then more than ten times their sum
+PHI_TERMS = 12  # of a series in |p| T, below `SLOW`: 0.1^12/14! is left
 ARCS = 64  # of half the circle to begin with
 SHORTEST_ARC = 1e-13  # rad: no arc is cut further, as its ends are known to a few last bits
 PIECES_OF_ARC = 4  # into which one is cut that is too long
@@ -178,7 +184,7 @@ class Circle(Generic[SampledKind]):
             ramp = arcs.turned(0).times(pulse.ramps[0]) + late.times(pulse.ramps[1])
             total = total + ((push * late).times(T) + x * ramp).times(twice) * late
         elif once:
-            total = total + (push * late).times(once)
+            total = total + (push * late if self.braked is None else self._braked_pair(arcs)).times(once)
         return total * arcs.turned(pulse.sampling.whole_delay)
 
     # ------------------------------------------------------------ arcs
@@ -212,9 +218,31 @@ class Circle(Generic[SampledKind]):
         """sum over slow poles of (r/p) (a - 1 + (b - a)/z)/(z - b), all that they give: discs (outputs, arcs)."""
         plant, sampling = self.loop.plant, self.loop.chain.sampling
         p, T, f = plant.poles[self.is_slow], sampling.period, sampling.fraction
-        at_rest = plant.residues[:, self.is_slow] / p
+        residues = plant.residues.copy()
+        if self.braked is not None:
+            residues[:, self.braked] += np.array([once for _, once in plant.rigid])  # the rest is in `_braked_pair`
+        at_rest = residues[:, self.is_slow] / p
         now, late = at_rest * np.expm1(p * ((1 - f) * T)), at_rest * np.exp(p * ((1 - f) * T)) * np.expm1(p * (f * T))
         return self._summed(arcs, p, now) + self._summed(arcs, p, late) * arcs.turned(1)
+
+    @cached_property
+    def braked(self) -> int | None:
+        """Which pole is that of a hub that friction brings to rest, where it is slow; None where there is none."""
+        poles = self.loop.plant.poles
+        (real,) = np.nonzero(self.is_slow & (poles.imag == 0))
+        is_integral = any(once and not twice for twice, once in self.loop.plant.rigid)
+        return int(real[abs(poles[real]).argmin()]) if is_integral and real.size else None
+
+    def _braked_pair(self, arcs: _Arcs) -> Discs:
+        """x times the pulse transfer function of 1/s - 1/(s - p), p the braked hub's pole."""
+        sampling = self.loop.chain.sampling
+        T, late = sampling.period, sampling.fraction * sampling.period
+        p = float(self.loop.plant.poles[self.braked].real)
+        first, last = (T - late) ** 2 * _phi(p * (T - late)), late**2 * np.exp(p * T) * _phi(-p * late)
+        whole = T * np.expm1(p * T) / p
+        over = self._summed(arcs, np.array([p + 0j]), np.array([[-p + 0j]]))[0]
+        sums = arcs.turned(0).times(first) + arcs.turned(1).times(whole - first - last) + arcs.turned(2).times(last)
+        return over * sums
 
     def _summed(self, arcs: _Arcs, p: Complex, weights: Complex) -> Discs:
         """sum over poles p of weight/(z - b) on arcs: discs (outputs, arcs)."""
@@ -232,6 +260,11 @@ class Circle(Generic[SampledKind]):
             middles.append(weights @ (1 / away).T)
             radii.append(abs(weights) @ change.T)
         return Discs(np.concatenate(middles, axis=1), np.concatenate(radii, axis=1))
+
+
+def _phi(u: float) -> float:
+    """(e^u - 1 - u)/u^2, by its series: |u| is below `SLOW`."""
+    return math.fsum(u**k / math.factorial(k + 2) for k in range(PHI_TERMS))
 
 
 def power(x: Discs, n: int) -> Discs:
