@@ -7,10 +7,11 @@ import pytest
 
 import tfarm
 from tfarm import HubFeedback, Law
-from tfarm.dsp import Chain, Converters, Sampling
+from tfarm.dsp import Chain, Converters, Sampling, pulse_transfer, sampled_loop
 from tfarm.dsp.band import complete_band
 from tfarm.dsp.closed import verdict_on
-from tfarm.dsp.margins import whole_loop
+from tfarm.dsp.margins import stable_windows, whole_loop
+from tfarm.reduced import modal_model, relaxed_model
 
 LAB = tfarm.load("sasaki2012-lab")
 BRAKED = replace(LAB, hub=replace(LAB.hub, friction=0.01))  # its slow pole is at -b/J = -0.015 1/s
@@ -50,3 +51,42 @@ def test_a_verdict_on_a_hub_with_friction_is_proven(arm, chain, law):
     verdict = verdict_on(arm, law, chain)
     assert verdict.is_settled
     assert verdict.is_stable == (np.abs(np.linalg.eigvals(verdict.loop.reduced_matrix())).max() < 1)
+
+
+@pytest.mark.parametrize("chain", CHAINS.values(), ids=CHAINS)
+def test_with_ever_less_friction_the_loop_is_ever_nearer_to_that_without(chain):
+    """Radius and edge of Kp are smooth in b: what b does at 1e-7 is the share of it that it does at 1e-3."""
+    found = {}
+    for b in (0.0, 1e-3, 1e-5, 1e-7):
+        loop = sampled_loop(replace(LAB, hub=replace(LAB.hub, friction=b)), GAINS, chain, count=6)
+        ((low, high),) = stable_windows(loop, "Kp")
+        assert low == 0.0
+        found[b] = np.array([loop.poles.log_spectral_radius, high])
+    slope = (found[1e-3] - found[0.0]) / 1e-3
+    for b in (1e-5, 1e-7):  # R/s and r/(s - p) cancel to first order: some last bits of J/(b T)
+        rounding = 20 * np.finfo(float).eps * LAB.total_inertia / (b * chain.sampling.period)
+        np.testing.assert_allclose(found[b], found[0.0] + slope * b, rtol=1e-7 + rounding)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.3, 1.0, 2.6])
+def test_the_state_space_of_a_braked_hub_is_its_pulse_transfer_function(delay):
+    """C (z - A)^-1 B against the sum over poles, with friction that leaves both their digits."""
+    arm = replace(LAB, hub=replace(LAB.hub, friction=0.3))
+    pulse = pulse_transfer(arm, ["hub_angle", "hub_rate", "root_moment"], Sampling(period=0.01, delay_samples=delay))
+    assert pulse.plant.braked(0.1 / 0.01) is not None
+    A, B, C = pulse.matrices()
+    z = np.array([1.2j, 0.95 * np.exp(0.3j), -1.1 + 0.2j])
+    states = np.array([C @ np.linalg.solve(each * np.eye(len(A)) - A, B) for each in z]).T
+    np.testing.assert_allclose(states, pulse(z), rtol=1e-9)
+
+
+@pytest.mark.parametrize("model", [modal_model, relaxed_model])
+def test_a_model_has_its_statics_whatever_the_friction(model):
+    """Exact values at low frequencies, where -r/p of the slow pole, up to 1e14, and what is at rest nearly cancel."""
+    names = ["hub_angle", "hub_rate", "root_moment", "tip_displacement"]
+    s = np.array([0.1j, 3j])
+    off = []
+    for b in (1e-1, 1e-3, 1e-5, 1e-7):
+        arm = replace(LAB, hub=replace(LAB.hub, friction=b))
+        off.append(abs(model(arm, names, 6)(s) / tfarm.transfer(arm, names)(s) - 1).max())
+    assert max(off) < 2 * off[0] + 1e-16 * LAB.total_inertia * 3 / 1e-7  # R/s and r/(s - p) cancel to first order

@@ -20,7 +20,6 @@ argument principle).  Arcs whose disc holds 0 are cut.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -33,11 +32,10 @@ from tfarm.arm import HubFeedback
 from tfarm.arrays import Complex, Real
 from tfarm.dsp.law_loop import SampledKind
 from tfarm.dsp.loop import ANGLE_ROW, RATE_ROW, SampledLoop
+from tfarm.dsp.sampling import SLOW, phi
 from tfarm.records import record
 
 MACHINE_EPS = float(np.finfo(float).eps)  # of a float64, times the counts of operations beside it
-SLOW = 0.1  # |p| T below which a pole is slow: its two parts are then more than ten times their sum
-PHI_TERMS = 12  # of a series in |p| T, below `SLOW`: 0.1^12/14! is left
 ARCS = 64  # of half the circle to begin with
 SHORTEST_ARC = 1e-13  # rad: no arc is cut further, as its ends are known to a few last bits
 PIECES_OF_ARC = 4  # into which one is cut that is too long
@@ -228,17 +226,13 @@ class Circle(Generic[SampledKind]):
     @cached_property
     def braked(self) -> int | None:
         """Which pole is that of a hub that friction brings to rest, where it is slow; None where there is none."""
-        poles = self.loop.plant.poles
-        (real,) = np.nonzero(self.is_slow & (poles.imag == 0))
-        is_integral = any(once and not twice for twice, once in self.loop.plant.rigid)
-        return int(real[abs(poles[real]).argmin()]) if is_integral and real.size else None
+        return self.loop.plant.braked(SLOW / self.loop.chain.sampling.period)
 
     def _braked_pair(self, arcs: _Arcs) -> Discs:
         """x times the pulse transfer function of 1/s - 1/(s - p), p the braked hub's pole."""
-        sampling = self.loop.chain.sampling
-        T, late = sampling.period, sampling.fraction * sampling.period
+        T, late = self.loop.chain.sampling.period, self.loop.chain.sampling.fraction * self.loop.chain.sampling.period
         p = float(self.loop.plant.poles[self.braked].real)
-        first, last = (T - late) ** 2 * _phi(p * (T - late)), late**2 * np.exp(p * T) * _phi(-p * late)
+        first, last = (T - late) ** 2 * phi(p * (T - late)), late**2 * np.exp(p * T) * phi(-p * late)
         whole = T * np.expm1(p * T) / p
         over = self._summed(arcs, np.array([p + 0j]), np.array([[-p + 0j]]))[0]
         sums = arcs.turned(0).times(first) + arcs.turned(1).times(whole - first - last) + arcs.turned(2).times(last)
@@ -260,11 +254,6 @@ class Circle(Generic[SampledKind]):
             middles.append(weights @ (1 / away).T)
             radii.append(abs(weights) @ change.T)
         return Discs(np.concatenate(middles, axis=1), np.concatenate(radii, axis=1))
-
-
-def _phi(u: float) -> float:
-    """(e^u - 1 - u)/u^2, by its series: |u| is below `SLOW`."""
-    return math.fsum(u**k / math.factorial(k + 2) for k in range(PHI_TERMS))
 
 
 def power(x: Discs, n: int) -> Discs:

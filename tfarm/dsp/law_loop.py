@@ -147,7 +147,7 @@ class SampledLaw:
         Such an angle is regulated by nothing: a pole at z = 1.
         """
         A, B, C, D = self.law.matrices()
-        angle = self.plant.rigid[:, int(self.is_damped)]
+        angle = self.pulse.matrices()[2][:, self.pulse.integrals_at + int(self.is_damped)]
         pushed = B @ angle
         states = np.zeros(0) if not len(A) else np.linalg.lstsq(np.eye(len(A)) - A, pushed, rcond=None)[0].astype(float)
         left = abs(states - A @ states - pushed)

@@ -197,7 +197,7 @@ class SampledLoop:
         shift = np.zeros(len(A))
         shift[first] = 1.0
         if self.differences:
-            shift[-2] = rigid[0] or rigid[1]
+            shift[-2] = self.pulse.matrices()[2][ANGLE_ROW, first + int(rigid[0] == 0.0)]
         return without_drift(A, first, shift)
 
     @cached_property

@@ -86,6 +86,15 @@ class Plant:
         """G_o(0) of every output that does not turn with the arm (outputs,), and H_o(1) at any period: a held input."""
         return np.asarray(self.static - (self.residues / self.poles).sum(axis=1).real)
 
+    def braked(self, slower_than: float) -> int | None:
+        """Which pole is that of a hub that friction brings to rest, if |p| is below that [1/s]; None if there is none.
+
+        Its residues nearly cancel what turns with the arm, rigid[:, 1], the more the less friction there is.
+        """
+        (slow,) = np.nonzero((self.poles.imag == 0) & (abs(self.poles) < slower_than))
+        turns = self.rigid[:, 1].any() and not self.rigid[:, 0].any()
+        return int(slow[abs(self.poles[slow]).argmin()]) if turns and slow.size else None
+
     @property
     def count(self) -> int:
         """The last flexible mode in it."""

@@ -13,6 +13,7 @@ quotient.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     import control
 
 
+SLOW = 0.1  # |p| T below which a pole is slow: its two parts are then more than ten times their sum
+PHI_TERMS = 12  # of a series in |p| T, below `SLOW`: 0.1^12/14! is left
 FORGOTTEN = 40.0  # e^-40 = 4e-18: such a pole has settled before the next sample
 
 
@@ -143,7 +146,8 @@ class PulseTransfer:
         """A (n, n), B (n,), C (outputs, n) of x_{k+1} = A x_k + B u_k, y_k = C x_k, real.
 
         States: real and imaginary part of the amplitude of each pole with Im p > 0, the amplitude of each real one, the
-        double integral and the integral of the torque, and u_{k-1} to u_{k-d-1}.
+        double integral and the integral of the torque, and u_{k-1} to u_{k-d-1}.  Of a hub that friction brings to rest
+        slowly (`Plant.braked`) the integral of that pole's amplitude stands for that of the torque.
         """
         return self._matrices
 
@@ -172,7 +176,24 @@ class PulseTransfer:
         else:
             B[:n] = now
         B[n] = 1.0
+        if (braked := self.plant.braked(SLOW / self.sampling.period)) is not None:
+            place, p = 2 * upper.size + int(np.flatnonzero(real == braked)[0]), float(self.plant.poles[braked].real)
+            self._integrate(A, B, p, (place, n - 1, last))
+            C[:, place] += self.plant.rigid[:, 1]  # R/s + r/(s - p) = -R p/(s (s - p)) + (r + R)/(s - p)
+            C[:, n - 1] = -p * self.plant.rigid[:, 1]
         return A, B, C
+
+    def _integrate(self, A: Real, B: Real, p: float, at: tuple[int, int, int]) -> None:
+        """Put the integral of the amplitude of a slow real pole p into a row; `at`: that pole, the row, the last u."""
+        T, late = self.sampling.period, self.sampling.fraction * self.sampling.period
+        (place, row, last), now = at, T - late
+        A[row] = 0.0
+        A[row, row], A[row, place] = 1.0, T * np.expm1(p * T) / (p * T)
+        A[row, last] = late**2 * phi(p * late) + np.expm1(p * late) / p * np.expm1(p * now) / p
+        if self.sampling.whole_delay:
+            A[row, last - 1] = now**2 * phi(p * now)
+        else:
+            B[row] = now**2 * phi(p * now)
 
     def kept(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Indices of the poles with Im p > 0 and of the real ones, those of s = 0 apart."""
@@ -213,6 +234,11 @@ def pulse_transfer(
     """
     clock = Sampling() if sampling is None else sampling
     return PulseTransfer(undelayed_plant(arm, Chain(sampling=clock), outputs, count), clock)
+
+
+def phi(u: float) -> float:
+    """(e^u - 1 - u)/u^2, by its series: |u| is below `SLOW`."""
+    return math.fsum(u**k / math.factorial(k + 2) for k in range(PHI_TERMS))
 
 
 def held_amplitude(p: Complex, duration: float) -> Complex:

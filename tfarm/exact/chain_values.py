@@ -29,6 +29,7 @@ SERIES_BITS = 512  # of the power series at s = 0, whose coefficients are sums o
 KNOWN_ZERO = 1e-80  # a coefficient below this share of the first is a zero that balls cannot know
 LAYOUTS_KEPT = 256  # of one chain: more places than a page looks at
 SERIES_KEPT = 512  # expansions at s = 0 of rigs and outputs: more than a report of six rigs asks for
+SLOW_POLE_STEPS = 8  # of Newton's method for a pole next to 0, each doubling its digits
 SERIES_ORDER = 8  # of the power series: the drive begins at s^2 at most
 
 
@@ -233,11 +234,40 @@ def series_at_zero(
 @lru_cache(SERIES_KEPT)  # loops, models and pages ask for the same few of a rig again and again
 def _series_at_zero(chain: ElementChain, output: Output, x: float, terms: int) -> tuple[float, ...]:
     """The same of one output."""
+    coefficients = _quotient_at_zero(chain, output, x, terms).c
+    order = _leading(_slow(chain, terms)[1])
+    return (*[0.0] * (2 - order), *(float(c.mid()) if hasattr(c, "mid") else float(c) for c in coefficients))
+
+
+def _quotient_at_zero(chain: ElementChain, output: Output, x: float, terms: int) -> Jet:
+    """The output's expansion from s^-n on, n the order of the drive's zero, in balls."""
     state, drive = _slow(chain, terms)
     order = _leading(drive)
     with precision(SERIES_BITS):
-        quotient = Jet(_cleared(state.numerator(output, x)).c[: terms - order]) / drive.shifted(order)
-        return (*[0.0] * (2 - order), *(float(c.mid()) if hasattr(c, "mid") else float(c) for c in quotient.c))
+        return Jet(_cleared(state.numerator(output, x)).c[: terms - order]) / drive.shifted(order)
+
+
+def beside_slow_pole(chain: ElementChain, wanted: Sequence[Output], x: float) -> list[tuple[float, float]]:
+    """Coefficients of 1 and s in each output's expansion at s = 0, without those of a single pole p next to 0.
+
+    Of r/(s - p) they are c_k = -r/p^(k+1), beside which those of all other poles vanish from some n on: so what is left
+    is c_k - p^(n-k) c_n, right to (p/w)^(n-k), w the next pole.  In float64 -r/p alone would drown it.
+    """
+    _, drive = _slow(chain, SERIES_ORDER)
+    first = _leading(drive)
+    with precision(SERIES_BITS):
+        of_drive = drive.shifted(first)
+        p = rational(0)
+        for _ in range(SLOW_POLE_STEPS):  # Newton's method on a power series that is nearly a line there
+            p = p - sum(c * p**k for k, c in enumerate(of_drive.c)) / sum(
+                k * c * p ** (k - 1) for k, c in enumerate(of_drive.c) if k
+            )
+        found = []
+        for each in wanted:
+            constant, slope, *others, last = _quotient_at_zero(chain, each, x, SERIES_ORDER).c[first:]
+            power = p ** (len(others) + 1)
+            found.append((float((constant - last * power * p).mid()), float((slope - last * power).mid())))
+    return found
 
 
 def order_at_zero(chain: ElementChain, wanted: Output | None, x: float = 0.0) -> int:

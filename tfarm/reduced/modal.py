@@ -13,15 +13,18 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, Arm
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
+from tfarm.exact.chain import ElementChain
+from tfarm.exact.chain_values import beside_slow_pole
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.exact.system import System
-from tfarm.response import Wanted, transfer
+from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import Modes, modes
 from tfarm.spectrum.damped import DampedModes, all_damped_modes, entered, single_zeros
 
@@ -31,6 +34,7 @@ from .residues import contour_residues, end_residues, undamped_residues
 
 MOST_MODELLED = 1000  # of a model: its matrices of 2000 states take 32 MB
 MOST_PROPER = 2  # power of s: a mode's share r s^2/(s^2 + w^2) is bounded, and one of s^3 is not
+NEXT_TO_REST = 1e-3  # of the first frequency: a pole nearer to 0 leaves 1e-15 of itself five terms on
 PULLED_APART = 1e-6  # of its size: what parts the two of a double pole
 
 
@@ -75,7 +79,7 @@ def modal_model(
     collocated = OUTPUTS["root_moment" if arm.is_locked else "hub_angle"]
     p, r, single, alone = _poles_and_residues(arm, table, k, [*wanted, collocated], share, branches)
     p, r = p[:count], r[:, :count]
-    expansion = G.expansion
+    expansion, kept = _beside_slow(G, single, table)
     return ModalModel(
         arm=arm,
         rows=G.rows,
@@ -85,7 +89,7 @@ def modal_model(
         eigenvalues=p,
         residues=r[:-1],
         rigid=expansion[:, :2],
-        static=expansion[:, 2] + (r[:-1] / p).real.sum(axis=(1, 2)) + (alone / single).sum(axis=1)[:-1],
+        static=expansion[:, 2] + (r[:-1] / p).real.sum(axis=(1, 2)) + (alone / single)[:-1, kept].sum(axis=1),
         single=single,
         single_residues=alone[:-1] if single.size else None,
         participation=np.sqrt(abs((r[-1] * p[:, ::-1]).real.sum(axis=-1))),
@@ -102,10 +106,10 @@ def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None)
     model, C = modal_model(arm, outputs, count, x), arm.damping
     if C == 0:
         raise ParameterError(key="link.damping", value=C, remedy="without damping nothing relaxes; take modal_model")
-    exact = transfer(arm, model.rows, x=x).expansion
+    exact, kept = _beside_slow(transfer(arm, model.rows, x=x), model.single, modes(arm, 1))
     slope = exact[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
     if model.single_residues is not None:
-        slope = slope + (model.single_residues / model.single**2).sum(axis=1)
+        slope = slope + (model.single_residues / model.single**2)[:, kept].sum(axis=1)
     return replace(model, static=model.static + slope / C, relaxation=-slope / C)
 
 
@@ -167,6 +171,20 @@ def tailed_model(arm: Arm, count: int) -> ModalModel:
         static=model.static + (tail / p).real.sum(axis=1),
         participation=np.r_[model.participation, math.sqrt(rho)],
     )
+
+
+def _beside_slow(G: TransferFunction, single: Real, table: Modes) -> tuple[Real, NDArray[np.bool_]]:
+    """The expansion of an arm (outputs, 4), and which of its single poles (m,) have their share in it yet.
+
+    The pole of a hub that hardly any friction brings to rest has not: there 1 and s have what is left without it.
+    """
+    expansion, kept = G.expansion, np.ones(single.size, np.bool_)
+    slowest = abs(single).min(initial=math.inf)
+    first = table.natural_frequency[table.index > 0][0]
+    if isinstance(G.system, ElementChain) and G.arm.has_rigid_mode and slowest < NEXT_TO_REST * first:
+        expansion = np.c_[expansion[:, :2], beside_slow_pole(G.system, G.rows, G.share)]
+        kept = abs(single) > slowest
+    return expansion, kept
 
 
 def proper(k: System, wanted: Output, share: float) -> Output:
