@@ -36,7 +36,8 @@ def confirmed(found: Crossings, low: float, high: float, is_stable: Callable[[fl
     """The intervals between `low` and `high`, which may be infinite, in which nothing is beyond the curve.
 
     Between two crossings the count is constant, and only where it is least it may be 0: there `is_stable` is asked at
-    one gain.  Gaps that rounding tears between crossings of one gain are none.
+    one gain.  Gaps that rounding tears between crossings of one gain are none.  Where it is stable in none of these
+    `is_stable` is asked between all: next to z = 1 rounding may have made a crossing, and the counts are wrong.
     """
     gains = found.within(low, high).gain
     edges = np.r_[low, gains[np.r_[True, np.diff(gains) > SAME_EDGE * abs(gains[1:])][: gains.size]], high]
@@ -44,7 +45,9 @@ def confirmed(found: Crossings, low: float, high: float, is_stable: Callable[[fl
     inner = np.clip(edges, -beyond, beyond)
     middles = (inner[1:] + inner[:-1]) / 2
     counts = found.passed(middles)  # the same up to a constant
-    stable = [i for i in np.flatnonzero(counts == counts.min()) if is_stable(float(middles[i]))]
+    is_least = counts == counts.min()
+    stable = [i for i in np.flatnonzero(is_least) if is_stable(float(middles[i]))]
+    stable = stable or [i for i in np.flatnonzero(~is_least) if is_stable(float(middles[i]))]
     return joined([(float(edges[i]), float(edges[i + 1])) for i in stable])
 
 
