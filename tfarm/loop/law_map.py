@@ -115,17 +115,22 @@ def law_map(arm: Arm, law: AnyLaw, vary: tuple[str, str], x: Real, y: Real, band
     at = _farthest(y, np.concatenate([y[:0], *(each.gain for each in columns)]))
     row = law.having(vary[1], float(y[at]))
     if is_counted:
-        there = [unstable_below(own.under(row.having(vary[0], float(value))), band) for value in x]
+        there = np.array([unstable_below(own.under(row.having(vary[0], float(value))), band) for value in x])
     else:
         across = law_crossings(own.under(row), vary[0], x, omega, known, band)
-        is_resting = own.under(row.having(vary[0], float(x[x.size // 2]))).resting_zeros
-        start = _farthest(x, across.gain) if is_resting else x.size // 2
-        begin = unstable_below(own.under(row.having(vary[0], float(x[start]))), band)
-        (there,) = counts_over(x, [across], float(x[start]), np.array([begin]))
-    counts = counts_over(y, columns, float(y[at]), np.asarray(there))
+        there = _counted(own.under(row), vary[0], x, across, band)
+    counts = counts_over(y, columns, float(y[at]), there)
     found = LawMap(own.arm, law, vary, x, y, counts.T.copy(), band, columns)
     _must_hold_at_corners(own, found)
     return found
+
+
+def _counted(loop: LawLoop, name: str, x: Real, across: Crossings, band: float) -> NDArray[np.int64]:
+    """Unstable poles at each x, from one count in the middle; where a pole rests there, farthest from the crossings."""
+    is_resting = loop.under(loop.law.having(name, float(x[x.size // 2]))).resting_zeros
+    start = float(x[_farthest(x, across.gain) if is_resting else x.size // 2])
+    begin = unstable_below(loop.under(loop.law.having(name, start)), band)
+    return np.asarray(counts_over(x, [across], start, np.array([begin]))[0])
 
 
 def _farthest(values: Real, crossings: Real) -> int:
