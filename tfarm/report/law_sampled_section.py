@@ -40,7 +40,7 @@ LATER_CAPTION = (
 )
 NUMBERS_CAPTION = (
     "The gain of each part of a law alone, as it is sampled; a name that ends in “gain” is a factor on that part. "
-    "Edges are where a pole of the exact sampled loop is on the unit circle: {modes}."
+    "At an edge a pole of the sampled loop is on the unit circle ({modes})."
 )
 APART_FROM_FREE = ", that at z = 1 of a hub that nothing holds apart"
 MEASURED_CAPTION = (
