@@ -205,7 +205,8 @@ def _listed(curves: Complex, variation: Variation, number: int) -> tuple[NDArray
     mode = np.r_[np.zeros(idle, int), mode]
     lives = ~np.isnan(curves)
     real = (lives & (curves.imag == 0)).any(axis=1)
-    kept = np.nonzero(lives.any(axis=1) & (real | ~(curves.imag < 0).any(axis=1)))[0][:number]
+    is_mirrored = (curves.imag < 0).any(axis=1) & ~(curves.imag > 0).any(axis=1)  # but for one that went through real
+    kept = np.nonzero(lives.any(axis=1) & (real | ~is_mirrored))[0][:number]
     if kept.size < number:
         raise ConvergenceError(f"only {kept.size} branches could be followed: ask for fewer", kept.size, number)
     return kept - idle, mode[kept]
