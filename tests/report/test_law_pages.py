@@ -27,6 +27,7 @@ from tfarm.report import law_sampled_section as in_time
 from tfarm.report import making, writing
 from tfarm.report.given_laws import GivenLaw, Subject, on_arm
 from tfarm.report.law_loop_section import law_margins_section, law_nyquist_section, law_poles_section
+from tfarm.report.law_measured import overshoot_table
 from tfarm.report.law_section import law_section, written_polynomial
 from tfarm.report.page import file_of
 from tfarm.tables.files import to_json
@@ -271,7 +272,7 @@ def test_what_is_measured_and_computed_of_the_real_controllers():
         goal = measured.reference[-1]
         assert 100 * overshoot(measured.hub_angle, measured.step, goal) == pytest.approx(over, abs=1e-3)
         assert np.degrees(measured.hub_angle[-1] - goal) == pytest.approx(end, abs=1e-4)
-        (row,) = in_time.overshoot_table({name: found})
+        (row,) = overshoot_table({name: found})
         assert row["overshoot_measured_percent"] == pytest.approx(over, abs=1e-3)
         assert row["end_computed_deg"] == pytest.approx(np.degrees(found.hub_angle[-1] - goal))
         first = [

@@ -143,6 +143,7 @@ def _turned(found: Locus) -> Locus:
 
 
 def _traced_along(wanted: Variation, gain: Real, branches: int, rounds: int) -> Locus:
+    """The locus followed from the first of the values to the last."""
     freed, loss = free_of_loss(wanted.arm)
     variation = Variation(freed, wanted.law, wanted.vary, loss)
     cut, lowest = followed(variation, float(gain[0]), float(gain[-1]), branches + 1)
