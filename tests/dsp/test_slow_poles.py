@@ -9,6 +9,7 @@ import tfarm
 from tfarm import HubFeedback, Law
 from tfarm.dsp import Chain, Converters, Sampling, pulse_transfer, sampled_loop
 from tfarm.dsp.band import complete_band
+from tfarm.dsp.circle import Circle
 from tfarm.dsp.closed import verdict_on
 from tfarm.dsp.margins import stable_windows, whole_loop
 from tfarm.reduced import modal_model, relaxed_model
@@ -90,3 +91,11 @@ def test_a_model_has_its_statics_whatever_the_friction(model):
         arm = replace(LAB, hub=replace(LAB.hub, friction=b))
         off.append(abs(model(arm, names, 6)(s) / tfarm.transfer(arm, names)(s) - 1).max())
     assert max(off) < 2 * off[0] + 1e-16 * LAB.total_inertia * 3 / 1e-7  # R/s and r/(s - p) cancel to first order
+
+
+def test_a_pole_left_of_the_line_is_not_bounded_twice():
+    """What is left of it is in `missing` already: then the integral of the rate stands by itself."""
+    loop = whole_loop(BRAKED, GAINS, Chain())
+    band = complete_band(loop)
+    left = band.kept & (np.arange(band.kept.size) != band.circle().braked)
+    assert Circle(loop, left, band.missing).braked is None

@@ -225,8 +225,9 @@ class Circle(Generic[SampledKind]):
 
     @cached_property
     def braked(self) -> int | None:
-        """Which pole is that of a hub that friction brings to rest, where it is slow; None where there is none."""
-        return self.loop.plant.braked(SLOW / self.loop.chain.sampling.period)
+        """Which pole is that of a hub that friction brings to rest, if it is slow and kept; None if there is none."""
+        found = self.loop.plant.braked(SLOW / self.loop.chain.sampling.period)
+        return found if found is not None and self.is_slow[found] else None
 
     def _braked_pair(self, arcs: _Arcs) -> Discs:
         """x times the pulse transfer function of 1/s - 1/(s - p), p the braked hub's pole."""
