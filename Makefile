@@ -15,11 +15,14 @@ SIZE ?= 100
 SEED ?= 1
 SURVEYS := \
 	left_out \
+	golden \
 	plausible \
 	properties \
 	audit.slips \
 	exact.accuracy \
 	exact.chain_accuracy \
+	response.rigid \
+	response.extrema \
 	spectrum.proofs \
 	spectrum.ritz \
 	spectrum.damped \
@@ -29,6 +32,7 @@ SURVEYS := \
 	loop.loci \
 	loop.law_counts \
 	loop.number_windows \
+	loop.law_times \
 	synthesis.designs \
 	synthesis.held_designs \
 	loop.nyquist_counts \
@@ -36,10 +40,12 @@ SURVEYS := \
 	dsp.verdicts \
 	dsp.settled \
 	dsp.law_verdicts \
+	dsp.law_orders \
 	fitting.planted \
 	tuner.bounded \
 	cli.fuzz \
 	cli.kills \
+	cli.stops \
 	report.plausible \
 	report.twice
 

@@ -19,6 +19,7 @@ from pathlib import Path
 ROOMS = [f"tests/{room}" for room in ("exact", "spectrum", "response", "reduced", "loop", "dsp", "tuner")]
 CORES = ("Haswell", "SkylakeX", "Zen", "Nehalem", "Prescott")
 FEW = ("Haswell", "Prescott")  # one with fused multiply-add and one without, whatever the machine's own is
+CHOSEN_BY = ("OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES")  # the variables of the environment that choose kernels
 NAMES = ("scipy_openblas_get_corename64_", "scipy_openblas_get_corename", "openblas_get_corename")
 
 
@@ -65,11 +66,16 @@ def variants(cores: tuple[str, ...]) -> dict[str, dict[str, str]]:
     return chosen
 
 
+def environment_with(chosen: dict[str, str]) -> dict[str, str]:
+    """This process's environment with those variables, and without any other choice of kernels that it has itself."""
+    return {name: value for name, value in os.environ.items() if name not in CHOSEN_BY} | chosen
+
+
 def probed(environment: dict[str, str]) -> str:
     """`kernels_in_use` of a process with that environment, or the signal that ended it: an instruction unknown here."""
     script = "from tests.kernels import kernels_in_use; print(*kernels_in_use(), sep=', ')"
     command = [sys.executable, "-c", script]
-    done = subprocess.run(command, env=os.environ | environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, env=environment_with(environment), capture_output=True, text=True, check=False)
     return done.stdout.strip() if done.returncode == 0 else f"exit {done.returncode}"
 
 
@@ -96,7 +102,7 @@ def main(arguments: list[str]) -> int:
         seen[what] = title, environment
 
     def passes(environment: dict[str, str]) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(pytest, env=os.environ | environment, capture_output=True, text=True, check=False)
+        return subprocess.run(pytest, env=environment_with(environment), capture_output=True, text=True, check=False)
 
     failed = []
     with ThreadPoolExecutor(2) as pool:

@@ -6,11 +6,23 @@ from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
 
+import pytest
+
 from tests import kernels
 
 ROOT = Path(__file__).parent.parent
 
 
+@pytest.fixture(params=[{}, {"OPENBLAS_CORETYPE": "Prescott", "NPY_DISABLE_CPU_FEATURES": "AVX2"}])
+def surroundings(request, monkeypatch):
+    """An environment that chooses no kernels, and one that does."""
+    for name in kernels.CHOSEN_BY:
+        monkeypatch.delenv(name, raising=False)
+    for name, value in request.param.items():
+        monkeypatch.setenv(name, value)
+
+
+@pytest.mark.usefixtures("surroundings")
 def test_what_is_chosen_is_what_runs() -> None:
     """Where NumPy and SciPy bring their OpenBLAS, the oldest kernels are never a CPU's own; NumPy's loops likewise."""
     own, oldest = kernels.probed({}), kernels.probed({"OPENBLAS_CORETYPE": "Prescott"})
@@ -22,6 +34,7 @@ def test_what_is_chosen_is_what_runs() -> None:
     assert plain == ", ".join([*own.split(", ")[:2], "baseline"])
 
 
+@pytest.mark.usefixtures("surroundings")
 def test_a_kernel_that_is_none_is_named_and_skipped(monkeypatch, capsys) -> None:
     """SkylakeX dies of an unknown instruction, Zen is Haswell again, Nehalem has a failing test."""
     what = {"Haswell": "h", "SkylakeX": "exit -4", "Zen": "h", "Nehalem": "n", "Prescott": "p"}

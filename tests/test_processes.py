@@ -45,6 +45,13 @@ def test_each_process_keeps_to_its_list_and_then_helps_the_other(by_turns):
     assert [task for pool, task in by_turns.handed if pool is second] == ["b1", "b2", "a5"]
 
 
+def test_what_runs_is_named_while_it_runs(by_turns):
+    """Both at first; then what one process begins, and what the other still has."""
+    seen = []
+    assert len(dict(shared([["a1", "a2"], ["b1"]], by_turns.submit, 2, begun=seen.append))) == 3
+    assert seen == [["a1", "b1"], ["b1", "a2"], ["a2"]]
+
+
 @pytest.mark.parametrize("lists", [[], [[]], [["a"]], [[], ["a"], [], ["b", "c"]]])
 def test_lists_of_any_length(by_turns, lists):
     assert dict(shared(lists, by_turns.submit, 2)) == {task: task.upper() for each in lists for task in each}

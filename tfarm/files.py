@@ -10,23 +10,25 @@ import errno
 import io
 import os
 import re
+import secrets
 import shutil
 import stat
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
 from tfarm.errors import ParameterError
+from tfarm.stopping import undone_if_stopped
 
 if sys.platform != "win32":
     import fcntl
 
 STANDARD_OUTPUT = "-"  # in the place of a path, as other programs have it; a file of that name is written as a/-
 PART, FOLDER = ".part", ".writing-"  # how the names of temporary files end, and those of temporary folders begin
-SUFFIX = "[a-z0-9_]{8}"  # what Python's tempfile puts in their middle or at their end
+SUFFIX = "[a-z0-9_]{8}"  # in their middle or at their end: eight hexadecimal digits, once Python's tempfile
 
 
 def read_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -> bytes:
@@ -101,7 +103,7 @@ def is_standard_output(path: Path) -> bool:
 def temporary_folder(place: Path) -> Iterator[Path]:
     """A new folder in `place`, gone afterwards with all that is in it; those that killed runs left there go first."""
     _remove_leftovers(place, re.escape(FOLDER) + SUFFIX)
-    with _temporary(lambda: tempfile.mkdtemp(prefix=FOLDER, dir=place)) as folder:
+    with _temporary(place, FOLDER, "", partial(Path.mkdir, mode=0o700)) as folder:
         yield folder
 
 
@@ -130,7 +132,7 @@ def _replace(path: Path, content: bytes) -> None:
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     prefix = f".{path.name[:40]}."
     _remove_leftovers(path.parent, re.escape(prefix) + SUFFIX + re.escape(PART))
-    with _temporary(lambda: _empty_file(path.parent, prefix)) as temporary:
+    with _temporary(path.parent, prefix, PART, partial(Path.touch, mode=0o600, exist_ok=False)) as temporary:
         temporary.write_bytes(content)
         if old is not None and hasattr(os, "chown"):
             with suppress(OSError):
@@ -139,26 +141,22 @@ def _replace(path: Path, content: bytes) -> None:
         os.replace(temporary, path)
 
 
-def _empty_file(folder: Path, prefix: str) -> str:
-    handle, name = tempfile.mkstemp(prefix=prefix, suffix=PART, dir=folder)
-    os.close(handle)
-    return name
-
-
 @contextmanager
-def _temporary(make: Callable[[], str]) -> Iterator[Path]:
-    """What `make` made, locked while it is in use, and gone afterwards; made again if another run tidied it away."""
+def _temporary(folder: Path, prefix: str, suffix: str, make: Callable[[Path], object]) -> Iterator[Path]:
+    """What `make` makes, locked while it is in use, and gone afterwards; made again if another run tidied it away."""
     while True:
-        path = Path(make())
-        handle = _locked(path, wait=True)
-        try:
-            if path.exists():
-                yield path
-                return
-        finally:
-            _remove(path)
-            if handle is not None:
-                os.close(handle)
+        path = folder / f"{prefix}{secrets.token_hex(4)}{suffix}"
+        with undone_if_stopped(partial(_remove, path)):
+            make(path)
+            handle = _locked(path, wait=True)
+            try:
+                if path.exists():
+                    yield path
+                    return
+            finally:
+                _remove(path)
+                if handle is not None:
+                    os.close(handle)
 
 
 def _remove_leftovers(folder: Path, pattern: str) -> None:

@@ -9,16 +9,21 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import ExitStack, contextmanager
-from multiprocessing import forkserver, get_context, parent_process
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from multiprocessing import active_children, forkserver, get_context, parent_process, resource_tracker
 from multiprocessing.context import BaseContext
-from threading import Thread, current_thread, main_thread
+from multiprocessing.process import BaseProcess
+from threading import Thread
 from typing import TypeVar
 
+from tfarm.stopping import SIGNALS, undone_if_stopped, when_stopped
+
 BLAS = "OPENBLAS_NUM_THREADS"
+WARNINGS = "PYTHONWARNINGS"
 LOADS_ONCE = sys.platform == "linux"  # macOS' own libraries do not bear a fork, and Windows has none
 
 Task = TypeVar("Task")
@@ -30,18 +35,22 @@ def shared(
     submit: Callable[[Executor, Task], Future[Result]],
     workers: int,
     modules: Sequence[str] = (),
+    begun: Callable[[Sequence[Task]], object] = lambda _: None,
 ) -> Iterator[tuple[Task, Result]]:
     """Each task of the lists with its result, as it comes.  `submit` hands one to a process, which has the `modules`.
 
-    What a task raises is raised here, when those that run have ended; the others are not begun.
+    `begun` is given the tasks that run, whenever one is begun.  What a task raises is raised here, when those that run
+    have ended; the others are not begun.
     """
     waiting = deque(deque(each) for each in lists)
+    others = set(active_children())
     with ExitStack() as stack:
         stack.enter_context(one_thread_each())
         context = load_beforehand(modules)
         pools = [ProcessPoolExecutor(1, context, leave_with_parent) for _ in range(workers)]
         for pool in pools:
             stack.callback(pool.shutdown, wait=True, cancel_futures=True)
+        stack.enter_context(_killed_by_interrupts(others))
         own: list[deque[Task]] = [deque() for _ in pools]
         running: dict[Future[Result], tuple[int, Task]] = {}
         idle = list(range(workers))
@@ -51,6 +60,7 @@ def shared(
                     running[submit(pools[i], task)] = i, task
             if not running:
                 return
+            begun([task for _, task in running.values()])
             done = wait(running, return_when=FIRST_COMPLETED).done
             ended = [(future.result(), *running.pop(future)) for future in done]
             idle = [i for _, i, _ in ended]
@@ -66,23 +76,45 @@ def load_beforehand(modules: Sequence[str]) -> BaseContext:
     if not LOADS_ONCE:
         return get_context("spawn")
     context = get_context("forkserver")
-    context.set_forkserver_preload([*modules, "tfarm.frozen"])
-    with _deaf_to_interrupts():
-        forkserver.ensure_running()
+    context.set_forkserver_preload(["tfarm.grouped", *modules, "tfarm.frozen"])
+    when_stopped(kill_workers)
+    with _environment_with(WARNINGS, "ignore:resource_tracker"):  # of the semaphores of a process that was stopped
+        resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    try:
+        forkserver.ensure_running()  # inherits that both signals are blocked, as do those forked from it
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
     return context
 
 
-@contextmanager
-def _deaf_to_interrupts() -> Iterator[None]:
-    """New processes ignore Ctrl-C, which would stop them amid their imports with a traceback."""
-    if current_thread() is not main_thread():
-        yield
+def kill_workers() -> None:
+    """End the process that workers are forked from, and all of these, at once; they are gone when this returns."""
+    server = getattr(forkserver._forkserver, "_forkserver_pid", None)
+    for child in active_children() if server is None else []:
+        child.kill()
+    if server is None:
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with suppress(ProcessLookupError):  # it has its group once it has begun to load
+        os.kill(server, signal.SIGKILL)
+        os.killpg(server, signal.SIGKILL)
+    with suppress(ChildProcessError, ProcessLookupError):
+        os.waitpid(server, 0)
+        for _ in range(50):
+            os.killpg(server, 0)
+            time.sleep(0.01)
+
+
+@contextmanager
+def _killed_by_interrupts(others: set[BaseProcess]) -> Iterator[None]:
+    """Processes but the `others` end where this one is interrupted; tasks that run would be waited for."""
     try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
+        with undone_if_stopped(kill_workers):
+            yield
+    except KeyboardInterrupt:
+        for child in set(active_children()) - others:
+            child.kill()
+        raise
 
 
 def _next(own: list[deque[Task]], i: int, waiting: deque[deque[Task]]) -> Task | None:
@@ -95,27 +127,34 @@ def _next(own: list[deque[Task]], i: int, waiting: deque[deque[Task]]) -> Task |
     return longest.pop() if longest else None
 
 
-@contextmanager
-def one_thread_each() -> Iterator[None]:
+def one_thread_each() -> AbstractContextManager[None]:
     """New processes inherit one thread of BLAS, unless the user chose a number.
 
     On matrices of a hundred rows more threads only wait for each other, and two processes' would share two cores.
     """
-    chosen = os.environ.get(BLAS)
-    os.environ.setdefault(BLAS, "1")
+    return _environment_with(BLAS, os.environ.get(BLAS, "1"))
+
+
+@contextmanager
+def _environment_with(name: str, value: str) -> Iterator[None]:
+    """That variable is so for new processes."""
+    before = os.environ.get(name)
+    os.environ[name] = value
     try:
         yield
     finally:
-        if chosen is None:
-            os.environ.pop(BLAS, None)
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
 
 
 def leave_with_parent() -> None:
     """In a worker: end when the process that started it is gone; a pool's workers would wait for work for ever.
 
-    Ctrl-C stops what it does.
+    Ctrl-C is for that process.
     """
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
 
     def leave() -> None:

@@ -187,6 +187,7 @@ def test_an_arm_of_the_paper_s_kind_is_written_as_it_ever_was():
     parts = ["name", "assumptions", "theory", "input", "link", "hub", "clamp", "motor", "attachment", "payload"]
     assert list(written) == parts  # no joint: it is rigid
     assert "back_emf_constant" not in written["motor"]
+    assert tomllib.loads(to_toml(rig('input = "motor_voltage"\n')))["input"] == "hub_torque"  # a motor's is a choice
     assert written["attachment"] == [{"x": 0.02, "mass": 0.005}, {"x": rig().length, "stiffness": 12.0}]
 
 
@@ -203,9 +204,8 @@ motors = st.builds(
     rotor_friction=loss,
     gear_efficiency=st.floats(0.1, 1.0),
 )
-attachments = st.builds(
-    Attachment, x=st.floats(0.0, 0.1), mass=positive, inertia=loss, stiffness=loss, rotational_stiffness=loss
-)
+places = st.one_of(st.just(0.0), st.floats(1e-6, 0.1))  # none so small that it is refused
+attachments = st.builds(Attachment, x=places, mass=positive, inertia=loss, stiffness=loss, rotational_stiffness=loss)
 offsets = st.floats(-0.5, 0.5).map(lambda x: round(x, 9))
 
 

@@ -141,8 +141,8 @@ def response_rows() -> Iterator[Row]:
 
 def _response(s: Complex, what: str, name: str, solve: Any, size: tuple[int, int]) -> Row:
     arm = tfarm.load(name)
-    G = tfarm.transfer(arm, list(OUTPUTS))
-    times = interleaved({"tfarm": lambda: G(s), "elements": lambda: solve(arm, s, *size)}, 7)
+    calls = {"tfarm": lambda: tfarm.transfer(arm, list(OUTPUTS))(s), "elements": lambda: solve(arm, s, *size)}
+    times = interleaved(calls, 7)
     some = s[np.linspace(0, s.size - 1, responses.CHECKED).astype(int)]
     clear = some[abs(some) > 1.0]
     error, beyond = (ExactResponse(arm, points).error(solve(arm, points, *size)) for points in (some, clear))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -17,6 +16,7 @@ from tfarm.fitting.solve import nearest_minimum
 
 from .reference import Complex
 from .rows import Row, Target
+from .timing import interleaved
 
 GROUP = "A fit: five numbers, 1,000 frequencies, three responses, noise of 1 % (data by finite elements of degree 8)"
 FREE = ("link.youngs_modulus", "hub.inertia", "link.damping", "payload.mass", "payload.inertia")
@@ -34,37 +34,35 @@ def fit_rows() -> Iterator[Row]:
     data, start = measured(arm), dict(zip(FREE, OFF, strict=True))
     values = {key: factor * _value(arm, key) for key, factor in start.items()}
     found = fit(arm, data, free=FREE, start=values, profile=False)
-    seconds, profiled = [], []
-    for _ in range(ROUNDS):
-        begin = time.perf_counter()
-        fit(arm, data, free=FREE, start=values, profile=False)
-        seconds.append(time.perf_counter() - begin)
-        begin = time.perf_counter()
-        fit(arm, data, free=FREE, start=values)
-        profiled.append(time.perf_counter() - begin - seconds[-1])
-    whole = float(np.median(seconds))
+    calls = {
+        "fit": lambda: fit(arm, data, free=FREE, start=values, profile=False),
+        "profiled": lambda: fit(arm, data, free=FREE, start=values),
+    }
+    times = interleaved(calls, ROUNDS)
+    whole = times.median("fit")
+    profiled = float(np.median(times.rounds["profiled"] - times.rounds["fit"]))
     yield Row(
         group=GROUP, what="tfarm: whole, from 20-30 % off", n=1, each="fit", seconds=whole,
         error=max(abs(_value(found.arm, key) / _value(arm, key) - 1) for key in FREE),
         target=Target(measured=whole, limit=SECONDS, unit="s"), note="largest error: of a number, by the noise.",
     )  # fmt: skip
     yield Row(
-        group=GROUP, what="tfarm: profile intervals of all five", n=1, each="fit", seconds=float(np.median(profiled)),
-        target=Target(measured=float(np.median(profiled)), limit=10.0, unit="s"),
+        group=GROUP, what="tfarm: profile intervals of all five", n=1, each="fit", seconds=profiled,
+        target=Target(measured=profiled, limit=10.0, unit="s"),
     )  # fmt: skip
     own = found.solution.problem
-    near, elements = found.solution.point + NEAR, ElementProblem(own.family, own.parameters, own.responses)
-    begin = time.perf_counter()
-    nearest_minimum(own, near)
-    ours = time.perf_counter() - begin
-    begin = time.perf_counter()
-    nearest_minimum(elements, near)
-    theirs = time.perf_counter() - begin
+    near, given = found.solution.point + NEAR, (own.family, own.parameters, own.responses)
+    calls = {
+        "exact": lambda: nearest_minimum(Problem(*given), near),
+        "elements": lambda: nearest_minimum(ElementProblem(*given), near),
+    }
+    times = interleaved(calls, ROUNDS)
+    ours, theirs, faster = times.median("exact"), times.median("elements"), times.ratio("elements", "exact")
     yield Row(
         group=GROUP, what=f"the last search, with {ELEMENTS} elements of two nodes", n=1, each="fit", seconds=theirs,
-        ratio=theirs / ours, to="the last search, exact", to_seconds=ours,
+        ratio=faster, to="the last search, exact", to_seconds=ours,
         note="NumPy's batched solve at all frequencies, forward differences along the five numbers, the same loop.",
-        target=Target(measured=FASTER, limit=theirs / ours, unit="times faster"),
+        target=Target(measured=FASTER, limit=faster, unit="times faster"),
     )  # fmt: skip
 
 

@@ -31,11 +31,11 @@ def rig_rows() -> Iterator[Row]:
     yield from _rows(lab, s, {
         "tfarm: three segments": (tfarm.transfer(in_three(lab), list(OUTPUTS)), LIMIT, CHAIN),
         f"{ELEMENTS} transfer matrices in NumPy": (partial(product, lab), None, LUMPED),
-    })  # fmt: skip
+    }, warm=True)  # fmt: skip
     lossless = lab.having(damping=0.0)
     solve = partial(modal_sum, in_three(lossless), elements=MESH[0], degree=MESH[1])
     what = f"scikit-fem, {MESH[0]} elements of degree {MESH[1]}/{MESH[1] - 1}, modal sum: C = 0"
-    yield from _rows(lossless, s, {what: (solve, None, MODAL)})
+    yield from _rows(lossless, s, {what: (solve, None, MODAL)}, warm=False)
 
 
 def in_three(arm: Arm) -> Arm:
@@ -45,12 +45,20 @@ def in_three(arm: Arm) -> Arm:
 
 
 def _rows(
-    single: Arm, s: Complex, candidates: dict[str, tuple[Callable[[Complex], Complex], float | None, str]]
+    single: Arm,
+    s: Complex,
+    candidates: dict[str, tuple[Callable[[Complex], Complex], float | None, str]],
+    *,
+    warm: bool,
 ) -> Iterator[Row]:
-    """A row a candidate, (what it calls, the ratio asked for, a note), beside the single link."""
+    """A row a candidate, (what it calls, the ratio asked for, a note), beside the single link.
+
+    `warm`: with transfer functions that are made already.
+    """
     one = tfarm.transfer(single, list(OUTPUTS))
     calls = {what: partial(call, s) for what, (call, _, _) in candidates.items()}
-    times = interleaved({"one": lambda: one(s), **calls}, ROUNDS)
+    link = partial(one, s) if warm else lambda: tfarm.transfer(single, list(OUTPUTS))(s)
+    times = interleaved({"one": link, **calls}, ROUNDS, warm=warm)
     exact = one(s)
     size = abs(exact) + abs(s * one.derivative(s))
     for what, (call, limit, note) in candidates.items():
@@ -58,7 +66,8 @@ def _rows(
         yield Row(
             group=GROUP, what=what, n=POINTS, each="point", seconds=times.median(what) / POINTS, ratio=ratio,
             to="one link", to_seconds=times.median("one") / POINTS, error=float((abs(call(s) - exact) / size).max()),
-            note=note, target=None if limit is None else Target(measured=ratio, limit=limit, unit="single links"),
+            target=None if limit is None else Target(measured=ratio, limit=limit, unit="single links"),
+            note=note, warm=warm,
         )  # fmt: skip
 
 

@@ -38,6 +38,7 @@ class Row:
     """One measurement: median `seconds` for each of n points or modes, and the largest error against a proven value.
 
     `ratio` is to what `to` names, which took `to_seconds` a point or mode, measured in turn in the same process.
+    tfarm's times are those of a first call, its caches empty; of a `warm` row those of a call to what is made already.
     """
 
     group: str
@@ -51,6 +52,7 @@ class Row:
     error: float | None = None
     target: Target | None = None
     note: str = ""
+    warm: bool = False
 
     @property
     def record(self) -> dict[str, object]:
@@ -104,4 +106,4 @@ def _cells(row: Row, mark: str) -> tuple[str, ...]:
     error = "" if row.error is None else f"{row.error:.1e}"
     target = "" if row.target is None else str(row.target)
     each = f"{duration(row.seconds)}/{row.each}"
-    return (row.what + mark).replace("[", r"\["), f"{row.n:,}", each, ratio, error, target
+    return (row.what + ", warm" * row.warm + mark).replace("[", r"\["), f"{row.n:,}", each, ratio, error, target

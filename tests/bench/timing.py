@@ -1,4 +1,4 @@
-"""Times that survive a busy machine: candidates take turns in one process, and medians are compared."""
+"""Times that survive a busy machine: processor time of one process, in which candidates take turns; medians of it."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .caches import ColdCalls, empty
 
 TURN = 2e-3  # seconds
 
@@ -29,30 +31,37 @@ class Times:
         return float(np.median(self.rounds[name] / self.rounds[to]))
 
 
-def interleaved(candidates: Mapping[str, Callable[[], object]], rounds: int) -> Times:
+def interleaved(candidates: Mapping[str, Callable[[], object]], rounds: int, *, warm: bool = False) -> Times:
     """Let each candidate have its turn once a round: as many calls as fill `TURN`, the same number every time.
 
-    Calls so short that the caches are still cold from another candidate's turn would measure that instead.
+    Before each call the package's caches are emptied, outside of its time; a call that finds what an earlier one has
+    left is an error (`caches`).  `warm` leaves them as they are: for what is made once and called again and again.
     """
-    calls = {name: max(1, math.ceil(TURN / _shortest(call))) for name, call in candidates.items()}
+    timers = {name: _Timer(call, None if warm else ColdCalls()) for name, call in candidates.items()}
+    calls = {name: max(1, math.ceil(TURN / min(timer(), timer()))) for name, timer in timers.items()}  # compiled by now
     seconds: dict[str, list[float]] = {name: [] for name in candidates}
     for _ in range(rounds):
-        for name, call in candidates.items():
-            start = time.perf_counter()
-            for _ in range(calls[name]):
-                call()
-            seconds[name].append((time.perf_counter() - start) / calls[name])
+        for name, timer in timers.items():
+            seconds[name].append(sum(timer() for _ in range(calls[name])) / calls[name])
     return Times({name: np.array(each) for name, each in seconds.items()})
 
 
-def _shortest(call: Callable[[], object]) -> float:
-    """Seconds of the faster of two calls: the first may have to load or compile."""
-    seconds = math.inf
-    for _ in range(2):
-        start = time.perf_counter()
-        call()
-        seconds = min(seconds, time.perf_counter() - start)
-    return seconds
+@dataclass(frozen=True, slots=True)
+class _Timer:
+    """One candidate; calling it gives the seconds of processor time of one call, on one thread."""
+
+    call: Callable[[], object]
+    cold: ColdCalls | None
+
+    def __call__(self) -> float:
+        if self.cold:
+            self.cold.before()
+        start = time.process_time()
+        self.call()
+        seconds = time.process_time() - start
+        if self.cold:
+            self.cold.after()
+        return seconds
 
 
 @dataclass(slots=True)
@@ -64,7 +73,8 @@ class Stopwatch:
 
 @contextmanager
 def once() -> Iterator[Stopwatch]:
-    """Time one long run, of single-threaded Python, by the processor's clock: other processes do not count."""
+    """Time one long run with empty caches by the processor's clock: other processes do not count."""
+    empty()
     watch, start = Stopwatch(), time.process_time()
     yield watch
     watch.seconds = time.process_time() - start

@@ -126,7 +126,7 @@ def slew_words(arm: Arm, law: HubFeedback, chain: Chain, modes: int) -> dict[str
     largest = {name: max(map(abs, answer[key])) for name, key in (("torque", "torque"), ("moment", "root_moment"))}
     figures = largest | {"residual": answer["residual_moment_rms"]}
     return {f"slew-{name}": f"{value:.5g}" for name, value in figures.items()} | {
-        "slew-settled": f"{settled:.5g}" if math.isfinite(settled) else "not in this time"
+        "slew-settled": f"not settled within {answer['t'][-1]:.5g} s" if settled is None else f"{settled:.5g}"
     }
 
 

@@ -276,6 +276,23 @@ def test_a_slip_of_units_is_a_warning_and_no_error(capsys: pytest.CaptureFixture
     assert "link.density = 7.85" in err
 
 
+@pytest.mark.parametrize("command", ["modes --count 1", "response --output hub_angle --omega 3"])
+def test_a_motor_without_an_input_is_named_once(command: str, capsys, tmp_path: Path) -> None:
+    """One line with key and remedy, and the answer under hub torque; none where file or option has the input."""
+    verb, *options = command.split()
+    text = PRESETS.joinpath("quanser-flexlink.toml").read_text(encoding="utf-8")
+    silent, named = tmp_path / "silent.toml", tmp_path / "named.toml"
+    silent.write_text(text.replace('input = "motor_voltage"', ""), encoding="utf-8")
+    named.write_text(text.replace("motor_voltage", "hub_torque"), encoding="utf-8")
+    code, out, err = run(capsys, verb, str(silent), *options, "--json")
+    expected = "input: not given with a [motor], hub_torque is assumed. Set input to hub_torque, motor_voltage or"
+    assert (code, err) == (0, f"tfarm: warning: {silent}: {expected} motor_current at the top of the file.\n")
+    assert json.loads(out) == answer(capsys, verb, str(named), *options)
+    if verb == "response":
+        code, _, err = run(capsys, verb, str(silent), *options, "--input", "motor_voltage")
+        assert (code, err) == (0, "")
+
+
 @pytest.mark.parametrize(
     ("preset", "lines", "command", "expected"),
     [

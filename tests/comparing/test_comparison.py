@@ -11,7 +11,15 @@ import tfarm
 from tests.shared import sized
 from tests.shell import answer, run
 from tfarm.comparing import comparison
-from tfarm.comparing.answers import ComparedQuantity, compared_answer, compared_margins, compared_modes, compared_poles
+from tfarm.comparing.answers import (
+    ComparedQuantity,
+    compared_answer,
+    compared_margins,
+    compared_modes,
+    compared_poles,
+    unpaired_poles,
+)
+from tfarm.comparing.pairing import poles_by_mode
 from tfarm.dsp import sampled_verdict
 from tfarm.dsp.law_verdict import analyse_law
 from tfarm.loop.answers import margins_answer
@@ -52,9 +60,9 @@ def test_an_arm_beside_itself_differs_in_nothing():
     found = tfarm.compare([LAB, LAB], LAW, modes=3)
     assert not found.is_of_arms
     for table in (compared_modes(found), compared_poles(found), compared_margins(found)):
-        apart = [value for row in table for key, value in row.items() if key.endswith("difference_percent")]
-        assert apart == [0.0] * len(apart)
+        apart = [[value for key, value in row.items() if "_difference_" in key] for row in table]
         assert apart
+        assert all(set(row) - {None} == {0.0} for row in apart)
     assert found.regions[0] == found.regions[1]
 
 
@@ -75,6 +83,69 @@ def test_each_side_is_what_it_is_alone():
     assert rows["delay_margin_s"]["value_difference_percent"] == pytest.approx(expected, rel=1e-12)
 
 
+def test_poles_are_compared_mode_by_mode_and_what_has_no_partner_apart():
+    """Rows 13 and 14 compared modes 13 and 14 of one arm with poles near 7.5e5 rad/s, in shear, of the other.
+
+    Followed from the open loop in small steps of the gains, each pole comes from the mode that it is listed under.
+    """
+    found = tfarm.compare([BARE, LAB])
+    rows, apart = list(compared_poles(found)), list(unpaired_poles(found))
+    assert [row["mode"] for row in rows] == list(range(1, 13))
+    assert [(row["of"], row["mode"]) for row in apart] == [
+        ("sasaki2012", 13), ("sasaki2012", 14), ("sasaki2012-lab", None), ("sasaki2012-lab", None)
+    ]  # fmt: skip
+    assert min(row["size_rad_s"] for row in apart[2:]) > 7e5
+    shown = {name: sum(row["of"] == name for row in apart) for name in ("sasaki2012", "sasaki2012-lab")}
+    assert all(len(side.oscillating) == len(rows) + shown[side.name] for side in found.sides)
+    paths = tfarm.locus(LAB, LAW, "all", 0.0, 1.0, 60, 8)
+    for row in rows[:6]:
+        ends = paths.branches[paths.mode == row["mode"], -1]
+        assert abs(ends) == pytest.approx([row["size_rad_s_other"]], rel=1e-6)
+
+
+def test_a_loop_of_the_hub_is_paired_with_the_other_hub():
+    """K_p and J make a slow pole on both sides: sqrt(Kp/J), by 41 % faster with twice the gain."""
+    laws = [tfarm.HubFeedback(K1=0.02, Kp=0.02), tfarm.HubFeedback(K1=0.02, Kp=0.04)]
+    hub, *others = compared_poles(tfarm.compare(LAB, laws, modes=3))
+    assert hub["mode"] == 0
+    assert hub["size_rad_s_difference_percent"] == pytest.approx(100 * (np.sqrt(2) - 1), rel=1e-3)
+    assert [row["mode"] for row in others][:3] == [1, 2, 3]
+
+
+def test_a_pole_of_the_law_is_no_mode():
+    """A resonance of the law at 1.15 of mode 1, which feeds back little: the mode keeps its number beside it."""
+    w = 1.15 * float(tfarm.modes(LAB, 1).natural_frequency[-1])
+    tuned = tfarm.Law({"hub_rate": ([0.3 * w**2], [1.0, 0.02 * w, w**2]), "hub_angle": 1e-3})
+    found = tfarm.compare(LAB, [tfarm.HubFeedback(K1=0.3, Kp=1e-3), tuned], modes=2)
+    apart = [row for row in unpaired_poles(found) if row["of"] == found.other.name and row["mode"] is None]
+    assert [row["size_rad_s"] for row in apart][:1] == pytest.approx([w], rel=0.25)
+    assert {row["mode"] for row in compared_poles(found)} >= {1, 2}
+
+
+def test_the_assignment_of_poles_to_modes():
+    """By least total distance, one a mode; a factor of e away is none, and two poles below mode 1 are not the hub's."""
+    own = {1: 10j, 2: 60j, 3: 200j}
+    assert poles_by_mode(np.array([-1 + 9j, -2 + 61j]), own) == {1: -1 + 9j, 2: -2 + 61j}
+    assert poles_by_mode(np.array([1j, 11j, 12j]), own) == {0: 1j, 1: 11j}
+    assert poles_by_mode(np.array([1j, 1.5j, 11j, 9e5j]), own) == {1: 11j}
+    assert poles_by_mode(np.array([], complex), own) == {}
+
+
+def test_a_phase_margins_difference_is_in_degrees(capsys):
+    """Of margins known apart; in per cent of a phase of -0.036 deg it was +2.19e+04 %."""
+    found = tfarm.compare([BARE, LAB], modes=1)
+    alone = [tfarm.margins(arm, side.law).in_band.phase for arm, side in zip((BARE, LAB), found.sides, strict=True)]
+    rows = {row["margin"]: row for row in compared_margins(found)}
+    phase, disk = rows["phase_margin_deg"], rows["disk_margin"]
+    assert phase["value_difference_deg"] == pytest.approx(alone[1] - alone[0], rel=1e-9)
+    assert phase["value_difference_percent"] is None
+    assert disk["value_difference_deg"] is None
+    _, out, _ = run(capsys, "compare", "sasaki2012", "sasaki2012-lab", "--modes", "1")
+    (line,) = [line for line in out.splitlines() if "phase margin [deg]" in line]
+    assert f"{alone[1] - alone[0]:+.3g} deg" in line
+    assert "%" not in line
+
+
 def test_two_laws_are_called_by_their_files_and_an_unstable_loop_has_no_margins(capsys, files, tmp_path):
     laws = ("--law", files["mild"], "--law", files["wild"])
     picture = tmp_path / "both.png"
@@ -83,6 +154,7 @@ def test_two_laws_are_called_by_their_files_and_an_unstable_loop_has_no_margins(
     assert (found["of"], found["names"], found["verdicts"]) == ("laws", ["mild", "wild"], ["stable", "unstable"])
     assert {row["value_other"] for row in found["margins"]} == {None}
     assert {row["value_difference_percent"] for row in found["margins"]} == {None}
+    assert {row["value_difference_deg"] for row in found["margins"]} == {None}
     assert [loop["K2"] for loop in found["loops"]] == [0.3, 1.5]
     assert [row["size_rad_s_one"] > 0 for row in found["poles"]] == [True] * len(found["poles"])
 

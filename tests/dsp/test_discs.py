@@ -1,4 +1,4 @@
-"""Discs about a polynomial's values on the unit circle, and the digits that a proven figure is shown with."""
+"""Discs about a product's values on the unit circle, and the digits that a proven figure is shown with."""
 
 import math
 
@@ -10,42 +10,37 @@ import tfarm
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, sampled_loop
 from tfarm.dsp.circle import Circle, Discs, _Arcs
-from tfarm.dsp.law_circle import on_discs
-from tfarm.dsp.law_polynomials import Polynomial
+from tfarm.dsp.law_circle import product
 from tfarm.dsp.shown import Figure
 
-RANDOM = np.random.default_rng(5).normal(size=6)
-POLYNOMIALS = {
-    "a constant": [3.0],
-    "a line": [0.5, -2.0],
-    "at rest twice": [1.0, -2.0, 1.0],  # (1 - w)^2: next to w = 1 all is curvature
-    "degree 5": RANDOM.tolist(),
+ROOTS = {  # less 1
+    "a constant": [],
+    "a lag": [-0.3],
+    "a notch next to z = 1": [-1e-4 + 1e-3j, -1e-4 - 1e-3j],
+    "a cluster next to z = 1": [-1e-4, -1.1e-4, -9e-5 + 1e-5j, -9e-5 - 1e-5j],
+    "degree 5": [-2.0, -1.7 + 0.4j, -1.7 - 0.4j, -1.0, 0.2],
 }
 
 
-@pytest.mark.parametrize("half", [1e-3, 0.1, 0.8])
-@pytest.mark.parametrize("name", POLYNOMIALS)
+@pytest.mark.parametrize("half", [1e-6, 1e-3, 0.1, 0.8])
+@pytest.mark.parametrize("name", ROOTS)
 def test_a_disc_holds_every_value_on_its_arc_and_is_no_larger_than_its_terms(name, half):
-    """Values by Horner's rule at points of the arc; their largest distance from the middle is found, not bounded."""
-    c = np.array(POLYNOMIALS[name])
-    middle = np.exp(1j * np.array([0.0, 0.7, 2.0, math.pi]))
-    radius = np.full(4, 2 * math.sin(half / 2))
-    found = on_discs(Polynomial(c, 0.0), Discs(middle, radius))
-    points = middle[:, None] * np.exp(1j * np.linspace(-half, half, 401))
-    away = abs(np.polyval(c[::-1], points) - found.middle[:, None]).max(axis=1)
+    """Values at points of the arc with forty digits; their largest distance from the middle is found, not bounded."""
+    roots = np.array(ROOTS[name], dtype=complex)
+    angles = np.array([0.0, 1e-4, 0.7, 2.0, math.pi])
+    radius = np.full(angles.size, 2 * math.sin(half / 2))
+    found = product(Discs(-np.expm1(-1j * angles), radius), roots)
+    away = np.zeros(angles.size)
+    with mpmath.workdps(40):
+        for n, angle in enumerate(angles.tolist()):
+            for share in np.linspace(-1, 1, 41).tolist():
+                x = 1 - mpmath.expj(-mpmath.mpf(angle) - share * mpmath.mpf(half))
+                exact = mpmath.fprod(x * (1 + mpmath.mpc(r)) - mpmath.mpc(r) for r in roots.tolist())
+                away[n] = max(away[n], float(abs(exact - mpmath.mpc(found.middle[n].item()))))
     assert (away <= found.radius).all()
-    rounding = 1e-14 * abs(c).sum()
-    least = abs(np.polyval(np.polyder(c[::-1]), middle)) * radius if c.size > 1 else np.zeros(4)
-    curve = half**2 * (np.arange(c.size) ** 2 * abs(c)).sum()
-    assert (found.radius <= least + curve + rounding).all()
-
-
-def test_the_error_of_its_coefficients_is_in_the_disc():
-    exact, off = on_discs(Polynomial(RANDOM, 0.0), ONE), on_discs(Polynomial(RANDOM, 0.25), ONE)
-    np.testing.assert_allclose(off.radius - exact.radius, 0.25, rtol=1e-12)
-
-
-ONE = Discs(np.array([1.0 + 0j]), np.array([0.1]))
+    sizes = abs(-np.expm1(-1j * angles)[:, None] * (1 + roots) - roots)
+    most = (sizes + radius[:, None] * abs(1 + roots)).prod(axis=1)
+    assert (found.radius <= most - sizes.prod(axis=1) + 1e-13 * (1 + most)).all()
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from tfarm import HubFeedback, Law
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain, Sampling, analyse, sampled_loop, stable_windows
 from tfarm.dsp.law_loop import sampled_law
-from tfarm.dsp.law_margins import known_grid, part_crossings, stable_numbers
+from tfarm.dsp.law_margins import law_grid, part_crossings, stable_numbers
 
 NAMES = {"hub_angle": "Kp", "hub_rate": "K1", "root_moment": "K2"}
 
@@ -66,7 +66,7 @@ def test_between_crossings_along_one_part_the_count_is_what_they_say():
             factors = np.r_[1.0, -(10 ** rng.uniform(-4, 3, 3)), 10 ** rng.uniform(-4, 3, 3)]
             places = range(len(loop.law.parts))
             loops = [loop.weighted([float(g) if place == part else 1.0 for place in places]) for g in factors]
-            passed = part_crossings(known_grid(loop), [part]).passed(factors)
+            passed = part_crossings(law_grid(loop), [part]).passed(factors)
             counts = np.array([(each.poles.log_radius > 0).sum() for each in loops])
             assert (counts - counts[0] == passed - passed[0]).all(), part
             compared += 1

@@ -1,5 +1,6 @@
 """Simulations: energy, poles seen in time, two implementations, converters, limit cycles, running away."""
 
+import math
 from dataclasses import replace
 from math import comb
 
@@ -189,7 +190,7 @@ def test_a_rigid_arm_has_no_vibration():
 
 def test_the_total_reading_feeds_the_whole_moment_back(lab):
     total = simulator(lab, chain=Chain(slew=Slew(reading="total")))
-    assert not total.scenario.rigid_moment.any()
+    assert not total.scenario.moment_reference.any()
     assert residual_moment_rms(total.linear(GAINS)) != residual_moment_rms(simulator(lab).linear(GAINS))
 
 
@@ -319,7 +320,7 @@ def test_running_away_is_said_with_its_time_and_mode(lab):
     for signal in (run.torque, run.at_samples.root_moment, run.at_samples.tip_displacement):
         assert np.isfinite(signal).all()
     answer = simulated_answer(lab, HubFeedback(K1=0.3, K2=1.5), Chain(), "slew", 5.0, count=8)
-    assert answer["settling_time_s"] == np.inf
+    assert answer["settling_time_s"] is None
     assert answer["stopped_at_s"] == run.stopped.time
 
 
@@ -330,6 +331,15 @@ def test_settling_and_residual_by_hand(lab):
     assert residual_raw_moment_rms(run) == pytest.approx(np.sqrt(np.mean(moment[100:] ** 2)), rel=1e-12)
     k = round(settling_time(run) / T)
     assert moment[k:].max() <= 0.05 * moment.max() < moment[k - 1]
+
+
+@pytest.mark.parametrize("more", [0, 1])
+def test_a_settling_time_has_a_tenth_of_the_record_after_it(lab, more):
+    """The same run, ended a sample before nine tenths are over at the settling time, and right there."""
+    k = round(settling_time(simulator(lab).linear(GAINS)) / T)
+    n = math.ceil(k / 0.9) - 1 + more  # samples after the first
+    settled = settling_time(simulator(lab, duration=n * T).linear(GAINS))
+    assert settled == (pytest.approx(k * T, rel=1e-12) if more else math.inf)
 
 
 def test_a_controller_must_give_a_finite_torque(lab):

@@ -1,11 +1,15 @@
-"""Arms found again from responses of finite elements with noise:  python -m tests.fitting.planted 300 [seed] [pairs]
+"""Arms found again from responses of finite elements with noise: python -m tests.fitting.planted 300 [seed] [pairs]
 
 Random arms, two or three responses of an independent model (`tests.chain_elements`, nothing of tfarm in it), noise of
 known size, four to six free numbers, each started up to 30 % off.  A fit is right where its sum of squares is at most
 that of the truth and every number within five deviations of it; nominal 95 % intervals are counted.  With "pairs" two
 of the numbers are known by their product or ratio alone, and a fit is right where it says so of these two and no other.
+With "rigs" they have springs, friction, a radius and a motor at the hub, over whatever drives them, their
+frequencies even or in proportion and often few for the sharpness of a resonance.  None may end above the truth's sum.
+With no word both arms and rigs are planted.
 """
 
+import math
 import os
 import sys
 import time
@@ -19,6 +23,8 @@ import numpy as np
 
 import tfarm
 from tests import chain_elements
+from tests.rigs import some_rig
+from tfarm.arm.keys import KeyedArms
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import fit
 from tfarm.spectrum.scales import first_frequency
@@ -31,6 +37,11 @@ PAIRS = (  # of the arm's numbers, of which these responses know but one combina
     ("hub_rate", "hub_torque"),
     ("root_moment", "hub_torque"),
 )
+RIG_OUTPUTS = ("hub_angle", "hub_rate", "tip_acceleration", "root_moment")
+RIG_RATIOS = (("tip_acceleration", "hub_angle"), ("root_moment", "hub_rate"))
+RIG_NUMBERS = ("payload.mass", "payload.inertia", "payload.offset", "clamp.stiffness", "hub.friction", "hub.stiffness",
+               "hub.radius", "hub.inertia")  # fmt: skip
+MOTOR_NUMBERS = ("motor.torque_constant", "motor.rotor_inertia")
 POINTS = 200
 OFF = 0.3  # of a number: its start
 MOSTLY = 0.99  # of the fits are right
@@ -59,17 +70,67 @@ def some_arm(rng):
 
 
 def elements_response(arm, omega, pairs):
-    """Responses (pairs, n) of finite elements, of one signal over another or over the torque."""
-    outputs = sorted({name for pair in pairs for name in pair if name != "hub_torque"})
-    names = [NAMED.get(name, name) for name in outputs]
-    model = chain_elements.assemble(arm, chain_elements.FINER * omega[-1], held=False)
+    """Responses (pairs, n) of finite elements, of one signal over another or over the arm's input."""
+    outputs = sorted({name for pair in pairs for name in pair if name != arm.input})
+    held = arm.input == "hub_angle"
+    model = chain_elements.assemble(arm, chain_elements.FINER * omega[-1], held=held)
     system = chain_elements.System(model, omega[len(omega) // 2])
-    values = np.array([system.response(1j * w, names, None) for w in omega]).T
-    by = dict(zip(outputs, values, strict=True)) | {"hub_torque": np.ones(omega.size)}
+    values = np.array([system.response(1j * w, outputs, None) for w in omega]).T
+    by = dict(zip(outputs, values, strict=True)) | {arm.input: np.ones(omega.size)}
     return [by[over] / by[under] for over, under in pairs]
 
 
-NAMED: dict[str, str] = {}
+def with_noise(rng, pair, omega, H):
+    """A measured response: H with noise of a known size."""
+    sigma = abs(H) * 10 ** rng.uniform(-2.5, -1.3) + 1e-3 * np.median(abs(H))
+    noise = sigma * (rng.standard_normal(omega.size) + 1j * rng.standard_normal(omega.size))
+    return Measured(output=pair[0], input=pair[1], omega=omega, values=H + noise, sigma=sigma)
+
+
+def geared(rng, arm):
+    """The arm at a hub that may have a radius, a spring, friction and a motor, its links hardly damped."""
+    w1, J = first_frequency(arm), arm.turned_inertia
+
+    def some(chance, low, high):
+        return 10 ** rng.uniform(low, high) if rng.random() < chance else 0.0
+
+    hub = tfarm.Hub(
+        inertia=arm.hub.inertia, radius=arm.length * rng.uniform(0, 0.3), stiffness=J * w1**2 * some(0.5, -4, 0),
+        friction=J * w1 * some(0.5, -4, -1),
+    )  # fmt: skip
+    clamp = arm.clamp if rng.random() < 0.5 else tfarm.RotarySpring()
+    arm = replace(arm, hub=hub, clamp=clamp).having(damping=arm.damping * some(1, -2, 0))
+    if rng.random() < 0.6:
+        return arm
+    N, R = 10 ** rng.uniform(0, 2), 10 ** rng.uniform(-1, 1)
+    motor = tfarm.Motor(
+        resistance=R, torque_constant=math.sqrt(R * J * w1 / N**2 * some(1, -3, 0)), gear_ratio=N,
+        rotor_inertia=J / N**2 * some(1, -3, 0), inductance=R / w1 * some(0.5, -3, -0.5),
+    )  # fmt: skip
+    return replace(arm, motor=motor, input=str(rng.choice(["motor_voltage", "motor_current", "hub_torque"])))
+
+
+def planted_rig(rng):
+    """The same as `planted` of a rig, every second one of `tests.rigs`."""
+    is_geared, arm = rng.random() < 0.5, None
+    while arm is None or not math.isfinite(arm.hub.inertia + arm.payload.mass + arm.payload.inertia):
+        arm = geared(rng, some_arm(rng)) if is_geared else some_rig(rng, damped=True, segments=int(rng.integers(1, 3)))
+    w1, count = first_frequency(arm), int(rng.integers(60, 200))
+    low, high = 0.3 * w1, w1 * 10 ** rng.uniform(0.6, 1.6)
+    spaced = np.geomspace if rng.random() < 0.5 else np.linspace
+    omega = spaced(low if rng.random() < 0.5 else min(low, high / count), high, count)
+    pairs = [(each, arm.input) for each in RIG_OUTPUTS if each != arm.input]
+    pairs += RIG_RATIOS if arm.input != "hub_angle" else ()
+    pairs = [pairs[n] for n in rng.choice(len(pairs), size=rng.integers(1, 4), replace=False)]
+    link = "link" if len(arm.links) == 1 else "link.1"
+    numbers = (f"{link}.damping", *RIG_NUMBERS, *(MOTOR_NUMBERS if arm.input.startswith("motor") else ()))
+    family = KeyedArms(arm, [f"{link}.youngs_modulus", *numbers])
+    there = [key for key in numbers if math.isfinite(family.value(key)) and family.value(key) != 0]
+    chosen = rng.choice(there, size=min(len(there), rng.integers(1, 5)), replace=False).tolist()
+    truth = {key: family.value(key) for key in (f"{link}.youngs_modulus", *chosen)}
+    responses = zip(pairs, elements_response(arm, omega, pairs), strict=True)
+    data = [with_noise(rng, pair, omega, H) for pair, H in responses]
+    return arm, data, list(truth), truth, {key: value * (1 + rng.uniform(-OFF, OFF)) for key, value in truth.items()}
 
 
 def planted(rng):
@@ -91,10 +152,7 @@ def planted(rng):
     delays = [float(rng.uniform(0, 0.3) / omega[-1]) if "delay" in keys else 0.0 for _ in pairs]
     data = []
     for (output, under), H, gain, delay in zip(pairs, elements_response(arm, omega, pairs), gains, delays, strict=True):
-        H = gain * H * np.exp(-1j * omega * delay)
-        sigma = abs(H) * 10 ** rng.uniform(-2.5, -1.3) + 1e-3 * np.median(abs(H))
-        noise = sigma * (rng.standard_normal(POINTS) + 1j * rng.standard_normal(POINTS))
-        data.append(Measured(output=output, input=under, omega=omega, values=H + noise, sigma=sigma))
+        data.append(with_noise(rng, (output, under), omega, gain * H * np.exp(-1j * omega * delay)))
     for n in range(len(data)):
         label = f":{n + 1}" if len(data) > 1 else ""
         truth |= {f"gain{label}": gains[n], f"delay{label}": delays[n]}
@@ -161,6 +219,31 @@ def judged_pair(seed):
     return "right" if found.converged and unknown == both and len(said) == 1 else f"{unknown}, {found.not_determined}"
 
 
+def judged_rig(seed):
+    """Whether the sum of squares of one fit is at most the truth's; and the process time [s] that it took."""
+    arm, data, keys, truth, start = planted_rig(np.random.default_rng([852780, seed]))
+    began = time.process_time()
+    found = fit(arm, data, free=keys, start=start, profile=False)
+    seconds = time.process_time() - began
+    at_truth = found.chi_squared_at(truth)
+    is_worse = found.chi_squared > at_truth * (1 + 1e-9)
+    words = f"{found.chi_squared:.5g} > {at_truth:.5g} of {found.freedom}, {found.solution.starts} starts: {keys}"
+    return words if is_worse else "right", seconds
+
+
+def rigs(size, seed):
+    verdicts, took = Counter(), []
+    for n in range(seed * 10000, seed * 10000 + size):
+        verdict, seconds = judged_rig(n)
+        took.append(seconds)
+        verdicts["right" if verdict == "right" else "above the truth"] += 1
+        if verdict != "right":
+            print(n, verdict, flush=True)
+    print(dict(verdicts), f"process time a fit: median {np.median(took):.2f} s, mean {np.mean(took):.2f} s", end=", ")
+    print(f"most {max(took):.2f} s")
+    return verdicts
+
+
 def pairs(size, seed):
     verdicts = Counter()
     for n in range(seed * 10000, seed * 10000 + size):
@@ -190,7 +273,9 @@ def main(size, seed):
 
 
 if __name__ == "__main__":
-    survey = pairs if "pairs" in sys.argv else main
-    size = int(sys.argv[1])
-    right = survey(size, int(sys.argv[2]) if len(sys.argv) > 2 else 1)["right"]
-    sys.exit(right < MOSTLY * size)
+    size, seed, *named = [*sys.argv[1:2], *(sys.argv[2:] or ["1"])]
+    surveys = {"arms": (main, MOSTLY), "pairs": (pairs, MOSTLY), "rigs": (rigs, 1.0)}
+    failed = False
+    for survey, share in (surveys[name] for name in named or ["arms", "rigs"]):
+        failed |= survey(int(size), int(seed))["right"] < share * int(size)
+    sys.exit(failed)

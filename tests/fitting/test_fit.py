@@ -10,16 +10,16 @@ import pytest
 
 import tfarm
 from tests import chain_elements
-from tests.fitting.planted import elements_response, judged, judged_pair
+from tests.fitting.planted import elements_response, judged, judged_pair, judged_rig
 from tests.shared import thinned
 from tests.shell import answer, run
 from tfarm.arm.keys import KeyedArms
 from tfarm.errors import ParameterError
-from tfarm.fitting import solve
 from tfarm.fitting.answers import resonances
 from tfarm.fitting.fit import fit
 from tfarm.fitting.noise import noise_of
 from tfarm.fitting.ringing import RingMode, mode_of
+from tfarm.fitting.start import equation_errors
 
 LAB = tfarm.load("sasaki2012-lab")
 OMEGA = np.geomspace(8.0, 1200.0, 160)
@@ -48,6 +48,63 @@ def test_planted_numbers_are_found_again(seed):
     assert verdict == "right"
     assert found.is_explained
     assert found.chi_squared / found.freedom == pytest.approx(1.0, abs=5 * math.sqrt(2 / found.freedom))
+
+
+HUB_SPRING = Path("tests/data/reproductions/hub-spring.toml")
+HUB_SPRING_FREE = ("link.youngs_modulus", "hub.inertia", "payload.mass")
+
+
+def hub_spring_sweep():
+    """A sweep of 90 lines of an arm of 110 GPa, whose second resonance, 0.2 % damped, lies between two of them."""
+    hertz, re, im, sigma = np.loadtxt(HUB_SPRING.with_name("hub-spring-sweep.csv"), delimiter=",", skiprows=1).T
+    omega = 2 * math.pi * hertz
+    return tfarm.Measured(output="hub_angle", input="hub_torque", omega=omega, values=re + 1j * im, sigma=sigma)
+
+
+def test_a_resonance_between_two_lines_is_found():
+    found = fit(tfarm.load(HUB_SPRING), [hub_spring_sweep()], free=HUB_SPRING_FREE, profile=False)
+    assert found.is_explained
+    assert abs(found.arm.link.youngs_modulus - 1.1e11) < 4 * found.parameters[0].deviation
+    elsewhere = found.chi_squared_at(
+        {each.key: each.value for each in found.parameters} | {HUB_SPRING_FREE[0]: 9.09e10}
+    )
+    assert found.chi_squared < elsewhere / 5
+
+
+def test_equation_errors_have_one_minimum_where_squares_have_many():
+    """Along Young's modulus, a factor of two to both sides; a wide `share` changes no minimum but its place."""
+    own = fit(tfarm.load(HUB_SPRING), [hub_spring_sweep()], free=HUB_SPRING_FREE, profile=False).solution
+    along = [own.point + np.array([ln_E, 0, 0]) for ln_E in np.linspace(-0.7, 0.7, 301)]
+
+    def minima(residuals):
+        sums = np.array([np.sum(residuals(x) ** 2) for x in along])
+        return 1 + np.flatnonzero((sums[1:-1] < sums[:-2]) & (sums[1:-1] < sums[2:]))
+
+    assert len(minima(own.problem.residuals)) > 10
+    for share in (0.1, 0.3):
+        (place,) = minima(lambda x, share=share: equation_errors(own.problem, x, share))
+        assert abs(along[place][0] - own.point[0]) < 0.02
+
+
+@pytest.mark.parametrize("share", [0.1, 1.0])
+def test_equation_errors_vanish_at_the_arm_itself(share):
+    """Without noise N - D P is 0 there, for responses of finite elements too, and it is no more than 1 anywhere."""
+    H = [
+        tfarm.Measured(output=a, input=b, omega=OMEGA, values=v)
+        for (a, b), v in zip(PAIRS, without_noise(LAB, PAIRS, tuple(OMEGA)), strict=True)
+    ]
+    own = fit(LAB, H, free=["link.youngs_modulus"], profile=False).solution.problem
+    assert abs(equation_errors(own, np.zeros(1), share)).max() < 1e-8
+    off = equation_errors(own, np.array([0.3]), share)
+    assert 0.05 < abs(off).max() < 1.5
+
+
+RIGS = [10001, 10006, 10021, 10028, 10081, 10085]  # sharp resonances between lines, and numbers hardly known
+
+
+@pytest.mark.parametrize("seed", thinned(RIGS, 2))
+def test_no_fit_of_a_rig_ends_above_the_true_numbers(seed):
+    assert judged_rig(seed)[0] == "right"
 
 
 def test_profiles_are_where_the_sum_of_squares_has_grown_by_the_quantile():
@@ -160,7 +217,7 @@ def test_noise_that_is_not_said_comes_from_the_residuals():
 
 def test_an_arm_that_is_wrong_is_not_said_to_explain_anything(monkeypatch):
     """The data are those of an arm with a clamp that yields; with a rigid one the fit ends, and says so."""
-    monkeypatch.setattr(solve, "STRAYED", 1)  # no start makes a clamp yield
+    monkeypatch.setattr("tfarm.fitting.start.STRAYED", 1)  # no start makes a clamp yield
     soft = tfarm.Arm(link=LAB.link, hub=LAB.hub, clamp=tfarm.RotarySpring(stiffness=300.0), name="soft")
     found = fit(LAB, measured(soft, PAIRS[:1], omega=OMEGA[::3]), free=["link.youngs_modulus"], profile=False)
     assert found.is_explained is False
@@ -269,7 +326,7 @@ def test_young_s_modulus_takes_the_shear_modulus_along():
 
 def test_a_step_to_no_arm_is_a_wall(monkeypatch):
     """An attachment beside the tip that would pass it where the link grows shorter: the search ends at an arm."""
-    monkeypatch.setattr(solve, "STRAYED", 1)  # the search that comes to the wall is the first of those that strayed
+    monkeypatch.setattr("tfarm.fitting.start.STRAYED", 1)
     rig = tfarm.load("tests/rigs/bench-rig.toml")
     omega = np.geomspace(20, 600, 20)
     H = tfarm.transfer(rig, "tip_acceleration")(1j * omega)

@@ -9,7 +9,8 @@ from tests.loop.ritz_loop import RitzLoop
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import many_laws
-from tfarm.loop.residual import PERIOD_SAMPLES, RISE, TRAVEL, command, residual_moment
+from tfarm.dsp import Chain, Sampling, Slew
+from tfarm.loop.residual import PERIOD_SAMPLES, RISE, TURN, command, residual_moment
 
 LAB = tfarm.load("sasaki2012-lab")
 
@@ -26,8 +27,7 @@ def transformed(signal, s):
 @pytest.mark.parametrize("gains", [HubFeedback(), HubFeedback(K1=0.3), HubFeedback(K1=0.1, Kp=2.0)])
 def test_the_command_is_the_transform_of_a_bang_bang_slew(gains):
     """J theta_tt + K1 theta_t + Kp theta of the reference, whose angle stays at its end: the last term's end is /s."""
-    angle = TRAVEL / LAB.length
-    a = 4 * angle / RISE**2
+    angle, a = TURN, 4 * TURN / RISE**2
 
     def acceleration(t):
         return np.where(t < RISE / 2, a, -a)
@@ -63,7 +63,7 @@ def played(gains, terms):
     whole[: len(A), : len(A)] = A
     whole[: len(A), len(A) :] = np.outer(B, [gains.Kp, gains.K1, LAB.total_inertia])
     whole[len(A), len(A) + 1] = whole[len(A) + 1, len(A) + 2] = 1.0
-    z, a = np.zeros(len(whole)), 4 * TRAVEL / LAB.length / RISE**2
+    z, a = np.zeros(len(whole)), 4 * TURN / RISE**2
     for acceleration in (a, -a):
         z[-1] = acceleration
         z = expm(whole * RISE / 2) @ z
@@ -84,3 +84,18 @@ def test_what_is_left_is_what_another_model_leaves(gains, modes):
     """The model's highest modes are not the arm's; as these have died down, the first ten or twelve leave it all."""
     found = residual_moment(LAB, many_laws(gains, K1=np.array([gains.K1])), modes)
     assert found == pytest.approx([played(gains, 16)], rel=1e-5)
+
+
+def test_what_is_left_on_a_rig_is_what_a_fast_sampled_loop_leaves():
+    """A motor with back-EMF and friction, a link of 0.4 m, and a slew of its own: at a 640th of the first period."""
+    arm = tfarm.load("quanser-flexlink").having(damping=1e-4)
+    gains, turn = HubFeedback(K1=0.5 * arm.rate_loss, Kp=2.0), 0.6
+    period = 2 * np.pi / tfarm.modes(arm, 1).natural_frequency[-1]
+    T = period / (10 * PERIOD_SAMPLES)
+    rise = 600 * T
+    chain = Chain(sampling=Sampling(period=T), slew=Slew(rise_time=rise, travel=turn * arm.reach))
+    sampled = tfarm.simulate(arm, gains, chain=chain, duration=rise + period, count=6)
+    moments = sampled.at_samples.root_moment[600 : 600 + 10 * PERIOD_SAMPLES : 10]
+    laws = many_laws(gains, K1=np.array([gains.K1]))
+    found = residual_moment(arm, laws, 6, rise=rise, turn=turn)
+    assert found == pytest.approx([np.sqrt(np.mean(moments**2))], rel=3e-3)

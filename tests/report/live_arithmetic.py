@@ -187,9 +187,9 @@ class Plant:
 
     def slew(self, data, law):
         """Torque, and every output at the samples (outputs, n)."""
-        ideal = np.frombuffer(base64.b64decode(data["ideal"]), "<f8").reshape(-1, 4)
+        ideal = np.frombuffer(base64.b64decode(data["ideal"]), "<f8").reshape(-1, 5)
         x, torque, outputs = np.zeros(len(self.A)), [], []
-        for r, theta, rate, moment in ideal:
+        for r, theta, rate, moment, _ in ideal:
             y = self.C @ x
             torque.append(r + law.Kp * (theta - y[0]) + law.K1 * (rate - y[1]) - law.K2 * (y[2] - moment))
             outputs.append(y)

@@ -36,7 +36,7 @@ def value(text):
 @pytest.mark.parametrize("arm", [LAB, PURE], ids=lambda arm: arm.name)
 def test_a_command_and_a_page_list_the_same_poles_and_zeros(arm):
     data = tfarm.bode(arm, "tip_displacement", (1.0, 900.0))
-    roots, sizes = np.r_[data.poles, data.zeros], np.r_[data.peaks, data.dips]
+    roots, sizes = np.r_[data.poles, data.zeros], np.r_[data.at_poles, data.at_zeros]
     found, page = bode_answer(data), read(roots_table(data, "pole", "zero"))
     rows = [*found["poles"], *found["zeros"]]
     for given, key in ((roots.real, "re"), (roots.imag, "im"), (sizes, "magnitude")):

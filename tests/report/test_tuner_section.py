@@ -14,7 +14,7 @@ import tfarm
 from tests.report.walked import Walk, columns_of, numbers_of, read, shown_in, told, untraced, untraced_cells
 from tests.shared import once
 from tfarm.digits import significant
-from tfarm.dsp import Chain
+from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.curves import away
 from tfarm.errors import CertificationError
 from tfarm.plots.files import save_figure
@@ -24,13 +24,14 @@ from tfarm.report.given_laws import Subject
 from tfarm.report.sections import save_section
 from tfarm.report.tuner_section import section_of, tuner_section
 from tfarm.report.writing import _write_pages
-from tfarm.tuner import Learning, Plan, initial_network, train, tried_loops, tune
+from tfarm.tuner import Learning, Plan, initial_network, train, tune
 from tfarm.tuner import overview as study_module
 from tfarm.tuner import tuning as tuning_room
-from tfarm.tuner.overview import CostMap, tuner_study
+from tfarm.tuner.overview import SIZES, CostMap, StudySize, tuner_study
 
 LAB = tfarm.load("sasaki2012-lab")
 SEEDS = 3
+SMALL = StudySize(curve_seeds=SEEDS, map_seeds=1, map_trials=3, conditions=4)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -46,10 +47,7 @@ def each_loop_once():
 def small(each_loop_once, tmp_path_factory):
     """The section and its numbers with few seeds, few trials and the first four conditions."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study_module, "CURVE_SEEDS", SEEDS)
-        patch.setattr(study_module, "MAP_SEEDS", 1)
-        patch.setattr(study_module, "MAP_TRIALS", 3)
-        patch.setattr(study_module, "tried_loops", lambda *each: tried_loops(*each)[:4])
+        patch.setattr(study_module, "SIZES", (SMALL,))
         data = pickle.loads(once(tmp_path_factory, "tuner", save_study).read_bytes())
         yield data, section_of(data)
 
@@ -210,6 +208,21 @@ def walked(small, tmp_path_factory):
     return next(part for part in page.parts if part.anchor == "tune"), folder
 
 
+def test_a_reduced_study_is_said_to_be_one(small):
+    """In the place of the full one: both sizes, and 4 conditions."""
+    assert "3 seeds instead of 20" in " ".join(small[1].words)
+    assert "1 seed and 3 trials a pair instead of 5 and 60. The comparison has 4 conditions" in " ".join(small[1].words)
+
+
+def test_a_slew_of_too_many_samples_has_no_study_but_its_number(monkeypatch):
+    """600,001 samples of a slew of 3 s at 5 us, and nothing begun."""
+    monkeypatch.setattr(tuner_section_room, "tuner_study", lambda *_: pytest.fail("begun"))
+    chain = Chain(sampling=Sampling(period=5e-6))
+    (words,) = tuner_section(LAB, chain).words
+    assert "600,001 samples" in words
+    assert "tfarm tune" in words
+
+
 @pytest.fixture(scope="module")
 def values(small, walked):
     """What the section may say: the command's JSON, the page's files, and what follows from these."""
@@ -221,7 +234,7 @@ def values(small, walked):
     rows = [read(folder / "data" / f"tune-{name}.json")["rows"] for name in ("comparison", "residual")]
     coarse = next(iter(data.coarse.values())).chain.converters
     settings = [coarse.moment_bits, coarse.moment_range, coarse.torque_bits, coarse.torque_range, coarse.encoder_counts]
-    drawn = [getattr(tuner_section_room, name) for name in ("CURVE_SEEDS", "MAP_SEEDS", "MAP_TRIALS")]
+    drawn = [number for size in (SMALL, SIZES[0]) for number in (size.curve_seeds, size.map_seeds, size.map_trials)]
     late = [1e3 * each["arrives_later_by_s"] for each in own["shaped"].values()]
     off = [1e3 * abs(each) for each in (*(own[key] for key in TIPS), held["tip_error_m"])]
     more = [*_learned(own), *settings, *drawn, *late, *off]

@@ -163,4 +163,4 @@ def test_progress_is_told_in_a_pipe_too(monkeypatch, capsys):
         while "a section" not in seen and time.monotonic() < deadline:
             time.sleep(0.02)
             seen += capsys.readouterr().err
-    assert "tfarm: 3 of 7 done, last: a section" in seen.splitlines()
+    assert "tfarm: 3 of 7 done, running: a section" in seen.splitlines()

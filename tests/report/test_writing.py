@@ -67,8 +67,12 @@ def test_two_processes_write_what_one_does(pages, tmp_path):
     assert "Bode" not in text
     assert "second assumption" in text
     assert {"other/modes.html", "other/pictures/card.svg"} <= set(Links(tmp_path / "index.html").targets)
-    assert [done for done, _, _ in told] == list(range(told[0][1] + 1))
-    assert told[-1][0] == told[-1][1]
+    dones = [done for done, _, _ in told]
+    assert dones == sorted(dones)
+    assert told[-1] == (told[0][1], told[0][1], "")
+    running = [names.split(", ") for _, _, names in told[1:-1]]
+    assert max(map(len, running)) == 2
+    assert {name for names in running for name in names} >= {f"{NAME}: modes", "other: modes", "other: card"}
 
 
 # ------------------------------------------------------------ pages

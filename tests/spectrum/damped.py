@@ -3,6 +3,10 @@
 Arms of slenderness L/h 5 to 500 with C = 1e-7 to 1e-3 s, hub, payload mass and inertia each 0, inf or anything between;
 1 to 24 flexible modes.  In the printed box there must be as many eigenvalues by the list, by the winding number in
 float64, by the proof in ball arithmetic and by a Galerkin model (`damped_roads`), whose own must be the listed ones.
+
+As many damped rigs (`tests.rigs`) with 1 to 8 modes: every eigenvalue that finite elements (`tests.chain_elements`)
+have in the box is listed, assigned to a mode or not, and there are no others; a list of fewer modes than were asked for
+is "short".
 """
 
 import os
@@ -17,6 +21,8 @@ if __name__ == "__main__":
 import numpy as np
 
 import tfarm
+from tests.chain_elements import eigenvalues
+from tests.rigs import some_rig
 from tests.spectrum.damped_roads import ritz_eigenvalues
 from tests.strategies import some_arm
 from tfarm.errors import CertificationError, ConvergenceError
@@ -24,7 +30,10 @@ from tfarm.exact.characteristic import zeros_at_origin
 from tfarm.spectrum.damped import damped_modes
 
 MOST_MODES = 24
+MOST_RIG_MODES = 8
 TERMS = 56
+OF_ELEMENTS = 1e-5  # of an eigenvalue: how far the one of finite elements may be: it is a matter of which
+NEXT_TO_REST = {0: 0.0, 1: 1e-12, 2: 1e-7}  # of the largest: what one zero at 0, or two, are to finite elements
 AGREED = 1e-6  # of the model with the listed eigenvalues: it is a matter of which, not of digits
 ROUNDING = 64 * np.finfo(float).eps  # of the model's flexibilities 1/w^2, in units of the largest
 
@@ -76,6 +85,43 @@ def pairs(damped):
     return damped.eigenvalues[damped.index > 0]
 
 
+def some_damped_rig(rng):
+    """A random rig that loses something, and a number of modes to ask for."""
+    while (arm := some_rig(rng)).is_undamped:
+        pass
+    return arm, int(rng.integers(1, MOST_RIG_MODES + 1))
+
+
+def judge_rig(arm, count, *, certify=True):
+    """List the damped modes of one rig, and compare all that is listed in the box with finite elements."""
+    start = time.process_time()
+    try:
+        damped = damped_modes(tfarm.modes(arm, count))
+        listing = 1e3 * (time.process_time() - start)
+        proof = damped.certify() if certify else None
+    except (ConvergenceError, CertificationError) as error:
+        return Verdict("refused", f"{type(error).__name__}: {str(error).partition(' near ')[0]}")
+    every = np.r_[damped.eigenvalues.ravel(), damped.single, damped.unassigned_pairs.ravel()]
+    every = np.unique(every[np.isfinite(every) & (every != 0)])
+    inside = every[damped.box.holds(every)]
+    at_rest = zeros_at_origin(damped.undamped.system)
+    wrong = [] if inside.size + at_rest == damped.count else ["not so many are listed"]
+    mine, theirs = inside[inside.imag >= 0], eigenvalues(arm, abs(damped.box.corners).max())
+    theirs = theirs[damped.box.holds(theirs) & (abs(theirs) > NEXT_TO_REST[at_rest] * abs(mine).max(initial=0.0))]
+    if mine.size != theirs.size:
+        wrong.append(f"{theirs.size} eigenvalues of finite elements in the box, {mine.size} listed")
+    wrong += [f"{s:.6g} is no eigenvalue of finite elements" for s in mine if _away(s, theirs) > OF_ELEMENTS]
+    if proof is not None and sum(map(len, proof)) < mine.size:
+        wrong.append("not a disc for each eigenvalue")
+    outcome = "wrong" if wrong else "short" if damped.left_out else "unassigned" if damped.unassigned else "right"
+    return Verdict(outcome, ", ".join(wrong), listing, 0.0, inside.size, int(damped.is_overdamped.sum()))
+
+
+def _away(zero, others):
+    """Distance to the nearest of the others, of its size."""
+    return abs(others / zero - 1).min(initial=np.inf)
+
+
 def compared(arm, damped, inside):
     """What the Galerkin model has against the list."""
     theirs = ritz_eigenvalues(arm, TERMS)
@@ -87,11 +133,11 @@ def compared(arm, damped, inside):
     return [f"eigenvalue {inside[int(np.argmax(far))]:.6g} not in the model"] if max(far, default=0) > 1 else []
 
 
-def survey(number, seed, every=1):
+def survey(number, seed, every=1, draw=some_damped_arm, judged=judge):
     """Arms, counts and verdicts; every so-and-so-manieth is certified."""
     rng = np.random.default_rng(seed)
-    drawn = [some_damped_arm(rng) for _ in range(number)]
-    return [(arm, count, judge(arm, count, certify=n % every == 0)) for n, (arm, count) in enumerate(drawn)]
+    drawn = [draw(rng) for _ in range(number)]
+    return [(arm, count, judged(arm, count, certify=n % every == 0)) for n, (arm, count) in enumerate(drawn)]
 
 
 def report(verdicts):
@@ -100,13 +146,14 @@ def report(verdicts):
     listing = [verdict.listing for verdict in verdicts]
     proving = [verdict.proving for verdict in verdicts if verdict.proving > 0.1]
     lines = [
-        f"{len(verdicts)} arms: {tally['right']} right, {tally['refused']} refused, {tally['wrong']} wrong",
+        f"{len(verdicts)} arms: {tally['right']} right, {tally['unassigned']} right with eigenvalues of no mode, "
+        f"{tally['short']} shorter than asked, {tally['refused']} refused, {tally['wrong']} wrong",
         f"{sum(v.inside for v in verdicts)} eigenvalues in boxes, {len(proving)} boxes proven; "
         f"{sum(v.overdamped for v in verdicts)} overdamped modes",
         f"list {np.mean(listing):.1f} ms in the mean, {np.max(listing):.1f} at most",
         f"proof {np.mean(proving or [0]):.1f} ms in the mean, {np.max(proving or [0]):.1f} at most",
     ]
-    reasons = Counter(f"{v.outcome}: {v.reason}" for v in verdicts if v.outcome != "right")
+    reasons = Counter(f"{v.outcome}: {v.reason}" for v in verdicts if v.reason)
     return "\n".join([*lines, *(f"{count} x {text}" for text, count in reasons.most_common())])
 
 
@@ -115,9 +162,12 @@ if __name__ == "__main__":
         int(sys.argv[n]) if len(sys.argv) > n else default for n, default in ((1, 200), (2, 1), (3, 1))
     )
     judge(*some_damped_arm(np.random.default_rng(0)))  # compile and cache
-    SURVEY = survey(NUMBER, SEED, EVERY)
-    print(report([verdict for *_, verdict in SURVEY]))
-    for ARM, COUNT, VERDICT in SURVEY:
-        if VERDICT.outcome != "right":
-            print(VERDICT.outcome, VERDICT.reason, COUNT, ARM)
-    sys.exit(any(case[-1].outcome == "wrong" for case in SURVEY))
+    ARMS = survey(NUMBER, SEED, EVERY)
+    RIGS = survey(NUMBER, SEED, EVERY, some_damped_rig, judge_rig)
+    for SURVEY in (ARMS, RIGS):
+        print(report([verdict for *_, verdict in SURVEY]))
+        for ARM, COUNT, VERDICT in SURVEY:
+            if VERDICT.outcome in ("wrong", "refused", "short"):
+                print(VERDICT.outcome, VERDICT.reason, COUNT, ARM)
+    REFUSED = sum(verdict.outcome == "refused" for *_, verdict in RIGS) > max(1, NUMBER // 500)
+    sys.exit(REFUSED or any(case[-1].outcome == "wrong" for case in ARMS + RIGS))

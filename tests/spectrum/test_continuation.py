@@ -261,15 +261,20 @@ def conjugates(*upper):
 
 
 def test_a_box_ends_below_the_first_zero_that_is_not_listed() -> None:
-    """Among known zeros by their heights, among unknown ones by the winding number."""
+    """Among known zeros by their heights, among unknown ones by the winding number; one below all of them is found."""
     all_there = with_zeros(conjugates(-0.01 + 1j, -0.01 + 2j, -0.02 + 3j, -0.1 + 5j))
     none = np.empty((0, 2), complex)
-    box, count = complete_box(all_there, conjugates(-0.01 + 1j, -0.01 + 2j, -0.1 + 5j), none, 0.0)
+    box, count, more = complete_box(all_there, conjugates(-0.01 + 1j, -0.01 + 2j, -0.1 + 5j), none, 0.0)
     assert 1 < box.im_max < 3
+    assert not more.size
     assert count == box.holds(np.array([1j, -1j, 2j, -2j])).sum()
     known = complete_box(all_there, conjugates(-0.01 + 1j, -0.01 + 2j), conjugates(-0.02 + 3j, -0.1 + 5j), 0.0)
     assert 2 < known[0].im_max < 3
     assert known[1] == 4
+    below = with_zeros(conjugates(-0.01 + 0.3j, -0.01 + 2j, -0.02 + 3j))
+    box, count, more = complete_box(below, conjugates(-0.01 + 2j), conjugates(-0.02 + 3j), 0.0)
+    assert 2 < box.im_max < 3
+    assert (count, *more) == (4, pytest.approx(-0.01 + 0.3j, rel=1e-12))
 
 
 def test_a_listed_zero_that_is_none_is_told() -> None:

@@ -18,7 +18,7 @@ from tfarm.loop.frequencies import band_of
 from tfarm.loop.lines import NO_FEEDBACK
 from tfarm.loop.margins import loop_margins
 from tfarm.loop.regions import region
-from tfarm.loop.residual import PERIOD_SAMPLES, RISE, TRAVEL, residual_moment
+from tfarm.loop.residual import PERIOD_SAMPLES, RISE, TURN, residual_moment
 from tfarm.loop.stability import stability
 from tfarm.synthesis.design import best_gains
 
@@ -39,9 +39,9 @@ def slew(model, law):
     whole[N, N + 1] = whole[N + 1, N + 2] = 1
     z, half = np.zeros(N + 3), expm(whole * RISE / 2)
     for acceleration in (1, -1):
-        z[-1] = acceleration * 4 * TRAVEL / (arm.link.length * RISE**2)
+        z[-1] = acceleration * 4 * TURN / RISE**2
         z = half @ z
-    assert z[N] == pytest.approx(TRAVEL / arm.link.length)
+    assert z[N] == pytest.approx(TURN)
     z[-1] = 0.0
     step = expm(whole * 2 * np.pi / tfarm.modes(arm, 1).natural_frequency[-1] / PERIOD_SAMPLES)
     moment = []

@@ -65,7 +65,7 @@ def run(trial, guard, rng):
         return f"not bounded: {training.stopped}"
     if not (guard.lo <= K.min() and K.max() <= guard.hi):
         return f"left the guard: {K.min()}, {K.max()}"
-    excess = (abs(x + trial.task.rigid_moment) - moment_bound(trial, guard) * (1 + 1e-9) - 1e-9).max()
+    excess = (abs(x + trial.task.moment_reference) - moment_bound(trial, guard) * (1 + 1e-9) - 1e-9).max()
     return None if excess <= 0 else f"passed its bound by {excess}"
 
 

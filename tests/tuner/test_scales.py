@@ -10,8 +10,8 @@ from tests.odd_arms import odd_arms
 from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.spectrum.scales import default_gains
 from tfarm.tuner.comparison import quantised_chain, tried_loops
-from tfarm.tuner.overview import plan_of
 from tfarm.tuner.shaping import shaper
+from tfarm.tuner.tuning import trial_of, usual_plan
 
 ARMS = odd_arms()
 TURNING = [name for name, arm in ARMS.items() if arm.has_rigid_mode and arm.hub.inertia]
@@ -31,11 +31,12 @@ def test_the_scales_of_the_tuner_are_the_arms_own(name):
     """Ranges hold the slew's own torque, rigid moment and some more; payloads and dampings are shares of the arm's."""
     arm, chain = ARMS[name], Chain()
     torque = arm.total_inertia * chain.slew.acceleration(arm.link.length)
-    converters, plan = quantised_chain(arm, chain).converters, plan_of(arm, chain)
+    converters, plan = quantised_chain(arm, chain).converters, usual_plan(arm, chain)
     assert 2 * torque < converters.torque_range < 5 * torque
     assert torque < converters.moment_range < 10 * torque
     assert 2 < torque / plan.scale < 4.5  # one digit of a third: the paper's 3 N m over its 1 N m
-    assert (plan.cost.a * plan.scale**2, plan.cost.b * plan.scale**2) == pytest.approx((1.0, 2.6))
+    cost = trial_of(arm, plan, chain).cost
+    assert (cost.a * plan.scale**2, cost.b * plan.scale**2) == pytest.approx((1.0, 2.6))
     conditioned = {each.name: each.arm for each in tried_loops(arm, chain)}
     loads = [each.payload.mass for key, each in conditioned.items() if key.startswith("payload")]
     of_mass, wanted = (arm.payload.mass, [0.5, 1.5, 2.0]) if arm.payload.mass else (arm.own_mass, [0.06, 0.15, 0.3])
@@ -59,7 +60,7 @@ def test_the_papers_arm_keeps_the_papers():
         each.replace("one", "one more") for each in names[2:4]
     ]
     converters = quantised_chain(lab, Chain()).converters
-    assert (converters.moment_range, converters.torque_range, plan_of(lab, Chain()).scale) == (20.0, 10.0, 1.0)
+    assert (converters.moment_range, converters.torque_range, usual_plan(lab, Chain()).scale) == (20.0, 10.0, 1.0)
 
 
 @pytest.mark.parametrize(("hub", "wanted"), [(0.1, [1e-5, 1e-3]), (1e-3, [5e-6, 5e-4])])
@@ -75,4 +76,4 @@ def test_an_arm_without_damping_is_tried_with_two_dampings_of_its_first_mode(hub
 @pytest.mark.parametrize("rise", [0.5, 2.0])
 def test_a_trial_lasts_three_slews(rise):
     chain = Chain(slew=replace(Chain().slew, rise_time=rise))
-    assert plan_of(tfarm.load("sasaki2012-lab"), chain).duration == 3 * rise
+    assert usual_plan(tfarm.load("sasaki2012-lab"), chain).duration == 3 * rise

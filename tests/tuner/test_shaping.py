@@ -53,7 +53,7 @@ def test_a_one_mode_arm_is_left_at_rest():
     trial = slew_trial(tfarm.load("sasaki2012"), K1=0.0, count=1)
     task = shaped(trial.task, shaper(trial.loop, "ZV", 1))
     quiet = replace(trial, task=task).with_constant(0.0)
-    before = residual_rms(trial.with_constant(0.0), trial.task.busy_until)
+    before = residual_rms(trial.with_constant(0.0), trial.task)
     after = quiet.x[quiet.t > task.busy_until + 0.011]
     assert before > 0.5
     assert abs(after).max() < 1e-10 * before

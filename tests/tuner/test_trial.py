@@ -117,7 +117,7 @@ def test_the_bound_is_batch_least_squares(lab, signals, delay, a, b):
         state = A @ state
     G = toeplitz(impulse, np.zeros(n))
     rest = np.zeros(n) if signals == "total" else trial.task.feedforward
-    x0 = G @ rest - trial.task.rigid_moment
+    x0 = G @ rest - (signals == "vibration") * trial.task.rigid_moment
     rows = np.vstack([np.sqrt(a) * G, np.sqrt(b) * np.eye(n)])
     e = np.linalg.lstsq(rows, np.r_[-np.sqrt(a) * x0, np.zeros(n)], rcond=None)[0]
     cost = 0.01 * np.sum(a * (x0 + G @ e) ** 2 + b * e**2) / 2
@@ -141,7 +141,7 @@ def test_a_trial_that_runs_away_stops_and_says_where(lab):
     record = slew_trial(lab).with_constant(3.0)
     assert record.stopped == record.K.size > 5
     assert record.cost == np.inf
-    assert residual_rms(record, 1.0) == np.inf
+    assert residual_rms(record, slew_trial(lab).task) is None
     assert np.isfinite(record.x).all()
 
 

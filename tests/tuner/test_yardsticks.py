@@ -16,7 +16,7 @@ def best_of(monkeypatch, cost, windows):
         return SimpleNamespace(cost=cost(K))
 
     monkeypatch.setattr(yardsticks, "constant_windows", lambda loop: windows)
-    return best_constant(SimpleNamespace(loop=None, with_constant=with_constant)), tried
+    return best_constant(SimpleNamespace(loop=None, n=300, with_constant=with_constant)), tried
 
 
 def test_the_lowest_of_two_valleys_is_found_though_it_is_the_narrower(monkeypatch):

@@ -33,9 +33,13 @@ def presets() -> tuple[str, ...]:
 
 def load(name_or_path: str | os.PathLike[str]) -> Arm:
     """The arm of a preset's name or of a TOML file's path."""
+    return arm_in(*load_tables(name_or_path))
+
+
+def arm_in(table: dict[str, Any], file: str) -> Arm:
+    """The arm of the parsed TOML of a file of that name."""
     from tfarm.arm.schema import arm_of_table  # here, because pydantic takes a while to import
 
-    table, file = load_tables(name_or_path)
     with naming(file):
         return arm_of_table(table)
 

@@ -355,6 +355,12 @@ class Arm:
         return self if self.has_elastic_link else self.having(damping=0.0)
 
     @property
+    def lossless(self) -> Arm:
+        """The same without anything that dissipates."""
+        clamp, joint = replace(self.clamp, damping=0.0), replace(self.joint, damping=0.0)
+        return replace(self.elastic.lossless_hub, clamp=clamp, joint=joint)
+
+    @property
     def lossless_hub(self) -> Arm:
         """The same without what `rate_loss` counts: friction of hub and rotor, and back-EMF."""
         motor = self.motor and replace(self.motor, rotor_friction=0.0, back_emf_constant=0.0)

@@ -16,7 +16,7 @@ def to_toml(arm: Arm) -> str:
     The numbers of the paper's arm are always there, all else only where it differs from its default.
     """
     named = {"theory": arm.theory, "input": arm.input}
-    defaults = {"theory": "timoshenko", "input": "hub_torque"}
+    defaults = {"theory": "timoshenko", "input": None if arm.motor else "hub_torque"}  # with a motor it is a choice
     springs = {"clamp": arm.clamp, "joint": arm.joint}
     tables = [
         [

@@ -7,15 +7,18 @@ import gc
 import os
 import sys
 
+from tfarm.stopping import stop_on_signals
+
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run one command and exit: 0, 2 for bad input, 3 for what could not be solved or proven, 130 if interrupted.
+    """Run one command and exit: 0, 2 for bad input, 3 for what could not be solved or proven, 130 or 143 if stopped.
 
-    Everything is imported inside, so that an interrupt is one line from the first moment on.  BLAS has one thread,
-    unless the user chose a number: on matrices of a hundred rows more only wait for each other.
+    Everything is imported inside, so that an interrupt is one line from the first moment on (see `stopping`).  BLAS
+    has one thread, unless the user chose a number: on matrices of a hundred rows more only wait for each other.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if arguments is None:
+        stop_on_signals()
         atexit.register(gc.freeze)  # a last look through all that was loaded takes half a second, and frees nothing
     try:
         from tfarm.cli.running import run

@@ -89,6 +89,7 @@ TheoryName = Annotated[
     str | None,
     typer.Option("--theory", help="timoshenko, shear, rayleigh or euler-bernoulli; the arm's own if not said"),
 ]
+INPUT_REMEDY = "Set input to hub_torque, motor_voltage or motor_current at the top of the file."
 SideName = Annotated[
     str | None, typer.Option("--side", help="outer (if not said) or inner side of a joint, for outputs along the arm")
 ]
@@ -101,15 +102,20 @@ Compare = Annotated[bool, typer.Option("--compare", help="all three methods besi
 DigitCount = Annotated[str | None, typer.Option("--digits", metavar="D", help="right digits, proven; strings above 15")]
 
 
-def load_arm(name: str, theory: str | None = None) -> Arm:
+def load_arm(name: str, theory: str | None = None, driven: str | None = None) -> Arm:
     """The preset or file of that name, under that theory, or what is `Asked`, or its own.
 
-    Values that look like a slip of units are named on standard error.
+    Values that look like a slip of units, and a motor without an input (`driven` or the file's), are named on standard
+    error.
     """
-    from tfarm.arm import implausible, load
+    from tfarm.arm import implausible
+    from tfarm.arm.reading import arm_in, load_tables
 
     say_when_compiling()
-    arm = load(name)
+    table, file = load_tables(name)
+    arm = arm_in(table, file)
+    if "motor" in table and "input" not in table and driven is None:
+        tell(f"warning: {file}: input: not given with a [motor], {arm.input} is assumed. {INPUT_REMEDY}")
     if (other := theory or getattr(name, "theory", None)) is not None:
         arm = arm.under(cast("Any", other))
     if texts := implausible(arm):

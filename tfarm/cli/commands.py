@@ -73,7 +73,11 @@ def modes(
         refuse_beside({"--certify": certify or None}, BESIDE_COMPARE)
         give(modes_by_methods_answer(table), json, print_compared)
         return
-    give(modes_answer(table, right, certify, road), json, print_modes)
+    answer = modes_answer(table, right, certify, road)
+    give(answer, json, print_modes)
+    if "damped_failure" in answer:
+        tell(answer["damped_failure"])
+        raise typer.Exit(3)  # as where nothing could be solved
 
 
 @app.command()
@@ -113,7 +117,7 @@ def response(
     from tfarm.response.answers import by_methods_answer, response_answer
 
     right, at = right_digits(digits), points_on(s, omega, start, stop, points)
-    subject, driven = asked_input(load_arm(arm), driven)
+    subject, driven = asked_input(load_arm(arm, driven=driven), driven)
     road = slow_method(method, at.size, right, compare)
     if compare:
         refuse_beside({"--csv": csv, "--input": driven}, BESIDE_COMPARE)

@@ -40,7 +40,7 @@ def compare(
     *,
     gains: Typed,
 ) -> None:
-    """Two arms, or two laws on one arm, beside each other: modes, poles, verdicts, margins; differences in per cent."""
+    """Two arms, or two laws on one arm, compared: modes, poles, verdicts, margins; differences in per cent or deg."""
     count, files = whole_number("--modes", modes, 1, 30), law or []
     _check_number(arms, files)
     subjects = [load_arm(name, theory) for name in arms]
@@ -92,8 +92,11 @@ def _print(found: Comparison, answer: dict[str, Any]) -> None:
         show(answer["modes"])
     if found.is_clocked:
         print("\none law is a law in z: both loops are compared at their samples, each pole z as s = ln(z)/T")
-    print("\noscillating closed-loop poles in the order of Im s (the n-th of both need not be the same mode):")
+    print("\noscillating closed-loop poles, by the mode whose open-loop pole each is nearest to:")
     show(answer["poles"])
+    if len(answer["unpaired_poles"]):
+        print("\npoles of one side alone:")
+        show(answer["unpaired_poles"])
     print()
     show(answer["margins"])
     if (windows := compared_windows(found)) is not None:

@@ -120,6 +120,7 @@ def print_law_map(answer: dict[str, Any]) -> None:
 def print_design(answer: dict[str, Any]) -> None:
     """The law and what it reaches, then a row an arm."""
     (_print_coefficients if "coefficients" in answer else _print_gains)(answer)
+    _print_record(answer)
     _print_arms(answer)
     print(answer["sign_convention"])
 
@@ -145,6 +146,13 @@ def _print_gains(answer: dict[str, Any]) -> None:
     if cut:
         ends = [f"{name} = {answer[name]:.6g} of {_pair(answer['bounds'][name])}" for name in cut]
         print(f"no optimum: {' and '.join(ends)} is where the search was cut off; it may get better beyond")
+
+
+def _print_record(answer: dict[str, Any]) -> None:
+    """The record of the slew that a residual or a cost is of."""
+    if (length := answer["slew_duration_s"]) is not None:
+        what = "root moment less the rigid arm's, N m rms" if answer["objective"] == "residual" else "cost of the slew"
+        print(f"{what}, in a record of {length:.6g} s (tfarm simulate --duration {length:.6g})")
 
 
 def _print_arms(answer: dict[str, Any]) -> None:

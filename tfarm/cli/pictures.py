@@ -32,7 +32,7 @@ def bode(
     json: Json = False,
 ) -> None:
     """Bode plot of the exact response to the arm's input, with the poles and zeros that the output shows."""
-    subject, driven = asked_input(load_arm(arm), driven)
+    subject, driven = asked_input(load_arm(arm, driven=driven), driven)
     band, (wanted,) = _band(subject, start, stop), read_on([output], side)
     from tfarm.cli.tables import hand_out
     from tfarm.response import bode as find
@@ -75,7 +75,7 @@ def _band(arm: Arm, start: float | None, stop: float | None) -> tuple[float, flo
 
 
 def _print_bode(answer: dict[str, Any]) -> None:
-    """Poles, then zeros."""
+    """Poles and zeros, then peaks and dips."""
     from tfarm.tables.terminal import show
 
     low, high = answer["band_rad_s"]
@@ -84,12 +84,13 @@ def _print_bode(answer: dict[str, Any]) -> None:
     if not any(map(any, answer["value"])):
         print("zero at every frequency")
         return
-    for kind in ("poles", "zeros"):
+    none = {"peaks": ": |G| has no local maximum here", "dips": ": |G| has no local minimum here"}
+    for kind in ("poles", "zeros", "peaks", "dips"):
         if len(answer[kind]):
             print(f"{kind}:")
             show(answer[kind])
         else:
-            print(f"no {kind}")
+            print(f"no {kind}{none.get(kind, '')}")
 
 
 def _print_nyquist(answer: dict[str, Any]) -> None:

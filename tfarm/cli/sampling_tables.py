@@ -66,14 +66,24 @@ def print_simulation(answer: dict[str, Any]) -> None:
     if change is not None:
         known = f"half of them change the signals by {change:.2g} of their largest"
     print(f"{answer['modes_used']} flexible modes{', ' if change is None else ': '}{known}")
-    print(f"residual root moment, less the rigid arm's: {answer['residual_moment_rms']:.6g} N m rms")
-    print(f"settled (5 %) at: {answer['settling_time_s']:.4g} s")
+    print(f"residual root moment, less the rigid arm's: {_residual(answer)}")
+    settled = answer["settling_time_s"]
+    print(f"not settled within {answer['t'][-1]:.4g} s" if settled is None else f"settled (5 %) at: {settled:.4g} s")
     print(f"saturated samples: {', '.join(f'{k} {n}' for k, n in answer['saturated_samples'].items())}")
     if answer["limit_cycle"] is not None:
         cycle = answer["limit_cycle"]
         at = cycle["frequency_rad_s"]
         size = f"root moment +-{cycle['root_moment_amplitude']:.4g} N m at {at:.4g} rad/s"
         print(f"limit cycle, kept up by {cycle['kept_up_by']}: {size}")
+
+
+def _residual(answer: dict[str, Any]) -> str:
+    """What is left after the slew, or why that was not computed."""
+    residual, stopped = answer["residual_moment_rms"], answer["stopped_at_s"]
+    if residual is not None:
+        return f"{residual:.6g} N m rms"
+    ends = "the record ends before the slew" if stopped is None else f"the run stops at {stopped:.6g} s"
+    return f"not computed, as {ends}"
 
 
 def warn_of_runaway(answer: dict[str, Any]) -> None:

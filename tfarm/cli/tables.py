@@ -59,6 +59,9 @@ def print_modes(answer: dict[str, Any]) -> None:
         print(f"{answer['box_note'].partition(': ')[2]}.")
         for each in answer.get("circuit_eigenvalues", ()):
             print(f"One more, {each:.8g} 1/s, belongs to no mode: it is the motor's circuit.")
+        for each in answer.get("unassigned_eigenvalues", ()):
+            re, im = each["eigenvalue"]
+            print(f"One more, {re:.8g}{f' +- {im:.8g}i' if im else ''} 1/s, is assigned to no mode: {each['origin']}.")
         if "damped_note" in answer:
             print(answer["damped_note"])
     if answer["hub_locked_note"]:
@@ -158,7 +161,7 @@ def say_written(*paths: Path | None) -> bool:
 
 @contextmanager
 def progress() -> Iterator[Callable[[int, int, str], None] | None]:
-    """A progress bar on a terminal; in a pipe a line every few seconds, of what was done last."""
+    """A progress bar on a terminal; in a pipe a line every few seconds, of what runs."""
     if sys.stderr.isatty():
         from rich.progress import Progress
 
@@ -169,7 +172,7 @@ def progress() -> Iterator[Callable[[int, int, str], None] | None]:
     state, over = ["starting"], Event()
 
     def advance(done: int, total: int, text: str) -> None:
-        state[0] = f"{done} of {total} done, last: {text}" if done else f"0 of {total} done"
+        state[0] = f"{done} of {total} done" + f", running: {text}" * bool(text)
 
     def speak() -> None:
         while not over.wait(PROGRESS_EVERY):

@@ -14,6 +14,7 @@ from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
+    from tfarm.dsp import Chain
     from tfarm.tuner import Plan
 
 HELP_ON_ANGLE_GAIN = f"hub angle gain: the reference is tracked, {RATE_GAIN} damps that by 0.71 if not given"
@@ -23,8 +24,8 @@ PLAN: dict[str, tuple[Any, Any]] = {  # of each option of a plan its type and wh
     "trials": (Annotated[str, typer.Option("--trials", metavar="N", help="slews to learn from")], "100"),
     "mode": (Annotated[str, typer.Option("--mode", help="trial: learn after each slew; online: at every sample")],
              "trial"),
-    "signals": (Annotated[str, typer.Option("--signals", help="vibration or total: what x and u contain")],
-                "vibration"),
+    "signals": (Annotated[str | None, typer.Option("--signals", help="vibration or total: what x and u contain; as "
+                                                   "[slew] of the file says if not given")], None),
     "seed": (Annotated[str, typer.Option("--seed", metavar="N", help="of the initial weights")], "0"),
     "guard": (Annotated[str, typer.Option("--guard", help="time-varying (proven), frozen or none")], "time-varying"),
     "rule": (Annotated[str, typer.Option("--rule", help="dynamic, clipped or plain: how (21) is made robust")],
@@ -35,11 +36,12 @@ PLAN: dict[str, tuple[Any, Any]] = {  # of each option of a plan its type and wh
     ),
     "eta": (Annotated[float, typer.Option("--eta", help="learning rate")], 0.8),
     "alpha": (Annotated[float, typer.Option("--alpha", help="momentum, in [0, 1)")], 0.6),
-    "a": (Annotated[float, typer.Option("--a", help="weight of the root moment in the cost")], 1.0),
-    "b": (Annotated[float, typer.Option("--b", help="weight of the control signal in the cost")], 2.6),
+    "a": (Annotated[float, typer.Option("--a", help="weight of the root moment in the cost, in the arm's unit")], 1.0),
+    "b": (Annotated[float, typer.Option("--b", help="weight of the control signal in the cost, likewise")], 2.6),
     "on_rate": (Annotated[float | None, typer.Option(f"--{RATE_GAIN}", help=HELP_ON_GAINS[RATE_GAIN])], None),
     "on_angle": (Annotated[float, typer.Option(f"--{ANGLE_GAIN}", help=HELP_ON_ANGLE_GAIN)], 0.0),
-    "duration": (Annotated[float, typer.Option("--duration", help="of a trial [s]")], 3.0),
+    "duration": (Annotated[float | None, typer.Option("--duration", help="of a trial [s]; three slews if not given")],
+                 None),
     "enough": (Annotated[float, typer.Option("--enough", help="stop once the rms of x is below this [N m]")], 0.0),
     "hidden": (Annotated[str, typer.Option("--hidden", metavar="N", help="hidden neurons")], "6"),
     "seventh_input": (Annotated[bool, typer.Option("--seventh-input", help="feed K(t-1) to the network too")], False),
@@ -73,7 +75,7 @@ def tune(
     from tfarm import tuner
     from tfarm.tuner.tuning import outcomes_answer
 
-    plan, said = _plan(subject, typed, whole)
+    plan, said = _plan(subject, chain, typed, whole)
     tuning = tuner.tune(subject, plan, chain)
     answer = tuner.tune_answer(tuning) | said
     if compare:
@@ -84,19 +86,23 @@ def tune(
     _show(answer, save, json)
 
 
-def _plan(subject: Arm, typed: dict[str, Any], whole: dict[str, int]) -> tuple[Plan, dict[str, Any]]:
+def _plan(subject: Arm, chain: Chain, typed: dict[str, Any], whole: dict[str, int]) -> tuple[Plan, dict[str, Any]]:
     """The plan that is typed, and what the answer says of a rate gain that was not."""
+    from dataclasses import replace
+
     from tfarm import tuner
+    from tfarm.tuner.tuning import usual_plan
 
     servo, said = _servo_gains(subject, typed["on_rate"], typed["on_angle"])
-    plan = tuner.Plan(
+    plan = replace(
+        usual_plan(subject, chain),
         cost=tuner.Cost(a=typed["a"], b=typed["b"]),
         learning=tuner.Learning(**{name: typed[name] for name in OF_LEARNING}),
         trials=whole["trials"],
         seed=whole["seed"],
         count=whole["modes"],
         hidden=whole["hidden"],
-        **{name: typed[name] for name in AS_TYPED},
+        **{name: typed[name] for name in AS_TYPED if typed[name] is not None},
         **servo,
     )
     return plan, said

@@ -25,11 +25,12 @@ def print_tuning(answer: dict[str, Any]) -> None:
     costs["linear-quadratic bound of the unshaped slew"] = answer["cost_lq_bound"]
     columns = Column("", of=list(costs)), Column("cost", "cost of a slew", of=list(costs.values()), digits=FOUR)
     show(Table(columns=columns))
+    if (unit := answer["cost_unit_N_m"]) != 1.0:
+        print(f"costs count moments and torques in units of {unit:g} N m")
     print(f"guard {answer['guard_says']}")
     K = answer["gain"]["K"]
     print(f"gain: K from {min(K):.4g} to {max(K):.4g}")
-    residual, without = answer["residual_moment_rms"], answer["residual_without"]
-    print(f"residual root moment: {residual:.4g} N m rms, {residual / without:.3g} of that without moment feedback")
+    print(f"residual root moment, less the rigid arm's: {_residual(answer)}")
     errors = [answer[f"tip_error{which}_m"] for which in ("", "_best_constant", "_without")]
     tuned, constant, free = ("ran away" if each is None else f"{1e3 * each:.3g} mm" for each in errors)
     name = ANGLE_GAIN
@@ -37,6 +38,15 @@ def print_tuning(answer: dict[str, Any]) -> None:
     print(f"tip off its target at the end: {tuned}, {constant} with the best constant gain, {free} without ({held})")
     if "comparison" in answer:
         _print_comparison(answer["comparison"])
+
+
+def _residual(answer: dict[str, Any]) -> str:
+    """With the tuner, and as a share of that without moment feedback."""
+    residual, without = answer["residual_moment_rms"], answer["residual_without"]
+    if residual is None:
+        return "not computed, as the loop ran away"
+    share = f", {residual / without:.3g} of that without moment feedback" if without else ""
+    return f"{residual:.6g} N m rms{share}"
 
 
 def warn_of_divergence(answer: dict[str, Any]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from tfarm.columns import FILES, JSON, Column, Table
@@ -35,13 +35,16 @@ class ComparedQuantity:
     relative: float = 0.0
     absolute: float = 0.0
 
-    def percent(self, one: float | None, other: float | None) -> float | None:
-        """By how much the second is larger, in per cent of the first's size; None where that is no number."""
+    def difference(self, one: float | None, other: float | None) -> float | None:
+        """By how much the second is larger; None where that is no number."""
         if one is None or other is None or not (math.isfinite(one) and math.isfinite(other)):
             return None
-        if abs(other - one) <= 2 * max(self.relative * abs(one), self.absolute):
-            return 0.0
-        return 100 * (other - one) / abs(one) if one else None
+        return 0.0 if abs(other - one) <= 2 * max(self.relative * abs(one), self.absolute) else other - one
+
+    def percent(self, one: float | None, other: float | None) -> float | None:
+        """The same in per cent of the first's size."""
+        apart = self.difference(one, other)
+        return 100 * apart / abs(one) if one and apart is not None else apart if apart == 0.0 else None
 
     def cell(self, value: float | None) -> str:
         """The value in the digits that hold, eight at most; "-" where there is none."""
@@ -61,6 +64,10 @@ class ComparedQuantity:
 
     def _cells(self, values: ValuesOfSide) -> list[str]:
         return [self.cell(value) for value in values]
+
+
+POLE_SIZE = ComparedQuantity("size_rad_s", "|s| of ", "rad/s", relative=EIGENVALUE_ERROR)
+POLE_DAMPING = ComparedQuantity("damping_ratio", "damping of ", absolute=EIGENVALUE_ERROR)
 
 
 def _percent(value: float | None) -> str:
@@ -84,16 +91,44 @@ def compared_modes(found: Comparison) -> Table:
 
 
 def compared_poles(found: Comparison) -> Table:
-    """A row an oscillating closed-loop pole, in the order of Im s: the n-th of both, which need not be one mode."""
-    pairs = list(zip(*(side.oscillating.tolist() for side in found.sides), strict=False))
-    sizes = [[abs(pole) for pole in side] for side in zip(*pairs, strict=True)] or [[], []]
-    ratios = [[-pole.real / abs(pole) + 0.0 for pole in side] for side in zip(*pairs, strict=True)] or [[], []]
+    """A row a mode that has an oscillating closed-loop pole on both sides, 0 the hub: both, and the difference."""
+    modes = [mode for mode in found.one.by_mode if mode in found.other.by_mode]
+    both = [[side.by_mode[mode] for mode in modes] for side in found.sides]
+    sizes, ratios = [[abs(s) for s in side] for side in both], [[_ratio(s) for s in side] for side in both]
     columns = (
-        Column("number", "pole", of=range(1, len(pairs) + 1)),
-        *ComparedQuantity("size_rad_s", "|s| of ", "rad/s", relative=EIGENVALUE_ERROR).columns(found, *sizes),
-        *ComparedQuantity("damping_ratio", "damping of ", absolute=EIGENVALUE_ERROR).columns(found, *ratios),
+        Column("number", on=(JSON, FILES), of=range(1, len(modes) + 1)),
+        _modes_column(modes),
+        *POLE_SIZE.columns(found, *sizes),
+        *POLE_DAMPING.columns(found, *ratios),
     )
     return Table(columns=columns)
+
+
+def unpaired_poles(found: Comparison) -> Table:
+    """A row an oscillating closed-loop pole that one side alone has, of a mode or of none."""
+    rows = [
+        (side.name, mode, pole)
+        for side, other in (found.sides, found.sides[::-1])
+        for pole in side.oscillating.tolist()
+        if (mode := next((n for n, s in side.by_mode.items() if s == pole), None)) not in other.by_mode
+    ]
+    columns = (
+        Column("of", "of", of=[name for name, _, _ in rows]),
+        _modes_column([mode for _, mode, _ in rows]),
+        Column("size_rad_s", "|s|", "rad/s", of=[abs(s) for _, _, s in rows], digits=singly(POLE_SIZE.cell)),
+        Column("damping_ratio", "damping", of=[_ratio(s) for _, _, s in rows], digits=singly(POLE_DAMPING.cell)),
+    )
+    return Table(columns=columns)
+
+
+def _modes_column(modes: Sequence[int | None]) -> Column:
+    return Column(
+        "mode", "mode", of=modes, shown=["none" if mode is None else str(mode) if mode else "hub" for mode in modes]
+    )
+
+
+def _ratio(s: complex) -> float:
+    return -s.real / abs(s) + 0.0
 
 
 def compared_margins(found: Comparison) -> Table:
@@ -113,9 +148,7 @@ def compared_margins(found: Comparison) -> Table:
             shown=[f"{title} [{unit}]" if unit else title for title, unit in names.values()],
         ),
         Column("unit", on=(JSON, FILES), of=[unit for _, unit in names.values()]),
-        *ComparedQuantity("value", "", relative=MARGIN_ERROR).columns(
-            found, [each for each, _ in one], [each for each, _ in other]
-        ),
+        *_margin_columns(found, [unit for _, unit in names.values()], [v for v, _ in one], [v for v, _ in other]),
         Column("known_one", f"known of {found.one.name}", of=[known for _, known in one]),
         Column(
             "known_other",
@@ -125,6 +158,26 @@ def compared_margins(found: Comparison) -> Table:
         ),
     )
     return Table(columns=columns)
+
+
+def _margin_columns(found: Comparison, units: Sequence[str], one: ValuesOfSide, other: ValuesOfSide) -> list[Column]:
+    """Both sides and the difference, of angles in degrees and not in per cent."""
+    quantity = ComparedQuantity("value", "", relative=MARGIN_ERROR)
+    first, second, apart = quantity.columns(found, one, other)
+    is_angle = [unit == "deg" for unit in units]
+    degrees = [quantity.difference(*pair) if yes else None for yes, *pair in zip(is_angle, one, other, strict=True)]
+    percent = [None if yes else each for yes, each in zip(is_angle, apart.values, strict=True)]
+    shown = [_degrees(d) if yes else _percent(p) for yes, d, p in zip(is_angle, degrees, percent, strict=True)]
+    return [
+        first,
+        second,
+        replace(apart, of=percent, shown=shown),
+        Column("value_difference_deg", on=(JSON, FILES), of=degrees),
+    ]
+
+
+def _degrees(value: float | None) -> str:
+    return "-" if value is None else f"{value:+.3g} deg" if value else "0 deg"
 
 
 def compared_windows(found: Comparison) -> Table | None:
@@ -154,6 +207,7 @@ def compared_answer(found: Comparison) -> dict[str, Any]:
         "sampled": [side.sampled.answer for side in found.sides],
         "modes": compared_modes(found),
         "poles": compared_poles(found),
+        "unpaired_poles": unpaired_poles(found),
         "margins": compared_margins(found),
         "at_samples": found.is_clocked,
         "loops": loops,

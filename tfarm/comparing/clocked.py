@@ -51,6 +51,15 @@ class Clocked:
         return np.asarray(s[np.lexsort((s.real, s.imag))])
 
     @property
+    def open_loop(self) -> dict[int, complex]:
+        """The poles ln(z)/T [1/s] of the rig by itself with Im z > 0, by flexible mode."""
+        pulse = self.analysis.loop.pulse
+        z, mode = pulse.multipliers, pulse.mode
+        upper = np.nonzero((mode > 0) & (pulse.poles.imag > 0))[0]
+        s = np.log(z[upper]) / self.period
+        return dict(zip(mode[upper].tolist(), (s.real + 1j * abs(s.imag)).tolist(), strict=True))
+
+    @property
     def loop_function(self) -> tuple[Real, Complex]:
         """Frequencies [rad/s] (n,) up to half the sample rate, and L(e^{iwT}) there."""
         grid = law_grid(self.analysis.loop)

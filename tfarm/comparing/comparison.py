@@ -30,6 +30,7 @@ from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum.scales import default_gains
 
 from .clocked import Clocked, Reach, clocked
+from .pairing import poles_by_mode
 
 MOST_COMPARED = 30  # flexible modes of a table that is read side by side
 LONGEST_SIDE_NAME = 60  # characters of a name: of two in one legend
@@ -51,9 +52,9 @@ class ComparedSide:
     """One of the two: what it is called, its arm and law, the modes of the arm, and what the loop is worth.
 
     `damping_ratio` is that of each flexible mode of the arm by itself, None where a mode could not be followed; `poles`
-    are closed-loop poles with Im s >= 0, complete in their box; `sampled` is the verdict at the chain's clock.  Where
-    one of the laws compared is a law in z there is no loop without a clock on either side: no `margins`, and `clocked`
-    is the loop at its samples, with its poles as s = ln(z)/T.
+    are closed-loop poles with Im s >= 0, complete in their box; `open_loop` those of the arm with Im s > 0 by flexible
+    mode; `sampled` is the verdict at the chain's clock.  Where one of the laws compared is a law in z there is no loop
+    without a clock on either side: no `margins`, and `clocked` is the loop at its samples, with poles as s = ln(z)/T.
     """
 
     name: str
@@ -62,6 +63,7 @@ class ComparedSide:
     modes: Modes
     damping_ratio: tuple[float | None, ...]
     poles: Complex
+    open_loop: dict[int, complex]
     margins: Margins[Any] | None
     sampled: SampledBrief
     clocked: Clocked | None = None
@@ -77,6 +79,11 @@ class ComparedSide:
     def oscillating(self) -> Complex:
         """The closed-loop poles with Im s > 0, ascending in Im s."""
         return self.poles[self.poles.imag > 0]
+
+    @cached_property
+    def by_mode(self) -> dict[int, complex]:
+        """The oscillating pole of each mode, 0 the hub's; those of no mode are left out."""
+        return poles_by_mode(self.oscillating, self.open_loop)
 
     @property
     def loop_function(self) -> tuple[Real, Complex]:
@@ -231,17 +238,23 @@ def _names(pairs: list[tuple[Arm, AnyLaw]]) -> tuple[str, ...]:
 
 def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_clocked: bool) -> ComparedSide:
     """All that is compared of one arm under its law; a verdict or a damping that cannot be settled is left open."""
-    found = modes_of(arm, count)
+    found, more = modes_of(arm, count), modes_of(arm, count + POLES_BEYOND_MODES)
+    open_loop = dict(zip(more.index.tolist(), (1j * more.natural_frequency).tolist(), strict=True))
     ratio = dict.fromkeys(range(1, count + 1), 0.0 if arm.is_undamped else None)
     if not arm.is_undamped:
         with suppress(ConvergenceError):
             damped = damped_modes(found)
-            ratio |= dict(zip(damped.index.tolist(), damped.damping_ratio.tolist(), strict=True))
+            known = damped.is_assigned
+            ratio |= dict(zip(damped.index[known].tolist(), damped.damping_ratio[known].tolist(), strict=True))
+            damped = damped_modes(more)
+            known = damped.is_assigned
+            open_loop |= dict(zip(damped.index[known].tolist(), damped.eigenvalues[known, 0].tolist(), strict=True))
     try:
         sampled = brief_of(verdict_on(arm, law, chain), chain)
     except ConvergenceError as error:
         sampled = SampledBrief(sampling=chain.sampling, is_stable=None, log_radius=None, sentence=f"undecided: {error}")
     at, most = clocked(arm, law, chain) if is_clocked else None, count + POLES_BEYOND_MODES
+    open_loop = open_loop if at is None else at.open_loop
     return ComparedSide(
         name=name,
         arm=arm,
@@ -249,6 +262,7 @@ def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_clocked
         modes=found,
         damping_ratio=tuple(ratio[n] for n in range(1, count + 1)),
         poles=closed_loop_poles(arm, law, most).values if at is None else at.poles[:most],
+        open_loop={n: s for n, s in open_loop.items() if n and s.imag > 0},
         margins=margins_of(arm, law) if at is None else None,
         sampled=sampled,
         clocked=at,

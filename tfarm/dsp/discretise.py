@@ -92,9 +92,9 @@ def _in_z(part: Part, law: Law, period: float) -> LawBlock:
 
 def tustin(block: LawBlock, period: float, prewarp: float = 0.0) -> LawBlock:
     """The block with s = c (z - 1)/(z + 1).  Raises ParameterError where it has a pole at s = c."""
-    c = prewarp / math.tan(prewarp * period / 2) if prewarp else 2 / period
+    c = prewarped(period, prewarp)
     if isinstance(block, Rational) and block.excess > 0:
-        return _substituted(block, c)
+        return substituted(block, c)
     A, B, C, D = block.matrices()
     unit = np.eye(len(A))
     whole = unit - A / c
@@ -103,6 +103,11 @@ def tustin(block: LawBlock, period: float, prewarp: float = 0.0) -> LawBlock:
         raise ParameterError(key="rule", value="tustin", remedy=remedy)
     within = np.linalg.inv(whole).astype(np.float64)
     return StateSpace(within @ (unit + A / c), within @ B * (2 / c), C @ within, D + C @ within @ B / c)
+
+
+def prewarped(period: float, prewarp: float) -> float:
+    """c [1/s] of s = c (z - 1)/(z + 1)."""
+    return prewarp / math.tan(prewarp * period / 2) if prewarp else 2 / period
 
 
 def zero_order_hold(block: LawBlock, period: float) -> StateSpace:
@@ -133,9 +138,9 @@ def _roots(polynomial: tuple[float, ...], period: float) -> tuple[float, NDArray
     return float(coefficients[-1]), roots, len(polynomial) - coefficients.size
 
 
-def _substituted(block: Rational, c: float) -> Rational:
-    """The ratio of polynomials with s = c (z - 1)/(z + 1), for one that differentiates."""
-    n = len(block.num) - 1
+def substituted(block: Rational, c: float) -> Rational:
+    """The ratio of polynomials with s = c (z - 1)/(z + 1), small coefficients kept as they are."""
+    n = max(len(block.num), len(block.den)) - 1
 
     def of(polynomial: tuple[float, ...]) -> Real:
         total = np.zeros(n + 1)

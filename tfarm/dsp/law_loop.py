@@ -3,13 +3,13 @@
     u_k = -(C x_k + D y_k) + r_k,  x_{k+1} = A x_k + B y_k          the law, p_i/q its entries
     F(z) = q(z) + sum over signals of p_i(z) H_i(z) = 0             closed-loop poles
 
-Poles are polished as those of gains at the hub are (`loop`): q and p_i are polynomials, so that F has no other poles
-than the plant has.
+Poles are polished as those of gains at the hub are (`loop`), from the nearest pole of the plant or of the law: q and
+p_i are polynomials, kept as factors (`law_factors`), so that F has no other poles than the plant has.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -23,9 +23,9 @@ from tfarm.arm.law import Law, Part
 from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.dsp.chain import MOST_DELAY, Chain
 from tfarm.dsp.discretise import discretised
+from tfarm.dsp.law_factors import LawFactors, law_factors
 from tfarm.dsp.law_plant import SensedPlant, sensed_plant
-from tfarm.dsp.law_polynomials import VANISHED, polynomials
-from tfarm.dsp.loop import SampledLoop, SampledPoles, polished_poles, without_drift
+from tfarm.dsp.loop import OpenLoop, SampledLoop, SampledPoles, polished_poles, without_drift
 from tfarm.dsp.plant import USUAL_MODES, Branching, Plant, is_analog
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ParameterError
@@ -41,13 +41,14 @@ STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 mo
 class SampledLaw:
     """A rig under a law at the samples of a chain: `asked` as it was given, `law` in z as it acts.
 
-    `sensed` is what the law reads, its delay among that of `chain`.
+    `sensed` is what the law reads, its delay among that of `chain`; `factors` are those of the law in z.
     """
 
     sensed: SensedPlant
     chain: Chain
     law: Law
     asked: Law
+    factors: LawFactors
 
     @cached_property
     def plant(self) -> Plant:
@@ -59,13 +60,24 @@ class SampledLaw:
         """The pulse transfer functions to the signals of the law."""
         return PulseTransfer(self.plant, self.chain.sampling).folded()
 
+    @cached_property
+    def own_moment(self) -> Real:
+        """The row of C that reads the arm's own root moment, a signal of the law, ahead of the anti-alias filter."""
+        plant = self.plant.beside(self.sensed.unfiltered.rows(["root_moment"]))
+        return np.asarray(PulseTransfer(plant, self.chain.sampling).folded().matrices()[2][-1])
+
     def times(self, factor: float) -> SampledLaw:
         """The same loop with a factor on the whole law."""
         return self.weighted([factor] * len(self.law.parts))
 
     def weighted(self, factors: Sequence[float]) -> SampledLaw:
         """The same loop with a factor on each part of the law."""
-        return replace(self, law=self.law.weighted(factors), asked=self.asked.weighted(factors))
+        return replace(
+            self,
+            law=self.law.weighted(factors),
+            asked=self.asked.weighted(factors),
+            factors=self.factors.weighted(factors),
+        )
 
     def with_delay(self, samples: float) -> SampledLaw:
         """The same loop with another delay in all."""
@@ -90,7 +102,8 @@ class SampledLaw:
     def push(self) -> Real:
         """What the law adds to each pole of the plant, at most, where the samples see it [1/s]."""
         seen = np.exp(1j * self.plant.poles.imag * self.chain.sampling.period)
-        entries, whole = self.law.polynomials(seen)
+        shares, whole = self.factors.shares(seen - 1)
+        entries = shares.sum(axis=0)
         return np.asarray(abs(entries * self.plant.residues).sum(axis=0) / np.maximum(abs(whole), LEAST_SIZE))
 
     def signals(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
@@ -102,26 +115,39 @@ class SampledLaw:
     def slowest(self) -> str:
         """What has the largest radius: the flexible mode whose pole is nearest, the hub, or the law itself."""
         n = int(self.poles.log_radius.argmax())
-        z, mode = self.poles.z[n], int(self.poles.mode[n])
-        own = abs(self.law.poles - z).min(initial=np.inf)
-        if own <= abs(self.pulse.multipliers - z).min():  # the same where it is put at z = 1: an integrator's
+        delta, mode = self.poles.z[n] - 1, int(self.poles.mode[n])
+        own = abs(self.factors.poles - delta).min(initial=np.inf)
+        if own <= abs(self.pulse.shifts - delta).min():  # the same where it is put at z = 1: an integrator's
             return "a pole of the law"
         return f"mode {mode}" if mode else "the hub"
 
     # ------------------------------------------------------------ characteristic function
 
     def characteristic(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
-        """offset F(z)."""
+        """offset F(z); F(z) where the pole is the law's."""
         open_loop, fed_back = self.terms(z, base, offset)
         return np.asarray(open_loop + fed_back.sum(axis=0))
 
     def terms(self, z: Complex, base: Whole | None, offset: Any) -> tuple[Complex, Complex]:
         """offset q (n,) and, of each part of the law, offset times its sum of p_i H_i (parts, n).
 
-        At z = e^{pT} + offset (n,), p the pole number `base`.
+        At z = e^{pT} + offset (n,), p the pole number `base`; of the law's poles, which are numbered after those of the
+        plant, not times the offset.
         """
-        shares, whole = self.law.shares(z)
-        return offset * whole, (shares * self.pulse.scaled(z, base, offset)).sum(axis=1)
+        z = np.asarray(z)
+        if base is None:
+            shares, whole = self.factors.shares(z - 1)
+            return offset * whole, (shares * self.pulse.scaled(z, None, offset)).sum(axis=1)
+        of_plant = self.pulse.poles.size
+        own = base - of_plant
+        delta = np.r_[self.pulse.shifts, self.factors.poles][base] + offset
+        shares, whole = self.factors.shares(delta, own, offset)
+        measured = np.empty((shares.shape[1], z.size), complex)
+        for rows, at in ((own < 0, base), (own >= 0, None)):
+            if rows.any():
+                factor = np.ones(int(rows.sum())) if at is None else offset[rows]
+                measured[:, rows] = self.pulse.scaled(z[rows], at if at is None else at[rows], factor, delta[rows])
+        return np.where(own < 0, offset, 1.0) * whole, (shares * measured).sum(axis=1)
 
     def __call__(self, z: Complex) -> Complex:
         """F(z) at an array of z."""
@@ -141,24 +167,10 @@ class SampledLaw:
         return bool(self.plant.arm.rate_loss or self.chain.actuator.hub_damping)
 
     @cached_property
-    def at_rest(self) -> tuple[Real, bool]:
-        """The states of the law (n,) when the hub stands still an angle off, and whether it then does nothing.
-
-        Such an angle is regulated by nothing: a pole at z = 1.
-        """
-        A, B, C, D = self.law.matrices()
-        angle = self.pulse.matrices()[2][:, self.pulse.integrals_at + int(self.is_damped)]
-        pushed = B @ angle
-        states = np.zeros(0) if not len(A) else np.linalg.lstsq(np.eye(len(A)) - A, pushed, rcond=None)[0].astype(float)
-        left = abs(states - A @ states - pushed)
-        settles = (left <= VANISHED * (abs(states) + abs(A) @ abs(states) + abs(pushed))).all()
-        out, size = (C @ states + D @ angle)[0], (abs(C) @ abs(states) + abs(D) @ abs(angle))[0]
-        return states, bool(self.plant.arm.has_rigid_mode and settles and abs(out) <= VANISHED * size)
-
-    @property
     def has_free_angle(self) -> bool:
         """Whether the hub angle is a pole at z = 1 that nothing regulates."""
-        return self.at_rest[1]
+        turned = dict(zip(self.factors.signals, self.plant.rigid[:, int(self.is_damped)], strict=True))
+        return bool(self.plant.arm.has_rigid_mode and self.factors.ignores(turned))
 
     def reduced_matrix(self) -> Real:
         """The closed-loop matrix without the pole z = 1 of a free hub angle, or of a hub that cannot drift."""
@@ -167,11 +179,13 @@ class SampledLaw:
             return np.delete(np.delete(A, [first, first + 1], 0), [first, first + 1], 1)
         if self.is_damped:  # its angle is the single integral
             A = np.delete(np.delete(A, first, 0), first, 1)
-        states, is_free = self.at_rest
-        if not is_free:
+        if not self.has_free_angle:
             return A
+        own, B, _, _ = self.law.matrices()
+        angle = self.pulse.matrices()[2][:, first + int(self.is_damped)]
         shift = np.zeros(len(A))
-        shift[first], shift[len(A) - states.size :] = 1.0, states
+        shift[first] = 1.0  # and the states of the law where the hub stands still an angle off
+        shift[len(A) - len(own) :] = np.linalg.lstsq(np.eye(len(own)) - own, B @ angle, rcond=None)[0]
         return without_drift(A, first, shift)
 
     @cached_property
@@ -179,25 +193,24 @@ class SampledLaw:
         """The closed-loop poles, not polished."""
         return np.linalg.eigvals(self.reduced_matrix()).astype(complex)
 
-    def near_one(self, law: Law) -> tuple[tuple[int, float], list[tuple[int, float]]]:
+    def near_one(self, places: Container[int] | None = None) -> tuple[tuple[int, float], list[tuple[int, float]]]:
         """q, and p_i H_i of each signal that is fed back, as (n, c) of c x^n where x = 1 - 1/z is small.
 
-        Of this loop's law, or one of the same signals.
+        Of the parts of the law at these places alone, or of all.
         """
-        plant, T, most = self.plant, self.chain.sampling.period, law.order
+        plant, T = self.plant, self.chain.sampling.period
         at_rest = plant.static - (plant.residues / plant.poles).real.sum(axis=1)
         size = abs(plant.static) + abs(plant.residues / plant.poles).sum(axis=1)
-        whole, entries = polynomials(law)
+        whole, entries = self.factors.at_one()
         slopes, found = self.pulse.slopes_at_one, []
-        for row, entry in enumerate(entries):
-            if entry.coefficients.any():
-                (twice, once), gain, n, left = plant.rigid[row], at_rest[row], *entry.at_one(most)
+        for place, row, n, value in entries:
+            if places is None or place in places:
+                (twice, once), gain = plant.rigid[row], at_rest[row]
                 own = (-2, twice * T * T) if twice else (-1, once * T) if once else (0, gain)
                 if own[0] == 0 and abs(gain) <= STATIC_ZERO * size[row]:
                     own = (1, slopes[row])
-                found.append((n + own[0], float(own[1] * left.coefficients.sum())))
-        n, left = whole.at_one(most)
-        return (n, float(left.coefficients.sum())), found
+                found.append((n + own[0], float(own[1] * value)))
+        return whole, found
 
     @cached_property
     def poles_at_one(self) -> int:
@@ -207,16 +220,20 @@ class SampledLaw:
         x^N F, N the poles of the plant there, vanishes at x = 1 - 1/z = 0 as often as all of its terms do.
         """
         poles = 0 if not self.plant.arm.has_rigid_mode else (1 if self.is_damped else 2) - self.has_free_angle
-        whole, fed_back = self.near_one(self.law)
+        whole, fed_back = self.near_one()
         return max(0, poles + min(n for n, _ in (whole, *fed_back)))
 
     @cached_property
     def poles(self) -> SampledPoles:
         """The closed-loop poles, polished, those that are at z = 1 for whatever numbers put there."""
-        found = polished_poles(self.eigenvalues, self.pulse, self.characteristic)
-        there = np.zeros(found.z.size, np.bool_)
-        there[np.argsort(abs(self.eigenvalues - 1), kind="stable")[: self.poles_at_one]] = True
-        return SampledPoles(np.where(there, 1.0, found.z), np.where(there, 0.0, found.log_radius), found.mode)
+        return self.polished()
+
+    def polished(self, which: Any = None) -> SampledPoles:
+        """Those poles, or some of them."""
+        z = self.eigenvalues.copy()
+        z[np.argsort(abs(z - 1), kind="stable")[: self.poles_at_one]] = 1.0
+        open_loop = OpenLoop.of_order(z.size, self.pulse, of_law=self.factors.poles)
+        return polished_poles(z, open_loop, self.characteristic, which)
 
 
 AnySampled = SampledLoop | SampledLaw
@@ -233,7 +250,8 @@ def sampled_law(
     """
     acting, late = acting_law(arm, law, chain)
     acting = with_estimate(acting, chain)
-    return SampledLaw(sensed_plant(arm, late, acting.signals, count, branches), late, acting, law)
+    sensed = sensed_plant(arm, late, acting.signals, count, branches)
+    return SampledLaw(sensed, late, acting, law, law_factors(law, chain))
 
 
 def acting_law(arm: Arm, law: Law, chain: Chain) -> tuple[Law, Chain]:

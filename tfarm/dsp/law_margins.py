@@ -26,20 +26,16 @@ from tfarm.dsp.boundary import (
     real_gain,
 )
 from tfarm.dsp.law_loop import SampledLaw
-from tfarm.dsp.law_polynomials import polynomials
 
 LEAST_LAW_FACTOR = 1e-9  # that is looked at: with less a law is none
 MOST_LAW_FACTOR = 1e9  # with more its gain is beyond any number
-BLURRED = 1e-6  # rad: nearer to z = 1 a polynomial with two roots there is lost in rounding
 
 
 def law_grid(loop: SampledLaw) -> CircleGrid:
     """The grid of the plant, and points around the poles and zeros of the law."""
     grid = circle_grid(loop)
     q, angles = [], grid.q
-    _, entries = polynomials(loop.law)
-    zeros = [np.roots(np.trim_zeros(each.coefficients, "f")) for each in entries]
-    roots = np.concatenate([loop.law.poles, *zeros])
+    roots = 1 + np.r_[loop.factors.poles, loop.factors.zeros]
     for root in roots[(abs(roots) > BRIGHT) & (roots.imag >= 0)]:  # the upper of each pair
         width, at = max(WIDTH_SHARE * abs(1 - abs(root)), NARROWEST_WIDTH), abs(np.angle(root))
         near = geometric(math.pi, width)
@@ -55,15 +51,8 @@ def law_grid(loop: SampledLaw) -> CircleGrid:
 
 def crossing_factors(loop: SampledLaw) -> Crossings:
     """The positive factors on the law at which poles are on the circle, `at` which angle [rad a sample]."""
-    found = part_crossings(known_grid(loop), range(len(loop.law.parts)))
+    found = part_crossings(law_grid(loop), range(len(loop.law.parts)))
     return Crossings.of(each for each in found if each.t > LEAST_LAW_FACTOR)
-
-
-def known_grid(loop: SampledLaw) -> CircleGrid:
-    """`law_grid`, but for what is next to z = 1 where a polynomial of the law vanishes: an absolute error blurs it."""
-    whole, entries = polynomials(loop.law)
-    blurs = any(each.coefficients.any() and each.at_one(1)[0] for each in (whole, *entries))
-    return law_grid(loop).above(BLURRED) if blurs else law_grid(loop)
 
 
 def part_crossings(grid: CircleGrid, varied: Sequence[int]) -> Crossings:
@@ -80,8 +69,7 @@ def part_crossings(grid: CircleGrid, varied: Sequence[int]) -> Crossings:
 
     found, first = crossed_on(grid, split)
     others, alone = (
-        loop.near_one(loop.law.weighted([float((place in varied) == is_varied) for place in places]))
-        for is_varied in (False, True)
+        loop.near_one([place for place in places if (place in varied) == is_varied]) for is_varied in (False, True)
     )
     lowest, at_one = _lowest([others[0], *others[1]])
     least, moving = _lowest(alone[1])
@@ -103,7 +91,7 @@ def stable_factors(loop: SampledLaw) -> list[Window]:
 
 def stable_numbers(loop: SampledLaw) -> dict[str, list[Window]]:
     """Every open interval of each of `Law.part_gains`, the others held, in which the loop is stable, by its name."""
-    grid, places, found = known_grid(loop), range(len(loop.law.parts)), {}
+    grid, places, found = law_grid(loop), range(len(loop.law.parts)), {}
     for name, (part, value) in loop.asked.part_gains.items():
         if not value:
             continue

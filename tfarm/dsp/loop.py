@@ -4,15 +4,20 @@
 
     F(z) = 1 + gains . H(z) = 1 + Kp Theta(z) + K1 R(z) + K2 M(z) = 0
 
-Matrix eigenvalues are right to about 1e-14, and a mode may grow by 1e-10 a sample.  So each is polished as an offset
-delta from the nearest open-loop pole e^{pT}, by the secant method on delta F(e^{pT} + delta), which is computed without
-loss; then ln|z| = Re(pT) + ln|1 + delta e^{-pT}|.
+Matrix eigenvalues are right to about 1e-14, and a mode may grow by 1e-10 a sample; those of n poles next to each other,
+as a law of high order has them next to z = 1, are right to the nth root of that.  So all are polished together, each as
+an offset o from the nearest open-loop pole e^{pT}, by the Ehrlich-Aberth method on P(z) = F(z) prod(z - poles of F),
+
+    step = 1/(P'/P - sum over the other roots of 1/(z - root))
+
+where o F(e^{pT} + o) is computed without loss; then ln|z| = Re(pT) + ln|1 + o e^{-pT}|.  (Aberth, Mathematics of
+Computation 27, 1973.)
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol, Self, TypeVar
 
@@ -21,7 +26,7 @@ import numpy as np
 from tfarm.arm import FED_BACK, Arm, HubFeedback, must_not_be_algebraic
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.dsp.chain import Chain, chain_or_usual
-from tfarm.dsp.plant import USUAL_MODES, Branching, Plant, is_analog, loop_plant, shorter_plant
+from tfarm.dsp.plant import USUAL_MODES, Branching, Plant, is_analog, loop_plant, shorter_plant, with_modes
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import torque
@@ -37,11 +42,13 @@ ANGLE_ROW, RATE_ROW = (FED_BACK.index(name) for name in ("hub_angle", "hub_rate"
 NO_LAG = 1e-30  # stands for zero where a root sits on the filter's own pole, which it does where nothing is fed back
 SMALLEST_LOG = -745.0  # of the smallest double: stands for the logarithm of 0
 OFF_POLE = 1e-17  # stands for an offset of 0: next to 1 that is none
-FIRST_DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-18  # of an offset, and beyond: between the two first points of a secant
-OFFSET_STEPS = 8  # of the secant: from four digits on three are enough
-EIGENVALUE_ROUNDING, OFF_COURSE = 1e-9, 1e-3  # and of the offset: a root farther than both from its start has strayed
-LAST_STEP = 1e-12  # of the offset: the secant method's next step would be below its rounding
+DIFFERENCE = 1e-7  # of an offset: between two points that give a slope
+MOST_STEPS = 60  # of all roots together: from four digits on two are enough, of a cluster a dozen spread first
+LAST_STEP = 1e-12  # of the offset: below its rounding
+SETTLED, EIGENVALUE_ROUNDING = 1e-6, 1e-9  # of the offset, and beyond: a root that still steps by more is put back
 UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
+NONE = np.empty(0, complex)
+LEAST_SQUARE = -1.0 + 1e-15  # stands for |z|^2 - 1 of a pole at z = 0, which no root is laid out from
 FADED_RADIUS = 0.2  # a pole nearer to z = 0 decides nothing and is not polished
 
 
@@ -149,6 +156,13 @@ class SampledLoop:
         """What the law adds to each pole of the plant, at most [1/s]."""
         return np.asarray(abs(np.array(self.gains.row)[:, None] * self.plant.residues).sum(axis=0))
 
+    @cached_property
+    def own_moment(self) -> Real:
+        """The row of C that reads the arm's own root moment, ahead of the anti-alias filter: states as in `matrix`."""
+        plant = with_modes(self.plant.model, self.chain, FED_BACK, self.plant.count).rows(["root_moment"])
+        row = PulseTransfer(self.plant.beside(plant), self.chain.sampling).folded().matrices()[2][-1]
+        return np.pad(row, (0, 2 * self.differences))
+
     # ------------------------------------------------------------ characteristic function
 
     def signals(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
@@ -208,42 +222,106 @@ class SampledLoop:
     @cached_property
     def poles(self) -> SampledPoles:
         """The closed-loop poles, polished."""
-        return polished_poles(self.eigenvalues, self.pulse, self.characteristic)
+        return self.polished()
+
+    def polished(self, which: Any = None) -> SampledPoles:
+        """The closed-loop poles, polished, or some of them."""
+        more = np.array([self.smoothing - 1, -1.0]) if self.differences else NONE
+        open_loop = OpenLoop.of_order(self.eigenvalues.size, self.pulse, of_F=more)
+        return polished_poles(self.eigenvalues, open_loop, self.characteristic, which)
 
 
-def polished_poles(eigenvalues: Complex, pulse: PulseTransfer, characteristic: Characteristic) -> SampledPoles:
-    """Closed-loop poles from eigenvalues that are nearly right, each as an offset from its nearest open-loop pole."""
-    z, open_loop = eigenvalues.copy(), pulse.multipliers
-    base = abs(z[:, None] - open_loop).argmin(axis=1)
+@dataclass(frozen=True)
+@record
+class OpenLoop:
+    """Poles to which roots are near, as z - 1: those of the plant and then others of q; `poles` are those of F."""
+
+    pulse: PulseTransfer
+    poles: Complex
+    others: Complex = field(default_factory=lambda: np.empty(0, complex))
+
+    @classmethod
+    def of_order(cls, order: int, pulse: PulseTransfer, *, of_F: Complex = NONE, of_law: Complex = NONE) -> OpenLoop:
+        """Of a loop with so many poles: those of its plant, of its delay, and at z = 1 what is left."""
+        known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0), of_F]
+        return cls(pulse, np.r_[known, np.zeros(max(0, order - known.size - of_law.size))], of_law)
+
+    @cached_property
+    def shifts(self) -> Complex:
+        """z - 1 of each pole that a root may be near to."""
+        return np.r_[self.pulse.shifts, self.others]
+
+    @cached_property
+    def log_radius(self) -> Real:
+        """ln|z| of each."""
+        own = 2 * self.others.real + abs(self.others) ** 2
+        return np.r_[self.pulse.poles.real * self.pulse.sampling.period, np.log1p(np.maximum(own, LEAST_SQUARE)) / 2]
+
+    def nearest(self, delta: Complex) -> Whole:
+        """The number of the pole nearest to each z = 1 + delta, of those that have not faded and that are poles of F.
+
+        The integrals of a hub that cannot drift are none: next to them F has no digits of its own.
+        """
+        away = abs(delta[:, None] - self.shifts)
+        away[:, abs(1 + self.shifts) <= FADED_RADIUS] = np.inf
+        if not self.pulse.plant.rigid.any():
+            away[:, self.pulse.poles.size - 1] = np.inf
+        return np.asarray(away.argmin(axis=1))
+
+
+def polished_poles(
+    eigenvalues: Complex, open_loop: OpenLoop, characteristic: Characteristic, which: Any = None
+) -> SampledPoles:
+    """Closed-loop poles from eigenvalues that are nearly right, each as an offset from its nearest open-loop pole.
+
+    Those of a mask alone where `which` is one; those that are 1 stay.
+    """
+    delta, pulse = eigenvalues - 1, open_loop.pulse
+    base = open_loop.nearest(delta)
+    offset = delta - open_loop.shifts[base]
+    bright = (abs(eigenvalues) > FADED_RADIUS) & (delta != 0) & (True if which is None else which)
+    rows = np.flatnonzero(bright)
+    if rows.size:
+        _settle(base, offset, rows, open_loop, characteristic)
+        moved = open_loop.nearest(open_loop.shifts[base] + offset)
+        if (rows := np.flatnonzero(bright & (moved != base))).size:  # then all digits are kept from there
+            offset[rows] += open_loop.shifts[base[rows]] - open_loop.shifts[moved[rows]]
+            base[rows] = moved[rows]
+            _settle(base, offset, rows, open_loop, characteristic)
+    z, at = eigenvalues.copy(), base[bright]
     with np.errstate(divide="ignore"):
         log_radius = np.maximum(np.log(abs(z)), SMALLEST_LOG)
-    bright = (abs(z) > FADED_RADIUS) & (abs(open_loop[base]) > FADED_RADIUS)
-    if bright.any():
-        offset = _offsets(z[bright], base[bright], open_loop[base[bright]], characteristic)
-        ratio = offset / open_loop[base[bright]]
-        own = pulse.poles[base[bright]].real * pulse.sampling.period
-        log_radius[bright] = own + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
-        z[bright] = open_loop[base[bright]] + offset
-    return SampledPoles(z, log_radius, pulse.mode[base])
+    ratio = offset[bright] / (1 + open_loop.shifts[at])
+    log_radius[bright] = open_loop.log_radius[at] + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
+    z[bright] = (1 + open_loop.shifts[at]) + offset[bright]
+    mode = pulse.mode[abs(z[:, None] - pulse.multipliers).argmin(axis=1)]
+    found = SampledPoles(z, log_radius, mode)
+    return found if which is None else SampledPoles(z[which], log_radius[which], mode[which])
 
 
-def _offsets(z: Complex, base: Whole, open_loop: Complex, characteristic: Characteristic) -> Complex:
-    """Offsets of the roots from their open-loop poles, by the secant method where it does not stray."""
-    start = z - open_loop
-    start = np.where(start == 0, OFF_POLE, start)
-    old = start * (1 + FIRST_DIFFERENCE) + LEAST_DIFFERENCE
-    new, f_old = start, characteristic(open_loop + old, base, old)
-    with np.errstate(all="ignore"):  # a root that strays beyond any number is put back to its start below
-        for _ in range(OFFSET_STEPS):
-            f_new = characteristic(open_loop + new, base, new)
-            slope = f_new - f_old
-            step = np.where(slope == 0, 0.0, f_new * (new - old) / np.where(slope == 0, 1.0, slope))
-            old, f_old, new = new, f_new, np.where(abs(new - step) < UNMOVED, UNMOVED, new - step)
-            if not (abs(step) > LAST_STEP * abs(new)).any():
+def _settle(base: Whole, offset: Complex, rows: Whole, open_loop: OpenLoop, characteristic: Characteristic) -> None:
+    """Bring some roots to rest, in place: those that never come there stay as they are."""
+    start, shifts = offset.copy(), open_loop.shifts
+    last = np.full(offset.size, np.inf)
+    offset[rows] = np.where(offset[rows] == 0, OFF_POLE, offset[rows])
+    with np.errstate(all="ignore"):  # a root on an open-loop pole, and one that strays beyond any number
+        for _ in range(MOST_STEPS):
+            b, o = base[rows], offset[rows]
+            both, one = np.r_[o, o * (1 + DIFFERENCE)], shifts[b]
+            f, ahead = characteristic(1 + (np.r_[one, one] + both), np.r_[b, b], both).reshape(2, -1)
+            slope = (ahead - f) / (DIFFERENCE * o * f) - np.where(b < open_loop.pulse.poles.size, 1 / o, 0.0)
+            apart = (one[:, None] - shifts[base]) + (o[:, None] - offset)
+            slope = slope + (1 / ((one[:, None] - open_loop.poles) + o[:, None])).sum(axis=1)
+            step = 1 / (slope - np.where(apart == 0, 0.0, 1 / apart).sum(axis=1))
+            step = np.where((f == 0) | ~np.isfinite(step), 0.0, step)
+            offset[rows] = np.where(abs(o - step) < UNMOVED, UNMOVED, o - step)
+            last[rows] = abs(step)
+            rows = rows[abs(step) > LAST_STEP * abs(offset[rows])]
+            if not rows.size:
                 break
-    near = abs(new - start) <= EIGENVALUE_ROUNDING + OFF_COURSE * abs(start)
-    offset = np.where(near, new, start)
-    return np.where(abs(offset) <= UNMOVED, 0.0, offset)
+    lost = np.isfinite(last) & (last > EIGENVALUE_ROUNDING + SETTLED * abs(offset))
+    offset[lost] = start[lost]
+    offset[abs(offset) <= UNMOVED] = 0.0
 
 
 def sampled_loop(

@@ -15,7 +15,7 @@ from tfarm.crossing import Window, confirmed
 from tfarm.dsp.boundary import circle_crossings, circle_grid
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.law_loop import AnySampled, SampledKind
-from tfarm.dsp.loop import SampledLoop, polished_poles, sampled_loop
+from tfarm.dsp.loop import SampledLoop, sampled_loop
 from tfarm.dsp.plant import Branching
 from tfarm.dsp.sampling import FORGOTTEN, held_amplitude
 from tfarm.errors import ConvergenceError
@@ -75,8 +75,8 @@ def delay_margin(loop: AnySampled) -> DelayMargin:
 
     def grows(more: float) -> bool:
         later = loop.with_delay(now + more)
-        near = later.eigenvalues[abs(later.eigenvalues) > 1 - CLEARLY]
-        return near.size > 0 and polished_poles(near, later.pulse, later.characteristic).log_spectral_radius >= 0
+        near = abs(later.eigenvalues) > 1 - CLEARLY
+        return bool(near.any()) and later.polished(near).log_spectral_radius >= 0
 
     if log_radius(0.0) >= 0:
         return DelayMargin(0.0, False)

@@ -12,7 +12,7 @@ import numpy as np
 from tfarm.arm import LISTED, TAKEN_OFF, AnyLaw, Arm, HubFeedback, driven, tracked, unit_of
 from tfarm.arrays import Real
 from tfarm.columns import Column
-from tfarm.dsp.chain import TIME_ROUNDING, Chain, chain_or_usual
+from tfarm.dsp.chain import Chain, chain_or_usual
 from tfarm.dsp.curves import resolved
 from tfarm.dsp.discretise import described_law
 from tfarm.dsp.enough import Enough, enough_modes
@@ -24,6 +24,7 @@ from tfarm.dsp.simulation import Simulation, Trace
 from tfarm.exact.outputs import OUTPUTS
 
 SETTLED_SHARE = 0.05  # of the largest root moment, within which a slew has settled
+LEFT_OF_RECORD = 10  # one part in so many of a record has to follow a settling time
 CYCLE_LASTS = 0.7  # a limit cycle keeps at least this much of its amplitude over a quarter of the record
 BEYOND_IDEAL = 2.0  # and is this much larger than what an ideal chain leaves at that time
 GROWS = 1.02  # in a quarter of the record, of an ideal loop that runs away: less may be how samples fall on its peaks
@@ -62,33 +63,40 @@ class LimitCycle:
     kept_up_by: Literal["quantisation", "saturation"]
 
 
-def residual_moment_rms(simulation: Simulation) -> float:
-    """Root mean square of the vibration x, the root moment less the rigid arm's [N m], from the end of the slew on.
+def residual_moment_rms(simulation: Simulation) -> float | None:
+    """Root mean square of the arm's own root moment less the rigid arm's [N m], from the end of the slew on.
 
-    0 if it stopped before.  What is taken off is the scenario's `rigid_moment`: nothing under the reading "total".
+    Whatever the moment feedback reads of it, and ahead of the anti-alias filter.  None where the simulation stopped,
+    or its record ends before the slew does.
     """
-    rigid = simulation.scenario.rigid_moment[: simulation.t.size]
-    return rms_after(simulation.t, simulation.at_samples.root_moment - rigid, simulation.scenario.busy_until)
+    return residual_left(simulation.scenario, simulation.at_samples.root_moment)
 
 
-def residual_raw_moment_rms(simulation: Simulation) -> float:
+def residual_raw_moment_rms(simulation: Simulation) -> float | None:
     """The same of the root moment itself, to whose first sample the slew's last torque still belongs."""
-    return rms_after(simulation.t, simulation.at_samples.root_moment, simulation.scenario.busy_until)
+    task, moment = simulation.scenario, simulation.at_samples.root_moment
+    return _rms(moment[task.is_after]) if moment.size == task.t.size else None
 
 
-def rms_after(t: Real, signal: Real, start: float) -> float:
-    """Root mean square of the samples of a signal from `start` [s] on; 0 where there is none."""
-    after = signal[t >= start * (1 - TIME_ROUNDING)]
-    return float(np.sqrt(np.mean(after**2))) if after.size else 0.0
+def residual_left(task: Scenario, moment: Real) -> float | None:
+    """Root mean square of a root moment (n,) less the rigid arm's [N m] after a slew; None for a shorter record."""
+    return _rms(task.residual(moment)) if moment.size == task.t.size else None
+
+
+def _rms(signal: Real) -> float | None:
+    return float(np.sqrt(np.mean(signal**2))) if signal.size else None
 
 
 def settling_time(simulation: Simulation) -> float:
-    """The time [s] from which on the root moment stays within 5 % of its largest; inf where it does not settle."""
+    """Return the settling time [s]: from there on the root moment stays within 5 % of its largest.
+
+    inf where the simulation stopped, or less than a tenth of the record is left: the moment may exceed 5 % after it.
+    """
     moment = abs(simulation.at_samples.root_moment)
     (above,) = np.nonzero(moment > SETTLED_SHARE * moment.max(initial=0.0))
-    if simulation.stopped or (above.size and above[-1] == moment.size - 1):
-        return math.inf
-    return float(simulation.t[above[-1] + 1]) if above.size else 0.0
+    first = int(above[-1]) + 1 if above.size else 0
+    is_late = first > 0 and LEFT_OF_RECORD * (moment.size - 1 - first) < moment.size - 1
+    return math.inf if simulation.stopped or is_late else float(simulation.t[first])
 
 
 def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
@@ -139,7 +147,7 @@ def simulation_answer(
     `modes_change`: by how much the signals changed when the modes were doubled to `modes_used`, relative to the
     largest value of each; null where the number of modes was asked for.
     """
-    stopped = simulation.stopped
+    stopped, settled = simulation.stopped, settling_time(simulation)
     answer: dict[str, Any] = {
         "arm": arm.name,
         **_led_by(arm, law),
@@ -155,7 +163,7 @@ def simulation_answer(
         "gain": [] if simulation.gain is None else simulation.gain.tolist(),
         "residual_moment_rms": residual_moment_rms(simulation),
         "residual_raw_moment_rms": residual_raw_moment_rms(simulation),
-        "settling_time_s": settling_time(simulation),
+        "settling_time_s": settled if math.isfinite(settled) else None,
         "saturated_samples": simulation.saturated,
         "energy_error": simulation.energy_error,
         "stopped_at_s": None if stopped is None else stopped.time,
@@ -230,7 +238,7 @@ def simulate(
     """
     chain = chain_or_usual(chain)
     arm, law = tracked(arm, law)
-    return _simulated(arm, law, chain, scenario(scenario_name, arm, chain, duration), count, between, outputs)[0]
+    return simulated(arm, law, chain, scenario(scenario_name, arm, chain, duration), count, between, outputs)[0]
 
 
 def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: float) -> Simulation:
@@ -262,10 +270,16 @@ def simulation_of(
     return LawSimulator(arm, law, chain, task, count=count, between=between, outputs=outputs).run()
 
 
-def _simulated(
-    arm: Arm, law: AnyLaw, chain: Chain, task: Scenario, count: int | None, between: int, outputs: Sequence[str]
+def simulated(
+    arm: Arm,
+    law: AnyLaw,
+    chain: Chain,
+    task: Scenario,
+    count: int | None = None,
+    between: int = 0,
+    outputs: Sequence[str] = (),
 ) -> tuple[Simulation, Enough]:
-    """The simulation, and how many modes it took."""
+    """The simulation with `count` modes, or as many as it takes, and how many these are."""
     used = modes_for(count, lambda n: simulation_of(arm, law, ideal_chain(chain), task, count=n, outputs=outputs))
     return simulation_of(arm, law, chain, task, count=used.modes, between=between, outputs=outputs), used
 
@@ -287,7 +301,7 @@ def simulated_answer(
     """
     arm, law = tracked(arm, law)
     task, cycle = scenario(name, arm, chain, duration), None
-    simulation, used = _simulated(arm, law, chain, task, count, between, outputs)
+    simulation, used = simulated(arm, law, chain, task, count, between, outputs)
     if not chain.is_linear:
         cycle = limit_cycle(simulation, simulation_of(arm, law, ideal_chain(chain), task, count=used.modes))
     return simulation_answer(arm, law, simulation, cycle, used) | {"scenario_in_words": described(task, arm, chain)}

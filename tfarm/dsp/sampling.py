@@ -69,6 +69,11 @@ class PulseTransfer:
         return np.exp(x.real) * (np.cos(x.imag) + 1j * np.sin(x.imag))
 
     @cached_property
+    def shifts(self) -> Complex:
+        """e^{pT} - 1, to all digits next to z = 1."""
+        return np.expm1(self.poles * self.sampling.period)
+
+    @cached_property
     def early(self) -> Complex:
         """What u_{k-d} adds to an amplitude within a sample."""
         return held_amplitude(self.poles, (1 - self.sampling.fraction) * self.sampling.period)
@@ -98,12 +103,14 @@ class PulseTransfer:
         flat = self.scaled(points.ravel(), None, np.ones(points.size))
         return flat.reshape(len(self.plant.outputs), *points.shape)
 
-    def scaled(self, z: Complex, base: NDArray[np.int64] | None, offset: NDArray[Any]) -> Complex:
+    def scaled(
+        self, z: Complex, base: NDArray[np.int64] | None, offset: NDArray[Any], delta: Complex | None = None
+    ) -> Complex:
         """offset H(z) at z = multipliers[base] + offset, without loss however small the offset: (outputs, n).
 
-        With no `base` it is offset H(z).
+        With no `base` it is offset H(z); `delta` is z - 1, where that is known to more digits than z.
         """
-        gap = z[:, None] - self.multipliers
+        gap = z[:, None] - self.multipliers if delta is None else delta[:, None] - self.shifts
         rows = np.arange(z.size)
         if base is not None:
             gap[rows, base] = 1.0
@@ -113,7 +120,8 @@ class PulseTransfer:
             weights[rows, base] = push[rows, base]
         value = self.residues @ weights.T + np.outer(self.plant.static, offset / z)
         if self.plant.rigid[:, 0].any():
-            distance = z - 1.0 if base is None else np.where(base == self.poles.size - 1, offset, z - 1.0)
+            distance = z - 1.0 if delta is None else delta
+            distance = distance if base is None else np.where(base == self.poles.size - 1, offset, distance)
             ramp = self.ramps[0] + self.ramps[1] / z
             twice = (self.sampling.period * push[:, -1] / distance + ramp) / distance
             value = value + np.outer(self.plant.rigid[:, 0], twice * offset)

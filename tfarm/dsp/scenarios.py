@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tfarm.arm import AT_HUB, FED_BACK, Arm, must_turn
 from tfarm.arm.checks import number, positive
 from tfarm.arrays import Real
-from tfarm.dsp.chain import TIME_ROUNDING, Chain
+from tfarm.dsp.chain import TIME_ROUNDING, Chain, Reading
 from tfarm.errors import ParameterError, must_be_known
 from tfarm.records import record
 from tfarm.spectrum.scales import turning_inertia
@@ -20,6 +21,7 @@ from tfarm.spectrum.scales import turning_inertia
 MOST_TASK_SAMPLES = 4_000_000  # of a record, a few hundred MB of signals
 STEP_TORQUE, IMPULSE, TIP_OFFSET = 0.1, 0.01, 0.01  # N m, N m s, m: what the scenarios of the paper's arm start with
 TRIAL_COST = (1.0, 2.6)  # 1/(N m)^2 s: weights a and b of the paper's (23), of what vibrates and of what a law adds
+TRIAL_SLEWS = 3.0  # times the slew: how long a trial is that is made for an arm and its chain
 TRIAL_DURATION = 3.0  # s, of a trial or a simulation whose length is not said: three times the paper's slew
 PAPER_TORQUE = 3.0  # N m, of the slew of 1.15 m in 1 s of the preset sasaki2012
 
@@ -27,11 +29,12 @@ PAPER_TORQUE = 3.0  # N m, of the slew of 1.15 m in 1 s of the preset sasaki2012
 @dataclass(frozen=True)
 @record
 class Scenario:
-    """A row a sample: `feedforward` r [N m], `hub_angle` and `hub_rate` references, `rigid_moment` [N m] that the
-    moment feedback takes off, `disturbance` [N m] at the hub (held over the sample, not delayed).
+    """A row a sample: `feedforward` r [N m], `hub_angle` and `hub_rate` references, `rigid_moment` [N m] at the root of
+    the rigid arm on them, `disturbance` [N m] at the hub (held over the sample, not delayed).
 
     It starts at rest, but for the first mode released with `tip_offset` [m] at the tip; `impulse` [N m s] strikes the
-    hub just after the sample at t = 0. `busy_until` [s]: the residual vibration is measured from there on.
+    hub just after the sample at t = 0. `busy_until` [s]: the residual vibration is measured from there on.  `reading`:
+    whether the moment feedback takes the rigid arm's moment off.
     """
 
     name: str
@@ -44,6 +47,7 @@ class Scenario:
     impulse: float = 0.0
     tip_offset: float = 0.0
     busy_until: float = 0.0
+    reading: Reading = "vibration"
 
     @property
     def t(self) -> Real:
@@ -53,7 +57,21 @@ class Scenario:
     @property
     def references(self) -> dict[str, Real]:
         """What outputs should be, by name: hub angle [rad], hub rate [rad/s], root moment [N m]."""
-        return dict(zip(AT_HUB, (self.hub_angle, self.hub_rate, self.rigid_moment), strict=True))
+        return dict(zip(AT_HUB, (self.hub_angle, self.hub_rate, self.moment_reference), strict=True))
+
+    @property
+    def moment_reference(self) -> Real:
+        """What the moment feedback takes off [N m]: the rigid arm's moment, or nothing under the reading "total"."""
+        return self.rigid_moment * float(self.reading == "vibration")
+
+    def residual(self, moment: Real) -> Real:
+        """The root moment (samples, ...) less the rigid arm's [N m], at the samples from the end of the slew on."""
+        return np.asarray((moment.T - self.rigid_moment).T[self.is_after])
+
+    @property
+    def is_after(self) -> NDArray[np.bool_]:
+        """Which samples (n,) are from the end of the slew on."""
+        return np.asarray(self.t >= self.busy_until * (1 - TIME_ROUNDING))
 
     @property
     def wanted(self) -> Real:
@@ -66,8 +84,8 @@ def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
     """The bang-bang slew: hub acceleration +-4 travel/((r + L) rise^2), its mean over a sample, J of it fed forward.
 
     On a rig also what friction and back-EMF take at the mean rate, all in the unit of its input.
-    What the moment feedback sees is the moment less the rigid arm's -(J - I_h) theta_dd_ref of the interval before the
-    sample ("vibration"), or all of it ("total").  Raises ParameterError for an arm that cannot turn.
+    The rigid arm's moment is -(J - I_h) theta_dd_ref of the interval before the sample.  Raises ParameterError for an
+    arm that cannot turn.
     """
     must_turn(arm)
     T, manoeuvre = chain.sampling.period, chain.slew
@@ -79,7 +97,7 @@ def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
     mean = (rate[1:] + rate[:-1]) / 2
     angle = np.r_[0.0, np.cumsum(mean * T)][:-1]
     before = np.r_[0.0, acceleration[:-1]]
-    rigid = -(arm.gauged_inertia) * before * (manoeuvre.reading == "vibration")
+    rigid = -arm.gauged_inertia * before
     return Scenario(
         name="slew",
         period=T,
@@ -89,6 +107,7 @@ def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
         rigid_moment=rigid,
         disturbance=np.zeros(n),
         busy_until=manoeuvre.rise_time,
+        reading=manoeuvre.reading,
     )
 
 
@@ -99,6 +118,12 @@ def torque_unit(arm: Arm, chain: Chain) -> float:
     """
     share = abs(turning_inertia(arm) * chain.slew.acceleration(arm.reach)) / PAPER_TORQUE
     return float(f"{share:.1g}")
+
+
+def trial_weights(arm: Arm, chain: Chain) -> tuple[float, float]:
+    """The weights a and b [1/(N m)^2 s] of the cost of a trial: `TRIAL_COST` in the arm's own unit of torque."""
+    a, b = TRIAL_COST
+    return a / torque_unit(arm, chain) ** 2, b / torque_unit(arm, chain) ** 2
 
 
 def step(arm: Arm, chain: Chain, duration: float, torque: float | None = None) -> Scenario:

@@ -74,7 +74,7 @@ class Sweep:
                 self.planes[each.number] = p
             else:
                 p = self._inside(each, p)
-        self.theta, self.M = p[0], p[1]
+        self.theta, self.M, self.Q = p[:3]
 
     @cached_property
     def input(self) -> Any:
@@ -95,6 +95,22 @@ class Sweep:
             else:
                 f = self._beyond(each, f)
         return found
+
+    def output(self, one: Any) -> Any:
+        """An output (`chain_values.Reading`) of this response, in SI units."""
+        value, exact = self.theta * self.exact(one.theta), self.exact
+        if one.is_current:  # what is left of the input after back-EMF turns the hub
+            drive = self.layout.chain.drive
+            value = (self.input - self.s * exact(drive.back_emf) * value) / (self.s * exact(drive.lag) + 1)
+        if one.place is not None:
+            mark = self.layout.places.index(one.place)
+            for weight, part in zip(one.state, self.states[mark], strict=True):
+                value = value + part * exact(weight) if weight else value
+            if one.gauge:
+                value = value / (self.s * exact(self.layout.read[mark].damping) + 1)
+        for _ in range(one.power):
+            value = value * self.s
+        return value * exact(one.unit)
 
     def exact(self, number: Any) -> Any:
         """An exact number of an element as one that s can be multiplied by."""

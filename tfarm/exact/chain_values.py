@@ -183,19 +183,7 @@ class ChainState:
     def numerator(self, output: Output, x: float = 0.0) -> Any:
         """The output of the free response, in SI units."""
         those = readings(self.chain, (output,), x)
-        one, sweep = those.each[0], self._sweep(those.layout, self.s)
-        value = sweep.theta * rational(one.theta)
-        if one.is_current:
-            drive = self.chain.drive
-            value = (sweep.input - self.s * rational(drive.back_emf) * value) / (self.s * rational(drive.lag) + 1)
-        if one.place is not None:
-            for weight, part in zip(one.state, sweep.states[0], strict=True):
-                value = value + part * rational(weight) if weight else value
-        for _ in range(one.power):
-            value = value * self.s
-        if one.gauge:
-            value = value / (self.s * rational(those.gauges[0]) + 1)
-        return value * rational(one.unit)
+        return self._sweep(those.layout, self.s).output(those.each[0])
 
     def value(self, output: Output, x: float = 0.0) -> Ball:
         """The output for a unit input, in SI units; x is a share of the length."""

@@ -192,22 +192,6 @@ class GradientSweep(Sweep):
         """What it is: the layout's numbers are jets.  A fraction beside them would make arrays of objects."""
         return number if isinstance(number, Jet) else float(number)
 
-    def output(self, one: Reading) -> Jet:
-        """An output in SI, of the free response that has the sweep's drive."""
-        value = self.theta * one.theta
-        if one.is_current:
-            drive = self.layout.chain.drive
-            value = (self.input - self.s * drive.back_emf * value) / (self.s * drive.lag + 1.0)
-        if one.place is not None:
-            mark = self.layout.places.index(one.place)
-            for weight, part in zip(one.state, self.states[mark], strict=True):
-                value = value + part * weight if weight else value
-            if one.gauge:
-                value = value / (self.s * self.layout.read[mark].damping + 1.0)
-        for _ in range(one.power):
-            value = value * self.s
-        return value * one.unit
-
     @cached_property
     def states(self) -> dict[int, Row]:
         """W, Psi, M and Q at each mark, by the scale that the plane has at the axis."""

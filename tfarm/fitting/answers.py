@@ -17,9 +17,8 @@ from tfarm.digits import general, listed, singly
 from tfarm.errors import ConvergenceError
 from tfarm.files import write_file
 
-from .around import Around
 from .data import Measured
-from .features import PEAKS_BEYOND, features_of, match, near_zeros
+from .features import PEAKS_BEYOND, clear_peaks, match, near_poles
 from .fit import Fit
 from .model import Response
 from .noise import CONFIDENCE
@@ -148,7 +147,7 @@ def resonances(fit: Fit) -> list[tuple[float | None, float | None, float]]:
     """
     found = {}
     for each in fit.solution.problem.responses:
-        _, peaks = features_of(each.data, each.noise.sigma)
+        peaks = clear_peaks(each.data, each.noise.sigma)
         (before, _), (after, ratio) = (_own_peaks(arm, each.data) for arm in (fit.before, fit.arm))
         places = dict(match(np.log(peaks), np.log(after)))
         earlier = dict(match(np.log(after), np.log(before)))
@@ -170,7 +169,7 @@ def _own_peaks(arm: Arm, data: Measured) -> tuple[Real, Real]:
     try:
         poles = Ratio(arm, data.output, data.input).poles(PEAKS_BEYOND * float(data.omega[-1])).values
     except ConvergenceError:
-        w = near_zeros(Around(arm, ()), data)[1][0]
+        w = near_poles(arm, data)
         return w, 0 * w
     upper = poles[poles.imag > 0]
     w = np.abs(upper)

@@ -100,14 +100,19 @@ class Problem:
 
     def computed(self, point: Real) -> list[Complex]:
         """Each response at its own frequencies."""
+        return [np.asarray(over / under) for over, under, _ in self.fractions(point)]
+
+    def fractions(self, point: Real, share: float = 0.0) -> list[tuple[Complex, Complex, Real]]:
+        """Numerator, denominator, and ln of the factor that both lack, of each response at s = (i + share) w."""
         arm = self.arm(point)
         found: list[Any] = [None] * len(self.responses)
         for (_, driven), numbers in self._grids.items():
             names = self._signals(numbers, driven)
-            parts = Signals(under_drive(arm, driven), names).parts(1j * self.responses[numbers[0]].data.omega)
+            s = (1j + share) * self.responses[numbers[0]].data.omega
+            parts = Signals(under_drive(arm, driven), names).parts(s)
             for n in numbers:
                 over, under = self._over_and_under(n, names, parts.drive, parts.numerators)
-                found[n] = np.asarray(over / under * self._sensor(n, point))
+                found[n] = over * self._sensor(n, point), under, parts.scale.real
         return found
 
     def slopes(self, point: Real, here: Around | None = None) -> list[tuple[Complex, Complex]]:

@@ -21,7 +21,8 @@ from tfarm.records import record
 from tfarm.response import transfer
 
 from .fit import Fit
-from .solve import FIT_SEED, OPEN_DEVIATION, principal_axes
+from .solve import OPEN_DEVIATION, principal_axes
+from .start import FIT_SEED
 
 ARMS = 40  # that a report draws
 DRAWS_KEPT = 0.999  # of the draws of a normal distribution: one whose sum of squares is larger is none of them

@@ -16,7 +16,8 @@ from tfarm.arrays import Real
 from tfarm.records import record
 
 from .fit import Fit
-from .solve import FIT_SEED, nearest_minimum
+from .solve import nearest_minimum
+from .start import FIT_SEED
 
 FEWEST_RECORDS = 3  # records of one response, for a scatter
 DRAWS = 40  # of records

@@ -7,7 +7,6 @@ and every interval, rests on Gaussian residuals alone.
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,18 +15,14 @@ from scipy.optimize import least_squares
 from scipy.special import chdtrc, ndtri, stdtrit
 
 from tfarm.arrays import Real
-from tfarm.errors import ParameterError
 from tfarm.records import record
 
 from .model import Problem, walled
 from .noise import CONFIDENCE
-from .start import Starts
+from .start import LADDERS, Starts
 
 NOISE_ALONE = 1e-6  # a sum of squares that noise alone exceeds so rarely is no noise: another start may do better
 MUCH_MISFIT = 4.0  # times its degrees of freedom: a best sum beyond is tried from strayed starts too
-STRAYED = 6  # starts beside the first ones, strayed from the best by
-SPREAD = 0.15  # of ln p
-FIT_SEED = 852780  # of all that a fit draws: the number of the paper's article, any would do
 MOST_EVALUATIONS = 60  # evaluations from one start
 FIRM_POINT = 1e-7  # of the coordinates: a step that changes less ends a search
 FIRM_SUM = 1e-9  # of the sum, likewise
@@ -87,30 +82,20 @@ class Solution:
 def best_solution(problem: Problem) -> Solution:
     """The least sum of squares over all starts; those of noise alone end the search early."""
     found: list[Solution] = []
-
-    def best_after(subject: Problem, start: Real) -> Solution:
-        found.append(_rescaled(nearest_minimum(subject, start)))
-        return min(found, key=lambda each: each.misfit)
-
     for subject, start in Starts(problem):
-        best = best_after(subject, start)
-        if best.converged and is_explained(best):
-            return replace(_nearest(best), starts=len(found))
-    rng = np.random.default_rng(FIT_SEED)
-    for _ in range(STRAYED):
-        if best.converged and best.chi_squared < MUCH_MISFIT * best.freedom:
+        found.append(_rescaled(nearest_minimum(subject, start)))
+        best = min(found, key=lambda each: each.misfit)
+        is_near = len(found) > len(LADDERS) and best.chi_squared < MUCH_MISFIT * best.freedom
+        if best.converged and (is_near or is_explained(best)):
             break
-        strayed = best.point + SPREAD * rng.standard_normal(best.point.size)
-        with suppress(ParameterError):  # no arm there
-            best = best_after(best.problem, problem.inside(strayed))
     return replace(_nearest(best), starts=len(found))
 
 
 def _nearest(found: Solution) -> Solution:
-    """Of the points where what the data do not know is something else, the one nearest to the start.
+    """The solution with those directions open that the data do not exclude to be so, at the point nearest to the start.
 
     A valley may be open where the search began and closed where it ended, by what noise makes of an effect too small
-    to be measured (the rotary inertia of E I): then too, if the data do not exclude the open part.
+    to be measured (the rotary inertia of E I).  The point moves only where the sum of squares stays what it is.
     """
     sizes, axes = principal_axes(found.jacobian)
     for limit, most in ((OPEN_DEVIATION, SAME_SUM), (WEAK, EXCLUDED)):
@@ -119,10 +104,14 @@ def _nearest(found: Solution) -> Solution:
             continue
         start = found.point - some.T @ (some @ found.point)
         back = nearest_minimum(found.problem, start, {int(n): float(start[n]) for n in abs(some).argmax(axis=1)})
+        again = nearest_minimum(found.problem, back.point)  # a logarithm may have ended where it changes nothing
+        if again.converged and again.chi_squared < found.chi_squared - SAME_SUM:
+            return _nearest(again)
         back = replace(back, jacobian=found.problem.jacobian(back.point), converged=found.converged)
         more = int((principal_axes(back.jacobian)[0] < 1.0 / OPEN_DEVIATION).sum())
         if back.chi_squared < found.chi_squared + most and more >= max(1, int((sizes < 1.0 / OPEN_DEVIATION).sum())):
-            return back
+            is_same = back.chi_squared < found.chi_squared + SAME_SUM
+            return back if is_same else replace(found, jacobian=back.jacobian)
     return found
 
 

@@ -1,35 +1,45 @@
-"""Where a fit begins: peaks and dips matched first, then curves by their logarithms.
+"""Where a fit begins: numerator and denominator of a response agree with the data first, then their ratio.
 
-The squares of complex residuals have a minimum for every peak that lies on a wrong one, so a search from parameters
-30 % off ends in one of them.  Peaks and dips of a measured response are poles and zeros near the imaginary axis;
-matched in their order with those of the arm, their logarithms are nearly linear in those of the parameters.  From there
-the logarithms of the curves, under a loss that lets wrong pieces be, lead to where the squares have one minimum.
-Tuned on the survey `tests.fitting.planted`: the counts and shares below.
+The squares of H - D, of a response H = N/P and its measured values D, have a minimum for every pole of H that lies
+between two other lines than the true one.  The equation error of Levy (1959)
+
+    e = (N - D P)/W,    W = |N(s + share w)| + (|D| + sigma) |P(s + share w)|    at s = i w
+
+has no poles: N and P are entire in s and smooth in the arm's numbers, and so is W, their size right of the axis, where
+neither has zeros.  So its squares have few minima, and a pole comes to where N and P have it, between lines too.  It is
+biased by noise (Sanathanan and Koerner 1963), and only where a search begins.  With a larger `share` W is smoother.
+Tuned on the survey `tests.fitting.planted`: the constants below.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 
+from .around import Around
 from .data import in_parts
-from .features import features_of, match, near_zeros
-from .model import Problem
+from .model import Problem, walled
 from .ringing import ring_residuals
 
-START_DEVIATION = 0.5  # of ln p: the deviation that a start is held with, where peaks do not decide
-MATCH_ROUNDS = 8  # of Newton's method on the frequencies
-SHIFTS = (0.0, -0.15, 0.15, -0.3, 0.3)  # of ln w: of all the arm's peaks, before the first match
-STEP_SHARES = (1.0, 0.5, 0.2, 0.05)  # of a step: where a whole one leads to no arm
-CURVE = 150  # points of a response that its curve is followed at
-LOSS = 0.3  # of ln H: residuals beyond count less and less
+LADDERS = ((0.1,), (1.0, 0.3, 0.1))  # shares of w, one after another, of the first starts
+DRAWS = 300  # points about one that the equation errors lead to
+DRAWN = 2.0  # times the deviation that they know it with
+STRAYED = 6  # starts beyond these, strayed from the first point by
+SPREAD = 0.3  # of ln p
+START_DEVIATION = 50.0  # of ln p, over that of an equation error: what the data do not know stays where it is
+LINES = 400  # of a response, at most
+LOSS = 0.1  # of an equation error: those beyond count less and less
+STEPS = 40  # evaluations, of each share
+FIT_SEED = 852780  # of all that a fit draws: the number of the paper's article, any would do
 
 
 class Starts:
@@ -37,122 +47,81 @@ class Starts:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self._free = len(problem.of_the_arm)
-        self._features = [features_of(each.data, each.noise.sigma) for each in problem.responses]
 
     def __iter__(self) -> Iterator[tuple[Problem, Real]]:
         zero = np.zeros(len(self.problem.parameters))
-        tried: list[Real] = []
-        for shift in SHIFTS if self._free else ():
-            matched = self._matched(zero, shift)
-            if any(abs(matched - other).max() < 1e-3 for other in tried):
-                continue
-            tried.append(matched)
-            try:
-                found = self._along_curves(matched)
-            except ParameterError:  # no arm there
-                continue
-            yield found
-        yield self._along_curves(zero)
+        yield self._near(zero, LADDERS[0], 0)
+        for shares in LADDERS:
+            yield self._near(zero, shares, DRAWS)
+        rng = np.random.default_rng(FIT_SEED)
+        for _ in range(STRAYED):
+            with suppress(ParameterError):  # no arm there
+                yield self._near(SPREAD * rng.standard_normal(zero.size), LADDERS[-1], DRAWS)
 
-    # ------------------------------------------------------------ peaks
+    def _near(self, point: Real, shares: tuple[float, ...], draws: int) -> tuple[Problem, Real]:
+        """The problem, its sensors' gains by the sign that they have, and where the equation errors lead from a point.
 
-    def _matched(self, point: Real, shift: float) -> Real:
-        """The point where the arm's peaks and dips are those measured, matched anew in each round."""
-        for turn in range(MATCH_ROUNDS):
-            rows, misfit = self._frequency_rows(point, shift * max(0.0, 1.0 - turn / 3))
-            held = np.eye(self._free) / START_DEVIATION
-            away = -point[: self._free] / START_DEVIATION
-            matrix, right = np.vstack([rows, held / 10]), np.concatenate([misfit, away / 10])
-            step = np.linalg.lstsq(matrix * 10, right * 10, rcond=None)[0]
-            step *= min(1.0, 0.3 / max(abs(step).max(), 1e-12))
-            point = self._stepped(point, step)
-            if abs(step).max() < 1e-4:
-                break
-        return point
-
-    def _stepped(self, point: Real, step: Real) -> Real:
-        """The point a step further on, or as much of it as there are arms."""
-        for share in STEP_SHARES:
-            beyond = point.copy()
-            beyond[: self._free] += share * step
-            beyond = self.problem.inside(beyond)
-            with suppress(ParameterError):
-                self.problem.arm(beyond)
-                return beyond
-        return point
-
-    def _frequency_rows(self, point: Real, shift: float) -> tuple[Real, Real]:
-        """d ln w of the arm's matched peaks along the parameters (matched, free), and ln w measured less theirs."""
-        rows, misfit = [np.empty((0, self._free))], [np.empty(0)]
-        here = self.problem.around(point)
-        for each, features in zip(self.problem.responses, self._features, strict=True):
-            for measured, (w, slopes) in zip(features, near_zeros(here, each.data), strict=True):
-                pairs = match(np.log(measured), np.log(w) + shift)
-                rows.append(np.array([slopes[:, j] for _, j in pairs]).reshape(-1, self._free))
-                misfit.append(np.array([np.log(measured[i] / w[j]) for i, j in pairs]))
-        if self.problem.rings:
-            decays, slopes = ring_residuals(here, self.problem.rings, point.size)
-            shares = np.array([each.frequency_deviation / each.frequency for each in self.problem.rings])
-            first = np.cumsum([0, *(1 + (each.ratio is not None) for each in self.problem.rings)])[:-1]
-            rows.append(slopes[first, : self._free] * shares[:, None])
-            misfit.append(-decays[first] * shares)
-        return np.vstack(rows), np.concatenate(misfit)
-
-    # ------------------------------------------------------------ curves
-
-    def _along_curves(self, point: Real) -> tuple[Problem, Real]:
-        """The point where the logarithms of the curves agree best, from there, under a loss for outliers.
-
-        The problem with it has its sensors' gains by the sign that they have.
+        Of the `draws` as far from there as these know it, that of the least squares: the true side of a line.
         """
-        whole = with_signs(self.problem, point)
-        thin = thinned(whole, CURVE)
-        low, high = thin.bounds
-        point = thin.inside(self._with_gains(thin, point))
-
-        if not thin.responses:
-            return whole, point
-
-        def residuals(x: Real) -> Real:
-            pairs = zip(thin.computed(x), thin.responses, strict=True)
-            return np.concatenate([in_parts(np.log(H / each.data.values)) for H, each in pairs])
-
-        def jacobian(x: Real) -> Real:
-            return np.concatenate([in_parts(dH / H).T for H, dH in thin.slopes(x)])
-
-        found = least_squares(
-            residuals,
-            point,
-            jac=jacobian,
-            bounds=(low, high),
-            loss="soft_l1",
-            f_scale=LOSS,
-            max_nfev=25,
-            xtol=1e-3,
-            ftol=1e-3,
-        )
-        return whole, np.asarray(found.x)
-
-    def _with_gains(self, problem: Problem, point: Real) -> Real:
-        """The point with each sensor's gain as the levels have it in the median."""
-        point = point.copy()
-        for H, each in zip(problem.computed(point), problem.responses, strict=True):
-            if each.gain is not None:
-                point[each.gain] += float(np.median(np.log(abs(each.data.values / H))))
-        return point
+        point = self.problem.inside(point)
+        for share in shares:
+            whole, first = with_gains(self.problem, point)
+            thin = thinned(whole, LINES)
+            found = least_errors(thin, first, share)
+            point = np.asarray(found.x)
+        _, sizes, axes = np.linalg.svd(found.jac, full_matrices=False)
+        deviation = math.sqrt(2 * found.cost / found.fun.size) / sizes
+        drawn = np.random.default_rng(FIT_SEED).standard_normal((draws, point.size)) * DRAWN * deviation
+        return whole, min((point, *map(thin.inside, point + drawn @ axes)), key=partial(sum_of_squares, thin))
 
 
-def with_signs(problem: Problem, point: Real) -> Problem:
-    """The problem with the sign of each sensor's gain as the data have it at a point: the start's is turned."""
-    parameters = list(problem.parameters)
+def least_errors(problem: Problem, first: Real, share: float) -> OptimizeResult:
+    """Where the equation errors are least, next to a point, under a loss for outliers."""
+
+    def errors(x: Real) -> Real:
+        return np.concatenate([equation_errors(problem, x, share), (x - first) / START_DEVIATION])
+
+    return least_squares(
+        walled(errors), first, bounds=problem.bounds, loss="soft_l1", f_scale=LOSS, max_nfev=STEPS, xtol=1e-4, ftol=1e-4
+    )
+
+
+def sum_of_squares(problem: Problem, point: Real) -> float:
+    """Of the complex residuals over their deviations; inf where there is no arm."""
+    try:
+        residuals = problem.residuals(point)
+    except ParameterError:
+        return math.inf
+    return float(residuals @ residuals)
+
+
+def equation_errors(problem: Problem, point: Real, share: float) -> Real:
+    """Real and imaginary parts of e at each frequency, and ln of each decay's frequency over the measured one."""
+    errors = []
+    pairs = zip(problem.fractions(point), problem.fractions(point, share), problem.responses, strict=True)
+    for (N, P, here), (smooth_N, smooth_P, there), each in pairs:
+        D = each.data.values
+        W = (abs(smooth_N) + (abs(D) + each.noise.sigma) * abs(smooth_P)) * np.exp(there - here)
+        errors.append(in_parts((N - D * P) / W))
+    if problem.rings:
+        decays = ring_residuals(Around(problem.arm(point), ()), problem.rings, point.size)[0]
+        shares = [(each.frequency_deviation / each.frequency, each.ratio is None) for each in problem.rings]
+        weights = np.concatenate([[size] if is_alone else [size, 0.0] for size, is_alone in shares])
+        errors.append(decays * weights)
+    return np.concatenate(errors)
+
+
+def with_gains(problem: Problem, point: Real) -> tuple[Problem, Real]:
+    """The problem with the sign of each sensor's gain as the data have it at a point; the point with its size."""
+    parameters, point = list(problem.parameters), point.copy()
     for H, each in zip(problem.computed(point), problem.responses, strict=True):
         if each.gain is not None:
-            weight = (each.data.values * np.conj(H)).real / abs(each.data.values * H)
-            if np.median(weight) < 0:
-                own = parameters[each.gain]
+            ratio = each.data.values / H
+            own = parameters[each.gain]
+            if np.median(ratio.real / abs(ratio)) < 0:
                 parameters[each.gain] = replace(own, start=-own.start)
-    return replace(problem, parameters=tuple(parameters))
+            point[each.gain] += float(np.median(np.log(abs(ratio))))
+    return replace(problem, parameters=tuple(parameters)), point
 
 
 def thinned(problem: Problem, most: int) -> Problem:

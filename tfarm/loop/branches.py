@@ -193,7 +193,8 @@ def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
     if not arm.is_uniform:
         found = damped_modes(modes(arm, number))
         turning = found.eigenvalues[(found.index == 0) & (found.eigenvalues[:, 1] != 0)]
-        return np.concatenate([turning, _alone(found.others), found.eigenvalues[found.index > 0]]), lowest
+        flexible = found.eigenvalues[(found.index > 0) & found.is_assigned]
+        return np.concatenate([turning, _alone(found.others), found.unassigned_pairs, flexible]), lowest
     stage = Stage(Variation(arm, HubFeedback(), "damping"), 0.0, C, lowest)
     return stage.follow(zeros, wanted, min(1.0, FIRST_STEP_SHARE / (omega[-1] * C)))[-1].zeros, lowest
 

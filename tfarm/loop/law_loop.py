@@ -29,7 +29,7 @@ from .resting import NEAREST_TO_ORIGIN, resting_zeros
 FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: how far right an improper law is looked at
 UNDISPERSED = 1e11  # of w1: where waves are no longer dispersed
 FALL_FACTOR = 0.5  # L must fall by this there, from one to the next
-ALMOST_ZERO = 1e-200  # 1/s: where it is seen whether a signal is fed back at all, also by a law that vanishes at rest
+SOMEWHERE = 0.31 + 0.71j  # of w1: where it is seen whether a signal is fed back at all; no law has its zero there
 NO_ORDER = 99  # of a zero at s = 0, of what is not fed back: above that of any part
 
 
@@ -71,7 +71,8 @@ class LawLoop:
 
     def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
         """Denominator and numerator of L at s, up to one factor: finite at poles too."""
-        drive, fed_back, _ = self._parts(np.asarray(s, dtype=complex))
+        s = np.asarray(s, dtype=complex)
+        drive, fed_back, _ = self._parts(s, self.signals.kept(s))
         return drive, fed_back
 
     def loop_function(self, s: NDArray[Any]) -> Complex:
@@ -84,7 +85,7 @@ class LawLoop:
         """How often D vanishes at s = 0: as the least of its terms does, and more often where these cancel."""
         integrators = int((self.law.poles == 0).sum())
         terms = [self.k.at_rest + integrators]
-        numerators, _ = self.law.polynomials(np.array([ALMOST_ZERO + 0j]))
+        numerators, _ = self.law.polynomials(np.array([SOMEWHERE * first_frequency(self.arm)]))
         for row, order in enumerate(self.signals.orders):
             if abs(numerators[row, 0]) > 0:
                 terms.append(order + self._order_of(row))
@@ -110,7 +111,7 @@ class LawLoop:
         s = np.where(s == 0, NEAREST_TO_ORIGIN * first_frequency(self.arm), np.asarray(s, dtype=complex))
         h = difference_steps(self.k, s)
         at = np.array([s, s + h, s - h])
-        drive, fed_back, scale = self._parts(at)
+        drive, fed_back, scale = self._parts(at, self.signals.parts(at))
         scale = scale - self.delay_of_waves * at
         up, down = (drive + fed_back)[1:] * np.exp(scale[1:] - scale[0])
         return deflated((drive + fed_back)[0], (up - down) / (2 * h), scale[0], s, self.zeros_at_origin)
@@ -128,9 +129,9 @@ class LawLoop:
         late = np.exp(-s * self.law.delay)
         return np.asarray(of_rig.drive * whole + late * (entries * of_rig.numerators).sum(axis=0))
 
-    def _parts(self, s: Complex) -> tuple[Complex, Complex, Complex]:
+    def _parts(self, s: Complex, of_rig: LoopParts) -> tuple[Complex, Complex, Complex]:
         """drive q, the fed back sum, both times e^{-scale}, and scale."""
-        drive, numerators, scale = self.signals.parts(s)
+        drive, numerators, scale = of_rig
         entries, whole = self.law.polynomials(s)
         fed_back = (entries * numerators).sum(axis=0)
         late = s * self.law.delay

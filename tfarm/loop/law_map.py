@@ -21,16 +21,16 @@ from tfarm.crossing import Crossing, Crossings, counts_over, crossed, with_dips
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.characteristic import LoopParts
 from tfarm.records import record
-from tfarm.spectrum.box import Box, winding_number
+from tfarm.spectrum.box import FIRST_POINTS, NEAREST_TO_ZERO, TRIED_HEIGHTS, turned
 from tfarm.spectrum.scales import first_frequency
 
 from .answers import law_answer
 from .frequencies import grid
 from .law_loop import LawLoop
-from .law_poles import law_box, law_poles_below
-from .law_stability import LISTED_LEFT, band_for, is_told_without
+from .law_poles import law_box
+from .law_stability import band_for, is_told_without
 from .lines import ROUNDED, ascending, through_infinity, through_origin
-from .stability import MARGIN_OF_ZERO, must_be_off_axis
+from .stability import MARGIN_OF_ZERO
 
 LEADING = ".den.0"  # how the name of a leading coefficient ends
 MOST_MAP_VALUES = 400  # along one number: each column is a line of crossings of its own
@@ -41,7 +41,6 @@ CLOSER_LOOKS = 3  # at most: down to 1e-18 of the range, below which a number is
 ORDER_READ_AT = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off
 SIMPLE = 3.0  # ratio of values at the first and the second: 2 of a simple zero, 4 of a double one
 BESIDE_MEETING = 1e-3  # of the range: how far from such a place its counts are taken
-CONTOUR_POINTS = 400  # of an edge of a contour, to begin with
 
 
 @dataclass(frozen=True)
@@ -166,19 +165,24 @@ def _turns_over(loop: LawLoop, name: str, values: Real) -> bool:
 
 
 def unstable_below(loop: LawLoop, band: float) -> int:
-    """Poles right of the axis with |Im s| < band: found one by one and counted, where the rig is damped.
+    """Poles right of the axis with |Im s| < band: by how often D turns around the upper half of that region.
 
-    Else by the winding number around that half of the box alone.  Raises ConvergenceError where one is on the axis, to
-    working precision.
+    Where one is on its upper edge the next of `TRIED_HEIGHTS` is taken.  Raises ConvergenceError where one is on the
+    axis, to working precision.
     """
     if loop.resting_zeros:
         raise ConvergenceError("a pole is at s = 0, neither stable nor not: take other values", loop, 0.0)
-    if loop.arm.least_damping:
-        found = law_poles_below(loop, band, LISTED_LEFT)
-        must_be_off_axis(found.moving[found.moving.real <= MARGIN_OF_ZERO * abs(found.moving)])
-        return found.unstable
-    right = law_box(loop, band).re_max
-    return winding_number(loop.function, Box(0.0, right, -band, band), CONTOUR_POINTS)
+    right, nearest = law_box(loop, band).re_max, MARGIN_OF_ZERO if loop.arm.least_damping else NEAREST_TO_ZERO
+    for factor in TRIED_HEIGHTS:
+        top = factor * band
+        side, above = right + 1j * np.linspace(0.0, top, FIRST_POINTS), np.linspace(right, 0.0, FIRST_POINTS) + 1j * top
+        path = np.r_[side, above[1:-1], 1j * np.asarray(grid(loop.arm, top))[::-1], 0.0]
+        try:
+            return round(turned(loop.function, path, abs(right + 1j * top), nearest) / math.pi)
+        except ConvergenceError as error:
+            if factor == TRIED_HEIGHTS[-1] or error.best.real == 0:
+                raise
+    raise AssertionError("unreachable")
 
 
 def law_crossings(loop: LawLoop, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:

@@ -96,11 +96,24 @@ def starting_points_of(loop: LawLoop, up_to: float) -> Complex:
     if not loop.law.is_improper:  # else it has no states
         count = min(modes_below(loop.arm, up_to) + MODES_ABOVE_BOX, MOST_MODEL_MODES)
         with suppress(ParameterError, ConvergenceError):  # the winding number says whether something is missing
-            of_model = poles_of_model(loop, sensed_model(loop.arm, loop.law.signals, count))
+            of_model = poles_of_model(loop, _lightly_damped(loop, count))
     starts = np.concatenate(
         [near, near.conj(), real, -real, own * FARTHER_OWN, own * NEARER_OWN + ASIDE_OWN * abs(own), of_model]
     )
     return starts[abs(starts) > LEAST_START]
+
+
+def _lightly_damped(loop: LawLoop, count: int) -> Matrices:
+    """A model of the rig in its undamped modes, each with the damping of its own C w, and what the hub loses.
+
+    Bending of one C has just that; the damped modes themselves take far longer to be followed than starts are worth.
+    """
+    arm, signals = loop.arm, loop.law.signals
+    A, B, C, D = sensed_model(arm.lossless, (*signals, "hub_rate"), count)
+    omega = np.diag(A, 1)
+    (pair,) = np.nonzero((omega > 0) & (np.diag(A, -1) == -omega))
+    A[pair + 1, pair + 1] -= arm.damping * omega[pair] ** 2
+    return A - arm.rate_loss * B @ C[-1:], B, C[:-1], D[:-1]
 
 
 def poles_of_model(loop: LawLoop, plant: Matrices) -> Complex:

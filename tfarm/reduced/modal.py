@@ -146,8 +146,7 @@ def tailed_model(arm: Arm, count: int) -> ModalModel:
     """
     model, lossless = modal_model(arm, FED_BACK, count), arm.elastic
     if not arm.is_uniform:  # without anything that dissipates, driven by a torque
-        clamp, joint = replace(arm.clamp, damping=0.0), replace(arm.joint, damping=0.0)
-        lossless = replace(lossless.lossless_hub, clamp=clamp, joint=joint, input="hub_torque")
+        lossless = replace(arm.lossless, input="hub_torque")
     undamped = modal_model(lossless, ("hub_angle",) if arm.is_uniform else ("hub_angle", "root_moment"), count)
     s, whole = float(undamped.natural_frequency[-1]), float(undamped.static[0])
     fallen, *others = (undamped(s) - transfer(undamped.arm, undamped.outputs)(s)).real.tolist()

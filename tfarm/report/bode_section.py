@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from operator import attrgetter
 
 import numpy as np
 
@@ -12,8 +13,10 @@ from tfarm.plots.frequency import draw_bode
 from tfarm.report.sections import PageSection, Picture
 from tfarm.report.words import upper
 from tfarm.response.answers import bode_table, roots_table
+from tfarm.response.extrema import Extremum
 from tfarm.response.frequency import AXIS_SHARE, Bode, bode
 
+MAGNITUDE = attrgetter("magnitude")
 ROOTS_CAPTION = (
     "Those below the real axis are their mirror images. A damping ratio of 100 % is a real root in the left "
     "half-plane, −100 % one in the right. Magnitude: at s = i Im s (real roots: at s = i |s|)."
@@ -50,18 +53,25 @@ def what_is_seen(data: Bode) -> str:
     grid = f"The exact response at {data.omega.size} frequencies from {low} to {high} rad/s"
     if data.poles.size or data.zeros.size:
         around = f"{how_many(len(data.poles), 'pole')} and {how_many(len(data.zeros), 'zero')}"
-        grid += f", spaced geometrically around its {around}, so that no peak and no dip falls between two of them"
+        grid += f", spaced geometrically around its {around}"
     grid += "."
     if data.infinite.size:
         edges = "the top edge" if not data.vanishing.size else "the top edge, or the bottom edge where it is truly zero"
         infinite = "Without damping every resonance is truly infinite: there the curve is broken and ends in an open "
         return f"{grid} {infinite}triangle on {edges}."
-    if not data.resonances.size:
-        return grid
-    peaks = data.peaks[data.poles.imag > 0]
-    top = int(np.argmax(peaks))
-    highest = f"{significant(float(peaks[top]), 4)} {data.gain_unit}"
-    return f"{grid} The highest peak reaches {highest} near {significant(data.resonances[top].imag, 6)} rad/s."
+    return f"{grid} {highest_and_lowest(data)}"
+
+
+def highest_and_lowest(data: Bode) -> str:
+    """The highest peak and the deepest dip, or that the magnitude has none."""
+
+    def at(each: Extremum) -> str:
+        size = significant(each.magnitude, 4)
+        return f"{size} {data.gain_unit} at {significant(each.omega, 6)} rad/s"
+
+    peak = f"Highest peak: {at(max(data.peaks, key=MAGNITUDE))}" if data.peaks else "No peak: no local maximum of |G|"
+    dip = f"deepest dip: {at(min(data.dips, key=MAGNITUDE))}" if data.dips else "no dip: no local minimum of |G|"
+    return f"{peak}; {dip}."
 
 
 def what_it_means(data: Bode) -> str:
@@ -87,10 +97,10 @@ def what_it_means(data: Bode) -> str:
 
 def alt_text(data: Bode) -> str:
     """The picture for those who cannot see it."""
-    places = ", ".join(significant(pole.imag, 4) for pole in data.resonances[:5])
-    more = " and more above" if data.resonances.size > 5 else ""
-    peaks = "infinite peaks" if data.infinite.size else "peaks"
-    where = f"{peaks} at {places} rad/s{more}" if data.resonances.size else "no peaks"
+    places = ", ".join(significant(peak.omega, 4) for peak in data.peaks[:5])
+    more = " and more above" if len(data.peaks) > 5 else ""
+    peaks = "infinite peaks" if all(math.isinf(peak.magnitude) for peak in data.peaks) else "peaks"
+    where = f"{peaks} at {places} rad/s{more}" if data.peaks else "no peaks"
     start = f"{significant(float(abs(data.value[0])), 3)} {data.gain_unit}"
     return f"Bode plot of {data.input_label} to {data.label}: {where}; it begins at {start}."
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from tfarm.arm import PLANE
 from tfarm.columns import Table
 from tfarm.comparing import Comparison
-from tfarm.comparing.answers import compared_margins, compared_modes, compared_poles, side_words
+from tfarm.comparing.answers import compared_margins, compared_modes, compared_poles, side_words, unpaired_poles
 from tfarm.errors import ParameterError
 from tfarm.files import temporary_folder
 from tfarm.plots.compared import draw_comparison
@@ -24,8 +24,9 @@ from tfarm.report.writing import TRUST_PAGE, move_into
 LEADING_MINUS = re.compile(r"^-(?=\d)")  # a minus sign before a number
 LEADING_OMEGA = re.compile(r"^w(?= of )")
 NUMBER_WORDS = {"inf": "∞", "-inf": "−∞", "-": "–"}
-DIFFERENCE_NOTE = "Differences are those of the second from the first, in per cent of the first."
-ORDER_NOTE = "The n-th of both in the order of Im s, which need not be the same mode of the link."
+DIFFERENCE_NOTE = "Differences are those of the second from the first, in per cent of the first, of angles in degrees."
+PAIRED_NOTE = "By the mode whose open-loop pole each is nearest to."
+UNPAIRED_NOTE = "Of a mode that has no oscillating pole on the other side, or of none."
 IN_Z_NOTE = "One of the laws is a law in z: both loops are compared at their samples, each pole z as s = ln(z)/T."
 AT_SAMPLES_NOTE = "Of the exact loop at its samples, with as many modes as its verdict takes."
 KNOWN_NOTE = (
@@ -78,20 +79,21 @@ def _sections(found: Comparison) -> Iterator[PageSection]:
     )  # fmt: skip
     yield PageSection(anchor="both", title="Both in one picture", blocks=(picture,))
     if found.is_of_arms:
-        modes = _set(compared_modes(found), "modes", "Natural frequencies and damping", "")
+        modes = _set(compared_modes(found), "modes", "Natural frequencies and damping", DIFFERENCE_NOTE)
         yield PageSection(anchor="modes", title="Modes", blocks=(modes,))
-    poles = _set(compared_poles(found), "poles", "Those that oscillate", f"{ORDER_NOTE} ")
-    yield PageSection(anchor="poles", title="Closed-loop poles", blocks=(poles,))
+    poles = [_set(compared_poles(found), "poles", "Those that oscillate", f"{PAIRED_NOTE} {DIFFERENCE_NOTE}")]
+    if len(apart := unpaired_poles(found)):
+        poles.append(_set(apart, "unpaired-poles", "Poles of one side alone", UNPAIRED_NOTE))
+    yield PageSection(anchor="poles", title="Closed-loop poles", blocks=tuple(poles))
     known = AT_SAMPLES_NOTE if found.is_clocked else KNOWN_NOTE
-    margins = _set(compared_margins(found), "margins", "How far from unstable", f"{known} ")
+    margins = _set(compared_margins(found), "margins", "How far from unstable", f"{known} {DIFFERENCE_NOTE}")
     yield PageSection(anchor="margins", title="Margins", blocks=(margins,))
 
 
-def _set(table: Table, of: str, title: str, note: str) -> Table:
+def _set(table: Table, of: str, title: str, caption: str) -> Table:
     """The table as pages show such: powers of ten, minus signs, infinity, and w in Greek."""
     columns = []
     for each in table.columns:
         cells = [NUMBER_WORDS.get(cell) or LEADING_MINUS.sub("−", typeset(cell)) for cell in each.cells]
         columns.append(replace(each, title=LEADING_OMEGA.sub("ω", each.title), shown=cells))
-    caption = f"{note}{DIFFERENCE_NOTE}"
     return replace(table, stem=f"compare-{of}", title=title, caption=caption, columns=tuple(columns), record=None)

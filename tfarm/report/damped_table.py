@@ -7,8 +7,9 @@ from functools import lru_cache
 import numpy as np
 
 from tfarm.arm import Arm
-from tfarm.columns import Column, Table
+from tfarm.columns import FILES, Column, Table
 from tfarm.digits import plain, significant
+from tfarm.errors import MISSING
 from tfarm.report.words import typeset
 from tfarm.spectrum import DampedModes, Modes, damped_modes, modes
 from tfarm.spectrum.answers import DAMPED_MODE_COLUMNS, beyond_the_box
@@ -26,6 +27,10 @@ NO_C_CAPTION = (
     "argument principle in ball arithmetic counts those in this box. {outside}Beyond any such box there are more, at "
     "ever higher frequency: {beyond}."
 )
+UNASSIGNED_NOTE = (
+    "Rows without a number are eigenvalues that continue from no mode for certain, named after the part of the drive "
+    "that sets them, where one does; a mode that is “not assigned” has one of them, or none in the box. "
+)
 NOT_LISTED = "Modes above {last} are not listed: their branches cannot be told apart. "
 OUTSIDE_NOTE = (
     "Rows that are “outside” lie, with one eigenvalue or both, beyond the box: beside them others may exist that are "
@@ -34,7 +39,7 @@ OUTSIDE_NOTE = (
 
 
 PROVEN_DIGITS = 12  # of an eigenvalue: more than a page prints of any
-BOX_WORDS = {True: "in the box", False: "outside"}
+BOX_WORDS = "in the box", "outside"
 
 
 @lru_cache(maxsize=8)  # the arm's page and the page on trust speak of the same ones, and a proof takes seconds
@@ -55,14 +60,22 @@ def damped_table(undamped: Modes) -> Table:
     C, box = arm.damping, damped.box
     edges = {"left": box.re_min, "right": box.re_max, "top": box.im_max}
     resisted = damped.single.size - len(damped.others)
-    rigid = ", with 0 twice" if arm.has_rigid_mode else ""
+    rigid = ""
+    if arm.has_rigid_mode:
+        rigid = ", with 0 twice" if damped.eigenvalues[0, 1] == 0 else ", with 0"
     if arm.has_rigid_mode and resisted:
         rigid = f", with 0 and the {significant(damped.single[0], 6)} 1/s to which friction resists the turning rig"
     for each in damped.others:
         rigid += f"; {significant(each, 6)} 1/s, of the motor's circuit, is one of no mode"
     words = {name: plain(round(x)) if abs(x) >= 100 else plain(x, 3) for name, x in edges.items()}
-    inside = np.all(box.holds(damped.eigenvalues), axis=1)
-    left_out = NOT_LISTED.format(last=damped.index[-1]) if damped.left_out else ""
+    every = np.concatenate([damped.eigenvalues, damped.unassigned_pairs])
+    inside = np.all(box.holds(every) | np.isnan(every), axis=1)
+    words_of = np.where(np.isnan(every[:, 0]), "-", np.where(inside, *BOX_WORDS))
+    notes = NOT_LISTED.format(last=damped.index[-1]) if damped.left_out else ""
+    if damped.unassigned or not damped.is_assigned.all():
+        notes += UNASSIGNED_NOTE
+    names = [*[MISSING] * len(damped.index), *(each.origin for each in damped.unassigned)]
+    origins = [Column("origin", of=names, on=(FILES,))] if damped.unassigned else []
     return Table(
         stem="damped-modes",
         title="Damped modes",
@@ -70,13 +83,14 @@ def damped_table(undamped: Modes) -> Table:
             C=plain(C),
             count=damped.count,
             rigid=rigid,
-            outside=("" if inside.all() else OUTSIDE_NOTE) + left_out,
+            outside=("" if inside.all() else OUTSIDE_NOTE) + notes,
             beyond=typeset(beyond_the_box(arm)),
             **words,
         ),
         columns=(
             *DAMPED_MODE_COLUMNS,
-            Column("complete", "list complete", of=[BOX_WORDS[bool(each)] for each in inside]),
+            Column("complete", "list complete", of=words_of),
+            *origins,
         ),
         record=damped,
     )

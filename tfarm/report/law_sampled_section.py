@@ -29,7 +29,7 @@ from tfarm.report.law_measured import measured_blocks
 from tfarm.report.sampled_words import in_ms, spans
 from tfarm.report.sections import Fact, PageSection, Picture
 from tfarm.report.time_responses import clipped_words, resolution_words, responses_table
-from tfarm.report.words import typeset, upper
+from tfarm.report.words import residual_words, typeset, upper
 
 SMALL_GROWTH = 0.05  # a sample: growth up to which damping is first order
 MORE_DELAY = (0.5, 1.0)  # samples of further delay that the verdict is asked for again
@@ -265,6 +265,6 @@ def _slewed(each: LawOnArm, run: Simulation) -> str:
     end = math.degrees(run.at_samples.hub_angle[-1] - run.scenario.hub_angle[-1])
     what = f"led by {', '.join(dict.fromkeys(led))}" if led else "led by nothing but the feedforward"
     return (
-        f"{upper(each.name)}, {what}: {significant(residual_moment_rms(run), 3)} N m rms left after the slew, the hub "
+        f"{upper(each.name)}, {what}: {residual_words(residual_moment_rms(run))} left after the slew, the hub "
         f"{plain(end, 3)} deg off at the end."
     )

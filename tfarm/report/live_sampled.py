@@ -102,7 +102,7 @@ def _kept(plant: Plant) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
 def _task(task: Scenario, chain: Chain, arm: Arm) -> dict[str, Any]:
     """References a sample, converters, and what a person is told of the slew."""
     rows = quantisers(chain).tolist()
-    ideal = np.c_[task.feedforward, task.hub_angle, task.hub_rate, task.rigid_moment]
+    ideal = np.c_[task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment]
     return {
         "ideal": packed(ideal),
         "converters": [[x if math.isfinite(x) else None for x in row] for row in rows],

@@ -40,7 +40,8 @@ def locked_words(arm: Arm) -> list[str]:
     omega, held = float(free.natural_frequency[-1]), float(locked.natural_frequency[-1])
     numbers = {"free": omega, "free_hz": omega / (2 * math.pi), "locked": held, "locked_hz": held / (2 * math.pi)}
     damped = ""
-    if (lossy := damped_at_hub(arm, 1)) is not None:  # how the first mode of the free hub rings with its own losses
+    lossy = damped_at_hub(arm, 1)  # how the first mode of the free hub rings with its own losses
+    if lossy is not None and lossy.is_assigned.all():
         s, ratio = complex(lossy.eigenvalues[-1, 0]), significant(100 * float(lossy.damping_ratio[-1]), 3)
         damped = SWINGS.format(omega=significant(s.imag, 5), ratio=ratio) if s.imag else CREEPS
     return [WHICH_IS_MEASURED.format(damped=damped, **{name: significant(x, 5) for name, x in numbers.items()})]
@@ -54,7 +55,7 @@ def locked_table(table: Modes) -> Table:
     held = locked.natural_frequency[locked.index > 0]
     columns = [Column("mode", "mode", of=range(1, LOCKED_MODES + 1)), *_pair("hub_free", "hub free", omega)]
     lossy = None if arm.is_locked else damped_at_hub(arm, LOCKED_MODES)
-    if lossy is not None and not lossy.left_out:
+    if lossy is not None and not lossy.left_out and lossy.is_assigned.all():
         flexible = lossy.index > 0
         s, ratio = lossy.eigenvalues[flexible, 0], lossy.damping_ratio[flexible]
         group = "hub free, with its own losses"

@@ -57,8 +57,12 @@ def make_all(
         tasks += [(i, LIVE_WORK)] * (not only and is_live(subject))
         tasks.append((i, CARD_ALONE_WORK if subject.laws and only else CARD_WORK))
     done: dict[PieceWork, Made] = {}
-    if progress is not None:
-        progress(0, len(tasks), _name_of(subjects, tasks[0]) if tasks else "nothing to make")
+
+    def tell(running: Sequence[PieceWork]) -> None:
+        if progress is not None:
+            progress(len(done), len(tasks), ", ".join(_name_of(subjects, task) for task in running))
+
+    tell(())
 
     def work(task: PieceWork) -> Callable[[], Made]:
         if task == EVIDENCE_WORK:
@@ -67,10 +71,9 @@ def make_all(
             return partial(write_assets, *scripts)
         return partial(make, subjects[task[0]], task[1], folders[task[0]])
 
-    for task, section in _results(subjects, tasks, work):
-        done[task] = section
-        if progress is not None:
-            progress(len(done), len(tasks), _name_of(subjects, task))
+    for task, section in _results(subjects, tasks, work, tell):
+        done[task] = section  # noqa: PERF403  `tell` counts them meanwhile
+    tell(())
     places = range(len(subjects))
     sections = [[s for t in tasks if t[0] == i and isinstance(s := done[t], SavedSection)] for i in places]
     evidence = done.get(EVIDENCE_WORK)
@@ -78,7 +81,10 @@ def make_all(
 
 
 def _results(
-    subjects: Sequence[Subject], tasks: Sequence[PieceWork], work: Callable[[PieceWork], Callable[[], Made]]
+    subjects: Sequence[Subject],
+    tasks: Sequence[PieceWork],
+    work: Callable[[PieceWork], Callable[[], Made]],
+    begun: Callable[[Sequence[PieceWork]], object],
 ) -> Iterator[tuple[PieceWork, Made]]:
     """Each task with its result as it comes: here, or by two processes where there is work for them.
 
@@ -87,6 +93,7 @@ def _results(
     is_little = len(subjects) == 1 and len(tasks) < WORTH_A_PROCESS
     if not tasks or is_little or MOST_WORKERS == 1 or not may_start_processes():
         for task in tasks:
+            begun([task])
             yield task, work(task)()
         return
 
@@ -100,7 +107,7 @@ def _results(
     by_arm = [
         sorted(each, key=seconds, reverse=True) for _, each in groupby(sorted(tasks, key=itemgetter(0)), itemgetter(0))
     ]
-    yield from shared(by_arm, submit, MOST_WORKERS, [__name__])
+    yield from shared(by_arm, submit, MOST_WORKERS, [__name__], begun)
 
 
 def make(subject: Subject, piece: int | str, folder: Path) -> Made:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from tfarm.plots.style import Figure
 
 CURVE_DIGITS = 7  # digits of a curve in its file: a hundredth of the width of a line is four
-UNTIL = 0.9  # of a record: what has settled after that may ring on
 
 
 def draw_slews(data: Slews) -> Figure:
@@ -33,21 +33,21 @@ def draw_slews(data: Slews) -> Figure:
 
 def what_slews_show(data: Slews) -> str:
     """The picture in numbers: what moment feedback does to what is left after the slew."""
-    gone = [
-        f"{name} at {significant(run.stopped.time, 3)} s"
-        for name, run in (("without moment feedback", data.without), ("with it", data.with_moment))
-        if run.stopped is not None
-    ]
     clipped = clipped_words(data.each)
-    if gone:
-        return f"The loop runs away until the arm is folded up: {' and '.join(gone)}.{clipped}"
     before, after = residual_moment_rms(data.without), residual_moment_rms(data.with_moment)
+    if before is None or after is None:
+        gone = [
+            f"{name} at {significant(run.stopped.time, 3)} s"
+            for name, run in (("without moment feedback", data.without), ("with it", data.with_moment))
+            if run.stopped is not None
+        ]
+        return f"The loop runs away until the arm is folded up: {' and '.join(gone)}.{clipped}"
     settled = []
     for run in (data.without, data.with_moment):
         time = settling_time(run)
-        is_late = time > UNTIL * float(run.scenario.t[-1])  # inf, or so near the end that it tells nothing
         stays = f"the moment stays within 5 % of its largest from {significant(time, 3)} s on"
-        settled.append("the moment does not settle within this record" if is_late else stays)
+        never = f"the moment is not settled within {plain(float(run.t[-1]), 4)} s"
+        settled.append(stays if math.isfinite(time) else never)
     each = f"Without moment feedback {settled[0]}, with it {settled[1]}"
     both = f"With moment feedback or without it {settled[0]}" if settled[0] == settled[1] else each
     ratio = "" if before == 0 or after == 0 else f", {significant(before / after, 3)} times as much without as with it"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -26,16 +27,17 @@ from tfarm.report.tuner_words import (
     tuner_facts,
     tuner_in_short,
 )
-from tfarm.report.words import typeset, upper
+from tfarm.report.words import residual_words, typeset, upper
 from tfarm.tuner.overview import (
     AS_TRAINED,
-    CURVE_SEEDS,
-    MAP_SEEDS,
-    MAP_TRIALS,
     QUANTISED_AND_LATE,
+    SIZES,
     TunerStudy,
+    study_size,
+    trial_samples,
     tuner_study,
 )
+from tfarm.tuner.yardsticks import CONSTANT_GAINS, tried_gains
 
 TUNER_TITLE = "The gain tuner: does a self-tuning gain help?"
 NOT_WITHOUT_DAMPING = (
@@ -57,11 +59,12 @@ RUNS_AWAY = (
 
 def tuner_section(arm: Arm, chain: Chain | None = None) -> PageSection:
     """The tuner with the paper's figures on a damped arm and its own chain; one sentence for any other."""
-    reason = why_not(arm)
+    chain = Chain() if chain is None else chain
+    reason = why_not(arm) or why_too_long(arm, chain)
     if reason:
         return PageSection(anchor="tune", title=TUNER_TITLE, words=(reason,))
     try:
-        data = tuner_study(arm, Chain() if chain is None else chain)
+        data = tuner_study(arm, chain)
     except CertificationError as error:
         words = f"No tuner here: no range of gains is proven stable for a gain that moves ({typeset(str(error))})."
         return PageSection(anchor="tune", title=TUNER_TITLE, words=(words,))
@@ -82,6 +85,7 @@ def section_of(data: TunerStudy) -> PageSection:
             shaping_words(data),
             bound_words(data),
             learning_words(data),
+            *([fewer_words(data)] if data.size != SIZES[0] else []),
             *([servo_words(data)] if data.servo else []),
         ),
         blocks=(
@@ -105,6 +109,32 @@ def why_not(arm: Arm) -> str:
     if not arm.has_elastic_link:
         return ""
     return NOT_WITHOUT_DAMPING if arm.is_undamped else NOT_ON_ELASTIC
+
+
+def why_too_long(arm: Arm, chain: Chain) -> str:
+    """The sentence for a slew of more samples than a page's study can have; empty for any other."""
+    samples = trial_samples(arm, chain)
+    if study_size(samples) is not None:
+        return ""
+    return (
+        f"No tuner here: a trial of this slew has {samples:,} samples at a period of "
+        f"{plain(chain.sampling.period)} s, and the smallest study of seeds and learning rates has "
+        f"{SIZES[-1].trials:,} trials. A single tuning: tfarm tune."
+    )
+
+
+def fewer_words(data: TunerStudy) -> str:
+    """The extent of a study that long trials limit."""
+    size, full, n = data.size, SIZES[0], data.tuning.trial.n
+    coarser = f", every second momentum and learning rate ({data.cost_map.median.size} pairs)" * size.coarser
+    rows = f" The comparison has {size.conditions} conditions, all on this arm." if size.conditions else ""
+    gains = tried_gains(n)
+    constant = f" {gains} constant gains are tried instead of {CONSTANT_GAINS}." * (gains < CONSTANT_GAINS)
+    return (
+        f"Reduced study: a trial has {n:,} samples. Learning curves: {size.curve_seeds} seeds instead of "
+        f"{full.curve_seeds}. Map: {how_many(size.map_seeds, 'seed')} and {size.map_trials} trials a pair instead of "
+        f"{full.map_seeds} and {full.map_trials}{coarser}.{rows}{constant}"
+    )
 
 
 # ------------------------------------------------------------ pictures
@@ -134,7 +164,7 @@ def _gain_picture(data: TunerStudy) -> Picture:
             columns=(
                 Column("t_s", "time", "s", of=tuning.training.result.t),
                 Column("K", "gain", of=K),
-                Column("x_N_m", "root moment less the rigid arm's", "N m", of=tuning.training.result.x),
+                Column("x_N_m", "x, as the controller reads it", "N m", of=tuning.training.result.x),
             ),
         ),
     )
@@ -185,8 +215,8 @@ def _residuals(data: TunerStudy, which: int) -> str:
     """What is left after the slew, from the table's rows: as trained, or with converters and delay."""
     row = data.rows[(AS_TRAINED, QUANTISED_AND_LATE)[which]]
     return (
-        f"Left after the slew: {significant(row.without.residual, 3)} N m rms without moment feedback, "
-        f"{significant(row.tuner.residual, 3)} N m with the tuner, {significant(row.best_constant.residual, 3)} N m "
+        f"Left after the slew: {residual_words(row.without.residual)} without moment feedback, "
+        f"{residual_words(row.tuner.residual)} with the tuner, {residual_words(row.best_constant.residual)} "
         "with the best constant gain."
     )
 
@@ -198,6 +228,7 @@ def _signals(data: TunerStudy, which: int, stem: str) -> Table:
 
 def _curves_picture(data: TunerStudy) -> Picture:
     columns: list[Column] = []
+    seeds = data.size.curve_seeds
     for curves in data.curves:
         for name, share in (("lower_quartile", 0.25), ("median", 0.5), ("upper_quartile", 0.75)):
             columns.append(Column(f"{curves.key}_{name}", name, of=curves.quantile(share)))
@@ -208,11 +239,11 @@ def _curves_picture(data: TunerStudy) -> Picture:
         stem="tune-curves",
         title="Learning",
         caption=(
-            f"Cost of each trial over {CURVE_SEEDS} seeds (the paper's Figure 5): grey each seed, blue the median and "
+            f"Cost of each trial over {seeds} seeds (the paper's Figure 5): grey each seed, blue the median and "
             "the middle half; what diverges leaves through the top. The default cuts the gradient to norm 0.5 and "
             "takes a step back where the cost rises; (21) as printed has its sign mended and nothing else."
         ),
-        alt=f"Learning curves of {CURVE_SEEDS} seeds for two rules, beside the best constant gain and the bound.",
+        alt=f"Learning curves of {seeds} seeds for two rules, beside the best constant gain and the bound.",
         figure=draw_curves(data),
         data=Table(stem="tune-curves-data", title="Learning curves", columns=(first, *columns)),
     )
@@ -231,8 +262,8 @@ def _map_picture(data: TunerStudy) -> Picture:
         stem="tune-map",
         title="Momentum and learning rate",
         caption=(
-            f"Median of the final cost over {MAP_SEEDS} seeds after {MAP_TRIALS} trials; lower is darker. "
-            f"{upper(typeset(found.verdict))}. {edge}"
+            f"Median of the final cost over {how_many(data.size.map_seeds, 'seed')} after {data.size.map_trials} "
+            f"trials; lower is darker. {upper(typeset(found.verdict))}. {edge}"
         ),
         alt=f"Map of the final cost over momentum and learning rate. {upper(typeset(found.verdict))}.",
         figure=draw_cost_map(data),
@@ -282,7 +313,10 @@ def residual_table(data: TunerStudy) -> Table:
     return Table(
         stem="tune-residual",
         title="Root moment left after the slew",
-        caption="Root mean square of the root moment less the rigid arm's, from the end of the slew on, in N m.",
+        caption=(
+            "Root mean square of the arm's own root moment less the rigid arm's, from the end of the slew on, in N m"
+            f"{'; – where the loop ran away' if any(row.tuner.residual is None for row in data.rows) else ''}."
+        ),
         record=data.rows,
         columns=_of_each("residual", 3),
     )
@@ -290,7 +324,11 @@ def residual_table(data: TunerStudy) -> Table:
 
 def _of_each(name: str, digits: int) -> tuple[Column, ...]:
     """The condition, then one number of every controller."""
-    cells = lined(digits, 2)
+
+    def cells(values: Sequence[float | None]) -> list[str]:
+        shown = iter(lined(digits, 2)([value for value in values if value is not None]))
+        return ["–" if value is None else next(shown) for value in values]
+
     return (
         Column("condition", "condition", digits=worded(typeset)),
         *(Column(f"{key}_{name}", title, of=f"{key}.{name}", digits=cells) for key, title in CONTROLLERS.items()),

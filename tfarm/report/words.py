@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from tfarm.digits import plain
+from tfarm.digits import plain, significant
 
 TYPESET = {
     "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", "L(iw)": "L(iω)", "J w1": "J ω₁",
@@ -18,6 +18,11 @@ def typeset(text: str) -> str:
     for plain_text, shown in TYPESET.items():
         text = text.replace(plain_text, shown)
     return MINUS_WRITTEN.sub("−", POWER_WRITTEN.sub(lambda number: plain(float(number[0])), text))
+
+
+def residual_words(rms: float | None) -> str:
+    """The root moment left after a slew [N m]; None where the loop ran away."""
+    return "not computed (the loop ran away)" if rms is None else f"{significant(rms, 3)} N m rms"
 
 
 def upper(text: str) -> str:

@@ -6,6 +6,7 @@ import errno
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 from tfarm.arm import Arm
@@ -26,6 +27,7 @@ from tfarm.report.sections import SavedSection
 from tfarm.report.trust import TRUST_FOLDER, kept_evidence, write_trust
 from tfarm.report.trust_proofs import written_proofs
 from tfarm.report.unchanged import is_unchanged, key_of, note_made
+from tfarm.stopping import undone_if_stopped
 
 Notice = Callable[[str], object]
 
@@ -59,11 +61,11 @@ def write(
     numbers are from, if they were fitted to measurements: their pages begin with these.  Responses that were `measured`
     are laid over those of every arm.
     `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  An arm whose
-    pages are up to date is left as it is, unless `force`.  `progress` is told (done, total, what) after each piece of
-    work.  A section that tfarm cannot make of an arm says why in its place, and `notice` is told so in one line, once
-    the pages are written, as it is of an arm left as it was.  Raises ParameterError before any work if
-    `out` cannot be written, two arms share a name or there is none, or an arm or its clock can make nothing of a law.
-    If the work itself fails, `out` is as it was.
+    pages are up to date is left as it is, unless `force`.  `progress` gets (done, total, what runs) whenever a piece of
+    work begins, and at the end.  A section that tfarm cannot make of an arm says why in its place, and `notice` is told
+    so in one line, once the pages are written, as it is of an arm left as it was.  Raises ParameterError before any
+    work if `out` cannot be written, two arms share a name or there is none, or an arm or its clock can make nothing of
+    a law.  If the work itself fails, `out` is as it was.
     """
     _check(arms, only)
     subjects = _subjects(arms, chains, laws, fits, measured)
@@ -163,27 +165,33 @@ def _beside(out: Path, names: Sequence[str]) -> Iterator[Path]:
     made: list[Path] = []
     why = "cannot be written ({}); give a folder that can"
     try:
-        _make_folders(out, made)
-        with temporary_folder(out) as beside:
-            for name in names:
-                _make_folders(out / name, made)
-            why = "could not be written to ({}); free some space, or give another folder"
-            yield beside
+        with undone_if_stopped(partial(_remove_empty, made)):
+            _make_folders(out, made)
+            with temporary_folder(out) as beside:
+                for name in names:
+                    _make_folders(out / name, made)
+                why = "could not be written to ({}); free some space, or give another folder"
+                yield beside
     except OSError as error:
         remedy = why.format(error.strerror or error)
         raise ParameterError(key="out", value=str(out), remedy=remedy) from None
     finally:
-        for folder in reversed(made):  # as far as nothing is in them
-            with suppress(OSError):
-                folder.rmdir()
+        _remove_empty(made)
+
+
+def _remove_empty(folders: Sequence[Path]) -> None:
+    """Remove those with nothing in them, the last first."""
+    for folder in reversed(folders):
+        with suppress(OSError):
+            folder.rmdir()
 
 
 def _make_folders(folder: Path, made: list[Path]) -> None:
     """Make a folder and its parents, noting each that was not there.  Raises OSError if it cannot be written."""
     missing = [part for part in (folder, *folder.parents) if not part.exists()]
     for part in reversed(missing):
-        part.mkdir(exist_ok=True)
         made.append(part)
+        part.mkdir(exist_ok=True)
     if not folder.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
     if not os.access(folder, os.W_OK | os.X_OK):

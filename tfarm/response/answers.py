@@ -12,6 +12,7 @@ from tfarm.digits import general, lined, scientific, singly, unit, within
 from tfarm.exact.methods import roads_answer
 from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
+from .extrema import Extremum
 from .frequency import Bode
 from .transfer import TransferFunction
 
@@ -78,7 +79,7 @@ class Root(NamedTuple):
 def roots_table(data: Bode, *kinds: str, stem: str = "", caption: str = "") -> Table:
     """A row a pole or zero of the upper half-plane, of these kinds."""
     elastic, rows = data.arm.has_elastic_link, []
-    roots = {"pole": (data.poles, data.peaks), "zero": (data.zeros, data.dips)}
+    roots = {"pole": (data.poles, data.at_poles), "zero": (data.zeros, data.at_zeros)}
     for kind in kinds:
         for s, size in zip(*(each.tolist() for each in roots[kind]), strict=True):
             on_axis = kind == "zero" and elastic and abs(s.real) < ZERO_ON_AXIS * abs(s)
@@ -101,10 +102,21 @@ def roots_table(data: Bode, *kinds: str, stem: str = "", caption: str = "") -> T
     return Table(stem=stem, title=title, caption=caption, columns=columns, record=rows)
 
 
-def bode_answer(data: Bode) -> dict[str, Any]:
-    """Poles and zeros of a Bode plot with |G| there ("inf" and 0 on the axis), then its curve, refined around them.
+def extrema_table(extrema: tuple[Extremum, ...], unit_of_gain: str) -> Table:
+    """A row a peak or dip: its frequency, and |G| there."""
+    columns = (
+        Column("omega_rad_s", "angular frequency", "rad/s", of="omega", digits=singly(general, 7)),
+        Column("frequency_hz", "frequency", "Hz", of=lambda each: each.omega / HERTZ, digits=singly(general, 7)),
+        Column("magnitude", "|G|", unit(unit_of_gain), digits=singly(general, 6), head="|G|"),
+    )
+    return Table(columns=columns, record=extrema)
 
-    They are complete up to the band's end in Im s, and in Re s between the two numbers beside each.
+
+def bode_answer(data: Bode) -> dict[str, Any]:
+    """Poles and zeros of a Bode plot with |G| at i Im s ("inf" and 0 on the axis), peaks and dips, then its curve.
+
+    Poles and zeros are complete up to the band's end in Im s, and in Re s between the two numbers beside each.  Peaks
+    and dips are the local maxima and minima of |G| inside the band.
     """
     return {
         "arm": data.arm.name,
@@ -115,6 +127,8 @@ def bode_answer(data: Bode) -> dict[str, Any]:
         "band_rad_s": list(data.band),
         "poles": roots_table(data, "pole"),
         "zeros": roots_table(data, "zero"),
+        "peaks": extrema_table(data.peaks, data.gain_unit),
+        "dips": extrema_table(data.dips, data.gain_unit),
         "poles_between_re_1_s": list(data.pole_width),
         "zeros_between_re_1_s": list(data.zero_width),
         "omega_rad_s": data.omega.tolist(),

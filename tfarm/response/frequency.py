@@ -21,9 +21,11 @@ from tfarm.arm import Arm
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.exact.outputs import Output
+from tfarm.exact.rigid import rigid_response
 from tfarm.records import record
 from tfarm.spectrum import modes
 
+from .extrema import Extremum, extrema
 from .transfer import TransferFunction, transfer
 
 BODE_BAND = "two frequencies in rad/s, the lower first: (1.0, 1000.0)"  # what is asked for
@@ -42,7 +44,8 @@ class Bode:
 
     `poles` and `zeros` are those with Im s >= 0 that the output shows (every cancellation made), s = 0 apart, complete
     up to `band`[1] in the ranges `pole_width` and `zero_width` of Re s [1/s]; the grid holds none of those on the axis.
-    `rigid` is the response of the rigid arm.  `row` is the output itself, `x` [m] its place, None where it has its own.
+    `rigid` is the response of the same rig with rigid links (`rigid_response`).  `row` is the output itself, `x` [m]
+    its place, None where it has its own.
     """
 
     arm: Arm
@@ -55,8 +58,10 @@ class Bode:
     poles: Complex
     zeros: Complex
     rigid: Complex
-    peaks: Real  # |G| at the frequency of each pole; inf on the axis
-    dips: Real  # and of each zero; 0 on the axis
+    at_poles: Real  # |G| at the frequency of each pole; inf on the axis
+    at_zeros: Real  # and of each zero; 0 on the axis
+    peaks: tuple[Extremum, ...]  # local maxima of |G| inside the band, ascending
+    dips: tuple[Extremum, ...]  # and minima
     pole_width: tuple[float, float]
     zero_width: tuple[float, float]
 
@@ -147,6 +152,8 @@ def bode(
     omega = refined_grid(band, np.r_[poles, zeros])
     value = G(1j * omega)
     inside_poles, inside_zeros = poles[poles.imag < band[1]], zeros[zeros.imag < band[1]]
+    infinite, vanishing = (_axis_frequencies(each, band) for each in (inside_poles, inside_zeros))
+    peaks, dips = extrema(G, omega, value, np.r_[poles, zeros], infinite, vanishing)
     return Bode(
         arm=arm,
         output=row.name,
@@ -157,9 +164,11 @@ def bode(
         phase=phase_of(omega, value, inside_poles, inside_zeros, is_real=arm.is_reactive),
         poles=inside_poles,
         zeros=inside_zeros,
-        rigid=G.rigid_body / (1j * omega) ** 2 if G.rigid_body else np.full(omega.size, G.static + 0j),
-        peaks=_magnitude_at(G, inside_poles, on_axis=math.inf),
-        dips=_magnitude_at(G, inside_zeros, on_axis=0.0),
+        rigid=rigid_response(arm, row, 1j * omega, G.share),
+        at_poles=_magnitude_at(G, inside_poles, on_axis=math.inf),
+        at_zeros=_magnitude_at(G, inside_zeros, on_axis=0.0),
+        peaks=peaks,
+        dips=dips,
         pole_width=(all_poles.box[0], all_poles.box[1]),
         zero_width=(all_zeros.box[0], all_zeros.box[1]),
     )
@@ -186,7 +195,7 @@ def _no_motion(arm: Arm, row: Output, x: float | None, band: tuple[float, float]
     zero, everywhere = np.zeros(2, complex), (-math.inf, math.inf)
     return Bode(
         arm=arm, output=row.name, row=row, x=x, omega=omega, value=zero, phase=zero.real, poles=none, zeros=none,
-        rigid=zero, peaks=real, dips=real, pole_width=everywhere, zero_width=everywhere,
+        rigid=zero, at_poles=real, at_zeros=real, peaks=(), dips=(), pole_width=everywhere, zero_width=everywhere,
     )  # fmt: skip
 
 
@@ -246,6 +255,12 @@ def phase_of(omega: Real, value: Complex, poles: Complex, zeros: Complex, *, is_
 
 def _on_axis(roots: Complex) -> NDArray[np.bool_]:
     return (abs(roots.real) <= AXIS_SHARE * abs(roots)) & (roots.imag > 0)
+
+
+def _axis_frequencies(roots: Complex, band: tuple[float, float]) -> Real:
+    """The frequencies inside a band of the roots on the imaginary axis."""
+    omega = roots.imag[_on_axis(roots)]
+    return np.asarray(omega[(omega > band[0]) & (omega < band[1])], float)
 
 
 def _magnitude_at(G: TransferFunction, roots: Complex, *, on_axis: float) -> Real:

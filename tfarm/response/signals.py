@@ -29,6 +29,7 @@ from tfarm.spectrum.scales import first_frequency
 
 RELATIVE = ("Y", "Phi")  # quantities relative to the hub: differences
 SERIES_BELOW = 3e-3  # of the slowest frequency: there as many digits are left as a series of REST_TERMS terms has
+GRIDS_KEPT = 24  # sets of points whose values are kept: memory against time, of no effect on an answer
 REST_TERMS = 8  # of that series: the next is below 1e-20 of the first
 
 
@@ -69,6 +70,19 @@ class Signals:
         """The exact system that they are read from: one link in closed form where they are those at its hub."""
         at_hub = set(self.names) <= set(FED_BACK)
         return loop_system(self.arm) if at_hub else chain_of(self.arm)
+
+    def kept(self, s: Complex) -> LoopParts:
+        """`parts`, not worked out again where they were asked for lately at the same points, as of another law."""
+        key, kept = (s.shape, s.tobytes()), self._kept
+        found = kept.pop(key, None) or self.parts(s)
+        kept[key] = found  # the last one is the latest
+        if len(kept) > GRIDS_KEPT:
+            del kept[next(iter(kept))]
+        return found
+
+    @cached_property
+    def _kept(self) -> dict[Any, LoopParts]:
+        return {}
 
     def parts(self, s: NDArray[Any]) -> LoopParts:
         """Drive (n,), numerators (signals, n) in SI per unit of the input, and scale, at s of any shape."""

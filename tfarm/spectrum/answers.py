@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tfarm.arm import WITH_SHEAR, Arm
-from tfarm.arrays import Real
+from tfarm.arrays import Complex, Real
 from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
-from tfarm.digits import DOUBLE_DIGITS, aligned, general, kept_digits, lined, significant, singly, within
-from tfarm.errors import MISSING
+from tfarm.digits import DOUBLE_DIGITS, CellsOf, general, kept_digits, lined, significant, singly, within
+from tfarm.errors import MISSING, CertificationError, ConvergenceError
 from tfarm.exact.methods import Method, roads_answer
 
-from .damped import DampedModes, damped_modes
+from .damped import NOT_ASSIGNED, DampedModes, damped_modes
+from .enclose import Disc
 from .table import FEWEST_LISTED, Modes, compare_theories, hub_locked
 
 SHAPE_DIGITS = 10  # in a report's files, of what shapes are needed for: these differ by 1e-14 between processors
@@ -59,11 +61,35 @@ MODE_COLUMNS = (  # of `Modes`; a page adds the nodes, which it rounds to a shar
 )  # fmt: skip
 
 
+def _every(damped: DampedModes) -> Complex:
+    """The first eigenvalue of each mode, NaN where it has none, then the unassigned ones."""
+    return np.r_[damped.eigenvalues[:, 0], damped.unassigned_pairs[:, 0]]
+
+
+def _every_ratio(damped: DampedModes) -> Real:
+    """The damping ratio of each of `_every`; NaN of an unassigned real one, which is of no pair."""
+    alone = damped.unassigned_pairs[:, 0]
+    ratio: Real = np.where(alone.imag > 0, -alone.real / abs(alone), np.nan)
+    return np.r_[damped.damping_ratio, ratio]
+
+
 def _imaginary(damped: DampedModes) -> list[str]:
     """Im s, or of an overdamped mode the second of its real eigenvalues."""
-    rising = aligned(damped.eigenvalues[:, 0].imag, 8, least=7)
-    pairs = zip(damped.eigenvalues[:, 1].real.tolist(), damped.is_overdamped, rising, strict=True)
-    return [f"overdamped, and {significant(second, 7)}" if over else text for second, over, text in pairs]
+    cells = _cells(_every(damped).imag, lined(8, 7))
+    for row in np.flatnonzero(damped.is_overdamped):
+        cells[row] = f"overdamped, and {significant(float(damped.eigenvalues[row, 1].real), 7)}"
+    return cells
+
+
+def _cells(values: NDArray[np.floating[Any]], digits: CellsOf, without: str = NOT_ASSIGNED) -> list[str]:
+    """The numbers in these digits, and words where there is none."""
+    known = iter(digits(values[np.isfinite(values)].tolist()))
+    return [next(known) if known_here else without for known_here in np.isfinite(values)]
+
+
+def _known(values: NDArray[np.floating[Any]]) -> list[Any]:
+    """The numbers, MISSING where there is none."""
+    return [MISSING if math.isnan(value) else value for value in values.tolist()]
 
 
 def _ratio(ratio: float) -> str:
@@ -72,11 +98,14 @@ def _ratio(ratio: float) -> str:
 
 
 DAMPED_MODE_COLUMNS = (  # of `DampedModes`, on a page; a command has them beside the undamped ones
-    Column("index", "mode"),
-    Column("eigenvalue_re", "Re s", "1/s", of=lambda damped: damped.eigenvalues[:, 0].real, digits=lined(7, 6)),
-    Column("eigenvalue_im", "Im s", "rad/s", of=lambda damped: damped.eigenvalues[:, 0].imag, shown=_imaginary),
-    Column("damping_ratio", "damping ratio", "-", digits=singly(_ratio)),
-)
+    Column("index", "mode", of=lambda damped: [*damped.index.tolist(), *[MISSING] * len(damped.unassigned)],
+           shown=lambda damped: [*map(str, damped.index), *(each.origin for each in damped.unassigned)]),
+    Column("eigenvalue_re", "Re s", "1/s", of=lambda damped: _known(_every(damped).real),
+           shown=lambda damped: _cells(_every(damped).real, lined(7, 6))),
+    Column("eigenvalue_im", "Im s", "rad/s", of=lambda damped: _known(_every(damped).imag), shown=_imaginary),
+    Column("damping_ratio", "damping ratio", "-", of=lambda damped: _known(_every_ratio(damped)), digits=singly(_ratio),
+           shown=lambda damped: _cells(_every_ratio(damped), singly(_ratio), "-")),
+)  # fmt: skip
 
 
 def modes_by_methods_answer(modes: Modes) -> dict[str, Any]:
@@ -91,7 +120,8 @@ def modes_answer(
     """The modal table, frequencies as strings of so many digits where more than 15 are asked for.
 
     With `certify` each flexible mode gets its proven bracket, and the whole the count that proves it complete; `method`
-    is the road to the frequencies.  Beside each stands that of the same number with the hub locked.
+    is the road to the frequencies.  Beside each stands that of the same number with the hub locked.  Where damped modes
+    cannot be found or proven, `damped_failure` is why.
     """
     columns = _undamped(modes, digits, method)
     answer: dict[str, Any] = {
@@ -113,11 +143,17 @@ def modes_answer(
             columns.append(Column(key, of=[*rigid, *ends], on=(JSON,)))
         answer |= {"proven_complete": True, "proof": {"count": proof.count, "below_rad_s": proof.below}}
     if not modes.arm.is_undamped:
-        damped = damped_modes(modes)
-        columns = [replace(column, on=(JSON,)) if column.key == "nodes_m" else column for column in columns]
-        discs = [] if wanted is None else [_discs(damped, len(modes), wanted)]
-        columns = [*columns[:3], *_damped(damped, len(modes)), *columns[3:], *discs]
-        answer |= _damped_answer(damped) | ({} if wanted is None else {"proven_complete_in_box": True})
+        try:
+            damped = damped_modes(modes)
+            discs = None if wanted is None else damped.certify(wanted)
+        except (ConvergenceError, CertificationError) as error:
+            answer["damped_failure"] = f"damped modes: {error}"
+        else:
+            columns = [replace(column, on=(JSON,)) if column.key == "nodes_m" else column for column in columns]
+            columns = [*columns[:3], *_damped(damped, len(modes)), *columns[3:]]
+            answer |= _damped_answer(damped, discs)
+            if discs is not None:
+                columns.append(_disc_column(damped, len(modes), discs))
     return answer | {"modes": Table(columns=tuple(columns), record=modes)}
 
 
@@ -155,12 +191,22 @@ def beyond_the_box(arm: Arm) -> str:
     return f"{light}, and {ACCUMULATE}{most}, {-1 / arm.damping:.6g} 1/s"
 
 
-def _damped_answer(damped: DampedModes) -> dict[str, Any]:
+def _damped_answer(damped: DampedModes, discs: Sequence[Sequence[Disc]] | None) -> dict[str, Any]:
     """The box of the eigenvalues, and what of them is in no row."""
     note = f"complete in the box; beyond it there are more: {beyond_the_box(damped.undamped.arm)}"
     answer: dict[str, Any] = {"box": list(damped.box), "eigenvalues_in_box": damped.count, "box_note": note}
     if damped.others:
         answer["circuit_eigenvalues"] = list(damped.others)
+    if damped.unassigned:
+        proven: list[dict[str, Any]] = [{}] * len(damped.unassigned)
+        if discs is not None:
+            proven = [{"discs": _as_entries(each)} for each in discs[-len(damped.unassigned) :]]
+        answer["unassigned_eigenvalues"] = [
+            {"eigenvalue": [s.real, s.imag], "origin": origin, **disc}
+            for (s, origin), disc in zip(damped.unassigned, proven, strict=True)
+        ]
+    if discs is not None:
+        answer["proven_complete_in_box"] = True
     if damped.left_out:
         last = damped.index[-1]
         answer["damped_note"] = f"eigenvalues up to mode {last} only: branches above cannot be told apart"
@@ -170,31 +216,46 @@ def _damped_answer(damped: DampedModes) -> dict[str, Any]:
 def _damped(damped: DampedModes, rows: int) -> list[Column]:
     """Eigenvalue, or two real ones, and damping ratio of each mode that was followed, in as many rows as there are."""
     turning = (damped.index == 0) & (damped.eigenvalues[:, 1] != 0)  # friction resists the rigid body
-    over, ratios = (damped.is_overdamped | turning).tolist(), damped.damping_ratio.tolist()
+    over, ratios = (damped.is_overdamped | turning).tolist(), damped.damping_ratio
     pairs = list(zip(damped.eigenvalues.tolist(), over, strict=True))
-    texts = [
-        f"{p.real:.8g} and {q.real:.8g}" if both else f"{within(p.real, EIGENVALUE_ERROR * abs(p), 8)} + {p.imag:.10g}i"
-        for (p, q), both in pairs
-    ]
     words = [
-        f"{ratio:.6g} (overdamped)" if ratio and both else within(ratio, EIGENVALUE_ERROR, 6)
-        for ratio, both in zip(ratios, over, strict=True)
+        "-" if math.isnan(ratio) else f"{ratio:.6g} (overdamped)" if ratio and both else _precise_ratio(ratio)
+        for ratio, both in zip(ratios.tolist(), over, strict=True)
     ]
+    single = [[p.real, p.imag] if np.isfinite(p) and not both else MISSING for (p, _), both in pairs]
+    double = [[p.real, None if math.isnan(q.real) else q.real] if both else MISSING for (p, q), both in pairs]
     rest = [MISSING] * (rows - len(pairs))
+    texts = [_pair_words(*each) for each in pairs] + ["not followed"] * len(rest)
     return [
-        Column("eigenvalue", of=[MISSING if both else [p.real, p.imag] for (p, _), both in pairs] + rest, on=(JSON,)),
-        Column("eigenvalues", of=[[p.real, q.real] if both else MISSING for (p, q), both in pairs] + rest, on=(JSON,)),
-        Column("eigenvalue", "eigenvalue", "1/s", of=texts + ["not followed"] * len(rest), on=(TERMINAL,)),
-        Column("damping_ratio", "damping ratio", of=ratios + rest, shown=words + ["-"] * len(rest)),
+        Column("eigenvalue", of=single + rest, on=(JSON,)),
+        Column("eigenvalues", of=double + rest, on=(JSON,)),
+        Column("eigenvalue", "eigenvalue", "1/s", of=texts, on=(TERMINAL,)),
+        Column("damping_ratio", "damping ratio", of=_known(ratios) + rest, shown=words + ["-"] * len(rest)),
     ]
 
 
-def _discs(damped: DampedModes, rows: int, digits: int) -> Column:
+def _precise_ratio(ratio: float) -> str:
+    return within(ratio, EIGENVALUE_ERROR, 6)
+
+
+def _pair_words(pair: Sequence[complex], is_real: bool) -> str:
+    """Both eigenvalues of a mode as a terminal shows them."""
+    p, q = pair
+    if not np.isfinite(p):
+        return NOT_ASSIGNED
+    if is_real:
+        return f"{p.real:.8g} and {NOT_ASSIGNED if math.isnan(q.real) else f'{q.real:.8g}'}"
+    return f"{within(p.real, EIGENVALUE_ERROR * abs(p), 8)} + {p.imag:.10g}i"
+
+
+def _as_entries(discs: Sequence[Disc]) -> list[dict[str, str]]:
+    return [{"re": disc.re, "im": disc.im, "radius": disc.radius} for disc in discs]
+
+
+def _disc_column(damped: DampedModes, rows: int, discs: Sequence[Sequence[Disc]]) -> Column:
     """The proven discs of each flexible mode that was followed."""
-    found = [
-        [{"re": disc.re, "im": disc.im, "radius": disc.radius} for disc in discs] for discs in damped.certify(digits)
-    ]
-    flexible = int(np.sum(damped.index > 0))
-    found, alone = found[:flexible], found[flexible : len(found) - len(damped.others)]
-    rigid: list[Any] = [*alone] or [MISSING] * int(np.sum(damped.index == 0))
+    found: list[Any] = [_as_entries(each) or MISSING for each in discs]
+    flexible, turning = int(np.sum(damped.index > 0)), damped.single.size - len(damped.others)
+    found, alone = found[:flexible], found[flexible : flexible + turning]
+    rigid = alone or [MISSING] * int(np.sum(damped.index == 0))
     return Column("discs", of=[*rigid, *found, *[MISSING] * (rows - len(rigid) - len(found))], on=(JSON,))

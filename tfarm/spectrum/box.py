@@ -89,25 +89,33 @@ def winding_number(function: Function, box: Box, points: int = FIRST_POINTS) -> 
     """
     corners = box.corners
     path = np.concatenate([np.linspace(a, b, points, endpoint=False) for a, b in pairwise(corners)])
-    path = np.append(path, corners[-1])
+    across = abs(corners[2] - corners[0])
+    return round(turned(function, np.append(path, corners[-1]), across) / (2 * math.pi))
+
+
+def turned(function: Function, path: Complex, across: float, nearest: float = NEAREST_TO_ZERO) -> float:
+    """The angle [rad] by which a function turns around 0 along a path of points, more of which are put in as needed.
+
+    Raises ConvergenceError where a zero is nearer to the path than the share `nearest` of |s|, of |s| between that of
+    `NARROW_BOX` and all of the size `across`.
+    """
     phase, rate = _phase(function, path)
     start, end = np.array([path[:-1], phase[:-1], rate[:-1]]), np.array([path[1:], phase[1:], rate[1:]])
-    across, turned, seen = abs(corners[2] - corners[0]), 0.0, path.size
+    angle, seen = 0.0, path.size
     while True:
         length, step = end[0] - start[0], np.angle(np.exp(1j * (end[1] - start[1]).real))
         foreseen = abs(length) * np.maximum(abs(start[2]), abs(end[2]))
         smooth = (abs(step) <= LONGEST_TURN) & (foreseen <= FORESEEN)  # not so what is no number
-        turned += float(step[smooth].sum())
+        angle += float(step[smooth].sum())
         start, end, length, step = start[:, ~smooth], end[:, ~smooth], length[~smooth], step[~smooth]
         if not length.size:
-            break
-        smallest = NEAREST_TO_ZERO * np.clip(abs(start[0]), NARROW_BOX * across, across)
+            return angle
+        smallest = nearest * np.clip(abs(start[0]), NARROW_BOX * across, across)
         if seen > MOST_CONTOUR_POINTS or (abs(length) < smallest).any():
             raise ConvergenceError(f"a zero lies on the contour near {start[0, 0]:.6g}", start[0, 0], step[0])
         halfway = (start[0] + end[0]) / 2
         middle = np.array([halfway, *_phase(function, halfway)])
         start, end, seen = np.hstack([start, middle]), np.hstack([middle, end]), seen + halfway.size
-    return round(turned / (2 * math.pi))
 
 
 def _phase(function: Function, points: Complex) -> tuple[NDArray[np.float64], Complex]:

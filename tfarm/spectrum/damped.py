@@ -9,7 +9,9 @@ can be complete but in a box, and no box can hold -1/C.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +33,10 @@ from tfarm.exact.system import System
 from tfarm.records import record
 
 from .box import Box
-from .complete_box import TOWARD_SINGULAR, complete_box
+from .complete_box import TOWARD_SINGULAR, complete_box, filled_box
 from .complex_shapes import mode_field
 from .continuation import Node, follow
-from .correction import Member, improved
+from .correction import BELIEVED_SHARE, Member, improved
 from .enclose import Disc, disjoint, enclosed, proven_count
 from .scales import first_frequency
 from .search import LISTS_KEPT
@@ -48,7 +50,19 @@ BESIDE_DISC = 1e-12  # how far a listed eigenvalue may be from its disc, of its 
 FIRST_STEP_IN_C = 0.01  # the first step in C, over 1/w of the highest mode
 FIRST_SHARE = 1e-3  # of all damping; of the lowest frequency, what a zero that friction makes may be: it is known there
 SLOWEST, REAL_POINTS = 1e-6, 300  # of the lowest frequency, and how many: signs read on the negative real axis
+DRIVE_PARTS = {"friction": "hub friction", "back_emf": "back-EMF", "lag": "electrical pole"}  # what may set a zero
+NOT_ASSIGNED = "not assigned"
+LEAST_INFLUENCE = 0.3  # |d ln s/d ln p| of a part p that an eigenvalue is named after: it is 1/2 where two share it
+PART_STEP = Fraction(1, 10_000)  # of a part, for differences: float64 has D to 1e-15 of its terms
+MOST_NAMED = 3  # eigenvalues in the text of an error
 LAST_STEPS = 3  # of Newton's method from zeros right to SETTLED_CORRECTION: all digits, and once more
+
+
+class Unassigned(NamedTuple):
+    """An eigenvalue [1/s] of no mode, Im >= 0, a complex one with its conjugate; `origin` is `origin_of` it."""
+
+    eigenvalue: complex
+    origin: str
 
 
 @dataclass(frozen=True)
@@ -62,6 +76,7 @@ class DampedModes:
     eigenvalues, all of them listed.  `left_out` modes that were asked for are not in the record: from the next one on
     branches could not be told apart.  `others` are real eigenvalues of the motor's circuit, which belong to no mode.
     Where friction at the hub resists the turning rig, the second eigenvalue of mode 0 is not 0 but about -b/J.
+    `unassigned` are eigenvalues that no mode certainly goes over into; a mode without an eigenvalue of its own has NaN.
     """
 
     undamped: Modes
@@ -70,6 +85,7 @@ class DampedModes:
     count: int
     left_out: int = 0
     others: tuple[float, ...] = ()
+    unassigned: tuple[Unassigned, ...] = ()
 
     @property
     def index(self) -> NDArray[np.int64]:
@@ -84,14 +100,20 @@ class DampedModes:
     @property
     def is_overdamped(self) -> NDArray[np.bool_]:
         """Which modes do not oscillate."""
-        return (self.eigenvalues[:, 0].imag == 0) & (self.index > 0)
+        return (self.eigenvalues[:, 0].imag == 0) & (self.index > 0) & self.is_assigned
+
+    @property
+    def is_assigned(self) -> NDArray[np.bool_]:
+        """Which modes have an eigenvalue of their own; of mode 0 it may be the 0 alone."""
+        return np.isfinite(self.eigenvalues[:, 0])
 
     @cached_property
     def damping_ratio(self) -> Real:
         """-(p + q)/(2 sqrt(p q)) of both eigenvalues: -Re/|s| of a pair, above 1 if overdamped, 0 for a rigid body."""
         p, q = self.eigenvalues.T
         size = np.sqrt((p * q).real)
-        return np.divide(-(p + q).real / 2, size, out=np.zeros_like(size), where=size > 0)
+        unknown = np.where(self.is_assigned, 0.0, np.nan)
+        return np.divide(-(p + q).real / 2, size, out=unknown, where=size > 0)
 
     def certify(self, digits: int = DOUBLE_DIGITS) -> tuple[tuple[Disc, ...], ...]:
         """A disc around each eigenvalue of the flexible modes (one for a pair), and a proof that the box has no other.
@@ -121,24 +143,29 @@ class DampedModes:
     def single(self) -> Real:
         """Real eigenvalues [1/s] of no flexible mode: what friction makes of the second 0 at rest, then `others`."""
         turning = self.eigenvalues[self.index == 0][:, 1].real
-        return np.r_[turning[turning != 0], np.array(self.others)]
+        return np.r_[turning[abs(turning) > 0], np.array(self.others)]
+
+    @property
+    def unassigned_pairs(self) -> Complex:
+        """The unassigned eigenvalues (n, 2) [1/s]: a conjugate pair, or a real one and NaN."""
+        zeros = np.array([each.eigenvalue for each in self.unassigned], dtype=complex)
+        return np.stack([zeros, np.where(zeros.imag > 0, zeros.conj(), np.nan)], axis=-1)
 
     @property
     def _listed(self) -> Complex:
-        """Every eigenvalue of the record but those at 0, (n, 2): the flexible modes', then single ones beside NaN."""
-        turning = self.eigenvalues[(self.index == 0)][:, 1]
-        alone = [*turning[turning != 0], *self.others]
-        return np.concatenate(
-            [self.eigenvalues[self.index > 0], [[each, np.nan] for each in alone]]
-            if alone
-            else [self.eigenvalues[self.index > 0]]
-        )
+        """Every eigenvalue of the record but those at 0, (n, 2): of the flexible modes, single ones, unassigned ones.
+
+        NaN stands where a row has one eigenvalue or none.
+        """
+        alone = np.stack([self.single, np.full(self.single.size, np.nan)], axis=-1)
+        return np.concatenate([self.eigenvalues[self.index > 0], alone, self.unassigned_pairs])
 
     # ------------------------------------------------------------ shapes
 
     def shape(self, x: NDArray[np.float64] | float) -> Complex:
         """Total displacement w(x) [m] of both eigenvalues of each flexible mode at x [m]: shape (n, 2, *x.shape).
 
+        NaN of a mode without an eigenvalue of its own.
         Scaled so that the residue of w(x) over torque is w(x) psi(0)/(2 s), as for undamped modes of unit modal mass.
         """
         return self._field("W", x) * float(self.undamped.system.length)
@@ -158,31 +185,42 @@ class DampedModes:
         if not np.all((share >= 0) & (share <= 1)):
             raise ParameterError(key="x", value=x, remedy=f"a point of the arm lies between 0 and {float(k.length)} m")
         zeros = self.eigenvalues[self.index > 0]
-        values = [[mode_field(k, complex(zero), quantity, share.ravel()) for zero in pair] for pair in zeros]
+        unknown = np.full(share.size, complex(np.nan, np.nan))
+        values = [
+            [mode_field(k, complex(zero), quantity, share.ravel()) if np.isfinite(zero) else unknown for zero in pair]
+            for pair in zeros
+        ]
         return np.array(values, dtype=complex).reshape(*zeros.shape, *share.shape)
 
 
 def damped_modes(undamped: Modes) -> DampedModes:
-    """The modes of the arm with its own C, continued from the undamped ones: all, or the first that can be followed.
+    """The modes of the arm with its own C, continued from the undamped ones as far as that can be followed.
 
-    Where branches cannot be told apart the record holds fewer modes than are asked for, and `left_out` says how many
-    are missing.  Raises ConvergenceError where not even the first can be followed.
+    Eigenvalues in the box that continue from no mode for certain are listed as `unassigned`.  Of more than 300 modes,
+    or where a box cannot be searched, the record holds fewer than are asked for, and `left_out` is how many are
+    missing.  Raises ConvergenceError where neither the first mode can be followed nor its box searched.
     """
     if not isinstance(undamped, Modes):
         raise ParameterError(key="modes", value=undamped, remedy="give what tfarm.modes returns")
-    asked, lost = int(undamped.index.max()), None
+    asked, lost, found = int(undamped.index.max()), None, None
     for count in sorted({asked, *FEWER_MODES}, reverse=True):
         if count > asked or (count > FEWER_MODES[0] and not undamped.arm.is_undamped):
             continue
         some = undamped if count == asked else modes(undamped.arm, count, theory=undamped.theory)
         try:
-            found = all_damped_modes(some, COMPANY if count == asked <= MANY_MODES else COMPANY[:1])
+            found = _listed(some, COMPANY if count == asked <= MANY_MODES else COMPANY[:1])
         except ConvergenceError as error:
             lost = error
             continue
-        return replace(found, left_out=asked - count)
-    assert lost is not None
-    raise lost
+        break
+    if found is not None and (found.undamped == undamped or asked > FEWER_MODES[0]):
+        return replace(found, left_out=asked - int(found.index.max()))
+    try:
+        return searched(undamped, found)
+    except ConvergenceError:
+        if found is None:
+            raise lost or AssertionError from None
+        return replace(found, left_out=asked - int(found.index.max()))
 
 
 def damped_at_hub(arm: Arm, count: int) -> DampedModes | None:
@@ -203,19 +241,31 @@ def damped_at_hub(arm: Arm, count: int) -> DampedModes | None:
 def all_damped_modes(undamped: Modes, companies: tuple[int, ...] = COMPANY) -> DampedModes:
     """All of the modes with the arm's own C, followed with so many more beside them: the next number if one fails.
 
-    Raises ConvergenceError if a branch is lost, or two arrive at one eigenvalue.
+    Raises ConvergenceError if a branch is lost, or an eigenvalue belongs to no mode.
     """
+    return _all_assigned(_listed(undamped, companies))
+
+
+def _listed(undamped: Modes, companies: tuple[int, ...]) -> DampedModes:
+    """`Branches.listed`, once for each arm."""
     found = _followed_once(undamped.arm, undamped.theory, int(undamped.index.max()), companies)
     if isinstance(found, ConvergenceError):
         raise found.with_traceback(None)  # else the frames of every search for it stay
-    return found if found.undamped == undamped else Branches(companies)(undamped)
+    return found if found.undamped == undamped else Branches(companies).listed(undamped)
+
+
+def _all_assigned(damped: DampedModes) -> DampedModes:
+    if damped.unassigned:
+        names = ", ".join(f"{each.eigenvalue:.6g} 1/s ({each.origin})" for each in damped.unassigned[:MOST_NAMED])
+        raise ConvergenceError(f"eigenvalues of no mode: {names}", damped, len(damped.unassigned))
+    return damped
 
 
 @lru_cache(maxsize=LISTS_KEPT)  # loops, plants and simulations of one page ask for the same modes some ninety times
 def _followed_once(arm: Arm, theory: Theory, count: int, companies: tuple[int, ...]) -> DampedModes | ConvergenceError:
     """All damped modes of an arm's own table of `count`, or why they cannot be followed: that takes longest."""
     try:
-        return Branches(companies)(modes(arm, count, theory=theory))
+        return Branches(companies).listed(modes(arm, count, theory=theory))
     except ConvergenceError as error:
         return error.with_traceback(None)
 
@@ -234,20 +284,27 @@ class Branches:
 
     def __call__(self, undamped: Modes) -> DampedModes:
         """The modes with the C of this table's arm.  Raises ConvergenceError as `all_damped_modes` does."""
+        return _all_assigned(self.listed(undamped))
+
+    def listed(self, undamped: Modes) -> DampedModes:
+        """The modes with the C of this table's arm, and what of their box is of no mode."""
         k = undamped.system
         flexible, alone = int((undamped.index > 0).sum()), len(single_zeros(undamped))
         zeros = self._followed(undamped, flexible + alone)
         listed, company = zeros[: flexible + alone], zeros[flexible + alone :]
-        box, count = complete_box(member(k).function, listed, company, k.damping)
+        box, count, more = complete_box(member(k).function, listed, company, k.damping)
         single = listed[:alone]
-        if single.size and (np.isfinite(single[:, 1]).any() or single[:, 0].imag.any()):
-            raise ConvergenceError("friction at the hub or the motor's circuit rings with a flexible mode", single, 0)
+        kept = np.isnan(single[:, 1]) & (single[:, 0].imag == 0)  # not what rings or has met another real one
+        free, pairs = np.r_[single[~kept].ravel(), more], listed[alone:].copy()
+        if free.size:  # then the drive's own zeros may have taken the places of modes
+            led = np.array([any(origin_of(k, each) != NOT_ASSIGNED for each in pair) for pair in pairs.tolist()])
+            free, pairs[led] = np.r_[free, pairs[led].ravel()], complex(np.nan, np.nan)
         resisted = int(bool(alone) and k.at_rest == 1)
         rigid = np.zeros((undamped.index.size - flexible, 2), complex)
-        rigid[:, 1] = single[:resisted, 0] if resisted else 0.0
-        others = tuple(float(each) for each in single[resisted:, 0].real)
-        eigenvalues = np.concatenate([rigid, listed[alone:]])
-        return DampedModes(undamped, eigenvalues, box, count + zeros_at_origin(k), others=others)
+        rigid[:, 1] = np.where(kept[:resisted], single[:resisted, 0], np.nan) if resisted else 0.0
+        others = tuple(float(each) for each in single[resisted:][kept[resisted:], 0].real)
+        eigenvalues, unassigned = np.concatenate([rigid, pairs]), _with_origins(k, free)
+        return DampedModes(undamped, eigenvalues, box, count + zeros_at_origin(k), others=others, unassigned=unassigned)
 
     def _followed(self, undamped: Modes, wanted: int) -> Complex:
         """The zeros that the first modes, and those in their company, arrive at."""
@@ -272,6 +329,71 @@ class Branches:
             return nodes[-1].zeros if C == 0 else polished(member(k), nodes[-1].zeros)
         assert lost is not None
         raise lost
+
+
+def searched(undamped: Modes, followed: DampedModes | None) -> DampedModes:
+    """All eigenvalues in a box up to half-way to the next mode, by search: no branch needs to be followed.
+
+    Modes of `followed` keep theirs; another has the one that is much nearer to its own i w than any other is to either.
+    Raises ConvergenceError where the search does not end.
+    """
+    k, asked = undamped.system, int(undamped.index.max())
+    omega = modes(undamped.arm, asked + 1, theory=undamped.theory).natural_frequency[-asked - 1 :]
+    eigenvalues = np.full((undamped.index.size, 2), complex(np.nan, np.nan))
+    eigenvalues[undamped.index == 0] = [0.0, np.nan if k.at_rest == 1 else 0.0]
+    single = np.array(single_zeros(undamped))
+    if followed is not None:
+        eigenvalues[: len(followed.index)], single = followed.eigenvalues, followed.single
+    listed = np.r_[eigenvalues[undamped.index > 0].ravel(), [] if followed is None else single]
+    listed = listed[np.isfinite(listed)]
+    starts = np.r_[listed, 1j * omega, -1j * omega, single]
+    box, found, more = filled_box(member(k).function, float(omega[-2:].mean()), listed, starts, k.damping)
+    for row in np.flatnonzero(np.isnan(eigenvalues[:, 0])):
+        mode = int(undamped.index[row]) - 1
+        if (near := _plainly(omega, mode, found, more)) is not None:
+            eigenvalues[row], more = [near, near.conjugate()], more[more != near]
+    others: tuple[float, ...] = ()
+    if followed is not None:
+        others, beyond = followed.others, followed.unassigned_pairs[:, 0]
+        more = np.r_[more, beyond[~box.holds(beyond)]]
+    count = found.size + zeros_at_origin(k)
+    return DampedModes(undamped, eigenvalues, box, count, others=others, unassigned=_with_origins(k, more))
+
+
+def _plainly(omega: Real, mode: int, found: Complex, free: Complex) -> complex | None:
+    """The free zero that a frequency has moved to by little beside the distance of each to all others; else None."""
+    ringing = free[free.imag > 0]
+    if not ringing.size:
+        return None
+    start, near = 1j * omega[mode], complex(ringing[np.argmin(abs(ringing - 1j * omega[mode]))])
+    rest = found[found != near]
+    apart = [*abs(np.delete(omega, mode) - omega[mode]), *abs(rest - near), *abs(rest - start)]
+    return near if abs(near - start) < BELIEVED_SHARE * min(apart) else None
+
+
+def _with_origins(k: System, zeros: Complex) -> tuple[Unassigned, ...]:
+    """Those of them with Im s >= 0 that are numbers, by size."""
+    upper = zeros[np.isfinite(zeros) & (zeros.imag >= 0)]
+    return tuple(Unassigned(each, origin_of(k, each)) for each in sorted(upper.tolist(), key=abs))
+
+
+def origin_of(k: System, s: complex) -> str:
+    """The parts p of the drive that set an eigenvalue, |d ln s/d ln p| > 0.3; "not assigned" where there are none.
+
+    By differences: ds = -dD/D'(s).  Of -b/J and of -k/b the one of b is 1, of -R/L_a that of the lag, of a pair
+    s^2 = -K^2/(J L_a) that of either 1/2; of a mode it is no more than the loss there does to its frequency.
+    """
+    if isinstance(k, Coefficients):
+        return NOT_ASSIGNED
+    at, found = np.array([s]), []
+    here = member(k).function(at)
+    for part, name in DRIVE_PARTS.items():
+        larger = k.drive._replace(**{part: getattr(k.drive, part) * (1 + PART_STEP)})
+        there = member(replace(k, drive=larger)).function(at)
+        change = there.value * np.exp(there.scale - here.scale) - here.value
+        if abs(change[0] / (here.slope[0] * s)) > LEAST_INFLUENCE * PART_STEP:
+            found.append(name)
+    return " and ".join(found) or NOT_ASSIGNED
 
 
 def entered(damped: DampedModes) -> Real:

@@ -9,6 +9,7 @@ from tfarm.dsp.brief import brief_of
 from tfarm.loop.answers import law_answer
 from tfarm.synthesis.design import Design
 from tfarm.synthesis.law_design import LawDesign
+from tfarm.synthesis.sampled import slew_and_after, trial_slew
 
 
 def design_answer(found: Design | LawDesign) -> dict[str, Any]:
@@ -39,12 +40,22 @@ def design_answer(found: Design | LawDesign) -> dict[str, Any]:
         "objective": found.objective,
         **law_answer(found.law, arm),
         "value": found.value,
+        "slew_duration_s": slew_duration(found),
         "verdict": verdict.verdict,
         "modes": found.modes,
         "at_limit": list(found.at_limit),
         **own,
         **arms_answer(found),
     }
+
+
+def slew_duration(found: Design | LawDesign) -> float | None:
+    """How long the record [s] is that a residual or a cost is of, for `tfarm simulate --duration`; None of others."""
+    arm, chain = found.verdict.loop.arm, found.chain
+    if isinstance(found, Design) and found.loop == "continuous":
+        return None
+    tasks = {"residual": lambda: slew_and_after(arm, arm, chain), "cost": lambda: trial_slew(arm, chain)}
+    return float(tasks[found.objective]().t[-1]) if found.objective in tasks else None
 
 
 def arms_answer(found: Design | LawDesign) -> dict[str, Any]:

@@ -10,13 +10,14 @@ import numpy as np
 
 from tfarm.arm import Arm, HubFeedback, law_of, laws_at
 from tfarm.arrays import Real
+from tfarm.dsp import Slew
 from tfarm.errors import ConvergenceError
 from tfarm.loop.damping import least_damping
 from tfarm.loop.frequencies import band_of, grid
 from tfarm.loop.margins import disk_at
 from tfarm.loop.plant import Loop
 from tfarm.loop.regions import region
-from tfarm.loop.residual import RISE, residual_moment
+from tfarm.loop.residual import residual_moment
 from tfarm.loop.stability import stability
 from tfarm.records import record
 from tfarm.spectrum import modes as natural_modes
@@ -28,13 +29,14 @@ POINTS_A_BASIN = 6  # points of the grid in each basin of a residual
 @dataclass(frozen=True)
 @record
 class ContinuousJudge:
-    """What both gains are worth without a clock, beside those of `held`; the slew is made for the arm `known`."""
+    """What both gains are worth without a clock, beside those of `held`; the `slew` is made for the arm `known`."""
 
     arm: Arm
     objective: str
     held: HubFeedback
     modes: int
     known: Arm
+    slew: Slew
 
     def effort(self, up: Bounds) -> Effort:
         """A residual has as many basins along the moment gain as its modes' frequencies run through slews.
@@ -51,7 +53,7 @@ class ContinuousJudge:
         ends = [
             natural_modes(self.arm.having(hub_inertia=I), self.modes).natural_frequency[-self.modes :] for I in hubs
         ]
-        basins = float(abs(ends[0] - ends[1]).max()) * RISE / (4 * math.pi)
+        basins = float(abs(ends[0] - ends[1]).max()) * self.slew.rise_time / (4 * math.pi)
         return Effort(36, int(min(max(60.0, POINTS_A_BASIN * basins), max(60, 1600 // self.modes))), starts)
 
     def landscape(self, axes: tuple[GainAxis, GainAxis], effort: Effort) -> tuple[Real, Score]:
@@ -82,7 +84,8 @@ class ContinuousJudge:
         if self.objective == "damping":
             return -least_damping(self.arm, laws, self.modes)
         if self.objective == "residual":
-            return residual_moment(self.arm, laws, self.modes, self.known)
+            turn = self.slew.travel_of(self.known.reach) / self.known.reach
+            return residual_moment(self.arm, laws, self.modes, self.known, rise=self.slew.rise_time, turn=turn)
         size = np.array([self._disk(law_of(law)) for law in laws.T])
         return np.asarray(-size - TIE * least_damping(self.arm, laws, self.modes))
 

@@ -163,7 +163,7 @@ def _judges(
 ) -> Iterator[Judge]:
     """Judges of gains on an arm, of ever more modes; `known` is what the slew is made for."""
     if continuous:
-        return iter([ContinuousJudge(arm, objective, held, modes, known)])
+        return iter([ContinuousJudge(arm, objective, held, modes, known, chain.slew)])
     return sampled_judges(arm, chain, objective, held, modes, known)
 
 

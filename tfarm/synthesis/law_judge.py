@@ -4,8 +4,8 @@ damping       least damping ratio of the oscillating poles, those of higher mode
 margin        min 2 |1 + L|/|1 - L|
 sensitivity   max |S|, S = 1/(1 + L)
 delay         the least further delay [s] that turns L to -1 where |L| = 1: (pi + arg L)/q samples, q its angle
-residual      root mean square of the root moment at the samples after the slew of the chain
-cost          T sum of (a x^2 + b e^2)/2 over a slew, the tuner's: x the moment less the rigid arm's, e what is added
+residual      root mean square of the arm's own root moment less the rigid arm's, at the samples after the slew
+cost          T sum of (a x^2 + b e^2)/2 over a slew, the tuner's: x as the controller reads it, e what is added
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ from tfarm.synthesis.sampled import (
     higher_poles,
     lowest_on_circle,
     of_first_modes,
+    simulated_residual,
 )
 from tfarm.synthesis.structures import Slope
 
@@ -88,10 +89,12 @@ class LawJudge:
         return Pieces(*self._curve.pieces(self.objective, acting, slopes), g, dg)
 
     def value(self, law: Law) -> float:
-        """The objective of one law, between the points of the circle too."""
+        """The objective of one law, between the points of the circle too; a residual as `tfarm simulate` finds it."""
+        if self.objective == "residual":
+            return simulated_residual(self.arm, law, self.chain, self.known)
         if self.objective not in ("margin", "sensitivity"):
             score = self.score(law)
-            return score if self.objective in SLEWED else -score
+            return score if self.objective == "cost" else -score
         acting = self._acting(law)
         of: Callable[[Complex], Real] = disk_of if self.objective == "margin" else lambda L: np.asarray(abs(1 + L))
         angles = np.asarray(self._curve.places.imag, dtype=float)
@@ -158,7 +161,8 @@ class LawJudge:
     @cached_property
     def _slew(self) -> LawSlew:
         last = self.loop.pulse.integrals_at + 2 - len(self._gone)
-        return LawSlew(self.arm, self.known, self.chain, self._held, self._signals, last, self._clock)
+        own = np.delete(self.loop.own_moment, self._gone)
+        return LawSlew(self.arm, self.known, self.chain, self._held, self._signals, last, own, self._clock)
 
     def _loop_function(self, acting: Law, q: Real) -> Complex:
         z = np.exp(1j * q)

@@ -6,8 +6,8 @@ few modes only says where to look.
 
     damping    least -Re s/|s| of the oscillating poles, s = ln z/T, of the first modes
     margin     min 2 |1 + L|/|1 - L| over the unit circle, of nearly equal ones that with more damping
-    residual   root mean square of the root moment at the samples after the slew of the chain, M read as it says
-    cost       that of the tuner's trial with constant gains
+    residual   root mean square of the arm's own root moment less the rigid arm's, at the samples after the slew
+    cost       that of the tuner's trial with constant gains, of the moment that the controller reads
 
 Poles of higher modes, which alias into the same angles, are told by where the open loop has them: a held torque moves a
 pole less the higher its mode.  They have to be stable and count no further; where two poles are about as near, the one
@@ -26,13 +26,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from tfarm.arm import FED_BACK, PLANE, Arm, HubFeedback, laws_at
+from tfarm.arm import FED_BACK, PLANE, AnyLaw, Arm, HubFeedback, laws_at, tracked
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, SampledLoop, Scenario, sampled_loop, sampled_verdict, scenario
-from tfarm.dsp.chain import TIME_ROUNDING
 from tfarm.dsp.margins import most_modes
+from tfarm.dsp.results import residual_moment_rms, simulated
 from tfarm.dsp.sampling import PulseTransfer
-from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
+from tfarm.dsp.scenarios import TRIAL_SLEWS, trial_weights
 from tfarm.dsp.verdict import UNDAMPED_MODES
 from tfarm.errors import ConvergenceError
 from tfarm.loop.stability import stability
@@ -104,6 +104,8 @@ class SampledJudge:
         """The damping ratio, disk margin, residual moment [N m] or cost of a law of that score."""
         if self.objective == "margin":
             return self.disk(law)
+        if self.objective == "residual":
+            return simulated_residual(self.loop.plant.arm, law, self.loop.chain, self.known)
         return -score if self.objective == "damping" else score
 
     def _scores(self, points: Real, z: Complex) -> Real:
@@ -160,18 +162,23 @@ class SampledJudge:
     # ------------------------------------------------------------ residual
 
     @cached_property
-    def _with_angle(self) -> tuple[Real, Real, Real, Real]:
-        """Closed-loop matrices with the hub angle: without both gains, what 1 of each adds; input, root moment."""
+    def _with_angle(self) -> tuple[Real, Real, Real]:
+        """Closed-loop matrices with the hub angle: without both gains, what 1 of each adds; the input."""
         bare = self._bare
         start = bare.matrix()
         by_each = np.array([bare.having(**{name: 1.0}).matrix() - start for name in PLANE])
-        _, B, C = self.loop.pulse.matrices()
-        more = len(start) - B.size
-        return start, by_each, np.pad(B, (0, more)), np.pad(C[FED_BACK.index("root_moment")], (0, more))
+        B = self.loop.pulse.matrices()[1]
+        return start, by_each, np.pad(B, (0, len(start) - B.size))
 
-    def _run(self, task: Scenario, points: Real) -> tuple[Real, Real]:
-        """Root moment and input at the samples of a slew, (samples, gains)."""
-        start, by_each, drive, sense = self._with_angle
+    @cached_property
+    def _measured_moment(self) -> Real:
+        """The row that reads the root moment as the controller does, through the anti-alias filter."""
+        row = self.loop.pulse.matrices()[2][FED_BACK.index("root_moment")]
+        return np.pad(row, (0, self.loop.own_moment.size - row.size))
+
+    def _run(self, task: Scenario, points: Real, sense: Real) -> tuple[Real, Real]:
+        """A root moment, as a row reads it of the states, and the input at the samples of a slew, (samples, gains)."""
+        start, by_each, drive = self._with_angle
         (on_rate, on_moment), number = points, points.shape[1]
         A = start + on_rate[:, None, None] * by_each[0] + on_moment[:, None, None] * by_each[1]
         laws, references = laws_at(self.loop.gains, points), task.wanted
@@ -190,16 +197,17 @@ class SampledJudge:
         return slew_and_after(self.loop.plant.arm, self.known, self.loop.chain)
 
     def residual(self, points: Real) -> Real:
-        """Root mean square of the root moment [N m] over a period of the first mode after the slew."""
+        """Root mean square of the root moment less the rigid arm's [N m] over a period of the first mode after it."""
         task = self._slew
-        moment, _ = self._run(task, points)
-        return np.asarray(np.sqrt((moment[task.t >= task.busy_until * (1 - TIME_ROUNDING)] ** 2).mean(axis=0)))
+        moment, _ = self._run(task, points, self.loop.own_moment)
+        return np.asarray(np.sqrt((task.residual(moment) ** 2).mean(axis=0)))
 
     def cost(self, points: Real) -> Real:
         """What the trial of the tuner costs with constant gains."""
         chain = self.loop.chain
         task = trial_slew(self.known, chain)
-        return slew_cost(task, chain, *self._run(task, points))
+        moment, u = self._run(task, points, self._measured_moment)
+        return slew_cost(task, chain, trial_weights(self.known, chain), moment, u)
 
 
 def slew_and_after(arm: Arm, known: Arm, chain: Chain) -> Scenario:
@@ -208,20 +216,27 @@ def slew_and_after(arm: Arm, known: Arm, chain: Chain) -> Scenario:
     return scenario("slew", known, chain, chain.slew.rise_time + left)
 
 
+def simulated_residual(arm: Arm, law: AnyLaw, chain: Chain, known: Arm) -> float:
+    """What `tfarm simulate` finds of that slew [N m], through the converters too; inf where it stops."""
+    run, _ = simulated(*tracked(arm, law), chain, slew_and_after(arm, known, chain))
+    left = residual_moment_rms(run)
+    return np.inf if left is None else left
+
+
 def trial_slew(known: Arm, chain: Chain) -> Scenario:
     """The slew of the tuner's trials, made for the arm `known`."""
-    return scenario("slew", known, chain, max(chain.slew.rise_time, TRIAL_DURATION))
+    return scenario("slew", known, chain, TRIAL_SLEWS * chain.slew.rise_time)
 
 
-def slew_cost(task: Scenario, chain: Chain, moment: Real, u: Real) -> Real:
+def slew_cost(task: Scenario, chain: Chain, weights: tuple[float, float], moment: Real, u: Real) -> Real:
     """T sum of (a x^2 + b e^2)/2 of a slew whose root moment and input are (samples, n)."""
-    (a, b), (x, e) = TRIAL_COST, slew_errors(task, chain, moment, u)
+    (a, b), (x, e) = weights, slew_errors(task, chain, moment, u)
     return np.asarray(task.period * (a * x**2 + b * e**2).sum(axis=0) / 2)
 
 
 def slew_errors(task: Scenario, chain: Chain, moment: Real, u: Real) -> tuple[Real, Real]:
-    """x and e of the tuner's cost, from root moment and input (samples, n) at the samples of a slew."""
-    return moment - task.rigid_moment[:, None], u - (chain.slew.reading == "vibration") * task.feedforward[:, None]
+    """x and e of the tuner's cost, from measured root moment and input (samples, n) at the samples of a slew."""
+    return moment - task.moment_reference[:, None], u - (chain.slew.reading == "vibration") * task.feedforward[:, None]
 
 
 def sampled_judges(

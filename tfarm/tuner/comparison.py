@@ -36,13 +36,13 @@ COMPUTER_DELAY = 1.0  # samples that the computer takes, beyond the chain's own
 
 
 class Outcome(NamedTuple):
-    """`cost` of the trial, and root mean square of x after the slew [N m]; inf where the loop ran away.
+    """`cost` of the trial, inf where the loop ran away, and `residual` root moment after the slew [N m], None there.
 
     `tip_error` [m] is how far the tip is off its target when the trial ends; None where it ran away, and of the bound.
     """
 
     cost: float
-    residual: float
+    residual: float | None
     tip_error: float | None
 
 
@@ -145,7 +145,7 @@ def _row(
         ZV=_constant(here, late["ZV"], 0.0),
         EI=_constant(here, late["EI"], 0.0),
         tuner=_played(gain.run(here.simulator()), here),
-        bound=Outcome(bound.cost, residual_rms(bound, here.task.busy_until), None),
+        bound=Outcome(bound.cost, residual_rms(bound, here.task), None),
         proven=guard.is_proven and _proven(here, guard),
     )
 
@@ -166,4 +166,4 @@ def _constant(trial: Trial, task: Scenario, K: float) -> Outcome:
 
 def _played(run: Simulation, trial: Trial) -> Outcome:
     record = judged(run, trial.cost, trial.signals)
-    return Outcome(record.cost, residual_rms(record, run.scenario.busy_until), tip_off(run, trial))
+    return Outcome(record.cost, residual_rms(record, run.scenario), tip_off(run, trial))

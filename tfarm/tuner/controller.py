@@ -44,18 +44,18 @@ class TunedGain:
 
 
 def judged(simulation: Simulation, cost: Cost, signals: Reading) -> Record:
-    """A simulation's x, u, e and cost: x before the converters, as a trial has it, e from the torque after them.
+    """A simulation as a record: x before the converters, as a trial has it, e from the torque after them.
 
     So x has passed the anti-alias filter where there is one, but none of the ADC's steps.
     """
     task, done = simulation.scenario, simulation.torque.size
     rest = 0.0 if signals == "total" else task.feedforward[:done]
-    x = simulation.measured[:, FED_BACK.index("root_moment")] - task.rigid_moment[:done]
+    x = simulation.measured[:, FED_BACK.index("root_moment")] - task.moment_reference[:done]
     e = simulation.torque - rest
     K = np.zeros(done) if simulation.gain is None else simulation.gain
-    total = float(task.period * np.sum(cost.a * x**2 + cost.b * e**2) / 2)
     stopped = done if simulation.stopped is not None else None
-    return Record(simulation.t, x, e + K * x, e, K, total if stopped is None else float("inf"), stopped)
+    total = np.inf if stopped is not None else float(task.period * np.sum(cost.a * x**2 + cost.b * e**2) / 2)
+    return Record(simulation.t, x, e + K * x, e, K, simulation.at_samples.root_moment, total, stopped)
 
 
 def simulated(simulator: Simulator, gain: TunedGain, cost: Cost) -> Record:

@@ -9,6 +9,8 @@ from __future__ import annotations
 from math import exp, inf, log1p
 from typing import NamedTuple
 
+import numpy as np
+
 from tfarm.arrays import Real
 from tfarm.exact.compiled import compiled, inlined
 
@@ -23,17 +25,21 @@ class Limits(NamedTuple):
 
 
 class Model(NamedTuple):
-    """s' = A s + B torque from sample to sample; servo.s reads angle and rate by their gains, moment.s the moment."""
+    """s' = A s + B torque from sample to sample; servo.s reads angle and rate by their gains, moment.s the moment.
+
+    `own`.s is the arm's own root moment, which the anti-alias filter does not pass.
+    """
 
     turned: Real  # A^T (n, n)
     A: Real  # (n, n)
     B: Real  # (n,)
     servo: Real  # (n,)
     moment: Real  # (n,)
+    own: Real  # (n,)
 
 
 class Reference(NamedTuple):
-    """At each sample (N,): what servo.s should be, torque counted in u, torque not counted, the rigid arm's moment."""
+    """At each sample (N,): what servo.s should be, torque counted in u and not counted, what is off the moment."""
 
     servo: Real
     counted: Real
@@ -63,7 +69,7 @@ class Setting(NamedTuple):
 
 class Run(NamedTuple):
     """What a trial fills, a row a sample: the network's inputs (N, m) and hidden neurons (N, h), signals (N,) [N m],
-    gain K and its slope dK/dz by the output neuron's sum."""
+    gain K, its slope dK/dz by the output neuron's sum, and the arm's own root moment."""
 
     inputs: Real
     hidden: Real
@@ -72,6 +78,7 @@ class Run(NamedTuple):
     e: Real
     K: Real
     slope: Real
+    moment: Real
 
 
 class Work(NamedTuple):
@@ -162,7 +169,7 @@ def sense(k: int, setting: Setting, run: Run, work: Work) -> bool:
     moment = dot(model.moment, work.state)
     if not abs(moment) <= setting.numbers.bound:
         return False
-    run.x[k] = moment - reference.rigid[k]
+    run.x[k], run.moment[k] = moment - reference.rigid[k], dot(model.own, work.state)
     run.u[k] = reference.counted[k] + reference.servo[k] - dot(model.servo, work.state)
     inputs.fill(0.0)
     inputs[U_NOW], inputs[X_NOW] = run.u[k], run.x[k]
@@ -249,3 +256,50 @@ def sample_gradient(k: int, numbers: Numbers, reply: float, x_next: float, run: 
     by_gain = -run.x[k] * (numbers.a * x_next * reply + numbers.b * run.e[k])
     out.fill(0.0)
     gain_gradient(weights, run.inputs[k], run.hidden[k], by_gain * run.slope[k], out)
+
+
+@compiled
+def optimal(model: Model, rest: Real, rigid: Real, numbers: Numbers, gains: Real, offsets: Real) -> None:
+    """Fills the gains (N, n) and offsets (N,) of the linear-quadratic optimum e_k = -gains_k.s - offsets_k, the last
+    sample first (see `yardsticks`)."""
+    A, B, c, T, n = model.A, model.B, model.moment, numbers.T, model.B.size
+    P, closed, turned, product = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
+    q, pull, PB = np.zeros(n), np.zeros(n), np.zeros(n)
+    for k in range(rest.size - 1, -1, -1):
+        g = gains[k]
+        turn(P, B, PB)
+        weight = T * numbers.b + dot(B, PB)
+        if weight > 0:
+            turn(A, PB, g)
+            for i in range(n):
+                g[i] /= weight
+            offsets[k] = (dot(B, q) + dot(B, PB) * rest[k]) / weight
+        for i in range(n):
+            pull[i] = q[i] + PB[i] * (rest[k] - offsets[k])
+            for j in range(n):
+                closed[i, j] = turned[j, i] = A[i, j] - B[i] * g[j]
+        turn(closed, pull, q)
+        for i in range(n):
+            q[i] += T * (numbers.b * offsets[k] * g[i] - numbers.a * rigid[k] * c[i])
+            turn(closed, P[i], product[i])
+        for i in range(n):
+            turn(product, turned[i], P[i])
+            for j in range(n):
+                P[i, j] += T * (numbers.b * g[i] * g[j] + numbers.a * c[i] * c[j])
+        for i in range(n):
+            for j in range(i):
+                P[i, j] = P[j, i] = (P[i, j] + P[j, i]) / 2
+
+
+@compiled
+def controlled(
+    model: Model, rest: Real, rigid: Real, gains: Real, offsets: Real, x: Real, e: Real, moment: Real
+) -> None:
+    """Fills x, e and the arm's own root moment [N m] of the slew under these gains and offsets."""
+    s, now = np.zeros(model.B.size), np.zeros(model.B.size)
+    for k in range(rest.size):
+        x[k], e[k] = dot(model.moment, s) - rigid[k], -dot(gains[k], s) - offsets[k]
+        moment[k] = dot(model.own, s)
+        turn(model.turned, s, now)
+        for i in range(s.size):
+            s[i] = now[i] + model.B[i] * (e[k] + rest[k])

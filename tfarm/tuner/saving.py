@@ -32,7 +32,10 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 @dataclass(frozen=True)
 @record
 class SavedTuner:
-    """What a tuner needs to run: network, guard, K1, Kp and the reading of the signals; and where it was trained."""
+    """What a tuner needs to run: network, guard, K1, Kp and the reading of the signals; and where it was trained.
+
+    `cost` counts moments and torques in the unit by which the network divides them, the first of its scales [N m].
+    """
 
     network: Network
     guard_kind: GuardKind

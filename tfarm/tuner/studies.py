@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -59,12 +60,15 @@ LINE_BEGINS = b'{"key": "'  # of every line that is kept
 @dataclass(frozen=True)
 @record
 class Finished:
-    """One tuning of a study: `costs` of its trials, then a trial with what was learnt (inf where it ran away)."""
+    """One tuning of a study: `costs` of its trials, then a trial with what was learnt.
+
+    Where it ran away, its cost is inf and nothing is known of the `residual` root moment.
+    """
 
     plan: Plan
     costs: list[float]
     cost: float
-    residual: float
+    residual: float | None
     mean_gain: float
     stopped: bool
     died: bool
@@ -121,7 +125,7 @@ def _finished(ground: _Ground, plan: Plan) -> dict[str, Any]:
     return {
         "costs": training.costs.tolist(),
         "cost": float("inf") if gone else training.result.cost,
-        "residual": float("inf") if gone else residual_rms(training.result, ground.trial.task.busy_until),
+        "residual": None if gone else residual_rms(training.result, ground.trial.task),
         "mean_gain": float(training.result.K.mean()),
         "stopped": gone,
         "died": training.died,
@@ -229,6 +233,10 @@ def learning_costs(finished: list[Finished], trials: int) -> Real:
     return costs
 
 
+def _known(value: float | None) -> str:
+    return "ran away" if value is None else general(value, 4)
+
+
 _four = partial(Column, digits=singly(general, 4))
 PLAN_COLUMNS = (  # what the seeds of a group have in common
     Column("alpha", "alpha", of=lambda group: group[0].plan.learning.alpha),
@@ -252,11 +260,17 @@ GROUP_COLUMNS = (  # of the runs of one plan, a run a seed
     Column("best_constant_gain", of=lambda group: group[0].best_constant_gain, on=(JSON,)),
     Column("best_constant_cost", of=lambda group: group[0].best_constant_cost, on=(JSON,)),
     Column("mean_gain_median", of=lambda group: float(np.median([each.mean_gain for each in group])), on=(JSON,)),
-    _four("residual_median", "residual", "N m",
-          of=lambda group: float(np.quantile([each.residual for each in group], 0.5, method="nearest"))),
+    Column("residual_median", "residual", "N m", of=lambda group: _median_residual(group), digits=singly(_known)),
     Column("diverged", "diverged", of=lambda group: sum(each.stopped for each in group)),
     Column("died", "died", of=lambda group: sum(each.died for each in group)),
 )  # fmt: skip
+
+
+def _median_residual(group: list[Finished]) -> float | None:
+    """Of the root moment left after the slew [N m]; None where half of the runs, or more, ran away."""
+    left = [math.inf if each.residual is None else each.residual for each in group]
+    found = float(np.quantile(left, 0.5, method="nearest"))
+    return found if math.isfinite(found) else None
 
 
 def _below(group: list[Finished]) -> int:

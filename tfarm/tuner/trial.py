@@ -26,7 +26,7 @@ from tfarm.arm.checks import check_fields, not_negative, number, positive
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, SampledLoop, Scenario, Simulator, sampled_loop, scenario
 from tfarm.dsp.chain import Reading, chain_or_usual
-from tfarm.dsp.results import rms_after
+from tfarm.dsp.results import residual_left
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.dsp.simulate import FOLDED_UP
 from tfarm.errors import ParameterError, must_be_known
@@ -54,17 +54,26 @@ class Cost:
         if self.a == 0.0 == self.b:
             raise ParameterError(key="a", value=self.a, remedy="a and b are both zero: a cost of nothing")
 
+    def in_units_of(self, torque: float) -> Cost:
+        """The cost that counts moments and torques in units of `torque` [N m] with these weights."""
+        return Cost(a=self.a / torque**2, b=self.b / torque**2)
+
 
 @dataclass(frozen=True)
 @record
 class Record:
-    """The signals of a trial at its samples: `x`, `u`, `e` [N m], gain `K`; `stopped`: the sample where it ran away."""
+    """The signals of a trial at its samples: `x`, `u`, `e` [N m], gain `K`; `stopped`: the sample where it ran away.
+
+    `x` is what the controller reads, through the anti-alias filter and less what is taken off it under the reading of
+    the signals; `moment` [N m] is the arm's own at the root.
+    """
 
     t: Real
     x: Real
     u: Real
     e: Real
     K: Real
+    moment: Real
     cost: float
     stopped: int | None
 
@@ -101,14 +110,17 @@ class Trial:
         moment = -self.loop.having(Kp=0.0, K1=0.0, K2=1.0).matrix()[last]
         B = self.loop.pulse.matrices()[1]
         drive = np.r_[B, np.zeros(len(A) - len(B))]
-        return kernel.Model(*(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment)))
+        return kernel.Model(
+            *(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment, self.loop.own_moment))
+        )
 
     @cached_property
     def reference(self) -> kernel.Reference:
         """What is wanted at each sample."""
         task, gains, none = self.task, self.loop.gains, np.zeros(self.n)
         counted, rest = (task.feedforward, none) if self.signals == "total" else (none, task.feedforward)
-        return kernel.Reference(gains.Kp * task.hub_angle + gains.K1 * task.hub_rate, counted, rest, task.rigid_moment)
+        wanted = gains.Kp * task.hub_angle + gains.K1 * task.hub_rate
+        return kernel.Reference(wanted, counted, rest, task.moment_reference)
 
     @cached_property
     def numbers(self) -> kernel.Numbers:
@@ -143,7 +155,7 @@ class Trial:
     def room(self, network: Network) -> tuple[kernel.Run, kernel.Work]:
         """What a trial with that network fills, and the room that it takes, empty."""
         (hidden, inputs), n, states = network.W1.shape, self.n, self.model.B.size
-        signals = (np.zeros(n) for _ in range(5))
+        signals = (np.zeros(n) for _ in range(6))
         run = kernel.Run(np.zeros((n, inputs)), np.zeros((n, hidden)), *signals)
         return run, kernel.Work(np.zeros(states), np.zeros(states), np.zeros(inputs))
 
@@ -152,10 +164,11 @@ class Trial:
     def with_network(self, network: Network, guard: kernel.Limits) -> Record:
         """The trial with a network as it is; where it was stopped it costs inf."""
         run, _, done = self._forward(network, guard)
-        x, u, e, K = (signal[:done].copy() for signal in (run.x, run.u, run.e, run.K))
+        x, u, e, K, moment = (signal[:done].copy() for signal in (run.x, run.u, run.e, run.K, run.moment))
+        cost, stopped = float(kernel.trial_cost(done, self.numbers, run)), None
         if done < self.n:
-            return Record(self.task.t[:done], x, u, e, K, np.inf, int(done))
-        return Record(self.task.t, x, u, e, K, float(kernel.trial_cost(done, self.numbers, run)), None)
+            cost, stopped = np.inf, int(done)
+        return Record(self.task.t[:done], x, u, e, K, moment, cost, stopped)
 
     def _forward(self, network: Network, guard: kernel.Limits) -> tuple[kernel.Run, kernel.Work, int]:
         """What the trial fills, the room that it takes, and how many samples it makes."""
@@ -238,6 +251,9 @@ def with_signals(chain: Chain, signals: Reading) -> Chain:
     return replace(chain, slew=replace(chain.slew, reading=signals))
 
 
-def residual_rms(record: Record, busy_until: float) -> float:
-    """Root mean square of x [N m] from the end of the slew on (0 if it ends with it); inf where the loop ran away."""
-    return float("inf") if record.stopped is not None else rms_after(record.t, record.x, busy_until)
+def residual_rms(record: Record, task: Scenario) -> float | None:
+    """Root mean square of the arm's own root moment less the rigid arm's [N m], from the end of the slew on.
+
+    None where the loop ran away.
+    """
+    return residual_left(task, record.moment)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
-from tfarm.dsp import Chain, Simulator, scenario
-from tfarm.dsp.chain import Reading
-from tfarm.dsp.results import ideal_chain, modes_for, rms_after, simulation_answer
-from tfarm.dsp.scenarios import TRIAL_DURATION, described
+from tfarm.dsp import Chain, Simulation, Simulator, scenario
+from tfarm.dsp.chain import Reading, chain_or_usual
+from tfarm.dsp.results import ideal_chain, modes_for, residual_moment_rms, residual_raw_moment_rms, simulation_answer
+from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.spectrum.scales import default_gains
@@ -28,7 +28,6 @@ from tfarm.tuner.trial import (
     Cost,
     Record,
     Trial,
-    residual_rms,
     slew_trial,
     usual_rate_gain,
     with_signals,
@@ -48,7 +47,7 @@ class Plan:
 
     `K1` [N m s/rad] and `Kp` [N m/rad] of the servo, 0 in the paper, `duration` of a trial [s], flexible modes `count`,
     `hidden` neurons; `seventh_input` feeds K(t-1) back too, the gain that the paper names among its inputs; `scale`
-    [N m] divides the other six.
+    [N m] is the unit of moments and torques, of the other six and in the cost.
     """
 
     cost: Cost = field(default_factory=Cost)
@@ -136,16 +135,23 @@ class Tuning:
         return self.trial.loop.gains.having(MOMENT_GAIN, self.best_constant.gain)
 
 
-def usual_plan(arm: Arm) -> Plan:
-    """The paper's figures, at the arm's own default rate gain."""
-    return Plan(K1=default_gains(arm).K1)
+def usual_plan(arm: Arm, chain: Chain | None = None) -> Plan:
+    """The paper's figures at the arm's own default rate gain, in its own unit of torque, and for the chain's own slew:
+    trials of three times as long, read as it says."""
+    chain = chain_or_usual(chain)
+    return Plan(
+        K1=default_gains(arm).K1,
+        signals=chain.slew.reading,
+        duration=TRIAL_SLEWS * chain.slew.rise_time,
+        scale=torque_unit(arm, chain),
+    )
 
 
 def trial_of(arm: Arm, plan: Plan, chain: Chain | None) -> Trial:
     """The slew that a plan learns from."""
     return slew_trial(
-        arm, chain, K1=plan.K1, Kp=plan.Kp, cost=plan.cost, signals=plan.signals, duration=plan.duration,
-        count=plan.count,
+        arm, chain, K1=plan.K1, Kp=plan.Kp, cost=plan.cost.in_units_of(plan.scale), signals=plan.signals,
+        duration=plan.duration, count=plan.count,
     )  # fmt: skip
 
 
@@ -157,7 +163,7 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
     if not isinstance(plan, Plan | None):
         raise ParameterError(key="plan", value=plan, remedy="give a tfarm.tuner.Plan, such as Plan(trials=50, K1=0.3)")
     must_be_arm(arm)
-    plan = usual_plan(arm) if plan is None else plan
+    plan = usual_plan(arm, chain) if plan is None else plan
     network = initial_network(plan.seed, hidden=plan.hidden, scales=plan.scales)
     trial = trial_of(arm, plan, chain)
     best = best_constant(trial)
@@ -178,7 +184,8 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
 def tune_answer(tuning: Tuning) -> dict[str, Any]:
     """The tuning as a dictionary of plain numbers, texts and lists."""
     training, plan, guard = tuning.training, tuning.plan, tuning.training.guard
-    result, busy = training.result, tuning.trial.task.busy_until
+    result, trial, runs = training.result, tuning.trial, _runs(tuning)
+    tuned, _, without = runs
     stopped = training.stopped
     return {
         "arm": tuning.trial.arm.name,
@@ -190,6 +197,9 @@ def tune_answer(tuning: Tuning) -> dict[str, Any]:
         "K1": plan.K1,
         "Kp": plan.Kp,
         "trials": int(training.costs.size),
+        "a": plan.cost.a,
+        "b": plan.cost.b,
+        "cost_unit_N_m": plan.scale,
         "cost": training.costs.tolist(),
         "cost_tuned": result.cost,
         "cost_without": tuning.without.cost,
@@ -199,10 +209,10 @@ def tune_answer(tuning: Tuning) -> dict[str, Any]:
         "lq_bound_note": BOUND_NOTES[plan.signals],
         **_shaped(tuning),
         "gain": {"t": result.t.tolist(), "K": result.K.tolist()},
-        "residual_moment_rms": residual_rms(result, busy),
-        "residual_raw_moment_rms": _raw_residual(tuning),
-        "residual_without": residual_rms(tuning.without, busy),
-        **tip_errors(tuning),
+        "residual_moment_rms": residual_moment_rms(tuned),
+        "residual_raw_moment_rms": residual_raw_moment_rms(tuned),
+        "residual_without": residual_moment_rms(without),
+        **_tip_errors(trial, runs),
         "guard": [guard.lo, guard.hi],
         "guard_kind": guard.kind,
         "guard_proven": guard.is_proven,
@@ -217,22 +227,18 @@ def tune_answer(tuning: Tuning) -> dict[str, Any]:
 
 def tip_errors(tuning: Tuning) -> dict[str, float | None]:
     """How far off the tip is [m] when the trial ends: tuned, with the best constant gain, without moment feedback."""
-    trial = tuning.trial
-    simulator = trial.simulator()
-    runs = {
-        "tip_error_m": tuning.gain().run(simulator),
-        "tip_error_best_constant_m": simulator.linear(tuning.constant),
-        "tip_error_without_m": simulator.linear(tuning.gain().servo),
-    }
-    return {key: tip_off(run, trial) for key, run in runs.items()}
+    return _tip_errors(tuning.trial, _runs(tuning))
 
 
-def _raw_residual(tuning: Tuning) -> float:
-    """Root mean square of the root moment itself after the slew [N m], as `tfarm simulate` has it under this key."""
-    result, task = tuning.training.result, tuning.trial.task
-    if result.stopped is not None:
-        return float("inf")
-    return rms_after(result.t, result.x + task.rigid_moment[: result.t.size], task.busy_until)
+def _tip_errors(trial: Trial, runs: Sequence[Simulation]) -> dict[str, float | None]:
+    keys = ("tip_error_m", "tip_error_best_constant_m", "tip_error_without_m")
+    return {key: tip_off(run, trial) for key, run in zip(keys, runs, strict=True)}
+
+
+def _runs(tuning: Tuning) -> tuple[Simulation, Simulation, Simulation]:
+    """The trial through the converters: tuned, with the best constant gain, without moment feedback."""
+    simulator, gain = tuning.trial.simulator(), tuning.gain()
+    return gain.run(simulator), simulator.linear(tuning.constant), simulator.linear(gain.servo)
 
 
 def _shaped(tuning: Tuning) -> dict[str, Any]:
@@ -282,6 +288,7 @@ def controlled_answer(
         "signals": saved.signals,
         "period_s": saved.period,
         **asdict(saved.cost),
+        "cost_unit_N_m": float(saved.network.scales[0]),
     }
     what = described(task, arm, chain)
     return answer | {MOMENT_GAIN: None, "controller": controller, "scenario_in_words": what}

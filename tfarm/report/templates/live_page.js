@@ -121,8 +121,8 @@
     const { moment, torque, residual, settled } = slew.figures(now.run), stopped = now.run.stopped;
     text("slew-torque", general(torque, 5));
     text("slew-moment", general(moment, 5));
-    text("slew-residual", general(residual, 5));
-    text("slew-settled", Number.isFinite(settled) ? general(settled, 5) : "not in this time");
+    text("slew-residual", residual === null ? "not computed" : general(residual, 5));
+    text("slew-settled", Number.isFinite(settled) ? general(settled, 5) : `not settled within ${general((slew.n - 1) * slew.period, 5)} s`);
     text("slew-stopped", stopped === null ? "" : `The arm is folded up after ${general(stopped, 4)} s.`);
     text("slew-command", `tfarm simulate ${gains} --duration ${general(slew.n * slew.period - slew.period, 6)} --modes ${slew.modes}`);
   }

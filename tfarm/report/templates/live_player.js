@@ -4,7 +4,7 @@ const ENLARGED = 0.2; // of the length: how far the largest deflection is drawn
 
 function slewSets(slew, found, between, width) {
   const { t, angle, moment, tip } = slew.traces(found, Math.min(between, Math.ceil(40_000 / found.n))), rows = y => shownOver(t, y, Math.max(width, 300));
-  const torque = [...Array(found.n).keys()].map(k => ({ t: k * slew.period, torque: found.torque[k], reference: slew.ideal[4 * k + 1] }));
+  const torque = [...Array(found.n).keys()].map(k => ({ t: k * slew.period, torque: found.torque[k], reference: slew.ideal[5 * k + 1] }));
   return { angle: rows(angle), moment: rows(moment), tip: rows(tip), torque };
 }
 
@@ -26,7 +26,7 @@ function makePlayer(slew, colours, first) {
     t = clip(time, 0, end());
     $("scrub").value = end() ? t / end() : 0;
     const state = slew.at(found, t), { angle, deflection } = slew.shape(state), moment = slew.read(5, state.a, state.rigid, state.u);
-    paint(angle, deflection, state.u, moment, slew.ideal[4 * state.k + 1]);
+    paint(angle, deflection, state.u, moment, slew.ideal[5 * state.k + 1]);
     $("frame").textContent = `t = ${t.toFixed(3)} s: hub ${angle.toFixed(4)} rad, ${slew.drive} ${general(state.u, 3)} ${slew.unit}, root moment ${general(moment, 3)} N m, tip deflection ${general(deflection[deflection.length - 1], 3)} m`;
     mark();
   }

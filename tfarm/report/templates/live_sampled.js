@@ -157,7 +157,7 @@ class Slew {
     this.p = [...Array(m).keys()].map(i => pair(p, i));
     this.w = doubles(data.residues);
     this.ideal = doubles(data.ideal);
-    this.n = this.ideal.length / 4;
+    this.n = this.ideal.length / 5;
     this.shapes = doubles(data.shapes);
     this.early = this.steps((1 - this.fraction) * this.period);
     this.late = this.steps(this.fraction * this.period);
@@ -193,11 +193,11 @@ class Slew {
     return Math.min(Math.max(near, low ?? -Infinity), high ?? Infinity);
   }
 
-  // u = r + Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t) - K2 (M - M_rigid)
+  // u = r + Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t) - K2 (M - M_ref)
   torque({ K1, K2, Kp }, k, angle, rate, moment) {
-    const f = this.single ? Math.fround : x => x, [r, theta, speed, rigid] = [0, 1, 2, 3].map(i => f(this.ideal[4 * k + i]));
+    const f = this.single ? Math.fround : x => x, [r, theta, speed, wanted] = [0, 1, 2, 3].map(i => f(this.ideal[5 * k + i]));
     const servo = f(f(r + f(f(Kp) * f(theta - f(angle)))) + f(f(K1) * f(speed - f(rate))));
-    return f(servo - f(f(K2) * f(f(moment) - rigid)));
+    return f(servo - f(f(K2) * f(f(moment) - wanted)));
   }
 
   // All samples: amplitudes, rigid motion and torques at each; it stops where the arm is folded up
@@ -224,11 +224,11 @@ class Slew {
   // Root moment and torque at their largest, what rings on after the slew, and when it is settled: tfarm.dsp.results
   figures({ moment, torque, n, stopped }) {
     const largest = list => list.reduce((top, x) => Math.max(top, Math.abs(x)), 0), T = this.period, top = largest(moment);
-    const after = moment.map((x, k) => x - this.ideal[4 * k + 3]).filter((_, k) => k * T >= this.rise * (1 - 1e-12));
+    const after = moment.map((x, k) => x - this.ideal[5 * k + 4]).filter((_, k) => k * T >= this.rise * (1 - 1e-12));
     let last = n - 1;
     while (last >= 0 && !(Math.abs(moment[last]) > 0.05 * top)) last -= 1;
-    const settled = stopped !== null || last === n - 1 ? Infinity : (last + 1) * T;
-    return { moment: top, torque: largest(torque.slice(0, n)), residual: after.length ? Math.sqrt(after.reduce((sum, x) => sum + x * x, 0) / after.length) : 0, settled };
+    const first = last + 1, settled = stopped !== null || (first > 0 && 10 * (n - 1 - first) < n - 1) ? Infinity : first * T;
+    return { moment: top, torque: largest(torque.slice(0, n)), residual: stopped === null ? Math.sqrt(after.reduce((sum, x) => sum + x * x, 0) / after.length) : null, settled };
   }
 
   // The state at any time t [s]: amplitudes, rigid motion, and the torque that acts
@@ -263,8 +263,8 @@ class Slew {
       pieces.push({ end, early: end > late, kept: ends.includes(end), step: this.steps(end - from) });
     }
     const push = (time, state) => {
-      const row = 4 * Math.min(Math.floor(time / T + 1e-9), this.n - 1), rest = time - row / 4 * T;
-      const slope = row + 6 < this.ideal.length ? (this.ideal[row + 6] - this.ideal[row + 2]) / T : 0;
+      const row = 5 * Math.min(Math.floor(time / T + 1e-9), this.n - 1), rest = time - row / 5 * T;
+      const slope = row + 7 < this.ideal.length ? (this.ideal[row + 7] - this.ideal[row + 2]) / T : 0;
       t.push(time);
       angle.push(this.read(3, ...state));
       moment.push(this.read(5, ...state));

@@ -1,0 +1,154 @@
+"""Laws of high order, whose poles lie next to z = 1, and what is known of an integrator there."""
+
+from pathlib import Path
+
+import flint
+import numpy as np
+import pytest
+
+import tfarm
+from tests.dsp.law_orders import BITS, Case, law_in_balls, main, truth, unit
+from tests.shared import sized
+from tfarm import Law
+from tfarm.arm.law_tables import load_law
+from tfarm.dsp import Chain, Converters, Sampling
+from tfarm.dsp.law_factors import law_factors
+from tfarm.dsp.law_loop import acting_law, sampled_law, with_estimate
+from tfarm.dsp.law_verdict import analyse_law, law_verdict
+
+LAB, FILES = tfarm.load("sasaki2012-lab"), Path(__file__).parents[1] / "data" / "reproductions"
+T = 0.01
+NUM = [0.00169331414232833, 0.03993113080787154, 0.391332712647419, 1.378767566695909, 2.4377415154961057]
+DEN = [1.0589339194859544e-05, 0.0012005021651140626, 0.015525504839968703, 0.140135637928477, 0.33676102126880014]
+SLOW = Law({"hub_angle": ([*NUM, 2.647353428853636], [*DEN, 1.0])})  # poles from 3 to 100 rad/s
+LAG = np.poly([-2.0, -2.2, -2.4, -2.5, -2.6, -2.8, -3.0, -3.1]).tolist()
+CLUSTER = {"hub_angle": ([0.2 * LAG[-1]], LAG), "hub_rate": 0.3}
+
+
+def chain_of(period):
+    return Chain(sampling=Sampling(period=period))
+
+
+def is_stable(law, chain):
+    return law_verdict(LAB, law, chain).is_stable
+
+
+# ------------------------------------------------------------ verdicts
+
+
+def test_five_poles_next_to_one_are_no_integrator():
+    """At 0.5 ms the loop's poles are as good as those of continuous time, which the exact arm has."""
+    chain = chain_of(0.0005)
+    analysis = analyse_law(LAB, SLOW, chain)
+    verdict, (low, high) = analysis.verdict, analysis.gain_factors
+    slowest = tfarm.closed_loop_poles(LAB, SLOW, 4).values.real.max()
+    assert (verdict.word, verdict.is_settled, verdict.loop.poles_at_one) == ("stable", True, 0)
+    assert verdict.log_radius == pytest.approx(slowest * 0.0005, rel=1e-3)
+    assert low == 0 < 1 < high
+    assert [is_stable(SLOW.times(each * high), chain) for each in (1e-6, 1 - 1e-6, 1 + 1e-6)] == [True, True, False]
+    (number,) = analysis.numbers
+    assert number.interval == pytest.approx((low, high), rel=1e-9)
+
+
+def test_a_rig_that_eleven_states_drive_grows_slowly():
+    arm = tfarm.load(str(FILES / "2_9.toml"))
+    case = Case(arm, load_law(FILES / "2_9_law.toml"), chain_of(0.000675))
+    verdict = law_verdict(arm, case.law, case.chain)
+    at_one, logs = truth(verdict.loop, case)
+    assert (verdict.word, verdict.is_settled, verdict.loop.poles_at_one) == ("unstable", True, 0)
+    assert at_one == 2  # the integrals of the input, which a hub on a spring does not have
+    assert verdict.loop.poles.log_spectral_radius == pytest.approx(logs[0], rel=1e-9)
+    assert verdict.log_radius == pytest.approx(1.0224e-4, rel=1e-4)
+
+
+@pytest.mark.parametrize("period", [1e-4, 0.01])
+@pytest.mark.parametrize("rule", ["tustin", "zoh", "matched"])
+def test_a_cluster_of_eight_poles_has_the_radius_of_its_state_transition(rule, period):
+    case = Case(LAB, Law(CLUSTER, rule=rule), chain_of(period))
+    verdict = law_verdict(LAB, case.law, case.chain)
+    at_one, logs = truth(verdict.loop, case)
+    assert (verdict.is_settled, at_one) == (True, 0)
+    found = np.sort(verdict.loop.poles.log_radius)[:-11:-1]
+    np.testing.assert_allclose(found, logs[:10], rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("den", "at_one"),
+    [
+        ([1.0, -1.5, 0.5], 1),  # vanishes at z = 1
+        ([1.0, -1.9, 0.9], 0),  # is 1.1e-16 there, as these are doubles: a lag of 1e15 samples
+        ([1.0, -1.1, 0.1], 0),  # is -8e-17: a pole outside
+        ([3.0, -3.3, 0.3], 0),
+    ],
+)
+def test_an_integrator_is_one_if_its_denominator_vanishes_exactly(den, at_one):
+    """The moment of a hub that turns steadily is 0, so that what integrates it stays where it is."""
+    case = Case(LAB, Law({"hub_rate": 0.3, "root_moment": ([0.001, 0.0], den)}, period=T), chain_of(T))
+    loop = sampled_law(LAB, case.law, case.chain, count=4)
+    there, logs = truth(loop, case)
+    assert (loop.poles_at_one, there - loop.has_free_angle) == (at_one, at_one)
+    largest = 0.0 if at_one else logs[0]
+    assert loop.poles.log_spectral_radius == pytest.approx(largest, rel=1e-6, abs=0)
+
+
+@pytest.mark.parametrize("number", sized(8, 100))
+def test_small_run_of_the_survey(number):
+    found = main(number, 3)
+    assert found["right"] == found.total() - found["refused"] - found["not proven"]
+    assert found["right"] > 0.7 * found.total()
+
+
+# ------------------------------------------------------------ factors
+
+
+LAWS = {
+    "tustin": Law(CLUSTER),
+    "zoh": Law({"hub_angle": ([1.0, 0.0, 0.0], [1.0, 5.0, 4.0, 0.0]), "hub_rate": ([1.0, 0.0], LAG)}, rule="zoh"),
+    "matched": Law({"hub_angle": ([2.0, 3.0, 0.0], LAG), "hub_rate": ([1.0, 1.0], [1.0, 0.0, 0.0])}, rule="matched"),
+    "in z": Law({"hub_angle": ([0.4, -0.3], [1.0, -2.9, 2.8, -0.9]), "hub_rate": ([1.0, -1.0], [2.0, -1.0])}, period=T),
+}
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_values_next_to_one_are_those_of_states_in_balls(law):
+    """C (z - A)^-1 B + D, at points from 1e-6 to 2 away from z = 1."""
+    factors = law_factors(law, Chain())
+    delta = np.r_[1e-6j, 1e-4 + 1e-4j, 0.03j, -0.3 + 0.7j, -1.999]
+    shares, whole = factors.shares(delta)
+    before, flint.ctx.prec = flint.ctx.prec, BITS
+    try:
+        for n, (name, block, through) in enumerate(law_in_balls(Case(LAB, law, Chain()))):
+            for k, each in enumerate(delta.tolist()):
+                value = flint.acb(through)
+                if block:
+                    A, B, C = (flint.acb_mat(matrix) for matrix in block)
+                    z = 1 + flint.acb(each.real, each.imag)
+                    value += (C * (unit(A.nrows()) * z - A).inv() * B)[0, 0]
+                found = shares[n, law.signals.index(name), k] / whole[k]
+                assert found == pytest.approx(complex(value), rel=1e-12)
+    finally:
+        flint.ctx.prec = before
+
+
+MATRICES = ([[0.9, 0.2], [0.0, 0.5]], [[0.0, 0.3], [1.0, 0.2]], [[1.0, 0.4]], [[0.1, 0.7]])
+OTHERS = {
+    "prewarped": Law({"hub_rate": ([1.0, 3.0], [1.0, 2.0, 50.0])}, prewarp=30.0),
+    "improper": Law({"hub_angle": ([0.1, 2.0, 1.0], [0.01, 1.0])}),
+    "matrices": Law.of_matrices(*MATRICES, ["hub_angle", "hub_rate"], period=T),
+    "held matrices": Law.of_matrices(*(np.array(each) for each in MATRICES), ["hub_rate", "hub_angle"], rule="zoh"),
+    "sign": Law({"hub_angle": 2.0, "hub_rate": ([0.3], [0.02, 1.0])}, sign=1),
+}
+
+
+@pytest.mark.parametrize("hub_rate", ["ideal", "difference"])
+@pytest.mark.parametrize("law", OTHERS.values(), ids=OTHERS)
+def test_factors_are_those_of_the_law_as_it_acts(law, hub_rate):
+    chain = Chain(converters=Converters(hub_rate=hub_rate, rate_filter=80.0))
+    acting = with_estimate(acting_law(LAB, law, chain)[0], chain)
+    z = np.array([1.3, 0.4 + 0.9j, -1.2 + 0.1j])
+    factors = law_factors(law, chain)
+    shares, whole = factors.shares(z - 1)
+    assert factors.signals == acting.signals
+    np.testing.assert_allclose(shares.sum(axis=0) / whole, acting.values(z), rtol=1e-11, atol=1e-15)
+    weighted = factors.weighted([2.0] * len(law.parts)).shares(z - 1)[0]
+    np.testing.assert_allclose(weighted, 2 * shares, rtol=1e-15)

@@ -1,0 +1,198 @@
+"""CPU seconds of margins and of the sampled verdict under random laws:  python -m tests.loop.law_times 200 [seed]
+
+Random rigs of every kind (`tests.rigs`) and plausible arms (`tests.plausible.arms`), in turn; laws of order 1 to 12 on
+one to three signals: clusters of slow poles, integrators, double integrators, notches on a mode, lags, rarely an
+unstable pole, some with a delay; periods of 0.1 to 20 ms.  Both commands' work is timed, to the JSON, in process, on
+empty caches of the package.
+"""
+
+import os
+import sys
+import time
+import tomllib
+from collections import Counter
+
+if __name__ == "__main__":
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+import tfarm
+from tests.bench import caches
+from tests.plausible.arms import draw
+from tests.rigs import some_rig
+from tfarm.arm import Law
+from tfarm.arm.schema import arm_of_table
+from tfarm.dsp import Chain, Sampling
+from tfarm.dsp.closed import sampled
+from tfarm.dsp.law_verdict import sampled_law_answer
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop.answers import margins_answer
+from tfarm.loop.closed import margins
+from tfarm.reduced.sensed import closed, sensed_model
+from tfarm.response.signals import Signals
+from tfarm.tables.files import to_json
+
+SIGNALS = ("hub_angle", "hub_rate", "hub_angle", "hub_rate", "root_moment", "tip_displacement", "tip_acceleration",
+           "moment@")  # fmt: skip
+PARTS = {"notch": 0.3, "lag": 0.25, "slow": 0.2, "integrator": 0.1, "pair": 0.13, "unstable": 0.02}  # how often
+MODES = 4  # of the rig, on which notches are put
+MODES_OF_MODEL = 8  # of the model by which some laws are made weaker until they work
+WEAKER = (1.0, 0.1, 0.01, 1e-3)  # times a law
+MEDIAN, MOST = 1.0, 5.0  # CPU s: what a median and a maximum may be
+
+
+def some_case(seed, number):
+    """A rig, a law in s and the chain of a sampled loop; the next draw where a rig has no input, or reads nothing."""
+    rng = np.random.default_rng([seed, number])
+    while True:
+        arm = plausible(seed, rng) if number % 2 else some_rig(rng)
+        if arm.is_locked or arm.input == "hub_angle":
+            continue
+        try:
+            omega = tfarm.modes(arm, MODES).natural_frequency[-MODES:]
+            law = some_law(rng, arm, omega)
+        except (ConvergenceError, ParameterError):
+            continue
+        if law is not None:
+            period = log(rng, 1e-4, 2e-2)
+            return arm, law, Chain(sampling=Sampling(period=period, delay_samples=float(rng.choice([0.0, 0.0, 1.0]))))
+
+
+def plausible(seed, rng):
+    """One of the arms of `tests.plausible`, some with friction at the hub."""
+    table = tomllib.loads(draw(int(rng.integers(10_000)), seed).toml)
+    table.pop("slew")
+    if rng.random() < 0.3:
+        table["hub"]["friction"] = table["hub"]["inertia"] * log(rng, 1e-2, 1e1)
+    return arm_of_table(table)
+
+
+def some_law(rng, arm, omega):
+    """One to three entries of order 1 to 12 in all, each loop function of the order of 1 somewhere; None of a gain.
+
+    Half of them are made to work: a proportional and derivative action on the hub's angle first, and all of it weaker
+    and weaker until a modal model is stable, where it ever is.
+    """
+    left, entries, works = int(rng.integers(1, 13)), {}, rng.random() < 0.6
+    names = [str(each) for each in rng.choice(SIGNALS, size=rng.integers(1, 4))]
+    for name in dict.fromkeys(["hub_angle", *names[1:]] if works else names):
+        if name == "root_moment" and arm.has_massless_hub:
+            continue
+        name = f"{name}{round(float(rng.uniform(0.1, 0.9)) * arm.length, 6)}" if name.endswith("@") else name
+        order = left if len(entries) == 2 else int(rng.integers(1 if works and not entries else 0, left + 1))
+        left -= order
+        zeros, poles = roots(rng, order - 1, omega) if works and not entries else roots(rng, order, omega)
+        if works and not entries:
+            zeros, poles = [*zeros, -omega[0] * log(rng, 0.05, 1)], [*poles, -omega[0] * log(rng, 3, 100)]
+        at = 1j * omega[0] * log(rng, 0.1, 10)
+        G = Signals(arm, (name,)).values(np.array([at]))[0, 0]
+        size = abs(G * np.prod(at - np.array(zeros)) / np.prod(at - np.array(poles)))
+        if 1e-100 < size < 1e100:
+            gain = log(rng, 1e-2, 2) / size * (1e-2 if works and entries else 1.0)
+            num, den = gain * np.atleast_1d(np.poly(zeros)).real, np.atleast_1d(np.poly(poles)).real
+            unit = 10.0 ** -np.floor(np.log10(abs(den[den != 0])).mean())  # as a person would write it
+            entries[name] = (tuple(unit * num), tuple(unit * den))
+    if not entries:
+        return None
+    delay = log(rng, 1e-3, 0.3 if not works else 0.03) / omega[0] if rng.random() < 0.3 else 0.0
+    law = Law(entries, delay=float(delay))
+    if works:
+        plant = sensed_model(arm, law.signals, MODES_OF_MODEL)
+        law = next((each for each in map(law.times, WEAKER) if is_stable(plant, each)), law)
+    return law if law.gains is None else None
+
+
+def is_stable(plant, law):
+    """Whether the loop of a modal model is, but for a pole or two at s = 0."""
+    s = np.linalg.eigvals(closed(plant, law.matrices()))
+    return (s.real < 1e-9 * abs(s).max()).all()
+
+
+def roots(rng, order, omega):
+    """Zeros and poles of an entry of that order, part by part."""
+    zeros, poles, w1 = [], [], omega[0]
+    while len(poles) < order:
+        part = str(rng.choice(list(PARTS), p=list(PARTS.values())))
+        room = order - len(poles)
+        if part == "notch" and room > 1:
+            w = float(rng.choice(omega)) * rng.uniform(0.8, 1.2)
+            zeros += pair(w, log(rng, 1e-3, 0.1))
+            poles += pair(w, rng.uniform(0.2, 1.0))
+        elif part == "pair" and room > 1:
+            poles += pair(w1 * log(rng, 0.1, 30), rng.uniform(0.05, 0.95))
+        elif part == "slow":
+            cluster = w1 * log(rng, 1e-3, 1e-1)
+            poles += [-cluster * rng.uniform(0.8, 1.25) for _ in range(min(room, int(rng.integers(1, 4))))]
+            zeros += [-cluster * rng.uniform(0.5, 5.0) for _ in range(len(poles) - len(zeros) - 1)]
+        elif part == "integrator":
+            poles += [0.0] * min(room, int(rng.choice([1, 1, 2])))
+            zeros += [-w1 * log(rng, 1e-2, 1)] * (len(poles) - len(zeros))
+        elif part == "unstable":
+            poles.append(w1 * log(rng, 1e-2, 1))
+        else:
+            poles.append(-w1 * log(rng, 0.1, 30))
+            zeros += [-w1 * log(rng, 0.1, 30)] * int(rng.random() < 0.5)
+    return zeros[: len(poles)] if len(zeros[: len(poles)]) == len(zeros) else whole(zeros, len(poles)), poles
+
+
+def whole(zeros, most):
+    """The first zeros, of which no pair is torn."""
+    kept = zeros[:most]
+    return kept[:-1] if sum(each.imag for each in map(complex, kept)) else kept
+
+
+def pair(w, ratio):
+    root = complex(-ratio * w, w * np.sqrt(1 - ratio**2))
+    return [root, root.conjugate()]
+
+
+def log(rng, low, high):
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def of_margins(arm, law, chain):
+    """The work of `tfarm margins --law`."""
+    return margins_answer(margins(arm, law))
+
+
+def of_sampled(arm, law, chain):
+    """The work of `tfarm sampled --law`."""
+    return sampled_law_answer(sampled(arm, law, chain))
+
+
+WORK = {"margins": of_margins, "sampled": of_sampled}
+
+
+def timed(work, case):
+    """A word, the answer as JSON or the reason that there is none, and CPU seconds."""
+    caches.empty()
+    start = time.process_time()
+    try:
+        word, text = "answered", to_json(work(*case))
+    except (ConvergenceError, ParameterError) as error:
+        word, text = "refused", str(error).splitlines()[0]
+    return word, text, time.process_time() - start
+
+
+def main(size, seed):
+    spent, words = {name: [] for name in WORK}, Counter()
+    for work in WORK.values():
+        timed(work, some_case(0, 0))  # kernels are compiled or read
+    for number in range(size):
+        case = some_case(seed, number)
+        for name, work in WORK.items():
+            word, text, seconds = timed(work, case)
+            spent[name].append(seconds)
+            words[f"{name} {word}"] += 1
+            if seconds > MOST or word == "refused":
+                print(number, name, f"{seconds:.2f} s", text if word == "refused" else word, flush=True)
+    print(dict(words))
+    for name, each in spent.items():
+        middle, high = np.percentile(each, (50, 95))
+        print(f"{name}: median {middle:.3f}, 95 % {high:.2f}, most {max(each):.2f} CPU s", flush=True)
+    return any(np.median(each) > MEDIAN or max(each) > MOST for each in spent.values())
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1))

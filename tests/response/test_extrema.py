@@ -1,0 +1,96 @@
+"""Peaks and dips of |G|: closed forms, a pole without a peak, true infinities, random rigs (`extrema`)."""
+
+import math
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.response.extrema import judged, run
+from tfarm.report.bode_section import alt_text, highest_and_lowest, what_is_seen
+from tfarm.response.extrema import extrema
+
+FLEX, BARE = tfarm.load("quanser-flexlink"), tfarm.load("sasaki2012")
+NONE = np.empty(0)
+
+
+def found(G, omega, roots=()):
+    """Peaks and dips of a function of s on a grid."""
+    return extrema(G, omega, G(1j * omega), np.array(roots, complex), NONE, NONE)
+
+
+@pytest.mark.parametrize("damping", [0.01, 0.3, 0.7])
+def test_of_an_oscillator_the_peak_is_below_its_natural_frequency(damping):
+    """omega sqrt(1 - 2 d^2) and 1/(2 d sqrt(1 - d^2)) in every textbook; none for d > 1/sqrt 2."""
+    pole = 5 * complex(-damping, math.sqrt(1 - damping**2))
+    ((omega, size),), dips = found(lambda s: 25 / (s**2 + 10 * damping * s + 25), np.geomspace(0.1, 100, 200), [pole])
+    assert omega == pytest.approx(5 * math.sqrt(1 - 2 * damping**2), rel=1e-6)  # |G| itself then to 1e-12
+    assert size == pytest.approx(1 / (2 * damping * math.sqrt(1 - damping**2)), rel=1e-12)
+    assert not dips
+
+
+def test_a_peak_and_a_dip_between_two_points_of_the_grid_are_found():
+    """|G|^2 = 1 + e (x^3/3 - h^2 x) in x = omega - 2 has a maximum at -h and a minimum at h."""
+    h, e = 0.01, 0.5
+
+    def G(s):
+        x = s.imag - 2
+        return np.sqrt(1 + e * (x**3 / 3 - h**2 * x)).astype(complex)
+
+    (peak,), (dip,) = found(G, np.array([1.0, 1.5, 1.9, 2.05, 2.4, 3.0]))
+    assert (peak.omega, dip.omega) == (pytest.approx(2 - h, abs=1e-5), pytest.approx(2 + h, abs=1e-5))
+    assert (peak.magnitude, dip.magnitude) == pytest.approx((1 + e * h**3 / 3, 1 - e * h**3 / 3), abs=1e-12)
+
+
+def test_what_rounding_makes_of_a_constant_is_no_peak():
+    rng = np.random.default_rng(4)
+    assert found(lambda s: 1 + 1e-13 * rng.standard_normal(s.size) + 0j, np.geomspace(1, 10, 500)) == ((), ())
+
+
+def test_a_damped_pole_past_which_the_magnitude_falls_is_no_peak():
+    """The first flexible pole of this rig, seen at the tip behind hub friction and motor."""
+    data = tfarm.bode(FLEX, "tip_displacement", (1.0, 60.0))
+    assert data.resonances.imag == pytest.approx([29.14], rel=1e-3)
+    assert (np.diff(abs(data.value)) < 0).all()
+    assert (data.peaks, data.dips) == ((), ())
+    assert highest_and_lowest(data) == "No peak: no local maximum of |G|; no dip: no local minimum of |G|."
+    assert what_is_seen(data).endswith(highest_and_lowest(data))
+    assert "no peaks" in alt_text(data)
+
+
+def test_the_highest_peak_of_a_page_is_the_largest_maximum():
+    data = tfarm.bode(FLEX, "tip_displacement", (1.0, 200.0))
+    (peak,), (dip,) = data.peaks, data.dips
+    inside = (data.omega > dip.omega) & (data.omega < 200.0)
+    assert peak.magnitude == pytest.approx(abs(data.value[inside]).max(), rel=1e-3)
+    words = highest_and_lowest(data)
+    assert words == "Highest peak: 0.02022 m/V at 140.285 rad/s; deepest dip: 8.597 × 10⁻⁴ m/V at 103.168 rad/s."
+    assert (f"{peak.omega:.6g}", f"{dip.omega:.6g}") == ("140.285", "103.168")
+
+
+def test_without_damping_the_dips_between_infinite_peaks_are_finite_where_there_is_no_zero():
+    data = tfarm.bode(BARE, "tip_displacement")
+    case = judged(data)
+    assert (case.false, case.missed) == ((), ())
+    assert [each.omega for each in data.peaks] == tfarm.modes(BARE, 10).natural_frequency[1:].tolist()
+    assert all(math.isinf(each.magnitude) for each in data.peaks)
+    assert all(each.magnitude > 0 for each in data.dips)
+    assert len(data.dips) == 10
+
+
+def test_none_is_false_and_none_missed_on_random_rigs():
+    """`python -m tests.response.extrema 200` for more."""
+    cases, refused = run(10, 12, modes=3)
+    assert not [case for case in cases if case.false or case.missed]
+    assert len(cases) + len(refused) == 10
+    assert sum(len(case.data.peaks) + len(case.data.dips) for case in cases) > 40
+
+
+def test_a_peak_that_is_moved_or_left_out_is_found_out():
+    """The survey's own yardstick."""
+    data = tfarm.bode(FLEX, "tip_displacement", (1.0, 900.0))
+    peak = data.peaks[1]._replace(omega=1.001 * data.peaks[1].omega)
+    object.__setattr__(data, "peaks", (data.peaks[0], peak))
+    case = judged(data)
+    assert case.false == (peak.omega,)
+    assert len(case.missed) == 2

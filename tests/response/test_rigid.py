@@ -1,0 +1,65 @@
+"""The response with rigid links: closed forms of rigid bodies, and the limit of ever stiffer links (`rigid`)."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.response.rigid import run
+from tfarm import Hub, Payload
+from tfarm.arm import RotarySpring
+from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.rigid import rigid_response
+
+FLEX, LAB = tfarm.load("quanser-flexlink"), tfarm.load("sasaki2012-lab")
+
+
+def test_behind_a_motor_with_friction_it_is_the_rigid_body_on_that_motor():
+    """(L_a s + R) i = v - N Ke s theta,  (J s^2 + b s) theta = eta N Kt i,  w(L) = L theta."""
+    data, motor = tfarm.bode(FLEX, "tip_displacement"), FLEX.motor
+    s, gain = 1j * data.omega, motor.gear_efficiency * motor.gear_ratio * motor.torque_constant
+    circuit = motor.inductance * s + motor.resistance
+    back_emf = gain * motor.gear_ratio * motor.back_emf_constant * s
+    theta = gain / (circuit * (FLEX.total_inertia * s**2 + FLEX.hub.friction * s) + back_emf)
+    np.testing.assert_allclose(data.rigid, FLEX.length * theta, rtol=1e-12)
+    assert abs(data.rigid[0]) > 100 * abs(data.rigid[-1])
+    np.testing.assert_allclose(rigid_response(FLEX, OUTPUTS["hub_rate"], s), s * theta, rtol=1e-12)
+
+
+def test_behind_a_clamp_spring_the_rigid_link_rings_on_it():
+    """J_h s^2 theta = u + k d (1 + c s) and J_l s^2 (theta + d) + k d (1 + c s) = 0: d of the clamp, L d at the tip."""
+    k, c = 30.0, 0.002
+    arm = replace(LAB, clamp=RotarySpring(stiffness=k, damping=c))
+    hub, carried, band = arm.hub.inertia, arm.carried_inertia, (1e-7, 300.0)
+    data = tfarm.bode(arm, "tip_deflection", band)
+    s = 1j * data.omega
+    over_theta = -carried * s**2 / (carried * s**2 + k * (1 + c * s))
+    theta = 1 / (hub * s**2 - k * (1 + c * s) * over_theta)
+    np.testing.assert_allclose(data.rigid, arm.length * over_theta * theta, rtol=1e-9)
+    moment = k * (1 + c * s) * over_theta * theta / (1 + arm.damping * s)  # as a strain gauge reads it
+    np.testing.assert_allclose(rigid_response(arm, OUTPUTS["root_moment"], s), moment, rtol=1e-9)
+
+
+@pytest.mark.parametrize("output", ["tip_deflection", "tip_rotation", "strain"])
+def test_a_rigid_link_in_a_rigid_clamp_does_not_bend(output):
+    arm = tfarm.load("stocky-steel")
+    data = tfarm.bode(arm, output, (1.0, 1e4), x=0.3 * arm.length if output == "strain" else None)
+    assert not data.rigid.any()
+
+
+def test_a_locked_hub_carries_it_along_and_a_held_link_has_none():
+    arm = replace(LAB, hub=Hub(inertia=math.inf))
+    data = tfarm.bode(arm, "tip_displacement", (1.0, 300.0))
+    np.testing.assert_allclose(data.rigid, arm.length, rtol=1e-14)
+    held = replace(arm, payload=Payload(inertia=math.inf))
+    assert not tfarm.bode(held, "root_moment", (1.0, 300.0)).rigid.any()
+
+
+def test_it_is_the_limit_of_ever_stiffer_links_on_random_rigs():
+    """`python -m tests.response.rigid 500` for more."""
+    cases = run(12, 34)
+    compared = [each for case in cases for each in case.departures.values()]
+    assert not [case for case in cases if case.wrong]
+    assert len(compared) > 150

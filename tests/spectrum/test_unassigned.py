@@ -1,0 +1,184 @@
+"""Damped modes of rigs that have eigenvalues of no mode: listed, named after what sets them, never refused."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.chain_elements import eigenvalues
+from tests.rigs import some_rig
+from tests.shared import sized, thinned
+from tests.spectrum.damped import judge_rig
+from tfarm import Arm, Hub
+from tfarm.arm import Motor
+from tfarm.cli.running import run
+from tfarm.errors import MISSING, ConvergenceError
+from tfarm.loop.branches import open_pairs
+from tfarm.report.damped_table import damped_table
+from tfarm.report.locked_table import locked_table, locked_words
+from tfarm.spectrum import damped as module
+from tfarm.spectrum.damped import NOT_ASSIGNED, origin_of, searched
+from tfarm.tables.files import json_value
+
+STIFF_FRICTION = Path("tests/data/reproductions/stiff-friction.toml")
+REFUSED_ONCE = {28: 2, 83: 2, 227: 8}  # rigs of `some_rig` at seed 1, and how many modes were asked for
+
+
+def refused_once() -> dict[int, tuple[Arm, int]]:
+    """Those rigs, drawn as they were."""
+    rng = np.random.default_rng(1)
+    drawn = [(some_rig(rng), int(rng.integers(1, 9))) for _ in range(max(REFUSED_ONCE) + 1)]
+    assert {number: drawn[number][1] for number in REFUSED_ONCE} == REFUSED_ONCE
+    return {number: drawn[number] for number in REFUSED_ONCE}
+
+
+RIGS = refused_once()
+
+
+@pytest.mark.parametrize("number", thinned([83, 28, 227], 3))
+def test_a_list_is_not_refused_for_want_of_a_name(number: int) -> None:
+    """All that finite elements have in the box, and a disc around each; something in the drive set what has no name."""
+    verdict = judge_rig(*RIGS[number])
+    assert (verdict.outcome, verdict.reason) == ("unassigned", "")
+
+
+def test_what_stiff_friction_holds_back_is_named_after_it() -> None:
+    """The slow zero is about -k/b: half the friction doubles it; all in the box are those of finite elements."""
+    arm = tfarm.load(STIFF_FRICTION)
+    damped = tfarm.damped_modes(tfarm.modes(arm, 5))
+    slow, *_ = damped.unassigned
+    assert slow.origin == "hub friction"
+    assert damped.left_out == 0
+    half = replace(arm, hub=replace(arm.hub, friction=arm.hub.friction / 2))
+    twice = eigenvalues(half, 5 * abs(slow.eigenvalue))
+    assert twice[0].real / slow.eigenvalue.real == pytest.approx(2, rel=0.3)
+    theirs = eigenvalues(arm, 1e4)
+    theirs = theirs[damped.box.holds(theirs)]
+    mine = np.r_[damped.eigenvalues[damped.is_assigned, 0], [each.eigenvalue for each in damped.unassigned]]
+    assert mine.size == theirs.size
+    np.testing.assert_allclose(np.sort_complex(mine), np.sort_complex(theirs), rtol=1e-6)
+
+
+def test_origins_are_those_of_closed_forms() -> None:
+    """A stiff, light link: -R/L_a of the circuit, about -b/J of the hub, and K^2/(J L_a) = |s|^2 of both together."""
+    lab = tfarm.load("sasaki2012-lab")
+    stiff = replace(lab, link=replace(lab.link, youngs_modulus=1e4 * lab.link.youngs_modulus, damping=0.0))
+    slow = replace(stiff, hub=Hub(inertia=stiff.hub.inertia, friction=1e-3 * stiff.total_inertia))
+    motor = Motor(resistance=1.0, torque_constant=0.05, inductance=1e-3, gear_ratio=50.0, rotor_inertia=1e-5)
+    found = {
+        "hub friction": (slow, -1e-3),
+        "electrical pole": (replace(slow, motor=replace(motor, torque_constant=1e-5), input="motor_voltage"), -1e3),
+    }
+    for origin, (arm, value) in found.items():
+        k = tfarm.modes(arm, 1).system
+        near = eigenvalues(arm, 2 * abs(value))
+        exact = near[abs(near / value - 1).argmin()]
+        assert exact == pytest.approx(value, rel=1e-2)
+        assert origin_of(k, complex(exact)) == origin
+    ringing = replace(stiff, motor=replace(motor, inductance=1.0), input="motor_voltage")
+    near = eigenvalues(ringing, 100.0)
+    pair = complex(near[near.imag > 0][0])
+    inertia = ringing.total_inertia
+    assert abs(pair) ** 2 == pytest.approx((50 * 0.05) ** 2 / (inertia * 1.0), rel=1e-3)
+    assert origin_of(tfarm.modes(ringing, 1).system, pair) == "back-EMF and electrical pole"
+    assert origin_of(tfarm.modes(slow, 1).system, 1j * tfarm.modes(slow, 1).natural_frequency[-1]) == NOT_ASSIGNED
+
+
+def test_without_any_branch_the_box_is_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is followed otherwise: the same eigenvalues, those of lightly damped modes under their numbers."""
+    arm = tfarm.load("sasaki2012-lab").having(damping=1e-5)
+    undamped = tfarm.modes(arm, 4)
+    expected = tfarm.damped_modes(undamped)
+    found = searched(undamped, None)
+    np.testing.assert_allclose(found.eigenvalues, expected.eigenvalues, rtol=1e-10)
+    assert (found.unassigned, found.left_out) == ((), 0)
+
+    def lose(*_: object) -> None:
+        raise ConvergenceError("lost", None, 0)
+
+    heavy = tfarm.modes(arm.having(damping=1e-3), 8)
+    pairs = tfarm.damped_modes(heavy)
+    monkeypatch.setattr(module, "_listed", lose)
+    alone = tfarm.damped_modes(heavy)
+    assert 0 < alone.is_assigned.sum() < len(alone.index)
+    every = np.r_[alone.eigenvalues[alone.is_assigned, 0], alone.unassigned_pairs[:, 0]]
+    inside = pairs.eigenvalues[1:].ravel()[alone.box.holds(pairs.eigenvalues[1:].ravel())]
+    assert all(abs(every / s - 1).min() < 1e-9 for s in inside[inside.imag >= 0])
+    assert alone.certify()
+
+
+@pytest.mark.parametrize("number", thinned([83, 28, 227], 3))
+def test_tables_of_them_hold_every_eigenvalue_and_no_nan(number: int) -> None:
+    arm, count = RIGS[number]
+    undamped = tfarm.modes(arm, count)
+    damped = tfarm.damped_modes(undamped)
+    table = damped_table(undamped)
+    rows = json_value(table)
+    assert [row.get("index") for row in rows] == [*damped.index.tolist(), *[None] * len(damped.unassigned)]
+    origins = next(column.values for column in table.on("files") if column.key == "origin")
+    assert [each for each in origins if each is not MISSING] == [each.origin for each in damped.unassigned]
+    assert all("nan" not in cell for column in table.on("page") for cell in column.cells)
+    shapes = damped.shape(np.array([0.0, arm.length]))
+    known = np.isfinite(damped.eigenvalues[damped.index > 0])
+    assert np.isfinite(shapes[known]).all()
+    assert np.isnan(shapes[~known]).all()
+    assert np.isnan(damped.damping_ratio).sum() == (~damped.is_assigned).sum()
+    locked_words(arm)
+    locked_table(undamped)
+
+
+@pytest.mark.parametrize("proof", sized((), ("--certify",)))
+def test_the_command_lists_them(capsys: pytest.CaptureFixture[str], proof: tuple[str, ...]) -> None:
+    asked = ["modes", str(STIFF_FRICTION), "--count", "2", *proof]
+    assert run([*asked, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    apart = answer["unassigned_eigenvalues"]
+    assert [each["origin"] for each in apart] == ["hub friction"] * 3
+    assert "damped_note" not in answer
+    discs = [each["discs"][0] for each in apart if proof]
+    assert [float(disc["re"]) for disc in discs] == pytest.approx([each["eigenvalue"][0] for each in apart if proof])
+    inside = [each["eigenvalue"][1] > 0 for each in apart if each["eigenvalue"][0] > answer["box"][0]]
+    assert answer["eigenvalues_in_box"] == sum(1 + is_pair for is_pair in inside) == 3
+    assert ["damping_ratio" in mode for mode in answer["modes"]] == [False, False]
+    assert run(asked) == 0
+    assert "One more, -9.2698256 1/s, is assigned to no mode: hub friction." in capsys.readouterr().out
+
+
+def test_the_undamped_table_is_printed_whatever_happens_to_the_damped_one(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One line says why, and the exit code is that of what could not be solved."""
+
+    def lose(*_: object) -> None:
+        raise ConvergenceError("no end of cuts", None, 0)
+
+    monkeypatch.setattr("tfarm.spectrum.answers.damped_modes", lose)
+    assert run(["modes", "sasaki2012-lab", "--count", "3"]) == 3
+    out, err = capsys.readouterr()
+    omega = tfarm.modes(tfarm.load("sasaki2012-lab"), 3).natural_frequency[1:]
+    assert all(f"{each:.12g}" in out for each in omega)
+    assert err == "tfarm: damped modes: no end of cuts\n"
+    assert run(["modes", "sasaki2012-lab", "--count", "3", "--json"]) == 3
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["damped_failure"] == "damped modes: no end of cuts"
+    assert [mode["natural_frequency_rad_s"] for mode in answer["modes"][1:]] == omega.tolist()
+
+
+@pytest.mark.survey
+def test_a_comparison_has_no_damping_ratio_of_what_has_no_name() -> None:
+    arm, other = tfarm.load(STIFF_FRICTION), tfarm.load("sasaki2012-lab")
+    ratios = tfarm.compare([arm, other], modes=4).one.damping_ratio
+    assert [each is None for each in ratios[:4]] == [True, True, False, False]
+    assert not math.isnan(ratios[2])
+
+
+def test_a_locus_begins_at_every_one_of_them() -> None:
+    arm = tfarm.load(STIFF_FRICTION)
+    pairs, _ = open_pairs(arm, 4, 4)
+    damped = tfarm.damped_modes(tfarm.modes(arm, 4))
+    listed = np.r_[damped.unassigned_pairs, damped.eigenvalues[damped.is_assigned]]
+    np.testing.assert_array_equal(pairs, listed)

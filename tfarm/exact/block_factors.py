@@ -1,0 +1,167 @@
+"""Zeros and poles in z of a block of a law, from its doubles as rational numbers, each as delta = z - 1 (FLINT).
+
+    tustin   s - r = (c - r)(delta - 2 r/(c - r))/(delta + 2)
+    matched  delta = e^{rT} - 1, with the same value at rest
+    zoh      poles so; zeros of C(z): det(z - Phi + Gamma C) + (D - 1) det(z - Phi), in balls
+    none     a block in z: roots of num(1 + delta) and den(1 + delta)
+
+Each is right to some last bits of delta, however many others are next to it, and one at z = 1 is 0.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import flint
+import numpy as np
+
+from tfarm.arm.blocks import LawBlock, Rational
+from tfarm.arrays import Complex, Real
+
+AT_MINUS_ONE = -2.0  # delta of z = -1, where Tustin's rule puts what is at infinity in s
+BITS_A_STATE, SPARE_STATES = 64, 8  # of the precision with which a held block begins, doubled until it is enough
+ENOUGH_BITS = 80  # of a coefficient of a held block: those of a double, and some
+MOST_DOUBLINGS = 5  # of the precision: a coefficient without digits by then is 0
+
+Gained = tuple[float, Complex]  # g and the zeros of g prod(delta - zeros)
+
+
+def block_factors(block: LawBlock, rule: str, T: float, c: float) -> tuple[Complex, list[Gained]]:
+    """The poles of a block in z, and of each of its signals the factor and the zeros, all as delta.
+
+    `rule` is that by which it is sampled with the period `T` [s], "none" of one in z; `c` [1/s] is Tustin's 2/T.
+    """
+    nums, den = _polynomials(block)
+    if rule == "none":
+        shift = flint.fmpq_poly([1, 1])
+        return _roots(den(shift)), [(_leading(num, den), _roots(num(shift))) for num in nums]
+    s = _roots(den)
+    if rule == "tustin":
+        most = max(den.degree(), *(num.degree() for num in nums))
+        poles = np.r_[2 * s / (c - s), np.full(most - s.size, AT_MINUS_ONE)]
+        return poles, [_of_tustin(num, den, c, most) for num in nums]
+    if rule == "matched" or not block.order:
+        return np.expm1(s * T), [_of_matched(num, den, T) for num in nums]
+    return np.expm1(s * T), _of_held(block, nums, den, T)
+
+
+# ------------------------------------------------------------ polynomials over the rationals
+
+
+def _polynomials(block: LawBlock) -> tuple[list[Any], Any]:
+    """Of each signal the numerator, and the denominator: polynomials over the rationals (`flint.fmpq_poly`)."""
+    if isinstance(block, Rational):
+        num, den = (flint.fmpq_poly([_rational(each) for each in reversed(of)]) for of in (block.num, block.den))
+        return [num], den
+    A, B, C, D = (_exact(each) for each in block.matrices())
+    den = A.charpoly()
+    nums = [
+        (A - flint.fmpq_mat([[B[i, j] * C[0, k] for k in range(block.order)] for i in range(block.order)])).charpoly()
+        + (D[0, j] - 1) * den
+        for j in range(block.signals)
+    ]
+    return nums, den
+
+
+def _zeros_at_0(polynomial: Any) -> int:
+    """How often a polynomial that is not 0 everywhere vanishes at 0."""
+    return next(n for n, each in enumerate(polynomial.coeffs()) if each)
+
+
+def _rational(x: float) -> Any:
+    return flint.fmpq(*float(x).as_integer_ratio())
+
+
+def _exact(matrix: Real) -> Any:
+    rows, columns = matrix.shape
+    return flint.fmpq_mat(rows, columns, [_rational(each) for each in matrix.ravel().tolist()])
+
+
+def _roots(polynomial: Any) -> Complex:
+    """The roots, to the last bit, each as often as it is one; of 0 none."""
+    if polynomial.degree() < 1:
+        return np.empty(0, complex)
+    found = [complex(root) for root, times in polynomial.complex_roots() for _ in range(times)]
+    return np.array(found, dtype=complex)
+
+
+def _leading(num: Any, den: Any) -> float:
+    """The ratio of the highest coefficients; as a rational number it may have larger parts than any double."""
+    ratio = num.leading_coefficient() / den.leading_coefficient() if num else flint.fmpq(0)
+    return int(ratio.p) / int(ratio.q)
+
+
+# ------------------------------------------------------------ rules
+
+
+def _of_tustin(num: Any, den: Any, c: float, most: int) -> Gained:
+    """Gain and zeros of num/den with s = c delta/(delta + 2), times (delta + 2)^most of both."""
+    zeros, poles = _roots(num), _roots(den)
+    gain = _leading(num, den) * np.prod(1 - zeros / c) / np.prod(1 - poles / c) * c ** (zeros.size - poles.size)
+    at_end = np.full(most - zeros.size, AT_MINUS_ONE) if num else np.empty(0)
+    return float(gain.real), np.r_[2 * zeros / (c - zeros), at_end]
+
+
+def _of_matched(num: Any, den: Any, T: float) -> Gained:
+    """Gain and zeros where every root r becomes e^{rT}; at rest both go the same way, as powers of s and delta/T."""
+    zeros, poles = _roots(num), _roots(den)
+
+    def growth(roots: Complex) -> complex:
+        """prod((e^{rT} - 1)/(r T)) of those that are not 0."""
+        x = roots[roots != 0] * T
+        return complex(np.prod(np.expm1(x) / x))
+
+    gain = _leading(num, den) * growth(poles) / growth(zeros) * T ** (poles.size - zeros.size)
+    return float(gain.real), np.expm1(zeros * T)
+
+
+def _of_held(block: LawBlock, nums: list[Any], den: Any, T: float) -> list[Gained]:
+    """Of each signal gain and zeros of what the block makes of a held one."""
+    states = _companion(nums[0], den) if isinstance(block, Rational) else tuple(map(_exact, block.matrices()))
+    prec = flint.ctx.prec
+    try:
+        flint.ctx.prec = BITS_A_STATE * (block.order + SPARE_STATES)
+        held = [_held_numerator(states, j, num, den, _rational(T)) for j, num in enumerate(nums)]
+    finally:
+        flint.ctx.prec = prec
+    return [(_leading(each, flint.fmpq_poly([1])), _roots(each)) for each in held]
+
+
+def _companion(num: Any, den: Any) -> tuple[Any, Any, Any, Any]:
+    """States of num/den in controllable form, exactly."""
+    n, first = den.degree(), den.leading_coefficient()
+    D = num[n] / first
+    A = flint.fmpq_mat([[-den[n - 1 - k] / first if i == 0 else int(k == i - 1) for k in range(n)] for i in range(n)])
+    C = flint.fmpq_mat([[(num[n - 1 - k] - D * den[n - 1 - k]) / first for k in range(n)]])
+    return A, flint.fmpq_mat(n, 1, [1] + [0] * (n - 1)), C, flint.fmpq_mat([[D]])
+
+
+def _held_numerator(states: Any, j: int, num: Any, den: Any, T: Any) -> Any:
+    """The polynomial in delta of signal j, over the rationals, with coefficients that are right to `ENOUGH_BITS`.
+
+    Where the block has no value at rest it vanishes at delta = 0, once: held signals leave no second zero there.
+    """
+    D, known = states[3][0, j], min(_zeros_at_0(num), _zeros_at_0(den) + 1) if num else 0
+    for _ in range(MOST_DOUBLINGS):
+        balls = _held_coefficients(states, j, T)[known:]
+        if not num or all(each.rel_accuracy_bits() >= ENOUGH_BITS for each in balls):
+            break
+        flint.ctx.prec *= 2
+    middles = [flint.fmpq(0) if each.contains(0) else _middle(each) for each in balls]
+    return flint.fmpq_poly([0] * known + middles + [D])
+
+
+def _held_coefficients(states: Any, j: int, T: Any) -> list[Any]:
+    """Those of delta^0 to delta^(n - 1), n the order of the block, as balls."""
+    A, B, C, D = states
+    n = A.nrows()
+    both = flint.arb_mat([*([A[i, k] * T for k in range(n)] + [B[i, j] * T] for i in range(n)), [0] * (n + 1)]).exp()
+    less = flint.arb_mat(n, n, [both[i, k] - int(i == k) for i in range(n) for k in range(n)])
+    fed = flint.arb_mat(n, n, [both[i, n] * C[0, k] for i in range(n) for k in range(n)])
+    p, q = (less - fed).charpoly(), less.charpoly()
+    return [p[k] + (flint.arb(D[0, j]) - 1) * q[k] for k in range(n)]
+
+
+def _middle(ball: Any) -> Any:
+    whole, power = ball.mid().man_exp()
+    return flint.fmpq(whole) * flint.fmpq(2) ** int(power)

@@ -1,0 +1,108 @@
+"""The response of a rig whose links are rigid: hub, joint, clamp, motor, payload and attachments stay as they are.
+
+It is the limit of ever stiffer links.  A rigid segment of length l is half of its offset, a body of mass rho A l and
+inertia rho A l^3/12 + rho I l, and the other half of the offset.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from tfarm.arm import Arm
+from tfarm.arrays import Complex
+
+from .chain_balls import Sweep
+from .chain_values import Reading, readings
+from .chaining import chain_of
+from .compound import Plane, Row
+from .elements import Body, Element, Offset, Place, Segment, Spring
+from .outputs import Output
+
+ROUNDING = 64 * float(np.finfo(float).eps)  # share of the hub's motion that rounding leaves of a link that is held
+
+
+def rigid_response(arm: Arm, wanted: Output, s: Complex, x: float = 0.0) -> Complex:
+    """One output in SI units per unit of the arm's input at s [1/s] (1-D), all links rigid; x is a share of the length.
+
+    Zero is returned for a strain, and where rigid parts contradict each other or leave the output open: a payload of
+    infinite mass and inertia, or either of them with a hub whose angle is the input.
+    """
+    if wanted.quantity == "strain":
+        return np.zeros(s.size, complex)
+    chain = chain_of(arm)
+    those = readings(chain, (wanted,), x)
+    one = those.each[0]
+    with np.errstate(all="ignore"):
+        sweep = RigidSweep(those.layout, s)
+        value = np.broadcast_to(sweep.output(one) / sweep.input, s.shape)
+        if one.place is not None and not (one.theta or one.state[2] or one.state[3]):  # W or Psi
+            reach = one._replace(place=None, theta=1 + chain.radius + abs(chain.offset))
+            value = np.where(abs(value) <= ROUNDING * abs(sweep.output(reach) / sweep.input), 0.0, value)
+    return np.where(np.isfinite(value), value, 0.0)
+
+
+class RigidSweep(Sweep):
+    """The sweep over rigid segments at an array of s, in float64.
+
+    W and Psi at a mark are less the motion of a rig without springs, (r + x) theta and theta: a deflection at low
+    frequency is a small difference of both.
+    """
+
+    def output(self, one: Reading) -> Any:
+        """An output of this response, in SI units."""
+        if one.place is not None:  # W = (r + x) theta + its mark's, Psi = theta + its mark's
+            reach = self.layout.chain.radius + self._from_clamp(one.place)
+            one = one._replace(theta=one.theta + one.state[0] * reach + one.state[1])
+        return super().output(one)
+
+    @cached_property
+    def states(self) -> dict[int, Row]:
+        """W - (r + x) theta, Psi - theta, M and Q at each mark."""
+        lift, turn = self._yielded
+        places = [float(self._from_clamp(place)) for place in self.layout.places]
+        return {n: (lift + places[n] * turn, turn, *state[2:]) for n, state in super().states.items()}
+
+    @cached_property
+    def _yielded(self) -> tuple[Any, Any]:
+        """What joint and clamp add to W and Psi at the clamp."""
+        lift, turn, M = 0.0 * self.s, 0.0 * self.s, self.M
+        for each in reversed(self.layout.elements):
+            if isinstance(each, Segment | Body):
+                break
+            if isinstance(each, Spring):
+                stiffness, compliance = self._spring(each)
+                turn = turn + compliance / stiffness * M
+            elif isinstance(each, Offset):
+                lift, M = lift + float(each.length) * turn, M - float(each.length) * self.Q
+        return lift, turn
+
+    def _from_clamp(self, place: Place) -> Fraction:
+        """Its distance from the clamp, a share of the length."""
+        return place.share + (self.layout.chain.offset if place.side == "payload" else 0)
+
+    def exact(self, number: Any) -> Any:
+        """The nearest float64."""
+        return float(number)
+
+    def _inside(self, element: Element, p: Plane) -> Plane:
+        for each in _rigid(element):
+            p = super()._inside(each, p)
+        return p
+
+    def _beyond(self, element: Element, f: Row) -> Row:
+        for each in _rigid(element):
+            f = super()._beyond(each, f)
+        return f
+
+
+def _rigid(element: Element) -> tuple[Element, ...]:
+    """A segment as a rigid body between two halves of its length; any other element as it is."""
+    if not isinstance(element, Segment):
+        return (element,)
+    l, EI, none = element.length, element.stiffness, Fraction(0)
+    half = Offset(l / 2)
+    return half, Body(EI * element.g / l**3, EI / l * (element.g / 12 + element.a), none, none), half
