@@ -17,8 +17,8 @@ from tfarm.dsp.regions import sampled_map
 from tfarm.dsp.scenarios import slew
 from tfarm.dsp.simulate import Simulator
 from tfarm.dsp.verdict import analyse
-from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.locus import locus
+from tfarm.loop.loop import Loop
 from tfarm.loop.regions import region
 from tfarm.records import LONGEST_REPR, record
 from tfarm.reduced import modal_model
@@ -155,7 +155,7 @@ def test_a_law_is_shown_as_it_is_typed() -> None:
         ["deflection@0.3", "0.5"],
         ["delay", "0.002"],
     ]
-    assert "law=Law(hub_angle=([2, 1], [0.01, 1]), deflection@0.3=0.5, delay=0.002)" in repr(LawLoop(LAB, LEAD))
+    assert "law=Law(hub_angle=([2, 1], [0.01, 1]), deflection@0.3=0.5, delay=0.002)" in repr(Loop(LAB, LEAD))
 
 
 def test_a_measurement_says_how_well_it_is_explained() -> None:

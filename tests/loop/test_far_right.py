@@ -9,8 +9,8 @@ import pytest
 import tfarm
 from tfarm import HubFeedback, Law
 from tfarm.errors import ConvergenceError
-from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_stability import law_stability
+from tfarm.loop.loop import Loop
 from tfarm.loop.stability import stability
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -43,7 +43,7 @@ def test_wherever_the_corner_of_such_a_law_is_each_turn_of_the_real_axis_is_a_po
     law = Law({"hub_rate": ((0.05 - 2 * J * corner, 0.05 * corner), (1.0, corner)), "hub_angle": 0.2})
     found = law_stability(arm, law)
     x = np.geomspace(found.band, 10 * max(corner, found.band), 400)
-    turns = int((np.diff(np.sign(1 + LawLoop(arm, law).loop_function(x + 0j).real)) != 0).sum())
+    turns = int((np.diff(np.sign(1 + Loop(arm, law).loop_function(x + 0j).real)) != 0).sum())
     assert turns == far_poles(found).size == (2 if corner == 1e9 else 0)
     assert (found.verdict == "unstable") == (turns > 0)
 

@@ -12,7 +12,7 @@ from tests.shared import thinned
 from tfarm import Hub, HubFeedback
 from tfarm.arm import Motor
 from tfarm.loop.margins import margins_of_gains
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import HubLoop
 from tfarm.loop.regions import region
 from tfarm.loop.stability import stability
 
@@ -81,6 +81,6 @@ def test_of_a_hub_without_inertia_nothing_below_its_losses_is_called_stable(seed
     found = region(arm, np.array([-b - 0.3 * unit, 0.5 * unit]), np.array([-1.3, 0.3]) * arm.input_per_torque)
     assert not found.stable[:, 0].any()
     s = tfarm.modes(arm, 12).natural_frequency[-1] * np.geomspace(1.0, 1e15, 61) + 0j
-    L = Loop(arm, law.having("K1", -3.0 * b)).loop_function(s)
+    L = HubLoop(arm, law.having("K1", -3.0 * b)).loop_function(s)
     if not arm.clamp.damping:  # or else that is lost in the clamp too
         assert (1 + L).real.min() < 0 < (1 + L).real.max()  # it changes its sign: there is a real pole on the right

@@ -12,8 +12,8 @@ from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.loop import closed
 from tfarm.loop.law_locus import assigned, inside, law_locus
-from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_poles import law_poles_below
+from tfarm.loop.loop import Loop
 from tfarm.spectrum.box import Box
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -41,7 +41,7 @@ def test_each_value_has_its_complete_list_of_poles(vary, start, stop):
         value = float(found.values[n])
         arm = LAB.having(payload_mass=value) if vary == "payload_mass" else LAB
         law = LAW if vary == "payload_mass" else LAW.having(vary, value)
-        poles = law_poles_below(LawLoop(arm, law), 1.2 * found.box.im_max).values
+        poles = law_poles_below(Loop(arm, law), 1.2 * found.box.im_max).values
         listed = np.sort_complex(found.branches[~np.isnan(found.branches[:, n]), n])
         expected = np.sort_complex(poles[found.box.holds(poles)])
         np.testing.assert_allclose(listed, expected, atol=1e-9 * found.box.im_max)

@@ -10,10 +10,10 @@ import tfarm
 from tests.shared import remember, sized, thinned
 from tests.shell import run
 from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
-from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_map import law_map, unstable_below
 from tfarm.loop.law_stability import band_for, law_stability
 from tfarm.loop.lines import through_infinity
+from tfarm.loop.loop import Loop
 from tfarm.loop.regions import between
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -51,7 +51,7 @@ def test_the_band_is_enough_for_each_corner(x, y, monkeypatch):
     vary = "hub_angle.num.0", "tip_acceleration.num.0"
     found = law_map(LAB, LAW, vary, np.array(x), np.array(y))
     corners = [LAW.having(vary[0], a).having(vary[1], b) for a in x for b in y]
-    assert found.band == max(band_for(LawLoop(LAB, law)) for law in corners)
+    assert found.band == max(band_for(Loop(LAB, law)) for law in corners)
 
 
 @pytest.mark.parametrize("vary", [("hub_angle.den.0", "gain"), ("gain", "hub_angle.den.0")])
@@ -61,7 +61,7 @@ def test_where_a_filter_turns_over_a_pole_has_passed_infinity(vary):
     x, y = (np.array(ranges[each]) for each in vary)
     found = law_map(LAB, LAW, vary, x, y)
     for i, j in np.ndindex(x.size, y.size):
-        loop = LawLoop(LAB, LAW.having(vary[0], x[i]).having(vary[1], y[j]))
+        loop = Loop(LAB, LAW.having(vary[0], x[i]).having(vary[1], y[j]))
         assert unstable_below(loop, found.band) == found.unstable[j, i]
 
 
@@ -69,7 +69,7 @@ def test_the_gain_that_takes_up_all_waves_of_an_arm_without_a_hub_brings_a_pole_
     """At C = 0 a hub without inertia feels the impedance of an endless beam far right: I sqrt(E rho)."""
     arm = BARE.having(hub_inertia=0.0)
     far = np.array([1e6, 1e7, 1e8], complex) * tfarm.modes(arm, 1).natural_frequency[1]
-    drive, (rate,), _ = LawLoop(arm, Law({"hub_rate": 1.0})).signals.parts(far)
+    drive, (_, rate, _), _ = Loop(arm, Law({"hub_rate": 1.0})).signals.parts(far)
     impedance = arm.link.section.second_moment * np.sqrt(arm.link.youngs_modulus * arm.link.density)
     found = through_infinity(drive, rate)
     assert (found.at, found.change) == (np.inf, -1)  # right of the axis at smaller gains alone, farther right
@@ -87,7 +87,7 @@ def test_over_gains_at_the_hub_it_is_their_map():
 def test_a_count_by_half_a_box_is_that_of_a_list_of_poles():
     for K1, K2 in ((0.3, 0.3), (0.3, 1.4), (-0.2, 0.5)):
         law = Law.of_gains(HubFeedback(K1=K1, K2=K2))
-        loop = LawLoop(LAB, law)
+        loop = Loop(LAB, law)
         poles = tfarm.closed_loop_poles(LAB, HubFeedback(K1=K1, K2=K2), 9)
         assert unstable_below(loop, poles.box.im_max) == poles.unstable
 

@@ -14,10 +14,11 @@ from tests.loop.law_counts import judge, some_delay, some_law
 from tests.shared import remember, sized, thinned
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
+from tfarm.arm import full_law
 from tfarm.loop import closed
-from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_poles import law_poles, law_poles_below
 from tfarm.loop.law_stability import law_stability
+from tfarm.loop.loop import Loop
 from tfarm.loop.margins import loop_margins
 from tfarm.loop.passivity import definite, is_hurwitz, on_axis, polynomial, signs_of
 from tfarm.loop.stability import stability
@@ -96,7 +97,7 @@ def test_delays_add_up_poles_as_the_lambert_function_says():
     J = 1e6
     arm = replace(LAB, hub=replace(LAB.hub, inertia=J))
     K, tau = 1.5 * J, 2.0
-    poles = law_poles_below(LawLoop(arm, Law({"hub_rate": K}, delay=tau)), 12.0).moving
+    poles = law_poles_below(Loop(arm, Law({"hub_rate": K}, delay=tau)), 12.0).moving
     expected = np.array([lambertw(-K * tau / J, n) / tau for n in range(-4, 5)])
     for pole in poles:
         assert abs(expected - pole).min() < 1e-5 * abs(pole)  # the link's share of the inertia: 1e-6 of it
@@ -135,7 +136,7 @@ def test_what_is_taken_off_a_wide_box_is_the_time_of_both_waves():
     """Far right the determinant grows like e^{s T}, T = L (sqrt(rhoA/kGA) + sqrt(rhoI/EI)): shear and bending."""
     link = BARE.link
     both = link.length * (np.sqrt(link.rhoA / link.kGA) + np.sqrt(link.rhoI / link.EI))
-    assert LawLoop(BARE, Law({"hub_rate": 0.1})).delay_of_waves == pytest.approx(both, rel=1e-12)
+    assert Loop(BARE, Law({"hub_rate": 0.1})).delay_of_waves == pytest.approx(both, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -198,7 +199,7 @@ def test_signs_of_polynomials_are_those_of_their_roots():
 )
 def test_no_loop_is_refused_by_its_key(entries, others, key):
     with pytest.raises(ParameterError) as error:
-        LawLoop(LAB, Law(entries, **others))
+        Loop(LAB, Law(entries, **others))
     assert error.value.key == key
 
 
@@ -210,7 +211,7 @@ def test_a_pure_derivative_of_the_angle_is_the_rate():
 
 def test_an_unstable_cancellation_in_the_law_is_said():
     law = Law({"hub_angle": {"zeros": [2.0], "poles": [2.0, -5.0], "gain": 1.0}, "hub_rate": 0.3})
-    (words,) = LawLoop(LAB, law).warnings
+    (words,) = Loop(LAB, law).warnings
     assert "cancels its own unstable pole" in words
     assert law_stability(LAB, law).unstable_roots == 1
 
@@ -321,9 +322,9 @@ def test_a_nyquist_plot_of_a_law_can_be_drawn():
 )
 def test_a_loop_under_another_law_is_that_made_anew(entries):
     """Of the same signals, which are taken over, and of others, which are not."""
-    first, law = LawLoop(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3})), Law(entries)
-    mine, anew, s = first.under(law), LawLoop(LAB, law), np.array([0.3 + 2j, 70j, -5 + 400j])
-    assert (mine.signals is first.signals) is (set(entries) == set(first.law.signals))
+    first, law = Loop(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3})), Law(entries)
+    mine, anew, s = first.under(law), Loop(LAB, law), np.array([0.3 + 2j, 70j, -5 + 400j])
+    assert (mine.signals is first.signals) is (set(full_law(law).signals) == set(first.law.signals))
     assert mine.zeros_at_origin == anew.zeros_at_origin
     np.testing.assert_array_equal(mine.loop_function(s), anew.loop_function(s))
 

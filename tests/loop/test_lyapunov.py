@@ -12,7 +12,7 @@ from tests.shared import thinned
 from tests.spectrum.damped_roads import newton_step
 from tfarm import Hub, HubFeedback, ParameterError, Payload
 from tfarm.loop.lyapunov import lyapunov
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import HubLoop
 from tfarm.loop.poles import poles_below, poles_of_gains
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.enclose import enclosed
@@ -103,7 +103,7 @@ def test_K2_of_one_leaves_the_modes_of_the_held_hub_undamped() -> None:
 
 @pytest.mark.parametrize("K2", [1.001, 1.05])
 def test_beyond_one_every_flexible_mode_is_unstable(K2: float) -> None:
-    loop = Loop(ARM, law(K2=K2))
+    loop = HubLoop(ARM, law(K2=K2))
     for height in (1e3, 1e4):
         poles = poles_below(loop, height)
         flexible = poles.values.imag > 0

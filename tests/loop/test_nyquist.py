@@ -7,9 +7,9 @@ import pytest
 
 import tfarm
 from tfarm import Hub, HubFeedback, Law, Payload
-from tfarm.loop.law_loop import LawLoop
+from tfarm.loop.loop import Loop
 from tfarm.loop.nyquist import compressed, poles_on_axis
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import HubLoop
 
 LAB = tfarm.load("sasaki2012-lab")
 ARMS = {
@@ -23,7 +23,7 @@ ARMS = {
 @pytest.mark.parametrize("law", [{"K1": 0.3}, {"Kp": 2.0}, {"K1": 0.3, "K2": 0.3}, {"K2": 0.3}])
 def test_the_loop_function_has_a_pole_at_rest_where_it_grows_without_bound(name, law):
     """Nearer to 0 by a factor of ten L is ten or a hundred times as large there, and nowhere else."""
-    loop = Loop(ARMS[name], HubFeedback(**law))
+    loop = HubLoop(ARMS[name], HubFeedback(**law))
     near = abs(loop.loop_function(1j * 1e-4 * np.array([10.0, 1.0])))
     grows = bool(near[1] > 5 * near[0])
     assert (0.0 in poles_on_axis(loop, 1000.0)) == grows
@@ -41,7 +41,7 @@ def test_the_plane_is_drawn_in_a_disc():
 @pytest.mark.parametrize("w", [0.2, 20.0])
 def test_an_undamped_pole_of_the_law_is_one_of_the_loop_however_slow(w):
     """Beside it, nearer by a factor of ten, |L| is ten times as large."""
-    loop = LawLoop(LAB, Law({"hub_rate": ([0.3, 0.0], [1.0, 0.0, w * w])}))
+    loop = Loop(LAB, Law({"hub_rate": ([0.3, 0.0], [1.0, 0.0, w * w])}))
     near = abs(loop.loop_function(1j * w * (1 + 1e-6 * np.array([10.0, 1.0]))))
     assert near[1] == pytest.approx(10 * near[0], rel=1e-3)
     assert abs(poles_on_axis(loop, 100.0) - w).min() < 1e-12 * w

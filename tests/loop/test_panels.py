@@ -7,7 +7,7 @@ import tfarm
 from tfarm.errors import ConvergenceError
 from tfarm.loop import lossless
 from tfarm.loop.panels import CHEBYSHEV, loop_panels
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import HubLoop
 
 
 @pytest.mark.parametrize("name", ["sasaki2012-lab", "quanser-flexlink"])
@@ -22,7 +22,7 @@ def test_samples_are_those_of_the_loop_function_at_chebyshevs_points(name):
         s = 1j * ((low + high) / 2 + (high - low) / 2 * CHEBYSHEV)
         s, keep = s[s.imag > 0], s.imag > 0
         L = ((law.Kp + law.K1 * s) * theta[keep] + law.K2 * m[keep] * s**2) / (d[keep] * s**found.order)
-        np.testing.assert_allclose(L, Loop(arm, law).loop_function(s), rtol=1e-9)
+        np.testing.assert_allclose(L, HubLoop(arm, law).loop_function(s), rtol=1e-9)
 
 
 def test_the_mode_that_the_hub_does_not_feel_is_named(monkeypatch):

@@ -9,7 +9,7 @@ import pytest
 import tfarm
 from tests.loop.arms import some_loop
 from tfarm import Hub, HubFeedback, ParameterError
-from tfarm.loop.plant import Loop, effective_inertia
+from tfarm.loop.plant import HubLoop, effective_inertia
 from tfarm.loop.poles import poles_of_gains
 
 ARM = tfarm.load("sasaki2012")
@@ -24,7 +24,7 @@ ARM = tfarm.load("sasaki2012")
 )
 def test_where_there_is_no_loop(inertia: float, law, words: str) -> None:
     with pytest.raises(ParameterError, match=words) as refused:
-        Loop(replace(ARM, hub=Hub(inertia=inertia)), law)
+        HubLoop(replace(ARM, hub=Hub(inertia=inertia)), law)
     assert "\n" not in str(refused.value)
 
 
@@ -41,7 +41,7 @@ def test_the_loop_function_is_made_of_transfer_functions(seed: int) -> None:
     s = omega * rng.uniform(0.05, 1, 12) * np.exp(1j * rng.uniform(-1.4, 1.4, 12))
     theta, moment = tfarm.transfer(arm, ["hub_angle", "root_moment"])(s)
     terms = np.array([law.Kp * theta, law.K1 * s * theta, law.K2 * moment])
-    miss = abs(Loop(arm, law).loop_function(s) - terms.sum(axis=0))
+    miss = abs(HubLoop(arm, law).loop_function(s) - terms.sum(axis=0))
     assert (miss < 1e-12 * abs(terms).sum(axis=0)).all()
 
 

@@ -13,7 +13,7 @@ from tests.loop.counts import nyquist_count, survey
 from tests.shared import thinned
 from tests.spectrum.damped_roads import newton_step
 from tfarm import Hub, HubFeedback, ParameterError
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import HubLoop
 from tfarm.loop.poles import poles_below, poles_of_gains
 from tfarm.reduced import modal_model
 
@@ -70,7 +70,7 @@ def test_modal_models_converge_to_the_exact_poles() -> None:
 @pytest.mark.parametrize("arm", thinned([ARM, LAB], 2), ids=["paper", "lab"])
 def test_a_modal_model_misses_by_its_own_error(arm, count: int) -> None:
     """To first order a pole moves by (L - L_model)/L', with both loop functions at the exact pole."""
-    loop, model = Loop(arm, LAW), modal_model(arm, ["hub_rate", "root_moment"], count)
+    loop, model = HubLoop(arm, LAW), modal_model(arm, ["hub_rate", "root_moment"], count)
     eigenvalues, rounding = modal_poles(arm, LAW, count)
     for s in poles_of_gains(arm, LAW, 6).moving:
         rate, moment = model(s)
@@ -106,7 +106,7 @@ def test_time_reversal_at_zero_damping(seed: int) -> None:
     rng = np.random.default_rng(seed)
     arm, feedback = some_loop(rng, damping=0.0)
     height = float(tfarm.modes(arm, 6).natural_frequency[-2:].mean())
-    there, back = (poles_below(Loop(arm, law), height) for law in (feedback, replace(feedback, K1=-feedback.K1)))
+    there, back = (poles_below(HubLoop(arm, law), height) for law in (feedback, replace(feedback, K1=-feedback.K1)))
     wide = min(min(-p.box.re_min, p.box.re_max) for p in (there, back))
     high = min(p.box.im_max for p in (there, back))
     first = there.values[(abs(there.values.real) < wide) & (there.values.imag < high)]
@@ -223,4 +223,4 @@ def test_a_spring_far_too_weak_for_the_flexible_arm_swings_the_rigid_one() -> No
 
 def test_a_gain_without_all_its_digits_is_refused() -> None:
     with pytest.raises(ParameterError, match="0, or at least"):
-        Loop(LAB, HubFeedback(K1=5e-324))
+        HubLoop(LAB, HubFeedback(K1=5e-324))

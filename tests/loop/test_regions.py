@@ -15,7 +15,7 @@ from tests.shared import thinned
 from tfarm import Hub, HubFeedback
 from tfarm.errors import ParameterError
 from tfarm.loop.answers import map_answer
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import HubLoop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.regions import INFINITE, between, ranges_of, region
 from tfarm.loop.stability import stability
@@ -39,7 +39,7 @@ def test_counts_of_the_lab_arm_are_those_of_an_independent_model(Kp) -> None:
     found = region(LAB, K1, K2, HubFeedback(Kp=Kp))
     there = model_counts(LAB, K1, K2, Kp, 10)
     low = np.array([
-        [poles_below(Loop(LAB, HubFeedback(K1=float(a), K2=float(b), Kp=Kp)), found.band).unstable for a in K1]
+        [poles_below(HubLoop(LAB, HubFeedback(K1=float(a), K2=float(b), Kp=Kp)), found.band).unstable for a in K1]
         for b in K2
     ])  # fmt: skip
     np.testing.assert_array_equal(found.unstable, low)
@@ -93,7 +93,7 @@ def test_every_point_of_the_boundary_puts_a_pole_on_the_axis(arm) -> None:
     inside = found.boundary[(abs(found.boundary[:, 0]) < 1e4) & (abs(found.boundary[:, 1]) < 100)][::37]
     assert len(inside) > 5
     for K1, K2, omega in inside:
-        loop = Loop(arm, HubFeedback(K1=float(K1), K2=float(K2)))
+        loop = HubLoop(arm, HubFeedback(K1=float(K1), K2=float(K2)))
         near = abs(1 + loop.loop_function(1j * omega * np.array([1 + 1e-4, 1 - 1e-4]))).max()
         assert abs(1 + loop.loop_function(np.array([1j * omega]))[0]) < 1e-9 * (near + abs(K1) + abs(K2) + 1) * 10
 

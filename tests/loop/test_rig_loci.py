@@ -13,7 +13,7 @@ from tfarm import Hub
 from tfarm.arm import Attachment, Motor
 from tfarm.loop.lines import along, line_crossings
 from tfarm.loop.locus import locus
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import HubLoop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.spectrum.scales import default_gains
@@ -110,7 +110,7 @@ def test_at_the_gain_at_which_a_pole_passes_through_0_it_is_0_and_the_others_are
     here = found.branches[:, n]
     assert (here == 0).sum() == 1
     step = 1e-7
-    sides = [poles_below(Loop(rig, law.having("K2", 1.0 + side * step)), 200.0).values for side in (-1, 1)]
+    sides = [poles_below(HubLoop(rig, law.having("K2", 1.0 + side * step)), 200.0).values for side in (-1, 1)]
     for pole in here[here != 0]:
         middle = np.mean([side[abs(side - pole).argmin()] for side in sides])
         assert pole == pytest.approx(middle, rel=1e-6)

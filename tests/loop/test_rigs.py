@@ -15,7 +15,7 @@ from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_verdict
 from tfarm.loop.frequencies import band_of
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import HubLoop
 from tfarm.loop.poles import poles_below, poles_of_gains
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.loop.regions import INFINITE, region
@@ -71,7 +71,7 @@ def test_no_bound_is_claimed_where_elastic_links_ring_beyond_the_band():
     law = default_gains(arm).having("K2", -0.015)
     verdict = stability(arm, law)
     assert "not bounded" in verdict.tail
-    beyond = poles_below(Loop(arm, law), 3e4)
+    beyond = poles_below(HubLoop(arm, law), 3e4)
     driven = beyond.moving[beyond.moving.real > 1e-12 * abs(beyond.moving)]
     assert driven.size
     assert driven.imag.min() > verdict.band
@@ -123,7 +123,7 @@ def test_more_than_the_whole_moment_drives_every_mode_behind_friction(K2):
     assert verdict.unstable_roots_infinite == driven
     assert verdict.is_known_beyond
     heights = [band_of(arm, number) for number in (4, 8)]
-    low, high = (poles_below(Loop(arm, law), height).unstable for height in heights)
+    low, high = (poles_below(HubLoop(arm, law), height).unstable for height in heights)
     assert high - low == 8 * driven
     plane = region(
         arm, np.array([0.5, 1.0]) * law.K1, np.array([1.0, 1.01]) * law.K2 if driven else np.array([1.0, 0.9]) * law.K2

@@ -11,11 +11,11 @@ from tfarm import HubFeedback, Law
 from tfarm.errors import ConvergenceError
 from tfarm.loop import panels, positions
 from tfarm.loop.law_locus import Family
-from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_map import asked_at
 from tfarm.loop.lines import along, crossing_at_zero, line_crossings
+from tfarm.loop.loop import Loop
 from tfarm.loop.margins import dense, minus_loop
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import HubLoop
 from tfarm.loop.regions import _crossings_along_K2
 from tfarm.spectrum.box import Box
 
@@ -62,7 +62,7 @@ def test_far_below_all_modes_the_loop_goes_on_as_that_of_the_rigid_arm():
     """(Kp + K1 s)/(J s^2) is the same at s c with K1 c and Kp c^2, down to where squares are no doubles."""
     c, law, w = 1e-142, HubFeedback(K1=0.3, K2=0.3, Kp=0.4), np.array([1e-3])
     slow = HubFeedback(K1=c * law.K1, K2=law.K2, Kp=c * c * law.Kp)
-    np.testing.assert_allclose(minus_loop(Loop(LAB, slow), c * w), minus_loop(Loop(LAB, law), w), rtol=1e-8)
+    np.testing.assert_allclose(minus_loop(HubLoop(LAB, slow), c * w), minus_loop(HubLoop(LAB, law), w), rtol=1e-8)
 
 
 def test_a_slow_pair_is_no_real_pole_to_a_locus():
@@ -125,7 +125,7 @@ def test_a_law_that_differentiates_the_angle_is_one_on_the_rate():
     den, s = [0.01, 1.0], np.array([0.3 + 2j, 40j, 5.0])
     improper = Law({"hub_angle": ([0.1, 1.0, 2.0], den)})
     proper = Law({"hub_rate": ([0.1, 1.0], den), "hub_angle": ([2.0], den)})
-    one, other = (LawLoop(LAB, law).loop_function(s) for law in (improper, proper))
+    one, other = (Loop(LAB, law).loop_function(s) for law in (improper, proper))
     np.testing.assert_allclose(one, other, rtol=1e-12)
 
 
@@ -133,7 +133,5 @@ def test_margins_look_at_what_is_narrow_in_the_law_itself():
     """A notch a ten-millionth wide."""
     w, ratio = 40.0, 1e-7
     law = Law({"hub_rate": ([0.3, 0.0, 0.3 * w * w], [1.0, 2 * ratio * w, w * w])})
-    omega = dense(
-        SimpleNamespace(loop=LawLoop(LAB, law), band=100.0, poles=SimpleNamespace(values=np.empty(0, complex)))
-    )
+    omega = dense(SimpleNamespace(loop=Loop(LAB, law), band=100.0, poles=SimpleNamespace(values=np.empty(0, complex))))
     assert (abs(omega - w) <= 2 * ratio * w).sum() > 5

@@ -15,7 +15,7 @@ from tests.loop.test_lines import held
 from tfarm import Arm, Hub, HubFeedback, Link, Payload, Section
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.nyquist import turning
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import HubLoop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import felt, is_felt, is_quiet, loop_band, stability
 
@@ -179,7 +179,7 @@ def test_beyond_the_band_the_loop_is_quiet_far_up_between_shear_resonances_too()
     rng = np.random.default_rng(8)
     for arm in (LAB, window_arm(), some_free_arm(rng, True), some_free_arm(rng, True)):
         inertia, omega = hub_units(arm)
-        loop = Loop(arm, HubFeedback(K1=inertia * omega, K2=-7.0))
+        loop = HubLoop(arm, HubFeedback(K1=inertia * omega, K2=-7.0))
         band, quiet = loop_band(loop)
         assert quiet
         shear = math.pi / arm.link.length * math.sqrt(arm.link.kGA / arm.link.rhoA)
@@ -191,7 +191,7 @@ def test_beyond_the_band_the_loop_is_quiet_far_up_between_shear_resonances_too()
 def test_twice_the_band_holds_no_more_unstable_poles() -> None:
     for arm, law in ((window_arm(), HubFeedback(K1=1.0, K2=-10.0)), (LAB, HubFeedback(K1=0.3, K2=1.5))):
         found = stability(arm, law)
-        assert poles_below(Loop(arm, law), 2 * found.band).unstable == found.unstable_roots
+        assert poles_below(HubLoop(arm, law), 2 * found.band).unstable == found.unstable_roots
 
 
 def test_where_the_tail_needs_too_many_modes_it_says_so() -> None:

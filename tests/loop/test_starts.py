@@ -11,9 +11,9 @@ from tests.loop.test_lossless import RIGS as REACTIVE
 from tests.shared import thinned
 from tfarm import HubFeedback, Law, Payload
 from tfarm.errors import ParameterError
-from tfarm.loop.law_loop import LawLoop
+from tfarm.loop.loop import Loop
 from tfarm.loop.lossless import locked_edges
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import HubLoop
 from tfarm.loop.poles import (
     Poles,
     count_with_mirrors,
@@ -61,7 +61,7 @@ def test_real_starts_are_even_in_decades_and_reach_beyond_the_box():
 @pytest.mark.parametrize("K1", [0.3, -30.0])
 def test_a_box_reaches_right_to_where_no_pole_can_be(K1):
     """From the first edge that is tried on: on the one that is taken Re L > -1/2, on the one before it was not."""
-    loop, height, first = Loop(LAB, HubFeedback(K1=K1)), 300.0, 30.0
+    loop, height, first = HubLoop(LAB, HubFeedback(K1=K1)), 300.0, 30.0
     right = quiet_edge(loop, first, height, 40, 1e3)
     edge = 1j * np.linspace(0.0, height, 400)
     assert loop.loop_function(right + edge).real.min() > -0.6
@@ -78,10 +78,10 @@ def test_slow_poles_are_of_an_arm_that_turns():
     """One that is held at its tip has none, however small the gains."""
     law = HubFeedback(K1=1e-9, Kp=1e-12)
     expected = np.roots([LAB.total_inertia, 1e-9, 1e-12])
-    found = slow_poles(Loop(LAB, law), 1e-3)
+    found = slow_poles(HubLoop(LAB, law), 1e-3)
     np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(expected), rtol=1e-5)
-    assert slow_poles(Loop(LAB, HubFeedback(K2=0.3)), 1e-3).size == 0
-    assert slow_poles(Loop(replace(LAB, payload=Payload(mass=math.inf)), law), 1e-3).size == 0
+    assert slow_poles(HubLoop(LAB, HubFeedback(K2=0.3)), 1e-3).size == 0
+    assert slow_poles(HubLoop(replace(LAB, payload=Payload(mass=math.inf)), law), 1e-3).size == 0
 
 
 # ------------------------------------------------------------ lists
@@ -89,7 +89,7 @@ def test_slow_poles_are_of_an_arm_that_turns():
 
 def listed(*values):
     box = Box(-50.0, 10.0, -60.0, 60.0)
-    return Poles(Loop(LAB, HubFeedback(K1=0.3)), np.array(values, complex), box)
+    return Poles(HubLoop(LAB, HubFeedback(K1=0.3)), np.array(values, complex), box)
 
 
 def test_a_shorter_list_has_a_lower_box_between_its_last_pole_and_the_next():
@@ -126,7 +126,7 @@ def test_of_a_rig_without_losses_each_driven_mode_of_the_box_is_two_unstable_pol
     edges = locked_edges(arm)
     K2 = 1.5 * float(max(edges.gain[:3], key=abs))
     law = HubFeedback(K1=1e-3 * rate_unit(arm), K2=K2)
-    poles = poles_below(Loop(arm, law), 1.3 * float(edges.at[3]))
+    poles = poles_below(HubLoop(arm, law), 1.3 * float(edges.at[3]))
     driven = (np.sign(edges.gain) == np.sign(K2)) & (abs(edges.gain) < abs(K2)) & (edges.at < poles.box.im_max)
     assert poles.unstable == 2 * driven.sum() > 0
 
@@ -137,21 +137,21 @@ def test_of_a_rig_without_losses_each_driven_mode_of_the_box_is_two_unstable_pol
 @pytest.mark.parametrize("arm", [LAB, STOCKY], ids=lambda arm: arm.name)
 def test_windows_are_looked_for_well_beyond_what_matters_to_the_first_mode(arm):
     """20 J w1 of a rate, 20 J w1^2 of an angle; 50 of a moment, or where twice the inertia is taken off."""
-    loop = Loop(arm, HubFeedback(K1=1e-3 * rate_unit(arm), K2=0.3))
+    loop = HubLoop(arm, HubFeedback(K1=1e-3 * rate_unit(arm), K2=0.3))
     assert looked_at(loop, "K1") == pytest.approx((-20 * rate_unit(arm), 20 * rate_unit(arm)), rel=1e-12)
     assert looked_at(loop, "Kp") == pytest.approx((-20 * angle_unit(arm), 20 * angle_unit(arm)), rel=1e-12)
     most = max(50.0, 2 * arm.total_inertia / arm.carried_inertia)
     assert looked_at(loop, "K2") == pytest.approx((-most, most), rel=1e-12)
-    far = Loop(arm, HubFeedback(K1=5 * rate_unit(arm), K2=-9.0))
+    far = HubLoop(arm, HubFeedback(K1=5 * rate_unit(arm), K2=-9.0))
     assert looked_at(far, "K1")[1] == pytest.approx(50 * rate_unit(arm), rel=1e-12)
     assert looked_at(far, "K2")[1] == pytest.approx(max(most, 90.0), rel=1e-12)
-    assert looked_at(Loop(arm, HubFeedback(K1=5e8 * rate_unit(arm))), "K1")[1] == 1e9 * rate_unit(arm)
+    assert looked_at(HubLoop(arm, HubFeedback(K1=5e8 * rate_unit(arm))), "K1")[1] == 1e9 * rate_unit(arm)
 
 
 def test_a_heavy_hub_has_its_window_of_the_moment_looked_for_farther():
     """Where K2 = J/(J - I_h) cancels the inertia, 500 here."""
     heavy = LAB.having(hub_inertia=499 * LAB.carried_inertia)
-    loop = Loop(heavy, HubFeedback(K1=0.3))
+    loop = HubLoop(heavy, HubFeedback(K1=0.3))
     assert looked_at(loop, "K2")[1] == pytest.approx(1000.0, rel=1e-9)
     assert looked_at(loop, "K1")[1] == pytest.approx(20 * rate_unit(heavy), rel=1e-12)
 
@@ -188,7 +188,7 @@ LAWS = {
 @pytest.mark.parametrize("name", LAWS)
 def test_the_slope_of_the_function_is_its_difference_quotient(name):
     """Of higher order and wider: by the values of the function alone, its zeros at 0 divided out."""
-    loop = LawLoop(LAB, LAWS[name])
+    loop = Loop(LAB, LAWS[name])
     for s in (0.3 + 2j, -5 + 40j, 2.0 + 0j, 1e-3 + 1e-2j):
         h = 1e-3 * abs(s)
         at = loop.function(s + h * np.array([0, -2, -1, 1, 2]))
@@ -200,7 +200,7 @@ def test_the_slope_of_the_function_is_its_difference_quotient(name):
 @pytest.mark.parametrize("name", LAWS)
 def test_two_laws_have_one_factor_of_the_rig(name):
     """D of one over D of the other, of laws with one denominator, is the quotient of 1 + L."""
-    one, s = LawLoop(LAB, LAWS[name]), np.array([0.3 + 2j, -5 + 40j, 2.0 + 0j])
+    one, s = Loop(LAB, LAWS[name]), np.array([0.3 + 2j, -5 + 40j, 2.0 + 0j])
     half = {signal: ([0.5 * n for n in num], den) for signal, (num, den) in LEAD.items()}
     other = one.under(Law(half, delay=0.001)) if name != "integral" else one.under(LAWS[name].having("gain", 0.5))
     of_rig = one.signals.parts(s)

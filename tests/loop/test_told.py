@@ -17,14 +17,14 @@ from tfarm.loop.answers import poles_answer
 from tfarm.loop.branches import open_pairs
 from tfarm.loop.crossings import BranchCrossing, in_words
 from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
-from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_map import law_map
 from tfarm.loop.locus import frame
+from tfarm.loop.loop import Loop
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import _nearest_to_one
 from tfarm.loop.nyquist import nyquist_answer, nyquist_table, poles_on_axis
 from tfarm.loop.panels import CHEBYSHEV, loop_panels
-from tfarm.loop.plant import Loop, effective_inertia
+from tfarm.loop.plant import HubLoop, effective_inertia
 from tfarm.loop.poles import slow_poles
 from tfarm.loop.stability import stability
 from tfarm.spectrum.scales import rate_unit
@@ -45,7 +45,7 @@ def test_an_answer_of_nyquist_s_criterion_is_its_record(name):
     rows = np.array([[row[key] for key in ("re_s", "im_s", "re_L", "im_L")] for row in table])
     np.testing.assert_array_equal(rows @ [1, 1j, 0, 0], found.s)
     np.testing.assert_array_equal(rows @ [0, 0, 1, 1j], found.L)
-    np.testing.assert_allclose(found.L[5::100], Loop(LAB, LAWS[name]).loop_function(found.s[5::100]), rtol=1e-12)
+    np.testing.assert_allclose(found.L[5::100], HubLoop(LAB, LAWS[name]).loop_function(found.s[5::100]), rtol=1e-12)
 
 
 def test_an_answer_of_poles_is_its_record():
@@ -184,7 +184,7 @@ def test_between_its_samples_a_panel_is_the_loop_function_too(arm):
         d, theta, m = (BarycentricInterpolator(CHEBYSHEV[order], part[order])(inside) for part in values)
         s = 1j * ((low + high) / 2 + (high - low) / 2 * inside)
         fed_back = (law.Kp + law.K1 * s) * theta + law.K2 * m * s**2
-        whole = Loop(arm, law).loop_function(s)
+        whole = HubLoop(arm, law).loop_function(s)
         np.testing.assert_allclose(fed_back / (d * s**found.order), whole, rtol=1e-6 * (1 + abs(whole).max()))
 
 
@@ -194,7 +194,7 @@ def test_between_its_samples_a_panel_is_the_loop_function_too(arm):
 def test_slow_poles_are_zeros_of_the_whole_characteristic_function():
     """Not of the rigid arm's alone, from which they start: to the last digits a step of Newton's method is none."""
     law = HubFeedback(K1=1e-4 * rate_unit(LAB), K2=0.3, Kp=3e-9 * rate_unit(LAB))
-    loop = Loop(LAB, law)
+    loop = HubLoop(LAB, law)
     found = slow_poles(loop, 1.0)
     assert found.size == 2
     at = loop.member.function(found)
@@ -206,11 +206,11 @@ def test_slow_poles_are_zeros_of_the_whole_characteristic_function():
 def test_a_contour_passes_the_poles_of_a_law_on_the_axis_below_its_band():
     """Where it rings without damping, and its integrator if the rig has no zero there."""
     slow, fast = ([1.0, 0.0, w**2] for w in (30.0, 900.0))
-    loop = LawLoop(LAB, Law({"hub_rate": ([1.0], slow), "root_moment": ([1.0], fast)}))
+    loop = Loop(LAB, Law({"hub_rate": ([1.0], slow), "root_moment": ([1.0], fast)}))
     np.testing.assert_allclose(poles_on_axis(loop, 400.0), [0.0, 30.0], rtol=1e-9)
     np.testing.assert_allclose(poles_on_axis(loop, 1000.0), [0.0, 30.0, 900.0], rtol=1e-9)
     np.testing.assert_allclose(poles_on_axis(loop, 10.0), [0.0])
-    bare = LawLoop(BARE, Law({"root_moment": ([1.0], slow)}))  # finite at rest, where the arm turns
+    bare = Loop(BARE, Law({"root_moment": ([1.0], slow)}))  # finite at rest, where the arm turns
     omega = tfarm.modes(BARE, 3).natural_frequency[1:]
     expected = np.sort([30.0, *omega[omega < 400.0]])
     np.testing.assert_allclose(poles_on_axis(bare, 400.0), expected, rtol=1e-9)

@@ -25,7 +25,7 @@ from tfarm.loop.damping import least_damping
 from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.loci import held_branches, loci
 from tfarm.loop.nyquist import compressed, nyquist_of
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import HubLoop
 from tfarm.loop.poles import poles_of_gains
 from tfarm.loop.stability import stability
 from tfarm.plots.plane import nice_levels
@@ -80,8 +80,8 @@ def test_the_edge_drawn_has_poles_on_the_axis(lab):
     ]
     assert len(points) > 10
     for K1, K2, omega in points:
-        loop = Loop(LAB, HubFeedback(K1=K1, K2=K2))
-        parts = [abs(Loop(LAB, law).loop_function(1j * np.array([omega]))[0]) for law in _single(K1, K2)]
+        loop = HubLoop(LAB, HubFeedback(K1=K1, K2=K2))
+        parts = [abs(HubLoop(LAB, law).loop_function(1j * np.array([omega]))[0]) for law in _single(K1, K2)]
         assert abs(1 + loop.loop_function(1j * np.array([omega]))[0]) < 2000 * EPS * (1 + sum(parts))
 
 

@@ -20,7 +20,7 @@ from tfarm.columns import PAGE
 from tfarm.dsp import Chain
 from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import HubLoop
 from tfarm.loop.poles import poles_below
 from tfarm.report import assumptions_section, loop_laws, loop_section, making
 from tfarm.report.arm_section import arm_section, derived_table
@@ -144,7 +144,7 @@ LOOPS = [name for name, arm in ARMS.items() if has_loop(arm)]
 
 def is_stable(arm, law, up_to):
     """By finding every pole below a frequency: a road that knows no windows."""
-    return poles_below(Loop(arm, law), up_to).unstable == 0
+    return poles_below(HubLoop(arm, law), up_to).unstable == 0
 
 
 @pytest.mark.parametrize("name", thinned(LOOPS, 2))
@@ -200,7 +200,7 @@ def test_the_answer_of_a_static_crossing_is_in_the_locus():
     assert np.isfinite(found.branches).all()
     assert 0 in found.branches[:, at]
     assert not (found.branches[:, at + 1] == 0).any()
-    poles = poles_below(Loop(arm, replace(law, K2=float(found.gain[at + 1]))), 500.0).values
+    poles = poles_below(HubLoop(arm, replace(law, K2=float(found.gain[at + 1]))), 500.0).values
     for branch in found.branches[:3, at + 1]:
         assert abs(poles - branch).min() < 1e-9 * abs(branch)
 
@@ -226,7 +226,7 @@ def test_branches_that_cannot_be_followed_end_or_are_left_out_with_a_word(monkey
     rates = section.blocks[0]
     for K1, count in zip(column(rates, "K1").values, column(rates, "unstable_poles").values, strict=True):
         law = replace(default_gains(arm), K1=K1)
-        assert count == poles_below(Loop(arm, law), 300.0).unstable
+        assert count == poles_below(HubLoop(arm, law), 300.0).unstable
     assert len(asked) == 7
 
 

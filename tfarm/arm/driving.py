@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tfarm.arm.feedback import HubFeedback
+from tfarm.arm.feedback import AT_HUB, GAINS, HubFeedback
 from tfarm.arm.law import Law
 from tfarm.arm.records import Arm
 from tfarm.errors import ParameterError
@@ -20,6 +20,15 @@ CANCELLED = 1e-6  # of its size: a zero of the law so near to an unstable pole o
 def as_law(law: AnyLaw) -> Law:
     """The law as one of signals, gains at the hub too."""
     return Law.of_gains(law) if isinstance(law, HubFeedback) else law
+
+
+def full_law(law: AnyLaw) -> Law:
+    """The law as one of signals; gains at the hub as a law on all of their signals, also those with a gain of 0."""
+    gains = as_law(law).gains
+    if gains is None:
+        return as_law(law)
+    entries = {gain.output: gains[gain.name] for gain in GAINS}
+    return Law(entries, name="gains at the hub", references=AT_HUB)
 
 
 def arm_and_law(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:

@@ -42,6 +42,7 @@ NAMES = tuple(gain.name for gain in LISTED)
 AT_HUB = ("hub_angle", "hub_rate", "root_moment")  # what theorems on the loop are about: gains on these, the first
 assert FED_BACK[: len(AT_HUB)] == AT_HUB
 ON = {gain.output: gain.name for gain in GAINS}  # the name of the gain on each output
+OUTPUT_OF = {name: output for output, name in ON.items()}
 ANGLE_GAIN, RATE_GAIN, MOMENT_GAIN = (ON[output] for output in AT_HUB)
 PLANE = (RATE_GAIN, MOMENT_GAIN)  # the gains of the paper's own law: across and up the map of a loop
 TWO_GAINS = "-".join(PLANE)  # the structure of a law that is these, beside PD, lead, ...

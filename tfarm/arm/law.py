@@ -19,7 +19,7 @@ import numpy as np
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace, block_of
 from tfarm.arm.checks import check_fields, not_negative, number, positive
 from tfarm.arm.choices import INPUTS
-from tfarm.arm.feedback import AT_HUB, GAINS, ON, HubFeedback
+from tfarm.arm.feedback import AT_HUB, GAINS, ON, OUTPUT_OF, HubFeedback
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError, did_you_mean, must_be_known
 from tfarm.records import record
@@ -261,9 +261,11 @@ class Law:
         """The law with another value of one number.
 
         "delay"; "gain", a factor on everything; "hub_angle" or "hub_angle.gain", a factor on what a signal takes;
-        "hub_angle.num.1", a coefficient, counted from 0.  Raises ParameterError for a key that there is not.
+        "hub_angle.num.1", a coefficient, counted from 0; "K1", "K2" and "Kp" are the gains on the hub's own signals.
+        Raises ParameterError for a key that there is not.
         """
         value = number(key, value, "a finite number")
+        key = OUTPUT_OF.get(key, key)
         if key == "delay":
             return replace(self, delay=value)
         if key == "gain":

@@ -17,8 +17,8 @@ from tfarm.response.answers import HERTZ
 from tfarm.response.signals import Signals
 from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
-from .law_loop import LawLoop
 from .law_stability import signs_of_loop
+from .loop import Loop
 from .lyapunov import lyapunov
 from .margins import LoopMargins, Margins
 from .poles import Poles
@@ -61,7 +61,7 @@ class GainRow(NamedTuple):
 def gain_rows(found: Margins[Any]) -> list[GainRow]:
     """The gains of a loop, or the numbers of its law."""
     loop, rows = found.stability.loop, found.windows.items()
-    if isinstance(loop, LawLoop):
+    if isinstance(loop, Loop):
         return [GainRow(name, loop.law.numbers[name], windows, "") for name, windows in rows]
     return [GainRow(name, loop.law[name], windows, shown_unit(name, loop.arm)) for name, windows in rows]
 
@@ -172,7 +172,7 @@ def convention(arm: Arm) -> dict[str, Any]:
     return {"sign_convention": sign_of(arm), "input": arm.input, "gain_units": units}
 
 
-def poles_answer(poles: Poles | Poles[LawLoop], certify: bool) -> dict[str, Any]:
+def poles_answer(poles: Poles | Poles[Loop], certify: bool) -> dict[str, Any]:
     """Poles with Im >= 0, how many are unstable, and the box in which they are complete; proven discs if asked."""
     answer = {
         "arm": poles.loop.arm.name,
@@ -191,7 +191,7 @@ def poles_answer(poles: Poles | Poles[LawLoop], certify: bool) -> dict[str, Any]
     return answer
 
 
-def margins_answer(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
+def margins_answer(found: Margins | Margins[Loop]) -> dict[str, Any]:
     """The verdict first; margins are null unless the loop is stable."""
     verdict = found.stability
     limits, sizes = found.in_band, sizes_of(found)
@@ -225,9 +225,9 @@ def margins_answer(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
     }
 
 
-def _known_of(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
+def _known_of(found: Margins | Margins[Loop]) -> dict[str, Any]:
     """What a theorem says of the law: Lyapunov's argument and the windows of gains at the hub, or the law's sign."""
-    if isinstance(found.stability.loop, LawLoop):
+    if isinstance(found.stability.loop, Loop):
         loop = found.stability.loop
         signs = signs_of_loop(loop)
         return {
@@ -255,7 +255,7 @@ def unsettled(found: Margins[Any]) -> str:
     A theorem on the sign of a law, or small gain, tells nothing of the law with another number in it.
     """
     loop, words = found.stability.loop, reach_words(found.windows.values())
-    if not isinstance(loop, LawLoop):
+    if not isinstance(loop, Loop):
         return "" if found.stability.is_known_beyond else words
     if not found.windows and loop.arm.has_elastic_link:
         return NO_WINDOWS

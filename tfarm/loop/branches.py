@@ -25,7 +25,7 @@ from tfarm.spectrum.correction import corrected
 from tfarm.spectrum.damped import COMPANY, single_zeros
 from tfarm.spectrum.scales import rate_unit
 
-from .plant import Loop, effective_inertia
+from .plant import HubLoop, effective_inertia
 from .variation import Variation, member_of
 
 MAY_PASS_ORIGIN = 1e-6  # of the lowest flexible frequency: zeros closer to the origin may pass it
@@ -115,7 +115,7 @@ class Stage:
     def _member(self, value: float) -> Any:
         return member_of(self.variation, value, self.at_zero, MAY_PASS_ORIGIN * self.lowest)
 
-    def _leaving(self, before: Node, rigid: Callable[[Loop, Complex], Complex]) -> Node:
+    def _leaving(self, before: Node, rigid: Callable[[HubLoop, Complex], Complex]) -> Node:
         """The first node after the start, where the rigid body's zeros leave s = 0 as `rigid` says."""
         share = FIRST_STEP_SHARE
         while share > LEAST_STEP_SHARE:
@@ -204,8 +204,8 @@ def _alone(zeros: Sequence[float]) -> Complex:
     return np.array([[zero, np.nan] for zero in zeros], complex).reshape(-1, 2)
 
 
-def rigid_pair(loop: Loop, _: Complex) -> Complex:
-    """The zeros of J_eff s^2 + b s + c (`Loop.at_rest`): what the rigid body's become under small gains."""
+def rigid_pair(loop: HubLoop, _: Complex) -> Complex:
+    """The zeros of J_eff s^2 + b s + c (`HubLoop.at_rest`): what the rigid body's become under small gains."""
     J = effective_inertia(loop.arm, loop.law) or CANCELLED_INERTIA * loop.arm.total_inertia
     b, c = (each / J for each in loop.at_rest)
     root = np.sqrt(complex(b * b / 4 - c))
@@ -214,7 +214,7 @@ def rigid_pair(loop: Loop, _: Complex) -> Complex:
     return np.array([near, far] if root.real else [far, near], complex)
 
 
-def _slow_zero(loop: Loop, pair: Complex) -> Complex:
+def _slow_zero(loop: HubLoop, pair: Complex) -> Complex:
     """The pair with its zero at 0 moved to -c/b: where it goes while little holds the hub's angle."""
     b, c = loop.at_rest
     return np.array([-c / b, pair[1]], complex)

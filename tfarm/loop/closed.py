@@ -10,13 +10,13 @@ from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 
 from .law_locus import LawLocus, law_locus
-from .law_loop import LawLoop
 from .law_map import LawMap, law_map
 from .law_poles import law_poles
 from .law_stability import is_quiet_above, law_stability
 from .law_windows import law_windows
 from .locus import Locus
 from .locus import locus as locus_of_gains
+from .loop import Loop
 from .margins import Margins, loop_margins, margins_of_gains
 from .nyquist import Nyquist, nyquist_of
 from .poles import Poles, poles_of_gains
@@ -27,7 +27,7 @@ from .variation import OF_THE_LAW
 LOCUS_VALUES, LAW_LOCUS_VALUES = 500, 100  # values of a locus unless so many are asked for: of gains, of any other law
 
 
-def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles | Poles[LawLoop]:
+def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles | Poles[Loop]:
     """The first `count` closed-loop poles with Im >= 0, ascending in Im s, complete in the box of the record.
 
     Without a count the first ten, or so.  Raises ParameterError where there is no loop, ConvergenceError where the box
@@ -37,7 +37,7 @@ def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles 
     return poles_of_gains(arm, law, count) if isinstance(law, HubFeedback) else law_poles(arm, law, count)
 
 
-def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins | Margins[LawLoop]:
+def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins | Margins[Loop]:
     """Verdict first, then the stable windows of each gain, or of each number of a law, and the margins of the loop.
 
     Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, or where with damping
@@ -56,13 +56,13 @@ def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins | Margi
     return Margins(verdict, windows, found, None, None, None)
 
 
-def verdict_on(arm: Arm, law: AnyLaw) -> Stability | Stability[LawLoop]:
+def verdict_on(arm: Arm, law: AnyLaw) -> Stability | Stability[Loop]:
     """The verdict alone.  Raises what `margins` raises."""
     arm, law = arm_and_law(arm, law)
     return stability(arm, law) if isinstance(law, HubFeedback) else law_stability(arm, law)
 
 
-def nyquist(arm: Arm, law: AnyLaw) -> Nyquist | Nyquist[LawLoop]:
+def nyquist(arm: Arm, law: AnyLaw) -> Nyquist | Nyquist[Loop]:
     """The loop function of a law on Nyquist's contour, its turns around -1 counted up to the verdict's band.
 
     Raises what the verdict raises, and ConvergenceError where the curve passes -1 so close that its turns cannot be

@@ -31,9 +31,9 @@ from .answers import law_answer
 from .crossings import BranchCrossing, crossing_answers, in_words
 from .damping import NO_PART
 from .frequencies import band_of, grid
-from .law_loop import LawLoop
 from .law_map import law_crossings
 from .law_poles import law_box, starting_points_of
+from .loop import Loop
 from .resting import NEAREST_TO_ORIGIN
 from .variation import ARM_PARAMETERS, must_be_way
 
@@ -114,21 +114,21 @@ class Family:
         """Whether the number is one of the arm."""
         return self.vary in ARM_PARAMETERS
 
-    def at(self, value: float) -> LawLoop:
+    def at(self, value: float) -> Loop:
         """The loop where the number has that value."""
         if self.is_of_arm:
-            return LawLoop(self.arm.having(**{self.vary: value}), self.law)
+            return Loop(self.arm.having(**{self.vary: value}), self.law)
         return self._first.under(self.law.having(self.vary, value))
 
     @property
-    def own(self) -> LawLoop:
+    def own(self) -> Loop:
         """The loop of the law as it is given: what varies may be a factor on it."""
         return self._first.under(self.law)
 
     @cached_property
-    def _first(self) -> LawLoop:
+    def _first(self) -> Loop:
         """The loop where the way begins, of whose rig the others are."""
-        return LawLoop(self.arm, self.law.having(self.vary, self.start))
+        return Loop(self.arm, self.law.having(self.vary, self.start))
 
     def started(self, values: Real, branches: int) -> tuple[Box, Complex]:
         """A box for the whole way, and the poles in it at the first value."""

@@ -26,10 +26,10 @@ from tfarm.spectrum.scales import first_frequency
 
 from .answers import law_answer
 from .frequencies import grid
-from .law_loop import LawLoop
 from .law_poles import law_box
 from .law_stability import band_for, is_told_without
 from .lines import ROUNDED, ascending, through_infinity, through_origin
+from .loop import Loop
 from .stability import MARGIN_OF_ZERO
 
 LEADING = ".den.0"  # how the name of a leading coefficient ends
@@ -94,7 +94,7 @@ def law_map(arm: Arm, law: AnyLaw, vary: tuple[str, str], x: Real, y: Real, band
     if vary[0] == vary[1]:
         raise ParameterError(key="vary", value=list(vary), remedy="two different numbers of the law")
     x, y = ascending(vary[0], x, MOST_MAP_VALUES), ascending(vary[1], y, MOST_MAP_VALUES)
-    own = LawLoop(arm, law)
+    own = Loop(arm, law)
     is_counted = vary[0] == "delay" or _turns_over(own, vary[0], x)
     if vary[1] == "delay" or (not is_counted and _turns_over(own, vary[1], y)):
         turned = law_map(arm, law, (vary[1], vary[0]), y, x, band)
@@ -124,7 +124,7 @@ def law_map(arm: Arm, law: AnyLaw, vary: tuple[str, str], x: Real, y: Real, band
     return found
 
 
-def _counted(loop: LawLoop, name: str, x: Real, across: Crossings, band: float) -> NDArray[np.int64]:
+def _counted(loop: Loop, name: str, x: Real, across: Crossings, band: float) -> NDArray[np.int64]:
     """Unstable poles at each x, from one count in the middle; where a pole rests there, farthest from the crossings."""
     is_resting = loop.under(loop.law.having(name, float(x[x.size // 2]))).resting_zeros
     start = float(x[_farthest(x, across.gain) if is_resting else x.size // 2])
@@ -137,7 +137,7 @@ def _farthest(values: Real, crossings: Real) -> int:
     return int(np.argmax(abs(values[:, None] - crossings).min(axis=1))) if crossings.size else values.size // 2
 
 
-def _must_hold_at_corners(loop: LawLoop, found: LawMap) -> None:
+def _must_hold_at_corners(loop: Loop, found: LawMap) -> None:
     """Refuse a map by ConvergenceError where poles came into the band or left it through its top, on the way."""
     for i, j in ((0, 0), (0, -1), (-1, 0), (-1, -1)):
         at = (float(found.x[i]), float(found.y[j]))
@@ -159,12 +159,12 @@ def asked_at(name: str, limits: tuple[float, float]) -> tuple[float, ...]:
     return (low, 0.0, high) if name.endswith(LEADING) and low < 0 < high else limits
 
 
-def _turns_over(loop: LawLoop, name: str, values: Real) -> bool:
+def _turns_over(loop: Loop, name: str, values: Real) -> bool:
     """Whether a leading coefficient passes through 0 between these values, where without it high modes are driven."""
     return name.endswith(LEADING) and bool(values[0] < 0 < values[-1]) and not is_told_without(loop, name)
 
 
-def unstable_below(loop: LawLoop, band: float) -> int:
+def unstable_below(loop: Loop, band: float) -> int:
     """Poles right of the axis with |Im s| < band: by how often D turns around the upper half of that region.
 
     Where one is on its upper edge the next of `TRIED_HEIGHTS` is taken.  Raises ConvergenceError where one is on the
@@ -185,7 +185,7 @@ def unstable_below(loop: LawLoop, band: float) -> int:
     raise AssertionError("unreachable")
 
 
-def law_crossings(loop: LawLoop, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:
+def law_crossings(loop: Loop, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:
     """The crossings of the axis along one number of a loop's law, between its first and last value.
 
     `known` are the parts of the loop's signals at `omega`.  Where the leading coefficient of a denominator changes its
@@ -209,7 +209,7 @@ def _is_next_to_zero(crossing: Crossing, values: Real) -> bool:
     return bool(0 < crossing.at < math.inf and values[0] < crossing.t < values[-1])
 
 
-def _crossings_in(loop: LawLoop, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:
+def _crossings_in(loop: Loop, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:
     """The same with the digits of the range: D = A + t B, 0 < t < 1 along it."""
     low, span = float(values[0]), float(values[-1] - values[0])
     first, last = (loop.under(loop.law.having(name, float(end))) for end in (values[0], values[-1]))
@@ -239,7 +239,7 @@ def _crossings_in(loop: LawLoop, name: str, values: Real, omega: Real, known: Lo
     return Crossings.of(each._replace(t=0.0) if abs(each.t) <= ROUNDED * span else each for each in found)
 
 
-def _change_at(loop: LawLoop, name: str, low: float, span: float, t: float, others: list[Crossing], band: float) -> int:
+def _change_at(loop: Loop, name: str, low: float, span: float, t: float, others: list[Crossing], band: float) -> int:
     """By how much the count grows at t where two poles meet at s = 0, from counts on either side.
 
     Without losses modes may cross at that value, but for rounding: it is no place to count at, and is refused.

@@ -18,7 +18,7 @@ from tfarm.spectrum.complete_box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SING
 from tfarm.spectrum.scales import first_frequency
 
 from .frequencies import band_of, steep_places
-from .law_loop import UNDISPERSED, LawLoop
+from .loop import UNDISPERSED, Loop
 from .poles import (
     MOST_POLES,
     STARTS_REACH,
@@ -41,14 +41,14 @@ MODES_ABOVE_BOX, MOST_MODEL_MODES = 4, 40  # modes of the model above the box, a
 MOST_LAW_BOX_MODES = 150  # flexible, below the highest box of a law that is searched for as many poles as are asked for
 
 
-def law_poles(arm: Arm, law: Law, count: int | None = None) -> Poles[LawLoop]:
+def law_poles(arm: Arm, law: Law, count: int | None = None) -> Poles[Loop]:
     """The first `count` poles with Im s >= 0 of the loop under a law, complete in the box of the record.
 
     Raises ParameterError where there is no loop, ConvergenceError where the box cannot be completed.
     """
     remedy = f"a whole number from 1 to {MOST_POLES}"
     wanted = USUAL_POLES if count is None else whole("count", count, 1, MOST_POLES, remedy)
-    loop, number = LawLoop(arm, law), wanted + 2
+    loop, number = Loop(arm, law), wanted + 2
     while True:
         poles = law_poles_below(loop, band_of(loop.arm, number))
         if poles.values.size >= wanted:
@@ -62,7 +62,7 @@ def law_poles(arm: Arm, law: Law, count: int | None = None) -> Poles[LawLoop]:
         number *= 2
 
 
-def law_poles_below(loop: LawLoop, height: float, late: float = LATE) -> Poles[LawLoop]:
+def law_poles_below(loop: Loop, height: float, late: float = LATE) -> Poles[Loop]:
     """All poles with |Im s| <= height [rad/s] in a box that reaches right of every unstable one.
 
     Left it reaches to -late/delay at most.
@@ -74,7 +74,7 @@ def law_poles_below(loop: LawLoop, height: float, late: float = LATE) -> Poles[L
     return Poles(loop, np.r_[np.zeros(at_zero, complex), upper], box)
 
 
-def law_box(loop: LawLoop, height: float, late: float = LATE) -> Box:
+def law_box(loop: Loop, height: float, late: float = LATE) -> Box:
     """A box of that height, right of the law's poles and until |L| is small; left short of -1/C and -late/delay."""
     own, C = loop.law.poles, loop.arm.damping
     if own.real.max(initial=0.0) > UNDISPERSED * first_frequency(loop.arm):
@@ -88,7 +88,7 @@ def law_box(loop: LawLoop, height: float, late: float = LATE) -> Box:
     return Box(-float(left), right, -height, height)
 
 
-def starting_points_of(loop: LawLoop, up_to: float) -> Complex:
+def starting_points_of(loop: Loop, up_to: float) -> Complex:
     """Where Newton's method starts: the loop of a modal model, the arm's own frequencies, and the law's poles."""
     omega, C = np.asarray(steep_places(loop.arm, up_to)), loop.arm.damping
     near = near_modes(omega, C)
@@ -103,7 +103,7 @@ def starting_points_of(loop: LawLoop, up_to: float) -> Complex:
     return starts[abs(starts) > LEAST_START]
 
 
-def _lightly_damped(loop: LawLoop, count: int) -> Matrices:
+def _lightly_damped(loop: Loop, count: int) -> Matrices:
     """A model of the rig in its undamped modes, each with the damping of its own C w, and what the hub loses.
 
     Bending of one C has just that; the damped modes themselves take far longer to be followed than starts are worth.
@@ -116,7 +116,7 @@ def _lightly_damped(loop: LawLoop, count: int) -> Matrices:
     return A - arm.rate_loss * B @ C[-1:], B, C[:-1], D[:-1]
 
 
-def poles_of_model(loop: LawLoop, plant: Matrices) -> Complex:
+def poles_of_model(loop: Loop, plant: Matrices) -> Complex:
     """Poles of a model of the rig, from its input to the law's signals, under the law, a delay by Pade's fraction."""
     law = loop.law.matrices()
     if loop.law.delay:

@@ -23,8 +23,8 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.spectrum import modes_below
 
 from .frequencies import MOST_BAND_MODES, QUIET_REACH, band_of, grid, quiet_places
-from .law_loop import LawLoop
 from .law_poles import law_box, law_poles_below
+from .loop import Loop
 from .passivity import Signs, signs_of
 from .poles import Poles
 from .stability import (
@@ -47,12 +47,12 @@ SLOWEST_BAND = 3.0  # heights: as far above it are resonances looked at one by o
 NEAREST_TO_AXIS = 1e-4  # of a band: the upper edge of the box is looked at on the axis and from so near to it on
 
 
-def law_stability(arm: Arm, law: Law, band: float | None = None) -> Stability[LawLoop]:
+def law_stability(arm: Arm, law: Law, band: float | None = None) -> Stability[Loop]:
     """The verdict on the loop under a law.  `band` [rad/s] is chosen if it is not given.
 
     Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted or one is on the axis.
     """
-    loop = LawLoop(arm, law)
+    loop = Loop(arm, law)
     signs = signs_of_loop(loop)
     height, quiet = (band, False) if band is not None else _band(loop, signs)
     poles = law_poles_below(loop, height, LISTED_LEFT)
@@ -71,14 +71,14 @@ def law_stability(arm: Arm, law: Law, band: float | None = None) -> Stability[La
     return Stability(loop, verdict, poles.unstable, infinite, poles.box.im_max, tail, poles, known)
 
 
-def signs_of_loop(loop: LawLoop) -> Signs:
+def signs_of_loop(loop: Loop) -> Signs:
     """What the law's sign tells of this rig: nothing behind an inductance, or through anything but the hub."""
     if loop.arm.input_lags:
         return Signs("", "behind an inductance the torque comes late")
     return signs_of(loop.law, loop.arm.rate_loss)
 
 
-def _holds(loop: LawLoop, signs: Signs) -> bool:
+def _holds(loop: Loop, signs: Signs) -> bool:
     """Whether the theorem leaves no pole right of the axis on this rig."""
     if signs.kind in ("strictly passive", "passive"):
         return True
@@ -88,7 +88,7 @@ def _holds(loop: LawLoop, signs: Signs) -> bool:
     return spring + signs.at_rest > 0
 
 
-def _verdict(poles: Poles[LawLoop], infinite: bool, loop: LawLoop, strict: bool) -> str:
+def _verdict(poles: Poles[Loop], infinite: bool, loop: Loop, strict: bool) -> str:
     """`strict`: a theorem puts every mode that the hub feels left of the axis, however little."""
     moving = poles.moving
     if infinite or bool((moving.real > MARGIN_OF_ZERO * abs(moving)).any()):
@@ -103,7 +103,7 @@ def _verdict(poles: Poles[LawLoop], infinite: bool, loop: LawLoop, strict: bool)
     return "stable"
 
 
-def _band(loop: LawLoop, signs: Signs) -> tuple[float, bool]:
+def _band(loop: Loop, signs: Signs) -> tuple[float, bool]:
     """The band [rad/s] in which poles are computed, and whether the loop is quiet beyond it."""
     own = loop.law.poles
     ringing = own[own.real > -DULL * abs(own)]
@@ -119,12 +119,12 @@ def _band(loop: LawLoop, signs: Signs) -> tuple[float, bool]:
     return least, False
 
 
-def band_for(loop: LawLoop) -> float:
+def band_for(loop: Loop) -> float:
     """The band [rad/s] in which the poles of a loop are counted."""
     return _band(loop, signs_of_loop(loop))[0]
 
 
-def is_told_without(loop: LawLoop, name: str) -> bool:
+def is_told_without(loop: Loop, name: str) -> bool:
     """Whether poles beyond some band are told, of this law or any nearer to it, once a leading coefficient is 0.
 
     Else high modes are driven on the way there, and their poles come to a band from above: counts in it cannot be
@@ -138,7 +138,7 @@ def is_told_without(loop: LawLoop, name: str) -> bool:
         return False
 
 
-def is_quiet_above(loop: LawLoop, band: float) -> bool:
+def is_quiet_above(loop: Loop, band: float) -> bool:
     """Whether 1 + L has no zero with Im s > band right of the axis, by |L| < 1/2 on the edges of that region.
 
     On the axis two decades are looked at, where |L| falls, with every natural frequency; on the upper edge of the box

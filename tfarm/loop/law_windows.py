@@ -13,14 +13,14 @@ from tfarm.crossing import Crossings, Window, counts_over, intervals, joined
 from tfarm.errors import ConvergenceError
 
 from .frequencies import grid
-from .law_loop import LawLoop
 from .law_map import LEADING, asked_at, law_crossings, unstable_below
 from .law_stability import band_for, is_told_without
+from .loop import Loop
 from .stability import Stability
 from .windows import BEYOND_LAW, Windows
 
 
-def law_windows(verdict: Stability[LawLoop]) -> dict[str, Windows]:
+def law_windows(verdict: Stability[Loop]) -> dict[str, Windows]:
     """The windows of each of `Law.numbers` between ten times what it is and minus that (`_range`).
 
     None where a pole is on the axis for whatever numbers, of an arm with elastic links, all of whose modes meet on it,
@@ -50,7 +50,7 @@ def law_windows(verdict: Stability[LawLoop]) -> dict[str, Windows]:
 
 
 def _stable(
-    verdict: Stability[LawLoop], name: str, limits: tuple[float, float], found: Crossings, band: float
+    verdict: Stability[Loop], name: str, limits: tuple[float, float], found: Crossings, band: float
 ) -> list[Window]:
     """The windows, from the verdict's count; where nothing is known beyond the band each is counted if need be.
 
@@ -71,7 +71,7 @@ def _stable(
     return intervals(found, *limits, value, verdict.unstable_roots)
 
 
-def _range(loop: LawLoop, name: str, value: float) -> tuple[float, float]:
+def _range(loop: Loop, name: str, value: float) -> tuple[float, float]:
     """Between which values a number is looked at: of a leading coefficient from a tenth of what it is on, with its
     sign, where without it high modes are driven."""
     if name.endswith(LEADING) and value and not is_told_without(loop, name):

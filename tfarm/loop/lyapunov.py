@@ -25,7 +25,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.records import record
 from tfarm.response import transfer
 
-from .plant import Loop
+from .plant import HubLoop
 
 Kind = Literal["dissipated", "conserved", "unproven"]
 
@@ -40,7 +40,7 @@ class Lyapunov:
     the law is "unproven", which alone does not make it unstable.  `reason` is one sentence.
     """
 
-    loop: Loop
+    loop: HubLoop
     proven: bool
     a1_over_a2: float | None
     kind: Kind
@@ -49,7 +49,7 @@ class Lyapunov:
 
 def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:
     """What V proves of the law with a strain gauge as it is.  Raises ParameterError where there is no loop."""
-    loop, C = Loop(arm, law), arm.damping
+    loop, C = HubLoop(arm, law), arm.damping
     if not law.is_at_hub:
         names = " and ".join(gain.name for gain in law.elsewhere)
         return _unproven(loop, f"V knows hub angle, hub rate and root moment, and nothing of what {names} feeds back")
@@ -64,7 +64,7 @@ def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:
     return _with_whole_moment(loop)
 
 
-def _with_whole_moment(loop: Loop) -> Lyapunov:
+def _with_whole_moment(loop: HubLoop) -> Lyapunov:
     """V_t = -a2 K1 theta_t^2 - a1 C integral(E I phi_xt^2) with a1/a2 = 1 - K2."""
     law, C = loop.law, 0.0 if loop.arm.is_undamped else 1.0
     weight, K1 = 1.0 - loop.moment_share, law.K1 + loop.arm.rate_loss
@@ -89,5 +89,5 @@ def _with_whole_moment(loop: Loop) -> Lyapunov:
     return Lyapunov(loop, True, weight, kind, f"V with a1/a2 = {weight:g} {what}: no pole lies in the right half-plane")
 
 
-def _unproven(loop: Loop, reason: str) -> Lyapunov:
+def _unproven(loop: HubLoop, reason: str) -> Lyapunov:
     return Lyapunov(loop, False, None, "unproven", reason)

@@ -30,10 +30,10 @@ from tfarm.records import record
 from tfarm.spectrum.scales import first_frequency
 
 from .frequencies import grid
-from .law_loop import LawLoop
 from .lines import NO_FEEDBACK, Line, line_crossings, static_crossings
+from .loop import Loop
 from .lossless import stable_moments
-from .plant import Loop, slow_terms
+from .plant import HubLoop, slow_terms
 from .poles import LEAST_SQUARABLE, AnyLoop
 from .stability import Stability, is_quiet, stability
 from .windows import Windows, gain_windows
@@ -140,7 +140,7 @@ def loop_margins(verdict: Stability[Any]) -> LoopMargins:
     values["peak_sensitivity"] = max(1.0, values["peak_sensitivity"])
     places = {name: float(f"{where:.{PLACE_DIGITS}g}") for name, (_, where) in least.items()}
     by_phase = phase_crossovers(loop, omega)
-    gain = gain_margin(loop, band) if isinstance(loop, Loop) else _nearest_to_one([t for _, t in by_phase])
+    gain = gain_margin(loop, band) if isinstance(loop, HubLoop) else _nearest_to_one([t for _, t in by_phase])
     by_gain = tuple(sorted(zip(crossed.tolist(), angle.tolist(), strict=True)))
     return LoopMargins(band=band, gain=gain, **values, at=places, gain_crossovers=by_gain, phase_crossovers=by_phase)
 
@@ -164,13 +164,13 @@ def _spread(f: Callable[[Real], Real | Complex], omega: Real) -> Real:
     return np.asarray(abs(f(near.ravel()).reshape(near.shape) - f(omega)).max(axis=0))
 
 
-def inverse_peak(loop: Loop | LawLoop, omega: Real, of: int) -> Real:
+def inverse_peak(loop: HubLoop | Loop, omega: Real, of: int) -> Real:
     """|1 + L| at i omega, or |1 + 1/L| for `of` 1: the inverse of what S = 1/(1 + L) and T = L/(1 + L) peak at."""
     parts = loop.parts(1j * omega)
     return np.asarray(abs(parts[0] + parts[1]) / np.maximum(abs(parts[of]), LEAST_SIZE))
 
 
-def phase_crossovers(loop: Loop | LawLoop, omega: Real) -> tuple[tuple[float, float], ...]:
+def phase_crossovers(loop: HubLoop | Loop, omega: Real) -> tuple[tuple[float, float], ...]:
     """Frequencies [rad/s] with L real and below 0, and the factor -1/L; at rest too where L is finite there."""
     factor, place, _ = crossed(omega, lambda w: loop.parts(1j * w))
     crosses = (factor > AT_POLE) & (factor < 1 / AT_POLE) & ~_through_pole_or_zero(loop, place)
@@ -183,7 +183,7 @@ def phase_crossovers(loop: Loop | LawLoop, omega: Real) -> tuple[tuple[float, fl
     return tuple(sorted(found))
 
 
-def _through_pole_or_zero(loop: Loop | LawLoop, place: Real) -> NDArray[np.bool_]:
+def _through_pole_or_zero(loop: HubLoop | Loop, place: Real) -> NDArray[np.bool_]:
     """Of frequencies (n,) at which L turns from one side of the real axis to the other, which do so at a pole or zero.
 
     There its denominator or numerator turns round and not L.  They are looked at as near as rounding lets the sides be
@@ -204,7 +204,7 @@ def _through_pole_or_zero(loop: Loop | LawLoop, place: Real) -> NDArray[np.bool_
     return turned
 
 
-def _factor(loop: Loop | LawLoop, omega: Real) -> Complex:
+def _factor(loop: HubLoop | Loop, omega: Real) -> Complex:
     """-1/L at i omega, 0 where L is infinite or vanishes."""
     drive, fed_back = loop.parts(1j * omega)
     return np.asarray(-drive / np.where(fed_back == 0, np.inf, fed_back))
@@ -215,7 +215,7 @@ def _nearest_to_one(factors: list[float]) -> tuple[float, float]:
     return max((t for t in factors if 0 <= t < 1), default=0.0), min((t for t in factors if t > 1), default=math.inf)
 
 
-def disk_at(loop: Loop | LawLoop, omega: Real) -> Real:
+def disk_at(loop: HubLoop | Loop, omega: Real) -> Real:
     """2 |(1 + L)/(1 - L)| at i omega."""
     drive, fed_back = loop.parts(1j * omega)
     return np.asarray(2 * abs(drive + fed_back) / np.maximum(abs(drive - fed_back), LEAST_SIZE))
@@ -228,7 +228,7 @@ def dense(verdict: Stability[Any]) -> Real:
     """
     poles = verdict.poles.values[verdict.poles.values.imag > 0]
     away = np.concatenate([-NEAR_POLES[::-1], [0.0], NEAR_POLES])
-    if isinstance(verdict.loop, LawLoop):  # its own poles and zeros of |L| may be as narrow
+    if isinstance(verdict.loop, Loop):  # its own poles and zeros of |L| may be as narrow
         own = verdict.loop.law.poles
         poles = np.r_[poles, own[own.imag > 0]]
     close = (poles.imag[:, None] + abs(poles.real[:, None]) * away).ravel()
@@ -252,24 +252,24 @@ def loop_curve(found: Margins[Any]) -> tuple[Real, NDArray[np.complex128]]:
     return omega[told], L[told]
 
 
-def minus_loop(loop: Loop | LawLoop, omega: Real) -> Complex:
+def minus_loop(loop: HubLoop | Loop, omega: Real) -> Complex:
     """-L(i w); below `LEAST_SQUARABLE` that of the rigid arm, from which the arm's own cannot be told there."""
     rigid = omega <= LEAST_SQUARABLE
     value = -loop.loop_function(1j * np.where(rigid, 1.0, omega))
-    if isinstance(loop, Loop) and rigid.any():
+    if isinstance(loop, HubLoop) and rigid.any():
         a, b, k = _rigid(loop)
         w = omega[rigid]
         value[rigid] = k + b / w / w + 1j * (a / w)
     return np.asarray(value)
 
 
-def rigid_crossings(loop: Loop | LawLoop) -> Real:
+def rigid_crossings(loop: HubLoop | Loop) -> Real:
     """Frequencies [rad/s] where the loop function of the rigid arm has size 1; none of an arm that cannot turn.
 
     -L = k + b/w^2 + i a/w with a = K1/J, b = Kp/J, k = K2 (J - I_h)/J, so (1 - k^2) w^4 - (2 b k + a^2) w^2 - b^2 = 0.
     Of a hub with friction the drive is not J s^2, and these are none of its own.
     """
-    if not isinstance(loop, Loop) or loop.arm.rate_loss or not loop.arm.has_rigid_mode:
+    if not isinstance(loop, HubLoop) or loop.arm.rate_loss or not loop.arm.has_rigid_mode:
         return np.empty(0)
     a, b, k = _rigid(loop)
     if not (a or b):
@@ -280,14 +280,14 @@ def rigid_crossings(loop: Loop | LawLoop) -> Real:
     return np.asarray(unit * np.sqrt(squares.real[(squares.imag == 0) & (squares.real > 0)]))
 
 
-def _rigid(loop: Loop) -> tuple[float, float, float]:
+def _rigid(loop: HubLoop) -> tuple[float, float, float]:
     """K1/J [1/s], Kp/J [1/s^2] and K2 (J - I_h)/J, with what other gains add (`slow_terms`)."""
     c, b, inertia, _ = slow_terms(loop.arm, loop.law).tolist()
     J = loop.arm.turned_inertia
     return b / J, c / J, -inertia / J
 
 
-def gain_margin(loop: Loop, band: float) -> tuple[float, float]:
+def gain_margin(loop: HubLoop, band: float) -> tuple[float, float]:
     """The factors on all gains at once, below and above 1, at which a pole first reaches the axis."""
     law, arm, free, line = loop.law, loop.arm, loop.freed.arm, Line(NO_FEEDBACK, loop.law)
     if loop.freed.is_reactive:
@@ -299,7 +299,7 @@ def gain_margin(loop: Loop, band: float) -> tuple[float, float]:
     return _nearest_to_one(factors)
 
 
-def unit_crossings(loop: Loop | LawLoop, omega: Real) -> Real:
+def unit_crossings(loop: HubLoop | Loop, omega: Real) -> Real:
     """Frequencies [rad/s] where |L(i w)| = 1."""
     if loop.law == NO_FEEDBACK:
         return np.empty(0)

@@ -25,8 +25,8 @@ from tfarm.spectrum import flexible_frequencies
 
 from .answers import law_answer
 from .frequencies import band_of, grid
-from .law_loop import LawLoop
-from .plant import Loop
+from .loop import Loop
+from .plant import HubLoop
 from .poles import AnyLoop, count_with_mirrors
 from .stability import Stability
 
@@ -93,7 +93,7 @@ def nyquist_of(verdict: Stability[AnyLoop]) -> Nyquist[AnyLoop]:
     corner = complex(verdict.poles.box.re_max, band)
     across, down = np.linspace(1j * band, corner, EDGE_POINTS), np.linspace(corner, corner.real, EDGE_POINTS)
     turned = turning(loop, np.r_[s, across[1:], down[1:]])
-    own = loop.law.poles if isinstance(loop, LawLoop) else np.empty(0, complex)
+    own = loop.law.poles if isinstance(loop, Loop) else np.empty(0, complex)
     inside = int(((own.real > AXIS_SHARE * abs(own)) & (abs(own.imag) < band)).sum())
     plot = Nyquist(s, loop.loop_function(s), is_arc, poles, round(turned / math.pi), verdict, inside)
     found = min(plot.clear, verdict.unstable_roots)
@@ -105,14 +105,14 @@ def nyquist_of(verdict: Stability[AnyLoop]) -> Nyquist[AnyLoop]:
     return plot
 
 
-def poles_on_axis(loop: Loop | LawLoop, band: float) -> Real:
+def poles_on_axis(loop: HubLoop | Loop, band: float) -> Real:
     """Poles of L on the imaginary axis [rad/s], from 0 up: the rigid body's, and at C = 0 every natural frequency.
 
     A law may have some of its own.
     """
     arm = loop.arm
     flexible = np.asarray(flexible_frequencies(arm, band)) if arm.is_undamped else np.empty(0)
-    if isinstance(loop, LawLoop):
+    if isinstance(loop, Loop):
         own = loop.law.poles
         on_axis = abs(own.real) <= AXIS_SHARE * abs(own)  # of a product of resonators roots are off it by rounding
         ringing = own.imag[on_axis & (own.imag > 0) & (own.imag < band)]
@@ -122,13 +122,13 @@ def poles_on_axis(loop: Loop | LawLoop, band: float) -> Real:
     return np.r_[zero, flexible]
 
 
-def upper_contour(loop: Loop | LawLoop, poles: Real, band: float, closed: Complex) -> tuple[Complex, NDArray[np.bool_]]:
+def upper_contour(loop: HubLoop | Loop, poles: Real, band: float, closed: Complex) -> tuple[Complex, NDArray[np.bool_]]:
     """From s = 0 (or right of it, where a pole is) up the axis to the band, past each pole on its right.
 
     `closed` are the closed loop's poles: each step past a pole of L goes nearer to it than the nearest of them.
     """
     omega = np.asarray(grid(loop.arm, band))
-    if isinstance(loop, LawLoop):
+    if isinstance(loop, Loop):
         own = loop.law.poles[loop.law.poles.imag > 0]
         near = (own.imag[:, None] + abs(own.real)[:, None] * AROUND_LAW_POLE).ravel()
         omega = np.unique(np.r_[omega, near[(near > omega[0]) & (near < band)]])
@@ -150,7 +150,7 @@ def upper_contour(loop: Loop | LawLoop, poles: Real, band: float, closed: Comple
     return s[order], is_arc[order]
 
 
-def smooth(loop: Loop | LawLoop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
+def smooth(loop: HubLoop | Loop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
     """More points on the axis wherever the drawn curve would have corners."""
     for _ in range(TURN_ROUNDS):
         length = abs(np.diff(compressed(loop.loop_function(s))))
@@ -162,7 +162,7 @@ def smooth(loop: Loop | LawLoop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple
     return s, is_arc
 
 
-def indentation(loop: Loop | LawLoop, pole: float) -> float:
+def indentation(loop: HubLoop | Loop, pole: float) -> float:
     """The radius at which |L| is about 20, and at most a thousandth of the pole's frequency (at 0: of the first)."""
     scale = pole or band_of(loop.arm, 1)
     step = RESIDUE_AT * scale
@@ -170,7 +170,7 @@ def indentation(loop: Loop | LawLoop, pole: float) -> float:
     return min(INDENT_RADIUS * float(abs(loop.loop_function(near)[0])) * step, WIDEST_INDENT * scale)
 
 
-def turning(loop: Loop | LawLoop, path: Complex) -> float:
+def turning(loop: HubLoop | Loop, path: Complex) -> float:
     """By how much [rad] the argument of 1 + L grows along a path, halved where it turns fast."""
     value = 1 + loop.loop_function(path)
     for _ in range(TURN_ROUNDS):

@@ -29,7 +29,7 @@ SMALLEST_NORMAL = float(np.finfo(float).tiny)  # a smaller double has not all it
 
 @dataclass(frozen=True)
 @record
-class Loop:
+class HubLoop:
     """An arm under a law at its hub.
 
     Raises ParameterError where there is no loop: a locked hub cannot turn; a pin without inertia has M(0) = -u at every
@@ -91,7 +91,7 @@ class Loop:
         return self.law.K2 / self.arm.input_per_torque
 
     @cached_property
-    def freed(self) -> Loop:
+    def freed(self) -> HubLoop:
         """A loop with the same poles whose hub loses nothing, if only that hides a reactive arm: the law's K1 takes it.
 
         Friction and back-EMF act as a rate gain does where the input acts at once.  Otherwise the loop itself.
@@ -100,7 +100,7 @@ class Loop:
         is_loop = arm.hub_side_inertia > 0 and abs(whole) <= most_gain(arm, RATE_GAIN)
         if not (self.arm.rate_loss and arm.is_reactive and is_loop):
             return self
-        return Loop(arm, self.law.having(RATE_GAIN, whole))
+        return HubLoop(arm, self.law.having(RATE_GAIN, whole))
 
     @property
     def is_reactive(self) -> bool:

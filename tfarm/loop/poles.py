@@ -26,9 +26,9 @@ from tfarm.spectrum.complete_box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SING
 from tfarm.spectrum.enclose import Disc, disjoint, enclosed, proven_count
 
 from .frequencies import band_of, steep_places
-from .law_loop import LawLoop
+from .loop import Loop
 from .lossless import driven_modes
-from .plant import Loop, effective_inertia
+from .plant import HubLoop, effective_inertia
 
 MOST_POLES = 1000  # that may be asked for
 USUAL_POLES = 10  # poles listed where no count is asked for
@@ -37,7 +37,7 @@ SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are the rigid arm's, a
 SLOW_STEPS = 4  # of Newton's method from there
 NEAR_RIGID = 0.01  # of its size: how far it may be from the rigid arm's
 LEAST_SQUARABLE = 1e-140  # 1/s: whose square is still a full double
-AnyLoop = TypeVar("AnyLoop", bound=Loop | LawLoop, default=Loop)  # hub gains, unless another law is said
+AnyLoop = TypeVar("AnyLoop", bound=HubLoop | Loop, default=HubLoop)  # hub gains, unless another law is said
 LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
 RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is looked at again
 FAR_RIGHT, BEYOND_CORNER = 1e5, 10.0  # times that edge, and a law's fastest corner: so far a real pole is looked for
@@ -77,11 +77,11 @@ class Poles(Generic[AnyLoop]):
     def unstable(self) -> int:
         """How many poles of the box, conjugates counted, lie to the right of the axis.
 
-        A real part below working precision decides nothing, but at C = 0 a theorem does (`Loop.takes_energy`,
+        A real part below working precision decides nothing, but at C = 0 a theorem does (`HubLoop.takes_energy`,
         `driven_modes`).
         """
         right = self.values.real > AXIS_SHARE * abs(self.values)
-        if isinstance(self.loop, LawLoop):  # of which no theorem on gains at the hub tells anything
+        if isinstance(self.loop, Loop):  # of which no theorem on gains at the hub tells anything
             return count_with_mirrors(self.values[right])
         loop = self.loop.freed
         if loop.arm.is_undamped and loop.is_told_by_theorem and loop.takes_energy < 0:
@@ -112,7 +112,7 @@ class Poles(Generic[AnyLoop]):
 
         Raises CertificationError where something cannot be proven.
         """
-        if isinstance(self.loop, LawLoop):
+        if isinstance(self.loop, Loop):
             raise CertificationError("discs are proven for gains at the hub; of a law the poles are counted in the box")
         k, gains = self.loop.k, self.loop.gains
         discs = tuple(enclosed(k, complex(pole), digits, gains) for pole in self.moving)
@@ -133,7 +133,7 @@ def poles_of_gains(arm: Arm, law: HubFeedback, count: int | None = None) -> Pole
     """
     if count is not None:
         count = whole("count", count, 1, MOST_POLES, f"a whole number from 1 to {MOST_POLES}")
-    loop, cut_off = Loop(arm, law), arm.shear_cutoff
+    loop, cut_off = HubLoop(arm, law), arm.shear_cutoff
     wanted, limit = (USUAL_POLES, cut_off) if count is None else (count, math.inf)
     number = wanted + 2
     while True:
@@ -152,7 +152,7 @@ def poles_of_gains(arm: Arm, law: HubFeedback, count: int | None = None) -> Pole
         number *= 2
 
 
-def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = TRIED_HEIGHTS) -> Poles:
+def poles_below(loop: HubLoop, height: float, factors: tuple[float, ...] = TRIED_HEIGHTS) -> Poles:
     """All closed-loop poles with |Im s| <= height, and more than about -1.5 heights or -0.8/C in Re s.
 
     Where a zero lies on the edge of the box the next of the `factors` on the height is tried.
@@ -177,7 +177,7 @@ def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = TRIED_HE
     return Poles(loop, np.r_[np.zeros(at_zero, complex), upper], box)
 
 
-def box_of(loop: Loop, height: float) -> Box:
+def box_of(loop: HubLoop, height: float) -> Box:
     """A box of that height which reaches far enough right for any unstable pole, and left short of -1/C."""
     right = quiet_edge(loop, RIGHT_OF_AXIS * height, height, RIGHT_POINTS, GAINS_RIGHT)
     left, C = HEIGHTS_LEFT * height, loop.arm.damping
@@ -185,7 +185,7 @@ def box_of(loop: Loop, height: float) -> Box:
 
 
 def quiet_edge(
-    loop: Loop | LawLoop, right: float, height: float, points: int, heights: float, corner: float = 0.0
+    loop: HubLoop | Loop, right: float, height: float, points: int, heights: float, corner: float = 0.0
 ) -> float:
     """The right edge [1/s] of a box of that height, from `right` on: where 1 + L has no zero, or after so many heights.
 
@@ -207,10 +207,10 @@ def quiet_edge(
     return float(far[turns[-1] + 1] if turns.size else right)
 
 
-def slow_poles(loop: Loop, below: float) -> Complex:
+def slow_poles(loop: HubLoop, below: float) -> Complex:
     """Poles [1/s] but 0 of the turning arm under small gains, of size up to `below`: zeros of J s^2 + b s + c.
 
-    J is the effective inertia, b and c are `Loop.at_rest`.  They are corrected on the characteristic function where
+    J is the effective inertia, b and c are `HubLoop.at_rest`.  They are corrected on the characteristic function if
     their squares are full doubles; smaller ones are right as they are, flexibility and damping adding terms of the
     order |s|/w1 and C |s|.
     """
@@ -229,7 +229,7 @@ def slow_poles(loop: Loop, below: float) -> Complex:
     return exact[abs(exact - slow) <= NEAR_RIGID * abs(slow)]
 
 
-def starting_points(loop: Loop, up_to: float) -> Complex:
+def starting_points(loop: HubLoop, up_to: float) -> Complex:
     """Where Newton's method starts: the arm's own frequencies, those with the hub locked, and the rigid arm's poles."""
     arm, C = loop.arm, loop.arm.damping
     near = near_modes(np.asarray(steep_places(arm, up_to)), C)

@@ -30,7 +30,7 @@ from tfarm.spectrum.scales import PAPER_GAINS, default_gains
 from .frequencies import grid
 from .lines import NO_FEEDBACK, ROUNDED, along, ascending, crossing_at_zero, line_crossings, static_crossings
 from .lossless import locked_edges, stable_moments
-from .plant import Loop
+from .plant import HubLoop
 from .stability import loop_band, stability
 from .windows import holds_undamped
 
@@ -78,8 +78,8 @@ class Region:
 
     @property
     def freed(self) -> Arm:
-        """The arm without what its hub loses, if only that hides a reactive one (`Loop.freed`), else itself."""
-        return Loop(self.arm, self.held).freed.arm
+        """The arm without what its hub loses, if only that hides a reactive one (`HubLoop.freed`), else itself."""
+        return HubLoop(self.arm, self.held).freed.arm
 
     @property
     def upright(self) -> float:
@@ -99,7 +99,7 @@ class Region:
             static = [each.t for each in static_crossings(arm, along("K2", law))]
             ends = {low, high, *stable_moments(arm), *static}
             pairs = itertools.pairwise(sorted(end for end in ends if low <= end <= high))
-            loop = Loop(arm, law)
+            loop = HubLoop(arm, law)
             held = [pair for pair in pairs if holds_undamped(replace(loop, law=law.having("K2", sum(pair) / 2)))]
             return [held if self.upright < K1 else [] for K1 in self.K1]
         first = self.unstable[0].tolist()
@@ -129,7 +129,7 @@ def region(arm: Arm, K1: Real, K2: Real, held: HubFeedback = NO_FEEDBACK) -> Reg
             "0: the plane of two gains is that of what is at the hub; of other laws ask for their own numbers, vary="
         )
         raise ParameterError(key=gain.name, value=held[gain.name], remedy=remedy)
-    free = Loop(arm, held.at(float(K1[-1]), float(K2[-1]))).freed.arm
+    free = HubLoop(arm, held.at(float(K1[-1]), float(K2[-1]))).freed.arm
     if free.is_told_by_lyapunov:
         counts = _undamped_counts(free, K1 + arm.rate_loss, K2, held)
         return Region(arm, held, K1, K2, counts, np.empty((0, 3)), 0.0, [])
@@ -137,7 +137,7 @@ def region(arm: Arm, K1: Real, K2: Real, held: HubFeedback = NO_FEEDBACK) -> Reg
         counts, band = _lossless_counts(free, K1 + arm.rate_loss, K2, held), float(locked_edges(free).at.max())
         return Region(arm, held, K1, K2, counts, np.empty((0, 3)), band, [])
     corners = [held.at(float(a), float(b)) for a in (K1[0], K1[-1]) for b in (K2[0], K2[-1])]
-    band = max(loop_band(Loop(arm, law))[0] for law in corners)
+    band = max(loop_band(HubLoop(arm, law))[0] for law in corners)
     omega = np.asarray(grid(arm, band))
     without = held.at(float(K1[-1]), 0.0)
     last = np.array([stability(arm, without).unstable_roots])
@@ -147,7 +147,7 @@ def region(arm: Arm, K1: Real, K2: Real, held: HubFeedback = NO_FEEDBACK) -> Reg
     if arm.loses_at_hub_alone and arm.reads_hub_moment and not arm.input_lags:
         # a hub without inertia behind a spring, which is not `freed`: of elastic links every mode is driven
         taken = np.sign(1.0 - K2[:, None] / arm.input_per_torque) * np.sign(K1 + arm.rate_loss)
-        unstable = np.where(taken < 0, INFINITE, unstable)  # as `Loop.takes_energy` says
+        unstable = np.where(taken < 0, INFINITE, unstable)  # as `HubLoop.takes_energy` says
     return Region(arm, held, K1, K2, unstable, boundary(arm, omega, held), band, found)
 
 

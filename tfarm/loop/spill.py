@@ -23,9 +23,9 @@ from tfarm.reduced.sensed import sensed_model
 from tfarm.spectrum import modes
 
 from .answers import law_answer
-from .law_loop import LawLoop
 from .law_poles import poles_of_model
 from .law_stability import law_stability
+from .loop import Loop
 from .stability import Stability
 
 MOST_SPILL_MODES = 60  # modes of a model
@@ -45,7 +45,7 @@ class Spill:
     unstable too, None where the last is not.
     """
 
-    verdict: Stability[LawLoop]
+    verdict: Stability[Loop]
     modes: NDArray[np.int64]
     unstable: NDArray[np.int64]
     rightmost: Complex

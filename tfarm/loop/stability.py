@@ -31,7 +31,7 @@ from tfarm.spectrum import modes, modes_below
 
 from .frequencies import MOST_BAND_MODES, QUIET_REACH, band_of, quiet_places
 from .lossless import driven_modes, locked_edges
-from .plant import Loop, slow_terms
+from .plant import HubLoop, slow_terms
 from .poles import AnyLoop, Poles, poles_below
 
 LEAST_BAND_MODES = 12  # flexible modes in the band at C = 0, and at least
@@ -79,7 +79,7 @@ def stability(arm: Arm, law: HubFeedback, band: float | None = None) -> Stabilit
     Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, and where at C > 0 one
     is on the axis to working precision.
     """
-    loop = Loop(arm, law)
+    loop = HubLoop(arm, law)
     height, quiet = (band, False) if band is not None else loop_band(loop)
     poles = poles_below(loop, height)
     beyond = _beyond(loop, quiet)
@@ -98,7 +98,7 @@ class Beyond(NamedTuple):
     is_known: bool = True
 
 
-def _verdict(poles: Poles, is_unstable: bool, loop: Loop) -> str:
+def _verdict(poles: Poles, is_unstable: bool, loop: HubLoop) -> str:
     moving, law, free = poles.moving, loop.law, loop.freed
     if is_unstable or bool((moving.real > MARGIN_OF_ZERO * abs(moving)).any()):
         return "unstable"
@@ -145,7 +145,7 @@ def felt(arm: Arm, up_to: float) -> Real:
     return np.array([b * scale / k, b * arm.hub_side_inertia * omega**2 * scale / (EI * k**2)])
 
 
-def _beyond(loop: Loop, quiet: bool) -> Beyond:
+def _beyond(loop: HubLoop, quiet: bool) -> Beyond:
     """What is known beyond the band."""
     arm, law, told = loop.arm, loop.law, loop.is_told_by_theorem
     if told and loop.takes_energy > 0:
@@ -163,7 +163,7 @@ def _beyond(loop: Loop, quiet: bool) -> Beyond:
     return Beyond(NOT_BOUNDED[bool(arm.least_damping)], is_known=False)
 
 
-def _beyond_lossless(loop: Loop) -> Beyond:
+def _beyond_lossless(loop: HubLoop) -> Beyond:
     """Without losses, where the gauge does not read the moment on the hub: by the modes of the locked hub."""
     arm, law = loop.freed.arm, loop.freed.law
     rate, opposite = RATES[arm is not loop.arm]
@@ -179,7 +179,7 @@ def _beyond_lossless(loop: Loop) -> Beyond:
     return Beyond(f"C = 0: {NO_THEOREM}; K2 is beyond the edge of none among {which}", is_known=False)
 
 
-def loop_band(loop: Loop) -> tuple[float, bool]:
+def loop_band(loop: HubLoop) -> tuple[float, bool]:
     """The band [rad/s] in which poles are computed, and whether the loop is quiet beyond it (always False at C = 0)."""
     few = band_of(loop.arm, LEAST_BAND_MODES)
     if loop.freed.arm.is_reactive or (loop.is_told_by_theorem and (loop.arm.is_undamped or loop.takes_energy > 0)):
@@ -198,11 +198,11 @@ def band_of_gains(arm: Arm, ranges: Mapping[str, tuple[float, float]]) -> tuple[
     |L| is convex in the gains, so that it is largest at a corner of their box.
     """
     corners = [HubFeedback(**dict(zip(ranges, each, strict=True))) for each in product(*ranges.values())]
-    bands, quiet = zip(*(loop_band(Loop(arm, law)) for law in corners), strict=True)
+    bands, quiet = zip(*(loop_band(HubLoop(arm, law)) for law in corners), strict=True)
     return max(bands), all(quiet)
 
 
-def is_quiet(loop: Loop, band: float) -> bool:
+def is_quiet(loop: HubLoop, band: float) -> bool:
     """Whether |L(i w)| stays below `QUIET` over two decades from the band on, and falls there.
 
     Of a rig with an elastic segment it is not known: with what the hub or another segment loses, the resonances of that
@@ -211,7 +211,7 @@ def is_quiet(loop: Loop, band: float) -> bool:
     return loop.arm.least_damping > 0 and _has_fallen(loop, band)
 
 
-def _has_fallen(loop: Loop, band: float) -> bool:
+def _has_fallen(loop: HubLoop, band: float) -> bool:
     """Whether |L| is so at `QUIET_POINTS` points of these two decades, and at the resonances between them."""
     omega, half = np.asarray(quiet_places(loop.arm, band, QUIET_POINTS)), math.sqrt(QUIET_REACH) * band
     size = abs(loop.loop_function(1j * omega))

@@ -18,7 +18,7 @@ from tfarm.records import record
 from tfarm.spectrum.correction import Member
 
 from .lines import NO_FEEDBACK, Line
-from .plant import Loop
+from .plant import HubLoop
 
 OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, as of the arm's below
 ARM_PARAMETERS = {
@@ -51,11 +51,11 @@ class Variation:
         """Whether the arm stays as it is."""
         return self.vary in OF_THE_LAW
 
-    def at(self, value: float) -> Loop:
+    def at(self, value: float) -> HubLoop:
         """The loop where the varied number has that value.  Raises ParameterError where there is none."""
         if self.is_of_gains:
-            return Loop(self.arm, self.line.at(value))
-        return Loop(self.arm.having(**{self.vary: value}), self.beside.plus(self.law))
+            return HubLoop(self.arm, self.line.at(value))
+        return HubLoop(self.arm.having(**{self.vary: value}), self.beside.plus(self.law))
 
     @property
     def line(self) -> Line:

@@ -19,7 +19,7 @@ from tfarm.spectrum.scales import gain_unit, most_gain
 
 from .lines import along, line_crossings, static_crossings
 from .lossless import locked_edges, stable_moments
-from .plant import Loop
+from .plant import HubLoop
 from .stability import Stability, loop_band, stability
 
 End = Literal["edge", "search bound", "no limit"]
@@ -65,7 +65,7 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
         told = told or free.arm.is_told_by_lyapunov  # every mode, by a theorem
         band = math.inf if told else float(locked_edges(free.arm).at.max())
     else:
-        ends = (Loop(loop.arm, law.having(name, end)) for end in (low, high))
+        ends = (HubLoop(loop.arm, law.having(name, end)) for end in (low, high))
         band = max(verdict.band, *(loop_band(end)[0] for end in ends))
         found = _as_mirrored(loop, name, line_crossings(loop.arm, along(name, law), band)).within(low, high)
     pairs = list(itertools.pairwise([low, *np.unique(found.gain).tolist(), high]))
@@ -82,12 +82,12 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
     return Windows(name, around, tuple(stable), (low, high), found, band)
 
 
-def _is_lossless_line(loop: Loop, name: str) -> bool:
+def _is_lossless_line(loop: HubLoop, name: str) -> bool:
     """Whether theorems without losses tell the loop, whatever value the gain of that name takes."""
     return loop.freed.arm.is_reactive and loop.law.having(name, 1.0).is_at_hub
 
 
-def _as_mirrored(loop: Loop, name: str, found: Crossings) -> Crossings:
+def _as_mirrored(loop: HubLoop, name: str, found: Crossings) -> Crossings:
     """The crossings along a gain, rounding taken off where without losses D is even in s but for that gain's part.
 
     Then poles are on the axis where an odd part vanishes with its gain, or by itself; an even part leaves every pole
@@ -101,7 +101,7 @@ def _as_mirrored(loop: Loop, name: str, found: Crossings) -> Crossings:
     return Crossings.of(each._replace(t=at) for each in found if name in odd and abs(each.t - at) < unit)
 
 
-def looked_at(loop: Loop, name: str) -> Window:
+def looked_at(loop: HubLoop, name: str) -> Window:
     """The range of a gain that is searched, symmetric and well beyond what matters to the first mode."""
     arm, law = loop.arm, loop.law
     reach = max(FARTHER_REACH.get(name, WINDOW_REACH) * gain_unit(arm, name), BEYOND_LAW * abs(law[name]))
@@ -112,7 +112,7 @@ def looked_at(loop: Loop, name: str) -> Window:
     return -most, most
 
 
-def _undamped(loop: Loop, name: str) -> Crossings:
+def _undamped(loop: HubLoop, name: str) -> Crossings:
     """Without losses: every mode at once at K2 = 1 (or each at its own K2, see `lossless`) and where K1 makes up for
     what the hub loses, 0 or below.
 
@@ -142,7 +142,7 @@ def _counts(verdict: Stability, name: str, pairs: list[Window], found: Crossings
     loop, value = verdict.loop, verdict.loop.law[name]
     if _is_lossless_line(loop, name):
         laws = [loop.law.having(name, (low + high) / 2) for low, high in pairs]
-        return [int(not holds_undamped(Loop(loop.arm, law).freed)) for law in laws]
+        return [int(not holds_undamped(HubLoop(loop.arm, law).freed)) for law in laws]
     middles = np.array([(low + high) / 2 for low, high in pairs])
     if verdict.verdict != "marginal" and any(low < value < high for low, high in pairs):
         known = verdict.unstable_roots
@@ -154,7 +154,7 @@ def _counts(verdict: Stability, name: str, pairs: list[Window], found: Crossings
     return [int(count) for count in counts]
 
 
-def _is_braked(loop: Loop) -> bool:
+def _is_braked(loop: HubLoop) -> bool:
     """Whether K1 > 0 takes energy from every mode by a theorem: at K2 = 0, or without losses (`lossless`)."""
     if loop.law.K2 == 0 or not loop.arm.is_reactive:
         return loop.law.K2 == 0
@@ -162,7 +162,7 @@ def _is_braked(loop: Loop) -> bool:
     return low < loop.law.K2 < high
 
 
-def holds_undamped(loop: Loop) -> bool:
+def holds_undamped(loop: HubLoop) -> bool:
     """Whether no pole is right of the axis without losses: K1 > 0, K2 < 1 (Lyapunov), and nothing falls statically.
 
     K2 is between `stable_moments` where the gauge does not read the hub's moment: no pole of the modes looked at then.
@@ -174,7 +174,7 @@ def holds_undamped(loop: Loop) -> bool:
     return bool((1 + loop.loop_function(small)[0]).real > 0)
 
 
-def _with_proven_ends(loop: Loop, name: str, pair: Window, limits: Window) -> Window:
+def _with_proven_ends(loop: HubLoop, name: str, pair: Window, limits: Window) -> Window:
     """Ends at the edge of the search replaced by infinity where a theorem says that nothing changes beyond it.
 
     At C = 0 the Lyapunov argument holds for every K1 > 0, Kp >= 0, K2 < 1; at C > 0 for K2 = 0 (a passive hub).

@@ -10,8 +10,8 @@ from tfarm.arm import MOMENT_GAIN
 from tfarm.columns import Column, Table
 from tfarm.digits import how_many, plain, significant, singly
 from tfarm.loop.answers import MARGIN_COLUMNS, NOT_STABLE, WINDOW_COLUMNS, gain_rows, margin_rows, unsettled
-from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_stability import signs_of_loop
+from tfarm.loop.loop import Loop
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
 from tfarm.report.loop_laws import Named
@@ -59,7 +59,7 @@ def verdict_words(name: str, found: Margins[Any]) -> str:
     it, loop = found.stability, found.stability.loop
     free = it.poles.moving.size < it.poles.values.size
     apart = ", the one at 0 that the hub angle leaves apart" if free else ""
-    if isinstance(loop, LawLoop):
+    if isinstance(loop, Loop):
         signs = signs_of_loop(loop)
         kind = f"it is {signs.kind}" if signs.kind else "no theorem on its sign helps"
         theorem = f"Beside that, {kind}: {typeset(signs.reason)}."

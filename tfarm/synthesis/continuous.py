@@ -15,7 +15,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.loop.damping import least_damping
 from tfarm.loop.frequencies import band_of, grid
 from tfarm.loop.margins import disk_at
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import HubLoop
 from tfarm.loop.regions import region
 from tfarm.loop.residual import residual_moment
 from tfarm.loop.stability import stability
@@ -107,4 +107,4 @@ class ContinuousJudge:
         return np.asarray(grid(self.arm, band_of(self.arm, self.modes)))
 
     def _disk(self, law: HubFeedback) -> float:
-        return float(disk_at(Loop(self.arm, law), self._omega).min())
+        return float(disk_at(HubLoop(self.arm, law), self._omega).min())

@@ -23,7 +23,7 @@ from tfarm.dsp.brief import SampledBrief, sampled_brief
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.frequencies import band_of
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import HubLoop
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import record
 from tfarm.spectrum.scales import check_gains, rate_unit, turning_inertia
@@ -147,7 +147,7 @@ def _bounds_at_first(
     """
     arm, unit = arms[0].arm, arms[0].arm.input_per_torque
     for each in arms:
-        Loop(each.arm, held.at(1.0, 0.0 if each.arm.has_massless_hub else 0.5 * unit))
+        HubLoop(each.arm, held.at(1.0, 0.0 if each.arm.has_massless_hub else 0.5 * unit))
     bounds = {
         "K1": _checked("K1", K1 or (0.0, 2.0 * turning_inertia(arm) * band_of(arm, 1))),
         "K2": _checked("K2", K2 or (-3.0 * unit, 1.0 * unit)),

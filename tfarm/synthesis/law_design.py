@@ -20,8 +20,8 @@ from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.law_loop import SampledLaw
 from tfarm.dsp.law_verdict import law_verdict
 from tfarm.errors import ConvergenceError, ParameterError, did_you_mean
-from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_stability import law_stability
+from tfarm.loop.loop import Loop
 from tfarm.loop.stability import Stability
 from tfarm.records import record
 from tfarm.synthesis.law_judge import LAW_OBJECTIVES, LawJudge, law_judge
@@ -55,7 +55,7 @@ class LawDesign:
     coefficients: dict[str, float]
     at_limit: tuple[str, ...]
     value: float
-    verdict: Stability[LawLoop]
+    verdict: Stability[Loop]
     sampled: Verdict[SampledLaw]
     modes: int
     chain: Chain
@@ -104,7 +104,7 @@ def law_design(
                 return LawDesign(
                     objective, structure, law, {ANGLE_GAIN: on_angle} | named, form.at_limit(x),
                     worst_value(objective, [each.value for each in on_arms]),
-                    cast("Stability[LawLoop]", on_arms[0].verdict), sampled[0], modes, chain,
+                    cast("Stability[Loop]", on_arms[0].verdict), sampled[0], modes, chain,
                     tuple(on_arms),
                 )  # fmt: skip
     raise ConvergenceError(_why_none(arms, structure, nearest[1], chain), nearest[1], None)

@@ -12,7 +12,7 @@ import numpy as np
 from tfarm.arm import HubFeedback
 from tfarm.arrays import Real
 from tfarm.dsp.brief import SampledBrief
-from tfarm.loop.law_loop import LawLoop
+from tfarm.loop.loop import Loop
 from tfarm.loop.stability import Stability
 from tfarm.records import record
 from tfarm.synthesis.continuous import ContinuousJudge
@@ -35,7 +35,7 @@ class OnArm:
     name: str
     numbers: dict[str, float]
     value: float
-    verdict: Stability | Stability[LawLoop]
+    verdict: Stability | Stability[Loop]
     sampled: SampledBrief
 
 

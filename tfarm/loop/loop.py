@@ -15,7 +15,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, Law, cancelled, must_be_arm
+from tfarm.arm import Arm, Law, cancelled, full_law, must_be_arm
 from tfarm.arrays import LEAST_SIZE, Complex
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, LoopParts, deflated, difference_steps
@@ -35,7 +35,7 @@ NO_ORDER = 99  # of a zero at s = 0, of what is not fed back: above that of any 
 
 @dataclass(frozen=True)
 @record
-class LawLoop:
+class Loop:
     """A rig under a law in s.  Raises ParameterError for a locked hub, a law in z, and an algebraic loop.
 
     `signals` are what is fed back: made unless they are given, as `under` gives those of another law.
@@ -55,14 +55,15 @@ class LawLoop:
         if self.law.is_discrete:
             remedy = "a law in z acts at samples: ask for the sampled loop, or leave the period out of a law in s"
             raise ParameterError(key="period", value=self.law.period, remedy=remedy)
+        object.__setattr__(self, "law", full_law(self.law))
         given: Signals | None = self.signals
         if given is None or given.names != self.law.signals or given.arm != self.arm:
             object.__setattr__(self, "signals", Signals(self.arm, self.law.signals))
         self._must_fall()
 
-    def under(self, law: Law) -> LawLoop:
+    def under(self, law: Law) -> Loop:
         """The same rig under another law: what its signals are at rest is not worked out again."""
-        return LawLoop(self.arm, law, self.signals)
+        return Loop(self.arm, law, self.signals)
 
     @property
     def k(self) -> System:
