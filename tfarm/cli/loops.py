@@ -23,7 +23,7 @@ Vary = Annotated[
     ),
 ]
 HELP_ON_POINTS = "values, equally spaced; 500, along a gain, delay or signal of a law 100"
-HELP_ON_BRANCHES = "branches, 1 to 200; along those the flexible modes below the top of the box, up to 60"
+HELP_ON_BRANCHES = "branches, 1 to 200; along those the flexible modes below the top of the box"
 
 
 @app.command()
@@ -44,21 +44,15 @@ def locus(
     """Root locus of the exact arm along a gain or a parameter; crossings of the imaginary axis are solved for."""
     count, subject = whole_number("--branches", branches, 1, 200), load_arm(arm)
     law, said = asked_law(subject, given)
-    from tfarm.arm import HubFeedback
     from tfarm.cli.tables import hand_out
     from tfarm.loop.closed import locus as find
-    from tfarm.loop.law_locus import LawLocus, law_locus_answer
     from tfarm.loop.loci import locus_answer
-    from tfarm.loop.reduced_locus import reduced_locus
+    from tfarm.loop.reduced_locus import reduced_of
 
-    most = (100_000, 200) if isinstance(law, HubFeedback) else (5000, 60)
-    number = None if points is None else whole_number("--points", points, 2, most[0])
-    found = find(subject, law, vary, start, stop, number, min(count, most[1]))
-    if isinstance(found, LawLocus):
-        reduced, answer = None, law_locus_answer(found)
-    else:
-        reduced = reduced_locus(found)
-        answer = locus_answer(found, reduced)
+    number = None if points is None else whole_number("--points", points, 2, 100_000)
+    found = find(subject, law, vary, start, stop, number, count)
+    reduced = reduced_of(found)
+    answer = locus_answer(found, reduced)
     hand_out(
         lambda: answer | said, print_locus, json,
         csv=csv, table=lambda: branches_table(answer, found.branches), png=png, picture=(found, reduced),
@@ -74,30 +68,26 @@ def branches_table(answer: dict[str, Any], branches: Complex) -> Table:
 
 
 def print_locus(answer: dict[str, Any]) -> None:
-    """A row a branch, then the crossings; of gains how far the reduced branches are, of any other law the box."""
+    """A row a branch, then the crossings, how far the reduced branches are, and the box."""
     from tfarm.tables.terminal import show
 
     first, last, name, branches = answer["gain"][0], answer["gain"][-1], answer["vary"], answer["branches"]
-    of_gains = "gap_by_branch" in answer
-    none = "ended" if of_gains else "-"
     columns = [
         Column("branch", "branch", of=range(len(branches))),
-        Column("mode", "mode", of=answer.get("mode")),
-        Column("first", f"s [1/s] at {name} = {first:g}", of=[_complex(branch[0], none) for branch in branches]),
-        Column("last", f"at {name} = {last:g}", of=[_complex(branch[-1], none) for branch in branches]),
+        Column("mode", "mode", of=answer["mode"]),
+        Column("first", f"s [1/s] at {name} = {first:g}", of=[_complex(branch[0]) for branch in branches]),
+        Column("last", f"at {name} = {last:g}", of=[_complex(branch[-1]) for branch in branches]),
         Column("gap", "gap to reduced", of=answer.get("gap_by_branch"), digits=singly("{:.1e}".format)),
     ]
     show(Table(columns=tuple(column for column in columns if column.of is not None)))
     _print_crossings(answer)
-    for each in answer.get("ends", ()):
-        print(f"branch {each['branch']} is followed to {name} = {each['gain']:.10g}: then it comes to -1/C, or is lost")
-    if of_gains:
+    for each in answer["ends"]:
+        print(f"branch {each['branch']} is followed to {name} = {each['gain']:.10g}")
+    if "gap_to_reduced" in answer:
         gap, order = answer["gap_to_reduced"], answer["reduced_order"]
         print(f"largest gap to python-control on a model of order {order}: {gap:.1e}")
-    else:
-        left, right, _, top = answer["box"]
-        box = f"{left:.6g} < Re s < {right:.6g} and |Im s| < {top:.6g}"
-        print(f"all poles with {box}, complete at each value; - : outside")
+    left, right, _, top = answer["box"]
+    print(f"poles complete at a few values with {left:.6g} < Re s < {right:.6g} and |Im s| < {top:.6g}; - : not followed")
     print(answer["sign_convention"])
 
 
@@ -113,8 +103,8 @@ def _print_crossings(answer: dict[str, Any]) -> None:
         print("no branch crosses the imaginary axis")
 
 
-def _complex(point: list[float] | None, none: str) -> str:
+def _complex(point: list[float] | None) -> str:
     if point is None:
-        return none
+        return "-"
     re, im = point
     return f"{re:.10g}{im:+.10g}i" if im else f"{re:.10g}"

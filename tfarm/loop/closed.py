@@ -9,20 +9,19 @@ from tfarm.arm import AT_HUB, FED_BACK, PLANE, AnyLaw, Arm, HubFeedback, Law, ar
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 
-from .law_locus import LawLocus, law_locus
 from .law_map import LawMap, law_map
 from .law_poles import law_poles
 from .law_stability import is_quiet_above, law_stability
 from .law_windows import law_windows
 from .locus import Locus
-from .locus import locus as locus_of_gains
+from .locus import locus as followed_locus
 from .loop import Loop
 from .margins import Margins, loop_margins, margins_of_gains
 from .nyquist import Nyquist, nyquist_of
 from .poles import Poles, poles_of_gains
 from .regions import Region, region
 from .stability import Stability, stability
-from .variation import OF_THE_LAW
+from .varied import OF_THE_LAW
 
 LOCUS_VALUES, LAW_LOCUS_VALUES = 500, 100  # values of a locus unless so many are asked for: of gains, of any other law
 
@@ -74,12 +73,12 @@ def nyquist(arm: Arm, law: AnyLaw) -> Nyquist | Nyquist[Loop]:
 
 def locus(
     arm: Arm, law: AnyLaw, vary: str, start: float, stop: float, points: int | None = None, branches: int = 10
-) -> Locus | LawLocus:
+) -> Locus:
     """The closed-loop poles of the exact arm as one number goes from `start` to `stop`, at equally spaced values.
 
     `vary` is a gain, "all" (a scale on the gains), payload_mass, payload_inertia, hub_inertia, length or damping; of a
     law of signals "gain" (a factor on it), "delay", a signal, "SIGNAL.num.N" or "SIGNAL.den.N", too.  Along these, and
-    of any other `Law` than gains at the hub, the record is a `LawLocus`, of the first `branches` (60 at most) flexible
+    of any other `Law` than gains at the hub, the record has all poles of a box as high as the first `branches` flexible
     modes, with 100 values unless `points` says otherwise.
     Raises ParameterError for what is no law, no loop or no range, ConvergenceError where branches cannot be told apart.
     """
@@ -88,9 +87,9 @@ def locus(
         raise ParameterError(key="vary", value=vary, remedy=f"the name of what varies, such as {PLANE[1]} or length")
     is_of_signals = isinstance(law, Law) or vary.partition(".")[0] in {"gain", "delay", *FED_BACK}
     if isinstance(plain, HubFeedback) and (vary in OF_THE_LAW or not is_of_signals):
-        return locus_of_gains(arm, plain, vary, start, stop, LOCUS_VALUES if points is None else points, branches)
+        return followed_locus(arm, plain, vary, start, stop, LOCUS_VALUES if points is None else points, branches)
     values = LAW_LOCUS_VALUES if points is None else points
-    return law_locus(arm, as_law(law), vary, start, stop, values, branches)
+    return followed_locus(arm, as_law(law), vary, start, stop, values, branches, in_box=True)
 
 
 def gain_map(

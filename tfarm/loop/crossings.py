@@ -1,4 +1,8 @@
-"""Where branches of a locus cross the imaginary axis: solved for gain and frequency together, not interpolated."""
+"""Where branches of a locus cross the imaginary axis: solved for gain and frequency together, not interpolated.
+
+Along a number of the law in which D is linear D-decomposition has every crossing of the axis (`tfarm.crossing`); each is
+that of the branch that changes sides there, or of a pole on none.  Along another number the branch is followed to it.
+"""
 
 from __future__ import annotations
 
@@ -9,26 +13,23 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
-from tfarm.arm import GAINS
 from tfarm.arrays import Complex, Real
+from tfarm.crossing import Crossing
 from tfarm.errors import ConvergenceError
-from tfarm.exact.characteristic import loop_parts, quick_characteristics, torque
-from tfarm.exact.outputs import OUTPUTS
 from tfarm.response.frequency import AXIS_SHARE
+from tfarm.spectrum.scales import first_frequency
 
-from .variation import Evaluator, Variation
+from .frequencies import grid
+from .law_map import law_crossings
+from .varied import Varied
 
 AT_ORIGIN = 1e-9  # of the largest of its branch: a pole so near to 0 is there but for the last step of its correction
-NEAR_ZERO = 1e-50  # of the lowest frequency: where D is taken for its value at s = 0
-CROSSING_SETTLED = 1e-6  # of the distance of two points: a crossing must be known so well at least
-CROSSING_STEP = 1e-5  # of a frequency, or of the distance of two gains, for differences
-CROSSING_STEPS = 30  # of Newton's method, at most: linear convergence at a double root leaves 1e-9
-ODD = np.array([OUTPUTS[gain.output].power % 2 == 1 for gain in GAINS])  # powers of s: imaginary on the axis
-CROSSING_HALVINGS = (0, 4, 12)  # of the distance of two points, before Newton's method is tried
-GAIN_KNOWN = 1e-17  # of the larger end of a bracket: a gain at which a pole is at 0 is known so closely, next to 0 too
-CROSSINGS_TOLD = 3  # of a locus in words
-LEAST_RTOL = 4 * float(np.finfo(float).eps)  # that SciPy's brentq takes
+SAME_CROSSING = 1e-3  # of the highest frequency: so near is a crossing of a branch to where its points say that it is
+AT_END = 1e-9  # of the range: a crossing so near to an end is at the end, and not between
+GAIN_KNOWN = 1e-15  # of the larger end of a step: the value at which a branch crosses
+CROSSINGS_SHOWN = 3  # of a locus in words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,12 +53,12 @@ class BranchCrossing:
 
 
 def in_words(vary: str, crossings: Sequence[BranchCrossing]) -> str:
-    """Where poles cross the imaginary axis as one number varies, the first `CROSSINGS_TOLD` of them."""
+    """Where poles cross the imaginary axis as one number varies, the first `CROSSINGS_SHOWN` of them."""
     if not crossings:
         return "no branch crosses the imaginary axis"
-    told = ", ".join(f"{each.direction} at {vary} = {each.gain:.6g}" for each in crossings[:CROSSINGS_TOLD])
-    more = len(crossings) - CROSSINGS_TOLD
-    return f"a pole becomes {told}{f' and {more} more' if more > 0 else ''}"
+    first = ", ".join(f"{each.direction} at {vary} = {each.gain:.6g}" for each in crossings[:CROSSINGS_SHOWN])
+    more = len(crossings) - CROSSINGS_SHOWN
+    return f"a pole becomes {first}{f' and {more} more' if more > 0 else ''}"
 
 
 def crossing_answers(found: Iterable[BranchCrossing]) -> list[dict[str, Any]]:
@@ -74,120 +75,83 @@ def crossing_answers(found: Iterable[BranchCrossing]) -> list[dict[str, Any]]:
     ]
 
 
-def branch_crossings(variation: Variation, gain: Real, branches: Complex, lowest: float) -> tuple[BranchCrossing, ...]:
-    """All changes of sign of Re s between neighbours of the sampled branches, in the order in which they come.
+def branch_crossings(family: Varied, gain: Real, branches: Complex) -> tuple[BranchCrossing, ...]:
+    """Return the crossings of the imaginary axis in the order in which they come, those of poles on no branch too.
 
-    Neighbours are on both sides of the axis, points on it left out; or one is on it at i w, and one real and off it.
-    The mirror image of a branch that is listed, with Im s < 0, is left out.  Raises ConvergenceError where a crossing
-    cannot be solved for.
+    The latter of a damped rig along a number of its law, up to the highest frequency that every value has.
+    """
+    sign, span = float(np.sign(gain[-1] - gain[0])), abs(float(gain[-1] - gain[0]))
+    highest = np.nanmax(np.where(np.isnan(branches), -math.inf, branches.imag), axis=0)
+    top = min(float(highest.min()) or first_frequency(family.first.arm), family.box.im_max)
+    changes, is_damped = _changes(branches), bool(family.first.arm.least_damping)
+    known = _on_line(family, gain, min(1.01 * float(highest.max()), family.box.im_max) or top) if changes or is_damped else []
+    found: list[BranchCrossing] = []
+    for number, low, high in changes:
+        ends, points = gain[[low, high]], branches[number, [low, high]]
+        at, omega = _crossed(family, ends, points, known, top)
+        direction = "unstable" if points[1].real > points[0].real else "stable"
+        found.append(BranchCrossing(gain=at, omega=omega, branch=number, direction=direction))
+    seen = {(each.gain, each.omega) for each in found}
+    for t, omega, change in known if is_damped else ():
+        inside = AT_END * span < abs(t - gain[0]) < (1 - AT_END) * span and not SAME_CROSSING * top < omega - top < math.inf
+        if inside and (t, omega) not in seen:
+            direction = "unstable" if sign * change > 0 else "stable"
+            found.append(BranchCrossing(gain=t, omega=omega, branch=None, direction=direction))
+    return tuple(sorted(found, key=lambda each: (sign * each.gain, each.omega)))
+
+
+def _on_line(family: Varied, gain: Real, top: float) -> list[Crossing]:
+    """The crossings by D-decomposition where D is linear in the number; else none."""
+    if family.is_of_arm or family.vary == "delay":
+        return []
+    loop = family.first.under(family.full)
+    omega = np.asarray(grid(loop.arm, top))
+    name = "gain" if family.vary == "all" else family.vary
+    return list(law_crossings(loop, name, np.sort(gain), omega, loop.signals.parts(1j * omega), top))
+
+
+def _changes(branches: Complex) -> list[tuple[int, int, int]]:
+    """Each branch that changes sides with the numbers of its last value before and the first after.
+
+    Points on the axis are left out; one of them that is at i w becomes a real one off it, too.  A mirror image is not
+    listed.
     """
     size = abs(branches)
-    on_axis = (abs(branches.real) <= AXIS_SHARE * size) | (size <= AT_ORIGIN * np.fmax.reduce(size, axis=1)[:, None])
+    largest = np.nanmax(np.where(np.isnan(size), 0.0, size), axis=1)[:, None]
+    on_axis = (abs(branches.real) <= AXIS_SHARE * size) | (size <= AT_ORIGIN * largest)
     side = np.where(on_axis | np.isnan(branches), 0, np.sign(branches.real)).astype(int)
     found = []
-    for number, (sides, zeros) in enumerate(zip(side, branches, strict=True)):
+    for number, (sides, poles) in enumerate(zip(side, branches, strict=True)):
         across = [(a, b) for a, b in pairwise(np.flatnonzero(sides)) if sides[a] != sides[b]]
         left = np.flatnonzero((sides[:-1] == 0) & (sides[1:] != 0))
-        away = [(n, n + 1) for n in left if zeros[n].imag > 0 == zeros[n + 1].imag]
-        listed = ((a, b) for a, b in sorted({*across, *away}) if zeros[a].imag >= 0 <= zeros[b].imag)
-        for low, high in listed:
-            at, omega = _solved(variation, gain[[low, high]], zeros[[low, high]], lowest)
-            direction = "unstable" if sides[high] > 0 else "stable"
-            found.append(BranchCrossing(gain=at, omega=omega, branch=number, direction=direction))
-    way = np.sign(gain[-1] - gain[0])
-    return tuple(sorted(found, key=lambda each: (way * each.gain, each.omega)))
+        away = [(n, n + 1) for n in left if poles[n].imag > 0 == poles[n + 1].imag]
+        listed = [(int(a), int(b)) for a, b in sorted({*across, *away}) if poles[a].imag >= 0 <= poles[b].imag]
+        found += [(number, a, b) for a, b in listed if not np.isnan(poles[a : b + 1]).any()]
+    return found
 
 
-def _solved(variation: Variation, gains: Real, zeros: Complex, lowest: float) -> tuple[float, float]:
-    """The gain and the frequency at which a branch between two of its points is on the axis."""
-    if (zeros.imag == 0).any():
-        at = _through_origin(variation, gains, lowest)
-        if at is not None:
-            return at, 0.0
-    for halvings in CROSSING_HALVINGS:
-        ends, points = _halved(variation, gains, zeros, halvings)
+def _crossed(family: Varied, ends: Real, points: Complex, known: Sequence[Crossing], top: float) -> tuple[float, float]:
+    """The value between two at which a branch is on the axis, and the frequency there."""
+    low, high = sorted(ends.tolist())
+    omegas = sorted(abs(points.imag).tolist())
+    wide = SAME_CROSSING * top + (omegas[1] - omegas[0])
+    near = [each for each in known if low <= each.t <= high and omegas[0] - wide <= each.at <= omegas[1] + wide]
+    if near:
         share = points.real[0] / (points.real[0] - points.real[1])
-        g, w = float(ends[0] + share * (ends[1] - ends[0])), float((points[0] + share * (points[1] - points[0])).imag)
-        try:
-            g, w, step = _newton(variation, g, w, gains)
-        except np.linalg.LinAlgError:
-            continue
-        if step < CROSSING_SETTLED and w > 0:
-            return g, w
-    raise ConvergenceError(f"a crossing of the imaginary axis near {gains.mean():.6g} could not be solved", g, w)
+        best = min(near, key=lambda each: abs(each.at - abs((points[0] + share * (points[1] - points[0])).imag)))
+        return best.t, best.at
+    at_rest = lambda value: family.at_rest(float(value))  # noqa: E731
+    tolerance = GAIN_KNOWN * max(abs(low), abs(high))
+    if not points.imag.all() and at_rest(low) * at_rest(high) <= 0:
+        return float(brentq(at_rest, low, high, xtol=tolerance)), 0.0
 
+    def pole(value: float) -> complex:
+        share = (value - ends[0]) / (ends[1] - ends[0])
+        found = family.near(np.array([value]), np.array([[points[0] + share * (points[1] - points[0])]]))[0, 0]
+        if np.isnan(found):
+            text = f"a crossing of the imaginary axis near {family.vary} = {value:.6g} could not be solved for"
+            raise ConvergenceError(text, value, found)
+        return complex(found)
 
-def _newton(variation: Variation, g: float, w: float, gains: Real) -> tuple[float, float, float]:
-    """Gain and frequency by Newton's method between two gains, and its last step as a share of their distance or w.
-
-    D(i w; g) = 0 is one complex equation in two real unknowns, its slopes from differences; LinAlgError if that has no
-    solution.
-    """
-    low, high = float(gains.min()), float(gains.max())
-    step, width = math.inf, high - low
-    for _ in range(CROSSING_STEPS if w > 0 else 0):
-        dg, dw = CROSSING_STEP * width, CROSSING_STEP * w
-        up, down = min(g + dg, high), max(g - dg, low)
-        values = _on_axis(variation, np.array([g, g, g, up, down]), np.array([w, w + dw, w - dw, w, w]))
-        by_omega, by_gain = (values[1] - values[2]) / (2 * dw), (values[3] - values[4]) / (up - down)
-        matrix = np.array([[by_gain.real, by_omega.real], [by_gain.imag, by_omega.imag]])
-        dg, dw = np.linalg.solve(matrix, [values[0].real, values[0].imag]).tolist()
-        g, w = min(max(g - dg, low), high), w - dw
-        last, step = step, max(abs(dg) / width, abs(dw) / abs(w))
-        if step == 0 or (step < CROSSING_SETTLED and step >= last / 2):
-            break
-    return g, w, step
-
-
-def _halved(variation: Variation, gains: Real, zeros: Complex, times: int) -> tuple[Real, Complex]:
-    """The two points brought nearer to each other, on both sides of the axis, by following the branch between them."""
-    ends, points = gains.copy(), zeros.copy()
-    for _ in range(times):
-        middle, s = ends.mean(), points.mean(keepdims=True)
-        here = Evaluator(variation, np.array([middle]))
-        for _ in range(CROSSING_STEPS):
-            value, slope, _ = here(s, np.zeros(1, int), variation.zeros_at_origin)
-            s = s - value / slope
-        side = int(np.sign(s.real[0]) == np.sign(points.real[1]))
-        ends[side], points[side] = middle, s[0]
-    return ends, points
-
-
-def _on_axis(variation: Variation, gains: Real, omega: Real) -> Complex:
-    """D(i w; g) for each gain and frequency, all on the scale of the first.
-
-    Without losses drive and numerators are real there, or imaginary with an odd power of s, and what rounding adds is
-    taken off: then Im D is that of the rate gain alone, and the crossings that theorems put at 0 and 1 come out to the
-    last digit.
-    """
-    values, base = np.empty(omega.size, complex), 0.0
-    for n, (gain, w) in enumerate(zip(gains, omega, strict=True)):
-        k, law = variation.system(float(gain))
-        drive, numerators, scale = (part[..., 0] for part in loop_parts(k, np.array([1j * w])))
-        turn = np.exp(1j * scale.imag)
-        drive, numerators = drive * turn, numerators * turn
-        if k.is_real_on_axis:
-            drive, numerators = drive.real, np.where(ODD, 1j * numerators.imag, numerators.real)
-        base = base if n else float(scale.real)
-        values[n] = (drive + torque(law[:, 0], numerators)) * np.exp(scale.real - base)
-    return values
-
-
-def _through_origin(variation: Variation, gains: Real, lowest: float) -> float | None:
-    """The gain at which D/s^n vanishes at s = 0, n zeros being there always; None if it keeps its sign."""
-    from scipy.optimize import brentq
-
-    n, s = variation.zeros_at_origin, np.array([NEAR_ZERO * lowest, -NEAR_ZERO * lowest], complex)
-
-    def at_origin(gain: float) -> float:
-        k, law = variation.system(gain)
-        value, _, scale = quick_characteristics(k, s, law, n)
-        return float((value * np.exp(1j * scale.imag)).real.mean())
-
-    ends = [at_origin(float(gain)) for gain in gains]
-    if ends[0] * ends[1] > 0:
-        return None
-    if 0 in ends:
-        return float(gains[ends.index(0)])
-    low, high = float(gains.min()), float(gains.max())
-    return float(brentq(at_origin, low, high, xtol=GAIN_KNOWN * max(-low, high), rtol=LEAST_RTOL))
+    at = float(brentq(lambda value: pole(value).real, low, high, xtol=tolerance))
+    return at, abs(pole(at).imag)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tfarm.arm import NAMES, many_laws
+from tfarm.arm import NAMES
 from tfarm.arrays import LEAST_SIZE, Complex, Real
+from tfarm.crossing.following import between
 from tfarm.records import record
 
-from .damping import exact_poles_next_to
-from .locus import Locus, locus
+from .locus import Locus
 
 ROUND_POINTS = 17  # of each round between two neighbours, so that it is an eighth as wide as the one before
 NARROWEST_ROUND = 1e-7  # of the gain: where rounds end; a damping ratio, flat there, is known to 1e-14 of its curvature
@@ -32,47 +32,29 @@ class MostDamped:
 def most_damped(found: Locus) -> MostDamped | None:
     """The first mode's largest damping ratio along a gain; None where its branch is not followed all the way.
 
-    Where it is the largest of the locus's values with a neighbour on either side that swings too, the poles between
-    these are solved for, on ever narrower grids; at an end of the range, or next to where the pole turns real, it is
-    that of the locus's own value.
+    Where it is the largest of the locus's values with a neighbour on either side that swings too, it is looked for
+    between these, on ever narrower grids; at an end of the range it is that of the locus's own value.
     """
     rows = found.branches[(found.mode == 1) & (found.branches.imag > 0).any(axis=1)]
     rows = rows[~np.isnan(rows).any(axis=1)]
     if found.vary not in NAMES or not rows.size:
         return None
-    branch, ratios = rows[0], damping_ratios(rows[0])
+    way, ratios = int(np.sign(found.gain[-1] - found.gain[0])), damping_ratios(rows[0])
     at = int(np.argmax(ratios))
-    gain, ratio = float(found.gain[at]), float(ratios[at])
-    near = slice(at - 1, at + 2)
-    if 0 < at < ratios.size - 1 and (branch[near].imag > 0).all():
-        gain, ratio = _between(found, found.gain[near], branch[near])
-    return MostDamped(gain, ratio, bool((branch[at:].imag > 0).all()), at < ratios.size - 1)
+    best, near = (float(found.gain[at]), float(ratios[at])), slice(at - 1, at + 2)
+    gain, branch = found.gain[near][::way], rows[0][near][::way]
+    inside = 0 < at < ratios.size - 1 and (branch.imag > 0).all()
+    while inside and gain[2] - gain[0] > NARROWEST_ROUND * abs(gain[1]):
+        grid = np.linspace(gain[0], gain[2], ROUND_POINTS)
+        found_there = between(found.varied, gain, branch[:, None], grid)[0][:, 0]
+        top = int(np.nanargmax(damping_ratios(found_there)))
+        if not 0 < top < ROUND_POINTS - 1:
+            break
+        gain, branch = grid[top - 1 : top + 2], found_there[top - 1 : top + 2]
+        best = float(gain[1]), float(damping_ratios(branch[1:2])[0])
+    return MostDamped(*best, bool((rows[0][at:].imag > 0).all()), at < ratios.size - 1)
 
 
 def damping_ratios(s: Complex) -> Real:
     """-Re s/|s| of poles that swing; -inf of real ones."""
     return np.where(s.imag > 0, -s.real / np.maximum(abs(s), LEAST_SIZE), -np.inf)
-
-
-def _between(found: Locus, gain: Real, branch: Complex) -> tuple[float, float]:
-    """The gain of largest damping ratio between three neighbours of which the middle one has the largest, and it.
-
-    On each grid between them the branch is next to their parabola, or followed where that is too coarse.
-    """
-    best = float(gain[1]), float(damping_ratios(branch[1:2])[0])
-    while gain[2] - gain[0] > NARROWEST_ROUND * abs(gain[1]):
-        grid = np.linspace(gain[0], gain[2], ROUND_POINTS)
-        starts = np.polyval(np.polyfit(gain - gain[1], branch, 2), grid - gain[1])
-        near, settled = exact_poles_next_to(found.arm, starts[:, None], many_laws(found.law, **{found.vary: grid}))
-        poles = near[:, 0]
-        if not settled.all():
-            ends = float(grid[0]), float(grid[-1])
-            more = locus(found.arm, found.law, found.vary, *ends, grid.size, len(found.branches)).branches
-            poles = more[np.argmin(abs(more[:, 0] - branch[0]))]
-        ratios = damping_ratios(poles)
-        at = int(np.argmax(ratios))
-        if not 0 < at < ROUND_POINTS - 1:
-            break
-        best = float(grid[at]), float(ratios[at])
-        gain, branch = grid[at - 1 : at + 2], poles[at - 1 : at + 2]
-    return best

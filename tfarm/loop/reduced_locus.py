@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from tfarm.arm import FED_BACK, Arm, HubFeedback
+from tfarm.arm import FED_BACK, Arm, HubFeedback, many_laws
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
@@ -23,7 +23,7 @@ from tfarm.reduced import ModalModel, modal_model
 from tfarm.spectrum import modes
 
 from .locus import Locus
-from .variation import OF_THE_LAW, Variation
+from .varied import OF_THE_LAW, Varied
 
 if TYPE_CHECKING:
     import control
@@ -72,12 +72,12 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
     count = order // 2 - rigid
     if exact.vary in OF_THE_LAW:
         which = np.arange(exact.gain.size)
-        poles = _polished(exact.variation, exact.gain, root_locus(arm, exact.law, exact.vary, exact.gain, count), count)
+        poles = _polished(exact.varied, exact.gain, root_locus(arm, exact.law, exact.vary, exact.gain, count), count)
     else:
         which = np.unique(np.linspace(0, exact.gain.size - 1, REDUCED_VALUES).round().astype(int))
-        loops = [exact.variation.at(float(value)) for value in exact.gain[which]]
+        arms = [exact.varied.at(float(value)).arm for value in exact.gain[which]]
         none = np.zeros(len(FED_BACK))
-        closed = [_closed(each.arm, np.array(each.law.row), count, none)[0][0] for each in loops]
+        closed = [_closed(each, np.array(exact.law.row), count, none)[0][0] for each in arms]
         poles = np.array([np.linalg.eigvals(A) for A in closed])
     branches = exact.branches[:, which]
     paired = np.full(branches.shape, np.nan, complex)
@@ -86,6 +86,11 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
         paired[:, n] = np.where(np.isnan(zeros), np.nan, found[chosen])
     size = np.maximum(abs(branches), modes(arm, 1).natural_frequency[-1])
     return ReducedLocus(order, exact.gain[which], paired, np.fmax.reduce(abs(paired - branches) / size, axis=1))
+
+
+def reduced_of(exact: Locus) -> ReducedLocus | None:
+    """The same of gains at the hub, of which there is a reduced locus; None of another law or number."""
+    return reduced_locus(exact) if isinstance(exact.law, HubFeedback) else None
 
 
 def root_locus(arm: Arm, law: HubFeedback, vary: str, gain: Real, count: int) -> Complex:
@@ -98,14 +103,14 @@ def root_locus(arm: Arm, law: HubFeedback, vary: str, gain: Real, count: int) ->
         raise ConvergenceError(f"python-control cannot follow a model of this arm: {error}", arm.name, count) from None
 
 
-def _polished(variation: Variation, gain: Real, poles: Complex, count: int) -> Complex:
+def _polished(family: Varied, gain: Real, poles: Complex, count: int) -> Complex:
     """The same poles (gains, order) to the last digits that float64 has of them, by Newton's method.
 
     What an eigenvalue solver gives depends on the processor in its last four digits.  Solved for is 1 + law . G(s) = 0
     on the model's partial fractions; a pole where that has no slope, or that would move, stays as it is.
     """
-    model = modal_model(variation.arm, FED_BACK, count)
-    laws = np.array([variation.at(float(value)).law.row for value in gain])
+    law, model = family.law, modal_model(family.first.arm, FED_BACK, count)
+    laws = gain[:, None] * np.array(law.row) if family.vary == "all" else many_laws(law, **{family.vary: gain}).T
     found = poles.astype(complex)
     for _ in range(POLISHING):
         value, slope = _return_difference(model, laws, found)

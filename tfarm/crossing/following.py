@@ -1,0 +1,177 @@
+"""Roots followed as one number of a family of functions varies: each keeps its column.
+
+Predictor: polynomials through the last values.  Of two roots that are each other's nearest, such as a pair next to the
+real axis, these are polynomials of their mean and of the square of half their distance, which are smooth where the two
+meet and part at a right angle.  Corrector: the family's own (`Family.near`), for many values and all roots at once.  A
+step is taken where no root moved further from its prediction than a share of its distance to the next root, and is
+halved otherwise.  Where no step is short enough the family's complete set is assigned to the predictions.
+
+The functions are real on the real axis: of a conjugate pair both roots have a column, and the lower is the mirror image.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from tfarm.arrays import Complex, Real, Whole
+
+PAST = 4  # values through which predictions go
+MOST_AHEAD = 64  # values predicted at once, at most: memory and time alone
+FIRST_STEP = 1e-4  # of the first step: how far the first value is that tells the slopes
+PLAIN_MOVE = 0.1  # of the distance to the next root: one that is off its prediction by less is itself
+PLAIN_IN_COUPLE = 0.2  # the same, of the distance to the other one of two that meet or part
+ENDS_BEFORE = 0.05  # of its size: a real root so near to a singular point, right of it, ends there
+TURNED = 0.5  # of a right angle's cosine: below it the two of a couple have met between two values
+
+
+class Family(Protocol):
+    """What is followed: `least_step` is the shortest step, as a share of the way; `blur` a distance that is none."""
+
+    least_step: float
+    blur: float
+
+    def near(self, values: Real, guess: Complex) -> Complex:
+        """The roots (m, b) next to the guesses at m values, NaN where there is none; real ones of real guesses.
+
+        Of the guess 0 those next to 0, the upper one or the larger real one first.
+        """
+        ...
+
+    def complete(self, value: float, guess: Complex) -> Complex:
+        """All roots that the family knows at a value, in any order, those next to the guesses (b,) among them."""
+        ...
+
+    def singular(self, values: Real) -> Real:
+        """Points (m, p) that no root passes, at m values: a real root that comes to one from the right ends there."""
+        ...
+
+
+def follow(family: Family, values: Real, start: Complex) -> Complex:
+    """Return the roots (n, b) at each of the values (n,), from those at the first; NaN from where one is lost.
+
+    A root is lost where it comes to a singular point, and where it is none of the family's complete set.
+    """
+    rows = np.full((values.size, start.size), np.nan, complex)
+    rows[0], past, span = start, [(float(values[0]), start)], abs(values[-1] - values[0])
+    ahead = [(float(value), n) for n, value in enumerate(values)][:0:-1]
+    ahead.append((past[0][0] + FIRST_STEP * (ahead[-1][0] - past[0][0]), 0))
+    many = 1
+    while ahead:
+        block = ahead[-many:][::-1]
+        at, last = np.array([value for value, _ in block]), past[-1][1]
+        guess = predicted(np.array([value for value, _ in past]), np.array([row for _, row in past]), at, last)
+        found = corrected(family, at, guess, last)
+        plain = is_plain(family, at, guess, found)
+        good = len(block) if plain.all() else int(np.argmin(plain))
+        if not good and len(block) == 1:
+            if abs(at[0] - past[-1][0]) > family.least_step * span:
+                ahead.append(((past[-1][0] + float(at[0])) / 2, 0))
+            else:
+                found, good = assigned(family, float(at[0]), guess[0])[None], 1
+        many = min(2 * many, MOST_AHEAD) if good == len(block) else max(1, good)
+        del ahead[len(ahead) - good :]
+        for (value, n), row in zip(block[:good], found[:good], strict=True):
+            if n:
+                rows[n] = row
+            past = [*past, (value, np.where(is_over(family, value, row), np.nan, row))][-PAST:]
+    return rows
+
+
+def between(family: Family, values: Real, rows: Complex, wanted: Real) -> tuple[Complex, NDArray[np.bool_]]:
+    """Return the roots (m, b) at wanted values (m,) between the known ones (n,), ascending, and where all are plain."""
+    found, plain = np.empty((wanted.size, rows.shape[1]), complex), np.empty(wanted.size, bool)
+    right = np.clip(np.searchsorted(values, wanted), 1, values.size - 1)
+    for n in np.unique(right):
+        low = int(np.clip(n - PAST // 2, 0, max(0, values.size - PAST)))
+        here, near = right == n, slice(low, low + PAST)
+        guess = predicted(values[near], rows[near], wanted[here], rows[n - 1])
+        found[here] = corrected(family, wanted[here], guess, rows[n - 1])
+        plain[here] = is_plain(family, wanted[here], guess, found[here])
+    return found, plain
+
+
+def is_over(family: Family, value: float, row: Complex) -> NDArray[np.bool_]:
+    """Which of the roots (b,) have come to a singular point from the right."""
+    points = family.singular(np.array([value]))[0]
+    away = row.real[:, None] - points
+    return np.asarray((row.imag == 0) & ((away > 0) & (away < ENDS_BEFORE * abs(points))).any(axis=1))
+
+
+def assigned(family: Family, value: float, guess: Complex) -> Complex:
+    """The complete set at a value in the order of the guesses (b,); NaN where there are fewer."""
+    every = family.complete(value, guess)
+    alive = np.flatnonzero(~np.isnan(guess))
+    rows, columns = linear_sum_assignment(abs(guess[alive, None] - every))
+    found = np.full(guess.shape, np.nan, complex)
+    found[alive[rows]] = every[columns]
+    return found
+
+
+def predicted(at: Real, rows: Complex, wanted: Real, base: Complex) -> Complex:
+    """Guesses (m, b) by polynomials through known roots (k, b) at k values; `base` (b,) says which are couples."""
+    own = np.eye(at.size, dtype=bool)
+    ratios = (wanted[:, None, None] - at) / np.where(own, 1.0, at[:, None] - at)
+    weights = np.where(own, 1.0, ratios).prod(axis=2)
+    guess = weights @ rows
+    first, second = couples(base)
+    mean, half = (rows[:, first] + rows[:, second]) / 2, (rows[:, first] - rows[:, second]) / 2
+    apart = (base[first] - base[second]) / 2
+    root = np.sqrt(weights @ (half * half))
+    way = (root * apart.conj()).real
+    turned = abs(way) < TURNED * abs(root) * abs(apart)  # then the first is the upper one, or the larger real one
+    root = np.where(np.where(turned, (root.real + root.imag) * (apart.real + apart.imag), way) < 0, -root, root)
+    middle = weights @ mean
+    guess[:, first], guess[:, second] = middle + root, middle - root
+    lost = np.isnan(guess) & ~np.isnan(base)
+    if lost.any() and at.size > 1:  # known at the last of the values alone
+        return np.where(lost, predicted(at[1:], rows[1:], wanted, base), guess)
+    return guess
+
+
+def couples(row: Complex) -> tuple[Whole, Whole]:
+    """Of each two roots (b,) that are each other's nearest the first and the second: conjugates, or of one half."""
+    away = distances(row)
+    nearest, every = away.argmin(axis=1), np.arange(row.size)
+    alike = (row == row[nearest].conj()) | (np.sign(row.imag) == np.sign(row[nearest].imag))
+    first = np.flatnonzero((nearest[nearest] == every) & (every < nearest) & alike & np.isfinite(away.min(axis=1)))
+    return first, nearest[first]
+
+
+def corrected(family: Family, values: Real, guess: Complex, base: Complex) -> Complex:
+    """The roots (m, b) next to the guesses: those below the real axis as mirror images of those above it."""
+    partner = np.arange(base.size)
+    first, second = couples(np.where(base.imag == 0, base, np.nan))
+    partner[first], partner[second] = second, first
+    lower, upper = np.flatnonzero(base.imag < 0), np.flatnonzero(base.imag > 0)
+    if lower.size:
+        partner[lower] = upper[abs(base[lower].conj()[:, None] - base[upper]).argmin(axis=1)]
+    is_lower = guess.imag < 0
+    found = family.near(values, np.where(is_lower, np.nan, guess))
+    return np.where(is_lower, found[:, partner].conj(), found)
+
+
+def distances(row: Complex) -> Real:
+    """How far the roots (..., b) are from each other (..., b, b); from themselves and from NaN infinitely."""
+    away = abs(row[..., :, None] - row[..., None, :])
+    away[..., np.arange(row.shape[-1]), np.arange(row.shape[-1])] = np.inf
+    away[np.isnan(away)] = np.inf
+    return np.asarray(away)
+
+
+def is_plain(family: Family, values: Real, guess: Complex, found: Complex) -> NDArray[np.bool_]:
+    """At which of the values every root is next to its prediction, compared with the distance to any other."""
+    away, moved = distances(found), abs(found - guess)
+    nearest = away.argmin(axis=2)[..., None]
+    own = np.take_along_axis(away, nearest, 2)[..., 0]
+    is_couple = np.take_along_axis(nearest[..., 0], nearest[..., 0], 1) == np.arange(found.shape[1])
+    np.put_along_axis(away, nearest, np.where(is_couple, np.inf, own)[..., None], 2)
+    room = away.min(axis=2, initial=np.inf)
+    for point in family.singular(values).T:
+        room = np.minimum(room, abs(found - point[:, None]))
+    near = (moved <= np.where(is_couple, PLAIN_IN_COUPLE, PLAIN_MOVE) * own) & (np.sign(found.imag) == np.sign(guess.imag))
+    same = (near | (guess == 0)) & (moved <= PLAIN_MOVE * room)
+    return np.asarray((np.isnan(guess) | same | (found == 0) | (moved <= family.blur)).all(axis=1))

@@ -1,0 +1,250 @@
+"""The loops of a rig and a law as one number varies: the family of functions whose roots a locus follows.
+
+    D(s; t) = drive(s) q(s; t) + e^{-s tau(t)} sum of p_i(s; t) numerator_i(s)
+
+In a factor on the law and in any coefficient of it q and p_i are linear in t; a parameter of the arm has systems of its
+own at each value.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from tfarm.arm import LISTED, AnyLaw, Arm, Law, full_law
+from tfarm.arrays import Complex, Real, Whole
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.exact.characteristic import Analytic, LoopParts, deflated, difference_steps
+from tfarm.records import record
+from tfarm.response.signals import Signals
+from tfarm.spectrum.box import Box, winding_number, zeros_in_box
+from tfarm.spectrum.scales import first_frequency
+
+from .damping import NO_PART
+from .frequencies import band_of
+from .law_poles import law_box, starting_points_of
+from .loop import Loop
+from .resting import NEAREST_TO_ORIGIN, READ_AT
+
+OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, as of the arm's below
+ARM_PARAMETERS = {
+    "payload_mass": "kg", "payload_inertia": "kg m^2", "hub_inertia": "kg m^2", "length": "m", "damping": "s"
+}  # fmt: skip
+HEIGHTS = (1.0, 1.013, 1.031, 1.057, 0.985, 1.09)  # of the box, until no pole is on its edge at the first value
+NEWTON_STEPS = 6  # from a guess right to some digits: what has not settled then is followed in shorter steps
+SETTLED = 1e-10  # of its size: one step more is taken where Newton's method still moves a pole by this
+SERIES_RADIUS, SERIES_POINTS = 0.2, 16  # of the first frequency: where a power series next to 0 is read off
+EMPTY = Box(0.0, 0.0, 0.0, 0.0)
+LOOPS_KEPT = 8  # at values asked for again: memory against time, of no effect on an answer
+SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are known beforehand, Newton's method finds none there
+
+
+@dataclass(frozen=True)
+@record
+class Varied:
+    """The loops of an arm and a law, of which `vary` takes values from `start` to `stop`.
+
+    `vary` is a number of the law as `Law.having` names it, "all" (a factor on it), or of the arm.  Raises
+    ParameterError for what is none, and where there is no loop.
+    """
+
+    arm: Arm
+    law: AnyLaw
+    vary: str
+    start: float
+    stop: float
+    box: Box = EMPTY
+
+    least_step = 1e-10
+    blur = 0.0
+
+    def __post_init__(self) -> None:
+        for key, value in (("from", self.start), ("to", self.stop)):
+            if not math.isfinite(value):
+                raise ParameterError(key=key, value=value, remedy="a finite number")
+        if self.start == self.stop:
+            raise ParameterError(key="to", value=self.stop, remedy="the range is empty: a locus runs to another value")
+        for value in (self.start, self.stop):
+            self.at(value)
+
+    # ------------------------------------------------------------ loops and functions
+
+    @property
+    def is_of_arm(self) -> bool:
+        """Whether the number is one of the arm."""
+        return self.vary in ARM_PARAMETERS
+
+    @cached_property
+    def full(self) -> Law:
+        """The law with every gain at the hub, where it is no more than these."""
+        return full_law(self.law)
+
+    def law_at(self, value: float) -> Law:
+        """The law where the number has that value."""
+        return self.full if self.is_of_arm else self.full.having("gain" if self.vary == "all" else self.vary, value)
+
+    @lru_cache(maxsize=LOOPS_KEPT)
+    def at(self, value: float) -> Loop:
+        """The loop where the number has that value."""
+        if self.is_of_arm:
+            return Loop(self.arm.having(**{self.vary: value}), self.full)
+        return Loop(self.arm, self.law_at(value)) if value == self.start else self.first.under(self.law_at(value))
+
+    @cached_property
+    def first(self) -> Loop:
+        """The loop where the way begins, of whose rig the others are."""
+        return self.at(self.start)
+
+    @cached_property
+    def pinned(self) -> int:
+        """How many poles are at s = 0 all the way."""
+        return min(self.at(value).zeros_at_origin for value in self.few)
+
+    @property
+    def few(self) -> tuple[float, float, float]:
+        """Both ends of the way, and a value between that is none of a grid's."""
+        return self.start, self.start + (self.stop - self.start) / math.e, self.stop
+
+    def _parts(self, s: Complex, values: Real) -> LoopParts:
+        """Drive, numerators and scale at s (3, n), each column at a value of its own (n,)."""
+        if not self.is_of_arm:
+            return self.first.signals.parts(s)
+        found = np.empty((2 + len(self.full.signals), *s.shape), complex)
+        for value in np.unique(values):
+            here = values == value
+            part = Signals(self.at(float(value)).arm, self.full.signals).parts(s[:, here])
+            found[0, :, here], found[1, :, here], found[2:, :, here] = part.drive.T, part.scale.T, part.numerators
+        return LoopParts(found[0], found[2:], found[1])
+
+    def _polynomials(self, s: Complex, values: Real) -> tuple[Complex, Complex, Real]:
+        """p_i (signals, ...), q (...) and the delay (n,) of the law at s (k, n), each column at a value of its own."""
+        delay = values if self.vary == "delay" else np.full(values.shape, self.full.delay)
+        if self.is_of_arm or self.vary == "delay":
+            return *self.full.polynomials(s), delay
+        (p0, q0), (p1, q1) = self._constants or (law.polynomials(s) for law in self._corners)
+        return p0 + values * (p1 - p0), q0 + values * (q1 - q0), delay
+
+    @cached_property
+    def _corners(self) -> tuple[Law, Law]:
+        """The law with 0 and with 1 in the place of the number."""
+        return self.law_at(0.0), self.law_at(1.0)
+
+    @cached_property
+    def _constants(self) -> list[tuple[Complex, Complex]]:
+        """p_i and q of these, where they are no functions of s; else none."""
+        is_plain = not (self.full.order or self.full.is_improper)
+        return [law.polynomials(np.ones((1, 1), complex)) for law in self._corners] if is_plain else []
+
+    def function(self, s: Complex, values: Real) -> Analytic:
+        """D/s^n at s (n,), each at a value of its own (n,), n = `pinned`, with slopes from differences."""
+        s = np.where(s == 0, NEAREST_TO_ORIGIN * self.frequency, s)
+        h = difference_steps(self.first.k, s)
+        D, scale = self._characteristic(np.array([s, s + h, s - h]), values)
+        up, down = D[1:] * np.exp(scale[1:] - scale[0])
+        return deflated(D[0], (up - down) / (2 * h), scale[0], s, self.pinned)
+
+    def _characteristic(self, s: Complex, values: Real) -> tuple[Complex, Complex]:
+        """D e^{-scale} and scale at s (k, n), each column at a value of its own (n,)."""
+        drive, numerators, scale = self._parts(s, values)
+        p, q, delay = self._polynomials(s, values)
+        return drive * q + np.exp(-s * delay) * (p * numerators).sum(axis=0), scale
+
+    @cached_property
+    def frequency(self) -> float:
+        """The rig's first flexible frequency [rad/s] where the way begins."""
+        return first_frequency(self.first.arm)
+
+    def resting(self, values: Real) -> Whole:
+        """How many poles more than `pinned` are at s = 0 at each of the values (n,).
+
+        Where D grows with a higher power next to 0; a pole that is slower than that is none, which the loop knows.
+        """
+        s = self.frequency * np.multiply.outer(READ_AT, np.ones(values.size)) + 0j
+        farther, nearer = self._characteristic(s, values)[0]
+        found = np.zeros(values.size, np.int64)
+        for n in np.flatnonzero(abs(farther) > abs(nearer) * (READ_AT[0] / READ_AT[1]) ** (self.pinned + 0.5)):
+            found[n] = self.at(float(values[n])).zeros_at_origin - self.pinned
+        return found
+
+    def at_rest(self, value: float) -> float:
+        """D/s^n at s = 0, real, up to a positive factor: a real pole passes through 0 where it changes its sign."""
+        s = NEAREST_TO_ORIGIN * self.frequency * np.array([1.0, -1.0]) + 0j
+        found = self.function(s, np.full(2, value))
+        return float((found.value * np.exp(1j * found.scale.imag)).real.mean())
+
+    # ------------------------------------------------------------ as `crossing.following` asks
+
+    def near(self, values: Real, guess: Complex) -> Complex:
+        """The poles (m, b) next to the guesses at m values, by Newton's method; NaN where it does not settle."""
+        found = guess.copy()
+        rank = abs(np.where(np.isnan(guess), np.inf, guess)).argsort(axis=1).argsort(axis=1)
+        rests = rank < self.resting(values)[:, None]
+        wanted = ~np.isnan(guess) & ~rests
+        for n in np.flatnonzero((wanted & (guess == 0)).any(axis=1)):
+            leaving = wanted[n] & (guess[n] == 0)
+            found[n, leaving] = self.slow(float(values[n]), int(leaving.sum()))
+        s, at = found[wanted], np.broadcast_to(values[:, None], guess.shape)[wanted]
+        still = np.ones(s.size, bool)
+        with np.errstate(all="ignore"):
+            for _ in range(NEWTON_STEPS):
+                there = self.function(s[still], at[still])
+                move = there.value / there.slope
+                s[still] -= np.where(s[still].imag == 0, move.real, move)
+                still[still] = ~(abs(move) <= SETTLED * abs(s[still]))
+                if not still.any():
+                    break
+        s[still | ~np.isfinite(s)] = np.nan
+        found[wanted], found[rests] = s, 0.0
+        return found
+
+    def slow(self, value: float, count: int) -> Complex:
+        """So many poles next to 0 at a value, from the power series of D there; the upper one, or the larger, first."""
+        circle = SERIES_RADIUS * self.frequency * np.exp(2j * np.pi * np.arange(SERIES_POINTS) / SERIES_POINTS)
+        D, scale = (each[0] for each in self._characteristic(circle[None], np.full(circle.size, value)))
+        series = np.fft.fft(D * np.exp(scale - scale[0]) / circle**self.pinned).real[: SERIES_POINTS // 2]
+        roots = SERIES_RADIUS * self.frequency * np.roots(series[::-1]).astype(complex)
+        nearest = roots[np.argsort(abs(roots))[:count]]
+        return nearest[np.lexsort((-nearest.real, -nearest.imag))]
+
+    def complete(self, value: float, guess: Complex) -> Complex:
+        """All poles in the box at one value, both of each pair, and those next to the guesses that lie outside it."""
+        loop, height = self.at(value), self.box.im_max
+        near = self.near(np.array([value]), np.where(guess.imag < 0, np.nan, guess)[None])[0]
+        near = near[~np.isnan(near) & (near != 0)]
+        near = np.r_[near, near[near.imag > 0].conj()]
+        starts, slow = np.r_[near, starting_points_of(loop, height)], near[abs(near) < SLOW_SHARE * height]
+        found = zeros_in_box(loop.function, self.box, starts, slow)
+        found = np.where(abs(found.imag) < NO_PART * abs(found), found.real, found)
+        upper, rests = found[found.imag > 0], np.zeros(loop.zeros_at_origin - self.pinned, complex)
+        return np.r_[rests, found[found.imag == 0], upper, upper.conj(), near[~self.box.holds(near)]]
+
+    def singular(self, values: Real) -> Real:
+        """-1/C of the damped segments, at m values (m, p)."""
+        if not self.is_of_arm:
+            return np.tile(self.first.k.singular, (values.size, 1))
+        return np.array([self.at(float(value)).k.singular for value in values])
+
+    # ------------------------------------------------------------ complete in a box
+
+    def boxed(self, modes: int) -> Varied:
+        """The same with a box for the whole way, as high as so many flexible modes, with no pole on its edge at first."""
+        loops, lost = [self.at(value) for value in self.few], ConvergenceError("no box", self, 0.0)
+        for factor in HEIGHTS:
+            height = factor * max(band_of(loop.arm, modes) for loop in loops)
+            boxes = [law_box(loop, height) for loop in loops]
+            left, right = max(each.re_min for each in boxes), max(each.re_max for each in boxes)
+            found = replace(self, box=Box(left, right, -height, height))
+            try:
+                found.count(self.start)
+            except ConvergenceError as error:
+                lost = error
+            else:
+                return found
+        raise lost
+
+    def count(self, value: float) -> int:
+        """How many poles but those at 0 the box holds at one value, by the winding number."""
+        return winding_number(self.at(value).function, self.box)
