@@ -12,13 +12,15 @@ import tfarm
 from tests.loop.arms import window_arm, with_damping
 from tests.shared import thinned
 from tfarm import Hub, HubFeedback, ParameterError, Payload
+from tfarm.arm import full_law
 from tfarm.cli import main
 from tfarm.loop import reduced_locus as reduced_locus_room
-from tfarm.loop.branches import rigid_pair
 from tfarm.loop.lines import along, line_crossings
-from tfarm.loop.locus import _gaps, frame, locus, rounded
+from tfarm.loop.law_poles import law_poles_below
+from tfarm.loop.closed import locus
+from tfarm.loop.locus import frame, rounded
+from tfarm.loop.loop import Loop
 from tfarm.loop.plant import HubLoop, effective_inertia
-from tfarm.loop.poles import poles_below
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.spectrum.damped import damped_modes
 from tfarm.spectrum.enclose import enclosed
@@ -61,7 +63,7 @@ def test_branches_are_all_poles_of_the_box_and_the_same_backwards(arm, law, vary
     assert found.branches.shape == (8, 11)
     for n in (0, 4, 10):
         zeros = found.branches[:, n]
-        poles = poles_below(found.variation.at(found.gain[n]), zeros.imag.max() * (1 + 1e-6))
+        poles = law_poles_below(found.varied.at(found.gain[n]), zeros.imag.max() * (1 + 1e-6))
         for zero in zeros[poles.box.holds(zeros)]:
             assert abs(poles.values - zero * (zero.imag >= 0) - zero.conj() * (zero.imag < 0)).min() <= 50 * EPS * abs(
                 zero
@@ -250,7 +252,7 @@ def test_reduced_poles_do_not_depend_on_the_eigenvalue_solver(law):
     rng = np.random.default_rng(3)
     start = reduced_locus_room.root_locus(LAB, law, "K2", found.gain, 9)
     noise = start * (1 + 1e-12 * (rng.standard_normal(start.shape) + 1j * rng.standard_normal(start.shape)))
-    one, two = (reduced_locus_room._polished(found.variation, found.gain, each, 9) for each in (start, noise))
+    one, two = (reduced_locus_room._polished(found.varied, found.gain, each, 9) for each in (start, noise))
     assert (abs(one - start) <= 1e-9 * abs(start)).all()
     moving = abs(one) > 1e-3 * tfarm.modes(LAB, 1).natural_frequency[-1]
     assert (abs(one - two) <= 1e3 * EPS * abs(one))[moving].all()
@@ -300,7 +302,7 @@ def test_a_branch_that_comes_to_the_accumulation_point_ends_there_and_the_others
     assert (ended.imag, -1 / C < ended.real < -0.95 / C) == (0.0, True)
     assert np.isnan(found.branches).sum() == np.isnan(found.branches[branch]).sum() == (found.gain > last).sum()
     others = np.delete(found.branches, branch, axis=0)[:, -1]
-    poles = poles_below(HubLoop(LAB, HubFeedback(K1=2000.0)), 0.9 * others.imag.max())
+    poles = law_poles_below(Loop(LAB, full_law(HubFeedback(K1=2000.0))), 0.9 * others.imag.max())
     assert upper(others[others.imag < 0.8 * others.imag.max()]) == pytest.approx(
         upper(poles.values[poles.values.imag < 0.8 * others.imag.max()]), rel=1e-9
     )
@@ -325,7 +327,7 @@ def test_modes_that_meet_on_the_axis_and_leave_it_as_a_quadruple_are_followed_ar
     """Without losses, K2 > 1 and Kp let the hub's mode meet the first one; the winding number has four poles off it."""
     arm, law = replace(LAB, link=replace(LAB.link, damping=0.0)), HubFeedback(K2=1.3, Kp=334.0593798812562)
     found = locus(arm, law, "K1", 0.0, 1e-6, 3, 4)
-    poles = poles_below(HubLoop(arm, law), 1.1 * found.branches[:, 0].imag.max())
+    poles = law_poles_below(Loop(arm, full_law(law)), 1.1 * found.branches[:, 0].imag.max())
     assert np.sort_complex(found.branches[:, 0].round(6)) == pytest.approx(
         np.sort_complex(poles.values.round(6)), rel=1e-9, abs=2e-6
     )
@@ -382,21 +384,6 @@ def test_each_branch_is_round_in_a_picture_of_its_own_and_of_all(arm, vary, star
             assert turn.max(initial=0.0) <= math.radians(2.5)
 
 
-def test_gaps_are_the_distances_to_the_nearest_zero_of_another_pair():
-    """One by one; of a conjugate pair the upper zero counts, of a real pair each of the two, and both have theirs."""
-    rng = np.random.default_rng(7)
-    for _ in range(20):
-        upper = rng.uniform(-3, 0, (3, 4)) + 1j * rng.uniform(1, 5, (3, 4))
-        zeros = np.stack([upper, upper.conj()], axis=2)
-        zeros[:2, 1], zeros[1:, 3] = rng.uniform(-3, 0, (2, 2)), rng.uniform(-3, 0, (2, 2))
-        found = _gaps(zeros)
-        for value, pair in np.ndindex(3, 4):
-            others = [z for n in range(4) for z in zeros[value, n] if n != pair and z.imag >= 0]
-            own = zeros[value, pair]
-            expected = [min(abs(z - other) for other in others) for z in (own if own.imag.any() == 0 else own[[0, 0]])]
-            np.testing.assert_allclose(found[value, pair], expected, rtol=1e-14)
-
-
 @pytest.mark.parametrize("law", [HubFeedback(K1=0.3, K2=0.3), HubFeedback(K1=0.1, K2=-1.0, Kp=0.4)])
 def test_the_slope_of_the_reduced_loop_is_its_difference_quotient(law):
     from tfarm.reduced import modal_model
@@ -407,12 +394,3 @@ def test_the_slope_of_the_reduced_loop_is_its_difference_quotient(law):
     ahead, behind = (reduced_locus_room._return_difference(model, row, s + way * h)[0] for way in (1, -1))
     _, slope = reduced_locus_room._return_difference(model, row, s)
     np.testing.assert_allclose(slope, (ahead - behind) / (2 * h), rtol=1e-7)
-
-
-@pytest.mark.parametrize("Kp", [0.0, 0.001, 4.0])
-def test_under_small_gains_the_rigid_zeros_are_those_of_its_quadratic(Kp):
-    """Both real or a pair, by the roots of the polynomial: J s^2 + K1 s + Kp, the inertia that the moment leaves."""
-    law = HubFeedback(K1=0.3, K2=0.2, Kp=Kp)
-    found = rigid_pair(HubLoop(LAB, law), np.zeros(0, complex))
-    expected = np.roots([effective_inertia(LAB, law), law.K1, law.Kp])
-    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(expected), rtol=1e-12)

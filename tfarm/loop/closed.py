@@ -5,9 +5,9 @@ A law that is no more than these gains is taken for them.
 
 from __future__ import annotations
 
-from tfarm.arm import AT_HUB, FED_BACK, PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law
+from tfarm.arm import AT_HUB, FED_BACK, NAMES, PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law
 from tfarm.arrays import Real
-from tfarm.errors import ParameterError
+from tfarm.errors import ParameterError, must_be_known
 
 from .law_map import LawMap, law_map
 from .law_poles import law_poles
@@ -21,7 +21,7 @@ from .nyquist import Nyquist, nyquist_of
 from .poles import Poles, poles_of_gains
 from .regions import Region, region
 from .stability import Stability, stability
-from .varied import OF_THE_LAW
+from .varied import ARM_PARAMETERS, OF_THE_LAW
 
 LOCUS_VALUES, LAW_LOCUS_VALUES = 500, 100  # values of a locus unless so many are asked for: of gains, of any other law
 
@@ -87,6 +87,9 @@ def locus(
         raise ParameterError(key="vary", value=vary, remedy=f"the name of what varies, such as {PLANE[1]} or length")
     is_of_signals = isinstance(law, Law) or vary.partition(".")[0] in {"gain", "delay", *FED_BACK}
     if isinstance(plain, HubFeedback) and (vary in OF_THE_LAW or not is_of_signals):
+        must_be_known("vary", vary, (*OF_THE_LAW, *ARM_PARAMETERS))
+        if vary == "all" and plain == HubFeedback():
+            raise ParameterError(key="vary", value="all", remedy=f"every gain is 0: give {' or '.join(NAMES)} to be scaled")
         return followed_locus(arm, plain, vary, start, stop, LOCUS_VALUES if points is None else points, branches)
     values = LAW_LOCUS_VALUES if points is None else points
     return followed_locus(arm, as_law(law), vary, start, stop, values, branches, in_box=True)

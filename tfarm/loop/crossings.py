@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tfarm.arrays import Complex, Real
-from tfarm.crossing import Crossing
+from tfarm.crossing import Crossing, crossed
 from tfarm.errors import ConvergenceError
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.spectrum.scales import first_frequency
@@ -29,6 +29,7 @@ AT_ORIGIN = 1e-9  # of the largest of its branch: a pole so near to 0 is there b
 SAME_CROSSING = 1e-3  # of the highest frequency: so near is a crossing of a branch to where its points say that it is
 AT_END = 1e-9  # of the range: a crossing so near to an end is at the end, and not between
 GAIN_KNOWN = 1e-15  # of the larger end of a step: the value at which a branch crosses
+STEP = 1e-6  # of a frequency, for a difference
 CROSSINGS_SHOWN = 3  # of a locus in words
 
 
@@ -106,8 +107,22 @@ def _on_line(family: Varied, gain: Real, top: float) -> list[Crossing]:
         return []
     loop = family.first.under(family.full)
     omega = np.asarray(grid(loop.arm, top))
+    if loop.k.is_real_on_axis and not loop.law.delay:
+        t, at, change = crossed(omega, family.on_axis)
+        return [Crossing(*each) for each in zip(_corrected(family, t, at), at, change, strict=True)]
     name = "gain" if family.vary == "all" else family.vary
     return list(law_crossings(loop, name, np.sort(gain), omega, loop.signals.parts(1j * omega), top))
+
+
+def _corrected(family: Varied, t: Real, at: Real) -> Real:
+    """The gains for what a frequency is off in its last bit, by a step of Newton's method for both.
+
+    Of D + B dt + D' dw = 0 the part across D' is one for dt alone.
+    """
+    (A, B), (after, by_after), (before, by_before) = (family.on_axis(at * (1 + d)) for d in (0.0, STEP, -STEP))
+    slope = (after + t * by_after) - (before + t * by_before)
+    with np.errstate(all="ignore"):
+        return np.asarray(t - ((A + t * B) * slope.conj()).imag / (B * slope.conj()).imag)
 
 
 def _changes(branches: Complex) -> list[tuple[int, int, int]]:

@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from tfarm.arm import LISTED, AnyLaw, Arm, Law, full_law
+from tfarm.arm import LISTED, RATE_GAIN, AnyLaw, Arm, Law, full_law
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.characteristic import Analytic, LoopParts, deflated, difference_steps
@@ -67,8 +67,11 @@ class Varied:
                 raise ParameterError(key=key, value=value, remedy="a finite number")
         if self.start == self.stop:
             raise ParameterError(key="to", value=self.stop, remedy="the range is empty: a locus runs to another value")
-        for value in (self.start, self.stop):
-            self.at(value)
+        for key, value in (("from", self.start), ("to", self.stop)):
+            arm = self.at(value).arm
+            if arm.rate_loss and arm.lossless_hub.has_massless_hub and self._rate_gain_at(value) <= -arm.rate_loss:
+                remedy = f"with hub.inertia = 0 a pole passes through infinity at {RATE_GAIN} = {-arm.rate_loss:.6g}"
+                raise ParameterError(key=key, value=value, remedy=f"{remedy}: stay above it, or give the hub an inertia")
 
     # ------------------------------------------------------------ loops and functions
 
@@ -85,6 +88,11 @@ class Varied:
     def law_at(self, value: float) -> Law:
         """The law where the number has that value."""
         return self.full if self.is_of_arm else self.full.having("gain" if self.vary == "all" else self.vary, value)
+
+    def _rate_gain_at(self, value: float) -> float:
+        """The gain on the hub's rate of a law that is gains at the hub; else none."""
+        gains = self.law_at(value).gains
+        return gains[RATE_GAIN] if gains else 0.0
 
     @lru_cache(maxsize=LOOPS_KEPT)
     def at(self, value: float) -> Loop:
@@ -174,6 +182,20 @@ class Varied:
         s = NEAREST_TO_ORIGIN * self.frequency * np.array([1.0, -1.0]) + 0j
         found = self.function(s, np.full(2, value))
         return float((found.value * np.exp(1j * found.scale.imag)).real.mean())
+
+    def on_axis(self, omega: Real) -> tuple[Complex, Complex]:
+        """A and B of D = A + t B at s = i omega (n,), of a rig without losses, where D is linear in the number.
+
+        There drive and numerators are real, or imaginary with an odd power of s: what rounding adds is taken off.
+        """
+        s, odd = 1j * omega[None], np.array([[[each.power % 2]] for each in self.first.signals.outputs])
+        drive, numerators, scale = self.first.signals.parts(s)
+        turn = np.exp(1j * scale.imag)
+        drive, numerators = (drive * turn).real, numerators * turn
+        numerators = np.where(odd, 1j * numerators.imag, numerators.real)
+        (p0, q0), (p1, q1) = self._constants or (law.polynomials(s) for law in self._corners)
+        A, B = (drive * q + (p * numerators).sum(axis=0) for p, q in ((p0, q0), (p1 - p0, q1 - q0)))
+        return A[0], B[0]
 
     # ------------------------------------------------------------ as `crossing.following` asks
 

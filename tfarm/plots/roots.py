@@ -16,7 +16,6 @@ from tfarm.digits import kept_digits, plain, significant
 from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, held_branches
 from tfarm.loop.locus import Locus, frame, rounded
 from tfarm.loop.reduced_locus import ReducedLocus
-from tfarm.loop.variation import OF_THE_LAW
 from tfarm.spectrum import modes
 
 from .labels import OFFSETS_BESIDE, Label
@@ -31,8 +30,8 @@ CIRCLE_AT_FIRST: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6, "mfc": 
 QUARTERS = (0.25, 0.5, 0.75)  # of the way that the modes go, on average: where a value is marked along each branch
 
 
-def gain_branches(exact: Locus, reduced: ReducedLocus | None, *, ax: Axes) -> None:
-    """The branches of a `Locus` and its crossings; thin beside them those of `reduced`."""
+def branches_of(exact: Locus, reduced: ReducedLocus | None, *, ax: Axes) -> None:
+    """The branches of a locus and its crossings, and thin those of `reduced`."""
     _all(rounded(exact), exact, reduced, ax)
 
 
@@ -92,7 +91,7 @@ def draw_loci(data: Loci) -> Figure:
 
 def _range(exact: Locus) -> str:
     first, last = (plain(float(exact.gain[i]), 4) for i in (0, -1))
-    return f"{exact.vary} goes from {first} to {last}, {gains_words(exact.law, but=exact.vary)} held"
+    return f"{exact.vary} goes from {first} to {last} with {gains_words(exact.law, but=exact.vary)}"
 
 
 def _marked(exact: Locus) -> tuple[float, list[float]]:
@@ -102,7 +101,8 @@ def _marked(exact: Locus) -> tuple[float, list[float]]:
     the one of these next to the value that damps the first mode best is at that, at three.
     """
     gain, last = exact.gain, float(exact.gain[-1])
-    begins = 0.0 if exact.vary in OF_THE_LAW and min(gain[0], last) <= 0 <= max(gain[0], last) else float(gain[0])
+    is_factor = not exact.varied.is_of_arm and exact.vary != "delay"
+    begins = 0.0 if is_factor and min(gain[0], last) <= 0 <= max(gain[0], last) else float(gain[0])
     gone = np.zeros(gain.size)
     for row in exact.branches[zoomed(exact)]:
         left, right, low, high = frame(row)

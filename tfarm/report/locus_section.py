@@ -45,9 +45,6 @@ NOT_FOLLOWED = (
     "−1/C, to be told apart. No line is drawn rather than one that may jump; where the poles are at a few gains, each "
     "list complete, stands in the table."
 )
-CUT_SHORT = (
-    " Beyond {name} = {end} the branches come too near to each other, or to −1/C, to be told apart: they end there."
-)
 BRANCH_ENDS = (
     " A branch ends at {name} = {gain}: there its pole comes to −1/C, where real poles accumulate, or cannot be told."
 )
@@ -76,9 +73,8 @@ def locus_section(arm: Arm) -> PageSection:
             continue
         size = scientific(data.reduced.worst, 2)
         gap = f"python-control's locus of order {data.reduced.order} is within {size} of |s| of the exact one."
-        cut = CUT_SHORT.format(name=name, end=plain(float(data.exact.gain[-1]), 4)) if data.is_cut else ""
         ended = "".join(BRANCH_ENDS.format(name=name, gain=significant(gain, 3)) for _, gain in data.exact.ends)
-        words.append(f"{_more_damping(data) if name == RATE_GAIN else _more_moment(data)}; {gap}{cut}{ended}")
+        words.append(f"{_more_damping(data) if name == RATE_GAIN else _more_moment(data)}; {gap}{ended}")
         blocks += [_locus_picture(data), gap_table(data, f"locus-{name}-gap")]
         if data.exact.crossings:
             blocks.append(crossing_table(data, f"locus-{name}-crossings"))
