@@ -8,7 +8,6 @@ import pytest
 import tfarm
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
-from tfarm.loop.law_locus import LawLocus
 from tfarm.loop.law_map import LawMap
 from tfarm.loop.law_stability import law_stability
 from tfarm.loop.locus import Locus, locus
@@ -30,7 +29,6 @@ def test_a_law_that_is_gains_has_the_locus_of_them(vary):
 
 def test_a_locus_of_any_law_ends_at_the_poles_of_its_loop():
     found = tfarm.locus(LAB, LAW, "delay", 0.001, 0.012, 6, 3)
-    assert isinstance(found, LawLocus)
     poles = tfarm.closed_loop_poles(LAB, LAW.having("delay", 0.012), 8).values
     last = found.branches[np.isfinite(found.branches[:, -1]), -1]
     swing = last[last.imag > 0]
@@ -41,7 +39,6 @@ def test_a_locus_of_any_law_ends_at_the_poles_of_its_loop():
 def test_gains_at_the_hub_have_a_delay_and_a_factor_too():
     """The pole that crosses at a delay is there with the phase margin's own delay."""
     found = tfarm.locus(LAB, HubFeedback(K1=0.3, K2=0.3), "delay", 0.001, 0.03, 12, 3)
-    assert isinstance(found, LawLocus)
     first = found.crossings[0]
     assert (first.direction, first.gain) == (
         "unstable", pytest.approx(tfarm.margins(LAB, HubFeedback(K1=0.3, K2=0.3)).in_band.delay, rel=1e-6)
@@ -123,7 +120,7 @@ def test_what_is_no_law_is_refused_everywhere(name, law):
         (lambda: tfarm.map(LAB, ACROSS, UP, law=LAW, vary="gain"), "two numbers of the law"),
         (lambda: tfarm.map(LAB, ACROSS, UP, vary=("gain", "delay")), "whose numbers vary names"),
         (lambda: tfarm.map(LAB, ACROSS, UP, 1.0, law=LAW, vary=("gain", "delay")), "give Kp in it"),
-        (lambda: tfarm.locus(LAB, GAINS, "K3", 0.0, 1.0), "use one of K1, K2"),
+        (lambda: tfarm.locus(LAB, GAINS, "K3", 0.0, 1.0), "known are: K1, K2"),
         (lambda: tfarm.locus(LAB, GAINS, 2, 0.0, 1.0), "the name of what varies, such as K2"),
         (lambda: tfarm.locus(LAB, LAW, "K2", 0.0, 1.0), "known are: gain, delay, hub_angle"),
         (lambda: tfarm.default_gains("sasaki2012"), "give tfarm.load"),

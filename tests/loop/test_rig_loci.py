@@ -9,9 +9,10 @@ import tfarm
 from tests.chain_elements import reached
 from tests.loop.rig_loops import RigLoop
 from tests.shared import thinned
-from tfarm import Hub
+from tfarm import Hub, HubFeedback
 from tfarm.arm import Attachment, Motor
-from tfarm.loop.lines import along, line_crossings
+from tfarm.loop.law_poles import law_poles_below
+from tfarm.loop.lines import Line, along, line_crossings
 from tfarm.loop.locus import locus
 from tfarm.loop.plant import HubLoop
 from tfarm.loop.poles import poles_below
@@ -48,11 +49,11 @@ def test_branches_are_poles_of_the_elements_and_all_of_a_box(name, vary):
     model = RigLoop(arm, reached(arm, 8))
     for n in (0, 4, 8):
         zeros = found.branches[:, n]
-        loop = found.variation.at(float(found.gain[n]))
-        theirs = model.eigenvalues(loop.law)
+        loop = found.varied.at(float(found.gain[n]))
+        theirs = model.eigenvalues(loop.law.gains)
         for zero in zeros[(zeros != 0) & (abs(zeros) < model.up_to / 2)]:
             assert abs(theirs - zero).min() < 1e-7 * abs(zero) + 1e-9 * model.a  # their own 0 is off by so much
-        box = poles_below(loop, zeros.imag.max() * (1 + 1e-6))
+        box = law_poles_below(loop, zeros.imag.max() * (1 + 1e-6))
         for pole in box.moving:
             assert abs(zeros - np.where(zeros.imag < 0, pole.conj(), pole)).min() < 1e-12 * abs(pole)
     assert reduced_locus(found).worst < 1e-5
@@ -77,7 +78,7 @@ def test_crossings_along_a_scale_are_those_of_the_decomposition():
     found = locus(arm, law, "all", -2.0, 2.0, points=41, branches=5)
     moving = [(each.gain, each.omega) for each in found.crossings if each.omega > 0]
     band = abs(found.branches).max()
-    known = [(t, w) for t, w, _ in line_crossings(arm, found.variation.line, band) if -2 < t < 2 and w > 0]
+    known = [(t, w) for t, w, _ in line_crossings(arm, Line(HubFeedback(), law), band) if -2 < t < 2 and w > 0]
     assert len(moving) == len(known) > 0
     assert np.allclose(sorted(moving), sorted(known), rtol=1e-8)
 

@@ -9,13 +9,10 @@ from tfarm.crossing import pieces
 from tfarm.dsp import load_chain, sampled_loop
 from tfarm.dsp.loci import sampled_loci
 from tfarm.loop.edges import moment_axis, rate_axis
-from tfarm.loop.law_locus import law_locus
-from tfarm.loop.law_rounded import rounded_law_locus as rounded_law
 from tfarm.loop.locus import locus, rounded
 from tfarm.loop.loop import Loop
-from tfarm.loop.poles import poles_below
+from tfarm.loop.law_poles import law_poles_below
 from tfarm.plots.folded import draw_folded_loci
-from tfarm.plots.laws import draw_law_locus
 from tfarm.plots.roots import draw_locus
 from tfarm.spectrum.scales import default_gains, rate_unit
 
@@ -64,7 +61,7 @@ def test_the_values_between_are_poles_too():
     assert more.size > 20
     for n in more[::12]:
         branch = fine.branches[2, n]
-        poles = poles_below(fine.variation.at(fine.gain[n]), 150.0).values
+        poles = law_poles_below(fine.varied.at(fine.gain[n]), 150.0).values
         assert abs(poles - branch).min() <= 1e-9 * abs(branch)
 
 
@@ -120,18 +117,18 @@ def _near_a_corner(line, n):
 def test_a_locus_under_any_law_is_round_too():
     """No turn beyond 5 degrees but at a corner; the poles of the record stay, those between are zeros of 1 + L."""
     law = tfarm.Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
-    found = law_locus(LAB, law, "gain", 1.0, 8.0, points=8, branches=1)
-    fine = rounded_law(found)
-    more = np.nonzero(~np.isin(fine.values, found.values))[0]
+    found = locus(LAB, law, "gain", 1.0, 8.0, points=8, branches=1, in_box=True)
+    fine = rounded(found)
+    more = np.nonzero(~np.isin(fine.gain, found.gain))[0]
     assert more.size
-    for value, poles in zip(found.values, found.branches.T, strict=True):
-        kept = fine.branches[:, fine.values == value]
+    for value, poles in zip(found.gain, found.branches.T, strict=True):
+        kept = fine.branches[:, fine.gain == value]
         assert set(poles[np.isfinite(poles)]) == set(kept[np.isfinite(kept)])
     for n in more[::3]:
-        loop = Loop(LAB, law.having("gain", float(fine.values[n])))
+        loop = Loop(LAB, law.having("gain", float(fine.gain[n])))
         told = fine.branches[np.isfinite(fine.branches[:, n]), n]
         assert abs(1 + loop.loop_function(told)).max() < 1e-6
-    figure = draw_law_locus(found)
+    figure = draw_locus(found)
     figure.canvas.draw()
-    told = [seen_turns(line)[0] for line in figure.axes[0].lines if line.get_linewidth() == 1.4]
+    told = [seen_turns(line)[0] for line in figure.axes[0].lines if line.get_linewidth() == 2.6]
     assert max(turn.max(initial=0.0) for turn in told) <= MOST

@@ -81,17 +81,21 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
     return rows
 
 
-def between(family: Family, values: Real, rows: Complex, wanted: Real) -> tuple[Complex, NDArray[np.bool_]]:
-    """Return the roots (m, b) at wanted values (m,) between the known ones (n,), ascending, and where all are plain."""
-    found, plain = np.empty((wanted.size, rows.shape[1]), complex), np.empty(wanted.size, bool)
+def between(family: Family, values: Real, rows: Complex, wanted: Real) -> Complex:
+    """Return the roots (m, b) at wanted values (m,) between the known ones (n,), ascending.
+
+    By interpolation, and where that is not plain by following them from the known value below.
+    """
+    found = np.empty((wanted.size, rows.shape[1]), complex)
     right = np.clip(np.searchsorted(values, wanted), 1, values.size - 1)
     for n in np.unique(right):
         low = int(np.clip(n - PAST // 2, 0, max(0, values.size - PAST)))
-        here, near = right == n, slice(low, low + PAST)
+        here, near = np.flatnonzero(right == n), slice(low, low + PAST)
         guess = predicted(values[near], rows[near], wanted[here], rows[n - 1])
         found[here] = corrected(family, wanted[here], guess, rows[n - 1])
-        plain[here] = is_plain(family, wanted[here], guess, found[here])
-    return found, plain
+        for each in here[~is_plain(family, wanted[here], guess, found[here])]:
+            found[each] = follow(family, np.array([values[n - 1], wanted[each]]), rows[n - 1])[1]
+    return found
 
 
 def is_over(family: Family, value: float, row: Complex) -> NDArray[np.bool_]:

@@ -94,8 +94,8 @@ def branch_crossings(family: Varied, gain: Real, branches: Complex) -> tuple[Bra
         found.append(BranchCrossing(gain=at, omega=omega, branch=number, direction=direction))
     seen = {(each.gain, each.omega) for each in found}
     for t, omega, change in known if is_damped else ():
-        inside = AT_END * span < abs(t - gain[0]) < (1 - AT_END) * span and not SAME_CROSSING * top < omega - top < math.inf
-        if inside and (t, omega) not in seen:
+        is_between = AT_END * span < sign * (t - float(gain[0])) < (1 - AT_END) * span
+        if is_between and not top < omega < math.inf and (t, omega) not in seen:
             direction = "unstable" if sign * change > 0 else "stable"
             found.append(BranchCrossing(gain=t, omega=omega, branch=None, direction=direction))
     return tuple(sorted(found, key=lambda each: (sign * each.gain, each.omega)))

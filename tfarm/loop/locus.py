@@ -8,7 +8,7 @@ rig without feedback: the whole law grows from 0 to what it is at the first valu
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -47,6 +47,7 @@ class Locus:
     (`mode` (b,), 0 for the rigid body, a motor's circuit, a filter, a delay).  The mirror image of a branch is left
     out, unless the two meet on the real axis and part there: then it is a branch of its own, with Im s < 0 where they
     are a pair.  A branch is NaN where it is not followed (`ends`).  `box` holds no other pole at its nodes.
+    `followed` are all poles but those at 0 all the way, mirror images too, `listed` the numbers of those in `branches`.
     `crossings` are those of the imaginary axis, ascending along the way.
     """
 
@@ -58,6 +59,8 @@ class Locus:
     mode: Whole
     box: Box
     crossings: tuple[BranchCrossing, ...]
+    followed: Complex = field(repr=False, compare=False)
+    listed: Whole = field(repr=False, compare=False)
 
     @property
     def finding(self) -> str:
@@ -67,7 +70,7 @@ class Locus:
     @property
     def varied(self) -> Varied:
         """The family of loops."""
-        return Varied(self.arm, self.law, self.vary, float(self.gain[0]), float(self.gain[-1]))
+        return Varied(self.arm, self.law, self.vary, float(self.gain[0]), float(self.gain[-1]), self.box)
 
     @property
     def spectral_abscissa(self) -> Real:
@@ -97,18 +100,17 @@ def locus(
     family = Varied(arm, law, vary, start, stop).boxed(number)
     gain = np.linspace(start, stop, points)
     rows, mode = followed(family, gain, number)
-    real, upper, alive = (rows.imag == 0).any(axis=1), (rows.imag > 0).any(axis=1), ~np.isnan(rows).all(axis=1)
-    listed = np.flatnonzero(alive & (real | upper))
-    if in_box:
-        rows[~family.box.holds(rows)] = np.nan
-        listed = listed[~np.isnan(rows[listed]).all(axis=1)]
-    listed = listed if in_box else listed[: branches - family.pinned]
-    rows = np.concatenate([np.zeros((family.pinned, points), complex), rows[listed]])
-    mode = np.r_[np.zeros(family.pinned, np.int64), mode[listed]]
-    if not in_box:
-        rows, mode = rows[:branches], mode[:branches]
-    found = branch_crossings(family, gain, rows)
-    return Locus(family.first.arm, law, vary, gain, rows + 0.0, mode, family.box, found)
+    is_mirrored = ~(rows.imag == 0).any(axis=1) & ~(rows.imag > 0).any(axis=1)
+    listed = np.flatnonzero(~np.isnan(rows).all(axis=1) & ~is_mirrored)
+    shown = np.where(family.box.holds(rows), rows, np.nan) if in_box else rows
+    listed = listed[~np.isnan(shown[listed]).all(axis=1)][: len(rows) if in_box else branches - family.pinned]
+    pinned = min(family.pinned, branches)
+    found = np.concatenate([np.zeros((pinned, points)), shown[listed]]) + 0.0  # no -0
+    if len(found) < branches and not in_box:
+        raise ConvergenceError(f"only {len(found)} branches could be followed: ask for fewer", found, branches)
+    mode = np.r_[np.zeros(pinned, np.int64), mode[listed]]
+    crossings = branch_crossings(family, gain, found)
+    return Locus(family.first.arm, law, vary, gain, found, mode, family.box, crossings, rows, listed)
 
 
 def followed(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
@@ -183,22 +185,20 @@ def open_poles(arm: Arm, number: int) -> tuple[Complex, Whole]:
 def rounded(found: Locus) -> Locus:
     """Return the same locus with more values between its own, until no branch turns by more than 5 degrees as it is drawn.
 
-    Each is seen in a picture of its own and in one of all, down to pieces of a pixel.  A value at which a pole is not
-    plainly that of its branch is left out.
+    Each is seen in a picture of its own and in one of all, down to pieces of a pixel.
     """
-    family, gain, rows = found.varied, found.gain, found.branches
-    way, pinned = np.sign(gain[-1] - gain[0]), rows[: family.pinned]
+    family, gain, rows, shown = found.varied, found.gain, found.followed, found.branches
+    way, pinned, is_cut = int(np.sign(gain[-1] - gain[0])), len(shown) - found.listed.size, np.isnan(shown)
     for _ in range(HALVING_ROUNDS):
-        more = _bent(gain, rows)
+        more = _bent(gain, shown)
         if not more.size or more.size + gain.size > MOST_LOCUS_POINTS:
             break
-        added, plain = between(family, gain[:: int(way)], rows[pinned.shape[0] :, :: int(way)].T, more)
-        if not plain.any():
-            break
-        order = np.argsort(way * np.r_[gain, more[plain]], kind="stable")
-        new = np.vstack([np.zeros((len(pinned), int(plain.sum()))), added[plain].T])
-        gain, rows = np.r_[gain, more[plain]][order], np.hstack([rows, new])[:, order]
-    return replace(found, gain=gain, branches=rows)
+        order = np.argsort(way * np.r_[gain, more], kind="stable")
+        added = between(family, gain[::way], rows[:, ::way].T, more).T
+        gain, rows = np.r_[gain, more][order], np.hstack([rows, added])[:, order]
+        shown = np.concatenate([np.zeros((pinned, gain.size)), rows[found.listed]])
+        shown = np.where(family.box.holds(shown) | ~is_cut.any(), shown, np.nan)
+    return replace(found, gain=gain, branches=shown, followed=rows)
 
 
 def _bent(gain: Real, rows: Complex) -> Real:

@@ -46,7 +46,7 @@ def most_damped(found: Locus) -> MostDamped | None:
     inside = 0 < at < ratios.size - 1 and (branch.imag > 0).all()
     while inside and gain[2] - gain[0] > NARROWEST_ROUND * abs(gain[1]):
         grid = np.linspace(gain[0], gain[2], ROUND_POINTS)
-        found_there = between(found.varied, gain, branch[:, None], grid)[0][:, 0]
+        found_there = between(found.varied, gain, branch[:, None], grid)[:, 0]
         top = int(np.nanargmax(damping_ratios(found_there)))
         if not 0 < top < ROUND_POINTS - 1:
             break
