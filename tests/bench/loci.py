@@ -9,6 +9,7 @@ import numpy as np
 import tfarm
 from tfarm.arm import HubFeedback
 from tfarm.loop.locus import Locus, locus
+from tfarm.loop.plant import HubLoop
 from tfarm.loop.reduced_locus import open_loop, reduced_locus
 from tfarm.spectrum.enclose import enclosed
 
@@ -65,7 +66,7 @@ def _error(exact: Locus, values: Complex) -> float:
     """The largest |s - z|/|z| over sampled gains and all branches apart from z = 0, z being right to 50 digits."""
     worst = 0.0
     for n in np.linspace(1, exact.gain.size - 1, SAMPLES).round().astype(int):
-        loop = exact.variation.at(float(exact.gain[n]))
+        loop = HubLoop(exact.arm, exact.law.having("K1", float(exact.gain[n])))
         for near, value in zip(exact.branches[:, n], values[:, n], strict=True):
             if near:
                 disc = enclosed(loop.k, complex(near), DIGITS, loop.gains)

@@ -11,8 +11,8 @@ from tests.shared import remember
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.loop import closed
-from tfarm.loop.locus import locus
 from tfarm.loop.law_poles import law_poles_below
+from tfarm.loop.locus import locus
 from tfarm.loop.loop import Loop
 
 LAB = tfarm.load("sasaki2012-lab")

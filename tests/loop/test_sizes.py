@@ -16,7 +16,6 @@ from tfarm.loop.loop import Loop
 from tfarm.loop.margins import dense, minus_loop
 from tfarm.loop.plant import HubLoop
 from tfarm.loop.regions import _crossings_along_K2
-from tfarm.spectrum.box import Box
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 

@@ -14,11 +14,10 @@ from tfarm import HubFeedback, Law
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop import panels
 from tfarm.loop.answers import poles_answer
-from tfarm.loop.branches import open_pairs
 from tfarm.loop.crossings import BranchCrossing, in_words
 from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.law_map import law_map
-from tfarm.loop.locus import frame
+from tfarm.loop.locus import frame, open_poles
 from tfarm.loop.loop import Loop
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import _nearest_to_one
@@ -132,15 +131,16 @@ def test_a_picture_of_no_poles_is_the_unit_square():
 
 
 def test_what_a_locus_of_a_damped_rig_begins_with():
-    """0 and about -b/J of the hub's friction, then the modes in their order, each of them a zero of the open arm."""
+    """About -b/J of the hub's friction, then the modes in their order, each of them a pole of the open rig."""
     arm = tfarm.load("quanser-2dsfl")
-    zeros, lowest = open_pairs(arm, 4, 3)
-    damped = tfarm.damped_modes(tfarm.modes(arm, 4))
-    np.testing.assert_array_equal(zeros, damped.eigenvalues)
-    assert zeros[0, 0] == 0
-    assert zeros[0, 1].imag == 0 > zeros[0, 1].real
-    assert lowest == damped.natural_frequency[1]
-    assert open_pairs(BARE, 4, 3)[0].tolist() == [[1j * w, -1j * w] for w in tfarm.modes(BARE, 4).natural_frequency[1:]]
+    poles, mode = open_poles(arm, 4)
+    damped = tfarm.damped_modes(tfarm.modes(arm, 4)).eigenvalues
+    np.testing.assert_array_equal(poles, damped.ravel()[1:])
+    assert damped[0, 0] == 0
+    assert poles[0].imag == 0 > poles[0].real
+    assert mode.tolist() == [0, 1, 1, 2, 2, 3, 3, 4, 4]
+    bare, _ = open_poles(BARE, 4)
+    assert bare[::2].tolist() == (1j * tfarm.modes(BARE, 4).natural_frequency[1:]).tolist()
 
 
 # ------------------------------------------------------------ panels

@@ -9,9 +9,9 @@ from tfarm.crossing import pieces
 from tfarm.dsp import load_chain, sampled_loop
 from tfarm.dsp.loci import sampled_loci
 from tfarm.loop.edges import moment_axis, rate_axis
+from tfarm.loop.law_poles import law_poles_below
 from tfarm.loop.locus import locus, rounded
 from tfarm.loop.loop import Loop
-from tfarm.loop.law_poles import law_poles_below
 from tfarm.plots.folded import draw_folded_loci
 from tfarm.plots.roots import draw_locus
 from tfarm.spectrum.scales import default_gains, rate_unit

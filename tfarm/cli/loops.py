@@ -87,7 +87,9 @@ def print_locus(answer: dict[str, Any]) -> None:
         gap, order = answer["gap_to_reduced"], answer["reduced_order"]
         print(f"largest gap to python-control on a model of order {order}: {gap:.1e}")
     left, right, _, top = answer["box"]
-    print(f"poles complete at a few values with {left:.6g} < Re s < {right:.6g} and |Im s| < {top:.6g}; - : not followed")
+    print(
+        f"poles complete at a few values with {left:.6g} < Re s < {right:.6g} and |Im s| < {top:.6g}; - : not followed"
+    )
     print(answer["sign_convention"])
 
 

@@ -6,7 +6,7 @@ meet and part at a right angle.  Corrector: the family's own (`Family.near`), fo
 step is taken where no root moved further from its prediction than a share of its distance to the next root, and is
 halved otherwise.  Where no step is short enough the family's complete set is assigned to the predictions.
 
-The functions are real on the real axis: of a conjugate pair both roots have a column, and the lower is the mirror image.
+The functions are real on the real axis: of a conjugate pair both have a column, and the lower is the mirror image.
 """
 
 from __future__ import annotations
@@ -18,12 +18,14 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from tfarm.arrays import Complex, Real, Whole
+from tfarm.errors import ConvergenceError
 
 PAST = 4  # values through which predictions go
 MOST_AHEAD = 64  # values predicted at once, at most: memory and time alone
 FIRST_STEP = 1e-4  # of the first step: how far the first value is that tells the slopes
 PLAIN_MOVE = 0.1  # of the distance to the next root: one that is off its prediction by less is itself
 PLAIN_IN_COUPLE = 0.2  # the same, of the distance to the other one of two that meet or part
+MOST_HALVINGS = 600  # of steps on the way: a branch that meets the axis takes some 40
 ENDS_BEFORE = 0.05  # of its size: a real root so near to a singular point, right of it, ends there
 TURNED = 0.5  # of a right angle's cosine: below it the two of a couple have met between two values
 
@@ -53,13 +55,14 @@ class Family(Protocol):
 def follow(family: Family, values: Real, start: Complex) -> Complex:
     """Return the roots (n, b) at each of the values (n,), from those at the first; NaN from where one is lost.
 
-    A root is lost where it comes to a singular point, and where it is none of the family's complete set.
+    A root is lost where it comes to a singular point, and where it is none of the family's complete set.  Raises
+    ConvergenceError where too many steps would have to be halved.
     """
     rows = np.full((values.size, start.size), np.nan, complex)
     rows[0], past, span = start, [(float(values[0]), start)], abs(values[-1] - values[0])
     ahead = [(float(value), n) for n, value in enumerate(values)][:0:-1]
     ahead.append((past[0][0] + FIRST_STEP * (ahead[-1][0] - past[0][0]), 0))
-    many = 1
+    many, halvings = 1, 0
     while ahead:
         block = ahead[-many:][::-1]
         at, last = np.array([value for value, _ in block]), past[-1][1]
@@ -70,6 +73,9 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
         if not good and len(block) == 1:
             if abs(at[0] - past[-1][0]) > family.least_step * span:
                 ahead.append(((past[-1][0] + float(at[0])) / 2, 0))
+                halvings += 1
+                if halvings > MOST_HALVINGS:
+                    raise ConvergenceError(f"branches cannot be told apart beyond {past[-1][0]:.10g}", past[-1], at[0])
             else:
                 found, good = assigned(family, float(at[0]), guess[0])[None], 1
         many = min(2 * many, MOST_AHEAD) if good == len(block) else max(1, good)
@@ -176,6 +182,8 @@ def is_plain(family: Family, values: Real, guess: Complex, found: Complex) -> ND
     room = away.min(axis=2, initial=np.inf)
     for point in family.singular(values).T:
         room = np.minimum(room, abs(found - point[:, None]))
-    near = (moved <= np.where(is_couple, PLAIN_IN_COUPLE, PLAIN_MOVE) * own) & (np.sign(found.imag) == np.sign(guess.imag))
+    near = (moved <= np.where(is_couple, PLAIN_IN_COUPLE, PLAIN_MOVE) * own) & (
+        np.sign(found.imag) == np.sign(guess.imag)
+    )
     same = (near | (guess == 0)) & (moved <= PLAIN_MOVE * room)
     return np.asarray((np.isnan(guess) | same | (found == 0) | (moved <= family.blur)).all(axis=1))

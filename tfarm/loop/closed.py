@@ -89,7 +89,9 @@ def locus(
     if isinstance(plain, HubFeedback) and (vary in OF_THE_LAW or not is_of_signals):
         must_be_known("vary", vary, (*OF_THE_LAW, *ARM_PARAMETERS))
         if vary == "all" and plain == HubFeedback():
-            raise ParameterError(key="vary", value="all", remedy=f"every gain is 0: give {' or '.join(NAMES)} to be scaled")
+            raise ParameterError(
+                key="vary", value="all", remedy=f"every gain is 0: give {' or '.join(NAMES)} to be scaled"
+            )
         return followed_locus(arm, plain, vary, start, stop, LOCUS_VALUES if points is None else points, branches)
     values = LAW_LOCUS_VALUES if points is None else points
     return followed_locus(arm, as_law(law), vary, start, stop, values, branches, in_box=True)

@@ -1,7 +1,7 @@
 """Where branches of a locus cross the imaginary axis: solved for gain and frequency together, not interpolated.
 
-Along a number of the law in which D is linear D-decomposition has every crossing of the axis (`tfarm.crossing`); each is
-that of the branch that changes sides there, or of a pole on none.  Along another number the branch is followed to it.
+Along a number of the law in which D is linear D-decomposition has every crossing (`tfarm.crossing`); each is that of
+the branch that changes sides there, or of a pole on none.  Along another number the branch is followed to it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossing, crossed
 from tfarm.errors import ConvergenceError
 from tfarm.response.frequency import AXIS_SHARE
-from tfarm.spectrum.scales import first_frequency
 
 from .frequencies import grid
 from .law_map import law_crossings
@@ -76,16 +75,15 @@ def crossing_answers(found: Iterable[BranchCrossing]) -> list[dict[str, Any]]:
     ]
 
 
-def branch_crossings(family: Varied, gain: Real, branches: Complex) -> tuple[BranchCrossing, ...]:
-    """Return the crossings of the imaginary axis in the order in which they come, those of poles on no branch too.
+def branch_crossings(family: Varied, gain: Real, branches: Complex, top: float) -> tuple[BranchCrossing, ...]:
+    """Return the crossings of the imaginary axis in the order in which they come.
 
-    The latter of a damped rig along a number of its law, up to the highest frequency that every value has.
+    Of a damped rig along a number of its law those of poles on no branch too, up to `top` [rad/s].
     """
     sign, span = float(np.sign(gain[-1] - gain[0])), abs(float(gain[-1] - gain[0]))
-    highest = np.nanmax(np.where(np.isnan(branches), -math.inf, branches.imag), axis=0)
-    top = min(float(highest.min()) or first_frequency(family.first.arm), family.box.im_max)
     changes, is_damped = _changes(branches), bool(family.first.arm.least_damping)
-    known = _on_line(family, gain, min(1.01 * float(highest.max()), family.box.im_max) or top) if changes or is_damped else []
+    band = max(top, float(np.nanmax(branches.imag, initial=0.0)))
+    known = _on_line(family, gain, band) if changes or is_damped else []
     found: list[BranchCrossing] = []
     for number, low, high in changes:
         ends, points = gain[[low, high]], branches[number, [low, high]]
@@ -155,10 +153,9 @@ def _crossed(family: Varied, ends: Real, points: Complex, known: Sequence[Crossi
         share = points.real[0] / (points.real[0] - points.real[1])
         best = min(near, key=lambda each: abs(each.at - abs((points[0] + share * (points[1] - points[0])).imag)))
         return best.t, best.at
-    at_rest = lambda value: family.at_rest(float(value))  # noqa: E731
     tolerance = GAIN_KNOWN * max(abs(low), abs(high))
-    if not points.imag.all() and at_rest(low) * at_rest(high) <= 0:
-        return float(brentq(at_rest, low, high, xtol=tolerance)), 0.0
+    if not points.imag.all() and family.at_rest(low) * family.at_rest(high) <= 0:
+        return float(brentq(family.at_rest, low, high, xtol=tolerance)), 0.0
 
     def pole(value: float) -> complex:
         share = (value - ends[0]) / (ends[1] - ends[0])

@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tfarm.arm import AnyLaw, Arm
+from tfarm.arm import AnyLaw, Arm, HubFeedback
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing.following import between, follow
@@ -47,7 +47,8 @@ class Locus:
     (`mode` (b,), 0 for the rigid body, a motor's circuit, a filter, a delay).  The mirror image of a branch is left
     out, unless the two meet on the real axis and part there: then it is a branch of its own, with Im s < 0 where they
     are a pair.  A branch is NaN where it is not followed (`ends`).  `box` holds no other pole at its nodes.
-    `followed` are all poles but those at 0 all the way, mirror images too, `listed` the numbers of those in `branches`.
+    `followed` are all poles but those at 0 all the way, mirror images too, `listed` the numbers of those in
+    `branches`, which with `in_box` are NaN outside the box.
     `crossings` are those of the imaginary axis, ascending along the way.
     """
 
@@ -61,6 +62,7 @@ class Locus:
     crossings: tuple[BranchCrossing, ...]
     followed: Complex = field(repr=False, compare=False)
     listed: Whole = field(repr=False, compare=False)
+    in_box: bool = False
 
     @property
     def finding(self) -> str:
@@ -71,6 +73,11 @@ class Locus:
     def varied(self) -> Varied:
         """The family of loops."""
         return Varied(self.arm, self.law, self.vary, float(self.gain[0]), float(self.gain[-1]), self.box)
+
+    @property
+    def gains(self) -> HubFeedback:
+        """The gains at the hub, of a locus of these."""
+        return cast("HubFeedback", self.law)
 
     @property
     def spectral_abscissa(self) -> Real:
@@ -105,12 +112,14 @@ def locus(
     shown = np.where(family.box.holds(rows), rows, np.nan) if in_box else rows
     listed = listed[~np.isnan(shown[listed]).all(axis=1)][: len(rows) if in_box else branches - family.pinned]
     pinned = min(family.pinned, branches)
-    found = np.concatenate([np.zeros((pinned, points)), shown[listed]]) + 0.0  # no -0
+    found = np.concatenate([np.zeros((pinned, points), complex), shown[listed]])
+    found += 0.0  # no -0
     if len(found) < branches and not in_box:
         raise ConvergenceError(f"only {len(found)} branches could be followed: ask for fewer", found, branches)
     mode = np.r_[np.zeros(pinned, np.int64), mode[listed]]
-    crossings = branch_crossings(family, gain, found)
-    return Locus(family.first.arm, law, vary, gain, found, mode, family.box, crossings, rows, listed)
+    top = family.box.im_max if in_box else float(np.fmax.reduce(found.imag).min()) or family.frequency
+    crossings = branch_crossings(family, gain, found, top)
+    return Locus(family.first.arm, law, vary, gain, found, mode, family.box, crossings, rows, listed, in_box)
 
 
 def followed(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
@@ -170,7 +179,11 @@ def open_poles(arm: Arm, number: int) -> tuple[Complex, Whole]:
     table = modes(arm, number)
     if arm.is_undamped:
         omega = table.natural_frequency[table.index > 0]
-        pairs, index, singles = np.stack([1j * omega, -1j * omega], axis=1), table.index[table.index > 0], single_zeros(table)
+        pairs, index, singles = (
+            np.stack([1j * omega, -1j * omega], axis=1),
+            table.index[table.index > 0],
+            single_zeros(table),
+        )
     else:
         found = damped_modes(table)
         rigid = found.eigenvalues[found.index == 0].ravel()
@@ -183,12 +196,12 @@ def open_poles(arm: Arm, number: int) -> tuple[Complex, Whole]:
 
 
 def rounded(found: Locus) -> Locus:
-    """Return the same locus with more values between its own, until no branch turns by more than 5 degrees as it is drawn.
+    """Return the same locus with more values, until no branch turns by more than 5 degrees as it is drawn.
 
     Each is seen in a picture of its own and in one of all, down to pieces of a pixel.
     """
     family, gain, rows, shown = found.varied, found.gain, found.followed, found.branches
-    way, pinned, is_cut = int(np.sign(gain[-1] - gain[0])), len(shown) - found.listed.size, np.isnan(shown)
+    way, pinned = int(np.sign(gain[-1] - gain[0])), len(shown) - found.listed.size
     for _ in range(HALVING_ROUNDS):
         more = _bent(gain, shown)
         if not more.size or more.size + gain.size > MOST_LOCUS_POINTS:
@@ -197,7 +210,7 @@ def rounded(found: Locus) -> Locus:
         added = between(family, gain[::way], rows[:, ::way].T, more).T
         gain, rows = np.r_[gain, more][order], np.hstack([rows, added])[:, order]
         shown = np.concatenate([np.zeros((pinned, gain.size)), rows[found.listed]])
-        shown = np.where(family.box.holds(shown) | ~is_cut.any(), shown, np.nan)
+        shown = np.where(family.box.holds(shown), shown, np.nan) if found.in_box else shown
     return replace(found, gain=gain, branches=shown, followed=rows)
 
 

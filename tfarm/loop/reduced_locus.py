@@ -23,7 +23,7 @@ from tfarm.reduced import ModalModel, modal_model
 from tfarm.spectrum import modes
 
 from .locus import Locus
-from .varied import OF_THE_LAW, Varied
+from .varied import OF_THE_LAW
 
 if TYPE_CHECKING:
     import control
@@ -72,12 +72,12 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
     count = order // 2 - rigid
     if exact.vary in OF_THE_LAW:
         which = np.arange(exact.gain.size)
-        poles = _polished(exact.varied, exact.gain, root_locus(arm, exact.law, exact.vary, exact.gain, count), count)
+        poles = _polished(exact, root_locus(arm, exact.gains, exact.vary, exact.gain, count), count)
     else:
         which = np.unique(np.linspace(0, exact.gain.size - 1, REDUCED_VALUES).round().astype(int))
         arms = [exact.varied.at(float(value)).arm for value in exact.gain[which]]
         none = np.zeros(len(FED_BACK))
-        closed = [_closed(each, np.array(exact.law.row), count, none)[0][0] for each in arms]
+        closed = [_closed(each, np.array(exact.gains.row), count, none)[0][0] for each in arms]
         poles = np.array([np.linalg.eigvals(A) for A in closed])
     branches = exact.branches[:, which]
     paired = np.full(branches.shape, np.nan, complex)
@@ -103,14 +103,14 @@ def root_locus(arm: Arm, law: HubFeedback, vary: str, gain: Real, count: int) ->
         raise ConvergenceError(f"python-control cannot follow a model of this arm: {error}", arm.name, count) from None
 
 
-def _polished(family: Varied, gain: Real, poles: Complex, count: int) -> Complex:
+def _polished(exact: Locus, poles: Complex, count: int) -> Complex:
     """The same poles (gains, order) to the last digits that float64 has of them, by Newton's method.
 
     What an eigenvalue solver gives depends on the processor in its last four digits.  Solved for is 1 + law . G(s) = 0
     on the model's partial fractions; a pole where that has no slope, or that would move, stays as it is.
     """
-    law, model = family.law, modal_model(family.first.arm, FED_BACK, count)
-    laws = gain[:, None] * np.array(law.row) if family.vary == "all" else many_laws(law, **{family.vary: gain}).T
+    law, gain, model = exact.gains, exact.gain, modal_model(exact.arm, FED_BACK, count)
+    laws = gain[:, None] * np.array(law.row) if exact.vary == "all" else many_laws(law, **{exact.vary: gain}).T
     found = poles.astype(complex)
     for _ in range(POLISHING):
         value, slope = _return_difference(model, laws, found)

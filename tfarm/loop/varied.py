@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
@@ -38,7 +38,7 @@ NEWTON_STEPS = 6  # from a guess right to some digits: what has not settled then
 SETTLED = 1e-10  # of its size: one step more is taken where Newton's method still moves a pole by this
 SERIES_RADIUS, SERIES_POINTS = 0.2, 16  # of the first frequency: where a power series next to 0 is read off
 EMPTY = Box(0.0, 0.0, 0.0, 0.0)
-LOOPS_KEPT = 8  # at values asked for again: memory against time, of no effect on an answer
+LOOPS_KEPT = 200  # at values asked for again: memory against time, of no effect on an answer
 SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are known beforehand, Newton's method finds none there
 
 
@@ -71,7 +71,9 @@ class Varied:
             arm = self.at(value).arm
             if arm.rate_loss and arm.lossless_hub.has_massless_hub and self._rate_gain_at(value) <= -arm.rate_loss:
                 remedy = f"with hub.inertia = 0 a pole passes through infinity at {RATE_GAIN} = {-arm.rate_loss:.6g}"
-                raise ParameterError(key=key, value=value, remedy=f"{remedy}: stay above it, or give the hub an inertia")
+                raise ParameterError(
+                    key=key, value=value, remedy=f"{remedy}: stay above it, or give the hub an inertia"
+                )
 
     # ------------------------------------------------------------ loops and functions
 
@@ -94,12 +96,19 @@ class Varied:
         gains = self.law_at(value).gains
         return gains[RATE_GAIN] if gains else 0.0
 
-    @lru_cache(maxsize=LOOPS_KEPT)
     def at(self, value: float) -> Loop:
         """The loop where the number has that value."""
-        if self.is_of_arm:
-            return Loop(self.arm.having(**{self.vary: value}), self.full)
-        return Loop(self.arm, self.law_at(value)) if value == self.start else self.first.under(self.law_at(value))
+        if value not in self._loops:
+            if len(self._loops) > LOOPS_KEPT:
+                self._loops.clear()
+            is_other = value != self.start and not self.is_of_arm
+            arm = self.arm.having(**{self.vary: value}) if self.is_of_arm else self.arm
+            self._loops[value] = self.first.under(self.law_at(value)) if is_other else Loop(arm, self.law_at(value))
+        return self._loops[value]
+
+    @cached_property
+    def _loops(self) -> dict[float, Loop]:
+        return {}
 
     @cached_property
     def first(self) -> Loop:
@@ -229,7 +238,7 @@ class Varied:
         series = np.fft.fft(D * np.exp(scale - scale[0]) / circle**self.pinned).real[: SERIES_POINTS // 2]
         roots = SERIES_RADIUS * self.frequency * np.roots(series[::-1]).astype(complex)
         nearest = roots[np.argsort(abs(roots))[:count]]
-        return nearest[np.lexsort((-nearest.real, -nearest.imag))]
+        return np.asarray(nearest[np.lexsort((-nearest.real, -nearest.imag))], dtype=complex)
 
     def complete(self, value: float, guess: Complex) -> Complex:
         """All poles in the box at one value, both of each pair, and those next to the guesses that lie outside it."""
@@ -241,18 +250,19 @@ class Varied:
         found = zeros_in_box(loop.function, self.box, starts, slow)
         found = np.where(abs(found.imag) < NO_PART * abs(found), found.real, found)
         upper, rests = found[found.imag > 0], np.zeros(loop.zeros_at_origin - self.pinned, complex)
-        return np.r_[rests, found[found.imag == 0], upper, upper.conj(), near[~self.box.holds(near)]]
+        every = np.r_[rests, found[found.imag == 0], upper, upper.conj(), near[~self.box.holds(near)]]
+        return every.astype(complex)
 
     def singular(self, values: Real) -> Real:
         """-1/C of the damped segments, at m values (m, p)."""
         if not self.is_of_arm:
-            return np.tile(self.first.k.singular, (values.size, 1))
+            return np.tile(np.array(self.first.k.singular), (values.size, 1))
         return np.array([self.at(float(value)).k.singular for value in values])
 
     # ------------------------------------------------------------ complete in a box
 
     def boxed(self, modes: int) -> Varied:
-        """The same with a box for the whole way, as high as so many flexible modes, with no pole on its edge at first."""
+        """The same with a box for the whole way, as high as so many modes, no pole on its edge at the first value."""
         loops, lost = [self.at(value) for value in self.few], ConvergenceError("no box", self, 0.0)
         for factor in HEIGHTS:
             height = factor * max(band_of(loop.arm, modes) for loop in loops)

@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tfarm.arrays import Complex
 from tfarm.digits import kept_digits, plain, significant
+from tfarm.errors import one_line
 from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, held_branches
 from tfarm.loop.locus import Locus, frame, rounded
 from tfarm.loop.reduced_locus import ReducedLocus
@@ -27,6 +28,7 @@ MODE_COLOURS = (INK, BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # by mode
 ROOM_AROUND = 0.12  # around a branch, as a share of its extent
 CROSS_AT_ZERO: dict[str, Any] = {"ls": "none", "marker": "x", "ms": 6, "mew": 1.4}  # poles without what varies
 CIRCLE_AT_FIRST: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6, "mfc": "white", "mew": 1.2}  # at the start
+LONGEST_LAW = 40  # characters of what is said of a law in a title
 QUARTERS = (0.25, 0.5, 0.75)  # of the way that the modes go, on average: where a value is marked along each branch
 
 
@@ -91,7 +93,8 @@ def draw_loci(data: Loci) -> Figure:
 
 def _range(exact: Locus) -> str:
     first, last = (plain(float(exact.gain[i]), 4) for i in (0, -1))
-    return f"{exact.vary} goes from {first} to {last} with {gains_words(exact.law, but=exact.vary)}"
+    law = one_line(gains_words(exact.law, but=exact.vary), LONGEST_LAW)
+    return f"{exact.vary} goes from {first} to {last} with {law}"
 
 
 def _marked(exact: Locus) -> tuple[float, list[float]]:

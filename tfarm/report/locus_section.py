@@ -86,7 +86,7 @@ def locus_section(arm: Arm) -> PageSection:
 def _more_damping(data: Loci) -> str:
     """How the damping of the first mode rises, and whether it falls again."""
     exact, found = data.exact, most_damped(data.exact)
-    held = exact.law.told(MOMENT_GAIN, plain)
+    held = exact.gains.told(MOMENT_GAIN, plain)
     if found is None:
         return f"More {data.name}, with {held} held"
     start = f"More {data.name} ({held} held)"
@@ -103,7 +103,7 @@ def _more_damping(data: Loci) -> str:
 def _more_moment(data: Loci) -> str:
     """From where on the loop is unstable."""
     exact = data.exact
-    held = exact.law.told(RATE_GAIN, shortly)
+    held = exact.gains.told(RATE_GAIN, shortly)
     more = f"More {data.name} ({held} held)"
     unstable = [each for each in exact.crossings if each.direction == "unstable"]
     if not unstable:
