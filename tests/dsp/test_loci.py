@@ -9,8 +9,8 @@ import tfarm
 from tfarm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.dsp.chain import Slew
+from tfarm.dsp.edges import another
 from tfarm.dsp.loci import RIM, STRONGER, sampled_loci
-from tfarm.dsp.shown import another
 from tfarm.dsp.slews import slews
 from tfarm.dsp.strip_chart import strip_chart
 

@@ -17,7 +17,7 @@ from tfarm.arm import Hub, HubFeedback, many_laws
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import sampled_brief
 from tfarm.dsp.chain import Sampling
-from tfarm.dsp.loop import sampled_loop
+from tfarm.dsp.sampled import sampled_loop
 from tfarm.errors import ConvergenceError
 from tfarm.loop import edges
 from tfarm.loop.closed import nyquist

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import AnyLaw, Arm
 from tfarm.dsp.chain import Chain, Sampling
 from tfarm.dsp.verdict import LARGEST_LOG, Verdict, sampled_verdict
 from tfarm.errors import ConvergenceError
@@ -60,7 +60,7 @@ class SampledBrief:
         }
 
 
-def sampled_brief(arm: Arm, law: HubFeedback, chain: Chain) -> SampledBrief:
+def sampled_brief(arm: Arm, law: AnyLaw, chain: Chain) -> SampledBrief:
     """The verdict on a law at the clock of a chain.  Raises ParameterError where the arm has no such loop."""
     try:
         verdict = sampled_verdict(arm, law, chain)
@@ -69,7 +69,7 @@ def sampled_brief(arm: Arm, law: HubFeedback, chain: Chain) -> SampledBrief:
     return brief_of(verdict, chain)
 
 
-def brief_of(verdict: Verdict[Any], chain: Chain) -> SampledBrief:
+def brief_of(verdict: Verdict, chain: Chain) -> SampledBrief:
     """A verdict in short."""
     return SampledBrief(
         sampling=chain.sampling,

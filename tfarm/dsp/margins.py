@@ -1,22 +1,19 @@
-"""How far a sampled loop is from its edges: intervals of the gains, delay, and the damping that would make it safe."""
+"""How far a sampled loop is from its edges in delay and in damping, and how many modes it takes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from scipy.optimize import brentq
 
-from tfarm.arm import Arm, HubFeedback
-from tfarm.crossing import Window, confirmed
-from tfarm.dsp.boundary import circle_crossings, circle_grid
+from tfarm.arm import AnyLaw, Arm
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.law_loop import AnySampled, SampledKind
-from tfarm.dsp.loop import SampledLoop, sampled_loop
+from tfarm.dsp.discretise import acting_law, with_all_gains
 from tfarm.dsp.plant import Branching
+from tfarm.dsp.sampled import Sampled, sampled_loop
 from tfarm.dsp.sampling import FORGOTTEN, held_amplitude
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
@@ -52,18 +49,7 @@ class DelayMargin:
     is_bound: bool
 
 
-def stable_windows(loop: SampledLoop, name: str) -> list[Window]:
-    """Every open interval of one gain in which the loop is stable, the others as they are, as its poles confirm."""
-    found = circle_crossings(circle_grid(loop), name, loop.gains)
-    return confirmed(found, -math.inf, math.inf, lambda gain: loop.having(**{name: gain}).poles.is_stable)
-
-
-def around(windows: list[Window], gain: float) -> Window | None:
-    """The window that a gain lies in."""
-    return next((window for window in windows if window[0] < gain < window[1]), None)
-
-
-def delay_margin(loop: AnySampled) -> DelayMargin:
+def delay_margin(loop: Sampled) -> DelayMargin:
     """How many samples of further delay, any fraction, until a stable loop is stable no more; 0 if it is not stable.
 
     Scanned finely enough for the fastest mode that the loop can drive unstable, then bisected to 1e-10.
@@ -95,23 +81,28 @@ def delay_margin(loop: AnySampled) -> DelayMargin:
     return DelayMargin(min(MOST_STEPS * step, LONGEST_DELAY_SAMPLES), True)
 
 
-def required_damping(
-    arm: Arm, gains: HubFeedback, chain: Chain, *, count: int = DAMPING_MODES, branches: Branching | None = None
-) -> float:
-    """The smallest C [s] from which on these gains are stable on this arm (its own C is set aside).
+def required_damping(arm: Arm, law: AnyLaw, chain: Chain, *, count: int = DAMPING_MODES) -> float:
+    """The smallest C [s] from which on the loop of this law is stable on this arm (its own C is set aside).
 
-    0 where they are stable without damping, inf where none up to 15 % of critical in the first mode helps.  Every
-    decade is looked at from there down, so that larger ones on that grid are stable too; the edge is found to 1e-6.
+    0 where it is stable without damping, inf where none up to 15 % of critical in the first mode helps.
     """
-    branches = Branches(LITTLE) if branches is None else branches
+    return damping_edge(sampled_loop(arm.elastic, law, chain, count=count), Branches(LITTLE))
+
+
+def damping_edge(loop: Sampled, branches: Branching) -> float:
+    """`required_damping` of an undamped loop, with its number of modes.
+
+    Every decade is looked at from the strongest C down, so that larger ones on that grid are stable too; the edge is
+    found to 1e-6.
+    """
 
     @cache
     def log_radius(C: float) -> float:
-        return log_radius_with(arm, gains, chain, C, count, branches)
+        return log_radius_with(loop, C, loop.plant.count, branches)
 
-    if sampled_loop(arm.elastic, gains, chain, count=count).poles.is_stable:
+    if loop.poles.is_stable:
         return 0.0
-    high = 2 * STRONGEST / first_frequency(arm)
+    high = 2 * STRONGEST / first_frequency(loop.plant.arm)
     if log_radius(high) >= 0:
         return math.inf
     for _ in range(DAMPING_DECADES):
@@ -123,23 +114,21 @@ def required_damping(
     return high
 
 
-def log_radius_with(
-    arm: Arm, gains: HubFeedback, chain: Chain, C: float, count: int, branches: Branching = all_damped_modes
-) -> float:
+def log_radius_with(loop: Sampled, C: float, count: int, branches: Branching) -> float:
     """The log spectral radius at C; where two damped modes are one there, at a C that differs by 1e-6.
 
     Modes that a strong C has settled before the next sample, or overdamped, are left to the remainder, but for a few.
     """
-    outliving = min(alive(arm.having(damping=C), chain), modes_below(arm, SURELY_OVERDAMPED / C))
-    count = min(count, KEPT_BEYOND + outliving)
+    arm = loop.plant.arm
+    outliving = min(alive(arm.having(damping=C), loop.chain), modes_below(arm, SURELY_OVERDAMPED / C))
     for nudge in NUDGES:
         try:
-            loop = sampled_loop(arm.having(damping=C * (1 + nudge)), gains, chain, count=count, branches=branches)
+            damped = loop.on(arm.having(damping=C * (1 + nudge)), min(count, KEPT_BEYOND + outliving), branches)
         except ConvergenceError:
             if nudge < 0:
                 raise
             continue
-        return loop.poles.log_spectral_radius
+        return damped.poles.log_spectral_radius
     raise AssertionError("unreachable")
 
 
@@ -160,31 +149,20 @@ def most_modes(arm: Arm, chain: Chain) -> int:
     return min(MOST_LOOP_MODES, MODES_BEYOND + outliving)
 
 
-def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching = all_damped_modes) -> SampledLoop:
-    """The loop of a damped arm with every mode that outlives a sample and a few, or the first 128: `with_all_modes`."""
-
-    def loop_of(count: int, branches: Branching) -> SampledLoop:
-        return sampled_loop(arm, gains, chain, count=count, branches=branches)
-
-    return with_all_modes(arm, chain, loop_of, branches)
-
-
-def with_all_modes(
-    arm: Arm, chain: Chain, loop_of: Callable[[int, Branching], SampledKind], branches: Branching = all_damped_modes
-) -> SampledKind:
-    """The loop of a damped arm with as many modes as it takes, `loop_of` giving that with so many.
+def whole_loop(arm: Arm, law: AnyLaw, chain: Chain, branches: Branching = all_damped_modes) -> Sampled:
+    """The loop of a damped arm with every mode that outlives a sample and a few, or the first 128.
 
     With somewhat fewer where two damped modes cannot be told apart; with one where the first is far overdamped.
     Raises ConvergenceError where not even that one can be followed.
     """
     criticals = arm.damping * first_frequency(arm) / 2
-    most = most_modes(arm, chain)
+    most = most_modes(arm, acting_law(arm, with_all_gains(arm, law), chain)[1])
     numbers = [most, *(int(share * most) for share in FEWER_SHARES)]
     if criticals > FAR_BEYOND:
         numbers, branches = [1], Branches(COMPANY[:1])
     for number in numbers:
         try:
-            return loop_of(max(1, number), branches)
+            return sampled_loop(arm, law, chain, count=max(1, number), branches=branches)
         except ConvergenceError as error:
             lost = error
     where = f"C = {arm.damping:g} s, {criticals:.3g} times critical in the first mode"

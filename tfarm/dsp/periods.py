@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from tfarm.arm import PLANE, Arm, HubFeedback
 from tfarm.crossing import Window
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.margins import stable_windows
+from tfarm.dsp.crossings import stable_windows
 from tfarm.dsp.verdict import sampled_verdict
 
 PERIOD_SHARES = (0.1, 0.5, 1.0, 2.0, 5.0)  # of the chain's own period

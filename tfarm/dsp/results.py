@@ -16,7 +16,6 @@ from tfarm.dsp.chain import Chain, chain_or_usual
 from tfarm.dsp.curves import resolved
 from tfarm.dsp.discretise import described_law
 from tfarm.dsp.enough import Enough, enough_modes
-from tfarm.dsp.law_simulate import LawSimulator
 from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario
 from tfarm.dsp.simulate import Simulator
@@ -246,11 +245,7 @@ def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: flo
     arm, law = tracked(arm, law)
     task = scenario(scenario_name, arm, chain, duration)
     used = modes_for(None, lambda n: simulation_of(arm, law, ideal_chain(chain), task, count=n))
-    if isinstance(law, HubFeedback):
-        gains = law
-        (found,) = resolved(Simulator(arm, chain, task, count=used.modes), arm, lambda it: it.linear(gains))
-        return found
-    (found,) = resolved(LawSimulator(arm, law, chain, task, count=used.modes), arm, LawSimulator.run)
+    (found,) = resolved(Simulator(arm, chain, task, law, count=used.modes), arm, Simulator.run)
     return found
 
 
@@ -265,9 +260,7 @@ def simulation_of(
     outputs: Sequence[str] = (),
 ) -> Simulation:
     """A scenario simulated with `count` modes, gains at the hub following references in all that they feed back."""
-    if isinstance(law, HubFeedback):
-        return Simulator(arm, chain, task, count=count, between=between, outputs=outputs).linear(law)
-    return LawSimulator(arm, law, chain, task, count=count, between=between, outputs=outputs).run()
+    return Simulator(arm, chain, task, law, count=count, between=between, outputs=outputs).run()
 
 
 def simulated(

@@ -7,9 +7,9 @@ from tfarm.columns import Column, Table
 from tfarm.digits import plain
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.curves import held_at, root_moment
-from tfarm.dsp.law import SAMPLED_MODE_COLUMNS, ModeTable
 from tfarm.dsp.loci import SampledLoci
-from tfarm.dsp.loop import SampledLoop
+from tfarm.dsp.modes import SAMPLED_MODE_COLUMNS, ModeTable
+from tfarm.dsp.sampled import Sampled
 from tfarm.dsp.strip_chart import StripChart
 
 MODE_TABLE = (
@@ -20,7 +20,7 @@ MODE_TABLE = (
 )
 
 
-def mode_rows(loop: SampledLoop, table: ModeTable, stem: str) -> Table:
+def mode_rows(loop: Sampled, table: ModeTable, stem: str) -> Table:
     """A row a mode that outlives a sample."""
     T = loop.chain.sampling.period
     return Table(

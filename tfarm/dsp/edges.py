@@ -12,21 +12,19 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 
-from tfarm.arm import Arm, HubFeedback
 from tfarm.crossing import Window
 from tfarm.dsp.band import Band, complete_band
-from tfarm.dsp.chain import Chain
 from tfarm.dsp.circle import Circle
-from tfarm.dsp.loop import SampledLoop, resized
+from tfarm.dsp.crossings import stable_windows
 from tfarm.dsp.margins import (
     DelayMargin,
+    damping_edge,
     delay_margin,
     log_radius_with,
     most_modes,
-    required_damping,
-    stable_windows,
     whole_loop,
 )
+from tfarm.dsp.sampled import Sampled, resized
 from tfarm.records import record
 from tfarm.spectrum.damped import LITTLE, Branches
 
@@ -126,7 +124,7 @@ class Edge:
         return min(band, narrower) if still is False else 0.0
 
 
-def shown_windows(loop: SampledLoop, band: Band | None, gain: str) -> ShownWindows:
+def shown_windows(loop: Sampled, band: Band | None, gain: str) -> ShownWindows:
     """The windows of one gain, with more modes than the loop's until their edges are proven to the last digit."""
     circle = None if band is None else band.circle()
     found = ShownWindows([], [])
@@ -137,7 +135,7 @@ def shown_windows(loop: SampledLoop, band: Band | None, gain: str) -> ShownWindo
     return found
 
 
-def _sizes(loop: SampledLoop, band: Band | None, most: int) -> Iterator[SampledLoop]:
+def _sizes(loop: Sampled, band: Band | None, most: int) -> Iterator[Sampled]:
     """The loop, at most MOST_EDGE_MODES of its modes, and where anything can be proven with 2, 4 ... times as many."""
     loop = loop if loop.plant.count <= MOST_EDGE_MODES else resized(loop, MOST_EDGE_MODES)
     yield loop
@@ -149,21 +147,18 @@ def _sizes(loop: SampledLoop, band: Band | None, most: int) -> Iterator[SampledL
         yield loop
 
 
-def _windows(loop: SampledLoop, band: Band | None, circle: Circle | None, gain: str) -> ShownWindows:
+def _windows(loop: Sampled, band: Band | None, circle: Circle | None, gain: str) -> ShownWindows:
     """The windows of this very loop."""
     other, modes = cache(lambda: resized(loop, another(loop.plant.count, _most(loop)))), loop.plant.count
-
-    def at(value: float) -> HubFeedback:
-        return loop.gains.having(gain, value)
 
     def proof(value: float) -> Proof:
         assert circle is not None
         assert band is not None
-        count = circle.count(at(value))
+        count = circle.count(loop.having(**{gain: value}).weights)
         return None if count is None else count == 0, band.top
 
     def holds(value: float) -> Proof:
-        return replace(other(), gains=at(value)).poles.is_stable, math.inf
+        return other().having(**{gain: value}).poles.is_stable, math.inf
 
     windows = stable_windows(loop, gain)
     figures = []
@@ -183,21 +178,21 @@ def another(count: int, most: int) -> int:
     return 2 * count if 2 * count <= most else max(1, count // 2)
 
 
-def _most(loop: SampledLoop) -> int:
+def _most(loop: Sampled) -> int:
     """The most that edges are looked for with: what a sample leaves nothing of is hard to follow and adds nothing."""
     return min(MOST_EDGE_MODES, most_modes(loop.plant.arm, loop.chain))
 
 
-def proof_of(loop: SampledLoop) -> Proof:
+def proof_of(loop: Sampled) -> Proof:
     """Whether a loop is stable with every mode of its band."""
     band = complete_band(loop)
     if band is None:
         return None, 0.0
-    count = band.circle().count(loop.gains)
+    count = band.circle().count(loop.weights)
     return None if count is None else count == 0, band.top
 
 
-def shown_delay(loop: SampledLoop, band: Band | None) -> tuple[DelayMargin, Figure]:
+def shown_delay(loop: Sampled, band: Band | None) -> tuple[DelayMargin, Figure]:
     """The delay margin, and its samples as a figure, with more modes until it is proven to the last digit."""
     found = DelayMargin(0.0, False), Figure(0.0, 0, None, 0)
     for each in _sizes(loop, band, MOST_EDGE_MODES // 2):
@@ -207,7 +202,7 @@ def shown_delay(loop: SampledLoop, band: Band | None) -> tuple[DelayMargin, Figu
     return found
 
 
-def _delay(loop: SampledLoop, band: Band | None) -> tuple[DelayMargin, Figure]:
+def _delay(loop: Sampled, band: Band | None) -> tuple[DelayMargin, Figure]:
     """The delay margin of this very loop; the 0 of one that is unstable is as settled as its verdict."""
     margin, now, modes = delay_margin(loop), loop.chain.sampling.delay_samples, loop.plant.count
     if margin.samples == 0.0:
@@ -225,16 +220,17 @@ def _delay(loop: SampledLoop, band: Band | None) -> tuple[DelayMargin, Figure]:
     return margin, Edge(margin.samples, True).figure(OTHER_DIGITS, modes, proof, holds)
 
 
-def shown_damping(arm: Arm, gains: HubFeedback, chain: Chain, *, count: int) -> Figure:
-    """The damping from which on the gains are stable, as a figure [s]."""
+def shown_damping(loop: Sampled, count: int) -> Figure:
+    """The damping from which on a loop is stable, looked for with so many modes, as a figure [s]."""
     count, branches = min(count, MOST_EDGE_MODES), Branches(LITTLE)
-    C = required_damping(arm, gains, chain, count=count, branches=branches)
+    bare, law = loop.on(loop.plant.arm.elastic, count), replace(loop.given, delay=0.0)  # which is in the chain's
+    C = damping_edge(bare, branches)
 
     def proof(value: float) -> Proof:
-        return proof_of(whole_loop(arm.having(damping=value), gains, chain, branches))
+        return proof_of(whole_loop(bare.plant.arm.having(damping=value), law, loop.chain, branches))
 
     def holds(value: float) -> Proof:
-        return log_radius_with(arm, gains, chain, value, another(count, MOST_EDGE_MODES), branches) < 0, math.inf
+        return log_radius_with(bare, value, another(count, MOST_EDGE_MODES), branches) < 0, math.inf
 
     if C == 0.0:
         return Figure(C, OTHER_DIGITS, None, count)
