@@ -94,7 +94,7 @@ def _sampled(arm: Any, law: Any) -> dict[str, Any]:
 def _simulated(arm: Any, law: Any) -> dict[str, Any]:
     """The input and the tip of a slew, and what a controller that measures three signals says to the law."""
     import tfarm
-    from tfarm.dsp.measurement import Measurement
+    from tfarm.dsp.simulate import Measurement
     from tfarm.errors import ParameterError
 
     found = tfarm.simulate(arm, law, duration=1.0, count=4)

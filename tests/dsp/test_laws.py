@@ -16,7 +16,7 @@ from tfarm.dsp import Chain, Converters, Sampling, sampled_loop
 from tfarm.dsp.band import complete_band
 from tfarm.dsp.crossings import crossing_factors, stable_factors
 from tfarm.dsp.discretise import discretised
-from tfarm.dsp.margins import whole_loop
+from tfarm.dsp.edges import whole_loop
 from tfarm.dsp.verdict import sampled_verdict
 
 T = 0.01

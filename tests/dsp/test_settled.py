@@ -25,8 +25,7 @@ from tfarm.dsp import (
 )
 from tfarm.dsp.band import complete_band
 from tfarm.dsp.circle import Circle
-from tfarm.dsp.edges import Edge, shown_windows
-from tfarm.dsp.margins import most_modes, whole_loop
+from tfarm.dsp.edges import Edge, most_modes, shown_windows, whole_loop
 from tfarm.dsp.sampled import resized
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum import continuation, damped, modes

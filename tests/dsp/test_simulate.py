@@ -21,9 +21,9 @@ from tfarm.dsp import (
     sampled_loop,
     scenario,
 )
-from tfarm.dsp.enough import change
 from tfarm.dsp.modes import dominant
 from tfarm.dsp.results import (
+    change,
     ideal_chain,
     limit_cycle,
     residual_moment_rms,

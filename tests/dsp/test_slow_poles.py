@@ -11,7 +11,7 @@ from tfarm.dsp import Chain, Converters, Sampling, pulse_transfer, sampled_loop,
 from tfarm.dsp.band import complete_band
 from tfarm.dsp.circle import Circle
 from tfarm.dsp.crossings import stable_windows
-from tfarm.dsp.margins import whole_loop
+from tfarm.dsp.edges import whole_loop
 from tfarm.reduced import modal_model, relaxed_model
 
 LAB = tfarm.load("sasaki2012-lab")

@@ -18,8 +18,7 @@ from tfarm.dsp import Chain, Simulator, sampled_loop, sampled_verdict, scenario,
 from tfarm.dsp.chain import Sampling
 from tfarm.dsp.loci import sampled_loci
 from tfarm.dsp.modes import mode_table
-from tfarm.dsp.slews import slews
-from tfarm.dsp.strip_chart import strip_chart
+from tfarm.dsp.traces import slews, strip_chart
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.plots.files import save_figure
@@ -259,7 +258,7 @@ def test_an_arm_without_a_loop_gets_one_sentence(inertia):
 def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
     monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
-    monkeypatch.setattr("tfarm.dsp.periods.PERIOD_SHARES", (1.0,))
+    monkeypatch.setattr("tfarm.dsp.verdict.PERIOD_SHARES", (1.0,))
     section = sampled_section(replace(LAB, payload=tfarm.Payload(mass=math.inf)))
     assert "no slew" in section.words[-1]
     assert "sampled-overlay" in blocks_of(section)

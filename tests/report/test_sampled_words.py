@@ -15,7 +15,7 @@ from tfarm.comparing.regions import StableRegions
 from tfarm.dsp import Chain, Sampling, sampled_loop, stable_windows
 from tfarm.dsp.chain import Converters
 from tfarm.dsp.modes import dominant, mode_table
-from tfarm.dsp.periods import AtPeriod
+from tfarm.dsp.verdict import AtPeriod
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.report.sampled_section import grown_words

@@ -120,7 +120,7 @@ def asked_chain(source: str, period: float | None, delay_samples: float | None) 
     """The chain of a file, with what the command line says instead."""
     from dataclasses import replace
 
-    from tfarm.dsp.reading import load_chain
+    from tfarm.dsp.chain import load_chain
 
     chain = load_chain(source)
     sampling = chain.sampling

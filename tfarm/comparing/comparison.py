@@ -14,9 +14,8 @@ from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law,
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.dsp import Chain
-from tfarm.dsp.brief import SampledBrief, brief_of
 from tfarm.dsp.chain import chain_or_usual
-from tfarm.dsp.verdict import sampled_verdict
+from tfarm.dsp.verdict import SampledBrief, brief_of, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError, one_line
 from tfarm.loop.closed import closed_loop_poles
 from tfarm.loop.closed import margins as margins_of

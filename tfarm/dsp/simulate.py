@@ -3,6 +3,9 @@
 A signal among a law's references enters as signal - reference: those of the hub's angle and rate are the slew's, that
 of the root moment is the rigid arm's.  A column "reference:hub_angle" takes the reference alone.  The encoder's counts
 and the strain amplifier's range act on hub angle and root moment; other signals are read as they are.
+
+A signal is rounded to the nearest step (mid-tread) and clipped to the codes that its bits have, as two's complement has
+them: -2^(b-1) .. 2^(b-1) - 1 steps of 2 R / 2^b.  An ideal converter has step 0.
 """
 
 from __future__ import annotations
@@ -10,29 +13,181 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from copy import copy
-from typing import Self
+from dataclasses import dataclass, field
+from typing import NamedTuple, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import AT_HUB, AnyLaw, Arm, HubFeedback
+from tfarm.arm import ANGLE_GAIN, AT_HUB, RATE_GAIN, AnyLaw, Arm, HubFeedback
 from tfarm.arm.checks import whole
 from tfarm.arm.law import REFERENCE, Law
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import kernel
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.converters import quantisers
 from tfarm.dsp.discretise import acting_law, with_all_gains
-from tfarm.dsp.measurement import Controller, Measurement
+from tfarm.dsp.kernel import DAC, HIGHEST, LOWEST
 from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, sensed_plant
 from tfarm.dsp.sampling import held_amplitude
 from tfarm.dsp.scenarios import Scenario
-from tfarm.dsp.simulation import Simulation, Stop, Trace
 from tfarm.errors import ParameterError, must_be_known
+from tfarm.exact.outputs import OUTPUTS
+from tfarm.records import record
 
 FOLDED_UP = 10.0  # rad: an arm bent by the moment EI/L times this is no arm any more, and the simulation stops
 MOST_BETWEEN = 1000  # records between two samples
 NO_GAINS = HubFeedback()
+
+
+def quantisers(chain: Chain) -> Real:
+    """Step, lowest and highest value (3, 3) of a chain's encoder, strain amplifier and DAC, as `kernel` numbers them.
+
+    A step of 0 is ideal; the torque's range also respects the motor's limit.
+    """
+    converters, limit = chain.converters, chain.actuator.torque_limit
+    counts = converters.encoder_counts
+    rows = np.array([
+        [0.0 if counts is None else 2 * math.pi / counts, -math.inf, math.inf],
+        _converter(converters.moment_bits, converters.moment_range),
+        _converter(converters.torque_bits, converters.torque_range),
+    ])  # fmt: skip
+    rows[DAC, LOWEST] = max(rows[DAC, LOWEST], -limit)
+    rows[DAC, HIGHEST] = min(rows[DAC, HIGHEST], limit)
+    return rows
+
+
+def _converter(bits: int | None, span: float | None) -> list[float]:
+    if span is None:
+        return [0.0, -math.inf, math.inf]
+    if bits is None:
+        return [0.0, -span, span]
+    step = 2 * span / 2**bits
+    return [step, -span, span - step]
+
+
+class Measurement(NamedTuple):
+    """What a controller gets at sample `k`, time `t` [s]: what the sensors read, and what is wanted.
+
+    `vibration` is the root moment less `rigid_moment` (the paper's x under either reading of it); `feedforward` is r.
+    """
+
+    k: int
+    t: float
+    hub_angle: float
+    hub_rate: float
+    root_moment: float
+    vibration: float
+    feedforward: float
+    angle_reference: float
+    rate_reference: float
+    rigid_moment: float
+
+    def servo(self, law: HubFeedback) -> float:
+        """What a law asks of the input [N m] for the hub's angle and rate, as they are off what is wanted.
+
+        Raises ParameterError for a law with a gain on what is not measured here.
+        """
+        if not law.is_at_hub:
+            name = law.elsewhere[0].name
+            remedy = "a controller of samples has hub angle, hub rate and root moment alone; set it to 0"
+            raise ParameterError(key=name, value=law[name], remedy=remedy)
+        angle_off, rate_off = self.angle_reference - self.hub_angle, self.rate_reference - self.hub_rate
+        return law[ANGLE_GAIN] * angle_off + law[RATE_GAIN] * rate_off
+
+    def asked(self, law: HubFeedback, moment_gain: float) -> float:
+        """What is fed forward and what the servo asks, less the gain at this sample times the vibration."""
+        return self.feedforward + self.servo(law) - moment_gain * self.vibration
+
+
+Controller = Callable[[Measurement], float]
+
+
+@dataclass(frozen=True)
+@record
+class Trace:
+    """Signals, not filtered, at `t` [s]: hub angle [rad], hub rate [rad/s], root moment [N m], tip displacement [m].
+
+    `others` are those asked for besides, by name and in SI units.
+    """
+
+    t: Real
+    hub_angle: Real
+    hub_rate: Real
+    root_moment: Real
+    tip_displacement: Real
+    others: dict[str, Real] = field(default_factory=dict)
+
+    def signal(self, name: str) -> Real:
+        """One of the signals by its name.  Raises ParameterError for one that was not asked for."""
+        must_be_known("output", name, self.names)
+        return self.others[name] if name in self.others else cast("Real", getattr(self, name))
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The SI units of what was asked for besides."""
+        return {name: OUTPUTS[name.partition("@")[0]].unit for name in self.others}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The signals that it has."""
+        return (*RECORDED, *self.others)
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Why a simulation ended early: at `time` [s] the arm was folded up, by `mode` above all (0: the hub)."""
+
+    time: float
+    mode: int
+
+
+@dataclass(frozen=True)
+@record
+class Simulation:
+    """A simulated loop: `at_samples` just before each update, `between` the records asked for between the samples.
+
+    `torque` [N m] is what leaves the DAC at each sample, `gain` that on the root moment there (None where a controller
+    does not say), `measured` (n, 3) what the analog filters pass of hub angle, hub rate and root moment.
+    `saturated_at` (n, 3) says at which samples the encoder, the strain amplifier and the torque were clipped.
+    `energy_error` is |energy gained - work done| over the energy that went to and fro, for an arm without damping; None
+    with damping.
+    """
+
+    scenario: Scenario
+    chain: Chain
+    at_samples: Trace
+    between: Trace | None
+    measured: Real
+    torque: Real
+    gain: Real | None
+    saturated_at: NDArray[np.bool_]
+    energy_error: float | None
+    stopped: Stop | None
+
+    @property
+    def finding(self) -> str:
+        """How far it ran, the largest root moment on the way, and what was clipped, in words."""
+        end, moment = float(self.t.max(initial=0.0)), float(abs(self.at_samples.root_moment).max(initial=0.0))
+        clipped = [f"{name} clipped at {n} samples" for name, n in self.saturated.items() if n]
+        ran = f"ran to {end:.6g} s" if self.stopped is None else f"ran away, stopped at {self.stopped.time:.6g} s"
+        return ", ".join([ran, f"root moment up to {moment:.4g} N m", *clipped])
+
+    @property
+    def t(self) -> Real:
+        """The times of the samples [s]."""
+        return self.at_samples.t
+
+    @property
+    def saturated(self) -> dict[str, int]:
+        """At how many samples encoder, strain amplifier and torque were clipped."""
+        counts = self.saturated_at.sum(axis=0)
+        return {name: int(n) for name, n in zip(("encoder", "moment", "torque"), counts, strict=True)}
+
+    @property
+    def volts(self) -> Real | None:
+        """The motor's voltage, where the actuator has a motor constant."""
+        constant = self.chain.actuator.motor_constant
+        return None if constant is None else self.torque / constant
 
 
 class Simulator:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -13,9 +13,11 @@ from tfarm.arm import (
     LISTED,
     MOMENT_GAIN,
     NAMES,
+    PLANE,
     TAKEN_OFF,
     AnyLaw,
     Arm,
+    HubFeedback,
     arm_and_law,
     cancelled,
     driven,
@@ -29,10 +31,19 @@ from tfarm.dsp.band import Band, complete_band
 from tfarm.dsp.chain import Chain, Sampling, chain_or_usual
 from tfarm.dsp.crossings import around, stable_factors, stable_windows
 from tfarm.dsp.discretise import described_law, rule_in_words
-from tfarm.dsp.edges import Figure, ShownWindows, shown_damping, shown_delay, shown_windows
-from tfarm.dsp.margins import DelayMargin, delay_margin, whole_loop
+from tfarm.dsp.edges import (
+    DelayMargin,
+    Figure,
+    ShownWindows,
+    delay_margin,
+    shown_damping,
+    shown_delay,
+    shown_windows,
+    whole_loop,
+)
 from tfarm.dsp.modes import SAMPLED_MODE_COLUMNS, ModeTable, dominant, mode_table
 from tfarm.dsp.sampled import Sampled, resized, sampled_loop
+from tfarm.errors import ConvergenceError
 from tfarm.records import record
 
 WINDOW_DIGITS = 6  # of the ends of a window, where a person reads
@@ -42,6 +53,7 @@ LARGEST_LOG = 700.0  # whose exponential is a double
 RADIUS_AGREES = 1e-4  # of ln of the spectral radius: how well fewer modes must have it
 RADIUS_NOISE = 1e-12  # and what it is known to at all
 MOST_ASKED = 400  # modes that may be asked for
+PERIOD_SHARES = (0.1, 0.5, 1.0, 2.0, 5.0)  # of the chain's own period
 
 
 @dataclass(frozen=True)
@@ -384,3 +396,94 @@ def sampled_law_answer(analysis: Analysis) -> dict[str, Any]:
         "delay_margin_is_lower_bound": bound.is_bound,
         "unfiltered_signals": [name for name, analog in zip(loop.in_z.signals, loop.analog, strict=True) if not analog],
     }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampledBrief:
+    """Whether a loop holds at a chain's sampling, apart from z = 1 of a free hub angle.
+
+    `is_stable` and `log_radius`, ln of the spectral radius, are None where the loop could not be judged; `sentence`
+    then says why.
+    """
+
+    sampling: Sampling
+    is_stable: bool | None
+    log_radius: float | None
+    sentence: str
+
+    @property
+    def at(self) -> str:
+        """The clock in words, and whether it is only tfarm's default: a file that names no period has that."""
+        T, delay = self.sampling.period, self.sampling.delay_samples
+        late = f", {delay:g} samples late" if delay else ""
+        default = " (tfarm's default period)" if Sampling().period == T else ""
+        return f"sampled every {1e3 * T:g} ms{late}{default}"
+
+    @property
+    def short(self) -> str:
+        """The verdict in a few words, for a legend or a card."""
+        verdict = "undecided" if self.is_stable is None else "stable" if self.is_stable else "UNSTABLE"
+        return f"{verdict} when sampled every {1e3 * self.sampling.period:g} ms"
+
+    @property
+    def words(self) -> str:
+        """The clock and the verdict, loud where the gains do not hold."""
+        verdict, _, rest = self.sentence.partition(":")
+        return f"{self.at} these gains are {verdict if self.is_stable else verdict.upper()}:{rest}"
+
+    @property
+    def answer(self) -> dict[str, Any]:
+        """The brief as a dictionary of plain numbers and texts."""
+        size = self.log_radius
+        radius = None if size is None else math.exp(size) if size < LARGEST_LOG else math.inf
+        return {
+            "period_s": self.sampling.period,
+            "period_is_default": self.sampling.period == Sampling().period,
+            "delay_samples": self.sampling.delay_samples,
+            "stable": self.is_stable,
+            "spectral_radius": radius,
+            "in_words": self.words,
+        }
+
+
+def sampled_brief(arm: Arm, law: AnyLaw, chain: Chain) -> SampledBrief:
+    """The verdict on a law at the clock of a chain.  Raises ParameterError where the arm has no such loop."""
+    try:
+        verdict = sampled_verdict(arm, law, chain)
+    except ConvergenceError as error:
+        return SampledBrief(sampling=chain.sampling, is_stable=None, log_radius=None, sentence=f"undecided: {error}")
+    return brief_of(verdict, chain)
+
+
+def brief_of(verdict: Verdict, chain: Chain) -> SampledBrief:
+    """A verdict in short."""
+    return SampledBrief(
+        sampling=chain.sampling,
+        is_stable=verdict.is_stable,
+        log_radius=float(verdict.log_radius),
+        sentence=verdict.sentence,
+    )
+
+
+@dataclass(frozen=True)
+class AtPeriod:
+    """One sample period [s]: its verdict, and every stable interval of each gain, by name, through `gains`."""
+
+    period: float
+    analysis_modes: int
+    is_settled: bool
+    log_radius: float
+    gains: HubFeedback
+    windows: Mapping[str, tuple[Window, ...]]
+
+
+def at_periods(arm: Arm, gains: HubFeedback, chain: Chain) -> tuple[AtPeriod, ...]:
+    """The gains from a tenth to five times the chain's own period.  Raises ParameterError for an arm without a loop."""
+    rows = []
+    for share in PERIOD_SHARES:
+        period = float(f"{share * chain.sampling.period:.12g}")  # 1 ms, and no 1.0000000000000002 ms
+        verdict = sampled_verdict(arm, gains, replace(chain, sampling=replace(chain.sampling, period=period)))
+        windows = {name: tuple(stable_windows(verdict.full, name)) for name in PLANE}
+        growth = verdict.log_radius
+        rows.append(AtPeriod(period, verdict.modes_used, verdict.is_settled, growth, gains, windows))
+    return tuple(rows)

@@ -13,9 +13,9 @@ from tfarm.columns import Column, Table
 from tfarm.digits import how_many, plain, scientific, significant, singly
 from tfarm.dsp import Chain, Simulation, Verdict, sampled_verdict
 from tfarm.dsp.chain import MOST_DELAY
-from tfarm.dsp.margins import DelayMargin
+from tfarm.dsp.edges import DelayMargin
 from tfarm.dsp.results import drawn, residual_moment_rms
-from tfarm.dsp.slews import RECORD_LENGTH
+from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.dsp.verdict import SAMPLED_NUMBER_COLUMNS, SampledNumber, sampled
 from tfarm.errors import ParameterError
 from tfarm.plots.motion import draw_responses

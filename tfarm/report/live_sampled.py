@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.dsp import Chain, PulseTransfer, Sampled, Scenario, Simulator, scenario
-from tfarm.dsp.converters import quantisers
-from tfarm.dsp.enough import enough_modes
 from tfarm.dsp.plant import Plant, sensed_plant
-from tfarm.dsp.results import ideal_chain
-from tfarm.dsp.simulate import FOLDED_UP
-from tfarm.dsp.slews import RECORD_LENGTH
+from tfarm.dsp.results import enough_modes, ideal_chain
+from tfarm.dsp.simulate import FOLDED_UP, quantisers
+from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.errors import TfarmError
 from tfarm.response import transfer
 

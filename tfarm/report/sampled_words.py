@@ -13,8 +13,7 @@ from tfarm.digits import how_many, plain, scientific, significant
 from tfarm.dsp import Analysis, Verdict
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.crossings import around
-from tfarm.dsp.periods import AtPeriod, at_periods
-from tfarm.dsp.verdict import sampled
+from tfarm.dsp.verdict import AtPeriod, at_periods, sampled
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Windows, gain_windows
 from tfarm.records import record

@@ -17,7 +17,7 @@ import numpy as np
 import tfarm
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain
-from tfarm.dsp.writing import file_text
+from tfarm.dsp.chain import file_text
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.loop.poles import Poles, poles_of_gains
 from tfarm.plots.words import gains_words

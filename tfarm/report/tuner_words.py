@@ -6,7 +6,7 @@ import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
 from tfarm.digits import significant
-from tfarm.dsp.curves import away
+from tfarm.dsp.traces import away
 from tfarm.report.sections import Fact
 from tfarm.report.words import typeset, upper
 from tfarm.tuner.overview import Curves, TunerStudy

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import tfarm
-from tfarm.dsp.writing import file_text
+from tfarm.dsp.chain import file_text
 from tfarm.report.given_laws import Subject
 from tfarm.report.kept import keep, kept_in
 

@@ -15,9 +15,8 @@ import numpy as np
 from tfarm.arm import ANGLE_GAIN, TWO_GAINS, Arm, Law
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, Verdict
-from tfarm.dsp.brief import brief_of
 from tfarm.dsp.chain import chain_or_usual
-from tfarm.dsp.verdict import sampled_verdict
+from tfarm.dsp.verdict import brief_of, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError, did_you_mean
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_stability import law_stability

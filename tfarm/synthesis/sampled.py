@@ -29,7 +29,7 @@ from scipy.optimize import minimize_scalar
 from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, laws_at, tracked
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, Sampled, Scenario, sampled_loop, sampled_verdict, scenario
-from tfarm.dsp.margins import most_modes
+from tfarm.dsp.edges import most_modes
 from tfarm.dsp.results import residual_moment_rms, simulated
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.dsp.scenarios import TRIAL_SLEWS, trial_weights

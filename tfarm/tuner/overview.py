@@ -10,9 +10,8 @@ import numpy as np
 from tfarm.arm import Arm
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, Simulation
-from tfarm.dsp.curves import resolved
 from tfarm.dsp.results import ideal_chain
-from tfarm.dsp.slews import WITHOUT
+from tfarm.dsp.traces import WITHOUT, resolved
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum.scales import first_frequency
