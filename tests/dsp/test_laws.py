@@ -17,6 +17,7 @@ from tfarm.dsp.band import complete_band
 from tfarm.dsp.crossings import crossing_factors, stable_factors
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.edges import whole_loop
+from tfarm.dsp.modes import mode_table
 from tfarm.dsp.verdict import sampled_verdict
 
 T = 0.01
@@ -301,3 +302,20 @@ def test_next_to_z_1_the_loop_goes_as_the_powers_that_are_named(arm, law):
         A, *B = loop.row * loop.terms(np.array([1 / (1 - x) + 0j]), None, np.ones(1))[:, 0]
         away.append(abs(A / sum(B) / (whole * x**n / (named * x**lowest)) - 1))
     assert away[1] < 0.2 * away[0] < 0.1
+
+
+@pytest.mark.parametrize("law", [LAWS["lead"], LAWS["along"]], ids=["lead", "along"])
+def test_a_law_moves_each_mode_to_first_order_as_its_poles_move(law):
+    """The difference over both signs of a law that is weak: right to the square of its size."""
+    size, loop = 1e-4, sampled_loop(LAB, law, Chain(), count=5)
+    radii = [mode_table(loop.times(sign * size)).log_radius for sign in (1, -1)]
+    found = mode_table(loop).first_order
+    np.testing.assert_allclose((radii[0] - radii[1]) / (2 * size), found, rtol=1e-4, atol=1e-6 * abs(found).max())
+
+
+def test_from_the_required_damping_on_a_law_is_stable():
+    law = Law({"hub_rate": ([6.0], [0.02, 1.0]), "moment@0.5": 0.2}, delay=0.004)
+    found = tfarm.sampled(LAB, law).damping
+    sides = [sampled_verdict(LAB.having(damping=share * found.value), law) for share in (0.999, 1.001)]
+    assert (found.is_settled, [each.is_stable for each in sides]) == (True, [False, True])
+    assert tfarm.plots.sampled_modes(tfarm.sampled(LAB, law, count=3)).get_title() == ""

@@ -19,7 +19,6 @@ from tfarm.cli import (  # noqa: F401  each adds its verbs to the application
     pictures,
     reduction,
     sampling,
-    studies,
     trust,
     tuning,
 )

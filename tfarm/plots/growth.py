@@ -28,7 +28,7 @@ def sampled_modes(found: Analysis, *, ax: Axes | None = None) -> Axes:
 
     The closed loop, and to first order what its gains and its own damping add; below 0 a mode decays.
     """
-    must_be(Analysis, found, "tfarm.sampled returns of gains at the hub")
+    must_be(Analysis, found, "tfarm.sampled returns")
     with style():
         if ax is None:
             return draw_modes(found.verdict.loop, found.modes, window).axes[0]
@@ -42,7 +42,7 @@ def draw_modes(loop: Sampled, table: ModeTable, new: New = blank) -> Figure:
         figure = new(9.0, 4.6)
         growths(loop, table, ax=figure.subplots())
         ms = plain(1e3 * loop.chain.sampling.period)
-        gains = gains_words(loop.gains, 10)
+        gains = gains_words(loop.gains if loop.is_of_gains else loop.given, 10)
         headline(figure, f"{loop.plant.arm.name}: what each mode gains or loses a sample ({ms} ms, {gains})")
     return figure
 

@@ -33,8 +33,7 @@ from tfarm.dsp.sampling import held_amplitude
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.records import record
 from tfarm.tuner.kernel import Limits
-from tfarm.tuner.lyapunov import CommonLyapunov
-from tfarm.tuner.sector import RADIUS_SHARE, MovingGain
+from tfarm.tuner.sector import RADIUS_SHARE, CommonLyapunov, MovingGain
 
 GuardKind = Literal["time-varying", "frozen", "none"]
 GUARD_KINDS: tuple[GuardKind, ...] = get_args(GuardKind)
