@@ -284,7 +284,7 @@ def simulate(
 
 
 def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: float) -> Simulation:
-    """The same for a picture: with 20 records in each period of the fastest mode that is seen (`curves.resolved`)."""
+    """The same for a picture: with 20 records in each period of the fastest mode that is seen (`traces.resolved`)."""
     arm, law = tracked(arm, law)
     task = scenario(scenario_name, arm, chain, duration)
     used = modes_for(None, lambda n: simulation_of(arm, law, ideal_chain(chain), task, count=n))
