@@ -24,7 +24,7 @@ import numpy as np
 import tfarm
 from tests import chain_elements
 from tests.rigs import some_rig
-from tfarm.arm.keys import KeyedArms
+from tfarm.arm.writing import KeyedArms
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import fit
 from tfarm.spectrum.scales import first_frequency

@@ -14,7 +14,7 @@ from tests.report import plausible
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import implausible
-from tfarm.audit import candidates
+from tfarm.audit import assumptions
 from tfarm.audit.assumptions import LoopVerdict, has_hub_inertia, hub_study, section_study
 from tfarm.columns import PAGE
 from tfarm.dsp import Chain
@@ -25,13 +25,13 @@ from tfarm.loop.poles import poles_below
 from tfarm.report import assumptions_section, loop_laws, loop_section, making
 from tfarm.report.arm_section import arm_section, derived_table
 from tfarm.report.bode_section import bode_section
-from tfarm.report.damped_table import damped_table
 from tfarm.report.frame import signs
 from tfarm.report.given_laws import Subject
 from tfarm.report.locus_section import beyond_table, locus_section
 from tfarm.report.loop_laws import has_loop
 from tfarm.report.loop_section import margins_section, nyquist_section
 from tfarm.report.margins_table import margin_table
+from tfarm.report.damped_table import damped_table
 from tfarm.report.modes_section import modal_table, places
 from tfarm.spectrum import DampedModes
 from tfarm.spectrum.scales import default_gains
@@ -288,10 +288,10 @@ def test_no_hub_takes_a_frequency_outside_what_is_said(name):
 def test_a_K2_where_the_search_ended_has_a_star():
     verdicts = (LoopVerdict("stable", 1.08, True), LoopVerdict("stable", 50.0, False), LoopVerdict("unstable", None))
     study = hub_study(ARMS["heavy-hub"], [1.0, 22.5, 30.0], count=1)
-    *_, edges = candidates.loop_columns(study, verdicts)
+    *_, edges = assumptions.loop_columns(study, verdicts)
     assert list(edges.cells) == ["1.08000", "50*", "-"]
     small = hub_study(ARMS["micro"], [1e-7, 2e-7, 5e-7], count=1)
-    assert "K1 = 1.66 × 10⁻⁵, K2 = 0.3" in next(candidates.loop_columns(small, verdicts)).group
+    assert "K1 = 1.66 × 10⁻⁵, K2 = 0.3" in next(assumptions.loop_columns(small, verdicts)).group
     assert "*" in assumptions_section.searched_words(edges)
     certain = replace(edges, of=edges.of[::2], shown=edges.shown[::2])
     assert not assumptions_section.searched_words(certain)

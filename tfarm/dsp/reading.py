@@ -6,32 +6,31 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-from tfarm.arm import declared
-from tfarm.arm.declared import TomlTable, validated
+from tfarm.arm import schema
 from tfarm.arm.reading import load_tables
-from tfarm.arm.tables import ArmTable
+from tfarm.arm.schema import ArmTable, TomlTable, validated
 from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew
 from tfarm.errors import ParameterError, did_you_mean, naming
 
 OF_AN_ARM = (*ArmTable.model_fields, "law")
 
 
-@declared.of(Sampling)
+@schema.of(Sampling)
 class SamplingTable(TomlTable):
     """[sampling]."""
 
 
-@declared.of(Converters)
+@schema.of(Converters)
 class ConvertersTable(TomlTable):
     """[converters]."""
 
 
-@declared.of(Actuator)
+@schema.of(Actuator)
 class ActuatorTable(TomlTable):
     """[actuator]."""
 
 
-@declared.of(Slew)
+@schema.of(Slew)
 class SlewTable(TomlTable):
     """[slew]."""
 

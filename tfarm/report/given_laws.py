@@ -13,7 +13,7 @@ from tfarm.dsp.loop import check_loop
 from tfarm.errors import one_line
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
-from tfarm.fitting.runs import MeasuredRun
+from tfarm.fitting.recording import MeasuredRun
 from tfarm.loop.law_loop import LawLoop
 from tfarm.plots.words import gains_words
 from tfarm.records import record
