@@ -25,13 +25,13 @@ from tfarm.loop.poles import poles_below
 from tfarm.report import assumptions_section, loop_laws, loop_section, making
 from tfarm.report.arm_section import arm_section, derived_table
 from tfarm.report.bode_section import bode_section
+from tfarm.report.damped_table import damped_table
 from tfarm.report.frame import signs
 from tfarm.report.given_laws import Subject
 from tfarm.report.locus_section import beyond_table, locus_section
 from tfarm.report.loop_laws import has_loop
 from tfarm.report.loop_section import margins_section, nyquist_section
 from tfarm.report.margins_table import margin_table
-from tfarm.report.damped_table import damped_table
 from tfarm.report.modes_section import modal_table, places
 from tfarm.spectrum import DampedModes
 from tfarm.spectrum.scales import default_gains

@@ -21,11 +21,8 @@ from tfarm.cli import (  # noqa: F401  each adds its verbs to the application
     fitting,
     help,
     loops,
-    measuring,
     pictures,
-    reduction,
     sampling,
-    trust,
     tuning,
 )
 from tfarm.cli.app import discard, tell, whole_command
