@@ -10,10 +10,8 @@ import tfarm
 from tfarm.arm import FED_BACK, Hub, HubFeedback, Law
 from tfarm.dsp import Chain, Sampling, band, sampled_loop, sampled_map
 from tfarm.dsp.band import HIGHER, complete_band
-from tfarm.dsp.boundary import COARSEST, circle_grid
-from tfarm.dsp.law_loop import sampled_law
-from tfarm.dsp.law_margins import crossing_factors
-from tfarm.dsp.shown import shown_delay
+from tfarm.dsp.crossings import COARSEST, circle_grid, crossing_factors
+from tfarm.dsp.edges import shown_delay
 from tfarm.dsp.verdict import Verdict
 from tfarm.reduced import modal_model
 
@@ -83,7 +81,7 @@ def test_a_law_without_zeros_at_rest_is_seen_to_cross_however_slowly():
     friction, T = 0.3, 0.01
     arm = replace(LAB, hub=replace(LAB.hub, friction=friction))
     law = Law({"hub_rate": -1.0, "hub_angle": 1e-10 * arm.total_inertia / friction})
-    (found,) = [each for each in crossing_factors(sampled_law(arm, law, Chain(), count=2)) if each.at < 1e-3]
+    (found,) = [each for each in crossing_factors(sampled_loop(arm, law, Chain(), count=2)) if each.at < 1e-3]
     assert found.t == pytest.approx(friction, rel=1e-6)
     assert found.at == pytest.approx(1e-5 * T / math.sqrt(1 + friction * T / 2 / arm.total_inertia), rel=1e-6)
     assert found.change == 2

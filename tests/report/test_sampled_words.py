@@ -14,8 +14,8 @@ from tests.shared import thinned
 from tfarm.comparing.regions import StableRegions
 from tfarm.dsp import Chain, Sampling, sampled_loop, stable_windows
 from tfarm.dsp.chain import Converters
-from tfarm.dsp.law import growing_mode, mode_table
-from tfarm.dsp.periods import AtPeriod
+from tfarm.dsp.modes import dominant, mode_table
+from tfarm.dsp.verdict import AtPeriod
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.report.sampled_section import grown_words
@@ -48,7 +48,7 @@ def data_of(name, period=0.01):
         sentence="stable: the hub decays most slowly, by 0.1 a sample",
     )  # fmt: skip
     analysis = SimpleNamespace(
-        verdict=verdict, K2_windows=stable_windows(loop, "K2"),
+        verdict=verdict, windows={"K2": stable_windows(loop, "K2")},
         shown={"K2": SimpleNamespace(is_settled=False)},
         delay_margin=SimpleNamespace(samples=1.25, is_bound=False), required_damping=0.0,
         damping=SimpleNamespace(is_settled=False, modes=MODES),
@@ -150,10 +150,10 @@ def test_the_words_are_about_the_chain_of_the_file():
 def test_the_table_of_modes_has_the_pole_that_the_verdict_names(name):
     """On the micro-arm mode 1, aliased to the edge of the strip, becomes two real poles: the slower one decides."""
     loop = data_of(name).analysis.verdict.loop
-    table, named = mode_table(loop), growing_mode(loop)
+    table, named = mode_table(loop), dominant(loop)
     assert table.log_radius.max() <= loop.poles.log_spectral_radius
-    if named:
-        assert table.log_radius[table.index == named] == [loop.poles.log_spectral_radius]
+    if named.startswith("mode"):
+        assert table.log_radius[table.index == int(named.partition(" ")[2])] == [loop.poles.log_spectral_radius]
 
 
 def test_rows_keep_every_interval():

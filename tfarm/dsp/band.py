@@ -15,15 +15,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Generic
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real
 from tfarm.dsp.circle import Circle
-from tfarm.dsp.law_loop import AnySampled, SampledKind
-from tfarm.dsp.loop import resized
+from tfarm.dsp.sampled import Sampled, resized
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import modes
@@ -43,11 +41,11 @@ MOST_MIDPOINTS = 200_000  # of a quadrature: one that does not settle by then is
 
 @dataclass(frozen=True)
 @record
-class Band(Generic[SampledKind]):
+class Band:
     """The poles of a loop's plant in a band up to `top` [rad/s], `kept` (poles,), and the bound `missing` (outputs,) on
     what the others of that band add to the pulse transfer functions, on the whole unit circle."""
 
-    loop: SampledKind
+    loop: Sampled
     top: float
     kept: NDArray[np.bool_]
     missing: Real
@@ -59,16 +57,16 @@ class Band(Generic[SampledKind]):
         return int(outside.min(initial=self.loop.plant.count + 1)) - 1
 
     @cached_property
-    def full(self) -> SampledKind:
+    def full(self) -> Sampled:
         """The loop with all of them, or with one where there is none."""
         return resized(self.loop, max(1, self.modes))
 
-    def circle(self) -> Circle[SampledKind]:
+    def circle(self) -> Circle:
         """The unit circle, on which poles outside are counted."""
         return Circle(self.loop, self.kept, self.missing)
 
 
-def complete_band(loop: SampledKind) -> Band[SampledKind] | None:
+def complete_band(loop: Sampled) -> Band | None:
     """The highest band in which the loop's plant is complete; None where it cannot be shown to be.
 
     Not without damping, nor with analog hub damping, whose poles the model has to its own accuracy alone.
@@ -86,7 +84,7 @@ def complete_band(loop: SampledKind) -> Band[SampledKind] | None:
     return Band(loop, top, kept, missing + _of_the_filter(loop, line))
 
 
-def _highest(loop: AnySampled, line: float) -> float | None:
+def _highest(loop: Sampled, line: float) -> float | None:
     """The top of the highest box right of the line in which the exact arm has the plant's poles and no other."""
     plant, function = loop.plant, member(modes(loop.plant.arm, 1).system).function
     poles = np.r_[plant.poles[plant.mode > 0], plant.model.single]
@@ -114,7 +112,7 @@ def _highest(loop: AnySampled, line: float) -> float | None:
     return float(tops[low]) if is_complete(float(tops[low])) else None
 
 
-def _left_of(loop: AnySampled, line: float, top: float) -> Real | None:
+def _left_of(loop: Sampled, line: float, top: float) -> Real | None:
     """The bound on all poles of the band left of the line; None where the integral cannot be had."""
     sampling, exact = loop.chain.sampling, loop.exact
     T, remaining = sampling.period, sampling.period * (1 - sampling.fraction)
@@ -146,7 +144,7 @@ def _integral(size: Callable[[Real], Real], ends: Real) -> Real | None:
     return None
 
 
-def _filter_factors(loop: AnySampled, s: Complex) -> Complex:
+def _filter_factors(loop: Sampled, s: Complex) -> Complex:
     """What the analog filter makes of each output: wc/(s + wc) or 1."""
     corner = loop.chain.sampling.antialias_corner
     if np.isinf(corner):
@@ -154,7 +152,7 @@ def _filter_factors(loop: AnySampled, s: Complex) -> Complex:
     return np.array([corner / (s + corner) if analog else np.ones(s.size) for analog in loop.analog])
 
 
-def _of_the_filter(loop: AnySampled, line: float) -> Real:
+def _of_the_filter(loop: Sampled, line: float) -> Real:
     """The bound on the error of the filter's own pole, whose residue has the model's value at -wc, not the arm's."""
     sampling, plant = loop.chain.sampling, loop.plant
     corner = sampling.antialias_corner

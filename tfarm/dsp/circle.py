@@ -12,26 +12,30 @@ that pole p and the integral of the rate of a braked hub, R/s - R/(s - p) of the
     x H(z) = -R p (c0 + c1/z + c2/z^2)/(z - e^{pT}),  c0 = t^2 phi(p t), t = (1 - f) T,
     c2 = (f T)^2 e^{pT} phi(-p f T),  c0 + c1 + c2 = T (e^{pT} - 1)/p,  phi(u) = (e^u - 1 - u)/u^2
 
-x^k F(z) = x^k (1 + gains . H), k the order of the pole at z = 1, is analytic on the circle and outside.  On an arc it
-stays in a disc about its value in the middle, for 1/(z - b) changes by h/(|z - b| (|z - b| - h)) at most over h.  Where
-no disc holds 0, the phase between neighbouring middles is known without doubt, and half the circle gives the count (the
-argument principle).  Arcs whose disc holds 0 are cut.
+With n the order of the law, q and p_i its polynomials in z, and H_i x^{n_i} as above,
+
+    x^k F z^-n = q z^-n x^k + sum over signals of p_i z^-n x^{k - n_i} (H_i x^{n_i})
+
+is analytic on the circle and outside, and no pole of the law is one of it: its zeros outside are the unstable poles.
+Of a root r the factor (z - r)/z is r x + 1 - r.  Those that are x, as of an integrator or a difference, are taken
+together, and so is what all terms have of them in common.
+
+On an arc it stays in a disc about its value in the middle, for 1/(z - b) changes by h/(|z - b| (|z - b| - h)) at most
+over h.  Where no disc holds 0, the phase between neighbouring middles is known without doubt, and half the circle gives
+the count (the argument principle).  Arcs whose disc holds 0 are cut.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Generic
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import HubFeedback
 from tfarm.arrays import Complex, Real
-from tfarm.dsp.law_loop import SampledKind
-from tfarm.dsp.loop import ANGLE_ROW, RATE_ROW, SampledLoop
+from tfarm.dsp.sampled import Sampled
 from tfarm.dsp.sampling import SLOW, phi
 from tfarm.records import record
 
@@ -41,6 +45,7 @@ SHORTEST_ARC = 1e-13  # rad: no arc is cut further, as its ends are known to a f
 PIECES_OF_ARC = 4  # into which one is cut that is too long
 MOST_ARCS = 60_000  # a loop that takes more is not shown
 ON_IT = 1e-100  # stands for the distance from the circle of a pole on it: its disc is wide, and holds 0
+ROUNDINGS = 8  # of a factor of the law: of its root, of its middle, and of the products
 TERMS_AT_A_TIME = 1 << 19  # terms 1/(z - b) at a time, lest they leave the cache
 
 
@@ -96,15 +101,15 @@ class _Arcs:
 
 
 @dataclass
-class Circle(Generic[SampledKind]):
-    """The upper half of the unit circle in arcs, and on each what a loop's plant is there; its gains do not matter.
+class Circle:
+    """The upper half of the unit circle in arcs, and on each the terms of a loop's F; its weights do not matter.
 
-    `missing` (outputs,) bounds |x sum over poles left out|.  `low` and `high` [rad] are the ends of the arcs, `parts`
-    the discs (1 + gains, arcs) of x and of what the gains multiply in F times x^n, n = `orders` (gains,) at z = 1;
-    arcs are cut as counts need it.
+    `missing` (signals,) bounds |x sum over poles left out|.  `low` and `high` [rad] are the ends of the arcs, `parts`
+    the discs (1 + terms, arcs) of x and of the terms of F z^-n without their `powers` of x; arcs are cut as counts
+    need it.
     """
 
-    loop: SampledKind
+    loop: Sampled
     kept: NDArray[np.bool_]
     missing: Real
     low: Real = field(init=False)
@@ -116,14 +121,10 @@ class Circle(Generic[SampledKind]):
         self.low, self.high = ends[:-1], ends[1:]
         self.parts = self._parts(self.low, self.high)
 
-    def count(self, gains: HubFeedback) -> int | None:
-        """Poles of the loop with these gains outside the circle, z = 1 of a free angle apart; None if not shown."""
-        return self.counted(lambda: self.characteristic(gains))
-
-    def counted(self, characteristic: Callable[[], Discs]) -> int | None:
-        """How many zeros a function has outside the circle, which `characteristic` gives on every arc as they are."""
+    def count(self, weights: Sequence[float]) -> int | None:
+        """Poles of the loop with these weights outside the circle, z = 1 of a free angle apart; None if not shown."""
         while True:
-            F = characteristic()
+            F = self.characteristic(weights)
             rough = ~(abs(F.middle) > F.radius)
             if not rough.any():
                 steps = np.angle(F.middle[1:] / F.middle[:-1])
@@ -136,34 +137,37 @@ class Circle(Generic[SampledKind]):
 
     # ------------------------------------------------------------ the characteristic function
 
-    def characteristic(self, gains: HubFeedback) -> Discs:
-        """x^k F on every arc, k the order of its pole at z = 1."""
-        used = [(K, order, row) for row, (K, order) in enumerate(zip(gains.row, self.orders, strict=True)) if K]
-        k = max((order for _, order, _ in used), default=0)
-        x = self.parts[0]
-        total = power(x, k)
-        for K, order, row in used:
-            part = self.parts[1 + row]
-            total = total + (part if order == k else power(x, k - order) * part).times(K)
+    @cached_property
+    def terms(self) -> list[tuple[int, int, float, Complex]]:
+        """Of q, whose part and row are -1, and of each p_i: part, row of the signal, gain, roots less 1."""
+        return [(-1, -1, 1.0, self.loop.in_z.poles), *self.loop.in_z.terms]
+
+    @cached_property
+    def orders(self) -> list[int]:
+        """The order at z = 1 of each signal's pulse transfer function, and 0 of q."""
+        return [*(2 if twice else int(once != 0.0) for twice, once in self.loop.plant.rigid), 0]
+
+    def characteristic(self, weights: Sequence[float]) -> Discs:
+        """x^k F z^-n on every arc, k the least that leaves no pole at z = 1."""
+        row, used = (*weights, 1.0), []
+        for n, (part, signal, gain, roots) in enumerate(self.terms, start=1):
+            if factor := row[part] * gain:
+                used.append((factor, int((roots == 0).sum()) - self.orders[signal], self.parts[n]))
+        least, x = min(exponent for _, exponent, _ in used), self.parts[0]
+        total = x.times(0.0)
+        for factor, exponent, disc in used:
+            total = total + (power(x, exponent - least) * disc).times(factor)
         return total
 
-    @property
-    def orders(self) -> list[int]:
-        """The order at z = 1 of what each gain multiplies."""
-        orders = [2 if twice else int(once != 0.0) for twice, once in self.loop.plant.rigid]
-        if isinstance(self.loop, SampledLoop) and self.loop.differences:
-            orders[RATE_ROW] = max(0, orders[ANGLE_ROW] - 1)
-        return orders
-
     def _parts(self, low: Real, high: Real) -> Discs:
-        """x, and what each gain multiplies in F times x^n, on arcs: discs (1 + gains, arcs)."""
-        arcs = _Arcs(low, high)
+        """x, and the terms of F z^-n without powers of x, on arcs."""
+        arcs, order = _Arcs(low, high), self.loop.in_z.poles.size
         sums, slow = self._sums(arcs), self._slow_sums(arcs)
-        found = [arcs.x, *(self._output(row, arcs, sums[row], slow[row]) for row in range(len(self.orders)))]
-        if isinstance(self.loop, SampledLoop) and self.loop.differences:
-            a, T = self.loop.smoothing, self.loop.chain.sampling.period
-            rate = found[1 + ANGLE_ROW] * (arcs.turned(0) + arcs.turned(1).times(-a)).inverse().times((1 - a) / T)
-            found[1 + RATE_ROW] = rate if self.orders[ANGLE_ROW] else rate * arcs.x
+        signals = [self._output(row, arcs, sums[row], slow[row]) for row in range(len(self.orders) - 1)]
+        found = [arcs.x]
+        for _, row, _, roots in self.terms:
+            term = product(arcs.x, roots[roots != 0]) * arcs.turned(order - roots.size)
+            found.append(term if row < 0 else term * signals[row])
         return Discs(np.array([each.middle for each in found]), np.array([each.radius for each in found]))
 
     def _output(self, row: int, arcs: _Arcs, poles: Discs, slow: Discs) -> Discs:
@@ -263,6 +267,15 @@ def power(x: Discs, n: int) -> Discs:
     for _ in range(n):
         total = total * x
     return total
+
+
+def product(x: Discs, roots: Complex) -> Discs:
+    """prod((z - r)/z) for x = 1 - 1/z in discs, each root r given as r - 1."""
+    factors = x.middle[:, None] * (1 + roots) - roots
+    sizes = abs(factors)
+    blur = MACHINE_EPS * ROUNDINGS * (abs(x.middle)[:, None] * abs(1 + roots) + abs(roots))
+    most = (sizes + x.radius[:, None] * abs(1 + roots) + blur).prod(axis=1)
+    return Discs(factors.prod(axis=1), most - sizes.prod(axis=1) + MACHINE_EPS * ROUNDINGS * (1 + roots.size) * most)
 
 
 def _to_the_axis(angle: float) -> float:

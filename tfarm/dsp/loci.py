@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, HubFeedback
 from tfarm.arrays import Complex, Real
 from tfarm.crossing.turning import loose
-from tfarm.dsp.law import followed_branches, origins
-from tfarm.dsp.loop import SampledLoop
+from tfarm.dsp.modes import followed_branches, origins
+from tfarm.dsp.sampled import Sampled
 from tfarm.records import record
 
 SAMPLED_LOCUS_VALUES = 61  # of a gain along its locus, to begin with
@@ -52,7 +52,7 @@ class SampledLoci:
     own, one a flexible mode, `mode` their numbers.
     """
 
-    loop: SampledLoop
+    loop: Sampled
     alone: SampledLocus
     by: Mapping[str, SampledLocus]
     poles: Complex
@@ -69,12 +69,12 @@ class SampledLoci:
         return bool(at.size and self.poles[at[0]].imag > 2 * math.pi * self.half_rate)
 
 
-def sampled_loci(loop: SampledLoop, top: float, moments: tuple[float, float]) -> SampledLoci:
+def sampled_loci(loop: Sampled, top: float, moments: tuple[float, float]) -> SampledLoci:
     """The loci of the rate gain from nearly 0 to `top` and of the moment gain over `moments`, the other as it is.
 
     Both begin below the gains of the loop.
     """
-    own, gains = loop.gains[RATE_GAIN], loop.gains
+    own = loop.number(RATE_GAIN)
     values = (
         np.geomspace(min(top / 10**RATE_DECADES, own / STRONGER), top, SAMPLED_LOCUS_VALUES),
         np.linspace(*moments, SAMPLED_LOCUS_VALUES),
@@ -82,12 +82,12 @@ def sampled_loci(loop: SampledLoop, top: float, moments: tuple[float, float]) ->
     upper = np.nonzero((loop.pulse.poles.imag > 0) & (loop.pulse.mode > 0))[0]
     upper = upper[np.argsort(loop.pulse.mode[upper])]
     small = np.geomspace(WEAKEST, STRONGER, SAMPLED_LOCUS_VALUES) * own
-    alone = _locus(loop.under(gains.having(MOMENT_GAIN, 0.0)), RATE_GAIN, small)
+    alone = _locus(loop.having(**{MOMENT_GAIN: 0.0}), RATE_GAIN, small)
     by = {name: _locus(loop, name, each) for name, each in zip(PLANE, values, strict=True)}
     return SampledLoci(loop, alone, by, loop.pulse.poles[upper], loop.pulse.mode[upper])
 
 
-def _locus(loop: SampledLoop, gain: str, values: Real) -> SampledLocus:
+def _locus(loop: Sampled, gain: str, values: Real) -> SampledLocus:
     """The locus at these values, that of the loop, and those between at which a branch turns in its picture."""
 
     def poles(value: float) -> Complex:
@@ -95,7 +95,8 @@ def _locus(loop: SampledLoop, gain: str, values: Real) -> SampledLocus:
         return np.where(abs(z.imag) <= IMAGINARY_ROUNDING, z.real, z)
 
     known: dict[float, Complex] = {}
-    wanted = np.union1d(values, loop.gains[gain]) if values[0] < loop.gains[gain] < values[-1] else values
+    own = loop.number(gain)
+    wanted = np.union1d(values, own) if values[0] < own < values[-1] else values
     for _ in range(BRANCH_ROUNDS):
         known |= {value: poles(value) for value in wanted.tolist() if value not in known}
         values = np.array(sorted(known))

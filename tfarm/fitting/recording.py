@@ -26,7 +26,7 @@ from tfarm.arrays import Real
 from tfarm.dsp.chain import TIME_ROUNDING, Chain
 from tfarm.dsp.results import modes_for, simulation_of
 from tfarm.dsp.scenarios import Scenario
-from tfarm.dsp.simulation import Simulation
+from tfarm.dsp.simulate import Simulation
 from tfarm.errors import MISSING, ParameterError, did_you_mean, naming
 from tfarm.files import read_mat
 from tfarm.records import record

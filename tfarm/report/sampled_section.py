@@ -11,11 +11,10 @@ from tfarm.columns import Column, Table
 from tfarm.comparing.regions import regions_table
 from tfarm.digits import how_many, plain, scientific, significant, singly
 from tfarm.dsp import Chain, sampled_verdict
-from tfarm.dsp.law import ModeTable
+from tfarm.dsp.crossings import around
 from tfarm.dsp.loci import STRONGER, sampled_loci
-from tfarm.dsp.margins import around
-from tfarm.dsp.slews import Slews, slews
-from tfarm.dsp.strip_chart import StripChart, strip_chart
+from tfarm.dsp.modes import ModeTable
+from tfarm.dsp.traces import Slews, StripChart, slews, strip_chart
 from tfarm.plots.folded import draw_folded_loci
 from tfarm.plots.growth import draw_modes
 from tfarm.plots.regions import draw_overlay

@@ -6,11 +6,10 @@ from tfarm.arm import PLANE
 from tfarm.columns import Column, Table
 from tfarm.digits import plain
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.curves import held_at, root_moment
-from tfarm.dsp.law import SAMPLED_MODE_COLUMNS, ModeTable
 from tfarm.dsp.loci import SampledLoci
-from tfarm.dsp.loop import SampledLoop
-from tfarm.dsp.strip_chart import StripChart
+from tfarm.dsp.modes import SAMPLED_MODE_COLUMNS, ModeTable
+from tfarm.dsp.sampled import Sampled
+from tfarm.dsp.traces import StripChart, held_at, root_moment
 
 MODE_TABLE = (
     "ln|z| is what a mode gains (+) or loses (−) per sample: its size is multiplied by |z| every {ms} ms. Own damping "
@@ -20,7 +19,7 @@ MODE_TABLE = (
 )
 
 
-def mode_rows(loop: SampledLoop, table: ModeTable, stem: str) -> Table:
+def mode_rows(loop: Sampled, table: ModeTable, stem: str) -> Table:
     """A row a mode that outlives a sample."""
     T = loop.chain.sampling.period
     return Table(

@@ -10,10 +10,10 @@ from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, unit_of
 from tfarm.comparing.regions import StableRegions, stable_regions
 from tfarm.crossing import Window
 from tfarm.digits import how_many, plain, scientific, significant
-from tfarm.dsp import Analysis, Verdict, analyse
+from tfarm.dsp import Analysis, Verdict
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.margins import around
-from tfarm.dsp.periods import AtPeriod, at_periods
+from tfarm.dsp.crossings import around
+from tfarm.dsp.verdict import AtPeriod, at_periods, sampled
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Windows, gain_windows
 from tfarm.records import record
@@ -57,7 +57,7 @@ class Sampled:
     @property
     def sampled_K2(self) -> Window | None:
         """The stable interval of the moment gain around the gains."""
-        return around(self.analysis.K2_windows, self.gains[MOMENT_GAIN])
+        return around(self.analysis.windows[MOMENT_GAIN], self.gains[MOMENT_GAIN])
 
     @property
     def held(self) -> str:
@@ -73,7 +73,7 @@ def in_ms(chain: Chain) -> str:
 def sampled_study(arm: Arm, chain: Chain) -> Sampled:
     """The numbers of the section.  Raises ParameterError for an arm without a loop."""
     gains = default_gains(arm)
-    analysis = analyse(arm, gains, chain)
+    analysis = sampled(arm, gains, chain)
     windows = gain_windows(stability(arm, gains), MOMENT_GAIN)
     return Sampled(arm, analysis, windows, stable_regions(arm, gains, chain), at_periods(arm, gains, chain))
 

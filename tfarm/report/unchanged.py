@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import tfarm
-from tfarm.dsp.writing import file_text
+from tfarm.dsp.chain import file_text
 from tfarm.report.given_laws import Subject
 
 NOTES_KIND = "made"
