@@ -21,7 +21,7 @@ from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.sampled import sampled_loop
 from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import one_line
-from tfarm.fitting.runs import beside_exact, load_run, overshoot
+from tfarm.fitting.recording import beside_exact, load_run, overshoot
 from tfarm.loop import closed
 from tfarm.report import law_sampled_section as in_time
 from tfarm.report import making, writing

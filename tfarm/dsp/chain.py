@@ -12,11 +12,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
-from tfarm.arm import Arm, declared, to_toml
+from tfarm.arm import Arm, schema, to_toml
 from tfarm.arm.checks import extended, not_negative, number, positive, whole
-from tfarm.arm.declared import TomlTable, validated
 from tfarm.arm.reading import load_tables
-from tfarm.arm.tables import ArmTable
+from tfarm.arm.schema import ArmTable, TomlTable, validated
 from tfarm.errors import ParameterError, did_you_mean, must_be_known, naming
 
 Reading = Literal["vibration", "total"]
@@ -206,22 +205,22 @@ def _whole(key: str, value: object, least: int, most: int, what: str) -> None:
     whole(key, value, least, most, remedy)
 
 
-@declared.of(Sampling)
+@schema.of(Sampling)
 class SamplingTable(TomlTable):
     """[sampling]."""
 
 
-@declared.of(Converters)
+@schema.of(Converters)
 class ConvertersTable(TomlTable):
     """[converters]."""
 
 
-@declared.of(Actuator)
+@schema.of(Actuator)
 class ActuatorTable(TomlTable):
     """[actuator]."""
 
 
-@declared.of(Slew)
+@schema.of(Slew)
 class SlewTable(TomlTable):
     """[slew]."""
 

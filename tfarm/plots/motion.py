@@ -1,10 +1,14 @@
-"""The arm over time: root moment, tip and motor, as lines or, where these ring too fast for a page, as bands."""
+"""The arm over time: root moment, tip and motor, as lines or, where these ring too fast for a page, as bands.
+
+Measured runs on a rig, and over each the exact sampled loop that was led by the same reference.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -12,11 +16,11 @@ from tfarm.arm import Arm, must_be_arm
 from tfarm.digits import plain
 from tfarm.dsp import Simulation, traces
 from tfarm.dsp.traces import POINTS_A_PERIOD, TimeCurve
+from tfarm.fitting.recording import Beside
 
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, must_be, style, taken, window
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, must_be, safe, style, taken, window
 
 RUN_COLOURS = (ORANGE, BLUE, GREEN, PURPLE)  # of several simulations; one alone is blue
-
 Runs = Mapping[str, Simulation]
 
 
@@ -112,3 +116,31 @@ def _until(simulation: Simulation, ax: Axes) -> None:
 
 def _colours(each: Runs) -> list[str]:
     return [BLUE] if len(each) == 1 else [RUN_COLOURS[i % len(RUN_COLOURS)] for i in range(len(each))]
+
+
+def draw_beside(title: str, each: Mapping[str, Beside]) -> Figure:
+    """A column a law: hub angle above, root moment below where it was measured."""
+    moment = any(found.measured.root_moment.size for found in each.values())
+    with style():
+        figure = blank(max(4.7 * len(each), 6.0), 6.0 if moment else 3.6)
+        axes = figure.subplots(1 + moment, len(each), sharex="col", sharey="row", squeeze=False)
+        for column, (name, found) in enumerate(each.items()):
+            measured, ax = found.measured, axes[0, column]
+            ax.plot(measured.t, np.degrees(measured.reference), color=GREY, lw=1.0, ls=(0, (4, 3)), label="reference")
+            if measured.hub_angle.size:
+                ax.plot(measured.t, np.degrees(measured.hub_angle), color=ORANGE, label="measured")
+            ax.plot(found.run.t, np.degrees(found.hub_angle), color=BLUE, lw=1.2, label="exact sampled loop")
+            ax.set_xlim(0.0, float(measured.t[-1]))
+            if moment and measured.root_moment.size:
+                axes[1, column].plot(measured.t, measured.root_moment, color=ORANGE)
+            if moment:
+                axes[1, column].plot(found.run.t, found.run.at_samples.root_moment, color=BLUE, lw=1.2)
+                axes[1, column].axhline(0.0, color=GREY, lw=0.6)
+            ax.set_title(safe(name), fontsize=9.5)
+            axes[-1, column].set_xlabel("time  [s]")
+        axes[0, 0].set_ylabel("hub angle  [deg]")
+        if moment:
+            axes[1, 0].set_ylabel("root moment  [N m]")
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
+        headline(figure, title)
+    return figure

@@ -12,7 +12,7 @@ from tfarm.dsp.discretise import discretised, with_all_gains
 from tfarm.errors import one_line
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
-from tfarm.fitting.runs import MeasuredRun
+from tfarm.fitting.recording import MeasuredRun
 from tfarm.loop.law_loop import LawLoop
 from tfarm.plots.words import gains_words
 from tfarm.records import record
