@@ -104,7 +104,7 @@ kernels: $(INSTALLED) ## run the numerical rooms under other kernels of BLAS and
 
 survey: $(INSTALLED) ## search random cases for a wrong answer (SIZE, SEED, SURVEYS=one or more)
 	@failed=; for each in $(SURVEYS); do echo "== $$each $(SIZE) $(SEED)"; \
-		$(BIN)/python -m tests.$$each $(SIZE) $(SEED) || failed="$$failed $$each"; done; \
+		OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.$$each $(SIZE) $(SEED) || failed="$$failed $$each"; done; \
 		test -z "$$failed" || { echo "failed:$$failed"; exit 1; }
 
 lint: $(INSTALLED) ## check style, types and which room imports which
