@@ -13,11 +13,12 @@ from tests.loop.arms import window_arm, with_damping
 from tests.shared import thinned
 from tfarm import Hub, HubFeedback, ParameterError, Payload
 from tfarm.cli import main
+from tfarm.exact.characteristic import gains_of
 from tfarm.loop import reduced_locus as reduced_locus_room
 from tfarm.loop.branches import rigid_pair
-from tfarm.loop.lines import along, line_crossings
+from tfarm.loop.lines import along, effective_inertia, line_crossings
 from tfarm.loop.locus import _gaps, frame, locus, rounded
-from tfarm.loop.plant import HubLoop, effective_inertia
+from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.spectrum.damped import damped_modes
@@ -152,8 +153,8 @@ def test_the_known_edge_of_the_lab_arm_to_its_last_digits():
     assert (round(found.gain, 4), round(found.omega, 1), found.direction) == (1.0305, 27.8, "unstable")
     side = []
     for K2 in (found.gain * (1 - 1e-13), found.gain * (1 + 1e-13)):
-        loop = HubLoop(LAB, HubFeedback(K1=0.3, K2=K2))
-        disc = enclosed(loop.k, 1j * found.omega, 30, loop.gains)
+        loop = Loop(LAB, HubFeedback(K1=0.3, K2=K2))
+        disc = enclosed(loop.k, 1j * found.omega, 30, gains_of(loop.k, loop.gains))
         assert found.omega == pytest.approx(float(disc.im), rel=1e-12)
         side.append(float(disc.re))
     assert side[0] < 0 < side[1]
@@ -300,7 +301,7 @@ def test_a_branch_that_comes_to_the_accumulation_point_ends_there_and_the_others
     assert (ended.imag, -1 / C < ended.real < -0.95 / C) == (0.0, True)
     assert np.isnan(found.branches).sum() == np.isnan(found.branches[branch]).sum() == (found.gain > last).sum()
     others = np.delete(found.branches, branch, axis=0)[:, -1]
-    poles = poles_below(HubLoop(LAB, HubFeedback(K1=2000.0)), 0.9 * others.imag.max())
+    poles = poles_below(Loop(LAB, HubFeedback(K1=2000.0)), 0.9 * others.imag.max())
     assert upper(others[others.imag < 0.8 * others.imag.max()]) == pytest.approx(
         upper(poles.values[poles.values.imag < 0.8 * others.imag.max()]), rel=1e-9
     )
@@ -325,7 +326,7 @@ def test_modes_that_meet_on_the_axis_and_leave_it_as_a_quadruple_are_followed_ar
     """Without losses, K2 > 1 and Kp let the hub's mode meet the first one; the winding number has four poles off it."""
     arm, law = replace(LAB, link=replace(LAB.link, damping=0.0)), HubFeedback(K2=1.3, Kp=334.0593798812562)
     found = locus(arm, law, "K1", 0.0, 1e-6, 3, 4)
-    poles = poles_below(HubLoop(arm, law), 1.1 * found.branches[:, 0].imag.max())
+    poles = poles_below(Loop(arm, law), 1.1 * found.branches[:, 0].imag.max())
     assert np.sort_complex(found.branches[:, 0].round(6)) == pytest.approx(
         np.sort_complex(poles.values.round(6)), rel=1e-9, abs=2e-6
     )
@@ -413,6 +414,6 @@ def test_the_slope_of_the_reduced_loop_is_its_difference_quotient(law):
 def test_under_small_gains_the_rigid_zeros_are_those_of_its_quadratic(Kp):
     """Both real or a pair, by the roots of the polynomial: J s^2 + K1 s + Kp, the inertia that the moment leaves."""
     law = HubFeedback(K1=0.3, K2=0.2, Kp=Kp)
-    found = rigid_pair(HubLoop(LAB, law), np.zeros(0, complex))
+    found = rigid_pair(Loop(LAB, law), np.zeros(0, complex))
     expected = np.roots([effective_inertia(LAB, law), law.K1, law.Kp])
     np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(expected), rtol=1e-12)
