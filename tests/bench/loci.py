@@ -8,8 +8,9 @@ import numpy as np
 
 import tfarm
 from tfarm.arm import HubFeedback
+from tfarm.exact.characteristic import gains_of
 from tfarm.loop.locus import Locus, locus
-from tfarm.loop.plant import HubLoop
+from tfarm.loop.loop import Loop
 from tfarm.loop.reduced_locus import open_loop, reduced_locus
 from tfarm.spectrum.enclose import enclosed
 
@@ -66,10 +67,10 @@ def _error(exact: Locus, values: Complex) -> float:
     """The largest |s - z|/|z| over sampled gains and all branches apart from z = 0, z being right to 50 digits."""
     worst = 0.0
     for n in np.linspace(1, exact.gain.size - 1, SAMPLES).round().astype(int):
-        loop = HubLoop(exact.arm, exact.law.having("K1", float(exact.gain[n])))
+        loop = Loop(exact.arm, exact.law.having("K1", float(exact.gain[n])))
         for near, value in zip(exact.branches[:, n], values[:, n], strict=True):
             if near:
-                disc = enclosed(loop.k, complex(near), DIGITS, loop.gains)
+                disc = enclosed(loop.k, complex(near), DIGITS, gains_of(loop.k, loop.gains))
                 true = complex(float(disc.re), float(disc.im))
                 worst = max(worst, abs(value - true) / abs(true))
     return worst

@@ -24,11 +24,10 @@ from tests.rigs import some_rig
 from tfarm.arm import Law
 from tfarm.arm.schema import arm_of_table
 from tfarm.dsp import Chain, Sampling
-from tfarm.dsp.closed import sampled
-from tfarm.dsp.law_verdict import sampled_law_answer
+from tfarm.dsp.verdict import sampled, sampled_law_answer
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.answers import margins_answer
-from tfarm.loop.closed import margins
+from tfarm.loop.margins import margins
 from tfarm.reduced.sensed import closed, sensed_model
 from tfarm.response.signals import Signals
 from tfarm.tables.files import to_json

@@ -19,8 +19,8 @@ import numpy as np
 import tfarm
 from tests.plausible.arms import draw
 from tfarm.errors import ConvergenceError
-from tfarm.loop.law_poles import law_poles_below
 from tfarm.loop.locus import locus
+from tfarm.loop.poles import poles_below
 
 SHARES = {"K1": 0.35, "K2": 0.25, "Kp": 0.05, "all": 0.1, "damping": 0.1, "length": 0.05, "hub_inertia": 0.05,
           "payload_mass": 0.05}  # fmt: skip
@@ -54,7 +54,7 @@ def wrong_points(found):
     for n in (0, found.gain.size // 2, found.gain.size - 1):
         here = found.branches[:, n]
         here, lowest = here[~np.isnan(here) & (here.imag >= 0)], abs(found.branches[found.mode == 1, n]).max()
-        complete = law_poles_below(found.varied.at(float(found.gain[n])), 1.01 * here.imag.max())
+        complete = poles_below(found.varied.at(float(found.gain[n])), 1.01 * here.imag.max())
         poles, inside = complete.values, here[(abs(here) > CLOSE * lowest) & complete.box.holds(here)]
         for zero in inside:
             away = np.sort(abs(poles - zero)) / abs(zero)

@@ -11,10 +11,9 @@ from tfarm.exact.characteristic import loop_parts
 from tfarm.loop.crossings import branch_crossings
 from tfarm.loop.loop import Loop
 from tfarm.loop.nyquist import upper_contour
-from tfarm.loop.passivity import definite, polynomial, signs_of
-from tfarm.loop.plant import HubLoop
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import gain_windows
+from tfarm.loop.theorem import definite, polynomial, signs_of
+from tfarm.loop.windows import windows_of
 
 LAB, MOTOR = tfarm.load("sasaki2012-lab"), tfarm.load("quanser-flexlink")
 
@@ -28,7 +27,7 @@ def test_of_a_pair_that_meets_on_the_axis_both_are_listed_and_mirror_images_wher
     for row, column in lower:
         pole = found.branches[row, column]
         assert pole.conjugate() in found.branches[:, column]
-        at = HubLoop(LAB, found.law.having("K1", float(found.gain[column]))).member.function(np.array([pole]))
+        at = Loop(LAB, found.law.having("K1", float(found.gain[column]))).function(np.array([pole]))
         assert abs(at.value / at.slope)[0] < 1e-12 * abs(pole)
 
 
@@ -70,7 +69,7 @@ def test_where_no_branch_swings_crossings_of_others_are_told_up_to_the_first_mod
     found = tfarm.locus(MOTOR, law, "K2", -20.0, 10.0, branches=3, points=40)
     assert (np.nanmax(found.branches.imag, axis=0) == 0).any()
     first = tfarm.modes(MOTOR, 1).natural_frequency[-1]
-    edges = gain_windows(stability(MOTOR, law), "K2").crossings
+    edges = windows_of(stability(MOTOR, law), ["K2"])["K2"].crossings
     expected = [(t, w) for t, w in zip(edges.gain, edges.at, strict=True) if -20 < t < 10 and w < first]
     assert [(each.gain, each.omega) for each in found.crossings] == [pytest.approx(each, rel=1e-9) for each in expected]
     assert len(expected) == 1

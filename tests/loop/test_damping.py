@@ -16,7 +16,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.loop import damping
 from tfarm.loop.damping import band_and_real_poles, band_poles, is_oscillating, least_damping
 from tfarm.loop.frequencies import band_of
-from tfarm.loop.plant import HubLoop
+from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.reduced import tailed_model
 
@@ -36,7 +36,7 @@ def test_they_are_the_poles_of_the_complete_list(seed, number) -> None:
     oscillating, either = band_poles(arm, laws, number), band_and_real_poles(arm, laws, number)
     real = np.where(is_oscillating(either), np.nan, either)
     for n, law in enumerate(laws.T):
-        complete = poles_below(HubLoop(arm, law_of(law)), 3 * top)
+        complete = poles_below(Loop(arm, law_of(law)), 3 * top)
         exact, left = complete.moving, complete.box.re_min
         for found, there in (
             (oscillating[n], exact[(exact.imag > 0) & (exact.imag < top)]),
@@ -63,7 +63,7 @@ def test_next_to_the_clamped_hub_a_larger_model_is_asked_before_a_box(monkeypatc
     arm = replace(arm, link=replace(arm.link, length=16.0))
     K1 = np.array([0.3, 0.1, 1.0])
     top = band_of(arm, 1)
-    boxed = [poles_below(HubLoop(arm, HubFeedback(K1=float(k), K2=0.9978)), top).values for k in K1]
+    boxed = [poles_below(Loop(arm, HubFeedback(K1=float(k), K2=0.9978)), top).values for k in K1]
     monkeypatch.setattr(damping, "poles_below", None)
     found = band_poles(arm, many_laws(HubFeedback(K2=0.9978), K1=K1), 1)
     for own, box in zip(found, boxed, strict=True):
@@ -104,7 +104,7 @@ def test_modes_that_cannot_be_followed_are_sought_once_and_left_to_a_box(monkeyp
     damping._model.cache_clear()
     assert sought == [6, 31]
     np.testing.assert_array_equal(*found)
-    boxed = poles_below(HubLoop(arm, law_of(laws[:, 0])), band_of(arm, 1)).moving
+    boxed = poles_below(Loop(arm, law_of(laws[:, 0])), band_of(arm, 1)).moving
     own = found[0][0]
     np.testing.assert_allclose(np.sort_complex(own[~np.isnan(own)]), np.sort_complex(boxed), rtol=1e-8)
 

@@ -10,7 +10,7 @@ from matplotlib.scale import SymmetricalLogTransform
 import tfarm
 from tfarm.arm import HubFeedback
 from tfarm.loop.edges import LINEAR_SCALE, Axis, edge, seen, static_edges
-from tfarm.loop.plant import HubLoop
+from tfarm.loop.loop import Loop
 from tfarm.loop.stability import stability
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -57,8 +57,8 @@ def test_the_edge_between_the_grids_frequencies_is_that_of_the_law_with_its_angl
     for K1, K2, omega in new[:: len(new) // 5]:
         law = HubFeedback(K1=K1, K2=K2, Kp=Kp)
         s = np.array([1j * omega])
-        parts = [abs(HubLoop(LAB, HubFeedback(**{name: law[name]})).loop_function(s)[0]) for name in ("K1", "K2", "Kp")]
-        assert abs(1 + HubLoop(LAB, law).loop_function(s)[0]) < 2000 * EPS * (1 + sum(parts))
+        parts = [abs(Loop(LAB, HubFeedback(**{name: law[name]})).loop_function(s)[0]) for name in ("K1", "K2", "Kp")]
+        assert abs(1 + Loop(LAB, law).loop_function(s)[0]) < 2000 * EPS * (1 + sum(parts))
 
 
 @pytest.mark.parametrize(("name", "K1", "K2"), [("free", 0.0, None), ("held", None, 1.0)])

@@ -11,9 +11,9 @@ from tests.loop.law_times import of_margins, some_case
 from tests.shared import sized, thinned
 from tfarm import Law
 from tfarm.errors import ConvergenceError
-from tfarm.loop.law_map import unstable_below
-from tfarm.loop.law_poles import law_poles_below
+from tfarm.loop.family import unstable_below
 from tfarm.loop.loop import Loop
+from tfarm.loop.poles import poles_below
 from tfarm.response.signals import Signals
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -49,7 +49,7 @@ def test_a_count_without_a_list_is_that_of_the_list(number):
         loop = Loop(arm, some_law(rng, arm, delay=some_delay(rng, arm)))
         band = float(tfarm.modes(arm, 9).natural_frequency[-2:].mean())
         try:
-            poles = law_poles_below(loop, band)
+            poles = poles_below(loop, band)
         except ConvergenceError:
             continue
         assert unstable_below(loop, poles.box.im_max) == poles.unstable

@@ -12,15 +12,14 @@ import tfarm
 from tests.loop.arms import window_arm, with_damping
 from tests.shared import thinned
 from tfarm import Hub, HubFeedback, ParameterError, Payload
-from tfarm.arm import full_law
 from tfarm.cli import main
+from tfarm.exact.characteristic import gains_of
 from tfarm.loop import reduced_locus as reduced_locus_room
 from tfarm.loop.closed import locus
-from tfarm.loop.law_poles import law_poles_below
 from tfarm.loop.lines import along, line_crossings
 from tfarm.loop.locus import frame, rounded
 from tfarm.loop.loop import Loop
-from tfarm.loop.plant import HubLoop
+from tfarm.loop.poles import poles_below
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.spectrum.damped import damped_modes
 from tfarm.spectrum.enclose import enclosed
@@ -63,7 +62,7 @@ def test_branches_are_all_poles_of_the_box_and_the_same_backwards(arm, law, vary
     assert found.branches.shape == (8, 11)
     for n in (0, 4, 10):
         zeros = found.branches[:, n]
-        poles = law_poles_below(found.varied.at(found.gain[n]), zeros.imag.max() * (1 + 1e-6))
+        poles = poles_below(found.varied.at(found.gain[n]), zeros.imag.max() * (1 + 1e-6))
         for zero in zeros[poles.box.holds(zeros)]:
             assert abs(poles.values - zero * (zero.imag >= 0) - zero.conj() * (zero.imag < 0)).min() <= 50 * EPS * abs(
                 zero
@@ -154,8 +153,8 @@ def test_the_known_edge_of_the_lab_arm_to_its_last_digits():
     assert (round(found.gain, 4), round(found.omega, 1), found.direction) == (1.0305, 27.8, "unstable")
     side = []
     for K2 in (found.gain * (1 - 1e-13), found.gain * (1 + 1e-13)):
-        loop = HubLoop(LAB, HubFeedback(K1=0.3, K2=K2))
-        disc = enclosed(loop.k, 1j * found.omega, 30, loop.gains)
+        loop = Loop(LAB, HubFeedback(K1=0.3, K2=K2))
+        disc = enclosed(loop.k, 1j * found.omega, 30, gains_of(loop.k, loop.gains))
         assert found.omega == pytest.approx(float(disc.im), rel=1e-12)
         side.append(float(disc.re))
     assert side[0] < 0 < side[1]
@@ -302,7 +301,7 @@ def test_a_branch_that_comes_to_the_accumulation_point_ends_there_and_the_others
     assert (ended.imag, -1 / C < ended.real < -0.95 / C) == (0.0, True)
     assert np.isnan(found.branches).sum() == np.isnan(found.branches[branch]).sum() == (found.gain > last).sum()
     others = np.delete(found.branches, branch, axis=0)[:, -1]
-    poles = law_poles_below(Loop(LAB, full_law(HubFeedback(K1=2000.0))), 0.9 * others.imag.max())
+    poles = poles_below(Loop(LAB, HubFeedback(K1=2000.0)), 0.9 * others.imag.max())
     assert upper(others[others.imag < 0.8 * others.imag.max()]) == pytest.approx(
         upper(poles.values[poles.values.imag < 0.8 * others.imag.max()]), rel=1e-9
     )
@@ -327,7 +326,7 @@ def test_modes_that_meet_on_the_axis_and_leave_it_as_a_quadruple_are_followed_ar
     """Without losses, K2 > 1 and Kp let the hub's mode meet the first one; the winding number has four poles off it."""
     arm, law = replace(LAB, link=replace(LAB.link, damping=0.0)), HubFeedback(K2=1.3, Kp=334.0593798812562)
     found = locus(arm, law, "K1", 0.0, 1e-6, 3, 4)
-    poles = law_poles_below(Loop(arm, full_law(law)), 1.1 * found.branches[:, 0].imag.max())
+    poles = poles_below(Loop(arm, law), 1.1 * found.branches[:, 0].imag.max())
     assert np.sort_complex(found.branches[:, 0].round(6)) == pytest.approx(
         np.sort_complex(poles.values.round(6)), rel=1e-9, abs=2e-6
     )

@@ -9,7 +9,6 @@ import tfarm
 from tfarm import Hub, HubFeedback, Law, Payload
 from tfarm.loop.loop import Loop
 from tfarm.loop.nyquist import compressed, poles_on_axis
-from tfarm.loop.plant import HubLoop
 
 LAB = tfarm.load("sasaki2012-lab")
 ARMS = {
@@ -23,7 +22,7 @@ ARMS = {
 @pytest.mark.parametrize("law", [{"K1": 0.3}, {"Kp": 2.0}, {"K1": 0.3, "K2": 0.3}, {"K2": 0.3}])
 def test_the_loop_function_has_a_pole_at_rest_where_it_grows_without_bound(name, law):
     """Nearer to 0 by a factor of ten L is ten or a hundred times as large there, and nowhere else."""
-    loop = HubLoop(ARMS[name], HubFeedback(**law))
+    loop = Loop(ARMS[name], HubFeedback(**law))
     near = abs(loop.loop_function(1j * 1e-4 * np.array([10.0, 1.0])))
     grows = bool(near[1] > 5 * near[0])
     assert (0.0 in poles_on_axis(loop, 1000.0)) == grows

@@ -9,8 +9,9 @@ import pytest
 import tfarm
 from tests.loop.arms import some_loop
 from tfarm import Hub, HubFeedback, ParameterError
-from tfarm.loop.plant import HubLoop, effective_inertia
-from tfarm.loop.poles import poles_of_gains
+from tfarm.loop.lines import effective_inertia
+from tfarm.loop.loop import Loop
+from tfarm.loop.poles import closed_loop_poles
 
 ARM = tfarm.load("sasaki2012")
 
@@ -24,12 +25,12 @@ ARM = tfarm.load("sasaki2012")
 )
 def test_where_there_is_no_loop(inertia: float, law, words: str) -> None:
     with pytest.raises(ParameterError, match=words) as refused:
-        HubLoop(replace(ARM, hub=Hub(inertia=inertia)), law)
+        Loop(replace(ARM, hub=Hub(inertia=inertia)), law)
     assert "\n" not in str(refused.value)
 
 
 def test_a_pin_without_inertia_may_be_damped() -> None:
-    poles = poles_of_gains(replace(ARM, hub=Hub(inertia=0.0)), HubFeedback(K1=0.3), 5)
+    poles = closed_loop_poles(replace(ARM, hub=Hub(inertia=0.0)), HubFeedback(K1=0.3), 5)
     assert poles.unstable == 0
 
 
@@ -41,7 +42,7 @@ def test_the_loop_function_is_made_of_transfer_functions(seed: int) -> None:
     s = omega * rng.uniform(0.05, 1, 12) * np.exp(1j * rng.uniform(-1.4, 1.4, 12))
     theta, moment = tfarm.transfer(arm, ["hub_angle", "root_moment"])(s)
     terms = np.array([law.Kp * theta, law.K1 * s * theta, law.K2 * moment])
-    miss = abs(HubLoop(arm, law).loop_function(s) - terms.sum(axis=0))
+    miss = abs(Loop(arm, law).loop_function(s) - terms.sum(axis=0))
     assert (miss < 1e-12 * abs(terms).sum(axis=0)).all()
 
 
@@ -51,7 +52,7 @@ def test_slow_torque_turns_the_effective_inertia(K2: float, radius: float) -> No
     """The slow real pole tends to -K1/J_eff as K1 -> 0; a gauge on a hub's rim does not read all that the hub turns."""
     arm, misses = replace(ARM, hub=replace(ARM.hub, radius=radius)), []
     for K1 in (1e-2, 1e-3):
-        slow = poles_of_gains(arm, HubFeedback(K1=K1, K2=K2), 6).moving
+        slow = closed_loop_poles(arm, HubFeedback(K1=K1, K2=K2), 6).moving
         slow = slow[abs(slow).argmin()].real
         misses.append(abs(slow * effective_inertia(arm, HubFeedback(K2=K2)) / -K1 - 1))
     assert misses[1] < 1e-3

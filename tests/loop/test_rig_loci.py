@@ -11,10 +11,9 @@ from tests.loop.rig_loops import RigLoop
 from tests.shared import thinned
 from tfarm import Hub, HubFeedback
 from tfarm.arm import Attachment, Motor
-from tfarm.loop.law_poles import law_poles_below
 from tfarm.loop.lines import Line, along, line_crossings
 from tfarm.loop.locus import locus
-from tfarm.loop.plant import HubLoop
+from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.spectrum.scales import default_gains
@@ -50,10 +49,10 @@ def test_branches_are_poles_of_the_elements_and_all_of_a_box(name, vary):
     for n in (0, 4, 8):
         zeros = found.branches[:, n]
         loop = found.varied.at(float(found.gain[n]))
-        theirs = model.eigenvalues(loop.law.gains)
+        theirs = model.eigenvalues(loop.gains)
         for zero in zeros[(zeros != 0) & (abs(zeros) < model.up_to / 2)]:
             assert abs(theirs - zero).min() < 1e-7 * abs(zero) + 1e-9 * model.a  # their own 0 is off by so much
-        box = law_poles_below(loop, zeros.imag.max() * (1 + 1e-6))
+        box = poles_below(loop, zeros.imag.max() * (1 + 1e-6))
         for pole in box.moving:
             assert abs(zeros - np.where(zeros.imag < 0, pole.conj(), pole)).min() < 1e-12 * abs(pole)
     assert reduced_locus(found).worst < 1e-5
@@ -111,7 +110,7 @@ def test_at_the_gain_at_which_a_pole_passes_through_0_it_is_0_and_the_others_are
     here = found.branches[:, n]
     assert (here == 0).sum() == 1
     step = 1e-7
-    sides = [poles_below(HubLoop(rig, law.having("K2", 1.0 + side * step)), 200.0).values for side in (-1, 1)]
+    sides = [poles_below(Loop(rig, law.having("K2", 1.0 + side * step)), 200.0).values for side in (-1, 1)]
     for pole in here[here != 0]:
         middle = np.mean([side[abs(side - pole).argmin()] for side in sides])
         assert pole == pytest.approx(middle, rel=1e-6)

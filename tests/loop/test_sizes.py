@@ -10,12 +10,10 @@ import tfarm
 from tfarm import HubFeedback, Law
 from tfarm.errors import ConvergenceError
 from tfarm.loop import panels, positions
-from tfarm.loop.law_map import asked_at
+from tfarm.loop.family import columns, critical, crossed
 from tfarm.loop.lines import along, crossing_at_zero, line_crossings
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import dense, minus_loop
-from tfarm.loop.plant import HubLoop
-from tfarm.loop.regions import _crossings_along_K2
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 
@@ -60,7 +58,7 @@ def test_far_below_all_modes_the_loop_goes_on_as_that_of_the_rigid_arm():
     """(Kp + K1 s)/(J s^2) is the same at s c with K1 c and Kp c^2, down to where squares are no doubles."""
     c, law, w = 1e-142, HubFeedback(K1=0.3, K2=0.3, Kp=0.4), np.array([1e-3])
     slow = HubFeedback(K1=c * law.K1, K2=law.K2, Kp=c * c * law.Kp)
-    np.testing.assert_allclose(minus_loop(HubLoop(LAB, slow), c * w), minus_loop(HubLoop(LAB, law), w), rtol=1e-8)
+    np.testing.assert_allclose(minus_loop(Loop(LAB, slow), c * w), minus_loop(Loop(LAB, law), w), rtol=1e-8)
 
 
 def test_a_slow_pair_is_no_real_pole_to_a_locus():
@@ -77,14 +75,16 @@ def test_one_cell_of_a_grid_shows_the_crossing_that_is_in_it():
     for t, at, change in list(line)[:3]:
         if at:
             cell = at * np.array([1 - 1e-3, 1 + 1e-3])
-            (found,) = _crossings_along_K2(LAB, np.array([0.3]), HubFeedback(), cell)
+            loop = Loop(LAB, HubFeedback())
+            lines = columns(loop, ("K1", "K2"), np.array([0.3]), (1.0, 10.0))
+            (found,) = crossed(loop, lines, [("K2", (-10.0, 10.0))], cell, [lambda one=loop: one])
             ((mine, where, step),) = [each for each in found if each.at]
             assert (mine, where, step) == (pytest.approx(t, rel=1e-9), pytest.approx(at, rel=1e-9), change)
 
 
 def test_without_losses_no_law_is_quiet_however_little_it_feeds_back(monkeypatch):
     """At each of its modes |L| is infinite, though between them it is 1e-12: what is exact is not told."""
-    monkeypatch.setattr("tfarm.loop.closed.law_windows", lambda _: {})  # which take longest
+    monkeypatch.setattr("tfarm.loop.margins.windows_of", lambda _: {})  # which take longest
     found = tfarm.margins(BARE, Law({"hub_rate": ([1e-12, 1e-12], [1.0, 2.0])}), band=1000.0)
     assert found.stability.is_stable
     assert found.in_band is not None
@@ -106,7 +106,7 @@ def test_a_crossing_at_0_is_at_0_and_not_below_it(name):
     ],
 )
 def test_a_leading_coefficient_is_asked_about_at_0_where_it_passes_there(name, limits, asked):
-    assert asked_at(name, limits) == asked
+    assert critical(name, limits) == asked
 
 
 def test_models_that_nothing_damps_are_not_unstable_by_rounding():

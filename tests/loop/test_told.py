@@ -13,17 +13,17 @@ from tests.similar import EITHER
 from tfarm import HubFeedback, Law
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop import panels
-from tfarm.loop.answers import poles_answer
+from tfarm.loop.answers import nyquist_answer, poles_answer
 from tfarm.loop.crossings import BranchCrossing, in_words
 from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
-from tfarm.loop.law_map import law_map
+from tfarm.loop.lines import effective_inertia
 from tfarm.loop.locus import frame, open_poles
 from tfarm.loop.loop import Loop
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import _nearest_to_one
-from tfarm.loop.nyquist import nyquist_answer, nyquist_table, poles_on_axis
+from tfarm.loop.nyquist import nyquist_table, poles_on_axis
 from tfarm.loop.panels import CHEBYSHEV, loop_panels
-from tfarm.loop.plant import HubLoop, effective_inertia
+from tfarm.loop.plane import plane
 from tfarm.loop.poles import slow_poles
 from tfarm.loop.stability import stability
 from tfarm.spectrum.scales import rate_unit
@@ -44,7 +44,7 @@ def test_an_answer_of_nyquist_s_criterion_is_its_record(name):
     rows = np.array([[row[key] for key in ("re_s", "im_s", "re_L", "im_L")] for row in table])
     np.testing.assert_array_equal(rows @ [1, 1j, 0, 0], found.s)
     np.testing.assert_array_equal(rows @ [0, 0, 1, 1j], found.L)
-    np.testing.assert_allclose(found.L[5::100], HubLoop(LAB, LAWS[name]).loop_function(found.s[5::100]), rtol=1e-12)
+    np.testing.assert_allclose(found.L[5::100], Loop(LAB, LAWS[name]).loop_function(found.s[5::100]), rtol=1e-12)
 
 
 def test_an_answer_of_poles_is_its_record():
@@ -119,7 +119,7 @@ def test_the_stable_edge_is_the_boundary_with_stable_points_on_one_side():
 @pytest.mark.parametrize(("x", "y", "key"), [([1.0, 0.5], [1.0, 2.0], "hub_rate"), ([1.0, 2.0], [1.0, 1.0], "gain")])
 def test_values_of_a_map_that_do_not_ascend_are_refused_by_their_name(x, y, key):
     with pytest.raises(ParameterError) as told:
-        law_map(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3}), ("hub_rate", "gain"), np.array(x), np.array(y))
+        plane(Loop(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3})), ("hub_rate", "gain"), np.array(x), np.array(y))
     assert told.value.key == key
 
 
@@ -184,7 +184,7 @@ def test_between_its_samples_a_panel_is_the_loop_function_too(arm):
         d, theta, m = (BarycentricInterpolator(CHEBYSHEV[order], part[order])(inside) for part in values)
         s = 1j * ((low + high) / 2 + (high - low) / 2 * inside)
         fed_back = (law.Kp + law.K1 * s) * theta + law.K2 * m * s**2
-        whole = HubLoop(arm, law).loop_function(s)
+        whole = Loop(arm, law).loop_function(s)
         np.testing.assert_allclose(fed_back / (d * s**found.order), whole, rtol=1e-6 * (1 + abs(whole).max()))
 
 
@@ -194,12 +194,12 @@ def test_between_its_samples_a_panel_is_the_loop_function_too(arm):
 def test_slow_poles_are_zeros_of_the_whole_characteristic_function():
     """Not of the rigid arm's alone, from which they start: to the last digits a step of Newton's method is none."""
     law = HubFeedback(K1=1e-4 * rate_unit(LAB), K2=0.3, Kp=3e-9 * rate_unit(LAB))
-    loop = HubLoop(LAB, law)
+    loop = Loop(LAB, law)
     found = slow_poles(loop, 1.0)
     assert found.size == 2
-    at = loop.member.function(found)
+    at = loop.function(found)
     assert (abs(at.value / at.slope) <= 1e-13 * abs(found)).all()
-    rigid = np.roots([effective_inertia(LAB, law), *loop.at_rest])
+    rigid = np.roots([effective_inertia(LAB, law), *loop.at_rest[1::-1]])
     assert 1e-9 < max(min(abs(each / other - 1) for other in rigid) for each in found) < 1e-2
 
 

@@ -9,9 +9,9 @@ from tfarm.crossing import pieces
 from tfarm.dsp import load_chain, sampled_loop
 from tfarm.dsp.loci import sampled_loci
 from tfarm.loop.edges import moment_axis, rate_axis
-from tfarm.loop.law_poles import law_poles_below
 from tfarm.loop.locus import locus, rounded
 from tfarm.loop.loop import Loop
+from tfarm.loop.poles import poles_below
 from tfarm.plots.folded import draw_folded_loci
 from tfarm.plots.roots import draw_locus
 from tfarm.spectrum.scales import default_gains, rate_unit
@@ -61,7 +61,7 @@ def test_the_values_between_are_poles_too():
     assert more.size > 20
     for n in more[::12]:
         branch = fine.branches[2, n]
-        poles = law_poles_below(fine.varied.at(fine.gain[n]), 150.0).values
+        poles = poles_below(fine.varied.at(fine.gain[n]), 150.0).values
         assert abs(poles - branch).min() <= 1e-9 * abs(branch)
 
 

@@ -15,18 +15,17 @@ from tests.report.coarse import coarsen
 from tests.shared import thinned
 from tfarm.arm import Hub, HubFeedback, many_laws
 from tfarm.dsp import Chain
-from tfarm.dsp.brief import sampled_brief
 from tfarm.dsp.chain import Sampling
-from tfarm.dsp.loop import sampled_loop
+from tfarm.dsp.sampled import sampled_loop
+from tfarm.dsp.verdict import sampled_brief
 from tfarm.errors import ConvergenceError
 from tfarm.loop import edges
-from tfarm.loop.closed import nyquist
 from tfarm.loop.damping import least_damping
 from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.loci import held_branches, loci
-from tfarm.loop.nyquist import compressed, nyquist_of
-from tfarm.loop.plant import HubLoop
-from tfarm.loop.poles import poles_of_gains
+from tfarm.loop.loop import Loop
+from tfarm.loop.nyquist import compressed, nyquist, nyquist_of
+from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 from tfarm.plots.plane import nice_levels
 from tfarm.plots.roots import zoomed
@@ -80,8 +79,8 @@ def test_the_edge_drawn_has_poles_on_the_axis(lab):
     ]
     assert len(points) > 10
     for K1, K2, omega in points:
-        loop = HubLoop(LAB, HubFeedback(K1=K1, K2=K2))
-        parts = [abs(HubLoop(LAB, law).loop_function(1j * np.array([omega]))[0]) for law in _single(K1, K2)]
+        loop = Loop(LAB, HubFeedback(K1=K1, K2=K2))
+        parts = [abs(Loop(LAB, law).loop_function(1j * np.array([omega]))[0]) for law in _single(K1, K2)]
         assert abs(1 + loop.loop_function(1j * np.array([omega]))[0]) < 2000 * EPS * (1 + sum(parts))
 
 
@@ -133,7 +132,7 @@ def test_the_contours_are_the_damping_of_the_poles(lab):
     """Least damping ratio by the exact poles in a box, below the band that the caption names."""
     for row, column in ((5, 20), (25, 40), (30, 55)):
         law = HubFeedback(K1=float(lab.axes[0][column]), K2=float(lab.axes[1][row]))
-        poles = poles_of_gains(LAB, law, 6).values
+        poles = closed_loop_poles(LAB, law, 6).values
         poles = poles[(poles.imag > 0) & (poles.imag < lab.band)]
         expected = (-poles.real / abs(poles)).min()
         assert lab.damping[row, column] == pytest.approx(expected, rel=1e-9, abs=0)
@@ -218,7 +217,7 @@ def test_the_loci_are_exact_and_the_gap_is_that_of_what_is_drawn():
     data = loci(LAB, PAPER_GAINS, "K2", -1.0, 1.6)
     for n in (0, 150, 299):
         law = replace(PAPER_GAINS, K2=float(data.exact.gain[n]))
-        poles = poles_of_gains(LAB, law, 5).values
+        poles = closed_loop_poles(LAB, law, 5).values
         for branch in zoomed(data.exact)[:2]:
             here = data.exact.branches[branch, n]
             assert abs(poles - here).min() < 1e-9 * abs(here)

@@ -14,13 +14,13 @@ from tests.report import plausible
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import implausible
-from tfarm.audit import candidates
+from tfarm.audit import assumptions
 from tfarm.audit.assumptions import LoopVerdict, has_hub_inertia, hub_study, section_study
 from tfarm.columns import PAGE
 from tfarm.dsp import Chain
 from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus
-from tfarm.loop.plant import HubLoop
+from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.report import assumptions_section, loop_laws, loop_section, making
 from tfarm.report.arm_section import arm_section, derived_table
@@ -144,7 +144,7 @@ LOOPS = [name for name, arm in ARMS.items() if has_loop(arm)]
 
 def is_stable(arm, law, up_to):
     """By finding every pole below a frequency: a road that knows no windows."""
-    return poles_below(HubLoop(arm, law), up_to).unstable == 0
+    return poles_below(Loop(arm, law), up_to).unstable == 0
 
 
 @pytest.mark.parametrize("name", thinned(LOOPS, 2))
@@ -200,7 +200,7 @@ def test_the_answer_of_a_static_crossing_is_in_the_locus():
     assert np.isfinite(found.branches).all()
     assert 0 in found.branches[:, at]
     assert not (found.branches[:, at + 1] == 0).any()
-    poles = poles_below(HubLoop(arm, replace(law, K2=float(found.gain[at + 1]))), 500.0).values
+    poles = poles_below(Loop(arm, replace(law, K2=float(found.gain[at + 1]))), 500.0).values
     for branch in found.branches[:3, at + 1]:
         assert abs(poles - branch).min() < 1e-9 * abs(branch)
 
@@ -223,7 +223,7 @@ def test_branches_that_cannot_be_followed_are_left_out_with_a_word(monkeypatch):
     rates = section.blocks[0]
     for K1, count in zip(column(rates, "K1").values, column(rates, "unstable_poles").values, strict=True):
         law = replace(default_gains(arm), K1=K1)
-        assert count == poles_below(HubLoop(arm, law), 300.0).unstable
+        assert count == poles_below(Loop(arm, law), 300.0).unstable
 
 
 def test_a_free_pin_has_its_rate_loop(monkeypatch):
@@ -284,10 +284,10 @@ def test_no_hub_takes_a_frequency_outside_what_is_said(name):
 def test_a_K2_where_the_search_ended_has_a_star():
     verdicts = (LoopVerdict("stable", 1.08, True), LoopVerdict("stable", 50.0, False), LoopVerdict("unstable", None))
     study = hub_study(ARMS["heavy-hub"], [1.0, 22.5, 30.0], count=1)
-    *_, edges = candidates.loop_columns(study, verdicts)
+    *_, edges = assumptions.loop_columns(study, verdicts)
     assert list(edges.cells) == ["1.08000", "50*", "-"]
     small = hub_study(ARMS["micro"], [1e-7, 2e-7, 5e-7], count=1)
-    assert "K1 = 1.66 × 10⁻⁵, K2 = 0.3" in next(candidates.loop_columns(small, verdicts)).group
+    assert "K1 = 1.66 × 10⁻⁵, K2 = 0.3" in next(assumptions.loop_columns(small, verdicts)).group
     assert "*" in assumptions_section.searched_words(edges)
     certain = replace(edges, of=edges.of[::2], shown=edges.shown[::2])
     assert not assumptions_section.searched_words(certain)

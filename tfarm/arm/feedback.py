@@ -15,8 +15,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tfarm.arm.checks import LARGEST_NUMBER, number
-from tfarm.arm.choices import INPUT_UNITS
+from tfarm.arm.checks import INPUT_UNITS, LARGEST_NUMBER, number
 from tfarm.arm.records import Arm
 from tfarm.errors import ParameterError
 
@@ -75,16 +74,6 @@ class HubFeedback:
     def row(self) -> tuple[float, ...]:
         """The gains in the order of `GAINS`: what the outputs in `FED_BACK` are multiplied by."""
         return tuple(self[gain.name] for gain in GAINS)
-
-    @property
-    def is_at_hub(self) -> bool:
-        """Whether hub angle, hub rate and root moment are all that is fed back: what theorems on the loop suppose."""
-        return not self.elsewhere
-
-    @property
-    def elsewhere(self) -> tuple[Gain, ...]:
-        """The entries on other outputs, whose gain is not 0."""
-        return tuple(gain for gain in GAINS if gain.output not in AT_HUB and self[gain.name])
 
     def __getitem__(self, name: str) -> float:
         """The gain of that name."""

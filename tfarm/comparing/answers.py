@@ -9,7 +9,7 @@ from typing import Any
 
 from tfarm.columns import FILES, JSON, Column, Table
 from tfarm.digits import general, singly, within
-from tfarm.dsp.law_verdict import sampled_law_answer
+from tfarm.dsp.verdict import sampled_law_answer
 from tfarm.loop.answers import MARGIN_COLUMNS, gain_rows, margins_answer, sizes_of
 from tfarm.loop.margins import Margins
 from tfarm.spectrum.answers import EIGENVALUE_ERROR
@@ -229,7 +229,7 @@ def _known(side: ComparedSide) -> list[tuple[float | None, str]]:
     if side.clocked is not None:
         return [(value, "-" if value is None else side.clocked.known) for value in side.clocked.margins.values()]
     assert side.margins is not None
-    found: Margins[Any] = side.margins
+    found: Margins = side.margins
     known: list[tuple[float | None, str]] = []
     for column in MARGIN_COLUMNS:
         exact, in_band = sizes_of(found)[column.key]

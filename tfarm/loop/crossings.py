@@ -20,8 +20,8 @@ from tfarm.crossing import Crossing, crossed
 from tfarm.errors import ConvergenceError
 from tfarm.response.frequency import AXIS_SHARE
 
+from .family import line_crossings
 from .frequencies import grid
-from .law_map import law_crossings
 from .varied import Varied
 
 AT_ORIGIN = 1e-9  # of the largest of its branch: a pole so near to 0 is there but for the last step of its correction
@@ -104,12 +104,11 @@ def _on_line(family: Varied, gain: Real, top: float) -> list[Crossing]:
     if family.is_of_arm or family.vary == "delay":
         return []
     loop = family.first.under(family.full)
-    omega = np.asarray(grid(loop.arm, top))
     if loop.k.is_real_on_axis and not loop.law.delay:
-        t, at, change = crossed(omega, family.on_axis)
+        t, at, change = crossed(np.asarray(grid(loop.arm, top)), family.on_axis)
         return [Crossing(*each) for each in zip(_corrected(family, t, at), at, change, strict=True)]
     name = "gain" if family.vary == "all" else family.vary
-    return list(law_crossings(loop, name, np.sort(gain), omega, loop.signals.parts(1j * omega), top))
+    return list(line_crossings(loop, name, float(gain.min()), float(gain.max()), top))
 
 
 def _corrected(family: Varied, t: Real, at: Real) -> Real:

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.arm import NAMES, Arm, HubFeedback, unit_of
+from tfarm.arm import NAMES, Arm, HubFeedback, as_law, unit_of
 from tfarm.arrays import Complex
 from tfarm.columns import Column
 from tfarm.records import record
 
-from .answers import law_answer
 from .crossings import crossing_answers
+from .law_answers import law_answer, signals_answer
 from .locus import Locus, locus
 from .most_damped import most_damped
 from .reduced_locus import ReducedLocus, reduced_locus
@@ -85,7 +85,7 @@ def locus_answer(exact: Locus, reduced: ReducedLocus | None) -> dict[str, Any]:
     best = most_damped(exact)
     answer = {
         "arm": exact.arm.name,
-        **law_answer(exact.law, exact.arm),
+        **(signals_answer(as_law(exact.law), exact.arm) if exact.in_box else law_answer(exact.law, exact.arm)),
         "vary": exact.vary,
         "unit": unit_in(exact),
         "gain": exact.gain.tolist(),

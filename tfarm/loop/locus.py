@@ -167,7 +167,7 @@ def named(family: Varied, number: int) -> tuple[Complex, Whole]:
     rests = grown.at(0.0).zeros_at_origin - grown.pinned
     row, mode = np.r_[np.zeros(rests, complex), row, law.poles[law.poles != 0]], np.r_[np.zeros(rests, np.int64), mode]
     mode = np.r_[mode, np.zeros(row.size - mode.size, np.int64)]
-    if any(abs(part) > 0 for part in law.polynomials(np.array([1.0 + 1.0j]))[0][:, 0]):
+    if loop.feeds_back:
         row = follow(grown, np.array([0.0, 1.0]), row)[1]
     more = max(0, grown.pinned - family.pinned)  # at 0 at the first value alone
     row, mode = np.r_[np.zeros(more, complex), row], np.r_[np.zeros(more, np.int64), mode]

@@ -25,9 +25,8 @@ from tfarm.spectrum.scales import first_frequency
 
 from .damping import NO_PART
 from .frequencies import band_of
-from .law_poles import law_box, starting_points_of
-from .loop import Loop
-from .resting import NEAREST_TO_ORIGIN, READ_AT
+from .loop import NEAREST_TO_ORIGIN, ORDER_READ_AT, Loop
+from .poles import SLOW_SHARE, box_of, slow_poles, starting_points
 
 OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, as of the arm's below
 ARM_PARAMETERS = {
@@ -39,7 +38,6 @@ SETTLED = 1e-10  # of its size: one step more is taken where Newton's method sti
 SERIES_RADIUS, SERIES_POINTS = 0.2, 16  # of the first frequency: where a power series next to 0 is read off
 EMPTY = Box(0.0, 0.0, 0.0, 0.0)
 LOOPS_KEPT = 200  # at values asked for again: memory against time, of no effect on an answer
-SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are known beforehand, Newton's method finds none there
 
 
 @dataclass(frozen=True)
@@ -179,10 +177,11 @@ class Varied:
 
         Where D grows with a higher power next to 0; a pole that is slower than that is none, which the loop knows.
         """
-        s = self.frequency * np.multiply.outer(READ_AT, np.ones(values.size)) + 0j
+        s = self.frequency * np.multiply.outer(ORDER_READ_AT, np.ones(values.size)) + 0j
         farther, nearer = self._characteristic(s, values)[0]
         found = np.zeros(values.size, np.int64)
-        for n in np.flatnonzero(abs(farther) > abs(nearer) * (READ_AT[0] / READ_AT[1]) ** (self.pinned + 0.5)):
+        most = (ORDER_READ_AT[0] / ORDER_READ_AT[1]) ** (self.pinned + 0.5)
+        for n in np.flatnonzero(abs(farther) > most * abs(nearer)):
             found[n] = self.at(float(values[n])).zeros_at_origin - self.pinned
         return found
 
@@ -246,7 +245,7 @@ class Varied:
         near = self.near(np.array([value]), np.where(guess.imag < 0, np.nan, guess)[None])[0]
         near = near[~np.isnan(near) & (near != 0)]
         near = np.r_[near, near[near.imag > 0].conj()]
-        starts, slow = np.r_[near, starting_points_of(loop, height)], near[abs(near) < SLOW_SHARE * height]
+        starts, slow = np.r_[near, starting_points(loop, height)], slow_poles(loop, SLOW_SHARE * height)
         found = zeros_in_box(loop.function, self.box, starts, slow)
         found = np.where(abs(found.imag) < NO_PART * abs(found), found.real, found)
         upper, rests = found[found.imag > 0], np.zeros(loop.zeros_at_origin - self.pinned, complex)
@@ -266,7 +265,7 @@ class Varied:
         loops, lost = [self.at(value) for value in self.few], ConvergenceError("no box", self, 0.0)
         for factor in HEIGHTS:
             height = factor * max(band_of(loop.arm, modes) for loop in loops)
-            boxes = [law_box(loop, height) for loop in loops]
+            boxes = [box_of(loop, height) for loop in loops]
             left, right = max(each.re_min for each in boxes), max(each.re_max for each in boxes)
             found = replace(self, box=Box(left, right, -height, height))
             try:

@@ -24,7 +24,7 @@ from tfarm.exact.outputs import Output
 from tfarm.exact.outputs import output as known_output
 from tfarm.exact.system import System
 from tfarm.exact.values import expansions_at_zero
-from tfarm.records import record
+from tfarm.records import read_only, record
 from tfarm.spectrum.scales import first_frequency
 
 RELATIVE = ("Y", "Phi")  # quantities relative to the hub: differences
@@ -74,7 +74,7 @@ class Signals:
     def kept(self, s: Complex) -> LoopParts:
         """`parts`, not worked out again where they were asked for lately at the same points, as of another law."""
         key, kept = (s.shape, s.tobytes()), self._kept
-        found = kept.pop(key, None) or self.parts(s)
+        found = kept.pop(key, None) or read_only(self.parts(s))
         kept[key] = found  # the last one is the latest
         if len(kept) > GRIDS_KEPT:
             del kept[next(iter(kept))]
@@ -129,9 +129,9 @@ class Signals:
     @cached_property
     def _series(self) -> dict[int, Real]:
         """Power series at rest, coefficients from s^-2 on, of outputs relative to the hub."""
-        assert isinstance(self.system, ElementChain)
+        k = chain_of(self.arm)
         relative = [n for n, each in enumerate(self.outputs) if each.quantity in RELATIVE]
-        series = {n: series_at_zero(self.system, [self.outputs[n]], self.places[n], REST_TERMS) for n in relative}
+        series = {n: series_at_zero(k, [self.outputs[n]], self.places[n], REST_TERMS) for n in relative}
         return {n: np.array(found[0]) for n, found in series.items()}
 
     def values(self, s: NDArray[Any]) -> Complex:

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from tfarm.arm import FED_BACK, HubFeedback
-from tfarm.arm.declared import StrictTable
+from tfarm.arm.schema import StrictTable
 from tfarm.dsp import Measurement, Simulation, Simulator
 from tfarm.dsp.chain import Reading
 from tfarm.errors import MISSING, ParameterError, TfarmError
