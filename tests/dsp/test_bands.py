@@ -8,8 +8,8 @@ import pytest
 
 import tfarm
 from tfarm.arm import FED_BACK, Hub, HubFeedback, Law
-from tfarm.dsp import Chain, Sampling, band, sampled_loop, sampled_map
-from tfarm.dsp.band import HIGHER, complete_band
+from tfarm.dsp import Chain, Sampling, circle, sampled_loop, sampled_map
+from tfarm.dsp.circle import HIGHER, complete_band
 from tfarm.dsp.crossings import COARSEST, circle_grid, crossing_factors
 from tfarm.dsp.edges import shown_delay
 from tfarm.dsp.verdict import Verdict
@@ -29,15 +29,15 @@ def test_the_filters_own_pole_errs_by_what_the_model_is_off_at_its_corner(delay)
     z = np.exp(1j * np.linspace(0, np.pi, 2001))
     late = math.exp(-corner * T * (1 - delay % 1))
     most = max(abs((1 - 1 / z) * late / (z - math.exp(-corner * T))))
-    found = band._of_the_filter(loop, 1000.0)
+    found = circle._of_the_filter(loop, 1000.0)
     np.testing.assert_allclose(found, [0.0, *abs(model - exact)[1:] * most], rtol=1e-6, atol=1e-15)
     assert found[2] > 1e-12
-    assert not band._of_the_filter(loop, 150.0).any()  # its pole is left of the line, with those that are left out
+    assert not circle._of_the_filter(loop, 150.0).any()  # its pole is left of the line, with those that are left out
 
 
 def test_the_top_of_a_band_is_so_many_times_the_last_pole_of_the_model():
     loop = sampled_loop(LAB.having(damping=1e-3), GAINS, count=4)
-    shares = complete_band(loop).top / loop.plant.poles.imag.max() / band.ABOVE_MODEL
+    shares = complete_band(loop).top / loop.plant.poles.imag.max() / circle.ABOVE_MODEL
     assert min(abs(shares / factor - 1) for factor in HIGHER) < 1e-12
 
 

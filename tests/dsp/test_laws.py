@@ -13,7 +13,7 @@ from tests.shared import sized
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.dsp import Chain, Converters, Sampling, sampled_loop
-from tfarm.dsp.band import complete_band
+from tfarm.dsp.circle import complete_band
 from tfarm.dsp.crossings import crossing_factors, stable_factors
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.edges import whole_loop

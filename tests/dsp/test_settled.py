@@ -17,16 +17,17 @@ from tfarm.dsp import (
     Chain,
     Converters,
     Sampling,
-    band,
     edges,
     plant,
     sampled_loop,
     sampled_verdict,
     stable_windows,
 )
-from tfarm.dsp.band import complete_band
-from tfarm.dsp.circle import Circle
-from tfarm.dsp.edges import Edge, most_modes, shown_windows, whole_loop
+from tfarm.dsp import (
+    circle as circle_module,
+)
+from tfarm.dsp.circle import Circle, complete_band
+from tfarm.dsp.edges import figure, most_modes, shown_windows, whole_loop
 from tfarm.dsp.sampled import resized
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum import continuation, damped, modes
@@ -105,7 +106,7 @@ def test_an_edge_has_the_digits_that_more_modes_leave():
     gains, chain = HubFeedback(K1=0.1, K2=0.3), Chain(sampling=Sampling(period=9e-5))
     loop, band = sampled_loop(LIGHT, gains, chain, count=16), complete_band(whole_loop(LIGHT, gains, chain))
     assert stable_windows(loop, "K1")[0][1] > 0.6
-    ((low, high),) = shown_windows(loop, band, "K1").figures
+    ((low, high),) = shown_windows(loop, band, "K1")
     assert low.text == "0"
     assert low.is_settled
     assert high.band == band.top
@@ -117,7 +118,7 @@ def test_an_edge_has_the_digits_that_more_modes_leave():
 def test_what_more_modes_change_is_not_shown():
     """Without a proof the digits are those that a loop with twice as many modes confirms: here not one."""
     gains, chain = HubFeedback(K1=0.1, K2=0.3), Chain(sampling=Sampling(period=9e-5))
-    ((_, high),) = shown_windows(sampled_loop(LIGHT, gains, chain, count=16), None, "K1").figures
+    ((_, high),) = shown_windows(sampled_loop(LIGHT, gains, chain, count=16), None, "K1")
     assert not high.is_settled
     assert high.modes == 16
     assert high.digits <= 1
@@ -176,7 +177,7 @@ def test_what_the_anti_alias_filter_leaves_in_the_band_is_wc_over_s_and_wc(lab, 
     s = np.array([-20 + 300j, 5 + 40j])
     lag = 1 / (1 + s / corner)
     rates = [] if hub_rate == "difference" else [lag]
-    found = band._filter_factors(sampled_loop(lab, HubFeedback(K1=0.3, K2=0.3), chain, count=4), s)
+    found = circle_module._filter_factors(sampled_loop(lab, HubFeedback(K1=0.3, K2=0.3), chain, count=4), s)
     np.testing.assert_allclose(found, [np.ones(2), *rates, lag], rtol=1e-14)
 
 
@@ -242,11 +243,11 @@ def test_digits_are_found_by_bisection():
             asked.append(value)
             return (value < np.pi if abs(value - np.pi) > 0.4 * 10.0**-held else None), 1.0
 
-        figure = Edge(np.pi, True).figure(6, 8, below, lambda value: (None, 1.0))
+        found = figure(np.pi, 6, 8, below, lambda value: (None, 1.0), below=True, spare=0.0)
         assert len(asked) <= 8
         ends = {n: (float(f"{np.pi:.{n}g}"), 0.5 * 10.0 ** (1 - n)) for n in range(2, 7)}
         hold = [n for n, (at, half) in ends.items() if (below(at - half)[0], below(at + half)[0]) == (True, False)]
-        assert figure.digits == max(hold, default=0)
+        assert found.digits == max(hold, default=0)
 
 
 @pytest.mark.parametrize("K2", [0.3, 1.3])
@@ -292,8 +293,8 @@ def test_what_is_left_of_the_line_is_bounded_by_the_integrals_of_both_edges():
 
     up, _ = quad(lambda w: size(complex(-line, w)), 0.0, top, limit=400)
     away, _ = quad(lambda c: size(complex(-c, top)), line, line + 45.0 / remaining, limit=400)
-    found = band._left_of(loop, line, top)[row]
-    assert 1.0 <= found / ((up + away) * 2 / np.pi) <= 1 + 4 * band.SURE
+    found = circle_module._left_of(loop, line, top)[row]
+    assert 1.0 <= found / ((up + away) * 2 / np.pi) <= 1 + 4 * circle_module.SURE
 
 
 def test_where_all_oscillating_modes_are_held_the_band_goes_on_to_where_shear_waves_are():

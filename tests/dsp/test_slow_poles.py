@@ -8,8 +8,7 @@ import pytest
 import tfarm
 from tfarm import HubFeedback, Law
 from tfarm.dsp import Chain, Converters, Sampling, pulse_transfer, sampled_loop, sampled_verdict
-from tfarm.dsp.band import complete_band
-from tfarm.dsp.circle import Circle
+from tfarm.dsp.circle import Circle, complete_band
 from tfarm.dsp.crossings import stable_windows
 from tfarm.dsp.edges import whole_loop
 from tfarm.reduced import modal_model, relaxed_model

@@ -14,8 +14,8 @@ from tests.shared import thinned
 from tfarm.comparing.regions import StableRegions
 from tfarm.dsp import Chain, Sampling, sampled_loop, stable_windows
 from tfarm.dsp.chain import Converters
+from tfarm.dsp.edges import Figure
 from tfarm.dsp.modes import dominant, mode_table
-from tfarm.dsp.verdict import AtPeriod
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.report.sampled_section import grown_words
@@ -49,7 +49,7 @@ def data_of(name, period=0.01):
     )  # fmt: skip
     analysis = SimpleNamespace(
         verdict=verdict, windows={"K2": stable_windows(loop, "K2")},
-        shown={"K2": SimpleNamespace(is_settled=False)},
+        shown={"K2": [(Figure(0.0, 0, None, MODES),) * 2]},
         delay_margin=SimpleNamespace(samples=1.25, is_bound=False), required_damping=0.0,
         damping=SimpleNamespace(is_settled=False, modes=MODES),
         modes=SimpleNamespace(natural_frequency=tfarm.modes(arm, 1).natural_frequency[-1:]),
@@ -154,8 +154,3 @@ def test_the_table_of_modes_has_the_pole_that_the_verdict_names(name):
     assert table.log_radius.max() <= loop.poles.log_spectral_radius
     if named.startswith("mode"):
         assert table.log_radius[table.index == int(named.partition(" ")[2])] == [loop.poles.log_spectral_radius]
-
-
-def test_rows_keep_every_interval():
-    every = {"K1": ((0.0, 1.0),), "K2": ()}
-    assert AtPeriod(0.01, 4, True, -0.1, default_gains(ARMS["boom"]), every).windows["K1"] == ((0.0, 1.0),)

@@ -66,11 +66,6 @@ class CircleGrid:
         offset = pulse.multipliers[base] * np.expm1(-decay + 1j * shift)
         return self.loop.terms(np.exp(1j * (self.angles[base] + shift)), base, offset)
 
-    def above(self, angle: float) -> CircleGrid:
-        """The points at greater angles alone."""
-        beyond = self.q > angle
-        return CircleGrid(self.loop, self.base[beyond], self.shift[beyond])
-
 
 def circle_grid(loop: Sampled) -> CircleGrid:
     """The grid that resolves every pole of the plant and every pole and zero of the law, whatever its weights."""

@@ -8,6 +8,7 @@ modes, and those digits are kept that a loop with twice as many (or half as many
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
@@ -16,10 +17,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tfarm.arm import AnyLaw, Arm
-from tfarm.crossing import Window
-from tfarm.dsp.band import Band, complete_band
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.circle import Circle
+from tfarm.dsp.circle import Band, Circle, complete_band
 from tfarm.dsp.crossings import stable_windows
 from tfarm.dsp.discretise import acting_law, with_all_gains
 from tfarm.dsp.plant import Branching
@@ -215,71 +214,49 @@ class Figure:
         return f"{self.value:.{self.digits}g}" if self.digits else "?"
 
 
-@dataclass(frozen=True)
-@record
-class ShownWindows:
-    """Stable intervals of a gain, and the two edges of each as `figures`."""
-
-    windows: list[Window]
-    figures: list[tuple[Figure, Figure]]
-
-    @property
-    def is_settled(self) -> bool:
-        """Whether every edge is proven."""
-        return all(edge.is_settled for pair in self.figures for edge in pair)
+Interval = tuple[Figure, Figure]  # both edges of a stable interval
 
 
-@dataclass(frozen=True)
-class Edge:
-    """A value at which stability turns: a loop is stable below it, or above.  `spare`: how far from 0 a 0 is tried."""
+def figure(value: float, digits: int, modes: int, proven: Test, other: Test, *, below: bool, spare: float) -> Figure:
+    """A value at which stability turns, a loop being stable `below` it, or above.
 
-    value: float
-    stable_below: bool
-    spare: float = 0.0
+    With the most digits that are `proven` (two at least), or else that hold in the `other` loop too; a 0 is tried so
+    far, `spare`, from 0.
+    """
 
-    def figure(self, digits: int, modes: int, proven: Test | None, other: Test) -> Figure:
-        """With the most digits that are `proven` (two at least), or else that hold in the `other` loop too."""
-        number, band = self._most(proven, digits, 2) if proven else (0, 0.0)
-        if number:
-            return Figure(self.value, number, band, None)
-        return Figure(self.value, self._most(other, digits, 1)[0], None, modes)
+    def most(test: Test, least: int) -> tuple[int, float]:
+        """So many digits that hold, and in which band; by bisection, as an interval of fewer holds that of more."""
 
-    def _most(self, test: Test, digits: int, least: int) -> tuple[int, float]:
-        """So many digits that hold where one more (or `digits`) does not, and their band; 0 where not the `least` do.
+        @cache
+        def turns(number: int) -> float:
+            """The band in which the loop is stable at one end of these digits' interval, not at the other; 0: none."""
+            if math.isinf(value):
+                return 0.0
+            rounded = float(f"{value:.{number}g}")
+            half = 0.5 * 10.0 ** (math.floor(math.log10(abs(rounded))) - number + 1) if rounded else spare
+            inside, outside = (rounded - half, rounded + half) if below else (rounded + half, rounded - half)
+            (stable, band), (still, narrower) = test(inside), (None, 0.0)
+            if stable:
+                still, narrower = test(outside)
+            return min(band, narrower) if still is False else 0.0
 
-        By bisection: an interval of fewer digits holds that of more, but for its rounding.
-        """
-        if band := self._turns(test, digits):
-            return digits, band
-        low, found, high = least - 1, 0.0, digits
-        while high - low > 1:
-            middle = (low + high + 1) // 2
-            band = self._turns(test, middle)
-            low, found, high = (middle, band, high) if band else (low, found, middle)
-        return (low, found) if found else (0, 0.0)
+        if turns(digits):
+            return digits, turns(digits)
+        number = least - 1 + bisect_right(range(least, digits), False, key=lambda each: not turns(each))
+        return (number, turns(number)) if number >= least else (0, 0.0)
 
-    def _turns(self, test: Test, digits: int) -> float:
-        """The band in which the loop is stable at one end of these digits' interval, not at the other; 0: none."""
-        if math.isinf(self.value):
-            return 0.0
-        rounded = float(f"{self.value:.{digits}g}")
-        half = 0.5 * 10.0 ** (math.floor(math.log10(abs(rounded))) - digits + 1) if rounded else self.spare
-        low, high = rounded - half, rounded + half
-        inside, outside = (low, high) if self.stable_below else (high, low)
-        stable, band = test(inside)
-        if not stable:
-            return 0.0
-        still, narrower = test(outside)
-        return min(band, narrower) if still is False else 0.0
+    number, band = most(proven, 2)
+    if number:
+        return Figure(value, number, band, None)
+    return Figure(value, most(other, 1)[0], None, modes)
 
 
-def shown_windows(loop: Sampled, band: Band | None, gain: str) -> ShownWindows:
-    """The windows of one gain, with more modes than the loop's until their edges are proven to the last digit."""
-    circle = None if band is None else band.circle()
-    found = ShownWindows([], [])
+def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]:
+    """The stable intervals of a number, with more modes than the loop's until they are proven to the last digit."""
+    circle, found = None if band is None else band.circle(), []
     for each in _sizes(loop, band, MOST_EDGE_MODES):
-        found = _windows(each, band, circle, gain)
-        if all(edge.is_sharp(GAIN_DIGITS) for pair in found.figures for edge in pair):
+        found = _windows(each, band, circle, name)
+        if all(edge.is_sharp(GAIN_DIGITS) for pair in found for edge in pair):
             break
     return found
 
@@ -296,30 +273,31 @@ def _sizes(loop: Sampled, band: Band | None, most: int) -> Iterator[Sampled]:
         yield loop
 
 
-def _windows(loop: Sampled, band: Band | None, circle: Circle | None, gain: str) -> ShownWindows:
-    """The windows of this very loop."""
-    other, modes = cache(lambda: resized(loop, another(loop.plant.count, _most(loop)))), loop.plant.count
+def _windows(loop: Sampled, band: Band | None, circle: Circle | None, name: str) -> list[Interval]:
+    """The intervals of this very loop."""
+    other = _with_others(loop)
 
     def proof(value: float) -> Proof:
-        assert circle is not None
-        assert band is not None
-        count = circle.count(loop.having(**{gain: value}).weights)
-        return None if count is None else count == 0, band.top
+        count = None if circle is None else circle.count(loop.having(**{name: value}).weights)
+        return None if count is None else count == 0, 0.0 if band is None else band.top
 
-    def holds(value: float) -> Proof:
-        return other().having(**{gain: value}).poles.is_stable, math.inf
+    def edge(value: float, opposite: float, *, below: bool) -> Figure:
+        return figure(
+            value, GAIN_DIGITS, loop.plant.count, proof,
+            lambda each: (other().having(**{name: each}).poles.is_stable, math.inf),
+            below=below, spare=_near_zero(opposite),
+        )  # fmt: skip
 
-    windows = stable_windows(loop, gain)
-    figures = []
-    for low, high in windows:
-        edges = Edge(low, False, _near_zero(high)), Edge(high, True, _near_zero(low))
-        first, second = (edge.figure(GAIN_DIGITS, modes, proof if circle else None, holds) for edge in edges)
-        figures.append((first, second))
-    return ShownWindows(windows, figures)
+    return [(edge(low, high, below=False), edge(high, low, below=True)) for low, high in stable_windows(loop, name)]
 
 
 def _near_zero(other: float) -> float:
     return TOLD_FROM_ZERO * (abs(other) if other and math.isfinite(other) else 1.0)
+
+
+def _with_others(loop: Sampled) -> Callable[[], Sampled]:
+    """The loop with another number of modes to compare with, made when first asked for."""
+    return cache(lambda: resized(loop, another(loop.plant.count, _most(loop))))
 
 
 def another(count: int, most: int) -> int:
@@ -332,13 +310,11 @@ def _most(loop: Sampled) -> int:
     return min(MOST_EDGE_MODES, most_modes(loop.plant.arm, loop.chain))
 
 
-def proof_of(loop: Sampled) -> Proof:
+def _proof_of(loop: Sampled) -> Proof:
     """Whether a loop is stable with every mode of its band."""
     band = complete_band(loop)
-    if band is None:
-        return None, 0.0
-    count = band.circle().count(loop.weights)
-    return None if count is None else count == 0, band.top
+    count = None if band is None else band.circle().count(loop.weights)
+    return None if count is None else count == 0, 0.0 if band is None else band.top
 
 
 def shown_delay(loop: Sampled, band: Band | None) -> tuple[DelayMargin, Figure]:
@@ -358,15 +334,15 @@ def _delay(loop: Sampled, band: Band | None) -> tuple[DelayMargin, Figure]:
         return margin, Figure(0.0, OTHER_DIGITS, band.top if band else None, None if band else modes)
     if margin.is_bound:
         return margin, Figure(margin.samples, OTHER_DIGITS, None, modes)
-    other = cache(lambda: resized(loop, another(modes, _most(loop))))
+    other = _with_others(loop)
 
     def proof(more: float) -> Proof:
-        return (None, 0.0) if band is None or more < 0 else proof_of(band.loop.with_delay(now + more))
+        return (None, 0.0) if band is None or more < 0 else _proof_of(band.loop.with_delay(now + more))
 
     def holds(more: float) -> Proof:
         return None if more < 0 else other().with_delay(now + more).poles.is_stable, math.inf
 
-    return margin, Edge(margin.samples, True).figure(OTHER_DIGITS, modes, proof, holds)
+    return margin, figure(margin.samples, OTHER_DIGITS, modes, proof, holds, below=True, spare=0.0)
 
 
 def shown_damping(loop: Sampled, count: int) -> Figure:
@@ -374,13 +350,13 @@ def shown_damping(loop: Sampled, count: int) -> Figure:
     count, branches = min(count, MOST_EDGE_MODES), Branches(LITTLE)
     bare, law = loop.on(loop.plant.arm.elastic, count), replace(loop.given, delay=0.0)  # which is in the chain's
     C = damping_edge(bare, branches)
+    if C == 0.0:
+        return Figure(C, OTHER_DIGITS, None, count)
 
     def proof(value: float) -> Proof:
-        return proof_of(whole_loop(bare.plant.arm.having(damping=value), law, loop.chain, branches))
+        return _proof_of(whole_loop(bare.plant.arm.having(damping=value), law, loop.chain, branches))
 
     def holds(value: float) -> Proof:
         return log_radius_with(bare, value, another(count, MOST_EDGE_MODES), branches) < 0, math.inf
 
-    if C == 0.0:
-        return Figure(C, OTHER_DIGITS, None, count)
-    return Edge(C, False).figure(OTHER_DIGITS, count, proof, holds)
+    return figure(C, OTHER_DIGITS, count, proof, holds, below=False, spare=0.0)

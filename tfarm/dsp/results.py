@@ -45,11 +45,13 @@ class Enough(NamedTuple):
     change: float
 
 
-def enough_modes(simulate: Callable[[int], Simulation]) -> Enough:
-    """The fewest of 20 or 40 modes that change no signal by more than 1e-4, else the most there are.
+def enough_modes(simulate: Callable[[int], Simulation], count: int | None = None) -> Enough:
+    """The fewest of 20 or 40 modes that change no signal by more than 1e-4, else the most there are; or `count`.
 
     `simulate` makes the simulation with so many modes, its converters ideal: steps would hide what modes do.
     """
+    if count is not None:
+        return Enough(count, math.nan)
     before, found = simulate(MODE_COUNTS[0]), Enough(MODE_COUNTS[0], np.inf)
     for count in MODE_COUNTS[1:]:
         try:
@@ -287,23 +289,9 @@ def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: flo
     """The same for a picture: with 20 records in each period of the fastest mode that is seen (`traces.resolved`)."""
     arm, law = tracked(arm, law)
     task = scenario(scenario_name, arm, chain, duration)
-    used = modes_for(None, lambda n: simulation_of(arm, law, ideal_chain(chain), task, count=n))
+    used = enough_modes(lambda n: Simulator(arm, ideal_chain(chain), task, law, count=n).run())
     (found,) = resolved(Simulator(arm, chain, task, law, count=used.modes), arm, Simulator.run)
     return found
-
-
-def simulation_of(
-    arm: Arm,
-    law: AnyLaw,
-    chain: Chain,
-    task: Scenario,
-    *,
-    count: int,
-    between: int = 0,
-    outputs: Sequence[str] = (),
-) -> Simulation:
-    """A scenario simulated with `count` modes, gains at the hub following references in all that they feed back."""
-    return Simulator(arm, chain, task, law, count=count, between=between, outputs=outputs).run()
 
 
 def simulated(
@@ -315,9 +303,13 @@ def simulated(
     between: int = 0,
     outputs: Sequence[str] = (),
 ) -> tuple[Simulation, Enough]:
-    """The simulation with `count` modes, or as many as it takes, and how many these are."""
-    used = modes_for(count, lambda n: simulation_of(arm, law, ideal_chain(chain), task, count=n, outputs=outputs))
-    return simulation_of(arm, law, chain, task, count=used.modes, between=between, outputs=outputs), used
+    """The simulation with `count` modes, or as many as it takes, and how many these are.
+
+    Gains at the hub follow references in all that they feed back.
+    """
+    ideal = ideal_chain(chain)
+    used = enough_modes(lambda n: Simulator(arm, ideal, task, law, count=n, outputs=outputs).run(), count)
+    return Simulator(arm, chain, task, law, count=used.modes, between=between, outputs=outputs).run(), used
 
 
 def simulated_answer(
@@ -339,10 +331,5 @@ def simulated_answer(
     task, cycle = scenario(name, arm, chain, duration), None
     simulation, used = simulated(arm, law, chain, task, count, between, outputs)
     if not chain.is_linear:
-        cycle = limit_cycle(simulation, simulation_of(arm, law, ideal_chain(chain), task, count=used.modes))
+        cycle = limit_cycle(simulation, Simulator(arm, ideal_chain(chain), task, law, count=used.modes).run())
     return simulation_answer(arm, law, simulation, cycle, used) | {"scenario_in_words": described(task, arm, chain)}
-
-
-def modes_for(count: int | None, simulate: Callable[[int], Simulation]) -> Enough:
-    """The modes that were asked for, of which nothing more is known (NaN), or as many as it takes."""
-    return enough_modes(simulate) if count is None else Enough(count, math.nan)

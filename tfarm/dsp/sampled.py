@@ -40,8 +40,6 @@ from tfarm.records import record
 from tfarm.reduced.sensed import closed
 from tfarm.spectrum.damped import all_damped_modes
 
-Characteristic = Callable[[Complex, Whole | None, Any], Complex]  # offset F at z = e^{pT} + offset, p of that number
-
 STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes
 SMALLEST_LOG = -745.0  # of the smallest double: stands for the logarithm of 0
 OFF_POLE = 1e-17  # stands for an offset of 0: next to 1 that is none
@@ -203,6 +201,11 @@ class Sampled:
     # ------------------------------------------------------------ characteristic function
 
     @cached_property
+    def open_loop(self) -> Complex:
+        """z - 1 of each pole of the plant, in the order of `PulseTransfer.poles`, and then of each of the law."""
+        return np.r_[self.pulse.shifts, self.in_z.poles]
+
+    @cached_property
     def row(self) -> Real:
         """What the rows of `terms` are multiplied by."""
         return np.array([1.0, *self.weights])
@@ -216,7 +219,7 @@ class Sampled:
         z, more, at, delta = np.asarray(z), 0.0, base, None
         start = z - 1
         if base is not None:
-            start, more = np.r_[self.pulse.shifts, self.in_z.poles][base], offset
+            start, more = self.open_loop[base], offset
             is_of_law, delta = base >= self.pulse.poles.size, start + offset
             at, offset = np.where(is_of_law, -1, base), np.where(is_of_law, 1.0, offset)
         measured = self.pulse.scaled(z, at, offset, delta)
@@ -279,8 +282,7 @@ class Sampled:
 
         Those of weight 0 are left out.
         """
-        plant, T = self.plant, self.chain.sampling.period
-        at_rest = plant.static - (plant.residues / plant.poles).real.sum(axis=1)
+        plant, T, at_rest = self.plant, self.chain.sampling.period, self.plant.at_rest
         size = abs(plant.static) + abs(plant.residues / plant.poles).sum(axis=1)
         found = [lowest_power(self.in_z.poles)] if weights[0] else []
         slopes = self.pulse.slopes_at_one
@@ -314,91 +316,66 @@ class Sampled:
         """Those poles, or some of them."""
         z = self.eigenvalues.copy()
         z[np.argsort(abs(z - 1), kind="stable")[: self.poles_at_one]] = 1.0
-        open_loop = OpenLoop.of_order(z.size, self.pulse, self.in_z.poles)
-        return polished_poles(z, open_loop, self.characteristic, which)
+        return _polished(self, z, which)
 
 
-@dataclass(frozen=True)
-@record
-class OpenLoop:
-    """Poles to which roots are near, as z - 1: those of the plant and then others of q; `poles` are those of F."""
+def _nearest(loop: Sampled, delta: Complex) -> Whole:
+    """The number of the open-loop pole nearest to each z = 1 + delta, of those that have not faded.
 
-    pulse: PulseTransfer
-    poles: Complex
-    others: Complex
-
-    @classmethod
-    def of_order(cls, order: int, pulse: PulseTransfer, of_law: Complex) -> OpenLoop:
-        """Of a loop with so many poles: those of its plant, of its delay, and at z = 1 what is left."""
-        known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0)]
-        return cls(pulse, np.r_[known, np.zeros(max(0, order - known.size - of_law.size))], of_law)
-
-    @cached_property
-    def shifts(self) -> Complex:
-        """z - 1 of each pole that a root may be near to."""
-        return np.r_[self.pulse.shifts, self.others]
-
-    @cached_property
-    def log_radius(self) -> Real:
-        """ln|z| of each."""
-        own = 2 * self.others.real + abs(self.others) ** 2
-        return np.r_[self.pulse.poles.real * self.pulse.sampling.period, np.log1p(np.maximum(own, LEAST_SQUARE)) / 2]
-
-    def nearest(self, delta: Complex) -> Whole:
-        """The number of the pole nearest to each z = 1 + delta, of those that have not faded and that are poles of F.
-
-        The integrals of a hub that cannot drift are none: next to them F has no digits of its own.
-        """
-        away = abs(delta[:, None] - self.shifts)
-        away[:, abs(1 + self.shifts) <= FADED_RADIUS] = np.inf
-        if not self.pulse.plant.rigid.any():
-            away[:, self.pulse.poles.size - 1] = np.inf
-        return np.asarray(away.argmin(axis=1))
+    The integrals of a hub that cannot drift are none: next to them F has no digits of its own.
+    """
+    away = abs(delta[:, None] - loop.open_loop)
+    away[:, abs(1 + loop.open_loop) <= FADED_RADIUS] = np.inf
+    if not loop.plant.rigid.any():
+        away[:, loop.pulse.poles.size - 1] = np.inf
+    return np.asarray(away.argmin(axis=1))
 
 
-def polished_poles(
-    eigenvalues: Complex, open_loop: OpenLoop, characteristic: Characteristic, which: Any = None
-) -> SampledPoles:
+def _polished(loop: Sampled, z: Complex, which: Any = None) -> SampledPoles:
     """Closed-loop poles from eigenvalues that are nearly right, each as an offset from its nearest open-loop pole.
 
     Those of a mask alone where `which` is one; those that are 1 stay.
     """
-    delta, pulse = eigenvalues - 1, open_loop.pulse
-    base = open_loop.nearest(delta)
-    offset = delta - open_loop.shifts[base]
-    bright = (abs(eigenvalues) > FADED_RADIUS) & (delta != 0) & (True if which is None else which)
+    delta, shifts, pulse = z - 1, loop.open_loop, loop.pulse
+    base = _nearest(loop, delta)
+    offset = delta - shifts[base]
+    bright = (abs(z) > FADED_RADIUS) & (delta != 0) & (True if which is None else which)
     rows = np.flatnonzero(bright)
     if rows.size:
-        _settle(base, offset, rows, open_loop, characteristic)
-        moved = open_loop.nearest(open_loop.shifts[base] + offset)
+        _settle(base, offset, rows, loop)
+        moved = _nearest(loop, shifts[base] + offset)
         if (rows := np.flatnonzero(bright & (moved != base))).size:  # then all digits are kept from there
-            offset[rows] += open_loop.shifts[base[rows]] - open_loop.shifts[moved[rows]]
+            offset[rows] += shifts[base[rows]] - shifts[moved[rows]]
             base[rows] = moved[rows]
-            _settle(base, offset, rows, open_loop, characteristic)
-    z, at = eigenvalues.copy(), base[bright]
+            _settle(base, offset, rows, loop)
+    at = base[bright]
     with np.errstate(divide="ignore"):
         log_radius = np.maximum(np.log(abs(z)), SMALLEST_LOG)
-    ratio = offset[bright] / (1 + open_loop.shifts[at])
-    log_radius[bright] = open_loop.log_radius[at] + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
-    z[bright] = (1 + open_loop.shifts[at]) + offset[bright]
+    own = 2 * loop.in_z.poles.real + abs(loop.in_z.poles) ** 2
+    start = np.r_[pulse.poles.real * pulse.sampling.period, np.log1p(np.maximum(own, LEAST_SQUARE)) / 2]
+    ratio = offset[bright] / (1 + shifts[at])
+    log_radius[bright] = start[at] + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
+    z[bright] = (1 + shifts[at]) + offset[bright]
     mode = pulse.mode[abs(z[:, None] - pulse.multipliers).argmin(axis=1)]
     found = SampledPoles(z, log_radius, mode)
     return found if which is None else SampledPoles(z[which], log_radius[which], mode[which])
 
 
-def _settle(base: Whole, offset: Complex, rows: Whole, open_loop: OpenLoop, characteristic: Characteristic) -> None:
+def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> None:
     """Bring some roots to rest, in place: those that never come there stay as they are."""
-    start, shifts = offset.copy(), open_loop.shifts
+    start, shifts, pulse = offset.copy(), loop.open_loop, loop.pulse
+    known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0)]  # of F; what is left is at z = 1
+    poles = np.r_[known, np.zeros(max(0, offset.size - known.size - loop.in_z.poles.size))]
     last = np.full(offset.size, np.inf)
     offset[rows] = np.where(offset[rows] == 0, OFF_POLE, offset[rows])
     with np.errstate(all="ignore"):  # a root on an open-loop pole, and one that strays beyond any number
         for _ in range(MOST_STEPS):
             b, o = base[rows], offset[rows]
             both, one = np.r_[o, o * (1 + DIFFERENCE)], shifts[b]
-            f, ahead = characteristic(1 + (np.r_[one, one] + both), np.r_[b, b], both).reshape(2, -1)
-            slope = (ahead - f) / (DIFFERENCE * o * f) - np.where(b < open_loop.pulse.poles.size, 1 / o, 0.0)
+            f, ahead = loop.characteristic(1 + (np.r_[one, one] + both), np.r_[b, b], both).reshape(2, -1)
+            slope = (ahead - f) / (DIFFERENCE * o * f) - np.where(b < pulse.poles.size, 1 / o, 0.0)
             apart = (one[:, None] - shifts[base]) + (o[:, None] - offset)
-            slope = slope + (1 / ((one[:, None] - open_loop.poles) + o[:, None])).sum(axis=1)
+            slope = slope + (1 / ((one[:, None] - poles) + o[:, None])).sum(axis=1)
             step = 1 / (slope - np.where(apart == 0, 0.0, 1 / apart).sum(axis=1))
             step = np.where((f == 0) | ~np.isfinite(step), 0.0, step)
             offset[rows] = np.where(abs(o - step) < UNMOVED, UNMOVED, o - step)

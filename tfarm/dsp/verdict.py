@@ -27,14 +27,14 @@ from tfarm.arm.checks import whole
 from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
 from tfarm.crossing import Window
 from tfarm.digits import general, plain, singly
-from tfarm.dsp.band import Band, complete_band
 from tfarm.dsp.chain import Chain, Sampling, chain_or_usual
+from tfarm.dsp.circle import Band, complete_band
 from tfarm.dsp.crossings import around, stable_factors, stable_windows
 from tfarm.dsp.discretise import described_law, rule_in_words
 from tfarm.dsp.edges import (
     DelayMargin,
     Figure,
-    ShownWindows,
+    Interval,
     delay_margin,
     shown_damping,
     shown_delay,
@@ -61,7 +61,7 @@ PERIOD_SHARES = (0.1, 0.5, 1.0, 2.0, 5.0)  # of the chain's own period
 class Verdict:
     """Whether a sampled loop is stable, apart from z = 1 of a hub angle that nothing regulates.
 
-    `band` is the part of the arm for which it is proven (`tfarm.dsp.band`); None where nothing is, as at C = 0: then
+    `band` is the part of the arm for which it is proven (`tfarm.dsp.circle`); None where nothing is, as at C = 0: then
     the verdict holds for the first `modes_used` modes, those of `loop`, and high ones may grow by 1e-9 a sample.
     """
 
@@ -231,17 +231,16 @@ class Analysis:
         return self.verdict.loop
 
     @cached_property
-    def shown(self) -> Mapping[str, ShownWindows]:
+    def shown(self) -> Mapping[str, list[Interval]]:
         """The stable intervals of each gain at the hub, the others held, by name."""
         without_loop = (MOMENT_GAIN,) if self.loop.plant.arm.has_massless_hub else ()
         return {
-            name: ShownWindows([], []) if name in without_loop else shown_windows(self.loop, self.verdict.band, name)
-            for name in NAMES
+            name: [] if name in without_loop else shown_windows(self.loop, self.verdict.band, name) for name in NAMES
         }
 
     def interval(self, name: str) -> Window | None:
         """The stable interval around a gain; one on the angle that is 0, where nothing holds that, is its end."""
-        value, windows = self.loop.number(name), self.shown[name].windows
+        value, windows = self.loop.number(name), self.windows[name]
         if name == ANGLE_GAIN and value == 0.0 and self.verdict.is_stable:
             return next((window for window in windows if window[0] <= 0.0 < window[1]), None)
         return around(windows, value)
@@ -249,7 +248,7 @@ class Analysis:
     @property
     def windows(self) -> Mapping[str, list[Window]]:
         """The same intervals without the digits of their edges."""
-        return {name: each.windows for name, each in self.shown.items()}
+        return {name: [(low.value, high.value) for low, high in each] for name, each in self.shown.items()}
 
     @cached_property
     def modes(self) -> ModeTable:
@@ -343,7 +342,7 @@ def verdict_answer(verdict: Verdict, sampling: Sampling) -> dict[str, Any]:
 def sampled_answer(analysis: Analysis) -> dict[str, Any]:
     """The analysis as a dictionary of plain numbers, texts, lists and the table of its modes."""
     verdict, gains = analysis.verdict, analysis.loop.gains
-    arm, sampling, shown = verdict.loop.plant.arm, verdict.loop.chain.sampling, analysis.shown.items()
+    arm, sampling, windows = verdict.loop.plant.arm, verdict.loop.chain.sampling, analysis.windows.items()
     return {
         "arm": arm.name,
         "law": f"u = -{TAKEN_OFF}; a positive root moment M accelerates the hub{driven(arm)}",
@@ -351,14 +350,17 @@ def sampled_answer(analysis: Analysis) -> dict[str, Any]:
         "gain_units": {gain.name: unit_of(gain.name, arm) for gain in LISTED},
         **gains.by_name,
         **verdict_answer(verdict, sampling),
-        **{f"{name}_interval": (it := analysis.interval(name)) and list(it) for name, _ in shown},
-        **{f"{name}_intervals": [list(window) for window in each.windows] for name, each in shown},
+        **{f"{name}_interval": (it := analysis.interval(name)) and list(it) for name, _ in windows},
+        **{f"{name}_intervals": [list(window) for window in each] for name, each in windows},
         "first_unstable_mode": analysis.first_unstable_mode,
         "delay_margin_samples": analysis.delay_margin.samples,
         "delay_margin_is_lower_bound": analysis.delay_margin.is_bound,
         "required_damping_s": analysis.required_damping,
         "shown": {
-            **{f"{name}_intervals": [list(map(_figure, pair)) for pair in each.figures] for name, each in shown},
+            **{
+                f"{name}_intervals": [list(map(_figure, pair)) for pair in each]
+                for name, each in analysis.shown.items()
+            },
             "delay_margin_samples": _figure(analysis.delay),
             "required_damping_s": _figure(analysis.damping),
         },
@@ -465,16 +467,12 @@ def brief_of(verdict: Verdict, chain: Chain) -> SampledBrief:
     )
 
 
-@dataclass(frozen=True)
-class AtPeriod:
-    """One sample period [s]: its verdict, and every stable interval of each gain, by name, through `gains`."""
+class AtPeriod(NamedTuple):
+    """The verdict at one sample period [s], and every stable interval of each gain, by name."""
 
     period: float
-    analysis_modes: int
-    is_settled: bool
-    log_radius: float
-    gains: HubFeedback
-    windows: Mapping[str, tuple[Window, ...]]
+    verdict: Verdict
+    windows: Mapping[str, list[Window]]
 
 
 def at_periods(arm: Arm, gains: HubFeedback, chain: Chain) -> tuple[AtPeriod, ...]:
@@ -483,7 +481,5 @@ def at_periods(arm: Arm, gains: HubFeedback, chain: Chain) -> tuple[AtPeriod, ..
     for share in PERIOD_SHARES:
         period = float(f"{share * chain.sampling.period:.12g}")  # 1 ms, and no 1.0000000000000002 ms
         verdict = sampled_verdict(arm, gains, replace(chain, sampling=replace(chain.sampling, period=period)))
-        windows = {name: tuple(stable_windows(verdict.full, name)) for name in PLANE}
-        growth = verdict.log_radius
-        rows.append(AtPeriod(period, verdict.modes_used, verdict.is_settled, growth, gains, windows))
+        rows.append(AtPeriod(period, verdict, {name: stable_windows(verdict.full, name) for name in PLANE}))
     return tuple(rows)

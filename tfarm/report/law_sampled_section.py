@@ -101,8 +101,8 @@ def held_by(each: LawOnArm, chain: Chain) -> LawAtClock:
     margin = analysis.delay_margin if analysis.verdict.is_settled else None
     if isinstance(each.law, HubFeedback):
         told = [
-            f"{name} {spans(shown.windows, each.law[name], analysis.interval(name))}{written_unit(name, each.arm)}"
-            for name, shown in analysis.shown.items()
+            f"{name} {spans(windows, each.law[name], analysis.interval(name))}{written_unit(name, each.arm)}"
+            for name, windows in analysis.windows.items()
         ]
         words = f"Stable, the others held: {'; '.join(told)}."
         return LawAtClock(each, analysis.verdict, words, margin)

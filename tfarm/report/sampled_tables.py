@@ -36,9 +36,10 @@ def loci_table(data: SampledLoci, stem: str) -> Table:
     rows = []
     for name, locus in ((f"{data.alone.gain} alone", data.alone), *data.by.items()):
         for value, poles in zip(locus.values.tolist(), locus.z, strict=True):
-            law = locus.law.having(locus.gain, value)
+            loop = locus.loop.having(**{locus.gain: value})
+            across, up = (loop.number(each) for each in PLANE)
             each = zip(locus.mode.tolist(), poles, strict=True)
-            rows += [(name, *law.point, mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
+            rows += [(name, across, up, mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
     titles = {"locus": "locus", **{name: name for name in PLANE}, "mode": "mode", "real": "Re z", "imaginary": "Im z"}
     columns = [
         Column(*title, of=list(cells)) for title, cells in zip(titles.items(), zip(*rows, strict=True), strict=True)

@@ -149,7 +149,8 @@ def duration(seconds: float) -> str:
 def against_continuous(data: Sampled) -> str:
     """The continuous interval of the moment gain against the sampled one, end by end."""
     verdict, before, after = data.analysis.verdict, data.continuous.around, data.sampled_K2
-    modes = "" if data.analysis.shown[MOMENT_GAIN].is_settled else f" (first {verdict.modes_used} modes)"
+    edges = [edge for pair in data.analysis.shown[MOMENT_GAIN] for edge in pair]
+    modes = "" if all(edge.is_settled for edge in edges) else f" (first {verdict.modes_used} modes)"
     both = (
         f"the continuous loop is stable for {MOMENT_GAIN} {interval_words(before, data.continuous.looked_at)}; "
         f"the sampled one {interval_words(after)}{modes}"
@@ -253,7 +254,7 @@ def sampled_facts(data: Sampled) -> tuple[Fact, ...]:
     late = f"{significant(margin.samples, 3)} samples"
     by = f"by {late} of delay" if verdict.is_stable else verdict.word
     continuous = span(data.continuous.around, data.continuous.looked_at)
-    on_rate, on_moment = (spans(analysis.shown[name].windows, gains[name]) for name in PLANE)
+    on_rate, on_moment = (spans(analysis.windows[name], gains[name]) for name in PLANE)
     return (
         Fact(label=f"does a {data.ms} ms loop hold?", value=_yes_or_no(data).lower(), beside=f"{by}, {held}"),
         Fact(label="ln|z| a sample, largest", value=scientific(growth, 3), beside="below 0 is stable"),
