@@ -153,7 +153,7 @@ def crossed(
     done = []
     for here, N, P, (name, (low, high)), member in zip(found, A, B, ranges, members, strict=True):
         rest, span = through_origin(N[:2], P[:2]), high - low
-        if rest is not None and low < rest.t < high:
+        if rest is not None and low <= rest.t <= high:
             (zero, half), (whole, part) = abs((N + rest.t * P)[2:4]), abs(P[2:4])
             is_single = zero * part < SIMPLE * half * whole
             more = rest.change if is_single else _change_at(member(), name, rest.t, span, here, float(omega[-1]))

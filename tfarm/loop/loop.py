@@ -175,7 +175,7 @@ class Loop:
         scale = scale - self.delay_of_waves * at
         with np.errstate(over="ignore", invalid="ignore"):  # far from where it is large: no number, and no start
             up, down = (drive + fed_back)[1:] * np.exp(scale[1:] - scale[0])
-        return deflated((drive + fed_back)[0], (up - down) / (2 * h), scale[0], s, self.zeros_at_origin)
+            return deflated((drive + fed_back)[0], (up - down) / (2 * h), scale[0], s, self.zeros_at_origin)
 
     @cached_property
     def delay_of_waves(self) -> float:
