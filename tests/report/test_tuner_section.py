@@ -15,7 +15,7 @@ from tests.report.walked import Walk, columns_of, numbers_of, read, shown_in, to
 from tests.shared import once
 from tfarm.digits import significant
 from tfarm.dsp import Chain, Sampling
-from tfarm.dsp.curves import away
+from tfarm.dsp.traces import away
 from tfarm.errors import CertificationError
 from tfarm.plots.files import save_figure
 from tfarm.plots.learning import draw_curves

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from tests.odd_arms import odd_arms
-from tfarm.dsp.curves import away
+from tfarm.dsp.traces import away
 from tfarm.report.tuner_words import drift_words, shaping_words, tuner_in_short
 from tfarm.report.words import typeset
 from tfarm.tuner import LearningCurves

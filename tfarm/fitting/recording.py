@@ -24,9 +24,9 @@ from tfarm.arm.reading import load_tables
 from tfarm.arm.schema import StrictTable, validated
 from tfarm.arrays import Real
 from tfarm.dsp.chain import TIME_ROUNDING, Chain
-from tfarm.dsp.results import modes_for, simulation_of
+from tfarm.dsp.results import enough_modes
 from tfarm.dsp.scenarios import Scenario
-from tfarm.dsp.simulation import Simulation
+from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.errors import MISSING, ParameterError, did_you_mean, naming
 from tfarm.files import read_mat
 from tfarm.records import record
@@ -216,8 +216,8 @@ def beside_exact(arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun) -> 
     """
     arm, law = tracked(arm, law)
     task = measured.scenario(chain.sampling.period)
-    used = modes_for(None, lambda n: simulation_of(arm, law, chain, task, count=n))
-    return Beside(measured, simulation_of(arm, law, chain, task, count=used.modes))
+    used = enough_modes(lambda n: Simulator(arm, chain, task, law, count=n).run())
+    return Beside(measured, Simulator(arm, chain, task, law, count=used.modes).run())
 
 
 def overshoot(angle: Real, step: float, end: float) -> float:

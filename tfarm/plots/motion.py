@@ -14,9 +14,8 @@ from matplotlib.figure import Figure
 
 from tfarm.arm import Arm, must_be_arm
 from tfarm.digits import plain
-from tfarm.dsp import Simulation, curves
-from tfarm.dsp.curves import TimeCurve
-from tfarm.dsp.ringing import POINTS_A_PERIOD
+from tfarm.dsp import Simulation, traces
+from tfarm.dsp.traces import POINTS_A_PERIOD, TimeCurve
 from tfarm.fitting.recording import Beside
 
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, must_be, safe, style, taken, window
@@ -44,7 +43,7 @@ def slew(arm: Arm, runs: Simulation | Runs, *, ax: Sequence[Axes] | None = None)
             tip_over_time(arm, each, ax=tip)
             motor_over_time(each, arm.input_unit, ax=torque)
             torque.set_xlabel("time  [s]")
-        points, finer = min(curves.points_a_period(arm, run) for run in each.values())
+        points, finer = min(traces.points_a_period(arm, run) for run in each.values())
         coarse = f"{plain(points, 2)} points a period of the fastest mode seen; between={finer} gives {POINTS_A_PERIOD}"
         moment.set_title(coarse if points < POINTS_A_PERIOD else "", loc="right", fontsize=8.0, color=GREY)
     return moment, tip, torque
@@ -75,7 +74,7 @@ def moment_over_time(each: Runs, *, ax: Axes) -> None:
     T = first.scenario.period
     ax.step(t - T, first.scenario.rigid_moment, where="post", color=GREY, lw=1.0, ls=(0, (4, 3)), label="rigid arm")
     for (name, simulation), colour in zip(each.items(), _colours(each), strict=True):
-        draw_curve(curves.root_moment(simulation), ax, colour, name or None)
+        draw_curve(traces.root_moment(simulation), ax, colour, name or None)
     _until(first, ax)
     ax.set_ylabel("root moment  [N m]")
 
@@ -83,7 +82,7 @@ def moment_over_time(each: Runs, *, ax: Axes) -> None:
 def tip_over_time(arm: Arm, each: Runs, *, ax: Axes) -> None:
     """How far the tip is from where a rigid arm on its reference would have it, in mm."""
     for simulation, colour in zip(each.values(), _colours(each), strict=True):
-        found = curves.tip_deviation(arm, simulation)
+        found = traces.tip_deviation(arm, simulation)
         draw_curve(replace(found, low=1e3 * found.low, high=1e3 * found.high), ax, colour)
     _until(next(iter(each.values())), ax)
     ax.set_ylabel("tip − reference  [mm]")
@@ -95,7 +94,7 @@ def motor_over_time(each: Runs, unit: str, *, ax: Axes) -> None:
     in_volts = first.volts is not None
     for simulation, colour in zip(each.values(), _colours(each), strict=True):
         values = simulation.volts if simulation.volts is not None else simulation.torque
-        held = curves.curve(simulation.t, values)
+        held = traces.curve(simulation.t, values)
         if held.is_band:
             draw_curve(held, ax, colour)
         else:

@@ -13,7 +13,7 @@ from typing import Any
 from tfarm.arm import PLANE, Arm
 from tfarm.digits import plain
 from tfarm.dsp import Chain
-from tfarm.dsp.closed import verdict_on
+from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import TfarmError
 from tfarm.loop.closed import verdict_on as continuous_verdict
 from tfarm.plots.files import save_figure
@@ -81,7 +81,7 @@ def law_cells(each: LawOnArm, chain: Chain) -> dict[str, str]:
         if not each.is_discrete:
             cells["verdict"] = continuous_verdict(each.arm, each.law).verdict
     with suppress(TfarmError):
-        word = verdict_on(each.arm, each.law, chain).word
+        word = sampled_verdict(each.arm, each.law, chain).word
         cells["sampled"] = f"{word.upper() if word == 'unstable' else word} when sampled every {in_ms(chain)} ms"
     return cells
 

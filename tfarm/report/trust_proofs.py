@@ -21,7 +21,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.columns import Column, Table
 from tfarm.digits import scientific, significant, singly, worded
 from tfarm.dsp import Chain
-from tfarm.dsp.writing import file_text
+from tfarm.dsp.chain import file_text
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.loop.poles import Poles, poles_of_gains
 from tfarm.plots.words import gains_words

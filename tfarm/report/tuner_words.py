@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
 from tfarm.digits import significant
 from tfarm.dsp import Chain, Simulation
-from tfarm.dsp.curves import away, resolved
 from tfarm.dsp.results import ideal_chain
-from tfarm.dsp.slews import WITHOUT
+from tfarm.dsp.traces import WITHOUT, away, resolved
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.records import record
 from tfarm.report.sections import Fact

@@ -31,7 +31,7 @@ from scipy.optimize import minimize_scalar
 
 from tfarm.arm import MOMENT_GAIN
 from tfarm.arrays import Real
-from tfarm.dsp import SampledLoop, Scenario
+from tfarm.dsp import Sampled, Scenario
 from tfarm.dsp.chain import TIME_ROUNDING
 from tfarm.tuner import kernel
 from tfarm.tuner.guard import constant_windows
@@ -113,10 +113,10 @@ def extra_insensitive(z: complex) -> Real:
     return np.convolve(zero_vibration(complex(beside[0])), zero_vibration(complex(beside[1])))
 
 
-def shaper(loop: SampledLoop, kind: Shaper, modes: int = SHAPED_MODES) -> Real:
+def shaper(loop: Sampled, kind: Shaper, modes: int = SHAPED_MODES) -> Real:
     """The impulses for the first modes below half the sample rate, at the poles of the loop without moment feedback."""
     impulses, build = np.ones(1), zero_vibration if kind == "ZV" else extra_insensitive
-    poles: Any = loop.under(loop.gains.having(MOMENT_GAIN, 0.0)).poles
+    poles: Any = loop.having(**{MOMENT_GAIN: 0.0}).poles
     for mode in range(1, modes + 1):
         own = loop.plant.poles[(loop.plant.mode == mode) & (loop.plant.poles.imag > 0)]
         upper = poles.z[(poles.mode == mode) & (poles.z.imag > 0)]

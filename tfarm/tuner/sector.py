@@ -26,9 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 
-from tfarm.arm import FED_BACK, MOMENT_GAIN
+from tfarm.arm import MOMENT_GAIN
 from tfarm.arrays import Real
-from tfarm.dsp import SampledLoop
+from tfarm.dsp import Sampled
 from tfarm.exact.whole import as_integers, falls, is_positive_definite
 from tfarm.records import record
 
@@ -115,7 +115,7 @@ def _sizes(A: Real, b: Real) -> Real:
 class MovingGain:
     """A sampled loop whose moment gain K moves: A(K) = open - K drive sense^T, apart from the free hub angle."""
 
-    loop: SampledLoop
+    loop: Sampled
 
     @cached_property
     def open(self) -> Real:
@@ -143,8 +143,8 @@ class MovingGain:
         """The closed-loop matrix at a gain."""
         return self._under(K).reduced_matrix()
 
-    def _under(self, K: float) -> SampledLoop:
-        return self.loop.under(self.loop.gains.having(MOMENT_GAIN, K))
+    def _under(self, K: float) -> Sampled:
+        return self.loop.having(**{MOMENT_GAIN: K})
 
     def radius(self, m: float) -> float:
         """Half the width of the widest sector around m; 0 where m itself is unstable."""
@@ -165,7 +165,7 @@ class MovingGain:
     def criterion(self, lo: float, hi: float, theta: Real) -> Real:
         """1 + (lo + hi) Re H + lo hi |H|^2 at z = e^{i theta}, by transfer functions."""
         z = np.exp(1j * theta)
-        moment = self.loop.signals(z, None, np.ones(theta.size))[FED_BACK.index("root_moment")]
+        moment = self.loop.terms(z, None, np.ones(theta.size))[1 + self.loop.place(MOMENT_GAIN)]
         H = moment / self._under(0.0)(z)
         return np.asarray(1 + (lo + hi) * H.real + lo * hi * abs(H) ** 2)
 

@@ -13,7 +13,7 @@ from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
 from tfarm.arm.checks import whole
 from tfarm.dsp import Chain, Simulation, Simulator, scenario
 from tfarm.dsp.chain import Reading, chain_or_usual
-from tfarm.dsp.results import ideal_chain, modes_for, residual_moment_rms, residual_raw_moment_rms, simulation_answer
+from tfarm.dsp.results import enough_modes, ideal_chain, residual_moment_rms, residual_raw_moment_rms, simulation_answer
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
 from tfarm.errors import ParameterError
 from tfarm.records import record
@@ -315,7 +315,7 @@ def controlled_answer(
     chain = with_signals(chain, saved.signals)
     task = scenario(name, arm, chain, duration)
     ideal = ideal_chain(chain)
-    used = modes_for(count, lambda n: saved.gain().run(Simulator(arm, ideal, task, count=n, outputs=outputs)))
+    used = enough_modes(lambda n: saved.gain().run(Simulator(arm, ideal, task, count=n, outputs=outputs)), count)
     run = saved.gain().run(Simulator(arm, chain, task, count=used.modes, between=between, outputs=outputs))
     answer = simulation_answer(arm, saved.gain().servo, run, None, used)
     controller = {
