@@ -28,6 +28,7 @@ AT_ORIGIN = 1e-9  # of the largest of its branch: a pole so near to 0 is there b
 SAME_CROSSING = 1e-3  # of the highest frequency: so near is a crossing of a branch to where its points say that it is
 AT_END = 1e-9  # of the range: a crossing so near to an end is at the end, and not between
 GAIN_KNOWN = 1e-15  # of the larger end of a step: the value at which a branch crosses
+JUST_ABOVE = 1.01  # times the highest frequency of a branch: between two values it may be higher
 STEP = 1e-6  # of a frequency, for a difference
 CROSSINGS_SHOWN = 3  # of a locus in words
 
@@ -82,7 +83,7 @@ def branch_crossings(family: Varied, gain: Real, branches: Complex, top: float) 
     """
     sign, span = float(np.sign(gain[-1] - gain[0])), abs(float(gain[-1] - gain[0]))
     changes, is_damped = _changes(branches), bool(family.first.arm.least_damping)
-    band = max(top, float(np.nanmax(branches.imag, initial=0.0)))
+    band = max(top, JUST_ABOVE * float(np.nanmax(branches.imag, initial=0.0)))
     known = _on_line(family, gain, band) if changes or is_damped else []
     found: list[BranchCrossing] = []
     for number, low, high in changes:
