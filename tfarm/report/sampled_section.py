@@ -149,8 +149,8 @@ def delay_words(found: SampledCase) -> str:
 def facts_of(found: SampledCase) -> list[Fact]:
     """Verdict, delay margin and minimum structural damping of a case."""
     verdict, name = found.verdict, f"{found.each.name}: "
-    facts = [Fact(label=f"{name}{found.each.gains}", value=verdict.word.upper() if verdict.log_radius > 0 else
-                  verdict.word, beside=typeset(f"ln|z| = {scientific(verdict.log_radius, 3)} a sample"))]  # fmt: skip
+    beside = typeset(f"ln|z| = {scientific(verdict.log_radius, 3)} a sample")
+    facts = [Fact(label=f"{name}{found.each.gains}", value=verdict.word.upper(), beside=beside)]
     if verdict.is_stable:
         facts.append(Fact(label=f"{name}delay margin", value=delay_words(found)))
     needed, arm = found.analysis.damping, found.each.arm
