@@ -45,13 +45,7 @@ def test_a_better_residual_holds_and_is_what_a_simulation_finds(name, structure)
     assert found["residual_moment_rms"] == pytest.approx(residual, rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("name", "structure"),
-    [
-        pytest.param("r2", "PD+notch", marks=pytest.mark.xfail(strict=True, reason="the search stops short")),
-        ("r3", "PD"),
-    ],
-)
+@pytest.mark.parametrize(("name", "structure"), BETTER)
 def test_a_design_leaves_no_more_than_the_better_point(name, structure):
     found = tfarm.design(ARMS[name], "residual", structure=structure)
     assert found.value <= BETTER[name, structure][1] * (1 + AS_GOOD)

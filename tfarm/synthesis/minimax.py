@@ -24,7 +24,7 @@ PRICE = 100.0  # of a g above -WITHIN: tuned on the laws of all structures for t
 WITHIN = 1e-5  # below 0, so that what is found holds: tuned with it
 # The others are customary, or were chosen by hand.
 TURNS = 120  # steps of the first part
-GO_ON = 2  # of the points that it comes to, the second part begins at
+GO_ON = 3  # of the points that it comes to, the second part begins at
 LENGTHS_TRIED = 25  # trials of a step's length
 TURNS_A_CHECK = 15  # turns after which a gain below LEAST_PROGRESS ends the first part
 LEAST_PROGRESS = 1e-4  # relative

@@ -1,8 +1,10 @@
 """The search for the best law: many points of the bounds, descents from the best of them, and wider bounds.
 
 The points are those of Sobol's sequence, which leave no large gap (Sobol, 1967); one unknown is searched on a line.
-From those that are best, each apart from the others, `minimax` goes down.  Where the best law lies at an end of the
-bounds that is neither given nor physical, the bounds are widened there, and what is new is searched too.
+From those that are best, each apart from the others, random walks look for better ones, all in step, as scores of many
+laws take little longer than one; from the best of these `minimax` goes down.  All of that may go beyond bounds that
+are neither given nor physical ends, and is repeated from points about the best.  Bounds that the best law lies beyond
+are those of the wider region.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import itemgetter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,21 +26,30 @@ from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Tell
 
 POINTS_LOG2 = 11  # of the number of points
-STRIP_LOG2 = 9  # of that in a strip by which the bounds were widened
 LINE_POINTS = 512  # of one unknown
 LINE_ZOOMS, ZOOM_POINTS = 8, 17  # of the grids between the neighbours of a minimum on a line
-DESCENTS = 6  # from so many points
-STRIP_DESCENTS = 1  # from that of strips
-APART = 0.1  # of the range of x: points that are nearer are not both begun at
-SEED = 0  # of the sequence's scrambling
-WIDENINGS = 5  # at most
-WIDENED_BY = 1.0  # of x: a factor e of a coefficient far above its unit
-WORTH_WIDENING = 1e-3  # relative: where the best got better by less, it is not worth while to widen once more
+BEYOND = 4.0  # of x: so far beyond its bounds a search may go, a factor e^4 of a coefficient far above its unit
+HOPS, HOP_POINTS = 2, 256  # searches from so many points about the best, at a deviation of 1 of x
+APART = 0.02  # of the range of x: points that are nearer are not both begun at
+SEED = 0  # of the sequence's scrambling, and of the walks
+WALK_ROUNDS, HALVED_EVERY, FEWEST_WALKS = 40, 10, 4  # of the walks: rounds, those after which the better half goes on
+WALK_POINTS = 8  # that each tries in a round
+FIRST_STEP, STEP_GROWS, STEP_SHRINKS = 0.15, 1.3, 0.7  # of the range of x; times
 AGREES = 5e-3  # relative: a descent that ends with so nearly the best score agrees
 SAME_POINT = 1e-6  # of x
 FLAT_WITHIN = 0.01  # laws whose score is worse by less than this share bound the flat part
 FLAT_STEPS, FLAT_HALVINGS = 60, 30  # of the way to the bounds, each 1.4 times the one before; of an interval
 AT_ORIGIN = 1e-9  # of that way: the first step
+
+
+class Effort(NamedTuple):
+    """Walks for each coefficient, and descents from the best of what they come to."""
+
+    walks: int
+    descents: int
+
+
+WHOLE, AROUND = Effort(16, 4), Effort(4, 2)  # from points of the bounds, and from some about the best
 
 
 @dataclass(frozen=True)
@@ -82,26 +94,22 @@ class Worst:
 
 
 def search(judge: Worst, form: Structure, tell: Tell) -> Search:
-    """The best laws of a structure within its bounds, which are widened where they cut the search off."""
-    first, starts = form, sobol(*form.box, POINTS_LOG2)
-    best = _descended(judge, form, np.c_[form.origin, starts], DESCENTS, tell)
-    number = len(best)
-    for _ in range(WIDENINGS):
-        ends = [each for each in form.at_ends(best[0][1]) if not is_final(form, *each)]
-        if not ends:
-            break
-        wider = form.wider(ends, WIDENED_BY)
-        tell(f"{form.name}: the best lies at a bound of {', '.join(form.names[place] for place, _ in ends)}: widened")
-        strips = np.concatenate([_strip(form, wider, *each) for each in ends], axis=1)
-        form, before = wider, best[0][0]
-        more = _descended(judge, form, strips, STRIP_DESCENTS, tell, [best[0][1]])
+    """The best laws of a structure near its bounds, which are widened where the best lies beyond."""
+    places = [(place, end) for place in range(form.size) for end in (0, 1) if not is_final(form, place, end)]
+    region = form.wider(places, BEYOND)
+    best = _descended(judge, region, np.c_[form.origin, sobol(*form.box, POINTS_LOG2)], WHOLE, tell)
+    number, rng = len(best), np.random.default_rng(SEED)
+    for _ in range(HOPS if form.size > 1 else 0):
+        around = best[0][1][:, None] + rng.standard_normal((form.size, HOP_POINTS))
+        more = _descended(judge, region, np.clip(around.T, *region.box).T, AROUND, tell)
         number += len(more)
         best = sorted([*best, *more], key=itemgetter(0))
-        if before - best[0][0] < WORTH_WIDENING * abs(before):
-            break
-    close = best[0][0] + AGREES * abs(best[0][0])
-    widened = tuple(a.name for a, b in zip(form.free, first.free, strict=True) if a.bounds != b.bounds)
-    return Search(form, _distinct(best), number, sum(score <= close for score, _ in best), widened)
+    close, x = best[0][0] + AGREES * abs(best[0][0]), best[0][1]
+    beyond = [each for each in places if (form.box[0] > x, form.box[1] < x)[each[1]][each[0]]]
+    widened = tuple(dict.fromkeys(form.names[place] for place, _ in beyond))
+    return Search(
+        form.wider(beyond, BEYOND), _distinct(best), number, sum(score <= close for score, _ in best), widened
+    )
 
 
 def is_final(form: Structure, place: int, end: int) -> bool:
@@ -118,33 +126,58 @@ def sobol(low: Real, high: Real, log2: int) -> Real:
     return np.asarray((low + shares * (high - low)).T)
 
 
-def _strip(form: Structure, wider: Structure, place: int, end: int) -> Real:
-    """Points of the part of wider bounds that is beyond an end of a structure's own."""
-    low, high = (each.copy() for each in wider.box)
-    (high if end == 0 else low)[place] = form.box[end][place]
-    return sobol(low, high, STRIP_LOG2)
-
-
-def _descended(
-    judge: Worst, form: Structure, points: Real, most: int, tell: Tell, more: Sequence[Real] = ()
-) -> list[ScoredPoint]:
-    """Where the search comes to from the best of points (n, laws), and from those of `more`."""
+def _descended(judge: Worst, form: Structure, points: Real, effort: Effort, tell: Tell) -> list[ScoredPoint]:
+    """Where the search comes to from the best of points (n, laws), the lowest first."""
     scores = judge.scores(form, points)
     if form.size == 1:
-        found = [_on_line(judge, form, points[0], scores, n) for n in _dips(points[0], scores, most)]
+        found = [_on_line(judge, form, points[0], scores, n) for n in _dips(points[0], scores, effort.descents)]
         return sorted(found, key=itemgetter(0))
-    low, high = form.box
-    starts = [*more]
-    for n in np.argsort(scores, kind="stable"):
-        if all((abs(points[:, n] - each) > APART * (high - low)).any() for each in starts):
-            starts.append(points[:, n])
-        if len(starts) == most + len(more):
-            break
+    first = points[:, _apart(form, points, scores, effort.walks * form.size)]
+    points, scores = walked(judge, form, first)
+    starts = list(points[:, _apart(form, points, scores, effort.descents)].T)
 
     def told(number: int, score: float) -> None:
         tell(f"{form.name}: descent {number} of {len(starts)}, best so far {score:.6g}")
 
     return minimax(lambda x: judge.pieces(form, x), starts, form.box, told)
+
+
+def _apart(form: Structure, points: Real, scores: Real, most: int) -> list[int]:
+    """The places of the best points, each of them apart from those before."""
+    low, high = form.box
+    found: list[int] = []
+    for n in np.argsort(scores, kind="stable").tolist():
+        if (abs(points[:, [n]] - points[:, found]) > APART * (high - low)[:, None]).any(axis=0).all():
+            found.append(n)
+        if len(found) == most:
+            break
+    return found
+
+
+def walked(judge: Worst, form: Structure, points: Real) -> tuple[Real, Real]:
+    """Where random walks from points (n, walks) come to, in step, and their scores; the better half goes on each time.
+
+    Each goes to the best of some points around it if that is better, and then takes longer steps, else shorter ones:
+    an evolution strategy of one parent (Rechenberg, 1973).
+    """
+    rng, (low, high) = np.random.default_rng(SEED), form.box
+    at, scores, step = points.copy(), judge.scores(form, points), np.full(points.shape[1], FIRST_STEP)
+    ended: list[tuple[Real, Real]] = []
+    for number in range(WALK_ROUNDS):
+        if number and number % HALVED_EVERY == 0:
+            order = np.argsort(scores, kind="stable")
+            kept, left = np.split(order, [max(FEWEST_WALKS, order.size // 2)])
+            ended.append((at[:, left], scores[left]))
+            at, scores, step = at[:, kept], scores[kept], step[kept]
+        moves = rng.standard_normal((*at.shape, WALK_POINTS)) * step[:, None] * (high - low)[:, None, None]
+        tried = np.clip((at[:, :, None] + moves).T, low, high).T
+        values = judge.scores(form, tried.reshape(low.size, -1)).reshape(tried.shape[1:])
+        rows, best = np.arange(step.size), values.argmin(axis=1)
+        better = values[rows, best] < scores
+        at = np.where(better, tried[:, rows, best], at)
+        scores = np.minimum(scores, values[rows, best])
+        step = np.where(better, STEP_GROWS, STEP_SHRINKS) * step
+    return np.concatenate([at, *(x for x, _ in ended)], axis=1), np.concatenate([scores, *(own for _, own in ended)])
 
 
 def _dips(x: Real, scores: Real, most: int) -> NDArray[np.int64]:
