@@ -16,8 +16,8 @@ from tfarm.dsp.chain import Sampling
 from tfarm.synthesis import search
 from tfarm.synthesis.design import design
 from tfarm.synthesis.judge import RESERVE
+from tfarm.tuner.baselines import best_constant
 from tfarm.tuner.trial import slew_trial
-from tfarm.tuner.yardsticks import best_constant
 
 LAB = tfarm.load("sasaki2012-lab")
 HELD = HeldLoop(LAB, 0.01)

@@ -129,9 +129,9 @@ class Signals:
     @cached_property
     def _series(self) -> dict[int, Real]:
         """Power series at rest, coefficients from s^-2 on, of outputs relative to the hub."""
-        assert isinstance(self.system, ElementChain)
+        k = chain_of(self.arm)
         relative = [n for n, each in enumerate(self.outputs) if each.quantity in RELATIVE]
-        series = {n: series_at_zero(self.system, [self.outputs[n]], self.places[n], REST_TERMS) for n in relative}
+        series = {n: series_at_zero(k, [self.outputs[n]], self.places[n], REST_TERMS) for n in relative}
         return {n: np.array(found[0]) for n, found in series.items()}
 
     def values(self, s: NDArray[Any]) -> Complex:

@@ -17,14 +17,14 @@ import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, as_law
 from tfarm.dsp import Chain
-from tfarm.dsp.brief import SampledBrief
 from tfarm.dsp.chain import chain_or_usual
+from tfarm.dsp.verdict import SampledBrief, sampled_brief, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError, must_be_known
 from tfarm.loop.answers import law_answer
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.stability import Stability
 from tfarm.records import record
-from tfarm.synthesis.judge import exact_stability, judges_of, sampled_of, verdict_when_sampled
+from tfarm.synthesis.judge import exact_stability, judges_of
 from tfarm.synthesis.minimax import LOST, ScoredPoint
 from tfarm.synthesis.objectives import OBJECTIVES
 from tfarm.synthesis.search import Search, Worst, flat_part, search
@@ -155,7 +155,7 @@ def design(
     choice, named, case = for_the_worst(arms, box, find, score_on, tell)
     on_arms = tuple(
         OnArm(each.name, each.numbers, judge.value(choice.law), exact_stability(each.arm, choice.law),
-              sampled_of(each.arm, choice.law, chain))
+              sampled_brief(each.arm, choice.law, chain))
         for each, judge in zip(named, choice.worst.judges, strict=True)
     )  # fmt: skip
     own, x = choice.search.form, choice.x
@@ -179,7 +179,7 @@ def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Cha
     text = f"no law {form.name} with {within} was found that is stable"
     if chain is None:
         return f"{text}: widen the bounds"
-    verdict = max((verdict_when_sampled(each.arm, law, chain) for each in arms), key=lambda each: each.log_radius)
+    verdict = max((sampled_verdict(each.arm, law, chain) for each in arms), key=lambda each: each.log_radius)
     growth = float(np.expm1(verdict.log_radius))
     grows = (
         f"under the nearest {verdict.slowest} grows by {growth:.2g} a sample" if growth > 0 else "none has a reserve"

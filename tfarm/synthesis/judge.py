@@ -17,10 +17,8 @@ import numpy as np
 from tfarm.arm import AnyLaw, Arm, HubFeedback, as_law, tracked
 from tfarm.arm.blocks import Rational
 from tfarm.arrays import Complex, Real
-from tfarm.dsp import Chain, Verdict, sampled_verdict
-from tfarm.dsp.brief import SampledBrief, brief_of
-from tfarm.dsp.law_verdict import law_verdict
-from tfarm.dsp.margins import most_modes
+from tfarm.dsp import Chain, sampled_verdict
+from tfarm.dsp.edges import most_modes
 from tfarm.dsp.results import residual_moment_rms, simulated
 from tfarm.dsp.verdict import UNDAMPED_MODES
 from tfarm.errors import ConvergenceError
@@ -161,7 +159,7 @@ class Judge:
         shares = (1.0, 1 / RESERVE, RESERVE) if self.is_sampled else ()
         try:
             return exact_stability(self.arm, law).is_stable and all(
-                verdict_when_sampled(self.arm, law.times(share), self.chain).is_stable for share in shares
+                sampled_verdict(self.arm, law.times(share), self.chain).is_stable for share in shares
             )
         except ConvergenceError:  # on the edge
             return False
@@ -223,16 +221,3 @@ def entries_of(law: AnyLaw) -> list[Entry]:
 def exact_stability(arm: Arm, law: AnyLaw, band: float | None = None) -> Stability[Any]:
     """The verdict without sampling.  Raises ConvergenceError as it does."""
     return stability(arm, law, band) if isinstance(law, HubFeedback) else law_stability(arm, law, band)
-
-
-def verdict_when_sampled(arm: Arm, law: AnyLaw, chain: Chain) -> Verdict[Any]:
-    """The verdict when sampled.  Raises ConvergenceError as it does."""
-    return sampled_verdict(arm, law, chain) if isinstance(law, HubFeedback) else law_verdict(arm, law, chain)
-
-
-def sampled_of(arm: Arm, law: AnyLaw, chain: Chain) -> SampledBrief:
-    """The verdict when sampled, in short; undecided where the loop could not be judged."""
-    try:
-        return brief_of(verdict_when_sampled(arm, law, chain), chain)
-    except ConvergenceError as error:
-        return SampledBrief(sampling=chain.sampling, is_stable=None, log_radius=None, sentence=f"undecided: {error}")

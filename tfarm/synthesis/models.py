@@ -25,7 +25,7 @@ from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain
-from tfarm.dsp.law_plant import sensed_plant
+from tfarm.dsp.plant import sensed_plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.loop.frequencies import band_of, grid
 from tfarm.records import record
