@@ -40,6 +40,16 @@ def each_of(judge):
     return findings
 
 
+def numbered(judge):
+    """The survey of a function of one generator, a new one for each case: by the seed and the case's number."""
+
+    def findings(size, seed):
+        yield from (judge(np.random.default_rng([seed, number])) for number in range(size))
+
+    findings.__name__ = judge.__name__
+    return findings
+
+
 def tally(survey, size, seed):
     """Outcomes counted, and figures listed, of one survey; what has words is printed."""
     outcomes, figures, wrong = Counter(), defaultdict(list), 0
@@ -53,10 +63,10 @@ def tally(survey, size, seed):
     return outcomes, figures, wrong
 
 
-def main(*surveys, size=100):
+def main(*surveys, size=100, seed=1):
     """Run the surveys that are named after size and seed on the command line, or all of them, and exit."""
     given = [int(text) for text in sys.argv[1:3]]
-    size, seed = [*given, *(size, 1)[len(given) :]]
+    size, seed = [*given, *(size, seed)[len(given) :]]
     failed = 0
     for survey in surveys:
         if survey.__name__ in (sys.argv[3:] or [survey.__name__]):

@@ -1,4 +1,4 @@
-"""float64 against ball arithmetic at random (arm, s, x):  python -m tests.exact.accuracy 10000 [seed]
+"""float64 against ball arithmetic at random (arm, s, x):  python -m tests.exact.accuracy SIZE SEED
 
 The error of an output G is counted in the change of G that a relative change of its argument brings about: what is
 left of |G_64/G - 1| after division by 1 + |s dG/ds / G|, along the arm by 1 + |s dG/ds / G| + |x dG/dx / G|.  All of
@@ -7,15 +7,15 @@ it comes from two ball evaluations, at (s, x) and next to it.
 
 import cmath
 import math
-import sys
-import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 
+from tests import survey
 from tests.outputs import OF_ONE_LINK
 from tests.strategies import some_arm, some_s
+from tests.survey import Finding
 from tfarm.exact import balls
 from tfarm.exact.coefficients import coefficients
 from tfarm.exact.fields import fields
@@ -188,29 +188,30 @@ def run_at(place, count, seed=0):
     return [point for _ in range(count) for point in measure(*place(rng), some_share(rng))]
 
 
-def main():
-    count, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    start = time.perf_counter()
-    points = run(count, seed)
-    fair = [point for point in points if not point.flagged]
-    above = sorted((p for p in fair if not p.error <= BOUND), key=lambda p: -p.error)
-    print(f"{count} random (arm, s, x) in {time.perf_counter() - start:.0f} s: {len(points)} representable values,")
-    print(f"{len(points) - len(fair)} of them flagged (the kernel asks for balls there)")
-    print(f"worst error {max(p.error for p in fair):.3g}; {len(above)} above {BOUND:g}")
-    special = [point.error for point in run_near_singularity(count // 4, seed) if not point.flagged]
-    print(f"next to -1/C, at real s: worst error {max(special, default=0.0):.3g} over {len(special)} values")
-    for name, place in PLACES.items():
-        errors = [point.error for point in run_at(place, count // 4, seed) if not point.flagged]
-        print(f"{name}: worst error {max(errors, default=0.0):.3g} over {len(errors)} values")
-        special += errors
-    for name in OF_ONE_LINK:
-        print(f"  {name:18s}{max((p.error for p in fair if p.name == name), default=0.0):.3g}")
-    for point in above[:20]:
+def findings(points, bound=BOUND):
+    """Of each value: flagged, where the kernel asks for balls, or its error."""
+    for point in points:
+        is_wrong = not (point.flagged or point.error <= bound)
         arm, s, x = point.where
-        arm = replace(arm, name="worst")
-        print(f"{point.error:.3g} {point.name} s={s!r} x={x!r}\n    {arm}")
-    return bool(above) or not max(special, default=0.0) <= BOUND
+        words = f"{point.error:.3g} {point.name} s={s!r} x={x!r}\n    {arm}" if is_wrong else ""
+        figures = {} if point.flagged else {"error": point.error, point.name: point.error}
+        outcome = "flagged" if point.flagged else f"above {bound:g}" if is_wrong else f"within {bound:g}"
+        yield Finding(outcome, words, is_wrong, figures)
+
+
+def anywhere(size, seed):
+    return findings(run(size, seed))
+
+
+def next_to_the_singularity(size, seed):
+    """At real s next to -1/C."""
+    return findings(run_near_singularity(size // 4, seed))
+
+
+def in_danger(size, seed):
+    """At each of the places."""
+    return (found for place in PLACES.values() for found in findings(run_at(place, size // 4, seed)))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    survey.main(anywhere, next_to_the_singularity, in_danger, size=10_000, seed=0)

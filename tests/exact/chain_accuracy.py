@@ -1,19 +1,18 @@
-"""float64 against ball arithmetic at random (rig, s, x):  python -m tests.exact.chain_accuracy 5000 [seed]
+"""float64 against ball arithmetic at random (rig, s, x):  python -m tests.exact.chain_accuracy SIZE SEED
 
 The error of an output G is counted as in `accuracy`: |G_64/G - 1| over 1 + |s dG/ds / G|, along the link over
 1 + |s dG/ds / G| + |x dG/dx / G|.  Points that the kernel flags are not its own to answer: balls do.
 """
 
 import math
-import sys
-import time
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 
+from tests import survey
 from tests.chain_elements import reached
-from tests.exact.accuracy import HUGE, STEP, TINY, some_share
+from tests.exact.accuracy import HUGE, STEP, TINY, findings, some_share
 from tests.rigs import some_point, some_rig
 from tfarm.exact import balls
 from tfarm.exact.balls import rational
@@ -155,32 +154,14 @@ def run(count, seed=0, place=anywhere):
     return points
 
 
-def summary(name, points):
-    """One line of a place: the worst error that is not flagged, how many are above the bound, and flagged."""
-    fair = [point.error for point in points if not point.flagged]
-    above = sum(not error <= BOUND for error in fair)
-    share = 100 * (1 - len(fair) / len(points)) if points else 0.0
-    worst = max(fair, default=0.0)
-    return f"{name}: worst error {worst:.3g} over {len(fair)} values, {above} above {BOUND:g}; {share:.2g} % flagged"
+def everywhere(size, seed):
+    return findings(run(size, seed), BOUND)
 
 
-def main():
-    count, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    start = time.perf_counter()
-    points = run(count, seed)
-    print(summary(f"{count} random (rig, s, x) in {time.perf_counter() - start:.0f} s", points))
-    for name in (each.name for each in WANTED):
-        print(f"  {name:18s}{max(p.error for p in points if p.name == name and not p.flagged):.3g}")
-    for name, place in PLACES.items():
-        special = run(math.ceil(count / 10), seed, place)
-        print(summary(name, special))
-        points += special
-    above = sorted((p for p in points if not (p.flagged or p.error <= BOUND)), key=lambda p: -p.error)
-    for point in above[:20]:
-        arm, s, x = point.where
-        print(f"{point.error:.3g} {point.name} s={s!r} x={x!r}\n    {arm}")
-    return bool(above)
+def in_danger(size, seed):
+    """At each of the places."""
+    return (found for place in PLACES.values() for found in findings(run(math.ceil(size / 10), seed, place), BOUND))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    survey.main(everywhere, in_danger, size=5_000, seed=0)

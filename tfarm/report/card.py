@@ -15,7 +15,7 @@ from tfarm.digits import plain
 from tfarm.dsp import Chain
 from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import TfarmError
-from tfarm.loop.closed import verdict_on as continuous_verdict
+from tfarm.loop.stability import stability as continuous_verdict
 from tfarm.plots.files import save_figure
 from tfarm.plots.frequency import draw_card
 from tfarm.plots.words import gains_words

@@ -20,11 +20,11 @@ from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.verdict import SampledBrief, sampled_brief, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError, must_be_known
-from tfarm.loop.answers import law_answer
-from tfarm.loop.law_loop import LawLoop
-from tfarm.loop.stability import Stability
+from tfarm.loop.law_answers import law_answer
+from tfarm.loop.loop import Loop
+from tfarm.loop.stability import Stability, stability
 from tfarm.records import record
-from tfarm.synthesis.judge import exact_stability, judges_of
+from tfarm.synthesis.judge import judges_of
 from tfarm.synthesis.minimax import LOST, ScoredPoint
 from tfarm.synthesis.objectives import OBJECTIVES
 from tfarm.synthesis.search import Search, Worst, flat_part, search
@@ -128,7 +128,7 @@ def design(
     bounds = {"K1": K1, "K2": K2}
     form = structure_of(structure, arm, Kp=Kp, modes=modes, period=chain.sampling.period, bounds=bounds)
     for each in arms:
-        LawLoop(each.arm, as_law(form.record_at(form.origin)))
+        Loop(each.arm, as_law(form.record_at(form.origin)))
         check_bounds(form, each.arm)
 
     def judges(on: Arm) -> Iterator[Any]:
@@ -154,7 +154,7 @@ def design(
 
     choice, named, case = for_the_worst(arms, box, find, score_on, tell)
     on_arms = tuple(
-        OnArm(each.name, each.numbers, judge.value(choice.law), exact_stability(each.arm, choice.law),
+        OnArm(each.name, each.numbers, judge.value(choice.law), stability(each.arm, choice.law),
               sampled_brief(each.arm, choice.law, chain))
         for each, judge in zip(named, choice.worst.judges, strict=True)
     )  # fmt: skip

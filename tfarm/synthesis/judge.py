@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from tfarm.arm import AnyLaw, Arm, HubFeedback, as_law, tracked
+from tfarm.arm import AnyLaw, Arm, as_law, tracked
 from tfarm.arm.blocks import Rational
 from tfarm.arrays import Complex, Real
 from tfarm.dsp import Chain, sampled_verdict
@@ -22,8 +21,7 @@ from tfarm.dsp.edges import most_modes
 from tfarm.dsp.results import residual_moment_rms, simulated
 from tfarm.dsp.verdict import UNDAMPED_MODES
 from tfarm.errors import ConvergenceError
-from tfarm.loop.law_stability import law_stability
-from tfarm.loop.stability import Stability, stability
+from tfarm.loop.stability import stability
 from tfarm.records import record
 from tfarm.synthesis.minimax import LOST, Pieces
 from tfarm.synthesis.models import Model, continuous_model, sampled_model
@@ -142,7 +140,7 @@ class Judge:
         """The least damping ratio: of the continuous loop that of its exact poles."""
         if self.is_sampled:
             return -self.score(law)
-        s = exact_stability(self.arm, law, self.model.band).poles.values
+        s = stability(self.arm, law, self.model.band).poles.values
         s = s[(s.imag > 0) & (s.imag < self.model.band)]
         return float((-s.real / abs(s)).min(initial=1.0))
 
@@ -158,7 +156,7 @@ class Judge:
         """Whether the loop is stable by the exact verdict, when sampled with a reserve, too."""
         shares = (1.0, 1 / RESERVE, RESERVE) if self.is_sampled else ()
         try:
-            return exact_stability(self.arm, law).is_stable and all(
+            return stability(self.arm, law).is_stable and all(
                 sampled_verdict(self.arm, law.times(share), self.chain).is_stable for share in shares
             )
         except ConvergenceError:  # on the edge
@@ -216,8 +214,3 @@ def entries_of(law: AnyLaw) -> list[Entry]:
     parts = as_law(law).parts
     blocks = [(part.signals[0], part.block) for part in parts if isinstance(part.block, Rational)]
     return [Entry(name, np.array(block.num)[:, None], np.array(block.den)[:, None]) for name, block in blocks]
-
-
-def exact_stability(arm: Arm, law: AnyLaw, band: float | None = None) -> Stability[Any]:
-    """The verdict without sampling.  Raises ConvergenceError as it does."""
-    return stability(arm, law, band) if isinstance(law, HubFeedback) else law_stability(arm, law, band)
