@@ -48,7 +48,7 @@ def folder(tmp_path_factory) -> Path:
     for name in ARMS:
         (out / name).mkdir(exist_ok=True)
         save_live(Subject(tfarm.load(name), load_chain(name)), out / name)
-    write_assets(out / ASSETS, out / ASSETS)
+    write_assets(out / ASSETS)
     return out
 
 

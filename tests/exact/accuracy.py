@@ -214,4 +214,4 @@ def in_danger(size, seed):
 
 
 if __name__ == "__main__":
-    survey.main(anywhere, next_to_the_singularity, in_danger, size=10_000)
+    survey.main(anywhere, next_to_the_singularity, in_danger, size=10_000, seed=0)

@@ -164,4 +164,4 @@ def in_danger(size, seed):
 
 
 if __name__ == "__main__":
-    survey.main(everywhere, in_danger, size=5_000)
+    survey.main(everywhere, in_danger, size=5_000, seed=0)

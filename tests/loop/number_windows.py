@@ -1,22 +1,16 @@
-"""Windows of the numbers of random laws, held against verdicts:  python -m tests.loop.number_windows 200 [seed]
+"""Windows of the numbers of random laws, held against verdicts:  python -m tests.loop.number_windows SIZE SEED
 
 Random damped arms and laws as in `tests.loop.law_counts`, delays among them.  Of a law whose windows are found one
 number is drawn and one of its windows: inside it, and just inside and outside of each of its edges, the law with that
 number is counted anew.
 """
 
-import os
-import sys
-import time
-from collections import Counter
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import numpy as np
 
+from tests import survey
 from tests.loop.arms import some_loop
 from tests.loop.law_counts import some_delay, some_law
+from tests.survey import Finding
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
@@ -65,20 +59,19 @@ def judge(rng, arm, law):
     return words
 
 
-def main(size, seed):
-    rng, found, number, start = np.random.default_rng(seed), Counter(), 0, time.perf_counter()
+def places_of_windows(size, seed):
+    """The findings at places in and beside a window of each loop."""
+    rng, number = np.random.default_rng(seed), 0
     while number < size:
         arm = some_loop(rng)[0]
         if not arm.least_damping:
             continue
         law, number = some_law(rng, arm, delay=some_delay(rng, arm)), number + 1
         for word in judge(rng, arm, law):
-            found[word.split(":")[0]] += 1
-            if word.startswith("wrong"):
-                print(number, arm, law, word, flush=True)
-    print(dict(found), f"{time.perf_counter() - start:.0f} s", flush=True)
-    return found
+            outcome, _, words = word.partition(":")
+            is_wrong = outcome == "wrong"
+            yield Finding(outcome, f"{words} {arm} {law}" if is_wrong else "", is_wrong)
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1)["wrong"] > 0)
+    survey.main(places_of_windows)

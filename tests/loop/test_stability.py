@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 import tfarm
-from tests.loop.agreement import some_free_arm, survey
+from tests.loop.agreement import some_cases, some_free_arm
 from tests.loop.arms import hub_units, window_arm
 from tests.loop.ritz_loop import RitzLoop
 from tests.loop.test_lines import held
@@ -24,7 +24,7 @@ LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012
 
 def test_map_count_and_simulation_agree_on_random_loops() -> None:
     """`python -m tests.loop.agreement 2000` for more, of three times as many arms."""
-    cases = survey(6, 4, arms=4)
+    cases = some_cases(6, 4, arms=4)
     assert [case for case in cases if case.outcome != "agree"] == []
     assert len(cases) > 6
     assert {-1, 0, 1} <= {case.of_map for case in cases}

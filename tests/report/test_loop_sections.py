@@ -9,10 +9,11 @@ import pytest
 
 import tfarm
 from tests.loop.arms import window_arm
-from tests.loop.nyquist_counts import survey
+from tests.loop.nyquist_counts import plots
 from tests.plots.labels import complaints
 from tests.report.coarse import coarsen
 from tests.shared import thinned
+from tests.survey import each_of, tally
 from tfarm.arm import Hub, HubFeedback, many_laws
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
@@ -370,9 +371,9 @@ def test_both_counts_of_a_nyquist_plot_are_compared():
 
 def test_random_loops_have_as_many_turns_as_unstable_poles():
     """`python -m tests.loop.nyquist_counts 500` for more; refused are poles as good as on the axis."""
-    outcomes = survey(3, 1)
-    assert sum(each == "agree" for each in outcomes) >= 2
-    assert not any("by finding" in each for each in outcomes)
+    outcomes, _, wrong = tally(each_of(plots), 3, 1)
+    assert outcomes["agree"] >= 2
+    assert wrong == 0
 
 
 def test_a_drawn_curve_keeps_directions_and_ends_on_the_rim():

@@ -26,8 +26,8 @@ from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.plots.words import gains_words
 from tfarm.report.damped_table import PROVEN_DIGITS, proven_damped_modes
+from tfarm.report.kept import keep, kept
 from tfarm.report.loop_laws import has_loop
-from tfarm.report.unchanged import keep, kept
 from tfarm.report.words import typeset
 from tfarm.response.accuracy import BAND_POINTS, worst_error
 from tfarm.spectrum import DampedModes, Modes
