@@ -18,7 +18,7 @@ from tests.loop.ritz_loop import RitzLoop
 from tests.strategies import some_arm
 from tests.survey import Finding
 from tfarm import Hub, HubFeedback
-from tfarm.loop.regions import INFINITE, region
+from tfarm.loop.plane import INFINITE, gain_map
 from tfarm.loop.stability import stability
 
 ARMS = 12
@@ -82,7 +82,7 @@ def some_cases(number, seed=2012, arms=ARMS):
         arm = some_free_arm(rng, damped=n % 3 != 0)
         size = max(2, int(np.ceil(np.sqrt(number / arms))))  # a map has two values of either gain at least
         K1, K2, Kp = some_gains(rng, arm, size)
-        found, model = region(arm, K1, K2, HubFeedback(Kp=Kp)), RitzLoop(arm, TERMS)
+        found, model = gain_map(arm, K1, K2, Kp), RitzLoop(arm, TERMS)
         for j, i in np.ndindex(size, size):
             law = HubFeedback(K1=float(K1[i]), K2=float(K2[j]), Kp=Kp)
             if far_from_boundary(found, law, np.prod(hub_units(arm))):

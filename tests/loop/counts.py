@@ -19,8 +19,9 @@ from tests.loop.arms import some_loop
 from tests.spectrum.damped_roads import newton_step
 from tests.survey import Finding
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
+from tfarm.exact.characteristic import gains_of
 from tfarm.exact.coefficients import coefficients
-from tfarm.loop.poles import poles_of_gains
+from tfarm.loop.poles import closed_loop_poles
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import winding_number
 from tfarm.spectrum.damped import member
@@ -47,7 +48,7 @@ def judge(arm, law, count, *, balls=False) -> Verdict:
     """List the poles of one loop and count them again."""
     start = time.perf_counter()
     try:
-        poles = poles_of_gains(arm, law, count)
+        poles = closed_loop_poles(arm, law, count)
     except (ConvergenceError, ParameterError) as error:
         return Verdict("refused", str(error).splitlines()[0])
     spent = 1e3 * (time.perf_counter() - start)
@@ -55,7 +56,7 @@ def judge(arm, law, count, *, balls=False) -> Verdict:
     counts = [nyquist_count(poles.loop, poles.box)]
     if balls:
         try:
-            counts.append(proven_count(poles.loop.k, poles.box, poles.loop.gains))
+            counts.append(proven_count(poles.loop.k, poles.box, gains_of(poles.loop.k, poles.loop.gains)))
         except CertificationError as error:
             return Verdict("refused", f"proof: {error}")
     step = max((newton_step(arm, complex(s), K1=law.K1, K2=law.K2, Kp=law.Kp) for s in poles.moving[-1:]), default=0.0)
@@ -67,7 +68,7 @@ def judge(arm, law, count, *, balls=False) -> Verdict:
 
 def nyquist_count(loop, box) -> int:
     """Closed-loop poles in a box: turns of 1 + L around it, and the arm's own poles inside."""
-    arm, law = loop.arm, loop.law
+    arm, law = loop.arm, loop.gains
     plant = tfarm.transfer(arm, ["hub_angle", "root_moment"])
 
     def phase(s):

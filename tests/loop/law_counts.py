@@ -16,7 +16,7 @@ from tests.loop.arms import some_loop
 from tests.survey import Finding, each_of
 from tfarm.arm import Law
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.loop.law_stability import law_stability
+from tfarm.loop.stability import stability
 from tfarm.response.signals import Signals
 from tfarm.spectrum.scales import first_frequency
 
@@ -165,7 +165,7 @@ def model(arm, names, count):
 def judge(arm, law):
     """ "right", "refused: ...", "wrong: ..." or "no second road"."""
     try:
-        found = law_stability(arm, law)
+        found = stability(arm, law)
     except (ConvergenceError, ParameterError) as error:
         return f"refused: {str(error).splitlines()[0]}"
     if found.unstable_roots_infinite:

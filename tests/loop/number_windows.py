@@ -12,8 +12,8 @@ from tests.loop.arms import some_loop
 from tests.loop.law_counts import some_delay, some_law
 from tests.survey import Finding
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.loop.law_stability import law_stability
-from tfarm.loop.law_windows import law_windows
+from tfarm.loop.stability import stability
+from tfarm.loop.windows import windows_of
 
 BESIDE = 1e-5  # of an edge: how far from it the verdict is asked
 LEAST = 1e-6  # of the width of a window: what an edge beside 0 is taken to be in size
@@ -32,8 +32,8 @@ def places(rng, window, low, high):
 def judge(rng, arm, law):
     """A word for each check: "right", "refused", "marginal", or "wrong: ..."."""
     try:
-        verdict = law_stability(arm, law)
-        windows = {name: each for name, each in law_windows(verdict).items() if each.all}
+        verdict = stability(arm, law)
+        windows = {name: each for name, each in windows_of(verdict).items() if each.all}
     except (ConvergenceError, ParameterError):
         return ["refused"]
     if verdict.is_stable and any(each.around is None for each in windows.values()):
@@ -46,7 +46,7 @@ def judge(rng, arm, law):
     words = []
     for at, stable in places(rng, window, low, high):
         try:
-            there = law_stability(arm, law.having(name, float(at)))
+            there = stability(arm, law.having(name, float(at)))
         except (ConvergenceError, ParameterError):
             words.append("refused")
             continue

@@ -21,13 +21,12 @@ from tfarm.dsp.sampled import sampled_loop
 from tfarm.dsp.verdict import sampled_brief
 from tfarm.errors import ConvergenceError
 from tfarm.loop import edges
-from tfarm.loop.closed import nyquist
 from tfarm.loop.damping import least_damping
 from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.loci import held_branches, loci
-from tfarm.loop.nyquist import compressed, nyquist_of
-from tfarm.loop.plant import Loop
-from tfarm.loop.poles import poles_of_gains
+from tfarm.loop.loop import Loop
+from tfarm.loop.nyquist import compressed, nyquist, nyquist_of
+from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 from tfarm.plots.plane import nice_levels
 from tfarm.plots.roots import zoomed
@@ -134,7 +133,7 @@ def test_the_contours_are_the_damping_of_the_poles(lab):
     """Least damping ratio by the exact poles in a box, below the band that the caption names."""
     for row, column in ((5, 20), (25, 40), (30, 55)):
         law = HubFeedback(K1=float(lab.axes[0][column]), K2=float(lab.axes[1][row]))
-        poles = poles_of_gains(LAB, law, 6).values
+        poles = closed_loop_poles(LAB, law, 6).values
         poles = poles[(poles.imag > 0) & (poles.imag < lab.band)]
         expected = (-poles.real / abs(poles)).min()
         assert lab.damping[row, column] == pytest.approx(expected, rel=1e-9, abs=0)
@@ -219,7 +218,7 @@ def test_the_loci_are_exact_and_the_gap_is_that_of_what_is_drawn():
     data = loci(LAB, PAPER_GAINS, "K2", -1.0, 1.6)
     for n in (0, 150, 299):
         law = replace(PAPER_GAINS, K2=float(data.exact.gain[n]))
-        poles = poles_of_gains(LAB, law, 5).values
+        poles = closed_loop_poles(LAB, law, 5).values
         for branch in zoomed(data.exact)[:2]:
             here = data.exact.branches[branch, n]
             assert abs(poles - here).min() < 1e-9 * abs(here)

@@ -20,7 +20,7 @@ from tfarm.dsp.loci import sampled_loci
 from tfarm.dsp.modes import mode_table
 from tfarm.dsp.traces import slews, strip_chart
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import gain_windows
+from tfarm.loop.windows import windows_of
 from tfarm.plots.files import save_figure
 from tfarm.plots.regions import draw_overlay
 from tfarm.plots.strip import draw_strip_chart
@@ -48,7 +48,7 @@ def section():
 
 
 def windows(arm, gains=GAINS):
-    return gain_windows(stability(arm, gains), "K2")
+    return windows_of(stability(arm, gains), ["K2"])["K2"]
 
 
 def blocks_of(section):

@@ -24,7 +24,7 @@ from tfarm.exact.outputs import Output
 from tfarm.exact.outputs import output as known_output
 from tfarm.exact.system import System
 from tfarm.exact.values import expansions_at_zero
-from tfarm.records import record
+from tfarm.records import read_only, record
 from tfarm.spectrum.scales import first_frequency
 
 RELATIVE = ("Y", "Phi")  # quantities relative to the hub: differences
@@ -74,7 +74,7 @@ class Signals:
     def kept(self, s: Complex) -> LoopParts:
         """`parts`, not worked out again where they were asked for lately at the same points, as of another law."""
         key, kept = (s.shape, s.tobytes()), self._kept
-        found = kept.pop(key, None) or self.parts(s)
+        found = kept.pop(key, None) or read_only(self.parts(s))
         kept[key] = found  # the last one is the latest
         if len(kept) > GRIDS_KEPT:
             del kept[next(iter(kept))]
