@@ -23,7 +23,6 @@ from tfarm.response.signals import Signals
 from tfarm.spectrum.box import Box, winding_number, zeros_in_box
 from tfarm.spectrum.scales import first_frequency
 
-from .damping import NO_PART
 from .frequencies import band_of
 from .loop import NEAREST_TO_ORIGIN, ORDER_READ_AT, Loop
 from .poles import SLOW_SHARE, box_of, slow_poles, starting_points
@@ -36,6 +35,7 @@ HEIGHTS = (1.0, 1.013, 1.031, 1.057, 0.985, 1.09)  # of the box, until no pole i
 NEWTON_STEPS = 6  # from a guess right to some digits: what has not settled then is followed in shorter steps
 SETTLED = 1e-10  # of its size: one step more is taken where Newton's method still moves a pole by this
 SERIES_RADIUS, SERIES_POINTS = 0.2, 16  # of the first frequency: where a power series next to 0 is read off
+NO_PART = 1e-9  # of a pole's size: a smaller imaginary part is rounding
 EMPTY = Box(0.0, 0.0, 0.0, 0.0)
 LOOPS_KEPT = 200  # at values asked for again: memory against time, of no effect on an answer
 
