@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from tfarm.arrays import Real
 from tfarm.records import record
@@ -119,6 +118,8 @@ def is_final(form: Structure, place: int, end: int) -> bool:
 
 def sobol(low: Real, high: Real, log2: int) -> Real:
     """Points (n, 2^log2) of Sobol's sequence in a box; of one unknown, evenly on a line."""
+    from scipy.stats import qmc  # here, because it takes half a second to load
+
     if low.size == 1:
         shares = (np.arange(LINE_POINTS) + 0.5)[:, None] / LINE_POINTS
     else:
