@@ -14,8 +14,8 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Gains, gains_of, loop_parts, loop_system, torque
 from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.series import expansions_at_zero
 from tfarm.exact.system import System
-from tfarm.exact.values import expansions_at_zero
 from tfarm.records import record
 from tfarm.spectrum.correction import Member
 from tfarm.spectrum.damped import member
