@@ -20,7 +20,6 @@ SURVEYS := \
 	properties \
 	audit.slips \
 	exact.accuracy \
-	exact.chain_accuracy \
 	response.rigid \
 	response.extrema \
 	spectrum.proofs \

@@ -1,9 +1,9 @@
 """float64 against ball arithmetic at random (arm, s, x):  python -m tests.exact.accuracy 5000 [seed]
 
-Arms of one link, whose ends the fused kernel has, and rigs.  The error of an output G is counted in the change of G that
-a relative change of its argument brings about: what is left of |G_64/G - 1| after division by 1 + |s dG/ds / G|, along
-the arm by 1 + |s dG/ds / G| + |x dG/dx / G|.  All of it comes from ball evaluations at (s, x) and next to it.  Points
-that the kernel flags are not its own to answer: balls do.
+Arms of one link, whose ends the fused kernel has, and rigs.  The error of an output G is counted in the change of G
+that a relative change of its argument brings about: what is left of |G_64/G - 1| after division by 1 + |s dG/ds / G|,
+along the arm by 1 + |s dG/ds / G| + |x dG/dx / G|.  All of it comes from ball evaluations at (s, x) and next to it.
+Points that the kernel flags are not its own to answer: balls do.
 """
 
 import cmath

@@ -23,7 +23,7 @@ import tfarm
 from tests.loop.arms import some_loop
 from tests.spectrum.damped_roads import newton_step
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
-from tfarm.exact.coefficients import coefficients
+from tfarm.exact.system import system_of
 from tfarm.loop.poles import poles_of_gains
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import winding_number
@@ -101,7 +101,7 @@ def edge(a, b):
 def own_poles(arm, box) -> int:
     """How many poles the arm itself has in a box."""
     if arm.link.damping:
-        return winding_number(member(coefficients(arm)).function, box, points=2000) + 2 * arm.has_rigid_mode
+        return winding_number(member(system_of(arm)).function, box, points=2000) + 2 * arm.has_rigid_mode
     return 2 * modes_below(arm, box.im_max) + 2 * arm.has_rigid_mode
 
 

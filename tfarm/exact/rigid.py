@@ -107,6 +107,7 @@ def _rigid(element: Any) -> tuple[Any, ...]:
     """A segment as a rigid body between two halves of its length; any other element as it is."""
     if not isinstance(element, Segment):
         return (element,)
-    l, EI, none = element.length, element.stiffness, Fraction(0)
+    l, EI = element.length, element.stiffness
+    none: Any = 0.0
     half = Offset(l / 2)
     return half, Body(EI * element.g / l**3, EI / l * (element.g / 12 + element.a), none, none), half

@@ -56,7 +56,7 @@ LN_2 = math.log(2.0)
 POLE = 1e-11  # drive below this share of its own terms: flagged, it may be a pole
 DIFFERENCE = 0.5  # an output below this share of its own terms has lost a bit: it is summed up from the axis instead,
 SMALL_DIFFERENCE = 0.05  # and where that cannot be, flagged below this share, which has lost four bits
-AXIS = np.array([1.0, 0.0, 0.0, 0.0])  # the condition W = 0 there
+AXIS = np.array([[1.0], [0.0], [0.0], [0.0]])  # the condition W = 0 there, at every point
 
 
 class Work(NamedTuple):
@@ -199,7 +199,7 @@ def _go_back(points: Any, rows: Any, axis: Any, work: Work, differs: bool, lost:
     """
     f, beyond, plane = work.conditions[0], work.conditions[1], work.planes[0]
     for i in range(BLOCK):
-        work.theta[i] = axis[0] * plane[i] + axis[2] * plane[2 * BLOCK + i] - axis[3] * plane[3 * BLOCK + i]
+        work.theta[i] = axis[0, i] * plane[i] + axis[2, i] * plane[2 * BLOCK + i] - axis[3, i] * plane[3 * BLOCK + i]
     left, number = len(work.marked), len(work.kept.low)
     scale, shift, raised = np.zeros(BLOCK, np.complex128), np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
     work.lift[:], work.turn[:], work.slow[:], reach = 0.0, 0.0, True, 0.0
@@ -210,7 +210,7 @@ def _go_back(points: Any, rows: Any, axis: Any, work: Work, differs: bool, lost:
             return
         row = rows[j]
         shift -= work.powers[j]
-        if differs:
+        if differs or row[ROW_KIND] != SEGMENT:
             reach = _yield(points, row, f, work.inner[j], shift, reach, work)
         if row[ROW_KIND] == SEGMENT:
             number -= 1
@@ -222,8 +222,14 @@ def _go_back(points: Any, rows: Any, axis: Any, work: Work, differs: bool, lost:
             left, mark = left - 1, int(row[NUMBER])
             work.scales[mark], work.shifts[mark] = scale, shift
             _meet(f, work.marked[mark])
-            for i in range(BLOCK if number < len(work.kept.low) else 0):  # of W, M and Q little may be left there
-                lost[i] = lost[i] or work.watched[i]
+            if number < len(work.kept.low):  # of W, M and Q little may be left there
+                for i in range(BLOCK):
+                    lost[i] = lost[i] or work.watched[i]
+            else:
+                for i in range(BLOCK):
+                    state, own = work.marked[mark], math.ldexp(1.0, -shift[i])
+                    state[i] = times(reach * work.theta[i] + work.lift[i], own)
+                    state[BLOCK + i] = times(work.theta[i] + work.turn[i], own)
         else:
             _small_back(points, row, f)
         _brought_back(f, 4, raised)
@@ -326,7 +332,7 @@ def drive_terms(s: complex, segment: Any, ends: Any, theta: complex, M: complex)
 def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, lost: Any) -> None:
     """Drive, scale and each output of the free response at s (1-D), a row each; whether digits are lost.
 
-    It obeys axis . (W, Psi, M, Q) = 0 on the hub's axis, W = 0 for `AXIS`.
+    It obeys axis . (W, Psi, M, Q) = 0 on the hub's axis, W = 0 for `AXIS`; `axis` (4, n) has a column a point or one.
 
     A row of `table` is an output: its place (or -1), weights of W, Psi, M, Q there and of theta, power of s, C of the
     gauge, factor.  Digits are lost where two waves of a segment are nearly one, where an output is a small difference
@@ -336,13 +342,15 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
     for o in range(len(table)):
         differs = differs or (table[o, 0] >= 0.0 and table[o, 5] != 0.0)
     work, values = _work(rows), np.empty((1 + len(table), BLOCK), np.complex128)
-    points, lost_here = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_)
+    points, lost_here, held = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_), np.empty((4, BLOCK))
     for first in range(0, s.size, BLOCK):
         n = min(BLOCK, s.size - first)
         points[:n] = s[first : first + n]
         points[n:] = points[0]
         _sweep(points, rows, ends, work, lost_here)
-        _go_back(points, rows, axis, work, differs, lost_here)
+        for i in range(BLOCK):
+            held[:, i] = axis[:, min(first + min(i, n - 1), axis.shape[1] - 1)]
+        _go_back(points, rows, held, work, differs, lost_here)
         _drive(points, _innermost(rows), ends, work.planes[0], values[0], lost_here)
         for o in range(len(table)):
             _output(points, table[o], work, values[1 + o], lost_here)

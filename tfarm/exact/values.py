@@ -69,10 +69,16 @@ def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -
     for C in {each.damping for each in chain.segments if each.damping}:
         radius = np.minimum(radius, CLEAR_OF_SINGULAR * abs(s + 1.0 / C))
     around = _free(those, (s[:, None] + radius[:, None] * SLOPE_CIRCLE).ravel())
-    factor = np.exp(around.scale.reshape(-1, SLOPE_CIRCLE.size) - here.scale[:, None]) / SLOPE_CIRCLE / radius[:, None]
-    drive = (around.drive.reshape(factor.shape) * factor).mean(axis=1)
-    outputs = (around.outputs.reshape(-1, *factor.shape) * factor).mean(axis=2)
-    return here, Free(drive, outputs, here.scale, here.lost)
+    scales = around.scale.reshape(-1, SLOPE_CIRCLE.size)
+    here = here._replace(scale=np.where(np.isfinite(here.scale), here.scale, scales[:, 0]))
+    values, slope = np.exp(scales - here.scale[:, None]), 1.0 / SLOPE_CIRCLE / radius[:, None]
+    drive, outputs = around.drive.reshape(scales.shape) * values, around.outputs.reshape(-1, *scales.shape) * values
+    if here.lost.any():  # there the values are the mean of those around, as where two waves are one
+        here = here._replace(
+            drive=np.where(here.lost, drive.mean(axis=1), here.drive),
+            outputs=np.where(here.lost, outputs.mean(axis=2), here.outputs),
+        )
+    return here, Free((drive * slope).mean(axis=1), (outputs * slope).mean(axis=2), here.scale, here.lost)
 
 
 def free_fields(
@@ -158,7 +164,8 @@ def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
         if any(expansions_at_zero(k, [wanted], x)[0][:2]):
             raise ParameterError(key="s", value=0, remedy="a pole: the arm turns as a rigid body there; choose s != 0")
         return
-    here, slopes = free_slopes(k, (), np.array([s]), 0.0)
+    with np.errstate(all="ignore"):
+        here, slopes = free_slopes(k, (), np.array([s]), 0.0)
     if abs(here.drive[0]) < AT_A_POLE * abs(s) * abs(slopes.drive[0]):  # both 0 where s^2 underflows: no pole there
         name = f"a natural frequency, {abs(s):.10g} rad/s" if s.real == 0 else f"an eigenvalue, {s:.10g} 1/s"
         raise ParameterError(key="s", value=s, remedy=f"a pole: {name}; the response is infinite there, move s")

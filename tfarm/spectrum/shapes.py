@@ -27,7 +27,6 @@ from tfarm.exact.compiled import python_of
 from tfarm.exact.compound import transition_rows
 from tfarm.exact.elements import Body, Place, Segment
 from tfarm.exact.layout import kernel_row
-from tfarm.exact.sweep import AXIS
 from tfarm.exact.system import System
 from tfarm.exact.values import free_fields
 from tfarm.exact.waves import SERIES_RADIUS, even_functions, fill_wave_numbers, transition_series
@@ -37,7 +36,7 @@ _even, _rows, _series = python_of(even_functions), python_of(transition_rows), p
 GAUSS_POINTS = 16  # a panel; exact for the products of waves once a panel holds a few radians
 PANEL_WAVES = 4.0  # rad of the fastest wave in a panel: there 16 points integrate products of two to the last digit
 LEAST_PANELS = 2  # of a segment, however slow its waves: more than they need
-DOUBLE = 4e-15  # relative gap under which two frequencies are one, with two modes
+DOUBLE = 1e-15  # relative gap under which two frequencies are one, with two modes
 CLOSE_MODES = 1e-5  # relative gap under which rounding would leave two modes not quite orthogonal
 QUADRATURE_BLOCK = 2**17  # modes times points that are evaluated at once, each of 256 bytes: memory, whatever the count
 FIRST_BLOCK = 4  # modes, of which each next block has twice as many, as their panels differ: time alone
@@ -57,12 +56,22 @@ class Shapes:
         inner = list(reversed(system.segments))
         edges = np.cumsum([0.0, *(float(each.length) for each in inner)])
         self._segments, self._edges = inner, edges / edges[-1]
-        # of each mode, and of the neighbour below that a close one is freed of: frequency, condition, scale and factor
-        is_second = np.r_[False, np.diff(omega) < DOUBLE * omega[1:]]
-        which = 2 * is_second + np.r_[is_second[1:], False]  # 0 of a single frequency, 1 and 2 of a double one
-        self._omegas, self._which = (np.stack([each, np.r_[each[:1], each[:-1]]]) for each in (omega, which))
-        self._sizes = np.stack([free_fields(system, 1j * each, ())[2].real for each in self._omegas])
-        self._factors = np.stack([np.ones(omega.size), np.zeros(omega.size)])
+        # Each mode is a sum of four responses, two of its own and two of the neighbour below that a close one is freed
+        # of: frequency, condition on the axis (`_condition`), scale and factor of each, of shape (4, modes).
+        gap = np.r_[np.inf, np.diff(omega) / omega[1:], np.inf]
+        is_first, is_second = gap[1:] < DOUBLE, gap[:-1] < DOUBLE
+        close = np.minimum(gap[1:], gap[:-1]) < CLOSE_MODES
+        left = np.array([self._at_axis(which) for which in (0, 1)])
+        best = (abs(left[1]).max(axis=0) > abs(left[0]).max(axis=0)).astype(int)  # the one of which more is left
+        Psi, M, Q = np.where(best, left[1], left[0])
+        own = np.array([Q, -Psi if system.drive.turns else -M])
+        own = np.where(is_first, [[1.0], [0.0]], np.where(is_second, [[0.0], [1.0]], own))
+        which = np.array([np.where(close, 2, best), np.full(omega.size, 3)])
+        self._factors = np.concatenate([np.where(close, own, [[1.0], [0.0]]), np.zeros((2, omega.size))])
+        self._which = np.concatenate([which, np.roll(which, 1, axis=1)])
+        self._omegas = np.array([omega, omega, np.roll(omega, 1), np.roll(omega, 1)])
+        size = free_fields(system, 1j * omega, ())[2].real  # a system that is cut has other scales
+        self._sizes = np.array([size, size, np.roll(size, 1), np.roll(size, 1)])
         self._normalise()
 
     def __call__(self, x: Real) -> Real:
@@ -118,11 +127,12 @@ class Shapes:
 
     def states(self, places: tuple[Place, ...]) -> tuple[Real, Real]:
         """W, Psi, M, Q (fields, modes, places) and the hub angle (modes,)."""
-        fields, theta = self._raw(0, np.arange(self.omega.size), places)
-        (close,) = np.nonzero(self._factors[1])
-        if close.size:
-            more, turned = self._raw(1, close, places)
-            fields[:, close], theta[close] = fields[:, close] + more, theta[close] + turned
+        fields, theta = np.zeros((4, self.omega.size, len(places))), np.zeros(self.omega.size)
+        for row in range(len(self._factors)):
+            (used,) = np.nonzero(self._factors[row])
+            if used.size:
+                more, turned = self._raw(row, used, places)
+                fields[:, used], theta[used] = fields[:, used] + more, theta[used] + turned
         return fields, theta
 
     def panels(self) -> Iterator[tuple[Segment, Real, Real]]:
@@ -145,15 +155,30 @@ class Shapes:
     def _points(self) -> int:
         return GAUSS_POINTS * sum(self._counts)
 
+    def _at_axis(self, which: int) -> Real:
+        """Psi, M and Q (3, modes) on the axis of the state that a condition leaves of the plane at each frequency."""
+        axis = self._condition(which, self.omega)
+        fields, theta, _ = free_fields(self.system, 1j * self.omega, (AT_HUB,), axis)
+        _, _, M, Q = fields[..., 0]
+        return np.array([theta, M + float(self.system.radius) * Q, Q]).real
+
+    def _condition(self, which: int, omega: Real) -> Real:
+        """The condition (4, modes) on the axis: W = 0, the hub's balance A Psi = M, or one of two for close modes."""
+        A = float(self.system.drive.stiffness) - float(self.system.drive.inertia) * omega**2
+        moment = 1.0 if self.system.drive.turns else 0.0
+        size = np.maximum(abs(A), moment) if moment else np.ones(omega.size)
+        balance = np.array([0.0 * A, A / size if moment else size, -moment / size, 0.0 * A])
+        units = np.eye(4)[:, :, None] * np.ones(omega.size)
+        return (units[0], balance, units[1] if moment else units[2], units[3])[which]
+
     def _raw(self, row: int, modes: Any, places: tuple[Place, ...]) -> tuple[Real, Real]:
-        """States and hub angles of those modes (row 1: of their neighbours), under the condition that picks each."""
+        """States and hub angles of those modes in one of their four responses."""
         omega, which = self._omegas[row, modes], self._which[row, modes]
         fields, theta = np.empty((4, omega.size, len(places))), np.empty(omega.size)
-        units = np.eye(4)
-        for number, axis in enumerate((AXIS, units[1 if self.system.drive.turns else 2], units[3])):
-            here = which == number
+        for number in np.unique(which):
+            here, axis = which == number, self._condition(int(number), omega)
             if here.any():
-                states, turned, scale = free_fields(self.system, 1j * omega[here], places, axis)
+                states, turned, scale = free_fields(self.system, 1j * omega[here], places, axis[:, here])
                 unit = np.exp(scale - self._sizes[row, modes][here]) * self._factors[row, modes][here]
                 fields[:, here], theta[here] = (states * unit[:, None]).real, (turned * unit).real  # real on the axis
         return fields, theta
@@ -166,10 +191,12 @@ class Shapes:
         places = Place(ends, "outer"), Place(min(ends + segment.length, Fraction(1)), "inner")
         units = np.array([float(each) for each in segment.units])
         own = np.array([units[0], 1.0, units[1], units[2]])[:, None]
-        result = _of_segment(segment, self.omega, self._raw(0, np.arange(self.omega.size), places)[0], own, x)
-        (close,) = np.nonzero(self._factors[1])
-        if close.size:
-            result[:, close] += _of_segment(segment, self._omegas[1, close], self._raw(1, close, places)[0], own, x)
+        result = np.zeros((4, self.omega.size, x.size))
+        for row in range(len(self._factors)):
+            (used,) = np.nonzero(self._factors[row])
+            if used.size:
+                states, _ = self._raw(row, used, places)
+                result[:, used] += _of_segment(segment, self._omegas[row, used], states, own, x)
         return result
 
     def _moving(self) -> list[tuple[Real, Real]]:
@@ -203,14 +230,14 @@ class Shapes:
         if not self.omega.size:
             return
         with np.errstate(all="ignore"):
-            self._factors[0] = np.concatenate([1.0 / np.sqrt(part.masses()) for part in self.blocks()])
-        lost = ~np.isfinite(self._factors[0])
+            self._factors[:2] /= np.sqrt(np.concatenate([part.masses() for part in self.blocks()]))
+        lost = ~np.isfinite(self._factors).all(axis=0)
         if lost.any():
             worst = float(self.omega[lost][0])
             raise ConvergenceError(f"the mode at {worst:.10g} rad/s has no shape of its own", worst, 0.0)
         for lower in map(int, np.flatnonzero(np.diff(self.omega) < CLOSE_MODES * self.omega[1:])):
             overlap = self.part(lower, lower + 2).mass_matrix()[0, 1]
-            self._factors[1, lower + 1] = -overlap * self._factors[0, lower]
+            self._factors[2:, lower + 1] = -overlap * self._factors[:2, lower]
             self._factors[:, lower + 1] /= math.sqrt(self.part(lower + 1, lower + 2).masses()[0])
         tip, theta = self.tip(), self.theta()
         turned = np.where(abs(tip[1]) > NO_MOTION * abs(theta), tip[1], theta)
@@ -227,6 +254,7 @@ def _of_segment(segment: Segment, omega: Real, ends: Real, own: Real, x: Real) -
     result = np.empty((4, omega.size, x.size))
     result[:, low] = _by_series(segment, omega[low], inner[:, low], x)
     result[:, ~low] = _by_waves(segment, omega[~low], numbers[:, ~low], inner[:, ~low], outer[:, ~low], x)
+    result[:, :, x == 0.0], result[:, :, x == 1.0] = inner[..., None], outer[..., None]
     return result / own[..., None]
 
 
