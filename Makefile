@@ -8,6 +8,7 @@ RIG := tests/data/quanser-2dsfl
 INSTALLED := .venv/.installed
 BENCH_INSTALLED := .venv/.bench
 BROWSER_INSTALLED := .venv/.browser
+LOWEST := .venv-lowest
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check install -c requirements.lock
 
 # What `make survey` runs, one module of tests a line; each takes a size and a seed.
@@ -48,7 +49,7 @@ SURVEYS := \
 	report.plausible \
 	report.twice
 
-.PHONY: help install reports modes bode margins locus sampled tune audit reference test test-browser kernels survey lint bench clean
+.PHONY: help install reports modes bode margins locus sampled tune audit reference test lowest test-browser kernels survey lint bench clean
 
 help: ## list these verbs
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r verb what; do \
@@ -87,6 +88,9 @@ reference: $(INSTALLED) ## write the reference of the public names to reference/
 test: $(INSTALLED) ## run the tests
 	@PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --dist worksteal # else each process compiles what it loads
 
+lowest: $(LOWEST)/.installed ## run the tests with the lowest versions that pyproject.toml allows
+	@PYTHONDONTWRITEBYTECODE= $(LOWEST)/bin/python -m pytest -n 2 --dist worksteal
+
 test-browser: $(INSTALLED) ## open pages in Chromium: errors, digits, times, phone, dark, axe, Nu (ONLY=--marked: CI's part)
 	@if ! { command -v chromium || command -v chromium-browser || command -v google-chrome; } > /dev/null; then \
 		echo "no Chromium on this machine: the browser tests are left out"; \
@@ -99,7 +103,7 @@ kernels: $(INSTALLED) ## run the numerical rooms under other kernels of BLAS and
 
 survey: $(INSTALLED) ## search random cases for a wrong answer (SIZE, SEED, SURVEYS=one or more)
 	@failed=; for each in $(SURVEYS); do echo "== $$each $(SIZE) $(SEED)"; \
-		$(BIN)/python -m tests.$$each $(SIZE) $(SEED) || failed="$$failed $$each"; done; \
+		OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.$$each $(SIZE) $(SEED) || failed="$$failed $$each"; done; \
 		test -z "$$failed" || { echo "failed:$$failed"; exit 1; }
 
 lint: $(INSTALLED) ## check style, types and which room imports which
@@ -112,7 +116,7 @@ bench: $(BENCH_INSTALLED) ## measure speed and memory, beside other packages
 	@$(BIN)/python -m tests.bench
 
 clean: ## remove everything that was generated
-	@rm -rf .venv build dist reference *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	@rm -rf .venv $(LOWEST) build dist reference *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	@find reports -mindepth 1 -maxdepth 1 ! -name README.md ! -name pictures -exec rm -rf {} +
 	@find tfarm tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
@@ -135,6 +139,13 @@ $(INSTALLED): pyproject.toml requirements.lock
 		$(BIN)/tfarm tune sasaki2012-lab --trials 1 > /dev/null && \
 		$(BIN)/tfarm tune sasaki2012-lab --trials 1 --mode online > /dev/null && \
 		$(BIN)/tfarm tune sasaki2012-lab --trials 1 --mode online --sensitivity whole > /dev/null && wait $$!
+
+# pip itself knows only the newest versions
+$(LOWEST)/.installed: pyproject.toml
+	@$(PYTHON) -m venv $(LOWEST)
+	@$(LOWEST)/bin/python -m pip --quiet --disable-pip-version-check install uv
+	@$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct -e '.[dev]'
+	@touch $@
 
 $(BENCH_INSTALLED): $(INSTALLED)
 	@$(PIP) -e '.[bench]'

@@ -76,8 +76,8 @@ def _loop(arm: Any, law: Any) -> dict[str, Any]:
 def _sampled(arm: Any, law: Any) -> dict[str, Any]:
     """The verdict on the sampled loop, its windows of the fourth gain, and what its modes gain a sample."""
     from tfarm.dsp import sampled_loop, sampled_verdict
-    from tfarm.dsp.law import mode_table
-    from tfarm.dsp.margins import stable_windows
+    from tfarm.dsp.crossings import stable_windows
+    from tfarm.dsp.modes import mode_table
 
     verdict = sampled_verdict(arm, law)
     table = mode_table(sampled_loop(arm, law.having("K1", 0.0).having("K2", 0.0).times(1e-6), count=8))
@@ -94,7 +94,7 @@ def _sampled(arm: Any, law: Any) -> dict[str, Any]:
 def _simulated(arm: Any, law: Any) -> dict[str, Any]:
     """The input and the tip of a slew, and what a controller that measures three signals says to the law."""
     import tfarm
-    from tfarm.dsp.measurement import Measurement
+    from tfarm.dsp.simulate import Measurement
     from tfarm.errors import ParameterError
 
     found = tfarm.simulate(arm, law, duration=1.0, count=4)

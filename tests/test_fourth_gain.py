@@ -15,7 +15,7 @@ import tfarm
 from tests.fourth_gain import AXES, OUTPUT, answers_of
 from tests.shared import remembered, thinned
 from tfarm import Law
-from tfarm.dsp.law_verdict import law_verdict
+from tfarm.dsp.verdict import sampled_verdict
 from tfarm.loop.regions import region
 
 SIGNALS = {"K1": "hub_rate", "K2": "root_moment", "Kp": "hub_angle", "K3": OUTPUT}
@@ -136,13 +136,13 @@ def test_what_no_law_has_a_part_in_is_that_of_the_program_without_it(number) -> 
 def test_the_sampled_loop_is_that_of_the_same_law_by_its_signals(number) -> None:
     case, found = CASES[number], answered(number)["sampled"]
     arm = arm_of(case)
-    known = law_verdict(arm, law_of(case))
+    known = sampled_verdict(arm, law_of(case))
     assert found["outside"] == known.loop.poles.unstable
     assert found["sentence"].split(" (")[0] == known.sentence.split(" (")[0]
     assert found["log_radius"] == pytest.approx(known.log_radius, rel=1e-9)
     for window in found["windows"]:
         for end, way in zip(window, (1, -1), strict=True):
-            sides = [law_verdict(arm, law_of(case, K3=end + side * way * 0.01)) for side in (1, -1)]
+            sides = [sampled_verdict(arm, law_of(case, K3=end + side * way * 0.01)) for side in (1, -1)]
             assert [each.is_stable for each in sides] == [True, False]
     assert found["windows"] or not known.is_stable
 

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
         presets,
     )
     from tfarm.comparing import compare
-    from tfarm.dsp.closed import sampled
     from tfarm.dsp.results import simulate
+    from tfarm.dsp.verdict import sampled
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
     from tfarm.exact.outputs import Output
     from tfarm.fitting.data import Measured
@@ -114,7 +114,7 @@ _ROOMS = {  # where a name stands; what it is called there after a colon, if not
     "plots": "plots",
     "read_measured": "fitting.reading",
     "reduce": "reduced",
-    "sampled": "dsp.closed",
+    "sampled": "dsp.verdict",
     "simulate": "dsp.results",
     "spill": "loop.spill",
     "transfer": "response",

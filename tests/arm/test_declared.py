@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import pytest
 from pydantic import ValidationError
 
-from tfarm.arm import declared
-from tfarm.arm.tables import ARM_TABLES, SHAPE_TABLES
+from tfarm.arm import schema
+from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES
 from tfarm.errors import ParameterError
 
 
@@ -20,8 +20,8 @@ class Spring:
             raise ParameterError(key="spring.stiffness", value=self.stiffness, remedy="zero or more")
 
 
-@declared.of(Spring)
-class SpringTable(declared.TomlTable):
+@schema.of(Spring)
+class SpringTable(schema.TomlTable):
     """[spring], with a colour that no spring asks for."""
 
     colour: str = "grey"
@@ -61,7 +61,7 @@ def test_types_are_strict_and_other_keys_are_refused(table, kind):
 )
 def test_one_wrong_key_is_named_in_a_line(table, words):
     with pytest.raises(ParameterError) as refused:
-        declared.validated(SpringTable, table, "spring")
+        schema.validated(SpringTable, table, "spring")
     assert str(refused.value).startswith(words)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from tfarm import Law, ParameterError
 from tfarm.arm.law_tables import load_law
-from tfarm.arm.law_writing import law_toml, save_law
+from tfarm.arm.writing import law_toml, save_law
 
 
 def some_law(rng):

@@ -3,16 +3,16 @@
     python -m tests.audit.slips SIZE SEED
 
 Up to SIZE signs between two terms of each formula, chosen by SEED, turned one at a time: the formula's check must
-find a residual, and read what is wrong and nothing of what is right.  A line a formula; the last counts the faults,
-and the exit code says whether there are any.  Budget: half a minute of CPU for all signs (there are fewer than 100
-in each formula).
+find a residual, and read what is wrong and nothing of what is right.  Budget: half a minute of CPU for all signs
+(there are fewer than 100 in each formula).
 """
 
 import random
 import re
-import sys
 from unittest.mock import patch
 
+from tests import survey
+from tests.survey import Finding
 from tfarm import audit
 from tfarm.audit import appendix, energy, formulas, motion
 
@@ -75,18 +75,15 @@ def faults(name, turned):
         yield f"not caught: {turned}"
 
 
-def survey(size, seed):
-    """The number of faults."""
-    rng, bad = random.Random(seed), 0
+def signs(size, seed):
+    """Of each formula up to `size` signs."""
+    rng = random.Random(seed)
     for name in SIGNED:
         turned_signs = list(flips(FORMULAS[name]))
-        chosen = rng.sample(turned_signs, min(size, len(turned_signs)))
-        found = [fault for turned in chosen for fault in faults(name, turned)]
-        bad += len(found)
-        print(f"{name}: {len(chosen)} of {len(turned_signs)} signs, {'; '.join(found) or 'all caught'}", flush=True)
-    print(f"{bad} faults")
-    return bad
+        for turned in rng.sample(turned_signs, min(size, len(turned_signs))):
+            wrong = "; ".join(faults(name, turned))
+            yield Finding("fault" if wrong else "caught", f"{name}: {wrong}" if wrong else "", bool(wrong))
 
 
 if __name__ == "__main__":
-    sys.exit(survey(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1) > 0)
+    survey.main(signs)

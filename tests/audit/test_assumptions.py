@@ -10,6 +10,7 @@ import pytest
 import tfarm
 from tests.shared import thinned
 from tfarm.audit.assumptions import (
+    assumptions_answer,
     candidate_depths,
     candidate_inertias,
     has_hub_inertia,
@@ -18,7 +19,6 @@ from tfarm.audit.assumptions import (
     own_depth,
     section_study,
 )
-from tfarm.audit.candidates import assumptions_answer
 from tfarm.spectrum.scales import PAPER_GAINS
 from tfarm.tables.files import to_json
 

@@ -1,4 +1,4 @@
-"""Arm files and options that nobody would write, through the command line:  python -m tests.cli.fuzz 5000 [seed]
+"""Arm files and options that nobody would write, through the command line:  python -m tests.cli.fuzz SIZE SEED
 
 SIZE arm files (presets with lines changed, doubled, cut or filled with odd values, and files of noise), each through
 one verb with its defaults, and SIZE/17 sets of odd options on the presets.  Each command must exit 0, 2 or 3, say
@@ -15,13 +15,14 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 import tfarm
+from tests import survey
+from tests.survey import Finding
 
 CPU_SECONDS = 20
 STARTING = 5  # CPU seconds that imports and kernels from the cache may take the first command of a worker
@@ -101,8 +102,6 @@ def odd_options(rng, options):
     arguments = [verb]
     if verb not in ("presets", "audit", "validate"):
         arguments += [str(rng.choice(tfarm.presets()))]
-    if verb == "study":
-        arguments += [str(rng.choice(["curves", "map", "nonsense"]))]
     known = options[verb]
     for _ in range(int(rng.integers(1, 5)) if known else 0):  # a verb may have none
         name, is_flag = known[int(rng.integers(len(known)))]
@@ -120,7 +119,7 @@ def options_of_the_verbs():
             (param.opts[0], bool(getattr(param, "is_flag", False))) for param in verb.params if param.opts[0][:1] == "-"
         ]
         for name, verb in verbs.items()
-        if name not in ("report", "tune", "study")
+        if name not in ("report", "tune")
     }
 
 
@@ -221,43 +220,31 @@ def judge(arguments, code, out, err, seconds):
     return Found(tuple(arguments), code, seconds, wrong)
 
 
-def survey(number, seed):
-    """Every command with what came of it."""
-    found = []
+def commands(size, seed):
+    """What came of every command."""
     with tempfile.TemporaryDirectory() as name:
         worker = Worker(name)
         try:
-            for arguments in cases(number, seed, Path(name)):
-                found.append(judge(arguments, *worker.run(arguments)))
-                if found[-1].wrong:
-                    tell(found[-1])
+            for arguments in cases(size, seed, Path(name)):
+                found = judge(arguments, *worker.run(arguments))
+                words = in_full(found) if found.wrong else ""
+                yield Finding(f"exit {found.code}", words, bool(found.wrong), {"CPU seconds": found.seconds})
         finally:
             worker.end()
-    return found
 
 
-def tell(found):
+def in_full(found):
     """A command that did wrong, with its file."""
-    print(f"WRONG {found.wrong} | {' '.join(map(repr, found.arguments))[:300]}", flush=True)
+    lines = [f"{found.wrong} | {' '.join(map(repr, found.arguments))[:300]}"]
     for argument in found.arguments:
         if argument.endswith(".toml") and os.path.exists(argument):
-            lines = Path(argument).read_bytes().splitlines()
-            print("   ", [line for line in lines if line[:1] not in (b" ", b"#", b"")], flush=True)
-
-
-def main(number, seed):
-    """A tally; whether nothing was wrong."""
-    found = survey(number, seed)
-    wrong = sum(bool(each.wrong) for each in found)
-    slowest = max(found, key=lambda each: each.seconds)
-    print(f"{len(found)} commands: {dict(Counter(str(each.code) for each in found))}, {wrong} wrong")
-    print(f"slowest: {slowest.seconds:.1f} CPU s, {' '.join(slowest.arguments)[:200]}")
-    return not wrong
+            text = Path(argument).read_bytes().splitlines()
+            lines.append(f"    {[line for line in text if line[:1] not in (b' ', b'#', b'')]}")
+    return "\n".join(lines)
 
 
 if __name__ == "__main__":
     if sys.argv[1:] == ["--work"]:
         work()
     else:
-        given = [int(text) for text in sys.argv[1:]] or [300]
-        sys.exit(not main(given[0], given[1] if len(given) > 1 else 1))
+        survey.main(commands, size=300)

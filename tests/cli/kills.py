@@ -1,4 +1,4 @@
-"""Commands that write files, killed at random moments:  python -m tests.cli.kills 200 [seed [command ...]]
+"""Commands that write files, killed at random moments:  python -m tests.cli.kills SIZE SEED
 
 Each command runs in a copy of a folder that holds its files as another arm left them.  After each of SIZE kills every
 file there is whole, the old one or the new, to the last byte, and no page names a file that is not there; after at most
@@ -17,16 +17,14 @@ import signal
 import sys
 import tempfile
 import time
-from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # a fork has none of its parent's threads
 
 import numpy as np
 
 import tfarm
+from tests import survey
+from tests.survey import Finding
 from tfarm.arm import to_toml
 from tfarm.cli.running import run
 
@@ -127,41 +125,38 @@ def _here(arguments, folder, arm):
     return Files.of(folder)
 
 
-def survey(number, seed, names=tuple(COMMANDS)):
-    """The outcome of each kill and of each run after some: "whole", "clean", or what is wrong."""
+def kills(size, seed):
+    """The outcome of each of so many kills of every command, and of each run after some."""
     rng = np.random.default_rng(seed)
-    outcomes = []
     lab = tfarm.load("sasaki2012-lab")
     other = replace(lab, hub=tfarm.Hub(inertia=0.2))
     with tempfile.TemporaryDirectory() as place:
-        for which, name in enumerate(names):
-            arguments, folder = COMMANDS[name], Path(place) / name
-            old = _here(arguments, folder / "old", other)
-            shutil.copytree(folder / "old", folder / "new")
-            new = _here(arguments, folder / "new", lab)
-            spent, first = completed(arguments, folder / "new")
-            share = number // len(names) + (which < number % len(names))
-            while share > 0:
-                shutil.rmtree(folder / "now", ignore_errors=True)
-                shutil.copytree(folder / "old", folder / "now")
-                _given(folder / "now", lab)
-                for _ in range(min(share, KILLS_A_RUN)):
-                    late = bool(rng.random() < 0.5)
-                    killed(arguments, folder / "now", rng.uniform(0, 1.1 * (spent - first if late else spent)), late)
-                    outcomes.append(wrong_with(Files.of(folder / "now"), old, new) or "whole")
-                share -= KILLS_A_RUN
-                ended = completed(arguments, folder / "now") is not None
-                is_new = Files.of(folder / "now").content == new.content
-                outcomes.append("clean" if ended and is_new else f"{name}: a run after kills leaves other files")
-    return outcomes
+        for which, name in enumerate(COMMANDS):
+            share = size // len(COMMANDS) + (which < size % len(COMMANDS))
+            yield from kills_of(name, share, Path(place) / name, lab, other, rng)
 
 
-def main(number, seed=1, *names):
-    """A tally; whether nothing was wrong."""
-    outcomes = survey(int(number), int(seed), names or tuple(COMMANDS))
-    print(dict(Counter(outcomes)))
-    return set(outcomes) == {"whole", "clean"}
+def kills_of(name, number, folder, arm, other, rng):
+    """The same of one command, on an arm in whose folder another one's files are."""
+    arguments = COMMANDS[name]
+    old = _here(arguments, folder / "old", other)
+    shutil.copytree(folder / "old", folder / "new")
+    new = _here(arguments, folder / "new", arm)
+    spent, first = completed(arguments, folder / "new")
+    for share in range(number, 0, -KILLS_A_RUN):
+        shutil.rmtree(folder / "now", ignore_errors=True)
+        shutil.copytree(folder / "old", folder / "now")
+        _given(folder / "now", arm)
+        for _ in range(min(share, KILLS_A_RUN)):
+            late = bool(rng.random() < 0.5)
+            killed(arguments, folder / "now", rng.uniform(0, 1.1 * (spent - first if late else spent)), late)
+            wrong = wrong_with(Files.of(folder / "now"), old, new)
+            yield Finding("wrong" if wrong else "whole", wrong, bool(wrong))
+        ended = completed(arguments, folder / "now") is not None
+        is_clean = ended and Files.of(folder / "now").content == new.content
+        words = "" if is_clean else f"{name}: a run after kills leaves other files"
+        yield Finding("clean" if is_clean else "wrong", words, not is_clean)
 
 
 if __name__ == "__main__":
-    sys.exit(not main(*(sys.argv[1:] or [200])))
+    survey.main(kills)

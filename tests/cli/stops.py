@@ -1,4 +1,4 @@
-"""Reports stopped at random moments by Ctrl-C or SIGTERM:  python -m tests.cli.stops 100 [seed]
+"""Reports stopped at random moments by Ctrl-C or SIGTERM:  python -m tests.cli.stops SIZE SEED
 
 Each run is a process of its own in a session of its own, with two workers.  The signal, or two of them up to 20 ms
 apart, goes to the process or to its group.  Within two seconds the process has ended with 130 or 143 and one line, no
@@ -11,14 +11,15 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from tests import survey
 from tests.cli.kills import Files
+from tests.survey import Finding
 
 COMMAND = (sys.executable, "-m", "tfarm", "report", "sasaki2012-lab", "--out", "pages")
 WITHIN = 2.0  # seconds
@@ -120,23 +121,14 @@ def wrong_with(code, out, said, took, left, stop):
     return ""
 
 
-def survey(number, seed, longest=LONGEST):
+def stops(size, seed):
     """The outcome of each stop, in an empty folder."""
-    for stop in some_stops(number, seed, longest):
+    for stop in some_stops(size, seed):
         with tempfile.TemporaryDirectory() as place:
-            yield outcome(stop, Path(place))
-
-
-def main(number, seed=1, longest=LONGEST):
-    """A tally; whether nothing was wrong."""
-    outcomes = Counter()
-    for found in survey(int(number), int(seed), float(longest)):
-        outcomes[found] += 1
-        if found not in ("clean", "ended before"):
-            print(found, flush=True)
-    print(dict(outcomes))
-    return set(outcomes) <= {"clean", "ended before"}
+            found = outcome(stop, Path(place))
+        is_wrong = found not in ("clean", "ended before")
+        yield Finding("wrong" if is_wrong else found, found if is_wrong else "", is_wrong)
 
 
 if __name__ == "__main__":
-    sys.exit(not main(*(sys.argv[1:] or [100])))
+    survey.main(stops)

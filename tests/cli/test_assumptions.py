@@ -12,7 +12,7 @@ import tfarm
 from tests.shell import heard
 from tests.shell import run as shell
 from tfarm.arm import to_toml
-from tfarm.audit.candidates import assumptions_answer
+from tfarm.audit.assumptions import assumptions_answer
 from tfarm.tables.files import to_json
 
 

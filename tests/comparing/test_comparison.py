@@ -20,8 +20,7 @@ from tfarm.comparing.answers import (
     unpaired_poles,
 )
 from tfarm.comparing.pairing import poles_by_mode
-from tfarm.dsp import sampled_verdict
-from tfarm.dsp.law_verdict import analyse_law
+from tfarm.dsp import Analysis, sampled_verdict
 from tfarm.loop.answers import margins_answer
 from tfarm.plots.compared import draw_comparison
 
@@ -203,7 +202,7 @@ def test_a_law_in_z_beside_gains_is_judged_at_the_clock_of_both():
     late = tfarm.Law({"hub_rate": ([0.35, -0.1], [1.0, -0.2]), "root_moment": 0.3}, period=0.01)
     found = tfarm.compare(LAB, [LAW, late], modes=1)
     for side, law, plane in zip(found.sides, (LAW, late), found.reaches, strict=True):
-        alone = analyse_law(LAB, tfarm.Law.of_gains(law) if law is LAW else law)
+        alone = Analysis(sampled_verdict(LAB, tfarm.Law.of_gains(law) if law is LAW else law))
         assert side.clocked.margins["gain_factor_up"] == alone.gain_factors[1]
         assert side.sampled.is_stable == alone.verdict.is_stable
         _, L = side.loop_function

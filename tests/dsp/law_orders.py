@@ -27,7 +27,7 @@ from tests.loop.law_counts import SIGNALS
 from tests.rigs import some_rig
 from tfarm.arm import Arm, Law
 from tfarm.dsp import Chain, Sampling
-from tfarm.dsp.law_verdict import law_verdict
+from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.spectrum.scales import first_frequency
 
@@ -283,7 +283,7 @@ def integrals_apart(loop):
 def judge(case):
     """ "right", "refused: ...", "wrong: ..." , whether it is proven, or that it need not be."""
     try:
-        verdict = law_verdict(case.arm, case.law, case.chain)
+        verdict = sampled_verdict(case.arm, case.law, case.chain)
         mine, word = verdict.log_radius, verdict.word
         loop = verdict.loop
     except (ConvergenceError, ParameterError) as error:

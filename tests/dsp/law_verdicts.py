@@ -22,10 +22,9 @@ from scipy.linalg import expm
 from tests.loop.arms import some_loop
 from tests.loop.law_counts import SIGNALS
 from tfarm.arm import Law
-from tfarm.dsp import Actuator, Chain, Sampling, pulse_transfer, scenario
-from tfarm.dsp.law_simulate import LawSimulator
-from tfarm.dsp.law_verdict import law_verdict
+from tfarm.dsp import Actuator, Chain, Sampling, Simulator, pulse_transfer, scenario
 from tfarm.dsp.plant import is_analog
+from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.reduced.sensed import sensed_model
 from tfarm.response.signals import Signals
@@ -156,7 +155,7 @@ def radius_of(M, at_one=0):
 def grows(arm, law, chain, count):
     """Whether the input of the simulated loop is larger at the end of 20,000 samples after an impulse than early on."""
     task = replace(scenario("impulse", arm, chain, SAMPLES * chain.sampling.period), impulse=1e-12)
-    run = LawSimulator(arm, law, chain, task, count=count).run()
+    run = Simulator(arm, chain, task, law, count=count).run()
     if run.stopped is not None:
         return True
     size = abs(run.torque)
@@ -167,7 +166,7 @@ def judge(arm, law, chain):
     """ "right", "refused: ...", "wrong: ..." or "too near", and whether a simulation was asked too."""
     try:
         count = None if arm.least_damping else MODES
-        verdict = law_verdict(arm, law, chain, count=count)
+        verdict = sampled_verdict(arm, law, chain, count=count)
     except (ConvergenceError, ParameterError) as error:
         return f"refused: {str(error).splitlines()[0]}", False
     try:

@@ -18,7 +18,7 @@ from tests.dsp.verdicts import Case, some_case
 from tests.strategies import arm_of
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_verdict
-from tfarm.dsp.law import growing_mode
+from tfarm.dsp.modes import dominant
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum import modes
 
@@ -63,7 +63,7 @@ def oracle(case):
 
 def large_enough(verdict):
     """How many polynomials have the mode that is said to grow, three times its number: half of them are modes."""
-    return max(240, 6 * growing_mode(verdict.loop)) if not verdict.is_stable else 240
+    return max(240, 6 * int(dominant(verdict.loop).partition("mode ")[2] or 0)) if not verdict.is_stable else 240
 
 
 def survey(number, seed=1, draw=hurting_case):

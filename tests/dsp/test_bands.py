@@ -8,12 +8,10 @@ import pytest
 
 import tfarm
 from tfarm.arm import FED_BACK, Hub, HubFeedback, Law
-from tfarm.dsp import Chain, Sampling, band, sampled_loop, sampled_map
-from tfarm.dsp.band import HIGHER, complete_band
-from tfarm.dsp.boundary import COARSEST, circle_grid
-from tfarm.dsp.law_loop import sampled_law
-from tfarm.dsp.law_margins import crossing_factors
-from tfarm.dsp.shown import shown_delay
+from tfarm.dsp import Chain, Sampling, circle, sampled_loop, sampled_map
+from tfarm.dsp.circle import HIGHER, complete_band
+from tfarm.dsp.crossings import COARSEST, circle_grid, crossing_factors
+from tfarm.dsp.edges import shown_delay
 from tfarm.dsp.verdict import Verdict
 from tfarm.reduced import modal_model
 
@@ -31,15 +29,15 @@ def test_the_filters_own_pole_errs_by_what_the_model_is_off_at_its_corner(delay)
     z = np.exp(1j * np.linspace(0, np.pi, 2001))
     late = math.exp(-corner * T * (1 - delay % 1))
     most = max(abs((1 - 1 / z) * late / (z - math.exp(-corner * T))))
-    found = band._of_the_filter(loop, 1000.0)
+    found = circle._of_the_filter(loop, 1000.0)
     np.testing.assert_allclose(found, [0.0, *abs(model - exact)[1:] * most], rtol=1e-6, atol=1e-15)
     assert found[2] > 1e-12
-    assert not band._of_the_filter(loop, 150.0).any()  # its pole is left of the line, with those that are left out
+    assert not circle._of_the_filter(loop, 150.0).any()  # its pole is left of the line, with those that are left out
 
 
 def test_the_top_of_a_band_is_so_many_times_the_last_pole_of_the_model():
     loop = sampled_loop(LAB.having(damping=1e-3), GAINS, count=4)
-    shares = complete_band(loop).top / loop.plant.poles.imag.max() / band.ABOVE_MODEL
+    shares = complete_band(loop).top / loop.plant.poles.imag.max() / circle.ABOVE_MODEL
     assert min(abs(shares / factor - 1) for factor in HIGHER) < 1e-12
 
 
@@ -83,7 +81,7 @@ def test_a_law_without_zeros_at_rest_is_seen_to_cross_however_slowly():
     friction, T = 0.3, 0.01
     arm = replace(LAB, hub=replace(LAB.hub, friction=friction))
     law = Law({"hub_rate": -1.0, "hub_angle": 1e-10 * arm.total_inertia / friction})
-    (found,) = [each for each in crossing_factors(sampled_law(arm, law, Chain(), count=2)) if each.at < 1e-3]
+    (found,) = [each for each in crossing_factors(sampled_loop(arm, law, Chain(), count=2)) if each.at < 1e-3]
     assert found.t == pytest.approx(friction, rel=1e-6)
     assert found.at == pytest.approx(1e-5 * T / math.sqrt(1 + friction * T / 2 / arm.total_inertia), rel=1e-6)
     assert found.change == 2

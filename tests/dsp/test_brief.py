@@ -11,8 +11,8 @@ from tests.synthesis.held_loop import HeldLoop
 from tfarm import HubFeedback
 from tfarm.arm import to_toml
 from tfarm.dsp import Chain
-from tfarm.dsp.brief import sampled_brief
 from tfarm.dsp.chain import Sampling
+from tfarm.dsp.verdict import sampled_brief
 from tfarm.synthesis import chosen
 
 LAB = tfarm.load("sasaki2012-lab")

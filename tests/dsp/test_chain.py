@@ -10,10 +10,9 @@ from tfarm.arm import HubFeedback, to_toml
 from tfarm.arm.checks import LARGEST_NUMBER
 from tfarm.arm.schema import arm_of_table
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Slew, load_chain
-from tfarm.dsp.converters import quantisers
+from tfarm.dsp.chain import chain_of_tables, file_text
 from tfarm.dsp.kernel import AMPLIFIER, DAC
-from tfarm.dsp.reading import chain_of_tables
-from tfarm.dsp.writing import file_text
+from tfarm.dsp.simulate import quantisers
 from tfarm.errors import ParameterError
 
 LAB = """

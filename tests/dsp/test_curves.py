@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.dsp import Chain, Slew, scenario
-from tfarm.dsp.curves import (
+from tfarm.dsp.results import drawn
+from tfarm.dsp.traces import (
     LEAST_BETWEEN,
     MOST_LINE,
     PERIODS,
@@ -17,9 +18,8 @@ from tfarm.dsp.curves import (
     points_a_period,
     reference_angle,
     root_moment,
+    slews,
 )
-from tfarm.dsp.results import drawn
-from tfarm.dsp.slews import slews
 from tfarm.report.time_responses import slews_table
 from tfarm.spectrum.scales import default_gains
 

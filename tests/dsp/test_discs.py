@@ -9,9 +9,8 @@ import pytest
 import tfarm
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, sampled_loop
-from tfarm.dsp.circle import Circle, Discs, _Arcs
-from tfarm.dsp.law_circle import product
-from tfarm.dsp.shown import Figure
+from tfarm.dsp.circle import Circle, Discs, _Arcs, product
+from tfarm.dsp.edges import Figure
 
 ROOTS = {  # less 1
     "a constant": [],

@@ -12,9 +12,9 @@ from tests.shared import sized
 from tfarm import Law
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain, Converters, Sampling
-from tfarm.dsp.law_factors import law_factors
-from tfarm.dsp.law_loop import acting_law, sampled_law, with_estimate
-from tfarm.dsp.law_verdict import analyse_law, law_verdict
+from tfarm.dsp.discretise import acting_law, law_in_z, with_estimate
+from tfarm.dsp.sampled import sampled_loop
+from tfarm.dsp.verdict import Analysis, sampled_verdict
 
 LAB, FILES = tfarm.load("sasaki2012-lab"), Path(__file__).parents[1] / "data" / "reproductions"
 T = 0.01
@@ -30,7 +30,7 @@ def chain_of(period):
 
 
 def is_stable(law, chain):
-    return law_verdict(LAB, law, chain).is_stable
+    return sampled_verdict(LAB, law, chain).is_stable
 
 
 # ------------------------------------------------------------ verdicts
@@ -39,7 +39,7 @@ def is_stable(law, chain):
 def test_five_poles_next_to_one_are_no_integrator():
     """At 0.5 ms the loop's poles are as good as those of continuous time, which the exact arm has."""
     chain = chain_of(0.0005)
-    analysis = analyse_law(LAB, SLOW, chain)
+    analysis = Analysis(sampled_verdict(LAB, SLOW, chain))
     verdict, (low, high) = analysis.verdict, analysis.gain_factors
     slowest = tfarm.closed_loop_poles(LAB, SLOW, 4).values.real.max()
     assert (verdict.word, verdict.is_settled, verdict.loop.poles_at_one) == ("stable", True, 0)
@@ -53,7 +53,7 @@ def test_five_poles_next_to_one_are_no_integrator():
 def test_a_rig_that_eleven_states_drive_grows_slowly():
     arm = tfarm.load(str(FILES / "2_9.toml"))
     case = Case(arm, load_law(FILES / "2_9_law.toml"), chain_of(0.000675))
-    verdict = law_verdict(arm, case.law, case.chain)
+    verdict = sampled_verdict(arm, case.law, case.chain)
     at_one, logs = truth(verdict.loop, case)
     assert (verdict.word, verdict.is_settled, verdict.loop.poles_at_one) == ("unstable", True, 0)
     assert at_one == 2  # the integrals of the input, which a hub on a spring does not have
@@ -65,7 +65,7 @@ def test_a_rig_that_eleven_states_drive_grows_slowly():
 @pytest.mark.parametrize("rule", ["tustin", "zoh", "matched"])
 def test_a_cluster_of_eight_poles_has_the_radius_of_its_state_transition(rule, period):
     case = Case(LAB, Law(CLUSTER, rule=rule), chain_of(period))
-    verdict = law_verdict(LAB, case.law, case.chain)
+    verdict = sampled_verdict(LAB, case.law, case.chain)
     at_one, logs = truth(verdict.loop, case)
     assert (verdict.is_settled, at_one) == (True, 0)
     found = np.sort(verdict.loop.poles.log_radius)[:-11:-1]
@@ -84,7 +84,7 @@ def test_a_cluster_of_eight_poles_has_the_radius_of_its_state_transition(rule, p
 def test_an_integrator_is_one_if_its_denominator_vanishes_exactly(den, at_one):
     """The moment of a hub that turns steadily is 0, so that what integrates it stays where it is."""
     case = Case(LAB, Law({"hub_rate": 0.3, "root_moment": ([0.001, 0.0], den)}, period=T), chain_of(T))
-    loop = sampled_law(LAB, case.law, case.chain, count=4)
+    loop = sampled_loop(LAB, case.law, case.chain, count=4)
     there, logs = truth(loop, case)
     assert (loop.poles_at_one, there - loop.has_free_angle) == (at_one, at_one)
     largest = 0.0 if at_one else logs[0]
@@ -101,6 +101,14 @@ def test_small_run_of_the_survey(number):
 # ------------------------------------------------------------ factors
 
 
+def values_of(in_z, delta):
+    """What each part multiplies each signal by (parts, signals, n), at z = 1 + delta."""
+    values = np.zeros((len(in_z.parts), len(in_z.signals), delta.size), complex)
+    for part, row, gain, zeros in in_z.terms:
+        values[part, row] += gain * (delta[:, None] - zeros).prod(axis=1)
+    return values / (delta[:, None] - in_z.poles).prod(axis=1)
+
+
 LAWS = {
     "tustin": Law(CLUSTER),
     "zoh": Law({"hub_angle": ([1.0, 0.0, 0.0], [1.0, 5.0, 4.0, 0.0]), "hub_rate": ([1.0, 0.0], LAG)}, rule="zoh"),
@@ -112,9 +120,9 @@ LAWS = {
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_values_next_to_one_are_those_of_states_in_balls(law):
     """C (z - A)^-1 B + D, at points from 1e-6 to 2 away from z = 1."""
-    factors = law_factors(law, Chain())
+    in_z = law_in_z(law, acting_law(LAB, law, Chain())[0], Chain())
     delta = np.r_[1e-6j, 1e-4 + 1e-4j, 0.03j, -0.3 + 0.7j, -1.999]
-    shares, whole = factors.shares(delta)
+    values = values_of(in_z, delta)
     before, flint.ctx.prec = flint.ctx.prec, BITS
     try:
         for n, (name, block, through) in enumerate(law_in_balls(Case(LAB, law, Chain()))):
@@ -124,7 +132,7 @@ def test_values_next_to_one_are_those_of_states_in_balls(law):
                     A, B, C = (flint.acb_mat(matrix) for matrix in block)
                     z = 1 + flint.acb(each.real, each.imag)
                     value += (C * (unit(A.nrows()) * z - A).inv() * B)[0, 0]
-                found = shares[n, law.signals.index(name), k] / whole[k]
+                found = values[n, law.signals.index(name), k]
                 assert found == pytest.approx(complex(value), rel=1e-12)
     finally:
         flint.ctx.prec = before
@@ -144,11 +152,11 @@ OTHERS = {
 @pytest.mark.parametrize("law", OTHERS.values(), ids=OTHERS)
 def test_factors_are_those_of_the_law_as_it_acts(law, hub_rate):
     chain = Chain(converters=Converters(hub_rate=hub_rate, rate_filter=80.0))
+    in_z = law_in_z(law, acting_law(LAB, law, chain)[0], chain)
     acting = with_estimate(acting_law(LAB, law, chain)[0], chain)
     z = np.array([1.3, 0.4 + 0.9j, -1.2 + 0.1j])
-    factors = law_factors(law, chain)
-    shares, whole = factors.shares(z - 1)
-    assert factors.signals == acting.signals
-    np.testing.assert_allclose(shares.sum(axis=0) / whole, acting.values(z), rtol=1e-11, atol=1e-15)
-    weighted = factors.weighted([2.0] * len(law.parts)).shares(z - 1)[0]
-    np.testing.assert_allclose(weighted, 2 * shares, rtol=1e-15)
+    assert in_z.signals == acting.signals
+    np.testing.assert_allclose(values_of(in_z, z - 1).sum(axis=0), acting.values(z), rtol=1e-11, atol=1e-15)
+    A, B, C, D = in_z.under([2.0] * len(law.parts))
+    by_states = np.array([C @ np.linalg.solve(each * np.eye(len(A)) - A, B) + D for each in z.tolist()])
+    np.testing.assert_allclose(by_states[:, 0].T, 2 * acting.values(z), rtol=1e-11, atol=1e-15)

@@ -14,10 +14,8 @@ from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, load_chain, scenario
-from tfarm.dsp.law_loop import sampled_law
-from tfarm.dsp.law_simulate import LawSimulator
-from tfarm.dsp.law_verdict import law_verdict
-from tfarm.dsp.scenarios import SCENARIOS
+from tfarm.dsp.sampled import sampled_loop
+from tfarm.dsp.verdict import sampled_verdict
 
 T = 0.01
 LAB, RIG = tfarm.load("sasaki2012-lab"), tfarm.load("quanser-2dsfl")
@@ -41,19 +39,11 @@ def assert_close(mine, theirs, tolerance=ROUNDED):
     assert mine.saturated == theirs.saturated
 
 
-@pytest.mark.parametrize("chain", [Chain(), REAL], ids=["ideal", "real"])
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_gains_at_the_hub_do_the_same_as_a_law(name, chain):
-    gains, task = HubFeedback(K1=0.3, K2=0.3, Kp=1.0), scenario(name, LAB, chain, 2.0)
-    mine = LawSimulator(LAB, Law.of_gains(gains), chain, task, count=8).run()
-    assert_close(mine, Simulator(LAB, chain, task, count=8).linear(gains))
-
-
-def test_float32_is_that_of_the_gains_to_its_last_bits():
-    chain, gains = Chain(converters=Converters(arithmetic="float32")), HubFeedback(K1=0.3, K2=0.3)
-    task = scenario("slew", LAB, chain, 2.0)
-    mine = LawSimulator(LAB, Law.of_gains(gains), chain, task, count=6).run()
-    assert_close(mine, Simulator(LAB, chain, task, count=6).linear(gains), 20 * np.finfo(np.float32).eps)
+def test_in_float32_a_law_differs_by_its_last_bits():
+    law = Law({"hub_angle": ([4.0, -3.6], [1.0, -0.5]), "root_moment": 0.1}, period=T, references=("hub_angle",))
+    chains = [Chain(converters=Converters(arithmetic=each)) for each in ("float32", "float64")]
+    mine, exact = (Simulator(LAB, each, scenario("slew", LAB, each, 2.0), law, count=6).run() for each in chains)
+    assert_close(mine, exact, 200 * np.finfo(np.float32).eps)
     assert (mine.torque == mine.torque.astype(np.float32)).all()
 
 
@@ -67,7 +57,7 @@ def test_a_law_with_states_is_a_controller_that_remembers():
         memory[:] = out, m.hub_angle
         return m.feedforward - out - 0.1 * m.root_moment
 
-    mine = LawSimulator(LAB, law, Chain(), task, count=8).run()
+    mine = Simulator(LAB, Chain(), task, law, count=8).run()
     assert_close(
         mine, Simulator(LAB, Chain(sampling=Sampling(delay_samples=0.4)), task, count=8).controller(controller)
     )
@@ -80,9 +70,9 @@ def test_a_servo_follows_as_python_control_says():
         period=T, references=("hub_angle",),
     )  # fmt: skip
     task = scenario("slew", LAB, Chain(), 2.0)
-    mine = LawSimulator(LAB, law, Chain(), task, count=6).run()
+    mine = Simulator(LAB, Chain(), task, law, count=6).run()
     A, B, C, D = law.matrices()
-    plant = sampled_law(LAB, law, Chain(), count=6).pulse.state_space()
+    plant = sampled_loop(LAB, law, Chain(), count=6).pulse.state_space()
     loop, by_angle = control.feedback(plant, control.ss(A, B, C, D, T)), control.ss(A, B[:, [0]], C, D[:, [0]], T)
     t = np.arange(task.feedforward.size) * T
     led = task.feedforward + control.forced_response(by_angle, t, task.hub_angle).outputs
@@ -101,7 +91,7 @@ def test_a_column_of_references_is_a_reference():
         ["hub_angle", "reference:hub_angle", "hub_rate"],
         sign=1,
     )
-    assert_close(*(LawSimulator(LAB, law, Chain(), task, count=6).run() for law in (one, other)))
+    assert_close(*(Simulator(LAB, Chain(), task, law, count=6).run() for law in (one, other)))
 
 
 def test_what_a_law_of_gains_follows_are_its_references():
@@ -175,7 +165,7 @@ def test_the_columns_are_what_the_law_files_take_them_for():
 def test_the_exact_rig_under_the_real_controllers_is_that_of_a_model_of_order_80(name, late):
     law = real(name)
     chain = Chain(sampling=Sampling(delay_samples=late / T))
-    loop = law_verdict(RIG, law, chain, count=40).loop
+    loop = sampled_verdict(RIG, law, chain, count=40).loop
     other = radius_of(stepped(RIG, loop.law, loop.chain), loop.has_free_angle)
     assert loop.poles.log_spectral_radius == pytest.approx(other, abs=1e-10)
     assert loop.poles.is_stable == (name == "hinf")

@@ -9,10 +9,9 @@ import tfarm
 from tfarm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.dsp.chain import Slew
+from tfarm.dsp.edges import another
 from tfarm.dsp.loci import RIM, STRONGER, sampled_loci
-from tfarm.dsp.shown import another
-from tfarm.dsp.slews import slews
-from tfarm.dsp.strip_chart import strip_chart
+from tfarm.dsp.traces import slews, strip_chart
 
 LAB = tfarm.load("sasaki2012-lab")
 GAINS = HubFeedback(K1=0.3, K2=0.3)

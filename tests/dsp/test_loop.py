@@ -9,7 +9,7 @@ import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, plant, sampled_loop
-from tfarm.dsp.law import followed_branches, mode_table
+from tfarm.dsp.modes import followed_branches, mode_table
 from tfarm.errors import ParameterError
 
 pytestmark = pytest.mark.kernels
@@ -122,7 +122,7 @@ def test_a_rate_by_difference_is_in_the_matrix_as_in_F(lab, delay, Kp, hub_dampi
     assert z.size >= 8
     np.testing.assert_allclose(abs(loop(z)), 0, atol=1e-8)
     a = np.exp(-200.0 * T)
-    angle, _, moment = loop.pulse(z)
+    angle, moment = loop.pulse(z)
     by_hand = 1 + Kp * angle + 0.3 * (1 - a) * (z - 1) / (T * (z - a)) * angle + 0.25 * moment
     np.testing.assert_allclose(abs(by_hand), 0, atol=1e-7)
 
@@ -149,7 +149,7 @@ SIZE = 1e-4  # of a gain: the difference over both signs is right to its square,
 
 def added(loop, by):
     """What a gain of that name alone adds to ln|z| of each listed mode, by the loop's own poles at a tiny gain."""
-    less, more = (loop.under(HubFeedback(**{by: sign * SIZE * loop.gains[by]})).poles for sign in (-1, 1))
+    less, more = (loop.times(0.0).having(**{by: sign * SIZE * loop.number(by)}).poles for sign in (-1, 1))
 
     def largest(poles, n):
         return poles.log_radius[poles.mode == n].max()

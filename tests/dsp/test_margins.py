@@ -12,14 +12,12 @@ from tfarm.dsp import (
     Chain,
     Converters,
     Sampling,
-    analyse,
     delay_margin,
     required_damping,
     sampled_loop,
     sampled_map,
 )
-from tfarm.dsp.boundary import circle_crossings, circle_grid
-from tfarm.dsp.margins import around, stable_windows
+from tfarm.dsp.crossings import around, circle_grid, number_crossings, stable_windows
 from tfarm.dsp.regions import ENDS_AT, ends_of_K1
 from tfarm.dsp.verdict import sampled_answer, sampled_verdict
 from tfarm.errors import ParameterError
@@ -82,17 +80,17 @@ def test_between_crossings_the_counts_are_those_of_the_eigenvalues(name, delay):
     loop = sampled_loop(tfarm.load(name), GAINS, chain, count=10)
     grid = circle_grid(loop)
     for gain, other in (("K2", 0.3), ("K2", 7.0), ("K1", 0.3), ("K1", -0.1)):
-        law = HubFeedback(K1=other, K2=other)
-        found = circle_crossings(grid, gain, law)
+        held = loop.having(K1=other, K2=other)
+        found = number_crossings(grid, gain, held.row)
         middles = np.r_[found.gain[0] - 1, (found.gain[1:] + found.gain[:-1]) / 2, found.gain[-1] + 1]
-        counts = [growing(replace(loop, gains=law.having(gain, m))) for m in middles]
+        counts = [growing(held.having(**{gain: m})) for m in middles]
         np.testing.assert_array_equal(np.diff(counts), found.change)
 
 
 def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
     """Sixty samples turn the loop's phase sixty times round the circle; a grid ten times coarser loses a pair."""
     loop = sampled_loop(lab, GAINS, Chain(sampling=Sampling(delay_samples=60.0)), count=6)
-    found = circle_crossings(circle_grid(loop), "K1", HubFeedback(K2=0.3))
+    found = number_crossings(circle_grid(loop), "K1", loop.having(K1=0.0, K2=0.3).row)
     gaps = np.nonzero(np.diff(found.gain) > 1e-6)[0]
     middles = np.r_[found.gain[0] - 1, (found.gain[gaps + 1] + found.gain[gaps]) / 2, found.gain[-1] + 1]
     passed = np.r_[0, np.cumsum(found.change)][np.searchsorted(found.gain, middles)]
@@ -160,7 +158,7 @@ def test_the_required_damping_is_where_the_verdict_turns(lossless):
 def test_at_a_crossing_the_closed_loop_matrix_has_an_eigenvalue_at_its_angle(lab, gain):
     """Not only the gain of a crossing is right, but the place on the circle, too."""
     loop = sampled_loop(lab, GAINS, count=6)
-    found = circle_crossings(circle_grid(loop), gain, GAINS)
+    found = number_crossings(circle_grid(loop), gain, loop.row)
     assert found.gain.size > 3
     for value, angle in zip(found.gain.tolist(), found.at.tolist(), strict=True):
         eigenvalues = loop.having(**{gain: value}).eigenvalues
@@ -198,7 +196,7 @@ def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossl
 
 
 def test_the_answer_is_plain_and_consistent(lab):
-    answer = sampled_answer(analyse(lab, GAINS))
+    answer = sampled_answer(tfarm.sampled(lab, GAINS))
     assert answer["stable"] is True
     assert answer["spectral_radius"] < 1
     low, high = answer["K2_interval"]
@@ -213,7 +211,7 @@ def test_the_answer_is_plain_and_consistent(lab):
         assert float(figure["text"]) == pytest.approx(answer[key], rel=5e-4)
     assert answer["first_unstable_mode"] is None
     assert [mode["index"] for mode in answer["modes"]] == list(range(1, len(answer["modes"]) + 1))
-    unstable = sampled_answer(analyse(lab, HubFeedback(K1=0.3, K2=1.3)))
+    unstable = sampled_answer(tfarm.sampled(lab, HubFeedback(K1=0.3, K2=1.3)))
     assert unstable["stable"] is False
     assert unstable["spectral_radius"] > 1
     assert unstable["K2_interval"] is None

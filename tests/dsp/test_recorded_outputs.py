@@ -16,10 +16,8 @@ from tests.shared import thinned
 from tests.shell import answer, run
 from tfarm.arm import HubFeedback, Law, RotarySpring
 from tfarm.dsp import Actuator, Chain, Sampling, Simulator, scenario
-from tfarm.dsp.law_loop import sampled_law
-from tfarm.dsp.law_simulate import LawSimulator
-from tfarm.dsp.loop import sampled_loop
 from tfarm.dsp.plant import RECORDED, undelayed_plant
+from tfarm.dsp.sampled import sampled_loop
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.reduced import modal_model
@@ -108,11 +106,9 @@ def test_every_output_there_is_can_be_recorded_or_is_refused_in_a_line():
     ("name", "why"),
     [("tip_rotatoin", 'did you mean "tip_rotation"'), ("moment", "moment@x"), ("moment@7", "lies between 0 and 1 m")],
 )
-def test_what_cannot_be_read_is_refused_by_both_simulators(name, why):
-    task = scenario("step", LAB, Chain(), 0.1)
-    for make in (Simulator, lambda *given, **how: LawSimulator(given[0], Law.of_gains(GAINS), *given[1:], **how)):
-        with pytest.raises(ParameterError, match=why):
-            make(LAB, Chain(), task, outputs=[name])
+def test_what_cannot_be_read_is_refused(name, why):
+    with pytest.raises(ParameterError, match=why):
+        Simulator(LAB, Chain(), scenario("step", LAB, Chain(), 0.1), outputs=[name])
 
 
 def test_what_was_not_asked_for_is_named_with_what_there_is():
@@ -157,8 +153,7 @@ def test_a_hub_that_its_actuator_damps_is_a_hub_with_that_friction(law, friction
     names = ("tip_rotation", "moment@0.3")
     by_actuator = Chain(actuator=Actuator(hub_damping=0.05))
     rig, rubbed = (replace(LAB, hub=replace(LAB.hub, friction=each)) for each in (friction, friction + 0.05))
-    sampled = sampled_law if isinstance(law, Law) else sampled_loop
-    one, other = sampled(rig, law, by_actuator, count=20), sampled(rubbed, law, Chain(), count=20)
+    one, other = sampled_loop(rig, law, by_actuator, count=20), sampled_loop(rubbed, law, Chain(), count=20)
     assert one.poles.log_spectral_radius == pytest.approx(other.poles.log_spectral_radius, rel=1e-9)
     one = tfarm.simulate(rig, law, by_actuator, "impulse", 0.3, count=20, outputs=names).at_samples
     other = tfarm.simulate(rubbed, law, Chain(), "impulse", 0.3, count=20, outputs=names).at_samples

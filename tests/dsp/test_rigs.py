@@ -12,9 +12,9 @@ from tests.shared import thinned
 from tfarm import Law
 from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp.chain import Actuator, Slew
-from tfarm.dsp.curves import away
 from tfarm.dsp.plant import undelayed_plant
 from tfarm.dsp.scenarios import slew
+from tfarm.dsp.traces import away
 from tfarm.errors import ParameterError
 from tfarm.tuner.controller import tip_off
 

@@ -8,7 +8,7 @@ import pytest
 import tfarm
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, Simulator, scenario
-from tfarm.dsp.ringing import POINTS_A_PERIOD, records_between, ringing
+from tfarm.dsp.traces import POINTS_A_PERIOD, records_between, ringing
 
 STEEL = tfarm.load("stocky-steel")
 

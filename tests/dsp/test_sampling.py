@@ -9,9 +9,9 @@ import tfarm
 from tests.dsp.roads import aliased, aliased_loop, durbin
 from tests.odd_arms import odd_arms
 from tests.strategies import arm_of
-from tfarm.arm import HubFeedback
+from tfarm.arm import FED_BACK, HubFeedback
 from tfarm.dsp import Chain, Sampling, pulse_transfer, sampled_loop
-from tfarm.dsp.plant import loop_plant, undelayed_plant, with_filter
+from tfarm.dsp.plant import sensed_plant, undelayed_plant, with_filter
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ParameterError
 from tfarm.reduced import modal_model
@@ -140,7 +140,7 @@ def test_offsets_lose_nothing_next_to_a_pole(lossless):
 def test_the_anti_alias_filter_is_a_filter(lab, delay):
     corner = 150.0
     chain = Chain(sampling=Sampling(delay_samples=delay, antialias_corner=corner))
-    H = PulseTransfer(loop_plant(lab, chain, 14), chain.sampling)
+    H = PulseTransfer(sensed_plant(lab, chain, FED_BACK, 14).together, chain.sampling)
     exact = tfarm.transfer(lab, ["hub_angle", "hub_rate", "root_moment"])
     lag = np.array([[0.0], [1.0], [1.0]])
 
@@ -158,7 +158,7 @@ def test_analog_hub_damping_moves_the_exact_arm(lab, delay):
 
     kb = 0.8
     chain = Chain(sampling=Sampling(delay_samples=delay), actuator=Actuator(hub_damping=kb))
-    H = PulseTransfer(loop_plant(lab, chain, 14), chain.sampling)
+    H = PulseTransfer(sensed_plant(lab, chain, FED_BACK, 14).together, chain.sampling)
     exact = tfarm.transfer(lab, ["hub_angle", "hub_rate", "root_moment"])
 
     def damped(s):

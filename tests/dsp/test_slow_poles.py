@@ -7,11 +7,10 @@ import pytest
 
 import tfarm
 from tfarm import HubFeedback, Law
-from tfarm.dsp import Chain, Converters, Sampling, pulse_transfer, sampled_loop
-from tfarm.dsp.band import complete_band
-from tfarm.dsp.circle import Circle
-from tfarm.dsp.closed import verdict_on
-from tfarm.dsp.margins import stable_windows, whole_loop
+from tfarm.dsp import Chain, Converters, Sampling, pulse_transfer, sampled_loop, sampled_verdict
+from tfarm.dsp.circle import Circle, complete_band
+from tfarm.dsp.crossings import stable_windows
+from tfarm.dsp.edges import whole_loop
 from tfarm.reduced import modal_model, relaxed_model
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -30,7 +29,7 @@ GAINS = HubFeedback(K1=0.3, K2=0.3, Kp=1.0)
 @pytest.mark.parametrize("chain", CHAINS.values(), ids=CHAINS)
 @pytest.mark.parametrize("arm", [BRAKED, LOOSE, SPRUNG], ids=["friction", "hardly any", "spring"])
 def test_discs_hold_the_pulse_transfer_functions(arm, chain):
-    """x^n H at a point of each arc, by `PulseTransfer`."""
+    """x^n H, through the law, at a point of each arc, by `Sampled.terms`."""
     loop = whole_loop(arm, GAINS, chain)
     circle = complete_band(loop).circle()
     assert circle.is_slow.any()
@@ -38,10 +37,10 @@ def test_discs_hold_the_pulse_transfer_functions(arm, chain):
     arcs = np.arange(4, circle.low.size)
     q = circle.low[arcs] + rng.uniform(0, 1, arcs.size) * (circle.high - circle.low)[arcs]
     z = np.exp(1j * q)
-    H = loop.signals(z, None, np.ones(q.size))
-    for row, order in enumerate(circle.orders):
-        disc = circle.parts[1 + row]
-        value = (1 - 1 / z) ** order * H[row]
+    terms = loop.terms(z, None, np.ones(q.size))
+    for row, (_, signal, gain, roots) in enumerate(circle.terms):
+        disc, order = circle.parts[1 + row], circle.orders[signal] - int((roots == 0).sum())
+        value = (1 - 1 / z) ** order * terms[row] / gain * z**-loop.in_z.poles.size
         assert (abs(value - disc.middle[arcs]) <= disc.radius[arcs]).all()
 
 
@@ -49,7 +48,7 @@ def test_discs_hold_the_pulse_transfer_functions(arm, chain):
 @pytest.mark.parametrize("law", [GAINS, replace(GAINS, Kp=0.01), LEAD], ids=["PD", "soft", "lead"])
 @pytest.mark.parametrize("arm", [BRAKED, LOOSE], ids=["friction", "hardly any"])
 def test_a_verdict_on_a_hub_with_friction_is_proven(arm, chain, law):
-    verdict = verdict_on(arm, law, chain)
+    verdict = sampled_verdict(arm, law, chain)
     assert verdict.is_settled
     assert verdict.is_stable == (np.abs(np.linalg.eigvals(verdict.loop.reduced_matrix())).max() < 1)
 

@@ -10,7 +10,7 @@ import pytest
 import tfarm
 from tests.shell import answer, run
 from tfarm.dsp import Actuator
-from tfarm.dsp.strip_chart import strip_chart
+from tfarm.dsp.traces import strip_chart
 from tfarm.plots import slew
 from tfarm.plots.strip import draw_strip_chart
 from tfarm.report.time_responses import responses_table

@@ -16,7 +16,7 @@ from tests.dsp.roads import aliased_loop
 from tests.strategies import arm_of
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, Simulator, sampled_verdict, scenario
-from tfarm.dsp.boundary import circle_crossings, circle_grid
+from tfarm.dsp.crossings import circle_grid, number_crossings
 from tfarm.errors import ConvergenceError
 
 PERIOD = 0.01
@@ -61,8 +61,8 @@ def is_clear(verdict):
     if abs(loop.poles.log_spectral_radius) < SLOW:
         return False
     grid = circle_grid(loop)
-    near_K1 = abs(circle_crossings(grid, "K1", gains).gain - gains.K1) < CLOSE * max(1, abs(gains.K1))
-    near_K2 = abs(circle_crossings(grid, "K2", gains).gain - gains.K2) < CLOSE
+    near_K1 = abs(number_crossings(grid, "K1", loop.row).gain - gains.K1) < CLOSE * max(1, abs(gains.K1))
+    near_K2 = abs(number_crossings(grid, "K2", loop.row).gain - gains.K2) < CLOSE
     return not (near_K1.any() or near_K2.any())
 
 

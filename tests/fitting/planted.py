@@ -1,4 +1,6 @@
-"""Arms found again from responses of finite elements with noise: python -m tests.fitting.planted 300 [seed] [pairs]
+"""Arms found again from responses of finite elements with noise.
+
+    python -m tests.fitting.planted SIZE SEED [arms pairs rigs]
 
 Random arms, two or three responses of an independent model (`tests.chain_elements`, nothing of tfarm in it), noise of
 known size, four to six free numbers, each started up to 30 % off.  A fit is right where its sum of squares is at most
@@ -6,25 +8,19 @@ that of the truth and every number within five deviations of it; nominal 95 % in
 of the numbers are known by their product or ratio alone, and a fit is right where it says so of these two and no other.
 With "rigs" they have springs, friction, a radius and a motor at the hub, over whatever drives them, their
 frequencies even or in proportion and often few for the sharpness of a resonance.  None may end above the truth's sum.
-With no word both arms and rigs are planted.
 """
 
 import math
-import os
-import sys
 import time
-from collections import Counter, defaultdict
 from dataclasses import replace
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
 import tfarm
-from tests import chain_elements
+from tests import chain_elements, survey
 from tests.rigs import some_rig
-from tfarm.arm.keys import KeyedArms
+from tests.survey import Finding
+from tfarm.arm.writing import KeyedArms
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import fit
 from tfarm.spectrum.scales import first_frequency
@@ -216,7 +212,8 @@ def judged_pair(seed):
     found = fit(arm, [data], free=keys, start=start, profile=False)
     unknown = [each.key for each in found.parameters if not each.identified]
     said = [words for words in found.not_determined if all(key in words for key in both) and "only" in words]
-    return "right" if found.converged and unknown == both and len(said) == 1 else f"{unknown}, {found.not_determined}"
+    is_right = found.converged and unknown == both and len(said) == 1
+    return "right" if is_right else f"wrong: {unknown}, {found.not_determined}"
 
 
 def judged_rig(seed):
@@ -227,55 +224,45 @@ def judged_rig(seed):
     seconds = time.process_time() - began
     at_truth = found.chi_squared_at(truth)
     is_worse = found.chi_squared > at_truth * (1 + 1e-9)
-    words = f"{found.chi_squared:.5g} > {at_truth:.5g} of {found.freedom}, {found.solution.starts} starts: {keys}"
+    words = f"above the truth: {found.chi_squared:.5g} > {at_truth:.5g} of {found.freedom}, {found.solution.starts} "
+    words += f"starts: {keys}"
     return words if is_worse else "right", seconds
 
 
-def rigs(size, seed):
-    verdicts, took = Counter(), []
-    for n in range(seed * 10000, seed * 10000 + size):
-        verdict, seconds = judged_rig(n)
-        took.append(seconds)
-        verdicts["right" if verdict == "right" else "above the truth"] += 1
-        if verdict != "right":
-            print(n, verdict, flush=True)
-    print(dict(verdicts), f"process time a fit: median {np.median(took):.2f} s, mean {np.mean(took):.2f} s", end=", ")
-    print(f"most {max(took):.2f} s")
-    return verdicts
+def share_right(name, judge, least):
+    """A survey that is wrong where fewer than the `least` share of the fits are right; `judge(n)` has its figures."""
+
+    def findings(size, seed):
+        right = 0
+        for n in range(seed * 10000, seed * 10000 + size):
+            verdict, figures = judge(n)
+            right += verdict == "right"
+            yield Finding(verdict.partition(":")[0], "" if verdict == "right" else f"{n} {verdict}", figures=figures)
+        if right < least * size:
+            yield Finding("too few right", f"{right} of {size}", is_wrong=True)
+
+    findings.__name__ = name
+    return findings
 
 
-def pairs(size, seed):
-    verdicts = Counter()
-    for n in range(seed * 10000, seed * 10000 + size):
-        verdict = judged_pair(n)
-        verdicts["right" if verdict == "right" else "wrong"] += 1
-        if verdict != "right":
-            print(n, verdict, flush=True)
-    print(dict(verdicts))
-    return verdicts
+def arm_fit(seed):
+    """One fit of an arm; the figures are the shares of its nominal 95 % intervals that hold the truth."""
+    verdict, covered, _ = judged(seed)
+    return verdict, {f"{key} inside 95 %": float(np.mean(inside)) for key, inside in covered.items()}
 
 
-def main(size, seed):
-    verdicts, covered, began = Counter(), defaultdict(list), time.perf_counter()
-    for n in range(seed * 10000, seed * 10000 + size):
-        verdict, inside, _ = judged(n)
-        verdicts[verdict] += 1
-        for key, each in inside.items():
-            covered[key] += each
-        if verdict != "right":
-            print(n, verdict, flush=True)
-    print(dict(verdicts), f"{(time.perf_counter() - began) / size:.2f} s a fit")
-    total = [one for each in covered.values() for one in each]
-    if total:
-        print(f"inside nominal 95 %: {np.mean(total):.3f} of {len(total)};", end=" ")
-        print(", ".join(f"{key} {np.mean(each):.3f}" for key, each in covered.items()))
-    return verdicts
+def pair_fit(seed):
+    return judged_pair(seed), {}
 
+
+def rig_fit(seed):
+    verdict, seconds = judged_rig(seed)
+    return verdict, {"process time a fit [s]": seconds}
+
+
+ARMS = share_right("arms", arm_fit, MOSTLY)
+PAIRS_KNOWN = share_right("pairs", pair_fit, MOSTLY)
+RIGS = share_right("rigs", rig_fit, 1.0)
 
 if __name__ == "__main__":
-    size, seed, *named = [*sys.argv[1:2], *(sys.argv[2:] or ["1"])]
-    surveys = {"arms": (main, MOSTLY), "pairs": (pairs, MOSTLY), "rigs": (rigs, 1.0)}
-    failed = False
-    for survey, share in (surveys[name] for name in named or ["arms", "rigs"]):
-        failed |= survey(int(size), int(seed))["right"] < share * int(size)
-    sys.exit(failed)
+    survey.main(ARMS, PAIRS_KNOWN, RIGS)

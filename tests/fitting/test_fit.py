@@ -13,11 +13,11 @@ from tests import chain_elements
 from tests.fitting.planted import elements_response, judged, judged_pair, judged_rig
 from tests.shared import thinned
 from tests.shell import answer, run
-from tfarm.arm.keys import KeyedArms
+from tfarm.arm.writing import KeyedArms
 from tfarm.errors import ParameterError
 from tfarm.fitting.answers import resonances
+from tfarm.fitting.data import noise_of
 from tfarm.fitting.fit import fit
-from tfarm.fitting.noise import noise_of
 from tfarm.fitting.ringing import RingMode, mode_of
 from tfarm.fitting.start import equation_errors
 

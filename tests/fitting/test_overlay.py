@@ -9,8 +9,7 @@ import pytest
 import tfarm
 from tests.shell import answer, run
 from tfarm.errors import ParameterError
-from tfarm.fitting.data import Measured
-from tfarm.fitting.noise import noise_of
+from tfarm.fitting.data import Measured, noise_of
 from tfarm.fitting.overlay import overlay
 from tfarm.fitting.ratio import Ratio
 from tfarm.fitting.resonances import matched_peaks, must_be_in_unit

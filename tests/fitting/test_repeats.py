@@ -8,7 +8,7 @@ import pytest
 from tests.fitting.test_fit import LAB, PAIRS, measured
 from tests.shared import thinned
 from tfarm.fitting.fit import fit
-from tfarm.fitting.repeats import repeats
+from tfarm.fitting.possible import repeats
 
 OMEGA = np.geomspace(8.0, 600.0, 60)
 

@@ -5,9 +5,8 @@ import pytest
 from scipy.signal import lfilter
 
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.fitting.decays import model, whiteness
 from tfarm.fitting.recording import Recording
-from tfarm.fitting.ringdown import ring
+from tfarm.fitting.ringdown import model, ring, whiteness
 
 T = 0.01
 t = T * np.arange(150)

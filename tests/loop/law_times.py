@@ -24,8 +24,7 @@ from tests.rigs import some_rig
 from tfarm.arm import Law
 from tfarm.arm.schema import arm_of_table
 from tfarm.dsp import Chain, Sampling
-from tfarm.dsp.closed import sampled
-from tfarm.dsp.law_verdict import sampled_law_answer
+from tfarm.dsp.verdict import sampled, sampled_law_answer
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.answers import margins_answer
 from tfarm.loop.closed import margins

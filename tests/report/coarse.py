@@ -2,8 +2,8 @@
 
 from tfarm.comparing import regions
 from tfarm.dsp import loci as sampled_loci
-from tfarm.dsp import periods
 from tfarm.dsp import regions as sampled_regions
+from tfarm.dsp import verdict
 from tfarm.loop import loci
 from tfarm.report import assumptions_section, card, live_data, making, map
 
@@ -15,7 +15,7 @@ COARSE = (
     (sampled_regions, "MOST_COLUMNS", 0),  # with the corners that so few have
     (loci, "LOCUS_POINTS", 60),
     (sampled_loci, "SAMPLED_LOCUS_VALUES", 31),
-    (periods, "PERIOD_SHARES", (1.0, 5.0)),
+    (verdict, "PERIOD_SHARES", (1.0, 5.0)),
     (assumptions_section, "CURVE_POINTS", 9),
     (making, "MOST_WORKERS", 1),  # a second process would have its own grids
     (map, "sampled_region", regions.sampled_region.__wrapped__),  # what is kept of it is of other grids

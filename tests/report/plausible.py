@@ -4,8 +4,7 @@
 
 SIZE arms drawn at random (steel to rubber, 5 cm to 10 m, L/h 5 to 300, rectangles and tubes, hub 1e-2 to 1e2 and
 payload 0 to 1e2 times the beam's, damping ratio 1e-4 to 2e-2 in the first mode, or C = 0), the pages of each written
-by a process of its own.  A line an arm: seconds, what went wrong, and the sections that say why they are missing.
-The last line counts the arms with something wrong, and so does the exit code.  Budget: a minute or two of CPU an arm.
+by a process of its own.  Budget: a minute or two of CPU an arm.
 """
 
 from __future__ import annotations
@@ -25,6 +24,8 @@ from pathlib import Path
 import numpy as np
 
 import tfarm
+from tests import survey
+from tests.survey import Finding
 from tfarm import Arm, Hub, Link, Payload, Section
 from tfarm.arm import to_toml
 
@@ -146,23 +147,15 @@ def report_on(arm: Arm, folder: Path) -> tuple[float, list[str], list[str]]:
     return time.perf_counter() - start, wrong, done.stdout.splitlines()
 
 
-def survey(size: int, seed: int) -> int:
-    """The number of arms with something wrong."""
-    bad = 0
+def arms(size, seed):
+    """Of each arm what is wrong, and what was left out."""
     for number in range(size):
         arm = some_arm(np.random.default_rng([seed, number]), f"plausible-{seed}-{number}")
         with tempfile.TemporaryDirectory() as folder:
             seconds, wrong, left_out = report_on(arm, Path(folder))
-        bad += bool(wrong)
-        print(
-            f"{arm.name}: {seconds:.0f} s",
-            *(f"\n  WRONG {each}" for each in wrong),
-            *(f"\n  {each}" for each in left_out),
-        )
-        sys.stdout.flush()
-    print(f"{bad} of {size} arms with something wrong")
-    return bad
+        words = "\n  ".join([arm.name, *wrong, *left_out]) if wrong else ""
+        yield Finding("wrong" if wrong else "right", words, bool(wrong), {"seconds": seconds})
 
 
 if __name__ == "__main__":
-    sys.exit(min(1, survey(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1)))
+    survey.main(arms)

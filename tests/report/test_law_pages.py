@@ -18,10 +18,10 @@ from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain, load_chain
-from tfarm.dsp.law_loop import sampled_law
-from tfarm.dsp.law_verdict import law_verdict
+from tfarm.dsp.sampled import sampled_loop
+from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import one_line
-from tfarm.fitting.runs import beside_exact, load_run, overshoot
+from tfarm.fitting.recording import beside_exact, load_run, overshoot
 from tfarm.loop import closed
 from tfarm.report import law_sampled_section as in_time
 from tfarm.report import making, writing
@@ -256,7 +256,7 @@ def test_a_step_over_the_measured_one_is_that_of_python_control(name):
     led = measured.scenario(0.01).hub_angle
     np.testing.assert_allclose(led, measured.reference - measured.reference[0], atol=1e-15)  # every row is a sample
     A, B, C, D = law.matrices((*law.signals, *law.wanted))
-    plant = sampled_law(PRESET, law, Chain(), count=count).pulse.state_space()
+    plant = sampled_loop(PRESET, law, Chain(), count=count).pulse.state_space()
     closed = control.feedback(plant, control.ss(A, B[:, :2], C, D[:, :2], 0.01))
     given = control.forced_response(control.ss(A, -B[:, 2:], C, -D[:, 2:], 0.01), np.arange(led.size) * 0.01, led)
     found = control.forced_response(closed, np.arange(led.size) * 0.01, given.outputs).outputs[0]
@@ -289,8 +289,8 @@ def test_a_little_damping_makes_the_rig_hold_and_a_quarter_of_it_does_not():
     (each,) = on_arm(PRESET, (GivenLaw(law),))
     words = in_time.cured(in_time.held_by(each, chain), chain)
     assert "C = 1 × 10⁻⁶ s, 0.052 % of critical in mode 3, it is stable" in words
-    assert law_verdict(PRESET.having(damping=1e-6), law, chain).is_stable
-    assert not law_verdict(PRESET.having(damping=2.5e-7), law, chain).is_stable
+    assert sampled_verdict(PRESET.having(damping=1e-6), law, chain).is_stable
+    assert not sampled_verdict(PRESET.having(damping=2.5e-7), law, chain).is_stable
 
 
 def test_a_measured_run_is_put_in_the_place_of_the_slew():

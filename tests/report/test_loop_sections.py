@@ -15,9 +15,9 @@ from tests.report.coarse import coarsen
 from tests.shared import thinned
 from tfarm.arm import Hub, HubFeedback, many_laws
 from tfarm.dsp import Chain
-from tfarm.dsp.brief import sampled_brief
 from tfarm.dsp.chain import Sampling
-from tfarm.dsp.loop import sampled_loop
+from tfarm.dsp.sampled import sampled_loop
+from tfarm.dsp.verdict import sampled_brief
 from tfarm.errors import ConvergenceError
 from tfarm.loop import edges
 from tfarm.loop.closed import nyquist

@@ -4,7 +4,7 @@ import tfarm
 from tests.shell import answer, run
 from tfarm.fitting.reading import read_measured
 from tfarm.report import making
-from tfarm.report.measured_section import measured_section
+from tfarm.report.fit_section import measured_section
 
 FILE = "tests/data/sweep/tip.csv"
 GIVEN = f"tip_acceleration/hub_torque={FILE}"

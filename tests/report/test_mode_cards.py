@@ -9,7 +9,7 @@ import pytest
 
 import tfarm
 from tfarm.plots.shapes import shapes_of
-from tfarm.report.mode_cards import CARD_EDGE, CARD_HEIGHT, CARD_WIDTH, mode_cards
+from tfarm.report.modes_section import CARD_EDGE, CARD_HEIGHT, CARD_WIDTH, mode_cards
 from tfarm.report.page import TEMPLATES
 
 NODES = {1: (), 2: (0.7834,), 3: (0.5035, 0.8677)}  # of a clamped-free beam, shares of its length (Blevins 1979, 8-1)

@@ -14,7 +14,7 @@ from tests.report import plausible
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import implausible
-from tfarm.audit import candidates
+from tfarm.audit import assumptions
 from tfarm.audit.assumptions import LoopVerdict, has_hub_inertia, hub_study, section_study
 from tfarm.columns import PAGE
 from tfarm.dsp import Chain
@@ -288,10 +288,10 @@ def test_no_hub_takes_a_frequency_outside_what_is_said(name):
 def test_a_K2_where_the_search_ended_has_a_star():
     verdicts = (LoopVerdict("stable", 1.08, True), LoopVerdict("stable", 50.0, False), LoopVerdict("unstable", None))
     study = hub_study(ARMS["heavy-hub"], [1.0, 22.5, 30.0], count=1)
-    *_, edges = candidates.loop_columns(study, verdicts)
+    *_, edges = assumptions.loop_columns(study, verdicts)
     assert list(edges.cells) == ["1.08000", "50*", "-"]
     small = hub_study(ARMS["micro"], [1e-7, 2e-7, 5e-7], count=1)
-    assert "K1 = 1.66 × 10⁻⁵, K2 = 0.3" in next(candidates.loop_columns(small, verdicts)).group
+    assert "K1 = 1.66 × 10⁻⁵, K2 = 0.3" in next(assumptions.loop_columns(small, verdicts)).group
     assert "*" in assumptions_section.searched_words(edges)
     certain = replace(edges, of=edges.of[::2], shown=edges.shown[::2])
     assert not assumptions_section.searched_words(certain)

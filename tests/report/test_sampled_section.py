@@ -14,12 +14,11 @@ from tfarm.arm import HubFeedback
 from tfarm.comparing.regions import CUT_RANGE, K2_RANGE, regions_table, stable_regions
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, scientific
-from tfarm.dsp import Chain, Simulator, analyse, sampled_loop, sampled_verdict, scenario, stable_windows
+from tfarm.dsp import Chain, Simulator, sampled_loop, sampled_verdict, scenario, stable_windows
 from tfarm.dsp.chain import Sampling
-from tfarm.dsp.law import mode_table
 from tfarm.dsp.loci import sampled_loci
-from tfarm.dsp.slews import slews
-from tfarm.dsp.strip_chart import strip_chart
+from tfarm.dsp.modes import mode_table
+from tfarm.dsp.traces import slews, strip_chart
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.plots.files import save_figure
@@ -36,7 +35,7 @@ from tfarm.tables.files import as_csv, as_json
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 GAINS = HubFeedback(K1=0.3, K2=0.3)
 PLANE = cache(lambda: stable_regions(LAB, GAINS, Chain()))
-analysed = cache(analyse)
+analysed = cache(tfarm.sampled)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +43,7 @@ def section():
     """With the map of both regions that the tests of it have."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("tfarm.report.sampled_words.stable_regions", lambda *what: {(LAB, GAINS, Chain()): PLANE()}[what])
-        patch.setattr("tfarm.report.sampled_words.analyse", analysed)
+        patch.setattr("tfarm.report.sampled_words.sampled", analysed)
         return sampled_section(LAB)
 
 
@@ -155,7 +154,7 @@ def test_the_table_of_periods_is_each_period_by_itself(section):
 
 
 def test_at_zero_damping_the_verdict_names_its_modes_its_growth_and_the_cure():
-    data = Sampled(PAPER, analyse(PAPER, GAINS), windows(PAPER), PLANE(), ())
+    data = Sampled(PAPER, tfarm.sampled(PAPER, GAINS), windows(PAPER), PLANE(), ())
     words = " ".join((sampled_in_short(data), against_continuous(data), cure(data)))
     assert "Not strictly" in words
     assert "as far as its first 20 modes go" in words
@@ -259,7 +258,7 @@ def test_an_arm_without_a_loop_gets_one_sentence(inertia):
 def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
     monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
-    monkeypatch.setattr("tfarm.dsp.periods.PERIOD_SHARES", (1.0,))
+    monkeypatch.setattr("tfarm.dsp.verdict.PERIOD_SHARES", (1.0,))
     section = sampled_section(replace(LAB, payload=tfarm.Payload(mass=math.inf)))
     assert "no slew" in section.words[-1]
     assert "sampled-overlay" in blocks_of(section)

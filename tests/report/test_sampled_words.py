@@ -14,8 +14,8 @@ from tests.shared import thinned
 from tfarm.comparing.regions import StableRegions
 from tfarm.dsp import Chain, Sampling, sampled_loop, stable_windows
 from tfarm.dsp.chain import Converters
-from tfarm.dsp.law import growing_mode, mode_table
-from tfarm.dsp.periods import AtPeriod
+from tfarm.dsp.edges import Figure
+from tfarm.dsp.modes import dominant, mode_table
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.report.sampled_section import grown_words
@@ -48,8 +48,8 @@ def data_of(name, period=0.01):
         sentence="stable: the hub decays most slowly, by 0.1 a sample",
     )  # fmt: skip
     analysis = SimpleNamespace(
-        verdict=verdict, K2_windows=stable_windows(loop, "K2"),
-        shown={"K2": SimpleNamespace(is_settled=False)},
+        verdict=verdict, windows={"K2": stable_windows(loop, "K2")},
+        shown={"K2": [(Figure(0.0, 0, None, MODES),) * 2]},
         delay_margin=SimpleNamespace(samples=1.25, is_bound=False), required_damping=0.0,
         damping=SimpleNamespace(is_settled=False, modes=MODES),
         modes=SimpleNamespace(natural_frequency=tfarm.modes(arm, 1).natural_frequency[-1:]),
@@ -150,12 +150,7 @@ def test_the_words_are_about_the_chain_of_the_file():
 def test_the_table_of_modes_has_the_pole_that_the_verdict_names(name):
     """On the micro-arm mode 1, aliased to the edge of the strip, becomes two real poles: the slower one decides."""
     loop = data_of(name).analysis.verdict.loop
-    table, named = mode_table(loop), growing_mode(loop)
+    table, named = mode_table(loop), dominant(loop)
     assert table.log_radius.max() <= loop.poles.log_spectral_radius
-    if named:
-        assert table.log_radius[table.index == named] == [loop.poles.log_spectral_radius]
-
-
-def test_rows_keep_every_interval():
-    every = {"K1": ((0.0, 1.0),), "K2": ()}
-    assert AtPeriod(0.01, 4, True, -0.1, default_gains(ARMS["boom"]), every).windows["K1"] == ((0.0, 1.0),)
+    if named.startswith("mode"):
+        assert table.log_radius[table.index == int(named.partition(" ")[2])] == [loop.poles.log_spectral_radius]

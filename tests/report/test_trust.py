@@ -18,8 +18,15 @@ from tfarm.report import making, trust_proofs, write
 from tfarm.report.modes_section import modal_table
 from tfarm.report.trust import Evidence, sources_table, write_trust
 from tfarm.report.trust_audit import in_letters
-from tfarm.report.trust_proofs import how_proven, prove, rounds_to, save_proof, shared_digits, written_proofs
-from tfarm.report.trust_tables import boxes_tables
+from tfarm.report.trust_proofs import (
+    boxes_tables,
+    how_proven,
+    prove,
+    rounds_to,
+    save_proof,
+    shared_digits,
+    written_proofs,
+)
 from tfarm.response import accuracy
 from tfarm.response.accuracy import worst_error
 

@@ -6,8 +6,17 @@ from xml.etree import ElementTree
 import pytest
 
 from tfarm.audit import claims
-from tfarm.report.trust_audit import GREEK_LETTERS, anchor, in_letters
-from tfarm.report.trust_math import INDENT_TEX, WIDEST_LINE, compared_formulas, formula_lines, formulas, width
+from tfarm.report.trust_audit import (
+    GREEK_LETTERS,
+    INDENT_TEX,
+    WIDEST_LINE,
+    anchor,
+    compared_formulas,
+    formula_lines,
+    formulas,
+    in_letters,
+    width,
+)
 
 CLAIMS = claims()
 TEXTS = [(claim, text) for claim in CLAIMS for text in (claim.printed, claim.corrected) if text]

@@ -15,23 +15,21 @@ from tests.report.walked import Walk, columns_of, numbers_of, read, shown_in, to
 from tests.shared import once
 from tfarm.digits import significant
 from tfarm.dsp import Chain, Sampling
-from tfarm.dsp.curves import away
+from tfarm.dsp.traces import away
 from tfarm.errors import CertificationError
 from tfarm.plots.files import save_figure
-from tfarm.plots.learning import draw_cost_map, draw_curves
+from tfarm.plots.learning import draw_curves
 from tfarm.report import tuner_section as tuner_section_room
+from tfarm.report import tuner_words
 from tfarm.report.given_laws import Subject
 from tfarm.report.sections import save_section
 from tfarm.report.tuner_section import section_of, tuner_section
 from tfarm.report.writing import _write_pages
 from tfarm.tuner import Learning, Plan, initial_network, train, tune
-from tfarm.tuner import overview as study_module
 from tfarm.tuner import tuning as tuning_room
-from tfarm.tuner.overview import SIZES, CostMap, StudySize, tuner_study
 
 LAB = tfarm.load("sasaki2012-lab")
 SEEDS = 3
-SMALL = StudySize(curve_seeds=SEEDS, map_seeds=1, map_trials=3, conditions=4)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -45,15 +43,17 @@ def each_loop_once():
 
 @pytest.fixture(scope="module")
 def small(each_loop_once, tmp_path_factory):
-    """The section and its numbers with few seeds, few trials and the first four conditions."""
+    """The section and its numbers with few seeds and the first four conditions."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study_module, "SIZES", (SMALL,))
+        patch.setattr(tuner_words, "LONG_TRIAL", 300)
+        patch.setattr(tuner_section_room, "LONG_TRIAL", 300)
+        patch.setattr(tuner_words, "CURVE_SAMPLES", SEEDS * Plan().trials * 301)
         data = pickle.loads(once(tmp_path_factory, "tuner", save_study).read_bytes())
-        yield data, section_of(data)
+        return data, section_of(data)
 
 
 def save_study(file):
-    file.write_bytes(pickle.dumps(tuner_study(LAB, Chain())))
+    file.write_bytes(pickle.dumps(tuner_words.tuner_numbers(LAB, Chain())))
 
 
 def blocks_of(section):
@@ -92,9 +92,9 @@ def test_curves_are_trainings_of_their_seeds(small):
     drawn = values_of(blocks_of(small[1])["tune-curves"].data)
     seed = 2
     trained = train(tuning.trial, initial_network(seed), tuning.training.guard, Learning(), Plan().trials)
-    assert drawn[f"default_seed_{seed}"] == trained.costs.tolist()
-    rows = np.sort([drawn[f"plain_seed_{i}"] for i in range(SEEDS)], axis=0)
-    assert drawn["plain_median"] == rows[1].tolist()
+    assert drawn[f"seed_{seed}"] == trained.costs.tolist()
+    rows = np.sort([drawn[f"seed_{i}"] for i in range(SEEDS)], axis=0)
+    assert drawn["median"] == rows[1].tolist()
     assert len(drawn["trial"]) == Plan().trials
 
 
@@ -115,7 +115,7 @@ def test_the_words_begin_with_the_answer_and_carry_the_numbers(small):
     words = section.words
     assert words[0].startswith("A little. A constant K2 of 0.336 already takes 65 % off")
     assert "Nothing is below" not in words[0]
-    below = int((data.curves[0].final < data.tuning.best_constant.cost).sum())
+    below = int((data.curves.final < data.tuning.best_constant.cost).sum())
     assert f"{below} of {SEEDS} seeds end below the best constant gain" in words[0]
     assert "0.256" in words[3]
     assert "With the angle held, Kp = " in words[-1]
@@ -141,25 +141,12 @@ def test_the_angle_that_a_moving_gain_leaves_is_its_integral_over_K1(small):
     assert f"the tip {1e3 * abs(drift):.0f} mm with the tuner" in small[1].words[1]
 
 
-def test_the_papers_pair_is_judged_by_the_map(small):
-    found = small[0].cost_map
-    assert found.median.shape == (6, 7)
-    assert (found.alphas[found.papers[0]], found.etas[found.papers[1]]) == (0.6, 0.8)
-    lower = (found.median < found.median[found.papers]).sum()
-    assert found.is_papers_best == (lower == 0)
-    assert f"rank {lower + 1} of 42" in found.verdict or lower == 0
-    at_edge = CostMap(found.alphas, found.etas, np.where(np.indices((6, 7))[1] == 6, 0.0, 1.0), "")
-    assert at_edge.best_at_edge
-    assert not replace(at_edge, median=np.where(np.indices((6, 7)).sum(axis=0) == 3, 0.0, 1.0)).best_at_edge
-
-
 @pytest.mark.survey
 def test_the_same_bytes_twice(small, tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
-        for i, draw in enumerate((draw_curves, draw_cost_map)):
-            save_figure(draw(small[0]), tmp_path / name, str(i), formats=("svg", "png"))
-    for file in ("0.svg", "0.png", "1.svg", "1.png"):
+        save_figure(draw_curves(small[0].curves, small[0].tuning), tmp_path / name, "0", formats=("svg", "png"))
+    for file in ("0.svg", "0.png"):
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
 
 
@@ -182,13 +169,13 @@ def test_other_arms_are_told_why_there_is_no_tuner(arm, word):
 def test_a_slew_that_runs_away_and_a_guard_that_fails_are_a_sentence(monkeypatch):
     """Random arms met both: a traceback out of matplotlib, and 3.21e+06 in the middle of a sentence."""
     runs_away = SimpleNamespace(tuning=SimpleNamespace(without=SimpleNamespace(cost=math.inf)))
-    monkeypatch.setattr(tuner_section_room, "tuner_study", lambda *_: runs_away)
+    monkeypatch.setattr(tuner_section_room, "tuner_numbers", lambda *_: runs_away)
     assert "runs away" in tuner_section_room.tuner_section(LAB).words[0]
 
     def unproven(*_):
         raise CertificationError("no sector at K1 = 3.21e+06, C = 6.94e-05 s")
 
-    monkeypatch.setattr(tuner_section_room, "tuner_study", unproven)
+    monkeypatch.setattr(tuner_section_room, "tuner_numbers", unproven)
     (words,) = tuner_section_room.tuner_section(LAB).words
     assert "K1 = 3210000, C = 6.94 × 10⁻⁵ s" in words
 
@@ -208,15 +195,19 @@ def walked(small, tmp_path_factory):
     return next(part for part in page.parts if part.anchor == "tune"), folder
 
 
-def test_a_reduced_study_is_said_to_be_one(small):
-    """In the place of the full one: both sizes, and 4 conditions."""
-    assert "3 seeds instead of 20" in " ".join(small[1].words)
-    assert "1 seed and 3 trials a pair instead of 5 and 60. The comparison has 4 conditions" in " ".join(small[1].words)
+def test_limits_of_long_trials_are_stated(small):
+    assert "Learning curves: 3 seeds instead of 20. Comparison: 4 conditions" in " ".join(small[1].words)
+
+
+@pytest.mark.parametrize(("samples", "seeds"), [(301, 20), (40_000, 20), (60_000, 13), (1_000_000, 1)])
+def test_long_trials_have_fewer_seeds(samples, seeds):
+    """At most 80 million samples in all of trainings of 100 trials, but one training always."""
+    assert tuner_words.curve_seeds(100 * samples) == seeds
 
 
 def test_a_slew_of_too_many_samples_has_no_study_but_its_number(monkeypatch):
     """600,001 samples of a slew of 3 s at 5 us, and nothing begun."""
-    monkeypatch.setattr(tuner_section_room, "tuner_study", lambda *_: pytest.fail("begun"))
+    monkeypatch.setattr(tuner_section_room, "tuner_numbers", lambda *_: pytest.fail("begun"))
     chain = Chain(sampling=Sampling(period=5e-6))
     (words,) = tuner_section(LAB, chain).words
     assert "600,001 samples" in words
@@ -234,7 +225,7 @@ def values(small, walked):
     rows = [read(folder / "data" / f"tune-{name}.json")["rows"] for name in ("comparison", "residual")]
     coarse = next(iter(data.coarse.values())).chain.converters
     settings = [coarse.moment_bits, coarse.moment_range, coarse.torque_bits, coarse.torque_range, coarse.encoder_counts]
-    drawn = [number for size in (SMALL, SIZES[0]) for number in (size.curve_seeds, size.map_seeds, size.map_trials)]
+    drawn = [SEEDS, tuner_words.CURVE_SEEDS, len(data.rows), data.curves.diverged, data.curves.died]
     late = [1e3 * each["arrives_later_by_s"] for each in own["shaped"].values()]
     off = [1e3 * abs(each) for each in (*(own[key] for key in TIPS), held["tip_error_m"])]
     more = [*_learned(own), *settings, *drawn, *late, *off]
@@ -242,21 +233,17 @@ def values(small, walked):
 
 
 def _learned(own):
-    """Final costs of every seed by the command, how many are below the best constant gain, and shares of medians."""
-    rules = ((), ("--guard", "none"), ("--guard", "none", "--rule", "plain"))
-    asked = [[told("tune", LAB.name, "--seed", str(n), *rule)["cost_tuned"] for n in range(SEEDS)] for rule in rules]
-    costs = np.array([[math.inf if each is None else float(each) for each in of] for of in asked])
+    """Final costs of every seed by the command, how many are below the best constant gain, and shares of the median."""
+    costs = np.array([told("tune", LAB.name, "--seed", str(n))["cost_tuned"] for n in range(SEEDS)])
     best, without = own["cost_best_constant"], own["cost_without"]
-    medians = np.quantile(costs, 0.5, axis=1, method="nearest")
-    numbers = [*costs.ravel(), *(costs < best).sum(axis=1), SEEDS, 100 * (1 - best / without)]
-    return [each for each in (*numbers, *100 * abs(1 - medians / best)) if math.isfinite(each)]
+    median = np.quantile(costs, 0.5, method="nearest")
+    return [*costs, (costs < best).sum(), 100 * (1 - best / without), 100 * abs(1 - median / best)]
 
 
 TIPS = ("tip_error_m", "tip_error_best_constant_m")
 SAID = {  # phrases with numbers that are no results
     r"as Figure \d|Figures? \d(?: and \d)?": "the paper's figures",
-    r"\(21\) as printed": "an equation of the paper",
-    r"K2 = 0\b|died at K = 0": "no moment feedback",
+    r"K2 = 0\b": "no moment feedback",
     r"norm 0\.5": "where the gradient is cut",
     r"middle half": "a quartile",
 }

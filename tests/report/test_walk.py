@@ -16,8 +16,8 @@ from tests.hostile import NAME
 from tests.report.full import ARM
 from tests.report.walked import Walk, columns_of, numbers_of, read, read_arm, shown_in, told, untraced, untraced_cells
 from tfarm.dsp import Chain
-from tfarm.dsp.brief import sampled_brief
 from tfarm.dsp.chain import Sampling
+from tfarm.dsp.verdict import sampled_brief
 from tfarm.report.locus_section import RANGE_OF_K2
 from tfarm.spectrum.scales import default_gains, rate_unit
 

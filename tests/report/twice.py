@@ -3,7 +3,7 @@
     python -m tests.report.twice SIZE SEED
 
 The full report of each of the first SIZE presets (four and more: all) by two processes, of which one has the hashes
-of SEED, compared byte by byte.  A line an arm; the last counts those that differ, and so does the exit code.
+of SEED, compared byte by byte.
 Budget: two minutes of CPU an arm.
 """
 
@@ -14,6 +14,8 @@ import tempfile
 from pathlib import Path
 
 import tfarm
+from tests import survey
+from tests.survey import Finding
 
 WRITE = (
     "import sys, tfarm; from pathlib import Path; from tfarm.report import write;"
@@ -35,17 +37,12 @@ def differing(name: str, seed: int) -> list[str]:
     return sorted(file for file in here.keys() | there.keys() if here.get(file) != there.get(file))
 
 
-def survey(size: int, seed: int) -> int:
-    """The number of presets whose report is not the same twice."""
-    names = tfarm.presets()[:size]
-    bad = 0
-    for name in names:
+def presets(size, seed):
+    """Of each preset the files that differ."""
+    for name in tfarm.presets()[:size]:
         files = differing(name, seed)
-        bad += bool(files)
-        print(f"{name}: {'the same bytes' if not files else 'DIFFER: ' + ', '.join(files)}", flush=True)
-    print(f"{bad} of {len(names)} reports differ")
-    return bad
+        yield Finding("differs" if files else "same bytes", f"{name}: {', '.join(files)}" if files else "", bool(files))
 
 
 if __name__ == "__main__":
-    sys.exit(min(1, survey(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 12345)))
+    survey.main(presets, size=4)

@@ -11,7 +11,7 @@ from tests.shell import answer, run
 from tfarm import Hub, HubFeedback, Link, Payload, Section
 from tfarm.dsp import Chain, stable_windows
 from tfarm.dsp.chain import Sampling
-from tfarm.dsp.loop import sampled_loop
+from tfarm.dsp.sampled import sampled_loop
 from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ParameterError
 from tfarm.loop.stability import stability

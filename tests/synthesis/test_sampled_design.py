@@ -15,8 +15,8 @@ from tfarm.dsp.chain import Sampling
 from tfarm.synthesis import design as gains_design
 from tfarm.synthesis.design import best_gains
 from tfarm.synthesis.sampled import RESERVE, sampled_judges
+from tfarm.tuner.baselines import best_constant
 from tfarm.tuner.trial import slew_trial
-from tfarm.tuner.yardsticks import best_constant
 
 LAB = tfarm.load("sasaki2012-lab")
 HELD = HeldLoop(LAB, 0.01)

@@ -1,14 +1,13 @@
 """Guarded runs of random seeds and arms stay in the guard and bounded; so do adversarial sequences inside a sector.
 
-`python -m tests.tuner.bounded 1000` for so many runs and a fifth as many sequences; prints a tally and every failure.
+`python -m tests.tuner.bounded SIZE SEED` for so many runs and a fifth as many sequences.
 """
-
-import sys
-import time
 
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
+from tests import survey
+from tests.survey import Finding
 from tfarm import Arm, Hub, Link, Payload, Section
 from tfarm.dsp import Chain, Sampling, Slew
 from tfarm.errors import CertificationError, ConvergenceError
@@ -92,31 +91,26 @@ def adversary(loop, lo, hi, rng, patience, root=None):
     return log_size - np.log(start)
 
 
-def tally(number, seed=0):
-    """Counts of runs, sequences and what went wrong."""
-    rng = np.random.default_rng(seed)
-    counts = {"runs": 0, "arms": 0, "without a sector": 0, "wrong": 0, "sequences": 0, "growing": 0}
-    while counts["runs"] < number:
+def runs(size, seed):
+    """So many guarded runs, several an arm, and a fifth as many sequences, one an arm."""
+    rng, made, sequences = np.random.default_rng(seed), 0, 0
+    while made < size:
         trial = some_trial(rng)
         try:
             guard = find_guard(trial.loop, "time-varying", best_constant(trial).gain)
         except (CertificationError, ConvergenceError):
-            counts["without a sector"] += 1
+            yield Finding("without a sector")
             continue
-        counts["arms"] += 1
-        for _ in range(min(SEEDS_AN_ARM, number - counts["runs"])):
-            counts["runs"] += 1
-            wrong = run(trial, guard, rng)
-            if wrong is not None:
-                counts["wrong"] += 1
-                print(wrong, guard.sentence, trial.arm, file=sys.stderr)
-        if counts["sequences"] < number // 5:
-            counts["sequences"] += 1
+        for _ in range(min(SEEDS_AN_ARM, size - made)):
+            made += 1
+            wrong = run(trial, guard, rng) or ""
+            yield Finding("run", f"{wrong} {guard.sentence} {trial.arm}" if wrong else "", bool(wrong))
+        if sequences < size // 5:
+            sequences += 1
             loop, patience = MovingGain(trial.loop), int(rng.integers(1, 6))
-            counts["growing"] += bool(adversary(loop, guard.lo, guard.hi, rng, patience, guard.proofs[0].root) >= 0)
-    return counts
+            grows = bool(adversary(loop, guard.lo, guard.hi, rng, patience, guard.proofs[0].root) >= 0)
+            yield Finding("sequence", f"grows {guard.sentence} {trial.arm}" if grows else "", grows)
 
 
 if __name__ == "__main__":
-    begun = time.perf_counter()
-    print(tally(int(sys.argv[1]) if len(sys.argv) > 1 else 40), f"{time.perf_counter() - begun:.0f} s")
+    survey.main(runs, size=40)

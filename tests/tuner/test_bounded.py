@@ -3,17 +3,17 @@
 import numpy as np
 
 import tfarm
-from tests.tuner.bounded import adversary, tally
+from tests.survey import tally
+from tests.tuner import bounded
+from tests.tuner.bounded import adversary
 from tfarm.arm import HubFeedback
 from tfarm.dsp import sampled_loop
 from tfarm.tuner.sector import MovingGain
 
 
 def test_guarded_runs_stay_bounded_and_in_the_guard():
-    counts = tally(2, seed=1)  # whose first arm has a sector, found soon
-    assert counts["runs"] == 2
-    assert counts["wrong"] == 0
-    assert counts["growing"] == 0
+    outcomes, _, wrong = tally(bounded.runs, 2, 1)  # whose first arm has a sector, found soon
+    assert (outcomes["run"], wrong) == (2, 0)
 
 
 def test_the_adversary_has_teeth():

@@ -1,4 +1,4 @@
-"""tfarm tune, tfarm study and tfarm simulate --controller as a shell sees them."""
+"""tfarm tune and tfarm simulate --controller as a shell sees them."""
 
 import json
 import math
@@ -72,31 +72,26 @@ def test_tables_for_people(capsys):
     _, out, _ = run(capsys, "tune", "sasaki2012-lab", "--trials", "2", "--mode", "online", "--seventh-input")
     assert "linear-quadratic bound of the unshaped slew" in out
     assert "proven for any K(t)" in out
-    _, out, _ = run(capsys, "study", "sasaki2012-lab", "inputs", "--seeds", "2", "--trials", "2", "--guard", "none")
-    assert "below best constant" in out
-    assert out.split()[:2] == ["inputs", "median"]  # two plans differ by their inputs, and by nothing else
 
 
-def test_study_answer(capsys, tmp_path):
-    keep = str(tmp_path / "study.jsonl")
-    arguments = (
-        "study",
-        "sasaki2012-lab",
-        "curves",
-        "--seeds",
-        "3",
-        "--trials",
-        "4",
-        "--guard",
-        "none",
-        "--keep",
-        keep,
-    )
-    code, out, _ = run(capsys, *arguments, "--json")
-    assert code == 0
-    result = json.loads(out)
-    assert len(result["median"]) == 4
-    assert result["groups"][0]["cost_median"] == pytest.approx(result["groups"][0]["cost_quartiles"][0], rel=0.5)
+def test_learning_curves_are_the_tunings_of_their_seeds(capsys):
+    """Median and quartiles after each trial, and of the final costs."""
+    options = ("tune", "sasaki2012-lab", "--trials", "4", "--guard", "frozen", "--rule", "clipped")
+    curves = answer(capsys, *options, "--seed", "7", "--curves", "5")["curves"]
+    alone = [answer(capsys, *options, "--seed", str(seed)) for seed in range(7, 12)]
+    costs, final = np.sort([each["cost"] for each in alone], axis=0), [each["cost_tuned"] for each in alone]
+    assert [curves[key] for key in ("lower_quartile", "median", "upper_quartile")] == costs[1:4].tolist()
+    assert (curves["seeds"], curves["final_cost"], curves["final_quartiles"]) == (5, final, sorted(final)[1:4])
+    assert (curves["diverged"], curves["died"]) == (0, 0)
+
+
+def test_learning_curves_count_what_diverged(capsys):
+    options = ("tune", "sasaki2012-lab", "--guard", "none", "--rule", "plain", "--seed", "3", "--curves", "2")
+    curves = json.loads(run(capsys, *options, "--json")[1])["curves"]
+    assert (curves["diverged"], curves["final_cost"][0], curves["upper_quartile"][-1]) == (1, "inf", "inf")
+    _, out, _ = run(capsys, *options)
+    assert "learning curves, 2 seeds: final cost" in out
+    assert "1 diverged" in out
 
 
 @pytest.mark.parametrize(
@@ -114,6 +109,7 @@ def test_study_answer(capsys, tmp_path):
         (("--K1", "nan"), 2, "K1"),
         (("--duration", "0"), 2, "duration"),
         (("--hidden", "0"), 2, "hidden"),
+        (("--curves", "-1"), 2, "curves"),
         (("--seed", "-1"), 2, "seed"),
         (("--save", "/no/such/folder/tuner.json", "--trials", "1", "--guard", "none"), 2, "save"),
     ],

@@ -13,13 +13,12 @@ import tfarm
 from tests.dsp.roads import aliased_loop
 from tests.shared import sized, thinned
 from tfarm.arm import HubFeedback
-from tfarm.dsp import Chain, SampledLoop, Sampling, sampled_loop
+from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import CertificationError, ParameterError
 from tfarm.exact.whole import as_integers, is_positive_definite
 from tfarm.tuner import find_guard, guard, slew_trial
 from tfarm.tuner.guard import upper_modes_are_quiet
-from tfarm.tuner.lyapunov import common_lyapunov
-from tfarm.tuner.sector import RADIUS_SHARE, MovingGain, _peak
+from tfarm.tuner.sector import RADIUS_SHARE, MovingGain, _peak, common_lyapunov
 
 FINE = np.r_[np.geomspace(1e-6, 1e-2, 500), np.linspace(1e-2, np.pi, 100_001)]
 
@@ -131,7 +130,7 @@ def test_the_exact_arm_obeys_the_criterion_too(lab, loop):
         sizes.append(abs(H / (1 + m * H)))
         assert 1 + 2 * m * H.real + (m**2 - (RADIUS_SHARE * radius) ** 2) * abs(H) ** 2 > 0
     z = np.exp(1j * theta)
-    _, rate, moment = loop.loop.signals(z, None, np.ones(z.size))
+    _, _, rate, moment = loop.loop.terms(z, None, np.ones(z.size))
     H = moment / (1 + 0.3 * rate)
     np.testing.assert_allclose(sizes, abs(H / (1 + m * H)), rtol=2e-4)
     assert max(sizes) == pytest.approx(1 / radius, rel=2e-4)
@@ -226,13 +225,14 @@ def test_a_best_gain_of_nothing_gets_a_sector_from_zero(lab):
     assert 0.05 < guard.hi < 0.2
 
 
-def test_modes_are_quiet_where_they_lose_more_than_the_feedback_could_give():
+def test_modes_are_quiet_where_they_lose_more_than_the_feedback_could_give(lab):
     """Two modes by hand, T = 1: the push is 2 (|K1| 0.01 + K 0.02) on a mode that loses 0.05 a sample."""
     plant = SimpleNamespace(
         residues=np.array([[0.0, 0.0], [9.0, 0.01], [9.0, 0.02]], complex),
         poles=np.array([-1e-3 + 1e-6j, -0.05 + 1e-6j]), mode=np.array([1, 2]), count=2,
     )  # fmt: skip
-    loop = SampledLoop(plant, Chain(sampling=Sampling(period=1.0)), HubFeedback(K1=-0.5))
+    loop = sampled_loop(lab, HubFeedback(K1=-0.5), Chain(sampling=Sampling(period=1.0)), count=1)
+    loop = replace(loop, sensed=SimpleNamespace(together=plant))
     hold = (1 - np.exp(-0.05)) / 0.05
     edge = (0.05 / hold / 2 - 0.5 * 0.01) / 0.02
     assert upper_modes_are_quiet(loop, 0.999 * edge)

@@ -10,10 +10,10 @@ import tfarm
 from tests.shell import answer, run
 from tfarm.dsp import Chain
 from tfarm.dsp.results import simulated_answer
+from tfarm.report import tuner_words
 from tfarm.report.tuner_section import comparison_table
 from tfarm.synthesis.law_judge import law_judge
 from tfarm.synthesis.sampled import sampled_judges
-from tfarm.tuner import overview
 from tfarm.tuner.tuning import trial_of, usual_plan
 
 SMALL = Path(__file__).parents[1] / "data" / "reproductions" / "r3.toml"
@@ -28,11 +28,11 @@ def saved(tmp_path_factory):
 @pytest.fixture(scope="module")
 def page():
     """What the page has, but with few seeds, and the rows of the arm itself alone."""
-    size = overview.StudySize(curve_seeds=1, map_seeds=1, map_trials=1, coarser=True, conditions=4)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(overview, "SIZES", (size,))
-        patch.setattr(overview, "_servo_tuning", lambda *given: None)
-        return overview.tuner_study(ARM, Chain())
+        patch.setattr(tuner_words, "CURVE_SEEDS", 1)
+        patch.setattr(tuner_words, "LONG_TRIAL", 1)
+        patch.setattr(tuner_words, "_servo_tuning", lambda *given: None)
+        return tuner_words.tuner_numbers(ARM, Chain())
 
 
 def by_hand(law, duration=3.0):

@@ -11,7 +11,7 @@ import pytest
 import tfarm
 from tfarm.errors import ParameterError
 from tfarm.tuner import Plan, load_tuner, save_tuner, tune
-from tfarm.tuner.saving import to_text
+from tfarm.tuner.controller import to_text
 
 
 @pytest.fixture(scope="module")

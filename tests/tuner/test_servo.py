@@ -13,6 +13,7 @@ from tests.tuner.plain import PlainTrial, complex_step, plain_gain
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Chain, Converters, Sampling, Simulator, sampled_loop
 from tfarm.errors import ParameterError
+from tfarm.report import tuner_words
 from tfarm.tuner import (
     Plan,
     TunedGain,
@@ -20,14 +21,13 @@ from tfarm.tuner import (
     find_guard,
     initial_network,
     load_tuner,
-    overview,
     save_tuner,
     simulated,
     slew_trial,
     tune,
 )
+from tfarm.tuner.controller import to_text
 from tfarm.tuner.kernel import Limits
-from tfarm.tuner.saving import to_text
 from tfarm.tuner.sector import RADIUS_SHARE, MovingGain
 from tfarm.tuner.trial import usual_rate_gain
 
@@ -79,7 +79,7 @@ def test_the_exact_arm_obeys_the_criterion_with_its_angle_held():
         rate, moment = aliased_loop(LAB, each, 0.01, terms=2000)
         H = moment / (1 + KP * aliased(angle, each, 0.01, 0.0, 2000)[0] + K1 * rate)
         sizes.append(abs(H / (1 + m * H)))
-    theta, rate, moment = loop.loop.signals(z, None, np.ones(z.size))
+    _, theta, rate, moment = loop.loop.terms(z, None, np.ones(z.size))
     H = moment / (1 + KP * theta + K1 * rate)
     np.testing.assert_allclose(sizes, abs(H / (1 + m * H)), rtol=3e-4)
     assert max(sizes) <= 1 / radius * (1 + 3e-4)
@@ -145,12 +145,12 @@ def test_the_usual_rate_gain_damps_the_rigid_arm():
         usual_rate_gain(LAB, -1.0)
 
 
-def test_the_servo_of_a_study_is_slow_beside_the_first_mode_and_the_clock(monkeypatch):
+def test_the_servo_of_a_page_is_slow_for_the_first_mode_and_the_period(monkeypatch):
     """sqrt(Kp/J), to two digits of Kp: a twentieth of the first frequency, or 0.03 rad a sample where that is less."""
-    monkeypatch.setattr(overview, "tune", lambda arm, plan, chain: plan)
+    monkeypatch.setattr(tuner_words, "tune", lambda arm, plan, chain: plan)
     first = tfarm.modes(LAB, 1).natural_frequency[-1]
     for period, speed in ((0.002, first / 20), (0.02, 0.03 / 0.02)):
-        plan = overview._servo_tuning(LAB, Plan(), Chain(sampling=Sampling(period=period)))
+        plan = tuner_words._servo_tuning(LAB, Plan(), Chain(sampling=Sampling(period=period)))
         assert np.sqrt(plan.Kp / LAB.total_inertia) == pytest.approx(speed, rel=0.03)
         assert usual_rate_gain(LAB, plan.Kp) == plan.K1
 

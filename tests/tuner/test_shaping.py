@@ -8,7 +8,7 @@ import pytest
 
 import tfarm
 from tfarm.tuner import extra_insensitive, lq_bound, residual_rms, shaped_trial, slew_trial, zero_vibration
-from tfarm.tuner.shaping import shaped, shaper
+from tfarm.tuner.baselines import shaped, shaper
 
 POLES = [0.999 * np.exp(0.3j), 0.97 * np.exp(0.71j), np.exp(1j * math.pi / 4), 0.9 * np.exp(2.04j)]
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from tfarm.tuner import best_constant, yardsticks
+from tfarm.tuner import baselines, best_constant
 
 
 def best_of(monkeypatch, cost, windows):
@@ -15,7 +15,7 @@ def best_of(monkeypatch, cost, windows):
         tried.append(K)
         return SimpleNamespace(cost=cost(K))
 
-    monkeypatch.setattr(yardsticks, "constant_windows", lambda loop: windows)
+    monkeypatch.setattr(baselines, "constant_windows", lambda loop: windows)
     return best_constant(SimpleNamespace(loop=None, n=300, with_constant=with_constant)), tried
 
 

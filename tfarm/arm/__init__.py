@@ -1,6 +1,6 @@
 """What is analysed: the arm as frozen records, its TOML file and the presets."""
 
-from tfarm.arm.choices import INPUT_UNITS, INPUTS, THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Input, Theory
+from tfarm.arm.checks import INPUT_UNITS, INPUTS, THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Input, Theory
 from tfarm.arm.driving import AnyLaw, arm_and_law, as_law, cancelled, must_not_be_algebraic, tracked
 from tfarm.arm.feedback import (
     ANGLE_GAIN,
@@ -27,12 +27,11 @@ from tfarm.arm.feedback import (
     written_unit,
 )
 from tfarm.arm.law import Law
-from tfarm.arm.link import Link
+from tfarm.arm.link import Link, Section
 from tfarm.arm.plausible import implausible
 from tfarm.arm.reading import load, presets
 from tfarm.arm.records import Arm, must_be_arm, must_turn
 from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring
-from tfarm.arm.sections import Section
 from tfarm.arm.writing import to_toml
 
 __all__ = [

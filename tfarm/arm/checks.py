@@ -2,6 +2,10 @@
 
 Everywhere `key` is the name as in the TOML file and `meaning` says, in the language of physics, what
 would be right.
+
+What an arm's file chooses by name, declared once for every room: what drives the hub, and the theory of its beam.
+
+The texts of an arm: its name, which is also a folder's, and its assumptions.
 """
 
 from __future__ import annotations
@@ -9,11 +13,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from numbers import Integral, Real
+from typing import Literal, get_args
 
 from tfarm.errors import ParameterError
 
 SMALLEST_NUMBER = 1e-40  # far outside any arm, yet no product of a few such numbers underflows
 LARGEST_NUMBER = 1e40  # nor overflows
+Input = Literal["hub_torque", "motor_voltage", "motor_current", "hub_angle"]
+INPUTS: tuple[Input, ...] = get_args(Input)
+INPUT_UNITS = {"hub_torque": "N m", "motor_voltage": "V", "motor_current": "A", "hub_angle": "rad"}
+Theory = Literal["timoshenko", "shear", "rayleigh", "euler-bernoulli"]  # of the beam
+THEORIES: tuple[Theory, ...] = get_args(Theory)
+WITH_ROTARY_INERTIA: tuple[Theory, ...] = ("timoshenko", "rayleigh")
+WITH_SHEAR: tuple[Theory, ...] = ("timoshenko", "shear")
+MOST_NAME_BYTES = 200  # in UTF-8: file systems stop at 255, and a temporary file's name is longer than its own
+DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in "0123456789¹²³")}
 
 
 def number(key: str, value: object, meaning: str) -> float:
@@ -83,3 +97,29 @@ def check_fields(
 def _too_far(key: str, value: object) -> ParameterError:
     remedy = f"beyond any arm ({SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}); check the unit: m, kg, s, Pa throughout"
     return ParameterError(key=key, value=value, remedy=remedy)
+
+
+def plain_name(name: object) -> str:
+    """The name, which is also the name of the arm's folder of reports, on every file system."""
+    remedy = 'a name has 1 to 80 characters, begins with a letter or digit and has no / \\ : * ? " < > |'
+    if not isinstance(name, str) or not 1 <= len(name) <= 80 or not name.isprintable():
+        raise ParameterError(key="name", value=name, remedy=remedy)
+    if not name[0].isalnum() or name[-1] in " ." or set(name) & set('/\\:*?"<>|'):
+        raise ParameterError(key="name", value=name, remedy=remedy)
+    if len(name.encode()) > MOST_NAME_BYTES:
+        raise ParameterError(key="name", value=name, remedy=f"{len(name.encode())} bytes; at most {MOST_NAME_BYTES}")
+    if name.partition(".")[0].rstrip().casefold() in DEVICES:
+        raise ParameterError(key="name", value=name, remedy="is a device to Windows; give the arm another name")
+    return name
+
+
+def plain_texts(assumptions: object) -> tuple[str, ...]:
+    """The assumptions, each with its white space made plain."""
+    remedy = "assumptions are a list of plain texts"
+    if not isinstance(assumptions, list | tuple):
+        raise ParameterError(key="assumptions", value=assumptions, remedy=remedy)
+    texts = tuple(" ".join(text.split()) if isinstance(text, str) else text for text in assumptions)
+    for text in texts:
+        if not isinstance(text, str) or not text.isprintable():
+            raise ParameterError(key="assumptions", value=text, remedy=remedy)
+    return texts

@@ -15,8 +15,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tfarm.arm.checks import LARGEST_NUMBER, number
-from tfarm.arm.choices import INPUT_UNITS
+from tfarm.arm.checks import INPUT_UNITS, LARGEST_NUMBER, number
 from tfarm.arm.records import Arm
 from tfarm.errors import ParameterError
 

@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace, block_of
-from tfarm.arm.checks import check_fields, not_negative, number, positive
-from tfarm.arm.choices import INPUTS
+from tfarm.arm.checks import INPUTS, check_fields, not_negative, number, positive
 from tfarm.arm.feedback import AT_HUB, GAINS, ON, HubFeedback
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError, did_you_mean, must_be_known

@@ -21,9 +21,9 @@ from typing import Any
 
 from pydantic import Field
 
-from tfarm.arm.declared import StrictTable, validated
 from tfarm.arm.law import Law
 from tfarm.arm.reading import load_tables
+from tfarm.arm.schema import StrictTable, validated
 from tfarm.errors import MISSING, ParameterError, close_to, must_be_known, naming
 from tfarm.files import read_mat
 

@@ -1,16 +1,23 @@
-"""The link: a uniform segment of a Timoshenko beam.  Frozen, checked once, SI units.
+"""Cross-sections: area, second moment of area, and Cowper's shear factor.
+
+Source of the shear factors: G. R. Cowper, "The shear coefficient in Timoshenko's beam theory",
+Journal of Applied Mechanics 33 (1966) 335-340, table 1.
+
+The link: a uniform segment of a Timoshenko beam.  Frozen, checked once, SI units.
 
 Letters as in the paper: E, G, rho, A, I, kappa, C.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from tfarm.arm.checks import check_fields, not_negative, number, positive
-from tfarm.arm.sections import Section
-from tfarm.errors import ParameterError
+from tfarm.errors import MISSING, ParameterError, did_you_mean
 
+KEY = "link.section"  # before the names of its numbers in messages
 SLENDEREST = 1e9  # length over radius of gyration: above it the units are mixed up
 MEANINGS = {
     "length": "a length is a positive, finite number of metres",
@@ -19,6 +26,162 @@ MEANINGS = {
     "shear_modulus": "a shear modulus is a positive, finite number in Pa",
 }
 DAMPING = "damping C is zero or a positive time in seconds, as in E (1 + C s)"
+
+
+@dataclass(frozen=True, slots=True)
+class NamedShape:
+    """A named shape: its dimensions [m]; area [m^2], second moment [m^4], Cowper's factor as functions."""
+
+    dimensions: tuple[str, ...]
+    area: Callable[..., float]
+    second_moment: Callable[..., float]
+    cowper: Callable[..., float]
+
+
+def cowper_rectangle(nu: float, **_: float) -> float:
+    """kappa = 10 (1 + nu) / (12 + 11 nu)."""
+    return 10 * (1 + nu) / (12 + 11 * nu)
+
+
+def cowper_round(nu: float, **_: float) -> float:
+    """kappa = 6 (1 + nu) / (7 + 6 nu)."""
+    return 6 * (1 + nu) / (7 + 6 * nu)
+
+
+def cowper_tube(nu: float, *, outer_diameter: float, inner_diameter: float) -> float:
+    """kappa = 6 (1 + nu) (1 + m^2)^2 / ((7 + 6 nu) (1 + m^2)^2 + (20 + 12 nu) m^2),  m = inner/outer."""
+    m2 = (inner_diameter / outer_diameter) ** 2
+    return 6 * (1 + nu) * (1 + m2) ** 2 / ((7 + 6 * nu) * (1 + m2) ** 2 + (20 + 12 * nu) * m2)
+
+
+SHAPES: Mapping[str, NamedShape] = {
+    "rectangle": NamedShape(
+        dimensions=("width", "depth"),
+        area=lambda width, depth: width * depth,
+        second_moment=lambda width, depth: width * depth**3 / 12,
+        cowper=cowper_rectangle,
+    ),
+    "round": NamedShape(
+        dimensions=("diameter",),
+        area=lambda diameter: math.pi * diameter**2 / 4,
+        second_moment=lambda diameter: math.pi * diameter**4 / 64,
+        cowper=cowper_round,
+    ),
+    "tube": NamedShape(
+        dimensions=("outer_diameter", "inner_diameter"),
+        area=lambda outer_diameter, inner_diameter: (
+            math.pi * (outer_diameter - inner_diameter) * (outer_diameter + inner_diameter) / 4
+        ),
+        second_moment=lambda outer_diameter, inner_diameter: (
+            math.pi
+            * (outer_diameter - inner_diameter)
+            * (outer_diameter + inner_diameter)
+            * (outer_diameter**2 + inner_diameter**2)
+            / 64
+        ),
+        cowper=cowper_tube,
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """A cross-section: `area` [m^2], `second_moment` [m^4] about the bending axis, `shear_factor` [-].
+
+    Build it by its shape: `Section.rectangle(width=, depth=)` and so on; `dimensions` [m] are what that was
+    given.  A named shape without a shear factor has Cowper's.
+    """
+
+    shape: str
+    area: float
+    second_moment: float
+    shear_factor: float | None = None
+    dimensions: tuple[tuple[str, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        meanings = {
+            "area": "a section has a positive, finite area in m^2",
+            "second_moment": "a section has a positive, finite second moment in m^4",
+        }
+        check_fields(self, KEY, positive, meanings)
+        if self.shear_factor is not None:
+            meaning = "a shear factor multiplies G A: above 0, up to 1 (a form factor of 6/5 is entered as 5/6)"
+            kappa = positive(f"{KEY}.shear_factor", self.shear_factor, meaning)
+            if kappa > 1.0:
+                raise ParameterError(key=f"{KEY}.shear_factor", value=kappa, remedy=meaning)
+            object.__setattr__(self, "shear_factor", kappa)
+        if self.shape != "general":
+            if (self.area, self.second_moment) != _properties(self.shape, dict(self.dimensions)):
+                remedy = f"does not fit this {self.shape}; use Section.{self.shape}() or Section.general()"
+                raise ParameterError(key=f"{KEY}.area", value=self.area, remedy=remedy)
+        elif self.shear_factor is None:
+            remedy = "a general section needs its own, e.g. 0.8333333333333334 for a rectangle"
+            raise ParameterError(key=f"{KEY}.shear_factor", value=MISSING, remedy=remedy)
+
+    @classmethod
+    def rectangle(cls, *, width: float, depth: float, shear_factor: float | None = None) -> Section:
+        """A solid rectangle, `depth` [m] in the plane of bending."""
+        return cls._named("rectangle", shear_factor, width=width, depth=depth)
+
+    @classmethod
+    def round(cls, *, diameter: float, shear_factor: float | None = None) -> Section:
+        """A solid round bar."""
+        return cls._named("round", shear_factor, diameter=diameter)
+
+    @classmethod
+    def tube(cls, *, outer_diameter: float, inner_diameter: float, shear_factor: float | None = None) -> Section:
+        """A round tube."""
+        return cls._named("tube", shear_factor, outer_diameter=outer_diameter, inner_diameter=inner_diameter)
+
+    @classmethod
+    def general(cls, *, area: float, second_moment: float, shear_factor: float) -> Section:
+        """Any section, by its numbers."""
+        return cls(shape="general", area=area, second_moment=second_moment, shear_factor=shear_factor)
+
+    @classmethod
+    def _named(cls, shape: str, shear_factor: float | None, **given: float) -> Section:
+        dimensions = {}
+        for name, value in given.items():
+            meaning = f"the {name.replace('_', ' ')} is a positive, finite number of metres"
+            dimensions[name] = positive(f"{KEY}.{name}", value, meaning)
+        area, second_moment = _properties(shape, dimensions)
+        return cls(
+            shape=shape,
+            area=area,
+            second_moment=second_moment,
+            shear_factor=shear_factor,
+            dimensions=tuple(dimensions.items()),
+        )
+
+    @property
+    def radius_of_gyration(self) -> float:
+        """sqrt(I/A) [m]."""
+        return math.sqrt(self.second_moment / self.area)
+
+    @property
+    def half_depth(self) -> float | None:
+        """From the middle to the surface in the plane of bending [m]; None for a general section."""
+        sizes = dict(self.dimensions)
+        depth = sizes.get("depth", sizes.get("diameter", sizes.get("outer_diameter")))
+        return None if depth is None else depth / 2
+
+    def cowper_factor(self, poissons_ratio: float) -> float:
+        """Cowper's shear factor of a named shape, for a Poisson's ratio in (-1, 0.5]."""
+        return SHAPES[self.shape].cowper(poissons_ratio, **dict(self.dimensions))
+
+
+def _properties(shape: str, dimensions: Mapping[str, float]) -> tuple[float, float]:
+    """Area [m^2] and second moment [m^4] of a named shape."""
+    if shape not in SHAPES:
+        raise ParameterError(key=f"{KEY}.shape", value=shape, remedy=did_you_mean(str(shape), [*SHAPES, "general"]))
+    names = SHAPES[shape].dimensions
+    if set(dimensions) != set(names):
+        remedy = f"a {shape} has {' and '.join(names)}: build it with Section.{shape}()"
+        raise ParameterError(key=f"{KEY}.dimensions", value=tuple(dimensions), remedy=remedy)
+    if shape == "tube" and dimensions["inner_diameter"] >= dimensions["outer_diameter"]:
+        remedy = f"a tube is hollow: less than its outer diameter, {dimensions['outer_diameter']:g} m"
+        raise ParameterError(key=f"{KEY}.inner_diameter", value=dimensions["inner_diameter"], remedy=remedy)
+    return SHAPES[shape].area(**dimensions), SHAPES[shape].second_moment(**dimensions)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,10 +11,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from tfarm.arm.choices import INPUT_UNITS, INPUTS, THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Input, Theory
+from tfarm.arm.checks import (
+    INPUT_UNITS,
+    INPUTS,
+    THEORIES,
+    WITH_ROTARY_INERTIA,
+    WITH_SHEAR,
+    Input,
+    Theory,
+    plain_name,
+    plain_texts,
+)
 from tfarm.arm.link import Link
 from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring, brief_repr
-from tfarm.arm.texts import plain_name, plain_texts
 from tfarm.errors import ParameterError, did_you_mean, shown
 
 MOST_PARTS = 64  # segments, and attachments: more than any rig has, and 64 equal pieces are a check of the chain

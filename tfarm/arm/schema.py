@@ -1,20 +1,240 @@
-"""From a parsed TOML table to the arm; the first problem becomes one ParameterError."""
+"""A TOML table is declared by what it builds: a strict pydantic model with the parameters of a record's constructor.
+
+What an arm's TOML file may hold: strict pydantic models at the file's edge, which build the records.
+
+Types and names are checked here, physics in the records.
+
+From a parsed TOML table to the arm; the first problem becomes one ParameterError.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import cache
+from inspect import Parameter, signature
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_type_hints
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from pydantic_core import ErrorDetails
 
-from tfarm.arm.choices import INPUTS, THEORIES
+from tfarm.arm.checks import INPUTS, THEORIES
+from tfarm.arm.link import Link, Section
 from tfarm.arm.records import MOST_PARTS, Arm
-from tfarm.arm.tables import ARM_TABLES, SHAPE_TABLES, ArmTable
+from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring
 from tfarm.errors import MISSING, ParameterError, did_you_mean
 
+_Strict = TypeVar("_Strict", bound="StrictTable")
+_Table = TypeVar("_Table", bound="TomlTable")
+_Part = TypeVar("_Part")
 LOOP_TABLES = ("sampling", "converters", "actuator", "slew", "law")  # of the loop: others read them
 AT_THE_TOP = ("name", "assumptions", "theory", "input")  # no tables: they stand before the first
+
+
+class StrictTable(BaseModel):
+    """What a file says: no unknown keys, no conversions."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class TomlTable(StrictTable):
+    """A TOML table of a record's numbers."""
+
+    makes: ClassVar[Callable[..., Any]]
+
+    def given(self) -> dict[str, Any]:
+        """What the file says, and nothing that it leaves out."""
+        return {name: getattr(self, name) for name in self.model_fields_set}
+
+    def build(self) -> Any:
+        """What the table declares.  Raises ParameterError where its numbers make none."""
+        known = _parameters(type(self).makes)
+        return type(self).makes(**{name: value for name, value in self.given().items() if name in known})
+
+
+@cache  # a fit builds a thousand arms
+def _parameters(makes: Callable[..., Any]) -> frozenset[str]:
+    """The names of a constructor's parameters."""
+    return frozenset(signature(makes).parameters)
+
+
+def validated(model: type[_Strict], table: object, place: str) -> _Strict:
+    """The table headed [place] of a file.
+
+    Raises ParameterError for what is no table, or one wrong key: a misspelt one comes before those that are then
+    missing.
+    """
+    if not isinstance(table, dict):
+        raise ParameterError(key=place, value=table, remedy=f"give a table, headed [{place}]")
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        problem = min(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
+    word, value = str(problem["loc"][0]), problem["input"]
+    if problem["type"] == "extra_forbidden":
+        remedy = f"unknown key; {did_you_mean(word, model.model_fields)}"
+    elif problem["type"] == "missing":
+        value, remedy = MISSING, f"[{place}] is nothing without it"
+    else:
+        remedy = f"wrong value; {problem['msg'][:1].lower()}{problem['msg'][1:]}"
+    raise ParameterError(key=f"{place}.{word}", value=value, remedy=remedy)
+
+
+def of(makes: Callable[..., Any]) -> Callable[[type[_Table]], type[_Table]]:
+    """A decorator: the table has the parameters of a dataclass, or of another constructor, as its keys.
+
+    Names, types and defaults are theirs, but for keys that the class itself declares.
+    """
+
+    def with_keys(table: type[_Table]) -> type[_Table]:
+        hints, known = get_type_hints(makes), signature(makes).parameters.values()
+        own: dict[str, Any] = {
+            each.name: (hints[each.name], ... if each.default is Parameter.empty else each.default)
+            for each in known
+            if each.name not in table.model_fields
+        }
+        made: type[_Table] = create_model(table.__name__, __base__=table, __doc__=table.__doc__, **own)
+        made.makes = makes
+        return made
+
+    return with_keys
+
+
+@of(Section.rectangle)
+class Rectangle(TomlTable):
+    """[link.section] with shape = "rectangle"."""
+
+    shape: Literal["rectangle"]
+
+
+@of(Section.round)
+class Round(TomlTable):
+    """[link.section] with shape = "round"."""
+
+    shape: Literal["round"]
+
+
+@of(Section.tube)
+class Tube(TomlTable):
+    """[link.section] with shape = "tube"."""
+
+    shape: Literal["tube"]
+
+
+@of(Section.general)
+class General(TomlTable):
+    """[link.section] with shape = "general"."""
+
+    shape: Literal["general"]
+
+
+@of(Link)
+class LinkTable(TomlTable):
+    """[link], or one [[link]] of several: exactly one of shear_modulus and poissons_ratio."""
+
+    shear_modulus: float | None = None
+    poissons_ratio: float | None = None
+    section: Annotated[Rectangle | Round | Tube | General, Field(discriminator="shape")]
+
+    def build(self) -> Link:
+        given = {**self.given(), "section": self.section.build()}
+        if self.shear_modulus is None and self.poissons_ratio is None:
+            remedy = "give it in Pa, or give poissons_ratio"
+            raise ParameterError(key="link.shear_modulus", value=MISSING, remedy=remedy)
+        if self.shear_modulus is not None and self.poissons_ratio is not None:
+            remedy = "shear_modulus is given too, and one follows from the other; leave one out"
+            raise ParameterError(key="link.poissons_ratio", value=self.poissons_ratio, remedy=remedy)
+        return Link(**given) if self.poissons_ratio is None else Link.isotropic(**given)
+
+
+@of(Hub)
+class HubTable(TomlTable):
+    """[hub]."""
+
+
+@of(RotarySpring)
+class SpringTable(TomlTable):
+    """[clamp] and [joint], optional."""
+
+
+@of(Motor)
+class MotorTable(TomlTable):
+    """[motor], optional."""
+
+
+@of(Attachment)
+class AttachmentTable(TomlTable):
+    """One [[attachment]]."""
+
+
+@of(Gauge)
+class GaugeTable(TomlTable):
+    """[gauge], optional."""
+
+
+@of(Payload)
+class PayloadTable(TomlTable):
+    """[payload], optional."""
+
+
+class ArmTable(TomlTable):
+    """The whole file, its [link] as a list of one."""
+
+    name: str
+    assumptions: list[str] = Field([])
+    theory: str = "timoshenko"
+    input: str = "hub_torque"
+    link: Annotated[list[LinkTable], Field(min_length=1, max_length=MOST_PARTS)]
+    hub: HubTable
+    clamp: SpringTable = SpringTable()
+    joint: SpringTable = SpringTable()
+    motor: MotorTable | None = None
+    attachment: Annotated[list[AttachmentTable], Field(max_length=MOST_PARTS)] = Field([])
+    gauge: GaugeTable = GaugeTable()
+    payload: PayloadTable = PayloadTable()
+
+    def build(self) -> Arm:
+        alone = len(self.link) == 1
+        link, *outer = (_within("link" if alone else f"link.{i}", table.build) for i, table in enumerate(self.link, 1))
+        attachments = (_within(f"attachment.{i}", table.build) for i, table in enumerate(self.attachment, 1))
+        texts: dict[str, Any] = {
+            key: getattr(self, key) for key in ("name", "theory", "input")
+        }  # the record checks them
+        return Arm(
+            **texts,
+            assumptions=tuple(self.assumptions),
+            link=link,
+            outer=tuple(outer),
+            hub=self.hub.build(),
+            clamp=_within("clamp", self.clamp.build),
+            joint=_within("joint", self.joint.build),
+            motor=None if self.motor is None else self.motor.build(),
+            attachments=tuple(attachments),
+            gauge=self.gauge.build(),
+            payload=self.payload.build(),
+        )
+
+
+def _within(place: str, build: Callable[[], _Part]) -> _Part:
+    """What `build` gives; a ParameterError names the table's place in the file in its key's first word."""
+    try:
+        return build()
+    except ParameterError as error:
+        key = ".".join((place, *error.key.split(".")[1:]))
+        raise ParameterError(key=key, value=error.value, remedy=error.remedy) from None
+
+
+SHAPE_TABLES: dict[str, type[TomlTable]] = {"rectangle": Rectangle, "round": Round, "tube": Tube, "general": General}
+ARM_TABLES: dict[str, type[TomlTable]] = {
+    "": ArmTable,
+    "link": LinkTable,
+    "hub": HubTable,
+    "clamp": SpringTable,
+    "joint": SpringTable,
+    "motor": MotorTable,
+    "attachment": AttachmentTable,
+    "gauge": GaugeTable,
+    "payload": PayloadTable,
+}
 
 
 def arm_of_table(table: dict[str, Any]) -> Arm:

@@ -1,13 +1,31 @@
-"""From an Arm back to TOML: what `load` reads, to the last bit."""
+"""From an Arm back to TOML: what `load` reads, to the last bit.
+
+From a Law back to TOML: what `load_law` reads, to the last bit.
+
+The numbers of an arm by their keys in its TOML file, "link.2.section.width": which there are, and other values.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
 
+from tfarm.arm.blocks import Rational
+from tfarm.arm.law import Law, Part
 from tfarm.arm.link import Link
 from tfarm.arm.records import Arm
 from tfarm.arm.rig import Motor, differing
+from tfarm.arm.schema import ARM_TABLES, arm_of_table
+from tfarm.errors import ParameterError, must_be_known
+from tfarm.files import write_file
+
+LAW_DEFAULTS: dict[str, Any] = {  # what a [law] is where it does not say otherwise
+    "input": None, "delay": 0.0, "period": None, "sign": -1, "references": (), "rule": "tustin", "prewarp": 0.0,
+}  # fmt: skip
 
 
 def to_toml(arm: Arm) -> str:
@@ -64,3 +82,110 @@ def _motor(motor: Motor) -> Iterable[str]:
 def _text(text: str) -> str:
     """A TOML basic string: JSON's escapes are TOML's, and a record's texts hold only what prints."""
     return json.dumps(text, ensure_ascii=False)
+
+
+def law_toml(law: Law) -> str:
+    """The table [law] of a law; equal laws give equal text.
+
+    Raises ParameterError for a law with a state space, which stands in a .mat file, and for one with two blocks on a
+    signal.
+    """
+    head = [f"name = {json.dumps(law.name, ensure_ascii=False)}"]
+    given = ((key, getattr(law, key), usual) for key, usual in LAW_DEFAULTS.items())
+    head += [f"{key} = {_value(value)}" for key, value, usual in given if value != usual]
+    names = [name for part in law.parts for name in part.signals]
+    if len(set(names)) < len(names):
+        raise ParameterError(key="law", value=law.name, remedy="two blocks on one signal: add them up to be saved")
+    tables = [["[law]", *head], *(list(_signal(part)) for part in law.parts)]
+    return "\n\n".join("\n".join(table) for table in tables) + "\n"
+
+
+def save_law(law: Law, path: Path) -> None:
+    """Write it beside, then rename."""
+    write_file(path, law_toml(law).encode(), key="--save")
+
+
+def _signal(part: Part) -> Iterable[str]:
+    """The table of one signal; a name with its place along the link is quoted."""
+    block, name = part.block, part.signals[0]
+    if not isinstance(block, Rational) or len(part.signals) > 1:
+        remedy = "a state space is kept in a .mat file: scipy.io.savemat(file, {'A': ..}), matrices = file in [law]"
+        raise ParameterError(key="law", value=name, remedy=remedy)
+    yield f"[law.{json.dumps(name) if '@' in name else name}]"
+    if len(block.num) == len(block.den) == 1 and block.den[0] == 1.0:
+        yield f"gain = {block.num[0]!r}"
+    else:
+        yield f"num = {_value(block.num)}"
+        yield f"den = {_value(block.den)}"
+
+
+def _value(value: Any) -> str:
+    """Python's shortest exact digits are TOML's too."""
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    return json.dumps(value) if isinstance(value, str) else repr(value)
+
+
+class KeyedArms:
+    """The arms that an arm becomes as some of its numbers run, by their TOML keys.
+
+    Poisson's ratio stays where Young's modulus runs alone: the shear modulus goes along.  Raises ParameterError, naming
+    `what`, for a key that the arm does not have, with the nearest.
+    """
+
+    def __init__(self, arm: Arm, keys: Sequence[str], what: str = "free") -> None:
+        self.arm, self.keys = arm, tuple(keys)
+        self._table = tomllib.loads(to_toml(arm))
+        known = list(_known(self._table))
+        for key in keys:
+            must_be_known(what, key, known)
+        if repeated := {key for key in keys if keys.count(key) > 1}:
+            raise ParameterError(key=what, value=min(repeated), remedy="is named twice; once is enough")
+
+    def at(self, values: Mapping[str, float]) -> Arm:
+        """The arm with those numbers in their places.  Raises ParameterError where it is none."""
+        table = deepcopy(self._table)
+        for key, value in values.items():
+            here, name = _table_of(table, key)
+            place = key.removesuffix(name)
+            if name == "youngs_modulus" and not {f"{place}shear_modulus", f"{place}poissons_ratio"} & set(values):
+                here["shear_modulus"] *= value / here[name]
+            if name == "poissons_ratio":
+                del here["shear_modulus"]
+            here[name] = value
+        return arm_of_table(table)
+
+    def value(self, key: str) -> float:
+        """The arm's own number: what its file says, or its default."""
+        place, name = _table_of(self._table, key)
+        if name == "poissons_ratio":
+            return float(place["youngs_modulus"] / (2 * place["shear_modulus"]) - 1)
+        if name in place:
+            return float(place[name])
+        if name == "back_emf_constant":
+            return float(place["torque_constant"])
+        words = key.split(".")
+        return float(ARM_TABLES[words[0]].model_fields[words[-1]].default)
+
+
+def _known(table: Mapping[str, Any]) -> Iterator[str]:
+    """The keys of all numbers that the arm's file holds or could hold."""
+    alone = isinstance(table["link"], dict)
+    links = [table["link"]] if alone else table["link"]
+    for number, link in enumerate(links, start=1):
+        place = "link" if alone else f"link.{number}"
+        yield from (f"{place}.{name}" for name in ARM_TABLES["link"].model_fields if name != "section")
+        yield from (f"{place}.section.{name}" for name, value in link["section"].items() if not isinstance(value, str))
+    for number in range(1, 1 + len(table.get("attachment", ()))):
+        yield from (f"attachment.{number}.{name}" for name in ARM_TABLES["attachment"].model_fields)
+    for room in ("hub", "clamp", "joint", "payload", *(["motor"] if "motor" in table else [])):
+        yield from (f"{room}.{name}" for name in ARM_TABLES[room].model_fields)
+
+
+def _table_of(table: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:
+    """The innermost table of a key, made where it is not there, and the name in it."""
+    *places, name = key.split(".")
+    here: Any = table
+    for place in places:
+        here = here[int(place) - 1] if isinstance(here, list) else here.setdefault(place, {})
+    return here, name

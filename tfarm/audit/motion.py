@@ -8,8 +8,20 @@ from functools import cache, partial
 
 import sympy as sp
 
-from .formulas import Expression, difference, jet, jet_parts, parsed, remainder, symbol
-from .jets import AT_ROOT, at_running_point, d_dt, d_dx, unbalanced
+from .formulas import (
+    AT_ROOT,
+    Expression,
+    at_running_point,
+    d_dt,
+    d_dx,
+    difference,
+    jet,
+    jet_parts,
+    parsed,
+    remainder,
+    symbol,
+    unbalanced,
+)
 from .rows import Claim
 
 DENSITY = (  # kinetic minus potential energy a length, from w = y + x theta and psi = phi + theta

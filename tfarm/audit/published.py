@@ -18,8 +18,7 @@ from tfarm.digits import TEXTS, general, powers, significant, singly, worded
 from tfarm.errors import CertificationError
 from tfarm.spectrum import modes
 
-from .literature import ANGULAR, CYCLIC, REDUCED, SOURCES, WAVE_NUMBER, Case, Source
-from .published_rigs import RIG_SOURCES
+from .literature import ANGULAR, CYCLIC, REDUCED, RIG_SOURCES, SOURCES, WAVE_NUMBER, Case, Source
 
 __all__ = [
     "SOURCES",

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import sympy as sp
 
-from .dimensions import PAPER_UNITS, Dimension, spelled, unit_dimension
 from .energy import CONTROL_LAW
-from .formulas import clauses, difference, jet, parsed, remainder, sides, symbol, symbols
-from .rows import Claim
-from .typesetting import in_words
+from .formulas import (
+    PAPER_UNITS,
+    Dimension,
+    clauses,
+    difference,
+    jet,
+    parsed,
+    remainder,
+    sides,
+    spelled,
+    symbol,
+    symbols,
+    unit_dimension,
+)
+from .rows import Claim, in_words
 
 INCREMENT = "dw = -eta_c*g + alpha_c*dw_before"
 UPDATE_PRINTED = "w_next = w - dw"

@@ -1,4 +1,9 @@
-"""The verbs that look at an arm.  Rooms are imported inside them, so that `tfarm --help` answers at once."""
+"""The verbs that look at an arm.  Rooms are imported inside them, so that `tfarm --help` answers at once.
+
+The verb that leaves exactness, and says by how much.
+
+The verbs that say why an answer can be trusted.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +25,10 @@ from tfarm.cli.app import (
     app,
     give,
     load_arm,
+    plain_number,
     read_on,
     right_digits,
+    say_when_compiling,
     tell,
     whole_number,
 )
@@ -62,8 +69,7 @@ def modes(
     """Natural frequencies and modes, complete by construction."""
     wanted, right = whole_number("--count", count, 1, MOST_LISTED), right_digits(digits)
     subject = load_arm(arm)
-    from tfarm.cli.methods import BESIDE_COMPARE, print_compared, refuse_beside, slow_method
-    from tfarm.cli.tables import print_modes
+    from tfarm.cli.tables import BESIDE_COMPARE, print_compared, print_modes, refuse_beside, slow_method
     from tfarm.spectrum import modes as find_modes
     from tfarm.spectrum.answers import modes_answer, modes_by_methods_answer
 
@@ -105,14 +111,14 @@ def response(
     With --measured tip_acceleration/hub_angle=sweep.csv: that measured response beside the exact one.
     """
     if measured is not None:
-        from tfarm.cli.overlaying import lay_over
+        from tfarm.cli.tables import lay_over
 
         others = {"--s": s, "--omega": omega, "--output": output, "--x": x, "--side": side, "--digits": digits}
         lay_over(arm, measured, others, csv, png, json)
         return
     (wanted,) = read_on([_asked_output(output, png)], side)
     from tfarm.cli.inputs import asked_input, points_on
-    from tfarm.cli.methods import BESIDE_COMPARE, print_compared, refuse_beside, slow_method
+    from tfarm.cli.tables import BESIDE_COMPARE, print_compared, refuse_beside, slow_method
     from tfarm.response import transfer
     from tfarm.response.answers import by_methods_answer, response_answer
 
@@ -196,3 +202,89 @@ def _written(subjects: list[Arm], out: Path, measured: list[str], **asked: Any) 
     for text in left_out:
         tell(text)
     return page
+
+
+@app.command()
+def reduce(
+    arm: ArmName,
+    outputs: Annotated[str, typer.Option("--outputs", help="names separated by commas")] = "root_moment,hub_rate",
+    order: Annotated[
+        str | None, typer.Option("--order", metavar="N", help="number of states; even where C = 0")
+    ] = None,
+    error: Annotated[float | None, typer.Option("--error", help="or the largest error allowed, such as 1e-6")] = None,
+    band: Annotated[str, typer.Option("--band", metavar="LOW,HIGH", help="frequencies [rad/s]")] = "0.1,1000",
+    method: Annotated[str | None, typer.Option("--method", help="modal or aaa; the better one if left out")] = None,
+    x: Place = None,
+    side: SideName = None,
+    mat: Annotated[Path | None, typer.Option("--mat", help="write a MATLAB file, and a script beside it")] = None,
+    json: Json = False,
+) -> None:
+    """A state space of few states, with its worst error against the exact arm over a band."""
+    try:
+        low, high = (plain_number(part) for part in band.split(","))
+    except ValueError:
+        remedy = "two frequencies in rad/s such as 0.1,1000"
+        raise ParameterError(key="--band", value=band, remedy=remedy) from None
+    states = None if order is None else whole_number("--order", order, 0, 10**9)
+    subject = load_arm(arm)
+    from tfarm.reduced import reduce as find
+    from tfarm.reduced import reduced_answer, save_mat
+
+    wanted = read_on([name.strip() for name in outputs.split(",")], side)
+    how: Any = {"order": states, "error": error, "method": method, "band": (low, high), "x": x}
+    reduced = find(subject, wanted, **how)
+    written = () if mat is None else save_mat(reduced, mat, key="--mat")
+    from tfarm.cli.tables import say_written
+
+    say_written(*written)
+    give(reduced_answer(reduced), json, _show)
+
+
+def _show(answer: dict[str, Any]) -> None:
+    low, high = answer["band_rad_s"]
+    print(f"{answer['arm']}: {answer['method']}, order {answer['order']}, from {answer['input']}")
+    print(f"worst {answer['error_norm']} over {low:g} to {high:g} rad/s: {answer['worst_error']:.3g}")
+    for name, error in answer["errors"].items():
+        print(f"  {name}: {error:.3g}, at {answer['worst_at_rad_s'][name]:.6g} rad/s")
+    frequency, hertz = answer["first_mode_lacking_rad_s"], answer["first_mode_lacking_hz"]
+    print(f"first mode it lacks: {answer['first_mode_lacking']}, {frequency:.10g} rad/s ({hertz:.6g} Hz)")
+    for name, (re, im) in zip(answer["states"][-len(answer["poles"]) :], answer["poles"], strict=True):
+        if im >= 0:
+            print(f"  {name.rsplit('_', 1)[0]}: pole {re:.10g}{im:+.10g}i 1/s")
+    if answer["note"]:
+        print(answer["note"])
+
+
+@app.command()
+def audit(json: Json = False) -> None:
+    """Every equation of the paper, as printed and as corrected, with the check that tells them apart."""
+    say_when_compiling()
+    from tfarm.audit import audit_answer
+    from tfarm.cli.tables import print_audit
+
+    give(audit_answer(), json, print_audit)
+
+
+@app.command()
+def assumptions(
+    arm: ArmName,
+    count: Annotated[str, typer.Option("--count", metavar="N", help="flexible modes, 1 to 100")] = "4",
+    json: Json = False,
+) -> None:
+    """What the assumed section and hub do: frequencies over the candidates, with exact sensitivities."""
+    wanted = whole_number("--count", count, 1, 100)
+    subject = load_arm(arm)
+    from tfarm.audit.assumptions import assumptions_answer
+    from tfarm.cli.tables import print_assumptions
+
+    give(assumptions_answer(subject, wanted), json, print_assumptions)
+
+
+@app.command()
+def validate(json: Json = False) -> None:
+    """Natural frequencies of published tables beside the exact ones, and why where they differ."""
+    say_when_compiling()
+    from tfarm.audit.published import validate_answer
+    from tfarm.cli.tables import print_validation
+
+    give(validate_answer(), json, print_validation)

@@ -202,7 +202,7 @@ def design(
     within: Any = {**_bounds_of(typed), ANGLE_GAIN: kp}
     ranges = dict(_range_of("--range", each) for each in over or [])
     from tfarm.arm import as_law
-    from tfarm.arm.law_writing import save_law
+    from tfarm.arm.writing import save_law
     from tfarm.cli.control_tables import print_design
     from tfarm.cli.tables import hand_out
     from tfarm.synthesis.answers import design_answer

@@ -163,7 +163,7 @@ def asked_law(arm: Arm, given: Given) -> tuple[HubFeedback | Law, dict[str, Any]
 def asked_laws(arm: Arm, name: str, gains: Typed, files: Sequence[str]) -> tuple[GivenLaw, ...]:
     """The laws that a page is about: those of files, gains that are typed, the arm's own [law]; else none."""
     from tfarm.arm.law_tables import load_law
-    from tfarm.fitting.runs import load_run
+    from tfarm.fitting.recording import load_run
     from tfarm.report.given_laws import GivenLaw
 
     if not files and all(value is None for value in gains.values()) and load_law(name) is None:

@@ -53,15 +53,14 @@ def sampled(
     subject, chain = load_arm(arm), asked_chain(dsp or arm, period, delay_samples)
     law, said = asked_law(subject, given)
     from tfarm.cli.sampling_tables import print_sampled, print_sampled_law
-    from tfarm.dsp.closed import sampled as analysed
-    from tfarm.dsp.law_verdict import LawAnalysis, sampled_law_answer
-    from tfarm.dsp.verdict import sampled_answer
+    from tfarm.dsp.verdict import sampled as analysed
+    from tfarm.dsp.verdict import sampled_answer, sampled_law_answer
 
     found = analysed(subject, law, chain, count=count)
-    if isinstance(found, LawAnalysis):
-        give(sampled_law_answer(found) | said, json, print_sampled_law)
-    else:
+    if found.loop.is_of_gains:
         give(sampled_answer(found) | said, json, print_sampled)
+    else:
+        give(sampled_law_answer(found) | said, json, print_sampled_law)
 
 
 @app.command()
@@ -93,7 +92,7 @@ def simulate(
         law, said = asked_law(subject, given)
         answer = said | simulated_answer(subject, law, chain, scenario, duration, **how)
     else:
-        from tfarm.tuner.saving import load_tuner
+        from tfarm.tuner.controller import load_tuner
         from tfarm.tuner.tuning import controlled_answer
 
         saved = load_tuner(controller)
@@ -121,7 +120,7 @@ def asked_chain(source: str, period: float | None, delay_samples: float | None) 
     """The chain of a file, with what the command line says instead."""
     from dataclasses import replace
 
-    from tfarm.dsp.reading import load_chain
+    from tfarm.dsp.chain import load_chain
 
     chain = load_chain(source)
     sampling = chain.sampling

@@ -1,7 +1,13 @@
-"""What the commands print for a person, and tables written to files."""
+"""What the commands print for a person, and tables written to files.
+
+The same number by three roads, beside each other: what `--compare` prints.
+
+A measured response over the exact one: what `tfarm response --measured` prints and writes.
+"""
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -13,13 +19,21 @@ from typing import Any
 from rich.console import Console
 
 from tfarm.arm import MOMENT_GAIN, Arm
-from tfarm.cli.app import give, tell
+from tfarm.cli.app import give, load_arm, tell
 from tfarm.columns import Column, Table
+from tfarm.digits import general, singly
+from tfarm.errors import ParameterError
+from tfarm.exact.methods import METHODS_AGREE, Method, known_method
 from tfarm.files import is_standard_output
+from tfarm.fitting.overlay import curves_table, overlay, overlay_answer, required_table
+from tfarm.fitting.reading import data_of
 from tfarm.tables.files import write_csv
 from tfarm.tables.terminal import show
 
 PROGRESS_EVERY = 4.0  # seconds from one line of progress to the next: few lines in a log, and no long silence
+MOST_SLOW = 2000  # points by balls or by the appendix, at some milliseconds each
+BESIDE_COMPARE = "--compare prints a table of its own: ask for one of them"
+MOST_LISTED_ROOTS = 12  # poles, or zeros, in one line of a terminal; --json has them all
 
 
 def presets_table(arms: list[Arm]) -> Table:
@@ -185,3 +199,90 @@ def progress() -> Iterator[Callable[[int, int, str], None] | None]:
     finally:
         over.set()
         speaker.join()
+
+
+def slow_method(method: str, number: int, digits: int | None, compare: bool) -> Method:
+    """The method asked for.  Raises ParameterError for an unknown one, too many points, digits beside a slow one."""
+    chosen = known_method(method)
+    if chosen == "closed-form" and not compare:
+        return chosen
+    if digits is not None:
+        remedy = "they are proven by balls in any case: leave --method and --compare out"
+        raise ParameterError(key="--digits", value=digits, remedy=remedy)
+    if number > MOST_SLOW:
+        remedy = f"at most {MOST_SLOW} by balls or the appendix, which take milliseconds for each"
+        raise ParameterError(key="points", value=number, remedy=remedy)
+    return chosen
+
+
+def refuse_beside(others: dict[str, Any], remedy: str) -> None:
+    """Raise ParameterError for an option that another one would leave unheard."""
+    for key, value in others.items():
+        if value is not None:
+            raise ParameterError(key=key, value=value, remedy=remedy)
+
+
+def print_compared(answer: dict[str, Any]) -> None:
+    """A row a point or a mode: the closed form's number, and how far the others are from it, relatively."""
+    numbers = answer["methods"]["closed-form"]
+    if "index" in answer:
+        first = Column("index", "mode", of=answer["index"]), Column("", "rad/s", of=numbers, digits=singly(general, 15))
+    else:
+        points = [f"{complex(*at):.10g}" for at in answer["s"]]
+        pairs = ([part if abs(part) > METHODS_AGREE * math.hypot(*pair) else 0.0 for part in pair] for pair in numbers)
+        values = [f"{complex(*pair):.15g}" for pair in pairs]  # no part that is less than the rounding of the other
+        first = Column("s", "s", "1/s", of=points), Column("", answer["output"], answer["unit"], of=values)
+    apart = [
+        Column(name, f"{name} differ{end} by", of=answer["differences"][name], digits=singly("{:.1e}".format))
+        for name, end in (("balls", ""), ("appendix", "s"))
+        if name in answer["differences"]
+    ]
+    show(Table(columns=(*first, *apart)))
+    largest = answer["largest_difference"]
+    if largest <= METHODS_AGREE:
+        others = " and proven balls" if answer["left_out"] else ", proven balls and the paper's own determinant"
+        print(f"Float64{others} agree to {largest:.1e}, their rounding.")
+    else:
+        print(f"They part by up to {largest:.1e}: more than rounding ({METHODS_AGREE:.0e}); the balls are proven.")
+    for method, why in answer["left_out"].items():
+        print(f"No {method} here: {why}.")
+
+
+def lay_over(arm: str, text: str, others: dict[str, Any], csv: Path | None, png: Path | None, json: bool) -> None:
+    """Both curves: mode by mode on the terminal or as JSON, point by point as a table, and as a picture.
+
+    Raises ParameterError for one of the `others`, options that would go unheard.
+    """
+    refuse_beside(others, "a measured response has its own outputs and frequencies; leave this out")
+    found = overlay(load_arm(arm), data_of(text, "--measured"))
+    hand_out(
+        lambda: overlay_answer(found), _print, json,
+        csv=csv, table=lambda: curves_table(found), png=png, picture=(found,),
+    )  # fmt: skip
+
+
+def _print(answer: dict[str, Any]) -> None:
+    low, high = answer["band_hz"]
+    span = f"{answer['points']} points from {low:.6g} to {high:.6g} Hz"
+    print(f"{answer['arm']}: {answer['output']} over {answer['input']} [{answer['unit']}], {span}")
+    if len(answer["modes"]):
+        show(answer["modes"])
+    else:
+        print("no resonance of the arm lies in the band")
+    for peak in answer["unmatched_peaks_hz"]:
+        print(f"measured peak at {peak:.6g} Hz: none of the arm's is near")
+    if (table := required_table(answer)) is not None:
+        print("what the arm's numbers would have to be, each alone and for each mode (to first order in logarithms):")
+        show(table)
+    for what in ("poles", "zeros"):
+        print(f"{what} up to {answer['roots_up_to_rad_s']:.6g} rad/s [1/s]: {_listed(answer[what])}")
+    if answer["common"]:
+        print(f"common to both signals, and in neither: {_listed(answer['common'])}")
+    print(f"noise by {answer['noise']}; rms of ln |measured/exact| {answer['rms_log_error']:.4g}")
+
+
+def _listed(roots: list[list[float]]) -> str:
+    """Those in the upper half-plane, the first of them."""
+    texts = [f"{re:.6g}{im:+.6g}i" if im else f"{re:.6g}" for re, im in roots[:MOST_LISTED_ROOTS]]
+    rest = f" and {len(roots) - MOST_LISTED_ROOTS} more" if len(roots) > MOST_LISTED_ROOTS else ""
+    return ", ".join(texts) + rest if texts else "none"

@@ -27,6 +27,8 @@ PLAN: dict[str, tuple[Any, Any]] = {  # of each option of a plan its type and wh
     "signals": (Annotated[str | None, typer.Option("--signals", help="vibration or total: what x and u contain; as "
                                                    "[slew] of the file says if not given")], None),
     "seed": (Annotated[str, typer.Option("--seed", metavar="N", help="of the initial weights")], "0"),
+    "curves": (Annotated[str, typer.Option("--curves", metavar="N", help="add learning curves over N seeds "
+                                           "(the paper's Figure 5)")], "0"),
     "guard": (Annotated[str, typer.Option("--guard", help="time-varying (proven), frozen or none")], "time-varying"),
     "rule": (Annotated[str, typer.Option("--rule", help="dynamic, clipped or plain: how (21) is made robust")],
              "dynamic"),
@@ -47,7 +49,13 @@ PLAN: dict[str, tuple[Any, Any]] = {  # of each option of a plan its type and wh
     "seventh_input": (Annotated[bool, typer.Option("--seventh-input", help="feed K(t-1) to the network too")], False),
     "modes": (Annotated[str, typer.Option("--modes", metavar="N", help="flexible modes")], "6"),
 }  # fmt: skip
-WHOLE = {"trials": (1, 1_000_000), "seed": (0, 2**53), "hidden": (1, 1000), "modes": (1, 48)}  # and their ranges
+WHOLE = {  # whole numbers, and their ranges
+    "trials": (1, 1_000_000),
+    "seed": (0, 2**53),
+    "curves": (0, 10_000),
+    "hidden": (1, 1000),
+    "modes": (1, 48),
+}
 OF_LEARNING, AS_TYPED = (
     ("mode", "rule", "sensitivity", "eta", "alpha", "enough"),
     ("signals", "guard", "duration", "seventh_input"),
@@ -73,11 +81,15 @@ def tune(
     whole = {name: whole_number(f"--{name}", typed[name], *limits) for name, limits in WHOLE.items()}
     subject, chain = load_arm(arm), asked_chain(dsp or arm, period, delay_samples)
     from tfarm import tuner
+    from tfarm.cli.tables import progress
     from tfarm.tuner.tuning import outcomes_answer
 
     plan, said = _plan(subject, chain, typed, whole)
     tuning = tuner.tune(subject, plan, chain)
     answer = tuner.tune_answer(tuning) | said
+    if whole["curves"]:
+        with progress() as advance:
+            answer["curves"] = tuner.curves_answer(tuner.learning_curves(tuning, whole["curves"], advance))
     if compare:
         rows = tuner.compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard)
         answer["comparison"] = outcomes_answer(rows)

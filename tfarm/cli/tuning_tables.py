@@ -1,4 +1,4 @@
-"""What `tfarm tune` and `tfarm study` print for a person."""
+"""What `tfarm tune` prints for a person."""
 
 from __future__ import annotations
 
@@ -36,6 +36,8 @@ def print_tuning(answer: dict[str, Any]) -> None:
     name = ANGLE_GAIN
     held = f"{name} = {answer[name]:g} holds the angle" if answer[name] else f"nothing holds the angle: --{name} does"
     print(f"tip off its target at the end: {tuned}, {constant} with the best constant gain, {free} without ({held})")
+    if "curves" in answer:
+        _print_curves(answer["curves"], answer["cost_best_constant"])
     if "comparison" in answer:
         _print_comparison(answer["comparison"])
 
@@ -47,6 +49,17 @@ def _residual(answer: dict[str, Any]) -> str:
         return "not computed, as the loop ran away"
     share = f", {residual / without:.3g} of that without moment feedback" if without else ""
     return f"{residual:.6g} N m rms{share}"
+
+
+def _print_curves(curves: dict[str, Any], best_constant: float) -> None:
+    lower, median, upper = curves["final_quartiles"]
+    counts = {
+        "below the best constant gain": sum(cost < best_constant for cost in curves["final_cost"]),
+        "diverged": curves["diverged"],
+        "died at K = 0": curves["died"],
+    }
+    print(f"learning curves, {curves['seeds']} seeds: final cost {median:.4g}, quartiles {lower:.4g} and {upper:.4g}")
+    print("seeds: " + ", ".join(f"{number} {what}" for what, number in counts.items()))
 
 
 def warn_of_divergence(answer: dict[str, Any]) -> None:
@@ -67,10 +80,3 @@ def _print_comparison(rows: list[dict[str, Any]]) -> None:
         Column("proven", "guard proven", of=["yes" if row["proven"] else "no" for row in rows]),
     )
     show(Table(columns=columns))
-
-
-def print_study(answer: dict[str, Any]) -> None:
-    """A row a group of seeds, and the verdict of the map."""
-    show(answer["groups"])
-    if "verdict" in answer:
-        print(answer["verdict"])

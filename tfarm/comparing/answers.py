@@ -9,7 +9,7 @@ from typing import Any
 
 from tfarm.columns import FILES, JSON, Column, Table
 from tfarm.digits import general, singly, within
-from tfarm.dsp.law_verdict import sampled_law_answer
+from tfarm.dsp.verdict import sampled_law_answer
 from tfarm.loop.answers import MARGIN_COLUMNS, gain_rows, margins_answer, sizes_of
 from tfarm.loop.margins import Margins
 from tfarm.spectrum.answers import EIGENVALUE_ERROR

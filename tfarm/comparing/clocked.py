@@ -11,8 +11,8 @@ from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arrays import Complex, Real
 from tfarm.crossing import Window
 from tfarm.dsp import Chain
-from tfarm.dsp.law_margins import law_grid, stable_factors
-from tfarm.dsp.law_verdict import LawAnalysis, analyse_law
+from tfarm.dsp.crossings import circle_grid, stable_factors
+from tfarm.dsp.verdict import Analysis, sampled_verdict
 from tfarm.records import record
 
 GONE_AFTER_SAMPLE = 1e-3  # |z| of a pole that leaves this much of itself after a sample: of those nothing is compared
@@ -35,7 +35,7 @@ class Reach:
 class Clocked:
     """A rig under a law at the samples of a chain, gains at the hub taken as a law like any other."""
 
-    analysis: LawAnalysis
+    analysis: Analysis
 
     @property
     def period(self) -> float:
@@ -62,10 +62,10 @@ class Clocked:
     @property
     def loop_function(self) -> tuple[Real, Complex]:
         """Frequencies [rad/s] (n,) up to half the sample rate, and L(e^{iwT}) there."""
-        grid = law_grid(self.analysis.loop)
-        whole, *fed_back = grid.terms[1]
+        loop = self.analysis.loop
+        grid = circle_grid(loop)
         with np.errstate(all="ignore"):
-            L = np.asarray(sum(fed_back) / whole, dtype=np.complex128)
+            L = np.asarray(loop.weights @ grid.terms[1:] / grid.terms[0], dtype=np.complex128)
         return grid.q / self.period, L
 
     @property
@@ -92,4 +92,4 @@ class Clocked:
 
 def clocked(arm: Arm, law: AnyLaw, chain: Chain) -> Clocked:
     """The law at the clock of a chain.  Raises what `tfarm.sampled` raises."""
-    return Clocked(analyse_law(arm, as_law(law), chain))
+    return Clocked(Analysis(sampled_verdict(arm, as_law(law), chain)))

@@ -14,9 +14,8 @@ from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law,
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.dsp import Chain
-from tfarm.dsp.brief import SampledBrief, brief_of
 from tfarm.dsp.chain import chain_or_usual
-from tfarm.dsp.closed import verdict_on
+from tfarm.dsp.verdict import SampledBrief, brief_of, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError, one_line
 from tfarm.loop.closed import closed_loop_poles
 from tfarm.loop.closed import margins as margins_of
@@ -250,7 +249,7 @@ def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_clocked
             known = damped.is_assigned
             open_loop |= dict(zip(damped.index[known].tolist(), damped.eigenvalues[known, 0].tolist(), strict=True))
     try:
-        sampled = brief_of(verdict_on(arm, law, chain), chain)
+        sampled = brief_of(sampled_verdict(arm, law, chain), chain)
     except ConvergenceError as error:
         sampled = SampledBrief(sampling=chain.sampling, is_stable=None, log_radius=None, sentence=f"undecided: {error}")
     at, most = clocked(arm, law, chain) if is_clocked else None, count + POLES_BEYOND_MODES

@@ -1,16 +1,14 @@
 """The sampled loop of the exact arm: hold, delay, converters, verdicts and simulations at 10 ms or any other period."""
 
-from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew
-from tfarm.dsp.loop import SampledLoop, sampled_loop
-from tfarm.dsp.margins import delay_margin, required_damping, stable_windows
-from tfarm.dsp.measurement import Measurement
-from tfarm.dsp.reading import load_chain
+from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew, load_chain
+from tfarm.dsp.crossings import stable_windows
+from tfarm.dsp.edges import delay_margin, required_damping
 from tfarm.dsp.regions import GainMap, sampled_map
+from tfarm.dsp.sampled import Sampled, sampled_loop
 from tfarm.dsp.sampling import PulseTransfer, pulse_transfer
 from tfarm.dsp.scenarios import Scenario, scenario
-from tfarm.dsp.simulate import Simulator
-from tfarm.dsp.simulation import Simulation
-from tfarm.dsp.verdict import Analysis, Verdict, analyse, sampled_verdict
+from tfarm.dsp.simulate import Measurement, Simulation, Simulator
+from tfarm.dsp.verdict import Analysis, Verdict, sampled_verdict
 
 __all__ = [
     "Actuator",
@@ -20,14 +18,13 @@ __all__ = [
     "GainMap",
     "Measurement",
     "PulseTransfer",
-    "SampledLoop",
+    "Sampled",
     "Sampling",
     "Scenario",
     "Simulation",
     "Simulator",
     "Slew",
     "Verdict",
-    "analyse",
     "delay_margin",
     "load_chain",
     "pulse_transfer",

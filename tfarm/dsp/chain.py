@@ -5,18 +5,25 @@ Everything is ideal unless it is said otherwise.  Frozen records, checked once, 
 
 from __future__ import annotations
 
+import json
 import math
-from dataclasses import dataclass, field
-from typing import Literal
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal
 
+from tfarm.arm import Arm, schema, to_toml
 from tfarm.arm.checks import extended, not_negative, number, positive, whole
-from tfarm.errors import ParameterError, must_be_known
+from tfarm.arm.reading import load_tables
+from tfarm.arm.schema import ArmTable, TomlTable, validated
+from tfarm.errors import ParameterError, did_you_mean, must_be_known, naming
 
 Reading = Literal["vibration", "total"]
 LEAST_BITS, MOST_BITS = 2, 32  # of a converter: of one bit there are no steps, of more than 32 no part
 MOST_DELAY = 100.0  # samples: each whole one is a state more
 TIME_ROUNDING = 1e-12  # of a time: so little before a sample it is at it, as its quotient with the period is rounded
 PAPER_ANGLE = 1.15  # rad, as tip travel over length: the paper moves the tip of its 1 m by 1.15 m
+OF_AN_ARM = (*ArmTable.model_fields, "law")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,3 +203,69 @@ def _whole(key: str, value: object, least: int, most: int, what: str) -> None:
         return
     remedy = f"a whole number of {what} from {least} to {most}; leave it out for an ideal converter"
     whole(key, value, least, most, remedy)
+
+
+@schema.of(Sampling)
+class SamplingTable(TomlTable):
+    """[sampling]."""
+
+
+@schema.of(Converters)
+class ConvertersTable(TomlTable):
+    """[converters]."""
+
+
+@schema.of(Actuator)
+class ActuatorTable(TomlTable):
+    """[actuator]."""
+
+
+@schema.of(Slew)
+class SlewTable(TomlTable):
+    """[slew]."""
+
+
+CHAIN_TABLES: dict[str, type[TomlTable]] = {
+    "sampling": SamplingTable,
+    "converters": ConvertersTable,
+    "actuator": ActuatorTable,
+    "slew": SlewTable,
+}
+
+
+def load_chain(name_or_path: str | os.PathLike[str]) -> Chain:
+    """The chain that an arm's file (or preset, or a file of its own) describes; ideal where it says nothing.
+
+    Raises ParameterError for an unknown key, a wrong type or a value that cannot be.
+    """
+    tables, file = load_tables(name_or_path)
+    with naming(file):
+        return chain_of_tables(tables)
+
+
+def chain_of_tables(tables: Mapping[str, Any]) -> Chain:
+    """The chain of a parsed file; the tables of an arm may stand beside its own."""
+    unknown = [key for key in tables if key not in CHAIN_TABLES and key not in OF_AN_ARM]
+    if unknown:
+        remedy = f"unknown table; {did_you_mean(unknown[0], CHAIN_TABLES)}"
+        raise ParameterError(key=unknown[0], value=tables[unknown[0]], remedy=remedy)
+    given = {name: table for name, table in CHAIN_TABLES.items() if name in tables}
+    return Chain(**{name: validated(table, tables[name], name).build() for name, table in given.items()})
+
+
+def file_text(arm: Arm, chain: Chain | None = None) -> str:
+    """The arm's TOML file with those tables of the chain that say more than the defaults; none: the arm alone.
+
+    Of [sampling], [converters], [actuator] and [slew] each key that differs from its default.  Python's shortest exact
+    digits are TOML's too, and so is inf; a text needs its quotes.
+    """
+    lines: list[str] = []
+    for table in () if chain is None else fields(chain):
+        record = getattr(chain, table.name)
+        default = type(record)()
+        given = {f.name: getattr(record, f.name) for f in fields(record)}
+        given = {name: value for name, value in given.items() if value != getattr(default, name)}
+        texts = (json.dumps(value) if isinstance(value, str) else repr(value) for value in given.values())
+        if given:
+            lines += ["", f"[{table.name}]", *map(" = ".join, zip(given, texts, strict=True))]
+    return to_toml(arm) + ("\n".join([*lines, ""]) if lines else "")

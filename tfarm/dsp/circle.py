@@ -12,28 +12,47 @@ that pole p and the integral of the rate of a braked hub, R/s - R/(s - p) of the
     x H(z) = -R p (c0 + c1/z + c2/z^2)/(z - e^{pT}),  c0 = t^2 phi(p t), t = (1 - f) T,
     c2 = (f T)^2 e^{pT} phi(-p f T),  c0 + c1 + c2 = T (e^{pT} - 1)/p,  phi(u) = (e^u - 1 - u)/u^2
 
-x^k F(z) = x^k (1 + gains . H), k the order of the pole at z = 1, is analytic on the circle and outside.  On an arc it
-stays in a disc about its value in the middle, for 1/(z - b) changes by h/(|z - b| (|z - b| - h)) at most over h.  Where
-no disc holds 0, the phase between neighbouring middles is known without doubt, and half the circle gives the count (the
-argument principle).  Arcs whose disc holds 0 are cut.
+With n the order of the law, q and p_i its polynomials in z, and H_i x^{n_i} as above,
+
+    x^k F z^-n = q z^-n x^k + sum over signals of p_i z^-n x^{k - n_i} (H_i x^{n_i})
+
+is analytic on the circle and outside, and no pole of the law is one of it: its zeros outside are the unstable poles.
+Of a root r the factor (z - r)/z is r x + 1 - r.  Those that are x, as of an integrator or a difference, are taken
+together, and so is what all terms have of them in common.
+
+On an arc it stays in a disc about its value in the middle, for 1/(z - b) changes by h/(|z - b| (|z - b| - h)) at most
+over h.  Where no disc holds 0, the phase between neighbouring middles is known without doubt, and half the circle gives
+the count (the argument principle).  Arcs whose disc holds 0 are cut.
+
+In a band of the arm a modal model holds every pole that outlives a sample: to the right of a line Re s = -c and below
+Im s = top, the argument principle for the exact arm counts as many poles as the model has there.  All others of the
+band lie left of the line, slow real ones near -1/C and all: by Cauchy they add
+
+    x sum of (r/p) a/(z - b) = x/(2 pi i) times the integral over the edge of  G(s)/s e^{s (1-f) T}/(z - e^{sT}) ds
+
+to a pulse transfer function (letters as above), the edge being that line and the two that lead from its ends to
+Re s = -inf.  So its absolute values bound them on the whole unit circle.  Beyond the band nothing is known: there the
+undamped shear of this model has poles as near to the imaginary axis as one likes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Generic
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import HubFeedback
 from tfarm.arrays import Complex, Real
-from tfarm.dsp.law_loop import SampledKind
-from tfarm.dsp.loop import ANGLE_ROW, RATE_ROW, SampledLoop
+from tfarm.dsp.sampled import Sampled, resized
 from tfarm.dsp.sampling import SLOW, phi
+from tfarm.errors import ConvergenceError
 from tfarm.records import record
+from tfarm.spectrum import modes
+from tfarm.spectrum.box import Box, winding_number
+from tfarm.spectrum.complete_box import TOWARD_SINGULAR
+from tfarm.spectrum.damped import member
 
 MACHINE_EPS = float(np.finfo(float).eps)  # of a float64, times the counts of operations beside it
 ARCS = 64  # of half the circle to begin with
@@ -41,7 +60,16 @@ SHORTEST_ARC = 1e-13  # rad: no arc is cut further, as its ends are known to a f
 PIECES_OF_ARC = 4  # into which one is cut that is too long
 MOST_ARCS = 60_000  # a loop that takes more is not shown
 ON_IT = 1e-100  # stands for the distance from the circle of a pole on it: its disc is wide, and holds 0
+ROUNDINGS = 8  # of a factor of the law: of its root, of its middle, and of the products
 TERMS_AT_A_TIME = 1 << 19  # terms 1/(z - b) at a time, lest they leave the cache
+DECAYED_EXPONENT = 30.0  # e^-30 = 1e-13 is left over a sample of the poles on the line
+HIGHER = (2.0, 8.0, 32.0, 128.0, 512.0)  # times the last pole of the model: how far up no other is looked for
+ABOVE_MODEL = 1.02  # times the last pole of the model: the least height at which all of them are in the box
+FINER = 10  # times finer than the distance of the line from the axis: the first panel up that line
+NEAREST_LEFT, FARTHEST_LEFT = 0.01, 45.0  # of 1/remaining: panels along the top, until e^-45 = 3e-20 is left
+PANEL_ENDS = 40  # of panels, that are halved where quadratures differ: time alone
+SURE = 0.1  # by which two quadratures of an absolute value may differ; the larger counts, with as much again
+MOST_MIDPOINTS = 200_000  # of a quadrature: one that does not settle by then is not had
 
 
 @dataclass(frozen=True)
@@ -68,13 +96,6 @@ class Discs:
         """The discs of one row."""
         return Discs(self.middle[row], self.radius[row])
 
-    def inverse(self) -> Discs:
-        """1/z for discs that do not hold 0; of infinite radius for those that do."""
-        size = abs(self.middle)
-        room = np.maximum(size - self.radius, 0.0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return Discs(1 / self.middle, np.where(room > 0, self.radius / (size * room), np.inf))
-
 
 @dataclass(frozen=True)
 class _Arcs:
@@ -96,15 +117,15 @@ class _Arcs:
 
 
 @dataclass
-class Circle(Generic[SampledKind]):
-    """The upper half of the unit circle in arcs, and on each what a loop's plant is there; its gains do not matter.
+class Circle:
+    """The upper half of the unit circle in arcs, and on each the terms of a loop's F; its weights do not matter.
 
-    `missing` (outputs,) bounds |x sum over poles left out|.  `low` and `high` [rad] are the ends of the arcs, `parts`
-    the discs (1 + gains, arcs) of x and of what the gains multiply in F times x^n, n = `orders` (gains,) at z = 1;
-    arcs are cut as counts need it.
+    `missing` (signals,) bounds |x sum over poles left out|.  `low` and `high` [rad] are the ends of the arcs, `parts`
+    the discs (1 + terms, arcs) of x and of the terms of F z^-n without their `powers` of x; arcs are cut as counts
+    need it.
     """
 
-    loop: SampledKind
+    loop: Sampled
     kept: NDArray[np.bool_]
     missing: Real
     low: Real = field(init=False)
@@ -116,14 +137,10 @@ class Circle(Generic[SampledKind]):
         self.low, self.high = ends[:-1], ends[1:]
         self.parts = self._parts(self.low, self.high)
 
-    def count(self, gains: HubFeedback) -> int | None:
-        """Poles of the loop with these gains outside the circle, z = 1 of a free angle apart; None if not shown."""
-        return self.counted(lambda: self.characteristic(gains))
-
-    def counted(self, characteristic: Callable[[], Discs]) -> int | None:
-        """How many zeros a function has outside the circle, which `characteristic` gives on every arc as they are."""
+    def count(self, weights: Sequence[float]) -> int | None:
+        """Poles of the loop with these weights outside the circle, z = 1 of a free angle apart; None if not shown."""
         while True:
-            F = characteristic()
+            F = self.characteristic(weights)
             rough = ~(abs(F.middle) > F.radius)
             if not rough.any():
                 steps = np.angle(F.middle[1:] / F.middle[:-1])
@@ -136,34 +153,37 @@ class Circle(Generic[SampledKind]):
 
     # ------------------------------------------------------------ the characteristic function
 
-    def characteristic(self, gains: HubFeedback) -> Discs:
-        """x^k F on every arc, k the order of its pole at z = 1."""
-        used = [(K, order, row) for row, (K, order) in enumerate(zip(gains.row, self.orders, strict=True)) if K]
-        k = max((order for _, order, _ in used), default=0)
-        x = self.parts[0]
-        total = power(x, k)
-        for K, order, row in used:
-            part = self.parts[1 + row]
-            total = total + (part if order == k else power(x, k - order) * part).times(K)
+    @cached_property
+    def terms(self) -> list[tuple[int, int, float, Complex]]:
+        """Of q, whose part and row are -1, and of each p_i: part, row of the signal, gain, roots less 1."""
+        return [(-1, -1, 1.0, self.loop.in_z.poles), *self.loop.in_z.terms]
+
+    @cached_property
+    def orders(self) -> list[int]:
+        """The order at z = 1 of each signal's pulse transfer function, and 0 of q."""
+        return [*(2 if twice else int(once != 0.0) for twice, once in self.loop.plant.rigid), 0]
+
+    def characteristic(self, weights: Sequence[float]) -> Discs:
+        """x^k F z^-n on every arc, k the least that leaves no pole at z = 1."""
+        row, used = (*weights, 1.0), []
+        for n, (part, signal, gain, roots) in enumerate(self.terms, start=1):
+            if factor := row[part] * gain:
+                used.append((factor, int((roots == 0).sum()) - self.orders[signal], self.parts[n]))
+        least, x = min(exponent for _, exponent, _ in used), self.parts[0]
+        total = x.times(0.0)
+        for factor, exponent, disc in used:
+            total = total + (power(x, exponent - least) * disc).times(factor)
         return total
 
-    @property
-    def orders(self) -> list[int]:
-        """The order at z = 1 of what each gain multiplies."""
-        orders = [2 if twice else int(once != 0.0) for twice, once in self.loop.plant.rigid]
-        if isinstance(self.loop, SampledLoop) and self.loop.differences:
-            orders[RATE_ROW] = max(0, orders[ANGLE_ROW] - 1)
-        return orders
-
     def _parts(self, low: Real, high: Real) -> Discs:
-        """x, and what each gain multiplies in F times x^n, on arcs: discs (1 + gains, arcs)."""
-        arcs = _Arcs(low, high)
+        """x, and the terms of F z^-n without powers of x, on arcs."""
+        arcs, order = _Arcs(low, high), self.loop.in_z.poles.size
         sums, slow = self._sums(arcs), self._slow_sums(arcs)
-        found = [arcs.x, *(self._output(row, arcs, sums[row], slow[row]) for row in range(len(self.orders)))]
-        if isinstance(self.loop, SampledLoop) and self.loop.differences:
-            a, T = self.loop.smoothing, self.loop.chain.sampling.period
-            rate = found[1 + ANGLE_ROW] * (arcs.turned(0) + arcs.turned(1).times(-a)).inverse().times((1 - a) / T)
-            found[1 + RATE_ROW] = rate if self.orders[ANGLE_ROW] else rate * arcs.x
+        signals = [self._output(row, arcs, sums[row], slow[row]) for row in range(len(self.orders) - 1)]
+        found = [arcs.x]
+        for _, row, _, roots in self.terms:
+            term = product(arcs.x, roots[roots != 0]) * arcs.turned(order - roots.size)
+            found.append(term if row < 0 else term * signals[row])
         return Discs(np.array([each.middle for each in found]), np.array([each.radius for each in found]))
 
     def _output(self, row: int, arcs: _Arcs, poles: Discs, slow: Discs) -> Discs:
@@ -265,6 +285,141 @@ def power(x: Discs, n: int) -> Discs:
     return total
 
 
+def product(x: Discs, roots: Complex) -> Discs:
+    """prod((z - r)/z) for x = 1 - 1/z in discs, each root r given as r - 1."""
+    factors = x.middle[:, None] * (1 + roots) - roots
+    sizes = abs(factors)
+    blur = MACHINE_EPS * ROUNDINGS * (abs(x.middle)[:, None] * abs(1 + roots) + abs(roots))
+    most = (sizes + x.radius[:, None] * abs(1 + roots) + blur).prod(axis=1)
+    return Discs(factors.prod(axis=1), most - sizes.prod(axis=1) + MACHINE_EPS * ROUNDINGS * (1 + roots.size) * most)
+
+
 def _to_the_axis(angle: float) -> float:
     """The angle of a value from the real axis, on whichever side of 0 it lies."""
     return angle - np.pi * round(angle / np.pi)
+
+
+@dataclass(frozen=True)
+@record
+class Band:
+    """The poles of a loop's plant in a band up to `top` [rad/s], `kept` (poles,), and the bound `missing` (outputs,) on
+    what the others of that band add to the pulse transfer functions, on the whole unit circle."""
+
+    loop: Sampled
+    top: float
+    kept: NDArray[np.bool_]
+    missing: Real
+
+    @property
+    def modes(self) -> int:
+        """How many flexible modes lie in it, the first ones."""
+        outside = self.loop.plant.mode[~self.kept & (abs(self.loop.plant.poles.imag) >= self.top)]
+        return int(outside.min(initial=self.loop.plant.count + 1)) - 1
+
+    @cached_property
+    def full(self) -> Sampled:
+        """The loop with all of them, or with one where there is none."""
+        return resized(self.loop, max(1, self.modes))
+
+    def circle(self) -> Circle:
+        """The unit circle, on which poles outside are counted."""
+        return Circle(self.loop, self.kept, self.missing)
+
+
+def complete_band(loop: Sampled) -> Band | None:
+    """The highest band in which the loop's plant is complete; None where it cannot be shown to be.
+
+    Not without damping, nor with analog hub damping, whose poles the model has to its own accuracy alone.
+    """
+    plant, sampling = loop.plant, loop.chain.sampling
+    C, remaining = plant.arm.damping, sampling.period * (1 - sampling.fraction)
+    if C == 0.0 or loop.chain.actuator.hub_damping > 0.0:
+        return None
+    line = min(TOWARD_SINGULAR / C, DECAYED_EXPONENT / remaining)
+    top = _highest(loop, line)
+    missing = None if top is None else _left_of(loop, line, top)
+    if top is None or missing is None:
+        return None
+    kept = (plant.poles.real > -line) & (abs(plant.poles.imag) < top)
+    return Band(loop, top, kept, missing + _of_the_filter(loop, line))
+
+
+def _highest(loop: Sampled, line: float) -> float | None:
+    """The top of the highest box right of the line in which the exact arm has the plant's poles and no other."""
+    plant, function = loop.plant, member(modes(loop.plant.arm, 1).system).function
+    poles = np.r_[plant.poles[plant.mode > 0], plant.model.single]
+    poles = poles[poles.real > -line]
+
+    def is_complete(top: float) -> bool:
+        box = Box(-line, line, -top, top)
+        try:
+            return winding_number(function, box) == int(box.holds(poles).sum())
+        except ConvergenceError:
+            return False
+
+    heights = np.r_[0.0, np.sort(poles.imag[poles.imag > 0])]
+    tops = np.r_[(heights[1:] + heights[:-1]) / 2, ABOVE_MODEL * heights[-1] or line]
+    if is_complete(top := float(tops[-1])):
+        for factor in HIGHER:
+            if not is_complete(factor * tops[-1]):
+                break
+            top = float(factor * tops[-1])
+        return top
+    low, high = 0, tops.size - 1  # tops[low] may be complete, tops[high] is not
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if is_complete(float(tops[middle])) else (low, middle)
+    return float(tops[low]) if is_complete(float(tops[low])) else None
+
+
+def _left_of(loop: Sampled, line: float, top: float) -> Real | None:
+    """The bound on all poles of the band left of the line; None where the integral cannot be had."""
+    sampling, exact = loop.chain.sampling, loop.exact
+    T, remaining = sampling.period, sampling.period * (1 - sampling.fraction)
+
+    def sizes(s: Complex) -> Real:
+        damped = np.exp(s.real * remaining) / -np.expm1(s.real * T)
+        return abs(exact(s) * _filter_factors(loop, s) / s) * damped
+
+    up = _integral(lambda w: sizes(-line + 1j * w), np.r_[0.0, _graded(line / FINER, top)])
+    away = _integral(
+        lambda c: sizes(-c + 1j * top), line + np.r_[0.0, _graded(NEAREST_LEFT / remaining, FARTHEST_LEFT / remaining)]
+    )
+    return None if up is None or away is None else (up + away) * (2 / np.pi) * (1 + 2 * SURE)
+
+
+def _graded(first: float, last: float) -> Real:
+    """Ends of panels from `first` to `last`, geometric."""
+    return np.geomspace(min(first, last / 2), last, PANEL_ENDS)
+
+
+def _integral(size: Callable[[Real], Real], ends: Real) -> Real | None:
+    """The integral (outputs,) of an absolute value by midpoints, halved until it stays; None if it never does."""
+    before: Real | None = None
+    while ends.size < MOST_MIDPOINTS:
+        values = size((ends[1:] + ends[:-1]) / 2) @ np.diff(ends)
+        if before is not None and (abs(values - before) <= SURE * np.maximum(values, before)).all():
+            return np.maximum(values, before)
+        before, ends = values, np.sort(np.r_[ends, (ends[1:] + ends[:-1]) / 2])
+    return None
+
+
+def _filter_factors(loop: Sampled, s: Complex) -> Complex:
+    """What the analog filter makes of each output: wc/(s + wc) or 1."""
+    corner = loop.chain.sampling.antialias_corner
+    if np.isinf(corner):
+        return np.ones((len(loop.analog), 1), complex)
+    return np.array([corner / (s + corner) if analog else np.ones(s.size) for analog in loop.analog])
+
+
+def _of_the_filter(loop: Sampled, line: float) -> Real:
+    """The bound on the error of the filter's own pole, whose residue has the model's value at -wc, not the arm's."""
+    sampling, plant = loop.chain.sampling, loop.plant
+    corner = sampling.antialias_corner
+    if corner >= line or not any(loop.analog):  # then none of the kept poles is it, and the integral has it right
+        return np.zeros(len(loop.analog))
+    own = plant.mode.size - 1
+    arm = loop.exact(np.array([-corner + 0j]))[:, 0]
+    wrong = np.where(plant.residues[:, own] == 0, 0.0, abs(plant.residues[:, own] / corner - arm))
+    left = sampling.period * corner
+    return wrong * np.exp(-left * (1 - sampling.fraction)) * 2 / (1 + np.exp(-left))

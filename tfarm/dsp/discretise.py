@@ -6,26 +6,41 @@
 
 A law in z is taken as it is.  All the delay of a law stays a delay.  (Franklin, Powell and Workman, Digital Control of
 Dynamic Systems, 1998, ch. 6.)
+
+For the characteristic function a law is kept as factors in delta = z - 1, from the numbers that were given:
+
+    p_i = g prod(delta - zeros),  q = prod(delta - poles)
+
+The coefficients of a law of high order are products of roots next to z = 1, and rounding loses those.  So the roots are
+those of the given numbers (`tfarm.exact.block_factors`), and an integrator is one that is 0.  A hub rate that a chain
+has as the filtered difference of the encoder is (1 - a)/T (z - 1)/(z - a) times the angle, a part of the law.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
-from tfarm.arm.blocks import LawBlock, Rational, StateSpace
+from tfarm.arm import AT_HUB, GAINS, MOMENT_GAIN, AnyLaw, Arm, HubFeedback, must_not_be_algebraic
+from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace
 from tfarm.arm.feedback import input_words
-from tfarm.arm.law import Law, Part
-from tfarm.arrays import Real
+from tfarm.arm.law import Law, Part, is_measured
+from tfarm.arrays import Complex, Real
+from tfarm.dsp.chain import MOST_DELAY, Chain
 from tfarm.errors import ParameterError
+from tfarm.records import record
 from tfarm.response.signals import Signals
+from tfarm.spectrum.scales import check_gains
 
 SAME_PERIOD = 1e-9  # relative: 1/100 s in two files may differ in its last digits
+VANISHED = 1e-12  # of its terms: what several signals give together where they cancel
+NONE = np.empty(0, complex)
 
 
 def discretised(law: Law, period: float) -> Law:
@@ -152,3 +167,179 @@ def substituted(block: Rational, c: float) -> Rational:
         return total
 
     return Rational(tuple(of(block.num)), tuple(of(block.den)))
+
+
+# ------------------------------------------------------------ the law as the computer has it
+
+
+def with_all_gains(arm: Arm, law: AnyLaw) -> Law:
+    """The law, of gains at the hub with a part for each of them, those that are 0 too.
+
+    Raises ParameterError for the loop that does not exist, I_h = 0 and K2 != 0, and for a gain that is absurdly large.
+    """
+    if not isinstance(law, HubFeedback):
+        return law
+    if law.K2:
+        must_not_be_algebraic(arm, MOMENT_GAIN, law.K2)
+    check_gains(arm, law)
+    return Law({gain.output: law[gain.name] for gain in GAINS}, name="gains at the hub", references=AT_HUB)
+
+
+def acting_law(arm: Arm, law: Law, chain: Chain) -> tuple[Law, Chain]:
+    """The law in z, and the chain with its delay.
+
+    Raises ParameterError for a delay that is too long, for what `discretised` refuses, and for a massless hub whose
+    moment is fed back (an algebraic loop).
+    """
+    T = chain.sampling.period
+    samples = chain.sampling.delay_samples + law.delay / T
+    if samples > MOST_DELAY:
+        remedy = f"with the chain's delay that is {samples:.4g} samples; at most {MOST_DELAY:g}"
+        raise ParameterError(key="delay", value=law.delay, remedy=remedy)
+    if "root_moment" in law.signals and law.part_gains.get("root_moment", (0, 1.0))[1]:
+        must_not_be_algebraic(arm, "signals", "root_moment")
+    late = replace(chain, sampling=replace(chain.sampling, delay_samples=samples))
+    return discretised(law, T), late
+
+
+def with_estimate(law: Law, chain: Chain) -> Law:
+    """The law in z with the difference of the encoder in it, where the chain makes the hub's rate so."""
+    if chain.converters.hub_rate != "difference" or "hub_rate" not in law.signals:
+        return law
+    T = chain.sampling.period
+    a = float(np.exp(-chain.converters.rate_filter * T))
+    return replace(law, parts=tuple(_differenced(part, a, T) for part in law.parts), references=())
+
+
+def _differenced(part: Part, a: float, T: float) -> Part:
+    """A part of a law with its columns of the hub's rate led to the hub's angle."""
+    if "hub_rate" not in part.signals:
+        return part
+    signals = tuple("hub_angle" if name == "hub_rate" else name for name in part.signals)
+    if isinstance(part.block, Rational):
+        num = np.convolve(part.block.num, [(1 - a) / T, -(1 - a) / T])
+        return Part(signals, Rational(tuple(num), tuple(np.convolve(part.block.den, [1.0, -a]))))
+    A, B, C, D = part.block.matrices()
+    rate = np.array([name == "hub_rate" for name in part.signals], dtype=float)
+    through, kept = (1 - a) / T, 1.0 - rate
+    Br, Dr = (B @ rate)[:, None], (D @ rate)[:, None]
+    slope = through * (a - 1)
+    block = StateSpace(
+        np.block([[A, slope * Br], [np.zeros((1, len(A))), np.array([[a]])]]),
+        np.vstack([B * kept + through * Br * rate, rate[None]]),
+        np.hstack([C, slope * Dr]),
+        D * kept + through * Dr * rate,
+    )
+    return Part(signals, block)
+
+
+# ------------------------------------------------------------ factors
+
+
+@dataclass(frozen=True)
+@record
+class Column:
+    """g prod(delta - zeros): what a part of a law multiplies a signal by, times the part's denominator."""
+
+    signal: str
+    gain: float
+    zeros: Complex
+
+
+@dataclass(frozen=True)
+@record
+class PartFactors:
+    """A part of a law: its `poles`, as delta, and a column for each signal that it feeds back."""
+
+    poles: Complex
+    columns: tuple[Column, ...]
+
+
+@dataclass(frozen=True)
+@record
+class LawInZ:
+    """The parts of a law as they act, with the sign of u = -sum, over `signals`: factors, and states.
+
+    `matrices`: A, B of x_{k+1} = A x_k + B y_k, and a row of C and of D for each part.
+    """
+
+    signals: tuple[str, ...]
+    parts: tuple[PartFactors, ...]
+    matrices: Matrices
+
+    @cached_property
+    def poles(self) -> Complex:
+        """Its poles, as delta."""
+        return np.concatenate([each.poles for each in self.parts])
+
+    @property
+    def zeros(self) -> Complex:
+        """The zeros of all columns, as delta."""
+        return np.concatenate([NONE, *(column.zeros for part in self.parts for column in part.columns)])
+
+    @cached_property
+    def terms(self) -> list[tuple[int, int, float, Complex]]:
+        """Of each column its part, the row of its signal, and gain and zeros of p_i, the poles of other parts too."""
+        return [
+            (n, self.signals.index(each.signal), each.gain, np.concatenate([each.zeros, *self._others(n)]))
+            for n, part in enumerate(self.parts)
+            for each in part.columns
+        ]
+
+    def _others(self, part: int) -> list[Complex]:
+        return [each.poles for n, each in enumerate(self.parts) if n != part]
+
+    def under(self, weights: Sequence[float]) -> Matrices:
+        """States of the law with a factor on each part."""
+        A, B, C, D = self.matrices
+        row = np.array([weights])
+        return A, B, row @ C, row @ D
+
+    def ignores(self, turned: Mapping[str, float], weights: Sequence[float]) -> bool:
+        """Whether it comes to rest, and does nothing, where its signals stay at such values."""
+        out = []
+        for part, weight in zip(self.parts, weights, strict=True):
+            held, below = lowest_power(part.poles)
+            terms = [(*lowest_power(each.zeros), weight * each.gain * turned[each.signal]) for each in part.columns]
+            by_order = [[value * factor for n, value, factor in terms if n == order] for order in range(held + 1)]
+            is_reached = held and len(terms) == 1 and terms[0][2]  # an integrator of the only signal, cancelled or not
+            if is_reached or not all(map(_cancel, by_order[:held])):
+                return False
+            out += [each / below for each in by_order[held]]
+        return _cancel(out)
+
+
+def _cancel(terms: Sequence[float]) -> bool:
+    return abs(sum(terms)) <= VANISHED * sum(map(abs, terms))
+
+
+def lowest_power(roots: Complex) -> tuple[int, float]:
+    """n and c of prod(delta - roots) = c delta^n + ..."""
+    left = roots[roots != 0]
+    return roots.size - left.size, float(np.prod(-left).real)
+
+
+def law_in_z(law: Law, acting: Law, chain: Chain) -> LawInZ:
+    """The parts of a law as it was given, `acting` in z, at the period of a chain that may estimate the hub's rate."""
+    acting = with_estimate(acting, chain)
+    alone = [acting.weighted(row).matrices() for row in np.eye(len(acting.parts)).tolist()]
+    (A, B, _, _), C, D = alone[0], *(np.vstack([each[n] for each in alone]) for n in (2, 3))
+    return LawInZ(acting.signals, tuple(_factors(part, law, chain) for part in law.parts), (A, B, C, D))
+
+
+def _factors(part: Part, law: Law, chain: Chain) -> PartFactors:
+    """The factors of one part, in z."""
+    from tfarm.exact.block_factors import block_factors  # FLINT, which few commands need
+
+    T = chain.sampling.period
+    rule = "none" if law.is_discrete else law.rule
+    poles, found = block_factors(part.block, rule, T, prewarped(T, law.prewarp))
+    is_difference = chain.converters.hub_rate == "difference" and "hub_rate" in part.signals
+    lag = float(np.expm1(-chain.converters.rate_filter * T))
+    columns = []
+    for name, (gain, zeros) in zip(part.signals, found, strict=True):
+        if is_measured(name) and is_difference and name == "hub_rate":  # -lag/T delta/(delta - lag) times the angle
+            columns.append(Column("hub_angle", law.sign * gain * lag / T, np.r_[zeros, 0.0]))
+        elif is_measured(name):
+            columns.append(Column(name, -law.sign * gain, np.r_[zeros, lag] if is_difference else zeros))
+    return PartFactors(np.r_[poles, lag] if is_difference else poles, tuple(columns))

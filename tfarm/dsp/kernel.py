@@ -176,31 +176,6 @@ def converted(record: Any, saturated: Any, memory: Any, of: Any) -> Any:
     return angle, estimate(angle, record[RATE], memory, of.is_differenced, of.pole, of.period), moment
 
 
-@compiled
-def signal(kind: int, own: float, angle: float, rate: float, moment: float) -> float:
-    """What a law reads of an output: itself (0), or what encoder (1), amplifier (2) or estimate (3) make of it."""
-    if kind == 1:
-        return angle
-    if kind == 2:
-        return moment
-    return rate if kind == 3 else own
-
-
-@inlined
-def law(k: int, gains: Any, ideal: Any, references: Any, measured: Any, single: bool) -> float:
-    """u = r + gains . (references - measured) at sample k, r the `ideal`; float64, or every step rounded to float32."""
-    if single:
-        rounded = np.float32(ideal[k])
-        for j in range(measured.size):
-            off = np.float32(references[k, j]) - np.float32(measured[j])
-            rounded = np.float32(rounded + np.float32(gains[k, j]) * off)
-        return float(rounded)
-    u = ideal[k]
-    for j in range(measured.size):
-        u += gains[k, j] * (references[k, j] - measured[j])
-    return u
-
-
 def before(k: int, model: Any, state: Any, forcing: Any, of: Any) -> bool:
     """Read the outputs just before sample k; whether the arm is still an arm, its root moment within its bound."""
     torque, rigid = state.held[(k - of.delay - 1) % state.held.size], state.rigid
@@ -227,26 +202,6 @@ _before, _converted, _after = inlined(before), inlined(converted), inlined(after
 
 
 @compiled
-def run_gains(model: Any, state: Any, forcing: Any, electronics: Any, gains: Any, references: Any) -> int:
-    """The linear law over all samples; returns how many were made before the root moment passed its bound.
-
-    `gains` and `references` (n, measured) are of the first outputs, which are measured: hub angle, hub rate and root
-    moment through filters and converters, any more as they are.
-    """
-    n, memory, measured = state.torque.size, np.zeros(3), np.zeros(gains.shape[1])
-    for k in range(n):
-        if not _before(k, model, state, forcing, electronics):
-            return k
-        record = state.record[k]
-        measured[ANGLE], measured[RATE], measured[MOMENT] = _converted(record, state.saturated[k], memory, electronics)
-        for j in range(3, measured.size):
-            measured[j] = record[j]
-        u = law(k, gains, forcing.feedforward, references, measured, electronics.is_single)
-        _after(k, u, model, state, forcing, electronics)
-    return n
-
-
-@compiled
 def product(row: Any, values: Any, start: float, single: bool) -> float:
     """start + row . values, in float64, or every product and sum rounded to float32."""
     total = start
@@ -261,30 +216,33 @@ def product(row: Any, values: Any, start: float, single: bool) -> float:
 
 
 @compiled
-def run_law(model: Any, state: Any, forcing: Any, electronics: Any, matrices: Any, kinds: Any, references: Any) -> int:
-    """As `run_gains`, under x_{k+1} = A x + B y, u = r - C x - D y, whose signals are the last outputs.
+def run(model: Any, state: Any, forcing: Any, electronics: Any, matrices: Any, sources: Any, references: Any) -> int:
+    """A law over all samples; returns how many were made before the root moment passed its bound.
 
-    `kinds` (signals,) says through what each goes: 0 nothing, 1 the encoder, 2 the strain amplifier, 3 the rate
-    estimate; `references` (n, columns) is taken off, and is all there is of columns beyond the signals (y = 0 there).
+    u = r + C x + D e, x_{k+1} = A x + B e of the errors e = reference - signal, `references` (n, columns); D has a row,
+    or one for each sample.  `sources` (columns,) is the output that a column reads, hub angle, hub rate and root moment
+    through their converters, or -1 of none: a reference alone.
     """
     A, B, C, D = matrices
-    n, single, memory, first = state.torque.size, electronics.is_single, np.zeros(3), state.record.shape[1] - kinds.size
-    x, following, y = np.zeros(A.shape[0]), np.zeros(A.shape[0]), np.zeros(B.shape[1])
+    n, single, memory, known = state.torque.size, electronics.is_single, np.zeros(3), np.zeros(3)
+    x, following, e = np.zeros(A.shape[0]), np.zeros(A.shape[0]), np.zeros(B.shape[1])
     for k in range(n):
         if not _before(k, model, state, forcing, electronics):
             return k
         record = state.record[k]
-        angle, rate, moment = _converted(record, state.saturated[k], memory, electronics)
-        for j in range(y.size):
-            value = signal(kinds[j], record[first + j], angle, rate, moment) if j < kinds.size else 0.0
-            y[j] = value - references[k, j]
+        known[ANGLE], known[RATE], known[MOMENT] = _converted(record, state.saturated[k], memory, electronics)
+        for j in range(e.size):
+            source = sources[j]
+            value = 0.0 if source < 0 else known[source] if source < known.size else record[source]
+            e[j] = references[k, j] - value
             if single:
-                y[j] = float(np.float32(float(np.float32(value)) - float(np.float32(references[k, j]))))
-        u = forcing.feedforward[k] - product(D[0], y, product(C[0], x, 0.0, single), single)
+                e[j] = float(np.float32(float(np.float32(references[k, j])) - float(np.float32(value))))
+        u = forcing.feedforward[k]
         if single:
             u = float(np.float32(u))
+        u = product(D[min(k, D.shape[0] - 1)], e, product(C[0], x, u, single), single)
         for i in range(x.size):
-            following[i] = product(B[i], y, product(A[i], x, 0.0, single), single)
+            following[i] = product(B[i], e, product(A[i], x, 0.0, single), single)
         x[:] = following
         _after(k, u, model, state, forcing, electronics)
     return n

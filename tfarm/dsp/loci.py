@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, HubFeedback
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN
 from tfarm.arrays import Complex, Real
 from tfarm.crossing.turning import loose
-from tfarm.dsp.law import followed_branches, origins
-from tfarm.dsp.loop import SampledLoop
+from tfarm.dsp.modes import followed_branches, origins
+from tfarm.dsp.sampled import Sampled
 from tfarm.records import record
 
 SAMPLED_LOCUS_VALUES = 61  # of a gain along its locus, to begin with
@@ -33,12 +33,12 @@ WEAKEST = 1e-3  # of it, where that locus begins
 @dataclass(frozen=True)
 @record
 class SampledLocus:
-    """One gain's locus, the others those of `law`: `z` (values, branches), and the flexible mode of each branch.
+    """The locus of one number of a law, the others those of `loop`: `z` (values, branches), and each branch's mode.
 
-    The mode is 0 for one that comes from the hub, a filter or the delay.
+    The mode is 0 for one that comes from the hub, a filter, the delay or the law.
     """
 
-    law: HubFeedback
+    loop: Sampled
     gain: str
     values: Real
     z: Complex
@@ -52,7 +52,7 @@ class SampledLoci:
     own, one a flexible mode, `mode` their numbers.
     """
 
-    loop: SampledLoop
+    loop: Sampled
     alone: SampledLocus
     by: Mapping[str, SampledLocus]
     poles: Complex
@@ -69,12 +69,12 @@ class SampledLoci:
         return bool(at.size and self.poles[at[0]].imag > 2 * math.pi * self.half_rate)
 
 
-def sampled_loci(loop: SampledLoop, top: float, moments: tuple[float, float]) -> SampledLoci:
+def sampled_loci(loop: Sampled, top: float, moments: tuple[float, float]) -> SampledLoci:
     """The loci of the rate gain from nearly 0 to `top` and of the moment gain over `moments`, the other as it is.
 
     Both begin below the gains of the loop.
     """
-    own, gains = loop.gains[RATE_GAIN], loop.gains
+    own = loop.number(RATE_GAIN)
     values = (
         np.geomspace(min(top / 10**RATE_DECADES, own / STRONGER), top, SAMPLED_LOCUS_VALUES),
         np.linspace(*moments, SAMPLED_LOCUS_VALUES),
@@ -82,20 +82,21 @@ def sampled_loci(loop: SampledLoop, top: float, moments: tuple[float, float]) ->
     upper = np.nonzero((loop.pulse.poles.imag > 0) & (loop.pulse.mode > 0))[0]
     upper = upper[np.argsort(loop.pulse.mode[upper])]
     small = np.geomspace(WEAKEST, STRONGER, SAMPLED_LOCUS_VALUES) * own
-    alone = _locus(loop.under(gains.having(MOMENT_GAIN, 0.0)), RATE_GAIN, small)
-    by = {name: _locus(loop, name, each) for name, each in zip(PLANE, values, strict=True)}
+    alone = sampled_locus(loop.having(**{MOMENT_GAIN: 0.0}), RATE_GAIN, small)
+    by = {name: sampled_locus(loop, name, each) for name, each in zip(PLANE, values, strict=True)}
     return SampledLoci(loop, alone, by, loop.pulse.poles[upper], loop.pulse.mode[upper])
 
 
-def _locus(loop: SampledLoop, gain: str, values: Real) -> SampledLocus:
-    """The locus at these values, that of the loop, and those between at which a branch turns in its picture."""
+def sampled_locus(loop: Sampled, gain: str, values: Real) -> SampledLocus:
+    """The locus of a number at these values, that of the loop, and those between at which a branch turns."""
 
     def poles(value: float) -> Complex:
         z = loop.having(**{gain: value}).poles.z
         return np.where(abs(z.imag) <= IMAGINARY_ROUNDING, z.real, z)
 
     known: dict[float, Complex] = {}
-    wanted = np.union1d(values, loop.gains[gain]) if values[0] < loop.gains[gain] < values[-1] else values
+    own = loop.number(gain)
+    wanted = np.union1d(values, own) if values[0] < own < values[-1] else values
     for _ in range(BRANCH_ROUNDS):
         known |= {value: poles(value) for value in wanted.tolist() if value not in known}
         values = np.array(sorted(known))
@@ -106,5 +107,6 @@ def _locus(loop: SampledLoop, gain: str, values: Real) -> SampledLocus:
         wanted = (values[:-1] + values[1:])[bent] / 2
     first = loop.having(**{gain: float(values[0])})
     origin = origins(first)
-    mode = np.where(origin < 0, 0, loop.pulse.mode[origin])
-    return SampledLocus(loop.gains, gain, values, z, mode[[abs(first.poles.z - start).argmin() for start in z[0]]])
+    modes = np.r_[loop.pulse.mode, np.zeros(loop.in_z.poles.size, np.int64)]
+    mode = np.where(origin < 0, 0, modes[origin])
+    return SampledLocus(loop, gain, values, z, mode[[abs(first.poles.z - start).argmin() for start in z[0]]])

@@ -18,15 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from tfarm.arm import FED_BACK, Arm
+from tfarm.arm import Arm
 from tfarm.arrays import Complex, Real
 from tfarm.dsp.chain import Chain
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.exact.outputs import OUTPUTS, Output
+from tfarm.exact.outputs import Output
 from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
 from tfarm.reduced.remainder import SLOW_POLES_FROM, slow_remainder
 from tfarm.response import transfer
+from tfarm.response.signals import Signals
 from tfarm.spectrum import DampedModes, Modes
 from tfarm.spectrum.damped import all_damped_modes
 from tfarm.spectrum.search import LISTS_KEPT
@@ -99,19 +100,6 @@ class Plant:
     def count(self) -> int:
         """The last flexible mode in it."""
         return int(self.mode.max(initial=0))
-
-
-def loop_plant(arm: Arm, chain: Chain, count: int, branches: Branching = all_damped_modes) -> Plant:
-    """What the controller of a chain measures: hub angle, hub rate and root moment through their analog filters.
-
-    Raises ParameterError for a locked hub, which no torque turns.
-    """
-    return filtered(undelayed_plant(arm, chain, FED_BACK, count, branches), chain)
-
-
-def shorter_plant(plant: Plant, chain: Chain, count: int) -> Plant:
-    """A plant of `loop_plant` with the first `count` modes of its model."""
-    return filtered(with_modes(plant.model, chain, FED_BACK, count), chain)
 
 
 def undelayed_plant(
@@ -207,14 +195,6 @@ def is_analog(wanted: Output, chain: Chain) -> bool:
     return wanted.quantity in AMPLIFIED or wanted.power > 0
 
 
-def filtered(plant: Plant, chain: Chain) -> Plant:
-    """The analog anti-alias filter on those of the first outputs, which are fed back, that pass one."""
-    corner = chain.sampling.antialias_corner
-    if math.isinf(corner):
-        return plant
-    return with_filter(plant, [n for n, name in enumerate(FED_BACK) if is_analog(OUTPUTS[name], chain)], corner)
-
-
 def with_filter(plant: Plant, rows: Sequence[int], corner: float) -> Plant:
     """wc/(s + wc) after some outputs: a pole at -wc, with the residue wc G(-wc).
 
@@ -278,3 +258,65 @@ def _with_hub_damping(model: ModalModel, outputs: Sequence[str], damping: float)
     mode[new] = np.repeat(model.index, 2)[old]
     damped = Plant(model.arm, model.outputs, poles, residues, rigid, D[:, 0], mode, model)
     return damped.rows(outputs)
+
+
+@dataclass(frozen=True)
+@record
+class SensedPlant:
+    """An arm's signals with `count` modes: one plant for each place that signals are read at, and all of it together.
+
+    `plants` are not filtered, one for each of `places` [share of the length].  Raises ParameterError as `Signals` does,
+    for a locked hub, and for an output that grows with s without bound.
+    """
+
+    read: Signals
+    chain: Chain
+    plants: tuple[Plant, ...]
+
+    @property
+    def together(self) -> Plant:
+        """All signals in the order of their names, through their analog filters."""
+        whole, corner = self.unfiltered, self.chain.sampling.antialias_corner
+        analog = [n for n, each in enumerate(self.read.outputs) if is_analog(each, self.chain)]
+        return whole if math.isinf(corner) or not analog else with_filter(whole, analog, corner)
+
+    @property
+    def unfiltered(self) -> Plant:
+        """All signals in the order of their names, as they are."""
+        places = list(dict.fromkeys(self.read.places))
+        first, rows = self.plants[0], []
+        for wanted, place in zip(self.read.outputs, self.read.places, strict=True):
+            plant = self.plants[places.index(place)]
+            assert np.array_equal(plant.poles, first.poles)  # the poles are the arm's, wherever it is looked at
+            rows.append((plant, plant.outputs.index(wanted.name)))
+        return replace(
+            first,
+            outputs=self.read.names,
+            residues=np.array([plant.residues[n] for plant, n in rows]),
+            rigid=np.array([plant.rigid[n] for plant, n in rows]),
+            static=np.array([plant.static[n] for plant, n in rows]),
+        )
+
+    def with_modes(self, count: int, branches: Branching = all_damped_modes) -> SensedPlant:
+        """The same with another number of modes; no work where the models have as many."""
+        if count > self.plants[0].model.index.size:
+            return sensed_plant(self.read.arm, self.chain, self.read.names, count, branches)
+        damped = self.chain.actuator.hub_damping > 0
+        shorter = [
+            with_modes(each.model, self.chain, each.model.outputs[: -len(AT_DAMPED_HUB) if damped else None], count)
+            for each in self.plants
+        ]
+        return replace(self, plants=tuple(shorter))
+
+
+def sensed_plant(
+    arm: Arm, chain: Chain, names: Sequence[str], count: int, branches: Branching = all_damped_modes
+) -> SensedPlant:
+    """The signals of that name with `count` flexible modes."""
+    read, plants = Signals(arm, tuple(names)), []
+    for share in dict.fromkeys(read.places):
+        here = zip(read.outputs, read.places, strict=True)
+        wanted = list(dict.fromkeys(each.name for each, place in here if place == share))
+        along = any(each.place == "x" for each in read.outputs if each.name in wanted)
+        plants.append(undelayed_plant(arm, chain, wanted, count, branches, share * arm.length if along else None))
+    return SensedPlant(read, chain, tuple(plants))

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arm import PLANE
 from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossings, Window, counts_over, intervals, pieces
 from tfarm.crossing.turning import loose_columns
-from tfarm.dsp.boundary import circle_crossings, circle_grid
-from tfarm.dsp.loop import SampledLoop
-from tfarm.dsp.margins import stable_windows
+from tfarm.dsp.crossings import circle_grid, number_crossings, stable_windows
+from tfarm.dsp.sampled import Sampled
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 
@@ -35,7 +35,7 @@ class GainMap:
     `crossings[i]`: at which K2 the count changes at K1[i], exact and not tied to the grid.
     """
 
-    loop: SampledLoop
+    loop: Sampled
     K1: Real
     K2: Real
     unstable: NDArray[np.int64]
@@ -61,7 +61,7 @@ class GainMap:
         ]
 
 
-def sampled_map(loop: SampledLoop, K1: Sequence[float] | Real, K2: Sequence[float] | Real) -> GainMap:
+def sampled_map(loop: Sampled, K1: Sequence[float] | Real, K2: Sequence[float] | Real) -> GainMap:
     """The map over the grid K1 x K2 (both ascending), the other settings as those of the loop.
 
     From the exact crossings of every row (D-decomposition) and one count by eigenvalues; those at three corners must
@@ -69,15 +69,15 @@ def sampled_map(loop: SampledLoop, K1: Sequence[float] | Real, K2: Sequence[floa
     """
     rows, columns = _ascending("K1", K1), _ascending("K2", K2)
     grid, start = circle_grid(loop), loop.having(K1=_off_the_edge(rows), K2=_off_the_edge(columns))
-    first, there = start.gains, np.array([start.poles.unstable])
-    (at_start,) = counts_over(rows, [circle_crossings(grid, "K1", first)], first.K1, there)
-    found = [circle_crossings(grid, "K2", first.having("K1", float(gain))) for gain in rows]
-    unstable = counts_over(columns, found, first.K2, at_start)
+    (across, up), there = (start.number(name) for name in PLANE), np.array([start.poles.unstable])
+    (at_start,) = counts_over(rows, [number_crossings(grid, "K1", start.row)], across, there)
+    found = [number_crossings(grid, "K2", start.having(K1=float(gain)).row) for gain in rows]
+    unstable = counts_over(columns, found, up, at_start)
     for i, j in ((0, 0), (-1, 0), (-1, -1)):
         corner = loop.having(K1=float(rows[i]), K2=float(columns[j]))
         is_told = abs(corner.poles.log_radius).min() >= TOLD_FROM_CIRCLE  # else on an edge, or too close to it
         if is_told and (count := corner.poles.unstable) != unstable[i, j]:
-            where = f"at K1 = {corner.gains.K1:g}, K2 = {corner.gains.K2:g}"
+            where = f"at K1 = {corner.number('K1'):g}, K2 = {corner.number('K2'):g}"
             message = f"{where} the crossings count {unstable[i, j]} growing poles, not {count}"
             raise ConvergenceError(message, GainMap(loop, rows, columns, unstable, found), abs(count - unstable[i, j]))
     return GainMap(loop, rows, columns, unstable, found)
@@ -111,7 +111,7 @@ def with_more(plane: GainMap, K1: Real) -> GainMap:
     )  # fmt: skip
 
 
-def ends_of_K1(loop: SampledLoop) -> Real:
+def ends_of_K1(loop: Sampled) -> Real:
     """Where stable intervals of K1 end, but at 0, at a few K2: there the region has upright edges."""
     unit = loop.plant.arm.input_per_torque
     found = [window for K2 in ENDS_AT for window in stable_windows(loop.having(K2=unit * K2), "K1")]

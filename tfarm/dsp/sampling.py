@@ -108,16 +108,15 @@ class PulseTransfer:
     ) -> Complex:
         """offset H(z) at z = multipliers[base] + offset, without loss however small the offset: (outputs, n).
 
-        With no `base` it is offset H(z); `delta` is z - 1, where that is known to more digits than z.
+        With no `base`, or one of -1, it is offset H(z); `delta` is z - 1, where that is known to more digits than z.
         """
         gap = z[:, None] - self.multipliers if delta is None else delta[:, None] - self.shifts
-        rows = np.arange(z.size)
-        if base is not None:
-            gap[rows, base] = 1.0
+        rows = np.empty(0, np.int64) if base is None else np.flatnonzero(base >= 0)
+        near = (rows, rows if base is None else base[rows])
+        gap[near] = 1.0
         push = self.early + self.late / z[:, None]
         weights = push * (offset[:, None] / gap)
-        if base is not None:
-            weights[rows, base] = push[rows, base]
+        weights[near] = push[near]
         value = self.residues @ weights.T + np.outer(self.plant.static, offset / z)
         if self.plant.rigid[:, 0].any():
             distance = z - 1.0 if delta is None else delta

@@ -1,41 +1,202 @@
-"""The sampled loop in time: exact between the samples, with any controller, recorded at the samples and between."""
+"""The sampled loop in time: exact between the samples, with any controller, recorded at the samples and between.
+
+A signal among a law's references enters as signal - reference: those of the hub's angle and rate are the slew's, that
+of the root moment is the rigid arm's.  A column "reference:hub_angle" takes the reference alone.  The encoder's counts
+and the strain amplifier's range act on hub angle and root moment; other signals are read as they are.
+
+A signal is rounded to the nearest step (mid-tread) and clipped to the codes that its bits have, as two's complement has
+them: -2^(b-1) .. 2^(b-1) - 1 steps of 2 R / 2^b.  An ideal converter has step 0.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from copy import copy
-from typing import Self
+from dataclasses import dataclass, field
+from typing import NamedTuple, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import AT_HUB, FED_BACK, MOMENT_GAIN, Arm, HubFeedback, many_laws
+from tfarm.arm import ANGLE_GAIN, AT_HUB, RATE_GAIN, AnyLaw, Arm, HubFeedback
 from tfarm.arm.checks import whole
+from tfarm.arm.law import REFERENCE, Law
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import kernel
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.converters import quantisers
-from tfarm.dsp.law_plant import sensed_plant
-from tfarm.dsp.loop import check_loop
-from tfarm.dsp.measurement import Controller, Measurement
-from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, filtered, undelayed_plant
+from tfarm.dsp.discretise import acting_law, with_all_gains
+from tfarm.dsp.kernel import DAC, HIGHEST, LOWEST
+from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, sensed_plant
 from tfarm.dsp.sampling import held_amplitude
 from tfarm.dsp.scenarios import Scenario
-from tfarm.dsp.simulation import Simulation, Stop, Trace
-from tfarm.errors import ParameterError
+from tfarm.errors import ParameterError, must_be_known
+from tfarm.exact.outputs import OUTPUTS
+from tfarm.records import record
 
 FOLDED_UP = 10.0  # rad: an arm bent by the moment EI/L times this is no arm any more, and the simulation stops
-SHOWN = slice(len(FED_BACK), len(FED_BACK) + len(RECORDED))  # of the outputs those recorded, after the measured ones
 MOST_BETWEEN = 1000  # records between two samples
+NO_GAINS = HubFeedback()
+
+
+def quantisers(chain: Chain) -> Real:
+    """Step, lowest and highest value (3, 3) of a chain's encoder, strain amplifier and DAC, as `kernel` numbers them.
+
+    A step of 0 is ideal; the torque's range also respects the motor's limit.
+    """
+    converters, limit = chain.converters, chain.actuator.torque_limit
+    counts = converters.encoder_counts
+    rows = np.array([
+        [0.0 if counts is None else 2 * math.pi / counts, -math.inf, math.inf],
+        _converter(converters.moment_bits, converters.moment_range),
+        _converter(converters.torque_bits, converters.torque_range),
+    ])  # fmt: skip
+    rows[DAC, LOWEST] = max(rows[DAC, LOWEST], -limit)
+    rows[DAC, HIGHEST] = min(rows[DAC, HIGHEST], limit)
+    return rows
+
+
+def _converter(bits: int | None, span: float | None) -> list[float]:
+    if span is None:
+        return [0.0, -math.inf, math.inf]
+    if bits is None:
+        return [0.0, -span, span]
+    step = 2 * span / 2**bits
+    return [step, -span, span - step]
+
+
+class Measurement(NamedTuple):
+    """What a controller gets at sample `k`, time `t` [s]: what the sensors read, and what is wanted.
+
+    `vibration` is the root moment less `rigid_moment` (the paper's x under either reading of it); `feedforward` is r.
+    """
+
+    k: int
+    t: float
+    hub_angle: float
+    hub_rate: float
+    root_moment: float
+    vibration: float
+    feedforward: float
+    angle_reference: float
+    rate_reference: float
+    rigid_moment: float
+
+    def servo(self, law: HubFeedback) -> float:
+        """What a law asks of the input [N m] for the hub's angle and rate, as they are off what is wanted.
+
+        Raises ParameterError for a law with a gain on what is not measured here.
+        """
+        if not law.is_at_hub:
+            name = law.elsewhere[0].name
+            remedy = "a controller of samples has hub angle, hub rate and root moment alone; set it to 0"
+            raise ParameterError(key=name, value=law[name], remedy=remedy)
+        angle_off, rate_off = self.angle_reference - self.hub_angle, self.rate_reference - self.hub_rate
+        return law[ANGLE_GAIN] * angle_off + law[RATE_GAIN] * rate_off
+
+    def asked(self, law: HubFeedback, moment_gain: float) -> float:
+        """What is fed forward and what the servo asks, less the gain at this sample times the vibration."""
+        return self.feedforward + self.servo(law) - moment_gain * self.vibration
+
+
+Controller = Callable[[Measurement], float]
+
+
+@dataclass(frozen=True)
+@record
+class Trace:
+    """Signals, not filtered, at `t` [s]: hub angle [rad], hub rate [rad/s], root moment [N m], tip displacement [m].
+
+    `others` are those asked for besides, by name and in SI units.
+    """
+
+    t: Real
+    hub_angle: Real
+    hub_rate: Real
+    root_moment: Real
+    tip_displacement: Real
+    others: dict[str, Real] = field(default_factory=dict)
+
+    def signal(self, name: str) -> Real:
+        """One of the signals by its name.  Raises ParameterError for one that was not asked for."""
+        must_be_known("output", name, self.names)
+        return self.others[name] if name in self.others else cast("Real", getattr(self, name))
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The SI units of what was asked for besides."""
+        return {name: OUTPUTS[name.partition("@")[0]].unit for name in self.others}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The signals that it has."""
+        return (*RECORDED, *self.others)
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Why a simulation ended early: at `time` [s] the arm was folded up, by `mode` above all (0: the hub)."""
+
+    time: float
+    mode: int
+
+
+@dataclass(frozen=True)
+@record
+class Simulation:
+    """A simulated loop: `at_samples` just before each update, `between` the records asked for between the samples.
+
+    `torque` [N m] is what leaves the DAC at each sample, `gain` that on the root moment there (None where a controller
+    does not say), `measured` (n, 3) what the analog filters pass of hub angle, hub rate and root moment.
+    `saturated_at` (n, 3) says at which samples the encoder, the strain amplifier and the torque were clipped.
+    `energy_error` is |energy gained - work done| over the energy that went to and fro, for an arm without damping; None
+    with damping.
+    """
+
+    scenario: Scenario
+    chain: Chain
+    at_samples: Trace
+    between: Trace | None
+    measured: Real
+    torque: Real
+    gain: Real | None
+    saturated_at: NDArray[np.bool_]
+    energy_error: float | None
+    stopped: Stop | None
+
+    @property
+    def finding(self) -> str:
+        """How far it ran, the largest root moment on the way, and what was clipped, in words."""
+        end, moment = float(self.t.max(initial=0.0)), float(abs(self.at_samples.root_moment).max(initial=0.0))
+        clipped = [f"{name} clipped at {n} samples" for name, n in self.saturated.items() if n]
+        ran = f"ran to {end:.6g} s" if self.stopped is None else f"ran away, stopped at {self.stopped.time:.6g} s"
+        return ", ".join([ran, f"root moment up to {moment:.4g} N m", *clipped])
+
+    @property
+    def t(self) -> Real:
+        """The times of the samples [s]."""
+        return self.at_samples.t
+
+    @property
+    def saturated(self) -> dict[str, int]:
+        """At how many samples encoder, strain amplifier and torque were clipped."""
+        counts = self.saturated_at.sum(axis=0)
+        return {name: int(n) for name, n in zip(("encoder", "moment", "torque"), counts, strict=True)}
+
+    @property
+    def volts(self) -> Real | None:
+        """The motor's voltage, where the actuator has a motor constant."""
+        constant = self.chain.actuator.motor_constant
+        return None if constant is None else self.torque / constant
 
 
 class Simulator:
-    """An arm with `count` modes, a chain and a scenario, prepared once; each call simulates it from the start.
+    """An arm with `count` modes, a chain, a scenario and a law, prepared once; each call simulates it from the start.
 
     `between` asks for so many records in each sample, `outputs` for more signals than those of `RECORDED`, by name,
     those along the arm with their place [m]: "tip_rotation", "strain@0.05".  Raises ParameterError for a locked hub,
-    for an unknown output, and for one that grows with s without bound.
+    for an unknown output or signal, one that grows with s without bound, a signal whose reference no scenario has, and
+    as `acting_law` does.
     """
 
     def __init__(
@@ -43,6 +204,7 @@ class Simulator:
         arm: Arm,
         chain: Chain,
         scenario: Scenario,
+        law: AnyLaw = NO_GAINS,
         *,
         count: int = USUAL_MODES,
         between: int = 0,
@@ -50,35 +212,50 @@ class Simulator:
     ) -> None:
         remedy = f"a whole number of records between two samples, 0 to {MOST_BETWEEN}"
         between = whole("between", between, 0, MOST_BETWEEN, remedy)
-        self.chain, self.scenario, self.between = chain, scenario, between
+        given = with_all_gains(arm, law)
+        self.gains = given.gains if given.references == AT_HUB else None
+        self.law, self.chain = acting_law(arm, given, chain)
+        references_of(self.law, scenario)  # which it has to have
+        self.scenario, self.between, self._wanted = scenario, between, scenario.wanted
         self.others = tuple(dict.fromkeys(name for name in outputs if name not in RECORDED))
-        self.plant = self.plant_of(arm, count)
+        self.measured = tuple(dict.fromkeys((*AT_HUB, *self.law.signals)))
+        self.plant = sensed_plant(arm, chain, self.measured, count).together
+        for names in filter(None, (RECORDED, self.others)):
+            self.plant = self.plant.beside(sensed_plant(arm, chain, names, count).unfiltered)
         self._kept = np.nonzero(self.plant.poles.imag >= 0)[0]
-        self._model = _model(self.plant, self._kept, chain, between)
-        self._wanted = scenario.wanted
+        self._model = self._prepared()
         self._forcing = kernel.Forcing(scenario.feedforward, scenario.disturbance, float(scenario.impulse))
-        self._electronics = _electronics(chain, FOLDED_UP * arm.bending_scale)
+        self._electronics = _electronics(self.chain, FOLDED_UP * arm.bending_scale)
 
-    def plant_of(self, arm: Arm, count: int) -> Plant:
-        """What is measured, through its filters, and then what is recorded."""
-        plant = filtered(undelayed_plant(arm, self.chain, (*FED_BACK, *RECORDED), count), self.chain)
-        if not self.others:
-            return plant
-        return plant.beside(sensed_plant(arm, self.chain, self.others, count).unfiltered)
+    def run(self) -> Simulation:
+        """The law over the scenario, from its start."""
+        n, gains = self.scenario.feedforward.size, self.gains
+        return self._driven(self.law, None if gains is None else np.full(n, gains.K2))
 
     def linear(self, gains: HubFeedback, K2: Real | None = None) -> Simulation:
-        """The law u = r + gains . (wanted - measured), compiled; `K2` (n,) may vary.  Nothing is wanted off the hub.
+        """The law u = r + gains . (wanted - measured) in the place of the simulator's own; `K2` (n,) may vary.
 
         Raises ParameterError for I_h = 0 with moment feedback, and for gains that are not one finite number a sample.
         """
-        check_loop(self.plant.arm, gains)
         n = self.scenario.feedforward.size
         gain = np.full(n, gains.K2) if K2 is None else np.array(K2, dtype=float)
         if gain.shape != (n,) or not np.isfinite(gain).all():
             raise ParameterError(key="K2", value=gain.shape, remedy=f"one finite gain a sample, {n} in all")
-        rows = np.ascontiguousarray(many_laws(gains, **{MOMENT_GAIN: gain}).T)
-        state = self._start()
-        done = kernel.run_gains(self._model, state, self._forcing, self._electronics, rows, self._wanted)
+        return self._driven(with_all_gains(self.plant.arm, gains), gain)
+
+    def _driven(self, law: Law, gain: Real | None) -> Simulation:
+        """A law in z over the scenario; `gain` is that on the root moment, sample by sample."""
+        columns = (*law.signals, *law.wanted)
+        A, B, C, D = law.matrices(columns)
+        if gain is not None:
+            D = np.repeat(D, gain.size, axis=0)
+            D[:, columns.index("root_moment")] = gain
+        matrices = tuple(np.ascontiguousarray(each) for each in (A, B, C, D))
+        if self._electronics.is_single:
+            matrices = tuple(each.astype(np.float32).astype(float) for each in matrices)
+        sources = np.array([self.measured.index(name) if name in self.measured else -1 for name in columns])
+        references, state = references_of(law, self.scenario), self._start()
+        done = kernel.run(self._model, state, self._forcing, self._electronics, matrices, sources, references)
         return self._result(state, int(done), gain)
 
     def controller(self, controller: Controller) -> Simulation:
@@ -99,12 +276,12 @@ class Simulator:
         """The same with so many records in each sample."""
         other = copy(self)
         other.between = between
-        other._model = _model(self.plant, self._kept, self.chain, between)
+        other._model = other._prepared()
         return other
 
     def modal(self) -> tuple[Complex, Complex]:
         """Poles (m,) [1/s] with Im p >= 0, and what each amplitude adds to hub angle, rate, moment and tip (4, m)."""
-        return self.plant.poles[self._kept], self._model.weights[SHOWN]
+        return self.plant.poles[self._kept], self._model.weights[len(self.measured) :][: len(RECORDED)]
 
     def first_amplitudes(self) -> Complex:
         """The modal amplitudes (m,) after the sample at t = 0, once the hub was struck."""
@@ -113,7 +290,7 @@ class Simulator:
     # ------------------------------------------------------------ inside
 
     def _stepped(self, rule: Callable[[Measurement], tuple[float, float]], gain: Real | None) -> Simulation:
-        """The loop of `kernel.run_gains` in Python."""
+        """The loop of `kernel.run` in Python."""
         state, memory, of, forcing = self._start(), np.zeros(3), self._electronics, self._forcing
         for k in range(state.torque.size):
             if not kernel.before(k, self._model, state, forcing, of):
@@ -158,7 +335,7 @@ class Simulator:
 
     def _energy(self, amplitude: Complex, rate: float) -> float:
         """Of an undamped arm [J]: b^2 |a|^2/2 a mode, b^2 twice the residue of the hub rate, and the rigid arm's."""
-        row = self.plant.outputs.index("hub_rate", SHOWN.start)
+        row = self.plant.outputs.index("hub_rate", len(self.measured))
         rigid = self.plant.rigid[row, 1] * rate**2 / 2
         return float(self.plant.residues[row, self._kept].real @ abs(amplitude) ** 2 + rigid)
 
@@ -192,10 +369,30 @@ class Simulator:
             stopped=stopped,
         )
 
+    def _prepared(self) -> kernel.Model:
+        """What the compiled loop takes of the plant, with the records between two samples."""
+        plant, kept, p = self.plant, self._kept, self.plant.poles[self._kept]
+        T, f = self.chain.sampling.period, self.chain.sampling.fraction
+        records = T * (np.arange(self.between) + 1) / (self.between + 1)
+        ends = np.unique(np.r_[records, [f * T] if f else [], T])
+        starts = np.r_[0.0, ends[:-1]]
+        durations = ends - starts
+        weights = np.ascontiguousarray(plant.residues[:, kept] * np.where(p.imag > 0, 2.0, 1.0))
+        row = plant.outputs.index("hub_angle", len(self.measured))
+        return kernel.Model(
+            turn=np.exp(p * durations[:, None]),
+            push=np.array([held_amplitude(p, float(each)) for each in durations]),
+            piece=np.c_[durations, starts >= f * T, np.isin(ends, records)].astype(float),
+            weights=weights,
+            rates=np.array(plant.rigid),  # in one layout: the compiled loop is compiled anew for each
+            static=np.array(plant.static),
+            hub=np.r_[plant.rigid[row], weights[row]].astype(complex),
+        )
+
     def _trace(self, t: Real, record: Real) -> Trace:
         """The recorded outputs."""
-        angle, rate, moment, tip, *more = (np.ascontiguousarray(column) for column in record[:, SHOWN.start :].T)
-        return Trace(t, angle, rate, moment, tip, dict(zip(self.others, more, strict=False)))  # then a law's signals
+        angle, rate, moment, tip, *more = (np.ascontiguousarray(column) for column in record[:, len(self.measured) :].T)
+        return Trace(t, angle, rate, moment, tip, dict(zip(self.others, more, strict=True)))
 
 
 def _electronics(chain: Chain, bound: float) -> kernel.Electronics:
@@ -211,26 +408,6 @@ def _electronics(chain: Chain, bound: float) -> kernel.Electronics:
     )
 
 
-def _model(plant: Plant, kept: NDArray[np.int64], chain: Chain, between: int) -> kernel.Model:
-    p, weight = plant.poles[kept], np.where(plant.poles[kept].imag > 0, 2.0, 1.0)
-    T, f = chain.sampling.period, chain.sampling.fraction
-    records = T * (np.arange(between) + 1) / (between + 1)
-    ends = np.unique(np.r_[records, [f * T] if f else [], T])
-    starts = np.r_[0.0, ends[:-1]]
-    durations = ends - starts
-    weights = np.ascontiguousarray(plant.residues[:, kept] * weight)
-    row = plant.outputs.index("hub_angle", SHOWN.start)
-    return kernel.Model(
-        turn=np.exp(p * durations[:, None]),
-        push=np.array([held_amplitude(p, float(each)) for each in durations]),
-        piece=np.c_[durations, starts >= f * T, np.isin(ends, records)].astype(float),
-        weights=weights,
-        rates=np.array(plant.rigid),  # in one layout: the compiled loop is compiled anew for each
-        static=np.array(plant.static),
-        hub=np.r_[plant.rigid[row], weights[row]].astype(complex),
-    )
-
-
 def _released(plant: Plant, kept: NDArray[np.int64], offset: float) -> tuple[int, complex]:
     """The amplitude of the first mode at rest with the tip displaced: a = i x/(p r), x = offset |p|^2/(2 Im p)."""
     row = plant.outputs.index("tip_displacement")
@@ -241,3 +418,19 @@ def _released(plant: Plant, kept: NDArray[np.int64], offset: float) -> tuple[int
     i = int(first[0])
     p, r = plant.poles[kept[i]], plant.residues[row, kept[i]]
     return i, complex(1j * offset * abs(p) ** 2 / (2 * p.imag) / (p * r))
+
+
+def references_of(law: Law, task: Scenario) -> Real:
+    """What is taken off each column of the law at each sample (n, columns): of a column of references, minus it.
+
+    Raises ParameterError for a signal whose reference a scenario does not have.
+    """
+    known = task.references
+    found = np.zeros((task.feedforward.size, len(law.signals) + len(law.wanted)))
+    for column, name in enumerate((*law.signals, *law.wanted)):
+        plain = name.removeprefix(REFERENCE)
+        if name == plain and name not in law.references:
+            continue
+        must_be_known("references", plain, known)
+        found[:, column] = known[plain] if name == plain else -known[plain]
+    return found

@@ -13,9 +13,8 @@ from tfarm.arm import Arm, must_be_arm
 from tfarm.errors import ParameterError
 from tfarm.records import record
 
-from .data import Measured, must_be_measured
+from .data import Measured, must_be_measured, noise_of
 from .model import Problem, Response, check_signals
-from .noise import noise_of
 from .parameters import Parameter, parameters
 from .ringing import RingMode
 from .solve import Solution, best_solution, is_explained, nearest_minimum

@@ -14,17 +14,15 @@ from typing import Any
 import numpy as np
 
 from tfarm.arm import INPUTS, Arm
-from tfarm.arm.keys import KeyedArms
+from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exact.series import Jet
 from tfarm.response.signals import Signals
 
-from .around import Around, drive_behind, under_drive
-from .data import Measured, in_parts
-from .noise import Noise
-from .parameters import COORDINATE_STEP, Parameter
+from .data import Measured, Noise, in_parts
+from .parameters import COORDINATE_STEP, Around, Parameter, drive_behind, under_drive
 from .reading import check_signal
 from .ringing import RingMode, ring_residuals
 

@@ -15,7 +15,7 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum import modes
 
-from .around import NUDGE, Around
+from .parameters import NUDGE, Around
 
 FREQUENCY_KNOWN = 2e-3  # of itself: what a decay says of it, where its deviation is not said
 RATIO_KNOWN = 0.1  # of itself, likewise

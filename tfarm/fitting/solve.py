@@ -17,8 +17,8 @@ from scipy.special import chdtrc, ndtri, stdtrit
 from tfarm.arrays import Real
 from tfarm.records import record
 
+from .data import CONFIDENCE
 from .model import Problem, walled
-from .noise import CONFIDENCE
 from .start import LADDERS, Starts
 
 NOISE_ALONE = 1e-6  # a sum of squares that noise alone exceeds so rarely is no noise: another start may do better

@@ -25,9 +25,9 @@ from scipy.optimize import OptimizeResult, least_squares
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 
-from .around import Around
 from .data import in_parts
 from .model import Problem, walled
+from .parameters import Around
 from .ringing import ring_residuals
 
 LADDERS = ((0.1,), (1.0, 0.3, 0.1))  # shares of w, one after another, of the first starts

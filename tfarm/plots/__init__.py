@@ -8,12 +8,12 @@ In the look of the report's pages, whose pictures these are.  This is the only r
 
 from tfarm.plots.compared import comparison
 from tfarm.plots.disc import nyquist
+from tfarm.plots.fitted import measured
 from tfarm.plots.frequency import bode
 from tfarm.plots.growth import sampled_modes
 from tfarm.plots.laws import gain_map, locus
 from tfarm.plots.learning import tuned_gain
 from tfarm.plots.motion import slew
-from tfarm.plots.overlaid import measured
 from tfarm.plots.regions import overlay
 from tfarm.plots.shapes import modes
 from tfarm.plots.sketch import sketch

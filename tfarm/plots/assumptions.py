@@ -7,8 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tfarm.arrays import Real
-from tfarm.audit.assumptions import HubStudy
-from tfarm.audit.candidates import Study
+from tfarm.audit.assumptions import HubStudy, Study
 from tfarm.digits import plain
 
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style

@@ -100,7 +100,7 @@ def z_plane(data: SampledLoci, locus: SampledLocus, *, ax: Axes) -> None:
     ax.fill_between(DRAWN_RADIUS * np.cos(angle), 0, DRAWN_RADIUS * np.sin(angle), color="#f7e9de", zorder=0)
     ax.fill_between(np.cos(angle), 0, np.sin(angle), color="white", zorder=0.2)
     ax.plot(np.cos(angle), np.sin(angle), color=INK, lw=0.9, zorder=1)
-    here = int(abs(locus.values - data.loop.gains[locus.gain]).argmin())
+    here = int(abs(locus.values - data.loop.number(locus.gain)).argmin())
     for branch in np.argsort(locus.mode):
         z, mode = locus.z[:, branch], int(locus.mode[branch])
         visible = np.where((z.imag >= -1e-12) & (abs(z) < DRAWN_RADIUS), z, np.nan)

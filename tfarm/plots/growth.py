@@ -12,8 +12,8 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from tfarm.arm import PLANE
 from tfarm.digits import SUPERSCRIPT, plain
 from tfarm.dsp import Analysis
-from tfarm.dsp.law import ModeTable
-from tfarm.dsp.loop import SampledLoop
+from tfarm.dsp.modes import ModeTable
+from tfarm.dsp.sampled import Sampled
 
 from .frequency import hertz_axis
 from .style import BLUE, GREY, INK, ORANGE, New, blank, headline, must_be, style, window
@@ -28,7 +28,7 @@ def sampled_modes(found: Analysis, *, ax: Axes | None = None) -> Axes:
 
     The closed loop, and to first order what its gains and its own damping add; below 0 a mode decays.
     """
-    must_be(Analysis, found, "tfarm.sampled returns of gains at the hub")
+    must_be(Analysis, found, "tfarm.sampled returns")
     with style():
         if ax is None:
             return draw_modes(found.verdict.loop, found.modes, window).axes[0]
@@ -36,18 +36,18 @@ def sampled_modes(found: Analysis, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def draw_modes(loop: SampledLoop, table: ModeTable, new: New = blank) -> Figure:
+def draw_modes(loop: Sampled, table: ModeTable, new: New = blank) -> Figure:
     """ln|z| per sample of every mode: own damping, both gains to first order, and the closed loop."""
     with style():
         figure = new(9.0, 4.6)
         growths(loop, table, ax=figure.subplots())
         ms = plain(1e3 * loop.chain.sampling.period)
-        gains = gains_words(loop.gains, 10)
+        gains = gains_words(loop.gains if loop.is_of_gains else loop.given, 10)
         headline(figure, f"{loop.plant.arm.name}: what each mode gains or loses a sample ({ms} ms, {gains})")
     return figure
 
 
-def growths(loop: SampledLoop, table: ModeTable, *, ax: Axes) -> None:
+def growths(loop: Sampled, table: ModeTable, *, ax: Axes) -> None:
     """The chart; where bands alternate, those shaded in which the rate gain destabilises to first order."""
     w, T = table.natural_frequency, loop.chain.sampling.period
     low, high = 0.7 * float(w[0]), 1.25 * float(w[-1])

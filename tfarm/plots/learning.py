@@ -1,4 +1,4 @@
-"""The tuner drawn: its gain and its guard on the map, the slew with and without it, learning, and the final cost."""
+"""The tuner drawn: its gain and its guard on the map, and its learning curves."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
 
 from tfarm.arm import MOMENT_GAIN
-from tfarm.digits import plain, significant
+from tfarm.digits import how_many, significant
 from tfarm.dsp import GainMap
 from tfarm.loop.regions import Region
 from tfarm.tuner import Tuning
-from tfarm.tuner.overview import CostMap, Curves, TunerStudy
+from tfarm.tuner.training import QUARTILES, LearningCurves
 
 from .regions import overlay
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, must_be, on_own_figure, style, window
@@ -36,7 +35,7 @@ def tuned_gain(found: Tuning, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def draw_gain(data: TunerStudy, continuous: Region, sampled: Sequence[GainMap]) -> Figure:
+def draw_gain(tuning: Tuning, continuous: Region, sampled: Sequence[GainMap]) -> Figure:
     """Left the map with the tuner's path and guard, right the gain over time, on the same axis."""
     with style():
         figure = blank(9.0, 4.9)
@@ -44,12 +43,12 @@ def draw_gain(data: TunerStudy, continuous: Region, sampled: Sequence[GainMap]) 
         overlay(continuous, sampled, ax=left)
         left.get_legend().remove()
         left.set_title("", loc="right")
-        path(data.tuning, ax=left)
-        gain_over_time(data.tuning, ax=right)
+        path(tuning, ax=left)
+        gain_over_time(tuning, ax=right)
         left.set_ylim(*K_RANGE)
         right.set_ylabel("")
         figure.legend(handles=right.get_legend_handles_labels()[0], loc="outside lower left", ncols=3)
-        headline(figure, f"{data.arm.name}: the tuner's gain, and where it is proven stable")
+        headline(figure, f"{tuning.trial.arm.name}: the tuner's gain, and where it is proven stable")
     return figure
 
 
@@ -77,74 +76,24 @@ def gain_over_time(tuning: Tuning, *, ax: Axes) -> None:
     ax.set_xlabel("time  [s]")
 
 
-def draw_curves(data: TunerStudy) -> Figure:
-    """Learning curves, a panel a rule: each seed, median and quartiles, and what there is to beat."""
+def draw_curves(curves: LearningCurves, tuning: Tuning) -> Figure:
+    """Learning curves: each seed, median and quartiles, and the baselines; what diverged leaves through the top."""
+    trial, seeds = np.arange(1, curves.costs.shape[1] + 1), len(curves.costs)
+    top = MOST_COST * tuning.without.cost
+    low, middle, high = (np.minimum(curves.quantile(share), 2 * top) for share in QUARTILES)
     with style():
         figure = blank(9.0, 4.4)
-        axes = figure.subplots(1, len(data.curves), sharey=True)
-        for curves, ax in zip(data.curves, axes, strict=True):
-            learning(curves, ax=ax)
-            yardsticks(data.tuning, ax=ax)
-            ax.set_title(curves.title, fontsize=9.5)
-        axes[0].set_ylabel("cost of a trial")
-        axes[0].set_ylim(0.0, MOST_COST * data.tuning.without.cost)
-        figure.legend(handles=axes[0].get_legend_handles_labels()[0], loc="outside lower left", ncols=3)
-        headline(figure, f"{data.arm.name}: learning, {len(data.curves[0].finished)} seeds")
+        ax = figure.subplots()
+        ax.plot(trial, np.minimum(curves.costs, 2 * top).T, color="#b9b9b9", lw=0.6, zorder=1)
+        ax.fill_between(trial, low, high, color=BLUE, alpha=0.22, lw=0, zorder=2, label="middle half of the seeds")
+        ax.plot(trial, middle, color=BLUE, lw=1.8, zorder=3, label="median")
+        for cost, colour, label in (
+            (tuning.without.cost, ORANGE, "no moment feedback"),
+            (tuning.best_constant.cost, PURPLE, "best constant gain"),
+            (tuning.bound.cost, INK, "linear-quadratic optimum: nothing is below"),
+        ):
+            ax.axhline(cost, color=colour, lw=1.2, ls=(0, (5, 3)), zorder=2.5, label=f"{label}, {significant(cost, 3)}")
+        ax.set(xlim=(1, max(2, trial[-1])), xlabel="trial", ylim=(0.0, top), ylabel="cost of a trial")
+        figure.legend(handles=ax.get_legend_handles_labels()[0], loc="outside lower left", ncols=3)
+        headline(figure, f"{tuning.trial.arm.name}: learning, {how_many(seeds, 'seed')}")
     return figure
-
-
-def learning(curves: Curves, *, ax: Axes) -> None:
-    """Each seed thin, the quartiles as a band, the median bold; what diverged leaves through the top."""
-    trial = np.arange(1, curves.costs.shape[1] + 1)
-    far = 1e6
-    costs = np.minimum(curves.costs, far)
-    ax.plot(trial, costs.T, color="#b9b9b9", lw=0.6, zorder=1)
-    low, middle, high = (np.minimum(curves.quantile(q), far) for q in (0.25, 0.5, 0.75))
-    ax.fill_between(trial, low, high, color=BLUE, alpha=0.22, lw=0, zorder=2, label="middle half of the seeds")
-    ax.plot(trial, middle, color=BLUE, lw=1.8, zorder=3, label="median")
-    ax.set_xlim(1, trial[-1])
-    ax.set_xlabel("trial")
-
-
-def yardsticks(tuning: Tuning, *, ax: Axes) -> None:
-    """What the tuner has to beat, and what nothing beats."""
-    for cost, colour, label in (
-        (tuning.without.cost, ORANGE, "no moment feedback"),
-        (tuning.best_constant.cost, PURPLE, "best constant gain"),
-        (tuning.bound.cost, INK, "linear-quadratic optimum: nothing is below"),
-    ):
-        ax.axhline(cost, color=colour, lw=1.2, ls=(0, (5, 3)), zorder=2.5, label=f"{label}, {significant(cost, 3)}")
-
-
-def draw_cost_map(data: TunerStudy) -> Figure:
-    """Median final cost over (alpha_c, eta_c), the paper's pair framed."""
-    with style():
-        figure = blank(9.0, 4.4)
-        cost_map(data.cost_map, ax=figure.subplots())
-        headline(figure, f"{data.arm.name}: final cost over momentum and learning rate")
-    return figure
-
-
-def cost_map(data: CostMap, *, ax: Axes) -> None:
-    """A cell a pair, its number written in it."""
-    finite = data.median[np.isfinite(data.median)]
-    low, high = float(finite.min()), float(np.quantile(finite, 0.9))
-    shown = np.where(np.isfinite(data.median), data.median, 1e9)
-    ax.pcolormesh(shown, cmap="Blues_r", vmin=low - 0.25 * (high - low), vmax=high, edgecolors="white", linewidth=1.0)
-    for i, row in enumerate(data.median):
-        for j, cost in enumerate(row):
-            colour = "white" if cost < low + 0.35 * (high - low) else INK
-            ax.text(j + 0.5, i + 0.5, significant(cost, 3), ha="center", va="center", fontsize=9, color=colour)
-    for (i, j), colour, label in (
-        (data.papers, ORANGE, "the paper's best, (0.6, 0.8)"),
-        (data.best, GREEN, "the lowest here"),
-    ):
-        ax.plot([j, j + 1, j + 1, j, j], [i, i, i + 1, i + 1, i], color=colour, lw=2.6, zorder=5, label=label)
-    ax.set_xticks(np.arange(data.etas.size) + 0.5, [plain(x) for x in data.etas])
-    ax.set_yticks(np.arange(data.alphas.size) + 0.5, [plain(x) for x in data.alphas])
-    ax.xaxis.set_minor_locator(NullLocator())
-    ax.tick_params(length=0)
-    ax.grid(False)
-    ax.set_xlabel(r"learning rate $\eta_c$")
-    ax.set_ylabel(r"momentum $\alpha_c$")
-    ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=2, borderaxespad=0.0)

@@ -1,23 +1,26 @@
-"""The arm over time: root moment, tip and motor, as lines or, where these ring too fast for a page, as bands."""
+"""The arm over time: root moment, tip and motor, as lines or, where these ring too fast for a page, as bands.
+
+Measured runs on a rig, and over each the exact sampled loop that was led by the same reference.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tfarm.arm import Arm, must_be_arm
 from tfarm.digits import plain
-from tfarm.dsp import Simulation, curves
-from tfarm.dsp.curves import TimeCurve
-from tfarm.dsp.ringing import POINTS_A_PERIOD
+from tfarm.dsp import Simulation, traces
+from tfarm.dsp.traces import POINTS_A_PERIOD, TimeCurve
+from tfarm.fitting.recording import Beside
 
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, must_be, style, taken, window
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, must_be, safe, style, taken, window
 
 RUN_COLOURS = (ORANGE, BLUE, GREEN, PURPLE)  # of several simulations; one alone is blue
-
 Runs = Mapping[str, Simulation]
 
 
@@ -40,7 +43,7 @@ def slew(arm: Arm, runs: Simulation | Runs, *, ax: Sequence[Axes] | None = None)
             tip_over_time(arm, each, ax=tip)
             motor_over_time(each, arm.input_unit, ax=torque)
             torque.set_xlabel("time  [s]")
-        points, finer = min(curves.points_a_period(arm, run) for run in each.values())
+        points, finer = min(traces.points_a_period(arm, run) for run in each.values())
         coarse = f"{plain(points, 2)} points a period of the fastest mode seen; between={finer} gives {POINTS_A_PERIOD}"
         moment.set_title(coarse if points < POINTS_A_PERIOD else "", loc="right", fontsize=8.0, color=GREY)
     return moment, tip, torque
@@ -71,7 +74,7 @@ def moment_over_time(each: Runs, *, ax: Axes) -> None:
     T = first.scenario.period
     ax.step(t - T, first.scenario.rigid_moment, where="post", color=GREY, lw=1.0, ls=(0, (4, 3)), label="rigid arm")
     for (name, simulation), colour in zip(each.items(), _colours(each), strict=True):
-        draw_curve(curves.root_moment(simulation), ax, colour, name or None)
+        draw_curve(traces.root_moment(simulation), ax, colour, name or None)
     _until(first, ax)
     ax.set_ylabel("root moment  [N m]")
 
@@ -79,7 +82,7 @@ def moment_over_time(each: Runs, *, ax: Axes) -> None:
 def tip_over_time(arm: Arm, each: Runs, *, ax: Axes) -> None:
     """How far the tip is from where a rigid arm on its reference would have it, in mm."""
     for simulation, colour in zip(each.values(), _colours(each), strict=True):
-        found = curves.tip_deviation(arm, simulation)
+        found = traces.tip_deviation(arm, simulation)
         draw_curve(replace(found, low=1e3 * found.low, high=1e3 * found.high), ax, colour)
     _until(next(iter(each.values())), ax)
     ax.set_ylabel("tip − reference  [mm]")
@@ -91,7 +94,7 @@ def motor_over_time(each: Runs, unit: str, *, ax: Axes) -> None:
     in_volts = first.volts is not None
     for simulation, colour in zip(each.values(), _colours(each), strict=True):
         values = simulation.volts if simulation.volts is not None else simulation.torque
-        held = curves.curve(simulation.t, values)
+        held = traces.curve(simulation.t, values)
         if held.is_band:
             draw_curve(held, ax, colour)
         else:
@@ -113,3 +116,31 @@ def _until(simulation: Simulation, ax: Axes) -> None:
 
 def _colours(each: Runs) -> list[str]:
     return [BLUE] if len(each) == 1 else [RUN_COLOURS[i % len(RUN_COLOURS)] for i in range(len(each))]
+
+
+def draw_beside(title: str, each: Mapping[str, Beside]) -> Figure:
+    """A column a law: hub angle above, root moment below where it was measured."""
+    moment = any(found.measured.root_moment.size for found in each.values())
+    with style():
+        figure = blank(max(4.7 * len(each), 6.0), 6.0 if moment else 3.6)
+        axes = figure.subplots(1 + moment, len(each), sharex="col", sharey="row", squeeze=False)
+        for column, (name, found) in enumerate(each.items()):
+            measured, ax = found.measured, axes[0, column]
+            ax.plot(measured.t, np.degrees(measured.reference), color=GREY, lw=1.0, ls=(0, (4, 3)), label="reference")
+            if measured.hub_angle.size:
+                ax.plot(measured.t, np.degrees(measured.hub_angle), color=ORANGE, label="measured")
+            ax.plot(found.run.t, np.degrees(found.hub_angle), color=BLUE, lw=1.2, label="exact sampled loop")
+            ax.set_xlim(0.0, float(measured.t[-1]))
+            if moment and measured.root_moment.size:
+                axes[1, column].plot(measured.t, measured.root_moment, color=ORANGE)
+            if moment:
+                axes[1, column].plot(found.run.t, found.run.at_samples.root_moment, color=BLUE, lw=1.2)
+                axes[1, column].axhline(0.0, color=GREY, lw=0.6)
+            ax.set_title(safe(name), fontsize=9.5)
+            axes[-1, column].set_xlabel("time  [s]")
+        axes[0, 0].set_ylabel("hub angle  [deg]")
+        if moment:
+            axes[1, 0].set_ylabel("root moment  [N m]")
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
+        headline(figure, title)
+    return figure

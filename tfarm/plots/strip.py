@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 from tfarm.arrays import Real
 from tfarm.digits import how_many, plain, significant
-from tfarm.dsp.curves import TimeCurve, continuous, root_moment
-from tfarm.dsp.strip_chart import StripChart
+from tfarm.dsp.traces import StripChart, TimeCurve, continuous, root_moment
 
 from .labels import OFFSETS_FURTHER, Label
 from .motion import draw_curve, motor_words

@@ -9,11 +9,12 @@ from tfarm.arrays import Real
 from tfarm.audit.assumptions import (
     HubStudy,
     SectionStudy,
+    Study,
+    candidates,
     has_hub_inertia,
     hub_study,
     section_study,
 )
-from tfarm.audit.candidates import Study, candidates
 from tfarm.columns import Column, Table
 from tfarm.digits import fixed, plain, significant
 from tfarm.plots.assumptions import CURVE_COLOURS, draw_over

@@ -8,12 +8,11 @@ from typing import NamedTuple
 
 from tfarm.arm import AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law
 from tfarm.dsp import Chain
-from tfarm.dsp.discretise import discretised
-from tfarm.dsp.loop import check_loop
+from tfarm.dsp.discretise import discretised, with_all_gains
 from tfarm.errors import one_line
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
-from tfarm.fitting.runs import MeasuredRun
+from tfarm.fitting.recording import MeasuredRun
 from tfarm.loop.law_loop import LawLoop
 from tfarm.plots.words import gains_words
 from tfarm.records import record
@@ -107,7 +106,7 @@ def check_laws(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> None:
         return  # its page says that there is no loop
     for each in on_arm(arm, laws):
         if isinstance(each.law, HubFeedback):
-            check_loop(each.arm, each.law)
+            with_all_gains(each.arm, each.law)
             continue
         _ = Signals(each.arm, each.law.signals)
         if not each.is_discrete:

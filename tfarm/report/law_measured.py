@@ -10,8 +10,8 @@ import numpy as np
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant, singly
 from tfarm.dsp import Chain
-from tfarm.fitting.runs import Beside, beside_exact, overshoot
-from tfarm.plots.measured_runs import draw_beside
+from tfarm.fitting.recording import Beside, beside_exact, overshoot
+from tfarm.plots.motion import draw_beside
 from tfarm.report.given_laws import LawOnArm
 from tfarm.report.sections import Picture
 

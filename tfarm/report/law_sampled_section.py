@@ -5,21 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from tfarm.arm import Arm, HubFeedback, written_unit
 from tfarm.columns import Column, Table
 from tfarm.digits import how_many, plain, scientific, significant, singly
-from tfarm.dsp import Chain, Simulation, Verdict, analyse
+from tfarm.dsp import Chain, Simulation, Verdict, sampled_verdict
 from tfarm.dsp.chain import MOST_DELAY
-from tfarm.dsp.closed import verdict_on
-from tfarm.dsp.law_margins import stable_factors
-from tfarm.dsp.law_verdict import SAMPLED_NUMBER_COLUMNS, SampledNumber, law_verdict, sampled_numbers
-from tfarm.dsp.margins import DelayMargin, delay_margin
+from tfarm.dsp.edges import DelayMargin
 from tfarm.dsp.results import drawn, residual_moment_rms
-from tfarm.dsp.slews import RECORD_LENGTH
+from tfarm.dsp.traces import RECORD_LENGTH
+from tfarm.dsp.verdict import SAMPLED_NUMBER_COLUMNS, SampledNumber, sampled
 from tfarm.errors import ParameterError
 from tfarm.plots.motion import draw_responses
 from tfarm.plots.style import safe
@@ -54,7 +51,7 @@ class LawAtClock:
     """
 
     each: LawOnArm
-    verdict: Verdict[Any]
+    verdict: Verdict
     stable_for: str
     margin: DelayMargin | None
     numbers: Sequence[SampledNumber] = ()
@@ -67,7 +64,7 @@ class Later:
 
     name: str
     more: float
-    verdict: Verdict[Any]
+    verdict: Verdict
 
 
 def law_sampled_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageSection:
@@ -100,19 +97,18 @@ def law_sampled_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Pag
 
 def held_by(each: LawOnArm, chain: Chain) -> LawAtClock:
     """The verdict on a law, and the room that it leaves."""
+    analysis = sampled(each.arm, each.law, chain)
+    margin = analysis.delay_margin if analysis.verdict.is_settled else None
     if isinstance(each.law, HubFeedback):
-        analysis = analyse(each.arm, each.law, chain)
         told = [
-            f"{name} {spans(shown.windows, each.law[name], analysis.interval(name))}{written_unit(name, each.arm)}"
-            for name, shown in analysis.shown.items()
+            f"{name} {spans(windows, each.law[name], analysis.interval(name))}{written_unit(name, each.arm)}"
+            for name, windows in analysis.windows.items()
         ]
         words = f"Stable, the others held: {'; '.join(told)}."
-        return LawAtClock(each, analysis.verdict, words, analysis.delay_margin if analysis.verdict.is_settled else None)
-    verdict = law_verdict(each.arm, each.law, chain)
-    factors = [f"{plain(low, 5)} to {plain(high, 5)}" for low, high in stable_factors(verdict.loop)]
+        return LawAtClock(each, analysis.verdict, words, margin)
+    factors = [f"{plain(low, 5)} to {plain(high, 5)}" for low, high in analysis.factors]
     words = f"Stable with the whole law times {' and '.join(factors)}." if factors else "No factor on it is stable."
-    margin = delay_margin(verdict.loop) if verdict.is_settled else None
-    return LawAtClock(each, verdict, words, margin, sampled_numbers(verdict.loop))
+    return LawAtClock(each, analysis.verdict, words, margin, analysis.numbers)
 
 
 # ------------------------------------------------------------ verdict
@@ -158,7 +154,7 @@ def cured(found: LawAtClock, chain: Chain) -> str:
         return ""
     w = float(abs(plant.poles[plant.mode == mode]).max())
     C = float(f"{2 * 2 * growth / (chain.sampling.period * w * w):.1g}")
-    damped = verdict_on(arm.having(damping=C), found.each.law, chain)
+    damped = sampled_verdict(arm.having(damping=C), found.each.law, chain)
     ratio = significant(100 * C * w / 2, 2)
     return (
         f" Real arms have some damping: with C = {plain(C)} s, {ratio} % of critical in mode {mode}, it is "
@@ -175,7 +171,7 @@ def verdicts_later(found: LawAtClock, chain: Chain) -> list[Later]:
         if delay + each.any_law.delay / chain.sampling.period > MOST_DELAY:
             continue
         late = replace(chain, sampling=replace(chain.sampling, delay_samples=delay))
-        rows.append(Later(each.name, more, verdict_on(each.arm, each.law, late)))
+        rows.append(Later(each.name, more, sampled_verdict(each.arm, each.law, late)))
     return rows
 
 

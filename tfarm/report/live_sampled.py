@@ -13,14 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
-from tfarm.dsp import Chain, SampledLoop, Scenario, Simulator, scenario
-from tfarm.dsp.converters import quantisers
-from tfarm.dsp.enough import enough_modes
-from tfarm.dsp.plant import Plant
-from tfarm.dsp.results import ideal_chain
-from tfarm.dsp.simulate import FOLDED_UP
-from tfarm.dsp.slews import RECORD_LENGTH
+from tfarm.arm import FED_BACK, Arm, HubFeedback
+from tfarm.dsp import Chain, PulseTransfer, Sampled, Scenario, Simulator, scenario
+from tfarm.dsp.plant import Plant, sensed_plant
+from tfarm.dsp.results import enough_modes, ideal_chain
+from tfarm.dsp.simulate import FOLDED_UP, quantisers
+from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.errors import TfarmError
 from tfarm.response import transfer
 
@@ -36,14 +34,15 @@ def packed(values: Any) -> str:
     return base64.b64encode(doubles.astype("<f8").tobytes()).decode("ascii")
 
 
-def sampled_numbers(loop: SampledLoop) -> dict[str, Any]:
+def sampled_numbers(loop: Sampled) -> dict[str, Any]:
     """The sampled loop with the modes that it has; `states`: poles at z = 1 that the hub's own motion has.
 
     These are 2, 1 where it is damped or driven through a motor, or 0.
     """
-    twice, once = loop.plant.rigid[0]
-    states = {"states": 2 if twice else 1 if once else 0, "modes": loop.plant.count}
-    return _clock(loop.chain) | _plant(loop.pulse.plant) | states
+    plant = sensed_plant(loop.plant.arm, loop.chain, FED_BACK, loop.plant.count).together
+    twice, once = plant.rigid[0]
+    states = {"states": 2 if twice else 1 if once else 0, "modes": plant.count}
+    return _clock(loop.chain) | _plant(PulseTransfer(plant, loop.chain.sampling).folded().plant) | states
 
 
 def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback) -> dict[str, Any] | None:

@@ -10,7 +10,7 @@ from typing import Protocol
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, input_words
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
-from tfarm.dsp.brief import SampledBrief, sampled_brief
+from tfarm.dsp.verdict import SampledBrief, sampled_brief
 from tfarm.errors import ConvergenceError
 from tfarm.loop.margins import Margins, margins_of_gains
 from tfarm.plots.words import gains_words

@@ -16,7 +16,7 @@ from tfarm.columns import Column, Table
 from tfarm.comparing.regions import sampled_region
 from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
-from tfarm.dsp.brief import SampledBrief
+from tfarm.dsp.verdict import SampledBrief
 from tfarm.loop.damping import least_damping
 from tfarm.loop.edges import Axis, edge, moment_axis, rate_axis
 from tfarm.loop.frequencies import band_of

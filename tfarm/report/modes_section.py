@@ -1,9 +1,14 @@
-"""Modes: the modal table, the shapes, the four beam theories side by side, and what each parameter does."""
+"""Modes: the modal table, the shapes, the four beam theories side by side, and what each parameter does.
+
+Cards of the first modes: a small shape each that swings on the screen, and stands still on paper.
+
+The hub-locked frequencies of a rig beside its free ones, with and without what its hub loses.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -12,21 +17,20 @@ import tfarm
 from tfarm.arm import Arm, Theory
 from tfarm.arrays import Real
 from tfarm.columns import REPORT, Column, Table
-from tfarm.digits import fixed, lined, listed, significant
+from tfarm.digits import fixed, lined, listed, significant, singly
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.plots.shapes import DrawnMode, draw_differences, draw_shapes, shapes_of, theory_name
 from tfarm.report.damped_table import damped_table
-from tfarm.report.locked_table import locked_table, locked_words
-from tfarm.report.mode_cards import mode_cards
-from tfarm.report.sections import PageSection, Picture
+from tfarm.report.sections import ModeCard, PageSection, Picture
 from tfarm.report.trust_proofs import how_proven
 from tfarm.spectrum import Modes, answers
+from tfarm.spectrum.damped import damped_at_hub
+from tfarm.spectrum.table import hub_locked
 
 TABLED_MODES, DRAWN_MODES = 10, 6  # as `tfarm modes` lists them; shapes in three rows of two
 SIMPLER: tuple[Theory, ...] = ("shear", "rayleigh", "euler-bernoulli")
 NEGLECTED = 5e-7  # a sensitivity that never exceeds this reads as zero
 RISE_COLOUR, FALL_COLOUR = (196, 80, 10), (0, 96, 168)  # red, green, blue: the orange and blue of the pictures
-
 COMPLETE = (
     "Free vibration of the undamped arm. The list is complete: the number of natural frequencies below any "
     "frequency is counted, not searched for, so no mode is missing between two rows."
@@ -59,12 +63,28 @@ SENSITIVITIES = (
     "mode. Blue lowers the frequency, orange raises it: the strongest colours are the parameters worth "
     "measuring well."
 )
-
-
 OF_RIGS = (
     " Without a segment's number a parameter is that of all segments at once; a length takes along what is attached to "
     "it, and x is the place of an attachment alone."
 )
+CARD_WIDTH, CARD_HEIGHT, CARD_EDGE = 120.0, 60.0, 8.0  # of the drawing, in its own units
+PATH_EVERY = 10  # of the points of a shape every so many are drawn: 41, half a unit from the true curve at most
+LOCKED_MODES = 6  # rows, of the modes that are measured on a rig
+LOCKED_CAPTION = (
+    "Natural frequencies with the hub free to turn and with the hub held still, neither damped{damped}. What is "
+    "measured on a rig after a slew lies mostly near the right column."
+)
+WITH_LOSSES = (
+    "; between them those of the free hub with what it loses at its own friction (and back-EMF), and nothing else"
+)
+WHICH_IS_MEASURED = (
+    "Which number is it that you measured? Once a slew is over dry friction holds the hub, and the link rings at the "
+    "hub-locked frequencies: first {locked} rad/s ({locked_hz} Hz). The linear rig, whose hub swings along, rings at "
+    "{free} rad/s ({free_hz} Hz){damped}. A peak near the former says that the hub stood still, one near the latter "
+    "that it moved; fit each to its own column."
+)
+SWINGS = "; with its hub's own losses at {omega} rad/s, {ratio} % of critical"
+CREEPS = "; with its hub's own losses its first mode no longer swings"
 
 
 def modes_section(arm: Arm) -> PageSection:
@@ -221,3 +241,65 @@ def tint(x: float) -> str:
     strength = 0.45 * min(1.0, abs(x) / 2.0) ** 0.6
     parts = (round(255 - strength * (255 - part)) for part in (RISE_COLOUR if x > 0 else FALL_COLOUR))
     return "#" + "".join(f"{part:02x}" for part in parts)
+
+
+def mode_cards(shapes: Sequence[DrawnMode]) -> tuple[ModeCard, ...]:
+    """A card for each shape, upwards where w is positive, its largest displacement as high as the card."""
+    cards = []
+    for shape in shapes:
+        across = _across(shape.x, shape)[::PATH_EVERY]
+        up = (CARD_HEIGHT / 2 - (CARD_HEIGHT / 2 - CARD_EDGE / 2) * shape.w)[::PATH_EVERY]
+        points = " ".join(f"{x:.1f},{y:.2f}" for x, y in zip(across, up, strict=True))
+        hertz = significant(shape.natural_frequency / (2 * math.pi), 5)
+        nodes = tuple(round(float(x), 1) for x in _across(shape.nodes, shape))
+        cards.append(ModeCard(number=shape.number, hertz=hertz, path=f"M{points}", nodes=nodes))
+    return tuple(cards)
+
+
+def _across(x: Real, shape: DrawnMode) -> Real:
+    return CARD_EDGE + (CARD_WIDTH - 2 * CARD_EDGE) * np.asarray(x) / shape.x[-1]
+
+
+def locked_words(arm: Arm) -> list[str]:
+    """What the two columns mean for a reader with a measured number; nothing where the hub is locked anyway."""
+    if arm.is_locked:
+        return []
+    free, locked = tfarm.modes(arm, 1), hub_locked(tfarm.modes(arm, 1))
+    omega, held = float(free.natural_frequency[-1]), float(locked.natural_frequency[-1])
+    numbers = {"free": omega, "free_hz": omega / (2 * math.pi), "locked": held, "locked_hz": held / (2 * math.pi)}
+    damped = ""
+    lossy = damped_at_hub(arm, 1)  # how the first mode of the free hub rings with its own losses
+    if lossy is not None and lossy.is_assigned.all():
+        s, ratio = complex(lossy.eigenvalues[-1, 0]), significant(100 * float(lossy.damping_ratio[-1]), 3)
+        damped = SWINGS.format(omega=significant(s.imag, 5), ratio=ratio) if s.imag else CREEPS
+    return [WHICH_IS_MEASURED.format(damped=damped, **{name: significant(x, 5) for name, x in numbers.items()})]
+
+
+def locked_table(table: Modes) -> Table:
+    """A row a mode: hub free, with its losses where it has any, and locked."""
+    arm = table.arm
+    free = tfarm.modes(arm, LOCKED_MODES, theory=table.theory)
+    omega, locked = free.natural_frequency[free.index > 0], hub_locked(free)
+    held = locked.natural_frequency[locked.index > 0]
+    columns = [Column("mode", "mode", of=range(1, LOCKED_MODES + 1)), *_pair("hub_free", "hub free", omega)]
+    lossy = None if arm.is_locked else damped_at_hub(arm, LOCKED_MODES)
+    if lossy is not None and not lossy.left_out and lossy.is_assigned.all():
+        flexible = lossy.index > 0
+        s, ratio = lossy.eigenvalues[flexible, 0], lossy.damping_ratio[flexible]
+        group = "hub free, with its own losses"
+        columns += [
+            Column("with_losses_rad_s", "Im s", "rad/s", of=s.imag, digits=lined(8, 7), group=group),
+            Column("with_losses_damping_percent", "damping ratio", "%", of=100 * ratio, digits=singly(significant, 4),
+                   group=group),
+        ]  # fmt: skip
+    columns += _pair("hub_locked", "hub locked", held)
+    caption = LOCKED_CAPTION.format(damped=WITH_LOSSES if lossy is not None else "")
+    return Table(stem="hub-locked", title="Hub free and hub locked", caption=caption, columns=tuple(columns))
+
+
+def _pair(key: str, group: str, omega: np.ndarray) -> list[Column]:
+    """Frequencies in rad/s and in Hz."""
+    return [
+        Column(f"{key}_rad_s", "frequency", "rad/s", of=omega, digits=lined(8, 7), group=group),
+        Column(f"{key}_hz", "", "Hz", of=omega / (2 * math.pi), digits=lined(8, 7), group=group),
+    ]

@@ -15,10 +15,10 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 import tfarm
 from tfarm.arm import Arm, as_law, load, presets
-from tfarm.arm.law_writing import law_toml
+from tfarm.arm.writing import law_toml
 from tfarm.digits import listed
 from tfarm.dsp import Chain, load_chain
-from tfarm.dsp.writing import file_text
+from tfarm.dsp.chain import file_text
 from tfarm.errors import ParameterError
 from tfarm.report.frame import BADGES, explained, framed, promises, section_rows, signs, word_id
 from tfarm.report.given_laws import Subject

@@ -10,7 +10,7 @@ from tfarm.arm import Arm
 from tfarm.report.arm_section import arm_section
 from tfarm.report.assumptions_section import assumptions_section
 from tfarm.report.bode_section import bode_section
-from tfarm.report.fit_section import fit_section
+from tfarm.report.fit_section import fit_section, measured_section
 from tfarm.report.given_laws import Subject, continuous_laws, on_arm
 from tfarm.report.law_loop_section import law_margins_section, law_nyquist_section, law_poles_section
 from tfarm.report.law_sampled_section import law_sampled_section
@@ -18,7 +18,6 @@ from tfarm.report.law_section import law_section
 from tfarm.report.locus_section import locus_section
 from tfarm.report.loop_laws import has_loop, has_rate_loop
 from tfarm.report.loop_section import map_section, margins_section, no_loop_section, nyquist_section
-from tfarm.report.measured_section import measured_section
 from tfarm.report.modes_section import modes_section
 from tfarm.report.paper import is_from_paper, paper_section
 from tfarm.report.sampled_section import sampled_section

@@ -11,11 +11,10 @@ from tfarm.columns import Column, Table
 from tfarm.comparing.regions import regions_table
 from tfarm.digits import how_many, plain, scientific, significant, singly
 from tfarm.dsp import Chain, sampled_verdict
-from tfarm.dsp.law import ModeTable
+from tfarm.dsp.crossings import around
 from tfarm.dsp.loci import STRONGER, sampled_loci
-from tfarm.dsp.margins import around
-from tfarm.dsp.slews import Slews, slews
-from tfarm.dsp.strip_chart import StripChart, strip_chart
+from tfarm.dsp.modes import ModeTable
+from tfarm.dsp.traces import Slews, StripChart, slews, strip_chart
 from tfarm.plots.folded import draw_folded_loci
 from tfarm.plots.growth import draw_modes
 from tfarm.plots.regions import draw_overlay
@@ -108,11 +107,11 @@ def beyond_words(arm: Arm) -> str:
 
 def _periods_table(data: Sampled) -> Table:
     rows = data.periods
-    growth = np.array([row.log_radius / row.period for row in rows])
+    growth = np.array([row.verdict.log_radius / row.period for row in rows])
     ms = np.array([1e3 * row.period for row in rows])
     half = 500.0 / ms
-    settled = [row.is_settled for row in rows]
-    first = [f"{'' if row.is_settled or not any(settled) else 'first '}{row.analysis_modes}" for row in rows]
+    settled, modes = [row.verdict.is_settled for row in rows], [row.verdict.modes_used for row in rows]
+    first = [f"{'' if known or not any(settled) else 'first '}{n}" for known, n in zip(settled, modes, strict=True)]
     held = "all that matter" if all(settled) else "the first so many" if not any(settled) else "where marked, the first"
     return Table(
         stem="sampled-periods",
@@ -126,9 +125,9 @@ def _periods_table(data: Sampled) -> Table:
         columns=(
             Column("period_ms", "period", "ms", of=ms, digits=singly(plain)),
             Column("half_rate_hz", "aliased above", "Hz", of=half, digits=singly(plain)),
-            Column("verdict", "verdict", of=lambda row: "stable" if row.log_radius < 0 else "unstable"),
+            Column("verdict", "verdict", of=lambda row: "stable" if row.verdict.log_radius < 0 else "unstable"),
             Column("growth_1_s", "growth", "1/s", of=growth, digits=singly(scientific, 3)),
-            Column("modes", "modes", of="analysis_modes", shown=first),
+            Column("modes", "modes", of=modes, shown=first),
             *(_window_column(name, data) for name in PLANE),
         ),
     )
@@ -136,7 +135,7 @@ def _periods_table(data: Sampled) -> Table:
 
 def _window_column(name: str, data: Sampled) -> Column:
     """The interval around the gain of that name, or the ends of all that there are, at each period."""
-    rows = [(row.windows[name], row.gains[name]) for row in data.periods]
+    rows = [(row.windows[name], data.gains[name]) for row in data.periods]
     here = [around(list(windows), gain) for windows, gain in rows]
     every = [tuple(end for window in windows for end in window) for windows, _ in rows]
     values = [window or others for window, others in zip(here, every, strict=True)]

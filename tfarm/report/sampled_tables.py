@@ -6,11 +6,10 @@ from tfarm.arm import PLANE
 from tfarm.columns import Column, Table
 from tfarm.digits import plain
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.curves import held_at, root_moment
-from tfarm.dsp.law import SAMPLED_MODE_COLUMNS, ModeTable
 from tfarm.dsp.loci import SampledLoci
-from tfarm.dsp.loop import SampledLoop
-from tfarm.dsp.strip_chart import StripChart
+from tfarm.dsp.modes import SAMPLED_MODE_COLUMNS, ModeTable
+from tfarm.dsp.sampled import Sampled
+from tfarm.dsp.traces import StripChart, held_at, root_moment
 
 MODE_TABLE = (
     "ln|z| is what a mode gains (+) or loses (−) per sample: its size is multiplied by |z| every {ms} ms. Own damping "
@@ -20,7 +19,7 @@ MODE_TABLE = (
 )
 
 
-def mode_rows(loop: SampledLoop, table: ModeTable, stem: str) -> Table:
+def mode_rows(loop: Sampled, table: ModeTable, stem: str) -> Table:
     """A row a mode that outlives a sample."""
     T = loop.chain.sampling.period
     return Table(
@@ -37,9 +36,10 @@ def loci_table(data: SampledLoci, stem: str) -> Table:
     rows = []
     for name, locus in ((f"{data.alone.gain} alone", data.alone), *data.by.items()):
         for value, poles in zip(locus.values.tolist(), locus.z, strict=True):
-            law = locus.law.having(locus.gain, value)
+            loop = locus.loop.having(**{locus.gain: value})
+            across, up = (loop.number(each) for each in PLANE)
             each = zip(locus.mode.tolist(), poles, strict=True)
-            rows += [(name, *law.point, mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
+            rows += [(name, across, up, mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
     titles = {"locus": "locus", **{name: name for name in PLANE}, "mode": "mode", "real": "Re z", "imaginary": "Im z"}
     columns = [
         Column(*title, of=list(cells)) for title, cells in zip(titles.items(), zip(*rows, strict=True), strict=True)

@@ -10,10 +10,10 @@ from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, unit_of
 from tfarm.comparing.regions import StableRegions, stable_regions
 from tfarm.crossing import Window
 from tfarm.digits import how_many, plain, scientific, significant
-from tfarm.dsp import Analysis, Verdict, analyse
+from tfarm.dsp import Analysis, Verdict
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.margins import around
-from tfarm.dsp.periods import AtPeriod, at_periods
+from tfarm.dsp.crossings import around
+from tfarm.dsp.verdict import AtPeriod, at_periods, sampled
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Windows, gain_windows
 from tfarm.records import record
@@ -57,7 +57,7 @@ class Sampled:
     @property
     def sampled_K2(self) -> Window | None:
         """The stable interval of the moment gain around the gains."""
-        return around(self.analysis.K2_windows, self.gains[MOMENT_GAIN])
+        return around(self.analysis.windows[MOMENT_GAIN], self.gains[MOMENT_GAIN])
 
     @property
     def held(self) -> str:
@@ -73,7 +73,7 @@ def in_ms(chain: Chain) -> str:
 def sampled_study(arm: Arm, chain: Chain) -> Sampled:
     """The numbers of the section.  Raises ParameterError for an arm without a loop."""
     gains = default_gains(arm)
-    analysis = analyse(arm, gains, chain)
+    analysis = sampled(arm, gains, chain)
     windows = gain_windows(stability(arm, gains), MOMENT_GAIN)
     return Sampled(arm, analysis, windows, stable_regions(arm, gains, chain), at_periods(arm, gains, chain))
 
@@ -149,7 +149,8 @@ def duration(seconds: float) -> str:
 def against_continuous(data: Sampled) -> str:
     """The continuous interval of the moment gain against the sampled one, end by end."""
     verdict, before, after = data.analysis.verdict, data.continuous.around, data.sampled_K2
-    modes = "" if data.analysis.shown[MOMENT_GAIN].is_settled else f" (first {verdict.modes_used} modes)"
+    edges = [edge for pair in data.analysis.shown[MOMENT_GAIN] for edge in pair]
+    modes = "" if all(edge.is_settled for edge in edges) else f" (first {verdict.modes_used} modes)"
     both = (
         f"the continuous loop is stable for {MOMENT_GAIN} {interval_words(before, data.continuous.looked_at)}; "
         f"the sampled one {interval_words(after)}{modes}"
@@ -253,7 +254,7 @@ def sampled_facts(data: Sampled) -> tuple[Fact, ...]:
     late = f"{significant(margin.samples, 3)} samples"
     by = f"by {late} of delay" if verdict.is_stable else verdict.word
     continuous = span(data.continuous.around, data.continuous.looked_at)
-    on_rate, on_moment = (spans(analysis.shown[name].windows, gains[name]) for name in PLANE)
+    on_rate, on_moment = (spans(analysis.windows[name], gains[name]) for name in PLANE)
     return (
         Fact(label=f"does a {data.ms} ms loop hold?", value=_yes_or_no(data).lower(), beside=f"{by}, {held}"),
         Fact(label="ln|z| a sample, largest", value=scientific(growth, 3), beside="below 0 is stable"),

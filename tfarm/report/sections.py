@@ -11,7 +11,6 @@ from markupsafe import Markup
 
 from tfarm.columns import Table
 from tfarm.plots.files import save_figure
-from tfarm.report.mode_cards import ModeCard
 from tfarm.tables.files import save_table
 from tfarm.tables.html import as_html
 
@@ -20,6 +19,16 @@ if TYPE_CHECKING:
 
 
 PICTURES, DATA = "pictures", "data"  # the folders of an arm's folder, beside its pages
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModeCard:
+    """A mode: its number, frequency [Hz] in digits, the path of its shape, and where its nodes are across the card."""
+
+    number: int
+    hertz: str
+    path: str
+    nodes: Sequence[float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,9 +12,9 @@ import numpy as np
 from tfarm.arm import MOMENT_GAIN, Arm
 from tfarm.columns import Column, Table
 from tfarm.digits import kept_digits, plain, significant
-from tfarm.dsp import Simulation, curves
+from tfarm.dsp import Simulation, traces
 from tfarm.dsp.results import residual_moment_rms, settling_time
-from tfarm.dsp.slews import Slews
+from tfarm.dsp.traces import Slews
 from tfarm.plots.motion import draw_responses
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def clipped_words(each: Mapping[str, Simulation]) -> str:
 
 def resolution_words(runs: Iterable[Simulation]) -> str:
     """A sentence where a curve is a band, and for how long each piece of it is; empty where all are lines."""
-    bands = [one for one in map(curves.root_moment, runs) if one.is_band]
+    bands = [one for one in map(traces.root_moment, runs) if one.is_band]
     if not bands:
         return ""
     ms = significant(1e3 * float(bands[0].t[1] - bands[0].t[0]), 2)
@@ -100,22 +100,22 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
     Torques and gains are those held at that time, the rigid arm's moment that of the sample after it.  Numbers have
     `CURVE_DIGITS` digits: a page's folder is no place for six thousand rows of eleven columns to the last bit.
     """
-    found = [(key, curves.root_moment(run), curves.tip_deviation(arm, run), run) for key, run in each.items()]
+    found = [(key, traces.root_moment(run), traces.tip_deviation(arm, run), run) for key, run in each.items()]
     t = min((moment.t for _, moment, _, _ in found), key=len)
     task = found[0][3].scenario
-    rigid = curves.held_at(found[0][3], np.r_[task.rigid_moment[1:], task.rigid_moment[-1:]], t)
+    rigid = traces.held_at(found[0][3], np.r_[task.rigid_moment[1:], task.rigid_moment[-1:]], t)
     columns: list[Column] = [
         Column("t_s", "time", "s", of=t),
         Column("rigid_moment_N_m", "rigid arm", "N m", of=rigid),
     ]
     for key, moment, tip, run in found:
         columns += moment.at(t).columns(f"root_moment_{key}", "root moment", "N m")
-        columns += curves.tip(run).at(t).columns(f"tip_{key}", "tip", "m")
+        columns += traces.tip(run).at(t).columns(f"tip_{key}", "tip", "m")
         columns += tip.at(t).columns(f"tip_error_{key}", "tip less reference", "m")
         given = "torque" if arm.input_unit == "N m" else "input"
         name = f"{given}_{key}_{arm.input_unit.replace(' ', '_')}"
-        columns.append(Column(name, given, arm.input_unit, of=curves.held_at(run, run.torque, t)))
+        columns.append(Column(name, given, arm.input_unit, of=traces.held_at(run, run.torque, t)))
         if run.gain is not None and np.ptp(run.gain):
-            columns.append(Column(f"K_{key}", "gain", of=curves.held_at(run, run.gain, t)))
+            columns.append(Column(f"K_{key}", "gain", of=traces.held_at(run, run.gain, t)))
     columns = [replace(each, of=kept_digits(map(float, each.values), CURVE_DIGITS)) for each in columns]
     return Table(stem=stem, title=title, columns=tuple(columns))

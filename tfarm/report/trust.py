@@ -19,13 +19,19 @@ from tfarm.arm import load, presets
 from tfarm.audit import published
 from tfarm.columns import Column, Table
 from tfarm.digits import scientific, significant, singly, worded
-from tfarm.report.kept import keep, kept_in
 from tfarm.report.page import command_for_all, render
 from tfarm.report.sections import DATA, Fact, PageSection, save_section
 from tfarm.report.trust_audit import VERDICT_MARKS, audit_table, shown_row, verdict_counts
-from tfarm.report.trust_proofs import BRACKET_DIGITS, ArmProof, hash_of
-from tfarm.report.trust_tables import accuracy_table, boxes_tables, counts_table, digits_table
-from tfarm.report.unchanged import PACKAGES, makers
+from tfarm.report.trust_proofs import (
+    BRACKET_DIGITS,
+    ArmProof,
+    accuracy_table,
+    boxes_tables,
+    counts_table,
+    digits_table,
+    hash_of,
+)
+from tfarm.report.unchanged import PACKAGES, keep, kept_in, makers
 from tfarm.response.accuracy import BAND_POINTS
 from tfarm.tables.files import save_table
 

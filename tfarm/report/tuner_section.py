@@ -13,31 +13,30 @@ from tfarm.comparing.regions import stable_regions
 from tfarm.digits import how_many, lined, plain, significant, worded
 from tfarm.dsp import Chain
 from tfarm.errors import CertificationError
-from tfarm.plots.learning import draw_cost_map, draw_curves, draw_gain
+from tfarm.plots.learning import draw_curves, draw_gain
 from tfarm.plots.motion import draw_responses
 from tfarm.report.loop_laws import has_loop, what_holds, why_no_loop
 from tfarm.report.sections import PageSection, Picture
 from tfarm.report.time_responses import clipped_words, resolution_words, responses_table
 from tfarm.report.tuner_words import (
+    AS_TRAINED,
+    CURVE_SEEDS,
+    LONG_TRIAL,
+    LONGEST_TRIAL,
+    QUANTISED_AND_LATE,
+    TunerNumbers,
     bound_words,
     drift_words,
-    learning_words,
     servo_words,
     shaping_words,
+    trial_samples,
     tuner_facts,
     tuner_in_short,
+    tuner_numbers,
 )
-from tfarm.report.words import residual_words, typeset, upper
-from tfarm.tuner.overview import (
-    AS_TRAINED,
-    QUANTISED_AND_LATE,
-    SIZES,
-    TunerStudy,
-    study_size,
-    trial_samples,
-    tuner_study,
-)
-from tfarm.tuner.yardsticks import CONSTANT_GAINS, tried_gains
+from tfarm.report.words import residual_words, typeset
+from tfarm.tuner.baselines import CONSTANT_GAINS, tried_gains
+from tfarm.tuner.training import QUARTILES
 
 TUNER_TITLE = "The gain tuner: does a self-tuning gain help?"
 NOT_WITHOUT_DAMPING = (
@@ -64,7 +63,7 @@ def tuner_section(arm: Arm, chain: Chain | None = None) -> PageSection:
     if reason:
         return PageSection(anchor="tune", title=TUNER_TITLE, words=(reason,))
     try:
-        data = tuner_study(arm, chain)
+        data = tuner_numbers(arm, chain)
     except CertificationError as error:
         words = f"No tuner here: no range of gains is proven stable for a gain that moves ({typeset(str(error))})."
         return PageSection(anchor="tune", title=TUNER_TITLE, words=(words,))
@@ -73,7 +72,7 @@ def tuner_section(arm: Arm, chain: Chain | None = None) -> PageSection:
     return section_of(data)
 
 
-def section_of(data: TunerStudy) -> PageSection:
+def section_of(data: TunerNumbers) -> PageSection:
     """The section on numbers that are there already."""
     return PageSection(
         anchor="tune",
@@ -84,8 +83,7 @@ def section_of(data: TunerStudy) -> PageSection:
             drift_words(data),
             shaping_words(data),
             bound_words(data),
-            learning_words(data),
-            *([fewer_words(data)] if data.size != SIZES[0] else []),
+            *fewer_words(data),
             *([servo_words(data)] if data.servo else []),
         ),
         blocks=(
@@ -95,7 +93,6 @@ def section_of(data: TunerStudy) -> PageSection:
             comparison_table(data),
             residual_table(data),
             _curves_picture(data),
-            _map_picture(data),
         ),
     )
 
@@ -112,35 +109,33 @@ def why_not(arm: Arm) -> str:
 
 
 def why_too_long(arm: Arm, chain: Chain) -> str:
-    """The sentence for a slew of more samples than a page's study can have; empty for any other."""
+    """The sentence for a slew of more samples than a page's trainings can have; empty for any other."""
     samples = trial_samples(arm, chain)
-    if study_size(samples) is not None:
+    if samples <= LONGEST_TRIAL:
         return ""
     return (
-        f"No tuner here: a trial of this slew has {samples:,} samples at a period of "
-        f"{plain(chain.sampling.period)} s, and the smallest study of seeds and learning rates has "
-        f"{SIZES[-1].trials:,} trials. A single tuning: tfarm tune."
+        f"No tuner here: a trial of this slew has {samples:,} samples at a period of {plain(chain.sampling.period)} s. "
+        "A single tuning: tfarm tune."
     )
 
 
-def fewer_words(data: TunerStudy) -> str:
-    """The extent of a study that long trials limit."""
-    size, full, n = data.size, SIZES[0], data.tuning.trial.n
-    coarser = f", every second momentum and learning rate ({data.cost_map.median.size} pairs)" * size.coarser
-    rows = f" The comparison has {size.conditions} conditions, all on this arm." if size.conditions else ""
-    gains = tried_gains(n)
-    constant = f" {gains} constant gains are tried instead of {CONSTANT_GAINS}." * (gains < CONSTANT_GAINS)
-    return (
-        f"Reduced study: a trial has {n:,} samples. Learning curves: {size.curve_seeds} seeds instead of "
-        f"{full.curve_seeds}. Map: {how_many(size.map_seeds, 'seed')} and {size.map_trials} trials a pair instead of "
-        f"{full.map_seeds} and {full.map_trials}{coarser}.{rows}{constant}"
-    )
+def fewer_words(data: TunerNumbers) -> list[str]:
+    """The extent of learning curves and comparison that long trials limit, none where nothing does."""
+    n, seeds, gains = data.tuning.trial.n, data.curves.final.size, tried_gains(data.tuning.trial.n)
+    limits = [
+        f"Learning curves: {seeds} seeds instead of {CURVE_SEEDS}" * (seeds < CURVE_SEEDS),
+        f"Comparison: {len(data.rows)} conditions, all on this arm" * (n > LONG_TRIAL),
+        f"Constant gains: {gains} instead of {CONSTANT_GAINS}" * (gains < CONSTANT_GAINS),
+    ]
+    if not any(limits):
+        return []
+    return [f"A trial has {n:,} samples. {'. '.join(limit for limit in limits if limit)}."]
 
 
 # ------------------------------------------------------------ pictures
 
 
-def _gain_picture(data: TunerStudy) -> Picture:
+def _gain_picture(data: TunerNumbers) -> Picture:
     tuning = data.tuning
     plane = stable_regions(data.arm, tuning.constant, tuning.trial.loop.chain)
     guard, K = tuning.training.guard, tuning.training.result.K
@@ -157,7 +152,7 @@ def _gain_picture(data: TunerStudy) -> Picture:
         ),
         alt=f"Map of {' and '.join(PLANE)} with the tuner's guard from {guard.lo:.3f} to {guard.hi:.3f}, and its gain "
         "over time.",
-        figure=draw_gain(data, *plane),
+        figure=draw_gain(tuning, *plane),
         data=Table(
             stem="tune-gain-data",
             title="The tuner's gain",
@@ -170,7 +165,7 @@ def _gain_picture(data: TunerStudy) -> Picture:
     )
 
 
-def _slew_picture(data: TunerStudy) -> Picture:
+def _slew_picture(data: TunerNumbers) -> Picture:
     return Picture(
         stem="tune-slew",
         title="The slew without and with the tuner",
@@ -185,7 +180,7 @@ def _slew_picture(data: TunerStudy) -> Picture:
     )
 
 
-def _coarse_picture(data: TunerStudy) -> Picture:
+def _coarse_picture(data: TunerNumbers) -> Picture:
     """The slew, and what stands between the controller and the arm in it."""
     chain = next(iter(data.coarse.values())).chain
     c, delay = chain.converters, chain.sampling.delay_samples
@@ -211,7 +206,7 @@ def _coarse_picture(data: TunerStudy) -> Picture:
     )
 
 
-def _residuals(data: TunerStudy, which: int) -> str:
+def _residuals(data: TunerNumbers, which: int) -> str:
     """What is left after the slew, from the table's rows: as trained, or with converters and delay."""
     row = data.rows[(AS_TRAINED, QUANTISED_AND_LATE)[which]]
     return (
@@ -221,53 +216,31 @@ def _residuals(data: TunerStudy, which: int) -> str:
     )
 
 
-def _signals(data: TunerStudy, which: int, stem: str) -> Table:
+def _signals(data: TunerNumbers, which: int, stem: str) -> Table:
     without, tuned = (data.slews, data.coarse)[which].values()
     return responses_table(stem, "The slew", data.arm, {"without": without, "tuner": tuned})
 
 
-def _curves_picture(data: TunerStudy) -> Picture:
-    columns: list[Column] = []
-    seeds = data.size.curve_seeds
-    for curves in data.curves:
-        for name, share in (("lower_quartile", 0.25), ("median", 0.5), ("upper_quartile", 0.75)):
-            columns.append(Column(f"{curves.key}_{name}", name, of=curves.quantile(share)))
-        for seed, costs in enumerate(curves.costs):
-            columns.append(Column(f"{curves.key}_seed_{seed}", f"seed {seed}", of=costs))
-    first = Column("trial", "trial", of=np.arange(1, data.curves[0].costs.shape[1] + 1))
+def _curves_picture(data: TunerNumbers) -> Picture:
+    curves = data.curves
+    seeds, trials = curves.costs.shape
+    first = Column("trial", "trial", of=np.arange(1, trials + 1))
+    quantiles = (
+        Column(name, name, of=curves.quantile(share))
+        for name, share in zip(("lower_quartile", "median", "upper_quartile"), QUARTILES, strict=True)
+    )
+    own = (Column(f"seed_{seed}", f"seed {seed}", of=costs) for seed, costs in enumerate(curves.costs))
     return Picture(
         stem="tune-curves",
         title="Learning",
         caption=(
-            f"Cost of each trial over {seeds} seeds (the paper's Figure 5): grey each seed, blue the median and "
-            "the middle half; what diverges leaves through the top. The default cuts the gradient to norm 0.5 and "
-            "takes a step back where the cost rises; (21) as printed has its sign mended and nothing else."
+            f"Cost of each trial over {how_many(seeds, 'seed')} (the paper's Figure 5): grey each seed, blue the "
+            f"median and the middle half; {curves.diverged} diverged, {curves.died} died at {MOMENT_GAIN} = 0. The "
+            "gradient is cut to norm 0.5, and a step that raises the cost is taken back and halved."
         ),
-        alt=f"Learning curves of {seeds} seeds for two rules, beside the best constant gain and the bound.",
-        figure=draw_curves(data),
-        data=Table(stem="tune-curves-data", title="Learning curves", columns=(first, *columns)),
-    )
-
-
-def _map_picture(data: TunerStudy) -> Picture:
-    found = data.cost_map
-    alpha, eta = (each.ravel() for each in np.meshgrid(found.alphas, found.etas, indexing="ij"))
-    edge = "The lowest is at the edge of this map: larger steps may go lower still." if found.best_at_edge else ""
-    columns = (
-        Column("alpha_c", "momentum", of=alpha),
-        Column("eta_c", "learning rate", of=eta),
-        Column("median_cost", "median final cost", of=found.median.ravel()),
-    )
-    return Picture(
-        stem="tune-map",
-        title="Momentum and learning rate",
-        caption=(
-            f"Median of the final cost over {how_many(data.size.map_seeds, 'seed')} after {data.size.map_trials} "
-            f"trials; lower is darker. {upper(typeset(found.verdict))}. {edge}"
-        ),
-        alt=f"Map of the final cost over momentum and learning rate. {upper(typeset(found.verdict))}.",
-        figure=draw_cost_map(data),
-        data=Table(stem="tune-map-data", title="Final cost", columns=columns),
+        alt=f"Learning curves of {how_many(seeds, 'seed')}, the best constant gain and the bound.",
+        figure=draw_curves(curves, data.tuning),
+        data=Table(stem="tune-curves-data", title="Learning curves", columns=(first, *quantiles, *own)),
     )
 
 
@@ -282,7 +255,7 @@ CONTROLLERS = {
 }
 
 
-def comparison_table(data: TunerStudy) -> Table:
+def comparison_table(data: TunerNumbers) -> Table:
     """Cost of a slew, a row a condition, a column a controller, and whether the guard is proven there too."""
     unit, best = data.tuning.plan.scale, significant(data.tuning.best_constant.gain, 3)
     units = f" Costs count moments and torques in units of {plain(unit)} N m, as suits this arm." * (unit != 1.0)
@@ -308,7 +281,7 @@ def comparison_table(data: TunerStudy) -> Table:
     )
 
 
-def residual_table(data: TunerStudy) -> Table:
+def residual_table(data: TunerNumbers) -> Table:
     """What is left of the moment after the slew."""
     return Table(
         stem="tune-residual",

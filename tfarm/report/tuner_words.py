@@ -1,29 +1,117 @@
-"""What is said about the tuner: the answer first, then what it leaves out."""
+"""The tuner on a page: its numbers, and the sentences on them."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Mapping
+from dataclasses import dataclass
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
 from tfarm.digits import significant
-from tfarm.dsp.curves import away
+from tfarm.dsp import Chain, Simulation
+from tfarm.dsp.results import ideal_chain
+from tfarm.dsp.traces import WITHOUT, away, resolved
+from tfarm.errors import CertificationError, ConvergenceError
+from tfarm.records import record
 from tfarm.report.sections import Fact
-from tfarm.report.words import typeset, upper
-from tfarm.tuner.overview import Curves, TunerStudy
-from tfarm.tuner.studies import QUARTILES
-from tfarm.tuner.tuning import tip_errors
+from tfarm.report.words import typeset
+from tfarm.spectrum.scales import first_frequency
+from tfarm.tuner import LearningCurves, Plan, Tuning, compare_controllers, learning_curves, tried_loops, tune
+from tfarm.tuner.comparison import Outcomes, quantised_chain
+from tfarm.tuner.training import QUARTILES
+from tfarm.tuner.tuning import tip_errors, usual_plan
 
+CURVE_SEEDS = 20  # of the learning curves
+CURVE_SAMPLES = 80_000_000  # that their trials may have together, some 35 s of one core
+LONG_TRIAL = 16_000  # samples: the comparison of a longer one is of the arm itself alone
+LONGEST_TRIAL = 70_000  # samples: a page has no longer one
+AS_TRAINED, QUANTISED_AND_LATE = 0, 3  # rows of the comparison, which begins with those of the arm itself
+SERVO_SPEED = 1 / 20  # of the first frequency: the servo's angle loop is so slow that it leaves the mode alone
+SERVO_TURN = 0.03  # rad a sample, where that is slower
 SERVO_GAINS = (ANGLE_GAIN, RATE_GAIN)
 ON_TARGET = 1e-10  # of the tip's travel: no slew ends nearer its target than rounding tells
 MUCH_MORE = 3.0  # times as far off its target is more, and no coincidence
 SAME_COST = 1e-4  # relative difference of two costs below which they are called the same
 
 
-def tuner_in_short(data: TunerStudy) -> str:
+@dataclass(frozen=True)
+@record
+class TunerNumbers:
+    """One tuning and what is compared with it.
+
+    `slews` and `coarse` hold two simulations each, without and with the tuner; `constant` is the slew with the best
+    constant gain; `servo` the tuning with the angle held, None where no range of gains is proven there.
+    """
+
+    arm: Arm
+    tuning: Tuning
+    slews: Mapping[str, Simulation]
+    constant: Simulation
+    coarse: Mapping[str, Simulation]
+    curves: LearningCurves
+    rows: tuple[Outcomes, ...]
+    servo: Tuning | None
+
+
+def tuner_numbers(arm: Arm, chain: Chain) -> TunerNumbers:
+    """Train with the paper's figures, through the arm's own chain with its converters ideal, and measure.
+
+    Raises ParameterError for an arm without a loop or a slew, CertificationError where no range of gains is proven.
+    """
+    plan = usual_plan(arm, chain)
+    tuning = tune(arm, plan, ideal_chain(chain))
+    ideal = tuning.trial.loop.chain
+    conditions = QUANTISED_AND_LATE + 1 if tuning.trial.n > LONG_TRIAL else None
+    listed = tried_loops(arm, ideal, quantised_chain(arm, chain))[:conditions]
+    rows = compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard, listed, tuning.best_constant.gain)
+    return TunerNumbers(
+        arm=arm,
+        tuning=tuning,
+        slews=_simulated(tuning, ideal),
+        constant=tuning.trial.simulator(chain=ideal).linear(tuning.constant),
+        coarse=_simulated(tuning, listed[QUANTISED_AND_LATE].chain),
+        curves=learning_curves(tuning, curve_seeds(plan.trials * tuning.trial.n)),
+        rows=tuple(rows),
+        servo=_servo_tuning(arm, plan, ideal),
+    )
+
+
+def curve_seeds(samples: int) -> int:
+    """Number of seeds of the learning curves, for trainings of so many samples."""
+    return min(CURVE_SEEDS, max(1, CURVE_SAMPLES // samples))
+
+
+def trial_samples(arm: Arm, chain: Chain) -> int:
+    """Number of samples of each trial."""
+    return 1 + round(usual_plan(arm, chain).duration / chain.sampling.period)
+
+
+def _servo_tuning(arm: Arm, plan: Plan, chain: Chain) -> Tuning | None:
+    """The same tuning with an angle loop a twentieth as fast as the first mode, or slower at a long period."""
+    speed = min(SERVO_SPEED * first_frequency(arm), SERVO_TURN / chain.sampling.period)
+    on_angle = float(f"{arm.turned_inertia * speed**2:.2g}")
+    try:
+        return tune(arm, plan.holding(arm, on_angle), chain)
+    except (CertificationError, ConvergenceError):
+        return None
+
+
+def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
+    without, tuned = resolved(
+        tuning.trial.simulator(chain=chain),
+        tuning.trial.arm,
+        lambda each: each.linear(tuning.gain().servo),
+        lambda each: tuning.gain().run(each),
+    )
+    return {WITHOUT: without, "with the tuner": tuned}
+
+
+# ------------------------------------------------------------ in words
+
+
+def tuner_in_short(data: TunerNumbers) -> str:
     """How much the tuner gains over the best constant gain, and what that does by itself."""
-    tuning, final = data.tuning, data.curves[0].final
+    tuning, final, median = data.tuning, data.curves.final, data.curves.final_quantile(0.5)
     constant, best, without = tuning.best_constant.gain, tuning.best_constant.cost, tuning.without.cost
-    median, free = (_median(curves) for curves in data.curves[:2])
     below = int((final < best).sum())
     gain = 100 * (1 - median / best)
     lead = "A little" if 100 * SAME_COST < gain < 15 else "Yes" if gain >= 15 else "No"
@@ -40,12 +128,8 @@ def tuner_in_short(data: TunerStudy) -> str:
     return (
         f"{lead}. {by_itself} ({costs}); a gain that tunes itself {moves} "
         f"{significant(median, 3)} in the median of {final.size} seeds. {below} of {final.size} seeds end below the "
-        f"best constant gain. Without the guard, and so without a proof, the median is {beside_best(free, best)}."
+        "best constant gain."
     )
-
-
-def _median(curves: Curves) -> float:
-    return float(np.quantile(curves.final, 0.5, method="nearest"))
 
 
 def _side(cost: float, yardstick: float) -> str:
@@ -55,15 +139,7 @@ def _side(cost: float, yardstick: float) -> str:
     return "below" if cost < yardstick else "above"
 
 
-def beside_best(cost: float, yardstick: float) -> str:
-    """A cost beside that of the best constant gain, in words."""
-    if not np.isfinite(cost):
-        return "infinite: more than half of the seeds run away"
-    side, share = _side(cost, yardstick), 100 * abs(1 - cost / yardstick)
-    return "that of the best constant gain" if side == "the same" else f"{significant(share, 2)} % {side} that"
-
-
-def drift_words(data: TunerStudy) -> str:
+def drift_words(data: TunerNumbers) -> str:
     """What the cost does not see: the angle that a moving gain leaves, as nothing regulates it."""
     tuned, constant = off_target(data)
     more = "a gain that moves leaves more of it than a constant one" if tuned > MUCH_MORE * constant else ""
@@ -77,7 +153,7 @@ def drift_words(data: TunerStudy) -> str:
     )
 
 
-def servo_words(data: TunerStudy) -> str:
+def servo_words(data: TunerNumbers) -> str:
     """The same with the angle held: where the slew ends then, and what the tuner is worth beside its yardsticks."""
     if data.servo is None:
         return ""
@@ -103,7 +179,7 @@ def servo_words(data: TunerStudy) -> str:
     )
 
 
-def off_target(data: TunerStudy) -> tuple[float, float]:
+def off_target(data: TunerNumbers) -> tuple[float, float]:
     """How far off the tip ends [m], with the tuner and with the best constant gain."""
     runs = data.slews["with the tuner"], data.constant
     travel = data.arm.reach * float(abs(data.constant.scenario.hub_angle).max())
@@ -111,9 +187,9 @@ def off_target(data: TunerStudy) -> tuple[float, float]:
     return tuned * (tuned > ON_TARGET * travel), constant * (constant > ON_TARGET * travel)
 
 
-def shaping_words(data: TunerStudy) -> str:
+def shaping_words(data: TunerNumbers) -> str:
     """What input shaping does instead."""
-    tuning, median = data.tuning, _median(data.curves[0])
+    tuning, median = data.tuning, data.curves.final_quantile(0.5)
     costs, late = tuning.shaped_costs, tuning.shaped_delays
     if not any(late.values()):
         return (
@@ -133,7 +209,7 @@ def shaping_words(data: TunerStudy) -> str:
     )
 
 
-def bound_words(data: TunerStudy) -> str:
+def bound_words(data: TunerNumbers) -> str:
     """How far everything is from what is possible, and what is proven."""
     bound, guard = data.tuning.bound.cost, data.tuning.training.guard
     return (
@@ -142,42 +218,10 @@ def bound_words(data: TunerStudy) -> str:
     )
 
 
-def learning_words(data: TunerStudy) -> str:
-    """What each rule does, what the guard costs and what it buys, and whether the paper's pair is the best."""
-    best, found = data.tuning.best_constant.cost, data.cost_map
-    told = [
-        f"{upper(curves.title)}: {int((curves.final < best).sum())} of {curves.final.size} below "
-        f"the best constant gain, {_ends(curves)}"
-        for curves in data.curves
-    ]
-    guarded, free = (_median(curves) for curves in data.curves[:2])
-    costs = {"below": "The guard costs part of the gain", "above": "The guard costs nothing here"}
-    cost = costs.get(_side(free, guarded), "The guard changes nothing in the median")
-    is_proven = data.tuning.training.guard.is_proven
-    price = f"{cost}, and buys the proof." if is_proven else f"{cost}; its proof is of the first modes alone."
-    answer = "Yes" if found.is_papers_best else "No"
-    return (
-        f"Seed by seed. {'. '.join(told)}. {price} Is (0.6, 0.8) the best pair of momentum and learning rate? "
-        f"{answer}: {typeset(found.verdict.partition(': ')[2])}."
-    )
-
-
-def _ends(curves: Curves) -> str:
-    finite = curves.final[np.isfinite(curves.final)]
-    gone = [
-        f"{count} {what}" for count, what in ((curves.diverged, "diverged"), (curves.died, "died at K = 0")) if count
-    ]
-    if not finite.size:
-        return ", ".join(gone) or "none of a finite cost"
-    low, middle, high = (significant(float(x), 3) for x in (finite.min(), _median(curves), finite.max()))
-    return ", ".join([*gone, f"median {middle}, from {low} to {high}"])
-
-
-def tuner_facts(data: TunerStudy) -> tuple[Fact, ...]:
+def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
     """The costs, from nothing to what is possible."""
-    tuning, final = data.tuning, data.curves[0].final
-    median = _median(data.curves[0])
-    low, high = (float(np.quantile(final, q, method="nearest")) for q in QUARTILES)
+    tuning, final = data.tuning, data.curves.final
+    low, median, high = (data.curves.final_quantile(share) for share in QUARTILES)
     gain = 100 * (1 - median / tuning.best_constant.cost)
     guard = tuning.training.guard
     off, off_constant = (significant(1e3 * x, 2) for x in off_target(data))

@@ -3,23 +3,25 @@
 A page is made of the arm's file with its chain, the laws that it is about, the fit that its numbers are from, what was
 measured, tfarm's own files and the versions of what computes and draws.  It is up to date if all of these are what they
 were and each of its files is as it was written.
+
+What a report keeps of each arm in its folder as JSON, and reads again for the pages that are about all arms.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 import pickle
 import platform
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import tfarm
-from tfarm.dsp.writing import file_text
+from tfarm.dsp.chain import file_text
 from tfarm.report.given_laws import Subject
-from tfarm.report.kept import keep, kept_in
 
 NOTES_KIND = "made"
 PACKAGES = (
@@ -34,6 +36,10 @@ PACKAGES = (
     "latex2mathml",
     "vl-convert-python",
 )
+COMPARISON_KIND = "compare"  # what is kept of a comparison
+COMPARISON_PAGE = "compare.html"
+LARGEST_READ = 1 << 20  # bytes of a file worth reading
+T = TypeVar("T")
 
 
 @cache
@@ -84,3 +90,35 @@ def _notes(folder: Path) -> dict[str, Any]:
 
 def _hash(file: Path) -> str:
     return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def keep(folder: Path, kind: str, content: Mapping[str, Any]) -> None:
+    """kind.json, with a mark of what it is."""
+    text = json.dumps({f"tfarm_{kind}": 1, **content}, ensure_ascii=False, indent=1) + "\n"
+    (folder / f"{kind}.json").write_text(text, encoding="utf-8", newline="")
+
+
+def kept_in(folder: Path, kind: str, made_of: Callable[[dict[str, Any]], T | None]) -> T | None:
+    """What `made_of` makes of a folder's kind.json; None where there is none, or none of ours."""
+    file = folder / f"{kind}.json"
+    try:
+        read = json.loads(file.read_text(encoding="utf-8")) if file.stat().st_size <= LARGEST_READ else {}
+        return made_of(read) if read.pop(f"tfarm_{kind}") == 1 else None
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return None
+
+
+def kept_comparison(out: Path) -> tuple[str, tuple[str, ...]]:
+    """The title of compare.html beside the reports, and the arms that it compares; ("", ()) where there is none."""
+    found = kept_in(out, COMPARISON_KIND, lambda read: (str(read["title"]), tuple(map(str, read["arms"]))))
+    return found if found is not None and (out / COMPARISON_PAGE).is_file() else ("", ())
+
+
+def kept(out: Path, kind: str, made_of: Callable[[dict[str, Any], Path], T | None]) -> list[T]:
+    """What `made_of` makes of each folder's kind.json, by name; what is none of ours is passed over."""
+
+    def made(folder: Path) -> T | None:
+        return kept_in(folder, kind, lambda read: made_of(read, folder) if read["name"] == folder.name else None)
+
+    folders = sorted((f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name)
+    return [each for each in map(made, folders) if each is not None]

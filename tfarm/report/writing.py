@@ -18,7 +18,6 @@ from tfarm.fitting.fit import Fit
 from tfarm.report.card import written_cards
 from tfarm.report.frame import other_pages
 from tfarm.report.given_laws import GivenLaw, Subject, check_laws
-from tfarm.report.kept import COMPARISON_PAGE, kept_comparison
 from tfarm.report.live import ASSETS, LIVE_PAGE, has_assets, is_live
 from tfarm.report.making import ReportProgress, make_all, pieces_of
 from tfarm.report.page import arm_page, file_of, index_page
@@ -26,7 +25,7 @@ from tfarm.report.pieces import QUESTIONS
 from tfarm.report.sections import SavedSection
 from tfarm.report.trust import TRUST_FOLDER, kept_evidence, write_trust
 from tfarm.report.trust_proofs import written_proofs
-from tfarm.report.unchanged import is_unchanged, key_of, note_made
+from tfarm.report.unchanged import COMPARISON_PAGE, is_unchanged, kept_comparison, key_of, note_made
 from tfarm.stopping import undone_if_stopped
 
 Notice = Callable[[str], object]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tfarm.arm import TWO_GAINS
-from tfarm.dsp.brief import brief_of
+from tfarm.dsp.verdict import brief_of
 from tfarm.loop.answers import law_answer
 from tfarm.synthesis.design import Design
 from tfarm.synthesis.law_design import LawDesign

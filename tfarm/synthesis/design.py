@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arrays import Real
 from tfarm.dsp import Chain
-from tfarm.dsp.brief import SampledBrief, sampled_brief
 from tfarm.dsp.chain import chain_or_usual
+from tfarm.dsp.verdict import SampledBrief, sampled_brief
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.frequencies import band_of
 from tfarm.loop.plant import Loop

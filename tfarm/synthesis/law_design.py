@@ -15,10 +15,8 @@ import numpy as np
 from tfarm.arm import ANGLE_GAIN, TWO_GAINS, Arm, Law
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, Verdict
-from tfarm.dsp.brief import brief_of
 from tfarm.dsp.chain import chain_or_usual
-from tfarm.dsp.law_loop import SampledLaw
-from tfarm.dsp.law_verdict import law_verdict
+from tfarm.dsp.verdict import brief_of, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError, did_you_mean
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_stability import law_stability
@@ -56,7 +54,7 @@ class LawDesign:
     at_limit: tuple[str, ...]
     value: float
     verdict: Stability[LawLoop]
-    sampled: Verdict[SampledLaw]
+    sampled: Verdict
     modes: int
     chain: Chain
     arms: tuple[OnArm, ...]
@@ -96,7 +94,7 @@ def law_design(
             nearest = min(nearest, (score, law), key=lambda pair: pair[0])
             if score < LOST and all(judge.holds(law) for judge in judges):
                 named = dict(zip(form.names, form.coefficients(x).tolist(), strict=True))
-                sampled = [law_verdict(each.arm, law, chain) for each in arms]
+                sampled = [sampled_verdict(each.arm, law, chain) for each in arms]
                 on_arms = [
                     OnArm(each.name, each.numbers, judge.value(law), law_stability(each.arm, law), brief_of(own, chain))
                     for each, judge, own in zip(arms, judges, sampled, strict=True)
@@ -113,7 +111,7 @@ def law_design(
 def _why_none(arms: Sequence[NamedArm], structure: str, law: Law, chain: Chain) -> str:
     """What drives the law that came nearest to holding, on the arm where it grows most, and what to try."""
     text = f"no law {structure} was found that holds when sampled: "
-    verdict = max((law_verdict(each.arm, law, chain) for each in arms), key=lambda each: float(each.log_radius))
+    verdict = max((sampled_verdict(each.arm, law, chain) for each in arms), key=lambda each: float(each.log_radius))
     growth = float(np.expm1(verdict.log_radius))
     slowest = f"under the nearest {verdict.slowest} grows by {growth:.2g} a sample"
     grows, arm = slowest if growth > 0 else "none has a reserve", verdict.loop.plant.arm

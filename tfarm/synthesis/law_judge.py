@@ -21,8 +21,9 @@ from tfarm.arm.blocks import Matrices, Rational
 from tfarm.arm.law import Law, Part
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain
-from tfarm.dsp.law_loop import SampledLaw, acting_law, sampled_law, with_estimate
-from tfarm.dsp.law_verdict import law_verdict
+from tfarm.dsp.discretise import acting_law, with_estimate
+from tfarm.dsp.sampled import Sampled, sampled_loop
+from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ConvergenceError
 from tfarm.loop.law_stability import law_stability
 from tfarm.records import record
@@ -54,7 +55,7 @@ class LawJudge:
 
     arm: Arm
     chain: Chain
-    loop: SampledLaw
+    loop: Sampled
     objective: str
     modes: int
     known: Arm
@@ -75,7 +76,7 @@ class LawJudge:
             )
             if share == 1.0:
                 poles, ways = z, moves
-        asked = self.loop.asked.signals
+        asked = self.loop.law.signals
         real, turn = directions(*pole_slopes(self._continuous, law.matrices(asked), slopes, 1.0, asked, Clock(None)))
         growth.append(growth_pieces(real - GROWTH_OF_MODEL, turn))
         g, dg = (np.concatenate(each) for each in zip(*growth, strict=True))
@@ -105,7 +106,8 @@ class LawJudge:
         """Whether the loop is stable with as many modes as it takes, also with the reserve, and without a clock."""
         try:
             return law_stability(self.arm, law).is_stable and all(
-                law_verdict(self.arm, law.times(share), self.chain).is_stable for share in (1.0, 1 / RESERVE, RESERVE)
+                sampled_verdict(self.arm, law.times(share), self.chain).is_stable
+                for share in (1.0, 1 / RESERVE, RESERVE)
             )
         except ConvergenceError:
             return False
@@ -116,7 +118,7 @@ class LawJudge:
 
     @property
     def _signals(self) -> tuple[str, ...]:
-        return self.loop.law.signals
+        return self.loop.in_z.signals
 
     @cached_property
     def _clock(self) -> Clock:
@@ -149,7 +151,7 @@ class LawJudge:
     @cached_property
     def _continuous(self) -> Matrices:
         """The modal model without a clock."""
-        return sensed_model(self.arm, self.loop.asked.signals, self.loop.plant.count)
+        return sensed_model(self.arm, self.loop.law.signals, self.loop.plant.count)
 
     @cached_property
     def _curve(self) -> LoopCurve:
@@ -178,4 +180,4 @@ def law_judge(
     """
     if objective in SLEWED and "root_moment" not in law.signals:
         law = replace(law, parts=(*law.parts, Part(("root_moment",), Rational((0.0,)))))
-    return LawJudge(arm, chain, sampled_law(arm, law, chain, count=count), objective, modes, known or arm)
+    return LawJudge(arm, chain, sampled_loop(arm, law, chain, count=count), objective, modes, known or arm)

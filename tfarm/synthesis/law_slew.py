@@ -18,10 +18,9 @@ from tfarm.arm import Arm, Law
 from tfarm.arm.blocks import Matrices, Rational
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.dsp import Chain, Scenario
-from tfarm.dsp.discretise import substituted
-from tfarm.dsp.law_loop import acting_law
-from tfarm.dsp.law_simulate import references_of
+from tfarm.dsp.discretise import acting_law, substituted
 from tfarm.dsp.scenarios import trial_weights
+from tfarm.dsp.simulate import references_of
 from tfarm.records import record
 from tfarm.reduced.sensed import closed
 from tfarm.synthesis.law_slopes import Clock

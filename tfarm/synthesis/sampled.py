@@ -26,10 +26,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from tfarm.arm import FED_BACK, PLANE, AnyLaw, Arm, HubFeedback, laws_at, tracked
+from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, laws_at, tracked
 from tfarm.arrays import LEAST_SIZE, Complex, Real
-from tfarm.dsp import Chain, SampledLoop, Scenario, sampled_loop, sampled_verdict, scenario
-from tfarm.dsp.margins import most_modes
+from tfarm.dsp import Chain, Sampled, Scenario, sampled_loop, sampled_verdict, scenario
+from tfarm.dsp.edges import most_modes
 from tfarm.dsp.results import residual_moment_rms, simulated
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.dsp.scenarios import TRIAL_SLEWS, trial_weights
@@ -60,7 +60,7 @@ class SampledJudge:
     `known` is the arm that the slew's references and feed-forward are made for.
     """
 
-    loop: SampledLoop
+    loop: Sampled
     objective: str
     modes: int
     known: Arm
@@ -121,14 +121,14 @@ class SampledJudge:
         """Closed-loop matrices without any gain, what the held ones add, and what 1 of each of both does (2, n, n)."""
         bare = self._bare
         start = bare.reduced_matrix()
-        by_held = bare.under(bare.gains.times(2.0)).reduced_matrix() - start
+        by_held = bare.times(2.0).reduced_matrix() - start
         by_each = np.array([bare.having(**{name: 1.0}).reduced_matrix() - start for name in PLANE])
         return start - by_held, by_held, by_each
 
     @property
-    def _bare(self) -> SampledLoop:
+    def _bare(self) -> Sampled:
         """The loop without both gains."""
-        return self.loop.under(self.loop.gains.at(0.0, 0.0))
+        return self.loop.having(**dict.fromkeys(PLANE, 0.0))
 
     def _matrices(self, points: Real, share: float) -> Real:
         start, by_held, by_each = self._parts
@@ -148,7 +148,8 @@ class SampledJudge:
         return np.concatenate([np.exp(1j * q)[None], self._signals(q)])
 
     def _signals(self, q: Real) -> Complex:
-        return self.loop.signals(np.exp(1j * q), None, np.ones(q.size))
+        whole, *rows = self.loop.terms(np.exp(1j * q), None, np.ones(q.size))
+        return np.asarray(rows / whole)
 
     def _disks(self, points: Real) -> Real:
         laws = laws_at(self.loop.gains, points)
@@ -173,8 +174,7 @@ class SampledJudge:
     @cached_property
     def _measured_moment(self) -> Real:
         """The row that reads the root moment as the controller does, through the anti-alias filter."""
-        row = self.loop.pulse.matrices()[2][FED_BACK.index("root_moment")]
-        return np.pad(row, (0, self.loop.own_moment.size - row.size))
+        return np.asarray(self.loop.pulse.matrices()[2][self.loop.in_z.signals.index("root_moment")])
 
     def _run(self, task: Scenario, points: Real, sense: Real) -> tuple[Real, Real]:
         """A root moment, as a row reads it of the states, and the input at the samples of a slew, (samples, gains)."""
@@ -182,7 +182,7 @@ class SampledJudge:
         (on_rate, on_moment), number = points, points.shape[1]
         A = start + on_rate[:, None, None] * by_each[0] + on_moment[:, None, None] * by_each[1]
         laws, references = laws_at(self.loop.gains, points), task.wanted
-        kept = self.loop.pulse.integrals_at + 2  # the input of the sample before
+        kept, sense = self.loop.pulse.integrals_at + 2, np.pad(sense, (0, len(start) - sense.size))
         feedforward = task.feedforward[:, None]
         wanted = sum((row * each[:, None] for row, each in zip(laws, references.T, strict=True)), start=feedforward)
         x, (moment, u) = np.zeros((number, len(start), 1)), np.zeros((2, task.t.size, number))

@@ -11,7 +11,7 @@ import numpy as np
 
 from tfarm.arm import HubFeedback
 from tfarm.arrays import Real
-from tfarm.dsp.brief import SampledBrief
+from tfarm.dsp.verdict import SampledBrief
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.stability import Stability
 from tfarm.records import record

@@ -17,8 +17,8 @@ from typing import TypeVar
 import numpy as np
 
 from tfarm.arm import Arm
-from tfarm.arm.keys import KeyedArms
 from tfarm.arm.records import ADJUSTABLE
+from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record

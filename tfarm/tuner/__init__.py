@@ -1,21 +1,20 @@
 """The neural gain tuner: a network that sets the moment gain while the arm slews, kept where that is proven stable."""
 
+from tfarm.tuner.baselines import BestConstant, best_constant, extra_insensitive, lq_bound, shaped_trial, zero_vibration
 from tfarm.tuner.comparison import compare_controllers, tried_loops
-from tfarm.tuner.controller import TunedGain, simulated
+from tfarm.tuner.controller import SavedTuner, TunedGain, load_tuner, save_tuner, simulated
 from tfarm.tuner.guard import Guard, find_guard
 from tfarm.tuner.network import Network, initial_network
-from tfarm.tuner.saving import SavedTuner, load_tuner, save_tuner
-from tfarm.tuner.shaping import extra_insensitive, shaped_trial, zero_vibration
-from tfarm.tuner.training import Learning, Stopped, Training, train
+from tfarm.tuner.training import Learning, LearningCurves, Stopped, Training, train
 from tfarm.tuner.trial import Cost, Record, Trial, residual_rms, slew_trial
-from tfarm.tuner.tuning import Plan, Tuning, tune, tune_answer
-from tfarm.tuner.yardsticks import BestConstant, best_constant, lq_bound
+from tfarm.tuner.tuning import Plan, Tuning, curves_answer, learning_curves, tune, tune_answer
 
 __all__ = [
     "BestConstant",
     "Cost",
     "Guard",
     "Learning",
+    "LearningCurves",
     "Network",
     "Plan",
     "Record",
@@ -27,9 +26,11 @@ __all__ = [
     "Tuning",
     "best_constant",
     "compare_controllers",
+    "curves_answer",
     "extra_insensitive",
     "find_guard",
     "initial_network",
+    "learning_curves",
     "load_tuner",
     "lq_bound",
     "residual_rms",

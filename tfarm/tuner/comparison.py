@@ -16,12 +16,11 @@ from tfarm.dsp import Chain, Converters, Scenario, Simulation
 from tfarm.dsp.scenarios import torque_unit
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum.scales import first_frequency
+from tfarm.tuner.baselines import SHAPERS, Shaper, best_constant, lq_bound, shaped_trial
 from tfarm.tuner.controller import TunedGain, judged, tip_off
 from tfarm.tuner.guard import Guard
 from tfarm.tuner.sector import MovingGain
-from tfarm.tuner.shaping import SHAPERS, Shaper, shaped_trial
 from tfarm.tuner.trial import Trial, residual_rms
-from tfarm.tuner.yardsticks import best_constant, lq_bound
 
 ADDED_MASSES = (0.06, 0.15, 0.3)  # of the arm's mass, for one without payload: 0.1, 0.25 and 0.5 kg on the paper's
 PAYLOAD_SHARES = (0.5, 1.5, 2.0)  # of the payload, for one that has one

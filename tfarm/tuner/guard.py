@@ -27,14 +27,13 @@ from typing import Literal, get_args
 import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
-from tfarm.dsp import SampledLoop, sampled_loop, stable_windows
-from tfarm.dsp.margins import around
+from tfarm.dsp import Sampled, sampled_loop, stable_windows
+from tfarm.dsp.crossings import around
 from tfarm.dsp.sampling import held_amplitude
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.records import record
 from tfarm.tuner.kernel import Limits
-from tfarm.tuner.lyapunov import CommonLyapunov
-from tfarm.tuner.sector import RADIUS_SHARE, MovingGain
+from tfarm.tuner.sector import RADIUS_SHARE, CommonLyapunov, MovingGain
 
 GuardKind = Literal["time-varying", "frozen", "none"]
 GUARD_KINDS: tuple[GuardKind, ...] = get_args(GuardKind)
@@ -94,7 +93,7 @@ class Guard:
         return f"[{self.lo:.4g}, {self.hi:.4g}]: {what} for any K(t), shrinking by {1 - rate:.2g} a sample ({modes})"
 
 
-def find_guard(loop: SampledLoop, kind: GuardKind, best_constant: float) -> Guard:
+def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
     """The guard of a loop (its servo, chain and modes); its moment gain does not matter.
 
     Raises CertificationError where there is none, with the damping that would have one.
@@ -109,12 +108,12 @@ def find_guard(loop: SampledLoop, kind: GuardKind, best_constant: float) -> Guar
     return guard
 
 
-def constant_windows(loop: SampledLoop) -> list[tuple[float, float]]:
+def constant_windows(loop: Sampled) -> list[tuple[float, float]]:
     """The intervals of constant gains K >= 0, up to 10, that leave the loop stable."""
     return [(max(low, 0.0), min(high, MOST_GAIN)) for low, high in stable_windows(loop, MOMENT_GAIN) if high > 0]
 
 
-def _frozen(loops: list[SampledLoop], best_constant: float) -> Guard | None:
+def _frozen(loops: list[Sampled], best_constant: float) -> Guard | None:
     """The interval that holds in every model, without its outermost hundredth."""
     found = []
     for loop in loops:
@@ -129,7 +128,7 @@ def _frozen(loops: list[SampledLoop], best_constant: float) -> Guard | None:
     return Guard("frozen", low + edge * (low > 0), high - edge, loops[-1].plant.count, _settled(loops, found))
 
 
-def _moving(loops: list[SampledLoop], best_constant: float) -> Guard | None:
+def _moving(loops: list[Sampled], best_constant: float) -> Guard | None:
     """The sector of the default rule, proven in every model; narrower where the proof needs it."""
     models = [MovingGain(loop) for loop in loops]
     m = _middle(models[0], best_constant)
@@ -174,7 +173,7 @@ def _middle(model: MovingGain, best_constant: float) -> float | None:
     return inner
 
 
-def _settled(loops: list[SampledLoop], found: list[tuple[float, float]]) -> bool:
+def _settled(loops: list[Sampled], found: list[tuple[float, float]]) -> bool:
     """Whether more modes changed nothing, and the modes left out are too damped to be driven.
 
     At C = 0 that can never be said.
@@ -186,16 +185,16 @@ def _settled(loops: list[SampledLoop], found: list[tuple[float, float]]) -> bool
     return agree and upper_modes_are_quiet(loops[-1], high)
 
 
-def upper_modes_are_quiet(loop: SampledLoop, highest: float) -> bool:
+def upper_modes_are_quiet(loop: Sampled, highest: float) -> bool:
     """Whether the upper half of the modes lose more in a sample by themselves than the feedback could give them."""
     plant, T = loop.plant, loop.chain.sampling.period
-    fed_back = loop.under(loop.gains.having(MOMENT_GAIN, highest)).push
+    fed_back = loop.having(**{MOMENT_GAIN: highest}).push
     push = 2 * fed_back * abs(held_amplitude(plant.poles, T))
     upper = (plant.mode > plant.count // 2) & (plant.poles.imag > 0)
     return bool((push[upper] < -plant.poles.real[upper] * T).all())
 
 
-def _larger(loop: SampledLoop) -> Iterator[SampledLoop]:
+def _larger(loop: Sampled) -> Iterator[Sampled]:
     """The loop, and the same with four times the modes; at C = 0 with twenty.
 
     Three times or twice, where two of the damped modes cannot be told apart.
@@ -214,11 +213,11 @@ def _larger(loop: SampledLoop) -> Iterator[SampledLoop]:
         return
 
 
-def _remedy(loop: SampledLoop, kind: str) -> str:
+def _remedy(loop: Sampled, kind: str) -> str:
     """Why there is no guard, and the smallest damping tried that has one."""
     arm = loop.plant.arm
     what = "no sector of moving gains" if kind == "time-varying" else "no constant gain"
-    served = [name for name in (RATE_GAIN, ANGLE_GAIN) if name == RATE_GAIN or loop.gains[name]]
+    served = [name for name in (RATE_GAIN, ANGLE_GAIN) if name == RATE_GAIN or loop.number(name)]
     at = ", ".join(loop.gains.told(name, "{:g}".format) for name in served)
     start = f"{arm.name}: {what} is proven stable at {at}, C = {arm.damping:g} s"
     for C in REMEDY_DAMPINGS[arm.damping < REMEDY_DAMPINGS]:
@@ -228,7 +227,7 @@ def _remedy(loop: SampledLoop, kind: str) -> str:
     return f"{start}, nor with any damping up to {REMEDY_DAMPINGS[-1]:g} s; {remedy}"
 
 
-def _has_guard(arm: Arm, loop: SampledLoop, kind: str) -> bool:
+def _has_guard(arm: Arm, loop: Sampled, kind: str) -> bool:
     try:
         first = sampled_loop(arm, loop.gains, loop.chain, count=loop.plant.count)
         if not constant_windows(first):

@@ -261,7 +261,7 @@ def sample_gradient(k: int, numbers: Numbers, reply: float, x_next: float, run: 
 @compiled
 def optimal(model: Model, rest: Real, rigid: Real, numbers: Numbers, gains: Real, offsets: Real) -> None:
     """Fills the gains (N, n) and offsets (N,) of the linear-quadratic optimum e_k = -gains_k.s - offsets_k, the last
-    sample first (see `yardsticks`)."""
+    sample first (see `baselines`)."""
     A, B, c, T, n = model.A, model.B, model.moment, numbers.T, model.B.size
     P, closed, turned, product = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
     q, pull, PB = np.zeros(n), np.zeros(n), np.zeros(n)

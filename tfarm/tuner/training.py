@@ -14,6 +14,7 @@ compare at every sample, and `dynamic` is `clipped`.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -34,6 +35,7 @@ Sensitivity = Literal["one-step", "whole"]
 
 RULE_NUMBERS = {"dynamic": rules.BACKTRACKING_RULE, "clipped": rules.CLIPPED_RULE, "plain": rules.PLAIN_RULE}
 MOST_TRIALS = 1_000_000  # of a tuning: a bound on what a slip of the hand may ask for
+QUARTILES = (0.25, 0.5, 0.75)  # of learning curves over the seeds
 NO_GAIN = 1e-3  # of K: a network that gives less all along a trial has driven its gain to nothing
 
 
@@ -111,6 +113,38 @@ class Training:
     def died(self) -> bool:
         """Whether the gain was driven to nothing."""
         return bool(self.result.K.max(initial=0.0) < NO_GAIN)
+
+
+@dataclass(frozen=True)
+@record
+class LearningCurves:
+    """Trainings from several seeds: `costs` (seeds, trials) as they were run, inf from where one diverged.
+
+    `final` (seeds,): the cost with what was learnt, inf where it diverged.  `diverged` and `died` count seeds.
+    """
+
+    costs: Real
+    final: Real
+    diverged: int
+    died: int
+
+    @classmethod
+    def of(cls, trainings: Sequence[Training], trials: int) -> LearningCurves:
+        """Those of trainings of up to `trials` trials."""
+        costs = np.full((len(trainings), trials), np.inf)
+        for row, training in zip(costs, trainings, strict=True):
+            row[: training.costs.size] = training.costs
+        final = [math.inf if each.stopped is not None else each.result.cost for each in trainings]
+        diverged = sum(each.stopped is not None for each in trainings)
+        return cls(costs, np.array(final), diverged, sum(each.died for each in trainings))
+
+    def quantile(self, share: float) -> Real:
+        """The cost (trials,) that this share of the seeds is below, after each trial; always one of the costs."""
+        return np.asarray(np.quantile(self.costs, share, axis=0, method="nearest"))
+
+    def final_quantile(self, share: float) -> float:
+        """The same of the final costs."""
+        return float(np.quantile(self.final, share, method="nearest"))
 
 
 def train(trial: Trial, network: Network, guard: Guard, learning: Learning, trials: int) -> Training:

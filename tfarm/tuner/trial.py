@@ -24,7 +24,7 @@ import numpy as np
 from tfarm.arm import Arm, HubFeedback, must_not_be_algebraic
 from tfarm.arm.checks import check_fields, not_negative, number, positive
 from tfarm.arrays import Real
-from tfarm.dsp import Chain, SampledLoop, Scenario, Simulator, sampled_loop, scenario
+from tfarm.dsp import Chain, Sampled, Scenario, Simulator, sampled_loop, scenario
 from tfarm.dsp.chain import Reading, chain_or_usual
 from tfarm.dsp.results import residual_left
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
@@ -86,7 +86,7 @@ class Trial:
     The controller knows the arm only by `task`, so the slew of one arm may be asked of another one's loop.
     """
 
-    loop: SampledLoop
+    loop: Sampled
     task: Scenario
     cost: Cost
     signals: Reading
@@ -108,11 +108,8 @@ class Trial:
         last = self.loop.pulse.integrals_at + 2  # where the torque of the sample before is kept: B is 1 there
         servo = -self.loop.having(K2=0.0).matrix()[last]
         moment = -self.loop.having(Kp=0.0, K1=0.0, K2=1.0).matrix()[last]
-        B = self.loop.pulse.matrices()[1]
-        drive = np.r_[B, np.zeros(len(A) - len(B))]
-        return kernel.Model(
-            *(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment, self.loop.own_moment))
-        )
+        drive, own = (np.pad(of, (0, len(A) - of.size)) for of in (self.loop.pulse.matrices()[1], self.loop.own_moment))
+        return kernel.Model(*(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment, own)))
 
     @cached_property
     def reference(self) -> kernel.Reference:

@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
+from tfarm.arm.checks import whole
 from tfarm.dsp import Chain, Simulation, Simulator, scenario
 from tfarm.dsp.chain import Reading, chain_or_usual
-from tfarm.dsp.results import ideal_chain, modes_for, residual_moment_rms, residual_raw_moment_rms, simulation_answer
+from tfarm.dsp.results import enough_modes, ideal_chain, residual_moment_rms, residual_raw_moment_rms, simulation_answer
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.spectrum.scales import default_gains
+from tfarm.tuner.baselines import SHAPERS, BestConstant, best_constant, lq_bound, shaped_trial
 from tfarm.tuner.comparison import Outcomes
-from tfarm.tuner.controller import TunedGain, tip_off
+from tfarm.tuner.controller import SavedTuner, TunedGain, tip_off, weights_answer
 from tfarm.tuner.guard import GuardKind, find_guard
 from tfarm.tuner.network import PAPER_HIDDEN, PAPER_INPUTS, initial_network
-from tfarm.tuner.saving import SavedTuner, weights_answer
-from tfarm.tuner.shaping import SHAPERS, shaped_trial
-from tfarm.tuner.training import Learning, Training, train
+from tfarm.tuner.training import QUARTILES, Learning, LearningCurves, Training, train
 from tfarm.tuner.trial import (
     TRIAL_MODES,
     Cost,
@@ -32,8 +33,11 @@ from tfarm.tuner.trial import (
     usual_rate_gain,
     with_signals,
 )
-from tfarm.tuner.yardsticks import BestConstant, best_constant, lq_bound
 
+Advance = Callable[[int, int, str], None]
+
+MOST_SEEDS = 10_000  # of learning curves
+TRAINING_THREADS = 2  # a report uses no more cores
 BOUND_NOTES = {
     "vibration": "the least cost of any control signal e on this slew, with full state and preview",
     "total": "the least cost of any torque: under this reading the cost does not ask the arm to move, so none is best",
@@ -181,6 +185,41 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
     )
 
 
+def learning_curves(tuning: Tuning, seeds: int, advance: Advance | None = None) -> LearningCurves:
+    """Train the tuning's plan from as many seeds, its own and those that follow (the paper's Figure 5).
+
+    `advance(done, all, text)` is called after each.  Raises ParameterError for a number of seeds out of range.
+    """
+    seeds = whole("seeds", seeds, 1, MOST_SEEDS, f"a whole number of seeds from 1 to {MOST_SEEDS}")
+    plan, done = tuning.plan, [tuning.training]
+
+    def training(seed: int) -> Training:
+        network = initial_network(seed, hidden=plan.hidden, scales=plan.scales)
+        return train(tuning.trial, network, tuning.training.guard, plan.learning, plan.trials)
+
+    with ThreadPoolExecutor(TRAINING_THREADS) as pool:  # compiled loops let other threads run
+        for each in pool.map(training, range(plan.seed + 1, plan.seed + seeds)):
+            done.append(each)
+            if advance is not None:
+                advance(len(done), seeds, "learning curves")
+    return LearningCurves.of(done, plan.trials)
+
+
+def curves_answer(curves: LearningCurves) -> dict[str, Any]:
+    """Learning curves as a dictionary of plain numbers and lists."""
+    lower, median, upper = (curves.quantile(share).tolist() for share in QUARTILES)
+    return {
+        "seeds": curves.final.size,
+        "median": median,
+        "lower_quartile": lower,
+        "upper_quartile": upper,
+        "final_cost": curves.final.tolist(),
+        "final_quartiles": [curves.final_quantile(share) for share in QUARTILES],
+        "diverged": curves.diverged,
+        "died": curves.died,
+    }
+
+
 def tune_answer(tuning: Tuning) -> dict[str, Any]:
     """The tuning as a dictionary of plain numbers, texts and lists."""
     training, plan, guard = tuning.training, tuning.plan, tuning.training.guard
@@ -276,7 +315,7 @@ def controlled_answer(
     chain = with_signals(chain, saved.signals)
     task = scenario(name, arm, chain, duration)
     ideal = ideal_chain(chain)
-    used = modes_for(count, lambda n: saved.gain().run(Simulator(arm, ideal, task, count=n, outputs=outputs)))
+    used = enough_modes(lambda n: saved.gain().run(Simulator(arm, ideal, task, count=n, outputs=outputs)), count)
     run = saved.gain().run(Simulator(arm, chain, task, count=used.modes, between=between, outputs=outputs))
     answer = simulation_answer(arm, saved.gain().servo, run, None, used)
     controller = {

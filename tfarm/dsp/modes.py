@@ -13,18 +13,17 @@ never destabilises.  At finite gains the closed-loop pole itself says it: it is 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from tfarm.arm import GAINS, MOMENT_GAIN, RATE_GAIN
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.columns import ANSWER, JSON, REPORT, Column
 from tfarm.digits import general, lined, scientific, singly
-from tfarm.dsp.loop import SampledLoop
+from tfarm.dsp.sampled import Sampled
 from tfarm.records import record
 from tfarm.spectrum import modes
 
@@ -67,9 +66,9 @@ class ModeTable:
     """A row a mode that outlives a sample.
 
     `log_radius`: ln|z| of the closed-loop pole that it becomes, the larger where its pair has become two real poles;
-    `first_order` is the change of it to first order in all gains, the sum of `by_rate` (K1), `by_moment` (K2) and
-    `by_others` (Kp, and any more); `by_damping`: Re(p) T, from the arm's own C (and analog hub damping).  `band`: 0
-    from 0 to 1/(2T) [Hz], and so on; `aliased`: where the samples see the mode [rad/s].
+    `first_order` is the change of it to first order in the law, the sum of `by_rate` (what is on the hub rate alone,
+    K1), `by_moment` (on the root moment, K2) and `by_others`; `by_damping`: Re(p) T, from the arm's own C (and analog
+    hub damping).  `band`: 0 from 0 to 1/(2T) [Hz], and so on; `aliased`: where the samples see the mode [rad/s].
     """
 
     index: NDArray[np.int64]
@@ -98,14 +97,15 @@ class ModeTable:
         return [int(each) for each in self.index[self.by_moment > 0]]
 
 
-def first_order(loop: SampledLoop, poles: Whole) -> Real:
-    """What each gain alone changes of ln|z| (gains, poles) at open-loop poles of these numbers, to first order."""
+def first_order(loop: Sampled, poles: Whole) -> Real:
+    """What each part of the law alone changes of ln|z| (parts, poles) at open-loop poles of these numbers."""
     z = loop.pulse.multipliers[poles]
-    signals = loop.signals(z, poles, np.zeros(z.size))
-    return np.asarray(-(np.array(loop.gains.row)[:, None] * signals / z).real) + 0.0  # -0.0 where a gain is 0
+    _, *rows = loop.terms(z, poles, np.zeros(z.size))
+    whole = (loop.pulse.shifts[poles][:, None] - loop.in_z.poles).prod(axis=1)
+    return np.asarray(-(np.array(loop.weights)[:, None] * rows / (z * whole)).real) + 0.0  # -0.0 where a weight is 0
 
 
-def mode_table(loop: SampledLoop) -> ModeTable:
+def mode_table(loop: Sampled) -> ModeTable:
     """The modes of a loop one by one."""
     pulse = loop.pulse
     own = np.asarray(pulse.poles.real * pulse.sampling.period, dtype=float)
@@ -114,7 +114,8 @@ def mode_table(loop: SampledLoop) -> ModeTable:
     index = pulse.mode[upper]
     table, T = modes(pulse.plant.arm, max(1, int(index.max(initial=1)))), pulse.sampling.period
     w = table.natural_frequency[np.searchsorted(table.index, index)]
-    by = dict(zip((gain.name for gain in GAINS), first_order(loop, upper), strict=True))
+    by, reads = first_order(loop, upper), [part.signals for part in loop.law.parts]
+    by_rate, by_moment = (by[[each == (name,) for each in reads]].sum(axis=0) for name in ("hub_rate", "root_moment"))
     turns, origin = np.round(w * T / (2 * np.pi)), origins(loop)
     # what comes from a mode's pole or its conjugate: two radii where both have become real
     conjugate = abs(pulse.poles - pulse.poles[upper].conj()[:, None]).argmin(axis=1)
@@ -124,9 +125,9 @@ def mode_table(loop: SampledLoop) -> ModeTable:
         natural_frequency=w,
         band=np.floor(w * T / np.pi).astype(np.int64),
         aliased=abs(w - turns * 2 * np.pi / T),
-        by_rate=by.pop(RATE_GAIN),
-        by_moment=by.pop(MOMENT_GAIN),
-        by_others=sum(by.values()),
+        by_rate=by_rate,
+        by_moment=by_moment,
+        by_others=by[[each not in (("hub_rate",), ("root_moment",)) for each in reads]].sum(axis=0),
         by_damping=own[upper],
         log_radius=np.array(radii),
     )
@@ -144,16 +145,18 @@ def followed_branches(poles: Sequence[Complex], values: Real) -> Complex:
 
 
 @lru_cache(maxsize=LOOPS_KEPT)
-def origins(loop: SampledLoop) -> NDArray[np.int64]:
-    """For each closed-loop pole the open-loop pole (its number in `PulseTransfer.poles`) that it comes from, or -1.
+def origins(loop: Sampled) -> NDArray[np.int64]:
+    """For each closed-loop pole the open-loop pole that it comes from, or -1.
 
-    All gains grow together from nearly zero, and each pole is followed.
+    These are numbered as in `PulseTransfer.poles`, those of the law after them.  The whole law grows from nearly
+    nothing, and each pole is followed.
     """
-    labels = np.nonzero(loop.pulse.poles != 0)[0]
-    ahead, rows = loop.pulse.multipliers[labels], []
+    open_loop = np.r_[loop.pulse.multipliers, 1 + loop.in_z.poles]
+    labels = np.nonzero(np.r_[loop.pulse.poles != 0, loop.in_z.poles + 1 != 0])[0]
+    ahead, rows = open_loop[labels], []
     scales = np.r_[FIRST_SCALE, np.arange(1, FOLLOWING_STEPS + 1) / FOLLOWING_STEPS, 1.0]
     for number, scale in enumerate(scales[:-1]):
-        z = replace(loop, gains=loop.gains.times(float(scale))).eigenvalues
+        z = loop.times(float(scale)).eigenvalues
         order = _matched(ahead, z)
         rows.append(z[order])
         ahead = _ahead(rows, scales[max(0, number - 1) : number + 2])
@@ -163,10 +166,13 @@ def origins(loop: SampledLoop) -> NDArray[np.int64]:
     return origin
 
 
-def growing_mode(loop: SampledLoop) -> int:
-    """The flexible mode whose closed-loop pole has the largest radius; 0 for the hub, a filter or the delay."""
+def dominant(loop: Sampled) -> str:
+    """What the pole with the largest radius comes from: a mode, a pole of the law, or the hub (a filter, the delay)."""
     origin = int(origins(loop)[loop.poles.log_radius.argmax()])
-    return 0 if origin < 0 else int(loop.pulse.mode[origin])
+    if origin >= loop.pulse.poles.size:
+        return "a pole of the law"
+    mode = 0 if origin < 0 else int(loop.pulse.mode[origin])
+    return f"mode {mode}" if mode else "the hub"
 
 
 def _ahead(rows: list[Complex], values: Real) -> Complex:

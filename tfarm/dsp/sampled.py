@@ -1,0 +1,427 @@
+"""The sampled loop of any linear law: its matrix, its characteristic function, its poles.
+
+    u_k = r_k - (C x_k + D y_k),  x_{k+1} = A x_k + B y_k                        the law in z, p_i/q its entries
+    F(z) = q(z) + sum over parts of weight sum over signals of p_i(z) H_i(z)     0 at the closed-loop poles
+
+Gains at the hub are a law of three parts without states, u = -Kp theta - K1 theta_t - K2 M + r, M the root moment
+E I phi'(0) as a strain gauge reads it.  F is affine in the weights of the parts, and `Sampled.terms` has its terms.
+
+Matrix eigenvalues are right to about 1e-14, and a mode may grow by 1e-10 a sample; those of n poles next to each other,
+as a law of high order has them next to z = 1, are right to the nth root of that.  So all are polished together, each as
+an offset o from the nearest open-loop pole, of the plant (e^{pT}) or of the law, by the Ehrlich-Aberth method on
+P(z) = F(z) prod(z - poles of F),
+
+    step = 1/(P'/P - sum over the other roots of 1/(z - root))
+
+where o F(e^{pT} + o) is computed without loss; then ln|z| = Re(pT) + ln|1 + o e^{-pT}|.  q and p_i are polynomials,
+kept as factors (`discretise`), so that F has no other poles than the plant.  (Aberth, Mathematics of Computation 27,
+1973.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from tfarm.arm import FED_BACK, GAINS, AnyLaw, Arm, HubFeedback
+from tfarm.arm.feedback import law_of
+from tfarm.arm.law import Law
+from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
+from tfarm.dsp.chain import Chain, chain_or_usual
+from tfarm.dsp.discretise import LawInZ, acting_law, law_in_z, lowest_power, with_all_gains
+from tfarm.dsp.plant import USUAL_MODES, Branching, Plant, SensedPlant, is_analog, sensed_plant
+from tfarm.dsp.sampling import PulseTransfer
+from tfarm.errors import ConvergenceError
+from tfarm.records import record
+from tfarm.reduced.sensed import closed
+from tfarm.spectrum.damped import all_damped_modes
+
+STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes
+SMALLEST_LOG = -745.0  # of the smallest double: stands for the logarithm of 0
+OFF_POLE = 1e-17  # stands for an offset of 0: next to 1 that is none
+DIFFERENCE = 1e-7  # of an offset: between two points that give a slope
+MOST_STEPS = 60  # of all roots together: from four digits on two are enough, of a cluster a dozen spread first
+LAST_STEP = 1e-12  # of the offset: below its rounding
+SETTLED, EIGENVALUE_ROUNDING = 1e-6, 1e-9  # of the offset, and beyond: a root that still steps by more is put back
+UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
+LEAST_SQUARE = -1.0 + 1e-15  # stands for |z|^2 - 1 of a pole at z = 0, which no root is laid out from
+FADED_RADIUS = 0.2  # a pole nearer to z = 0 decides nothing and is not polished
+OUTPUT_OF = {gain.name: gain.output for gain in GAINS}
+
+
+@dataclass(frozen=True)
+@record
+class SampledPoles:
+    """Closed-loop poles `z` and `log_radius` ln|z| of each, the z = 1 of a hub angle that nothing regulates left out.
+
+    `mode` is the flexible mode of the open-loop pole that is nearest (0: none).
+    """
+
+    z: Complex
+    log_radius: Real
+    mode: Whole
+
+    @property
+    def log_spectral_radius(self) -> float:
+        """The largest ln|z|."""
+        return float(self.log_radius.max())
+
+    @property
+    def unstable(self) -> int:
+        """How many lie outside the unit circle."""
+        return int((self.log_radius > 0).sum())
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether all lie inside the unit circle; nothing is rounded."""
+        return self.log_spectral_radius < 0.0
+
+
+def without_drift(A: Real, first: int, shift: Real) -> Real:
+    """A without its pole z = 1 at the direction `shift`, whose entry `first` is 1: the quotient by that direction."""
+    others = np.arange(len(A)) != first
+    return np.asarray(A[others][:, others] - np.outer(shift[others], A[first, others]))
+
+
+@dataclass(frozen=True)
+@record
+class Sampled:
+    """A rig under a law at the samples of a chain, which has the law's delay too.
+
+    `sensed` is what the law reads, `law` its parts, of plain gains 1 in the place of each, and `in_z` these as they
+    act; `weights` are the numbers that the parts are multiplied by: such a gain, or 1.
+    """
+
+    sensed: SensedPlant
+    chain: Chain
+    law: Law
+    in_z: LawInZ
+    weights: tuple[float, ...]
+
+    @cached_property
+    def plant(self) -> Plant:
+        """From the input to the signals of the law, through their filters."""
+        return self.sensed.together
+
+    @cached_property
+    def pulse(self) -> PulseTransfer:
+        """The pulse transfer functions to the signals of the law."""
+        return PulseTransfer(self.plant, self.chain.sampling).folded()
+
+    @cached_property
+    def own_moment(self) -> Real:
+        """The row of C that reads the arm's own root moment, a signal of the law, ahead of the anti-alias filter."""
+        plant = self.plant.beside(self.sensed.unfiltered.rows(["root_moment"]))
+        return np.asarray(PulseTransfer(plant, self.chain.sampling).folded().matrices()[2][-1])
+
+    # ------------------------------------------------------------ its numbers, and other loops
+
+    @property
+    def given(self) -> Law:
+        """The law in the form in which it was given."""
+        return self.law.weighted(self.weights)
+
+    @property
+    def is_of_gains(self) -> bool:
+        """Whether the law is that of all gains at the hub."""
+        return self.law.signals == FED_BACK and self.law.gains is not None
+
+    @property
+    def gains(self) -> HubFeedback:
+        """The gains at the hub, of a loop that has all of them and no more."""
+        assert self.is_of_gains
+        return law_of(self.weights)
+
+    def place(self, name: str) -> int:
+        """The part that a number is the weight of, by its name in `Law.part_gains`, or as "K1" of a gain at the hub."""
+        return self.law.part_gains[OUTPUT_OF.get(name, name)][0]
+
+    def number(self, name: str) -> float:
+        """A number of the law."""
+        return self.weights[self.place(name)]
+
+    def weighted(self, weights: Sequence[float]) -> Sampled:
+        """The same loop with other weights; plant and pulse transfer functions, which know no law, are shared."""
+        other = replace(self, weights=tuple(weights))
+        vars(other).update(plant=self.plant, pulse=self.pulse)
+        return other
+
+    def having(self, **numbers: float) -> Sampled:
+        """The same loop with other values of the numbers that are named."""
+        weights = list(self.weights)
+        for name, value in numbers.items():
+            weights[self.place(name)] = value
+        return self.weighted(weights)
+
+    def times(self, factor: float) -> Sampled:
+        """The same loop with a factor on the whole law."""
+        return self.weighted([factor * each for each in self.weights])
+
+    def with_delay(self, samples: float) -> Sampled:
+        """The same loop with another delay in all."""
+        chain = replace(self.chain, sampling=replace(self.chain.sampling, delay_samples=samples))
+        other = replace(self, chain=chain)
+        vars(other).update(plant=self.plant)
+        return other
+
+    def with_modes(self, count: int) -> Sampled:
+        """The same loop with another number of flexible modes; no work where its models have as many."""
+        return replace(self, sensed=self.sensed.with_modes(count))
+
+    def on(self, arm: Arm, count: int, branches: Branching = all_damped_modes) -> Sampled:
+        """The same law on another arm, with so many flexible modes."""
+        return replace(self, sensed=sensed_plant(arm, self.chain, self.in_z.signals, count, branches))
+
+    # ------------------------------------------------------------ what it feeds back
+
+    @property
+    def exact(self) -> Callable[[Complex], Complex]:
+        """The exact transfer functions of the signals, at s (n,), without the filters."""
+        return self.sensed.read.values
+
+    @property
+    def analog(self) -> tuple[bool, ...]:
+        """Which signals pass the anti-alias filter."""
+        return tuple(is_analog(each, self.chain) for each in self.sensed.read.outputs)
+
+    @property
+    def push(self) -> Real:
+        """What the law adds to each pole of the plant, at most, where the samples see it [1/s]."""
+        delta = np.exp(1j * self.plant.poles.imag * self.chain.sampling.period) - 1
+        entries = np.zeros(self.plant.residues.shape, complex)
+        for part, row, gain, zeros in self.in_z.terms:
+            entries[row] += self.weights[part] * gain * _product(delta, zeros)
+        whole = np.maximum(abs(_product(delta, self.in_z.poles)), LEAST_SIZE)
+        return np.asarray(abs(entries * self.plant.residues).sum(axis=0) / whole)
+
+    # ------------------------------------------------------------ characteristic function
+
+    @cached_property
+    def open_loop(self) -> Complex:
+        """z - 1 of each pole of the plant, in the order of `PulseTransfer.poles`, and then of each of the law."""
+        return np.r_[self.pulse.shifts, self.in_z.poles]
+
+    @cached_property
+    def row(self) -> Real:
+        """What the rows of `terms` are multiplied by."""
+        return np.array([1.0, *self.weights])
+
+    def terms(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
+        """Rows (1 + parts, n): offset q, and of each part offset times its sum of p_i H_i.
+
+        At z = e^{pT} + offset (n,), p the pole number `base`; of the law's poles, which are numbered after those of the
+        plant, not times the offset.
+        """
+        z, more, at, delta = np.asarray(z), 0.0, base, None
+        start = z - 1
+        if base is not None:
+            start, more = self.open_loop[base], offset
+            is_of_law, delta = base >= self.pulse.poles.size, start + offset
+            at, offset = np.where(is_of_law, -1, base), np.where(is_of_law, 1.0, offset)
+        measured = self.pulse.scaled(z, at, offset, delta)
+        rows = np.zeros((1 + len(self.in_z.parts), z.size), complex)
+        rows[0] = offset * _product(start, self.in_z.poles, more)
+        for part, row, gain, zeros in self.in_z.terms:
+            rows[1 + part] += gain * _product(start, zeros, more) * measured[row]
+        return rows
+
+    def characteristic(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
+        """offset F(z); F(z) where the pole is the law's."""
+        return np.asarray(self.row @ self.terms(z, base, offset))
+
+    def __call__(self, z: Complex) -> Complex:
+        """F(z) at an array of z."""
+        z = np.asarray(z, dtype=complex)
+        return self.characteristic(z.ravel(), None, np.ones(z.size)).reshape(z.shape)
+
+    # ------------------------------------------------------------ poles
+
+    def matrix(self) -> Real:
+        """The closed-loop matrix: states of `PulseTransfer.matrices`, then those of the law."""
+        A, B, C = self.pulse.matrices()
+        return closed((A, B[:, None], C, np.zeros((len(C), 1))), self.in_z.under(self.weights))
+
+    @property
+    def is_damped(self) -> bool:
+        """Whether friction makes the turning hub a single integral of the input."""
+        return bool(self.plant.arm.rate_loss or self.chain.actuator.hub_damping)
+
+    @cached_property
+    def has_free_angle(self) -> bool:
+        """Whether the hub angle is a pole at z = 1 that nothing regulates."""
+        turned = dict(zip(self.in_z.signals, self.plant.rigid[:, int(self.is_damped)], strict=True))
+        return bool(self.plant.arm.has_rigid_mode and self.in_z.ignores(turned, self.weights))
+
+    def reduced_matrix(self) -> Real:
+        """The closed-loop matrix without the pole z = 1 of a free hub angle, or of a hub that cannot drift."""
+        A, first = self.matrix(), self.pulse.integrals_at
+        if not self.plant.arm.has_rigid_mode:
+            return np.delete(np.delete(A, [first, first + 1], 0), [first, first + 1], 1)
+        if self.is_damped:  # its angle is the single integral
+            A = np.delete(np.delete(A, first, 0), first, 1)
+        if not self.has_free_angle:
+            return A
+        own, B, _, _ = self.in_z.matrices
+        angle = self.pulse.matrices()[2][:, first + int(self.is_damped)]
+        shift = np.zeros(len(A))
+        shift[first] = 1.0  # and the states of the law where the hub stands still an angle off
+        shift[len(A) - len(own) :] = np.linalg.lstsq(np.eye(len(own)) - own, B @ angle, rcond=None)[0]
+        return without_drift(A, first, shift)
+
+    @cached_property
+    def eigenvalues(self) -> Complex:
+        """The closed-loop poles, not polished, in the order of `poles`."""
+        return np.linalg.eigvals(self.reduced_matrix()).astype(complex)
+
+    def near_one(self, weights: Real) -> list[tuple[int, float]]:
+        """The rows of `terms` times weights (1 + parts,), each as (n, c) of c x^n where x = 1 - 1/z is small.
+
+        Those of weight 0 are left out.
+        """
+        plant, T, at_rest = self.plant, self.chain.sampling.period, self.plant.at_rest
+        size = abs(plant.static) + abs(plant.residues / plant.poles).sum(axis=1)
+        found = [lowest_power(self.in_z.poles)] if weights[0] else []
+        slopes = self.pulse.slopes_at_one
+        for part, row, gain, zeros in self.in_z.terms:
+            weight = float(weights[1 + part] * gain)
+            if weight:
+                n, value = lowest_power(zeros)
+                (twice, once), rest = plant.rigid[row], at_rest[row]
+                own = (-2, twice * T * T) if twice else (-1, once * T) if once else (0, rest)
+                if own[0] == 0 and abs(rest) <= STATIC_ZERO * size[row]:
+                    own = (1, slopes[row])
+                found.append((n + own[0], float(own[1] * value * weight)))
+        return found
+
+    @cached_property
+    def poles_at_one(self) -> int:
+        """How many closed-loop poles are at z = 1 for whatever numbers, a free hub angle apart.
+
+        So are an integrator of what is 0 at rest, one of two integrators side by side, a hub whose rate nothing feels:
+        x^N F, N the poles of the plant there, vanishes at x = 1 - 1/z = 0 as often as all of its terms do.
+        """
+        poles = 0 if not self.plant.arm.has_rigid_mode else (1 if self.is_damped else 2) - self.has_free_angle
+        return max(0, poles + min(n for n, _ in self.near_one(self.row)))
+
+    @cached_property
+    def poles(self) -> SampledPoles:
+        """The closed-loop poles, polished, those that are at z = 1 for whatever numbers put there."""
+        return self.polished()
+
+    def polished(self, which: Any = None) -> SampledPoles:
+        """Those poles, or some of them."""
+        z = self.eigenvalues.copy()
+        z[np.argsort(abs(z - 1), kind="stable")[: self.poles_at_one]] = 1.0
+        return _polished(self, z, which)
+
+
+def _nearest(loop: Sampled, delta: Complex) -> Whole:
+    """The number of the open-loop pole nearest to each z = 1 + delta, of those that have not faded.
+
+    The integrals of a hub that cannot drift are none: next to them F has no digits of its own.
+    """
+    away = abs(delta[:, None] - loop.open_loop)
+    away[:, abs(1 + loop.open_loop) <= FADED_RADIUS] = np.inf
+    if not loop.plant.rigid.any():
+        away[:, loop.pulse.poles.size - 1] = np.inf
+    return np.asarray(away.argmin(axis=1))
+
+
+def _polished(loop: Sampled, z: Complex, which: Any = None) -> SampledPoles:
+    """Closed-loop poles from eigenvalues that are nearly right, each as an offset from its nearest open-loop pole.
+
+    Those of a mask alone where `which` is one; those that are 1 stay.
+    """
+    delta, shifts, pulse = z - 1, loop.open_loop, loop.pulse
+    base = _nearest(loop, delta)
+    offset = delta - shifts[base]
+    bright = (abs(z) > FADED_RADIUS) & (delta != 0) & (True if which is None else which)
+    rows = np.flatnonzero(bright)
+    if rows.size:
+        _settle(base, offset, rows, loop)
+        moved = _nearest(loop, shifts[base] + offset)
+        if (rows := np.flatnonzero(bright & (moved != base))).size:  # then all digits are kept from there
+            offset[rows] += shifts[base[rows]] - shifts[moved[rows]]
+            base[rows] = moved[rows]
+            _settle(base, offset, rows, loop)
+    at = base[bright]
+    with np.errstate(divide="ignore"):
+        log_radius = np.maximum(np.log(abs(z)), SMALLEST_LOG)
+    own = 2 * loop.in_z.poles.real + abs(loop.in_z.poles) ** 2
+    start = np.r_[pulse.poles.real * pulse.sampling.period, np.log1p(np.maximum(own, LEAST_SQUARE)) / 2]
+    ratio = offset[bright] / (1 + shifts[at])
+    log_radius[bright] = start[at] + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
+    z[bright] = (1 + shifts[at]) + offset[bright]
+    mode = pulse.mode[abs(z[:, None] - pulse.multipliers).argmin(axis=1)]
+    found = SampledPoles(z, log_radius, mode)
+    return found if which is None else SampledPoles(z[which], log_radius[which], mode[which])
+
+
+def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> None:
+    """Bring some roots to rest, in place: those that never come there stay as they are."""
+    start, shifts, pulse = offset.copy(), loop.open_loop, loop.pulse
+    known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0)]  # of F; what is left is at z = 1
+    poles = np.r_[known, np.zeros(max(0, offset.size - known.size - loop.in_z.poles.size))]
+    last = np.full(offset.size, np.inf)
+    offset[rows] = np.where(offset[rows] == 0, OFF_POLE, offset[rows])
+    with np.errstate(all="ignore"):  # a root on an open-loop pole, and one that strays beyond any number
+        for _ in range(MOST_STEPS):
+            b, o = base[rows], offset[rows]
+            both, one = np.r_[o, o * (1 + DIFFERENCE)], shifts[b]
+            f, ahead = loop.characteristic(1 + (np.r_[one, one] + both), np.r_[b, b], both).reshape(2, -1)
+            slope = (ahead - f) / (DIFFERENCE * o * f) - np.where(b < pulse.poles.size, 1 / o, 0.0)
+            apart = (one[:, None] - shifts[base]) + (o[:, None] - offset)
+            slope = slope + (1 / ((one[:, None] - poles) + o[:, None])).sum(axis=1)
+            step = 1 / (slope - np.where(apart == 0, 0.0, 1 / apart).sum(axis=1))
+            step = np.where((f == 0) | ~np.isfinite(step), 0.0, step)
+            offset[rows] = np.where(abs(o - step) < UNMOVED, UNMOVED, o - step)
+            last[rows] = abs(step)
+            rows = rows[abs(step) > LAST_STEP * abs(offset[rows])]
+            if not rows.size:
+                break
+    lost = np.isfinite(last) & (last > EIGENVALUE_ROUNDING + SETTLED * abs(offset))
+    offset[lost] = start[lost]
+    offset[abs(offset) <= UNMOVED] = 0.0
+
+
+def _product(start: Complex, roots: Complex, more: Any = 0.0) -> Complex:
+    """prod(delta - roots) at delta = start + more (n,), without loss where a root is the start."""
+    return np.asarray(((start[:, None] - roots) + np.reshape(more, (-1, 1))).prod(axis=1))
+
+
+def sampled_loop(
+    arm: Arm,
+    law: AnyLaw,
+    chain: Chain | None = None,
+    *,
+    count: int = USUAL_MODES,
+    branches: Branching = all_damped_modes,
+) -> Sampled:
+    """The loop with `count` flexible modes.
+
+    For one arm with many C: `branches` of its damped modes, that remember where they were.  Raises ParameterError for a
+    locked hub, an unknown signal, a law in z of another period, and what `discretised` refuses, and for a massless hub
+    whose moment is fed back (an algebraic loop).
+    """
+    law = with_all_gains(arm, law)
+    acting, chain = acting_law(arm, law, chain_or_usual(chain))
+    weights, units = [1.0] * len(law.parts), law.part_gains
+    for name, (place, value) in units.items():
+        weights[place] = value
+        law, acting = (each.having(name, 1.0) for each in (law, acting))
+    in_z = law_in_z(law, acting, chain)
+    return Sampled(sensed_plant(arm, chain, in_z.signals, count, branches), chain, law, in_z, tuple(weights))
+
+
+def resized(loop: Sampled, count: int) -> Sampled:
+    """The loop with another number of flexible modes, or a few less or more where two damped modes are one there."""
+    for number in (count, count - 1, count + 1, count - 2, count + 2):
+        try:
+            return loop.with_modes(max(1, number))
+        except ConvergenceError as error:
+            lost = error
+    raise lost

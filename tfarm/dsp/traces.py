@@ -1,0 +1,298 @@
+"""Signals in time as they are drawn: fine enough for the fastest mode that is seen, or a band that says so.
+
+Under the torque u that is held a mode goes round its rest, a + u/p, on a circle that shrinks with Re p.  The torques of
+a simulation are played again, and the largest circle of every mode, times what it shows in an output, is its share.
+
+So a simulation is made twice: first at its samples, to see which modes ring visibly, then with at least 20 records in
+each period of the fastest of them.  Where that is more than a page can show as a line, the curve is drawn, and written
+to its file, as the band between its smallest and largest value over at least two such periods.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, HubFeedback
+from tfarm.arrays import Real
+from tfarm.columns import Column
+from tfarm.digits import plain
+from tfarm.dsp.chain import TIME_ROUNDING, Chain
+from tfarm.dsp.kernel import AMPLIFIER, STEP
+from tfarm.dsp.plant import RECORDED
+from tfarm.dsp.scenarios import Scenario, scenario
+from tfarm.dsp.simulate import Measurement, Simulation, Simulator, quantisers
+from tfarm.records import record
+
+POINTS_A_PERIOD = 20  # of a curve in each period of the fastest mode that is seen
+VISIBLE = 1 / 300  # of the height of a curve: a pixel of a picture
+AnySimulator = TypeVar("AnySimulator", bound=Simulator)
+
+LEAST_BETWEEN = 3  # records between two samples at least
+MOST_LINE = 6000  # points of a line: at 20 a period still three pixels a period
+PERIODS = 2  # of the fastest mode that each piece of a band holds at least
+BAND_PIECES = 1500  # of a band at most
+MOST_RECORDS = 400_000  # of a simulation for a picture, some 30 MB
+WITHOUT = f"without moment feedback, {MOMENT_GAIN} = 0"
+RECORD_LENGTH = 3.0  # times the slew: how long a record is
+COARSE_BITS = 6  # of the ADC: few, so that its steps are seen
+MOTOR_SHARE = 0.8  # of the torque that the ideal chain takes: what the motor gives at most
+RANGE_SHARE = 1.2  # times the largest moment: the ADC's range
+CHART_DELAY = 1.0  # samples, where the chain has none
+CHART_LENGTH = 2.0  # times the slew
+
+
+class Ringing(NamedTuple):
+    """`frequency` (m,) [rad/s] of the modes that ring, and how far they do in `RECORDED` (4, m)."""
+
+    frequency: Real
+    size: Real
+
+    def fastest(self, signal: str, height: float) -> float:
+        """The highest frequency [rad/s] that is seen in a curve of that height; 0 where none is."""
+        seen = self.size[RECORDED.index(signal)] > VISIBLE * height
+        return float(self.frequency[seen].max(initial=0.0))
+
+
+def ringing(simulator: Simulator, run: Simulation) -> Ringing:
+    """The ringing of a simulation by this simulator, its torques played again; no mode rings that decays faster."""
+    p, weights = simulator.modal()
+    rings = p.imag > -p.real
+    p, weights, amplitude = p[rings], weights[:, rings], simulator.first_amplitudes()[rings]
+    sampling, d = simulator.chain.sampling, simulator.chain.sampling.whole_delay
+    late = sampling.fraction * sampling.period
+    pieces = [(0, np.exp(p * late))] if late else []  # the torque before, and then this one
+    pieces.append((1, np.exp(p * (sampling.period - late))))
+    torque, largest = np.r_[np.zeros(d + 1), run.torque], np.zeros(p.size)
+    for k, extra in enumerate(simulator.scenario.disturbance[: run.torque.size]):
+        for shift, turn in pieces:
+            rest = (torque[k + shift] + extra) / p
+            circle = amplitude + rest
+            largest = np.maximum(largest, abs(circle))
+            amplitude = turn * circle - rest
+    return Ringing(np.asarray(p.imag, dtype=float), np.asarray(abs(weights) * largest, dtype=float))
+
+
+def records_between(simulator: Simulator, run: Simulation, heights: dict[str, float]) -> int:
+    """How many records between two samples show every mode that is seen in curves of these heights [SI]."""
+    found = ringing(simulator, run)
+    fastest = max((found.fastest(signal, height) for signal, height in heights.items()), default=0.0)
+    return max(0, math.ceil(POINTS_A_PERIOD * fastest * run.scenario.period / (2 * math.pi)) - 1)
+
+
+@dataclass(frozen=True)
+@record
+class TimeCurve:
+    """A signal over time: a line where `low` is `high`, else the band between them from each `t` [s] to the next."""
+
+    t: Real
+    low: Real
+    high: Real
+    is_band: bool
+
+    def at(self, t: Real) -> TimeCurve:
+        """The same at other times, which its own begin with or hold, for a file with one column of time."""
+        if self.t.size == t.size:
+            return self
+        k = np.clip(np.searchsorted(self.t, t * (1 + TIME_ROUNDING), side="right") - 1, 0, self.t.size - 1)
+        return TimeCurve(t, self.low[k], self.high[k], self.is_band)
+
+    def columns(self, key: str, title: str, unit: str) -> Sequence[Column]:
+        """What is drawn, for the file: one column, or both edges of the band."""
+        name = f"{key}_{unit.replace(' ', '_')}"
+        if not self.is_band:
+            return (Column(name, title, unit, of=self.low),)
+        return (
+            Column(f"{name}_low", f"{title}, lowest", unit, of=self.low),
+            Column(f"{name}_high", f"{title}, highest", unit, of=self.high),
+        )
+
+
+def resolved(simulator: AnySimulator, arm: Arm, *runs: Callable[[AnySimulator], Simulation]) -> list[Simulation]:
+    """The simulations of one picture, with as many records between their samples as its fastest visible mode takes."""
+    rough = [run(simulator) for run in runs]
+    needed = [records_between(simulator, each, _heights(arm, each)) for each in rough if each.t.size > 1]
+    most = max(LEAST_BETWEEN, MOST_RECORDS // simulator.scenario.t.size)
+    finer = simulator.finer(min(max(LEAST_BETWEEN, *needed), most) if needed else LEAST_BETWEEN)
+    return [run(finer) for run in runs]
+
+
+def points_a_period(arm: Arm, run: Simulation) -> tuple[float, int]:
+    """How many points the records have in a period of the fastest mode that is seen, and how many between two samples
+    there would have to be for 20; infinitely many where none is seen."""
+    simulator = Simulator(arm, run.chain, run.scenario)
+    needed = records_between(simulator, run, _heights(arm, run)) if run.t.size > 1 else 0
+    there = 0 if run.between is None else run.between.t.size // max(1, run.t.size)
+    return (POINTS_A_PERIOD * (there + 1) / (needed + 1) if needed else math.inf), needed
+
+
+def _heights(arm: Arm, run: Simulation) -> dict[str, float]:
+    """How high the curves are that are drawn, by the signal that they come from."""
+    return {"root_moment": float(np.ptp(run.at_samples.root_moment)), "tip_displacement": float(np.ptp(away(arm, run)))}
+
+
+def away(arm: Arm, simulation: Simulation) -> Real:
+    """Tip displacement less where a rigid arm on its reference has it [m], at the samples."""
+    reference = arm.reach * simulation.scenario.hub_angle[: simulation.t.size]
+    return simulation.at_samples.tip_displacement - reference
+
+
+def root_moment(simulation: Simulation) -> TimeCurve:
+    """The root moment [N m]."""
+    return curve(*continuous(simulation, "root_moment"))
+
+
+def tip(simulation: Simulation) -> TimeCurve:
+    """The tip displacement [m]."""
+    return curve(*continuous(simulation, "tip_displacement"))
+
+
+def tip_deviation(arm: Arm, simulation: Simulation) -> TimeCurve:
+    """Tip displacement less where a rigid arm on its reference has it [m]."""
+    t, displacement = continuous(simulation, "tip_displacement")
+    return curve(t, displacement - arm.reach * reference_angle(simulation.scenario, t))
+
+
+def reference_angle(task: Scenario, t: Real) -> Real:
+    """The reference angle [rad] between its samples, where its rate is linear in time."""
+    T, n = task.period, task.hub_angle.size
+    k = np.minimum(np.floor(t / T * (1 + TIME_ROUNDING)).astype(np.int64), n - 1)
+    slope = np.diff(np.r_[task.hub_rate, task.hub_rate[-1:]]) / T
+    tau = t - k * T
+    return task.hub_angle[k] + tau * (task.hub_rate[k] + slope[k] * tau / 2)
+
+
+def curve(t: Real, y: Real) -> TimeCurve:
+    """A line where a page can show one, else a band."""
+    if t.size <= MOST_LINE:
+        return TimeCurve(t, y, y, False)
+    step = max(PERIODS * POINTS_A_PERIOD, math.ceil(t.size / BAND_PIECES))
+    starts = np.arange(0, t.size, step)
+    return TimeCurve(t[starts], np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts), True)
+
+
+def continuous(simulation: Simulation, signal: str) -> tuple[Real, Real]:
+    """A signal at the samples and between them, in order of time."""
+    at, between = simulation.at_samples, simulation.between
+    if between is None:
+        return at.t, at.signal(signal)
+    t, y = np.r_[at.t, between.t], np.r_[at.signal(signal), between.signal(signal)]
+    order = np.argsort(t, kind="stable")
+    return t[order], y[order]
+
+
+def held_at(simulation: Simulation, values: Real, t: Real) -> Real:
+    """What is held from sample to sample, at the times t [s]."""
+    k = np.floor(t / simulation.scenario.period * (1 + TIME_ROUNDING)).astype(np.int64)
+    return values[np.minimum(k, values.size - 1)]
+
+
+@dataclass(frozen=True)
+@record
+class Slews:
+    """One slew simulated twice: `without` and `with_moment` feedback, the other gains the same."""
+
+    arm: Arm
+    gains: HubFeedback
+    without: Simulation
+    with_moment: Simulation
+
+    @property
+    def each(self) -> Mapping[str, Simulation]:
+        """Both, by what they are called; the one without comes first."""
+        return {WITHOUT: self.without, f"with, {self.fed_back}": self.with_moment}
+
+    @property
+    def held(self) -> str:
+        """The gain on the hub rate, which both have."""
+        return self.gains.told(RATE_GAIN, plain)
+
+    @property
+    def fed_back(self) -> str:
+        """The gain on the root moment of the second."""
+        return self.gains.told(MOMENT_GAIN, plain)
+
+
+def slews(arm: Arm, gains: HubFeedback, chain: Chain, modes: int) -> Slews:
+    """The slew of the chain, for three times as long as it takes.
+
+    Raises ParameterError for an arm that cannot turn.
+    """
+    task = scenario("slew", arm, chain, RECORD_LENGTH * chain.slew.rise_time)
+    simulator = Simulator(arm, chain, task, count=modes)
+    laws = (gains.having(MOMENT_GAIN, 0.0), gains)
+    both = resolved(simulator, arm, *(partial(Simulator.linear, gains=law) for law in laws))
+    return Slews(arm, gains, *both)
+
+
+@dataclass(frozen=True)
+@record
+class StripChart:
+    """A slew through a coarse chain.
+
+    `read` [N m] is what the ADC hands over at each sample, `asked` [N m, V or A] what the controller then wants;
+    `simulation.torque` is what the motor gives, `delay_samples` later.
+    """
+
+    arm: Arm
+    gains: HubFeedback
+    simulation: Simulation
+    read: Real
+    asked: Real
+
+    @property
+    def step(self) -> float:
+        """One step of the ADC [N m]."""
+        return float(quantisers(self.simulation.chain)[AMPLIFIER, STEP])
+
+    @property
+    def limit(self) -> float:
+        """The most the motor gives [N m, V or A]."""
+        return self.simulation.chain.actuator.torque_limit
+
+    @property
+    def saturated(self) -> NDArray[np.bool_]:
+        """At which samples more was asked than the motor gives."""
+        return np.asarray(abs(self.asked) > self.limit)
+
+
+def strip_chart(arm: Arm, gains: HubFeedback, ideal: Simulation, modes: int) -> StripChart:
+    """The same slew as that of an ideal chain, with a coarse ADC, a weak motor and one more sample of delay."""
+    chain = coarse_chain(ideal)
+    task = scenario("slew", arm, chain, CHART_LENGTH * chain.slew.rise_time)
+    read, asked = np.zeros(task.t.size), np.zeros(task.t.size)
+
+    def controller(m: Measurement) -> float:
+        u = m.asked(gains, gains[MOMENT_GAIN])
+        read[m.k], asked[m.k] = m.root_moment, u
+        return u
+
+    (done,) = resolved(Simulator(arm, chain, task, count=modes), arm, lambda each: each.controller(controller))
+    n = done.torque.size
+    return StripChart(arm, gains, done, read[:n], asked[:n])
+
+
+def coarse_chain(ideal: Simulation) -> Chain:
+    """A simulation's chain; where that is ideal 6 bits of ADC over a little more than its moment, 80 % of its torque as
+    the motor's limit, and one sample of delay."""
+    chain, c = ideal.chain, ideal.chain.converters
+    if c.moment_bits is None:
+        span = RANGE_SHARE * float(abs(ideal.at_samples.root_moment).max())
+        unit = 10.0 ** (math.floor(math.log10(span)) - 1)
+        span = c.moment_range or float(f"{math.ceil(span / unit) * unit:.2g}")  # rounded up to two digits
+        c = replace(c, moment_bits=COARSE_BITS, moment_range=span)
+    limit = min(chain.actuator.torque_limit, c.torque_range or math.inf)
+    if math.isinf(limit):
+        limit = float(f"{MOTOR_SHARE * float(abs(ideal.torque).max()):.2g}")
+    return replace(
+        chain,
+        sampling=replace(chain.sampling, delay_samples=chain.sampling.delay_samples or CHART_DELAY),
+        converters=c,
+        actuator=replace(chain.actuator, torque_limit=limit),
+    )
