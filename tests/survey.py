@@ -40,6 +40,16 @@ def each_of(judge):
     return findings
 
 
+def numbered(judge):
+    """The survey of a function of one generator, a new one for each case: by the seed and the case's number."""
+
+    def findings(size, seed):
+        yield from (judge(np.random.default_rng([seed, number])) for number in range(size))
+
+    findings.__name__ = judge.__name__
+    return findings
+
+
 def tally(survey, size, seed):
     """Outcomes counted, and figures listed, of one survey; what has words is printed."""
     outcomes, figures, wrong = Counter(), defaultdict(list), 0

@@ -1,6 +1,6 @@
 """Sampled verdicts under laws of order 1 to 12, against state transitions at 80 digits:
 
-    python -m tests.dsp.law_orders 2000 [seed]
+    python -m tests.dsp.law_orders SIZE SEED
 
 Random rigs (`tests.rigs`) and arms (`tests.loop.arms`), periods of 0.1 to 20 ms; clusters of poles near s = 0,
 integrators, double integrators and notches on one or two signals, in s under each rule or in z.  The truth is the
@@ -9,22 +9,17 @@ and its eigenvalues: their verdict, the poles at z = 1, and the spectral radius.
 """
 
 import math
-import os
-import sys
-import time
-from collections import Counter
 from dataclasses import dataclass, replace
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import flint
 import numpy as np
 
+from tests import survey
 from tests.dsp.law_verdicts import sampled
 from tests.loop.arms import some_loop
 from tests.loop.law_counts import SIGNALS
 from tests.rigs import some_rig
+from tests.survey import Finding, each_of
 from tfarm.arm import Arm, Law
 from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.verdict import sampled_verdict
@@ -304,23 +299,18 @@ def judge(case):
     return "right" if verdict.is_settled or not case.arm.damping else "not proven"
 
 
-def main(size, seed):
-    rng, found, number, start = np.random.default_rng(seed), Counter(), 0, time.perf_counter()
-    while number < size:
-        case = some_case(rng)
-        if case is None:
-            continue
-        number += 1
-        word = judge(case)
-        found[word.split(":")[0]] += 1
-        if word != "right":
-            law, kind = case.law, "in z" if case.law.is_discrete else case.law.rule
-            known = f"order {law.order} {kind}, T {case.chain.sampling.period:.3g}, C {case.arm.damping:.3g}"
-            print(number, known, law.signals, word, flush=True)
-    print(dict(found), f"{time.perf_counter() - start:.0f} s", flush=True)
-    return found
+def laws(rng):
+    """The finding on one case; None where there is none."""
+    case = some_case(rng)
+    if case is None:
+        return None
+    word = judge(case)
+    outcome, _, words = word.partition(":")
+    law, kind = case.law, "in z" if case.law.is_discrete else case.law.rule
+    known = f"order {law.order} {kind}, T {case.chain.sampling.period:.3g}, C {case.arm.damping:.3g} {law.signals}"
+    is_wrong = outcome in ("wrong", "inexact", "miscounted")
+    return Finding(outcome, "" if word == "right" else f"{words} {known}", is_wrong)
 
 
 if __name__ == "__main__":
-    counts = main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1)
-    sys.exit(bool(counts["wrong"] + counts["inexact"] + counts["miscounted"]))
+    survey.main(each_of(laws))

@@ -1,4 +1,4 @@
-"""Verdicts on random laws in z, by two other roads:  python -m tests.dsp.law_verdicts 500 [seed]
+"""Verdicts on random laws in z, by two other roads:  python -m tests.dsp.law_verdicts SIZE SEED
 
 Random arms (as in `tests.loop.arms`), periods of 0.02 to 1.5 over the first frequency, delays of up to three samples,
 some with an anti-alias filter and some with a hub that the actuator damps; one to three signals with ratios of
@@ -7,20 +7,15 @@ against the eigenvalues of a modal model of 40 modes, discretised with matrix ex
 largest |ln z| is beyond 1e-9; and against a simulation of 20,000 samples after an impulse where that is beyond 1e-3.
 """
 
-import os
-import sys
-import time
-from collections import Counter
 from dataclasses import replace
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 from scipy.linalg import expm
 
+from tests import survey
 from tests.loop.arms import some_loop
 from tests.loop.law_counts import SIGNALS
+from tests.survey import Finding, each_of
 from tfarm.arm import Law
 from tfarm.dsp import Actuator, Chain, Sampling, Simulator, pulse_transfer, scenario
 from tfarm.dsp.plant import is_analog
@@ -186,30 +181,17 @@ def judge(arm, law, chain):
     return "right", False
 
 
-def main(size, seed):
-    rng, found, simulated, number = np.random.default_rng(seed), Counter(), 0, 0
-    start = time.perf_counter()
-    while number < size:
-        case = some_case(rng)
-        if case is None:
-            continue
-        number += 1
-        word, asked = judge(*case)
-        simulated += asked
-        found[word.split(":")[0]] += 1
-        if word.startswith(("wrong", "refused")):
-            print(
-                number,
-                case[0].damping,
-                case[1].signals,
-                case[2].sampling,
-                case[2].actuator.hub_damping,
-                word,
-                flush=True,
-            )
-    print(dict(found), f"{simulated} simulated, {time.perf_counter() - start:.0f} s", flush=True)
-    return found
+def laws(rng):
+    """The finding on one case; None where there is none."""
+    case = some_case(rng)
+    if case is None:
+        return None
+    (word, simulated), (arm, law, chain) = judge(*case), case
+    outcome, _, words = word.partition(":")
+    if outcome in ("wrong", "refused"):
+        words += f" {arm.damping} {law.signals} {chain.sampling} {chain.actuator.hub_damping}"
+    return Finding(outcome, words, outcome == "wrong", {"simulated": float(simulated)})
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1)["wrong"] > 0)
+    survey.main(each_of(laws))

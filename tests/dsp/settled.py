@@ -7,15 +7,15 @@ that put one of the modes 10 to 60 where sampled rate feedback destabilises it, 
 must agree, or one of 240 polynomials decides; where the growth is below 1e-7 a sample nobody can tell.
 """
 
-import sys
-import time
 from dataclasses import replace
 
 import numpy as np
 
+from tests import survey
 from tests.dsp.hold import HoldModel
 from tests.dsp.verdicts import Case, some_case
 from tests.strategies import arm_of
+from tests.survey import Finding, each_of
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_verdict
 from tfarm.dsp.modes import dominant
@@ -66,36 +66,31 @@ def large_enough(verdict):
     return max(240, 6 * int(dominant(verdict.loop).partition("mode ")[2] or 0)) if not verdict.is_stable else 240
 
 
-def survey(number, seed=1, draw=hurting_case):
-    """Counts of cases, stable, settled and falsely settled ones, refusals, and those that the oracle cannot tell."""
-    rng = np.random.default_rng(seed)
-    counts = {"cases": 0, "stable": 0, "settled": 0, "false": 0, "unclear": 0, "refused": 0}
-    for _ in range(number):
-        case = draw(rng)
-        counts["cases"] += 1
-        try:
-            verdict = sampled_verdict(case.arm, case.gains, case.chain)
-        except ConvergenceError as error:
-            counts["refused"] += 1
-            print("refused:", error, case, file=sys.stderr)
-            continue
-        stable = oracle(case)
-        counts["stable"] += verdict.is_stable
-        counts["settled"] += verdict.is_settled
-        counts["unclear"] += stable is None
-        if verdict.is_settled and stable not in (None, verdict.is_stable):
-            larger = HoldModel(case.arm, large_enough(verdict)).log_radius(case.gains, case.chain)
-            counts["false"] += (larger < 0) != verdict.is_stable
-            print("doubtful:", verdict.sentence, larger, case, file=sys.stderr)
-    return counts
+def settled(case):
+    """The finding on one loop; what the oracle cannot tell is "unclear", what it contradicts is looked at again."""
+    try:
+        verdict = sampled_verdict(case.arm, case.gains, case.chain)
+    except ConvergenceError as error:
+        return Finding("refused", f"{error} {case}")
+    stable = oracle(case)
+    if stable is None:
+        return Finding("unclear")
+    if not verdict.is_settled:
+        return Finding("not settled")
+    if stable == verdict.is_stable:
+        return Finding("settled stable" if stable else "settled unstable")
+    larger = HoldModel(case.arm, large_enough(verdict)).log_radius(case.gains, case.chain)
+    is_false = (larger < 0) != verdict.is_stable
+    return Finding("false" if is_false else "doubtful", f"{verdict.sentence} {larger} {case}", is_false)
+
+
+def hurting(rng):
+    return settled(hurting_case(rng))
+
+
+def ordinary(rng):
+    return settled(some_case(rng))
 
 
 if __name__ == "__main__":
-    number, seed = int(sys.argv[1]) if len(sys.argv) > 1 else 100, int(sys.argv[2]) if len(sys.argv) > 2 else 1
-    wrong = 0
-    for draw in (hurting_case, some_case):
-        start = time.process_time()
-        found = survey(number, seed, draw)
-        wrong += found["false"]
-        print(draw.__name__, found, f"{time.process_time() - start:.0f} s", flush=True)
-    sys.exit(wrong > 0)
+    survey.main(each_of(hurting), each_of(ordinary))

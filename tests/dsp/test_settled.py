@@ -9,8 +9,9 @@ from scipy.integrate import quad
 
 import tfarm
 from tests.dsp.hold import HoldModel
-from tests.dsp.settled import survey
+from tests.dsp.settled import hurting
 from tests.shared import thinned
+from tests.survey import each_of, tally
 from tfarm.arm import FED_BACK, Arm, Hub, HubFeedback, Link, Payload, Section
 from tfarm.dsp import (
     Chain,
@@ -272,9 +273,9 @@ def test_without_damping_nothing_is_settled(lossless):
 
 def test_a_small_survey():
     """Of `python -m tests.dsp.settled 2000`."""
-    counts = survey(1, seed=3)
-    assert counts["false"] == 0
-    assert counts["settled"] == 1
+    outcomes, _, wrong = tally(each_of(hurting), 1, 3)
+    assert wrong == 0
+    assert outcomes["settled stable"] + outcomes["settled unstable"] == 1
 
 
 def test_what_is_left_of_the_line_is_bounded_by_the_integrals_of_both_edges():

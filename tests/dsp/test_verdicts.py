@@ -5,15 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.dsp.verdicts import encirclements, simulated_growth, some_case, tally
+from tests.dsp.verdicts import encirclements, loops, simulated_growth, some_case
+from tests.survey import each_of, tally
 from tfarm.arm import HubFeedback
 from tfarm.dsp import sampled_loop, sampled_verdict
 
 
 def test_the_verdict_is_what_simulations_and_encirclements_say():
-    counts = tally(3, seed=7)
-    assert 1 <= counts.pop("stable") <= 2
-    assert counts == {"cases": 3, "simulation": 0, "encirclement": 0, "refused": 0}
+    outcomes, _, wrong = tally(each_of(loops), 3, 7)
+    assert 1 <= outcomes["stable"] <= 2
+    assert (outcomes["stable"] + outcomes["unstable"], outcomes.total(), wrong) == (3, 3, 0)
 
 
 def test_the_sample_can_tell():

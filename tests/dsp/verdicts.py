@@ -5,15 +5,15 @@
 Cases nearer than 1e-3 to an edge (in K1 or K2), or with |ln radius| below 1e-5, are drawn again.
 """
 
-import sys
-import time
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 import tfarm
+from tests import survey
 from tests.dsp.roads import aliased_loop
 from tests.strategies import arm_of
+from tests.survey import Finding, each_of
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, Simulator, sampled_verdict, scenario
 from tfarm.dsp.crossings import circle_grid, number_crossings
@@ -126,31 +126,20 @@ def judge(case):
     return growing, growth, encirclements(case)
 
 
-def tally(number, seed=1):
-    """Counts of cases, stable ones, disagreements with the simulation and with the encirclements, and refusals."""
-    rng = np.random.default_rng(seed)
-    counts = {"cases": 0, "stable": 0, "simulation": 0, "encirclement": 0, "refused": 0}
-    while counts["cases"] < number:
-        case = some_case(rng)
-        try:
-            judged = judge(case)
-        except ConvergenceError as error:
-            counts["refused"] += 1
-            print(error, case, file=sys.stderr)
-            continue
-        if judged is None:
-            continue
-        growing, growth, outside = judged
-        counts["cases"] += 1
-        counts["stable"] += growing == 0
-        wrong_growth, wrong_count = bool((growing > 0) != (growth > 1)), growing != outside
-        counts["simulation"] += wrong_growth
-        counts["encirclement"] += wrong_count
-        if wrong_growth or wrong_count:
-            print(judged, case, file=sys.stderr)
-    return counts
+def loops(rng):
+    """The finding on one loop; None where the verdict is too near to an edge."""
+    case = some_case(rng)
+    try:
+        judged = judge(case)
+    except ConvergenceError as error:
+        return Finding("refused", f"{error} {case}")
+    if judged is None:
+        return None
+    growing, growth, outside = judged
+    is_wrong = (growing > 0) != (growth > 1) or growing != outside
+    outcome = "wrong" if is_wrong else "unstable" if growing else "stable"
+    return Finding(outcome, f"{judged} {case}" if is_wrong else "", is_wrong)
 
 
 if __name__ == "__main__":
-    start = time.perf_counter()
-    print(tally(int(sys.argv[1]) if len(sys.argv) > 1 else 100), f"{time.perf_counter() - start:.0f} s")
+    survey.main(each_of(loops))

@@ -1,4 +1,4 @@
-"""float64 against ball arithmetic at random (arm, s, x):  python -m tests.exact.accuracy 5000 [seed]
+"""float64 against ball arithmetic at random (arm, s, x):  python -m tests.exact.accuracy SIZE SEED
 
 Arms of one link, whose ends the fused kernel has, and rigs.  The error of an output G is counted in the change of G
 that a relative change of its argument brings about: what is left of |G_64/G - 1| after division by 1 + |s dG/ds / G|,
@@ -8,16 +8,16 @@ Points that the kernel flags are not its own to answer: balls do.
 
 import cmath
 import math
-import sys
-import time
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 
+from tests import survey
 from tests.chain_elements import reached
 from tests.rigs import some_point, some_rig
 from tests.strategies import some_arm, some_s
+from tests.survey import Finding
 from tfarm.exact import balls
 from tfarm.exact.balls import Sweep, rational
 from tfarm.exact.layout import readings
@@ -228,32 +228,35 @@ def run(place, count, seed=0):
     return points
 
 
-def summary(name, points):
-    """One line of a place: the worst error that is not flagged, how many are above the bound, and flagged."""
-    fair = [point.error for point in points if not point.flagged]
-    above = sum(not error <= BOUND for error in fair)
-    share = 100 * (1 - len(fair) / len(points)) if points else 0.0
-    worst = max(fair, default=0.0)
-    return f"{name}: worst error {worst:.3g} over {len(fair)} values, {above} above {BOUND:g}; {share:.2g} % flagged"
-
-
-def main():
-    count, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    every, start = [], time.perf_counter()
-    for name, place in PLACES.items():
-        points = run(place, count if "anywhere" in name else math.ceil(count / 10), seed)
-        print(summary(name, points))
-        every += points
-    print(summary("next to -1/C, at real s", next_to_the_singularity(math.ceil(count / 10), seed)))
-    print(f"{len(every)} values in {time.perf_counter() - start:.0f} s")
-    for name in WANTED:
-        print(f"  {name:20s}{max((p.error for p in every if p.name == name and not p.flagged), default=0.0):.3g}")
-    above = sorted((p for p in every if not (p.flagged or p.error <= BOUND)), key=lambda p: -p.error)
-    for point in above[:20]:
+def findings(points):
+    """Of each value: flagged, where the kernel asks for balls, or its error."""
+    for point in points:
+        is_wrong = not (point.flagged or point.error <= BOUND)
         arm, s, x = point.where
-        print(f"{point.error:.3g} {point.name} s={s!r} x={x!r}\n    {arm}")
-    return bool(above)
+        words = f"{point.error:.3g} {point.name} s={s!r} x={x!r}\n    {arm}" if is_wrong else ""
+        figures = {} if point.flagged else {"error": point.error, point.name: point.error}
+        outcome = "flagged" if point.flagged else f"above {BOUND:g}" if is_wrong else f"within {BOUND:g}"
+        yield Finding(outcome, words, is_wrong, figures)
+
+
+def link_at_random(size, seed):
+    return findings(run(link_anywhere, size, seed))
+
+
+def rig_at_random(size, seed):
+    return findings(run(rig_anywhere, size // 2, seed))
+
+
+def link_next_to_the_singularity(size, seed):
+    """At real s next to -1/C."""
+    return findings(next_to_the_singularity(size // 4, seed))
+
+
+def in_danger(size, seed):
+    """At each of the other places."""
+    others = [place for name, place in PLACES.items() if "anywhere" not in name]
+    return (found for place in others for found in findings(run(place, size // 10, seed)))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    survey.main(link_at_random, rig_at_random, link_next_to_the_singularity, in_danger, size=10_000)

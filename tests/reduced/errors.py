@@ -1,19 +1,19 @@
-"""The printed worst error against the true one on random arms:  python -m tests.reduced.errors 500 [seed]
+"""The printed worst error against the true one on random arms:  python -m tests.reduced.errors SIZE SEED
 
 Each arm is reduced to a random order for random outputs over a random band.  The true error is that of the matrices of
 the state space, on a grid of its own: even, logarithmic and random frequencies, none chosen by the code under test.
 """
 
 import math
-import sys
-import time
 from dataclasses import dataclass
 
 import numpy as np
 
 import tfarm
+from tests import survey
 from tests.outputs import OF_ONE_LINK
 from tests.strategies import some_arm
+from tests.survey import Finding, each_of
 from tfarm.reduced import reduce
 
 ALONG = [name for name, each in OF_ONE_LINK.items() if each.place == "x"]
@@ -91,18 +91,13 @@ def by_matrices(reduced, w):
     return value
 
 
-def main(count, seed):
-    rng, worst, start = np.random.default_rng(seed), 0.0, time.perf_counter()
-    for number in range(count):
-        case = measure(rng, 30_000, damping=float(rng.choice([0.0, 10 ** rng.uniform(-7, -3)])))
-        share = case.found / case.printed
-        worst = max(worst, share)
-        if share > 1:
-            print(number, case.reduced.name, case.reduced.outputs, case.printed, case.found, case.at, case.reduced.arm)
-    print(f"{count} arms: largest true/printed {worst:.4f} (1 is the limit), {time.perf_counter() - start:.0f} s")
-    return worst <= 1
+def reductions(rng):
+    """The finding on one reduction: the true error over the printed one, of which 1 is the limit."""
+    case = measure(rng, 30_000, damping=float(rng.choice([0.0, 10 ** rng.uniform(-7, -3)])))
+    share = case.found / case.printed
+    words = f"{case.reduced.name} {case.reduced.outputs} {case.printed} {case.found} {case.at} {case.reduced.arm}"
+    return Finding("above" if share > 1 else "within", words * (share > 1), share > 1, {"true/printed": share})
 
 
 if __name__ == "__main__":
-    arguments = [int(text) for text in sys.argv[1:]] or [500]
-    sys.exit(not main(arguments[0], arguments[1] if len(arguments) > 1 else 0))
+    survey.main(each_of(reductions))

@@ -1,19 +1,19 @@
-"""Peaks and dips of Bode plots against dense grids:  python -m tests.response.extrema 200 [seed]
+"""Peaks and dips of Bode plots against dense grids:  python -m tests.response.extrema SIZE SEED
 
 Random rigs, outputs and places.  A peak is false unless the slope of ln |G|, by dG/ds, changes its sign there; it is
 missed where a grid of some ten times as many points has a local maximum of `PROMINENCE` (scipy.signal.find_peaks)
 and no peak is listed.  On the imaginary axis peaks are to be infinite exactly where the undamped rig has a pole.
 """
 
-import sys
-import time
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import find_peaks
 
 import tfarm
+from tests import survey
 from tests.rigs import some_rig
+from tests.survey import Finding, numbered
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.response.frequency import resonant_band
 
@@ -33,20 +33,11 @@ class Case:
     missed: tuple
 
 
-def run(count, seed=0, modes=6):
-    """The cases of so many rigs, and the errors of those that have no Bode plot."""
-    cases, refused = [], []
-    for n in range(count):
-        rng = np.random.default_rng([seed, n])
-        arm, wanted = some_rig(rng), WANTED[rng.integers(len(WANTED))]
-        x = float(rng.uniform(0, arm.length)) if wanted.place == "x" else None
-        try:
-            data = tfarm.bode(arm, wanted, resonant_band(arm, modes), x=x)
-        except tfarm.TfarmError as error:
-            refused.append((arm, error))
-            continue
-        cases.append(judged(data))
-    return cases, refused
+def some_bode(rng, modes=6):
+    """A Bode plot of a random rig.  Raises TfarmError where there is none."""
+    arm, wanted = some_rig(rng), WANTED[rng.integers(len(WANTED))]
+    x = float(rng.uniform(0, arm.length)) if wanted.place == "x" else None
+    return tfarm.bode(arm, wanted, resonant_band(arm, modes), x=x)
 
 
 def judged(data):
@@ -102,28 +93,18 @@ def missing(G, data, sign, listed, roots):
     return result
 
 
-def main():
-    count, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    start = time.perf_counter()
-    cases, refused = run(count, seed)
-    listed = [each for case in cases for each in (*case.data.peaks, *case.data.dips)]
-    limits = sum(each.magnitude in (0.0, np.inf) for each in listed)
-    false, missed = (sum(len(getattr(case, name)) for case in cases) for name in ("false", "missed"))
-    poles = sum(case.data.resonances.size for case in cases)
-    print(
-        f"{len(listed)} peaks and dips of {len(cases)} Bode plots with {poles} resonances in "
-        f"{time.perf_counter() - start:.0f} s, {limits} of them at 0 or infinite: {false} false, {missed} missed; "
-        f"{len(refused)} rigs refused"
-    )
-    for case in cases:
-        if case.false or case.missed:
-            print(
-                f"{case.data.row.name} at {case.data.x}: false {case.false}, missed {case.missed}\n    {case.data.arm}"
-            )
-    for arm, error in refused[:5]:
-        print(f"{error}\n    {arm}")
-    return bool(false or missed) or not listed
+def plots(rng, modes=6):
+    """The finding on one Bode plot."""
+    try:
+        data = some_bode(rng, modes)
+    except tfarm.TfarmError as error:
+        return Finding("refused", str(error))
+    case = judged(data)
+    is_wrong = bool(case.false or case.missed)
+    words = f"{data.row.name} at {data.x}: false {case.false}, missed {case.missed}\n    {data.arm}" if is_wrong else ""
+    figures = {"peaks and dips": len(data.peaks) + len(data.dips), "resonances": data.resonances.size}
+    return Finding("wrong" if is_wrong else "right", words, is_wrong, figures)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    survey.main(numbered(plots))

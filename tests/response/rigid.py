@@ -1,19 +1,19 @@
-"""The response with rigid links against that of ever stiffer ones:  python -m tests.response.rigid 500 [seed]
+"""The response with rigid links against that of ever stiffer ones:  python -m tests.response.rigid SIZE SEED
 
 Random rigs with links 1e6, 1e8 and 1e10 times as stiff, each output at one frequency and place.  Where these converge,
 each step a hundredth of the one before, the rigid response is to be within two steps more of the last (and 1e-9 of it).
 """
 
 import math
-import sys
-import time
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 import tfarm
+from tests import survey
 from tests.chain_elements import reached
 from tests.rigs import some_rig
+from tests.survey import Finding, numbered
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exact.rigid import rigid_response
 
@@ -37,15 +37,11 @@ class Case:
         return {name: value for name, value in self.departures.items() if not value <= 1.0}
 
 
-def run(count, seed=0):
-    """The cases of so many rigs."""
-    cases = []
-    for n in range(count):
-        rng = np.random.default_rng([seed, n])
-        arm = some_rig(rng)
-        omega, x = reached(arm, 10 ** rng.uniform(-3, 0.5)), float(rng.uniform(0, arm.length))
-        cases.append(Case(arm, omega, x, {} if contradicts(arm) else departures(arm, omega, x)))
-    return cases
+def case_of(rng):
+    """A rig, and its responses at one frequency and place."""
+    arm = some_rig(rng)
+    omega, x = reached(arm, 10 ** rng.uniform(-3, 0.5)), float(rng.uniform(0, arm.length))
+    return Case(arm, omega, x, {} if contradicts(arm) else departures(arm, omega, x))
 
 
 def departures(arm, omega, x):
@@ -78,21 +74,13 @@ def stiffened(arm, factor):
     return replace(arm, link=first, outer=tuple(outer))
 
 
-def main():
-    count, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    start = time.perf_counter()
-    cases = run(count, seed)
-    compared = sum(len(case.departures) for case in cases)
-    wrong = [case for case in cases if case.wrong]
-    held = sum(not case.departures for case in cases)
-    print(
-        f"{compared} responses of {count} rigs in {time.perf_counter() - start:.0f} s, {held} of them held twice over: "
-        f"{sum(len(case.wrong) for case in wrong)} not the limit of stiff links"
-    )
-    for case in wrong[:20]:
-        print(f"{case.wrong} at {case.omega!r} rad/s, x = {case.x!r} m\n    {case.arm}")
-    return bool(wrong) or not compared
+def rigs(rng):
+    """The finding on one rig."""
+    case = case_of(rng)
+    words = f"{case.wrong} at {case.omega!r} rad/s, x = {case.x!r} m\n    {case.arm}" if case.wrong else ""
+    outcome = "wrong" if words else "right" if case.departures else "held twice over"
+    return Finding(outcome, words, bool(words), {"responses": len(case.departures)})
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    survey.main(numbered(rigs))

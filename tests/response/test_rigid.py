@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.response.rigid import run
+from tests.response.rigid import rigs
+from tests.survey import numbered, tally
 from tfarm import Hub, Payload
 from tfarm.arm import RotarySpring
 from tfarm.exact.outputs import OUTPUTS
@@ -59,7 +60,6 @@ def test_a_locked_hub_carries_it_along_and_a_held_link_has_none():
 
 def test_it_is_the_limit_of_ever_stiffer_links_on_random_rigs():
     """`python -m tests.response.rigid 500` for more."""
-    cases = run(12, 34)
-    compared = [each for case in cases for each in case.departures.values()]
-    assert not [case for case in cases if case.wrong]
-    assert len(compared) > 150
+    _, figures, wrong = tally(numbered(rigs), 12, 34)
+    assert wrong == 0
+    assert sum(figures["responses"]) > 150

@@ -1,4 +1,4 @@
-"""Frequencies and damped modes of random rigs against two other models:  python -m tests.spectrum.chains 1000 [seed]
+"""Frequencies and damped modes of random rigs against two other models:  python -m tests.spectrum.chains SIZE SEED
 
 Rigs of 1 to 6 segments with whatever a rig can have (`tests.rigs`).  The first twenty frequencies of each are compared
 with finite elements of high degree, one by one, so that none can be missing; every tenth is certified in balls.  Of as
@@ -7,21 +7,17 @@ determinant of transition matrices; every tenth is certified.  Timed on rigs of 
 """
 
 import math
-import os
-import sys
 import time
-from collections import Counter
 from dataclasses import dataclass
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import mpmath
 import numpy as np
 
 import tfarm
+from tests import survey
 from tests.chain_elements import eigenvalues, natural_frequencies
 from tests.rigs import some_rig
+from tests.survey import Finding
 from tests.transition import determinant
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.spectrum.damped import damped_modes
@@ -127,51 +123,30 @@ def _since(start):
     return 1e3 * (time.process_time() - start)
 
 
-def frequencies(number, seed):
-    """Rigs and verdicts, without damping."""
-    cases = []
-    for n in range(number):
+def finding(arm, verdict):
+    """The finding of a verdict."""
+    figures = {"distance from the other model": verdict.distance, "eigenvalues in the box": verdict.inside}
+    figures |= {"list of three segments [ms]": verdict.listing} if verdict.segments == 3 else {}
+    figures |= {"proof [ms]": verdict.proving} if verdict.proving else {}
+    words = f"{verdict.reason} {arm}" if verdict.outcome != "right" else ""
+    return Finding(verdict.outcome, words, verdict.outcome == "wrong", figures)
+
+
+def frequencies(size, seed):
+    """Rigs without damping; every tenth is certified."""
+    for n in range(size):
         arm = some_rig(np.random.default_rng([seed, n]), damped=False)
-        cases.append((arm, judge(arm, certify=n % 10 == 0)))
-    return cases
+        yield finding(arm, judge(arm, certify=n % 10 == 0))
 
 
-def damped_rigs(number, seed):
-    """Rigs and verdicts, with damping."""
-    cases = []
-    for n in range(number):
+def damped_rigs(size, seed):
+    """Fewer rigs with damping, the same."""
+    for n in range(math.ceil(DAMPED * size)):
         rng = np.random.default_rng([seed, n, 1])
         arm, count = some_rig(rng, damped=True), int(rng.integers(1, MOST_DAMPED + 1))
-        cases.append((arm, judge_damped(arm, count, certify=n % 10 == 0)))
-    return cases
-
-
-def report(name, verdicts):
-    """The tally as text."""
-    tally, three = Counter(each.outcome for each in verdicts), [each for each in verdicts if each.segments == 3]
-    proven = [each.proving for each in verdicts if each.proving]
-    lines = [
-        f"{len(verdicts)} {name}: {tally['right']} right, {tally['refused']} refused, {tally['wrong']} wrong",
-        f"furthest from the other model {max((each.distance for each in verdicts), default=0.0):.1e}; "
-        f"{sum(each.inside for each in verdicts)} eigenvalues in boxes",
-        f"list of a rig of three segments {np.mean([each.listing for each in three] or [0]):.1f} ms in the mean; proof "
-        f"{np.mean([each.proving for each in three if each.proving] or [0]):.1f} ms, of {len(proven)} rigs of any size",
-    ]
-    reasons = Counter(f"{each.outcome}: {each.reason}" for each in verdicts if each.outcome != "right")
-    return "\n".join([*lines, *(f"{count} x {text}" for text, count in reasons.most_common())])
-
-
-def main():
-    number, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1
-    judge(some_rig(np.random.default_rng(0), damped=False), certify=True)  # compile and cache
-    plain, damped = frequencies(number, seed), damped_rigs(math.ceil(DAMPED * number), seed)
-    print(report("rigs without damping", [verdict for _, verdict in plain]))
-    print(report("damped rigs", [verdict for _, verdict in damped]))
-    for arm, verdict in [*plain, *damped]:
-        if verdict.outcome != "right":
-            print(verdict.outcome, verdict.reason, arm)
-    return any(verdict.outcome == "wrong" for _, verdict in [*plain, *damped])
+        yield finding(arm, judge_damped(arm, count, certify=n % 10 == 0))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    judge(some_rig(np.random.default_rng(0), damped=False), certify=True)  # compile and cache
+    survey.main(frequencies, damped_rigs)

@@ -1,4 +1,4 @@
-"""Damped modes of random arms, counted by four roads:  python -m tests.spectrum.damped 200 [seed] [certify every]
+"""Damped modes of random arms, counted by four roads:  python -m tests.spectrum.damped SIZE SEED
 
 Arms of slenderness L/h 5 to 500 with C = 1e-7 to 1e-3 s, hub, payload mass and inertia each 0, inf or anything between;
 1 to 24 flexible modes.  In the printed box there must be as many eigenvalues by the list, by the winding number in
@@ -9,22 +9,18 @@ have in the box is listed, assigned to a mode or not, and there are no others; a
 is "short".
 """
 
-import os
-import sys
 import time
-from collections import Counter
 from dataclasses import dataclass
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
 import tfarm
+from tests import survey
 from tests.chain_elements import eigenvalues
 from tests.rigs import some_rig
 from tests.spectrum.damped_roads import ritz_eigenvalues
 from tests.strategies import some_arm
+from tests.survey import Finding, each_of
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.exact.characteristic import zeros_at_origin
 from tfarm.spectrum.damped import damped_modes
@@ -133,41 +129,34 @@ def compared(arm, damped, inside):
     return [f"eigenvalue {inside[int(np.argmax(far))]:.6g} not in the model"] if max(far, default=0) > 1 else []
 
 
-def survey(number, seed, every=1, draw=some_damped_arm, judged=judge):
-    """Arms, counts and verdicts; every so-and-so-manieth is certified."""
-    rng = np.random.default_rng(seed)
-    drawn = [draw(rng) for _ in range(number)]
-    return [(arm, count, judged(arm, count, certify=n % every == 0)) for n, (arm, count) in enumerate(drawn)]
+def finding(arm, count, verdict):
+    """The finding of a verdict."""
+    words = f"{verdict.reason} {count} {arm}" if verdict.outcome in ("wrong", "refused", "short") else ""
+    figures = {"list [ms]": verdict.listing, "eigenvalues in the box": verdict.inside, "overdamped": verdict.overdamped}
+    figures |= {"proof [ms]": verdict.proving} if verdict.proving > 0.1 else {}
+    return Finding(verdict.outcome, words, verdict.outcome == "wrong", figures)
 
 
-def report(verdicts):
-    """The tally as text."""
-    tally = Counter(verdict.outcome for verdict in verdicts)
-    listing = [verdict.listing for verdict in verdicts]
-    proving = [verdict.proving for verdict in verdicts if verdict.proving > 0.1]
-    lines = [
-        f"{len(verdicts)} arms: {tally['right']} right, {tally['unassigned']} right with eigenvalues of no mode, "
-        f"{tally['short']} shorter than asked, {tally['refused']} refused, {tally['wrong']} wrong",
-        f"{sum(v.inside for v in verdicts)} eigenvalues in boxes, {len(proving)} boxes proven; "
-        f"{sum(v.overdamped for v in verdicts)} overdamped modes",
-        f"list {np.mean(listing):.1f} ms in the mean, {np.max(listing):.1f} at most",
-        f"proof {np.mean(proving or [0]):.1f} ms in the mean, {np.max(proving or [0]):.1f} at most",
-    ]
-    reasons = Counter(f"{v.outcome}: {v.reason}" for v in verdicts if v.reason)
-    return "\n".join([*lines, *(f"{count} x {text}" for text, count in reasons.most_common())])
+def arms(rng):
+    arm, count = some_damped_arm(rng)
+    return finding(arm, count, judge(arm, count))
+
+
+def rigs(rng):
+    arm, count = some_damped_rig(rng)
+    return finding(arm, count, judge_rig(arm, count))
+
+
+def few_refused(size, seed):
+    """The rigs, and that hardly one is refused."""
+    refused = 0
+    for found in each_of(rigs)(size, seed):
+        refused += found.outcome == "refused"
+        yield found
+    if refused > max(1, size // 500):
+        yield Finding("too many refused", f"{refused} of {size}", is_wrong=True)
 
 
 if __name__ == "__main__":
-    NUMBER, SEED, EVERY = (
-        int(sys.argv[n]) if len(sys.argv) > n else default for n, default in ((1, 200), (2, 1), (3, 1))
-    )
     judge(*some_damped_arm(np.random.default_rng(0)))  # compile and cache
-    ARMS = survey(NUMBER, SEED, EVERY)
-    RIGS = survey(NUMBER, SEED, EVERY, some_damped_rig, judge_rig)
-    for SURVEY in (ARMS, RIGS):
-        print(report([verdict for *_, verdict in SURVEY]))
-        for ARM, COUNT, VERDICT in SURVEY:
-            if VERDICT.outcome in ("wrong", "refused", "short"):
-                print(VERDICT.outcome, VERDICT.reason, COUNT, ARM)
-    REFUSED = sum(verdict.outcome == "refused" for *_, verdict in RIGS) > max(1, NUMBER // 500)
-    sys.exit(REFUSED or any(case[-1].outcome == "wrong" for case in ARMS + RIGS))
+    survey.main(each_of(arms), few_refused, size=200)

@@ -1,4 +1,4 @@
-"""Certified lists against an independent Ritz model on random arms:  python -m tests.spectrum.proofs 1000 [seed]
+"""Certified lists against an independent Ritz model on random arms:  python -m tests.spectrum.proofs SIZE SEED
 
 Arms of slenderness L/h 5 to 500, hub, payload mass and inertia each 0, inf or anything between; twenty flexible modes.
 For each arm that `certify` proves, the Legendre-Ritz model (tests.models) must have a frequency in every bracket, and
@@ -6,20 +6,16 @@ as many below each gap between brackets as the proof counts.  The model is as ac
 the flexibilities 1/w^2 come to ROUNDING x epsilon of the largest, so w_n to that times (w_n/w_1)^2 / 2.
 """
 
-import os
-import sys
 import time
-from collections import Counter
 from dataclasses import dataclass
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices of 129 rows: threads cost more than they bring
 
 import numpy as np
 
 import tfarm
+from tests import survey
 from tests.models import Ritz
 from tests.spectrum.test_certify import random_arm
+from tests.survey import Finding, each_of
 from tfarm import CertificationError
 
 MODES = 20
@@ -71,38 +67,18 @@ def _since(start):
     return 1e3 * (time.perf_counter() - start)
 
 
-def survey(number, seed):
-    """Arms and verdicts."""
-    generator = np.random.default_rng(seed)
-    arms = [random_arm(generator) for _ in range(number)]
-    return [(arm, judge(arm)) for arm in arms]
-
-
-def report(verdicts):
-    """The tally as text."""
-    tally = Counter(verdict.outcome for verdict in verdicts)
-    proven = [verdict for verdict in verdicts if verdict.outcome == "proven"]
-    spent = [verdict.milliseconds for verdict in verdicts]
-    tolerances = [verdict.tolerance for verdict in proven]
-    lines = [
-        f"{len(verdicts)} arms, {MODES} flexible modes: {tally['proven']} proven, {tally['refused']} refused, "
-        f"{tally['wrong']} wrong",
-        f"{np.mean(spent):.1f} ms an arm in the mean, {np.max(spent):.1f} at most",
-        f"{MODES * len(proven)} brackets: model at most {max(v.distance for v in proven):.2f} of its tolerance away; "
-        f"{sum(v.gaps for v in proven)} of {(MODES - 1) * len(proven)} gaps counted",
-        f"the model's tolerance for mode {MODES}: median {np.median(tolerances):.0e}, largest {max(tolerances):.0e}",
-    ]
-    reasons = Counter(f"{v.outcome}: {v.reason}" for v in verdicts if v.outcome != "proven")
-    return "\n".join([*lines, *(f"{count} x {text}" for text, count in reasons.most_common())])
+def arms(rng):
+    """The finding on one arm."""
+    arm = random_arm(rng)
+    verdict = judge(arm)
+    figures = {"milliseconds": verdict.milliseconds}
+    if verdict.outcome == "proven":
+        figures |= {"model's distance over its tolerance": verdict.distance, "tolerance": verdict.tolerance}
+        figures |= {f"gaps counted, of {MODES - 1}": verdict.gaps}
+    words = f"{verdict.reason} {arm}" if verdict.outcome != "proven" else ""
+    return Finding(verdict.outcome, words, verdict.outcome == "wrong", figures)
 
 
 if __name__ == "__main__":
-    NUMBER = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
-    SEED = int(sys.argv[2]) if len(sys.argv) > 2 else 2012
     judge(random_arm(np.random.default_rng(0)))  # compile and cache
-    SURVEY = survey(NUMBER, SEED)
-    print(report([verdict for _, verdict in SURVEY]))
-    for ARM, VERDICT in SURVEY:
-        if VERDICT.outcome != "proven":
-            print(VERDICT.outcome, VERDICT.reason, ARM)
-    sys.exit(any(verdict.outcome == "wrong" for _, verdict in SURVEY))
+    survey.main(each_of(arms), size=1000)

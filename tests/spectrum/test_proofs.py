@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from tests.spectrum.proofs import judge, report, survey
+from tests.spectrum.proofs import arms, judge
 from tests.spectrum.test_certify import random_arm
+from tests.survey import each_of, tally
 from tfarm import CertificationError
 from tfarm.spectrum import Modes
 from tfarm.spectrum.certify import Certificate
@@ -12,9 +13,9 @@ from tfarm.spectrum.certify import Certificate
 
 def test_random_arms_are_proven_and_none_wrongly() -> None:
     """`python -m tests.spectrum.proofs 60` for more."""
-    text = report([verdict for _, verdict in survey(4, 77)])
-    assert text.startswith("4 arms, 20 flexible modes: 4 proven, 0 refused, 0 wrong\n")
-    assert "76 of 76 gaps counted" in text
+    outcomes, figures, _ = tally(each_of(arms), 4, 77)
+    assert outcomes == {"proven": 4}
+    assert figures["gaps counted, of 19"] == [19] * 4
 
 
 def forged(monkeypatch: pytest.MonkeyPatch, change) -> None:
