@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.errors import ParameterError
+from tfarm.records import read_only
 
 from .elements import Body, Element, EndCondition, Mark, Offset, Place, Segment, Spring, double_double
 from .outputs import Output, unit_scale
@@ -79,7 +80,8 @@ class Layout:
     @cached_property
     def rows(self) -> NDArray[np.float64]:
         """The elements, which balls have no use for (elements, `ROW_WIDTH`)."""
-        return np.array([kernel_row(each) for each in self.elements]).reshape(-1, ROW_WIDTH)
+        rows = np.array([kernel_row(each) for each in self.elements]).reshape(-1, ROW_WIDTH)
+        return np.asarray(read_only(rows))
 
     @property
     def segment_row(self) -> int:
@@ -92,7 +94,7 @@ class Layout:
         chain = self.chain
         tip = [EndCondition.of(inertia) for inertia in (chain.tip_mass, chain.tip_inertia)]
         numbers = [number for end in tip for number in (end.rest, end.inertia, end.force)]
-        return np.array([*map(float, (*numbers, *chain.drive.of_angle, *chain.drive.of_moment))])
+        return np.asarray(read_only(np.array([*map(float, (*numbers, *chain.drive.of_angle, *chain.drive.of_moment))])))
 
     @cached_property
     def read(self) -> tuple[Segment, ...]:
@@ -204,21 +206,23 @@ class Readings:
     def table(self) -> NDArray[np.float64]:
         """Rows for `sweep.fill_free`."""
         places = self.layout.places
-        return np.array([
+        table = np.array([
             [-1 if one.place is None else places.index(one.place), *one.state, one.theta, one.power, C, one.unit]
             for one, C in zip(self.each, self.gauges, strict=True)
         ], dtype=float).reshape(-1, 9)  # fmt: skip
+        return np.asarray(read_only(table))
 
     @cached_property
     def ends_table(self) -> NDArray[np.float64] | None:
         """Rows for `uniform.fill_ends`: its number, power of s, C of the gauge, factor; None if one is elsewhere."""
-        if not self.layout.chain.is_uniform:
+        chain = self.layout.chain
+        if not chain.is_uniform or chain.drive.friction or chain.drive.stiffness or chain.drive.lag:
             return None
         which = [None if one.is_current else AT_ENDS.get((*one.at, one.state, one.theta)) for one in self.each]
         if None in which:
             return None
         rows = [(n, one.power, C, one.unit) for n, one, C in zip(which, self.each, self.gauges, strict=True)]
-        return np.array(rows, dtype=float).reshape(-1, 4)
+        return np.asarray(read_only(np.array(rows, dtype=float).reshape(-1, 4)))
 
 
 def reading_of(chain: System, wanted: Output, x: float) -> Reading:

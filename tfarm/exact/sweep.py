@@ -16,6 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.records import read_only
+
 from .compiled import compiled, inlined
 from .compound import (
     beyond_body,
@@ -56,7 +58,7 @@ LN_2 = math.log(2.0)
 POLE = 1e-11  # drive below this share of its own terms: flagged, it may be a pole
 DIFFERENCE = 0.5  # an output below this share of its own terms has lost a bit: it is summed up from the axis instead,
 SMALL_DIFFERENCE = 0.05  # and where that cannot be, flagged below this share, which has lost four bits
-AXIS = np.array([[1.0], [0.0], [0.0], [0.0]])  # the condition W = 0 there, at every point
+AXIS = read_only(np.array([[1.0], [0.0], [0.0], [0.0]]))  # the condition W = 0 there, at every point
 
 
 class Work(NamedTuple):

@@ -24,7 +24,8 @@ from .uniform import fill_ends
 AT_A_POLE = 4 * float(np.finfo(float).eps)  # nearer than this share of |s|, no digit of the answer can be right
 PROVEN_BITS = 60  # a little more than a float64 holds
 MOST_ENCLOSURE_BITS = 1 << 18  # of working precision: at a pole no number of them is enough
-SLOPE_CIRCLE = np.exp(2j * np.pi * np.arange(16) / 16)
+_UPPER_HALF = np.exp(1j * np.pi * np.arange(1, 8) / 8)
+SLOPE_CIRCLE = np.r_[1.0, _UPPER_HALF, -1.0, _UPPER_HALF[::-1].conj()]  # as many points above the axis as below
 SLOPE_RADIUS = 0.3  # of that circle, of |s| over the phase of all waves: the 16th Taylor term is below 1e-17
 CLEAR_OF_SINGULAR = 0.1  # of the way to a -1/C: its radius at most
 
@@ -75,10 +76,17 @@ def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -
     drive, outputs = around.drive.reshape(scales.shape) * values, around.outputs.reshape(-1, *scales.shape) * values
     if here.lost.any():  # there the values are the mean of those around, as where two waves are one
         here = here._replace(
-            drive=np.where(here.lost, drive.mean(axis=1), here.drive),
-            outputs=np.where(here.lost, outputs.mean(axis=2), here.outputs),
+            drive=np.where(here.lost, _mean(drive), here.drive),
+            outputs=np.where(here.lost, _mean(outputs), here.outputs),
         )
-    return here, Free((drive * slope).mean(axis=1), (outputs * slope).mean(axis=2), here.scale, here.lost)
+    return here, Free(_mean(drive * slope), _mean(outputs * slope), here.scale, here.lost)
+
+
+def _mean(values: Complex) -> Complex:
+    """The mean over the circle (last axis), summed so that conjugate points have conjugate means to the last bit."""
+    half = SLOPE_CIRCLE.size // 2
+    pairs = values[..., 1:half] + values[..., :half:-1]
+    return np.asarray((values[..., 0] + values[..., half] + pairs.sum(axis=-1)) / SLOPE_CIRCLE.size)
 
 
 def free_fields(
