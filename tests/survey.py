@@ -63,10 +63,10 @@ def tally(survey, size, seed):
     return outcomes, figures, wrong
 
 
-def main(*surveys, size=100):
+def main(*surveys, size=100, seed=1):
     """Run the surveys that are named after size and seed on the command line, or all of them, and exit."""
     given = [int(text) for text in sys.argv[1:3]]
-    size, seed = [*given, *(size, 1)[len(given) :]]
+    size, seed = [*given, *(size, seed)[len(given) :]]
     failed = 0
     for survey in surveys:
         if survey.__name__ in (sys.argv[3:] or [survey.__name__]):

@@ -106,7 +106,7 @@ def test_the_example_of_a_report_runs(
     monkeypatch.chdir(tmp_path)
     for dear in ("save_proof", "save_live"):
         monkeypatch.setattr(making, dear, lambda *_: None)
-    monkeypatch.setattr(making, "write_assets", lambda folder, _: (folder.mkdir(), (folder / "live.js").touch()))
+    monkeypatch.setattr(making, "write_assets", lambda folder: (folder.mkdir(), (folder / "live.js").touch()))
     pieces = [each for each in making.ARM_PIECES if each.name in ("the arm", "root moment")]
     monkeypatch.setattr(making, "ARM_PIECES", pieces)
     (line,) = (line for line in COMMANDS if line.startswith("tfarm report "))

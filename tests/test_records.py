@@ -13,12 +13,12 @@ import pytest
 import tfarm
 from tfarm import HubFeedback
 from tfarm.dsp import Chain
-from tfarm.dsp.regions import sampled_map
+from tfarm.dsp.crossings import sampled_map
 from tfarm.dsp.scenarios import slew
 from tfarm.dsp.simulate import Simulator
-from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.locus import locus
-from tfarm.loop.regions import region
+from tfarm.loop.loop import Loop
+from tfarm.loop.plane import gain_map
 from tfarm.records import LONGEST_REPR, record
 from tfarm.reduced import modal_model
 
@@ -38,7 +38,7 @@ MAKERS = {
     "poles": lambda: tfarm.closed_loop_poles(LAB, LAW, 5),
     "margins": lambda: tfarm.margins(LAB, LAW),
     "locus": lambda: locus(LAB, LAW, "K2", 0.0, 1.0, 5, 4),
-    "region": lambda: region(LAB, np.linspace(0.1, 1, 3), np.linspace(0, 0.5, 3)),
+    "region": lambda: gain_map(LAB, np.linspace(0.1, 1, 3), np.linspace(0, 0.5, 3)),
     "model": lambda: modal_model(LAB, ["root_moment"], 4),
     "sampled": lambda: tfarm.sampled(LAB, LAW, count=4),
     "sampled map": small_map,
@@ -121,13 +121,13 @@ LEAD = tfarm.Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "deflection@0.3": 0.5}
 def test_what_was_found_stands_first_in_words() -> None:
     """Each number in the words is counted here from the record's own arrays."""
     plane = tfarm.map(LAB, np.linspace(0.1, 1, 3), np.linspace(0.5, 1.5, 4))
-    assert repr(plane).startswith(f"Region(finding='stable at {(plane.unstable == 0).sum()} of 12 points', ")
+    assert repr(plane).startswith(f"Plane(finding='stable at {(plane.unstable == 0).sum()} of 12 points', ")
     found = locus(LAB, LAW, "K2", 0.0, 2.0, 5, 4)
     (_, window) = tfarm.margins(LAB, LAW).windows["K2"].around
     assert repr(found).startswith(f"Locus(finding='a pole becomes unstable at K2 = {window:.6g}', ")
     assert "no branch crosses" in repr(tfarm.locus(LAB, LEAD, "gain", 0.5, 0.6, 3, 2))
     counts = tfarm.map(LAB, np.array([0.5, 40.0]), np.array([0.0, 0.03]), law=LEAD, vary=("gain", "delay"))
-    assert repr(counts).startswith(f"LawMap(finding='stable at {(counts.unstable == 0).sum()} of 4 points', ")
+    assert repr(counts).startswith(f"Plane(finding='stable at {(counts.unstable == 0).sum()} of 4 points', ")
     table = tfarm.modes(LAB, 3)
     ends = "{:.6g} to {:.6g}".format(*table.natural_frequency[[1, 3]])
     assert repr(table).startswith(f"Modes(finding='3 flexible, {ends} rad/s', ")
@@ -154,7 +154,7 @@ def test_a_law_is_shown_as_it_is_typed() -> None:
         ["deflection@0.3", "0.5"],
         ["delay", "0.002"],
     ]
-    assert "law=Law(hub_angle=([2, 1], [0.01, 1]), deflection@0.3=0.5, delay=0.002)" in repr(LawLoop(LAB, LEAD))
+    assert "law=Law(hub_angle=([2, 1], [0.01, 1]), deflection@0.3=0.5, delay=0.002)" in repr(Loop(LAB, LEAD))
 
 
 def test_a_measurement_says_how_well_it_is_explained() -> None:

@@ -41,8 +41,11 @@ if TYPE_CHECKING:
     from tfarm.fitting.fit import fit
     from tfarm.fitting.overlay import overlay
     from tfarm.fitting.reading import read_measured
-    from tfarm.loop.closed import closed_loop_poles, locus, margins, nyquist
-    from tfarm.loop.closed import gain_map as map
+    from tfarm.loop.closed import locus
+    from tfarm.loop.margins import margins
+    from tfarm.loop.nyquist import nyquist
+    from tfarm.loop.plane import gain_map as map
+    from tfarm.loop.poles import closed_loop_poles
     from tfarm.loop.spill import spill
     from tfarm.reduced import reduce
     from tfarm.response import bode, transfer
@@ -99,13 +102,13 @@ _ROOMS = {  # where a name stands; what it is called there after a colon, if not
     "bode": "response",
     "design": "synthesis.chosen",
     "locus": "loop.closed",
-    "nyquist": "loop.closed",
-    "closed_loop_poles": "loop.closed",
+    "nyquist": "loop.nyquist",
+    "closed_loop_poles": "loop.poles",
     "compare": "comparing",
     "damped_modes": "spectrum",
     "default_gains": "spectrum.scales",
-    "map": "loop.closed:gain_map",
-    "margins": "loop.closed",
+    "map": "loop.plane:gain_map",
+    "margins": "loop.margins",
     "Measured": "fitting.data",
     "fit": "fitting.fit",
     "modes": "spectrum",

@@ -1,8 +1,4 @@
-"""Work shared by two processes.  Each keeps to one arm while it has work, so that its sections share what they compute.
-
-A process that is done takes the next list of work, and when none is left the last piece of another's: so neither waits
-for the other at the end.
-"""
+"""Work shared by a few processes, which end with the one that started them."""
 
 from __future__ import annotations
 
@@ -10,82 +6,79 @@ import os
 import signal
 import sys
 import time
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
+from itertools import islice
 from multiprocessing import active_children, forkserver, get_context, parent_process, resource_tracker
-from multiprocessing.context import BaseContext
-from multiprocessing.process import BaseProcess
 from threading import Thread
 from typing import TypeVar
 
-from tfarm.stopping import SIGNALS, undone_if_stopped, when_stopped
+from tfarm.errors import ConvergenceError
+from tfarm.stopping import SIGNALS, undone_if_stopped
 
-BLAS = "OPENBLAS_NUM_THREADS"
-WARNINGS = "PYTHONWARNINGS"
-LOADS_ONCE = sys.platform == "linux"  # macOS' own libraries do not bear a fork, and Windows has none
+BLAS, WARNINGS = "OPENBLAS_NUM_THREADS", "PYTHONWARNINGS"
+LOADS_ONCE = sys.platform == "linux"  # macOS' own libraries do not survive a fork, and Windows has none
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 
 def shared(
-    lists: Sequence[Sequence[Task]],
-    submit: Callable[[Executor, Task], Future[Result]],
-    workers: int,
+    tasks: Mapping[Task, Callable[[], Result]],
+    count: int,
     modules: Sequence[str] = (),
     begun: Callable[[Sequence[Task]], object] = lambda _: None,
 ) -> Iterator[tuple[Task, Result]]:
-    """Each task of the lists with its result, as it comes.  `submit` hands one to a process, which has the `modules`.
+    """Yield each task with its result as it comes, made by `count` processes, which have the `modules`.
 
-    `begun` is given the tasks that run, whenever one is begun.  What a task raises is raised here, when those that run
-    have ended; the others are not begun.
+    `begun` is called with the tasks that run whenever one is begun.  What a task raises is raised here once those that
+    run have ended; the others are not begun.  Raises ConvergenceError where a process dies.
     """
-    waiting = deque(deque(each) for each in lists)
-    others = set(active_children())
-    with ExitStack() as stack:
-        stack.enter_context(one_thread_each())
-        context = load_beforehand(modules)
-        pools = [ProcessPoolExecutor(1, context, leave_with_parent) for _ in range(workers)]
-        for pool in pools:
-            stack.callback(pool.shutdown, wait=True, cancel_futures=True)
-        stack.enter_context(_killed_by_interrupts(others))
-        own: list[deque[Task]] = [deque() for _ in pools]
-        running: dict[Future[Result], tuple[int, Task]] = {}
-        idle = list(range(workers))
+    waiting = iter(tasks)
+    running: dict[Future[Result], Task] = {}
+    with _pool(count, modules) as pool:
         while True:
-            for i in idle:
-                if (task := _next(own, i, waiting)) is not None:
-                    running[submit(pools[i], task)] = i, task
+            running |= {pool.submit(tasks[task]): task for task in islice(waiting, count - len(running))}
             if not running:
                 return
-            begun([task for _, task in running.values()])
-            done = wait(running, return_when=FIRST_COMPLETED).done
-            ended = [(future.result(), *running.pop(future)) for future in done]
-            idle = [i for _, i, _ in ended]
-            yield from ((task, result) for result, _, task in ended)
+            begun(list(running.values()))
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                task = running.pop(future)
+                yield task, future.result()
 
 
-def load_beforehand(modules: Sequence[str]) -> BaseContext:
-    """How processes are started: on Linux from one that loads the modules for all of them, elsewhere each anew.
+@contextmanager
+def _pool(count: int, modules: Sequence[str]) -> Iterator[ProcessPoolExecutor]:
+    """Processes with one thread of BLAS each, unless the user chose a number; killed where this one is stopped.
 
-    That one begins at once, while this process may still be busy.  (None is forked from the caller's own, whose threads
-    it would not have.)
+    On matrices of a hundred rows more threads only wait for each other.  On Linux they are forked from a process that
+    has loaded the modules (none from the caller's own, whose threads it would lack), and inherit that signals are
+    blocked; elsewhere each begins anew.
     """
-    if not LOADS_ONCE:
-        return get_context("spawn")
-    context = get_context("forkserver")
-    context.set_forkserver_preload(["tfarm.grouped", *modules, "tfarm.frozen"])
-    when_stopped(kill_workers)
-    with _environment_with(WARNINGS, "ignore:resource_tracker"):  # of the semaphores of a process that was stopped
-        resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-    try:
-        forkserver.ensure_running()  # inherits that both signals are blocked, as do those forked from it
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-    return context
+    others, context = set(active_children()), get_context("forkserver" if LOADS_ONCE else "spawn")
+    quiet = "ignore:resource_tracker"  # of the semaphores of a process that was stopped
+    with _environment(BLAS, os.environ.get(BLAS, "1")), undone_if_stopped(kill_workers):
+        if LOADS_ONCE:
+            context.set_forkserver_preload(["tfarm.grouped", *modules])
+            with _environment(WARNINGS, quiet):
+                resource_tracker.ensure_running()
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+            try:
+                forkserver.ensure_running()
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        with ProcessPoolExecutor(count, context, initializer=leave_with_parent) as pool:
+            try:
+                yield pool
+            except BrokenProcessPool:
+                words = "a worker process ended before its work was done, perhaps for want of memory; ask for less"
+                raise ConvergenceError(words, None, None) from None
+            except KeyboardInterrupt:
+                for child in set(active_children()) - others:
+                    child.kill()
+                raise
 
 
 def kill_workers() -> None:
@@ -106,37 +99,7 @@ def kill_workers() -> None:
 
 
 @contextmanager
-def _killed_by_interrupts(others: set[BaseProcess]) -> Iterator[None]:
-    """Processes but the `others` end where this one is interrupted; tasks that run would be waited for."""
-    try:
-        with undone_if_stopped(kill_workers):
-            yield
-    except KeyboardInterrupt:
-        for child in set(active_children()) - others:
-            child.kill()
-        raise
-
-
-def _next(own: list[deque[Task]], i: int, waiting: deque[deque[Task]]) -> Task | None:
-    """What process i is to do next: the first of its own list or of the next one, or the last of the longest."""
-    while waiting and not own[i]:
-        own[i] = waiting.popleft()
-    if own[i]:
-        return own[i].popleft()
-    longest = max(own, key=len)
-    return longest.pop() if longest else None
-
-
-def one_thread_each() -> AbstractContextManager[None]:
-    """New processes inherit one thread of BLAS, unless the user chose a number.
-
-    On matrices of a hundred rows more threads only wait for each other, and two processes' would share two cores.
-    """
-    return _environment_with(BLAS, os.environ.get(BLAS, "1"))
-
-
-@contextmanager
-def _environment_with(name: str, value: str) -> Iterator[None]:
+def _environment(name: str, value: str) -> Iterator[None]:
     """That variable is so for new processes."""
     before = os.environ.get(name)
     os.environ[name] = value
@@ -150,11 +113,8 @@ def _environment_with(name: str, value: str) -> Iterator[None]:
 
 
 def leave_with_parent() -> None:
-    """In a worker: end when the process that started it is gone; a pool's workers would wait for work for ever.
-
-    Ctrl-C is for that process.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """In a worker: end when the process that started it is gone; a pool's workers would wait for work for ever."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for that process
     parent = parent_process()
 
     def leave() -> None:

@@ -8,8 +8,8 @@ import numpy as np
 
 import tfarm
 from tfarm import Arm, HubFeedback
-from tfarm.loop.margins import margins_of_gains
-from tfarm.loop.regions import Region, between, region
+from tfarm.loop.margins import margins
+from tfarm.loop.plane import Plane, between, gain_map
 from tfarm.reduced import relaxed_model
 
 from .rows import Row, Target
@@ -25,7 +25,7 @@ LAW = HubFeedback(K1=0.3, K2=0.3)
 def loop_rows() -> Iterator[Row]:
     """Margins, and a map of 200 x 200 gains, of the damped preset."""
     arm = tfarm.load("sasaki2012-lab")
-    seconds = interleaved({"tfarm": lambda: margins_of_gains(arm, LAW)}, 9).median("tfarm")
+    seconds = interleaved({"tfarm": lambda: margins(arm, LAW)}, 9).median("tfarm")
     yield Row(
         group=GROUP, what="tfarm: verdict, windows, margins", n=1, each="loop", seconds=seconds,
         target=Target(measured=1e3 * seconds, limit=100.0, unit="ms"),
@@ -36,7 +36,7 @@ def loop_rows() -> Iterator[Row]:
 def _map_row(arm: Arm) -> Row:
     K1, K2 = between(-1, 3, POINTS), between(-2, 2, POINTS)
     with once() as watch:
-        found = region(arm, K1, K2)
+        found = gain_map(arm, K1, K2)
     theirs, differ = _by_eigenvalues(arm, found)
     return Row(
         group=GROUP, what="tfarm: unstable poles over a map", n=K1.size * K2.size, each="point",
@@ -47,7 +47,7 @@ def _map_row(arm: Arm) -> Row:
     )  # fmt: skip
 
 
-def _by_eigenvalues(arm: Arm, found: Region) -> tuple[float, int]:
+def _by_eigenvalues(arm: Arm, found: Plane) -> tuple[float, int]:
     """Seconds a point, and at how many points of a coarser map the count differs."""
     A, B, C, D = relaxed_model(arm, ["hub_rate", "root_moment"], SIXTY).matrices()
     step, differ = POINTS // SAMPLE, 0

@@ -21,8 +21,8 @@ import tfarm
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain, load_chain, sampled_verdict
 from tfarm.dsp.results import simulated_answer
-from tfarm.loop.margins import LoopMargins, margins_of_gains
-from tfarm.loop.regions import region
+from tfarm.loop.margins import LoopMargins, margins
+from tfarm.loop.plane import gain_map
 from tfarm.loop.stability import stability
 from tfarm.report import write
 from tfarm.report.given_laws import Subject
@@ -48,7 +48,7 @@ def folder(tmp_path_factory) -> Path:
     for name in ARMS:
         (out / name).mkdir(exist_ok=True)
         save_live(Subject(tfarm.load(name), load_chain(name)), out / name)
-    write_assets(out / ASSETS, out / ASSETS)
+    write_assets(out / ASSETS)
     return out
 
 
@@ -172,7 +172,7 @@ def test_what_is_shown_at_ten_gains_is_what_tfarm_margins_prints(browser, folder
         for law in random_gains(data, GAINS):
             set_gains(page, law)
             here = shown(page)
-            found = margins_of_gains(arm, law, data["band"])
+            found = margins(arm, law, data["band"])
             assert here["verdict"].startswith("stable") == found.stability.is_stable, law
             if found.in_band is not None:
                 stable += 1
@@ -267,7 +267,7 @@ def test_the_region_of_a_hub_that_is_held_is_the_librarys(browser, folder, name)
         areas, Kp = page.evaluate("[live.now.areas, live.now.law.Kp]")
         assert {row["what"] for row in areas} == {"stable, continuous"}
         columns = sorted({row["K1"] for row in areas})[3 :: len(areas) // 5]
-        known = region(arm, np.array(columns), np.array([axes["K2"]["low"], axes["K2"]["high"]]), HubFeedback(Kp=Kp))
+        known = gain_map(arm, np.array(columns), np.array([axes["K2"]["low"], axes["K2"]["high"]]), HubFeedback(Kp=Kp))
         for gain, intervals in zip(columns, known.stable_intervals, strict=True):
             here = [(row["low"], row["high"]) for row in areas if row["K1"] == gain]
             cut = [(max(row[0], axes["K2"]["low"]), row[1]) for row in here]

@@ -65,7 +65,7 @@ def few(tmp_path_factory):
         patch.setattr(making, "ARM_PIECES", tuple(piece for piece in PIECES if piece.anchor in ("fit", "arm")))
         _arm_page(Subject(replace(found.arm, name="fitted"), chain, (), found), out / "fitted")
     save_live(Subject(LAB, chain), out / NAME)
-    write_assets(out / ASSETS, out / ASSETS)
+    write_assets(out / ASSETS)
     laws_of_gains = [tfarm.HubFeedback(K1=0.3, K2=0.3), tfarm.HubFeedback(K1=14.7, K2=-0.26)]
     write_comparison(tfarm.compare(LAB, laws_of_gains, names=("as in the paper", TEXT), modes=2), out / "compared")
     return out

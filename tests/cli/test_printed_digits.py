@@ -10,7 +10,7 @@ import tfarm
 from tests.shell import run
 from tfarm.arm.writing import to_toml
 from tfarm.digits import within
-from tfarm.loop.poles import poles_of_gains
+from tfarm.loop.poles import closed_loop_poles
 from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
 
@@ -34,7 +34,7 @@ def test_poles_of_a_hardly_damped_arm_are_printed_as_far_as_they_are_proven(caps
     file.write_text(to_toml(arm), encoding="utf-8")
     code, out, _ = run(capsys, "poles", str(file), "--K1", "1e-6", "--K2", "0", "--count", "6")
     assert code == 0
-    discs = poles_of_gains(arm, tfarm.HubFeedback(K1=1e-6), 6).certify(25)
+    discs = closed_loop_poles(arm, tfarm.HubFeedback(K1=1e-6), 6).certify(25)
     rows = [line.split() for line in out.splitlines()[2 : 2 + len(discs)]]
     for row, disc in zip(rows, discs, strict=True):
         unit = Decimal(row[0]).as_tuple().exponent

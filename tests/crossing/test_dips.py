@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tfarm.crossing import crossed, with_dips
+from tfarm.crossing import Family, crossed, crossings
 
 
 def of(h):
@@ -14,6 +14,13 @@ def of(h):
         return (1.0 + 1j * h(place)) * B, B
 
     return parts
+
+
+def found(grid, parts, with_dips=True):
+    """Gain, place and change of all crossings, dips searched too."""
+    family = Family(lambda w: tuple(each[None] for each in parts(w)), lambda _, w: parts(w))
+    (line,) = crossings(family, grid, with_dips=with_dips)
+    return np.array(sorted(line, key=lambda each: each.at)).T
 
 
 def counted(h):
@@ -34,10 +41,7 @@ def test_two_zeros_in_one_dip_are_both_found(half, middle, sign):
     """A parabola with zeros at middle -+ half on a grid of whole numbers, which sees one sign alone."""
     grid, parts = np.arange(8.0), of(lambda x: sign * ((x - middle) ** 2 - half**2) / 20)
     assert crossed(grid, parts)[0].size == 0
-    places, known = with_dips(grid, parts, parts(grid))
-    assert set(grid) < set(places)
-    np.testing.assert_array_equal(known, parts(places))
-    gain, at, change = crossed(places, parts, known)
+    gain, at, change = found(grid, parts)
     np.testing.assert_allclose(at, [middle - half, middle + half], rtol=1e-13)
     np.testing.assert_allclose(gain, -1.0, rtol=1e-13)
     np.testing.assert_array_equal(change, [2 * sign, -2 * sign])
@@ -51,10 +55,10 @@ def test_dips_are_searched_together_the_first_and_the_last_that_have_two_neighbo
         return np.cos(turn * (x - 4.1)) ** 2 - np.cos(turn * 0.05) ** 2
 
     parts, asked = counted(lambda x: -h(x))
-    more, known = with_dips(places, parts, of(lambda x: -h(x))(places))
+    _, at, _ = found(places, parts)
     zeros = [each + off for each in (1.1, 4.1, 7.1) for off in (-0.05, 0.05)]
-    np.testing.assert_allclose(crossed(more, parts, known)[1], zeros, rtol=1e-13)
-    assert set(asked[:14]) == {6}  # two places of each dip a step
+    np.testing.assert_allclose(at, zeros, rtol=1e-13)
+    assert set(asked[1:15]) == {6}  # two places of each dip a step
 
 
 @pytest.mark.parametrize(
@@ -71,13 +75,12 @@ def test_dips_are_searched_together_the_first_and_the_last_that_have_two_neighbo
 )
 def test_what_is_no_dip_is_not_searched(h):
     grid, (parts, asked) = np.arange(7.0), counted(h)
-    known = of(h)(grid)
-    same, values = with_dips(grid, parts, known)
-    assert same is grid
-    assert values is known
-    assert asked == []
+    found(grid, parts, with_dips=False)
+    without = list(asked)
+    found(grid, parts)
+    assert asked[len(without) :] == without
 
 
 def test_a_dip_that_stays_off_0_adds_nothing():
     grid, parts = np.arange(7.0), of(lambda x: (x - 3.2) ** 2 / 10 + 1e-6)
-    assert with_dips(grid, parts, parts(grid))[0] is grid
+    assert found(grid, parts).size == 0

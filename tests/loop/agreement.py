@@ -1,4 +1,4 @@
-"""Map, count and simulation of random loops against each other:  python -m tests.loop.agreement 2000 [seed]
+"""Map, count and simulation of random loops against each other:  python -m tests.loop.agreement SIZE SEED
 
 A dozen random arms (slenderness 5 to 60, free or held tip, a third of them at C = 0), and for each a grid of random
 gains: the region's number of unstable poles, that of `stability`, and the growth of the energy of a Legendre-Ritz model
@@ -8,21 +8,17 @@ Left out are gains within 1e-3 (of the hub's own unit) of the boundary, and loop
 a sample of 10 ms.
 """
 
-import os
-import sys
-from collections import Counter
 from dataclasses import dataclass, replace
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
+from tests import survey
 from tests.loop.arms import hub_units, with_damping
 from tests.loop.ritz_loop import RitzLoop
 from tests.strategies import some_arm
+from tests.survey import Finding
 from tfarm import Hub, HubFeedback
-from tfarm.loop.regions import INFINITE, region
+from tfarm.loop.plane import INFINITE, gain_map
 from tfarm.loop.stability import stability
 
 ARMS = 12
@@ -79,14 +75,14 @@ def far_from_boundary(found, law, unit):
     return bool(away.min(initial=np.inf) > NEAR)
 
 
-def survey(number, seed=2012, arms=ARMS):
+def some_cases(number, seed=2012, arms=ARMS):
     """So many loops judged; gains too close to the boundary, or too slow to tell, drawn but left out."""
     rng, cases = np.random.default_rng(seed), []
     for n in range(arms):
         arm = some_free_arm(rng, damped=n % 3 != 0)
         size = max(2, int(np.ceil(np.sqrt(number / arms))))  # a map has two values of either gain at least
         K1, K2, Kp = some_gains(rng, arm, size)
-        found, model = region(arm, K1, K2, HubFeedback(Kp=Kp)), RitzLoop(arm, TERMS)
+        found, model = gain_map(arm, K1, K2, Kp), RitzLoop(arm, TERMS)
         for j, i in np.ndindex(size, size):
             law = HubFeedback(K1=float(K1[i]), K2=float(K2[j]), Kp=Kp)
             if far_from_boundary(found, law, np.prod(hub_units(arm))):
@@ -107,13 +103,12 @@ def judge(model, law, of_map, rng):
     )  # fmt: skip
 
 
+def loops(size, seed):
+    """Of each loop whether map, count and simulation agree."""
+    for case in some_cases(size, seed):
+        is_wrong = case.outcome != "agree"
+        yield Finding(case.outcome, str(case) if is_wrong else "", is_wrong, {"unstable": case.of_map})
+
+
 if __name__ == "__main__":
-    NUMBER = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
-    SEED = int(sys.argv[2]) if len(sys.argv) > 2 else 2012
-    CASES = survey(NUMBER, SEED)
-    print(f"{len(CASES)} loops: {dict(Counter(case.outcome for case in CASES))}")
-    print(dict(Counter(f"{case.of_map} unstable" for case in CASES)))
-    for CASE in CASES:
-        if CASE.outcome != "agree":
-            print(CASE.outcome, CASE)
-    sys.exit(any(case.outcome != "agree" for case in CASES))
+    survey.main(loops, size=2000, seed=2012)

@@ -1,4 +1,4 @@
-"""Lists of closed-loop poles, counted again by another road:  python -m tests.loop.counts 500 [seed]
+"""Lists of closed-loop poles, counted again by another road:  python -m tests.loop.counts SIZE SEED
 
 Random arms (slenderness L/h 5 to 100, any payload, C = 0 or up to a fifth of critical in the first mode) and gains of
 any sign; three to fifteen poles each.  The number listed must be, by Nyquist, the winding number of 1 + L(s) around the
@@ -7,24 +7,21 @@ Wittrick and Williams gives, at C > 0 the winding number of the open arm.  Every
 arithmetic too.  The highest pole of each loop takes a Newton step on the paper's determinant with its hub row changed.
 """
 
-import os
-import sys
 import time
-from collections import Counter
 from dataclasses import dataclass
 from itertools import pairwise
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
 import tfarm
+from tests import survey
 from tests.loop.arms import some_loop
 from tests.spectrum.damped_roads import newton_step
+from tests.survey import Finding
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
+from tfarm.exact.characteristic import gains_of
 from tfarm.exact.system import system_of
-from tfarm.loop.poles import poles_of_gains
+from tfarm.loop.poles import closed_loop_poles
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import winding_number
 from tfarm.spectrum.damped import member
@@ -51,7 +48,7 @@ def judge(arm, law, count, *, balls=False) -> Verdict:
     """List the poles of one loop and count them again."""
     start = time.perf_counter()
     try:
-        poles = poles_of_gains(arm, law, count)
+        poles = closed_loop_poles(arm, law, count)
     except (ConvergenceError, ParameterError) as error:
         return Verdict("refused", str(error).splitlines()[0])
     spent = 1e3 * (time.perf_counter() - start)
@@ -59,7 +56,7 @@ def judge(arm, law, count, *, balls=False) -> Verdict:
     counts = [nyquist_count(poles.loop, poles.box)]
     if balls:
         try:
-            counts.append(proven_count(poles.loop.k, poles.box, poles.loop.gains))
+            counts.append(proven_count(poles.loop.k, poles.box, gains_of(poles.loop.k, poles.loop.gains)))
         except CertificationError as error:
             return Verdict("refused", f"proof: {error}")
     step = max((newton_step(arm, complex(s), K1=law.K1, K2=law.K2, Kp=law.Kp) for s in poles.moving[-1:]), default=0.0)
@@ -71,7 +68,7 @@ def judge(arm, law, count, *, balls=False) -> Verdict:
 
 def nyquist_count(loop, box) -> int:
     """Closed-loop poles in a box: turns of 1 + L around it, and the arm's own poles inside."""
-    arm, law = loop.arm, loop.law
+    arm, law = loop.arm, loop.gains
     plant = tfarm.transfer(arm, ["hub_angle", "root_moment"])
 
     def phase(s):
@@ -105,35 +102,18 @@ def own_poles(arm, box) -> int:
     return 2 * modes_below(arm, box.im_max) + 2 * arm.has_rigid_mode
 
 
-def survey(number, seed):
-    """Loops and verdicts."""
+def loops(size, seed):
+    """Of each loop the finding; every so many are counted in balls too."""
     rng = np.random.default_rng(seed)
-    drawn = [(*some_loop(rng), int(rng.integers(3, 16))) for _ in range(number)]
-    return [(case, judge(*case, balls=n % PROVEN == 0)) for n, case in enumerate(drawn)]
-
-
-def report(verdicts) -> str:
-    """The tally as text."""
-    tally = Counter(verdict.outcome for verdict in verdicts)
-    right = [verdict for verdict in verdicts if verdict.outcome == "right"]
-    spent = [verdict.milliseconds for verdict in right]
-    lines = [
-        f"{len(verdicts)} loops: {tally['right']} right, {tally['refused']} refused, {tally['wrong']} wrong",
-        f"counted again by Nyquist, {sum(v.proven for v in right)} of them proven in balls too; "
-        f"{sum(v.poles for v in right)} poles, {sum(v.unstable for v in right)} unstable",
-        f"highest poles: Newton on the paper's determinant moves them by at most {max(v.step for v in right):.1e}",
-        f"{np.median(spent):.0f} ms a list in the median, {max(spent):.0f} at most",
-    ]
-    reasons = Counter(f"{v.outcome}: {v.reason}" for v in verdicts if v.outcome != "right")
-    return "\n".join([*lines, *(f"{count} x {text}" for text, count in reasons.most_common())])
+    drawn = [(*some_loop(rng), int(rng.integers(3, 16))) for _ in range(size)]
+    for n, case in enumerate(drawn):
+        verdict = judge(*case, balls=n % PROVEN == 0)
+        words = " ".join(map(str, (verdict.reason, *case))) if verdict.outcome != "right" else ""
+        figures = {"poles": verdict.poles, "unstable": verdict.unstable, "proven in balls": verdict.proven}
+        figures |= {"Newton's step": verdict.step, "milliseconds": verdict.milliseconds}
+        is_right = verdict.outcome == "right"
+        yield Finding(verdict.outcome, words, verdict.outcome == "wrong", figures if is_right else {})
 
 
 if __name__ == "__main__":
-    NUMBER = int(sys.argv[1]) if len(sys.argv) > 1 else 500
-    SEED = int(sys.argv[2]) if len(sys.argv) > 2 else 2012
-    SURVEY = survey(NUMBER, SEED)
-    print(report([verdict for _, verdict in SURVEY]))
-    for CASE, VERDICT in SURVEY:
-        if VERDICT.outcome != "right":
-            print(VERDICT.outcome, VERDICT.reason, *CASE)
-    sys.exit(any(case[-1].outcome == "wrong" for case in SURVEY))
+    survey.main(loops, size=500, seed=2012)

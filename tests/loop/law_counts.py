@@ -1,4 +1,4 @@
-"""Unstable poles under random laws, counted again by another road:  python -m tests.loop.law_counts 1000 [seed]
+"""Unstable poles under random laws, counted again by another road:  python -m tests.loop.law_counts SIZE SEED
 
 Random arms (as in `tests.loop.arms`), one to three signals, rational entries of order 8 at most in all, some with
 unstable poles and zeros, delays of 0 to 50 ms at C > 0.  Without damping the count is that of modal models of 30 and 40
@@ -6,21 +6,17 @@ modes closed with the law, wherever these agree; with damping, by Nyquist, that 
 public transfer functions, and of models where their modes ring.
 """
 
-import os
-import sys
 import time
-from collections import Counter
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
 import tfarm
+from tests import survey
 from tests.loop.arms import some_loop
+from tests.survey import Finding, each_of
 from tfarm.arm import Law
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.loop.law_stability import law_stability
+from tfarm.loop.stability import stability
 from tfarm.response.signals import Signals
 from tfarm.spectrum.scales import first_frequency
 
@@ -169,7 +165,7 @@ def model(arm, names, count):
 def judge(arm, law):
     """ "right", "refused: ...", "wrong: ..." or "no second road"."""
     try:
-        found = law_stability(arm, law)
+        found = stability(arm, law)
     except (ConvergenceError, ParameterError) as error:
         return f"refused: {str(error).splitlines()[0]}"
     if found.unstable_roots_infinite:
@@ -188,20 +184,16 @@ def judge(arm, law):
     return "right" if other[0] == found.unstable_roots else f"wrong: {found.unstable_roots}, by models {other}"
 
 
-def main(size, seed):
-    rng, found, spent = np.random.default_rng(seed), Counter(), []
-    for number in range(size):
-        arm = some_loop(rng)[0]
-        law = some_law(rng, arm, delay=some_delay(rng, arm) if arm.damping else 0.0)
-        start = time.perf_counter()
-        word = judge(arm, law)
-        spent.append(time.perf_counter() - start)
-        found[word.split(":")[0]] += 1
-        if word.startswith(("wrong", "refused")):
-            print(number, arm.damping, law.signals, law.delay, word, flush=True)
-    print(dict(found), f"{1e3 * np.median(spent):.0f} ms a loop", flush=True)
-    return found["wrong"]
+def loops(rng):
+    """The finding on one loop."""
+    arm = some_loop(rng)[0]
+    law = some_law(rng, arm, delay=some_delay(rng, arm) if arm.damping else 0.0)
+    start = time.perf_counter()
+    outcome, _, words = judge(arm, law).partition(":")
+    figures = {"milliseconds": 1e3 * (time.perf_counter() - start)}
+    known = f"{words} {arm.damping} {law.signals} {law.delay}" if outcome in ("wrong", "refused") else ""
+    return Finding(outcome, known, outcome == "wrong", figures)
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1) > 0)
+    survey.main(each_of(loops))

@@ -1,4 +1,4 @@
-"""CPU seconds of margins and of the sampled verdict under random laws:  python -m tests.loop.law_times 200 [seed]
+"""CPU seconds of margins and of the sampled verdict under random laws:  python -m tests.loop.law_times SIZE SEED
 
 Random rigs of every kind (`tests.rigs`) and plausible arms (`tests.plausible.arms`), in turn; laws of order 1 to 12 on
 one to three signals: clusters of slow poles, integrators, double integrators, notches on a mode, lags, rarely an
@@ -6,28 +6,24 @@ unstable pole, some with a delay; periods of 0.1 to 20 ms.  Both commands' work 
 empty caches of the package.
 """
 
-import os
-import sys
 import time
 import tomllib
-from collections import Counter
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
 import tfarm
+from tests import survey
 from tests.bench import caches
 from tests.plausible.arms import draw
 from tests.rigs import some_rig
+from tests.survey import Finding
 from tfarm.arm import Law
 from tfarm.arm.schema import arm_of_table
 from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.verdict import sampled, sampled_law_answer
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.answers import margins_answer
-from tfarm.loop.closed import margins
+from tfarm.loop.margins import margins
 from tfarm.reduced.sensed import closed, sensed_model
 from tfarm.response.signals import Signals
 from tfarm.tables.files import to_json
@@ -174,8 +170,9 @@ def timed(work, case):
     return word, text, time.process_time() - start
 
 
-def main(size, seed):
-    spent, words = {name: [] for name in WORK}, Counter()
+def commands(size, seed):
+    """The work of each command under each law; wrong is what takes too long, once or in the median."""
+    spent = {name: [] for name in WORK}
     for work in WORK.values():
         timed(work, some_case(0, 0))  # kernels are compiled or read
     for number in range(size):
@@ -183,15 +180,14 @@ def main(size, seed):
         for name, work in WORK.items():
             word, text, seconds = timed(work, case)
             spent[name].append(seconds)
-            words[f"{name} {word}"] += 1
-            if seconds > MOST or word == "refused":
-                print(number, name, f"{seconds:.2f} s", text if word == "refused" else word, flush=True)
-    print(dict(words))
+            is_late = seconds > MOST
+            words = f"{number} {seconds:.2f} s {text if word == 'refused' else word}"
+            figures = {f"{name} [CPU s]": seconds}
+            yield Finding(f"{name} {word}", words if is_late or word == "refused" else "", is_late, figures)
     for name, each in spent.items():
-        middle, high = np.percentile(each, (50, 95))
-        print(f"{name}: median {middle:.3f}, 95 % {high:.2f}, most {max(each):.2f} CPU s", flush=True)
-    return any(np.median(each) > MEDIAN or max(each) > MOST for each in spent.values())
+        if np.median(each) > MEDIAN:
+            yield Finding(f"{name} is slow", f"{np.median(each):.2f} CPU s in the median", is_wrong=True)
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1))
+    survey.main(commands, size=200)

@@ -1,23 +1,19 @@
-"""Root loci of random plausible arms:  python -m tests.loop.loci 500 [seed]
+"""Root loci of random plausible arms:  python -m tests.loop.loci SIZE SEED
 
 Along gains, all gains together and parameters of the arm.  At both ends and in the middle every listed pole is compared
 with those of a box that a winding number completes; how many loci were refused, how many branches end on the way, and
 how many crossings are on no branch.
 """
 
-import os
-import sys
 import tempfile
-from collections import Counter
 from pathlib import Path
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
 import tfarm
+from tests import survey
 from tests.plausible.arms import draw
+from tests.survey import Finding
 from tfarm.errors import ConvergenceError
 from tfarm.loop.locus import locus
 from tfarm.loop.poles import poles_below
@@ -62,28 +58,24 @@ def wrong_points(found):
     return wrong
 
 
-def survey(size, seed):
-    """What became of each locus, as words, and how often."""
-    told = Counter()
+def loci(size, seed):
+    """The finding on each locus."""
     for number in range(1, size + 1):
         arm, law, vary, start, stop = some_locus(number, seed)
+        name = f"arm {number} of seed {seed}, {vary} from {start:g} to {stop:g}"
         try:
             found = locus(arm, law, vary, start, stop, 60, 10)
             wrong = wrong_points(found)
         except ConvergenceError as error:
-            told["refused"] += 1
-            print(f"arm {number} of seed {seed}, {vary} from {start:g} to {stop:g}: {error}", flush=True)
+            yield Finding("refused", f"{name}: {error}")
             continue
-        told["wrong" if wrong else "right"] += 1
-        told["with a branch that ends"] += bool(found.ends)
-        told["with crossings on no branch"] += any(each.branch is None for each in found.crossings)
-        if wrong:
-            print(f"arm {number} of seed {seed}, {vary}: {wrong} listed poles are none", flush=True)
-    return told
+        figures = {
+            "with a branch that ends": bool(found.ends),
+            "with crossings on no branch": any(each.branch is None for each in found.crossings),
+        }
+        words = f"{name}: {wrong} listed poles are none" if wrong else ""
+        yield Finding("wrong" if wrong else "right", words, bool(wrong), figures)
 
 
 if __name__ == "__main__":
-    numbers = [int(each) for each in sys.argv[1:]]
-    counts = survey(*(numbers + [500, 2026][len(numbers) :]))
-    print(", ".join(f"{count} {what}" for what, count in counts.items()))
-    sys.exit(bool(counts["wrong"]))
+    survey.main(loci, size=500, seed=2026)

@@ -1,25 +1,19 @@
-"""Windows of the numbers of random laws, held against verdicts:  python -m tests.loop.number_windows 200 [seed]
+"""Windows of the numbers of random laws, held against verdicts:  python -m tests.loop.number_windows SIZE SEED
 
 Random damped arms and laws as in `tests.loop.law_counts`, delays among them.  Of a law whose windows are found one
 number is drawn and one of its windows: inside it, and just inside and outside of each of its edges, the law with that
 number is counted anew.
 """
 
-import os
-import sys
-import time
-from collections import Counter
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import numpy as np
 
+from tests import survey
 from tests.loop.arms import some_loop
 from tests.loop.law_counts import some_delay, some_law
+from tests.survey import Finding
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.loop.law_stability import law_stability
-from tfarm.loop.law_windows import law_windows
+from tfarm.loop.stability import stability
+from tfarm.loop.windows import windows_of
 
 BESIDE = 1e-5  # of an edge: how far from it the verdict is asked
 LEAST = 1e-6  # of the width of a window: what an edge beside 0 is taken to be in size
@@ -38,8 +32,8 @@ def places(rng, window, low, high):
 def judge(rng, arm, law):
     """A word for each check: "right", "refused", "marginal", or "wrong: ..."."""
     try:
-        verdict = law_stability(arm, law)
-        windows = {name: each for name, each in law_windows(verdict).items() if each.all}
+        verdict = stability(arm, law)
+        windows = {name: each for name, each in windows_of(verdict).items() if each.all}
     except (ConvergenceError, ParameterError):
         return ["refused"]
     if verdict.is_stable and any(each.around is None for each in windows.values()):
@@ -52,7 +46,7 @@ def judge(rng, arm, law):
     words = []
     for at, stable in places(rng, window, low, high):
         try:
-            there = law_stability(arm, law.having(name, float(at)))
+            there = stability(arm, law.having(name, float(at)))
         except (ConvergenceError, ParameterError):
             words.append("refused")
             continue
@@ -65,20 +59,19 @@ def judge(rng, arm, law):
     return words
 
 
-def main(size, seed):
-    rng, found, number, start = np.random.default_rng(seed), Counter(), 0, time.perf_counter()
+def places_of_windows(size, seed):
+    """The findings at places in and beside a window of each loop."""
+    rng, number = np.random.default_rng(seed), 0
     while number < size:
         arm = some_loop(rng)[0]
         if not arm.least_damping:
             continue
         law, number = some_law(rng, arm, delay=some_delay(rng, arm)), number + 1
         for word in judge(rng, arm, law):
-            found[word.split(":")[0]] += 1
-            if word.startswith("wrong"):
-                print(number, arm, law, word, flush=True)
-    print(dict(found), f"{time.perf_counter() - start:.0f} s", flush=True)
-    return found
+            outcome, _, words = word.partition(":")
+            is_wrong = outcome == "wrong"
+            yield Finding(outcome, f"{words} {arm} {law}" if is_wrong else "", is_wrong)
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1)["wrong"] > 0)
+    survey.main(places_of_windows)

@@ -9,10 +9,9 @@ import tfarm
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.loop.law_locus import LawLocus
-from tfarm.loop.law_map import LawMap
-from tfarm.loop.law_stability import law_stability
 from tfarm.loop.locus import Locus, locus
-from tfarm.loop.regions import Region
+from tfarm.loop.plane import Plane
+from tfarm.loop.stability import stability
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 GAINS = HubFeedback(K1=0.3, K2=0.3, Kp=2.0)
@@ -56,17 +55,17 @@ def test_gains_at_the_hub_have_a_delay_and_a_factor_too():
 
 def test_a_map_of_any_law_counts_the_unstable_poles_of_its_loops():
     found = tfarm.map(LAB, ACROSS, UP, law=LAW, vary=("gain", "delay"))
-    assert isinstance(found, LawMap)
+    assert isinstance(found, Plane)
     for i, j in ((0, 0), (1, 2), (2, 1)):
         law = LAW.having("gain", ACROSS[i]).having("delay", UP[j])
-        assert law_stability(LAB, law, found.band).unstable_roots == found.unstable[j, i]
+        assert stability(LAB, law, found.band).unstable_roots == found.unstable[j, i]
     assert len(np.unique(found.unstable)) > 1
 
 
 def test_a_map_of_gains_holds_the_angle_as_their_law_does():
     assert tfarm.map(LAB, ACROSS, UP, law=PLAIN) == tfarm.map(LAB, ACROSS, UP, 2.0)
     plane = tfarm.map(LAB, ACROSS, UP, law=GAINS, vary=("K1", "K2"))
-    assert isinstance(plane, Region)
+    assert isinstance(plane, Plane)
     assert plane.Kp == 2.0
     turned = tfarm.map(LAB, np.array([0.2, 1.6]), np.array([0.2, 0.4]), law=GAINS, vary=("root_moment", "hub_rate"))
     assert turned.unstable[0].tolist() == [

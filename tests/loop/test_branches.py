@@ -10,17 +10,16 @@ from tests.loop.test_starts import LAWS
 from tests.shared import thinned
 from tfarm import Hub, HubFeedback, Law
 from tfarm.arm import Motor
-from tfarm.exact.characteristic import loop_parts, quick_characteristics
+from tfarm.exact.characteristic import gains_of, loop_parts, quick_characteristics
 from tfarm.loop.branches import NOBODY, Stretch, ordered, stretches
 from tfarm.loop.law_locus import Family, _crossings, _room, law_locus
-from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_rounded import _with
+from tfarm.loop.loop import Loop
 from tfarm.loop.nyquist import upper_contour
-from tfarm.loop.passivity import definite, polynomial, signs_of
-from tfarm.loop.plant import Loop
 from tfarm.loop.stability import stability
+from tfarm.loop.theorem import definite, polynomial, signs_of
 from tfarm.loop.variation import Variation, free_of_loss
-from tfarm.loop.windows import gain_windows
+from tfarm.loop.windows import windows_of
 from tfarm.spectrum.continuation import Node
 
 LAB, MOTOR = tfarm.load("sasaki2012-lab"), tfarm.load("quanser-flexlink")
@@ -98,7 +97,7 @@ def test_of_a_pair_that_meets_on_the_axis_both_are_listed_and_mirror_images_wher
     for row, column in lower:
         pole = found.branches[row, column]
         assert pole.conjugate() in found.branches[:, column]
-        at = Loop(LAB, found.law.having("K1", float(found.gain[column]))).member.function(np.array([pole]))
+        at = Loop(LAB, found.law.having("K1", float(found.gain[column]))).function(np.array([pole]))
         assert abs(at.value / at.slope)[0] < 1e-12 * abs(pole)
 
 
@@ -141,7 +140,7 @@ def test_where_no_branch_swings_crossings_of_others_are_told_up_to_the_first_mod
     found = tfarm.locus(MOTOR, law, "K2", -20.0, 10.0, branches=3, points=40)
     assert (np.nanmax(found.branches.imag, axis=0) == 0).any()
     first = tfarm.modes(MOTOR, 1).natural_frequency[-1]
-    edges = gain_windows(stability(MOTOR, law), "K2").crossings
+    edges = windows_of(stability(MOTOR, law), ["K2"])["K2"].crossings
     expected = [(t, w) for t, w in zip(edges.gain, edges.at, strict=True) if -20 < t < 10 and w < first]
     assert [(each.gain, each.omega) for each in found.crossings] == [pytest.approx(each, rel=1e-9) for each in expected]
     assert len(expected) == 1
@@ -185,7 +184,7 @@ def test_what_a_hub_loses_is_a_rate_gain_beside_any_law(inductance):
     law, s = HubFeedback(K1=0.3, K2=0.2, Kp=1.0), np.array([0.3 + 2j, -4 + 57j, 20.0 + 0j])
     k, gains = Variation(freed, law, "K1", loss).system(law.K1)
     whole = Loop(arm, law)
-    own = np.array([[float(gain)] for gain in whole.gains])
+    own = np.array([[float(gain)] for gain in gains_of(whole.k, whole.gains)])
     mine, theirs = quick_characteristics(k, s, gains, 0), quick_characteristics(whole.k, s, own, 0)
     ratio = mine.value / theirs.value * np.exp(mine.scale - theirs.scale)
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-9)
@@ -209,7 +208,7 @@ def test_the_contour_ends_at_the_band_wherever_the_law_has_poles():
     for ringing, is_near in ((0.6 * band, True), (1.004 * band, False)):
         damped = 0.01 * ringing
         den = [1.0, 2 * damped, damped**2 + ringing**2]
-        loop = LawLoop(LAB, Law({"hub_rate": ([ringing**2], den)}))
+        loop = Loop(LAB, Law({"hub_rate": ([ringing**2], den)}))
         s, is_arc = upper_contour(loop, np.array([0.0]), band, np.array([-1 + 20j]))
         w = s.imag[~is_arc]
         assert w.max() == pytest.approx(band, rel=1e-12)
@@ -224,7 +223,7 @@ def test_the_contour_ends_at_the_band_wherever_the_law_has_poles():
 @pytest.mark.parametrize("name", LAWS)
 def test_the_function_of_a_law_is_the_rig_s_drive_times_one_plus_l(name):
     """D s^n/(q drive) is 1 + L, up to the time that waves take and one factor."""
-    loop = LawLoop(LAB, LAWS[name])
+    loop = Loop(LAB, LAWS[name])
     s = np.array([0.3 + 2j, -5 + 40j, 2.0 + 9j])
     at = loop.function(s)
     drive, _, scale = loop_parts(loop.k, s)

@@ -16,7 +16,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.loop import damping
 from tfarm.loop.damping import band_and_real_poles, band_poles, is_oscillating, least_damping
 from tfarm.loop.frequencies import band_of
-from tfarm.loop.plant import Loop
+from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.reduced import tailed_model
 

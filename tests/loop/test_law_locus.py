@@ -1,6 +1,7 @@
 """Loci of any law: against gains at the hub, lists of poles, and crossings solved for in another way."""
 
 import json
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -10,10 +11,9 @@ from tests.loop.arms import window_arm
 from tests.shared import remember
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
-from tfarm.loop import closed
 from tfarm.loop.law_locus import assigned, inside, law_locus
-from tfarm.loop.law_loop import LawLoop
-from tfarm.loop.law_poles import law_poles_below
+from tfarm.loop.loop import Loop
+from tfarm.loop.poles import poles_below
 from tfarm.spectrum.box import Box
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -41,7 +41,7 @@ def test_each_value_has_its_complete_list_of_poles(vary, start, stop):
         value = float(found.values[n])
         arm = LAB.having(payload_mass=value) if vary == "payload_mass" else LAB
         law = LAW if vary == "payload_mass" else LAW.having(vary, value)
-        poles = law_poles_below(LawLoop(arm, law), 1.2 * found.box.im_max).values
+        poles = poles_below(Loop(arm, law), 1.2 * found.box.im_max).values
         listed = np.sort_complex(found.branches[~np.isnan(found.branches[:, n]), n])
         expected = np.sort_complex(poles[found.box.holds(poles)])
         np.testing.assert_allclose(listed, expected, atol=1e-9 * found.box.im_max)
@@ -98,7 +98,7 @@ def test_well_inside_a_box_is_a_twentieth_of_its_shorter_measure_from_the_edges_
 
 
 def test_the_command_follows_a_law(capsys, tmp_path, monkeypatch):
-    remember(monkeypatch, closed, "locus")  # two commands ask for the same
+    remember(monkeypatch, import_module("tfarm.loop.closed"), "locus")  # two commands ask for the same
     text = "[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
     (tmp_path / "law.toml").write_text(text)
     way = ("--vary", "gain", "--from", "1", "--to", "9", "--points", "3", "--branches", "1")

@@ -10,11 +10,10 @@ import tfarm
 from tests.shared import remember, sized, thinned
 from tests.shell import run
 from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
-from tfarm.loop.law_loop import LawLoop
-from tfarm.loop.law_map import law_map, unstable_below
-from tfarm.loop.law_stability import band_for, law_stability
-from tfarm.loop.lines import through_infinity
-from tfarm.loop.regions import between
+from tfarm.loop.family import through_infinity, unstable_below
+from tfarm.loop.loop import Loop
+from tfarm.loop.plane import between, plane
+from tfarm.loop.stability import band_of_loop, stability
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)
@@ -34,24 +33,24 @@ LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], 
 )
 @pytest.mark.parametrize("points", sized(2, 4))
 def test_counts_are_those_of_full_searches(vary, x, y, points):
-    found = law_map(LAB, LAW, vary, between(*x, 8), between(*y, 10))
+    found = plane(Loop(LAB, LAW), vary, between(*x, 8), between(*y, 10))
     assert len(np.unique(found.unstable)) > 2
     for i, j in np.random.default_rng(1).integers((8, 10), size=(points, 2)):
         law = LAW.having(vary[0], found.x[i]).having(vary[1], found.y[j])
-        assert law_stability(LAB, law, found.band).unstable_roots == found.unstable[j, i], law
+        assert stability(LAB, law, found.band).unstable_roots == found.unstable[j, i], law
 
 
 @pytest.mark.parametrize("x", [(-1e6, 1.0), (-1.0, 2e6)])
 @pytest.mark.parametrize("y", [(-1e6, 1.0), (-1.0, 1e6)])
 def test_the_band_is_enough_for_each_corner(x, y, monkeypatch):
     """The more a filter amplifies, the farther up it is to be looked: the largest number once at each of four ends."""
-    module = import_module("tfarm.loop.law_map")
+    module = import_module("tfarm.loop.plane")
     monkeypatch.setattr(module, "unstable_below", lambda *_: 0)  # a count takes longest
     monkeypatch.setattr(module, "_must_hold_at_corners", lambda *_: None)
     vary = "hub_angle.num.0", "tip_acceleration.num.0"
-    found = law_map(LAB, LAW, vary, np.array(x), np.array(y))
+    found = plane(Loop(LAB, LAW), vary, np.array(x), np.array(y))
     corners = [LAW.having(vary[0], a).having(vary[1], b) for a in x for b in y]
-    assert found.band == max(band_for(LawLoop(LAB, law)) for law in corners)
+    assert found.band == max(band_of_loop(Loop(LAB, law))[0] for law in corners)
 
 
 @pytest.mark.parametrize("vary", [("hub_angle.den.0", "gain"), ("gain", "hub_angle.den.0")])
@@ -59,9 +58,9 @@ def test_where_a_filter_turns_over_a_pole_has_passed_infinity(vary):
     """With T < 0 in T s + 1 a pole is unstable that no crossing of the axis brought there."""
     ranges = {"hub_angle.den.0": [-0.1, -0.01, 0.03], "gain": [-1.0, 1.0, 20.0]}
     x, y = (np.array(ranges[each]) for each in vary)
-    found = law_map(LAB, LAW, vary, x, y)
+    found = plane(Loop(LAB, LAW), vary, x, y)
     for i, j in np.ndindex(x.size, y.size):
-        loop = LawLoop(LAB, LAW.having(vary[0], x[i]).having(vary[1], y[j]))
+        loop = Loop(LAB, LAW.having(vary[0], x[i]).having(vary[1], y[j]))
         assert unstable_below(loop, found.band) == found.unstable[j, i]
 
 
@@ -69,7 +68,7 @@ def test_the_gain_that_takes_up_all_waves_of_an_arm_without_a_hub_brings_a_pole_
     """At C = 0 a hub without inertia feels the impedance of an endless beam far right: I sqrt(E rho)."""
     arm = BARE.having(hub_inertia=0.0)
     far = np.array([1e6, 1e7, 1e8], complex) * tfarm.modes(arm, 1).natural_frequency[1]
-    drive, (rate,), _ = LawLoop(arm, Law({"hub_rate": 1.0})).signals.parts(far)
+    drive, (_, rate, _), _ = Loop(arm, Law({"hub_rate": 1.0})).signals.parts(far)
     impedance = arm.link.section.second_moment * np.sqrt(arm.link.youngs_modulus * arm.link.density)
     found = through_infinity(drive, rate)
     assert (found.at, found.change) == (np.inf, -1)  # right of the axis at smaller gains alone, farther right
@@ -80,14 +79,14 @@ def test_the_gain_that_takes_up_all_waves_of_an_arm_without_a_hub_brings_a_pole_
 def test_over_gains_at_the_hub_it_is_their_map():
     K1, K2 = between(-1, 3, 10), between(-2, 2, 12)
     law = Law({"hub_rate": 0.1, "root_moment": 0.1})
-    mine = law_map(LAB, law, ("hub_rate", "root_moment"), K1, K2)
+    mine = plane(Loop(LAB, law), ("hub_rate", "root_moment"), K1, K2)
     np.testing.assert_array_equal(mine.unstable, tfarm.map(LAB, K1, K2).unstable)
 
 
 def test_a_count_by_half_a_box_is_that_of_a_list_of_poles():
     for K1, K2 in ((0.3, 0.3), (0.3, 1.4), (-0.2, 0.5)):
         law = Law.of_gains(HubFeedback(K1=K1, K2=K2))
-        loop = LawLoop(LAB, law)
+        loop = Loop(LAB, law)
         poles = tfarm.closed_loop_poles(LAB, HubFeedback(K1=K1, K2=K2), 9)
         assert unstable_below(loop, poles.box.im_max) == poles.unstable
 
@@ -98,19 +97,19 @@ def test_a_count_by_half_a_box_is_that_of_a_list_of_poles():
 )
 def test_what_is_no_pair_of_numbers_is_refused(vary, key):
     with pytest.raises(ParameterError) as error:
-        law_map(LAB, LAW, vary, between(0, 1, 3), between(0, 1, 3))
+        plane(Loop(LAB, LAW), vary, between(0, 1, 3), between(0, 1, 3))
     assert error.value.key == key
 
 
 def test_the_command_writes_what_the_map_says(capsys, tmp_path, monkeypatch):
-    remember(monkeypatch, import_module("tfarm.loop.law_map"), "law_map")  # two commands ask for the same
+    remember(monkeypatch, import_module("tfarm.loop.plane"), "plane")  # two commands ask for the same
     text = "[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
     (tmp_path / "law.toml").write_text(text)
     ranges = ("--vary", "gain=0,9", "--vary", "delay=0,0.03", "--points", "3")
     code, out, err = run(capsys, "map", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), *ranges, "--json")
     assert (code, err) == (0, "")
     law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
-    found = law_map(LAB, law, ("gain", "delay"), between(0, 9, 3), between(0, 0.03, 3))
+    found = plane(Loop(LAB, law), ("gain", "delay"), between(0, 9, 3), between(0, 0.03, 3))
     assert json.loads(out)["unstable_roots"] == found.unstable.tolist()
     code, out, _ = run(
         capsys, "map", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), *ranges, "--csv", str(tmp_path / "m.csv")
@@ -123,13 +122,13 @@ def test_a_map_around_a_law_s_own_resonance_counts_as_the_verdict_does():
     """Two zeros close to each other turn the phase once around between two points of a contour of even steps."""
     law = Law({"hub_angle": 1.0, "hub_rate": 0.3, "tip_deflection": ([-100.0], [1.0, 2 * 0.02 * 39.487, 39.487**2])})
     lab, values = tfarm.load("sasaki2012-lab"), np.linspace(0.9, 1.1, 3)
-    assert law_stability(lab, law).is_stable
-    assert law_map(lab, law, ("hub_angle", "tip_deflection.num.0"), values, values).stable.all()
+    assert stability(lab, law).is_stable
+    assert plane(Loop(lab, law), ("hub_angle", "tip_deflection.num.0"), values, values).stable.all()
 
 
 def test_a_map_whose_counts_do_not_hold_at_its_corners_is_refused(monkeypatch):
     """As if a pair had come into the band through its top, on the way to the last corner."""
-    module = import_module("tfarm.loop.law_map")
+    module = import_module("tfarm.loop.plane")
     counted = module.unstable_below
 
     def other(loop, band):
@@ -139,7 +138,7 @@ def test_a_map_whose_counts_do_not_hold_at_its_corners_is_refused(monkeypatch):
 
     monkeypatch.setattr(module, "unstable_below", other)
     with pytest.raises(ConvergenceError, match=r"at gain = 20, hub_angle.den.1 = 3 .* ask for a smaller range"):
-        law_map(LAB, LAW, ("gain", "hub_angle.den.1"), np.array([1.0, 5.0, 20.0]), np.array([0.5, 1.0, 3.0]))
+        plane(Loop(LAB, LAW), ("gain", "hub_angle.den.1"), np.array([1.0, 5.0, 20.0]), np.array([0.5, 1.0, 3.0]))
 
 
 def test_where_two_poles_meet_at_rest_their_count_goes_on_as_the_lag_says():

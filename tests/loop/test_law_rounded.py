@@ -13,8 +13,8 @@ from scipy.optimize import minimize_scalar
 import tfarm
 from tests.shared import thinned
 from tfarm.loop.law_locus import inside, law_locus
-from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_rounded import rounded_law_locus
+from tfarm.loop.loop import Loop
 
 LAB = tfarm.load("sasaki2012-lab")
 LAW = tfarm.Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
@@ -29,7 +29,7 @@ def stationary(low, high, sign):
     """Where the gain of a real pole is largest (sign 1) or least between two, and that gain."""
 
     def size(s):
-        return -sign * float(-1.0 / LawLoop(LAB, LAW).loop_function(np.array([complex(s)]))[0].real)
+        return -sign * float(-1.0 / Loop(LAB, LAW).loop_function(np.array([complex(s)]))[0].real)
 
     found = minimize_scalar(size, bounds=(low, high), method="bounded", options={"xatol": 1e-10})
     return float(found.x), -sign * float(found.fun)
@@ -72,5 +72,5 @@ def test_every_value_between_has_poles_on_every_branch():
     """The residual 1 + L of each, and of the meeting, where it is of second order."""
     fine = drawn(1.0, 8.0, 8)
     for n in range(0, fine.values.size, 7):
-        loop = LawLoop(LAB, LAW.having("gain", float(fine.values[n])))
+        loop = Loop(LAB, LAW.having("gain", float(fine.values[n])))
         assert abs(1 + loop.loop_function(fine.branches[np.isfinite(fine.branches[:, n]), n])).max() < 1e-6

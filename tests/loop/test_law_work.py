@@ -11,9 +11,9 @@ from tests.loop.law_times import of_margins, some_case
 from tests.shared import sized, thinned
 from tfarm import Law
 from tfarm.errors import ConvergenceError
-from tfarm.loop.law_loop import LawLoop
-from tfarm.loop.law_map import unstable_below
-from tfarm.loop.law_poles import law_poles_below
+from tfarm.loop.family import unstable_below
+from tfarm.loop.loop import Loop
+from tfarm.loop.poles import poles_below
 from tfarm.response.signals import Signals
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -46,10 +46,10 @@ def test_a_count_without_a_list_is_that_of_the_list(number):
         arm = some_loop(rng)[0]
         if not arm.least_damping:
             continue
-        loop = LawLoop(arm, some_law(rng, arm, delay=some_delay(rng, arm)))
+        loop = Loop(arm, some_law(rng, arm, delay=some_delay(rng, arm)))
         band = float(tfarm.modes(arm, 9).natural_frequency[-2:].mean())
         try:
-            poles = law_poles_below(loop, band)
+            poles = poles_below(loop, band)
         except ConvergenceError:
             continue
         assert unstable_below(loop, poles.box.im_max) == poles.unstable
@@ -61,7 +61,7 @@ def test_a_count_next_to_a_law_s_slow_poles_is_right():
     """Three within a millionth of the lowest frequency, and a hub that turns freely: all in one step of a grid."""
     slow = 1e-6 * tfarm.modes(LAB, 1).natural_frequency[-1]
     law = Law({"hub_rate": {"zeros": [0.0] * 3, "poles": [slow, slow * (1 + 1j), slow * (1 - 1j)], "gain": 0.3}})
-    loop = LawLoop(LAB, law)
+    loop = Loop(LAB, law)
     near = loop.law.times(1e-9)  # as good as no feedback: its own poles, three of them right of the axis
     assert unstable_below(loop.under(near), 300.0) == 3
 
@@ -73,7 +73,7 @@ def test_integrators_of_two_signals_leave_the_third_its_zeros_at_rest():
         "root_moment": ([0.3, 5.0], [1.0, 0.0]),
         "tip_acceleration": ([0.3, 5.0], [1.0, 7.0, 0.0]),
     })  # fmt: skip
-    loop = LawLoop(LAB, law)
+    loop = Loop(LAB, law)
     assert loop.zeros_at_origin == 2
     at = loop.function(1e-5 * np.array([1j, 0.5j]))
     farther, nearer = at.value * np.exp(at.scale)

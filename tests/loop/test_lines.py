@@ -13,9 +13,9 @@ from tests.loop.ritz_loop import RitzLoop
 from tfarm import Arm, Hub, HubFeedback, Payload
 from tfarm.loop.frequencies import grid, steep_places
 from tfarm.loop.lines import Line, along, crossing_at_zero, line_crossings
-from tfarm.loop.plant import Loop
+from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
-from tfarm.loop.stability import loop_band
+from tfarm.loop.stability import band_of_loop
 
 LAB = tfarm.load("sasaki2012-lab")
 
@@ -40,7 +40,7 @@ EMPTY = {(LAB, "Kp"), (held(), "K2"), (held(), "Kp")}
 def test_at_each_crossing_a_pole_of_that_frequency_is_on_the_axis_and_goes_the_way_it_says(arm, name) -> None:
     law = HubFeedback(K1=0.3 if arm is not window_arm() else 1.0, K2=-9.0)
     line = along(name, law)
-    band = loop_band(Loop(arm, law))[0]
+    band = band_of_loop(Loop(arm, law))[0]
     found = [each for each in line_crossings(arm, line, band) if each.at and abs(each.t) < 1e9][:6]
     assert bool(found) != ((arm, name) in EMPTY)
     for each in found:
@@ -75,7 +75,7 @@ def test_no_crossing_is_missed_the_count_steps_as_they_say() -> None:
         K1, K2, Kp = some_gains(rng, arm, 2)
         law, model = HubFeedback(K1=float(K1[-1]), K2=float(K2[0]), Kp=Kp), RitzLoop(arm, 20)
         line = along("K2", law)
-        found = line_crossings(arm, line, loop_band(Loop(arm, line.at(-25.0)))[0])
+        found = line_crossings(arm, line, band_of_loop(Loop(arm, line.at(-25.0)))[0])
         for low, high in ((-25.0, -3.0), (-3.0, 0.5), (0.5, 4.0)):
             counts = [int((model.eigenvalues(line.at(t)).real > 0).sum()) for t in (low, high)]
             assert counts[1] - counts[0] == sum(each.change for each in found if low < each.t < high)

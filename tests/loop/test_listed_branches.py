@@ -4,8 +4,8 @@ import numpy as np
 
 from tfarm import Arm, HubFeedback, Link, Payload, Section
 from tfarm.arm import Hub
-from tfarm.loop.closed import closed_loop_poles
 from tfarm.loop.locus import locus
+from tfarm.loop.poles import closed_loop_poles
 
 TUBE = Section.tube(outer_diameter=0.0056, inner_diameter=0.0038)
 PLASTIC = Arm(  # a hub of next to no inertia and a heavy tip: K1 makes mode 1 two real poles at once

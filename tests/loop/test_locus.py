@@ -13,11 +13,12 @@ from tests.loop.arms import window_arm, with_damping
 from tests.shared import thinned
 from tfarm import Hub, HubFeedback, ParameterError, Payload
 from tfarm.cli import main
+from tfarm.exact.characteristic import gains_of
 from tfarm.loop import reduced_locus as reduced_locus_room
 from tfarm.loop.branches import rigid_pair
-from tfarm.loop.lines import along, line_crossings
+from tfarm.loop.lines import along, effective_inertia, line_crossings
 from tfarm.loop.locus import _gaps, frame, locus, rounded
-from tfarm.loop.plant import Loop, effective_inertia
+from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.spectrum.damped import damped_modes
@@ -153,7 +154,7 @@ def test_the_known_edge_of_the_lab_arm_to_its_last_digits():
     side = []
     for K2 in (found.gain * (1 - 1e-13), found.gain * (1 + 1e-13)):
         loop = Loop(LAB, HubFeedback(K1=0.3, K2=K2))
-        disc = enclosed(loop.k, 1j * found.omega, 30, loop.gains)
+        disc = enclosed(loop.k, 1j * found.omega, 30, gains_of(loop.k, loop.gains))
         assert found.omega == pytest.approx(float(disc.im), rel=1e-12)
         side.append(float(disc.re))
     assert side[0] < 0 < side[1]

@@ -11,9 +11,10 @@ from tests.loop.arms import some_loop, window_arm, with_damping
 from tests.shared import thinned
 from tests.spectrum.damped_roads import newton_step
 from tfarm import Hub, HubFeedback, ParameterError, Payload
+from tfarm.exact.characteristic import gains_of
+from tfarm.loop.loop import Loop
 from tfarm.loop.lyapunov import lyapunov
-from tfarm.loop.plant import Loop
-from tfarm.loop.poles import poles_below, poles_of_gains
+from tfarm.loop.poles import closed_loop_poles, poles_below
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.enclose import enclosed
 
@@ -26,7 +27,7 @@ def law(K1=0.3, K2=0.3, Kp=0.0):
 
 
 def unstable(arm, feedback, count=8):
-    return poles_of_gains(arm, feedback, count).unstable
+    return closed_loop_poles(arm, feedback, count).unstable
 
 
 # ------------------------------------------------------------ the proven region and the exact one
@@ -43,7 +44,7 @@ def test_weights_prove_every_K2_below_one(K2: float) -> None:
 def test_without_K1_V_is_constant() -> None:
     found = lyapunov(ARM, law(K1=0.0))
     assert (found.proven, found.kind, found.a1_over_a2) == (True, "conserved", 0.7)
-    poles = poles_of_gains(ARM, law(K1=0.0), 8)
+    poles = closed_loop_poles(ARM, law(K1=0.0), 8)
     assert abs(poles.values.real).max() < 1e-12 * abs(poles.values).max()
 
 
@@ -94,7 +95,7 @@ def test_a_negative_spring_is_proven_up_to_the_stiffness_of_a_held_tip() -> None
 
 
 def test_K2_of_one_leaves_the_modes_of_the_held_hub_undamped() -> None:
-    poles = poles_of_gains(ARM, law(K2=1.0), 10)
+    poles = closed_loop_poles(ARM, law(K2=1.0), 10)
     held = tfarm.modes(replace(ARM, hub=Hub(inertia=math.inf)), 8).natural_frequency
     np.testing.assert_allclose(poles.values[2:], 1j * held, rtol=1e-13)
     assert poles.values[1] == pytest.approx(-0.3 / ARM.hub.inertia, rel=1e-13)  # the hub by itself
@@ -114,7 +115,7 @@ def test_beyond_one_every_flexible_mode_is_unstable(K2: float) -> None:
 
 
 def test_one_of_them_is_proven_to_the_right_in_balls() -> None:
-    discs = poles_of_gains(ARM, law(K2=1.001), 6).certify(25)
+    discs = closed_loop_poles(ARM, law(K2=1.001), 6).certify(25)
     right = [float(disc.re) > float(disc.radius) for disc in discs if not disc.is_real]
     assert len(right) == 4
     assert all(right)
@@ -123,7 +124,7 @@ def test_one_of_them_is_proven_to_the_right_in_balls() -> None:
 def test_far_beyond_one_a_real_pole_is_unstable_even_without_K1() -> None:
     J, I_h = ARM.total_inertia, ARM.hub.inertia
     edge = 1 + I_h / (J - I_h)
-    below, above = (poles_of_gains(ARM, law(K1=0.0, K2=edge + d), 6) for d in (-1e-3, 1e-3))
+    below, above = (closed_loop_poles(ARM, law(K1=0.0, K2=edge + d), 6) for d in (-1e-3, 1e-3))
     assert below.unstable == 0
     real = above.values[(above.values.imag == 0) & (above.values.real > 0)]
     assert above.unstable == real.size == 1
@@ -144,11 +145,11 @@ def test_counterexample_at_positive_damping(K2: float, expected: int) -> None:
 
 
 def test_the_unstable_root_of_the_counterexample() -> None:
-    poles = poles_of_gains(window_arm(), law(K1=1.0, K2=-10.0), 8)
+    poles = closed_loop_poles(window_arm(), law(K1=1.0, K2=-10.0), 8)
     (root,) = poles.values[poles.values.real > 1]
     assert root == pytest.approx(24.7 + 35236j, abs=0.5)
     assert newton_step(window_arm(), root, K1=1.0, K2=-10.0) < 1e-14  # the paper's determinant, hub row changed
-    disc = enclosed(poles.loop.k, complex(root), 20, poles.loop.gains)
+    disc = enclosed(poles.loop.k, complex(root), 20, gains_of(poles.loop.k, poles.loop.gains))
     assert float(disc.re) == pytest.approx(root.real, rel=1e-9)
 
 

@@ -7,9 +7,8 @@ import pytest
 
 import tfarm
 from tfarm import Hub, HubFeedback, Law, Payload
-from tfarm.loop.law_loop import LawLoop
+from tfarm.loop.loop import Loop
 from tfarm.loop.nyquist import compressed, poles_on_axis
-from tfarm.loop.plant import Loop
 
 LAB = tfarm.load("sasaki2012-lab")
 ARMS = {
@@ -41,7 +40,7 @@ def test_the_plane_is_drawn_in_a_disc():
 @pytest.mark.parametrize("w", [0.2, 20.0])
 def test_an_undamped_pole_of_the_law_is_one_of_the_loop_however_slow(w):
     """Beside it, nearer by a factor of ten, |L| is ten times as large."""
-    loop = LawLoop(LAB, Law({"hub_rate": ([0.3, 0.0], [1.0, 0.0, w * w])}))
+    loop = Loop(LAB, Law({"hub_rate": ([0.3, 0.0], [1.0, 0.0, w * w])}))
     near = abs(loop.loop_function(1j * w * (1 + 1e-6 * np.array([10.0, 1.0]))))
     assert near[1] == pytest.approx(10 * near[0], rel=1e-3)
     assert abs(poles_on_axis(loop, 100.0) - w).min() < 1e-12 * w

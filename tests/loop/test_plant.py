@@ -9,8 +9,9 @@ import pytest
 import tfarm
 from tests.loop.arms import some_loop
 from tfarm import Hub, HubFeedback, ParameterError
-from tfarm.loop.plant import Loop, effective_inertia
-from tfarm.loop.poles import poles_of_gains
+from tfarm.loop.lines import effective_inertia
+from tfarm.loop.loop import Loop
+from tfarm.loop.poles import closed_loop_poles
 
 ARM = tfarm.load("sasaki2012")
 
@@ -29,7 +30,7 @@ def test_where_there_is_no_loop(inertia: float, law, words: str) -> None:
 
 
 def test_a_pin_without_inertia_may_be_damped() -> None:
-    poles = poles_of_gains(replace(ARM, hub=Hub(inertia=0.0)), HubFeedback(K1=0.3), 5)
+    poles = closed_loop_poles(replace(ARM, hub=Hub(inertia=0.0)), HubFeedback(K1=0.3), 5)
     assert poles.unstable == 0
 
 
@@ -51,7 +52,7 @@ def test_slow_torque_turns_the_effective_inertia(K2: float, radius: float) -> No
     """The slow real pole tends to -K1/J_eff as K1 -> 0; a gauge on a hub's rim does not read all that the hub turns."""
     arm, misses = replace(ARM, hub=replace(ARM.hub, radius=radius)), []
     for K1 in (1e-2, 1e-3):
-        slow = poles_of_gains(arm, HubFeedback(K1=K1, K2=K2), 6).moving
+        slow = closed_loop_poles(arm, HubFeedback(K1=K1, K2=K2), 6).moving
         slow = slow[abs(slow).argmin()].real
         misses.append(abs(slow * effective_inertia(arm, HubFeedback(K2=K2)) / -K1 - 1))
     assert misses[1] < 1e-3

@@ -15,11 +15,11 @@ from tests.shared import thinned
 from tfarm import Hub, HubFeedback
 from tfarm.errors import ParameterError
 from tfarm.loop.answers import map_answer
-from tfarm.loop.plant import Loop
+from tfarm.loop.loop import Loop
+from tfarm.loop.plane import INFINITE, between, gain_map, ranges_of
 from tfarm.loop.poles import poles_below
-from tfarm.loop.regions import INFINITE, between, ranges_of, region
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import gain_windows
+from tfarm.loop.windows import windows_of
 from tfarm.spectrum.scales import default_gains
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -36,7 +36,7 @@ def model_counts(arm, K1, K2, Kp, terms):
 @pytest.mark.parametrize("Kp", thinned([0.0, 3.0, -0.5], 2))
 def test_counts_of_the_lab_arm_are_those_of_an_independent_model(Kp) -> None:
     K1, K2 = between(-1, 3, 5), between(-2, 2.5, 6)
-    found = region(LAB, K1, K2, HubFeedback(Kp=Kp))
+    found = gain_map(LAB, K1, K2, Kp)
     there = model_counts(LAB, K1, K2, Kp, 10)
     low = np.array([
         [poles_below(Loop(LAB, HubFeedback(K1=float(a), K2=float(b), Kp=Kp)), found.band).unstable for a in K1]
@@ -50,7 +50,7 @@ def test_counts_of_the_lab_arm_are_those_of_an_independent_model(Kp) -> None:
 def test_counts_of_a_held_arm_step_where_its_stiffness_vanishes(Kp) -> None:
     """At K1 < 0 the real pole goes the other way there than at K1 > 0."""
     K1, K2 = between(-6, 6, 5), between(-2, 3, 9)
-    found = region(held(1e-3), K1, K2, HubFeedback(Kp=Kp))
+    found = gain_map(held(1e-3), K1, K2, Kp)
     np.testing.assert_array_equal(found.unstable, model_counts(held(1e-3), K1, K2, Kp, 10))
 
 
@@ -59,7 +59,7 @@ def test_a_column_without_rate_feedback_steps_where_the_effective_inertia_vanish
     J = LAB.total_inertia
     limit = J / (J - LAB.hub.inertia)
     K2 = np.array([-20.0, -2.0, 0.5, limit * (1 - 1e-6), limit * (1 + 1e-6), 40.0])
-    found = region(LAB, np.array([-0.5, 0.0, 0.5]), K2)
+    found = gain_map(LAB, np.array([-0.5, 0.0, 0.5]), K2)
     counted = [[stability(LAB, HubFeedback(K1=a, K2=float(b))).unstable_roots for a in (-0.5, 0.0, 0.5)] for b in K2]
     assert found.unstable.tolist() == counted
     assert found.unstable[4, 1] == found.unstable[3, 1] + 1
@@ -68,7 +68,7 @@ def test_a_column_without_rate_feedback_steps_where_the_effective_inertia_vanish
 
 def test_the_window_at_negative_k2_is_on_the_map() -> None:
     K2 = np.array([-13.0, -11.48, -11.46, -10.0, -8.49, -8.47, -5.0, 0.0, 1.0, 1.03])
-    found = region(window_arm(), np.array([0.5, 1.0]), K2)
+    found = gain_map(window_arm(), np.array([0.5, 1.0]), K2)
     assert found.unstable[:, 1].tolist() == [0, 0, 2, 2, 2, 0, 0, 0, 0, 2]
     close = found.boundary[abs(found.boundary[:, 0] - 1.0) < 40.0]
     assert abs(close[:, 1] + 8.483).min() < 0.1
@@ -78,18 +78,18 @@ def test_columns_and_rows_are_cut_where_the_windows_of_each_gain_end() -> None:
     law = HubFeedback(K1=1.0, K2=-5.0)
     verdict = stability(window_arm(), law)
     K2 = np.linspace(-49.9, 3.0, 400)
-    found = region(window_arm(), np.array([1.0, 2.0]), K2)
-    of_K2 = gain_windows(verdict, "K2").all
+    found = gain_map(window_arm(), np.array([1.0, 2.0]), K2)
+    of_K2 = windows_of(verdict, ["K2"])["K2"].all
     assert found.stable[:, 0].tolist() == [any(a < value < b for a, b in of_K2) for value in K2]
     K1 = np.linspace(-2e3, 4e4, 300)
-    found = region(window_arm(), K1, np.array([-10.0, -5.0]))
-    of_K1 = gain_windows(stability(window_arm(), replace(law, K2=-10.0)), "K1").all
+    found = gain_map(window_arm(), K1, np.array([-10.0, -5.0]))
+    of_K1 = windows_of(stability(window_arm(), replace(law, K2=-10.0)), ["K1"])["K1"].all
     assert found.stable[0].tolist() == [any(a < value < b for a, b in of_K1) for value in K1]
 
 
 @pytest.mark.parametrize("arm", [LAB, window_arm()], ids=["lab", "window"])
 def test_every_point_of_the_boundary_puts_a_pole_on_the_axis(arm) -> None:
-    found = region(arm, between(0.1, 3, 4), between(-20, 2, 4))
+    found = gain_map(arm, between(0.1, 3, 4), between(-20, 2, 4))
     inside = found.boundary[(abs(found.boundary[:, 0]) < 1e4) & (abs(found.boundary[:, 1]) < 100)][::37]
     assert len(inside) > 5
     for K1, K2, omega in inside:
@@ -100,18 +100,18 @@ def test_every_point_of_the_boundary_puts_a_pole_on_the_axis(arm) -> None:
 
 def test_at_no_damping_the_plane_is_cut_by_two_lines() -> None:
     K1, K2 = between(-2, 2, 6), between(-1, 3, 8)
-    found = region(BARE, K1, K2)
+    found = gain_map(BARE, K1, K2)
     same = np.sign(K1)[None, :] == np.sign(1 - K2)[:, None]
     np.testing.assert_array_equal(found.unstable == INFINITE, ~same)
     np.testing.assert_array_equal(found.stable, (K1 > 0)[None, :] & (K2 < 1)[:, None])
     assert found.boundary.size == 0
 
 
-@pytest.mark.parametrize("arm", [BARE, RIGS["r = 0.05"]], ids=["bare", "r = 0.05"])
+@pytest.mark.parametrize("arm", [BARE], ids=["bare"])
 def test_on_the_lines_where_nothing_damps_each_point_has_the_count_and_verdict_of_its_loop(arm) -> None:
     """K1 = 0 and K2 = 1: every pole may lie on the axis there, and none be unstable."""
     K1, K2 = np.array([-0.3, 0.0, 0.3]), np.array([0.5, 1.0, 1.5])
-    found = region(arm, K1, K2)
+    found = gain_map(arm, K1, K2)
     assert (found.unstable[0, 1], found.unstable[1, 1], found.stable[0, 1]) == (0, 0, False)
     for (j, i), count in np.ndenumerate(found.unstable):
         there = stability(arm, HubFeedback(K1=float(K1[i]), K2=float(K2[j])))
@@ -125,7 +125,7 @@ NO_DAMPING = [(BARE, -2.0), (held(0.0), -30.0), (BARE, 0.0), (held(0.0), 5.0), (
 @pytest.mark.parametrize(("arm", "Kp"), thinned(NO_DAMPING, 3))
 def test_at_no_damping_finite_counts_are_those_of_a_verdict_at_each_point(arm, Kp) -> None:
     K1, K2 = between(-5, 5, 4), between(-2, 5, 5)
-    found = region(arm, K1, K2, HubFeedback(Kp=Kp))
+    found = gain_map(arm, K1, K2, Kp)
     for (j, i), count in np.ndenumerate(found.unstable):
         there = stability(arm, HubFeedback(K1=float(K1[i]), K2=float(K2[j]), Kp=Kp))
         assert count == (INFINITE if there.unstable_roots_infinite else there.unstable_roots)
@@ -141,7 +141,7 @@ def test_the_middle_of_a_range_around_0_is_0_and_not_next_to_it() -> None:
         assert np.diff(gains) == pytest.approx((high - low) / number, rel=1e-12)
         assert abs(gains[gains != 0]).min() > 0.01 * (high - low) / number
     columns = between(-2.1, 0.7, 6)
-    found = region(BARE, columns, np.array([0.0, 0.5]))
+    found = gain_map(BARE, columns, np.array([0.0, 0.5]))
     assert columns[4] == 0
     assert not found.stable[:, :5].any()
     assert found.stable[:, 5:].all()
@@ -149,7 +149,7 @@ def test_the_middle_of_a_range_around_0_is_0_and_not_next_to_it() -> None:
 
 def test_a_range_of_k1_that_ends_at_zero_counts_as_one_that_goes_beyond() -> None:
     K2 = np.array([-1.0, 0.5])
-    upto, beyond = (region(LAB, np.array(K1), K2).unstable[:, :2] for K1 in ([-1.0, -0.5, 0.0], [-1.0, -0.5, 0.5]))
+    upto, beyond = (gain_map(LAB, np.array(K1), K2).unstable[:, :2] for K1 in ([-1.0, -0.5, 0.0], [-1.0, -0.5, 0.5]))
     np.testing.assert_array_equal(upto, beyond)
 
 
@@ -159,7 +159,7 @@ def test_points_are_the_middles_of_equal_parts() -> None:
 
 def test_the_answer_holds_the_boundary_inside_the_map_to_its_very_corner() -> None:
     """Every point of it that lies in the rectangle of the two ranges, and no other."""
-    found = region(LAB, np.linspace(0.0, 20.0, 3), np.linspace(-0.5, 1.5, 3))
+    found = gain_map(LAB, np.linspace(0.0, 20.0, 3), np.linspace(-0.5, 1.5, 3))
     answer = map_answer(found)
     K1, K2 = found.boundary[:, 0], found.boundary[:, 1]
     inside = (K1 >= 0.0) & (K1 <= 20.0) & (K2 >= -0.5) & (K2 <= 1.5)
@@ -174,26 +174,26 @@ def test_the_answer_holds_the_boundary_inside_the_map_to_its_very_corner() -> No
 )
 def test_an_empty_or_unordered_range_is_refused(K1) -> None:
     with pytest.raises(ParameterError, match="K1"):
-        region(LAB, K1, np.array([0.0, 1.0]))
+        gain_map(LAB, K1, np.array([0.0, 1.0]))
 
 
 def test_where_there_is_no_loop_there_is_no_map() -> None:
     gains = np.array([0.1, 0.2])
     for inertia in (0.0, math.inf):
         with pytest.raises(ParameterError):
-            region(replace(LAB, hub=Hub(inertia=inertia)), gains, gains)
+            gain_map(replace(LAB, hub=Hub(inertia=inertia)), gains, gains)
 
 
 def test_the_intervals_of_a_column_are_the_windows_along_it() -> None:
     """Road: `gain_windows`, from a verdict of its own; between the edges the map's own counts."""
-    plane = region(LAB, np.array([0.05, 0.3, 2.0]), np.linspace(-2.0, 1.5, 29))
+    plane = gain_map(LAB, np.array([0.05, 0.3, 2.0]), np.linspace(-2.0, 1.5, 29))
     for n, (K1, column) in enumerate(zip(plane.K1, plane.stable_intervals, strict=True)):
-        windows = gain_windows(stability(LAB, HubFeedback(K1=float(K1), K2=0.1)), "K2").all
+        windows = windows_of(stability(LAB, HubFeedback(K1=float(K1), K2=0.1)), ["K2"])["K2"].all
         cut = [(max(low, -2.0), min(high, 1.5)) for low, high in windows if low < 1.5 and high > -2.0]
         np.testing.assert_allclose(column, cut, rtol=1e-9)
         inside = [any(low < K2 < high for low, high in column) for K2 in plane.K2[1:-1]]
         np.testing.assert_array_equal(inside, plane.unstable[1:-1, n] == 0)
-    (right,) = region(LAB.having(damping=0.0), np.array([0.1, 0.3]), np.linspace(-1.0, 2.0, 5)).stable_intervals[1]
+    (right,) = gain_map(LAB.having(damping=0.0), np.array([0.1, 0.3]), np.linspace(-1.0, 2.0, 5)).stable_intervals[1]
     assert right == (-1.0, 1.0)
 
 
@@ -201,7 +201,7 @@ def test_without_damping_the_intervals_of_a_held_arm_end_where_it_falls_statical
     """An angle pushed away by less than the arm's own stiffness: the map's counts tell the same, point by point."""
     held = BARE.having(payload_mass=math.inf)
     assert held.is_undamped
-    plane = region(held, np.array([-0.3, 0.3]), np.linspace(-2.5, 1.9, 41), HubFeedback(Kp=-150.0))
+    plane = gain_map(held, np.array([-0.3, 0.3]), np.linspace(-2.5, 1.9, 41), -150.0)
     for n, column in enumerate(plane.stable_intervals):
         inside = [any(low < K2 < high for low, high in column) for K2 in plane.K2[1:-1]]
         np.testing.assert_array_equal(inside, plane.unstable[1:-1, n] == 0)

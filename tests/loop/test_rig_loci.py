@@ -13,7 +13,7 @@ from tfarm import Hub
 from tfarm.arm import Attachment, Motor
 from tfarm.loop.lines import along, line_crossings
 from tfarm.loop.locus import locus
-from tfarm.loop.plant import Loop
+from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.spectrum.scales import default_gains
@@ -49,7 +49,7 @@ def test_branches_are_poles_of_the_elements_and_all_of_a_box(name, vary):
     for n in (0, 4, 8):
         zeros = found.branches[:, n]
         loop = found.variation.at(float(found.gain[n]))
-        theirs = model.eigenvalues(loop.law)
+        theirs = model.eigenvalues(loop.gains)
         for zero in zeros[(zeros != 0) & (abs(zeros) < model.up_to / 2)]:
             assert abs(theirs - zero).min() < 1e-7 * abs(zero) + 1e-9 * model.a  # their own 0 is off by so much
         box = poles_below(loop, zeros.imag.max() * (1 + 1e-6))

@@ -8,7 +8,7 @@ import tfarm
 from tests.shell import run
 from tfarm.loop.answers import margins_answer
 from tfarm.loop.lines import along, line_crossings
-from tfarm.loop.margins import margins_of_gains
+from tfarm.loop.margins import margins
 from tfarm.spectrum.scales import default_gains
 
 
@@ -16,7 +16,7 @@ def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():
     """Elastic links: each higher mode is driven by less; the answer names the band, which a higher one undercuts."""
     arm = tfarm.load("quanser-flexlink")
     law = default_gains(arm)
-    found = margins_of_gains(arm, law)
+    found = margins(arm, law)
     answer = margins_answer(found)
     assert "some may cross inside them" in answer["windows_note"]
     band = answer["K2_band_rad_s"]
@@ -34,6 +34,6 @@ def test_the_table_says_so_too(capsys):
 @pytest.mark.parametrize(("name", "reach"), [("sasaki2012", math.inf), ("sasaki2012-lab", None)])
 def test_where_all_is_known_nothing_is_said(name, reach):
     arm = tfarm.load(name)
-    answer = margins_answer(margins_of_gains(arm, default_gains(arm)))
+    answer = margins_answer(margins(arm, default_gains(arm)))
     assert answer["windows_note"] is None
     assert reach in (None, answer["K2_band_rad_s"])

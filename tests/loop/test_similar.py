@@ -11,8 +11,8 @@ from tests.rigs import some_rig
 from tests.shared import thinned
 from tests.similar import EITHER, TORQUE
 from tfarm import HubFeedback
-from tfarm.loop.margins import margins_of_gains
-from tfarm.loop.regions import region
+from tfarm.loop.margins import margins
+from tfarm.loop.plane import gain_map
 from tfarm.spectrum.scales import default_gains
 
 LAB, STOCKY, MOTOR = (tfarm.load(name) for name in ("sasaki2012-lab", "stocky-steel", "quanser-flexlink"))
@@ -61,7 +61,7 @@ def apart(here, there, units):
 
 def differing(arm, law, units):
     """What is not the same of verdict, windows and margins of the loop and of that in other units."""
-    here, there = margins_of_gains(arm, law), margins_of_gains(units.arm(arm), units.law(arm, law))
+    here, there = margins(arm, law), margins(units.arm(arm), units.law(arm, law))
     same = {name: getattr(here.stability, name) == getattr(there.stability, name) for name in TOLD}
     for name, windows in here.windows.items():
         unit = units.law(arm, HubFeedback(**{name: 1.0}))[name]
@@ -91,9 +91,9 @@ def test_random_rigs_have_the_same_margins(seed):
 @pytest.mark.parametrize("arm", [LAB, CLAMP], ids=lambda arm: arm.name)
 def test_a_map_has_the_same_counts(arm, units):
     K1, K2 = np.linspace(-1.03, 2, 7), np.linspace(-2.04, 2, 8)
-    here = region(arm, K1, K2)
+    here = gain_map(arm, K1, K2)
     unit = units.law(arm, HubFeedback(K1=1.0, K2=1.0))
-    there = region(units.arm(arm), K1 * unit.K1, K2 * unit.K2)
+    there = gain_map(units.arm(arm), K1 * unit.K1, K2 * unit.K2)
     np.testing.assert_array_equal(there.unstable, here.unstable)
     np.testing.assert_allclose(there.boundary[:, 0], here.boundary[:, 0] * unit.K1, rtol=1e-6)
 

@@ -10,13 +10,11 @@ import tfarm
 from tfarm import HubFeedback, Law
 from tfarm.errors import ConvergenceError
 from tfarm.loop import panels, positions
+from tfarm.loop.family import columns, critical, crossed
 from tfarm.loop.law_locus import Family
-from tfarm.loop.law_loop import LawLoop
-from tfarm.loop.law_map import asked_at
 from tfarm.loop.lines import along, crossing_at_zero, line_crossings
+from tfarm.loop.loop import Loop
 from tfarm.loop.margins import dense, minus_loop
-from tfarm.loop.plant import Loop
-from tfarm.loop.regions import _crossings_along_K2
 from tfarm.spectrum.box import Box
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -79,14 +77,16 @@ def test_one_cell_of_a_grid_shows_the_crossing_that_is_in_it():
     for t, at, change in list(line)[:3]:
         if at:
             cell = at * np.array([1 - 1e-3, 1 + 1e-3])
-            (found,) = _crossings_along_K2(LAB, np.array([0.3]), HubFeedback(), cell)
+            loop = Loop(LAB, HubFeedback())
+            lines = columns(loop, ("K1", "K2"), np.array([0.3]), (1.0, 10.0))
+            (found,) = crossed(loop, lines, [("K2", (-10.0, 10.0))], cell, [lambda one=loop: one])
             ((mine, where, step),) = [each for each in found if each.at]
             assert (mine, where, step) == (pytest.approx(t, rel=1e-9), pytest.approx(at, rel=1e-9), change)
 
 
 def test_without_losses_no_law_is_quiet_however_little_it_feeds_back(monkeypatch):
     """At each of its modes |L| is infinite, though between them it is 1e-12: what is exact is not told."""
-    monkeypatch.setattr("tfarm.loop.closed.law_windows", lambda _: {})  # which take longest
+    monkeypatch.setattr("tfarm.loop.margins.windows_of", lambda _: {})  # which take longest
     found = tfarm.margins(BARE, Law({"hub_rate": ([1e-12, 1e-12], [1.0, 2.0])}), band=1000.0)
     assert found.stability.is_stable
     assert found.in_band is not None
@@ -108,7 +108,7 @@ def test_a_crossing_at_0_is_at_0_and_not_below_it(name):
     ],
 )
 def test_a_leading_coefficient_is_asked_about_at_0_where_it_passes_there(name, limits, asked):
-    assert asked_at(name, limits) == asked
+    assert critical(name, limits) == asked
 
 
 def test_models_that_nothing_damps_are_not_unstable_by_rounding():
@@ -125,7 +125,7 @@ def test_a_law_that_differentiates_the_angle_is_one_on_the_rate():
     den, s = [0.01, 1.0], np.array([0.3 + 2j, 40j, 5.0])
     improper = Law({"hub_angle": ([0.1, 1.0, 2.0], den)})
     proper = Law({"hub_rate": ([0.1, 1.0], den), "hub_angle": ([2.0], den)})
-    one, other = (LawLoop(LAB, law).loop_function(s) for law in (improper, proper))
+    one, other = (Loop(LAB, law).loop_function(s) for law in (improper, proper))
     np.testing.assert_allclose(one, other, rtol=1e-12)
 
 
@@ -133,7 +133,5 @@ def test_margins_look_at_what_is_narrow_in_the_law_itself():
     """A notch a ten-millionth wide."""
     w, ratio = 40.0, 1e-7
     law = Law({"hub_rate": ([0.3, 0.0, 0.3 * w * w], [1.0, 2 * ratio * w, w * w])})
-    omega = dense(
-        SimpleNamespace(loop=LawLoop(LAB, law), band=100.0, poles=SimpleNamespace(values=np.empty(0, complex)))
-    )
+    omega = dense(SimpleNamespace(loop=Loop(LAB, law), band=100.0, poles=SimpleNamespace(values=np.empty(0, complex))))
     assert (abs(omega - w) <= 2 * ratio * w).sum() > 5

@@ -13,18 +13,18 @@ from tests.similar import EITHER
 from tfarm import HubFeedback, Law
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop import panels
-from tfarm.loop.answers import poles_answer
+from tfarm.loop.answers import nyquist_answer, poles_answer
 from tfarm.loop.branches import open_pairs
 from tfarm.loop.crossings import BranchCrossing, in_words
 from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
-from tfarm.loop.law_loop import LawLoop
-from tfarm.loop.law_map import law_map
+from tfarm.loop.lines import effective_inertia
 from tfarm.loop.locus import frame
+from tfarm.loop.loop import Loop
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import _nearest_to_one
-from tfarm.loop.nyquist import nyquist_answer, nyquist_table, poles_on_axis
+from tfarm.loop.nyquist import nyquist_table, poles_on_axis
 from tfarm.loop.panels import CHEBYSHEV, loop_panels
-from tfarm.loop.plant import Loop, effective_inertia
+from tfarm.loop.plane import plane
 from tfarm.loop.poles import slow_poles
 from tfarm.loop.stability import stability
 from tfarm.spectrum.scales import rate_unit
@@ -120,7 +120,7 @@ def test_the_stable_edge_is_the_boundary_with_stable_points_on_one_side():
 @pytest.mark.parametrize(("x", "y", "key"), [([1.0, 0.5], [1.0, 2.0], "hub_rate"), ([1.0, 2.0], [1.0, 1.0], "gain")])
 def test_values_of_a_map_that_do_not_ascend_are_refused_by_their_name(x, y, key):
     with pytest.raises(ParameterError) as told:
-        law_map(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3}), ("hub_rate", "gain"), np.array(x), np.array(y))
+        plane(Loop(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3})), ("hub_rate", "gain"), np.array(x), np.array(y))
     assert told.value.key == key
 
 
@@ -197,20 +197,20 @@ def test_slow_poles_are_zeros_of_the_whole_characteristic_function():
     loop = Loop(LAB, law)
     found = slow_poles(loop, 1.0)
     assert found.size == 2
-    at = loop.member.function(found)
+    at = loop.function(found)
     assert (abs(at.value / at.slope) <= 1e-13 * abs(found)).all()
-    rigid = np.roots([effective_inertia(LAB, law), *loop.at_rest])
+    rigid = np.roots([effective_inertia(LAB, law), *loop.at_rest[1::-1]])
     assert 1e-9 < max(min(abs(each / other - 1) for other in rigid) for each in found) < 1e-2
 
 
 def test_a_contour_passes_the_poles_of_a_law_on_the_axis_below_its_band():
     """Where it rings without damping, and its integrator if the rig has no zero there."""
     slow, fast = ([1.0, 0.0, w**2] for w in (30.0, 900.0))
-    loop = LawLoop(LAB, Law({"hub_rate": ([1.0], slow), "root_moment": ([1.0], fast)}))
+    loop = Loop(LAB, Law({"hub_rate": ([1.0], slow), "root_moment": ([1.0], fast)}))
     np.testing.assert_allclose(poles_on_axis(loop, 400.0), [0.0, 30.0], rtol=1e-9)
     np.testing.assert_allclose(poles_on_axis(loop, 1000.0), [0.0, 30.0, 900.0], rtol=1e-9)
     np.testing.assert_allclose(poles_on_axis(loop, 10.0), [0.0])
-    bare = LawLoop(BARE, Law({"root_moment": ([1.0], slow)}))  # finite at rest, where the arm turns
+    bare = Loop(BARE, Law({"root_moment": ([1.0], slow)}))  # finite at rest, where the arm turns
     omega = tfarm.modes(BARE, 3).natural_frequency[1:]
     expected = np.sort([30.0, *omega[omega < 400.0]])
     np.testing.assert_allclose(poles_on_axis(bare, 400.0), expected, rtol=1e-9)

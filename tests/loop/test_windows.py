@@ -14,17 +14,17 @@ from tests.loop.ritz_loop import RitzLoop
 from tests.loop.test_lines import held
 from tests.strategies import some_arm
 from tfarm import Hub, HubFeedback, Payload, Section
-from tfarm.loop.plant import Loop
+from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import gain_windows, looked_at
+from tfarm.loop.windows import looked_at, windows_of
 from tfarm.spectrum.scales import most_gain
 
 LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 
 
 def windows(arm, law, name):
-    return gain_windows(stability(arm, law), name)
+    return windows_of(stability(arm, law), [name])[name]
 
 
 def edge_by_bisection(model, law, name, inside, outside):
@@ -54,8 +54,8 @@ def test_so_it_does_for_any_undamped_arm() -> None:
         arm = some_arm(rng, case, damping=0.0, slenderness=(5, 100))
         K1 = float(10 ** rng.uniform(-3, 3))
         verdict = stability(arm, HubFeedback(K1=K1, K2=float(rng.uniform(-3, 0.99))))
-        assert gain_windows(verdict, "K2").around == pytest.approx((-math.inf, 1.0), abs=1e-9)
-        assert gain_windows(verdict, "K1").around == (0.0, math.inf)
+        assert windows_of(verdict, ["K2"])["K2"].around == pytest.approx((-math.inf, 1.0), abs=1e-9)
+        assert windows_of(verdict, ["K1"])["K1"].around == (0.0, math.inf)
 
 
 def test_the_lab_arm_reaches_a_little_above_one() -> None:
@@ -97,7 +97,7 @@ def test_random_windows_hold_what_the_model_says(seed) -> None:
     law, model = HubFeedback(K1=float(K1[1]), K2=float(K2[1]), Kp=Kp), RitzLoop(arm, 18)
     verdict = stability(arm, law)
     for name in ("K1", "K2", "Kp"):
-        found = gain_windows(verdict, name)
+        found = windows_of(verdict, [name])[name]
         edges = sorted({*found.looked_at, *(each.t for each in found.crossings)})
         for low, high in itertools.pairwise(edges):
             middle = (low + high) / 2

@@ -10,9 +10,9 @@ from tfarm.dsp import load_chain, sampled_loop
 from tfarm.dsp.loci import sampled_loci
 from tfarm.loop.edges import moment_axis, rate_axis
 from tfarm.loop.law_locus import law_locus
-from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_rounded import rounded_law_locus as rounded_law
 from tfarm.loop.locus import locus, rounded
+from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.plots.folded import draw_folded_loci
 from tfarm.plots.laws import draw_law_locus
@@ -128,7 +128,7 @@ def test_a_locus_under_any_law_is_round_too():
         kept = fine.branches[:, fine.values == value]
         assert set(poles[np.isfinite(poles)]) == set(kept[np.isfinite(kept)])
     for n in more[::3]:
-        loop = LawLoop(LAB, law.having("gain", float(fine.values[n])))
+        loop = Loop(LAB, law.having("gain", float(fine.values[n])))
         told = fine.branches[np.isfinite(fine.branches[:, n]), n]
         assert abs(1 + loop.loop_function(told)).max() < 1e-6
     figure = draw_law_locus(found)

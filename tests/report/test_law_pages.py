@@ -4,6 +4,7 @@ import json
 import math
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 import control
@@ -22,7 +23,6 @@ from tfarm.dsp.sampled import sampled_loop
 from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import one_line
 from tfarm.fitting.recording import beside_exact, load_run, overshoot
-from tfarm.loop import closed
 from tfarm.report import law_sampled_section as in_time
 from tfarm.report import making, writing
 from tfarm.report.given_laws import GivenLaw, Subject, on_arm
@@ -75,7 +75,8 @@ def table(section, stem):
 
 
 def test_margins_on_the_page_are_those_of_the_command(capsys, file, given, monkeypatch):
-    monkeypatch.setattr(closed, "law_windows", cache(closed.law_windows))  # of the same loop both times
+    room = import_module("tfarm.loop.margins")
+    monkeypatch.setattr(room, "windows_of", cache(room.windows_of))  # of the same loop both times
     section, found = law_margins_section(LAB, Chain(), given), answer(capsys, "margins", LAB.name, "--law", str(file))
     shown = table(section, "margins")
     exact = dict(zip(shown["quantity"], shown["law_exact"], strict=True))

@@ -148,7 +148,7 @@ def test_a_page_has_the_same_sections_whatever_is_written_with_it(tmp_path, monk
     monkeypatch.setattr(making, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
     for only in (("modes",), ("locus",), ("modes", "locus")):
-        write([HELD], tmp_path, only=only, force=True)
+        write([HELD], tmp_path, only=only)
         ids = {page: [i for i in Links(tmp_path / HELD.name / f"{page}.html").ids if i in ANCHORS] for page in only}
         assert ids == {page: {"modes": ["arm", "modes"], "locus": ["arm", "no-loop"]}[page] for page in only}
 

@@ -18,9 +18,9 @@ from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, load_chain, sampled_verdict
 from tfarm.exact.characteristic import float_units, loop_parts
 from tfarm.exact.system import system_of
-from tfarm.loop.margins import margins_of_gains
+from tfarm.loop.loop import Loop
+from tfarm.loop.margins import margins
 from tfarm.loop.panels import MOST_MISS, loop_panels
-from tfarm.loop.plant import Loop
 from tfarm.loop.stability import stability
 from tfarm.report.given_laws import Subject
 from tfarm.report.live import save_live
@@ -59,7 +59,7 @@ def some_gains(data, seed, number):
 
 
 def test_samples_are_the_parts_of_the_loop_function(case):
-    """Not at the samples, and with gains of every kind: L of the page is that of `Loop`, as closely as L is steep."""
+    """Not at the samples, and with gains of every kind: L of the page is of `Loop`, as closely as L is steep."""
     arm, data, page = case
     omega = np.random.default_rng(3).uniform(1e-3, 1.0, 200) * data["band"]
     for law in some_gains(data, 5, 3):
@@ -102,7 +102,7 @@ def test_margins_are_the_librarys_to_the_printed_digits(case):
     arm, data, page = case
     compared = 0
     for law in some_gains(data, 1, 8):
-        found = margins_of_gains(arm, law, data["band"])
+        found = margins(arm, law, data["band"])
         told = page.verdict(law)
         assert told.startswith("stable") == found.stability.is_stable, law
         if found.in_band is None:

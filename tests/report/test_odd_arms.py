@@ -20,7 +20,7 @@ from tfarm.columns import PAGE
 from tfarm.dsp import Chain
 from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus
-from tfarm.loop.plant import Loop
+from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.report import assumptions_section, loop_laws, loop_section, making
 from tfarm.report.arm_section import arm_section, derived_table

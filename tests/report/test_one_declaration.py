@@ -12,7 +12,7 @@ from tfarm.columns import Table
 from tfarm.loop.answers import plane_table
 from tfarm.loop.loci import branch_columns
 from tfarm.loop.nyquist import nyquist_table
-from tfarm.loop.regions import INFINITE
+from tfarm.loop.plane import INFINITE
 from tfarm.response.answers import bode_answer, roots_table
 from tfarm.tables.files import as_csv, to_json
 

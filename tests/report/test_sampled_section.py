@@ -20,7 +20,7 @@ from tfarm.dsp.loci import sampled_loci
 from tfarm.dsp.modes import mode_table
 from tfarm.dsp.traces import slews, strip_chart
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import gain_windows
+from tfarm.loop.windows import windows_of
 from tfarm.plots.files import save_figure
 from tfarm.plots.regions import draw_overlay
 from tfarm.plots.strip import draw_strip_chart
@@ -48,7 +48,7 @@ def section():
 
 
 def windows(arm, gains=GAINS):
-    return gain_windows(stability(arm, gains), "K2")
+    return windows_of(stability(arm, gains), ["K2"])["K2"]
 
 
 def blocks_of(section):
@@ -104,7 +104,7 @@ def test_the_edges_at_the_default_gains_are_published_ones(section):
 
 def test_without_damping_the_layers_are_nested_at_the_gains_and_say_for_how_many_modes(monkeypatch):
     monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
-    monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
+    monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
     data = stable_regions(PAPER, GAINS, Chain())
     assert [layer.loop.plant.arm.damping for layer in data.sampled] == [1e-4, 1e-6, 0.0]
     assert data.sampled[-1].modes_used == 20
@@ -230,7 +230,7 @@ def test_the_strip_chart_has_steps_delay_and_saturation():
 @pytest.mark.survey
 def test_the_same_bytes_twice(tmp_path, monkeypatch):
     monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
-    monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
+    monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
     loop = sampled_verdict(LAB, GAINS).loop
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
@@ -257,7 +257,7 @@ def test_an_arm_without_a_loop_gets_one_sentence(inertia):
 
 def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
     monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
-    monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
+    monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
     monkeypatch.setattr("tfarm.dsp.verdict.PERIOD_SHARES", (1.0,))
     section = sampled_section(replace(LAB, payload=tfarm.Payload(mass=math.inf)))
     assert "no slew" in section.words[-1]

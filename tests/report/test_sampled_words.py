@@ -17,7 +17,7 @@ from tfarm.dsp.chain import Converters
 from tfarm.dsp.edges import Figure
 from tfarm.dsp.modes import dominant, mode_table
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import gain_windows
+from tfarm.loop.windows import windows_of
 from tfarm.report.sampled_section import grown_words
 from tfarm.report.sampled_words import (
     Sampled,
@@ -54,7 +54,7 @@ def data_of(name, period=0.01):
         damping=SimpleNamespace(is_settled=False, modes=MODES),
         modes=SimpleNamespace(natural_frequency=tfarm.modes(arm, 1).natural_frequency[-1:]),
     )  # fmt: skip
-    windows = gain_windows(stability(arm, gains), "K2")
+    windows = windows_of(stability(arm, gains), ["K2"])["K2"]
     return Sampled(arm, analysis, windows, StableRegions(None, ()), ())
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import tfarm
 from tfarm import Arm, Hub, HubFeedback, Link, Payload, Section
 from tfarm.arm import many_laws
-from tfarm.loop.regions import region
+from tfarm.loop.plane import gain_map
 from tfarm.loop.residual import residual_moment
 from tfarm.spectrum.scales import rate_unit
 from tfarm.synthesis.design import best_gains
@@ -68,7 +68,7 @@ def grids(rng, found):
 
 def least_on(arm, K1, K2):
     """The least residual [N m] of the stable points of a grid; inf where none is."""
-    stable = region(arm, K1, K2).stable
+    stable = gain_map(arm, K1, K2).stable
     a, b = np.meshgrid(K1, K2)
     return float(residual_moment(arm, many_laws(HubFeedback(), K1=a[stable], K2=b[stable]), 2).min(initial=np.inf))
 

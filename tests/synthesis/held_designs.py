@@ -41,7 +41,7 @@ def excess(rng, structures=(TWO_GAINS, *STRUCTURES)):
     law = Law.of_gains(found.law) if isinstance(found.law, HubFeedback) else found.law
     held, radii = HeldLoop(arm, chain.sampling.period, 20), []
     for share in (1 / RESERVE, 1.0, RESERVE):
-        z = held.law_poles(law.times(share))
+        z = held.closed_loop_poles(law.times(share))
         radii.append(abs(z[abs(z - 1) > 1e-7] if structure == TWO_GAINS else z).max())
     return max(radii[0], radii[2]) - 1 - EDGE, radii[1] - 1, f"{arm.name}, {structure}"
 

@@ -48,7 +48,7 @@ class HeldLoop:
         A, B, sense = self.parts
         return np.linalg.eigvals(A - np.outer(B, np.array(law.row) @ sense)).astype(complex)
 
-    def law_poles(self, law):
+    def closed_loop_poles(self, law):
         """Closed-loop poles under any law: eigenvalues of the loop's whole state matrix, block after block."""
         A, B, sense = self.parts
         for row, num, den in blocks(law, self.period):

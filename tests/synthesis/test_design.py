@@ -17,7 +17,7 @@ from tfarm.loop.damping import least_damping
 from tfarm.loop.frequencies import band_of
 from tfarm.loop.lines import NO_FEEDBACK
 from tfarm.loop.margins import loop_margins
-from tfarm.loop.regions import region
+from tfarm.loop.plane import gain_map
 from tfarm.loop.residual import PERIOD_SAMPLES, RISE, TURN, residual_moment
 from tfarm.loop.stability import stability
 from tfarm.synthesis.design import best_gains
@@ -75,7 +75,7 @@ def damping():
 def random_gains(arm, number):
     rng = np.random.default_rng(5)
     K1, K2 = np.sort(rng.uniform(*BOUNDS["K1"], 15)), np.sort(rng.uniform(*BOUNDS["K2"], 15))
-    stable = region(arm, K1, K2).stable
+    stable = gain_map(arm, K1, K2).stable
     a, b = np.meshgrid(K1, K2)
     assert stable.sum() >= number
     return a[stable][:number], b[stable][:number]

@@ -24,7 +24,7 @@ HELD = HeldLoop(LAB, T)
 
 def poles(law):
     """Closed-loop poles by the Galerkin model."""
-    return HELD.law_poles(law)
+    return HELD.closed_loop_poles(law)
 
 
 def loop(law, q):

@@ -1,7 +1,7 @@
 """What is analysed: the arm as frozen records, its TOML file and the presets."""
 
 from tfarm.arm.checks import INPUT_UNITS, INPUTS, THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Input, Theory
-from tfarm.arm.driving import AnyLaw, arm_and_law, as_law, cancelled, must_not_be_algebraic, tracked
+from tfarm.arm.driving import AnyLaw, arm_and_law, as_law, cancelled, full_law, must_not_be_algebraic, tracked
 from tfarm.arm.feedback import (
     ANGLE_GAIN,
     AT_HUB,
@@ -71,6 +71,7 @@ __all__ = [
     "as_law",
     "cancelled",
     "driven",
+    "full_law",
     "implausible",
     "input_words",
     "law_of",

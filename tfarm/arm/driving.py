@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tfarm.arm.feedback import HubFeedback
+from tfarm.arm.feedback import AT_HUB, GAINS, HubFeedback
 from tfarm.arm.law import Law
 from tfarm.arm.records import Arm
 from tfarm.errors import ParameterError
@@ -18,8 +18,19 @@ CANCELLED = 1e-6  # of its size: a zero of the law so near to an unstable pole o
 
 
 def as_law(law: AnyLaw) -> Law:
-    """The law as one of signals, gains at the hub too."""
+    """The law as one of signals, gains at the hub too.  Raises ParameterError for what is no law."""
+    if not isinstance(law, HubFeedback | Law):
+        raise ParameterError(key="law", value=law, remedy="give a HubFeedback or a Law")
     return Law.of_gains(law) if isinstance(law, HubFeedback) else law
+
+
+def full_law(law: AnyLaw) -> Law:
+    """The law as one of signals; gains at the hub as a law on all of their signals, also those with a gain of 0."""
+    gains = as_law(law).gains
+    if gains is None:
+        return as_law(law)
+    entries = {gain.output: gains[gain.name] for gain in GAINS}
+    return Law(entries, name="gains at the hub", references=AT_HUB)
 
 
 def arm_and_law(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
@@ -29,8 +40,7 @@ def arm_and_law(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
     """
     if isinstance(law, HubFeedback):
         return arm, law
-    if not isinstance(law, Law):
-        raise ParameterError(key="law", value=law, remedy="give a HubFeedback or a Law")
+    law = as_law(law)
     if law.input is not None and law.input != arm.input:
         arm = replace(arm, input=law.input)  # type: ignore[arg-type]  # the record refuses what is none
     return arm, law.gains or law

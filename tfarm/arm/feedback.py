@@ -41,6 +41,7 @@ NAMES = tuple(gain.name for gain in LISTED)
 AT_HUB = ("hub_angle", "hub_rate", "root_moment")  # what theorems on the loop are about: gains on these, the first
 assert FED_BACK[: len(AT_HUB)] == AT_HUB
 ON = {gain.output: gain.name for gain in GAINS}  # the name of the gain on each output
+OUTPUT_OF = {name: output for output, name in ON.items()}
 ANGLE_GAIN, RATE_GAIN, MOMENT_GAIN = (ON[output] for output in AT_HUB)
 PLANE = (RATE_GAIN, MOMENT_GAIN)  # the gains of the paper's own law: across and up the map of a loop
 TWO_GAINS = "-".join(PLANE)  # the structure of a law that is these, beside PD, lead, ...
@@ -73,16 +74,6 @@ class HubFeedback:
     def row(self) -> tuple[float, ...]:
         """The gains in the order of `GAINS`: what the outputs in `FED_BACK` are multiplied by."""
         return tuple(self[gain.name] for gain in GAINS)
-
-    @property
-    def is_at_hub(self) -> bool:
-        """Whether hub angle, hub rate and root moment are all that is fed back: what theorems on the loop suppose."""
-        return not self.elsewhere
-
-    @property
-    def elsewhere(self) -> tuple[Gain, ...]:
-        """The entries on other outputs, whose gain is not 0."""
-        return tuple(gain for gain in GAINS if gain.output not in AT_HUB and self[gain.name])
 
     def __getitem__(self, name: str) -> float:
         """The gain of that name."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace, block_of
 from tfarm.arm.checks import INPUTS, check_fields, not_negative, number, positive
-from tfarm.arm.feedback import AT_HUB, GAINS, ON, HubFeedback
+from tfarm.arm.feedback import AT_HUB, GAINS, ON, OUTPUT_OF, HubFeedback
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError, did_you_mean, must_be_known
 from tfarm.records import record
@@ -147,6 +147,12 @@ class Law:
         return any(part.block.excess > 0 for part in self.parts)
 
     @property
+    def is_static(self) -> bool:
+        """Whether it multiplies each signal by a number, at once, and does no more."""
+        plain = all(isinstance(part.block, Rational) and not part.block.order for part in self.parts)
+        return plain and not (self.delay or self.is_discrete or self.is_improper)
+
+    @property
     def poles(self) -> Complex:
         """Its own poles [1/s], or in z."""
         return np.concatenate([np.empty(0, complex), *(part.block.poles for part in self.parts)])
@@ -154,9 +160,7 @@ class Law:
     @property
     def gains(self) -> HubFeedback | None:
         """The law as gains at the hub, where it is no more than that; None where it is."""
-        plain = all(isinstance(part.block, Rational) and not part.block.order for part in self.parts)
-        more = self.delay or self.is_discrete or self.is_improper or not plain
-        if more or not set(self.signals) <= set(ON):
+        if not self.is_static or not set(self.signals) <= set(ON):
             return None
         numbers = self.values(np.zeros(1, complex))[:, 0].real
         return HubFeedback(**{ON[name]: float(each) for name, each in zip(self.signals, numbers, strict=True)})
@@ -260,9 +264,11 @@ class Law:
         """The law with another value of one number.
 
         "delay"; "gain", a factor on everything; "hub_angle" or "hub_angle.gain", a factor on what a signal takes;
-        "hub_angle.num.1", a coefficient, counted from 0.  Raises ParameterError for a key that there is not.
+        "hub_angle.num.1", a coefficient, counted from 0; "K1", "K2" and "Kp" are the gains on the hub's own signals.
+        Raises ParameterError for a key that there is not.
         """
         value = number(key, value, "a finite number")
+        key = OUTPUT_OF.get(key, key)
         if key == "delay":
             return replace(self, delay=value)
         if key == "gain":

@@ -25,7 +25,7 @@ from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
 from tfarm.digits import fixed, general, plain, significant, singly
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import gain_windows
+from tfarm.loop.windows import windows_of
 from tfarm.records import record
 from tfarm.spectrum import modes
 from tfarm.spectrum.scales import default_gains
@@ -103,7 +103,7 @@ def loop_verdicts(study: SectionStudy | HubStudy) -> tuple[LoopVerdict, ...] | N
     for arm in study.arms:
         try:
             found = stability(arm, law)
-            around = (windows := gain_windows(found, MOMENT_GAIN)).around
+            around = (windows := windows_of(found, [MOMENT_GAIN])[MOMENT_GAIN]).around
         except ConvergenceError:
             verdicts.append(LoopVerdict("undecided", None))
             continue

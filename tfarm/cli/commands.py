@@ -167,7 +167,6 @@ def report(
     measured: Annotated[
         list[str] | None, typer.Option("--measured", metavar="OUTPUT/INPUT=FILE", help="lay this over the exact one")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="make pages that are up to date again, too")] = False,
     *,
     gains: Typed,
 ) -> None:
@@ -175,10 +174,6 @@ def report(
 
     With gains, or laws, or a [law] in an arm's file, the pages are about these; else about the default gains.
     """
-    from tfarm.processes import load_beforehand
-
-    if only is None:
-        load_beforehand(["tfarm.report.making"])
     import tfarm
 
     names = arms or tfarm.presets()
@@ -186,7 +181,7 @@ def report(
     chains = [asked_chain(dsp or name, period, delay_samples) for name in names]
     laws = [asked_laws(arm, name, gains, law or []) for arm, name in zip(subjects, names, strict=True)]
     pages = None if only is None else (only,)
-    print(_written(subjects, out, measured or [], chains=chains, laws=laws, only=pages, force=force))
+    print(_written(subjects, out, measured or [], chains=chains, laws=laws, only=pages))
 
 
 def _written(subjects: list[Arm], out: Path, measured: list[str], **asked: Any) -> Path:

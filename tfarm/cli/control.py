@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, TWO_GAINS, HubFeedback
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, TWO_GAINS, as_law
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, plain_number, tell, whole_number
 from tfarm.cli.inputs import Given, HeldAngle, LawFile, Png, asked_law, range_option, under_a_law, with_options
 from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
@@ -58,7 +58,7 @@ def poles(
     law, said = asked_law(subject, given)
     from tfarm.cli.control_tables import print_poles
     from tfarm.loop.answers import poles_answer
-    from tfarm.loop.closed import closed_loop_poles
+    from tfarm.loop.poles import closed_loop_poles
 
     give(poles_answer(closed_loop_poles(subject, law, number), certify) | said, json, print_poles)
 
@@ -71,7 +71,7 @@ def margins(arm: ArmName, json: Json = False, *, given: Given) -> None:
     law, said = asked_law(subject, given)
     from tfarm.cli.control_tables import print_margins
     from tfarm.loop.answers import margins_answer
-    from tfarm.loop.closed import margins as find_margins
+    from tfarm.loop.margins import margins as find_margins
 
     found = find_margins(subject, law)
     give(margins_answer(found) | said, json, partial(print_margins, found))
@@ -90,8 +90,8 @@ def spill(
     number, subject = whole_number("--modes", modes, 1, 60), load_arm(arm)
     law, said = asked_law(subject, given)
     from tfarm.cli.control_tables import print_spill
+    from tfarm.loop.answers import spill_answer
     from tfarm.loop.spill import spill as find
-    from tfarm.loop.spill import spill_answer
 
     give(spill_answer(find(subject, law, number)) | said, json, print_spill)
 
@@ -116,16 +116,17 @@ def gain_map(
         _must_be_none_of(typed | {ANGLE_GAIN: kp or None})
         _law_map(subject, arm, law, vary or [], whole_number("--points", points or "60", 2, 400), csv, png, json)
         return
-    from tfarm.loop.regions import ranges_of
+    from tfarm.loop.plane import ranges_of
 
     usual, given = ranges_of(subject), _bounds_of(typed)
     x, y = (given[name] or known for name, known in zip(PLANE, usual, strict=True))
     from tfarm.cli.control_tables import print_map
     from tfarm.cli.tables import hand_out
     from tfarm.loop.answers import map_answer, plane_table
-    from tfarm.loop.regions import between, region
+    from tfarm.loop.plane import between
+    from tfarm.loop.plane import gain_map as find
 
-    found = region(subject, between(*x, number), between(*y, number), HubFeedback(**{ANGLE_GAIN: kp}))
+    found = find(subject, between(*x, number), between(*y, number), kp)
     hand_out(
         lambda: map_answer(found), print_map, json,
         csv=csv, table=lambda: plane_table(PLANE, *found.axes, found.unstable), png=png, picture=(found,),
@@ -158,12 +159,12 @@ def _law_map(
     typed = asked_law(subject, Given({}, law, name))[0]
     from tfarm.cli.control_tables import print_law_map
     from tfarm.cli.tables import hand_out
-    from tfarm.loop.answers import plane_table
-    from tfarm.loop.law_map import law_map, law_map_answer
-    from tfarm.loop.regions import between
+    from tfarm.loop.answers import law_map_answer, plane_table
+    from tfarm.loop.loop import Loop
+    from tfarm.loop.plane import between, plane
 
     x, y = (between(*limits, number) for _, limits in ranges)
-    found = law_map(subject, typed, (ranges[0][0], ranges[1][0]), x, y)
+    found = plane(Loop(subject, as_law(typed)), (ranges[0][0], ranges[1][0]), x, y)
     names = [name.replace(".", "_").replace("@", "_at_") for name in found.vary]
     hand_out(
         lambda: law_map_answer(found), print_law_map, json,
@@ -201,7 +202,6 @@ def design(
     chain = asked_chain(dsp or arm, period, delay_samples)
     within: Any = {**_bounds_of(typed), ANGLE_GAIN: kp}
     ranges = dict(_range_of("--range", each) for each in over or [])
-    from tfarm.arm import as_law
     from tfarm.arm.writing import save_law
     from tfarm.cli.control_tables import print_design
     from tfarm.cli.tables import hand_out

@@ -27,7 +27,7 @@ def print_poles(answer: dict[str, Any]) -> None:
     print(answer["sign_convention"])
 
 
-def print_margins(found: Margins[Any], answer: dict[str, Any]) -> None:
+def print_margins(found: Margins, answer: dict[str, Any]) -> None:
     """The verdict, then everything else: of gains at the hub Lyapunov's argument, and how far each may go alone."""
     far = answer["verdict"] == "unstable" or answer["known_beyond_the_band"]
     reach = "" if far else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
@@ -58,7 +58,7 @@ def print_margins(found: Margins[Any], answer: dict[str, Any]) -> None:
     print(answer["sign_convention"])
 
 
-def _print_loop_margins(found: Margins[Any], answer: dict[str, Any]) -> None:
+def _print_loop_margins(found: Margins, answer: dict[str, Any]) -> None:
     assert found.in_band is not None
     rows, band, six = list(margin_rows(found, found.in_band)), answer["in_band"], singly(general, 6)
     columns = (

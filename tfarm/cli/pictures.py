@@ -52,8 +52,9 @@ def nyquist(arm: ArmName, png: Png = None, csv: Csv = None, json: Json = False, 
     subject = load_arm(arm)
     law, said = asked_law(subject, given)
     from tfarm.cli.tables import hand_out
-    from tfarm.loop.closed import nyquist as find
-    from tfarm.loop.nyquist import nyquist_answer, nyquist_table
+    from tfarm.loop.answers import nyquist_answer
+    from tfarm.loop.nyquist import nyquist as find
+    from tfarm.loop.nyquist import nyquist_table
 
     found = find(subject, law)
     hand_out(

@@ -229,7 +229,7 @@ def _known(side: ComparedSide) -> list[tuple[float | None, str]]:
     if side.clocked is not None:
         return [(value, "-" if value is None else side.clocked.known) for value in side.clocked.margins.values()]
     assert side.margins is not None
-    found: Margins[Any] = side.margins
+    found: Margins = side.margins
     known: list[tuple[float | None, str]] = []
     for column in MARGIN_COLUMNS:
         exact, in_band = sizes_of(found)[column.key]

@@ -17,11 +17,11 @@ from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.verdict import SampledBrief, brief_of, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError, one_line
-from tfarm.loop.closed import closed_loop_poles
-from tfarm.loop.closed import margins as margins_of
-from tfarm.loop.law_map import LawMap, law_map
+from tfarm.loop.loop import Loop
 from tfarm.loop.margins import Margins, dense
-from tfarm.loop.regions import Region, between, ranges_of, region
+from tfarm.loop.margins import margins as margins_of
+from tfarm.loop.plane import Plane, between, gain_map, plane, ranges_of
+from tfarm.loop.poles import closed_loop_poles
 from tfarm.records import record
 from tfarm.response.frequency import Bode, bode, resonant_band
 from tfarm.spectrum import Modes, damped_modes
@@ -63,7 +63,7 @@ class ComparedSide:
     damping_ratio: tuple[float | None, ...]
     poles: Complex
     open_loop: dict[int, complex]
-    margins: Margins[Any] | None
+    margins: Margins | None
     sampled: SampledBrief
     clocked: Clocked | None = None
 
@@ -141,7 +141,7 @@ class Comparison:
         return first, second
 
     @cached_property
-    def regions(self) -> tuple[Region, Region] | None:
+    def regions(self) -> tuple[Plane, Plane] | None:
         """The plane of both gains for each, on one grid that holds both laws; None where a law is not these gains."""
         laws = [side.law for side in self.sides if isinstance(side.law, HubFeedback)]
         if len(laws) < 2:
@@ -156,7 +156,7 @@ class Comparison:
             for n, (name, number) in enumerate(zip(PLANE, (REGION_COLUMNS, REGION_ROWS), strict=True))
         )
         x = np.union1d(x, [FIRST_COLUMN * x[-1]])
-        first, second = (region(side.arm, x, y, law) for side, law in zip(self.sides, laws, strict=True))
+        first, second = (gain_map(side.arm, x, y, law.Kp) for side, law in zip(self.sides, laws, strict=True))
         return first, second
 
     @cached_property
@@ -170,13 +170,13 @@ class Comparison:
         return each[0].reach(samples), each[1].reach(samples)
 
     @cached_property
-    def delays(self) -> tuple[LawMap, LawMap]:
+    def delays(self) -> tuple[Plane, Plane]:
         """The plane of a factor on each law and its whole delay [s]: for laws that are more than gains at the hub."""
         laws = [as_law(side.law) for side in self.sides]
         longest = max(DELAY_SHOWN, *(2 * law.delay for law in laws))
         x, y = between(0.0, MOST_FACTOR, DELAY_PLANE_POINTS), between(0.0, longest, DELAY_PLANE_POINTS)
         first, second = (
-            law_map(side.arm, law, ("gain", "delay"), x, y) for side, law in zip(self.sides, laws, strict=True)
+            plane(Loop(side.arm, law), ("gain", "delay"), x, y) for side, law in zip(self.sides, laws, strict=True)
         )
         return first, second
 

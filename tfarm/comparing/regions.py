@@ -16,10 +16,10 @@ from tfarm.arm import PLANE, Arm, HubFeedback, shown_unit
 from tfarm.arrays import Complex, Real
 from tfarm.columns import Column, Table
 from tfarm.dsp import Chain, GainMap, sampled_map, sampled_verdict
-from tfarm.dsp.regions import ends_of_K1, rounded_map, with_both_sides, with_more
+from tfarm.dsp.crossings import ends_of_K1, rounded_map, with_both_sides, with_more
 from tfarm.errors import ConvergenceError
 from tfarm.loop.edges import Axis, rate_columns
-from tfarm.loop.regions import Region, region
+from tfarm.loop.plane import Plane, gain_map
 from tfarm.spectrum.scales import default_gains
 
 K2_RANGE = (-1.0, 1.5)  # of what balances a torque: 1 where the input is one, less where it is a motor's current
@@ -38,7 +38,7 @@ BEYOND_PICTURE = 0.1  # of the gain up the plane, beyond the picture: an edge th
 class StableRegions(NamedTuple):
     """Both regions of one arm.  `sampled` has the arm's own C; at C = 0 also what a little damping would give."""
 
-    continuous: Region
+    continuous: Plane
     sampled: tuple[GainMap, ...]  # most damping first, so that each lies on the one before
 
 
@@ -64,7 +64,7 @@ def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
 
     planes = [rounded_map(sampled_map(loop, across, cut), drawn) for loop in loops]
     every = np.unique(np.concatenate([plane.axes[0] for plane in planes]))
-    return StableRegions(region(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
+    return StableRegions(gain_map(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
 
 
 def regions_table(data: StableRegions, stem: str) -> Table:

@@ -3,13 +3,25 @@
 The curve may be the imaginary axis or the unit circle; nothing here knows what A and B are.
 """
 
-from tfarm.crossing.line import Crossing, Crossings, Parts, brackets, crossed, solved, with_dips, zeros_between
+from tfarm.crossing.line import (
+    Crossing,
+    Crossings,
+    Family,
+    Parts,
+    brackets,
+    crossed,
+    crossings,
+    family_of,
+    solved,
+    zeros_between,
+)
 from tfarm.crossing.pieces import RegionPiece, pieces
 from tfarm.crossing.plane import Window, confirmed, counts_over, intervals, joined
 
 __all__ = [
     "Crossing",
     "Crossings",
+    "Family",
     "Parts",
     "RegionPiece",
     "Window",
@@ -17,10 +29,11 @@ __all__ = [
     "confirmed",
     "counts_over",
     "crossed",
+    "crossings",
+    "family_of",
     "intervals",
     "joined",
     "pieces",
     "solved",
-    "with_dips",
     "zeros_between",
 ]

@@ -13,13 +13,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.records import record
 
+Places = NDArray[Any]  # of a curve, as whoever gives the functions has them
 Parts = Callable[[Real], tuple[Complex, Complex]]  # A and B at places of a curve
 
 LAST_BIT = 2.0**-53  # of a place, and of its bracket, which is narrower
@@ -133,29 +135,76 @@ def crossed(places: Real, parts: Parts, known: tuple[Complex, Complex] | None = 
     return gain, at, change
 
 
-def with_dips(places: Real, parts: Parts, known: tuple[Complex, Complex]) -> tuple[Real, tuple[Complex, Complex]]:
-    """A grid of places, and A and B on it, and places in every dip of |h| between neighbours that goes through 0.
+class Family(NamedTuple):
+    """Lines of loops, A + g B along each, at places of one curve.
+
+    `on` gives A and B of every line at each place, both (lines, n); `at` those of one line, by its number, at each of
+    some places of its own, both (n,).
+    """
+
+    on: Callable[[Places], tuple[Complex, Complex]]
+    at: Callable[[Whole, Places], tuple[Complex, Complex]]
+
+
+def family_of(corners: Callable[[Places], Complex], across: Callable[[Places], Complex], count: int) -> Family:
+    """The lines along y of  F = a + f b + y (c + f d),  one for each of so many values of f.
+
+    `corners` gives a, b, c and d at places (4, n); `across` gives f (lines, n), or (lines, 1) where no place matters.
+    """
+
+    def on(places: Places) -> tuple[Complex, Complex]:
+        (a, b, c, d), f = corners(places), across(places)
+        return a + f * b, c + f * d
+
+    def at(line: Whole, places: Places) -> tuple[Complex, Complex]:
+        a, b, c, d = corners(places)
+        f = np.broadcast_to(across(places), (count, places.size))[line, np.arange(places.size)]
+        return a + f * b, c + f * d
+
+    return Family(on, at)
+
+
+def crossings(family: Family, places: Real, *, with_dips: bool) -> list[list[Crossing]]:
+    """The crossings of each line between neighbours of a grid of places, all solved for at once.
+
+    `with_dips`: those too of which two lie between neighbours, where |h| dips through 0.
+    """
+    A, B = family.on(places)
+    h = (A * B.conj()).imag
+    (line, before), change = brackets(h)
+    low, high = places[before], places[before + 1]
+    if with_dips:
+        dip_line, first, middle, last, sign = _dips(family, places, _share(A, B))
+        line, change = np.r_[line, dip_line, dip_line], np.r_[change, 2 * sign, -2 * sign]
+        low, high = np.r_[low, first, middle], np.r_[high, middle, last]
+    at, gain = solved(lambda w: family.at(line, w), low, high)
+    found: list[list[Crossing]] = [[] for _ in range(len(h))]
+    for number, *each in zip(line.tolist(), gain.tolist(), at.tolist(), change.tolist(), strict=True):
+        found[number].append(Crossing(*each))
+    return found
+
+
+def _dips(family: Family, places: Real, share: Real) -> tuple[Whole, Real, Real, Real, Whole]:
+    """Dips of |h| through 0 between three neighbours: the line, the first place, one beyond 0, the last, and the sign.
 
     Two crossings lie there, as close together as a resonance makes them, and h has one sign at all points around.
     Each dip is searched by golden section, all at once.
     """
-    h = _share(*known)
-    inner, sign = h[1:-1], np.sign(h[1:-1])
-    lower = np.minimum(sign * h[:-2], sign * h[2:])  # of the neighbours: below 0 where one has the other sign
-    before = np.flatnonzero((abs(inner) <= lower) & (abs(inner) > ROUNDED))
-    low, high, sign = places[before], places[before + 2], sign[before]
-    found: list[Real] = []
-    for _ in range(DIP_STEPS if before.size else 0):
+    inner, sign = share[:, 1:-1], np.sign(share[:, 1:-1])
+    lower = np.minimum(sign * share[:, :-2], sign * share[:, 2:])  # of the neighbours: below 0 where one is across
+    line, before = np.nonzero((abs(inner) <= lower) & (abs(inner) > ROUNDED))
+    sign = sign[line, before]
+    first, last = places[before], places[before + 2]
+    low, high, best, depth = first, last, places[before + 1], np.full(line.size, np.inf)
+    for _ in range(DIP_STEPS if line.size else 0):
         left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-        at_left, at_right = np.split(np.tile(sign, 2) * _share(*parts(np.r_[left, right])), 2)
+        at_left, at_right = np.split(np.tile(sign, 2) * _share(*family.at(np.tile(line, 2), np.r_[left, right])), 2)
         is_left = at_left < at_right
-        found.append(np.where(is_left, left, right)[np.minimum(at_left, at_right) < -ROUNDED])
+        here = np.minimum(at_left, at_right)
+        best, depth = np.where(here < depth, np.where(is_left, left, right), best), np.minimum(here, depth)
         low, high = np.where(is_left, low, left), np.where(is_left, right, high)
-    more = np.concatenate([places[:0], *found])
-    if not more.size:
-        return places, known
-    both = np.unique(np.r_[places, more])
-    return both, parts(both)
+    through = depth < -ROUNDED
+    return line[through], first[through], best[through], last[through], sign[through].astype(np.int64)
 
 
 def _share(A: Complex, B: Complex) -> Real:

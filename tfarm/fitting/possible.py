@@ -22,8 +22,8 @@ from scipy.special import gammaincinv
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.errors import ConvergenceError
-from tfarm.loop.margins import margins_of_gains
-from tfarm.loop.regions import region
+from tfarm.loop.margins import margins
+from tfarm.loop.plane import gain_map
 from tfarm.records import record
 from tfarm.response import transfer
 
@@ -90,7 +90,7 @@ class LoopOnAll:
 
 def loop_on_all(those: Possible, law: HubFeedback) -> LoopOnAll:
     """The verdict on each arm, and its margins where it holds: None of an arm where a margin is not."""
-    found = [margins_of_gains(arm, law) for arm in those.arms]
+    found = [margins(arm, law) for arm in those.arms]
     bands = [each.in_band for each in found if each.in_band is not None]
 
     def column(name: str) -> Real:
@@ -110,7 +110,7 @@ def loop_on_all(those: Possible, law: HubFeedback) -> LoopOnAll:
 
 def share_stable(those: Possible, across: Real, up: Real) -> Real:
     """The share of the arms on which both gains hold (up, across), without a clock."""
-    return np.asarray(np.mean([region(arm, across, up).unstable == 0 for arm in those.arms], axis=0))
+    return np.asarray(np.mean([gain_map(arm, across, up).unstable == 0 for arm in those.arms], axis=0))
 
 
 def response_band(those: Possible, output: str, omega: Real) -> tuple[Real, Real, Real]:

@@ -1,4 +1,4 @@
 """The continuous loop of the exact arm: poles, verdicts, windows of gains, margins, maps, loci, Lyapunov.
 
-Import from its modules: `from tfarm.loop.closed import margins`.
+Import from its modules: `from tfarm.loop.margins import margins`.
 """

@@ -8,24 +8,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, LISTED, PLANE, SPELT_OUT, Arm, HubFeedback, Law, input_words, shown_unit, unit_of
+from tfarm.arm import ANGLE_GAIN, PLANE, as_law, shown_unit
 from tfarm.arrays import Real, Whole
 from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
 from tfarm.crossing import Window
 from tfarm.digits import general, lined, plain, significant, singly, within
 from tfarm.response.answers import HERTZ
-from tfarm.response.signals import Signals
 from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
-from .law_loop import LawLoop
-from .law_stability import signs_of_loop
+from .law_answers import convention, law_answer, signals_answer
 from .lyapunov import lyapunov
 from .margins import LoopMargins, Margins
+from .nyquist import Nyquist
+from .plane import INFINITE, Plane
 from .poles import Poles
-from .regions import INFINITE, Region
+from .spill import SPILL, Spill
+from .theorem import signs_of_loop
 from .windows import Windows, reach_words
 
-LAW_IN_WORDS = f"u = -{SPELT_OUT} + r"
 WINDOW_DIGITS, PAGE_WINDOW_DIGITS = 8, 5  # of the ends of a window, on a terminal and on a page
 POLE_COLUMNS = (  # of complex poles [1/s]
     Column("re", "Re s", "1/s", of=lambda pole: within(pole.real, EIGENVALUE_ERROR * abs(pole), 12), on=(TERMINAL,)),
@@ -58,12 +58,11 @@ class GainRow(NamedTuple):
         return [f"({low}, {high})" for low, high in ends]
 
 
-def gain_rows(found: Margins[Any]) -> list[GainRow]:
+def gain_rows(found: Margins) -> list[GainRow]:
     """The gains of a loop, or the numbers of its law."""
     loop, rows = found.stability.loop, found.windows.items()
-    if isinstance(loop, LawLoop):
-        return [GainRow(name, loop.law.numbers[name], windows, "") for name, windows in rows]
-    return [GainRow(name, loop.law[name], windows, shown_unit(name, loop.arm)) for name, windows in rows]
+    units = {} if loop.gains is None else {name: shown_unit(name, loop.arm) for name in loop.numbers}
+    return [GainRow(name, loop.numbers[name], windows, units.get(name, "")) for name, windows in rows]
 
 
 def _joined(*pairs: Window) -> str:
@@ -74,6 +73,7 @@ def _joined(*pairs: Window) -> str:
 NOT_STABLE = "none: not stable"
 NOT_KNOWN = "not known"  # an exact margin, where nothing bounds L beyond the band
 UNLIMITED = {"disk": 2.0, "peak_sensitivity": 1.0}  # sizes of a passive loop, at no frequency of its own; else inf
+SAME_SIZE = 1e-7  # of such a size: so much rounding leaves next to a narrow resonance
 WINDOW_COLUMNS = (  # of `GainRow`; JSON has the gain's name before each key
     Column("gain", "gain", on=(TERMINAL, *REPORT)),
     Column("unit", "unit", on=REPORT),
@@ -138,41 +138,7 @@ _WHAT = Column("what", "what", of=lambda each: "|L| = 1" if each.factor == "" el
 GAIN_CROSSOVERS, PHASE_CROSSOVERS, CROSSOVERS = (_AT, _MARGIN), (_AT, _FACTOR), (_AT, _WHAT, _MARGIN, _FACTOR)
 
 
-def sign_of(arm: Arm) -> str:
-    """The law, and what a gauge reads of a static torque: with it the sign of its gain; of a rig what u is."""
-    if arm.is_uniform:
-        return f"{LAW_IN_WORDS}; a static torque u gives the moment -(J - I_h)/J u"
-    if not arm.has_rigid_mode:
-        return f"{LAW_IN_WORDS}; u is {input_words(arm)}"
-    share = arm.gauged_inertia / arm.total_inertia
-    static = f"a static torque at the hub gives the moment {-share:.6g} times as much"
-    return f"{LAW_IN_WORDS}; u is {input_words(arm)}, and {static}"
-
-
-def law_answer(law: HubFeedback | Law, arm: Arm) -> dict[str, Any]:
-    """The gains, with the sign convention that they need, and what the loop closes through; or what a law reads."""
-    if isinstance(law, HubFeedback):
-        return law.by_name | convention(arm)
-    sign = "-" if law.sign < 0 else "+"
-    late = f", {law.delay:g} s late" if law.delay else ""
-    words = f"v = {sign}sum of C_i(s) y_i{late}; v is {input_words(arm)}, y = ({', '.join(law.signals)})"
-    return {
-        "law": law.name,
-        "signals": dict(zip(law.signals, Signals(arm, law.signals).units, strict=True)),
-        "law_order": law.order,
-        "delay_s": law.delay,
-        "sign_convention": words,
-        "input": arm.input,
-    }
-
-
-def convention(arm: Arm) -> dict[str, Any]:
-    """Of the answers of every loop: the sign of the moment's gain, the input, and each gain's unit."""
-    units = {gain.name: unit_of(gain.name, arm) for gain in LISTED}
-    return {"sign_convention": sign_of(arm), "input": arm.input, "gain_units": units}
-
-
-def poles_answer(poles: Poles | Poles[LawLoop], certify: bool) -> dict[str, Any]:
+def poles_answer(poles: Poles, certify: bool) -> dict[str, Any]:
     """Poles with Im >= 0, how many are unstable, and the box in which they are complete; proven discs if asked."""
     answer = {
         "arm": poles.loop.arm.name,
@@ -191,7 +157,7 @@ def poles_answer(poles: Poles | Poles[LawLoop], certify: bool) -> dict[str, Any]
     return answer
 
 
-def margins_answer(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
+def margins_answer(found: Margins) -> dict[str, Any]:
     """The verdict first; margins are null unless the loop is stable."""
     verdict = found.stability
     limits, sizes = found.in_band, sizes_of(found)
@@ -225,10 +191,10 @@ def margins_answer(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
     }
 
 
-def _known_of(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
+def _known_of(found: Margins) -> dict[str, Any]:
     """What a theorem says of the law: Lyapunov's argument and the windows of gains at the hub, or the law's sign."""
-    if isinstance(found.stability.loop, LawLoop):
-        loop = found.stability.loop
+    loop = found.stability.loop
+    if loop.gains is None:
         signs = signs_of_loop(loop)
         return {
             "passivity": {"kind": signs.kind, "reason": signs.reason},
@@ -236,7 +202,7 @@ def _known_of(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
             "windows": Table(columns=LAW_WINDOW_COLUMNS, record=gain_rows(found)),
             "windows_note": unsettled(found) or None,
         }
-    proof = lyapunov(found.stability.loop.arm, found.stability.loop.law)
+    proof = lyapunov(loop.arm, loop.gains)
     rows = gain_rows(found)
     windows = Table(columns=WINDOW_COLUMNS, record=rows)
     return {
@@ -249,13 +215,13 @@ def _known_of(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
 NO_WINDOWS = "no windows of the law's numbers: of a rig with a link without damping all modes meet on the axis"
 
 
-def unsettled(found: Margins[Any]) -> str:
+def unsettled(found: Margins) -> str:
     """What the windows leave open where nothing is known beyond the band, in words; else empty.
 
     A theorem on the sign of a law, or small gain, tells nothing of the law with another number in it.
     """
     loop, words = found.stability.loop, reach_words(found.windows.values())
-    if not isinstance(loop, LawLoop):
+    if loop.gains is not None:
         return "" if found.stability.is_known_beyond else words
     if not found.windows and loop.arm.has_elastic_link:
         return NO_WINDOWS
@@ -263,7 +229,7 @@ def unsettled(found: Margins[Any]) -> str:
     return words + (f"; of {', '.join(uncounted)} poles could not be counted" if uncounted else "")
 
 
-def sizes_of(found: Margins[Any]) -> dict[str, tuple[float | None, float | None]]:
+def sizes_of(found: Margins) -> dict[str, tuple[float | None, float | None]]:
     """Of each of `MARGIN_COLUMNS` what is exact and what holds in the band; None where not known, or where none is."""
     limits: Any = found.in_band
     exact = {"delay": found.exact_delay, "disk": found.exact_disk, "peak_sensitivity": found.exact_peak}
@@ -282,15 +248,14 @@ class MarginRow(NamedTuple):
     at: float | str
 
 
-def margin_rows(found: Margins[Any], limits: LoopMargins) -> Iterator[MarginRow]:
+def margin_rows(found: Margins, limits: LoopMargins) -> Iterator[MarginRow]:
     """A row a margin: not known where nothing bounds L, no exact phase where any delay destabilises."""
     for column, (exact, size) in zip(MARGIN_COLUMNS, sizes_of(found).values(), strict=True):
         assert size is not None
         hidden = column.unit == "deg" and not found.exact_delay
         known = "" if hidden else NOT_KNOWN if exact is None else exact
-        yield MarginRow(
-            column, known, size, "" if abs(size) == UNLIMITED.get(column.of, math.inf) else limits.at[column.of]
-        )
+        is_anywhere = math.isclose(abs(size), UNLIMITED.get(column.of, math.inf), rel_tol=SAME_SIZE)
+        yield MarginRow(column, known, size, "" if is_anywhere else limits.at[column.of])
 
 
 def plane_table(names: Sequence[str], x: Real, y: Real, unstable: Whole) -> Table:
@@ -303,9 +268,13 @@ def plane_table(names: Sequence[str], x: Real, y: Real, unstable: Whole) -> Tabl
     return Table(columns=columns)
 
 
-def map_answer(found: Region) -> dict[str, Any]:
+def _counts(found: Plane) -> list[list[int | str]]:
+    """Unstable poles over the grid, rows upwards, "inf" where they are infinitely many."""
+    return [["inf" if count == INFINITE else int(count) for count in row] for row in found.unstable]
+
+
+def map_answer(found: Plane) -> dict[str, Any]:
     """Unstable poles over the grid, rows upwards, "inf" where they are infinitely many, and the boundary curve."""
-    rows = [["inf" if count == INFINITE else int(count) for count in row] for row in found.unstable]
     inside = [
         [float(value) for value in point]
         for point in found.boundary
@@ -313,10 +282,63 @@ def map_answer(found: Region) -> dict[str, Any]:
     ]
     return {
         "arm": found.arm.name,
-        ANGLE_GAIN: found.held[ANGLE_GAIN],
+        ANGLE_GAIN: found.Kp,
         **convention(found.arm),
         **{name: values.tolist() for name, values in zip(PLANE, found.axes, strict=True)},
-        "unstable_roots": rows,
+        "unstable_roots": _counts(found),
         "boundary": inside,
+        "band_rad_s": found.band,
+    }
+
+
+def nyquist_answer(found: Nyquist) -> dict[str, Any]:
+    """The verdict, the turns around -1 beside the unstable poles found in a box, and L on the contour for Im s >= 0."""
+    verdict = found.verdict
+    return {
+        "arm": verdict.loop.arm.name,
+        **law_answer(verdict.loop.law, verdict.loop.arm),
+        "verdict": verdict.verdict,
+        "encirclements": found.encirclements,
+        "unstable_open": found.unstable_open,
+        "unstable_by_nyquist": found.expected,
+        "unstable_roots": verdict.unstable_roots,
+        "on_axis": found.on_axis,
+        "band_rad_s": verdict.band,
+        "beyond_the_band": verdict.tail,
+        "s": [[s.real, s.imag] for s in found.s.tolist()],
+        "L": [[L.real, L.imag] for L in found.L.tolist()],
+    }
+
+
+def spill_answer(found: Spill) -> dict[str, Any]:
+    """The verdict, what it means in words, and a row a model."""
+    verdict = found.verdict
+    return {
+        "arm": verdict.loop.arm.name,
+        **signals_answer(as_law(verdict.loop.gains or verdict.loop.law), verdict.loop.arm),
+        "verdict": verdict.verdict,
+        "stable": verdict.is_stable,
+        "in_words": found.in_words,
+        "unstable_roots": verdict.unstable_roots,
+        "unstable_roots_infinite": verdict.unstable_roots_infinite,
+        "band_rad_s": verdict.band,
+        "known_beyond_the_band": verdict.is_known_beyond,
+        "beyond_the_band": verdict.tail,
+        "driven": [[float(pole.real), float(pole.imag)] for pole in found.driven],
+        "first_mode": found.first_mode,
+        "shown_from_modes": found.shown_from,
+        "models": Table(columns=SPILL, record=found),
+    }
+
+
+def law_map_answer(found: Plane) -> dict[str, Any]:
+    """Unstable poles over the grid, rows of the second number, as plain lists."""
+    return {
+        "arm": found.arm.name,
+        **signals_answer(found.law, found.arm),
+        "vary": list(found.vary),
+        "x": found.x.tolist(),
+        "y": found.y.tolist(),
+        "unstable_roots": _counts(found),
         "band_rad_s": found.band,
     }

@@ -25,7 +25,7 @@ from tfarm.spectrum.correction import corrected
 from tfarm.spectrum.damped import COMPANY, single_zeros
 from tfarm.spectrum.scales import rate_unit
 
-from .plant import Loop, effective_inertia
+from .loop import Loop
 from .variation import Variation, member_of
 
 MAY_PASS_ORIGIN = 1e-6  # of the lowest flexible frequency: zeros closer to the origin may pass it
@@ -162,7 +162,8 @@ def _followed(variation: Variation, start: float, stop: float, wanted: int, numb
     Without losses two modes may meet on that way and leave the imaginary axis as a quadruple: then around that, with a
     little feedback of the hub's rate that is taken back at the end.
     """
-    arm, law = variation.at(start).arm, variation.at(start).law
+    first = variation.at(start)
+    arm, law = first.arm, first.gains or HubFeedback()
     zeros, lowest = open_pairs(arm, number, wanted)
     wanted += len(single_zeros(modes(arm, 1)))  # which stand before the flexible modes
     if any(law.row):
@@ -206,8 +207,10 @@ def _alone(zeros: Sequence[float]) -> Complex:
 
 def rigid_pair(loop: Loop, _: Complex) -> Complex:
     """The zeros of J_eff s^2 + b s + c (`Loop.at_rest`): what the rigid body's become under small gains."""
-    J = effective_inertia(loop.arm, loop.law) or CANCELLED_INERTIA * loop.arm.total_inertia
-    b, c = (each / J for each in loop.at_rest)
+    assert loop.at_rest is not None
+    c, b, J = loop.at_rest
+    J = J or CANCELLED_INERTIA * loop.arm.total_inertia
+    b, c = b / J, c / J
     root = np.sqrt(complex(b * b / 4 - c))
     far = -b / 2 - np.copysign(root.real, b) if root.real else -b / 2 + 1j * root.imag
     near = c / far if root.real else np.conj(far)
@@ -216,7 +219,8 @@ def rigid_pair(loop: Loop, _: Complex) -> Complex:
 
 def _slow_zero(loop: Loop, pair: Complex) -> Complex:
     """The pair with its zero at 0 moved to -c/b: where it goes while little holds the hub's angle."""
-    b, c = loop.at_rest
+    assert loop.at_rest is not None
+    c, b, _ = loop.at_rest
     return np.array([-c / b, pair[1]], complex)
 
 

@@ -13,14 +13,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, law_of
+from tfarm.arm import Arm, as_law, law_of
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import dimensionless, loop_system, quick_characteristics
 from tfarm.reduced import ModalModel, tailed_model
 
 from .frequencies import band_of
-from .plant import Loop
+from .loop import Loop
 from .poles import poles_below
 
 Kind = Callable[[Complex, float], NDArray[np.bool_]]  # which poles below a top frequency are meant
@@ -52,7 +52,7 @@ def band_and_real_poles(arm: Arm, laws: Real, number: int) -> Complex:
 
 
 def _in_blocks(kind: Kind, arm: Arm, laws: Real, number: int) -> Complex:
-    Loop(arm, law_of(abs(laws).max(axis=1)))
+    Loop(arm, as_law(law_of(abs(laws).max(axis=1))))
     top = band_of(arm, number)
     parts = [slice(i, i + GAINS_AT_A_TIME) for i in range(0, laws.shape[1], GAINS_AT_A_TIME)]
     found = [_of_block(kind, arm, laws[:, part], number, top) for part in parts]
@@ -98,7 +98,7 @@ def _of_block(kind: Kind, arm: Arm, laws: Real, number: int, top: float) -> Comp
         if not left.size:
             return poles
     for n in left:
-        exact = poles_below(Loop(arm, law_of(laws[:, n])), top).values
+        exact = poles_below(Loop(arm, as_law(law_of(laws[:, n]))), top).values
         poles = _filled(poles, np.array([n]), exact[kind(exact, top)][None])
     return poles
 

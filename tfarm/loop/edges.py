@@ -1,6 +1,6 @@
 """The plane of both gains as it is drawn: axes, and the exact stability boundary fine enough for a picture.
 
-The boundary of a `Region` is known at the frequencies of the arm's grid.  Where a segment of it would be seen as one,
+The boundary of a `Plane` is known at the frequencies of the arm's grid.  Where a segment of it would be seen as one,
 the D-decomposition is evaluated between; where the curve leaves the picture, or runs through infinity, it is cut.
 """
 
@@ -18,8 +18,9 @@ from tfarm.spectrum import modes
 from tfarm.spectrum.scales import default_gains, rate_unit
 from tfarm.spectrum.table import hub_locked
 
-from .lines import along, crossing_at_zero
-from .regions import Region, between, boundary, region
+from .loop import Loop
+from .plane import Plane, between, boundary, gain_map
+from .windows import static_edge
 
 LOG_BASE = math.log(10.0)
 LINEAR_SCALE = 0.5  # decades that the linear part of an axis takes on each side of 0, as matplotlib's `linscale` has it
@@ -105,16 +106,16 @@ def moment_axis(arm: Arm, x: Axis) -> Axis:
     if arm.is_undamped:
         return Axis(low, high)
     across = x.grid(SCAN)
-    deep = region(arm, across[across > 0], between(deepest, low, DEEP_ROWS))
+    deep = gain_map(arm, across[across > 0], between(deepest, low, DEEP_ROWS))
     rows = np.nonzero(~deep.stable.all(axis=1))[0]
     if not rows.size:
         return Axis(low, high)
     return Axis(max(deepest, BELOW_DEEPEST * float(deep.axes[1][rows[0]])), high, high)
 
 
-def edge(found: Region, x: Axis, y: Axis) -> Real:
+def edge(found: Plane, x: Axis, y: Axis) -> Real:
     """The boundary in the picture, finer where it is coarse, with a row of nan after each of its parts."""
-    points = found.boundary
+    points, loop = found.boundary, Loop(found.arm, found.law)
     if not points.size:
         return points
     for _ in range(EDGE_ROUNDS):
@@ -124,7 +125,7 @@ def edge(found: Region, x: Axis, y: Axis) -> Real:
             break
         middle = np.sqrt(points[coarse, 2] * points[coarse + 1, 2])
         middle = middle[(middle > points[coarse, 2]) & (middle < points[coarse + 1, 2])]
-        points = np.concatenate([points, boundary(found.arm, middle, found.held)])
+        points = np.concatenate([points, boundary(loop, middle)])
         points = points[np.unique(points[:, 2], return_index=True)[1]]
     length, is_seen = _segments(points, x, y)
     kept = is_seen & (length < LONG_SEGMENT)
@@ -143,7 +144,7 @@ def _segments(points: Real, x: Axis, y: Axis) -> tuple[Real, NDArray[np.bool_]]:
     return np.hypot(*np.diff(places)), np.asarray(((high >= 0) & (low <= 1)).all(axis=0))
 
 
-def stable_edge(found: Region, points: Real, x: Axis, y: Axis) -> Real:
+def stable_edge(found: Plane, points: Real, x: Axis, y: Axis) -> Real:
     """Of points (n, 3) of the boundary those in the picture with the stable region on one side, above or below."""
     points = points[~np.isnan(points[:, 0])]
     if not points.size:
@@ -162,20 +163,21 @@ def _middles(values: Real) -> Real:
     return np.asarray((values[1:] + values[:-1]) / 2)
 
 
-def seen(found: Region, x: Axis, y: Axis) -> Region:
+def seen(found: Plane, x: Axis, y: Axis) -> Plane:
     """The counts of a map on a grid that is even as seen: at each of its points those of the nearest one computed."""
     across, up = (axis.grid(values.size) for axis, values in zip((x, y), found.axes, strict=True))
     columns, rows = (np.searchsorted(_middles(old), new) for old, new in zip(found.axes, (across, up), strict=True))
     return found.on(across, up, found.unstable[np.ix_(rows, columns)])
 
 
-def resting_frequencies(found: Region, count: int) -> Real:
+def resting_frequencies(found: Plane, count: int) -> Real:
     """The first frequencies [rad/s] with the hub at rest, which the edge along the gain across is made of."""
     return hub_locked(modes(found.arm, count)).natural_frequency
 
 
-def static_edges(found: Region) -> tuple[float | None, float | None]:
+def static_edges(found: Plane) -> tuple[float | None, float | None]:
     """Where a real pole passes through 0: an upright line of the boundary, and a level one."""
-    upright = crossing_at_zero(found.arm, along(RATE_GAIN, found.held))
-    level = crossing_at_zero(found.arm, along(MOMENT_GAIN, found.held.having(RATE_GAIN, 1.0)))
+    loop, (across, up) = Loop(found.arm, found.law), (abs(values).max() for values in found.axes)
+    upright = static_edge(loop.having(MOMENT_GAIN, 0.0), RATE_GAIN, (-across, across))
+    level = static_edge(loop.having(RATE_GAIN, 1.0), MOMENT_GAIN, (-up, up))
     return None if upright is None else upright.t, None if level is None else level.t

@@ -37,7 +37,7 @@ def with_others(
         for n in np.unique(np.linspace(0, gain.size - 1, LOOPS).round().astype(int)):
             here = branches[:, n]
             right = (here.real > AXIS_SHARE * abs(here)) & (abs(here.imag) < top)
-            poles = poles_below(variation.at(float(gain[n])), top, BOX_HEIGHTS)
+            poles = poles_below(variation.at(float(gain[n])), top, factors=BOX_HEIGHTS)
             if poles.unstable > count_with_mirrors(here[right]):
                 where = f"at {variation.vary} = {gain[n]:.6g}"
                 text = f"{where} an unstable pole is on none of the branches that could be followed: use another range"

@@ -27,14 +27,13 @@ from tfarm.records import record
 from tfarm.spectrum.box import Box, newton, zeros_in_box
 from tfarm.spectrum.scales import first_frequency
 
-from .answers import law_answer
 from .crossings import BranchCrossing, crossing_answers, in_words
 from .damping import NO_PART
-from .frequencies import band_of, grid
-from .law_loop import LawLoop
-from .law_map import law_crossings
-from .law_poles import law_box, starting_points_of
-from .resting import NEAREST_TO_ORIGIN
+from .family import line_crossings
+from .frequencies import band_of
+from .law_answers import signals_answer
+from .loop import NEAREST_TO_ORIGIN, Loop
+from .poles import box_of, starting_points
 from .variation import ARM_PARAMETERS, must_be_way
 
 MOST_LAW_LOCUS_POINTS = 5000  # values: at each all poles of a box are found
@@ -114,21 +113,21 @@ class Family:
         """Whether the number is one of the arm."""
         return self.vary in ARM_PARAMETERS
 
-    def at(self, value: float) -> LawLoop:
+    def at(self, value: float) -> Loop:
         """The loop where the number has that value."""
         if self.is_of_arm:
-            return LawLoop(self.arm.having(**{self.vary: value}), self.law)
+            return Loop(self.arm.having(**{self.vary: value}), self.law)
         return self._first.under(self.law.having(self.vary, value))
 
     @property
-    def own(self) -> LawLoop:
+    def own(self) -> Loop:
         """The loop of the law as it is given: what varies may be a factor on it."""
         return self._first.under(self.law)
 
     @cached_property
-    def _first(self) -> LawLoop:
+    def _first(self) -> Loop:
         """The loop where the way begins, of whose rig the others are."""
-        return LawLoop(self.arm, self.law.having(self.vary, self.start))
+        return Loop(self.arm, self.law.having(self.vary, self.start))
 
     def started(self, values: Real, branches: int) -> tuple[Box, Complex]:
         """A box for the whole way, and the poles in it at the first value."""
@@ -136,7 +135,7 @@ class Family:
         lost: ConvergenceError | None = None
         for factor in HEIGHTS:
             height = factor * max(band_of(loop.arm, branches) for loop in loops)
-            boxes = [law_box(loop, height) for loop in loops]
+            boxes = [box_of(loop, height) for loop in loops]
             box = Box(max(each.re_min for each in boxes), max(each.re_max for each in boxes), -height, height)
             try:
                 return box, self.poles(float(values[0]), box, np.empty(0, complex))
@@ -149,7 +148,7 @@ class Family:
         """All poles in the box with Im s >= 0 at one value, those at 0 too; `near` are some to begin with."""
         loop = self.at(value)
         known = near[near != 0]
-        starts = np.r_[known, known.conj()] if near.size else starting_points_of(loop, box.im_max)
+        starts = np.r_[known, known.conj()] if near.size else starting_points(loop, box.im_max)
         found = zeros_in_box(loop.function, box, starts)
         found = np.where(abs(found.imag) < NO_PART * abs(found), found.real, found)
         return np.r_[np.zeros(loop.zeros_at_origin, complex), found[found.imag >= 0]]
@@ -251,9 +250,8 @@ def _crossings(family: Family, values: Real, branches: Complex, box: Box) -> tup
             found.append(BranchCrossing(gain=float(at), omega=float(omega), branch=number, direction=way))
     if not family.is_of_arm and family.vary != "delay":
         loop, ascending, band, seen = family.own, np.sort(values), box.im_max, tuple(found)
-        omega, span = np.asarray(grid(loop.arm, band)), float(ascending[-1] - ascending[0])
-        parts = loop.signals.parts(1j * omega)
-        for t, w, change in law_crossings(loop, family.vary, ascending, omega, parts, band):
+        span = float(ascending[-1] - ascending[0])
+        for t, w, change in line_crossings(loop, family.vary, float(ascending[0]), float(ascending[-1]), band):
             near = [each for each in seen if abs(each.gain - t) <= SEEN_CROSSING * span]
             is_seen = any(abs(each.omega - w) <= SEEN_CROSSING * band for each in near)
             if AT_END * span < t - ascending[0] < (1 - AT_END) * span and not is_seen:
@@ -284,7 +282,7 @@ def law_locus_answer(found: LawLocus) -> dict[str, Any]:
     """The branches at each value, null where they are not in the box, and where they cross the imaginary axis."""
     return {
         "arm": found.arm.name,
-        **law_answer(found.law, found.arm),
+        **signals_answer(found.law, found.arm),
         "vary": found.vary,
         "unit": ARM_PARAMETERS.get(found.vary, "s" if found.vary == "delay" else "1"),
         "gain": found.values.tolist(),

@@ -4,12 +4,11 @@ Along laws g0 + t g1 the characteristic function is N(s) + t P(s), linear in t. 
 t(s) = -N/P for real s has a finite limit, and goes right if t(s) grows with s.
 
 At C = 0 h vanishes identically along K2 where the gauge reads the hub's moment: there is no curve, only the line
-K2 = 1; `windows` knows that case, and `lossless` that of other gauges.
+K2 = 1; `windows` knows that case.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,20 +18,16 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossing, Crossings, crossed
-from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import gains_of, loop_parts, loop_system, torque
 from tfarm.exact.system import System
 from tfarm.spectrum import flexible_frequencies, modes
 
 from .frequencies import grid
-from .plant import effective_inertia, slow_terms
 
 NO_FEEDBACK = HubFeedback()  # every gain 0
 SAME_FREQUENCY = 1e-12  # of a frequency: nearer than this are two numbers for one
 FINITE_LIMIT = 1.5  # times the gain at the farther of two small s: more at the nearer one is a gain without a limit
-STILL_GROWS = 0.75  # of the step before: by more, of places ever farther right, a gain without a limit grows
 JUST_BEYOND = 1.01  # of a band: natural frequencies up to there, as one may be at its end
-ROUNDED = 4 * float(np.finfo(float).eps)  # of a range: a gain so small is 0, and not beside a line on which it is
 NEARLY_AT_REST = 1e-7  # of the lowest frequency: values there are those at s = 0 to as many digits
 
 
@@ -129,30 +124,20 @@ def through_origin(N: Complex, P: Complex) -> Crossing | None:
     return Crossing(float(2 * near - far), 0.0, 1 if far > near else -1)
 
 
-def through_infinity(N: Complex, P: Complex) -> Crossing | None:
-    """A real pole through infinity, from N and P at three real s far right, each so many times the one before.
+def effective_inertia(arm: Arm, law: HubFeedback) -> float:
+    """I_h + (1 - K2)(J - I_h) [kg m^2]: what slow torque turns once the moment is fed back.
 
-    None where t has no limit there.
+    In units of the input, and with what the root's gauge reads of the turning rig in the place of J - I_h.
     """
-    if not P.all():
-        return None
-    first, second, third = -(N / P).real
-    before, last = second - first, third - second
-    if not abs(last) < STILL_GROWS * abs(before):
-        return None
-    return Crossing(float(third + last * last / (before - last)), math.inf, 1 if before < 0 else -1)
+    if arm.is_uniform:
+        return arm.hub_inertia + (1.0 - law.K2) * arm.carried_inertia
+    return float(arm.turned_inertia + slow_terms(arm, law)[2])
 
 
-def ascending(name: str, values: Any, most: int) -> Real:
-    """The values (n,) of one number of a map.  Raises ParameterError for what is no ascending range of 2 to `most`."""
-    try:
-        values = np.atleast_1d(np.asarray(values, dtype=float))
-    except (TypeError, ValueError):  # no numbers
-        values = np.empty(0)
-    if not (2 <= values.size <= most and np.isfinite(values).all() and (np.diff(values) > 0).all()):
-        remedy = f"an ascending range of 2 to {most} values"
-        raise ParameterError(key=name, value=f"{values.size} values", remedy=remedy)
-    return np.asarray(values)
+def slow_terms(arm: Arm, law: HubFeedback) -> Real:
+    """What a law adds to the coefficients of 1, s, s^2 and s^3 in D/theta (4,) of a turning arm."""
+    by_moment = law.K2 * arm.gauged_inertia
+    return np.array([law.Kp, law.K1, -by_moment, by_moment * arm.damping])
 
 
 def _sign(value: float) -> int:

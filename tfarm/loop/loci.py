@@ -13,8 +13,8 @@ from tfarm.columns import Column
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 
-from .answers import law_answer
 from .crossings import crossing_answers
+from .law_answers import law_answer
 from .locus import Locus, locus
 from .most_damped import most_damped
 from .reduced_locus import ReducedLocus, reduced_locus

@@ -21,11 +21,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import Arm, HubFeedback, as_law
 from tfarm.records import record
 from tfarm.response import transfer
 
-from .plant import Loop
+from .loop import Loop
 
 Kind = Literal["dissipated", "conserved", "unproven"]
 
@@ -49,10 +49,7 @@ class Lyapunov:
 
 def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:
     """What V proves of the law with a strain gauge as it is.  Raises ParameterError where there is no loop."""
-    loop, C = Loop(arm, law), arm.damping
-    if not law.is_at_hub:
-        names = " and ".join(gain.name for gain in law.elsewhere)
-        return _unproven(loop, f"V knows hub angle, hub rate and root moment, and nothing of what {names} feeds back")
+    loop, C = Loop(arm, as_law(law)), arm.damping
     if law.K2 and not arm.reads_hub_moment:
         return _unproven(loop, "the gauge does not read the moment on the hub (r > 0, or inertia at the clamp)")
     if C and law.K2:
@@ -61,13 +58,13 @@ def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:
             "and no weights a1, a2 prove a K2 other than 0"
         )
         return _unproven(loop, reason)
-    return _with_whole_moment(loop)
+    return _with_whole_moment(loop, law)
 
 
-def _with_whole_moment(loop: Loop) -> Lyapunov:
+def _with_whole_moment(loop: Loop, law: HubFeedback) -> Lyapunov:
     """V_t = -a2 K1 theta_t^2 - a1 C integral(E I phi_xt^2) with a1/a2 = 1 - K2."""
-    law, C = loop.law, 0.0 if loop.arm.is_undamped else 1.0
-    weight, K1 = 1.0 - loop.moment_share, law.K1 + loop.arm.rate_loss
+    C = 0.0 if loop.arm.is_undamped else 1.0
+    weight, K1 = 1.0 - law.K2 / loop.arm.input_per_torque, law.K1 + loop.arm.rate_loss
     if loop.arm.input_lags:
         return _unproven(loop, "the voltage reaches the hub through an inductance, late: V_t has a term of no sign")
     if weight == 0:

@@ -17,26 +17,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Generic
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from tfarm.arm import NAMES, Arm, HubFeedback
+from tfarm.arm import AnyLaw, Arm
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.crossing import brackets, crossed, zeros_between
 from tfarm.records import record
 from tfarm.spectrum.scales import first_frequency
 
 from .frequencies import grid
-from .law_loop import LawLoop
-from .lines import NO_FEEDBACK, Line, line_crossings, static_crossings
-from .lossless import stable_moments
-from .plant import Loop, slow_terms
-from .poles import LEAST_SQUARABLE, AnyLoop
+from .loop import Loop
+from .poles import LEAST_SQUARABLE
 from .stability import Stability, is_quiet, stability
-from .windows import Windows, gain_windows
+from .theorem import theorem_of
+from .windows import Windows, windows_of
 
 MARGIN_DIGITS, PLACE_DIGITS = 9, 7  # of a margin, at most, and of the frequency of a dip, which its depth hardly feels
 CROSSOVER_DIGITS = 12  # of what each crossover is listed with, at most: more than any table rounds to
@@ -79,7 +76,7 @@ class LoopMargins:
 
 @dataclass(frozen=True)
 @record
-class Margins(Generic[AnyLoop]):
+class Margins:
     """The verdict first.  `windows` are those of each gain, or number of a law, by its name.
 
     `in_band` are the margins up to the verdict's band; `exact_delay`, `exact_disk` and `exact_peak` those of the whole
@@ -87,7 +84,7 @@ class Margins(Generic[AnyLoop]):
     bounds |L| beyond the band (the hub's inertia does, where it has some): not known then.
     """
 
-    stability: Stability[AnyLoop]
+    stability: Stability
     windows: dict[str, Windows]
     in_band: LoopMargins | None
     exact_delay: float | None
@@ -95,28 +92,39 @@ class Margins(Generic[AnyLoop]):
     exact_peak: float | None
 
 
-def margins_of_gains(arm: Arm, law: HubFeedback, band: float | None = None) -> Margins:
-    """Verdict, windows of each gain, and margins of the loop.  Raises what `stability` raises."""
+def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins:
+    """Verdict first, then the stable windows of each gain, or of each number of a law, and the margins of the loop.
+
+    Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, or where with damping
+    one is on the axis to working precision.
+    """
     verdict = stability(arm, law, band)
-    windows = {name: gain_windows(verdict, name) for name in NAMES}
+    windows = windows_of(verdict)
     if not verdict.is_stable:
         return Margins(verdict, windows, None, None, None, None)
     found = loop_margins(verdict)
-    if arm.is_undamped and not verdict.loop.is_told_by_theorem:
-        return Margins(verdict, windows, found, None, None, None)
-    if arm.is_undamped and law.K2:
-        return Margins(verdict, windows, found, 0.0, 0.0, math.inf)
-    if arm.is_undamped and law.K1:  # 1 + L = 1 + (Kp + i K1 w) theta, theta real: no dip deepens with w
-        return Margins(verdict, windows, found, 0.0, found.disk, found.peak_sensitivity)
-    if arm.is_undamped or is_quiet(verdict.loop, verdict.band):
-        return Margins(verdict, windows, found, found.delay, found.disk, found.peak_sensitivity)
-    is_passive = law.is_at_hub and law.K2 == law.Kp == 0 and not arm.input_lags
-    if is_passive:  # rate feedback of a passive arm: L in the right half-plane
-        return Margins(verdict, windows, found, None, found.disk, found.peak_sensitivity)
-    return Margins(verdict, windows, found, None, None, None)
+    return Margins(verdict, windows, found, *_exact(verdict, found))
 
 
-def loop_margins(verdict: Stability[Any]) -> LoopMargins:
+def _exact(verdict: Stability, found: LoopMargins) -> tuple[float | None, float | None, float | None]:
+    """Delay margin, disk margin and peak sensitivity of the whole infinite-dimensional loop, None where not known."""
+    loop = verdict.loop
+    arm, gains = loop.arm, loop.gains
+    if arm.is_undamped:
+        if gains is None or theorem_of(loop).energy is None:
+            return None, None, None
+        if gains.K2:
+            return 0.0, 0.0, math.inf
+        # 1 + L = 1 + (Kp + i K1 w) theta, theta real: no dip deepens with w
+        return 0.0 if loop.feeds_back else found.delay, found.disk, found.peak_sensitivity
+    if is_quiet(loop, verdict.band):
+        return found.delay, found.disk, found.peak_sensitivity
+    if gains is not None and gains.K2 == gains.Kp == 0 and not arm.input_lags:  # L in the right half-plane
+        return None, found.disk, found.peak_sensitivity
+    return None, None, None
+
+
+def loop_margins(verdict: Stability) -> LoopMargins:
     """The margins of a stable loop up to the verdict's band."""
     loop, band = verdict.loop, verdict.band
     omega = dense(verdict)
@@ -140,7 +148,7 @@ def loop_margins(verdict: Stability[Any]) -> LoopMargins:
     values["peak_sensitivity"] = max(1.0, values["peak_sensitivity"])
     places = {name: float(f"{where:.{PLACE_DIGITS}g}") for name, (_, where) in least.items()}
     by_phase = phase_crossovers(loop, omega)
-    gain = gain_margin(loop, band) if isinstance(loop, Loop) else _nearest_to_one([t for _, t in by_phase])
+    gain = _nearest_to_one(gain_edges(loop, by_phase))
     by_gain = tuple(sorted(zip(crossed.tolist(), angle.tolist(), strict=True)))
     return LoopMargins(band=band, gain=gain, **values, at=places, gain_crossovers=by_gain, phase_crossovers=by_phase)
 
@@ -164,13 +172,13 @@ def _spread(f: Callable[[Real], Real | Complex], omega: Real) -> Real:
     return np.asarray(abs(f(near.ravel()).reshape(near.shape) - f(omega)).max(axis=0))
 
 
-def inverse_peak(loop: Loop | LawLoop, omega: Real, of: int) -> Real:
+def inverse_peak(loop: Loop, omega: Real, of: int) -> Real:
     """|1 + L| at i omega, or |1 + 1/L| for `of` 1: the inverse of what S = 1/(1 + L) and T = L/(1 + L) peak at."""
     parts = loop.parts(1j * omega)
     return np.asarray(abs(parts[0] + parts[1]) / np.maximum(abs(parts[of]), LEAST_SIZE))
 
 
-def phase_crossovers(loop: Loop | LawLoop, omega: Real) -> tuple[tuple[float, float], ...]:
+def phase_crossovers(loop: Loop, omega: Real) -> tuple[tuple[float, float], ...]:
     """Frequencies [rad/s] with L real and below 0, and the factor -1/L; at rest too where L is finite there."""
     factor, place, _ = crossed(omega, lambda w: loop.parts(1j * w))
     crosses = (factor > AT_POLE) & (factor < 1 / AT_POLE) & ~_through_pole_or_zero(loop, place)
@@ -183,7 +191,7 @@ def phase_crossovers(loop: Loop | LawLoop, omega: Real) -> tuple[tuple[float, fl
     return tuple(sorted(found))
 
 
-def _through_pole_or_zero(loop: Loop | LawLoop, place: Real) -> NDArray[np.bool_]:
+def _through_pole_or_zero(loop: Loop, place: Real) -> NDArray[np.bool_]:
     """Of frequencies (n,) at which L turns from one side of the real axis to the other, which do so at a pole or zero.
 
     There its denominator or numerator turns round and not L.  They are looked at as near as rounding lets the sides be
@@ -204,7 +212,7 @@ def _through_pole_or_zero(loop: Loop | LawLoop, place: Real) -> NDArray[np.bool_
     return turned
 
 
-def _factor(loop: Loop | LawLoop, omega: Real) -> Complex:
+def _factor(loop: Loop, omega: Real) -> Complex:
     """-1/L at i omega, 0 where L is infinite or vanishes."""
     drive, fed_back = loop.parts(1j * omega)
     return np.asarray(-drive / np.where(fed_back == 0, np.inf, fed_back))
@@ -215,22 +223,21 @@ def _nearest_to_one(factors: list[float]) -> tuple[float, float]:
     return max((t for t in factors if 0 <= t < 1), default=0.0), min((t for t in factors if t > 1), default=math.inf)
 
 
-def disk_at(loop: Loop | LawLoop, omega: Real) -> Real:
+def disk_at(loop: Loop, omega: Real) -> Real:
     """2 |(1 + L)/(1 - L)| at i omega."""
     drive, fed_back = loop.parts(1j * omega)
     return np.asarray(2 * abs(drive + fed_back) / np.maximum(abs(drive - fed_back), LEAST_SIZE))
 
 
-def dense(verdict: Stability[Any]) -> Real:
+def dense(verdict: Stability) -> Real:
     """The grid of the arm and points about every oscillating pole of the loop, as close as it is to the axis.
 
     There |1 + L| dips, by as little damping as narrowly, and not where the arm's own functions are steep.
     """
     poles = verdict.poles.values[verdict.poles.values.imag > 0]
     away = np.concatenate([-NEAR_POLES[::-1], [0.0], NEAR_POLES])
-    if isinstance(verdict.loop, LawLoop):  # its own poles and zeros of |L| may be as narrow
-        own = verdict.loop.law.poles
-        poles = np.r_[poles, own[own.imag > 0]]
+    own = verdict.loop.law.poles  # a law's own poles and zeros of |L| may be as narrow
+    poles = np.r_[poles, own[own.imag > 0]]
     close = (poles.imag[:, None] + abs(poles.real[:, None]) * away).ravel()
     omega = np.asarray(grid(verdict.loop.arm, verdict.band))
     slow = np.outer(rigid_crossings(verdict.loop), [0.5, 2.0]).ravel()
@@ -238,7 +245,7 @@ def dense(verdict: Stability[Any]) -> Real:
     return np.unique(np.concatenate([omega, more[more > LEAST_SQUARABLE]]))
 
 
-def loop_curve(found: Margins[Any]) -> tuple[Real, NDArray[np.complex128]]:
+def loop_curve(found: Margins) -> tuple[Real, NDArray[np.complex128]]:
     """Frequencies [rad/s] (n,) around every steep place of the loop, and L there, as far as that is finite.
 
     They begin below the first crossing and the first mode: further down L is all the same.
@@ -252,24 +259,24 @@ def loop_curve(found: Margins[Any]) -> tuple[Real, NDArray[np.complex128]]:
     return omega[told], L[told]
 
 
-def minus_loop(loop: Loop | LawLoop, omega: Real) -> Complex:
+def minus_loop(loop: Loop, omega: Real) -> Complex:
     """-L(i w); below `LEAST_SQUARABLE` that of the rigid arm, from which the arm's own cannot be told there."""
     rigid = omega <= LEAST_SQUARABLE
     value = -loop.loop_function(1j * np.where(rigid, 1.0, omega))
-    if isinstance(loop, Loop) and rigid.any():
+    if rigid.any() and loop.at_rest is not None:
         a, b, k = _rigid(loop)
         w = omega[rigid]
         value[rigid] = k + b / w / w + 1j * (a / w)
     return np.asarray(value)
 
 
-def rigid_crossings(loop: Loop | LawLoop) -> Real:
+def rigid_crossings(loop: Loop) -> Real:
     """Frequencies [rad/s] where the loop function of the rigid arm has size 1; none of an arm that cannot turn.
 
     -L = k + b/w^2 + i a/w with a = K1/J, b = Kp/J, k = K2 (J - I_h)/J, so (1 - k^2) w^4 - (2 b k + a^2) w^2 - b^2 = 0.
     Of a hub with friction the drive is not J s^2, and these are none of its own.
     """
-    if not isinstance(loop, Loop) or loop.arm.rate_loss or not loop.arm.has_rigid_mode:
+    if loop.at_rest is None or loop.arm.rate_loss:
         return np.empty(0)
     a, b, k = _rigid(loop)
     if not (a or b):
@@ -281,27 +288,30 @@ def rigid_crossings(loop: Loop | LawLoop) -> Real:
 
 
 def _rigid(loop: Loop) -> tuple[float, float, float]:
-    """K1/J [1/s], Kp/J [1/s^2] and K2 (J - I_h)/J, with what other gains add (`slow_terms`)."""
-    c, b, inertia, _ = slow_terms(loop.arm, loop.law).tolist()
+    """K1/J [1/s], Kp/J [1/s^2] and K2 (J - I_h)/J of an arm that turns."""
+    assert loop.at_rest is not None
+    c, b, effective = loop.at_rest
     J = loop.arm.turned_inertia
-    return b / J, c / J, -inertia / J
+    return (b - loop.arm.rate_loss) / J, c / J, 1.0 - effective / J
 
 
-def gain_margin(loop: Loop, band: float) -> tuple[float, float]:
-    """The factors on all gains at once, below and above 1, at which a pole first reaches the axis."""
-    law, arm, free, line = loop.law, loop.arm, loop.freed.arm, Line(NO_FEEDBACK, loop.law)
-    if loop.freed.is_reactive:
-        factors = [end / law.K2 for end in stable_moments(free) if law.K2 * end > 0 and math.isfinite(end)]
-        factors += [each.t for each in static_crossings(arm, line)]
-        factors += [-arm.rate_loss / law.K1] if law.K1 and arm.rate_loss else []  # there the hub loses nothing
-    else:
-        factors = line_crossings(arm, line, band).gain.tolist()
-    return _nearest_to_one(factors)
+def gain_edges(loop: Loop, by_phase: tuple[tuple[float, float], ...]) -> list[float]:
+    """The factors on all of a law at which a pole reaches the axis, from where L < 0.
+
+    Without damping all modes may reach it at one factor, where rounding alone decides whether L < 0: there a theorem
+    says at which.
+    """
+    gains, arm = loop.gains, loop.arm
+    if gains is None or not arm.loses_at_hub_alone or theorem_of(loop).energy is None:
+        return [t for _, t in by_phase]
+    found = [t for w, t in by_phase if w == 0]
+    found += [arm.input_per_torque / gains.K2] if gains.K2 else []
+    return found + ([-arm.rate_loss / gains.K1] if gains.K1 and arm.rate_loss else [])
 
 
-def unit_crossings(loop: Loop | LawLoop, omega: Real) -> Real:
+def unit_crossings(loop: Loop, omega: Real) -> Real:
     """Frequencies [rad/s] where |L(i w)| = 1."""
-    if loop.law == NO_FEEDBACK:
+    if not loop.feeds_back:
         return np.empty(0)
 
     def size(w: Real) -> Real:

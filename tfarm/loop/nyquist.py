@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Generic
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import ANGLE_GAIN, RATE_GAIN
+from tfarm.arm import AnyLaw, Arm
 from tfarm.arrays import Complex, Real
 from tfarm.columns import Column, Table
 from tfarm.errors import ConvergenceError
@@ -23,12 +22,10 @@ from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.spectrum import flexible_frequencies
 
-from .answers import law_answer
 from .frequencies import band_of, grid
-from .law_loop import LawLoop
-from .plant import Loop
-from .poles import AnyLoop, count_with_mirrors
-from .stability import Stability
+from .loop import Loop
+from .poles import count_with_mirrors
+from .stability import Stability, stability
 
 INDENT_RADIUS = 0.05  # radius of a semicircle around a pole of L, in units of its residue: |L| is about 20 on it
 NEARER = 0.1  # of the way to the nearest closed-loop pole: no step past a pole of L leaves an unstable one out
@@ -46,7 +43,7 @@ TURN_ROUNDS = 24  # of halving where it turns more
 
 @dataclass(frozen=True)
 @record
-class Nyquist(Generic[AnyLoop]):
+class Nyquist:
     """L on the contour for Im s >= 0: `s` (n,), `L` (n,), `is_arc` where the contour passes a pole on the axis.
 
     `poles` [rad/s] are those of L on the axis, `encirclements` of -1 by the whole contour, counter-clockwise positive,
@@ -59,7 +56,7 @@ class Nyquist(Generic[AnyLoop]):
     is_arc: NDArray[np.bool_]
     poles: Real
     encirclements: int
-    verdict: Stability[AnyLoop]
+    verdict: Stability
     unstable_open: int = 0
 
     @property
@@ -81,7 +78,16 @@ class Nyquist(Generic[AnyLoop]):
         return self.unstable_open - self.encirclements
 
 
-def nyquist_of(verdict: Stability[AnyLoop]) -> Nyquist[AnyLoop]:
+def nyquist(arm: Arm, law: AnyLaw) -> Nyquist:
+    """The loop function of a law on Nyquist's contour, its turns around -1 counted up to the verdict's band.
+
+    Raises what the verdict raises, and ConvergenceError where the curve passes -1 so close that its turns cannot be
+    counted, or where the two counts differ.
+    """
+    return nyquist_of(stability(arm, law))
+
+
+def nyquist_of(verdict: Stability) -> Nyquist:
     """The same for a verdict, its encirclements counted up to the verdict's band.
 
     The contour goes around the right part of the verdict's box, so both counts are of one region.  Raises
@@ -93,7 +99,7 @@ def nyquist_of(verdict: Stability[AnyLoop]) -> Nyquist[AnyLoop]:
     corner = complex(verdict.poles.box.re_max, band)
     across, down = np.linspace(1j * band, corner, EDGE_POINTS), np.linspace(corner, corner.real, EDGE_POINTS)
     turned = turning(loop, np.r_[s, across[1:], down[1:]])
-    own = loop.law.poles if isinstance(loop, LawLoop) else np.empty(0, complex)
+    own = loop.law.poles
     inside = int(((own.real > AXIS_SHARE * abs(own)) & (abs(own.imag) < band)).sum())
     plot = Nyquist(s, loop.loop_function(s), is_arc, poles, round(turned / math.pi), verdict, inside)
     found = min(plot.clear, verdict.unstable_roots)
@@ -105,33 +111,29 @@ def nyquist_of(verdict: Stability[AnyLoop]) -> Nyquist[AnyLoop]:
     return plot
 
 
-def poles_on_axis(loop: Loop | LawLoop, band: float) -> Real:
+def poles_on_axis(loop: Loop, band: float) -> Real:
     """Poles of L on the imaginary axis [rad/s], from 0 up: the rigid body's, and at C = 0 every natural frequency.
 
     A law may have some of its own.
     """
     arm = loop.arm
     flexible = np.asarray(flexible_frequencies(arm, band)) if arm.is_undamped else np.empty(0)
-    if isinstance(loop, LawLoop):
-        own = loop.law.poles
-        on_axis = abs(own.real) <= AXIS_SHARE * abs(own)  # of a product of resonators roots are off it by rounding
-        ringing = own.imag[on_axis & (own.imag > 0) & (own.imag < band)]
-        integrators = loop.k.at_rest + int((own == 0).sum())
-        return np.unique(np.r_[[0.0] * (integrators > loop.zeros_at_origin), flexible, ringing])
-    zero = [0.0] if arm.has_rigid_mode and (loop.law[RATE_GAIN] or loop.law[ANGLE_GAIN]) else []
-    return np.r_[zero, flexible]
+    own = loop.law.poles
+    on_axis = abs(own.real) <= AXIS_SHARE * abs(own)  # of a product of resonators roots are off it by rounding
+    ringing = own.imag[on_axis & (own.imag > 0) & (own.imag < band)]
+    integrators = loop.k.at_rest + int((own == 0).sum())
+    return np.unique(np.r_[[0.0] * (integrators > loop.zeros_at_origin), flexible, ringing])
 
 
-def upper_contour(loop: Loop | LawLoop, poles: Real, band: float, closed: Complex) -> tuple[Complex, NDArray[np.bool_]]:
+def upper_contour(loop: Loop, poles: Real, band: float, closed: Complex) -> tuple[Complex, NDArray[np.bool_]]:
     """From s = 0 (or right of it, where a pole is) up the axis to the band, past each pole on its right.
 
     `closed` are the closed loop's poles: each step past a pole of L goes nearer to it than the nearest of them.
     """
     omega = np.asarray(grid(loop.arm, band))
-    if isinstance(loop, LawLoop):
-        own = loop.law.poles[loop.law.poles.imag > 0]
-        near = (own.imag[:, None] + abs(own.real)[:, None] * AROUND_LAW_POLE).ravel()
-        omega = np.unique(np.r_[omega, near[(near > omega[0]) & (near < band)]])
+    own = loop.law.poles[loop.law.poles.imag > 0]
+    near = (own.imag[:, None] + abs(own.real)[:, None] * AROUND_LAW_POLE).ravel()
+    omega = np.unique(np.r_[omega, near[(near > omega[0]) & (near < band)]])
     s, is_arc = 1j * omega, np.zeros(omega.size, bool)
     for pole in poles:
         radius = indentation(loop, float(pole))
@@ -150,7 +152,7 @@ def upper_contour(loop: Loop | LawLoop, poles: Real, band: float, closed: Comple
     return s[order], is_arc[order]
 
 
-def smooth(loop: Loop | LawLoop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
+def smooth(loop: Loop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
     """More points on the axis wherever the drawn curve would have corners."""
     for _ in range(TURN_ROUNDS):
         length = abs(np.diff(compressed(loop.loop_function(s))))
@@ -162,7 +164,7 @@ def smooth(loop: Loop | LawLoop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple
     return s, is_arc
 
 
-def indentation(loop: Loop | LawLoop, pole: float) -> float:
+def indentation(loop: Loop, pole: float) -> float:
     """The radius at which |L| is about 20, and at most a thousandth of the pole's frequency (at 0: of the first)."""
     scale = pole or band_of(loop.arm, 1)
     step = RESIDUE_AT * scale
@@ -170,7 +172,7 @@ def indentation(loop: Loop | LawLoop, pole: float) -> float:
     return min(INDENT_RADIUS * float(abs(loop.loop_function(near)[0])) * step, WIDEST_INDENT * scale)
 
 
-def turning(loop: Loop | LawLoop, path: Complex) -> float:
+def turning(loop: Loop, path: Complex) -> float:
     """By how much [rad] the argument of 1 + L grows along a path, halved where it turns fast."""
     value = 1 + loop.loop_function(path)
     for _ in range(TURN_ROUNDS):
@@ -201,26 +203,7 @@ CONTOUR_COLUMNS = (  # of pairs s, L on the contour of a `Nyquist`
 )
 
 
-def nyquist_answer(found: Nyquist[Any]) -> dict[str, Any]:
-    """The verdict, the turns around -1 beside the unstable poles found in a box, and L on the contour for Im s >= 0."""
-    verdict = found.verdict
-    return {
-        "arm": verdict.loop.arm.name,
-        **law_answer(verdict.loop.law, verdict.loop.arm),
-        "verdict": verdict.verdict,
-        "encirclements": found.encirclements,
-        "unstable_open": found.unstable_open,
-        "unstable_by_nyquist": found.expected,
-        "unstable_roots": verdict.unstable_roots,
-        "on_axis": found.on_axis,
-        "band_rad_s": verdict.band,
-        "beyond_the_band": verdict.tail,
-        "s": [[s.real, s.imag] for s in found.s.tolist()],
-        "L": [[L.real, L.imag] for L in found.L.tolist()],
-    }
-
-
-def nyquist_table(*found: Nyquist[Any], stem: str = "", laws: Sequence[str] = ()) -> Table:
+def nyquist_table(*found: Nyquist, stem: str = "", laws: Sequence[str] = ()) -> Table:
     """L on the contour, a row a point; of several loops, the law of each before it."""
     pairs = [list(zip(each.s.tolist(), each.L.tolist(), strict=True)) for each in found]
     named = [name for name, points in zip(laws, pairs, strict=False) for _ in points]

@@ -1,34 +1,37 @@
-"""Closed-loop poles of the exact arm: zeros of a transcendental function, complete in a printed box.
+"""Closed-loop poles of the exact rig under any law: zeros of a transcendental function, complete in a printed box.
 
-No reduced model takes part.  Newton's method finds zeros from many starts, and the winding number of the characteristic
-function around the box says how many there are (`spectrum.box`); where it disagrees the box is cut and searched again.
+No reduced model takes part, but for places to start from.  Newton's method finds zeros from many starts, and the
+winding number of the characteristic function around the box says how many there are (`spectrum.box`); where it
+disagrees the box is cut and searched again.
 """
 
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Generic
 
 import numpy as np
-from typing_extensions import TypeVar
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import AnyLaw, Arm, as_law
+from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
-from tfarm.exact.characteristic import Analytic, deflated, off_rest, zeros_at_origin
+from tfarm.exact.characteristic import gains_of
 from tfarm.records import record
+from tfarm.reduced.sensed import closed, in_series, pade, sensed_model
 from tfarm.response.frequency import AXIS_SHARE
+from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import TRIED_HEIGHTS, Box, complete
 from tfarm.spectrum.complete_box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR
 from tfarm.spectrum.enclose import Disc, disjoint, enclosed, proven_count
+from tfarm.spectrum.scales import first_frequency
 
 from .frequencies import band_of, steep_places
-from .law_loop import LawLoop
-from .lossless import driven_modes
-from .plant import Loop, effective_inertia
+from .loop import UNDISPERSED, Loop
+from .theorem import CONSERVES, GIVES, theorem_of
 
 MOST_POLES = 1000  # that may be asked for
 USUAL_POLES = 10  # poles listed where no count is asked for
@@ -37,19 +40,23 @@ SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are the rigid arm's, a
 SLOW_STEPS = 4  # of Newton's method from there
 NEAR_RIGID = 0.01  # of its size: how far it may be from the rigid arm's
 LEAST_SQUARABLE = 1e-140  # 1/s: whose square is still a full double
-AnyLoop = TypeVar("AnyLoop", bound=Loop | LawLoop, default=Loop)  # hub gains, unless another law is said
 LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
 RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is looked at again
 FAR_RIGHT, BEYOND_CORNER = 1e5, 10.0  # times that edge, and a law's fastest corner: so far a real pole is looked for
 FAR_POINTS = 41  # of the real axis up to there, on which 1 + L is smooth
 RIGHT_GROWS = 1.7  # times, from one right edge that is tried to the next: of effect on the time alone
-RIGHT_POINTS = 40  # of half a right edge under gains, where Re L is looked at: far from any pole of L, it is smooth
-GAINS_RIGHT = 1e3  # heights that a box reaches right under gains, at most: there the search for its edge ends
+RIGHT_POINTS = 60  # of half a right edge, where Re L is looked at: far from any pole of L, it is smooth
+MOST_HEIGHTS_RIGHT = 1e8  # that a box reaches at most: an improper law may have poles so far right
+LATE = 2.0  # of 1/delay: further left a delayed loop has ever more poles, and all of them are fast
+BEYOND_OWN = 1.1  # times the rightmost pole of a law, where L is infinite: the nearest right edge that is tried
 # Starts of Newton's method: the winding number says what they missed, so that they bear on the time alone.
 STARTS_REACH = 1.3  # heights of the box: modes of the arm up to there, as a law may draw their poles down into it
 DAMPED_BY_LAW = (0.0, 0.02, 0.3)  # of its frequency: how far left of a mode's own pole a law may have moved it
 REAL_STARTS, REAL_SPAN, REAL_REACH = 25, 300, 1.4  # on the real axis: so many, from height/300 to 1.4 heights
-SOME_INERTIA = 1e-12  # kg m^2, of a hub that has none: the rigid arm's polynomial keeps its degree
+FARTHER_OWN, NEARER_OWN, ASIDE_OWN = 1.01, 0.9, 0.1j  # of a law's pole: starts beside it, as on it D is infinite
+LEAST_START = 1e-100  # 1/s: zeros at 0 are divided out
+PADE = 8  # order of the approximation of a delay in the model that starts are taken from
+MODES_ABOVE_BOX, MOST_MODEL_MODES = 4, 40  # modes of the model above the box, and at most
 SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)  # of a box that may not reach above the shear cut-off
 
 
@@ -60,7 +67,7 @@ def count_with_mirrors(zeros: Complex) -> int:
 
 @dataclass(frozen=True)
 @record
-class Poles(Generic[AnyLoop]):
+class Poles:
     """Closed-loop poles [1/s] with Im >= 0, ascending in Im, those at 0 as often as they are: all there are in `box`.
 
     A real pole is listed as often as its order, an oscillating one stands for its conjugate too.
@@ -68,7 +75,7 @@ class Poles(Generic[AnyLoop]):
     above are of shear, and undamped but for the little that bending takes.
     """
 
-    loop: AnyLoop
+    loop: Loop
     values: Complex
     box: Box
     ends_at_shear_cutoff: bool = False
@@ -77,19 +84,12 @@ class Poles(Generic[AnyLoop]):
     def unstable(self) -> int:
         """How many poles of the box, conjugates counted, lie to the right of the axis.
 
-        A real part below working precision decides nothing, but at C = 0 a theorem does (`Loop.takes_energy`,
-        `driven_modes`).
+        A real part below working precision decides nothing, but without damping a theorem does (`theorem_of`).
         """
-        right = self.values.real > AXIS_SHARE * abs(self.values)
-        if isinstance(self.loop, LawLoop):  # of which no theorem on gains at the hub tells anything
-            return count_with_mirrors(self.values[right])
-        loop = self.loop.freed
-        if loop.arm.is_undamped and loop.is_told_by_theorem and loop.takes_energy < 0:
-            right |= (self.values.imag > 0) & (abs(self.values.real) <= AXIS_SHARE * abs(self.values))
-        on_rate, on_moment = loop.law.point
-        if loop.is_reactive and not loop.is_told_by_theorem and on_rate > 0:
-            driven = driven_modes(loop.arm, on_moment)
-            return max(count_with_mirrors(self.values[right]), 2 * int((driven.at < self.box.im_max).sum()))
+        size = abs(self.values)
+        right = self.values.real > AXIS_SHARE * size
+        if theorem_of(self.loop).energy == GIVES:
+            right |= (self.values.imag > 0) & (abs(self.values.real) <= AXIS_SHARE * size)
         return count_with_mirrors(self.values[right])
 
     @property
@@ -112,9 +112,10 @@ class Poles(Generic[AnyLoop]):
 
         Raises CertificationError where something cannot be proven.
         """
-        if isinstance(self.loop, LawLoop):
+        if self.loop.gains is None:
             raise CertificationError("discs are proven for gains at the hub; of a law the poles are counted in the box")
-        k, gains = self.loop.k, self.loop.gains
+        k = self.loop.k
+        gains = gains_of(k, self.loop.gains)
         discs = tuple(enclosed(k, complex(pole), digits, gains) for pole in self.moving)
         if not disjoint(discs):
             raise CertificationError("the discs of two poles touch: ask for more digits")
@@ -124,7 +125,7 @@ class Poles(Generic[AnyLoop]):
         return discs
 
 
-def poles_of_gains(arm: Arm, law: HubFeedback, count: int | None = None) -> Poles:
+def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles:
     """The first `count` closed-loop poles with Im >= 0, ascending in Im s, complete in the box of the record.
 
     Without a count the first ten (more, where more are real), or as many as lie below the shear cut-off where these are
@@ -133,13 +134,13 @@ def poles_of_gains(arm: Arm, law: HubFeedback, count: int | None = None) -> Pole
     """
     if count is not None:
         count = whole("count", count, 1, MOST_POLES, f"a whole number from 1 to {MOST_POLES}")
-    loop, cut_off = Loop(arm, law), arm.shear_cutoff
-    wanted, limit = (USUAL_POLES, cut_off) if count is None else (count, math.inf)
+    loop = Loop(arm, as_law(law))
+    wanted, limit = (USUAL_POLES, loop.arm.shear_cutoff) if count is None else (count, math.inf)
     number = wanted + 2
     while True:
-        height = band_of(arm, number)
+        height = band_of(loop.arm, number)
         if height >= limit:
-            poles = poles_below(loop, limit, SHRUNK_HEIGHTS)
+            poles = poles_below(loop, limit, factors=SHRUNK_HEIGHTS)
             if poles.values.size <= wanted:
                 return replace(poles, ends_at_shear_cutoff=True)
         else:
@@ -147,54 +148,55 @@ def poles_of_gains(arm: Arm, law: HubFeedback, count: int | None = None) -> Pole
         if poles.values.size >= wanted:
             return first_poles(poles, count)
         if number > MOST_BOX_MODES:
-            text = f"only {poles.values.size} poles right of -1/C lie below {height:.4g} rad/s, not {count}"
-            raise ConvergenceError(text, poles.values, count)
+            left, _, _, top = poles.box
+            text = f"only {poles.values.size} poles right of {left:.4g} 1/s lie below {top:.4g} rad/s, not {wanted}"
+            raise ConvergenceError(text, poles.values, wanted)
         number *= 2
 
 
-def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = TRIED_HEIGHTS) -> Poles:
-    """All closed-loop poles with |Im s| <= height, and more than about -1.5 heights or -0.8/C in Re s.
+def poles_below(loop: Loop, height: float, late: float = LATE, factors: tuple[float, ...] = TRIED_HEIGHTS) -> Poles:
+    """All closed-loop poles with |Im s| <= height [rad/s] in a box that reaches right of every unstable one.
 
-    Where a zero lies on the edge of the box the next of the `factors` on the height is tried.
+    Left it reaches to about -1.5 heights, -0.8/C or -late/delay.  Where a zero lies on the edge of the box the next of
+    the `factors` on the height is tried.
     """
-    if loop.freed is not loop and loop.freed.is_lossless:  # with its poles at 0 and on the axis where they belong
-        return replace(poles_below(loop.freed, height, factors), loop=loop)
-    resting = loop.resting_zeros
-    at_zero = zeros_at_origin(loop.k, loop.gains) + resting
     starts, known = starting_points(loop, STARTS_REACH * height), slow_poles(loop, SLOW_SHARE * height)
-    whole = loop.member.function
-
-    def function(s: Complex) -> Analytic:
-        s = off_rest(s) if resting else s
-        return deflated(*whole(s), s, resting)
-
-    found, box = complete(function, lambda height: box_of(loop, height), height, starts, known, factors)
-    # without losses the function is even in s: a simple zero is its own mirror image, its real part is rounding
-    on_axis = loop.is_lossless & (abs(found.real) <= AXIS_SHARE * abs(found))
+    found, box = complete(loop.function, lambda top: box_of(loop, top, late), height, starts, known, factors)
+    # without losses a simple zero is its own mirror image, and its real part is rounding
+    is_even = loop.is_lossless or (loop.arm.is_undamped and theorem_of(loop).energy == CONSERVES)
+    on_axis = is_even & (abs(found.real) <= AXIS_SHARE * abs(found))
     found = np.where(on_axis, 1j * found.imag, found)
     upper = found[found.imag >= 0]
     upper = upper[np.lexsort((upper.real, upper.imag))]
-    return Poles(loop, np.r_[np.zeros(at_zero, complex), upper], box)
+    return Poles(loop, np.r_[np.zeros(loop.zeros_at_origin, complex), upper], box)
 
 
-def box_of(loop: Loop, height: float) -> Box:
-    """A box of that height which reaches far enough right for any unstable pole, and left short of -1/C."""
-    right = quiet_edge(loop, RIGHT_OF_AXIS * height, height, RIGHT_POINTS, GAINS_RIGHT)
-    left, C = HEIGHTS_LEFT * height, loop.arm.damping
-    return Box(-min(left, TOWARD_SINGULAR / C) if C else -left, right, -height, height)
+def box_of(loop: Loop, height: float, late: float = LATE) -> Box:
+    """A box of that height, right of the law's poles and until |L| is small; left short of -1/C and -late/delay."""
+    own, C = loop.law.poles, loop.arm.damping
+    if own.real.max(initial=0.0) > UNDISPERSED * first_frequency(loop.arm):
+        fastest = complex(own[own.real.argmax()])
+        why = f"the law has a pole at {fastest:.3g} 1/s, farther right than a box reaches: its den begins next to 0"
+        raise ConvergenceError(f"{why}; begin it with 0, which is another law, or a larger number", fastest, height)
+    right = RIGHT_OF_AXIS * height
+    if own.size:
+        right = BEYOND_OWN * max([right, *own.real.tolist()])
+    right = quiet_edge(loop, right, height)
+    clear = TOWARD_SINGULAR / C if C else np.inf
+    left = min(HEIGHTS_LEFT * height, clear, late / loop.law.delay if loop.law.delay else np.inf)
+    return Box(-float(left), right, -height, height)
 
 
-def quiet_edge(
-    loop: Loop | LawLoop, right: float, height: float, points: int, heights: float, corner: float = 0.0
-) -> float:
+def quiet_edge(loop: Loop, right: float, height: float) -> float:
     """The right edge [1/s] of a box of that height, from `right` on: where 1 + L has no zero, or after so many heights.
 
     That is where Re L > -1/2, on the edge and at a few places beyond; L > 0 may be large, as on a hub without inertia,
-    and 1 + L keeps its sign on the real axis for five decades more, and beyond the `corner` [1/s] of a law: a hub of
+    and 1 + L keeps its sign on the real axis for five decades more, and beyond the fastest corner of a law: a hub of
     little inertia meets it only there.
     """
-    edge = 1j * np.linspace(0.0, height, points)
-    while right < heights * height:
+    edge = 1j * np.linspace(0.0, height, RIGHT_POINTS)
+    corner = float(abs(loop.law.poles).max(initial=0.0))
+    while right < MOST_HEIGHTS_RIGHT * height:
         L = loop.loop_function(np.r_[right + edge, right * np.array(RIGHT_OF_EDGE)])
         if L.real.min() > LEAST_REAL_PART:
             break
@@ -210,34 +212,59 @@ def quiet_edge(
 def slow_poles(loop: Loop, below: float) -> Complex:
     """Poles [1/s] but 0 of the turning arm under small gains, of size up to `below`: zeros of J s^2 + b s + c.
 
-    J is the effective inertia, b and c are `Loop.at_rest`.  They are corrected on the characteristic function where
-    their squares are full doubles; smaller ones are right as they are, flexibility and damping adding terms of the
-    order |s|/w1 and C |s|.
+    These are `Loop.at_rest`.  They are corrected on the characteristic function if their squares are full doubles;
+    smaller ones are right as they are, flexibility and damping adding terms of the order |s|/w1 and C |s|.
     """
-    b, c = loop.at_rest
-    if not loop.arm.has_rigid_mode:
+    if loop.at_rest is None:
         return np.empty(0, complex)
-    J = effective_inertia(loop.arm, loop.law)
+    c, b, J = loop.at_rest
     unit = max(abs(b), math.sqrt(abs(c)) * math.sqrt(abs(J)), LEAST_SIZE)  # b and sqrt(c J) alike
     with np.errstate(over="ignore"):
         roots = unit * np.roots([J, b / unit, c / unit / unit]).astype(complex)
     slow = roots[(roots != 0) & (abs(roots) <= below)]
     exact = slow.copy()
     for _ in range(SLOW_STEPS):
-        at = loop.member.function(np.where(abs(exact) > LEAST_SQUARABLE, exact, 1.0))
+        at = loop.function(np.where(abs(exact) > LEAST_SQUARABLE, exact, 1.0))
         exact = exact - np.where(abs(exact) > LEAST_SQUARABLE, at.value / at.slope, 0.0)
     return exact[abs(exact - slow) <= NEAR_RIGID * abs(slow)]
 
 
 def starting_points(loop: Loop, up_to: float) -> Complex:
-    """Where Newton's method starts: the arm's own frequencies, those with the hub locked, and the rigid arm's poles."""
-    arm, C = loop.arm, loop.arm.damping
-    near = near_modes(np.asarray(steep_places(arm, up_to)), C)
-    J = arm.turned_inertia if arm.has_rigid_mode else arm.hub_side_inertia + SOME_INERTIA
-    slow = np.roots([J, *loop.at_rest]).astype(complex)
-    slow = slow[abs(slow) > LEAST_SQUARABLE]  # zeros at 0 are divided out
-    real = real_starts(up_to)
-    return np.concatenate([near, near.conj(), slow, -real, real])
+    """Where Newton's method starts: the arm's own frequencies, the law's poles, and the loop of a modal model."""
+    omega, C = np.asarray(steep_places(loop.arm, up_to)), loop.arm.damping
+    near, real, own = near_modes(omega, C), real_starts(up_to), loop.law.poles
+    slow, of_model = np.empty(0, complex), np.empty(0, complex)
+    if loop.at_rest is not None:
+        c, b, _ = loop.at_rest
+        slow = np.roots([loop.arm.turned_inertia, b, c]).astype(complex)
+    if not (loop.law.is_static or loop.law.is_improper):  # which has no states
+        count = min(modes_below(loop.arm, up_to) + MODES_ABOVE_BOX, MOST_MODEL_MODES)
+        with suppress(ParameterError, ConvergenceError):  # the winding number says whether something is missing
+            of_model = poles_of_model(loop, _lightly_damped(loop, count))
+    beside = [own * FARTHER_OWN, own * NEARER_OWN + ASIDE_OWN * abs(own)]
+    starts = np.concatenate([near, near.conj(), slow, real, -real, *beside, of_model])
+    return starts[abs(starts) > LEAST_START]
+
+
+def _lightly_damped(loop: Loop, count: int) -> Matrices:
+    """A model of the rig in its undamped modes, each with the damping of its own C w, and what the hub loses.
+
+    Bending of one C has just that; the damped modes themselves take far longer to be followed than starts are worth.
+    """
+    arm, signals = loop.arm, loop.law.signals
+    A, B, C, D = sensed_model(arm.lossless, (*signals, "hub_rate"), count)
+    omega = np.diag(A, 1)
+    (pair,) = np.nonzero((omega > 0) & (np.diag(A, -1) == -omega))
+    A[pair + 1, pair + 1] -= arm.damping * omega[pair] ** 2
+    return A - arm.rate_loss * B @ C[-1:], B, C[:-1], D[:-1]
+
+
+def poles_of_model(loop: Loop, plant: Matrices) -> Complex:
+    """Poles of a model of the rig, from its input to the law's signals, under the law, a delay by Pade's fraction."""
+    law = loop.law.matrices()
+    if loop.law.delay:
+        law = in_series(law, pade(loop.law.delay, PADE).matrices())
+    return np.linalg.eigvals(closed(plant, law)).astype(complex)
 
 
 def real_starts(up_to: float) -> Real:
@@ -252,7 +279,7 @@ def near_modes(omega: Real, C: float) -> Complex:
     return (-decay - shift * omega + 1j * omega * np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))).ravel()
 
 
-def first_poles(poles: Poles[AnyLoop], count: int | None) -> Poles[AnyLoop]:
+def first_poles(poles: Poles, count: int | None) -> Poles:
     """The first so many poles, the usual ones and all real ones if no number is given, and a lower box of just these.
 
     Raises ParameterError where a number that is given parts real poles.

@@ -77,7 +77,7 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
         which = np.unique(np.linspace(0, exact.gain.size - 1, REDUCED_VALUES).round().astype(int))
         loops = [exact.variation.at(float(value)) for value in exact.gain[which]]
         none = np.zeros(len(FED_BACK))
-        closed = [_closed(each.arm, np.array(each.law.row), count, none)[0][0] for each in loops]
+        closed = [_closed(each.arm, np.array((each.gains or HubFeedback()).row), count, none)[0][0] for each in loops]
         poles = np.array([np.linalg.eigvals(A) for A in closed])
     branches = exact.branches[:, which]
     paired = np.full(branches.shape, np.nan, complex)
@@ -105,7 +105,7 @@ def _polished(variation: Variation, gain: Real, poles: Complex, count: int) -> C
     on the model's partial fractions; a pole where that has no slope, or that would move, stays as it is.
     """
     model = modal_model(variation.arm, FED_BACK, count)
-    laws = np.array([variation.at(float(value)).law.row for value in gain])
+    laws = np.array([(variation.at(float(value)).gains or HubFeedback()).row for value in gain])
     found = poles.astype(complex)
     for _ in range(POLISHING):
         value, slope = _return_difference(model, laws, found)

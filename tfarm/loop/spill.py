@@ -7,7 +7,6 @@ of them (Balas 1978).  The exact loop has them all.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +14,15 @@ from numpy.typing import NDArray
 from tfarm.arm import AnyLaw, Arm, arm_and_law, as_law
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex
-from tfarm.columns import Column, Table
+from tfarm.columns import Column
 from tfarm.digits import general, plain, singly
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.reduced.sensed import sensed_model
 from tfarm.spectrum import modes
 
-from .answers import law_answer
-from .law_loop import LawLoop
-from .law_poles import poles_of_model
-from .law_stability import law_stability
-from .stability import Stability
+from .poles import poles_of_model
+from .stability import Stability, stability
 
 MOST_SPILL_MODES = 60  # modes of a model
 USUAL_SPILL_MODES = 20  # up to which models are looked at where nothing else is asked for
@@ -45,7 +41,7 @@ class Spill:
     unstable too, None where the last is not.
     """
 
-    verdict: Stability[LawLoop]
+    verdict: Stability
     modes: NDArray[np.int64]
     unstable: NDArray[np.int64]
     rightmost: Complex
@@ -104,14 +100,14 @@ def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
 
     The models are those that a law is designed on: bare modes.  A delay is in them as a Pade approximation.
     Raises ParameterError for what is no law, where there is no loop, or none of finite order; ConvergenceError as
-    `law_stability` does.
+    `stability` does.
     """
     (arm, _), law = arm_and_law(arm, law), as_law(law)
     most = whole("modes", most, 1, MOST_SPILL_MODES, f"a whole number of modes, 1 to {MOST_SPILL_MODES}")
     if law.is_improper:
         remedy = "differentiates, and has no states; add a fast pole to den"
         raise ParameterError(key="law", value=law.name, remedy=remedy)
-    verdict = law_stability(arm, law)
+    verdict = stability(arm, law)
     loop, numbers, unstable, rightmost = verdict.loop, np.arange(1, most + 1), [], []
     slowest = REST_SHARE * float(modes(loop.arm, 1).natural_frequency[-1])
     for number in numbers.tolist():
@@ -131,24 +127,3 @@ SPILL = (
     Column("im", "Im", "rad/s", of=lambda it: abs(it.rightmost.imag).tolist(), digits=singly(plain, 6),
            printed=singly(general, 6)),
 )  # fmt: skip
-
-
-def spill_answer(found: Spill) -> dict[str, Any]:
-    """The verdict, what it means in words, and a row a model."""
-    verdict = found.verdict
-    return {
-        "arm": verdict.loop.arm.name,
-        **law_answer(verdict.loop.law, verdict.loop.arm),
-        "verdict": verdict.verdict,
-        "stable": verdict.is_stable,
-        "in_words": found.in_words,
-        "unstable_roots": verdict.unstable_roots,
-        "unstable_roots_infinite": verdict.unstable_roots_infinite,
-        "band_rad_s": verdict.band,
-        "known_beyond_the_band": verdict.is_known_beyond,
-        "beyond_the_band": verdict.tail,
-        "driven": [[float(pole.real), float(pole.imag)] for pole in found.driven],
-        "first_mode": found.first_mode,
-        "shown_from_modes": found.shown_from,
-        "models": Table(columns=SPILL, record=found),
-    }

@@ -1,70 +1,70 @@
 """The verdict on a loop: stable, marginal or unstable, and for how much of the infinite spectrum that is known.
 
-Poles are computed, completely, up to a band; what lies beyond is
+Poles are computed, completely, up to a band; what lies beyond is known by
 
-* at C = 0 a theorem: with K1 > 0 every flexible mode is damped if K2 < 1 and driven if K2 > 1, and K2 = 1 leaves the
-  modes of the locked hub alone (`lyapunov`), so a few modes tell the rest; where the gauge does not read the moment on
-  the hub it tells nothing, and the edges of many modes are looked at (`lossless`);
-* at C > 0 bounded: from the band on |L(i w)| stays below one half, and falls (the hub's inertia against ever more
-  heavily damped bending), so that 1 + L has no zero there, nor further right.  Where the band of that would hold more
-  modes than `MOST_BAND_MODES` it is cut, and where a segment of a lossy rig has C = 0 there is none: the verdict says
-  so.
+* a theorem on the sign of the law (`theorem`): on the hub's own angle or rate, through a torque that acts at once, it
+  tells every mode of any rig; with feedback of the hub's moment every mode of a rig without damping, so that a few
+  modes tell the rest;
+* small gain: with damping in every segment, once |L| stays below one half on the axis, and falls, and on the upper
+  edge of the box, 1 + L has no zero above it.  Where the band of that would hold more modes than `MOST_BAND_MODES` it
+  is cut, and where a segment of a lossy rig has C = 0 there is none;
+* delay without any damping: the phase of what is fed back turns ever on from mode to mode, so that of infinitely many
+  modes infinitely many are driven.
 
-A pole at 0 remains where Kp = 0, whatever K1 and K2: verdicts are apart from it.
+Else it is not known, and the verdict is that of the band.  A pole at 0 remains where nothing holds the hub's angle:
+verdicts are apart from it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import product
-from typing import Generic, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arrays import Complex, Real
-from tfarm.errors import ConvergenceError
+from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum import modes, modes_below
 
 from .frequencies import MOST_BAND_MODES, QUIET_REACH, band_of, quiet_places
-from .lossless import driven_modes, locked_edges
-from .plant import Loop, slow_terms
-from .poles import AnyLoop, Poles, poles_below
+from .loop import Loop
+from .poles import Poles, box_of, poles_below
+from .theorem import GIVES, TAKES, Theorem, theorem_of
 
 LEAST_BAND_MODES = 12  # flexible modes in the band at C = 0, and at least
-QUIET = 0.5  # |L| beyond the band, at C > 0
-QUIET_POINTS = 1200  # in them, 600 a decade
+QUIET = 0.5  # |L| beyond the band, with damping
+QUIET_POINTS = 1200  # in the bands of QUIET_REACH, 600 a decade; a quarter of so many on the upper edge of the box
 WIDENED = 1.6  # times, from one band that is tried to the next
 MARGIN_OF_ZERO = 1e-11  # a real part below this share of |s| is none: the poles are right to a few eps
-NOT_BOUNDED = (  # beyond the band: of a rig with a segment without damping, and of others
-    "beyond the band not bounded: with C = 0 in the link resonances are too narrow to be looked at",
-    "beyond the band not bounded: the small-gain condition would need more modes than are looked at",
-)
-NO_THEOREM = "beyond the band no theorem tells the modes where the gauge does not read the moment on the hub"
-MIRRORED = "C = 0 and {rate} < 0: the poles are those of {opposite} mirrored, infinitely many of them unstable"
-RATES = ("K1", "-K1"), ("K1 + b, with what the hub loses,", "-(K1 + b)")  # of a hub without losses, and with them
-DRIVEN = "C = 0: every flexible mode beyond the band is unstable too, with a growth rate that tends to 0"
+LISTED_LEFT = 0.5  # of 1/delay: poles are listed so far left, of ever more as |L| falls, to tell the unstable ones
+BEYOND_LAW_POLES = 1.3  # of the fastest pole of the law that rings: a band reaches so far, if it can
+DULL = 0.7  # damping ratio from which on a pole of the law makes no peak
+NEAREST_TO_AXIS = 1e-4  # of a band: the upper edge of the box is looked at on the axis and from so near to it on
 UNFELT = 1e-9  # a hub participation below this share of an ordinary one is none
+DELAYED = "without any damping a delayed law drives infinitely many modes beyond the band"
+SMALL_GAIN = f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)"
+UNKNOWN_ABOVE = "converged up to {band:.4g} rad/s, not determined beyond, neither by small gain nor by a theorem"
 
 
 @dataclass(frozen=True)
 @record
-class Stability(Generic[AnyLoop]):
+class Stability:
     """`verdict` "stable", "marginal" or "unstable"; poles in the band; what is known beyond it, in words.
 
     Where `is_known_beyond` is false the verdict is that of the band alone.
     """
 
-    loop: AnyLoop
+    loop: Loop
     verdict: str
     unstable_roots: int
     unstable_roots_infinite: bool
     band: float
     tail: str
-    poles: Poles[AnyLoop]
+    poles: Poles
     is_known_beyond: bool = True
 
     @property
@@ -73,45 +73,55 @@ class Stability(Generic[AnyLoop]):
         return self.verdict == "stable"
 
 
-def stability(arm: Arm, law: HubFeedback, band: float | None = None) -> Stability:
-    """The verdict on the loop.  `band` [rad/s] is chosen if it is not given.
-
-    Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, and where at C > 0 one
-    is on the axis to working precision.
-    """
-    loop = Loop(arm, law)
-    height, quiet = (band, False) if band is not None else loop_band(loop)
-    poles = poles_below(loop, height)
-    beyond = _beyond(loop, quiet)
-    verdict = _verdict(poles, beyond.is_unstable, loop)
-    return Stability(
-        loop, verdict, poles.unstable, beyond.is_infinite, poles.box.im_max, beyond.words, poles, beyond.is_known
-    )
-
-
 class Beyond(NamedTuple):
-    """What is known beyond the band, in words: whether infinitely many poles are unstable, or at least one."""
+    """What is known beyond the band, in words: whether infinitely many poles there are unstable."""
 
     words: str
     is_infinite: bool = False
-    is_unstable: bool = False
     is_known: bool = True
 
 
-def _verdict(poles: Poles, is_unstable: bool, loop: Loop) -> str:
-    moving, law, free = poles.moving, loop.law, loop.freed
-    if is_unstable or bool((moving.real > MARGIN_OF_ZERO * abs(moving)).any()):
+def stability(arm: Arm, law: AnyLaw, band: float | None = None) -> Stability:
+    """The verdict on the loop of an arm and a law.  `band` [rad/s] is chosen if it is not given.
+
+    Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, and where with damping
+    one is on the axis to working precision.
+    """
+    return verdict_on(Loop(arm, as_law(law)), band)
+
+
+def verdict_on(loop: Loop, band: float | None = None) -> Stability:
+    """`stability` of a loop."""
+    theorem = theorem_of(loop)
+    height, quiet = (band, False) if band is not None else band_of_loop(loop, theorem)
+    poles = poles_below(loop, height, LISTED_LEFT)
+    beyond = _beyond(loop, theorem, quiet, height)
+    verdict = _verdict(poles, theorem, beyond.is_infinite)
+    top = poles.box.im_max
+    return Stability(loop, verdict, poles.unstable, beyond.is_infinite, top, beyond.words, poles, beyond.is_known)
+
+
+def _beyond(loop: Loop, theorem: Theorem, quiet: bool, band: float) -> Beyond:
+    if theorem.energy is not None:
+        return Beyond(theorem.reason, is_infinite=theorem.energy == GIVES)
+    if quiet:
+        return Beyond(SMALL_GAIN)
+    if loop.arm.is_undamped and loop.law.delay and loop.feeds_back:
+        return Beyond(DELAYED, is_infinite=True)
+    return Beyond(UNKNOWN_ABOVE.format(band=band), is_known=False)
+
+
+def _verdict(poles: Poles, theorem: Theorem, is_infinite: bool) -> str:
+    """The verdict from the poles of the band and the theorem, which may know a side that rounding hides."""
+    moving, arm = poles.moving, poles.loop.arm
+    if is_infinite or bool((moving.real > MARGIN_OF_ZERO * abs(moving)).any()):
         return "unstable"
     at_zero = poles.values.size - moving.size
-    if at_zero > 1 or (at_zero == 1 and not slow_terms(free.arm, law)[1]):
+    if at_zero > 1 or (at_zero == 1 and not arm.has_rigid_mode):
         return "marginal"
-    if free.is_lossless:
-        return "marginal"
-    if free.is_reactive:
-        told = free.is_told_by_theorem
-        return "marginal" if told and not is_felt(free.arm, poles.box.im_max) else "stable"
-    if free.arm.is_reactive and (moving.real > -MARGIN_OF_ZERO * abs(moving)).any():
-        return "marginal"  # on the axis to working precision, and no theorem that tells on which side
+    if arm.loses_at_hub_alone:
+        known = theorem.energy == TAKES or not (moving.real > -MARGIN_OF_ZERO * abs(moving)).any()
+        return "stable" if known and is_felt(arm.lossless_hub, poles.box.im_max) else "marginal"
     must_be_off_axis(moving)
     return "stable"
 
@@ -145,74 +155,61 @@ def felt(arm: Arm, up_to: float) -> Real:
     return np.array([b * scale / k, b * arm.hub_side_inertia * omega**2 * scale / (EI * k**2)])
 
 
-def _beyond(loop: Loop, quiet: bool) -> Beyond:
-    """What is known beyond the band."""
-    arm, law, told = loop.arm, loop.law, loop.is_told_by_theorem
-    if told and loop.takes_energy > 0:
-        return Beyond("C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0")
-    if told and loop.takes_energy < 0 and arm.loses_at_hub_alone:
-        return Beyond(DRIVEN, is_infinite=True, is_unstable=True)
-    if arm.is_undamped and told:
-        if law.K1 == 0:
-            return Beyond("C = 0 and K1 = 0: nothing takes or gives energy, modes beyond the band lie on the axis")
-        return Beyond("C = 0 and K2 = 1: modes with the hub at rest stay undamped, in every band")
-    if loop.freed.is_reactive:
-        return _beyond_lossless(loop)
-    if quiet:
-        return Beyond(f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)")
-    return Beyond(NOT_BOUNDED[bool(arm.least_damping)], is_known=False)
-
-
-def _beyond_lossless(loop: Loop) -> Beyond:
-    """Without losses, where the gauge does not read the moment on the hub: by the modes of the locked hub."""
-    arm, law = loop.freed.arm, loop.freed.law
-    rate, opposite = RATES[arm is not loop.arm]
-    if not law.K1:
-        return Beyond(f"C = 0 and {rate} = 0: nothing takes or gives energy; {NO_THEOREM}", is_known=False)
-    edges, driven = locked_edges(arm), driven_modes(arm, law.K2)
-    if law.K1 < 0:
-        return Beyond(MIRRORED.format(rate=rate, opposite=opposite), is_infinite=True, is_unstable=True)
-    which = f"the first {len(edges)} modes of the locked hub, up to {edges.at.max():.4g} rad/s"
-    if len(driven):
-        words = f"C = 0: K2 is beyond the edge of {len(driven)} among {which}: two poles of each grow, ever more slowly"
-        return Beyond(f"{words}; the lowest is that at {driven.at.min():.4g} rad/s", is_unstable=True)
-    return Beyond(f"C = 0: {NO_THEOREM}; K2 is beyond the edge of none among {which}", is_known=False)
-
-
-def loop_band(loop: Loop) -> tuple[float, bool]:
-    """The band [rad/s] in which poles are computed, and whether the loop is quiet beyond it (always False at C = 0)."""
-    few = band_of(loop.arm, LEAST_BAND_MODES)
-    if loop.freed.arm.is_reactive or (loop.is_told_by_theorem and (loop.arm.is_undamped or loop.takes_energy > 0)):
-        return few, False
-    band = few
-    while modes_below(loop.arm, band) <= MOST_BAND_MODES:
-        if _has_fallen(loop, band):
-            return band, is_quiet(loop, band)
+def band_of_loop(loop: Loop, theorem: Theorem | None = None) -> tuple[float, bool]:
+    """The band [rad/s] in which poles are computed, and whether the loop is quiet beyond it (never without damping)."""
+    theorem, arm, own = theorem or theorem_of(loop), loop.arm, loop.law.poles
+    ringing = own[own.real > -DULL * abs(own)]
+    fastest, highest = BEYOND_LAW_POLES * float(abs(ringing).max(initial=0.0)), band_of(arm, MOST_BAND_MODES)
+    least = max(band_of(arm, LEAST_BAND_MODES), min(fastest, highest))
+    is_told = theorem.energy is not None and (arm.has_elastic_link or not loop.law.is_static)
+    if arm.loses_at_hub_alone or is_told or fastest > highest:
+        return least, False
+    band = least
+    while modes_below(arm, band) <= MOST_BAND_MODES:
+        if has_fallen(loop, band):
+            return band, arm.least_damping > 0
         band *= WIDENED
-    return max(few, band / WIDENED), False
+    return max(least, band / WIDENED) if loop.law.is_static else least, False
 
 
-def band_of_gains(arm: Arm, ranges: Mapping[str, tuple[float, float]]) -> tuple[float, bool]:
-    """A band [rad/s] for all gains in these ranges, and whether all their loops are quiet beyond it.
-
-    |L| is convex in the gains, so that it is largest at a corner of their box.
-    """
-    corners = [HubFeedback(**dict(zip(ranges, each, strict=True))) for each in product(*ranges.values())]
-    bands, quiet = zip(*(loop_band(Loop(arm, law)) for law in corners), strict=True)
+def band_of_family(loops: Iterable[Loop]) -> tuple[float, bool]:
+    """A band [rad/s] for all these loops, and whether they are all quiet beyond it."""
+    bands, quiet = zip(*map(band_of_loop, loops), strict=True)
     return max(bands), all(quiet)
 
 
 def is_quiet(loop: Loop, band: float) -> bool:
-    """Whether |L(i w)| stays below `QUIET` over two decades from the band on, and falls there.
+    """Whether small gain tells every pole beyond a band.
 
     Of a rig with an elastic segment it is not known: with what the hub or another segment loses, the resonances of that
     one become ever narrower, and pass between any points that are looked at.
     """
-    return loop.arm.least_damping > 0 and _has_fallen(loop, band)
+    return loop.arm.least_damping > 0 and has_fallen(loop, band)
 
 
-def _has_fallen(loop: Loop, band: float) -> bool:
-    """Whether |L| is so at `QUIET_POINTS` points of these two decades, and at the resonances between them."""
+def has_fallen(loop: Loop, band: float) -> bool:
+    """Whether 1 + L has no zero with Im s > band right of the axis, by |L| < 1/2 on the edges of that region.
+
+    On the axis two decades are looked at, where |L| falls, with the natural frequencies between; on the upper edge of
+    the box as far right as that reaches, and beyond |L| is smaller still.
+    """
     omega, half = np.asarray(quiet_places(loop.arm, band, QUIET_POINTS)), math.sqrt(QUIET_REACH) * band
     size = abs(loop.loop_function(1j * omega))
-    return bool(size.max() < QUIET and size[omega > half].max() <= size[omega <= half].max())
+    if not (size.max() < QUIET and size[omega > half].max() <= size[omega <= half].max()):
+        return False
+    right = box_of(loop, band).re_max
+    edge = np.r_[0.0, np.geomspace(NEAREST_TO_AXIS * band, right, QUIET_POINTS // 4)] + 1j * band
+    return bool(abs(loop.loop_function(edge)).max() < QUIET)
+
+
+def is_known_without(loop: Loop, name: str) -> bool:
+    """Whether poles beyond some band are known, of this law or any nearer to it, once a leading coefficient is 0.
+
+    Else high modes are driven on the way there, and their poles come to a band from above: counts in it cannot be
+    carried from one side of 0 to the other.
+    """
+    try:
+        without = loop.having(name, 0.0)
+        return theorem_of(without).energy in (TAKES, 0) or band_of_loop(without)[1]
+    except (ParameterError, ConvergenceError):
+        return False

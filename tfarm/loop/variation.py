@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import LISTED, NAMES, RATE_GAIN, Arm, HubFeedback
+from tfarm.arm import LISTED, NAMES, RATE_GAIN, Arm, HubFeedback, as_law
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, gains_of, loop_system, quick_characteristics, zeros_at_origin
@@ -18,7 +18,7 @@ from tfarm.records import record
 from tfarm.spectrum.correction import Member
 
 from .lines import NO_FEEDBACK, Line
-from .plant import Loop
+from .loop import Loop
 
 OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, as of the arm's below
 ARM_PARAMETERS = {
@@ -54,8 +54,8 @@ class Variation:
     def at(self, value: float) -> Loop:
         """The loop where the varied number has that value.  Raises ParameterError where there is none."""
         if self.is_of_gains:
-            return Loop(self.arm, self.line.at(value))
-        return Loop(self.arm.having(**{self.vary: value}), self.beside.plus(self.law))
+            return Loop(self.arm, as_law(self.line.at(value)))
+        return Loop(self.arm.having(**{self.vary: value}), as_law(self.beside.plus(self.law)))
 
     @property
     def line(self) -> Line:
@@ -117,7 +117,7 @@ def must_keep_losing(variation: Variation, start: float, stop: float) -> None:
     if not (variation.is_of_gains and arm.rate_loss and arm.lossless_hub.has_massless_hub):
         return
     for key, value in (("from", start), ("to", stop)):
-        if variation.at(value).law[RATE_GAIN] <= -arm.rate_loss:
+        if (variation.at(value).gains or NO_FEEDBACK)[RATE_GAIN] <= -arm.rate_loss:
             remedy = f"with hub.inertia = 0 a pole passes through infinity at {RATE_GAIN} = {-arm.rate_loss:.6g}"
             raise ParameterError(key=key, value=value, remedy=f"{remedy}: stay above it, or give the hub an inertia")
 

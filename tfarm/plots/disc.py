@@ -31,7 +31,7 @@ ARROWS_AT = np.array([0.12, 0.4, 0.75])  # of the drawn length of the curve, arc
 RING_HALO: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
 
 
-def nyquist(data: Nyquist[Any], *, ax: Axes | None = None, name: str = "") -> Axes:
+def nyquist(data: Nyquist, *, ax: Axes | None = None, name: str = "") -> Axes:
     """L on Nyquist's contour (what `tfarm.nyquist` returns), verdict and encirclements above it; the axes.
 
     A size r of L is drawn as r/(1 + r): the rim is infinity, -1 lies half way.  `name`: what the law is called.
@@ -53,7 +53,7 @@ def nyquist(data: Nyquist[Any], *, ax: Axes | None = None, name: str = "") -> Ax
 
 
 @drawn.register(Nyquist)
-def draw_disc(data: Nyquist[Any], name: str = "", new: New = blank) -> Figure:
+def draw_disc(data: Nyquist, name: str = "", new: New = blank) -> Figure:
     """One disc, on a figure of its own."""
     title = f"{data.verdict.loop.arm.name}: the loop function L(iω)"
     return on_own_figure(lambda own: nyquist(data, ax=own, name=name), (5.0, 5.8), title, _legend(), new)
@@ -92,7 +92,7 @@ def _disc(ax: Axes) -> None:
     ax.set_frame_on(False)
 
 
-def _curve(data: Nyquist[Any], ax: Axes) -> None:
+def _curve(data: Nyquist, ax: Axes) -> None:
     """Along the axis as a line, past poles as arcs beyond the rim, one for all that turn alike; arrows as w rises."""
     z = compressed(data.L)
     turn = np.flatnonzero(np.diff(data.is_arc.astype(int))) + 1
@@ -115,7 +115,7 @@ def _curve(data: Nyquist[Any], ax: Axes) -> None:
     ax.set_ylim(-LAST_RADIUS - RADIUS_STEP, LAST_RADIUS + RADIUS_STEP)
 
 
-def _arc(data: Nyquist[Any], z: Complex, pieces: list[NDArray[np.int64]], radius: float, ax: Axes) -> None:
+def _arc(data: Nyquist, z: Complex, pieces: list[NDArray[np.int64]], radius: float, ax: Axes) -> None:
     """The first of some arcs that turn alike, and how many they are."""
     piece = pieces[0]
     ring = arc_on_ring(data.L[piece], radius)

@@ -8,12 +8,11 @@ from matplotlib.figure import Figure
 
 from tfarm.digits import plain, significant
 from tfarm.loop.law_locus import LawLocus
-from tfarm.loop.law_map import LawMap
 from tfarm.loop.law_rounded import rounded_law_locus
 from tfarm.loop.loci import held_branches
 from tfarm.loop.locus import Locus
+from tfarm.loop.plane import Plane
 from tfarm.loop.reduced_locus import ReducedLocus
-from tfarm.loop.regions import Region
 
 from .drawn import drawn
 from .labels import OFFSETS_BESIDE, Label
@@ -51,17 +50,17 @@ def draw_locus_of(exact: Locus | LawLocus, reduced: ReducedLocus | None = None, 
     return draw_locus(exact, reduced, new) if isinstance(exact, Locus) else draw_law_locus(exact, new)
 
 
-def gain_map(found: Region | LawMap, *, ax: Axes | None = None) -> Axes:
+def gain_map(found: Plane, *, ax: Axes | None = None) -> Axes:
     """The plane of both gains, or of two numbers of a law (what `tfarm.map` returns), in the axes given or in new ones.
 
     Colours for the number of unstable poles; a black line for the exact boundary with frequencies [rad/s] along it, of
     a law dots where a pole is on the axis.  Returns the axes.
     """
-    must_be(Region | LawMap, found, "tfarm.map returns")
+    must_be(Plane, found, "tfarm.map returns")
     if ax is None:
         return draw_map_of(found, window).axes[0]
     with style():
-        if isinstance(found, Region):
+        if found.is_of_gains:
             gain_counts(found, ax=ax)
         else:
             law_counts(found, ax=ax)
@@ -69,9 +68,9 @@ def gain_map(found: Region | LawMap, *, ax: Axes | None = None) -> Axes:
 
 
 @drawn.register
-def draw_map_of(found: Region | LawMap, new: New = blank) -> Figure:
+def draw_map_of(found: Plane, new: New = blank) -> Figure:
     """The plane, of gains or of two numbers of any law, on a figure of its own."""
-    return draw_map(found, new) if isinstance(found, Region) else draw_law_map(found, new)
+    return draw_map(found, new) if found.is_of_gains else draw_law_map(found, new)
 
 
 def draw_law_locus(found: LawLocus, new: New = blank) -> Figure:
@@ -105,13 +104,13 @@ def law_branches(found: LawLocus, *, ax: Axes) -> None:
     ax.set_ylabel("Im s [rad/s]")
 
 
-def draw_law_map(found: LawMap, new: New = blank) -> Figure:
-    """The plane of a `LawMap`, on a figure of its own."""
+def draw_law_map(found: Plane, new: New = blank) -> Figure:
+    """The plane of a `Plane`, on a figure of its own."""
     title = f"{found.arm.name}: unstable poles below {significant(found.band, 5)} rad/s under {found.law.name}"
     return on_own_figure(lambda ax: law_counts(found, ax=ax), (7.0, 5.4), title, new=new)
 
 
-def law_counts(found: LawMap, *, ax: Axes) -> None:
+def law_counts(found: Plane, *, ax: Axes) -> None:
     """Colours for the number of unstable poles, black dots for the exact crossings along the second number."""
     image = colours(found.unstable)
     ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True, zorder=0.1)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from tfarm.arm import MOMENT_GAIN
 from tfarm.digits import how_many, significant
 from tfarm.dsp import GainMap
-from tfarm.loop.regions import Region
+from tfarm.loop.plane import Plane
 from tfarm.tuner import Tuning
 from tfarm.tuner.training import QUARTILES, LearningCurves
 
@@ -35,7 +35,7 @@ def tuned_gain(found: Tuning, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def draw_gain(tuning: Tuning, continuous: Region, sampled: Sequence[GainMap]) -> Figure:
+def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap]) -> Figure:
     """Left the map with the tuner's path and guard, right the gain over time, on the same axis."""
     with style():
         figure = blank(9.0, 4.9)

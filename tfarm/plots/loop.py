@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -22,7 +20,7 @@ BEYOND_MARKED = 1e3  # beyond all that is marked |L| is a pole or a zero on the 
 LEAST_REACH = 3.0  # factors of |L| beyond 1 that the picture reaches at least, either way
 
 
-def draw_loop(found: Margins[Any], name: str) -> Figure:
+def draw_loop(found: Margins, name: str) -> Figure:
     """|L| above the phase from -180 to 180 deg; |L| = 1 and L < 0 marked where they are crossed."""
     omega, L = loop_curve(found)
     with style():
@@ -40,7 +38,7 @@ def draw_loop(found: Margins[Any], name: str) -> Figure:
     return figure
 
 
-def _size(omega: Real, L: NDArray[np.complex128], found: Margins[Any], ax: Axes) -> None:
+def _size(omega: Real, L: NDArray[np.complex128], found: Margins, ax: Axes) -> None:
     """|L| with the line 1, and at each L < 0 the way to it: the factor on the whole law that puts a pole there."""
     ax.set_yscale("log")
     size = abs(L)
@@ -65,7 +63,7 @@ def _size(omega: Real, L: NDArray[np.complex128], found: Margins[Any], ax: Axes)
     _crossed(margins.gain_crossovers, [1.0] * len(margins.gain_crossovers), "|L| = 1", ax)
 
 
-def _phase(omega: Real, L: NDArray[np.complex128], found: Margins[Any], ax: Axes) -> None:
+def _phase(omega: Real, L: NDArray[np.complex128], found: Margins, ax: Axes) -> None:
     """The angle of L in degrees, broken where it passes 180; at each |L| = 1 the phase margin with its sign."""
     ax.plot(*wrapped_phase(omega, L), color=BLUE)
     ax.set_ylim(-190, 190)

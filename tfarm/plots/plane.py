@@ -21,8 +21,7 @@ from tfarm.crossing import RegionPiece, pieces
 from tfarm.digits import SUPERSCRIPT, how_many, plain, significant
 from tfarm.dsp import GainMap
 from tfarm.loop.edges import LINEAR_SCALE, Axis, edge, resting_frequencies, seen, stable_edge, static_edges
-from tfarm.loop.lossless import locked_edges
-from tfarm.loop.regions import INFINITE, Region
+from tfarm.loop.plane import INFINITE, Plane
 
 from .labels import OFFSET_UPON, OFFSETS_AROUND, Label
 from .style import BLUE, GREY, INK, ORANGE, PURPLE, New, blank, on_own_figure
@@ -41,7 +40,7 @@ NUMBER_HALO: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad":
 TICKS_UP = (-50, -20, -10, -5, -2, -1, 0, 1, 2)  # moment gains on a logarithmic axis, of them those in the picture
 
 
-def gain_counts(found: Region, *, ax: Axes) -> None:
+def gain_counts(found: Plane, *, ax: Axes) -> None:
     """Colours for the number of unstable poles, a black line for the exact boundary, frequencies [rad/s] along it."""
     x, y = map(Axis.of, found.axes)
     ground(found, x, y, ax)
@@ -49,13 +48,13 @@ def gain_counts(found: Region, *, ax: Axes) -> None:
     count_labels(found, x, y, ax)
 
 
-def draw_map(found: Region, new: New = blank) -> Figure:
+def draw_map(found: Plane, new: New = blank) -> Figure:
     """The plane, on a figure of its own."""
     title = f"{found.arm.name}: unstable poles over the plane of both gains"
     return on_own_figure(lambda own: gain_counts(found, ax=own), (7.0, 5.4), title, new=new)
 
 
-def ground(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
+def ground(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
     """Both axes, and the colours of the count."""
     for axis, setter, limits, name in (
         (x, ax.set_xscale, ax.set_xlim, ax.xaxis),
@@ -128,9 +127,9 @@ def nice_levels(low: float, high: float) -> list[float]:
     return levels + more
 
 
-def draw_boundary(found: Region, points: Real, x: Axis, y: Axis, ax: Axes) -> None:
+def draw_boundary(found: Plane, points: Real, x: Axis, y: Axis, ax: Axes) -> None:
     """The exact edge (n, 3) with its frequencies; without damping an upright line and a level one."""
-    if found.freed.is_reactive:
+    if found.arm.loses_at_hub_alone:
         _undamped_boundary(found, x, y, ax)
         return
     ax.plot(points[:, 0], points[:, 1], color=INK, lw=1.6, label="poles on the axis at iω, exact")
@@ -147,7 +146,7 @@ def draw_boundary(found: Region, points: Real, x: Axis, y: Axis, ax: Axes) -> No
     ax.plot([], [], "o", ms=4.0, mfc="white", mec=INK, mew=1.0, label="with ω in rad/s")
 
 
-def _undamped_boundary(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
+def _undamped_boundary(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
     """Strong around what is stable, thin where only the number of unstable poles changes.
 
     That is at the edge of each mode of the locked hub, the first few with their frequency; of a uniform arm all these
@@ -161,8 +160,8 @@ def _undamped_boundary(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
         corners = [(x.high, low)] * (low not in cut) + side + [(x.high, high)] * (high not in cut)
         ax.plot(*zip(*corners, strict=True), color=INK, lw=1.8, label=label)
         label = None
-    if not found.freed.is_told_by_lyapunov:
-        edges = sorted(locked_edges(found.freed).within(y.low, y.high), key=lambda each: each.at)
+    if not found.is_known:
+        edges = sorted(found.crossings[-1].within(y.low, y.high), key=lambda each: each.at)
         for number, each in enumerate(edges):
             ax.plot([found.upright, x.high], [each.t, each.t], color=INK, lw=0.5)
             if number < MOST_MARKED:
@@ -235,7 +234,7 @@ def draw_proven(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
         ax.plot([0, x.high], [0, 0], color=PURPLE, lw=1.6, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven")
 
 
-def count_labels(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
+def count_labels(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
     """In every region that is large enough, how many poles are unstable there."""
     grid = seen(found, x, y)
     across, up = grid.axes

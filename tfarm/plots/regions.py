@@ -16,7 +16,7 @@ from tfarm.comparing.regions import K2_RANGE, StableRegions
 from tfarm.crossing import pieces
 from tfarm.digits import plain, scientific
 from tfarm.dsp import GainMap
-from tfarm.loop.regions import Region
+from tfarm.loop.plane import Plane
 
 from .plane import outline
 from .style import BLUE, GREY, INK, ORANGE, blank, headline, must_be, style, window
@@ -28,13 +28,13 @@ CONVENTION = "u = −{} dθ/dt − {} M;  a positive root moment M accelerates t
 LABEL = "{name}, on the {output}  [{unit}]"
 
 
-def overlay(continuous: Region, sampled: GainMap | Sequence[GainMap], *, ax: Axes | None = None) -> Axes:
+def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes | None = None) -> Axes:
     """Both regions of the two gains, in the axes given or in new ones; the axes.
 
     `continuous` is what `tfarm.map` returns, `sampled` what `tfarm.dsp.sampled_map` does: several, for arms with ever
     less damping, lie on each other.  The point is the law of the sampled loop.
     """
-    must_be(Region, continuous, "tfarm.map returns of gains at the hub")
+    must_be(Plane, continuous, "tfarm.map returns of gains at the hub")
     planes = list(sampled) if isinstance(sampled, Sequence) else [sampled]
     for plane in planes:
         must_be(GainMap, plane, "tfarm.dsp.sampled_map returns")
@@ -74,7 +74,7 @@ def draw_overlay(data: StableRegions) -> Figure:
     return figure
 
 
-def _scale(continuous: Region, ax: Axes) -> None:
+def _scale(continuous: Plane, ax: Axes) -> None:
     """Logarithmic across where that gain is positive."""
     across, up = continuous.axes
     if across[0] > 0:
@@ -89,7 +89,7 @@ def _scale(continuous: Region, ax: Axes) -> None:
     ax.set_title(CONVENTION, loc="right", fontsize=8.5, color=GREY)
 
 
-def sampled_label(continuous: Region, plane: GainMap) -> str:
+def sampled_label(continuous: Plane, plane: GainMap) -> str:
     """What a sampled region holds for: the modes at C = 0, the damping where it is not the arm's own."""
     C = plane.loop.plant.arm.damping
     if C == 0.0:
@@ -97,7 +97,7 @@ def sampled_label(continuous: Region, plane: GainMap) -> str:
     return "" if continuous.arm.damping == C else f", if C were {scientific(C, 1)} s"
 
 
-def _fill(ax: Axes, region: Region | GainMap, colour: str, edge: str, label: str) -> Patch:
+def _fill(ax: Axes, region: Plane | GainMap, colour: str, edge: str, label: str) -> Patch:
     for piece in pieces(region.axes[0], region.stable_intervals):
         x, low, high = np.array(piece.points).T
         ax.fill_between(x, low, high, facecolor=colour, edgecolor="none", zorder=2)

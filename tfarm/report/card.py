@@ -15,18 +15,18 @@ from tfarm.digits import plain
 from tfarm.dsp import Chain
 from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import TfarmError
-from tfarm.loop.closed import verdict_on as continuous_verdict
+from tfarm.loop.stability import stability as continuous_verdict
 from tfarm.plots.files import save_figure
 from tfarm.plots.frequency import draw_card
 from tfarm.plots.words import gains_words
 from tfarm.report.arm_section import headline_numbers
 from tfarm.report.given_laws import GivenLaw, LawOnArm, on_arm
+from tfarm.report.kept import keep, kept
 from tfarm.report.loop_laws import brief_on, has_loop, margins_of
 from tfarm.report.page import Card, summary
 from tfarm.report.pieces import QUESTIONS
 from tfarm.report.sampled_words import in_ms
 from tfarm.report.sections import PICTURES, Fact
-from tfarm.report.unchanged import keep, kept
 from tfarm.response.frequency import bode
 from tfarm.spectrum.scales import default_gains
 

@@ -15,9 +15,9 @@ from tfarm.errors import ParameterError
 from tfarm.files import temporary_folder
 from tfarm.plots.compared import draw_comparison
 from tfarm.report.card import written_cards
+from tfarm.report.kept import COMPARISON_KIND, COMPARISON_PAGE, keep
 from tfarm.report.page import index_page, render
 from tfarm.report.sections import PageSection, Picture, save_section
-from tfarm.report.unchanged import COMPARISON_KIND, COMPARISON_PAGE, keep
 from tfarm.report.words import typeset, upper
 from tfarm.report.writing import TRUST_PAGE, move_into
 

@@ -18,7 +18,7 @@ from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.overlay import curves_table, overlay, overlay_answer, required_table
 from tfarm.fitting.possible import ARMS, Possible, extremes, loop_on_all, possible
-from tfarm.loop.regions import ranges_of
+from tfarm.loop.plane import ranges_of
 from tfarm.plots.fitted import draw_band, draw_fit, draw_measured, draw_share
 from tfarm.plots.words import gains_words
 from tfarm.report.loop_laws import has_loop

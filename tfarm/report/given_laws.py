@@ -13,7 +13,7 @@ from tfarm.errors import one_line
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.recording import MeasuredRun
-from tfarm.loop.law_loop import LawLoop
+from tfarm.loop.loop import Loop
 from tfarm.plots.words import gains_words
 from tfarm.records import record
 from tfarm.response.signals import Signals
@@ -110,7 +110,7 @@ def check_laws(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> None:
             continue
         _ = Signals(each.arm, each.law.signals)
         if not each.is_discrete:
-            LawLoop(each.arm, each.law)
+            Loop(each.arm, each.law)
         discretised(each.law, chain.sampling.period)
 
 

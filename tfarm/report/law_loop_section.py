@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -14,11 +13,10 @@ from tfarm.digits import how_many, plain, significant
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.loop.answers import CROSSOVERS, POLE_COLUMNS, crossovers
-from tfarm.loop.closed import closed_loop_poles
-from tfarm.loop.closed import margins as margins_under
-from tfarm.loop.closed import nyquist as nyquist_under
 from tfarm.loop.margins import Margins, loop_curve
-from tfarm.loop.poles import Poles
+from tfarm.loop.margins import margins as margins_under
+from tfarm.loop.nyquist import nyquist as nyquist_under
+from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.loop.spill import SPILL, Spill, spill
 from tfarm.loop.stability import Stability
 from tfarm.plots.disc import draw_nyquist
@@ -58,7 +56,7 @@ POLES_CAPTION = (
 def law_margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageSection:
     """The verdict on each law, what is known beyond its band, its margins and crossings, and what spills over."""
     named = continuous_laws(on_arm(arm, laws))
-    found: list[Margins[Any]] = [margins_under(each.arm, each.law) for each in named]
+    found: list[Margins] = [margins_under(each.arm, each.law) for each in named]
     both = list(zip(named, found, strict=True))
     undamped = arm.is_told_by_lyapunov and all(isinstance(each.law, HubFeedback) for each in named)
     blocks: list[Picture | Table] = [_bode_picture(*each) for each in both]
@@ -82,12 +80,12 @@ def law_margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Pag
     return PageSection(anchor="margins", title=title, facts=facts, words=words, blocks=blocks)
 
 
-def _far(it: Stability[Any]) -> str:
+def _far(it: Stability) -> str:
     """Said beside a verdict that holds in the band alone."""
     return "" if it.is_known_beyond or it.verdict == "unstable" else ", not known beyond"
 
 
-def _bode_picture(each: LawOnArm, found: Margins[Any]) -> Picture:
+def _bode_picture(each: LawOnArm, found: Margins) -> Picture:
     omega, L = loop_curve(found)
     stem = f"{each.key.replace('_', '-')}-bode"
     none = "" if found.in_band is not None else " No margin is marked: the loop is not stable, and has none."
@@ -106,7 +104,7 @@ def _bode_picture(each: LawOnArm, found: Margins[Any]) -> Picture:
     )
 
 
-def crossings_table(each: LawOnArm, found: Margins[Any]) -> Table:
+def crossings_table(each: LawOnArm, found: Margins) -> Table:
     """Every crossing of |L| = 1 and of L < 0 in the band, ascending."""
     assert found.in_band is not None
     rows = sorted(itertools.chain(*crossovers(found.in_band)), key=lambda row: row.omega_rad_s)
@@ -195,7 +193,7 @@ def law_poles_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageS
     return PageSection(anchor="locus", title="Where are the poles?", words=words, blocks=blocks)
 
 
-def law_poles_table(each: LawOnArm, poles: Poles[Any]) -> Table:
+def law_poles_table(each: LawOnArm, poles: Poles) -> Table:
     """Poles with Im s >= 0, with their damping ratio."""
     left, right, _, top = poles.box
     box = f"{plain(left, 5)} < Re s < {plain(right, 5)} and |Im s| < {plain(top, 6)}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from functools import cache
 from pathlib import Path
 
 import vl_convert
@@ -49,27 +48,13 @@ def save_live(subject: Subject, folder: Path) -> None:
     out.write_text(page, encoding="utf-8", newline="")
 
 
-def write_assets(folder: Path, there: Path) -> None:
-    """Vega's runtime, as vl-convert carries it, and this page's own script with its charts.
-
-    They are on their way from `folder` to `there`, where the runtime may be already.
-    """
+def write_assets(folder: Path) -> None:
+    """Vega's runtime, as vl-convert carries it, and this page's own script with its charts."""
     folder.mkdir(exist_ok=True)
-    if not (there / RUNTIME).is_file():
-        (folder / RUNTIME).write_text(_runtime(), encoding="utf-8", newline="")
+    (folder / RUNTIME).write_text(vl_convert.javascript_bundle(BUNDLED), encoding="utf-8", newline="")
     from tfarm.report.live_charts import charts  # and Altair, which the processes that make pages do not need
 
     named = json.dumps(charts(), separators=(",", ":"), sort_keys=True)
     scripts = "".join((TEMPLATES / name).read_text(encoding="utf-8") for name in SCRIPT_PARTS)
     own = f"(() => {{\nconst LIVE_CHARTS = {named};\n{scripts}}})();\n"  # the runtime has names of its own
     (folder / SCRIPT).write_text(own, encoding="utf-8", newline="")
-
-
-def has_assets(folder: Path) -> bool:
-    """Whether the scripts are there."""
-    return all((folder / name).is_file() for name in (RUNTIME, SCRIPT))
-
-
-@cache
-def _runtime() -> str:
-    return vl_convert.javascript_bundle(BUNDLED)

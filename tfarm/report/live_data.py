@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import product
 from typing import Any, get_args
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, GAINS, PLANE, Arm, HubFeedback, unit_of
+from tfarm.arm import ANGLE_GAIN, GAINS, MOMENT_GAIN, PLANE, Arm, HubFeedback, as_law, unit_of
 from tfarm.comparing.regions import BEYOND_PICTURE, sampled_region
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits
@@ -20,11 +21,12 @@ from tfarm.dsp import GainMap as SampledMap
 from tfarm.errors import TfarmError
 from tfarm.loop.edges import moment_axis, rate_axis, rate_columns
 from tfarm.loop.frequencies import steep_places
-from tfarm.loop.lossless import stable_moments
+from tfarm.loop.loop import Loop
 from tfarm.loop.panels import Panels, loop_panels
+from tfarm.loop.plane import gain_map
 from tfarm.loop.positions import Positions, Sensor, positions, sensed_places
-from tfarm.loop.regions import region
-from tfarm.loop.stability import band_of_gains, stability
+from tfarm.loop.stability import band_of_family, stability
+from tfarm.loop.windows import windows_of
 from tfarm.report.live_sampled import packed, sampled_numbers, slew_numbers
 from tfarm.spectrum.scales import angle_unit, default_gains
 
@@ -40,7 +42,7 @@ SENSOR_DIGITS = 6  # of what that chart draws and tells: far more than a screen 
 def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[str, Any]:
     """Everything as plain numbers and words.  `law` is where the page begins: the default gains if not given.
 
-    Raises what `region` and `loop_panels` raise.
+    Raises what `gain_map` and `loop_panels` raise.
     """
     x = rate_axis(arm)
     y, stiffest = moment_axis(arm, x), ANGLE_RANGE * angle_unit(arm)
@@ -49,10 +51,11 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
         for name, axis in zip(PLANE, (x, y), strict=True)
     } | {ANGLE_GAIN: {"low": 0.0, "high": stiffest, "linear": ANGLE_LINEAR * stiffest}}
     reference = default_gains(arm)
-    band, is_quiet = band_of_gains(arm, {name: (each["low"], each["high"]) for name, each in axes.items()})
+    laws = (dict(zip(axes, each, strict=True)) for each in product(*((of["low"], of["high"]) for of in axes.values())))
+    band, is_quiet = band_of_family(Loop(arm, as_law(HubFeedback(**law))) for law in laws)
     samples, across = loop_panels(arm, band), rate_columns(arm, x, LIVE_COLUMNS)
     beyond = np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
-    continuous = region(arm, np.unique(np.r_[across, x.high]), beyond)
+    continuous = gain_map(arm, np.unique(np.r_[across, x.high]), beyond)
     sampled = sampled_region(arm, x, y, chain)
     return {
         "name": arm.name,
@@ -92,7 +95,7 @@ def _known(arm: Arm, is_quiet: bool) -> dict[str, Any]:
     beyond = "beyond the band |L| stays below one half at all gains of this page: no unstable pole there (small gain)"
     if arm.is_reactive and not arm.is_told_by_lyapunov:
         by_energy = "C = 0: none of the modes looked at is driven; no theorem tells the others"
-    moments = stable_moments(arm) if arm.is_reactive else (-math.inf, math.inf)
+    moments = _stable_moments(arm) if arm.is_reactive else (-math.inf, math.inf)
     return {
         "kind": kind,
         "beyond": beyond if kind == "quiet" else by_energy,
@@ -104,6 +107,13 @@ def _known(arm: Arm, is_quiet: bool) -> dict[str, Any]:
         "inertia": arm.turned_inertia,
         "gauged": arm.gauged_inertia,
     }
+
+
+def _stable_moments(arm: Arm) -> tuple[float, float]:
+    """Between which K2 no mode is driven by K1 > 0 without damping; infinite where no limit was found."""
+    found = windows_of(stability(arm, default_gains(arm).having(MOMENT_GAIN, 0.0)), [MOMENT_GAIN])[MOMENT_GAIN]
+    low, high = found.around or (-math.inf, math.inf)
+    return low if found.end(low) == "edge" else -math.inf, high if found.end(high) == "edge" else math.inf
 
 
 def _areas(across: Any, intervals: Sequence[Sequence[tuple[float, float]]]) -> list[dict[str, float]]:

@@ -12,7 +12,7 @@ from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
 from tfarm.dsp.verdict import SampledBrief, sampled_brief
 from tfarm.errors import ConvergenceError
-from tfarm.loop.margins import Margins, margins_of_gains
+from tfarm.loop.margins import Margins, margins
 from tfarm.plots.words import gains_words
 from tfarm.response import transfer
 from tfarm.spectrum.scales import default_gains
@@ -129,7 +129,7 @@ def brief_on(arm: Arm, law: HubFeedback, chain: Chain) -> SampledBrief:
 @lru_cache(maxsize=64)
 def margins_of(arm: Arm, law: HubFeedback) -> Margins:
     """Verdict and margins, computed once for all sections."""
-    return margins_of_gains(arm, law)
+    return margins(arm, law)
 
 
 def laws(arm: Arm, chain: Chain) -> tuple[NamedLaw, ...]:

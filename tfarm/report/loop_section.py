@@ -171,7 +171,7 @@ def _best_words(data: MapOfArm) -> str:
 def _map_caption(data: MapOfArm) -> str:
     proof = proof_words(data.arm)
     unit = f"{plain(rate_unit(data.arm), 4)} {unit_of(RATE_GAIN, data.arm)}"
-    reach = ALL_MODES if data.region.freed.is_told_by_lyapunov else UP_TO.format(band=significant(data.region.band, 5))
+    reach = ALL_MODES if data.region.is_known else UP_TO.format(band=significant(data.region.band, 5))
     free = data.arm.has_rigid_mode
     seen = MAP_SEEN.format(
         band=significant(data.band, 5),
@@ -185,7 +185,7 @@ def _map_caption(data: MapOfArm) -> str:
     clock = f"{plain(1e3 * data.chain.sampling.period)} ms"
     modes = 0 if data.sampled is None else data.sampled.modes_used
     deepest = plain(DEEPEST_MOMENT_GAIN * data.arm.input_per_torque, 4)
-    depth = "" if data.region.freed.is_reactive else DEPTH_WORDS.format(deepest=deepest)  # by a theorem, however deep
+    depth = "" if data.arm.loses_at_hub_alone else DEPTH_WORDS.format(deepest=deepest)  # by a theorem, however deep
     return seen + sampled.format(clock=clock, modes=modes) + depth
 
 

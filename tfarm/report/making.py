@@ -1,16 +1,13 @@
 """The pieces of a report: each a section of an arm's page, its card, its proof or the evidence, made by itself.
 
-None needs another, so two processes can share them.  What a piece returns are words and file names; its pictures and
+None needs another, so two processes share them.  What a piece returns are words and file names; its pictures and
 tables are on disk already.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future
+from collections.abc import Callable, Sequence
 from functools import partial
-from itertools import groupby
-from operator import itemgetter
 from pathlib import Path
 
 from tfarm.errors import TfarmError
@@ -27,10 +24,10 @@ from tfarm.report.words import typeset, upper
 ReportProgress = Callable[[int, int, str], object]
 
 MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores as a small machine has
-WORTH_A_PROCESS = 8  # pieces of one arm for which a second process, which takes a second or two to start, is worth it
+WORTH_A_PROCESS = 8  # pieces for which a second process, which takes a second or two to start, is worth it
 CARD_WORK, CARD_ALONE_WORK = "card", "card alone"  # with the proofs of the arm, and without
 LIVE_WORK = "live loop"
-CARD_SECONDS = 0.9  # less than the modes, beside which the proofs are begun that share them
+CARD_SECONDS = 0.9  # less than the modes, which share their proofs and are begun before
 PieceWork = tuple[int, int | str]  # which arm, which piece (or its card and proof)
 Made = SavedSection | Evidence | None
 
@@ -42,15 +39,14 @@ def make_all(
     subjects: Sequence[Subject],
     folders: Sequence[Path],
     only: tuple[str, ...],
-    with_evidence: bool,
-    scripts: tuple[Path, Path] | None,
+    scripts: Path | None,
     progress: ReportProgress | None,
 ) -> tuple[list[list[SavedSection]], Evidence | None]:
-    """The sections of each arm's page, in the order of PIECES, and the evidence if that is asked for.
+    """The sections of each arm's page, in the order of PIECES, and the evidence of a full report.
 
-    `scripts`: the folder that the live pages' scripts are made in, and that which they are for (see `write_assets`).
+    `scripts` is the folder that the live pages' scripts are made in.
     """
-    tasks = [EVIDENCE_WORK] * with_evidence + [SCRIPTS_WORK] * (scripts is not None)
+    tasks = [EVIDENCE_WORK] * (not only) + [SCRIPTS_WORK] * (scripts is not None)
     for i, subject in enumerate(subjects):
         suited = [(j, piece) for j, piece in enumerate(pieces_of(subject)) if piece.is_for(subject)]
         tasks += [(i, j) for j, piece in suited if not only or any(map(piece.is_on, only))]
@@ -62,52 +58,33 @@ def make_all(
         if progress is not None:
             progress(len(done), len(tasks), ", ".join(_name_of(subjects, task) for task in running))
 
-    tell(())
-
     def work(task: PieceWork) -> Callable[[], Made]:
         if task == EVIDENCE_WORK:
             return gather
         if task == SCRIPTS_WORK and scripts is not None:
-            return partial(write_assets, *scripts)
+            return partial(write_assets, scripts)
         return partial(make, subjects[task[0]], task[1], folders[task[0]])
 
-    for task, section in _results(subjects, tasks, work, tell):
-        done[task] = section  # noqa: PERF403  `tell` counts them meanwhile
+    def turn(task: PieceWork) -> tuple[int, float]:  # an arm after the other, and of each the longest work first
+        i, piece = task
+        if isinstance(piece, str):
+            return i, -CARD_SECONDS * (piece == CARD_WORK)
+        return i, -pieces_of(subjects[i])[piece].seconds
+
+    tell(())
+    if len(tasks) < WORTH_A_PROCESS or MOST_WORKERS == 1 or not may_start_processes():
+        for task in tasks:
+            tell([task])
+            done[task] = work(task)()
+    else:
+        ordered = {task: work(task) for task in sorted(tasks, key=turn)}
+        for task, result in shared(ordered, MOST_WORKERS, [__name__], tell):
+            done[task] = result  # noqa: PERF403  `tell` counts them meanwhile
     tell(())
     places = range(len(subjects))
     sections = [[s for t in tasks if t[0] == i and isinstance(s := done[t], SavedSection)] for i in places]
     evidence = done.get(EVIDENCE_WORK)
     return sections, evidence if isinstance(evidence, Evidence) else None
-
-
-def _results(
-    subjects: Sequence[Subject],
-    tasks: Sequence[PieceWork],
-    work: Callable[[PieceWork], Callable[[], Made]],
-    begun: Callable[[Sequence[PieceWork]], object],
-) -> Iterator[tuple[PieceWork, Made]]:
-    """Each task with its result as it comes: here, or by two processes where there is work for them.
-
-    Then the tasks of none are first, and of each arm what takes longest, so that no end is long.
-    """
-    is_little = len(subjects) == 1 and len(tasks) < WORTH_A_PROCESS
-    if not tasks or is_little or MOST_WORKERS == 1 or not may_start_processes():
-        for task in tasks:
-            begun([task])
-            yield task, work(task)()
-        return
-
-    def seconds(task: PieceWork) -> float:
-        i, piece = task
-        return CARD_SECONDS * (piece == CARD_WORK) if isinstance(piece, str) else pieces_of(subjects[i])[piece].seconds
-
-    def submit(pool: Executor, task: PieceWork) -> Future[Made]:
-        return pool.submit(work(task))
-
-    by_arm = [
-        sorted(each, key=seconds, reverse=True) for _, each in groupby(sorted(tasks, key=itemgetter(0)), itemgetter(0))
-    ]
-    yield from shared(by_arm, submit, MOST_WORKERS, [__name__], begun)
 
 
 def make(subject: Subject, piece: int | str, folder: Path) -> Made:

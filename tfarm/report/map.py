@@ -20,7 +20,7 @@ from tfarm.dsp.verdict import SampledBrief
 from tfarm.loop.damping import least_damping
 from tfarm.loop.edges import Axis, edge, moment_axis, rate_axis
 from tfarm.loop.frequencies import band_of
-from tfarm.loop.regions import Region, region
+from tfarm.loop.plane import Plane, gain_map
 from tfarm.plots import plane
 from tfarm.plots.style import blank, headline, legend_below, style
 from tfarm.records import record
@@ -51,7 +51,7 @@ class MapOfArm:
     arm: Arm
     x: Axis
     y: Axis
-    region: Region
+    region: Plane
     edge: Real
     axes: tuple[Real, Real]
     damping: Real
@@ -69,7 +69,7 @@ class MapOfArm:
     @cached_property
     def counts(self) -> NDArray[np.int64]:
         """Unstable poles on the grid of the damping."""
-        return np.asarray(region(self.arm, *self.axes).unstable)
+        return np.asarray(gain_map(self.arm, *self.axes).unstable)
 
     @property
     def band(self) -> float:
@@ -82,7 +82,7 @@ def map_of_arm(arm: Arm, chain: Chain | None = None) -> MapOfArm:
     chain = Chain() if chain is None else chain
     x = rate_axis(arm)
     y = moment_axis(arm, x)
-    found = region(arm, x.grid(GRID_COLUMNS), y.grid(GRID_ROWS))
+    found = gain_map(arm, x.grid(GRID_COLUMNS), y.grid(GRID_ROWS))
     half = DAMPING_EVERY // 2
     across, up = (
         np.r_[axis.low, each[half::DAMPING_EVERY], axis.high] for axis, each in zip((x, y), found.axes, strict=True)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 from tfarm.arm import MOMENT_GAIN
 from tfarm.columns import Column, Table
 from tfarm.digits import how_many, plain, significant, singly
 from tfarm.loop.answers import MARGIN_COLUMNS, NOT_STABLE, WINDOW_COLUMNS, gain_rows, margin_rows, unsettled
-from tfarm.loop.law_loop import LawLoop
-from tfarm.loop.law_stability import signs_of_loop
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
+from tfarm.loop.theorem import signs_of_loop
 from tfarm.report.loop_laws import Named
 from tfarm.report.sections import Fact
 from tfarm.report.words import typeset, upper
@@ -45,7 +43,7 @@ QUANTITIES = (
 MarginRow = tuple[str, str, float | str, float | str, float | str]  # quantity, unit, exact, in the band, at
 
 
-def verdict_fact(named: Named, found: Margins[Any], more: str) -> Fact:
+def verdict_fact(named: Named, found: Margins, more: str) -> Fact:
     """The verdict, large, how many poles are unstable up to where, and what more is to be said beside it."""
     it = found.stability
     number = how_many(it.unstable_roots, "unstable pole")
@@ -54,18 +52,18 @@ def verdict_fact(named: Named, found: Margins[Any], more: str) -> Fact:
     return Fact(label=f"{named.name}: {named.gains}", value=it.verdict.upper(), beside=beside)
 
 
-def verdict_words(name: str, found: Margins[Any]) -> str:
+def verdict_words(name: str, found: Margins) -> str:
     """The verdict on the law of that name, what is known beyond the band, and what Lyapunov or the law's sign adds."""
     it, loop = found.stability, found.stability.loop
     free = it.poles.moving.size < it.poles.values.size
     apart = ", the one at 0 that the hub angle leaves apart" if free else ""
-    if isinstance(loop, LawLoop):
+    if loop.gains is None:
         signs = signs_of_loop(loop)
         kind = f"it is {signs.kind}" if signs.kind else "no theorem on its sign helps"
         theorem = f"Beside that, {kind}: {typeset(signs.reason)}."
         theorem += "".join(f" Warning: {typeset(text)}." for text in loop.warnings)
     else:
-        proof = lyapunov(loop.arm, loop.law)
+        proof = lyapunov(loop.arm, loop.gains)
         theorem = f"Lyapunov: {'proven' if proof.proven else 'no proof'}, {typeset(proof.reason)}."
     poles = f"{how_many(it.unstable_roots, 'unstable pole')} up to {significant(it.band, 5)} rad/s"
     return f"{name}: {it.verdict.upper()}, with {poles}{apart}; {typeset(it.tail)}. {theorem}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from tfarm.columns import Column, Table
 from tfarm.digits import significant, singly
@@ -27,7 +27,7 @@ class PlotOfLaw(NamedTuple):
     """One law's plot: its name, and the counted contour."""
 
     named: Named
-    data: Nyquist[Any]
+    data: Nyquist
 
 
 def count_table(plots: Sequence[PlotOfLaw], names: Sequence[str]) -> Table:

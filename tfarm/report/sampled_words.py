@@ -15,7 +15,7 @@ from tfarm.dsp.chain import Chain
 from tfarm.dsp.crossings import around
 from tfarm.dsp.verdict import AtPeriod, at_periods, sampled
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import Windows, gain_windows
+from tfarm.loop.windows import Windows, windows_of
 from tfarm.records import record
 from tfarm.report.sections import Fact
 from tfarm.report.words import typeset, upper
@@ -74,7 +74,7 @@ def sampled_study(arm: Arm, chain: Chain) -> Sampled:
     """The numbers of the section.  Raises ParameterError for an arm without a loop."""
     gains = default_gains(arm)
     analysis = sampled(arm, gains, chain)
-    windows = gain_windows(stability(arm, gains), MOMENT_GAIN)
+    windows = windows_of(stability(arm, gains), [MOMENT_GAIN])[MOMENT_GAIN]
     return Sampled(arm, analysis, windows, stable_regions(arm, gains, chain), at_periods(arm, gains, chain))
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -31,11 +31,22 @@ from tfarm.report.trust_proofs import (
     digits_table,
     hash_of,
 )
-from tfarm.report.unchanged import PACKAGES, keep, kept_in, makers
 from tfarm.response.accuracy import BAND_POINTS
 from tfarm.tables.files import save_table
 
-TRUST_FOLDER, EVIDENCE_KIND = "trust", "evidence"
+TRUST_FOLDER = "trust"
+PACKAGES = (
+    "numpy",
+    "scipy",
+    "numba",
+    "mpmath",
+    "python-flint",
+    "sympy",
+    "control",
+    "matplotlib",
+    "latex2mathml",
+    "vl-convert-python",
+)
 
 PROOFS_WORDS = (
     "Modes are counted before they are looked for: a chain of signs in the manner of Wittrick and Williams (1971) "
@@ -74,24 +85,11 @@ def gather() -> Evidence:
     return Evidence(audit=audit.audit(), published=published.validate())
 
 
-def kept_evidence(folder: Path) -> Evidence | None:
-    """What is in evidence.json; None where it is of another tfarm or other versions, or none of ours."""
-
-    def evidence(read: dict[str, Any]) -> Evidence | None:
-        if read["makers"] != makers():
-            return None
-        rows = tuple(audit.AuditRow(**row) for row in read["audit"])
-        return Evidence(audit=rows, published=tuple(published.PublishedRow(**row) for row in read["published"]))
-
-    return kept_in(folder, EVIDENCE_KIND, evidence)
-
-
 def write_trust(evidence: Evidence, proofs: Sequence[ArmProof], folder: Path) -> None:
     """index.html and its tables, into a folder of their own."""
     folder.mkdir()
     sections = {s.anchor: save_section(s, folder) for s in _sections(evidence, proofs)}
     files = save_table(audit_table(evidence.audit), folder / DATA)
-    keep(folder, EVIDENCE_KIND, {"name": folder.name, "makers": makers(), **asdict(evidence)})  # for the next report
     page = render(
         "trust.html",
         title="Why trust this",

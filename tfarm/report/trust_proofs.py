@@ -23,11 +23,11 @@ from tfarm.digits import scientific, significant, singly, worded
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import file_text
 from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.loop.poles import Poles, poles_of_gains
+from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.plots.words import gains_words
 from tfarm.report.damped_table import PROVEN_DIGITS, proven_damped_modes
+from tfarm.report.kept import keep, kept
 from tfarm.report.loop_laws import has_loop
-from tfarm.report.unchanged import keep, kept
 from tfarm.report.words import typeset
 from tfarm.response.accuracy import BAND_POINTS, worst_error
 from tfarm.spectrum import DampedModes, Modes
@@ -135,7 +135,7 @@ def boxed(arm: Arm) -> Iterator[Boxed]:
 
 
 def _proven_poles(arm: Arm, law: HubFeedback) -> Poles:
-    poles = poles_of_gains(arm, law, PROVEN_MODES)
+    poles = closed_loop_poles(arm, law, PROVEN_MODES)
     poles.certify(PROVEN_DIGITS)
     return poles
 

@@ -18,14 +18,14 @@ from tfarm.fitting.fit import Fit
 from tfarm.report.card import written_cards
 from tfarm.report.frame import other_pages
 from tfarm.report.given_laws import GivenLaw, Subject, check_laws
-from tfarm.report.live import ASSETS, LIVE_PAGE, has_assets, is_live
+from tfarm.report.kept import COMPARISON_PAGE, kept_comparison
+from tfarm.report.live import ASSETS, LIVE_PAGE, is_live
 from tfarm.report.making import ReportProgress, make_all, pieces_of
 from tfarm.report.page import arm_page, file_of, index_page
 from tfarm.report.pieces import QUESTIONS
 from tfarm.report.sections import SavedSection
-from tfarm.report.trust import TRUST_FOLDER, kept_evidence, write_trust
+from tfarm.report.trust import TRUST_FOLDER, write_trust
 from tfarm.report.trust_proofs import written_proofs
-from tfarm.report.unchanged import COMPARISON_PAGE, is_unchanged, kept_comparison, key_of, note_made
 from tfarm.stopping import undone_if_stopped
 
 Notice = Callable[[str], object]
@@ -36,7 +36,6 @@ RESERVED_NAMES = (  # which no arm's folder may have
 
 
 TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
-LEFT_AS_IT_IS = "{name}: left as it is, for nothing that its page is made of has changed; --force makes it again"
 LEFT_OUT_OF = "{name}: the page leaves out “{title}” and says why: {why}"
 
 
@@ -49,7 +48,6 @@ def write(
     fits: Sequence[Fit | None] | None = None,
     measured: Sequence[Measured] = (),
     only: tuple[str, ...] | None = None,
-    force: bool = False,
     progress: ReportProgress | None = None,
     notice: Notice | None = None,
 ) -> Path:
@@ -59,19 +57,18 @@ def write(
     those that each arm's page is about; where there is none it is about the default gains.  `fits` are where the arms'
     numbers are from, if they were fitted to measurements: their pages begin with these.  Responses that were `measured`
     are laid over those of every arm.
-    `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  An arm whose
-    pages are up to date is left as it is, unless `force`.  `progress` gets (done, total, what runs) whenever a piece of
-    work begins, and at the end.  A section that tfarm cannot make of an arm says why in its place, and `notice` is told
-    so in one line, once the pages are written, as it is of an arm left as it was.  Raises ParameterError before any
-    work if `out` cannot be written, two arms share a name or there is none, or an arm or its clock can make nothing of
-    a law.  If the work itself fails, `out` is as it was.
+    `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  `progress` gets
+    (done, total, what runs) whenever a piece of work begins, and at the end.  A section that tfarm cannot make of an
+    arm says why in its place, and `notice` gets the same in one line once the pages are written.  Raises ParameterError
+    before any work if `out` cannot be written, two arms share a name or there is none, or an arm or its chain does not
+    suit a law; ConvergenceError if a process dies.  If the work itself fails, `out` is as it was.
     """
     _check(arms, only)
     subjects = _subjects(arms, chains, laws, fits, measured)
     out = Path(out)
     names = [arm.name for arm in arms] + [TRUST_FOLDER, ASSETS] * (not only)
     with _beside(out, names) as beside:
-        told = _written(subjects, out, beside, only, force, progress)
+        told = _written(subjects, out, beside, only, progress)
     for text in told:
         if notice is not None:
             notice(text)
@@ -102,44 +99,31 @@ def _written(
     out: Path,
     beside: Path,
     only: tuple[str, ...] | None,
-    force: bool,
     progress: ReportProgress | None,
 ) -> list[str]:
     """Make all pages in `beside`, move them to `out`, and the index last; what is to be said of them."""
     trust = TRUST_PAGE if not only or (out / TRUST_PAGE).is_file() else ""
-    left = [not force and _is_left(each, out, only, trust) for each in subjects]
-    told = [LEFT_AS_IT_IS.format(name=each.arm.name) for each, same in zip(subjects, left, strict=True) if same]
-    changed = [each for each, same in zip(subjects, left, strict=True) if not same]
-    folders = [beside / str(i) for i in range(len(changed))]
+    folders = [beside / str(i) for i in range(len(subjects))]
     for folder in folders:
         folder.mkdir()
-    evidence = None if only or force else kept_evidence(out / TRUST_FOLDER)
-    wants_scripts = not only and any(map(is_live, subjects)) and bool(changed or not has_assets(out / ASSETS))
-    scripts = (beside / ASSETS, out / ASSETS) if wants_scripts else None
-    sections, gathered = make_all(changed, folders, only or (), not only and evidence is None, scripts, progress)
-    for subject, folder, parts in zip(changed, folders, sections, strict=True):
+    scripts = beside / ASSETS if not only and any(map(is_live, subjects)) else None
+    sections, evidence = make_all(subjects, folders, only or (), scripts, progress)
+    told = []
+    for subject, folder, parts in zip(subjects, folders, sections, strict=True):
         _write_pages(subject, folder, parts, only, trust, out / subject.arm.name)
         failed = [part.section for part in parts if part.section.failure]
         told += [LEFT_OUT_OF.format(name=subject.arm.name, title=each.title, why=each.failure) for each in failed]
-        done = () if failed else _pages(only)
-        note_made(folder, out / subject.arm.name, done, key_of(subject, _leads(trust, out, subject.arm)))
-    if wants_scripts:
-        move_into(beside / ASSETS, out / ASSETS)
-    for subject, folder in zip(changed, folders, strict=True):
+    if scripts is not None:
+        move_into(scripts, out / ASSETS)
+    for subject, folder in zip(subjects, folders, strict=True):
         move_into(folder, out / subject.arm.name)
-    if (evidence := gathered or evidence) is not None:
+    if evidence is not None:
         write_trust(evidence, written_proofs(out), beside / TRUST_FOLDER)
         move_into(beside / TRUST_FOLDER, out / TRUST_FOLDER)
     index = index_page(written_cards(out), trust=trust, compared=kept_comparison(out)[0])
     (beside / "index.html").write_text(index, encoding="utf-8", newline="")
     os.replace(beside / "index.html", out / "index.html")
     return told
-
-
-def _is_left(subject: Subject, out: Path, only: tuple[str, ...] | None, trust: str) -> bool:
-    """Whether the arm's pages in `out` are what they would be now."""
-    arm = subject.arm
-    return is_unchanged(out / arm.name, _pages(only), _leads(trust, out, arm), subject)
 
 
 def _check(arms: Sequence[Arm], only: tuple[str, ...] | None) -> None:
@@ -197,11 +181,6 @@ def _make_folders(folder: Path, made: list[Path]) -> None:
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
 
-def _pages(only: tuple[str, ...] | None) -> tuple[str, ...]:
-    """The pages written of an arm, as made.json names them."""
-    return only or ("index",)
-
-
 def _write_pages(
     subject: Subject,
     folder: Path,
@@ -219,7 +198,10 @@ def _write_pages(
         anchors = {piece.anchor for piece in pieces_of(subject) if question and piece.is_on(question)}
         wanted = [each for each in sections if question is None or each.section.anchor in anchors]
         live = (folder / LIVE_PAGE).is_file()
-        others = [*other_pages(earlier, _pages(only), question or "index"), *_compared(earlier.parent, subject.arm)]
+        others = [
+            *other_pages(earlier, only or ("index",), question or "index"),
+            *_compared(earlier.parent, subject.arm),
+        ]
         page = arm_page(subject, wanted, question, trust=f"../{trust}" if trust else "", live=live, others=others)
         (folder / f"{question or 'index'}.html").write_text(page, encoding="utf-8", newline="")
 
@@ -228,11 +210,6 @@ def _compared(out: Path, arm: Arm) -> list[tuple[str, str]]:
     """(file, title) of the comparison beside the reports, as an arm's page sees it, where it is one of this arm."""
     title, arms = kept_comparison(out)
     return [(f"../{COMPARISON_PAGE}", title)] if arm.name in arms else []
-
-
-def _leads(trust: str, out: Path, arm: Arm) -> str:
-    """The pages that an arm's page leads to besides its own."""
-    return "\n".join((trust, *(title for _, title in _compared(out, arm))))
 
 
 def move_into(made: Path, folder: Path) -> None:

@@ -22,7 +22,7 @@ from tfarm.exact.outputs import output as known_output
 from tfarm.exact.series import expansions_at_zero
 from tfarm.exact.system import System, system_of
 from tfarm.exact.values import free_outputs
-from tfarm.records import record
+from tfarm.records import read_only, record
 
 GRIDS_KEPT = 24  # sets of points whose values are kept: memory against time, of no effect on an answer
 
@@ -67,7 +67,7 @@ class Signals:
     def kept(self, s: Complex) -> LoopParts:
         """`parts`, not worked out again where they were asked for lately at the same points, as of another law."""
         key, kept = (s.shape, s.tobytes()), self._kept
-        found = kept.pop(key, None) or self.parts(s)
+        found = kept.pop(key, None) or read_only(self.parts(s))
         kept[key] = found  # the last one is the latest
         if len(kept) > GRIDS_KEPT:
             del kept[next(iter(kept))]

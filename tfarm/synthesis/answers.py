@@ -6,7 +6,7 @@ from typing import Any
 
 from tfarm.arm import TWO_GAINS
 from tfarm.dsp.verdict import brief_of
-from tfarm.loop.answers import law_answer
+from tfarm.loop.law_answers import law_answer
 from tfarm.synthesis.design import Design
 from tfarm.synthesis.law_design import LawDesign
 from tfarm.synthesis.sampled import slew_and_after, trial_slew

@@ -8,15 +8,15 @@ from functools import cached_property
 
 import numpy as np
 
-from tfarm.arm import Arm, HubFeedback, law_of, laws_at
+from tfarm.arm import Arm, HubFeedback, as_law, law_of, laws_at
 from tfarm.arrays import Real
 from tfarm.dsp import Slew
 from tfarm.errors import ConvergenceError
 from tfarm.loop.damping import least_damping
 from tfarm.loop.frequencies import band_of, grid
+from tfarm.loop.loop import Loop
 from tfarm.loop.margins import disk_at
-from tfarm.loop.plant import Loop
-from tfarm.loop.regions import region
+from tfarm.loop.plane import gain_map
 from tfarm.loop.residual import residual_moment
 from tfarm.loop.stability import stability
 from tfarm.records import record
@@ -59,7 +59,7 @@ class ContinuousJudge:
     def landscape(self, axes: tuple[GainAxis, GainAxis], effort: Effort) -> tuple[Real, Score]:
         """Scores over the grid, rows upwards, inf where not stable; and the score where its nearest point is stable."""
         gains = [axis.gain(axis.middles(number)) for axis, number in zip(axes, effort[:2], strict=True)]
-        stable = region(self.arm, gains[0], gains[1], self.held).stable
+        stable = gain_map(self.arm, gains[0], gains[1], self.held.Kp).stable
         grid = np.array(np.meshgrid(*gains))
         values = np.full(stable.shape, np.inf)
         if stable.any():
@@ -107,4 +107,4 @@ class ContinuousJudge:
         return np.asarray(grid(self.arm, band_of(self.arm, self.modes)))
 
     def _disk(self, law: HubFeedback) -> float:
-        return float(disk_at(Loop(self.arm, law), self._omega).min())
+        return float(disk_at(Loop(self.arm, as_law(law)), self._omega).min())

@@ -11,19 +11,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, cast, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import Arm, HubFeedback, as_law
 from tfarm.arrays import Real
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.verdict import SampledBrief, sampled_brief
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.frequencies import band_of
-from tfarm.loop.plant import Loop
+from tfarm.loop.loop import Loop
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import record
 from tfarm.spectrum.scales import check_gains, rate_unit, turning_inertia
@@ -129,7 +129,7 @@ def best_gains(
     flat = _flat(judge.score, best, bounds)
     return Design(
         objective=objective, law=law, value=worst_value(objective, [each.value for each in on_arms]),
-        verdict=cast("Stability", on_arms[0].verdict), bounds=bounds,
+        verdict=on_arms[0].verdict, bounds=bounds,
         flat_K1=flat[0], flat_K2=flat[1], modes=modes, at_bound=tuple(name for name, _ in ends),
         at_limit=tuple(name for name, end in ends if free[name] and (name, end) in PHYSICAL_ENDS),
         widened=tuple(name for name in bounds if bounds[name] != start[name]),
@@ -147,7 +147,7 @@ def _bounds_at_first(
     """
     arm, unit = arms[0].arm, arms[0].arm.input_per_torque
     for each in arms:
-        Loop(each.arm, held.at(1.0, 0.0 if each.arm.has_massless_hub else 0.5 * unit))
+        Loop(each.arm, as_law(held.at(1.0, 0.0 if each.arm.has_massless_hub else 0.5 * unit)))
     bounds = {
         "K1": _checked("K1", K1 or (0.0, 2.0 * turning_inertia(arm) * band_of(arm, 1))),
         "K2": _checked("K2", K2 or (-3.0 * unit, 1.0 * unit)),

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
@@ -18,9 +17,7 @@ from tfarm.dsp import Chain, Verdict
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.verdict import brief_of, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError, did_you_mean
-from tfarm.loop.law_loop import LawLoop
-from tfarm.loop.law_stability import law_stability
-from tfarm.loop.stability import Stability
+from tfarm.loop.stability import Stability, stability
 from tfarm.records import record
 from tfarm.synthesis.law_judge import LAW_OBJECTIVES, LawJudge, law_judge
 from tfarm.synthesis.minimax import LOST, Pieces, ScoredPoint, minimax
@@ -53,7 +50,7 @@ class LawDesign:
     coefficients: dict[str, float]
     at_limit: tuple[str, ...]
     value: float
-    verdict: Stability[LawLoop]
+    verdict: Stability
     sampled: Verdict
     modes: int
     chain: Chain
@@ -96,13 +93,13 @@ def law_design(
                 named = dict(zip(form.names, form.coefficients(x).tolist(), strict=True))
                 sampled = [sampled_verdict(each.arm, law, chain) for each in arms]
                 on_arms = [
-                    OnArm(each.name, each.numbers, judge.value(law), law_stability(each.arm, law), brief_of(own, chain))
+                    OnArm(each.name, each.numbers, judge.value(law), stability(each.arm, law), brief_of(own, chain))
                     for each, judge, own in zip(arms, judges, sampled, strict=True)
                 ]
                 return LawDesign(
                     objective, structure, law, {ANGLE_GAIN: on_angle} | named, form.at_limit(x),
                     worst_value(objective, [each.value for each in on_arms]),
-                    cast("Stability[LawLoop]", on_arms[0].verdict), sampled[0], modes, chain,
+                    on_arms[0].verdict, sampled[0], modes, chain,
                     tuple(on_arms),
                 )  # fmt: skip
     raise ConvergenceError(_why_none(arms, structure, nearest[1], chain), nearest[1], None)

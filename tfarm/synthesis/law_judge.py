@@ -25,7 +25,7 @@ from tfarm.dsp.discretise import acting_law, with_estimate
 from tfarm.dsp.sampled import Sampled, sampled_loop
 from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ConvergenceError
-from tfarm.loop.law_stability import law_stability
+from tfarm.loop.stability import stability
 from tfarm.records import record
 from tfarm.reduced.sensed import sensed_model
 from tfarm.synthesis.law_slew import SLEWED, LawSlew
@@ -105,7 +105,7 @@ class LawJudge:
     def holds(self, law: Law) -> bool:
         """Whether the loop is stable with as many modes as it takes, also with the reserve, and without a clock."""
         try:
-            return law_stability(self.arm, law).is_stable and all(
+            return stability(self.arm, law).is_stable and all(
                 sampled_verdict(self.arm, law.times(share), self.chain).is_stable
                 for share in (1.0, 1 / RESERVE, RESERVE)
             )

@@ -12,7 +12,6 @@ import numpy as np
 from tfarm.arm import HubFeedback
 from tfarm.arrays import Real
 from tfarm.dsp.verdict import SampledBrief
-from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.stability import Stability
 from tfarm.records import record
 from tfarm.synthesis.continuous import ContinuousJudge
@@ -35,7 +34,7 @@ class OnArm:
     name: str
     numbers: dict[str, float]
     value: float
-    verdict: Stability | Stability[LawLoop]
+    verdict: Stability
     sampled: SampledBrief
 
 

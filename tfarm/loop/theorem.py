@@ -1,4 +1,4 @@
-"""What a law does to every mode of any rig, by its sign alone: passivity and negative imaginary systems.
+"""What the sign of a law does to every mode of a rig: passivity, negative imaginary systems, and moment feedback.
 
 A hub torque does work on its own angle: the transfer function from torque to hub rate is positive real (passive) for
 any rig, with any losses.  So a positive real law on the rate cannot drive a mode, and where no mode hides from the hub
@@ -8,22 +8,35 @@ Petersen 2008; positive position feedback is of that kind).
 
 Both need hub torque on the hub's own angle or rate, no delay, no inductance, no sampling.  The signs of real
 polynomials are decided in exact arithmetic, by Sturm's theorem: no frequency is passed over.
+
+Feedback of the moment M on the hub, u = -C - k M, is absorbed by the hub of another rig (`absorbed`).  Its equation
+
+    I theta_tt + b theta_t + c theta = u + M   divided by 1 - k   is that of inertia I/(1-k), friction b/(1-k),
+                                                                  stiffness c/(1-k) and the law C/(1-k)
+
+So for k < 1 the sign of C decides, for k > 1 the opposite sign, and k = 1 leaves the modes of the locked hub as they
+are.  That is the paper's theorem for C = K1 s + Kp.  It holds where the gauge reads M, so without damping in the links.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from tfarm.arm import Law
+import numpy as np
+
+from tfarm.arm import Arm, Law
 from tfarm.arm.blocks import Rational
 from tfarm.records import record
+
+from .loop import Loop
 
 if TYPE_CHECKING:
     Poly = Any  # of sympy, over the rationals: it comes without types, and is imported where it is used
 
 MOST_EXACT_DEGREE = 40  # degree: exact arithmetic with such polynomials takes a moment
+TAKES, CONSERVES, GIVES = 1, 0, -1  # what a law does to the energy of every mode that the hub takes part in
 
 
 @dataclass(frozen=True)
@@ -33,11 +46,76 @@ class Signs:
 
     "strictly passive": Re of the law on the rate is above 0 at all frequencies; "passive": nowhere below;
     "negative imaginary": -C strictly so on the angle, with C(0) = `at_rest` [N m/rad]; "" where none of these is shown.
+    `energy` is what it does to each mode: TAKES, CONSERVES, GIVES; None where that is not shown.
     """
 
     kind: Literal["strictly passive", "passive", "negative imaginary", ""]
     reason: str
     at_rest: float = 0.0
+    energy: int | None = None
+
+
+class Theorem(NamedTuple):
+    """What a theorem says of every mode of a loop, in words, and what becomes of its energy; None: nothing."""
+
+    energy: int | None
+    reason: str
+
+
+NO_THEOREM = Theorem(None, "")
+HELD = "modes with the hub at rest stay undamped, in every band: all of the moment on the hub is fed back"
+CONSERVED = "C = 0 and nothing takes or gives energy: modes beyond the band lie on the axis"
+DAMPED = "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"
+DRIVEN = "C = 0: every flexible mode beyond the band is unstable too, with a growth rate that tends to 0"
+
+
+def absorbed(arm: Arm, law: Law) -> tuple[float, Law] | None:
+    """The share k of the moment on the hub that a law takes off it, and the rest of the law.
+
+    None where the law reads more than the hub's angle and rate and statically the moment that acts on the hub: with
+    damping in the links a gauge does not read that.
+    """
+    share, rest = 0.0, []
+    for part in law.parts:
+        if part.signals != ("root_moment",):
+            rest.append(part)
+        elif isinstance(part.block, Rational) and not part.block.order and not part.block.excess:
+            share -= law.sign * part.block.num[0] / part.block.den[0] / arm.input_per_torque
+        else:
+            return None
+    if not set(law.signals) <= {"hub_angle", "hub_rate", "root_moment"}:
+        return None
+    if share and not (arm.has_elastic_link and arm.reads_hub_moment and not law.delay):
+        return None
+    return share, replace(law, parts=tuple(rest), references=())
+
+
+def theorem_of(loop: Loop) -> Theorem:
+    """What is known of every mode of a loop, however high."""
+    arm, parts = loop.arm, absorbed(loop.arm, loop.law)
+    if parts is None or (arm.input_lags and loop.feeds_back):
+        return NO_THEOREM
+    share, rest = parts
+    if share == 1.0:
+        return Theorem(CONSERVES, HELD)
+    way = 1.0 if share < 1.0 else -1.0
+    signs = signs_of(rest.times(way), way * arm.rate_loss)
+    if signs.energy is not None:
+        is_plain = arm.has_elastic_link and loop.law.is_static
+        words = f"{signs.reason}: no mode, however high, is driven"
+        return Theorem(signs.energy, (DAMPED if signs.energy else CONSERVED) if is_plain else words)
+    if arm.has_elastic_link and arm.loses_at_hub_alone:
+        opposite = signs_of(rest.times(-way), -way * arm.rate_loss)
+        if opposite.energy == TAKES:
+            return Theorem(GIVES, DRIVEN)
+    return NO_THEOREM
+
+
+def signs_of_loop(loop: Loop) -> Signs:
+    """The sign of the law of a loop, with the hub's friction counted to it: none behind an inductance."""
+    if loop.arm.input_lags:
+        return Signs("", "behind an inductance the torque comes late")
+    return signs_of(loop.law, loop.arm.rate_loss)
 
 
 def signs_of(law: Law, friction: float = 0.0) -> Signs:
@@ -48,6 +126,8 @@ def signs_of(law: Law, friction: float = 0.0) -> Signs:
         return Signs("", "the sign of a law tells something where it reads the hub's own angle or rate")
     if not all(isinstance(part.block, Rational) for part in law.parts):
         return Signs("", "matrices are not looked at: give transfer functions")
+    if law.is_static:
+        return _static_signs(law, friction)
     if law.order > MOST_EXACT_DEGREE:
         return Signs("", f"of a law of more than {MOST_EXACT_DEGREE} states the sign is not looked for")
     num, den = polynomial([0.0]), polynomial([1.0])  # of the whole law as one fraction on the angle
@@ -57,11 +137,30 @@ def signs_of(law: Law, friction: float = 0.0) -> Signs:
         if part.signals == ("hub_rate",):
             p = p * polynomial([1.0, 0.0])
         num, den = num * q + p * den, den * q
-    return (
-        _positive_real(num + polynomial([friction, 0.0]) * den, den)
-        or _negative_imaginary(num, den)
-        or Signs("", "neither passive nor negative imaginary")
-    )
+    passive = _positive_real(num + polynomial([friction, 0.0]) * den, den)
+    if passive is not None and passive.kind:
+        return passive
+    return _negative_imaginary(num, den) or passive or Signs("", "neither passive nor negative imaginary")
+
+
+def _static_signs(law: Law, friction: float) -> Signs:
+    """`signs_of` for gains on hub angle and hub rate, by their signs alone."""
+    values = dict(zip(law.signals, law.values(np.ones(1, complex))[:, 0].real.tolist(), strict=True))
+    return _of_signs(values.get("hub_rate", 0.0) + friction, values.get("hub_angle", 0.0))
+
+
+def _of_signs(rate: float, at_rest: float) -> Signs:
+    """The signs of a law without poles right of the axis, by that of Re on the rate and by its value at rest."""
+    if rate > 0 and at_rest >= 0:
+        words = "the law on the hub's rate takes energy at every frequency (strictly positive real)"
+        return Signs("strictly passive", words, at_rest, TAKES)
+    if rate == 0 and at_rest >= 0:
+        words = "the law on the hub's rate gives energy at no frequency (positive real)"
+        return Signs("passive", words, at_rest, CONSERVES)
+    if rate < 0:
+        return Signs("", "neither passive nor negative imaginary")
+    # Re > 0 on the whole axis but 0: a pole crosses that at s = 0 alone, and only real poles are driven
+    return Signs("", "at rest the law pushes the hub on", at_rest, TAKES if rate else CONSERVES)
 
 
 def _positive_real(num: Poly, den: Poly) -> Signs | None:
@@ -71,18 +170,14 @@ def _positive_real(num: Poly, den: Poly) -> Signs | None:
     only one at 0 is granted, the C(0) of an angle that is held.
     """
     at_rest = num.eval(0) / den.eval(0) if den.eval(0) else None
-    if at_rest is None or not is_hurwitz(den) or at_rest < 0:
+    if at_rest is None or not is_hurwitz(den):
         return None
     if num.degree() > den.degree() + 2 or (num.degree() == den.degree() + 2 and num.LC() / den.LC() < 0):
         return None
     sign = definite(on_axis(num, den)[1])  # Re C(i w)/(i w) = Im C(i w)/w
-    if sign == "above":
-        words = "the law on the hub's rate takes energy at every frequency (strictly positive real)"
-        return Signs("strictly passive", words, float(at_rest))
-    if sign:
-        words = "the law on the hub's rate gives energy at no frequency (positive real)"
-        return Signs("passive", words, float(at_rest))
-    return None
+    if not sign or (at_rest < 0 and sign != "above"):
+        return None
+    return _of_signs(float(sign == "above"), float(at_rest))
 
 
 def _negative_imaginary(num: Poly, den: Poly) -> Signs | None:
@@ -90,7 +185,7 @@ def _negative_imaginary(num: Poly, den: Poly) -> Signs | None:
     if not is_hurwitz(den) or num.degree() > den.degree() or definite(on_axis(num, den)[1]) != "above":
         return None
     words = "the law on the hub's angle, with its sign changed, is strictly negative imaginary"
-    return Signs("negative imaginary", words, float(num.eval(0) / den.eval(0)))
+    return Signs("negative imaginary", words, float(num.eval(0) / den.eval(0)), TAKES)
 
 
 # ------------------------------------------------------------ polynomials, exactly

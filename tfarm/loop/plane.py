@@ -1,0 +1,313 @@
+"""The plane of two numbers of a law: how many poles are unstable over a grid, and the exact stability boundary.
+
+D-decomposition (Neimark 1948): D is affine in each number (`family`), so that along the second one, column by column,
+its crossings of the imaginary axis are solved for, all columns at once, and one count of unstable poles gives all the
+others: nothing is interpolated or missed between grid points.  In a delay D is not affine: that runs across the
+columns, each counted by itself.  So does a leading coefficient through 0 where no band tells all there: poles come to
+any band from above.
+
+Of both gains K1 and K2 each frequency has one point with poles at s = i w: the boundary.  Without damping, where the
+gauge reads the hub's moment, that collapses onto the lines where K1 makes up for what the hub loses and where K2 takes
+the whole moment: between them a theorem tells every mode (`theorem`).
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, HubFeedback, Law, as_law
+from tfarm.arm.feedback import ON
+from tfarm.arrays import Real
+from tfarm.crossing import Crossings, Window, counts_over, intervals
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.records import record
+from tfarm.spectrum.scales import PAPER_GAINS, default_gains
+
+from .family import (
+    ROUNDED,
+    columns,
+    corner_laws,
+    critical,
+    crossed,
+    line_crossings,
+    rows,
+    turns_over,
+    unstable_below,
+    with_numbers,
+)
+from .frequencies import grid
+from .loop import Loop
+from .stability import band_of_family, verdict_on
+from .windows import held_windows, told_edges
+
+INFINITE = -1  # stands for infinitely many unstable poles
+MOST_GRID_VALUES, MOST_LAW_VALUES = 2000, 400  # of a map, along one gain, and along one number of another law
+SHOWN_K1, SHOWN_K2 = (-1.0, 3.0), (-2.0, 2.0)  # of a map, by default: what the paper's arm is stable in, and around it
+NOT_AFFINE = ("delay", ".den.")  # in the name of a number in which L is not affine: its size is not largest at corners
+
+
+@dataclass(frozen=True)
+@record
+class Plane:
+    """Unstable poles over a grid of two numbers: `unstable` (len(y), len(x)), -1 where they are infinitely many.
+
+    `vary` names both numbers of `law`, across and up, as `Law.having` does.  `boundary` (n, 3) holds both gains and
+    w [rad/s] of the D-decomposition curve of K1 and K2; empty without losses and of other numbers.  `band` [rad/s] is
+    how far up crossings were looked for, 0 where every mode is known; `crossings` those along y for each x, or none.
+    """
+
+    arm: Arm
+    law: Law
+    vary: tuple[str, str]
+    x: Real
+    y: Real
+    unstable: NDArray[np.int64]
+    boundary: Real
+    band: float
+    crossings: list[Crossings]
+
+    @property
+    def finding(self) -> str:
+        """At how many points of the grid the loop is stable, in words."""
+        return f"stable at {int(self.stable.sum())} of {self.stable.size} points"
+
+    @property
+    def axes(self) -> tuple[Real, Real]:
+        """The values of both numbers: across the plane, and up it."""
+        return self.x, self.y
+
+    @property
+    def is_of_gains(self) -> bool:
+        """Whether it is the plane of K1 and K2."""
+        return self.vary == PLANE and self.law.gains is not None
+
+    @property
+    def is_known(self) -> bool:
+        """Whether a theorem tells every mode at each point: no damping in the links, gains at the hub alone."""
+        return self.is_of_gains and _is_known_everywhere(self.arm)
+
+    @property
+    def K1(self) -> Real:
+        """The values across, of the plane of K1 and K2."""
+        return self.x
+
+    @property
+    def K2(self) -> Real:
+        """The values up, of the plane of K1 and K2."""
+        return self.y
+
+    @property
+    def Kp(self) -> float:
+        """The gain on the hub angle that it holds."""
+        return 0.0 if self.law.gains is None else self.law.gains.Kp
+
+    @property
+    def upright(self) -> float:
+        """The K1 that takes off what the hub loses."""
+        return 0.0 - self.arm.rate_loss
+
+    def on(self, across: Real, up: Real, unstable: NDArray[np.int64]) -> Plane:
+        """The same plane, with counts on another grid."""
+        return replace(self, x=across, y=up, unstable=unstable)
+
+    @property
+    def stable_intervals(self) -> list[list[Window]]:
+        """For each x the intervals of y, cut to the map, in which nothing grows: the region with exact edges.
+
+        Where a theorem tells every mode the same for every K1 > `upright`, and none for others.
+        """
+        limits = float(self.y[0]), float(self.y[-1])
+        if self.is_known:
+            loop = Loop(self.arm, self.law.having(RATE_GAIN, self.upright + default_gains(self.arm).K1))
+            held = held_windows(loop, MOMENT_GAIN, limits, told_edges(loop, MOMENT_GAIN, limits))
+            return [held if self.upright < K1 else [] for K1 in self.x]
+        first = self.unstable[0].tolist()
+        return [intervals(found, *limits, limits[0], count) for found, count in zip(self.crossings, first, strict=True)]
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Where no pole is unstable, the free hub angle has not two poles at 0 (K1 = Kp = 0), and something damps."""
+        if not self.is_of_gains:
+            return np.asarray(self.unstable == 0)
+        arm = self.arm
+        drifts = (self.x == 0) & arm.has_rigid_mode & (self.Kp == 0)
+        swings = (self.upright == self.x) & arm.loses_at_hub_alone
+        passed = (self.upright >= self.x) & (not arm.hub_side_inertia)  # a pole has passed through infinity
+        no_moment_is_left = np.equal(self.y, arm.input_per_torque) & self.is_known
+        return np.asarray((self.unstable == 0) & ~(drifts | swings | passed) & ~no_moment_is_left[:, None])
+
+
+def gain_map(
+    arm: Arm, K1: Real, K2: Real, Kp: float = 0.0, *, law: AnyLaw | None = None, vary: tuple[str, str] | None = None
+) -> Plane:
+    """How many poles are unstable over the plane of K1 and K2 (1-D, ascending), and its exact boundary.
+
+    Of a `law` `vary` names two of its numbers ("gain", "delay", a signal, "SIGNAL.num.N", "SIGNAL.den.N", "K1"): the
+    values are theirs then, first across and then up.  A grid line exactly on K1 = 0 or K2 = 1 at C = 0 is not stable,
+    though no pole need be right of the axis there, nor is K1 = 0 where the hub angle is free.
+    Raises ParameterError for what is no law, no loop or no range, ConvergenceError where poles cannot be counted.
+    """
+    if isinstance(K1, HubFeedback | Law):
+        raise ParameterError(key="K1", value=K1, remedy="a range of values; give the law as law=, its numbers as vary=")
+    if law is None:
+        if vary is not None:
+            raise ParameterError(key="law", value=None, remedy="give the HubFeedback or Law whose numbers vary names")
+        return plane(Loop(arm, as_law(HubFeedback(Kp=Kp))), PLANE, K1, K2)
+    if not isinstance(law, HubFeedback | Law):
+        raise ParameterError(key="law", value=law, remedy="give a HubFeedback or a Law")
+    if Kp:
+        raise ParameterError(key=ANGLE_GAIN, value=Kp, remedy="the law holds the angle: give Kp in it, or no law")
+    loop = Loop(arm, as_law(law))
+    if vary is None and loop.gains is not None:
+        vary = PLANE
+    if not isinstance(vary, tuple | list) or len(vary) != 2 or not all(isinstance(each, str) for each in vary):
+        raise ParameterError(key="vary", value=vary, remedy='two numbers of the law, such as ("gain", "delay")')
+    return plane(loop, (vary[0], vary[1]), K1, K2)
+
+
+def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real, band: float | None = None) -> Plane:
+    """The map over two numbers of the law of a loop, x and y (1-D, ascending), the others held.
+
+    Raises ParameterError for what is no number of the law, no loop or no range; ConvergenceError where poles cannot be
+    counted.
+    """
+    if vary[0] == vary[1]:
+        raise ParameterError(key="vary", value=list(vary), remedy="two different numbers of the law")
+    if vary == PLANE and loop.gains is not None:
+        loop = loop.under(with_numbers(loop.law, dict.fromkeys(PLANE, 0.0)))
+    most = MOST_LAW_VALUES if loop.gains is None else MOST_GRID_VALUES
+    x, y = ascending(vary[0], x, most), ascending(vary[1], y, most)
+    across, up = (float(x[0]), float(x[-1])), (float(y[0]), float(y[-1]))
+    ends = [critical(name, pair) for name, pair in zip(vary, (across, up), strict=True)]
+    corners = [loop.under(law) for law in corner_laws(loop.law, vary, ends)]
+    if (
+        tuple(ON.get(name, name) for name in vary) == PLANE
+        and loop.gains is not None
+        and _is_known_everywhere(loop.arm)
+    ):
+        counts = _known_counts(loop, x, y)
+        return Plane(loop.arm, loop.law, vary, x, y, counts, np.empty((0, 3)), 0.0, [])
+    is_counted = vary[0] == "delay" or turns_over(loop, vary[0], across)
+    if vary[1] == "delay" or (not is_counted and turns_over(loop, vary[1], up)):
+        turned = plane(loop, (vary[1], vary[0]), y, x, band)
+        return replace(turned, vary=vary, x=x, y=y, unstable=turned.unstable.T.copy(), crossings=[])
+    is_quiet = False
+    if band is None:
+        band, is_quiet = band_of_family(corners)
+    omega = np.asarray(grid(loop.arm, band))
+    members = [lambda value=value: loop.having(vary[0], value) for value in x.tolist()]
+    lines = columns(loop, vary, x, (max(map(abs, across)), max(map(abs, up))))
+    found = crossed(loop, lines, [(vary[1], up)] * x.size, omega, members)
+    crossing = np.concatenate([y[:0], *(each.gain for each in found)])
+    at = 0.0 if vary == PLANE else float(y[_farthest(y, crossing)])  # at K2 = 0 the hub is passive
+    row = loop.having(vary[1], at)
+    if is_counted:
+        there = np.array([unstable_below(row.having(vary[0], value), band) for value in x.tolist()])
+    else:
+        there = _counts_across(row, vary[0], x, band)
+    unstable = counts_over(y, found, at, there).T.copy()
+    edge = boundary(loop, omega) if vary == PLANE and loop.gains is not None else np.empty((0, 3))
+    done = Plane(loop.arm, loop.law, vary, x, y, unstable, edge, band, found)
+    if not is_quiet or any(part in name for part in NOT_AFFINE for name in vary):
+        _must_hold_at_corners(loop, done)
+    return done
+
+
+def _is_known_everywhere(arm: Arm) -> bool:
+    """Whether a theorem tells every mode whatever K1 and K2."""
+    return arm.loses_at_hub_alone and arm.reads_hub_moment and not arm.input_lags
+
+
+def _known_counts(loop: Loop, K1: Real, K2: Real) -> NDArray[np.int64]:
+    """Unstable poles without damping: one count for each side of each line on which modes meet the axis."""
+    limits = float(K2[0]), float(K2[-1])
+    edges = told_edges(loop.having(RATE_GAIN, default_gains(loop.arm).K1), MOMENT_GAIN, limits)
+    static = [each.t for each in edges if each.at == 0]
+    side = static[0] < K2 if static else np.zeros(K2.size, bool)
+    unstable = np.zeros((K2.size, K1.size), dtype=np.int64)
+    of_K1, of_K2 = np.sign(K1 + loop.arm.rate_loss), np.sign(K2 - loop.arm.input_per_torque)
+    for of_column, of_row, each in itertools.product((-1, 0, 1), (-1, 0, 1), (True, False)):
+        (where,), (here,) = np.nonzero(of_K1 == of_column), np.nonzero((of_K2 == of_row) & (side == each))
+        if here.size and where.size:
+            point = float(K1[where[where.size // 2]]), float(K2[here[here.size // 2]])
+            found = verdict_on(loop.under(with_numbers(loop.law, dict(zip(PLANE, point, strict=True)))))
+            count = INFINITE if found.unstable_roots_infinite else found.unstable_roots
+            unstable[np.ix_(here, where)] = count
+    return unstable
+
+
+def _counts_across(row: Loop, name: str, x: Real, band: float) -> NDArray[np.int64]:
+    """Unstable poles at each x along a row, from one count at the value farthest from its crossings."""
+    across = line_crossings(row, name, float(x[0]), float(x[-1]), band)
+    start = float(x[-1] if name == RATE_GAIN else x[x.size // 2])
+    if row.having(name, start).resting_zeros:
+        start = float(x[_farthest(x, across.gain)])
+    begin = unstable_below(row.having(name, start), band)
+    return np.asarray(counts_over(x, [across], start, np.array([begin]))[0])
+
+
+def _farthest(values: Real, at: Real) -> int:
+    """Which of the values is farthest from all crossings; the middle one where there are none."""
+    return int(np.argmax(abs(values[:, None] - at).min(axis=1))) if at.size else values.size // 2
+
+
+def _must_hold_at_corners(loop: Loop, found: Plane) -> None:
+    """Refuse a map by ConvergenceError where poles came into the band or left it through its top, on the way."""
+    for i, j in ((0, 0), (0, -1), (-1, 0), (-1, -1)):
+        at = (float(found.x[i]), float(found.y[j]))
+        law = with_numbers(loop.law, dict(zip(found.vary, at, strict=True)))
+        try:
+            count = unstable_below(loop.under(law), found.band)
+        except ConvergenceError:  # a pole on the axis to working precision, which is on either side
+            continue
+        if count != found.unstable[j, i]:
+            where = ", ".join(f"{name} = {value:.6g}" for name, value in zip(found.vary, at, strict=True))
+            why = f"at {where} {count} poles below {found.band:.4g} rad/s are unstable, not {found.unstable[j, i]}"
+            remedy = "on the way there some passed the band's top: ask for a smaller range"
+            raise ConvergenceError(f"{why}; {remedy}", found, abs(count - int(found.unstable[j, i])))
+
+
+def boundary(loop: Loop, omega: Real) -> Real:
+    """K1 and K2 with poles at +-i w, the other gains those of the loop, and w: (n, 3), in the order of omega."""
+    if loop.arm.loses_at_hub_alone:
+        return np.empty((0, 3))  # both equations are one
+    terms, one = rows(loop, 1j * omega), np.ones(1, complex)
+    N = terms[0] + loop.having(RATE_GAIN, 0.0).having(MOMENT_GAIN, 0.0).law.polynomials(one)[0][:, 0] @ terms[1:]
+    a, b = (terms[1 + loop.law.signals.index(name)] for name in ("hub_rate", "root_moment"))
+    determinant = (a * b.conj()).imag
+    with np.errstate(all="ignore"):  # where both equations are one, the point is far away
+        K1 = -(N * b.conj()).imag / determinant
+        K2 = (N * a.conj()).imag / determinant
+    points = np.stack([K1, K2, omega], axis=1)
+    return points[np.isfinite(points).all(1)]
+
+
+def ranges_of(arm: Arm) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The ranges of K1 and K2 that a map has by default: of a rig, in its own units."""
+    K1 = 1.0 if arm.is_uniform else default_gains(arm).K1 / PAPER_GAINS.K1
+    K2 = arm.input_per_torque
+    (low, high), (lower, upper) = SHOWN_K1, SHOWN_K2
+    return (low * K1, high * K1), (lower * K2, upper * K2)
+
+
+def between(low: float, high: float, number: int) -> Real:
+    """So many gains from low to high, the middles of equal parts: none of them on a line K1 = 0 unless by chance."""
+    values = low + (high - low) * (np.arange(number) + 0.5) / number
+    return np.where(abs(values) <= ROUNDED * (high - low), 0.0, values)
+
+
+def ascending(name: str, values: Any, most: int) -> Real:
+    """The values (n,) of one number of a map.  Raises ParameterError for what is no ascending range of 2 to `most`."""
+    try:
+        values = np.atleast_1d(np.asarray(values, dtype=float))
+    except (TypeError, ValueError):  # no numbers
+        values = np.empty(0)
+    if not (2 <= values.size <= most and np.isfinite(values).all() and (np.diff(values) > 0).all()):
+        remedy = f"an ascending range of 2 to {most} values"
+        raise ParameterError(key=name, value=f"{values.size} values", remedy=remedy)
+    return np.asarray(values)
