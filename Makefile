@@ -19,7 +19,7 @@ SURVEYS := \
 	golden \
 	plausible \
 	properties \
-	audit.slips \
+	audit.test_planted_slips \
 	exact.accuracy \
 	response.rigid \
 	response.extrema \
@@ -33,7 +33,7 @@ SURVEYS := \
 	loop.law_counts \
 	loop.number_windows \
 	loop.law_times \
-	synthesis.designs \
+	synthesis.optima \
 	synthesis.held_designs \
 	loop.nyquist_counts \
 	reduced.errors \
