@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from itertools import accumulate
@@ -190,8 +190,8 @@ class Reading(NamedTuple):
 class Readings:
     """Several outputs of one chain: where and what, and the table that the compiled sweep takes."""
 
-    layout: Layout
-    each: tuple[Reading, ...]
+    layout: Layout = field(repr=False)
+    each: tuple[Reading, ...] = field(repr=False)
 
     @property
     def gauges(self) -> list[float]:
