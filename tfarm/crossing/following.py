@@ -185,5 +185,5 @@ def is_plain(family: Family, values: Real, guess: Complex, found: Complex) -> ND
     near = (moved <= np.where(is_couple, PLAIN_IN_COUPLE, PLAIN_MOVE) * own) & (
         np.sign(found.imag) == np.sign(guess.imag)
     )
-    same = (near | (guess == 0)) & (moved <= PLAIN_MOVE * room)
-    return np.asarray((np.isnan(guess) | same | (found == 0) | (moved <= family.blur)).all(axis=1))
+    same = (near | (guess == 0) | (found == 0)) & (moved <= PLAIN_MOVE * room)
+    return np.asarray((np.isnan(guess) | same | (moved <= family.blur)).all(axis=1))

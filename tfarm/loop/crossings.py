@@ -82,7 +82,7 @@ def branch_crossings(family: Varied, gain: Real, branches: Complex, top: float) 
     Of a damped rig along a number of its law those of poles on no branch too, up to `top` [rad/s].
     """
     sign, span = float(np.sign(gain[-1] - gain[0])), abs(float(gain[-1] - gain[0]))
-    changes, is_damped = _changes(branches), bool(family.first.arm.least_damping)
+    changes, is_damped = _changes(branches), not family.is_reactive
     band = max(top, JUST_ABOVE * float(np.nanmax(branches.imag, initial=0.0)))
     known = _on_line(family, gain, band) if changes or is_damped else []
     found: list[BranchCrossing] = []
@@ -105,7 +105,7 @@ def _on_line(family: Varied, gain: Real, top: float) -> list[Crossing]:
     if family.is_of_arm or family.vary == "delay":
         return []
     loop = family.first.under(family.full)
-    if loop.k.is_real_on_axis and not loop.law.delay:
+    if family.is_reactive:
         t, at, change = crossed(np.asarray(grid(loop.arm, top)), family.on_axis)
         return [Crossing(*each) for each in zip(_corrected(family, t, at), at, change, strict=True)]
     name = "gain" if family.vary == "all" else family.vary

@@ -80,6 +80,11 @@ class Varied:
         """Whether the number is one of the arm."""
         return self.vary in ARM_PARAMETERS
 
+    @property
+    def is_reactive(self) -> bool:
+        """Whether nothing is lost but by the law, which is static: then modes may stay on the axis at all values."""
+        return self.first.k.is_real_on_axis and self.full.is_static and not self.full.delay
+
     @cached_property
     def full(self) -> Law:
         """The law with every gain at the hub, where it is no more than these."""
@@ -210,8 +215,9 @@ class Varied:
     def near(self, values: Real, guess: Complex) -> Complex:
         """The poles (m, b) next to the guesses at m values, by Newton's method; NaN where it does not settle."""
         found = guess.copy()
-        rank = abs(np.where(np.isnan(guess), np.inf, guess)).argsort(axis=1).argsort(axis=1)
-        rests = rank < self.resting(values)[:, None]
+        order = abs(np.where(np.isnan(guess), np.inf, guess)).argsort(axis=1)
+        both = np.take_along_axis(np.where(guess.imag > 0, 2, 1), order, 1).cumsum(axis=1)  # of a pair that rests
+        rests = np.take_along_axis(both, order.argsort(axis=1), 1) <= self.resting(values)[:, None]
         wanted = ~np.isnan(guess) & ~rests
         for n in np.flatnonzero((wanted & (guess == 0)).any(axis=1)):
             leaving = wanted[n] & (guess[n] == 0)

@@ -95,7 +95,7 @@ def draw_loci(data: Loci) -> Figure:
 
 def _range(exact: Locus) -> str:
     first, last = (plain(float(exact.gain[i]), 4) for i in (0, -1))
-    law = one_line(gains_words(exact.law, but=exact.vary), LONGEST_LAW)
+    law = one_line(gains_words(exact.law, but=exact.vary).partition(", of ")[0], LONGEST_LAW)
     return f"{exact.vary} goes from {first} to {last} with {law}"
 
 
