@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import cast
 
 import numpy as np
@@ -17,7 +16,7 @@ import numpy as np
 from tfarm.arm import AnyLaw, Arm, HubFeedback
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.crossing.following import between, follow
+from tfarm.crossing.following import assigned, between, follow
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
@@ -126,16 +125,23 @@ def followed(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
     """All poles (b, n) but those at 0 all the way, mirror images among them, and the mode of each."""
     row, mode = named(family, modes + COMPANY)
     row = np.r_[row, missing(family, family.start, row)]
-    rows = row[:, None]
-    nodes = np.unique(np.linspace(0, gain.size - 1, NODES + 1).round().astype(int))
-    for low, high in pairwise(nodes):
-        part = follow(family, gain[low : high + 1], rows[:, -1])
+    rows, low = row[:, None], 0
+    nodes = np.unique(np.linspace(0, gain.size - 1, NODES + 1).round().astype(int)).tolist()[1:]
+    while nodes:
+        high = nodes[0]
+        try:
+            part = follow(family, gain[low : high + 1], rows[:, -1])
+        except ConvergenceError:  # of a pole that came into the box, and is next to one of these
+            if high - low == 1:
+                raise
+            nodes.insert(0, (low + high) // 2)
+            continue
         new = missing(family, float(gain[high]), part[-1])
         if new.size:
             back = follow(family, gain[low : high + 1][::-1], np.r_[part[-1], new])
             part = np.hstack([part, back[::-1, part.shape[1] :]])
             rows = np.vstack([rows, np.full((new.size, rows.shape[1]), np.nan)])
-        rows = np.hstack([rows, part[1:].T])
+        rows, low = np.hstack([rows, part[1:].T]), nodes.pop(0)
     return rows, np.r_[mode, np.zeros(len(rows) - mode.size, np.int64)]
 
 
@@ -168,7 +174,10 @@ def named(family: Varied, number: int) -> tuple[Complex, Whole]:
     row, mode = np.r_[np.zeros(rests, complex), row, law.poles[law.poles != 0]], np.r_[np.zeros(rests, np.int64), mode]
     mode = np.r_[mode, np.zeros(row.size - mode.size, np.int64)]
     if loop.feeds_back:
-        row = follow(grown, np.array([0.0, 1.0]), row)[1]
+        try:
+            row = follow(grown, np.array([0.0, 1.0]), row)[1]
+        except ConvergenceError:  # of poles that come in from afar, as under a delay
+            row = assigned(grown, 1.0, row)
     more = max(0, grown.pinned - family.pinned)  # at 0 at the first value alone
     row, mode = np.r_[np.zeros(more, complex), row], np.r_[np.zeros(more, np.int64), mode]
     return row[~np.isnan(row)], mode[~np.isnan(row)]
