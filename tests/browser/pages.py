@@ -373,22 +373,6 @@ def test_nothing_is_hidden_on_a_phone_nor_in_the_dark(browser, folder, width, sc
             assert not opened.said
 
 
-@pytest.mark.parametrize(("motion", "medium", "moves"), [
-    ("no-preference", "screen", True), ("reduce", "screen", False), ("no-preference", "print", False)
-])  # fmt: skip
-def test_modes_swing_unless_a_reader_or_paper_wants_them_still(browser, folder, motion, medium, moves):
-    with Opened(browser, folder / REPORTED / "modes.html", motion=motion) as opened:
-        page = opened.page
-        page.emulate_media(media=medium)
-        names = page.evaluate("[...document.querySelectorAll('.swing')].map(e => getComputedStyle(e).animationName)")
-        assert set(names) == ({"swing"} if moves else {"none"})
-        assert len(names) >= 5
-        if moves:
-            page.locator(".modes input").uncheck()
-            assert page.evaluate("getComputedStyle(document.querySelector('.swing')).animationName") == "none"
-        assert not opened.said
-
-
 def test_pointing_at_a_curve_reads_both_units(browser, folder):
     with Opened(browser, folder / ARMS[0] / "live.html") as opened:
         page = opened.page

@@ -18,9 +18,8 @@ from tfarm.dsp.traces import (
     points_a_period,
     reference_angle,
     root_moment,
-    slews,
 )
-from tfarm.report.time_responses import slews_table
+from tfarm.report.time_responses import responses_table
 from tfarm.spectrum.scales import default_gains
 
 STEEL = tfarm.load("stocky-steel")
@@ -41,16 +40,16 @@ def test_a_fast_ringing_is_drawn_as_a_band_that_holds_the_curve():
 
 
 def test_the_slew_of_a_stiff_arm_is_not_aliased_and_its_file_has_the_curve():
-    data = slews(STEEL, default_gains(STEEL), Chain(), 8)
-    records = data.without.between.t.size / data.without.t.size
+    run = drawn(STEEL, default_gains(STEEL).having("K2", 0.0), Chain(), "slew", 3.0)
+    records = run.between.t.size / run.t.size
     first = tfarm.modes(STEEL, 1).natural_frequency[-1] / (2 * np.pi)
     assert (records + 1) * 100 >= POINTS_A_PERIOD * first > 400  # 400 a second is what three records gave
-    drawn, table = root_moment(data.without), slews_table(data, "t")
+    curve, table = root_moment(run), responses_table("t", "t", STEEL, {"without": run})
     columns = {column.key: np.array(column.values) for column in table.columns}
-    assert drawn.is_band
-    rounded = 0.5e-6 * abs(drawn.high).max()  # seven digits are in the file
-    assert columns["root_moment_without_N_m_low"] == pytest.approx(drawn.low, abs=rounded)
-    assert columns["root_moment_without_N_m_high"] == pytest.approx(drawn.high, abs=rounded)
+    assert curve.is_band
+    rounded = 0.5e-6 * abs(curve.high).max()  # seven digits are in the file
+    assert columns["root_moment_without_N_m_low"] == pytest.approx(curve.low, abs=rounded)
+    assert columns["root_moment_without_N_m_high"] == pytest.approx(curve.high, abs=rounded)
     assert (columns["root_moment_without_N_m_low"] <= columns["root_moment_without_N_m_high"]).all()
 
 
@@ -70,10 +69,10 @@ def test_a_slew_under_any_law_is_resolved_too():
 
 def test_a_slow_arm_is_a_line_of_the_simulators_own_records():
     lab = tfarm.load("sasaki2012-lab")
-    data = slews(lab, default_gains(lab), Chain(), 8)
-    drawn = root_moment(data.with_moment)
-    assert not drawn.is_band
-    assert drawn.t.size == data.with_moment.t.size + data.with_moment.between.t.size >= (LEAST_BETWEEN + 1) * 301
+    run = drawn(lab, default_gains(lab), Chain(), "slew", 3.0)
+    curve = root_moment(run)
+    assert not curve.is_band
+    assert curve.t.size == run.t.size + run.between.t.size >= (LEAST_BETWEEN + 1) * 301
 
 
 def test_the_reference_between_the_samples_is_that_of_the_slew():

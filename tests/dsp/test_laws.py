@@ -318,4 +318,3 @@ def test_from_the_required_damping_on_a_law_is_stable():
     found = tfarm.sampled(LAB, law).damping
     sides = [sampled_verdict(LAB.having(damping=share * found.value), law) for share in (0.999, 1.001)]
     assert (found.is_settled, [each.is_stable for each in sides]) == (True, [False, True])
-    assert tfarm.plots.sampled_modes(tfarm.sampled(LAB, law, count=3)).get_title() == ""

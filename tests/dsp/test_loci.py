@@ -8,10 +8,8 @@ import pytest
 import tfarm
 from tfarm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
-from tfarm.dsp.chain import Slew
 from tfarm.dsp.edges import another
 from tfarm.dsp.loci import RIM, STRONGER, sampled_loci
-from tfarm.dsp.traces import slews, strip_chart
 
 LAB = tfarm.load("sasaki2012-lab")
 GAINS = HubFeedback(K1=0.3, K2=0.3)
@@ -54,25 +52,6 @@ def test_a_branch_is_named_after_the_mode_whose_pole_it_leaves(found):
     for number, pair in zip(range(1, 7), eigenvalues[-6:], strict=True):
         mine = np.sort_complex(start[mode == number])
         np.testing.assert_allclose(mine, np.sort_complex(np.exp(pair * 0.01)), rtol=0, atol=1e-4)
-
-
-def test_a_strip_chart_lasts_twice_the_slew():
-    ideal = slews(LAB, GAINS, Chain(slew=Slew(rise_time=0.8)), 6)
-    chart = strip_chart(LAB, GAINS, ideal.with_moment, 6)
-    period = chart.simulation.chain.sampling.period
-    assert chart.read.size * period == pytest.approx(1.6, abs=1.5 * period)
-
-
-def test_a_strip_chart_reads_and_drives_in_the_steps_and_limits_that_it_says():
-    """What is read are whole numbers of steps, each of them seen; the motor gives what was asked, cut at its limit."""
-    ideal = slews(LAB, GAINS, Chain(), 6)
-    chart = strip_chart(LAB, GAINS, ideal.with_moment, 6)
-    steps = np.unique(np.round(chart.read / chart.step, 9))
-    np.testing.assert_array_equal(steps, np.round(steps))
-    assert np.diff(steps).min() == 1
-    assert abs(chart.read - chart.simulation.at_samples.root_moment).max() <= 0.5 * chart.step * (1 + 1e-9)
-    assert chart.saturated.any()
-    assert abs(chart.simulation.torque).max() == pytest.approx(chart.limit)
 
 
 @pytest.mark.parametrize(("count", "most", "other"), [(5, 40, 10), (20, 40, 40), (21, 40, 10), (1, 1, 1), (3, 5, 1)])

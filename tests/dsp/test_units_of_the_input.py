@@ -1,6 +1,5 @@
 """What a rig's motor gives is in volts or amperes where these are its input: words, columns and pictures say so."""
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,9 +9,7 @@ import pytest
 import tfarm
 from tests.shell import answer, run
 from tfarm.dsp import Actuator
-from tfarm.dsp.traces import strip_chart
 from tfarm.plots import slew
-from tfarm.plots.strip import draw_strip_chart
 from tfarm.report.time_responses import responses_table
 
 RIG = "quanser-2dsfl"
@@ -35,15 +32,6 @@ def test_the_unit_stands_at_the_axis_and_in_the_table(run_of):
     (column,) = (each for each in table.columns if each.key.startswith(("torque_", "input_")))
     assert column.unit == unit
     assert column.key == ("torque_run_N_m" if unit == "N m" else f"input_run_{unit}")
-
-
-def test_a_coarse_chain_clips_in_the_inputs_unit(run_of):
-    arm, unit, done = run_of
-    figure = draw_strip_chart(strip_chart(arm, tfarm.HubFeedback(), done, 3))
-    texts = [text.get_text() for text in figure.findobj(matplotlib.text.Text)]
-    assert any(re.search(rf"at most [\d.]+ {unit}$", text) for text in texts)
-    assert any(text.startswith("motor") and text.endswith(f"[{unit}]") for text in texts)
-    matplotlib.pyplot.close(figure)
 
 
 def test_the_signals_file_and_the_words_have_it(tmp_path, capsys):

@@ -133,7 +133,6 @@ def test_what_is_no_law_is_refused_everywhere(name, law):
         (lambda: tfarm.reduce(LAB, GAINS, order=4), "the name of an output"),
         (lambda: tfarm.plots.locus(LAB), "what tfarm.locus returns"),
         (lambda: tfarm.plots.gain_map(LAB), "what tfarm.map returns"),
-        (lambda: tfarm.plots.sampled_modes(tfarm.margins(LAB, LAW)), "what tfarm.sampled returns"),
     ],
 )
 def test_what_a_function_cannot_take_it_says_how_to_give(call, words):

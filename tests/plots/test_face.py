@@ -52,7 +52,6 @@ def records():
         "modes": ([tfarm.modes(LAB, count=3)], 3),
         "nyquist": ([tfarm.nyquist(LAB, LAW)], 0),
         "overlay": ([plane, sampled_map(analysis.verdict.loop, K1, K2)], 0),
-        "sampled_modes": ([analysis], 0),
         "sketch": ([LAB], 0),
         "tuned_gain": ([tfarm.tune(LAB, Plan(trials=1))], 0),
         "slew": ([LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)], 3),
@@ -299,19 +298,6 @@ def test_overlay_draws_both_regions_edges(records):
     assert (LAW.K1, LAW.K2) in drawn
     legend = [text.get_text() for text in ax.get_legend().get_texts()]
     assert {"K1 = 0.3, K2 = 0.3", "stable in neither"} <= set(legend)
-
-
-def test_sampled_modes_draws_the_growth_of_each(records):
-    (found,), _ = records["sampled_modes"]
-    ax = tfarm.plots.sampled_modes(found, ax=axes_for(0))
-    drawn = {line.get_label(): line.get_ydata() for line in ax.lines}
-    table = found.modes
-    assert ax.lines[1].get_xdata().tolist() == table.natural_frequency.tolist()
-    assert drawn["closed loop, exact"].tolist() == table.log_radius.tolist()
-    assert drawn["by K1, first order"].tolist() == table.by_rate.tolist()
-    assert drawn["by K2, first order"].tolist() == table.by_moment.tolist()
-    assert drawn["own damping"].tolist() == table.by_damping.tolist()
-    assert "[rad/s]" in ax.get_xlabel()
 
 
 def test_slew_draws_the_records_at_the_samples_and_between(records):

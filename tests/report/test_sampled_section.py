@@ -10,25 +10,26 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.odd_arms import odd_arms
 from tfarm.arm import HubFeedback
 from tfarm.comparing.regions import CUT_RANGE, K2_RANGE, regions_table, stable_regions
 from tfarm.crossing import pieces
-from tfarm.digits import kept_digits, scientific
+from tfarm.digits import kept_digits, plain
 from tfarm.dsp import Chain, Simulator, sampled_loop, sampled_verdict, scenario, stable_windows
-from tfarm.dsp.chain import Sampling
+from tfarm.dsp.chain import Converters, Sampling
 from tfarm.dsp.loci import sampled_loci
-from tfarm.dsp.modes import mode_table
-from tfarm.dsp.traces import slews, strip_chart
+from tfarm.dsp.modes import dominant, mode_table
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots.files import save_figure
 from tfarm.plots.regions import draw_overlay
-from tfarm.plots.strip import draw_strip_chart
+from tfarm.plots.roots import draw_sampled_loci
+from tfarm.report import sampled_section as page
+from tfarm.report.given_laws import cases_of
 from tfarm.report.loop_laws import sign_words, what_holds
-from tfarm.report.sampled_section import first_order_words, sampled_section
-from tfarm.report.sampled_tables import loci_table
-from tfarm.report.sampled_words import Sampled, against_continuous, cure, duration, interval_words, sampled_in_short
+from tfarm.report.sampled_section import SampledCase, loci_table, sampled_section
 from tfarm.report.time_responses import CURVE_DIGITS
+from tfarm.report.words import spans
 from tfarm.spectrum.scales import default_gains
 from tfarm.tables.files import as_csv, as_json
 
@@ -42,9 +43,9 @@ analysed = cache(tfarm.sampled)
 def section():
     """With the map of both regions that the tests of it have."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tfarm.report.sampled_words.stable_regions", lambda *what: {(LAB, GAINS, Chain()): PLANE()}[what])
-        patch.setattr("tfarm.report.sampled_words.sampled", analysed)
-        return sampled_section(LAB)
+        patch.setattr(page, "stable_regions", lambda *what: {(LAB, GAINS, Chain()): PLANE()}[what])
+        patch.setattr(page, "sampled", analysed)
+        return sampled_section(LAB, Chain())
 
 
 def windows(arm, gains=GAINS):
@@ -98,8 +99,7 @@ def test_the_edges_at_the_default_gains_are_published_ones(section):
         ends = [column[0][side] for column in sampled.stable_intervals[stable]]
         edges.append(np.interp(0.3, sampled.K1[stable], ends))
     assert edges == pytest.approx([1.0305, -0.1526, 1.1639], abs=2e-3)  # linear between columns 12 % apart
-    assert "below 1.0305" in " ".join(section.words)
-    assert "from −0.1526 to 1.1639" in " ".join(section.words)
+    assert "K2 < 1.031 continuous, −0.153 … 1.164 sampled" in blocks_of(section)["sampled-overlay"].caption
 
 
 def test_without_damping_the_layers_are_nested_at_the_gains_and_say_for_how_many_modes(monkeypatch):
@@ -133,12 +133,16 @@ def test_a_region_is_cut_into_pieces_that_cover_it_exactly():
 
 def test_facts_words_and_tables_are_the_analysis(section):
     analysis = analysed(LAB, GAINS, Chain())
-    facts = {fact.label: (fact.value, fact.beside) for fact in section.facts}
-    band = scientific(analysis.verdict.band_rad_s, 2)
-    told = f"by 1.28 samples of delay, every mode below {band} rad/s (not known beyond)"
-    assert facts["does a 10 ms loop hold?"] == ("yes", told)
-    assert facts["stable K2"][0] == "−0.153 … 1.164"
-    assert facts["further delay it bears"] == ("12.8", "1.28 samples")
+    name = "default gains: "
+    assert [(fact.label.removeprefix(name), fact.value) for fact in section.facts] == [
+        ("K1 = 0.3, K2 = 0.3", "STABLE"),
+        ("delay margin", "12.8 ms (1.28 samples)"),
+    ]
+    assert "the loop is stable when sampled every 10 ms, delay margin 12.8 ms" in section.words[0]
+    assert f"|z| = {plain(math.exp(analysis.verdict.log_radius), 10)}" in section.words[0]
+    numbers = values_of(blocks_of(section)["sampled-numbers"])
+    assert numbers["number"] == ["K1", "K2", "Kp"]
+    assert numbers["stable_windows"][1] == " ".join(repr(end) for end in analysis.windows["K2"][0])
     table = values_of(blocks_of(section)["sampled-modes"])
     assert table["log_radius"] == analysis.modes.log_radius.tolist()
     assert table["by_K1"] == analysis.modes.by_rate.tolist()
@@ -153,39 +157,61 @@ def test_the_table_of_periods_is_each_period_by_itself(section):
     assert table["stable_K2"][-1] in stable_windows(verdict.full, "K2")
 
 
-def test_at_zero_damping_the_verdict_names_its_modes_its_growth_and_the_cure():
-    data = Sampled(PAPER, tfarm.sampled(PAPER, GAINS), windows(PAPER), PLANE(), ())
-    words = " ".join((sampled_in_short(data), against_continuous(data), cure(data)))
-    assert "Not strictly" in words
-    assert "as far as its first 20 modes go" in words
-    assert "Mode 13 grows by 8.62 × 10⁻⁹ a sample: it doubles in 9.3 days" in words  # ln 2/8.62e-9 * 10 ms
-    assert "C = 1.0 × 10⁻¹⁴ s" in words
+def test_at_zero_damping_the_verdict_names_its_modes_and_the_damping_that_it_needs():
+    """The number is where the poles say so: a little more damping is stable."""
+    (case,) = cases_of(PAPER, ())
+    found = SampledCase(case, tfarm.sampled(PAPER, GAINS))
+    assert "holds for the first 20 modes" in page.answer(found)
+    assert "Dominant pole: mode 13" in page.answer(found)
+    damping = page.facts_of(found)[-1]
+    assert (damping.value, damping.label) == (
+        "C = 1.0 × 10⁻¹⁴ s",
+        "default gains: minimum structural damping for stability",
+    )
     healed = replace(PAPER, link=replace(PAPER.link, damping=1.01e-14))
     assert sampled_loop(healed, GAINS, Chain(), count=20).poles.is_stable
 
 
-@pytest.mark.parametrize(("seconds", "text"), [(0.5, "0.50 s"), (7200.0, "2.0 hours"), (8.64e5, "10 days")])
-def test_times_are_said_in_the_unit_that_a_person_would_use(seconds, text):
-    assert duration(seconds) == text
+def test_intervals_that_do_not_contain_the_value_are_shown():
+    """(0, 0.2) is stable although 0.3 is not: no "none"."""
+    assert spans([(0.0, 0.2)], 0.3) == "0 … 0.2000, not 0.3"
+    assert spans([(0.0, 0.2), (0.25, 0.4)], 0.3) == "0.250 … 0.4000"
+    assert spans([], 0.3) == "none"
 
 
-@pytest.mark.parametrize(
-    ("window", "looked_at", "text"),
-    [
-        (None, (-50.0, 50.0), "for no K2 around this one"),
-        ((-math.inf, 1.0), (-50.0, 50.0), "below 1.0000"),
-        ((-50.0, 1.0305), (-50.0, 50.0), "below 1.0305 (looked at down to −50)"),
-        ((-60.0, 1.0305), (-math.inf, math.inf), "from −60.00 to 1.0305"),
-        ((-0.5, 202.0), (-202.0, 202.0), "above −0.50000 (looked at up to 202)"),
-        ((-202.0, 202.0), (-202.0, 202.0), "of any size (looked at down to −202 and up to 202)"),
-        ((-0.1526, 1.1639), (-50.0, 50.0), "from −0.1526 to 1.1639"),
-    ],
-)
-def test_an_end_of_the_search_is_not_sold_as_a_proof(window, looked_at, text):
-    assert interval_words(window, looked_at) == text
+@pytest.mark.parametrize("name", ["micro", "rubber"])
+def test_the_table_of_modes_has_the_pole_that_the_verdict_names(name):
+    """On the micro-arm mode 1, aliased to the edge of the strip, becomes two real poles: the slower one decides."""
+    arm = odd_arms()[name]
+    loop = sampled_loop(arm, default_gains(arm), Chain(), count=4)
+    table, named = mode_table(loop), dominant(loop)
+    assert table.log_radius.max() <= loop.poles.log_spectral_radius
+    if named.startswith("mode"):
+        assert table.log_radius[table.index == int(named.partition(" ")[2])] == [loop.poles.log_spectral_radius]
+
+
+def test_every_part_of_a_chain_is_named():
+    own = Chain(sampling=Sampling(period=0.004, delay_samples=0.5), converters=Converters(hub_rate="difference"))
+    words = page.chain_words(LAB, own)
+    assert "every 4 ms, 0.5 samples of delay" in words
+    assert "differenced" in words
+    assert "the paper's" in page.chain_words(LAB, Chain())
 
 
 # ------------------------------------------------------------ loci and time
+
+
+def test_the_slew_is_the_simulators_own(section):
+    """Without the feedback of the root moment, and with it."""
+    drawn = values_of(blocks_of(section)["sampled-slew"].data)
+    simulator = Simulator(LAB, Chain(), scenario("slew", LAB, Chain(), 3.0), count=20)
+    for key, K2 in (("without", 0.0), ("default", 0.3)):
+        expected = simulator.linear(HubFeedback(K1=0.3, K2=K2))
+        for name, signal in (("torque", expected.torque), ("root_moment", expected.at_samples.root_moment)):
+            at_samples = np.isin(drawn["t_s"], kept_digits(expected.t, CURVE_DIGITS))
+            shown = np.array(drawn[f"{name}_{key}_N_m"])[at_samples]
+            half_a_digit = 0.5 * 10.0 ** (1 - CURVE_DIGITS)  # of a number that begins with 1
+            assert abs(shown - signal).max() < half_a_digit * abs(signal).max()
 
 
 def test_loci_are_the_poles_at_their_gains_and_aliased_modes_are_told_apart():
@@ -196,32 +222,6 @@ def test_loci_are_the_poles_at_their_gains_and_aliased_modes_are_told_apart():
         z = loop.having(**{locus.gain: value}).poles.z
         assert np.sort_complex(locus.z[i]) == pytest.approx(np.sort_complex(z), abs=1e-12)
     assert [data.is_aliased(mode) for mode in (1, 2, 3, 4)] == [False, False, True, True]
-
-
-def test_the_slew_is_the_simulators_own(section):
-    count = sampled_verdict(LAB, GAINS, Chain()).modes_used
-    simulator = Simulator(LAB, Chain(), scenario("slew", LAB, Chain(), 3.0), count=count)
-    drawn = values_of(blocks_of(section)["sampled-slew"].data)
-    for key, K2 in (("without", 0.0), ("with", 0.3)):
-        expected = simulator.linear(HubFeedback(K1=0.3, K2=K2))
-        for name, signal in (("torque", expected.torque), ("root_moment", expected.at_samples.root_moment)):
-            at_samples = np.isin(drawn["t_s"], kept_digits(expected.t, CURVE_DIGITS))
-            shown = np.array(drawn[f"{name}_{key}_N_m"])[at_samples]
-            half_a_digit = 0.5 * 10.0 ** (1 - CURVE_DIGITS)  # of a number that begins with 1
-            assert abs(shown - signal).max() < half_a_digit * abs(signal).max()
-
-
-def test_the_strip_chart_has_steps_delay_and_saturation():
-    ideal = slews(LAB, GAINS, Chain(), 14)
-    chart = strip_chart(LAB, GAINS, ideal.with_moment, 14)
-    assert np.allclose(chart.read / chart.step, np.round(chart.read / chart.step), rtol=0, atol=1e-9)
-    assert abs(chart.read - chart.simulation.at_samples.root_moment).max() <= chart.step / 2 * (1 + 1e-9)
-    assert chart.saturated.sum() == chart.simulation.saturated["torque"] > 0
-    assert np.array_equal(chart.simulation.torque, np.clip(chart.asked, -chart.limit, chart.limit))
-    assert chart.simulation.chain.sampling.delay_samples == 1.0
-    room = 1.2 * abs(ideal.with_moment.at_samples.root_moment).max()
-    span = chart.simulation.chain.converters.moment_range
-    assert room <= span == float(f"{span:.2g}") < 1.1 * room
 
 
 # ------------------------------------------------------------ bytes and odd arms
@@ -236,8 +236,7 @@ def test_the_same_bytes_twice(tmp_path, monkeypatch):
         (tmp_path / name).mkdir()
         data = stable_regions(LAB, GAINS, Chain())
         found = sampled_loci(loop, 20.0, (-0.5, 1.5))
-        ideal = slews(LAB, GAINS, Chain(), 14)
-        figures = (draw_overlay(data), draw_strip_chart(strip_chart(LAB, GAINS, ideal.without, 14)))
+        figures = (draw_overlay(data), draw_sampled_loci(found))
         for i, figure in enumerate(figures):
             save_figure(figure, tmp_path / name, str(i), formats=("svg",))
         table = as_csv(regions_table(data, "t")) + as_json(loci_table(found, "t"))
@@ -249,7 +248,7 @@ def test_the_same_bytes_twice(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("inertia", [math.inf, 0.0])
 def test_an_arm_without_a_loop_gets_one_sentence(inertia):
-    section = sampled_section(replace(LAB, hub=tfarm.Hub(inertia=inertia)))
+    section = sampled_section(replace(LAB, hub=tfarm.Hub(inertia=inertia)), Chain())
     assert len(section.words) == 1
     assert not section.blocks
     assert not section.facts
@@ -259,7 +258,7 @@ def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
     monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
     monkeypatch.setattr("tfarm.dsp.verdict.PERIOD_SHARES", (1.0,))
-    section = sampled_section(replace(LAB, payload=tfarm.Payload(mass=math.inf)))
+    section = sampled_section(replace(LAB, payload=tfarm.Payload(mass=math.inf)), Chain())
     assert "no slew" in section.words[-1]
     assert "sampled-overlay" in blocks_of(section)
     assert "sampled-slew" not in blocks_of(section)
@@ -268,19 +267,6 @@ def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
 # ------------------------------------------------------------ rigs that springs hold
 
 SPRUNG = replace(LAB, name="sprung", hub=replace(LAB.hub, stiffness=3.0))
-
-
-def test_words_on_modes_are_what_their_table_says():
-    """A spring's mode is driven by K2 > 0; late, bands do not alternate, and nothing is said to be shaded."""
-    plain, late = Chain(), Chain(sampling=Sampling(delay_samples=1.3))
-    for arm, chain, shaded in ((PAPER, plain, True), (SPRUNG, plain, True), (PAPER, late, False)):
-        table = mode_table(sampled_loop(arm, HubFeedback(K1=1e-3, K2=0.3), chain, count=6))
-        words = first_order_words(table)
-        assert ("Shaded" in words) == shaded == table.rate_alternates
-        driven = [int(n) for n, by in zip(table.index, table.by_moment, strict=True) if by > 0]
-        named = f"drives mode{'s' * (len(driven) > 1)} {', '.join(map(str, driven))}" if driven else "damps every mode"
-        assert words.endswith(f"Root moment feedback {named} to first order. ")
-    assert "moment" not in first_order_words(mode_table(sampled_loop(PAPER, HubFeedback(K1=1e-3), count=6)))
 
 
 def test_an_arm_on_springs_is_not_said_to_be_held_at_its_tip():

@@ -11,23 +11,19 @@ to its file, as the band between its smallest and largest value over at least tw
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, HubFeedback
+from tfarm.arm import Arm
 from tfarm.arrays import Real
 from tfarm.columns import Column
-from tfarm.digits import plain
-from tfarm.dsp.chain import TIME_ROUNDING, Chain
-from tfarm.dsp.kernel import AMPLIFIER, STEP
+from tfarm.dsp.chain import TIME_ROUNDING
 from tfarm.dsp.plant import RECORDED
-from tfarm.dsp.scenarios import Scenario, scenario
-from tfarm.dsp.simulate import Measurement, Simulation, Simulator, quantisers
+from tfarm.dsp.scenarios import Scenario
+from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.records import record
 
 POINTS_A_PERIOD = 20  # of a curve in each period of the fastest mode that is seen
@@ -39,13 +35,7 @@ MOST_LINE = 6000  # points of a line: at 20 a period still three pixels a period
 PERIODS = 2  # of the fastest mode that each piece of a band holds at least
 BAND_PIECES = 1500  # of a band at most
 MOST_RECORDS = 400_000  # of a simulation for a picture, some 30 MB
-WITHOUT = f"without moment feedback, {MOMENT_GAIN} = 0"
 RECORD_LENGTH = 3.0  # times the slew: how long a record is
-COARSE_BITS = 6  # of the ADC: few, so that its steps are seen
-MOTOR_SHARE = 0.8  # of the torque that the ideal chain takes: what the motor gives at most
-RANGE_SHARE = 1.2  # times the largest moment: the ADC's range
-CHART_DELAY = 1.0  # samples, where the chain has none
-CHART_LENGTH = 2.0  # times the slew
 
 
 class Ringing(NamedTuple):
@@ -191,108 +181,3 @@ def held_at(simulation: Simulation, values: Real, t: Real) -> Real:
     """What is held from sample to sample, at the times t [s]."""
     k = np.floor(t / simulation.scenario.period * (1 + TIME_ROUNDING)).astype(np.int64)
     return values[np.minimum(k, values.size - 1)]
-
-
-@dataclass(frozen=True)
-@record
-class Slews:
-    """One slew simulated twice: `without` and `with_moment` feedback, the other gains the same."""
-
-    arm: Arm
-    gains: HubFeedback
-    without: Simulation
-    with_moment: Simulation
-
-    @property
-    def each(self) -> Mapping[str, Simulation]:
-        """Both, by what they are called; the one without comes first."""
-        return {WITHOUT: self.without, f"with, {self.fed_back}": self.with_moment}
-
-    @property
-    def held(self) -> str:
-        """The gain on the hub rate, which both have."""
-        return self.gains.told(RATE_GAIN, plain)
-
-    @property
-    def fed_back(self) -> str:
-        """The gain on the root moment of the second."""
-        return self.gains.told(MOMENT_GAIN, plain)
-
-
-def slews(arm: Arm, gains: HubFeedback, chain: Chain, modes: int) -> Slews:
-    """The slew of the chain, for three times as long as it takes.
-
-    Raises ParameterError for an arm that cannot turn.
-    """
-    task = scenario("slew", arm, chain, RECORD_LENGTH * chain.slew.rise_time)
-    simulator = Simulator(arm, chain, task, count=modes)
-    laws = (gains.having(MOMENT_GAIN, 0.0), gains)
-    both = resolved(simulator, arm, *(partial(Simulator.linear, gains=law) for law in laws))
-    return Slews(arm, gains, *both)
-
-
-@dataclass(frozen=True)
-@record
-class StripChart:
-    """A slew through a coarse chain.
-
-    `read` [N m] is what the ADC hands over at each sample, `asked` [N m, V or A] what the controller then wants;
-    `simulation.torque` is what the motor gives, `delay_samples` later.
-    """
-
-    arm: Arm
-    gains: HubFeedback
-    simulation: Simulation
-    read: Real
-    asked: Real
-
-    @property
-    def step(self) -> float:
-        """One step of the ADC [N m]."""
-        return float(quantisers(self.simulation.chain)[AMPLIFIER, STEP])
-
-    @property
-    def limit(self) -> float:
-        """The most the motor gives [N m, V or A]."""
-        return self.simulation.chain.actuator.torque_limit
-
-    @property
-    def saturated(self) -> NDArray[np.bool_]:
-        """At which samples more was asked than the motor gives."""
-        return np.asarray(abs(self.asked) > self.limit)
-
-
-def strip_chart(arm: Arm, gains: HubFeedback, ideal: Simulation, modes: int) -> StripChart:
-    """The same slew as that of an ideal chain, with a coarse ADC, a weak motor and one more sample of delay."""
-    chain = coarse_chain(ideal)
-    task = scenario("slew", arm, chain, CHART_LENGTH * chain.slew.rise_time)
-    read, asked = np.zeros(task.t.size), np.zeros(task.t.size)
-
-    def controller(m: Measurement) -> float:
-        u = m.asked(gains, gains[MOMENT_GAIN])
-        read[m.k], asked[m.k] = m.root_moment, u
-        return u
-
-    (done,) = resolved(Simulator(arm, chain, task, count=modes), arm, lambda each: each.controller(controller))
-    n = done.torque.size
-    return StripChart(arm, gains, done, read[:n], asked[:n])
-
-
-def coarse_chain(ideal: Simulation) -> Chain:
-    """A simulation's chain; where that is ideal 6 bits of ADC over a little more than its moment, 80 % of its torque as
-    the motor's limit, and one sample of delay."""
-    chain, c = ideal.chain, ideal.chain.converters
-    if c.moment_bits is None:
-        span = RANGE_SHARE * float(abs(ideal.at_samples.root_moment).max())
-        unit = 10.0 ** (math.floor(math.log10(span)) - 1)
-        span = c.moment_range or float(f"{math.ceil(span / unit) * unit:.2g}")  # rounded up to two digits
-        c = replace(c, moment_bits=COARSE_BITS, moment_range=span)
-    limit = min(chain.actuator.torque_limit, c.torque_range or math.inf)
-    if math.isinf(limit):
-        limit = float(f"{MOTOR_SHARE * float(abs(ideal.torque).max()):.2g}")
-    return replace(
-        chain,
-        sampling=replace(chain.sampling, delay_samples=chain.sampling.delay_samples or CHART_DELAY),
-        converters=c,
-        actuator=replace(chain.actuator, torque_limit=limit),
-    )

@@ -10,7 +10,6 @@ from tfarm.plots.compared import comparison
 from tfarm.plots.disc import nyquist
 from tfarm.plots.fitted import measured
 from tfarm.plots.frequency import bode
-from tfarm.plots.growth import sampled_modes
 from tfarm.plots.laws import gain_map, locus
 from tfarm.plots.learning import tuned_gain
 from tfarm.plots.motion import slew
@@ -27,7 +26,6 @@ __all__ = [
     "modes",
     "nyquist",
     "overlay",
-    "sampled_modes",
     "sketch",
     "slew",
     "tuned_gain",

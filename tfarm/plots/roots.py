@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,6 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tfarm.arrays import Complex
 from tfarm.digits import kept_digits, plain, significant
+from tfarm.dsp.loci import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
 from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, held_branches
 from tfarm.loop.locus import Locus, frame, rounded
 from tfarm.loop.reduced_locus import ReducedLocus
@@ -197,3 +199,48 @@ def _legend(exact: Locus, reduced: ReducedLocus | None) -> Keys:
     if exact.crossings:
         keys["crosses the axis"] = Line2D([], [], color=ORANGE, ls="none", marker="D")
     return list(keys.values()), list(keys)
+
+
+def draw_sampled_loci(data: SampledLoci) -> Figure:
+    """The z-plane with the locus along each gain."""
+    with style():
+        figure = blank(9.0, 3.4)
+        for locus, ax in zip(data.by.values(), figure.subplots(1, 2), strict=True):
+            z_plane(data, locus, ax=ax)
+        arm, ms = data.loop.plant.arm.name, plain(1e3 * data.loop.chain.sampling.period)
+        headline(figure, f"{arm}: poles of the loop sampled every {ms} ms")
+    return figure
+
+
+def z_plane(data: SampledLoci, locus: SampledLocus, *, ax: Axes) -> None:
+    """The upper half of the z-plane with one gain's locus; open circles at its start, dots at the loop's gains."""
+    angle = np.linspace(0.0, math.pi, 181)
+    ax.fill_between(DRAWN_RADIUS * np.cos(angle), 0, DRAWN_RADIUS * np.sin(angle), color="#f7e9de", zorder=0)
+    ax.fill_between(np.cos(angle), 0, np.sin(angle), color="white", zorder=0.2)
+    ax.plot(np.cos(angle), np.sin(angle), color=INK, lw=0.9, zorder=1)
+    here = int(abs(locus.values - data.loop.number(locus.gain)).argmin())
+    for branch in np.argsort(locus.mode):
+        z, mode = locus.z[:, branch], int(locus.mode[branch])
+        visible = np.where((z.imag >= -1e-12) & (abs(z) < DRAWN_RADIUS), z, np.nan)
+        if not np.isfinite(visible).any():
+            continue
+        colour = _colour(data, mode) if mode else GREY
+        ax.plot(visible.real, visible.imag, color=colour, lw=1.4, zorder=3)
+        if np.isfinite(visible[0]):
+            ax.plot(z[0].real, z[0].imag, "o", mfc="white", mec=colour, mew=1.1, ms=4.5, zorder=4)
+        if np.isfinite(visible[here]):
+            ax.plot(z[here].real, z[here].imag, "o", color=colour, ms=4.5, zorder=5)
+    ax.set_xlim(-RIM, RIM)
+    ax.set_xticks([-1.0, -0.5, 0.0, 0.5, 1.0])
+    ax.set_ylim(0.0, RIM)
+    ax.set_aspect("equal")
+    ax.grid(False)
+    span = f"{plain(locus.values[0], 2)} to {plain(locus.values[-1], 3)}"
+    held = gains_words(data.loop.gains, 10, but=locus.gain)
+    ax.set_title(f"z-plane, {locus.gain} from {span} ({held})", fontsize=9.5)
+    ax.set_xlabel("Re z")
+    ax.set_ylabel("Im z")
+
+
+def _colour(data: SampledLoci, mode: int) -> str:
+    return ORANGE if data.is_aliased(mode) else BLUE

@@ -25,8 +25,8 @@ from tfarm.report.kept import keep, kept
 from tfarm.report.loop_laws import brief_on, has_loop, margins_of
 from tfarm.report.page import Card, summary
 from tfarm.report.pieces import QUESTIONS
-from tfarm.report.sampled_words import in_ms
 from tfarm.report.sections import PICTURES, Fact
+from tfarm.report.words import in_ms
 from tfarm.response.frequency import bode
 from tfarm.spectrum.scales import default_gains
 

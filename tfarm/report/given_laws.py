@@ -17,6 +17,7 @@ from tfarm.loop.loop import Loop
 from tfarm.plots.words import gains_words
 from tfarm.records import record
 from tfarm.response.signals import Signals
+from tfarm.spectrum.scales import default_gains
 
 GIVEN_GAINS = "the gains given"
 LONGEST_LAW_NAME = 60  # characters of a law's name in a heading
@@ -98,6 +99,14 @@ def on_arm(arm: Arm, laws: Sequence[GivenLaw]) -> tuple[LawOnArm, ...]:
             name = f"{name} ({number})"
         found.append(LawOnArm(driven, law, given, name, f"law_{number}" if len(laws) > 1 else "law"))
     return tuple(found)
+
+
+def cases_of(arm: Arm, laws: Sequence[GivenLaw]) -> tuple[LawOnArm, ...]:
+    """The controllers that a section is about: the laws given, else the default gains."""
+    if laws:
+        return on_arm(arm, laws)
+    gains = default_gains(arm)
+    return (LawOnArm(arm, gains, GivenLaw(gains), "default gains", "default"),)
 
 
 def check_laws(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> None:

@@ -1,14 +1,12 @@
 """Modes: the modal table, the shapes, the four beam theories side by side, and what each parameter does.
 
-Cards of the first modes: a small shape each that swings on the screen, and stands still on paper.
-
 The hub-locked frequencies of a rig beside its free ones, with and without what its hub loses.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
@@ -21,7 +19,7 @@ from tfarm.digits import fixed, lined, listed, significant, singly
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.plots.shapes import DrawnMode, draw_differences, draw_shapes, shapes_of, theory_name
 from tfarm.report.damped_table import damped_table
-from tfarm.report.sections import ModeCard, PageSection, Picture
+from tfarm.report.sections import PageSection, Picture
 from tfarm.report.trust_proofs import how_proven
 from tfarm.spectrum import Modes, answers
 from tfarm.spectrum.damped import damped_at_hub
@@ -67,8 +65,6 @@ OF_RIGS = (
     " Without a segment's number a parameter is that of all segments at once; a length takes along what is attached to "
     "it, and x is the place of an attachment alone."
 )
-CARD_WIDTH, CARD_HEIGHT, CARD_EDGE = 120.0, 60.0, 8.0  # of the drawing, in its own units
-PATH_EVERY = 10  # of the points of a shape every so many are drawn: 41, half a unit from the true curve at most
 LOCKED_MODES = 6  # rows, of the modes that are measured on a rig
 LOCKED_CAPTION = (
     "Natural frequencies with the hub free to turn and with the hub held still, neither damped{damped}. What is "
@@ -102,7 +98,6 @@ def modes_section(arm: Arm) -> PageSection:
             damped = [damped_table(modes)]
         except (ConvergenceError, CertificationError) as error:
             words.append(NO_DAMPED_TABLE.format(why=error))
-    shapes = shapes_of(modes, DRAWN_MODES)
     return PageSection(
         anchor="modes",
         title="Modes",
@@ -111,12 +106,11 @@ def modes_section(arm: Arm) -> PageSection:
             modal_table(modes),
             *([] if arm.is_uniform else [locked_table(modes)]),
             *damped,
-            _shapes(arm.name, shapes),
+            _shapes(arm.name, shapes_of(modes, DRAWN_MODES)),
             theories_table(exact, theories, differences),
             _differences(arm.name, differences),
             sensitivity_table(modes),
         ),
-        cards=mode_cards(shapes),
     )
 
 
@@ -241,23 +235,6 @@ def tint(x: float) -> str:
     strength = 0.45 * min(1.0, abs(x) / 2.0) ** 0.6
     parts = (round(255 - strength * (255 - part)) for part in (RISE_COLOUR if x > 0 else FALL_COLOUR))
     return "#" + "".join(f"{part:02x}" for part in parts)
-
-
-def mode_cards(shapes: Sequence[DrawnMode]) -> tuple[ModeCard, ...]:
-    """A card for each shape, upwards where w is positive, its largest displacement as high as the card."""
-    cards = []
-    for shape in shapes:
-        across = _across(shape.x, shape)[::PATH_EVERY]
-        up = (CARD_HEIGHT / 2 - (CARD_HEIGHT / 2 - CARD_EDGE / 2) * shape.w)[::PATH_EVERY]
-        points = " ".join(f"{x:.1f},{y:.2f}" for x, y in zip(across, up, strict=True))
-        hertz = significant(shape.natural_frequency / (2 * math.pi), 5)
-        nodes = tuple(round(float(x), 1) for x in _across(shape.nodes, shape))
-        cards.append(ModeCard(number=shape.number, hertz=hertz, path=f"M{points}", nodes=nodes))
-    return tuple(cards)
-
-
-def _across(x: Real, shape: DrawnMode) -> Real:
-    return CARD_EDGE + (CARD_WIDTH - 2 * CARD_EDGE) * np.asarray(x) / shape.x[-1]
 
 
 def locked_words(arm: Arm) -> list[str]:

@@ -13,7 +13,6 @@ from tfarm.report.bode_section import bode_section
 from tfarm.report.fit_section import fit_section, measured_section
 from tfarm.report.given_laws import Subject, continuous_laws, on_arm
 from tfarm.report.law_loop_section import law_margins_section, law_nyquist_section, law_poles_section
-from tfarm.report.law_sampled_section import law_sampled_section
 from tfarm.report.law_section import law_section
 from tfarm.report.locus_section import locus_section
 from tfarm.report.loop_laws import has_loop, has_rate_loop
@@ -98,7 +97,7 @@ ARM_PIECES = (
 QUESTIONS = {piece.page: piece.title for piece in ARM_PIECES if piece.title}  # pages that may be asked for alone
 LAW_PIECES = (
     Answer("margins", "margins", law_margins_section, has_rate_loop, of=LAWS, in_s=True),
-    Answer("sampled loop", "sampled", law_sampled_section, has_rate_loop, seconds=8.0, of=LAWS),
+    Answer("sampled loop", "sampled", sampled_section, has_rate_loop, seconds=8.0, of=LAWS),
     Answer("the law", "law", law_section, has_rate_loop, is_also_on=is_of_the_loop, of=LAWS),
     Piece("Nyquist", "margins-nyquist", law_nyquist_section, has_rate_loop, of=LAWS, in_s=True),
     Answer("poles", "locus", law_poles_section, has_rate_loop, seconds=2.0, of=LAWS, in_s=True),

@@ -1,258 +1,404 @@
-"""Does the loop still hold when it is sampled?  Verdict, regions, loci, modes, the slew in time, and a coarse chain."""
+"""The sampled loop of each case of a page: verdict, margins, stability intervals, modes, and motion in time."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
-import numpy as np
-
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, shown_unit
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit
 from tfarm.columns import Column, Table
-from tfarm.comparing.regions import regions_table
+from tfarm.comparing.regions import StableRegions, regions_table, stable_regions
+from tfarm.crossing import Window
 from tfarm.digits import how_many, plain, scientific, significant, singly
-from tfarm.dsp import Chain, sampled_verdict
+from tfarm.dsp import Analysis, Chain, Simulation, Verdict, sampled_verdict
+from tfarm.dsp.chain import MOST_DELAY
 from tfarm.dsp.crossings import around
-from tfarm.dsp.loci import STRONGER, sampled_loci
-from tfarm.dsp.modes import ModeTable
-from tfarm.dsp.traces import Slews, StripChart, slews, strip_chart
-from tfarm.plots.folded import draw_folded_loci
-from tfarm.plots.growth import draw_modes
+from tfarm.dsp.loci import STRONGER, SampledLoci, sampled_loci
+from tfarm.dsp.modes import SAMPLED_MODE_COLUMNS
+from tfarm.dsp.results import drawn, residual_moment_rms, settling_time
+from tfarm.dsp.traces import RECORD_LENGTH
+from tfarm.dsp.verdict import SampledNumber, at_periods, sampled
+from tfarm.errors import ParameterError
+from tfarm.plots.motion import draw_responses
 from tfarm.plots.regions import draw_overlay
-from tfarm.plots.strip import draw_strip_chart
-from tfarm.report.loop_laws import has_loop, what_holds, why_no_loop
-from tfarm.report.sampled_tables import example_words, loci_table, mode_rows, strip_table
-from tfarm.report.sampled_words import (
-    Sampled,
-    against_continuous,
-    chain_words,
-    cure,
-    in_ms,
-    interval_words,
-    sampled_facts,
-    sampled_in_short,
-    sampled_study,
-    spans,
+from tfarm.plots.roots import draw_sampled_loci
+from tfarm.plots.style import safe
+from tfarm.records import record
+from tfarm.report.given_laws import GivenLaw, LawOnArm, cases_of, on_arm
+from tfarm.report.law_measured import measured_blocks
+from tfarm.report.loop_laws import has_loop, margins_of, what_holds, why_no_loop
+from tfarm.report.sections import Fact, PageSection, Picture
+from tfarm.report.time_responses import clipped_words, resolution_words, responses_table
+from tfarm.report.words import in_ms, residual_words, span, spans, typeset, upper
+
+MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict is given
+PAST_HUB = 1.25  # times the rate gain at which sampling alone makes the hub unstable: the end of its locus
+LOCUS_K2 = (-0.5, 1.5)  # of its locus: the stability interval of most arms, and a little to either side
+DELAYS_CAPTION = (
+    "The exact loop with further delay between reading and acting. Stable: every |z| below 1{apart}. {held}"
 )
-from tfarm.report.sections import PageSection, Picture
-from tfarm.report.time_responses import (
-    draw_slews,
-    resolution_words,
-    seen_words,
-    slews_table,
-    what_slews_show,
+APART_FROM_FREE = ", that at z = 1 of a hub without angle feedback apart"
+NUMBERS_CAPTION = (
+    "Each number alone, the others fixed; a name that ends in “gain” is a factor on that part of the controller. At an "
+    "edge a pole of the sampled loop is on the unit circle ({modes})."
 )
-from tfarm.report.words import typeset
+MODES_CAPTION = (
+    "ln|z|: change of a mode's size per sample of {ms} ms, negative where it decays. Own damping: without feedback; "
+    "{gains}: to first order; the closed loop is the exact pole. Modes above {half} Hz (band 1 and on) are aliased: "
+    "the samples show them at the frequency given."
+)
+LOCI_CAPTION = (
+    "z-plane, stable inside the circle. Open circles: where the range of the gain begins; dots: gains of the loop; "
+    "orange: modes above {half} Hz, which are aliased; grey: hub, filters and delay."
+)
+OVERLAY_CAPTION = (
+    "Sand: stability region of the continuous loop, with every mode. Blue: that of the sampled loop. {layers}{proven}"
+    "Edges are exact crossings of the imaginary axis or the unit circle. Logarithmic axis: {rate} = 0 lies beyond its "
+    "left end at {low}{beyond}."
+)
+SLEW_CAPTION = (
+    "A bang-bang slew with the rigid arm's feedforward. Dotted line: its end. Tip: deviation from a rigid arm on its "
+    "reference. "
+)
+NO_DAMPING_HELPS = "none up to 15 % of critical in the first mode"
 
-PAST_HUB = 1.25  # times the rate gain at which sampling the hub alone would break it: how far its locus goes
 
-LOCUS_K2 = (-0.5, 1.5)  # of its locus: what holds when sampled, and a little of what does not, to either side
+@dataclass(frozen=True)
+@record
+class SampledCase:
+    """A case with the analysis of its sampled loop."""
+
+    each: LawOnArm
+    analysis: Analysis
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict on the loop."""
+        return self.analysis.verdict
+
+    @property
+    def numbers(self) -> Sequence[SampledNumber]:
+        """Each gain at the hub, or each number of another controller, with its stability intervals."""
+        found = self.analysis
+        if not found.loop.is_of_gains:
+            return [SampledNumber("whole controller", 1.0, found.factors), *found.numbers]
+        return [SampledNumber(name, found.loop.number(name), list(each)) for name, each in found.windows.items()]
 
 
-def sampled_section(arm: Arm, chain: Chain | None = None) -> PageSection:
-    """The loop through the arm's own chain, under the default gains; one sentence for an arm without a loop."""
-    chain = Chain() if chain is None else chain
-    title = f"The sampled loop: does it still hold at {in_ms(chain)} ms?"
-    if not has_loop(arm):
+def sampled_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> PageSection:
+    """The sampled loop under the laws given, or the default gains; one sentence for an arm without a loop.
+
+    In time: runs measured under the laws with the exact loop over them, else the slew.
+    """
+    title = f"The sampled loop, {in_ms(chain)} ms"
+    if not laws and not has_loop(arm):
         return PageSection(anchor="sampled", title=title, words=(why_no_loop(arm),))
-    data = sampled_study(arm, chain)
-    blocks: list[Picture | Table] = [_overlay_picture(data), _periods_table(data), *_mode_blocks(data)]
-    words = [sampled_in_short(data), chain_words(arm, chain), against_continuous(data), cure(data)]
-    if arm.has_rigid_mode:
-        loop = data.analysis.verdict.loop
-        moved = slews(arm, data.gains, loop.chain, loop.plant.count)
-        blocks.append(_slew_picture(moved))
-        if moved.with_moment.stopped is None:
-            coarse = strip_chart(arm, data.gains, moved.with_moment, loop.plant.count)
-            blocks.append(_strip_picture(coarse, loop.chain))
-    else:
-        words.append(f"{what_holds(arm)}, so there is no slew to show in time.")
-    return PageSection(anchor="sampled", title=title, words=words, facts=sampled_facts(data), blocks=blocks)
+    cases = cases_of(arm, laws)
+    found = [SampledCase(each, sampled(each.arm, each.law, chain)) for each in cases]
+    words = [*map(answer, found), chain_words(arm, chain)]
+    blocks: list[Picture | Table] = [numbers_table(found), delays_table(found, chain)]
+    if not laws:
+        gains = found[0].analysis.loop.gains
+        blocks = [overlay_picture(stable_regions(arm, gains, chain), found[0]), *blocks]
+        blocks += [periods_table(arm, gains, chain), loci_picture(found[0].analysis)]
+    blocks += [modes_table(each) for each in found]
+    if any(each.measured is not None for each in cases):
+        blocks += measured_blocks(cases, chain)
+    if not arm.has_rigid_mode:
+        words.append(f"{what_holds(arm)}: no slew is simulated.")
+    elif any(each.measured is None for each in cases):
+        slewed = cases if laws else (without_moment(arm, found[0]), *cases)
+        pictures, said = slew(arm, chain, slewed)
+        blocks += pictures
+        words += said
+    facts = [fact for each in found for fact in facts_of(each)]
+    return PageSection(anchor="sampled", title=title, facts=facts, words=words, blocks=blocks)
 
 
-def _overlay_picture(data: Sampled) -> Picture:
-    regions = data.regions
-    low = plain(float(regions.continuous.axes[0][0]), 2)
-    layers = (
-        "Nested blues: C = 0 (for the first modes only), and what the same arm would do with a little damping. "
-        if len(regions.sampled) > 1
-        else ""
+def without_moment(arm: Arm, found: SampledCase) -> LawOnArm:
+    """The gains of a case without the feedback of the root moment."""
+    gains = found.analysis.loop.gains.having(MOMENT_GAIN, 0.0)
+    (each,) = on_arm(arm, (GivenLaw(gains),))
+    return replace(each, name=f"{MOMENT_GAIN} = 0", key="without")
+
+
+# ------------------------------------------------------------ verdict
+
+
+def answer(found: SampledCase) -> str:
+    """Verdict, delay margin, how far both are certified, and the dominant pole."""
+    verdict, T = found.verdict, found.verdict.loop.chain.sampling.period
+    delay = f", delay margin {delay_words(found)}" if verdict.is_stable else ""
+    radius, growth = math.exp(verdict.log_radius), verdict.log_radius
+    pace = f", time constant {significant(T / abs(growth), 3)} s" if growth else ""
+    return typeset(
+        f"{upper(found.each.name)}, {found.each.gains}: the loop is {verdict.word} when sampled every "
+        f"{in_ms(verdict.loop.chain)} ms{delay} ({verdict.holds_for}). "
+        f"Dominant pole: {verdict.slowest}, |z| = {plain(radius, 10)}{pace}."
     )
-    proven = "Below the dashed line lies what the energy argument proves at C = 0. " if data.arm.is_uniform else ""
+
+
+def delay_words(found: SampledCase) -> str:
+    """The delay margin in ms and samples."""
+    margin, T = found.analysis.delay_margin, found.verdict.loop.chain.sampling.period
+    ms = significant(1e3 * T * margin.samples, 3)
+    return f"{'over ' if margin.is_bound else ''}{ms} ms ({significant(margin.samples, 3)} samples)"
+
+
+def facts_of(found: SampledCase) -> list[Fact]:
+    """Verdict, delay margin and minimum structural damping of a case."""
+    verdict, name = found.verdict, f"{found.each.name}: "
+    beside = typeset(f"ln|z| = {scientific(verdict.log_radius, 3)} a sample")
+    facts = [Fact(label=f"{name}{found.each.gains}", value=verdict.word.upper(), beside=beside)]
+    if verdict.is_stable:
+        facts.append(Fact(label=f"{name}delay margin", value=delay_words(found)))
+    needed, arm = found.analysis.damping, found.each.arm
+    if arm.has_elastic_link or not verdict.is_stable:
+        held = "" if needed.is_settled else f"for the first {needed.modes} modes"
+        value = "none" if needed.value == 0 else NO_DAMPING_HELPS
+        if 0 < needed.value < math.inf:
+            percent = 50 * needed.value * float(found.analysis.modes.natural_frequency[0])
+            value = f"C = {scientific(needed.value, 2)} s"
+            held = f"{scientific(percent, 2)} % of critical in the first mode{f', {held}' if held else ''}"
+        facts.append(Fact(label=f"{name}minimum structural damping for stability", value=value, beside=held))
+    return facts
+
+
+def chain_words(arm: Arm, chain: Chain) -> str:
+    """Every part of the chain that is not ideal."""
+    sampling, converters, actuator = chain.sampling, chain.converters, chain.actuator
+    parts = [f"sampled every {in_ms(chain)} ms"]
+    parts += [f"{how_many(sampling.delay_samples, 'sample')} of delay"] * bool(sampling.delay_samples)
+    if not math.isinf(sampling.antialias_corner):
+        parts.append(f"an anti-alias filter at {plain(sampling.antialias_corner)} rad/s")
+    parts += [f"an encoder of {converters.encoder_counts} counts a turn"] * (converters.encoder_counts is not None)
+    parts += ["the hub rate differenced from the encoder"] * (converters.hub_rate == "difference")
+    parts += [f"a moment read with {converters.moment_bits} bits"] * (converters.moment_bits is not None)
+    if not math.isinf(actuator.torque_limit):
+        parts.append(f"an input of at most {plain(actuator.torque_limit)} {arm.input_unit}")
+    parts += [f"hub damping of {plain(actuator.hub_damping)} N m s/rad"] * bool(actuator.hub_damping)
+    steps = " Verdicts are of the linear loop; steps and limits act in the simulations." * (not chain.is_linear)
+    paper = " These are the paper's: the arm's file has no chain of its own." * (chain == Chain())
+    return f"The chain: {', '.join(parts)}.{steps}{paper}"
+
+
+def numbers_table(found: Sequence[SampledCase]) -> Table:
+    """Stability intervals of each number of each case, the others fixed."""
+    rows = [(it, number) for it in found for number in it.numbers]
+    modes = ", ".join(dict.fromkeys(f"{it.each.name} with {it.verdict.modes_used} flexible modes" for it in found))
+    return Table(
+        stem="sampled-numbers",
+        title="Stability intervals, the other numbers fixed",
+        caption=NUMBERS_CAPTION.format(modes=modes),
+        columns=(
+            Column("law", "controller", of=[it.each.name for it, _ in rows]),
+            Column("number", "number", of=[number.number for _, number in rows]),
+            Column("value", "value", of=[number.value for _, number in rows], digits=singly(plain, 5)),
+            Column(
+                "stable_windows", "stable, sampled",
+                of=[" ".join(repr(end) for window in number.windows for end in window) or "none" for _, number in rows],
+                shown=[spans(number.windows, number.value, interval_of(it, number)) for it, number in rows],
+            ),
+        ),
+        keys=2,
+    )  # fmt: skip
+
+
+def interval_of(found: SampledCase, number: SampledNumber) -> Window | None:
+    """The stability interval around a number; a gain on the angle that is 0 is the lower end of its own."""
+    return found.analysis.interval(number.number) if number.number == ANGLE_GAIN else number.interval
+
+
+def delays_table(found: Sequence[SampledCase], chain: Chain) -> Table:
+    """The verdict on each case as it is, and with half a sample and a whole one of further delay."""
+    rows: list[tuple[str, float, Verdict]] = []
+    T = chain.sampling.period
+    for it in found:
+        for more in MORE_DELAY:
+            delay = chain.sampling.delay_samples + more
+            if more and delay + it.each.any_law.delay / T > MOST_DELAY:
+                continue
+            late = replace(chain, sampling=replace(chain.sampling, delay_samples=delay))
+            verdict = sampled_verdict(it.each.arm, it.each.law, late) if more else it.verdict
+            rows.append((it.each.name, more, verdict))
+    verdicts = [verdict for *_, verdict in rows]
+    held = dict.fromkeys(f"{upper(verdict.holds_for)}." for verdict in verdicts)
+    free = any(verdict.loop.has_free_angle for verdict in verdicts)
+    return Table(
+        stem="sampled-delays",
+        title="Stability with further delay",
+        caption=DELAYS_CAPTION.format(apart=APART_FROM_FREE * free, held=typeset(" ".join(held))),
+        record=verdicts,
+        columns=(
+            Column("law", "controller", of=[name for name, *_ in rows]),
+            Column("further_delay_ms", "further delay", "ms", of=[1e3 * T * more for _, more, _ in rows],
+                   digits=singly(plain)),
+            Column("verdict", "verdict", of="word"),
+            Column("spectral_radius", "largest |z|", of=lambda it: math.exp(it.log_radius), digits=singly(plain, 10)),
+            Column("log_spectral_radius", "ln|z| a sample", of="log_radius", digits=singly(scientific, 4)),
+            Column("slowest", "dominant pole"),
+            Column("modes_used", "modes"),
+        ),
+    )  # fmt: skip
+
+
+def periods_table(arm: Arm, gains: HubFeedback, chain: Chain) -> Table:
+    """The gains at other sampling periods, with their stability intervals there."""
+    rows = at_periods(arm, gains, chain)
+    return Table(
+        stem="sampled-periods",
+        title="Stability at other sampling periods",
+        caption=(
+            f"The same gains, {' and '.join(gains.told(name, plain) for name in PLANE)}. Growth: of the dominant "
+            "pole, per second: negative is stable. Verdicts hold for the modes given where they are not certified."
+        ),
+        record=rows,
+        columns=(
+            Column("period_ms", "period", "ms", of=lambda row: 1e3 * row.period, digits=singly(plain)),
+            Column("half_rate_hz", "aliased above", "Hz", of=lambda row: 0.5 / row.period, digits=singly(plain)),
+            Column("verdict", "verdict", of=lambda row: row.verdict.word),
+            Column("growth_1_s", "growth", "1/s", of=lambda row: row.verdict.log_radius / row.period,
+                   digits=singly(scientific, 3)),
+            Column("modes", "modes", of=lambda row: row.verdict.modes_used,
+                   shown=[f"{'' if row.verdict.is_settled else 'first '}{row.verdict.modes_used}" for row in rows]),
+            *(
+                Column(
+                    f"stable_{name}", f"stable {name}", shown_unit(name, arm),
+                    of=[
+                        around(list(row.windows[name]), gains[name])
+                        or tuple(end for window in row.windows[name] for end in window)
+                        for row in rows
+                    ],
+                    shown=[spans(row.windows[name], gains[name]) for row in rows],
+                )
+                for name in PLANE
+            ),
+        ),
+    )  # fmt: skip
+
+
+def modes_table(found: SampledCase) -> Table:
+    """The modes of the sampled loop one by one."""
+    T = found.verdict.loop.chain.sampling.period
+    gains = " and ".join(PLANE)
+    suffix = "" if found.each.key in ("default", "law") else f"-{found.each.key.replace('_', '-')}"
+    return Table(
+        stem=f"sampled-modes{suffix}",
+        title=f"Modes of the sampled loop, {found.each.name}",
+        caption=MODES_CAPTION.format(ms=plain(1e3 * T), half=plain(0.5 / T), gains=gains),
+        columns=SAMPLED_MODE_COLUMNS,
+        record=found.analysis.modes,
+    )
+
+
+# ------------------------------------------------------------ pictures of gains
+
+
+def overlay_picture(regions: StableRegions, found: SampledCase) -> Picture:
+    """Stability regions of the continuous and of the sampled loop in one plane."""
+    arm, gains = found.each.arm, found.analysis.loop.gains
+    layers = "Nested blues: C = 0 (first modes only), and the same arm with a little damping. "
+    low = plain(float(regions.continuous.axes[0][0]), 2)
+    held = gains.told(RATE_GAIN, plain)
+    before = margins_of(arm, gains).windows[MOMENT_GAIN]
+    after = found.analysis.interval(MOMENT_GAIN)
+    both = f"{MOMENT_GAIN} {span(before.around, before.looked_at)} continuous, {span(after)} sampled"
     return Picture(
         stem="sampled-overlay",
-        title="The same gains, continuous and sampled",
-        caption=(
-            "Sand: where the continuous loop is stable, with every mode. Blue: where the sampled one is. Sand without "
-            f"blue is what a controller that ignores its clock would wrongly trust. {layers}{proven}"
-            "All edges are exact crossings of the axis or the unit circle. "
-            f"The axis is logarithmic: {RATE_GAIN} = 0 lies beyond its left end at {low}{beyond_words(data.arm)}. "
-        ),
-        alt=(
-            f"Map of {' and '.join(PLANE)}: at {data.held} the continuous loop is stable for {MOMENT_GAIN} "
-            f"{interval_words(data.continuous.around, data.continuous.looked_at)}, the sampled one "
-            f"{interval_words(data.sampled_K2)}."
-        ),
+        title="Stability regions, continuous and sampled",
+        caption=OVERLAY_CAPTION.format(
+            layers=layers * (len(regions.sampled) > 1),
+            proven="Below the dashed line: stable at C = 0 by the energy argument. " * arm.is_uniform,
+            rate=RATE_GAIN, low=low, beyond=beyond_words(arm),
+        ) + f" At {held}: stable for {both}.",
+        alt=f"Map of {' and '.join(PLANE)}: at {held} stable for {both}.",
         figure=draw_overlay(regions),
         data=regions_table(regions, "sampled-overlay-data"),
-    )
+    )  # fmt: skip
 
 
 def beyond_words(arm: Arm) -> str:
-    """From which rate gain down a free hub runs away, whatever the other gain; a sampled one too."""
+    """The rate gain below which a free hub is unstable, whatever the other gain; sampled too."""
     if not arm.has_rigid_mode:
         return ""
     least = f"−{plain(arm.rate_loss, 5)}, which takes what the hub loses" if arm.rate_loss else "0"
     return f", and nothing is stable at {RATE_GAIN} < {least}"
 
 
-def _periods_table(data: Sampled) -> Table:
-    rows = data.periods
-    growth = np.array([row.verdict.log_radius / row.period for row in rows])
-    ms = np.array([1e3 * row.period for row in rows])
-    half = 500.0 / ms
-    settled, modes = [row.verdict.is_settled for row in rows], [row.verdict.modes_used for row in rows]
-    first = [f"{'' if known or not any(settled) else 'first '}{n}" for known, n in zip(settled, modes, strict=True)]
-    held = "all that matter" if all(settled) else "the first so many" if not any(settled) else "where marked, the first"
-    return Table(
-        stem="sampled-periods",
-        title="Faster or slower sampling",
-        caption=(
-            f"The same gains, {' and '.join(data.gains.told(name, plain) for name in PLANE)}, at other sample periods; "
-            f"the verdicts hold for the modes given ({held}). Growth is that of the pole that decides, per second: "
-            "negative is stable. Where the gains are not stable, the intervals are those that would be. "
-        ),
-        record=rows,
-        columns=(
-            Column("period_ms", "period", "ms", of=ms, digits=singly(plain)),
-            Column("half_rate_hz", "aliased above", "Hz", of=half, digits=singly(plain)),
-            Column("verdict", "verdict", of=lambda row: "stable" if row.verdict.log_radius < 0 else "unstable"),
-            Column("growth_1_s", "growth", "1/s", of=growth, digits=singly(scientific, 3)),
-            Column("modes", "modes", of=modes, shown=first),
-            *(_window_column(name, data) for name in PLANE),
-        ),
-    )
-
-
-def _window_column(name: str, data: Sampled) -> Column:
-    """The interval around the gain of that name, or the ends of all that there are, at each period."""
-    rows = [(row.windows[name], data.gains[name]) for row in data.periods]
-    here = [around(list(windows), gain) for windows, gain in rows]
-    every = [tuple(end for window in windows for end in window) for windows, _ in rows]
-    values = [window or others for window, others in zip(here, every, strict=True)]
-    shown = [spans(*row) for row in rows]
-    return Column(f"stable_{name}", f"stable {name}", shown_unit(name, data.arm), of=values, shown=shown)
-
-
-def _mode_blocks(data: Sampled) -> list[Picture | Table]:
-    loop, table = data.analysis.verdict.loop, data.analysis.modes
-    T = loop.chain.sampling.period
-    turning = data.arm.hub_side_inertia * data.arm.input_per_torque  # at the hub, in the unit of the input times s^2
-    top = max(PAST_HUB * 2 * turning / T, STRONGER * data.gains[RATE_GAIN])
-    found = sampled_loci(loop, top, LOCUS_K2)
-    aliased = [int(i) for i, band in zip(table.index, table.band, strict=True) if band > 0]
-    first = f"From mode {aliased[0]} on all are aliased. " if aliased else "No mode here is aliased. "
-    picture = Picture(
+def loci_picture(found: Analysis) -> Picture:
+    """Root loci of the sampled loop in the z-plane, along each gain."""
+    loop, arm = found.loop, found.loop.plant.arm
+    turning = arm.hub_side_inertia * arm.input_per_torque  # at the hub, in the unit of the input times s^2
+    top = max(PAST_HUB * 2 * turning / loop.chain.sampling.period, STRONGER * loop.gains[RATE_GAIN])
+    loci = sampled_loci(loop, top, LOCUS_K2)
+    aliased = int((found.modes.band > 0).sum())
+    return Picture(
         stem="sampled-loci",
-        title="Poles of the sampled loop",
-        caption=(
-            f"Left: the samples tell frequencies apart up to {plain(0.5 / T)} Hz only; what lies in the shaded strips "
-            f"is seen, and moved by the gains, where the arrows end. {first}Lines: {RATE_GAIN} alone, growing from the "
-            "open circles to the dots; the real axis is logarithmic away from 0. Right: the z-plane, stable inside the "
-            "circle; open circles where the range begins, dots at the gains, orange the aliased modes, grey hub and "
-            f"delay. What looks like lying on the circle is told apart by the next picture."
-        ),
-        alt=f"Root loci of the sampled loop in the folded s-plane and the z-plane; {len(aliased)} aliased modes.",
-        figure=draw_folded_loci(found),
-        data=loci_table(found, "sampled-loci-data"),
+        title="Root loci of the sampled loop",
+        caption=LOCI_CAPTION.format(half=plain(loci.half_rate)),
+        alt=f"Root loci of the sampled loop in the z-plane; {how_many(aliased, 'aliased mode')}.",
+        figure=draw_sampled_loci(loci),
+        data=loci_table(loci, "sampled-loci-data"),
     )
-    grown = table.index[table.log_radius > 0]
-    rows = mode_rows(loop, table, "sampled-modes")
-    said = grown_words(grown.tolist())
-    chart = Picture(
-        stem="sampled-growth",
-        title="What each mode gains or loses a sample",
-        caption=(
-            f"Upwards is growth, downwards decay, both on logarithmic scales. {first_order_words(table)}Where a filled "
-            "dot lies far from what is added to first order, another mode in the loop decides. "
-            f"Of {table.index.size} modes, {said}."
-        ),
-        alt=f"Growth per sample of {table.index.size} modes over their frequency; {said}.",
-        figure=draw_modes(loop, table),
-        data=replace(rows, stem="sampled-growth-data"),
-    )
-    return [picture, chart, rows]
 
 
-def first_order_words(table: ModeTable) -> str:
-    """What the rate gain does in each band where that alternates, and which modes the moment gain drives."""
-    shaded = (
-        "Shaded are the bands in which hub rate feedback destabilises, as the samples see a rate of the wrong sign "
-        "there; above the narrowest one shown they alternate too closely to draw. "
-    )
-    words = shaded if table.rate_alternates and table.by_rate.any() else ""
-    if not table.by_moment.any():
-        return words
-    driven = table.driven_by_moment
-    effect = f"drives {named_modes(driven)}" if driven else "damps every mode"
-    return f"{words}Root moment feedback {effect} to first order. "
+def loci_table(data: SampledLoci, stem: str) -> Table:
+    """Every pole of the loci with Im z >= 0: a row a gain and a branch."""
+    rows = []
+    for name, locus in data.by.items():
+        for value, poles in zip(locus.values.tolist(), locus.z, strict=True):
+            loop = locus.loop.having(**{locus.gain: value})
+            across, up = (loop.number(each) for each in PLANE)
+            each = zip(locus.mode.tolist(), poles, strict=True)
+            rows += [(name, across, up, mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
+    titles = {"locus": "locus", **{name: name for name in PLANE}, "mode": "mode", "real": "Re z", "imaginary": "Im z"}
+    columns = [
+        Column(*title, of=list(cells)) for title, cells in zip(titles.items(), zip(*rows, strict=True), strict=True)
+    ]
+    return Table(stem=stem, title="Poles of the sampled loop", columns=tuple(columns))
 
 
-def grown_words(grown: list[int]) -> str:
-    """Which modes grow, as the end of "Of 20 modes ..."."""
-    if not grown:
-        return "none grows"
-    return f"{'one grows' if len(grown) == 1 else f'{len(grown)} grow'}: {named_modes(grown)}"
+# ------------------------------------------------------------ in time
 
 
-def named_modes(numbers: list[int]) -> str:
-    """Modes by their numbers: mode 1, modes 2, 5."""
-    return f"mode{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers))}"
-
-
-def _slew_picture(moved: Slews) -> Picture:
-    volts = (
-        "The motor is in N m, as the file gives no motor constant: its volts are this curve divided by it. "
-        if moved.with_moment.volts is None and moved.arm.input_unit == "N m"
-        else ""
-    )
-    if moved.arm.motor is not None and moved.arm.input_unit == "N m":
-        volts = "The motor's torque is that at the hub, behind the gear. "
-    return Picture(
+def slew(arm: Arm, chain: Chain, cases: Sequence[LawOnArm]) -> tuple[list[Picture | Table], list[str]]:
+    """The slew of the chain under each case, and why one is not simulated."""
+    runs: dict[str, Simulation] = {}
+    words = []
+    for each in cases:
+        try:
+            runs[each.name] = drawn(each.arm, each.law, chain, "slew", RECORD_LENGTH * chain.slew.rise_time)
+        except ParameterError as error:
+            words.append(f"No slew of {each.name} is simulated: {typeset(str(error))}.")
+    simulated = [each for each in cases if each.name in runs]
+    if not simulated:
+        return [], words
+    driven = simulated[0].arm
+    if any(each.arm.input_unit != driven.input_unit for each in cases):
+        return [], [*words, "The controllers drive inputs of different units: their slews are not drawn together."]
+    what = f"{plain(chain.slew.travel_of(arm.reach), 3)} m of tip travel in {plain(chain.slew.rise_time, 3)} s"
+    shown = {safe(name): run for name, run in runs.items()}
+    figures = " ".join(slew_words(each, runs[each.name]) for each in simulated)
+    picture = Picture(
         stem="sampled-slew",
-        title="The slew, with and without moment feedback",
-        caption=(
-            f"{what_slews_show(moved)} A bang-bang slew with rigid feedforward; the moment feedback sees "
-            f"{seen_words(moved)}. The dotted line is the end of the slew; the tip is shown against a rigid "
-            f"arm's on its reference.{resolution_words(moved.each.values())} {volts}"
-        ),
-        alt=f"Root moment, tip and motor torque of a slew. {what_slews_show(moved)}",
-        figure=draw_slews(moved),
-        data=slews_table(moved, "sampled-slew-data"),
+        title="The slew",
+        caption=f"{SLEW_CAPTION}{figures}{clipped_words(runs)}{resolution_words(runs.values())}",
+        alt=f"Root moment, tip and motor in a slew of {what}. {figures}",
+        figure=draw_responses(driven, shown, what),
+        data=responses_table("sampled-slew-data", "The slew in time", driven, {e.key: runs[e.name] for e in simulated}),
     )
+    return [picture], words
 
 
-def _strip_picture(coarse: StripChart, own: Chain) -> Picture:
-    chain, delay = coarse.simulation.chain, coarse.simulation.chain.sampling.delay_samples
-    verdict = sampled_verdict(coarse.arm, coarse.gains, chain)
-    clipped, read = int(coarse.saturated.sum()), coarse.simulation.saturated["moment"]
-    unit = coarse.arm.input_unit
-    what = (
-        f"{clipped} of {coarse.asked.size} samples ask for more than the motor's {plain(coarse.limit, 3)} {unit} "
-        f"(shaded); the moment is read in steps of {significant(coarse.step, 3)} N m"
-    )
-    beyond = f", and lies beyond the ADC's range at {read} samples" if read else ""
-    late = f"{how_many(delay, 'sample')} of delay"
-    return Picture(
-        stem="sampled-strip",
-        title="A coarse chain: ADC steps, delay, saturation",
-        caption=(
-            f"{example_words(own, chain)}: {chain.converters.moment_bits} bits of ADC over "
-            f"±{plain(chain.converters.moment_range or 0.0, 3)} N m, {late}, and a motor that gives at most "
-            f"{plain(coarse.limit, 3)} {unit}. {what[0].upper()}{what[1:]}{beyond}. Without its steps and limits "
-            f"the loop with this delay is {typeset(verdict.sentence.partition(' (')[0])}."
-            f"{resolution_words([coarse.simulation])}"
-        ),
-        alt=f"Strip chart of root moment and motor torque through a coarse chain; {what}.",
-        figure=draw_strip_chart(coarse),
-        data=strip_table(coarse, "sampled-strip-data"),
+def slew_words(each: LawOnArm, run: Simulation) -> str:
+    """Residual moment, settling time and steady-state error of a slew."""
+    if run.stopped is not None:
+        return f"{upper(each.name)}: unstable; stopped at {significant(run.stopped.time, 3)} s, the arm folded up."
+    time = settling_time(run)
+    settled = f"settled at {significant(time, 3)} s" if math.isfinite(time) else "not settled within the record"
+    end = math.degrees(run.at_samples.hub_angle[-1] - run.scenario.hub_angle[-1])
+    return (
+        f"{upper(each.name)}: residual root moment {residual_words(residual_moment_rms(run))}, {settled}, hub error at "
+        f"the end {plain(end, 3)} deg."
     )

@@ -22,16 +22,6 @@ PICTURES, DATA = "pictures", "data"  # the folders of an arm's folder, beside it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ModeCard:
-    """A mode: its number, frequency [Hz] in digits, the path of its shape, and where its nodes are across the card."""
-
-    number: int
-    hertz: str
-    path: str
-    nodes: Sequence[float]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Fact:
     """One headline number, or the word for it."""
 
@@ -61,7 +51,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PageSection:
-    """A part of a page.  `words` are paragraphs, `items` a list; `blocks` pictures and tables, `cards` of modes.
+    """A part of a page.  `words` are paragraphs, `items` a list; `blocks` pictures and tables.
 
     `failure` says why the section could not be made, where the words say so in its place; empty otherwise.
     """
@@ -72,7 +62,6 @@ class PageSection:
     items: Sequence[str] = ()
     facts: Sequence[Fact] = ()
     blocks: Sequence[Picture | Table] = ()
-    cards: Sequence[ModeCard] = ()
     failure: str = ""
 
 

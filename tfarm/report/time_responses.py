@@ -1,68 +1,18 @@
-"""The slew in time, with and without moment feedback: the paper's Figures 4, 6, 8 and 9 in spirit."""
+"""What is said of simulations, and their curves in a table."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, Arm
+from tfarm.arm import Arm
 from tfarm.columns import Column, Table
-from tfarm.digits import kept_digits, plain, significant
+from tfarm.digits import kept_digits, significant
 from tfarm.dsp import Simulation, traces
-from tfarm.dsp.results import residual_moment_rms, settling_time
-from tfarm.dsp.traces import Slews
-from tfarm.plots.motion import draw_responses
-
-if TYPE_CHECKING:
-    from tfarm.plots.style import Figure
 
 CURVE_DIGITS = 7  # digits of a curve in its file: a hundredth of the width of a line is four
-
-
-def draw_slews(data: Slews) -> Figure:
-    """Root moment, tip and motor torque over time."""
-    slew = data.with_moment.chain.slew
-    travel = plain(slew.travel_of(data.arm.reach), 3)
-    what = f"{travel} m of tip travel in {plain(slew.rise_time, 3)} s, {data.held}"
-    return draw_responses(data.arm, data.each, what)
-
-
-def what_slews_show(data: Slews) -> str:
-    """The picture in numbers: what moment feedback does to what is left after the slew."""
-    clipped = clipped_words(data.each)
-    before, after = residual_moment_rms(data.without), residual_moment_rms(data.with_moment)
-    if before is None or after is None:
-        gone = [
-            f"{name} at {significant(run.stopped.time, 3)} s"
-            for name, run in (("without moment feedback", data.without), ("with it", data.with_moment))
-            if run.stopped is not None
-        ]
-        return f"The loop runs away until the arm is folded up: {' and '.join(gone)}.{clipped}"
-    settled = []
-    for run in (data.without, data.with_moment):
-        time = settling_time(run)
-        stays = f"the moment stays within 5 % of its largest from {significant(time, 3)} s on"
-        never = f"the moment is not settled within {plain(float(run.t[-1]), 4)} s"
-        settled.append(stays if math.isfinite(time) else never)
-    each = f"Without moment feedback {settled[0]}, with it {settled[1]}"
-    both = f"With moment feedback or without it {settled[0]}" if settled[0] == settled[1] else each
-    ratio = "" if before == 0 or after == 0 else f", {significant(before / after, 3)} times as much without as with it"
-    return (
-        f"Root moment left after the slew, less the rigid arm's: {significant(before, 3)} N m rms with "
-        f"{MOMENT_GAIN} = 0, {significant(after, 3)} N m with {data.fed_back}{ratio}. "
-        f"{both}.{clipped}"
-    )
-
-
-def seen_words(data: Slews) -> str:
-    """What the moment feedback sees during the slew."""
-    if data.with_moment.chain.slew.reading == "total":
-        return "the whole moment"
-    return "the moment less the rigid arm's (dashed)"
 
 
 def clipped_words(each: Mapping[str, Simulation]) -> str:
@@ -87,11 +37,6 @@ def resolution_words(runs: Iterable[Simulation]) -> str:
         f" The ringing is too fast to draw as a line: the bands lie between the smallest and the largest value in each "
         f"{ms} ms."
     )
-
-
-def slews_table(data: Slews, stem: str) -> Table:
-    """The curves of the picture."""
-    return responses_table(stem, "The slew in time", data.arm, {"without": data.without, "with": data.with_moment})
 
 
 def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulation]) -> Table:

@@ -9,7 +9,7 @@ from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
 from tfarm.digits import significant
 from tfarm.dsp import Chain, Simulation
 from tfarm.dsp.results import ideal_chain
-from tfarm.dsp.traces import WITHOUT, away, resolved
+from tfarm.dsp.traces import away, resolved
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.records import record
 from tfarm.report.sections import Fact
@@ -20,6 +20,7 @@ from tfarm.tuner.comparison import Outcomes, quantised_chain
 from tfarm.tuner.training import QUARTILES
 from tfarm.tuner.tuning import tip_errors, usual_plan
 
+WITHOUT = f"without moment feedback, {MOMENT_GAIN} = 0"
 CURVE_SEEDS = 20  # of the learning curves
 CURVE_SAMPLES = 80_000_000  # that their trials may have together, some 35 s of one core
 LONG_TRIAL = 16_000  # samples: the comparison of a longer one is of the arm itself alone
