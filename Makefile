@@ -21,7 +21,6 @@ SURVEYS := \
 	properties \
 	audit.test_planted_slips \
 	exact.accuracy \
-	exact.chain_accuracy \
 	response.rigid \
 	response.extrema \
 	spectrum.proofs \

@@ -3,5 +3,5 @@
 from tfarm.exact.outputs import OUTPUTS
 
 OF_ONE_LINK = {  # the rotation of the tip has tests of its own (tests/response/test_outputs.py)
-    name: each for name, each in OUTPUTS.items() if not each.is_of_a_chain and name != "tip_rotation"
+    name: each for name, each in OUTPUTS.items() if each.is_in_appendix and name != "tip_rotation"
 }

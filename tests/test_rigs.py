@@ -14,7 +14,7 @@ from tests.shared import thinned
 from tests.transition import determinant, response
 from tfarm import Hub
 from tfarm.arm import RotarySpring
-from tfarm.exact.chaining import chain_of
+from tfarm.exact.system import system_of
 
 FEATURES = {
     "radius": lambda arm: arm.hub.radius > 0,
@@ -94,7 +94,7 @@ def test_damped_eigenvalues_are_zeros_of_the_determinant(seed):
     arm = some_rig(np.random.default_rng([6, seed]), damped=True)
     arm = replace(arm, hub=replace(arm.hub, inertia=1.0) if math.isinf(arm.hub.inertia) else arm.hub)
     for s in eigenvalues(arm, reached(arm, 4)):
-        if abs(s) < 1e-6 * reached(arm, 1) or any(abs(s - at) < 0.5 * abs(at) for at in chain_of(arm).singular):
+        if abs(s) < 1e-6 * reached(arm, 1) or any(abs(s - at) < 0.5 * abs(at) for at in system_of(arm).singular):
             continue  # the rigid body's zero, and the crowd of poles at -1/C
         with mpmath.workdps(60):
             h = mpmath.mpf("1e-20") * abs(s)

@@ -21,7 +21,7 @@ from tfarm.arm import (
     must_turn,
 )
 from tfarm.errors import ParameterError
-from tfarm.exact.chaining import chain_of
+from tfarm.exact.system import system_of
 
 ROOT = Link.isotropic(
     length=0.3,
@@ -81,9 +81,9 @@ def test_what_is_read_off_several_segments():
     assert RIG.links == (ROOT, TIP)
     assert RIG.length == 0.5
     assert RIG.damping == 2e-4
-    assert chain_of(RIG).singular == (-2e4, -5e3)
-    assert chain_of(replace(RIG, outer=(ROOT, TIP, replace(TIP, damping=0.0)))).singular == (-2e4, -5e3)
-    assert chain_of(PLAIN.having(damping=0.0)).singular == ()
+    assert system_of(RIG).singular == (-2e4, -5e3)
+    assert system_of(replace(RIG, outer=(ROOT, TIP, replace(TIP, damping=0.0)))).singular == (-2e4, -5e3)
+    assert system_of(PLAIN.having(damping=0.0)).singular == ()
     assert RIG.own_mass == pytest.approx(7850 * 0.04 * 0.006 * 0.3 + 2700 * 0.03 * 0.004 * 0.2, rel=1e-15)
     assert RIG.bending_scale == ROOT.EI / 0.5
     assert RIG.shear_cutoff == PLAIN.shear_cutoff  # the inner segment is the deeper one

@@ -307,7 +307,7 @@ def test_a_motor_without_an_input_is_named_once(command: str, capsys, tmp_path: 
             "sasaki2012-as-printed",
             {"youngs_modulus": "16.0", "shear_modulus": "1e-40"},
             "reduce --outputs root_moment --order 6",
-            (2, "a pole: a natural frequency"),
+            (0, ""),
         ),
     ],
 )

@@ -15,8 +15,8 @@ from tests.shared import thinned
 from tests.strategies import BOUNDARY_CASES, arm_of, some_arm, some_s
 from tfarm import Arm, ConvergenceError, Hub, Link, ParameterError, Payload, Section
 from tfarm.exact import appendix
-from tfarm.exact.coefficients import coefficients
-from tfarm.exact.enclosures import enclose
+from tfarm.exact.system import system_of
+from tfarm.exact.values import enclose
 
 EPS = np.finfo(float).eps
 
@@ -32,7 +32,7 @@ def test_forty_digits_are_those_of_the_balls(case):
     rng = np.random.default_rng(BOUNDARY_CASES.index(case))
     arm, s = some_arm(rng, case), some_s(rng)
     x = float(rng.uniform(0.05, 0.95)) * arm.link.length
-    k, compared = coefficients(arm), 0
+    k, compared = system_of(arm), 0
     for name, output in OF_ONE_LINK.items():
         value = appendix.response(arm, name, s, 40, x=x)
         if value == 0:

@@ -20,18 +20,18 @@ from tests.transition import determinant, response
 from tfarm import Hub
 from tfarm.arm import THEORIES, Attachment, Motor, RotarySpring
 from tfarm.errors import ParameterError
-from tfarm.exact.chain import ElementChain
-from tfarm.exact.chain_values import free_fields
-from tfarm.exact.chaining import chain_of
-from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.elements import Place
+from tfarm.exact.layout import readings
 from tfarm.exact.outputs import OUTPUTS, Output
+from tfarm.exact.series import expansions_at_zero
+from tfarm.exact.sweep import AXIS, fill_free
 from tfarm.exact.system import system_of
-from tfarm.exact.values import evaluate_outputs, expansions_at_zero, kernel_table
+from tfarm.exact.uniform import fill_ends
+from tfarm.exact.values import free_fields
 from tfarm.spectrum.search import natural_frequencies
 
 EPS = np.finfo(float).eps
-LOST = 1e-13  # error over 1 + condition: 20 times what 5,000 rigs of `chain_accuracy` have at most
+LOST = 1e-13  # error over 1 + condition: 20 times what 5,000 rigs of `accuracy` have at most
 EXACT = mpmath.mpf("1e-29")  # of 30 digits, rounded
 INPUTS = ("hub_torque", "motor_voltage", "motor_current", "hub_angle")
 ENDS = [name for name, each in OUTPUTS.items() if each.place != "x" and name != "motor_current"]
@@ -289,7 +289,7 @@ def test_a_value_does_not_depend_on_the_points_beside_it(seed):
     """
     rng = np.random.default_rng(seed)
     arm = some_rig(rng, segments=4)
-    first = natural_frequencies(chain_of(lossless(arm)), 2, 2)[0]
+    first = natural_frequencies(system_of(lossless(arm)), 2, 2)[0]
     s = rng.permutation(first * np.geomspace(1e-2, 1e2, 77)) * np.exp(1j * rng.uniform(0.3, 1.5))
     G = tfarm.transfer(arm, ["hub_angle", "root_moment", "tip_displacement"])
     np.testing.assert_array_equal(G(s), np.array([G(each) for each in s]).T)
@@ -299,31 +299,32 @@ def test_what_is_zero_or_rigid_leaves_the_papers_arm():
     arm = tfarm.load("sasaki2012-lab")
     hub = Hub(inertia=arm.hub.inertia, radius=0.0, friction=0.0, stiffness=0.0)
     same = replace(arm, hub=hub, clamp=RotarySpring(stiffness=math.inf), joint=RotarySpring(stiffness=math.inf))
-    assert isinstance(system_of(same), Coefficients)
     assert system_of(same) == system_of(arm)
-    more = {"motor": Motor(resistance=1.0, torque_constant=1.0), "attachments": (Attachment(x=0.1, mass=1.0),)}
-    assert all(isinstance(system_of(replace(arm, **{name: part})), ElementChain) for name, part in more.items())
+    assert system_of(arm).is_uniform
+    heavier = replace(arm, attachments=(Attachment(x=0.1, mass=1.0),))
+    assert not system_of(heavier).is_uniform
 
 
 @pytest.mark.parametrize("seed", thinned(range(12), 6))
-def test_the_papers_arm_as_a_chain(seed):
-    """One segment, solved as chains are: the closed form's frequencies, responses and expansions at rest."""
+def test_the_fused_kernel_of_one_link_says_what_the_sweep_says(seed):
+    """Drive and outputs at the ends of one uniform link, slow and fast: with the scale of each they are the same."""
     rng = np.random.default_rng([3, seed])
     arm = some_arm(rng)
-    k, chain = system_of(arm), chain_of(arm)
-    assert natural_frequencies(chain.with_damping(0.0), 1, 12)[arm.has_rigid_mode :] == pytest.approx(
-        natural_frequencies(k.with_damping(0.0), 1, 12)[arm.has_rigid_mode :], rel=1e-14, abs=0
-    )
-    wanted, x = list(OF_ONE_LINK.values()), 0.4
-    s = np.array([some_point(rng, arm) for _ in range(8)])
-    G = tfarm.transfer(arm, wanted, x=x * arm.length)
-    ours, theirs = (evaluate_outputs(each, wanted, kernel_table(each, wanted), s, x) for each in (chain, k))
-    there = theirs != 0
-    condition = abs(s * G.derivative(s))[there] / abs(theirs[there])
-    assert (abs(ours[there] / theirs[there] - 1) / (1 + condition)).max() < 1e-14
-    assert (abs(ours[~there]) <= 1e-16 * abs(ours).max()).all()
-    ours, theirs = (np.array(expansions_at_zero(each, wanted, x)) for each in (chain, k))
-    assert (abs(ours - theirs) <= 1e-14 * abs(theirs) + 1e-15 * abs(theirs).max(axis=1)[:, None]).all()
+    wanted = tuple(OF_ONE_LINK[name] for name in ENDS if name in OF_ONE_LINK)
+    s = np.array([some_point(rng, arm) * 10 ** rng.uniform(-4, 0) for _ in range(40)])
+    those = readings(system_of(arm), wanted, 0.0)
+    layout, lost = those.layout, np.empty(s.size, bool)
+    fused, swept = np.empty((2, 2 + len(wanted), s.size), complex)
+    fill_ends(s, layout.rows[layout.segment_row], layout.ends, those.ends_table, False, fused, lost)
+    fill_free(s, layout.rows, layout.ends, AXIS, those.table, swept, lost)
+    swept[2:] = swept[2:] * np.exp(swept[1] - fused[1])
+    swept[0] = swept[0] * np.exp(swept[1] - fused[1])
+    here, there = fused[[0, *range(2, len(fused))]], swept[[0, *range(2, len(fused))]]
+    condition = 1 + abs(fused[1])  # the phase of all waves, whose last bits the scales have apart
+    assert (abs(here - there) <= 1e-14 * condition * (abs(there) + abs(here))).all()
+    per_input = np.empty((len(wanted), s.size), complex)
+    fill_ends(s, layout.rows[layout.segment_row], layout.ends, those.ends_table, True, per_input, lost)
+    assert (abs(per_input * fused[0] - fused[2:]) <= 16 * EPS * abs(fused[2:])).all()
 
 
 @pytest.mark.parametrize("theory", THEORIES)

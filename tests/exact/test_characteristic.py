@@ -23,7 +23,7 @@ from tfarm.exact.characteristic import (
     quick_characteristics,
     zeros_at_origin,
 )
-from tfarm.exact.coefficients import coefficients
+from tfarm.exact.system import system_of
 from tfarm.exact.wide_balls import characteristic_ball, characteristic_over, tangent
 
 EPS = np.finfo(float).eps
@@ -68,7 +68,7 @@ def gains_under(k, law):
 @pytest.mark.parametrize("case", thinned([(each,) for each in list(product(ENDS, repeat=3))[::6]], 5))
 def test_D_is_the_determinant_of_the_shot_arm_but_for_a_constant(case, points) -> None:
     arm = arm_at(case)
-    k = coefficients(arm)
+    k = system_of(arm)
     for law in laws(case):
         ours = balls(k, S[:points], gains_under(k, law))
         with mpmath.workdps(40):
@@ -80,7 +80,7 @@ def test_D_is_the_determinant_of_the_shot_arm_but_for_a_constant(case, points) -
 def test_float64_agrees_with_balls_at_random_s(case) -> None:
     rng = np.random.default_rng(11)
     arm = arm_at(case, seed=6)
-    k = coefficients(arm)
+    k = system_of(arm)
     size = 3 * tfarm.modes(arm, 8).natural_frequency[-1]
     s = np.array(
         [complex(rng.uniform(-0.5, 0.5), rng.uniform(-1, 1)) * size * 10 ** rng.uniform(-3, 0) for _ in range(40)]
@@ -99,7 +99,7 @@ def test_float64_agrees_with_balls_at_random_s(case) -> None:
 def test_slopes_are_derivatives_of_the_values() -> None:
     """(log D)' of each against a difference of 60-digit balls."""
     arm = arm_at(("some", "some", "some"))
-    k = coefficients(arm)
+    k = system_of(arm)
     for law in ({}, LAW):
         gains = gains_under(k, law)
         ours, quick = characteristic(k, S, gains), quick_characteristic(k, S, gains)
@@ -147,7 +147,7 @@ def test_feedback_changes_the_hub_row_of_the_papers_matrix(law) -> None:
         ("zero", "some", "zero"),
     ):
         arm = arm_at(case, seed=8)
-        k = coefficients(arm)
+        k = system_of(arm)
         gains = gains_of(k, HubFeedback(**law))
         s = S[:5]
         fed, free = balls(k, s, gains), balls(k, s)
@@ -158,7 +158,7 @@ def test_feedback_changes_the_hub_row_of_the_papers_matrix(law) -> None:
 
 def test_a_closed_loop_pole_in_float64_is_one_of_the_papers_matrix() -> None:
     arm = tfarm.load("sasaki2012-lab")
-    k = coefficients(arm)
+    k = system_of(arm)
     gains = gains_of(k, HubFeedback(K1=0.3, K2=0.3, Kp=0.5))
     s = np.array([-3 + 70j, -3 + 200j, -20 + 530j])
     for _ in range(60):
@@ -170,7 +170,7 @@ def test_a_closed_loop_pole_in_float64_is_one_of_the_papers_matrix() -> None:
 def test_D_is_linear_in_the_gains_and_the_gauge_does_not_read_the_damping() -> None:
     """dD/dK2 is M/(1 + C s), the moment without its damping part: E I psi'(0) over theta as `transfer` has it."""
     arm = tfarm.load("sasaki2012-lab")
-    k = coefficients(arm)
+    k = system_of(arm)
     s = S[:5]
     none, by_angle, by_gauge = (
         np.array([complex(v) for v in true_value(characteristic(k, s, gains_of(k, HubFeedback(K2=K2, Kp=Kp))))])
@@ -186,7 +186,7 @@ def test_D_is_linear_in_the_gains_and_the_gauge_does_not_read_the_damping() -> N
 )
 def test_zeros_at_the_origin_are_as_many_as_the_order_of_D_there(case) -> None:
     arm = arm_at(case)
-    k = coefficients(arm)
+    k = system_of(arm)
     small = np.array([1e-3, 1e-4]) * tfarm.modes(arm, 1).natural_frequency[-1]
     laws = [(0, 0, 0)] if case[0] == "infinite" else [(0, 0, 0), (1, 0.2, 0), (0, 0.2, 0), (1, 0.2, 3)]
     for K1, K2, Kp in laws:
@@ -199,7 +199,7 @@ def test_zeros_at_the_origin_are_as_many_as_the_order_of_D_there(case) -> None:
 
 def test_zeros_at_the_origin_are_divided_out() -> None:
     arm = tfarm.load("sasaki2012-lab")
-    k = coefficients(arm)
+    k = system_of(arm)
     whole = characteristic(k, S)
     for kind in (characteristic, quick_characteristic):
         less = kind(k, S, NO_GAINS, 2)
@@ -217,7 +217,7 @@ def test_a_wide_ball_holds_every_value_in_it(case) -> None:
     """Steps of contours, short and long, but for the factor > 0 found at the middle (1 in the plain form)."""
     rng = np.random.default_rng(3)
     arm = arm_at(case, seed=9, damping=1e-4)
-    k = coefficients(arm)
+    k = system_of(arm)
     omega = tfarm.modes(arm, 4).natural_frequency[-1]
     with precision(160):
         for _ in range(25):
@@ -232,7 +232,7 @@ def test_a_wide_ball_holds_every_value_in_it(case) -> None:
 
 def test_a_step_that_is_narrow_for_D_gives_a_ball_off_zero() -> None:
     """The point of Taylor's form: the plain one loses the sign of D over so wide a ball."""
-    k = coefficients(tfarm.load("sasaki2012-lab"))
+    k = system_of(tfarm.load("sasaki2012-lab"))
     with precision(96):
         assert not characteristic_over(k, wide(300 + 5000j, 10.0)).contains(0)
         assert characteristic_ball(k, wide(300 + 5000j, 10.0)).contains(0)
@@ -240,7 +240,7 @@ def test_a_step_that_is_narrow_for_D_gives_a_ball_off_zero() -> None:
 
 def test_the_tangent_bounds_the_remainder_over_a_disc() -> None:
     rng = np.random.default_rng(4)
-    k = coefficients(tfarm.load("sasaki2012-lab"))
+    k = system_of(tfarm.load("sasaki2012-lab"))
     with precision(300):
         for middle, radius in ((-0.25 + 71.5j, 3.0), (-200 + 4000j, 40.0), (5000 + 100j, 10.0)):
             value, slope, half = tangent(k, point(middle), flint.arb(radius))
@@ -265,7 +265,7 @@ def _difference(k, middle, factor):
 def test_random_points_of_the_plane_need_no_warning() -> None:
     rng = np.random.default_rng(21)
     for _ in range(60):
-        k = coefficients(some_arm(rng, damping=float(10 ** rng.uniform(-9, -2))))
+        k = system_of(some_arm(rng, damping=float(10 ** rng.uniform(-9, -2))))
         s = np.array([some_s(rng) for _ in range(10)])
         at = characteristic(k, s)
         quick = quick_characteristic(k, s)

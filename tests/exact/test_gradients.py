@@ -8,8 +8,8 @@ import pytest
 import tfarm
 from tests.rigs import some_rig
 from tfarm.errors import ParameterError
-from tfarm.exact.chaining import chain_of
 from tfarm.exact.gradients import Direction, response_gradients
+from tfarm.exact.system import system_of
 from tfarm.response.signals import Signals
 
 NAMES = ("hub_angle", "tip_acceleration", "root_moment", "root_shear", "strain@0.05", "payload_displacement")
@@ -41,9 +41,9 @@ def gradients(arm, ways, s, names=NAMES):
     for way in ways:
         below, above = way(arm, 1 - STEP), way(arm, 1 + STEP)
         shares = Signals(below, names).places, Signals(above, names).places
-        directions.append(Direction(chain_of(below), chain_of(above), *shares, 2 * STEP))
+        directions.append(Direction(system_of(below), system_of(above), *shares, 2 * STEP))
     signals = Signals(arm, names)
-    drive, outputs = response_gradients(chain_of(arm), signals.outputs, signals.places, directions, s)
+    drive, outputs = response_gradients(system_of(arm), signals.outputs, signals.places, directions, s)
     H = np.array([each.c[0] / drive.c[0] for each in outputs])
     slopes = [h * (each.c[1] / each.c[0] - drive.c[1] / drive.c[0]) for h, each in zip(H, outputs, strict=True)]
     return H, np.array(slopes)
@@ -101,6 +101,6 @@ def test_slopes_of_random_rigs():
 
 def test_a_step_that_makes_another_chain_is_refused():
     plain, outputs = replace(RIG, attachments=()), Signals(RIG, ("hub_angle",)).outputs
-    direction = Direction(chain_of(plain), chain_of(RIG), (0.0,), (0.0,), 1.0)
+    direction = Direction(system_of(plain), system_of(RIG), (0.0,), (0.0,), 1.0)
     with pytest.raises(ParameterError, match="another chain"):
-        response_gradients(chain_of(RIG), outputs, (0.0,), [direction], np.array([1j]))
+        response_gradients(system_of(RIG), outputs, (0.0,), [direction], np.array([1j]))

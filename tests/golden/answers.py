@@ -22,7 +22,6 @@ PHRASES = re.compile(r"(^|[._])(verdict|method|objective|structure|units?(\.\w+)
 SEARCHES = {"design": "value", "tune": "cost_tuned", "fit": "chi_squared"}  # what a search is judged by
 LARGER_IS_BETTER = ("--objective damping", "--objective margin")
 SPREAD = 1e-3  # of a score, relative, over the kernels of BLAS; it may improve
-WIDER_SPREAD: dict[str, float] = {}
 
 # Command and path, relative tolerance, and whether it is relative to the largest number of its list; the first match.
 LOOSER = (
@@ -103,7 +102,7 @@ def _of_search(line, before, now):
         yield f"keys: {sorted(before.keys() ^ now.keys())}"
     if before.get("verdict") != now.get("verdict"):
         yield f"verdict: {before.get('verdict')}, {now.get('verdict')}"
-    if sign * (now[score] - before[score]) > WIDER_SPREAD.get(line, SPREAD) * abs(before[score]):
+    if sign * (now[score] - before[score]) > SPREAD * abs(before[score]):
         yield f"{score}: {before[score]}, {now[score]}"
 
 

@@ -20,7 +20,7 @@ from tests.spectrum.damped_roads import newton_step
 from tests.survey import Finding
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import gains_of
-from tfarm.exact.coefficients import coefficients
+from tfarm.exact.system import system_of
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import winding_number
@@ -98,7 +98,7 @@ def edge(a, b):
 def own_poles(arm, box) -> int:
     """How many poles the arm itself has in a box."""
     if arm.link.damping:
-        return winding_number(member(coefficients(arm)).function, box, points=2000) + 2 * arm.has_rigid_mode
+        return winding_number(member(system_of(arm)).function, box, points=2000) + 2 * arm.has_rigid_mode
     return 2 * modes_below(arm, box.im_max) + 2 * arm.has_rigid_mode
 
 

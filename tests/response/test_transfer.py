@@ -11,8 +11,8 @@ import tfarm
 from tests.outputs import OF_ONE_LINK
 from tests.shared import thinned
 from tfarm import Arm, Hub, ParameterError, Payload
-from tfarm.exact import appendix, balls, enclosures
-from tfarm.exact.coefficients import coefficients
+from tfarm.exact import appendix, balls, values
+from tfarm.exact.system import system_of
 
 EPS = np.finfo(float).eps
 AT_ENDS = [name for name, output in OF_ONE_LINK.items() if output.place != "x"]
@@ -48,7 +48,7 @@ def test_values_along_the_arm_agree_with_the_paper(arm: Arm, name: str) -> None:
 def test_derivative_is_the_limit_of_differences_with_many_digits(arm: Arm, name: str) -> None:
     G = tfarm.transfer(arm, name)
     for s in (0.3 + 57.1j, 10 + 700j, 3e-3 + 1e-3j, 2e4j):
-        expected = balls.nearest_float(enclosures.slope(coefficients(arm), OF_ONE_LINK[name], s))
+        expected = balls.nearest_float(values.slope(system_of(arm), OF_ONE_LINK[name], s))
         scale = abs(G(s) / s) + abs(expected)
         assert abs(G.derivative(s) - expected) <= 4000 * EPS * scale
 
@@ -132,8 +132,8 @@ def test_next_to_a_pole_there_is_a_value() -> None:
 
 
 def test_where_two_waves_coincide_there_is_a_value(arm: Arm) -> None:
-    k = coefficients(arm)
-    s = 2 * math.sqrt(k.g) / abs(float(k.a - k.b))
+    a, b, g = system_of(arm).segments[0][:3]
+    s = 2 * math.sqrt(g) / abs(float(a - b))
     G = tfarm.transfer(arm, "root_moment")
     for near in (s, s * (1 + 1e-12), s * (1 + 1e-3j)):
         if abs(near) < 1e5:  # e^{-t} of slender arms underflows elsewhere

@@ -20,7 +20,8 @@ from tests.models import Ritz
 from tests.strategies import BOUNDARY_CASES, some_arm
 from tfarm.arm import THEORIES
 from tfarm.exact import balls
-from tfarm.exact.coefficients import coefficients
+from tfarm.exact.layout import Layout
+from tfarm.exact.system import system_of
 from tfarm.spectrum.counting import Counter
 from tfarm.spectrum.search import count_below, natural_frequencies
 
@@ -41,7 +42,7 @@ def against_ritz(arm):
     Eigenvalues 1/w^2 of the Ritz model are right to some eps of the largest; its own frequencies, converged with 40
     polynomials, come from no count and no search.
     """
-    k, rigid = coefficients(arm), arm.has_rigid_mode
+    k, rigid = system_of(arm), arm.has_rigid_mode
     omega = natural_frequencies(k, rigid + 1, rigid + 13)
     flexibility = Ritz(arm).flexibilities()[0][:13]
     rounding = EPS * (2000 + 10 * flexibility[0] / flexibility)
@@ -55,7 +56,7 @@ def against_ritz(arm):
 
 def against_count(arm, theory):
     """What the count has against thirty: below each lie as many as its number less one, just above it its number."""
-    k, rigid = coefficients(arm, theory), int(arm.has_rigid_mode)
+    k, rigid = system_of(arm, theory), int(arm.has_rigid_mode)
     omega = natural_frequencies(k, rigid + 1, rigid + 30)
     if not ((np.diff(omega) >= 0).all() and (omega > 0).all()):
         return "frequencies do not ascend"
@@ -72,7 +73,7 @@ def sign(k, omega):
     bits = 128
     while True:
         with balls.precision(bits):
-            drive = balls.State(k, flint.acb(0, omega)).input.real
+            drive = balls.Sweep(Layout(k), flint.acb(0, omega)).input.real
             if not drive.contains(0):
                 return 1 if drive > 0 else -1
         bits *= 2
@@ -88,7 +89,7 @@ def brackets(k, omega, units):
 
 def last_places(arm):
     """Within how many units in the last place each of the first twelve frequencies is right (inf: of none)."""
-    k, rigid = coefficients(arm), arm.has_rigid_mode
+    k, rigid = system_of(arm), arm.has_rigid_mode
     omega = natural_frequencies(k, rigid + 1, rigid + 12)
     return [next(n for n in (*UNITS, math.inf) if brackets(k, float(each), n)) for each in omega]
 

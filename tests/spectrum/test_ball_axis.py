@@ -13,8 +13,8 @@ from tests.strategies import BOUNDARY_CASES, some_arm
 from tfarm.arm import THEORIES
 from tfarm.exact import balls
 from tfarm.exact.system import system_of
-from tfarm.spectrum.ball_axis import AXIS_STEPS, MOST_AXIS_BITS, axis_of, axis_precisions, pinned_count, secant
-from tfarm.spectrum.counting import counter_of
+from tfarm.spectrum.ball_axis import AXIS_STEPS, MOST_AXIS_BITS, RealAxis, axis_precisions, pinned_count, secant
+from tfarm.spectrum.counting import Counter
 
 COUNT = 7
 
@@ -38,10 +38,10 @@ def test_the_count_in_balls_is_the_list_and_its_parity_the_sign_of_the_drive(arm
     k, omega = undamped(arm), table.natural_frequency[table.index > 0]
     between = np.sqrt(omega[1:] * omega[:-1])[np.diff(omega) > 1e-9 * omega[1:]]
     with balls.precision(512):  # of six segments far below the first frequency 200 bits do not tell
-        axis = axis_of(k)
+        axis = RealAxis(k)
         for point in (0.5 * omega[0], *between):
             below = int((table.natural_frequency < point).sum())
-            assert axis.count(flint.arb(point)) == below == counter_of(k)(np.array([point]))[0]
+            assert axis.count(flint.arb(point)) == below == Counter(k)(np.array([point]))[0]
             assert bool(axis.drive(flint.arb(point)) < 0) == (below % 2 == 1)
         assert (
             axis.count(flint.arb(float(omega[0]), 0.1 * float(omega[0]))) is None
@@ -67,7 +67,7 @@ def test_a_secant_ends_next_to_its_start_with_all_digits(arm):
     """From a start that has nine digits; a start between two frequencies has no root close by."""
     omega = tfarm.modes(arm, 3).natural_frequency[-3:]
     with balls.precision(400):
-        axis = axis_of(undamped(arm))
+        axis = RealAxis(undamped(arm))
         for each in map(float, omega):
             root = secant(axis, each, 60)
             assert abs(root / each - 1) < 4e-16

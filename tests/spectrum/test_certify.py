@@ -12,7 +12,7 @@ import tfarm
 from tests.shared import sized
 from tfarm import Arm, CertificationError, Hub, Payload
 from tfarm.exact import appendix
-from tfarm.exact.coefficients import coefficients
+from tfarm.exact.system import system_of
 from tfarm.spectrum import ball_axis as room
 from tfarm.spectrum.certify import certify
 from tfarm.spectrum.search import natural_frequencies
@@ -57,21 +57,21 @@ def test_every_boundary_condition_is_certified(hub: float, mass: float, inertia:
 
 
 def test_a_list_with_a_missing_mode_is_not_certified() -> None:
-    k = coefficients(tfarm.load("sasaki2012"))
+    k = system_of(tfarm.load("sasaki2012"))
     omega = natural_frequencies(k, 2, 7)
     with pytest.raises(CertificationError, match=r"5 frequencies were enclosed, but 6 lie below"):
         certify(k, np.delete(omega[:-1], 2), float(omega[-1]), 15, 1)
 
 
 def test_a_number_that_is_no_frequency_is_not_certified() -> None:
-    k = coefficients(tfarm.load("sasaki2012"))
+    k = system_of(tfarm.load("sasaki2012"))
     omega = natural_frequencies(k, 2, 7) * np.where(np.arange(6) == 2, 1 + 1e-6, 1.0)
     with pytest.raises(CertificationError, match="no proven sign change"):
         certify(k, omega[:-1], float(omega[-1]), 15, 1)
 
 
 def test_a_frequency_listed_twice_is_not_certified() -> None:
-    k = coefficients(tfarm.load("sasaki2012"))
+    k = system_of(tfarm.load("sasaki2012"))
     omega = natural_frequencies(k, 2, 7)[[0, 1, 2, 2, 3]]
     with pytest.raises(CertificationError, match=r"overlap|enclosed"):
         certify(k, omega, float(natural_frequencies(k, 7, 7)[0]), 15, 1)

@@ -17,7 +17,7 @@ from tests.spectrum.test_damped import damped_arm, listed
 from tfarm import CertificationError, HubFeedback
 from tfarm.exact.balls import point, precision
 from tfarm.exact.characteristic import NO_GAINS, characteristic, gains_of, zeros_at_origin
-from tfarm.exact.coefficients import coefficients
+from tfarm.exact.system import system_of
 from tfarm.spectrum import ball_axis, enclose
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.enclose import Disc, _holds_one, disjoint, enclosed, proven_count
@@ -36,7 +36,7 @@ def box_of(height, reach):
 @pytest.mark.parametrize("digits", [15, 40, 200])
 def test_discs_hold_the_papers_roots(digits: int) -> None:
     arm = damped_arm(2e-5, hub=0.3, mass=0.4, inertia=0.5, slenderness=12.0)
-    k = coefficients(arm)
+    k = system_of(arm)
     for zero in pairs(listed(arm, 3))[[0, 2], 0]:
         disc = enclosed(k, complex(zero), digits)
         root = newton_root(arm, zero, digits)
@@ -72,7 +72,7 @@ def test_without_shear_forty_digits_follow_from_the_undamped_frequency() -> None
 
 
 def test_a_poor_start_ends_in_a_disc_around_some_zero() -> None:
-    k = coefficients(LAB)
+    k = system_of(LAB)
     for start in (0.9 + 70j, -5 + 74j, 300 + 300j, -3 - 71j):
         disc = enclosed(k, start, 15)
         assert newton_step(LAB, complex(float(disc.re), float(disc.im))) < 1e-13
@@ -83,7 +83,7 @@ def test_a_double_eigenvalue_has_no_disc(monkeypatch: pytest.MonkeyPatch) -> Non
     rigid = damped_arm(0.0, hub=math.inf)
     omega = tfarm.modes(rigid, 2, theory="euler-bernoulli").natural_frequency
     arm = replace(rigid, link=replace(rigid.link, damping=2 / float(omega[1])))
-    k = coefficients(arm, "euler-bernoulli")
+    k = system_of(arm, "euler-bernoulli")
     monkeypatch.setattr(ball_axis, "MOST_AXIS_BITS", 1000)
     with pytest.raises(CertificationError) as refused:
         enclosed(k, complex(-omega[1]) * (1 + 1e-4), 5)
@@ -92,7 +92,7 @@ def test_a_double_eigenvalue_has_no_disc(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_a_closed_loop_pole_is_enclosed() -> None:
-    k = coefficients(LAB)
+    k = system_of(LAB)
     gains = gains_of(k, HubFeedback(K1=0.3, K2=0.3))
     s = np.array([-3 + 70j])
     for _ in range(60):
@@ -124,7 +124,7 @@ def test_touching_discs_are_seen() -> None:
 def test_rouches_theorem_is_right_about_discs_of_any_size() -> None:
     """Where it says one there is one: none beside a zero, nor two together; and small discs around one are proven."""
     rng = np.random.default_rng(6)
-    k = coefficients(LAB)
+    k = system_of(LAB)
     zeros = listed(LAB, 12).eigenvalues[1:].ravel()
     said = 0
     with precision(200):
@@ -150,7 +150,7 @@ def test_counts_of_sine_waves_are_those_of_the_closed_form(theory: str, boxes: i
     first = tfarm.modes(pinned(link), 1).natural_frequency[-1]
     for Cw in (0.0, 0.05):
         arm = pinned(replace(link, damping=Cw / float(first)))
-        k = coefficients(arm, theory)
+        k = system_of(arm, theory)
         exact = np.concatenate([part.ravel() for part in sine_waves(arm, 200, theory)])
         for _ in range(boxes):
             height = float(first * 10 ** rng.uniform(-0.5, 1.2))
@@ -165,7 +165,7 @@ def test_counts_of_sine_waves_are_those_of_the_closed_form(theory: str, boxes: i
 def test_counts_are_those_of_a_galerkin_model(hub: float, mass: float, boxes: int) -> None:
     rng = np.random.default_rng(32)
     arm = damped_arm(4e-5, hub=hub, mass=mass, inertia=0.2, slenderness=12.0)
-    k = coefficients(arm)
+    k = system_of(arm)
     theirs = ritz_eigenvalues(arm, 48)
     for _ in range(boxes):
         height = float(10 ** rng.uniform(2.5, 4.2))
@@ -203,7 +203,7 @@ def turns_of_ratio(arm, box, **gains):
 def test_a_loop_has_as_many_unstable_poles_as_the_papers_matrix(K1: float, K2: float, unstable: int) -> None:
     """Undamped: K2 > 1 and K1 < 0 destabilise (a strip beside the axis is left out)."""
     arm = tfarm.load("sasaki2012")
-    k = coefficients(arm)
+    k = system_of(arm)
     box = Box(0.5, 100.0, -100.0, 100.0)
     assert turns_of_ratio(arm, box, K1=K1, K2=K2) == unstable
     assert proven_count(k, box, gains_of(k, HubFeedback(K1=K1, K2=K2))) == unstable
@@ -220,7 +220,7 @@ def one_line(error) -> str:
 
 
 def test_a_box_through_a_zero_is_refused() -> None:
-    k = coefficients(LAB)
+    k = system_of(LAB)
     zero = pairs(listed(LAB, 3))[0, 0]
     for box in (
         Box(-50.0, 30.0, -zero.imag, zero.imag),
@@ -234,7 +234,7 @@ def test_a_box_through_a_zero_is_refused() -> None:
 
 
 def test_a_box_with_the_accumulation_point_is_refused() -> None:
-    k = coefficients(LAB)
+    k = system_of(LAB)
     for left in (-1 / LAB.link.damping, -2 / LAB.link.damping):
         with pytest.raises(CertificationError) as refused:
             proven_count(k, Box(left, 10.0, -300.0, 300.0))
@@ -297,7 +297,7 @@ def test_certified_discs_hold_the_listed_eigenvalues() -> None:
 
 def test_a_contour_that_takes_too_many_pieces_is_given_up(monkeypatch):
     """One arm's proof took 27,000 evaluations for a third of one side; a proof ends, or says that it does not."""
-    k = coefficients(tfarm.load("sasaki2012-lab"))
+    k = system_of(tfarm.load("sasaki2012-lab"))
     box = Box(-300.0, 100.0, -400.0, 400.0)
     assert proven_count(k, box) > 0
     monkeypatch.setattr(enclose, "MOST_PIECES", 20)

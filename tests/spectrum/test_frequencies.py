@@ -19,7 +19,7 @@ from tests.spectrum.ritz import (
 from tests.strategies import some_arm
 from tfarm import Hub
 from tfarm.arm import THEORIES
-from tfarm.exact.coefficients import coefficients
+from tfarm.exact.system import system_of
 from tfarm.spectrum.counting import Counter
 from tfarm.spectrum.search import natural_frequencies
 
@@ -43,7 +43,7 @@ def test_the_count_never_falls():
     """N(w) on a fine grid, from far below the first frequency to beyond the cut-off."""
     for arm in random_arms(200, 27):
         omega = np.geomspace(1e-3, 2, 2000) * arm.shear_cutoff
-        counts = Counter(coefficients(arm))(omega)
+        counts = Counter(system_of(arm))(omega)
         assert counts[0] >= arm.has_rigid_mode
         assert (np.diff(counts) >= 0).all()
 
@@ -58,7 +58,7 @@ def test_frequencies_are_right_to_the_last_digits(slenderness):
 
 def test_the_thousandth_mode():
     arm = some_arm(np.random.default_rng(6), ("some", "some", "some"), damping=0.0)
-    k = coefficients(arm)
+    k = system_of(arm)
     for omega in natural_frequencies(k, 1000, 1004):
         assert brackets(k, float(omega), 8)
 
@@ -68,7 +68,7 @@ def test_poles_and_zeros_of_the_hub_angle_interlace():
     for arm in random_arms(300, 27):
         if not arm.is_locked:
             locked = replace(arm, hub=Hub(inertia=math.inf))
-            poles, zeros = (natural_frequencies(coefficients(each), 1, 25) for each in (arm, locked))
+            poles, zeros = (natural_frequencies(system_of(each), 1, 25) for each in (arm, locked))
             slack = 1 + 16 * EPS  # a mode that the hub does not feel is both
             assert (poles <= zeros * slack).all()
             assert (zeros[:-1] <= poles[1:] * slack).all()
@@ -78,5 +78,5 @@ def test_only_a_zero_of_the_hub_angle_vanishes_there():
     """At a hub-locked frequency the hub does not answer a torque: theta is as small there as its slope allows."""
     arm = some_arm(np.random.default_rng(8), ("some", "some", "zero"), damping=0.0)
     G = tfarm.transfer(arm, "hub_angle")
-    for omega in natural_frequencies(coefficients(replace(arm, hub=Hub(inertia=math.inf))), 1, 8):
+    for omega in natural_frequencies(system_of(replace(arm, hub=Hub(inertia=math.inf))), 1, 8):
         assert abs(G(1j * omega)) <= 16 * EPS * omega * abs(G.derivative(1j * omega))

@@ -18,7 +18,8 @@ from tests.strategies import BOUNDARY_CASES, some_arm
 from tfarm import Hub, Link, ParameterError, Payload, Section
 from tfarm.arm import THEORIES
 from tfarm.exact import balls
-from tfarm.exact.coefficients import coefficients
+from tfarm.exact.layout import Layout
+from tfarm.exact.system import system_of
 from tfarm.spectrum import PARAMETERS
 from tfarm.spectrum.precise import refine
 from tfarm.spectrum.table import flexible_frequencies
@@ -127,7 +128,7 @@ def test_the_hub_participation_is_a_residue(modes):
         with balls.precision(400):
             root = flint.arb(refine(k, float(omega), 60))
             S, step = -root * root, root * root * flint.arb(2) ** -130
-            here, there = (balls.State(k, flint.acb(0, (-at).sqrt())) for at in (S, S + step))
+            here, there = (balls.Sweep(Layout(k), flint.acb(0, (-at).sqrt())) for at in (S, S + step))
             slope = (there.input - here.input).real / step
             residue = here.theta.real / slope * balls.rational(k.length / k.EI)
             squares.append(float(residue.mid()))
@@ -254,7 +255,7 @@ def test_euler_bernoulli_has_no_shear_energy():
     arm = replace(tfarm.load("stocky-steel"), payload=Payload(mass=1.0, inertia=0.1))
     for theory, without in (("euler-bernoulli", "shear_modulus"), ("rayleigh", "shear_modulus")):
         assert not tfarm.modes(arm, 5, theory=theory).sensitivity[without].any()
-    assert coefficients(arm, "shear").a == 0
+    assert system_of(arm, "shear").segments[0].a == 0
 
 
 def test_the_root_moment_of_a_light_hub_is_not_rounding():

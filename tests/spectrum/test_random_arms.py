@@ -8,7 +8,7 @@ import numpy as np
 import tfarm
 from tests.spectrum.test_certify import random_arm
 from tfarm import Arm, Hub, Payload
-from tfarm.exact.coefficients import coefficients
+from tfarm.exact.system import system_of
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.counting import Counter
 
@@ -36,7 +36,7 @@ def test_the_list_is_the_count_on_random_arms() -> None:
         modes = tfarm.modes(arm, 12)
         omega = modes.natural_frequency[-12:]
         assert (np.diff(omega) >= 0).all()
-        count = Counter(coefficients(arm))
+        count = Counter(system_of(arm))
         steps = np.r_[omega * (1 - 1e-11), omega * (1 + 1e-11)]
         below, above = np.split(count(steps) - arm.has_rigid_mode, 2)
         number = np.arange(1, 13)

@@ -1,14 +1,14 @@
 """The exact solution in ball arithmetic (python-flint): every number comes with a bound on its error.
 
-No wave is ever separated here.  With z1 + z2 and z1 z2 from the dispersion relation, the functions F0..F3 of
-`closed_form.from_transition` are the last column of the exponential of a 4x4 companion matrix, entire in
-s^2/(1 + C s): there is no cut-off, no pair of equal waves and no low frequency where this form loses
-its meaning, only digits, and then the precision is raised until the digits asked for are proven.
+No wave is ever separated here.  With z1 + z2 and z1 z2 from the dispersion relation, the functions F0..F3 of `waves`
+are the last column of the exponential of a 4x4 companion matrix, entire in s^2/(1 + C s): there is no cut-off, no pair
+of equal waves and no low frequency where this form loses its meaning, only digits, and then the precision is raised
+until the digits asked for are proven.  The sweeps are those of `sweep`, with the error of every number enclosed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 from functools import cached_property
@@ -16,12 +16,39 @@ from typing import Any
 
 import flint
 
-from .closed_form import fields_from_root, from_transition
-from .coefficients import Coefficients, EndCondition
 from .compiled import python_of
-from .outputs import Output, Quantity, unit_scale
+from .compound import (
+    Plane,
+    Row,
+    across_rows,
+    beyond_body,
+    beyond_offset,
+    beyond_spring,
+    end_plane,
+    inside_body,
+    inside_offset,
+    inside_spring,
+    met,
+    row_across,
+    transition_rows,
+)
+from .elements import Body, Mark, Offset, Segment, Spring
+from .layout import Layout, Numbers, Reading, constant_of, readings
+from .outputs import Output
+from .system import System
 
-_algebra, _fields = python_of(from_transition), python_of(fields_from_root)
+_end_plane, _inside_offset, _inside_spring = python_of(end_plane), python_of(inside_offset), python_of(inside_spring)
+_inside_body, _across_rows, _transition_rows = (
+    python_of(inside_body),
+    python_of(across_rows),
+    python_of(transition_rows),
+)
+_beyond_offset, _beyond_spring, _beyond_body = (
+    python_of(beyond_offset),
+    python_of(beyond_spring),
+    python_of(beyond_body),
+)
+_row_across, _met = python_of(row_across), python_of(met)
 Ball = Any  # flint.acb or flint.arb, which come without types
 
 
@@ -47,82 +74,192 @@ def root(z: Ball) -> Ball:
     return z.sqrt() if z.real.mid() >= 0 else (-z).sqrt() * flint.acb(0, 1)
 
 
-def transition(z_sum: Ball, z_product: Ball, x: Ball) -> tuple[Ball, Ball, Ball, Ball]:
-    """F0..F3 at x (0..1), by the two waves where they differ and by the matrix exponential where they may not.
+def transition(z_sum: Ball, z_product: Ball) -> tuple[Ball, Ball, Ball, Ball]:
+    """F0..F3, by the two waves where they differ and by the matrix exponential where they may not.
 
     That is of F'''' = (z1 + z2) F'' - z1 z2 F as a first-order system, with F'''(0) = 1.
     """
     spread = root(z_sum * z_sum / 4 - z_product)
     z1, z2 = z_sum / 2 + spread, z_sum / 2 - spread
     if (z1 - z2).contains(0) or z1.contains(0) or z2.contains(0):
-        zero, one = flint.acb(0), flint.acb(x)
+        zero, one = flint.acb(0), flint.acb(1)
         rows = [[zero, one, zero, zero], [zero, zero, one, zero], [zero, zero, zero, one]]
-        exponential = flint.acb_mat([*rows, [-z_product * x, zero, z_sum * x, zero]]).exp()
+        exponential = flint.acb_mat([*rows, [-z_product, zero, z_sum, zero]]).exp()
         return exponential[0, 3], exponential[1, 3], exponential[2, 3], exponential[3, 3]
     t1, t2 = root(z1), root(z2)
-    (h1, c1), (h2, c2) = (t1 * x).sinh_cosh(), (t2 * x).sinh_cosh()
+    (h1, c1), (h2, c2) = t1.sinh_cosh(), t2.sinh_cosh()
     over = 1 / (z1 - z2)
     return (h1 / t1 - h2 / t2) * over, (c1 - c2) * over, (t1 * h1 - t2 * h2) * over, (z1 * c1 - z2 * c2) * over
-
-
-class State:
-    """The free response of the arm at one s: root values, and by them the fields at any x."""
-
-    def __init__(self, k: Coefficients, s: Ball) -> None:
-        self.k, self.s = k, s
-        self._fields: dict[float, tuple[Ball, ...]] = {}  # by x: four quantities share the transition
-        self.S, self.d = s * s, 1 + rational(k.damping) * s
-        self.a, self.b, self.g, self.sigma = (rational(value) for value in (k.a, k.b, k.g, k.sigma))
-        S, over_d = self.S, 1 / self.d
-        self.z_sum = S * (self.b + self.a * over_d)
-        self.z_product = S * (self.a * self.b * S + self.g) * over_d
-        mass, inertia = EndCondition.of(k.tip_mass), EndCondition.of(k.tip_inertia)
-        F0, F1, F2, F3 = transition(self.z_sum, self.z_product, flint.arb(1))
-        self.theta, self.M0, self.Q0, self.W1, self.Y1 = _algebra(
-            F0, F1, F2, F3, F2 - 1, S, over_d, self.a, self.b, self.g, self.sigma,
-            self.end(mass), rational(mass.force), self.end(inertia), rational(inertia.force),
-        )  # fmt: skip
-
-    def end(self, condition: EndCondition) -> Ball:
-        """rest + inertia s^2 of an end condition."""
-        return rational(condition.rest) + rational(condition.inertia) * self.S
-
-    @cached_property
-    def input(self) -> Ball:
-        """The torque behind this response, or the hub angle where the hub is locked: zero at a pole."""
-        hub = EndCondition.of(self.k.hub_inertia)
-        drive = self.end(hub) * self.theta - rational(hub.force) * self.M0
-        return drive if hub.rest else drive / rational(hub.force)
-
-    def field(self, quantity: Quantity, x: float) -> Ball:
-        """The quantity at x (a share of the length, 0..1), from the root by the state-transition matrix."""
-        if x not in self._fields:
-            at = rational(x)
-            F0, F1, F2, F3 = transition(self.z_sum, self.z_product, at)
-            self._fields[x] = _fields(
-                at, F0, F1, F2, F3, F2 - at, F3 - 1, self.S, 1 / self.d, self.a, self.b, self.g, self.sigma,
-                self.theta, self.M0, self.Q0,
-            )  # fmt: skip
-        return self._fields[x][("Y", "Phi", "M", "Q").index(quantity)]
-
-    def value(self, output: Output, x: float = 0.0) -> Ball:
-        """The output for a unit input, in SI units; x is a share of the length."""
-        constant = output.constant(self.k, x)
-        ratio = self.s**output.power * (self._ratio(output, x) if constant is None else constant)
-        ratio = ratio / self.d if output.gauge else ratio
-        return ratio * rational(unit_scale(output, self.k))
-
-    def _ratio(self, output: Output, x: float) -> Ball:
-        if output.is_at_end:
-            ends = {"theta": self.theta, "M": self.M0, "Q": self.Q0, "W": self.W1, "Y": self.Y1}
-            return ends[output.quantity] / self.input
-        return self.field(output.quantity, output.share(x)) / self.input
-
-    def determines(self, output: Output, x: float) -> bool:
-        """Whether the output has a value here: everywhere but where the input may be zero, at a pole."""
-        return output.constant(self.k, x) is not None or not self.input.contains(0)
 
 
 def nearest_float(ball: Ball) -> complex:
     """The complex float at the middle of a ball."""
     return complex(float(ball.real.mid()), float(ball.imag.mid()))
+
+
+def summed(z_sum: Any, z_product: Any, count: int) -> list[Any]:
+    """F0..F3 at a segment's end by so many terms of their series in z1 + z2 and z1 z2: `Jet`s, or series of flint."""
+    h, before, sums = 0 * z_sum + 1, 0 * z_sum, [0 * z_sum] * 4
+    factorial = Fraction(1)
+    for n in range(count):
+        factorial = factorial / max(1, (2 * n) * (2 * n - 1))  # 1/(2 n)!
+        terms = [factorial]
+        for shift in (1, 2, 3):
+            terms.append(terms[-1] / (2 * n + shift))
+        sums = [total + h * rational(term) for total, term in zip(sums, reversed(terms), strict=True)]
+        h, before = z_sum * h - z_product * before, h
+    return sums
+
+
+class Sweep:
+    """The plane of a layout at the axis and at its marks, at one s (a ball or a series of balls)."""
+
+    def __init__(self, layout: Layout, s: Any, S: Any = None) -> None:
+        self.layout, self.s, self.S = layout, s, s * s if S is None else S
+        self.numbers = self.numbers_of(layout)
+        self._rows: dict[int, tuple[Row, ...]] = {}
+        self.planes: dict[int, Plane] = {}
+        p = _end_plane(*self._end(self.numbers.tip_mass), *self._end(self.numbers.tip_inertia))
+        for each in self.numbers.elements:
+            if isinstance(each, Mark):
+                self.planes[each.number] = p
+            else:
+                p = self._inside(each, p)
+        self.theta, self.M, self.Q = p[:3]
+
+    def numbers_of(self, layout: Layout) -> Numbers:
+        """The layout's numbers as those that s can be multiplied by."""
+        return layout.numbers(flint.ctx.prec, rational)
+
+    def exact(self, number: Any) -> Any:
+        """An exact number of an output as one that s can be multiplied by."""
+        return rational(number)
+
+    @cached_property
+    def input(self) -> Any:
+        """What the input must be for this response: zero at a pole."""
+        return self.drive_of(self.theta, self.M)
+
+    def drive_of(self, theta: Any, M: Any) -> Any:
+        """The input behind a response with that hub angle and moment on the hub."""
+        s, (A0, A1, A2, A3), (B0, B1) = self.s, self.numbers.of_angle, self.numbers.of_moment
+        return (((s * A3 + A2) * s + A1) * s + A0) * theta - (s * B1 + B0) * M
+
+    @cached_property
+    def states(self) -> dict[int, Row]:
+        """W, Psi, M and Q at each mark."""
+        one, none = self.exact(1) + 0 * self.s, 0 * self.s
+        f: Row = (one, none, none, none)
+        found: dict[int, Row] = {}
+        for each in reversed(self.numbers.elements):
+            if len(found) == len(self.planes):
+                break
+            if isinstance(each, Mark):
+                found[each.number] = _met(f, self.planes[each.number])
+            else:
+                f = self._beyond(each, f)
+        return found
+
+    def output(self, one: Reading) -> Any:
+        """An output of this response, in SI units."""
+        value, exact = self.theta * self.exact(one.theta), self.exact
+        if one.is_current:  # what is left of the input after back-EMF turns the hub
+            drive = self.layout.chain.drive
+            value = (self.input - self.s * exact(drive.back_emf) * value) / (self.s * exact(drive.lag) + 1)
+        if one.place is not None:
+            mark = self.layout.places.index(one.place)
+            for weight, part in zip(one.state, self.states[mark], strict=True):
+                value = value + part * exact(weight) if weight else value
+            if one.gauge:
+                value = value / (self.s * exact(self.layout.read[mark].damping) + 1)
+        for _ in range(one.power):
+            value = value * self.s
+        return value * exact(one.unit)
+
+    def _end(self, condition: Any) -> tuple[Any, Any]:
+        rest, inertia, force = condition
+        return self.S * inertia + rest, force
+
+    def _inside(self, element: Any, p: Plane) -> Plane:
+        match element:
+            case Segment():
+                return out_of_own(_across_rows(*self._transition(element), into_own(p, *element.units)), *element.units)
+            case Offset():
+                return _inside_offset(element.length, p)
+            case Spring():
+                return _inside_spring(*self._spring(element), p)
+        return _inside_body(*self._body(element), p)
+
+    def _beyond(self, element: Any, f: Row) -> Row:
+        match element:
+            case Segment():
+                w, m, q = element.units
+                own = _row_across(*self._transition(element), (f[0] / w, f[1], f[2] / m, f[3] / q))
+                return own[0] * w, own[1], own[2] * m, own[3] * q
+            case Offset():
+                return _beyond_offset(element.length, f)
+            case Spring():
+                return _beyond_spring(*self._spring(element), f)
+        return _beyond_body(*self._body(element), f)
+
+    def _transition(self, segment: Any) -> tuple[Row, ...]:
+        if id(segment) not in self._rows:
+            a, b, g, sigma = segment[:4]
+            S, over_d = self.S, 1 / (self.s * segment.damping + 1)
+            z_sum, z_product = S * (over_d * a + b), S * (S * (a * b) + g) * over_d
+            functions = self._functions(z_sum, z_product)
+            self._rows[id(segment)] = _transition_rows(*functions, S, over_d, a, b, g, sigma)
+        return self._rows[id(segment)]
+
+    def _functions(self, z_sum: Any, z_product: Any) -> tuple[Any, ...]:
+        """F0..F3 at the segment's end."""
+        return transition(z_sum, z_product)
+
+    def _spring(self, spring: Any) -> tuple[Any, Any]:
+        return self.s * (spring.stiffness * spring.damping) + spring.stiffness, spring.compliance
+
+    def _body(self, body: Any) -> tuple[Any, Any]:
+        assert isinstance(body, Body)
+        return self.S * body.mass + body.stiffness, self.S * body.inertia + body.rotational_stiffness
+
+
+def into_own(p: Plane, w: Any, m: Any, q: Any) -> Plane:
+    """A plane in a segment's own units, which W, M and Q are multiplied by for it (`Segment.units`)."""
+    return p[0] * w, p[1] * (w * m), p[2] * m, p[3] * q, p[4] * (m * q)
+
+
+def out_of_own(p: Sequence[Any], w: Any, m: Any, q: Any) -> Plane:
+    """The plane in the chain's units again."""
+    return p[0] / w, p[1] / (w * m), p[2] / m, p[3] / q, p[4] / (m * q)
+
+
+class State:
+    """The free response of a system at one s in balls, to read outputs of."""
+
+    def __init__(self, system: System, s: Any) -> None:
+        self.system, self.s = system, s
+
+    @cached_property
+    def input(self) -> Any:
+        """What the input must be for this response: zero at a pole."""
+        return Sweep(readings(self.system, (), 0.0).layout, self.s).input
+
+    def numerator(self, output: Output, x: float = 0.0) -> Any:
+        """The output of the free response, in SI units."""
+        those = readings(self.system, (output,), x)
+        return Sweep(those.layout, self.s).output(those.each[0])
+
+    def value(self, output: Output, x: float = 0.0) -> Ball:
+        """The output for a unit input, in SI units; x is a share of the length."""
+        constant, drive = constant_of(self.system, output, x), self.system.drive
+        those = readings(self.system, (output,), x)
+        (one,) = those.each
+        if one.is_current and not (drive.back_emf or drive.lag):  # the input itself, but for its unit
+            constant = 1
+        if constant is None:
+            return self.numerator(output, x) / self.input
+        return self.s**one.power * constant * rational(one.unit) / (1 + rational(those.gauges[0]) * self.s)
+
+    def determines(self, output: Output, x: float) -> bool:
+        """Whether the output has a value here: everywhere but where the input may be zero, at a pole."""
+        return constant_of(self.system, output, x) is not None or not self.input.contains(0)

@@ -1,7 +1,7 @@
 """The characteristic function of the arm and of its closed loop: entire at C = 0, analytic but for s = -1/C.
 
-The free response needs a torque u(s) at the hub, the *drive*; a law asks for another, minus the sum of its gains times
-what they multiply of that response, the *numerators*, and an eigenvalue is where both agree:
+The free response needs an input at the hub, the *drive*; a law asks for another, minus the sum of its gains times the
+outputs that they multiply of that response, the *numerators*, and an eigenvalue is where both agree:
 
     D(s) = drive + gains . numerators,     numerators = theta, s theta, M(0)/(1 + C s)
 
@@ -20,21 +20,13 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import AT_HUB, FED_BACK, GAINS, Arm, HubFeedback
+from tfarm.arm import GAINS, Arm, HubFeedback
 from tfarm.arrays import Complex, Real
 from tfarm.records import read_only
 
-from .chain import ElementChain
-from .chain_values import free_outputs, free_slopes
-from .chaining import chain_of
-from .compiled import compiled, inlined, python_of
-from .dispersion import quotient, reciprocal
-from .free import free_response
-from .jets import Jet
 from .outputs import OUTPUTS, unit_scale
 from .system import System, system_of
-from .vector import DAMPING, HUB_FORCE, HUB_INERTIA, HUB_REST, TORQUE_DIVISOR
-from .waves import free_ends
+from .values import free_outputs, free_slopes
 
 Gains = tuple[Fraction, ...]  # of a law without dimensions, in the order of `GAINS`, exact
 NO_GAINS: Gains = (Fraction(0),) * len(GAINS)
@@ -46,8 +38,8 @@ DIFFERENCE_STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
 
 
 def loop_system(arm: Arm) -> System:
-    """The exact system of an arm under a law: a chain where a gain is on what `numerators` has not."""
-    return system_of(arm) if FED_BACK == AT_HUB else chain_of(arm)
+    """The exact system of an arm under a law."""
+    return system_of(arm)
 
 
 def unit_gains(k: System) -> Gains:
@@ -55,12 +47,6 @@ def unit_gains(k: System) -> Gains:
     if "unit gains" not in k.kept:
         k.kept["unit gains"] = tuple(unit_scale(OUTPUTS[gain.output], k) for gain in GAINS)
     return cast("Gains", k.kept["unit gains"])
-
-
-def at_hub(gains: Gains) -> Gains:
-    """Those on the hub's own outputs, which are all that one link is asked for: a law of others is on a chain."""
-    assert not any(gains[len(AT_HUB) :])
-    return gains[: len(AT_HUB)]
 
 
 def gains_of(k: System, law: HubFeedback) -> Gains:
@@ -72,18 +58,6 @@ def dimensionless(k: System, laws: Real) -> Real:
     """Rows (gains, ...) of gains in SI units, in the order of `GAINS`, without dimensions, as doubles."""
     units = np.array([float(unit) for unit in unit_gains(k)])
     return np.asarray(units.reshape(-1, *[1] * (laws.ndim - 1)) * laws)
-
-
-@inlined
-def numerators(s: Any, over_d: Any, theta: Any, M0: Any) -> Any:
-    """What the gains multiply, in the order of `GAINS`, of a response with that hub angle and root moment.
-
-    `over_d` is 1/(1 + C s), s any kind of number.
-    """
-    return theta, s * theta, M0 * over_d
-
-
-NUMERATORS = python_of(numerators)
 
 
 def torque(gains: Iterable[Any], fed_back: Iterable[Any]) -> Any:
@@ -115,17 +89,12 @@ class LoopParts(NamedTuple):
 def characteristic(k: System, s: Complex, gains: Gains = NO_GAINS, at_zero: int = 0) -> Analytic:
     """D(s)/s^at_zero and its derivative at s (1-D, complex), in float64."""
     s = off_rest(s) if at_zero else s
-    if isinstance(k, ElementChain):
-        used = [each for each, gain in zip(FED, gains, strict=True) if gain]
-        here, slopes = free_slopes(k, used, s, 0.0)
-        units = [float(gain / unit) for gain, unit in zip(gains, unit_gains(k), strict=True) if gain]  # outputs are SI
-        both = (here, slopes)
-        value, slope = (each.drive + np.tensordot(units, each.outputs, 1) if units else each.drive for each in both)
-        return deflated(value, slope, here.scale, s, at_zero)
-    free, at = free_response(k, s), Jet.variable(s, 1)
-    fed_back = NUMERATORS(at, 1.0 / (1.0 + k.damping * at), free.theta, free.M)
-    value, slope = (free.drive + torque([float(gain) for gain in at_hub(gains)], fed_back)).c
-    return deflated(value, slope, free.scale, s, at_zero)
+    used = [each for each, gain in zip(FED, gains, strict=True) if gain]
+    here, slopes = free_slopes(k, used, s, 0.0)
+    units = [float(gain / unit) for gain, unit in zip(gains, unit_gains(k), strict=True) if gain]  # outputs are SI
+    both = (here, slopes)
+    value, slope = (each.drive + np.tensordot(units, each.outputs, 1) if units else each.drive for each in both)
+    return deflated(value, slope, here.scale, s, at_zero)
 
 
 def off_rest(s: Complex) -> Complex:
@@ -151,18 +120,13 @@ def quick_characteristics(k: System, s: Complex, rows: Real, at_zero: int = 0) -
 
     With gains of their own at each point, rows (gains, n), or one `as_column` (gains, 1), dimensionless.
     """
-    if isinstance(k, ElementChain):
-        s = off_rest(np.asarray(s, dtype=complex))
-        h = difference_steps(k, s)
-        at = np.array([s, s + h, s - h])
-        parts = loop_parts(k, at)
-        values = (parts.drive + (rows[:, None, :] * parts.numerators).sum(axis=0)) / at**at_zero
-        up, down = values[1:] * np.exp(parts.scale[1:] - parts.scale[0])
-        return Analytic(values[0], (up - down) / (2.0 * h), parts.scale[0])
-    found = np.empty((3, s.size), complex)
-    s, rows = np.ascontiguousarray(s, dtype=complex), np.ascontiguousarray(rows, dtype=float)
-    fill_characteristics(s, k.kernel, rows, at_zero, found)
-    return Analytic(found[0], found[1], found[2])
+    s = off_rest(np.asarray(s, dtype=complex))
+    h = difference_steps(k, s)
+    at = np.array([s, s + h, s - h])
+    parts = loop_parts(k, at)
+    values = (parts.drive + (rows[:, None, :] * parts.numerators).sum(axis=0)) / at**at_zero
+    up, down = values[1:] * np.exp(parts.scale[1:] - parts.scale[0])
+    return Analytic(values[0], (up - down) / (2.0 * h), parts.scale[0])
 
 
 def float_units(k: System) -> Real:
@@ -178,53 +142,11 @@ def difference_steps(k: System, s: Complex) -> Real:
     return np.asarray(DIFFERENCE_STEP * np.maximum(abs(s) * near, 1e-300))
 
 
-@compiled
-def fill_characteristics(s: Any, k: Any, rows: Any, at_zero: int, found: Any) -> None:
-    """Value, slope and scale of D/s^at_zero at s (1-D), a row each; the slope from values at s +- h."""
-    values, scales = np.empty(3, np.complex128), np.empty(3, np.complex128)
-    for i in range(s.size):
-        law = i if rows.shape[1] > 1 else 0
-        here = s[i] if s[i] != 0.0 or at_zero == 0 else complex(NEXT_TO_REST, 0.0)
-        h = DIFFERENCE_STEP * max(abs(here) * min(1.0, abs(1.0 + k[DAMPING] * here)), 1e-300)
-        for j in range(3):
-            at = here + h * (j - 3 * (j // 2))
-            value, scales[j], fed_back = parts_at(at, k)
-            for row, part in enumerate(fed_back):
-                value += rows[row, law] * part
-            for _ in range(at_zero):
-                value = quotient(value, at)
-            values[j] = value
-        up, down = values[1] * np.exp(scales[1] - scales[0]), values[2] * np.exp(scales[2] - scales[0])
-        found[0, i], found[1, i], found[2, i] = values[0], (up - down) / (2.0 * h), scales[0]
-
-
 def loop_parts(k: System, s: NDArray[Any]) -> LoopParts:
     """Drive, numerators and scale at s: what a law makes of them is linear, D = drive + torque(gains, numerators)."""
-    if isinstance(k, ElementChain):
-        free = free_outputs(k, FED, np.asarray(s, dtype=complex).ravel(), 0.0)
-        numerators = free.outputs / float_units(k)
-        return LoopParts(*(part.reshape(*part.shape[:-1], *s.shape) for part in (free.drive, numerators, free.scale)))
-    parts = np.empty((2 + len(GAINS), s.size), complex)
-    fill_loop_parts(np.ascontiguousarray(s, dtype=complex).ravel(), k.kernel, parts)
-    parts = parts.reshape(len(parts), *s.shape)
-    return LoopParts(parts[0], parts[2:], parts[1])
-
-
-@compiled
-def fill_loop_parts(s: Any, k: Any, parts: Any) -> None:
-    """Drive, scale and the numerators at s (1-D), a row each."""
-    for i in range(s.size):
-        parts[0, i], parts[1, i], fed_back = parts_at(s[i], k)
-        for row, part in enumerate(fed_back):
-            parts[2 + row, i] = part
-
-
-@compiled
-def parts_at(s: complex, k: Any) -> Any:
-    """Drive, scale and the numerators at one s."""
-    theta, M0, scale = free_ends(s, k)
-    drive = ((k[HUB_REST] + k[HUB_INERTIA] * s * s) * theta - k[HUB_FORCE] * M0) / k[TORQUE_DIVISOR]
-    return drive, scale, numerators(s, reciprocal(1.0 + k[DAMPING] * s), theta, M0)
+    free = free_outputs(k, FED, np.asarray(s, dtype=complex).ravel(), 0.0)
+    numerators = free.outputs / float_units(k)
+    return LoopParts(*(part.reshape(*part.shape[:-1], *s.shape) for part in (free.drive, numerators, free.scale)))
 
 
 def zeros_at_origin(k: System, gains: Sequence[Fraction | float] = NO_GAINS) -> int:

@@ -9,14 +9,14 @@ element is symplectic, for complex s and with damping too, which leaves p_WQ = -
 
 and a condition f z = 0 at the other end, a row f = (f_W, f_Psi, f_M, f_Q) carried outwards, leaves of the plane one
 state, z_j = sum over i of f_i p_ij: the free response.  Of one segment with W = 0 at its root they are theta = p_WPsi,
-M(0) = p_WM and Q(0) = p_WQ, the functions of `closed_form`.
+M(0) = p_WM and Q(0) = p_WQ, the functions of `waves`.
 
 A uniform segment has two pairs of waves, W = cosh(t_j x) and sinh(t_j x)/t_j with z_j = t_j^2, whose weights
 (alpha_j, beta_j) turn into (c alpha - z s beta, c beta - s alpha) where the origin is moved inwards by the length.
 This has the determinant 1, so alpha_1 beta_1 and alpha_2 beta_2 stay as they are, and what is left of p is a 2x2
 matrix that the first wave turns from the left and the second from the right: no product of a wave with itself appears.
 
-In these formulas lengths are in the segment's own length, moments in EI/l, forces in EI/l^2 (`closed_form`); numbers
+In these formulas lengths are in the segment's own length, moments in EI/l, forces in EI/l^2 (`waves`); numbers
 are floats, arrays, balls or series alike.
 """
 
@@ -89,7 +89,7 @@ def across_waves(
 ) -> Plane:
     """The plane at the inner end of a segment from that at its outer one, times g S d (z1 - z2)^2 e^{-(t1 + t2)}.
 
-    c, s are scaled by e = e^{-t}, v_j = z_j - b S and v1 v2 = g S/d, v_sum = v1 + v2 (see `closed_form`).
+    c, s are scaled by e = e^{-t}, v_j = z_j - b S and v1 v2 = g S/d, v_sum = v1 + v2 (see `waves`).
     """  # fmt: skip
     WPsi, WM, WQ, PsiQ, MQ = p
     gap = z1 - z2

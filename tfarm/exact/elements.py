@@ -5,14 +5,22 @@ Lengths are in L (clamp to tip), moments in EI/L, forces in EI/L^2 of the segmen
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from typing import Literal, NamedTuple
+
+from tfarm.arm import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Link, Theory
+from tfarm.errors import ParameterError
 
 from .outputs import Side
 
+Inertia = Fraction | float  # a fraction, or math.inf
+
 
 class Segment(NamedTuple):
-    """A uniform piece: a, b, g [s^2], sigma, C [s] as in `Coefficients`, length/L, EI/EI of the first, depth/2 [m]."""
+    """A uniform piece: a, b, g [s^2], sigma, C [s] (see `waves`), length/L, EI/EI of the first, depth/2 [m]."""
 
     a: Fraction
     b: Fraction
@@ -110,3 +118,52 @@ class Drive(NamedTuple):
     def of_moment(self) -> tuple[Fraction, Fraction]:
         """B_0 and B_1."""
         return Fraction(self.turns), self.lag * self.turns
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EndCondition:
+    """An end condition  (rest + inertia s^2) motion + force_weight force = 0, scaled to stay near one.
+
+    A finite dimensionless inertia n gives (0, n, 1)/(1 + n), an infinite one (1, 0, 0): motion = 0.
+    """
+
+    rest: Fraction
+    inertia: Fraction
+    force: Fraction
+
+    @classmethod
+    @lru_cache(maxsize=64)  # a proof asks for the same three at every step of its contour
+    def of(cls, inertia: Inertia) -> EndCondition:
+        """The condition of a body of that dimensionless inertia (0..inf)."""
+        if not isinstance(inertia, Fraction):
+            return cls(rest=Fraction(1), inertia=Fraction(0), force=Fraction(0))
+        return cls(rest=Fraction(0), inertia=inertia / (1 + inertia), force=1 / (1 + inertia))
+
+
+def double_double(value: Fraction) -> tuple[float, float]:
+    """The two floats whose sum is nearest to the fraction."""
+    high = float(value)
+    return high, float(value - Fraction(high))
+
+
+def uniform(link: Link, theory: Theory) -> tuple[Fraction, Fraction, Fraction, Fraction]:
+    """a, b, g [s^2] and sigma of a link under one of `THEORIES`.  Raises ParameterError for another name."""
+    if theory not in THEORIES:
+        raise ParameterError(key="theory", value=theory, remedy=f"use one of {', '.join(THEORIES)}")
+    length, density, E = Fraction(link.length), Fraction(link.density), Fraction(link.youngs_modulus)
+    kG = Fraction(link.shear_factor) * Fraction(link.shear_modulus)
+    area, EI = Fraction(link.section.area), stiffness_of(link)
+    rotary = theory in WITH_ROTARY_INERTIA
+    flexible = theory in WITH_SHEAR
+    a, b = density * length**2 / E * rotary, density * length**2 / kG * flexible
+    return a, b, density * area * length**4 / EI, EI / (kG * area * length**2) * flexible
+
+
+def stiffness_of(link: Link) -> Fraction:
+    """E I [N m^2] of a link, exact."""
+    return Fraction(link.youngs_modulus) * Fraction(link.section.second_moment)
+
+
+def scaled_inertia(value: float, unit: Fraction) -> Inertia:
+    """A mass or inertia in that unit; inf stays."""
+    return math.inf if math.isinf(value) else Fraction(value) * unit

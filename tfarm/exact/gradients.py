@@ -1,8 +1,8 @@
 """The free response of a rig with its derivatives along any number of its parameters: jets through the same sweep.
 
 Each number of a chain's elements is a jet of order one, its value with a row of slopes, one for each parameter; the
-formulas of `compound` and `closed_form` carry the slopes by the rules of calculus, so that nothing but rounding is lost
-(1e-9 of a value at worst: no double-double arithmetic here; the values themselves come from `chain_values`).  Only
+formulas of `compound` and `waves` carry the slopes by the rules of calculus, so that nothing but rounding is lost
+(1e-9 of a value at worst: no double-double arithmetic here; the values themselves come from `values`).  Only
 the way from a parameter to the elements' numbers is taken by differences, of exact fractions: to some 1e-10 of them.
 """
 
@@ -21,16 +21,15 @@ from numpy.typing import NDArray
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError
 
-from .chain import ElementChain
-from .chain_balls import Sweep, into_own, out_of_own
-from .chain_values import Reading, laid_out
-from .closed_form import SERIES_RADIUS, even_functions, transition_series
+from .balls import Sweep, into_own, out_of_own
 from .compiled import python_of
 from .compound import Plane, Row, across_waves, met, row_across_waves
-from .elements import Drive, Element, Mark, Segment
-from .free import sinhc_slope
-from .jets import Jet
+from .elements import Drive, Mark, Segment
+from .layout import Numbers, Reading, laid_out
 from .outputs import Output
+from .series import Jet
+from .system import System
+from .waves import SERIES_RADIUS, even_functions, transition_series
 
 _across_waves, _row_across_waves, _met = python_of(across_waves), python_of(row_across_waves), python_of(met)
 _transition_series, _even_functions = python_of(transition_series), python_of(even_functions)
@@ -39,8 +38,8 @@ _transition_series, _even_functions = python_of(transition_series), python_of(ev
 class Direction(NamedTuple):
     """A parameter a step below and a step above its value, as the chains of both, and what the two differ by."""
 
-    below: ElementChain
-    above: ElementChain
+    below: System
+    above: System
     shares_below: tuple[float, ...]  # where each output is then, as a share of the length
     shares_above: tuple[float, ...]
     width: float
@@ -61,7 +60,7 @@ class JetWave(NamedTuple):
 
 
 def response_gradients(
-    chain: ElementChain, wanted: Sequence[Output], shares: Sequence[float], directions: Sequence[Direction], s: Complex
+    chain: System, wanted: Sequence[Output], shares: Sequence[float], directions: Sequence[Direction], s: Complex
 ) -> tuple[Jet, list[Jet]]:
     """Drive and outputs (SI) of the free response at s (1-D), up to one factor that all of them share.
 
@@ -110,7 +109,7 @@ class _Ends(NamedTuple):
 
 
 def _with_slopes(
-    chain: ElementChain, wanted: Sequence[Output], shares: Sequence[float], directions: Sequence[Direction]
+    chain: System, wanted: Sequence[Output], shares: Sequence[float], directions: Sequence[Direction]
 ) -> Slopes:
     here = laid_out(chain, wanted, shares)
     below = [laid_out(each.below, wanted, each.shares_below) for each in directions]
@@ -192,13 +191,19 @@ class GradientSweep(Sweep):
         """What it is: the layout's numbers are jets.  A fraction beside them would make arrays of objects."""
         return number if isinstance(number, Jet) else float(number)
 
+    def numbers_of(self, layout: Any) -> Numbers:
+        """The layout's numbers, those of the drive worked out; payload mass and inertia as they are."""
+        chain = layout.chain
+        of_angle, of_moment = (tuple(map(self.exact, each)) for each in (chain.drive.of_angle, chain.drive.of_moment))
+        return Numbers(layout.elements, chain.tip_mass, chain.tip_inertia, of_angle, of_moment)
+
     @cached_property
     def states(self) -> dict[int, Row]:
         """W, Psi, M and Q at each mark, by the scale that the plane has at the axis."""
         found: dict[int, Row] = {}
         scale, none = Jet([1.0 + 0j, 0.0]), Jet([0j, 0.0])
         f: Row = (scale, none, none, none)
-        for each in reversed(self.layout.elements):
+        for each in reversed(self.numbers.elements):
             if isinstance(each, Mark):
                 W, Psi, M, Q = _met(f, self.planes[each.number])
                 found[each.number] = W * scale, Psi * scale, M * scale, Q * scale
@@ -215,7 +220,7 @@ class GradientSweep(Sweep):
         share = 1.0 / (inertia + 1.0)
         return self.S * (inertia * share), share
 
-    def _inside(self, element: Element, p: Plane) -> Plane:
+    def _inside(self, element: Any, p: Plane) -> Plane:
         if not isinstance(element, Segment) or self._slow[id(element)]:
             return super()._inside(element, p)
         one, two, gS, d = self._separated(element)
@@ -227,7 +232,7 @@ class GradientSweep(Sweep):
         unit = 1.0 / (gS * d * gap * gap)
         return out_of_own([part * unit for part in inner], *element.units)
 
-    def _beyond(self, element: Element, f: Row) -> Row:
+    def _beyond(self, element: Any, f: Row) -> Row:
         if not isinstance(element, Segment) or self._slow[id(element)]:
             return super()._beyond(element, f)
         w, m, q = element.units
@@ -282,3 +287,11 @@ def _wave(z: Jet, bS: Jet) -> JetWave:
     by_z = np.where(is_far, (c - s) / (2 * far), e * sinhc_slope(near))
     slope = z.c[1]
     return JetWave(z, z - bS, Jet([c, s / 2 * slope]), Jet([s, by_z * slope]), e, t.c[0])
+
+
+def sinhc_slope(z: Complex) -> Complex:
+    """d/dz of sinh sqrt z / sqrt z, by its series for |z| <= 1."""
+    slope = np.zeros_like(z)
+    for n in range(10, 0, -1):
+        slope = (n + z * slope) / ((2 * n) * (2 * n + 1))
+    return slope

@@ -18,16 +18,14 @@ from typing import Any, NamedTuple
 
 from tfarm.errors import CertificationError, ParameterError
 
-from .balls import Ball, point, precision, rational
-from .chain import ElementChain
-from .chain_balls import Sweep, drive_of
-from .chain_values import Reading, reading_of
+from .balls import Ball, Sweep, point, precision, rational
 from .compiled import python_of
 from .compound import Plane, Row, met
-from .elements import Body, Element, Mark, Offset, Place, Segment, Spring
-from .enclosures import precisions
+from .elements import Body, Mark, Offset, Place, Segment, Spring
+from .layout import Layout, Reading, reading_of
 from .outputs import Output
-from .values import PROVEN_BITS
+from .system import System
+from .values import PROVEN_BITS, precisions
 
 _met = python_of(met)
 LOAD_KINDS = {"force": ("N", 3), "moment_pair": ("N m", 2)}  # unit, and which entry of (W, Psi, M, Q) jumps
@@ -71,7 +69,7 @@ def load_of(text: str, length: float) -> Load:
     return Load(found[1], tuple(x / length for x in places))
 
 
-def loaded_value(chain: ElementChain, load: Load, wanted: Output, s: complex, x: float) -> Ball:
+def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float) -> Ball:
     """The output per unit load at s, SI, to `PROVEN_BITS`.  Raises CertificationError at a pole or an exact zero."""
     for working in precisions(PROVEN_BITS):
         with precision(working):
@@ -81,7 +79,7 @@ def loaded_value(chain: ElementChain, load: Load, wanted: Output, s: complex, x:
     raise CertificationError(f"no {PROVEN_BITS} bits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
 
 
-def _value(chain: ElementChain, load: Load, wanted: Output, s: Ball, x: float) -> Ball | None:
+def _value(chain: System, load: Load, wanted: Output, s: Ball, x: float) -> Ball | None:
     one = reading_of(chain, wanted, x)
     if one.is_current:
         raise ParameterError(key="output", value=wanted.name, remedy="is known for an input at the hub, not for a load")
@@ -99,13 +97,13 @@ def _value(chain: ElementChain, load: Load, wanted: Output, s: Ball, x: float) -
 class _Loaded(Sweep):
     """The sweep with a mark at the load, and one at the place that is read, if it is on the link."""
 
-    def __init__(self, chain: ElementChain, s: Ball, at: Place, read: Place | None) -> None:
+    def __init__(self, chain: System, s: Ball, at: Place, read: Place | None) -> None:
         self.places = (at,) if read is None or read == at else (at, read)
-        super().__init__(chain.at(self.places), s)
+        super().__init__(Layout(chain, self.places), s)
         zero, one = 0 * s, 1 + 0 * s
         self.f: Row = (one, zero, zero, zero)
-        self.g: Row = (zero, drive_of(chain.drive, s, one, zero), drive_of(chain.drive, s, zero, one), zero)
-        for each in reversed(self.layout.elements):
+        self.g: Row = (zero, self.drive_of(one, zero), self.drive_of(zero, one), zero)
+        for each in reversed(self.numbers.elements):
             if each == Mark(0):
                 break
             if not isinstance(each, Mark):
@@ -136,7 +134,7 @@ class _Loaded(Sweep):
 
     def _inwards(self, state: Any) -> tuple[Ball, Any]:
         """The hub angle, and the state at the place that is read where that lies on this side of the load."""
-        found, elements = None, self.layout.elements
+        found, elements = None, self.numbers.elements
         for each in elements[elements.index(Mark(0)) + 1 :]:
             if isinstance(each, Mark):
                 found = state
@@ -146,25 +144,25 @@ class _Loaded(Sweep):
 
     def _outwards(self, h: Any) -> Any:
         """The state at a place beyond the load."""
-        elements = self.layout.elements
+        elements = self.numbers.elements
         for each in reversed(elements[: elements.index(Mark(0))]):
             if isinstance(each, Mark):
                 return tuple(-part / self.balance for part in _met(h, self.planes[each.number]))
             h = self._beyond(each, h)
         raise AssertionError("the place is on neither side of the load")
 
-    def _state_inside(self, element: Element, z: Any) -> Any:
+    def _state_inside(self, element: Any, z: Any) -> Any:
         """A state at the inner end of an element from that at its outer one."""
         W, Psi, M, Q = z
         match element:
             case Segment():
-                w, m, q = (rational(unit) for unit in element.units)
+                w, m, q = element.units
                 own = W * w, Psi, M * m, Q * q
                 rows = self._transition(element)
                 W, Psi, M, Q = (sum(a * b for a, b in zip(row, own, strict=True)) for row in rows)
                 return W / w, Psi, M / m, Q / q
             case Offset():
-                a = rational(element.length)
+                a = element.length
                 return W - a * Psi, Psi, M + a * Q, Q
             case Spring():
                 stiffness, compliance = self._spring(element)

@@ -94,7 +94,7 @@ def why_no_appendix(arm: Arm, theory: Theory, wanted: Sequence[Output] = ()) -> 
     """Why the paper's appendix has no value of these outputs, or no frequencies; "" where it has."""
     if theory != "timoshenko" or not arm.is_uniform:
         return "the paper's appendix is of one Timoshenko beam on a hub"
-    others = [each.name for each in wanted if each.is_of_a_chain]
+    others = [each.name for each in wanted if not each.is_in_appendix]
     return (
         f"the paper's appendix has no {others[0]}: it is an output of rigs, worked out by closed form and balls"
         if others

@@ -1,8 +1,8 @@
 """What can be asked of the arm: one row an output, and nothing else to edit for a power of s or another place.
 
-A new quantity is told here where it is read, in what unit and whether of chains alone, and `reading_of` in
-`chain_values` what it is of a state.  An output is a power of s times one quantity of the exact solution, at the hub,
-at the tip or at a point x of the arm.  Signs as in the paper: root moment E I phi'(0), shear force
+Of a new quantity this file has the places where it is read, its unit and whether the appendix has it, and `reading_of`
+in `layout` how it weighs W, Psi, M and Q.  An output is a power of s times one quantity of the exact solution, at the
+hub, at the tip or at a point x of the arm.  Signs as in the paper: root moment E I phi'(0), shear force
 kappa G A (w' - psi).
 """
 
@@ -17,8 +17,6 @@ from typing import Literal, Protocol, get_args
 
 from tfarm.arm.checks import whole
 from tfarm.errors import ParameterError, did_you_mean, must_be_known
-
-from .coefficients import Coefficients
 
 # theta, M, Q, W, W - (r + x) theta, Psi - theta: hub angle, moment, shear force, displacement, deflection, rotation;
 # Psi: rotation in space;
@@ -104,15 +102,10 @@ class Output:
         return "it is read elsewhere"
 
     @property
-    def is_at_end(self) -> bool:
-        """Whether the closed form at hub and tip gives it; else the fields along the arm do."""
-        return self.place == "root" or (self.place == "tip" and self.quantity in ("W", "Y"))
-
-    @property
-    def is_of_a_chain(self) -> bool:
-        """Whether the closed form of one link leaves it out: then that link is taken as a chain of one segment."""
+    def is_in_appendix(self) -> bool:
+        """Whether the paper's appendix has it: other quantities, and places of them, came with rigs."""
         along = self.quantity == "W" and self.place == "x"
-        return along or self.quantity in ("Psi", "strain", "centre", "current") or self.side == "inner"
+        return not along and self.quantity not in ("Psi", "strain", "centre", "current") and self.side == "outer"
 
     @property
     def base(self) -> Output:
@@ -122,30 +115,6 @@ class Output:
     def share(self, x: float) -> float:
         """Where it is, as a share of the length; x is that share for an output along the arm."""
         return {"root": 0.0, "tip": 1.0, "x": x}[self.place]
-
-    def constant(self, k: Units, x: float) -> int | None:
-        """What an end condition makes the quantity per unit of input, dimensionless and at any s: 0, 1 or -1, or None.
-
-        Held or free ends: W, Phi and Y are 0 at the root, and at the tip W where it is pinned, M and Q where nothing is
-        there to take them.  The hub angle is the input where the hub is locked, M(0) = -u where it has no inertia.
-        """
-        at, locked = self.share(x), k.is_locked
-        if not isinstance(k, Coefficients):
-            return 1 if self.quantity == "theta" and locked else None
-        pinned, clamped = (not isinstance(end, Fraction) for end in (k.tip_mass, k.tip_inertia))
-        if at == 0:
-            root = {"theta": 1 if locked else None, "M": -1 if k.hub_inertia == 0 else None, "Q": None}
-            return root.get(self.quantity, 0)
-        if at != 1:
-            return None
-        tip = {
-            "M": 0 if k.tip_inertia == 0 else None,
-            "Q": 0 if k.tip_mass == 0 else None,
-            "W": 0 if pinned else None,
-            "Y": -1 if pinned and locked else None,
-            "Phi": -1 if clamped and locked else None,
-        }
-        return tip[self.quantity]
 
 
 def _unit(quantity: Quantity, power: int) -> str:

@@ -14,19 +14,30 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .chain import TO_M, TO_Q, TO_W
-from .closed_form import transition_series
 from .compiled import compiled, inlined
 from .compound import across_rows, across_waves, row_across, row_across_waves, transition_rows
-from .dispersion import dispersion, reciprocal
-from .vector import DAMPING, SIGMA, A, B, G
-from .waves import PARALLEL, is_low, magnitude, wave_functions
+from .layout import TO_M, TO_Q, TO_W
+from .waves import (
+    DAMPING,
+    PARALLEL,
+    SIGMA,
+    A,
+    B,
+    G,
+    dispersion,
+    is_low,
+    magnitude,
+    reciprocal,
+    transition_series,
+    wave_functions,
+)
 
 BLOCK = 32  # points a block: few, as single points fill one too; many, as each loop has its own beginning and end
 S_SQUARED, D, GS, Z1, V1, T1, DT1, Z2, V2, T2, DT2 = (BLOCK * j for j in range(11))
 C1, S1, E1, C2, S2, E2 = (BLOCK * j for j in range(6))
 
 PLANE_SIZE, ROW_SIZE, NUMBERS_SIZE, FUNCTIONS_SIZE = (BLOCK * parts for parts in (5, 4, 11, 6))  # of the flat buffers
+SLOW_WAVE = 1.0  # |z_2| below which a wave hardly turns along a segment: next to its shear cut-off
 FADED = 1e-140  # |e^{-t}| below which a wave has no part in the other's
 
 
@@ -46,34 +57,38 @@ def times(z: complex, factor: float) -> complex:
 
 
 @compiled
-def cross(points: Any, row: Any, plane: Any, inner: Any, scale: Any, lost: Any, kept: Any, number: int) -> None:
+def cross(
+    points: Any, row: Any, plane: Any, inner: Any, scale: Any, lost: Any, watched: Any, kept: Any, number: int
+) -> None:
     """The plane at the inner end of a segment (into `inner`) from that at its outer one, at the points of a block.
 
-    Scales are added to `scale`, lost digits marked.  What the way back needs is `kept` (`Kept`) under its number.
+    Scales are added to `scale`, lost digits and points next to the shear cut-off marked.  What the way back needs is
+    `kept` (`Kept`) under its number.
     """
     low, numbers, series, slow = kept.low[number], kept.numbers[number], kept.series[number], 0
     for i in range(BLOCK):
         low[i] = is_low(points[i], row)
         slow += low[i]
     if slow < BLOCK:
-        _wave_numbers(points, row, numbers)
-        _wave_functions(numbers, kept.functions[number])
+        all_wave_numbers(points, row, numbers)
+        all_wave_functions(numbers, kept.functions[number])
         _by_waves(row, numbers, kept.functions[number], plane, inner)
         for i in range(BLOCK):
             if not low[i]:
                 z1, z2 = numbers[Z1 + i], numbers[Z2 + i]
                 scale[i] += numbers[T1 + i] + numbers[DT1 + i] + numbers[T2 + i] + numbers[DT2 + i]
                 lost[i] = lost[i] or magnitude(z1 - z2) < PARALLEL * (magnitude(z1) + magnitude(z2))
+                watched[i] = watched[i] or magnitude(z2) < SLOW_WAVE
     if slow:
         _transition(points, row, series)
         other = inner.copy() if slow < BLOCK else inner
         _by_series(points, row, series, plane, other)
         if slow < BLOCK:
-            _where(low, other, inner)
+            take_where(low, other, inner)
 
 
 @compiled
-def _wave_numbers(points: Any, row: Any, numbers: Any) -> None:
+def all_wave_numbers(points: Any, row: Any, numbers: Any) -> None:
     """`dispersion` at every point of a block."""
     for i in range(BLOCK):
         S, d, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(points[i], row)
@@ -83,7 +98,7 @@ def _wave_numbers(points: Any, row: Any, numbers: Any) -> None:
 
 
 @compiled
-def _wave_functions(numbers: Any, functions: Any) -> None:
+def all_wave_functions(numbers: Any, functions: Any) -> None:
     """The two complex exponentials a point: the only loop that calls a library."""
     for i in range(BLOCK):
         c1, s1, e1 = wave_functions(numbers[Z1 + i], numbers[T1 + i], numbers[DT1 + i])
@@ -93,7 +108,7 @@ def _wave_functions(numbers: Any, functions: Any) -> None:
 
 
 @compiled
-def _where(low: Any, source: Any, target: Any) -> None:
+def take_where(low: Any, source: Any, target: Any) -> None:
     """Take the slow points of another buffer."""
     for j in range(len(target) // BLOCK):
         for i in range(BLOCK):
@@ -179,7 +194,7 @@ def cross_back(points: Any, row: Any, f: Any, outer: Any, scale: Any, faded: Any
         other = outer.copy() if slow < BLOCK else outer
         _row_by_series(points, row, kept.series[number], f, other)
         if slow < BLOCK:
-            _where(low, other, outer)
+            take_where(low, other, outer)
 
 
 @compiled

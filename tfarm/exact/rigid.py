@@ -15,12 +15,12 @@ import numpy as np
 from tfarm.arm import Arm
 from tfarm.arrays import Complex
 
-from .chain_balls import Sweep
-from .chain_values import Reading, readings
-from .chaining import chain_of
+from .balls import Sweep
 from .compound import Plane, Row
-from .elements import Body, Element, Offset, Place, Segment, Spring
+from .elements import Body, Offset, Place, Segment, Spring
+from .layout import Layout, Numbers, Reading, readings
 from .outputs import Output
+from .system import system_of
 
 ROUNDING = 64 * float(np.finfo(float).eps)  # share of the hub's motion that rounding leaves of a link that is held
 
@@ -33,7 +33,7 @@ def rigid_response(arm: Arm, wanted: Output, s: Complex, x: float = 0.0) -> Comp
     """
     if wanted.quantity == "strain":
         return np.zeros(s.size, complex)
-    chain = chain_of(arm)
+    chain = system_of(arm)
     those = readings(chain, (wanted,), x)
     one = those.each[0]
     with np.errstate(all="ignore"):
@@ -70,14 +70,14 @@ class RigidSweep(Sweep):
     def _yielded(self) -> tuple[Any, Any]:
         """What joint and clamp add to W and Psi at the clamp."""
         lift, turn, M = 0.0 * self.s, 0.0 * self.s, self.M
-        for each in reversed(self.layout.elements):
+        for each in reversed(self.numbers.elements):
             if isinstance(each, Segment | Body):
                 break
             if isinstance(each, Spring):
                 stiffness, compliance = self._spring(each)
                 turn = turn + compliance / stiffness * M
             elif isinstance(each, Offset):
-                lift, M = lift + float(each.length) * turn, M - float(each.length) * self.Q
+                lift, M = lift + each.length * turn, M - each.length * self.Q
         return lift, turn
 
     def _from_clamp(self, place: Place) -> Fraction:
@@ -88,21 +88,26 @@ class RigidSweep(Sweep):
         """The nearest float64."""
         return float(number)
 
-    def _inside(self, element: Element, p: Plane) -> Plane:
+    def numbers_of(self, layout: Layout) -> Numbers:
+        """The layout's numbers as float64."""
+        return layout.numbers("float64", float)
+
+    def _inside(self, element: Any, p: Plane) -> Plane:
         for each in _rigid(element):
             p = super()._inside(each, p)
         return p
 
-    def _beyond(self, element: Element, f: Row) -> Row:
+    def _beyond(self, element: Any, f: Row) -> Row:
         for each in _rigid(element):
             f = super()._beyond(each, f)
         return f
 
 
-def _rigid(element: Element) -> tuple[Element, ...]:
+def _rigid(element: Any) -> tuple[Any, ...]:
     """A segment as a rigid body between two halves of its length; any other element as it is."""
     if not isinstance(element, Segment):
         return (element,)
-    l, EI, none = element.length, element.stiffness, Fraction(0)
+    l, EI = element.length, element.stiffness
+    none: Any = 0.0
     half = Offset(l / 2)
     return half, Body(EI * element.g / l**3, EI / l * (element.g / 12 + element.a), none, none), half

@@ -16,7 +16,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .chain import (
+from tfarm.records import read_only
+
+from .compiled import compiled, inlined
+from .compound import (
+    beyond_body,
+    beyond_offset,
+    beyond_spring,
+    end_plane,
+    inside_body,
+    inside_offset,
+    inside_spring,
+    met,
+)
+from .layout import (
     COMPLIANCE,
     GROUND,
     INERTIA,
@@ -33,34 +46,28 @@ from .chain import (
     SPRING,
     STIFFNESS,
     TO_M,
+    TO_Q,
+    TO_W,
     TURNING_GROUND,
 )
-from .closed_form import tip_conditions
-from .compiled import compiled, inlined
-from .compound import (
-    beyond_body,
-    beyond_offset,
-    beyond_spring,
-    end_plane,
-    inside_body,
-    inside_offset,
-    inside_spring,
-    met,
-)
-from .dispersion import reciprocal
 from .pieces import BLOCK, FUNCTIONS_SIZE, NUMBERS_SIZE, PLANE_SIZE, ROW_SIZE, Kept, cross, cross_back, times
-from .waves import POLE, impedance, magnitude
+from .waves import DAMPING, SIGMA, A, B, G, impedance, magnitude, reciprocal, tip_conditions, transition_series
 
 OVERFLOW, UNDERFLOW = 1e80, 1e-80  # a plane beyond is brought back to 1, by a power of two
 LN_2 = math.log(2.0)
-SMALL_DIFFERENCE = 0.05  # an output below this share of its own terms has lost four bits: flagged
+POLE = 1e-11  # drive below this share of its own terms: flagged, it may be a pole
+DIFFERENCE = 0.5  # an output below this share of its own terms has lost a bit: it is summed up from the axis instead,
+SMALL_DIFFERENCE = 0.05  # and where that cannot be, flagged below this share, which has lost four bits
+AXIS = read_only(np.array([[1.0], [0.0], [0.0], [0.0]]))  # the condition W = 0 there, at every point
 
 
 class Work(NamedTuple):
     """What a block is worked in: planes (2) here and beyond, and at marks; conditions (2); the scales of all.
 
     `powers` (elements, points) are those of two that the plane was divided by after each; a mark's state times e^scale
-    2^shift goes with the plane at the axis.
+    2^shift goes with the plane at the axis.  `inner` are the planes at the inner side of each element; `lift`, `turn`
+    are W - r theta and Psi - theta on the way back, r the distance from the axis, as long as all segments are `slow`,
+    and `yielded` both at each mark, where `known`.  `watched` are points next to a segment's shear cut-off.
     """
 
     planes: NDArray[np.complex128]
@@ -71,6 +78,14 @@ class Work(NamedTuple):
     faded: NDArray[np.complex128]
     scales: NDArray[np.complex128]
     shifts: NDArray[np.int64]
+    theta: NDArray[np.complex128]
+    inner: NDArray[np.complex128]
+    lift: NDArray[np.complex128]
+    turn: NDArray[np.complex128]
+    slow: NDArray[np.bool_]
+    yielded: NDArray[np.complex128]
+    known: NDArray[np.bool_]
+    watched: NDArray[np.bool_]
     kept: Kept
 
 
@@ -97,6 +112,14 @@ def _work(rows: Any) -> Work:
         np.empty(ROW_SIZE, number),
         np.empty((marks, BLOCK), number),
         np.empty((marks, BLOCK), np.int64),
+        np.empty(BLOCK, number),
+        np.empty((len(rows), PLANE_SIZE), number),
+        np.empty(BLOCK, number),
+        np.empty(BLOCK, number),
+        np.empty(BLOCK, np.bool_),
+        np.empty((marks, 2 * BLOCK), number),
+        np.empty((marks, BLOCK), np.bool_),
+        np.empty(BLOCK, np.bool_),
         kept,
     )
 
@@ -106,17 +129,18 @@ def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
     """The plane at the axis, into work.planes[0], and at each mark, with its scale; whether digits are lost."""
     plane, beyond, scale, number = work.planes[0], work.planes[1], work.scale, 0
     _begin(points, ends, plane)
-    scale[:], lost[:] = 0.0, False
+    scale[:], lost[:], work.watched[:] = 0.0, False, False
     for j in range(len(rows)):
         row = rows[j]
         if row[ROW_KIND] == SEGMENT:
-            cross(points, row, plane, beyond, scale, lost, work.kept, number)
+            cross(points, row, plane, beyond, scale, lost, work.watched, work.kept, number)
             plane[:] = beyond
             number += 1
         elif row[ROW_KIND] == MARK:
             work.marked[int(row[NUMBER])] = plane
         else:
             _small(points, row, plane)
+        work.inner[j] = plane
         _brought_back(plane, 5, work.powers[j])
         for i in range(BLOCK):
             scale[i] += work.powers[j, i] * LN_2
@@ -170,25 +194,44 @@ def _brought_back(buffer: Any, parts: int, powers: Any) -> None:
 
 
 @compiled
-def _go_back(points: Any, rows: Any, work: Work) -> None:
-    """The state at each mark, in place of its plane: the condition W = 0 of the axis, carried outwards, meets it."""
-    f, beyond = work.conditions[0], work.conditions[1]
+def _go_back(points: Any, rows: Any, axis: Any, work: Work, differs: bool, lost: Any) -> None:
+    """The state at each mark, in place of its plane: the condition of the axis, carried outwards, meets it.
+
+    That is axis . (W, Psi, M, Q) = 0; the hub angle under it is left in work.theta.
+    """
+    f, beyond, plane = work.conditions[0], work.conditions[1], work.planes[0]
+    for i in range(BLOCK):
+        work.theta[i] = axis[0, i] * plane[i] + axis[2, i] * plane[2 * BLOCK + i] - axis[3, i] * plane[3 * BLOCK + i]
     left, number = len(work.marked), len(work.kept.low)
     scale, shift, raised = np.zeros(BLOCK, np.complex128), np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
-    f[:BLOCK], f[BLOCK:] = 1.0, 0.0
+    work.lift[:], work.turn[:], work.slow[:], reach = 0.0, 0.0, True, 0.0
+    for part in range(4):
+        f[part * BLOCK : (part + 1) * BLOCK] = axis[part]
     for j in range(len(rows) - 1, -1, -1):
         if left == 0:
             return
         row = rows[j]
         shift -= work.powers[j]
+        if differs or row[ROW_KIND] != SEGMENT:
+            reach = _yield(points, row, f, work.inner[j], shift, reach, work)
         if row[ROW_KIND] == SEGMENT:
             number -= 1
+            for i in range(BLOCK):
+                work.slow[i] = work.slow[i] and work.kept.low[number, i]
             cross_back(points, row, f, beyond, scale, work.faded, work.kept, number)
             f[:] = beyond
         elif row[ROW_KIND] == MARK:
             left, mark = left - 1, int(row[NUMBER])
             work.scales[mark], work.shifts[mark] = scale, shift
             _meet(f, work.marked[mark])
+            if number < len(work.kept.low):  # of W, M and Q little may be left there
+                for i in range(BLOCK):
+                    lost[i] = lost[i] or work.watched[i]
+            else:
+                for i in range(BLOCK):
+                    state, own = work.marked[mark], math.ldexp(1.0, -shift[i])
+                    state[i] = times(reach * work.theta[i] + work.lift[i], own)
+                    state[BLOCK + i] = times(work.theta[i] + work.turn[i], own)
         else:
             _small_back(points, row, f)
         _brought_back(f, 4, raised)
@@ -219,6 +262,54 @@ def _meet(f: Any, plane: Any) -> None:
         plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i] = met(own, p)
 
 
+@compiled
+def _yield(points: Any, row: Any, f: Any, plane: Any, shift: Any, reach: float, work: Work) -> float:
+    """W - r theta and Psi - theta at the outer side of an element from those at its inner one, r from the axis, and r.
+
+    Only while all segments are slow; f and the plane at the inner side give M and Q there with all their digits.
+    """
+    if row[ROW_KIND] == MARK:
+        mark = int(row[NUMBER])
+        work.known[mark] = work.slow
+        work.yielded[mark, :BLOCK], work.yielded[mark, BLOCK:] = work.lift, work.turn
+        return reach
+    for i in range(BLOCK):
+        s, theta, lift, turn = points[i], work.theta[i], work.lift[i], work.turn[i]
+        own = f[i], f[BLOCK + i], f[2 * BLOCK + i], f[3 * BLOCK + i]
+        p = plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i]
+        _, _, M, Q = met(own, p)
+        M, Q = times(M, math.ldexp(1.0, shift[i])), times(Q, math.ldexp(1.0, shift[i]))
+        if row[ROW_KIND] == SEGMENT:
+            lift, turn = _beyond_slow(s, row, reach, theta, lift, turn, M, Q)
+        elif row[ROW_KIND] == OFFSET:
+            lift += row[LENGTH] * turn
+        elif row[ROW_KIND] == SPRING:
+            turn += row[COMPLIANCE] * reciprocal(row[STIFFNESS] + row[LOSS] * s) * M
+        work.lift[i], work.turn[i] = lift, turn
+    if row[ROW_KIND] == SEGMENT:
+        return reach + 1.0 / row[TO_W]
+    return reach + row[LENGTH] if row[ROW_KIND] == OFFSET else reach
+
+
+@inlined
+def _beyond_slow(
+    s: complex, row: Any, reach: float, theta: complex, lift: complex, turn: complex, M: complex, Q: complex
+) -> tuple[complex, complex]:
+    """W - r theta and Psi - theta at the outer end of a slow segment from the state at its inner one.
+
+    It is `compound.transition_rows` seen from the other end, where Psi and Q have the other sign, less the identity.
+    """
+    w, M, Q = row[TO_W], row[TO_M] * M, row[TO_Q] * Q
+    lift, W, Psi = w * lift, w * (reach * theta + lift), theta + turn
+    S, over_d = s * s, reciprocal(1.0 + row[DAMPING] * s)
+    aS, bS, gS = row[A] * S, row[B] * S, row[G] * S
+    z_sum, z_product = S * (row[B] + row[A] * over_d), S * (row[A] * row[B] * S + row[G]) * over_d
+    F0, F1, F2, _, F2_less_1, F3_less_1 = transition_series(z_sum, z_product)
+    lift += turn + F2_less_1 * Psi + (F3_less_1 - aS * over_d * F1) * W + over_d * (F1 * M - F0 * Q)
+    turn += (F3_less_1 - bS * F1) * Psi + over_d * ((F2 - bS * F0) * M - F1 * Q - gS * F0 * W)
+    return (lift + row[SIGMA] * (F2 - aS * over_d * F0) * Q) / w, turn
+
+
 @inlined
 def drive_at(s: complex, ends: Any, theta: complex, M: complex) -> complex:
     """The input behind a response with that hub angle and moment on the hub."""
@@ -228,7 +319,7 @@ def drive_at(s: complex, ends: Any, theta: complex, M: complex) -> complex:
 
 
 @inlined
-def _drive_terms(s: complex, segment: Any, ends: Any, theta: complex, M: complex) -> float:
+def drive_terms(s: complex, segment: Any, ends: Any, theta: complex, M: complex) -> float:
     """What the drive would be away from a pole: its two terms, and each with the other's size of motion."""
     A0, B0 = OF_ANGLE, OF_MOMENT
     S = magnitude(s * s)
@@ -240,21 +331,28 @@ def _drive_terms(s: complex, segment: Any, ends: Any, theta: complex, M: complex
 
 
 @compiled
-def fill_free(s: Any, rows: Any, ends: Any, table: Any, found: Any, lost: Any) -> None:
+def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, lost: Any) -> None:
     """Drive, scale and each output of the free response at s (1-D), a row each; whether digits are lost.
+
+    It obeys axis . (W, Psi, M, Q) = 0 on the hub's axis, W = 0 for `AXIS`; `axis` (4, n) has a column a point or one.
 
     A row of `table` is an output: its place (or -1), weights of W, Psi, M, Q there and of theta, power of s, C of the
     gauge, factor.  Digits are lost where two waves of a segment are nearly one, where an output is a small difference
-    (a deflection at low frequency), and where the drive is: there it may be a pole.
+    of what fast waves carry, and where the drive is: there it may be a pole.
     """
+    differs = False
+    for o in range(len(table)):
+        differs = differs or (table[o, 0] >= 0.0 and table[o, 5] != 0.0)
     work, values = _work(rows), np.empty((1 + len(table), BLOCK), np.complex128)
-    points, lost_here = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_)
+    points, lost_here, held = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_), np.empty((4, BLOCK))
     for first in range(0, s.size, BLOCK):
         n = min(BLOCK, s.size - first)
         points[:n] = s[first : first + n]
         points[n:] = points[0]
         _sweep(points, rows, ends, work, lost_here)
-        _go_back(points, rows, work)
+        for i in range(BLOCK):
+            held[:, i] = axis[:, min(first + min(i, n - 1), axis.shape[1] - 1)]
+        _go_back(points, rows, held, work, differs, lost_here)
         _drive(points, _innermost(rows), ends, work.planes[0], values[0], lost_here)
         for o in range(len(table)):
             _output(points, table[o], work, values[1 + o], lost_here)
@@ -279,7 +377,7 @@ def _drive(points: Any, segment: Any, ends: Any, plane: Any, drive: Any, lost: A
     for i in range(BLOCK):
         drive[i] = drive_at(points[i], ends, plane[i], plane[BLOCK + i])
     for i in range(BLOCK):
-        terms = _drive_terms(points[i], segment, ends, plane[i], plane[BLOCK + i])
+        terms = drive_terms(points[i], segment, ends, plane[i], plane[BLOCK + i])
         lost[i] = lost[i] or magnitude(drive[i]) < POLE * terms
 
 
@@ -288,7 +386,7 @@ def _output(points: Any, want: Any, work: Work, value: Any, lost: Any) -> None:
     """An output of a row of the table, at every point of a block; digits are lost where it is a small difference."""
     of_theta, power, C, unit = want[5], int(want[6]), want[7], want[8]
     for i in range(BLOCK):
-        value[i] = times(work.planes[0, i], of_theta)
+        value[i] = times(work.theta[i], of_theta)
     if want[0] >= 0.0:
         mark = int(want[0])
         states, scale, shift = work.marked[mark], work.scales[mark], work.shifts[mark]
@@ -298,8 +396,13 @@ def _output(points: Any, want: Any, work: Work, value: Any, lost: Any) -> None:
             if scale[i] != 0.0 or shift[i]:
                 decay, turn = math.ldexp(math.exp(scale[i].real), shift[i]), scale[i].imag
                 at *= complex(decay * math.cos(turn), decay * math.sin(turn))
-            lost[i] = lost[i] or (of_theta != 0.0 and magnitude(value[i] + at) < SMALL_DIFFERENCE * magnitude(value[i]))
+            size = magnitude(value[i])
             value[i] += at
+            if of_theta != 0.0 and magnitude(value[i]) < DIFFERENCE * size:
+                if work.known[mark, i]:
+                    value[i] = times(work.yielded[mark, i], want[1]) + times(work.yielded[mark, BLOCK + i], want[2])
+                else:
+                    lost[i] = lost[i] or magnitude(value[i]) < SMALL_DIFFERENCE * size
     for _ in range(power):
         for i in range(BLOCK):
             value[i] *= points[i]

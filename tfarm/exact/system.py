@@ -1,40 +1,246 @@
-"""The exact system that an arm is: one uniform link in closed form, or a chain of elements.  Above, no more is known.
+"""The exact system that an arm is: a chain of elements without dimensions, from the payload inwards.
 
-Both have `damping`, `is_undamped`, `is_real_on_axis`, `is_locked`, `at_rest`, `singular`, `transit`, `length`, `EI`,
-`input_unit` and `with_damping`, and the functions of this room take either.
+One uniform link is a chain of one segment.
+
+Payload, offset of its centre, segments with bodies and springs between them, clamp, hub radius, joint, and at last the
+drive: what the input must be for the response that is left,
+
+    input = sum of A_n s^n theta - sum of B_n s^n M_axis,
+
+with M_axis the moment that the link puts on the hub.  Torque has A = (k_theta, b, I_h + N^2 J_m), B = 1; a motor's
+voltage and a prescribed hub angle have others (see `Drive`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property, lru_cache
+from itertools import takewhile
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, Theory
+from tfarm.arm import Arm, Attachment, Link, RotarySpring, Theory
+from tfarm.records import record
 
-from .chain import ElementChain
-from .chaining import chain_of
-from .coefficients import Coefficients, coefficients
-from .outputs import Output
+from .elements import (
+    Body,
+    Drive,
+    Element,
+    Inertia,
+    Offset,
+    Place,
+    Segment,
+    Spring,
+    scaled_inertia,
+    stiffness_of,
+    uniform,
+)
 
-System = Coefficients | ElementChain
+SYSTEMS_KEPT = 64  # arms whose exact numbers are kept: one page asks for those of one arm some thousand times
 
 
-def system_of(arm: Arm, theory: Theory | None = None, wanted: Sequence[Output] = ()) -> System:
-    """The system of an arm under its own theory, or another, for certain outputs.
+@dataclass(frozen=True, kw_only=True)
+@record
+class System:
+    """An arm or rig: its elements from the payload inwards, the conditions of both ends, and the units.
 
-    Raises ParameterError for an unknown theory.
+    `gauge` is where the moment that a law feeds back is read; `radius` and `offset` of hub and payload are shares of
+    the link's `length` [m]; `EI` [N m^2] is that at the hub.
     """
+
+    elements: tuple[Element, ...]
+    tip_mass: Inertia
+    tip_inertia: Inertia
+    drive: Drive
+    radius: Fraction
+    offset: Fraction
+    gauge: Place
+    length: Fraction
+    EI: Fraction
+
+    @cached_property
+    def kept(self) -> dict[Any, Any]:
+        """What is laid out or worked out of it once (`layout.readings`), with the system and gone with it."""
+        return {}
+
+    @cached_property
+    def segments(self) -> tuple[Segment, ...]:
+        """The uniform pieces, from the outermost inwards."""
+        return tuple(each for each in self.elements if isinstance(each, Segment))
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether it is one uniform link that hub and payload are fixed to, centre to end."""
+        return len(self.elements) == 1
+
+    @property
+    def reads_hub_moment(self) -> bool:
+        """Whether the link's moment at its root is what acts on the hub: clamped on the axis, with no body there."""
+        inside = takewhile(lambda each: not isinstance(each, Segment), reversed(self.elements))
+        return not self.radius and not any(isinstance(each, Body) for each in inside)
+
+    @property
+    def damping(self) -> float:
+        """The largest C [s] of the segments."""
+        return max(each.damping for each in self.segments)
+
+    @property
+    def is_locked(self) -> bool:
+        """Whether the hub angle is the input."""
+        return not self.drive.turns
+
+    @property
+    def has_rigid_mode(self) -> bool:
+        """Whether it can turn as a rigid body: nothing is infinite and no spring holds it."""
+        free = all(isinstance(end, Fraction) for end in (self.tip_mass, self.tip_inertia)) and not self.is_locked
+        bodies = [each for each in self.elements if isinstance(each, Body)]
+        return (
+            free
+            and not self.drive.stiffness
+            and not any(each.stiffness or each.rotational_stiffness for each in bodies)
+        )
+
+    @property
+    def transit(self) -> float:
+        """The sum over the segments of (rho A l^4/(E I))^(1/4) [s^(1/2)]."""
+        return math.fsum(float(each.g) ** 0.25 for each in self.segments)
+
+    @property
+    def at_rest(self) -> int:
+        """How often the drive vanishes at s = 0: twice where the rig turns freely, once where friction resists it."""
+        if not self.has_rigid_mode:
+            return 0
+        return 1 if self.drive.friction or self.drive.back_emf else 2
+
+    @cached_property
+    def singular(self) -> tuple[float, ...]:
+        """-1/C [1/s] of each damped segment, ascending: there eigenvalues accumulate."""
+        return tuple(sorted({-1.0 / each.damping for each in self.segments if each.damping}))
+
+    @property
+    def is_undamped(self) -> bool:
+        """Whether nothing dissipates."""
+        dashpots = any(each.damping for each in self.elements if isinstance(each, Segment | Spring))
+        return not (dashpots or self.drive.friction or self.drive.back_emf)
+
+    @property
+    def is_real_on_axis(self) -> bool:
+        """Whether drive and outputs are real at s = i w, but for odd powers of s: no loss, and no inductance's lag."""
+        return self.is_undamped and not self.drive.lag
+
+    @property
+    def input_unit(self) -> Fraction:
+        """The SI value of one unit of the input."""
+        return self.drive.unit
+
+    def with_damping(self, share: float) -> System:
+        """The chain with so much of every damper: of C, of the dashpots, and of what the drive has in odd powers."""
+        parts: list[Element] = [
+            each._replace(damping=each.damping * share) if isinstance(each, Segment | Spring) else each
+            for each in self.elements
+        ]
+        drive = self.drive._replace(
+            friction=self.drive.friction * Fraction(share), back_emf=self.drive.back_emf * Fraction(share)
+        )
+        return replace(self, elements=tuple(parts), drive=drive)
+
+
+@lru_cache(maxsize=SYSTEMS_KEPT)
+def system_of(arm: Arm, theory: Theory | None = None) -> System:
+    """The system of an arm under its own theory, or another.  Raises ParameterError for an unknown theory."""
     theory = theory or arm.theory
-    is_simple = arm.is_uniform and not any(each.is_of_a_chain for each in wanted)
-    return coefficients(arm, theory) if is_simple else chain_of(arm, theory)
+    unit_length, EI = sum((Fraction(link.length) for link in arm.links), Fraction(0)), stiffness_of(arm.link)
+    translation, rotation = unit_length**3 / EI, unit_length / EI
+
+    def segment(link: Link) -> Segment:
+        numbers = uniform(link, theory)
+        length, stiffness = Fraction(link.length) / unit_length, stiffness_of(link) / EI
+        return Segment(*numbers, link.damping, length, stiffness, link.section.half_depth)
+
+    pieces: list[Element] = [Offset(Fraction(arm.payload.offset) / unit_length)] if arm.payload.offset else []
+    waiting = sorted(arm.attachments, key=lambda each: each.x)
+    position = unit_length
+    for link in reversed(arm.links):
+        start, own = position - Fraction(link.length), segment(link)
+        while waiting and Fraction(waiting[-1].x) > start:
+            each = waiting.pop()
+            if gap := position - min(Fraction(each.x), position):
+                pieces.append(own.piece(gap / Fraction(link.length)))
+                position -= gap
+            pieces.append(_body(each, translation, rotation))
+        pieces.append(own.piece((position - start) / Fraction(link.length)))
+        position = start
+    at_clamp = [_body(each, translation, rotation) for each in reversed(waiting)]
+    if not arm.hub.radius:  # on the axis nothing moves: a spring there holds nothing
+        at_clamp = [each._replace(stiffness=Fraction(0)) for each in at_clamp]
+    pieces += at_clamp
+    pieces += _springs(arm.clamp, rotation)
+    pieces += [Offset(Fraction(arm.hub.radius) / unit_length)] if arm.hub.radius else []
+    pieces += _springs(arm.joint, rotation)
+    return System(
+        elements=tuple(pieces),
+        tip_mass=scaled_inertia(arm.payload.mass, translation),
+        tip_inertia=scaled_inertia(arm.payload.inertia, rotation),
+        drive=hub_drive(arm, rotation),
+        radius=Fraction(arm.hub.radius) / unit_length,
+        offset=Fraction(arm.payload.offset) / unit_length,
+        gauge=Place(min(Fraction(arm.gauge.x) / unit_length, Fraction(1)), arm.gauge.side),
+        length=unit_length,
+        EI=EI,
+    )
+
+
+def hub_drive(arm: Arm, rotation: Fraction) -> Drive:
+    """The drive of an arm's input; `rotation` is L/EI."""
+    hub, motor, none = arm.hub, arm.motor, Fraction(0)
+    if arm.is_locked:
+        return Drive(False, none, none, none, none, none, Fraction(1))
+    inertia, friction, per_ampere, lag, back_emf = (
+        Fraction(hub.inertia),
+        Fraction(hub.friction),
+        Fraction(1),
+        none,
+        none,
+    )
+    if motor is not None:
+        N = Fraction(motor.gear_ratio)
+        inertia += N**2 * Fraction(motor.rotor_inertia)
+        friction += N**2 * Fraction(motor.rotor_friction)
+        per_ampere = Fraction(motor.gear_efficiency) * N * Fraction(motor.torque_constant)
+        back_emf = per_ampere * N * Fraction(motor.back_emf_constant) / Fraction(motor.resistance) * rotation
+        lag = Fraction(motor.inductance) / Fraction(motor.resistance)
+    per_torque = {"motor_current": 1 / per_ampere}.get(arm.input, Fraction(1))
+    if motor is not None and arm.input == "motor_voltage":
+        per_torque = Fraction(motor.resistance) / per_ampere
+    else:
+        lag = back_emf = none
+    own = inertia * rotation, friction * rotation, Fraction(hub.stiffness) * rotation
+    return Drive(True, *own, back_emf, lag, per_torque / rotation, per_ampere if motor is not None else none)
+
+
+def _body(each: Attachment, translation: Fraction, rotation: Fraction) -> Body:
+    return Body(
+        mass=Fraction(each.mass) * translation,
+        inertia=Fraction(each.inertia) * rotation,
+        stiffness=Fraction(each.stiffness) * translation,
+        rotational_stiffness=Fraction(each.rotational_stiffness) * rotation,
+    )
+
+
+def _springs(spring: RotarySpring, rotation: Fraction) -> list[Element]:
+    """The spring as an element, or nothing where it is rigid."""
+    if math.isinf(spring.stiffness):
+        return []
+    k = Fraction(spring.stiffness) * rotation
+    return [Spring(k / (1 + k), 1 / (1 + k), spring.damping)]
 
 
 def shear_flexibility(k: System, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """E I/(kappa G A L^2) at the shares x (1-D) of the length, with E I and L of the whole: W' = Psi + that Q."""
-    if isinstance(k, Coefficients):
-        return np.full(x.shape, float(k.sigma))
     inner = list(reversed(k.segments))
     edges = np.cumsum([float(each.length) for each in inner])[:-1]
     own = np.array([float(each.sigma * each.length**2 / each.stiffness) for each in inner])

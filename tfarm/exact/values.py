@@ -1,82 +1,144 @@
-"""Outputs at any s: the fused kernel where it has all digits, ball arithmetic at the few points where it has not."""
+"""Outputs at any s: the compiled sweeps where they have all digits, ball arithmetic at the few points where not."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arrays import Complex
-from tfarm.errors import ParameterError
+from tfarm.arrays import Complex, Real
+from tfarm.errors import CertificationError, ParameterError
 
-from .balls import nearest_float
-from .chain import ElementChain
-from .chain_values import expansions, free_outputs, free_slopes
-from .enclosures import decimals, enclose, slope
-from .fields import fields, from_root
-from .free import free_response, low_frequency, low_frequency_tip
-from .jets import Jet
-from .outputs import Output, unit_scale
+from .balls import Ball, State, nearest_float, point, precision, rational
+from .elements import Place
+from .layout import Layout, Readings, constant_of, readings
+from .outputs import Output
+from .series import expansions_at_zero
+from .sweep import AXIS, fill_free
 from .system import System
-from .waves import evaluate
+from .uniform import fill_ends
 
 AT_A_POLE = 4 * float(np.finfo(float).eps)  # nearer than this share of |s|, no digit of the answer can be right
 PROVEN_BITS = 60  # a little more than a float64 holds
-_ENDS = {"theta": 0, "M": 1, "Q": 2, "W": 3, "Y": 4}
-_FIELDS = {"Y": 0, "Phi": 1, "M": 2, "Q": 3}
+MOST_ENCLOSURE_BITS = 1 << 18  # of working precision: at a pole no number of them is enough
+_UPPER_HALF = np.exp(1j * np.pi * np.arange(1, 8) / 8)
+SLOPE_CIRCLE = np.r_[1.0, _UPPER_HALF, -1.0, _UPPER_HALF[::-1].conj()]  # as many points above the axis as below
+SLOPE_RADIUS = 0.3  # of that circle, of |s| over the phase of all waves: the 16th Taylor term is below 1e-17
+CLEAR_OF_SINGULAR = 0.1  # of the way to a -1/C: its radius at most
 
 
-def kernel_table(k: System, wanted: Sequence[Output]) -> NDArray[np.float64]:
-    """The outputs as `waves.evaluate` reads them: worth keeping between calls."""
-    if isinstance(k, ElementChain):
-        return np.empty((0, 4))
-    return np.array([
-        (_ENDS.get(each.quantity, 0), each.power, each.gauge, float(unit_scale(each, k))) for each in wanted
-    ])  # fmt: skip
+# ------------------------------------------------------------ the free response
 
 
-def evaluate_outputs(
-    k: System, wanted: Sequence[Output], table: NDArray[np.float64], s: Complex, x: float = 0.0
-) -> Complex:
+class Free(NamedTuple):
+    """Drive (n,) and outputs (rows, n) of the free response times e^{-scale}, and where digits are lost."""
+
+    drive: Complex
+    outputs: Complex
+    scale: Complex
+    lost: NDArray[np.bool_]
+
+
+def free_outputs(chain: System, wanted: Sequence[Output], s: Complex, x: float) -> Free:
+    """The free response at s (1-D): outputs in SI per unit of the input that the drive is."""
+    return _free(readings(chain, tuple(wanted), x), s)
+
+
+def _free(those: Readings, s: Complex) -> Free:
+    found, lost = np.empty((2 + len(those.each), s.size), complex), np.empty(s.size, bool)
+    s, layout, ends = np.ascontiguousarray(s, dtype=complex), those.layout, those.ends_table
+    if ends is not None:
+        fill_ends(s, layout.rows[layout.segment_row], layout.ends, ends, False, found, lost)
+        return Free(found[0], found[2:], found[1], lost)
+    fill_free(s, layout.rows, layout.ends, AXIS, those.table, found, lost)
+    drive = those.layout.chain.drive
+    for row, one in enumerate(those.each):
+        if one.is_current:  # the row holds theta: what is left of the input after back-EMF turns the hub
+            unit, back = float(one.unit) * s**one.power, float(drive.back_emf) * s
+            found[2 + row] = (unit * found[0] - back * found[2 + row]) / (1.0 + float(drive.lag) * s)
+    return Free(found[0], found[2:], found[1], lost)
+
+
+def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -> tuple[Free, Free]:
+    """The free response and its derivative at s (1-D), by Cauchy's integral on a circle that is right to rounding."""
+    those = readings(chain, tuple(wanted), x)
+    here = _free(those, s)
+    radius = SLOPE_RADIUS * np.maximum(abs(s), 1e-150) / np.maximum(1.0, abs(here.scale))
+    for C in {each.damping for each in chain.segments if each.damping}:
+        radius = np.minimum(radius, CLEAR_OF_SINGULAR * abs(s + 1.0 / C))
+    around = _free(those, (s[:, None] + radius[:, None] * SLOPE_CIRCLE).ravel())
+    scales = around.scale.reshape(-1, SLOPE_CIRCLE.size)
+    here = here._replace(scale=np.where(np.isfinite(here.scale), here.scale, scales[:, 0]))
+    values, slope = np.exp(scales - here.scale[:, None]), 1.0 / SLOPE_CIRCLE / radius[:, None]
+    drive, outputs = around.drive.reshape(scales.shape) * values, around.outputs.reshape(-1, *scales.shape) * values
+    if here.lost.any():  # there the values are the mean of those around, as where two waves are one
+        here = here._replace(
+            drive=np.where(here.lost, _mean(drive), here.drive),
+            outputs=np.where(here.lost, _mean(outputs), here.outputs),
+        )
+    return here, Free(_mean(drive * slope), _mean(outputs * slope), here.scale, here.lost)
+
+
+def _mean(values: Complex) -> Complex:
+    """The mean over the circle (last axis), summed so that conjugate points have conjugate means to the last bit."""
+    half = SLOPE_CIRCLE.size // 2
+    pairs = values[..., 1:half] + values[..., :half:-1]
+    return np.asarray((values[..., 0] + values[..., half] + pairs.sum(axis=-1)) / SLOPE_CIRCLE.size)
+
+
+def free_fields(
+    chain: System, s: Complex, places: Sequence[Place], axis: Real = AXIS
+) -> tuple[NDArray[Any], NDArray[Any], Complex]:
+    """W, Psi, M, Q (4, s, places) and hub angle (s,) times e^{-scale}, and scale: dimensionless.
+
+    Of the states that the payload allows those with axis . (W, Psi, M, Q) = 0 on the hub's axis: W = 0 by default.
+    """
+    layout = Layout(chain, tuple(dict.fromkeys(places)))
+    order = [layout.places.index(place) for place in places]
+    table = np.zeros((4 * len(layout.places) + 1, 9))
+    table[:, 8], table[-1, 0], table[-1, 5] = 1.0, -1.0, 1.0
+    for number in range(len(layout.places)):
+        rows = slice(4 * number, 4 * (number + 1))
+        table[rows, 0], table[rows, 1:5] = number, np.eye(4)
+    found, lost = np.empty((2 + len(table), s.size), complex), np.empty(s.size, bool)
+    fill_free(np.ascontiguousarray(s, dtype=complex), layout.rows, layout.ends, axis, table, found, lost)
+    fields = found[2:-1].reshape(len(layout.places), 4, s.size).transpose(1, 2, 0)[:, :, order]
+    return fields, found[-1], found[1]
+
+
+# ------------------------------------------------------------ outputs for a unit input
+
+
+def evaluate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float = 0.0) -> Complex:
     """Outputs (rows) for a unit input at s (1-D), SI; x is a share of the length, for outputs along the arm.
 
-    `table` is their `kernel_table`.  Raises ParameterError at a pole, naming it.
+    Raises ParameterError at a pole, naming it.
     """
-    s = np.ascontiguousarray(s)
-    values, suspects = np.empty((len(wanted), s.size), complex), np.empty(s.size, bool)
-    with np.errstate(under="ignore", over="ignore", invalid="ignore", divide="ignore"):
-        if isinstance(k, ElementChain):
-            free = free_outputs(k, wanted, s, x)
-            values, suspects = free.outputs / free.drive, free.lost
+    s, those = np.ascontiguousarray(s, dtype=complex), readings(k, tuple(wanted), x)
+    with np.errstate(all="ignore"):
+        if those.ends_table is not None:
+            values, lost = np.empty((len(wanted), s.size), complex), np.empty(s.size, bool)
+            fill_ends(
+                s, those.layout.rows[those.layout.segment_row], those.layout.ends, those.ends_table, True, values, lost
+            )
         else:
-            evaluate(s, k.kernel, table, values, suspects)
-            for row, each in ((row, each) for row, each in enumerate(wanted) if not each.is_at_end):
-                field = fields(k, s, each.share(x))[0][_FIELDS[each.quantity]]
-                values[row] = field * float(unit_scale(each, k)) * s**each.power
-                values[row] /= 1.0 + k.damping * s if each.gauge else 1.0
-    for i in np.flatnonzero(suspects | ~np.isfinite(values).all(axis=0)):
+            free = _free(those, s)
+            values, lost = free.outputs / free.drive, free.lost
+    for i in np.flatnonzero(lost | ~np.isfinite(values).all(axis=0)):
         values[:, i] = [value_with_care(k, each, complex(s[i]), x) for each in wanted]
     return values
 
 
 def differentiate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float = 0.0) -> Complex:
-    """The derivatives of the outputs (rows) with respect to s, by power series at the ends and by balls along x."""
-    values = np.empty((len(wanted), s.size), complex)
-    if isinstance(k, ElementChain):
-        return _of_chain(k, wanted, s, x)
-    with np.errstate(under="ignore", invalid="ignore", divide="ignore"):
-        free, at = free_response(k, s), Jet.variable(s, 1)
-        for row, each in enumerate(wanted):
-            if each.is_at_end:
-                numerator = free[_ENDS[each.quantity]] * _power(at, each.power) * float(unit_scale(each, k))
-                ratio = numerator / free.drive
-                values[row] = (ratio / (1.0 + k.damping * at) if each.gauge else ratio).c[1]
-    suspects = free.parallel | (s == 0) | _at_pole(free.drive, s)
-    for row, each in enumerate(wanted):
-        for i in np.nonzero(suspects | (not each.is_at_end))[0]:
-            values[row, i] = _slope_with_care(k, each, complex(s[i]), x)
+    """The derivatives of the outputs (rows) with respect to s: N'/D - N D'/D^2, by balls where digits are lost."""
+    with np.errstate(all="ignore"):
+        free, slopes = free_slopes(k, wanted, s, x)
+        values: Complex = (slopes.outputs - free.outputs * slopes.drive / free.drive) / free.drive
+    for i in np.flatnonzero(free.lost | (s == 0) | ~np.isfinite(values).all(axis=0)):
+        values[:, i] = [_slope_with_care(k, each, complex(s[i]), x) for each in wanted]
     return values
 
 
@@ -87,7 +149,7 @@ def value_with_care(k: System, wanted: Output, s: complex, x: float = 0.0) -> co
     """
     _refuse_pole(k, wanted, s, x)
     if s == 0:
-        return complex(expansion_at_zero(k, wanted, x)[2])
+        return complex(expansions_at_zero(k, [wanted], x)[0][2])
     value = nearest_float(enclose(k, wanted, s, bits=PROVEN_BITS, x=x))
     if not np.isfinite(value):
         raise ParameterError(
@@ -102,75 +164,17 @@ def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0
     return decimals(k, wanted, s, digits, x)
 
 
-def expansion_at_zero(k: System, wanted: Output, x: float = 0.0) -> tuple[float, float, float, float]:
-    """Coefficients of s^-2, s^-1, 1 and s in the output's expansion at s = 0."""
-    return expansions_at_zero(k, [wanted], x)[0]
-
-
-def expansions_at_zero(k: System, wanted: Sequence[Output], x: float = 0.0) -> list[tuple[float, float, float, float]]:
-    """The expansions at s = 0 of several outputs, from one free response."""
-    if isinstance(k, ElementChain):
-        return expansions(k, wanted, x)
-    s = Jet.variable(0.0, 7)
-    *state, drive = low_frequency(k, s)
-    order = next(n for n, coefficient in enumerate(drive.c) if coefficient != 0)
-
-    def quantity(each: Output) -> Jet:
-        constant, at = each.constant(k, x), each.share(x)
-        if constant is not None:
-            return constant * drive
-        if each.is_at_end:
-            return state[_ENDS[each.quantity]]
-        if at < 1:
-            return from_root(k, s * s, 1.0 + k.damping * s, tuple(state[:3]), at)[_FIELDS[each.quantity]]
-        return state[_ENDS["Y"]] if each.quantity == "Y" else low_frequency_tip(k, s)[_FIELDS[each.quantity] - 1]
-
-    def expand(each: Output) -> tuple[float, float, float, float]:
-        quotient = Jet((quantity(each) * _power(s, each.power)).c[: 8 - order]) / drive.shifted(order)
-        quotient = quotient / Jet((1.0 + k.damping * s).c[: 8 - order]) if each.gauge else quotient
-        series = [0.0] * (2 - order) + [float(c) * float(unit_scale(each, k)) for c in quotient.c]
-        return series[0], series[1], series[2], series[3]
-
-    return [expand(each) for each in wanted]
-
-
-def _of_chain(k: ElementChain, wanted: Sequence[Output], s: Complex, x: float) -> Complex:
-    """The derivatives of a chain's outputs: N'/D - N D'/D^2, by balls where digits are lost."""
-    with np.errstate(all="ignore"):
-        free, slopes = free_slopes(k, wanted, s, x)
-        values: Complex = (slopes.outputs - free.outputs * slopes.drive / free.drive) / free.drive
-    for i in np.flatnonzero(free.lost | (s == 0) | ~np.isfinite(values).all(axis=0)):
-        values[:, i] = [_slope_with_care(k, each, complex(s[i]), x) for each in wanted]
-    return values
-
-
-def _power(s: Any, power: int) -> Any:
-    """s^power for any kind of number."""
-    product = s if power else 1.0 + 0.0 * s
-    for _ in range(power - 1):
-        product = product * s
-    return product
-
-
-def _at_pole(drive: Jet, s: Complex) -> NDArray[np.bool_]:
-    value, slope = drive.c
-    return abs(value) < AT_A_POLE * abs(s) * abs(slope)  # both 0 where s^2 underflows: no pole there
-
-
 def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
     """Raise ParameterError if s is a pole to the last digit that a float64 holds."""
-    if wanted.constant(k, x) is not None:
+    if constant_of(k, wanted, x) is not None:
         return
     if s == 0:
-        if any(expansion_at_zero(k, wanted, x)[:2]):
+        if any(expansions_at_zero(k, [wanted], x)[0][:2]):
             raise ParameterError(key="s", value=0, remedy="a pole: the arm turns as a rigid body there; choose s != 0")
         return
-    at = np.array([s])
-    if isinstance(k, ElementChain):
-        drive = Jet([part.drive for part in free_slopes(k, (), at, 0.0)])
-    else:
-        drive = free_response(k, at).drive
-    if _at_pole(drive, at)[0]:
+    with np.errstate(all="ignore"):
+        here, slopes = free_slopes(k, (), np.array([s]), 0.0)
+    if abs(here.drive[0]) < AT_A_POLE * abs(s) * abs(slopes.drive[0]):  # both 0 where s^2 underflows: no pole there
         name = f"a natural frequency, {abs(s):.10g} rad/s" if s.real == 0 else f"an eigenvalue, {s:.10g} 1/s"
         raise ParameterError(key="s", value=s, remedy=f"a pole: {name}; the response is infinite there, move s")
 
@@ -178,5 +182,75 @@ def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
 def _slope_with_care(k: System, wanted: Output, s: complex, x: float) -> complex:
     _refuse_pole(k, wanted, s, x)
     if s == 0:
-        return complex(expansion_at_zero(k, wanted, x)[3])
+        return complex(expansions_at_zero(k, [wanted], x)[0][3])
     return nearest_float(slope(k, wanted, s, x=x))
+
+
+# ------------------------------------------------------------ enclosures: a precision that grows until it does
+
+
+def enclose(k: System, wanted: Output, s: complex, *, bits: int, x: float = 0.0) -> Ball:
+    """A ball around the output at s whose relative radius is below 2^-bits.
+
+    Raises CertificationError where no precision up to `MOST_ENCLOSURE_BITS` gives one: at a pole, or at an exact zero.
+    """
+    for working in precisions(bits):
+        with precision(working):
+            state = State(k, point(s))
+            if state.determines(wanted, x):
+                value = state.value(wanted, x)
+                if value.rel_accuracy_bits() >= bits or value.is_zero():
+                    return value
+    raise CertificationError(f"no {bits} bits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
+
+
+def slope(k: System, wanted: Output, s: complex, *, bits: int = 60, x: float = 0.0) -> Ball:
+    """dG/ds at s, by a difference so short that its error is below 2^-bits of the larger of G/s and dG/ds."""
+    step = rational(Fraction(1, 1 << (2 * bits)))
+    for working in precisions(4 * bits):
+        with precision(working):
+            here, there = State(k, point(s)), State(k, point(s) * (1 + step))
+            if here.determines(wanted, x) and there.determines(wanted, x):
+                value = here.value(wanted, x)
+                difference = (there.value(wanted, x) - value) / (step * point(s))
+                if (difference + value / point(s)).rel_accuracy_bits() >= bits or value.is_zero():
+                    return difference
+    raise CertificationError(f"no derivative at s = {s:g} 1/s: it is a pole, or too close to one")
+
+
+def decimals(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:
+    """Real and imaginary part to `digits` significant right digits each ("0" where it vanishes identically).
+
+    By symmetry G is real for real s, and without losses a function of s^2: then one of the two parts is exactly zero.
+    """
+    vanish = False, s.imag == 0  # of the real and of the imaginary part
+    if s.real == 0 != s.imag and k.is_real_on_axis:
+        vanish = wanted.power % 2 == 1, wanted.power % 2 == 0
+    for working in precisions(4 * digits):
+        with precision(working):
+            state = State(k, point(s))
+            if not state.determines(wanted, x):
+                continue
+            value = state.value(wanted, x)
+            parts = zip(vanish, (value.real, value.imag), strict=True)
+            texts = ["0.0" if is_zero else _decimal(part, digits) for is_zero, part in parts]
+            if None not in texts:
+                return str(texts[0]), str(texts[1])
+    raise CertificationError(f"no {digits} digits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
+
+
+def _decimal(part: Ball, digits: int) -> str | None:
+    """A ball rounded to so many digits, None if it does not determine them."""
+    if part.is_zero():
+        return "0.0"
+    if part.rel_accuracy_bits() < 3.33 * digits + 8:
+        return None
+    return str(part.mid().str(digits, radius=False))
+
+
+def precisions(bits: int) -> Iterator[int]:
+    """Working precisions worth trying for so many right bits, each twice the one before."""
+    working = 2 * bits + 64
+    while working < MOST_ENCLOSURE_BITS:
+        yield working
+        working *= 2

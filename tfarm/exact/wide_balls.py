@@ -6,44 +6,106 @@ Evaluated on a wide ball an expression forgets that its parts move together.  By
 
 where only the last term is taken over the wide ball, so that a step may be long.
 
-The two waves are kept apart and scaled by e^{-t}: in the form of `balls.State` a wide s would lose what products of a
-wave with itself lose by cancelling, at any precision.  Where a wave is long or both may be one, that form is taken.
+A fast segment is crossed by its two waves, kept apart and scaled by e^{-t}: in the form of `balls.Sweep` a wide s would
+lose what products of a wave with itself lose by cancelling, at any precision.  A slow one is crossed by the power
+series of its transition functions, whose tail is bounded.  Where two waves may be one, the form of `balls` is taken.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from fractions import Fraction
-from typing import Any, NamedTuple, cast
+from typing import Any
 
 import flint
 
-from .balls import Ball, State, point, rational
-from .chain import ElementChain
-from .chain_values import ChainState
-from .chain_wide import swept
-from .characteristic import FED, NO_GAINS, NUMERATORS, Gains, at_hub, unit_gains
-from .closed_form import from_waves
-from .coefficients import Coefficients, EndCondition
+from .balls import Ball, Sweep, into_own, out_of_own, point, rational, summed
+from .characteristic import FED, NO_GAINS, Gains, unit_gains
 from .compiled import python_of
+from .compound import Plane, Row, across_waves
 from .elements import Segment
+from .layout import Readings, readings
 from .system import System
 
 Series = Any  # flint.acb_series, which comes without types
 
-_separated = python_of(from_waves)
+_across_waves = python_of(across_waves)
 
 LONG_WAVE = 0.3  # |z| below which a wave is not separated from the others
 TAYLOR_TERMS = 4  # of D over a piece of a contour, the last of them over the wide ball
+SLOW_WAVES = 6.0  # |z1| + |z2| below which a segment is crossed by power series
+WIDE_TERMS = 40  # of them: of arguments up to twice that the tail is below 1e-60
+
+
+class InseparableError(Exception):
+    """Two waves of a segment may be one over this ball, or a wave has no definite square root there."""
+
+
+class WideSweep(Sweep):
+    """The sweep at a Taylor series s; `phase` is the series of t1 + t2 of all segments that waves have crossed."""
+
+    def __init__(self, layout: Any, s: Series, shortest: float) -> None:
+        self._shortest, self.phase = shortest, 0 * s
+        super().__init__(layout, s)
+
+    def _inside(self, element: Any, p: Plane) -> Plane:
+        if not isinstance(element, Segment) or self._is_slow(element):
+            return super()._inside(element, p)
+        units, (a, b, g) = element.units, element[:3]
+        S, d = self.S, self.s * element.damping + 1
+        pair = _waves(a, b, g, S, d, self._shortest)
+        if pair is None:
+            raise InseparableError
+        one, two = pair
+        gap = one[2] - two[2]
+        unit = gap * gap * d * S * g
+        if unit[0].contains(0):
+            raise InseparableError
+        inner = _across_waves(*one[:5], *two[:5], S * g, d, S * (a / d - b), into_own(p, *units))
+        self.phase = self.phase + one[5] + two[5]
+        return out_of_own([part / unit for part in inner], *units)
+
+    def _is_slow(self, segment: Any) -> bool:
+        z_sum, z_product = self._sums(segment)
+        return bool(abs(z_sum[0]).mid() + 2 * abs(z_product[0]).mid().sqrt() < SLOW_WAVES)
+
+    def _sums(self, segment: Any) -> tuple[Series, Series]:
+        a, b, g = segment[:3]
+        over_d = 1 / (self.s * segment.damping + 1)
+        return self.S * (over_d * a + b), self.S * (self.S * (a * b) + g) * over_d
+
+    def _transition(self, segment: Any) -> tuple[Row, ...]:
+        if not self._is_slow(segment):
+            raise InseparableError
+        return super()._transition(segment)
+
+    def _functions(self, z_sum: Series, z_product: Series) -> tuple[Series, ...]:
+        """F0..F3 as truncated power series, the tail added as a ball to every coefficient.
+
+        In the sum of the sizes of the coefficients, h_k of `waves` is at most (k + 1) q^k with q = |z1 + z2| +
+        |z1 z2|^(1/2), and the terms left out below sum to less than twice the first of them.
+        """
+        q = _size(z_sum) + _size(z_product).sqrt()
+        tail = (WIDE_TERMS + 1) * q**WIDE_TERMS * rational(Fraction(2, math.factorial(2 * WIDE_TERMS)))
+        if not q < WIDE_TERMS**2:  # then each term is less than half of the one before
+            raise InseparableError
+        ball = flint.acb(flint.arb(0, tail.upper()), flint.arb(0, tail.upper()))
+        terms_kept = z_sum.prec
+        rest = flint.acb_series([ball] * terms_kept, prec=terms_kept)
+        return tuple(total + rest for total in summed(z_sum, z_product, WIDE_TERMS))
+
+
+def _size(series: Series) -> Ball:
+    """The sum of the sizes of a series' coefficients."""
+    total = flint.arb(0)
+    for coefficient in series.coeffs():
+        total += abs(coefficient)
+    return total.upper() if hasattr(total, "upper") else total
 
 
 def characteristic_ball(k: System, s: Ball, gains: Gains = NO_GAINS) -> Ball:
     """D(s) enclosed, at the working precision: for points, at any s."""
-    if isinstance(k, ElementChain):
-        chain = ChainState(k, s)
-        return _law(k, gains, chain.input, [chain.numerator(each) for each in FED])
-    state = State(k, s)
-    return _closed(k, s, state.theta, state.M0, gains)
+    return _fed_back(k, Sweep(_read(k, gains).layout, s), gains)
 
 
 def characteristic_over(k: System, s: Ball, gains: Gains = NO_GAINS) -> Ball:
@@ -69,49 +131,6 @@ def tangent(k: System, m: Ball, r: Ball, gains: Gains = NO_GAINS) -> tuple[Ball,
     return None if here is None or there is None else (here[0][0], here[0][1], there[0][2])
 
 
-class End(NamedTuple):
-    """An end condition (see `EndCondition`) in balls."""
-
-    rest: Ball
-    inertia: Ball
-    force: Ball
-
-
-class Numbers(NamedTuple):
-    """The numbers of a uniform arm in balls of one working precision."""
-
-    a: Ball
-    b: Ball
-    g: Ball
-    C: Ball
-    mass: End
-    inertia: End
-    hub: End
-
-
-def _numbers(k: Coefficients) -> Numbers:
-    """Those at the working precision, made once: a contour asks for them some thousand times."""
-    key = "balls", flint.ctx.prec
-    if key not in k.kept:
-        ends = [EndCondition.of(inertia) for inertia in (k.tip_mass, k.tip_inertia, k.hub_inertia)]
-        balls = [End(*(rational(number) for number in (each.rest, each.inertia, each.force))) for each in ends]
-        k.kept[key] = Numbers(*(rational(number) for number in (k.a, k.b, k.g, k.damping)), *balls)
-    return cast("Numbers", k.kept[key])
-
-
-def _closed(k: Coefficients, s: Any, theta: Any, M0: Any, gains: Gains) -> Any:
-    """D (see `characteristic`) of a response with that hub angle and root moment, for balls and for series."""
-    numbers = _numbers(k)
-    hub = numbers.hub
-    drive = theta * (s * s * hub.inertia + hub.rest) - M0 * hub.force
-    drive = drive / hub.force if isinstance(k.hub_inertia, Fraction) else drive
-    if not any(gains):
-        return drive
-    for gain, part in zip(at_hub(gains), NUMERATORS(s, 1 / (s * numbers.C + 1), theta, M0), strict=True):
-        drive = drive + part * rational(gain) if gain else drive
-    return drive
-
-
 def _by_waves(
     k: System, at: Ball, gains: Gains, scale: Ball | None, shortest: float, terms: int
 ) -> tuple[Series, Ball] | None:
@@ -119,51 +138,27 @@ def _by_waves(
 
     None where waves may be one.
     """
-    s = flint.acb_series([at, 1], prec=terms)
-    if isinstance(k, ElementChain):
-        return _by_segments(k, s, gains, scale, shortest)
-    a, b, g, C, mass, inertia, _ = _numbers(k)
-    S, d = s * s, s * C + 1
-    pair = _waves(a, b, g, S, d, shortest)
-    if pair is None:
+    try:
+        sweep = WideSweep(_read(k, gains).layout, flint.acb_series([at, 1], prec=terms), shortest)
+        value = _fed_back(k, sweep, gains)
+    except InseparableError:
         return None
-    one, two = pair
-    ends = [S * end.inertia + end.rest for end in (mass, inertia)]
-    theta, M0, _, _ = _separated(*one[:5], *two[:5], S * g, d, ends[0], mass.force, ends[1], inertia.force)
-    t = one[5] + two[5]
-    scale = t[0] if scale is None else scale
-    gap = one[2] - two[2]
-    unit = S * d * gap * gap * g
-    if unit[0].contains(0):
-        return None
-    return _closed(k, s, theta, M0, gains) * (t - scale).exp() / unit, scale
+    scale = sweep.phase[0] if scale is None else scale
+    return value * (sweep.phase - scale).exp(), scale
 
 
-def _by_segments(
-    k: ElementChain, s: Series, gains: Gains, scale: Ball | None, shortest: float
-) -> tuple[Series, Ball] | None:
-    """`_by_waves` of a chain."""
-
-    def waves(each: Segment, S: Series, d: Series) -> tuple[tuple[Series, ...], tuple[Series, ...]] | None:
-        a, b, g = (rational(value) for value in each[:3])
-        return _waves(a, b, g, S, d, shortest)
-
-    used = [each for each, gain in zip(FED, gains, strict=True) if gain]
-    found = swept(k, s, used, waves)
-    if found is None:
-        return None
-    drive, outputs, t = found
-    every = iter(outputs)
-    value = _law(k, gains, drive, [next(every) if gain else 0 * s for gain in gains])
-    scale = t[0] if scale is None else scale
-    return value * (t - scale).exp(), scale
+def _read(k: System, gains: Gains) -> Readings:
+    """The outputs with a gain that is not 0."""
+    return readings(k, tuple(each for each, gain in zip(FED, gains, strict=True) if gain), 0.0)
 
 
-def _law(k: ElementChain, gains: Gains, drive: Any, outputs: Sequence[Any]) -> Any:
-    """drive + gains . numerators, from outputs in SI."""
-    for gain, unit, part in zip(gains, unit_gains(k), outputs, strict=True):
-        drive = drive + part * rational(gain / unit) if gain else drive
-    return drive
+def _fed_back(k: System, sweep: Sweep, gains: Gains) -> Any:
+    """drive + gains . numerators of a sweep, for balls and for series."""
+    value, used = sweep.input, iter(_read(k, gains).each)
+    for gain, unit in zip(gains, unit_gains(k), strict=True):
+        if gain:
+            value = value + sweep.output(next(used)) * rational(gain / unit)  # outputs are in SI
+    return value
 
 
 def _waves(
@@ -189,7 +184,7 @@ def _root(z: Series) -> Series | None:
 
 
 def _wave(z: Series, S: Series, d: Series, a: Ball, b: Ball, g: Ball, shortest: float) -> tuple[Series, ...] | None:
-    """c, s, z, v, e and t of one wave as `from_waves` wants them, scaled by e^{-t}."""
+    """c, s, z, v, e and t of one wave as `across_waves` wants them, scaled by e^{-t}."""
     t = _root(z) if abs(z[0]).mid() > shortest else None
     if t is None or t[0].contains(0):
         return None

@@ -17,8 +17,8 @@ from tfarm.arm import INPUTS, Arm
 from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
-from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.series import Jet
 from tfarm.response.signals import Signals
 
 from .data import Measured, Noise, in_parts

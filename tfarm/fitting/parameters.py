@@ -17,11 +17,10 @@ from tfarm.arm import INPUTS, Arm, Input
 from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError, did_you_mean
-from tfarm.exact.chain import ElementChain
-from tfarm.exact.chaining import chain_of
 from tfarm.exact.gradients import Direction, response_gradients
-from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.series import Jet
+from tfarm.exact.system import System, system_of
 from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum.scales import first_frequency
@@ -166,13 +165,13 @@ class Around:
 
     def __init__(self, arm: Arm, pairs: Sequence[tuple[Arm, ...]]) -> None:
         self.arm, self._pairs = arm, pairs
-        self._chains: dict[str, tuple[ElementChain, list[tuple[ElementChain, ElementChain]]]] = {}
+        self._chains: dict[str, tuple[System, list[tuple[System, System]]]] = {}
 
     def gradients(self, driven: str, names: tuple[str, ...], s: Complex) -> tuple[Jet, list[Jet]]:
         """Drive and signals at s, up to one factor, with their derivatives along the free numbers."""
         if driven not in self._chains:
-            pairs = [(chain_of(under_drive(a, driven)), chain_of(under_drive(b, driven))) for a, b in self._pairs]
-            self._chains[driven] = chain_of(under_drive(self.arm, driven)), pairs
+            pairs = [(system_of(under_drive(a, driven)), system_of(under_drive(b, driven))) for a, b in self._pairs]
+            self._chains[driven] = system_of(under_drive(self.arm, driven)), pairs
         chain, pairs = self._chains[driven]
         signals, own = Signals(self.arm, names), self.arm
         along = [

@@ -19,10 +19,9 @@ from tfarm.arm import Arm
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
-from tfarm.exact.chain import ElementChain
-from tfarm.exact.chain_values import beside_slow_pole
-from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.layout import constant_of
 from tfarm.exact.outputs import OUTPUTS, Output
+from tfarm.exact.series import beside_slow_pole
 from tfarm.exact.system import System
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import Modes, modes
@@ -143,7 +142,7 @@ def _beside_slow(G: TransferFunction, single: Real, table: Modes) -> tuple[Real,
     expansion, kept = G.expansion, np.ones(single.size, np.bool_)
     slowest = abs(single).min(initial=math.inf)
     first = table.natural_frequency[table.index > 0][0]
-    if isinstance(G.system, ElementChain) and G.arm.has_rigid_mode and slowest < NEXT_TO_REST * first:
+    if G.arm.has_rigid_mode and slowest < NEXT_TO_REST * first:
         expansion = np.c_[expansion[:, :2], beside_slow_pole(G.system, G.rows, G.share)]
         kept = abs(single) > slowest
     return expansion, kept
@@ -151,7 +150,7 @@ def _beside_slow(G: TransferFunction, single: Real, table: Modes) -> tuple[Real,
 
 def proper(k: System, wanted: Output, share: float) -> Output:
     """The output, if a state space of finite order can have it.  Raises ParameterError if not."""
-    if wanted.power and wanted.constant(k, share):
+    if wanted.power and constant_of(k, wanted, share):
         remedy = "a power of s times the input itself, which no state space has; ask for another output"
         raise ParameterError(key="outputs", value=wanted.name, remedy=remedy)
     if wanted.power > MOST_PROPER:
@@ -182,7 +181,6 @@ def _poles_and_residues(
         damped = branches(table)
         p, single = damped.eigenvalues[table.index > 0], np.r_[damped.single, entered(damped)]
     residues, doubtful = end_residues(k, wanted, p.ravel(), share)
-    doubtful = doubtful | (isinstance(k, Coefficients) and any(not each.is_at_end for each in wanted))
     if doubtful.any():
         residues[:, doubtful] = contour_residues(k, wanted, p.ravel()[doubtful], share)
     residues = residues.reshape(len(wanted), *p.shape)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError
-from tfarm.exact.values import expansions_at_zero
+from tfarm.exact.series import expansions_at_zero
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import modes_below
 

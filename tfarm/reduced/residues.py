@@ -2,8 +2,8 @@
 
 An output is G = N/D with N and the drive D analytic, so its residue at a simple zero p of D is N(p)/D'(p): one
 evaluation with its derivative, all eigenvalues at once.  Where hub angle or moment is a small difference there, the
-hub's own balance gives it.  Along the arm, and for double frequencies, mode shapes do it at C = 0 (residue c b,
-Meirovitch, Fundamentals of Vibrations, 2001, ch. 7) and Cauchy's integral around p at C > 0.
+hub's own balance gives it.  For double frequencies mode shapes do it at C = 0 (residue c b, Meirovitch, Fundamentals
+of Vibrations, 2001, ch. 7) and Cauchy's integral around p at C > 0.
 """
 
 from __future__ import annotations
@@ -15,19 +15,21 @@ from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
-from tfarm.exact.chain import ElementChain
-from tfarm.exact.chain_values import free_slopes
-from tfarm.exact.free import free_response
 from tfarm.exact.outputs import Output, unit_scale
 from tfarm.exact.system import System
-from tfarm.exact.values import evaluate_outputs, kernel_table
-from tfarm.exact.vector import HUB_REST, TORQUE_DIVISOR
+from tfarm.exact.values import evaluate_outputs, free_slopes
 from tfarm.spectrum import Modes
 
 CLOSE_FREQUENCIES = 1e-6  # relative gap under which two frequencies are told apart by their shapes alone
 UNIT_CIRCLE = np.exp(2j * np.pi * np.arange(32) / 32)  # of Cauchy's integral: a pole 4 radii off adds 4^-32 of its own
 POLES_AWAY = 4  # radii of its circle: how far off another pole is at least
 RADII_TRIED, RADIUS_FALLS = 9, 3  # circles after the first, each a third of the one before
+OF_SHAPES = ("theta", "W", "Y", "Phi", "M", "Q")  # quantities that a table of modes has
+AT_HUB = (  # moment and shear force of the link at the hub, and the hub's angle
+    Output(quantity="M", place="root", unit="N m", label="moment at the root"),
+    Output(quantity="Q", place="root", unit="N", label="shear at the root"),
+    Output(quantity="theta", place="root", unit="rad", label="angle of the hub"),
+)
 RADII_AGREE = 1e-11  # of the largest value on the circle: what two radii may differ by
 
 
@@ -38,46 +40,38 @@ def undamped_residues(table: Modes, wanted: Sequence[Output], k: System, x: floa
     `x` is a share of the length.
     """
     omega, powers = table.natural_frequency[table.index > 0], np.array([[each.power] for each in wanted])
-    if isinstance(k, ElementChain):
-        return np.asarray((_of_chain(k, wanted, 1j * omega, x)[0] * 2j * omega / (1j * omega) ** powers).real)
+    residues, doubtful = end_residues(k, wanted, 1j * omega, x)
+    products: Real = (residues * 2j * omega / (1j * omega) ** powers).real
     close = np.r_[False, np.diff(omega) < CLOSE_FREQUENCIES * omega[1:], False]
-    by_shapes = close[:-1] | close[1:] | any(not each.is_at_end for each in wanted)
-    products = np.empty((len(wanted), omega.size))
-    if not by_shapes.all():
-        residues, doubtful = end_residues(k, wanted, 1j * omega)
-        products[:] = (residues * 2j * omega / (1j * omega) ** powers).real
-        by_shapes |= doubtful
-    if by_shapes.any():
+    by_shapes = close[:-1] | close[1:] | doubtful
+    if by_shapes.any() and all(each.quantity in OF_SHAPES and each.side == "outer" for each in wanted):
         products[:, by_shapes] = _from_shapes(table, wanted, k, x)[:, by_shapes]
     return products
 
 
 def end_residues(k: System, wanted: Sequence[Output], p: Complex, x: float = 0.0) -> tuple[Complex, NDArray[np.bool_]]:
-    """Residues (outputs, p) of outputs at hub and tip at eigenvalues p, and where they are in doubt."""
-    if isinstance(k, ElementChain):
-        return _of_chain(k, wanted, p, x)
-    with np.errstate(all="ignore"):
-        free = free_response(k, p)
-        rest, inertia, force = k.kernel[HUB_REST:TORQUE_DIVISOR]
-        balance = rest + inertia * p * p  # balance theta = force M, and the larger side has lost digits
-        heavy = abs(balance) > force
-        theta = np.where(heavy, force * free.M.c[0] / np.where(heavy, balance, 1.0), free.theta.c[0])
-        moment = np.where(heavy, free.M.c[0], balance * free.theta.c[0] / (force or 1.0))
-        state = {"theta": theta, "M": moment, "Q": free.Q.c[0], "W": free.W.c[0], "Y": free.Y.c[0]}
-        slope = free.drive.c[1]
-        residues = np.array([
-            state.get(each.quantity, theta) * float(unit_scale(each, k)) * p**each.power
-            / (slope * (1.0 + k.damping * p) ** each.gauge)
-            for each in wanted
-        ])  # fmt: skip
-    return residues, free.parallel | ~np.isfinite(residues).all(axis=0)
+    """Residues N(p)/D'(p) (outputs, p) at eigenvalues p, and where they are in doubt.
 
-
-def _of_chain(k: ElementChain, wanted: Sequence[Output], p: Complex, x: float) -> tuple[Complex, NDArray[np.bool_]]:
-    """Residues of a chain's outputs anywhere on it, and where they are in doubt."""
+    There A theta = B M on the hub (see `tfarm.exact.system`); of the two the one on the larger side has lost digits.
+    """
     with np.errstate(all="ignore"):
-        here, slopes = free_slopes(k, wanted, p, x)
-        residues: Complex = here.outputs / slopes.drive
+        here, slopes = free_slopes(k, [*wanted, *AT_HUB], p, x)
+        residues: Complex = here.outputs[: len(wanted)] / slopes.drive
+        moment, shear, theta = (
+            row / float(unit_scale(each, k)) for row, each in zip(here.outputs[-3:], AT_HUB, strict=True)
+        )
+        A, B = (np.polyval([float(c) for c in reversed(each)], p) for each in (k.drive.of_angle, k.drive.of_moment))
+        heavy = abs(A) > abs(B)
+        balanced = {
+            "theta": np.where(heavy, (moment + float(k.radius) * shear) * B / A, theta),
+            "M": np.where(heavy | (B == 0), moment, theta * A / B),
+        }
+        for row, each in enumerate(wanted):
+            at_root = each.share(x) == 0 and (each.place == "x" or not each.gauge or k.gauge.share == 0)
+            if each.quantity == "theta" or (each.quantity == "M" and at_root and k.reads_hub_moment):
+                damper = (1.0 + k.segments[-1].damping * p) ** each.gauge
+                value = balanced[each.quantity] * float(unit_scale(each, k)) * p**each.power
+                residues[row] = value / (slopes.drive * damper)
     return residues, np.asarray(~np.isfinite(residues).all(axis=0))
 
 
@@ -110,7 +104,7 @@ def _around(
 ) -> tuple[Complex, NDArray[np.float64]]:
     """Cauchy's integral on the circles, and the largest |G| radius on each."""
     arrow = radius[:, None] * UNIT_CIRCLE
-    values = evaluate_outputs(k, wanted, kernel_table(k, wanted), (p[:, None] + arrow).ravel(), x)
+    values = evaluate_outputs(k, wanted, (p[:, None] + arrow).ravel(), x)
     values = values.reshape(len(wanted), *arrow.shape) * arrow
     return values.mean(axis=2), abs(values).max(axis=2)
 
@@ -126,7 +120,7 @@ def _from_shapes(table: Modes, wanted: Sequence[Output], k: System, x: float) ->
         if each.quantity == "theta":
             return theta
         if each.quantity in ("W", "Y"):
-            return table.shape(at) - at * theta * (each.quantity == "Y")
+            return table.shape(at) - (at + float(k.radius) * length) * theta * (each.quantity == "Y")
         if each.quantity == "Phi":
             return table.rotation(at) - theta
         return table.moment(at) if each.quantity == "M" else table.shear(at)

@@ -10,15 +10,12 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arrays import Complex
-from tfarm.exact.chain import ElementChain
-from tfarm.exact.chain_values import free_slopes, order_at_zero
-from tfarm.exact.chaining import chain_of
 from tfarm.exact.characteristic import Analytic, characteristic, deflated, off_rest
-from tfarm.exact.coefficients import Coefficients
-from tfarm.exact.free import free_response, low_frequency, low_frequency_tip, tip_response
-from tfarm.exact.jets import Jet
+from tfarm.exact.layout import constant_of
 from tfarm.exact.outputs import Output
+from tfarm.exact.series import order_at_zero
 from tfarm.exact.system import System, system_of
+from tfarm.exact.values import free_slopes
 from tfarm.records import record
 from tfarm.spectrum import flexible_frequencies
 from tfarm.spectrum.box import REAL_SHARE, Box, Function, complete
@@ -53,15 +50,15 @@ def zeros_of(arm: Arm, wanted: Output, up_to: float, x: float) -> Roots:
     One that its end condition holds constant has none but those of its power of s (at the tip: 0 throughout has none).
     """
     share = wanted.share(x)
-    k = chain_of(arm) if wanted.place == "x" else system_of(arm, wanted=[wanted])
-    constant = wanted.constant(k, share)
+    k = system_of(arm)
+    constant = constant_of(k, wanted, share)
     if constant is not None:
         at_zero = wanted.power if constant else 0
         return Roots(np.zeros(at_zero, complex), (-math.inf, math.inf, -up_to, up_to), "constant")
     order, numerator = _numerator(k, wanted, x)
     at_zero = max(0, order + wanted.power - k.at_rest)
-    neighbour = {("theta", "root"): math.inf, ("M", "root"): 0.0}.get((wanted.quantity, wanted.place))
-    neighbour = None if isinstance(k, ElementChain) and neighbour == 0.0 else neighbour
+    neighbours = {("theta", "root"): math.inf, ("M", "root"): 0.0 if arm.is_uniform else None}
+    neighbour = neighbours.get((wanted.quantity, wanted.place))
     other = arm if neighbour is None else arm.having(hub_inertia=neighbour)
     if neighbour is not None and arm.is_undamped:
         return _on_axis(flexible_frequencies(other, up_to), at_zero, up_to)
@@ -99,8 +96,6 @@ def _starts_by_sampling(numerator: Function, up_to: float) -> Complex:
 
 def _numerator(k: System, wanted: Output, x: float) -> tuple[int, Function]:
     """How often an output over its power of s vanishes at s = 0, and the function without these zeros."""
-    if isinstance(k, Coefficients):
-        return _of_one_link(k, wanted.quantity, at_tip=not wanted.is_at_end)
     base = replace(wanted.base, gauge=False)
     order = order_at_zero(k, base, x)
 
@@ -108,23 +103,6 @@ def _numerator(k: System, wanted: Output, x: float) -> tuple[int, Function]:
         s = off_rest(s)
         here, slopes = free_slopes(k, [base], s, x)
         return deflated(here.outputs[0], slopes.outputs[0], here.scale, s, order)
-
-    return order, function
-
-
-def _of_one_link(k: Coefficients, quantity: str, *, at_tip: bool) -> tuple[int, Function]:
-    """Order of the zero at s = 0 of the free response's quantity, and the quantity over s to that order."""
-    s = Jet.variable(0.0, 6)
-    names = ("Phi", "M", "Q") if at_tip else ("theta", "M", "Q", "W", "Y", "drive")
-    every = low_frequency_tip(k, s) if at_tip else low_frequency(k, s)
-    series = dict(zip(names, every, strict=True))[quantity]
-    order = next(n for n, coefficient in enumerate(series.c) if coefficient != 0)
-
-    def function(s: Complex) -> Analytic:
-        s = off_rest(s)
-        free = tip_response(k, s) if at_tip else free_response(k, s)
-        value, slope = getattr(free, quantity).c
-        return deflated(value, slope, free.scale, s, order)
 
     return order, function
 

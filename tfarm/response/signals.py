@@ -13,24 +13,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import FED_BACK, Arm
-from tfarm.arrays import Complex, Real
+from tfarm.arm import Arm
+from tfarm.arrays import Complex
 from tfarm.errors import MISSING, ParameterError
-from tfarm.exact.chain import ElementChain
-from tfarm.exact.chain_values import free_outputs, series_at_zero
-from tfarm.exact.chaining import chain_of
-from tfarm.exact.characteristic import LoopParts, float_units, loop_parts, loop_system
+from tfarm.exact.characteristic import LoopParts
 from tfarm.exact.outputs import Output
 from tfarm.exact.outputs import output as known_output
-from tfarm.exact.system import System
-from tfarm.exact.values import expansions_at_zero
+from tfarm.exact.series import expansions_at_zero
+from tfarm.exact.system import System, system_of
+from tfarm.exact.values import free_outputs
 from tfarm.records import read_only, record
-from tfarm.spectrum.scales import first_frequency
 
-RELATIVE = ("Y", "Phi")  # quantities relative to the hub: differences
-SERIES_BELOW = 3e-3  # of the slowest frequency: there as many digits are left as a series of REST_TERMS terms has
 GRIDS_KEPT = 24  # sets of points whose values are kept: memory against time, of no effect on an answer
-REST_TERMS = 8  # of that series: the next is below 1e-20 of the first
 
 
 @dataclass(frozen=True)
@@ -67,9 +61,8 @@ class Signals:
 
     @cached_property
     def system(self) -> System:
-        """The exact system that they are read from: one link in closed form where they are those at its hub."""
-        at_hub = set(self.names) <= set(FED_BACK)
-        return loop_system(self.arm) if at_hub else chain_of(self.arm)
+        """The exact system that they are read from."""
+        return system_of(self.arm)
 
     def kept(self, s: Complex) -> LoopParts:
         """`parts`, not worked out again where they were asked for lately at the same points, as of another law."""
@@ -87,11 +80,6 @@ class Signals:
     def parts(self, s: NDArray[Any]) -> LoopParts:
         """Drive (n,), numerators (signals, n) in SI per unit of the input, and scale, at s of any shape."""
         k, s = self.system, np.asarray(s, dtype=complex)
-        if not isinstance(k, ElementChain):
-            found = loop_parts(k, s)
-            rows = [FED_BACK.index(name) for name in self.names]
-            units = float_units(k).reshape(-1, *[1] * s.ndim)
-            return LoopParts(found.drive, (found.numerators * units)[rows], found.scale)
         numerators = np.empty((len(self.names), s.size), complex)
         first: LoopParts | None = None
         for share in dict.fromkeys(self.places):
@@ -101,38 +89,10 @@ class Signals:
             same = free.outputs * np.exp(free.scale - first.scale)  # a layout with more places may be scaled otherwise
             numerators[rows] = same
         assert first is not None  # there is at least one signal
-        self._mend_at_rest(s.ravel(), first.drive, numerators)
         shape = s.shape
         return LoopParts(
             first.drive.reshape(shape), numerators.reshape(len(self.names), *shape), first.scale.reshape(shape)
         )
-
-    def _mend_at_rest(self, s: Complex, drive: Complex, numerators: Complex) -> None:
-        """Numerators that are differences, relative to the hub, from their power series where s is small.
-
-        There W and x theta are nearly one, and the direct difference has lost (s/w1)^2 of its digits.
-        """
-        relative = [n for n, each in enumerate(self.outputs) if each.quantity in RELATIVE]
-        slow = np.flatnonzero(abs(s) < SERIES_BELOW * self._slowest) if relative else np.empty(0, np.int64)
-        if not slow.size:
-            return
-        for n in relative:
-            coefficients = self._series[n]
-            numerators[n, slow] = drive[slow] * np.polyval(coefficients[::-1], s[slow]) / s[slow] ** 2
-
-    @cached_property
-    def _slowest(self) -> float:
-        """A frequency [rad/s] within which the power series at rest converge."""
-        times = (self.arm.damping, self.arm.rate_loss and self.arm.turned_inertia / self.arm.rate_loss)
-        return min([first_frequency(self.arm.lossless_hub), *(1.0 / each for each in times if each)])
-
-    @cached_property
-    def _series(self) -> dict[int, Real]:
-        """Power series at rest, coefficients from s^-2 on, of outputs relative to the hub."""
-        k = chain_of(self.arm)
-        relative = [n for n, each in enumerate(self.outputs) if each.quantity in RELATIVE]
-        series = {n: series_at_zero(k, [self.outputs[n]], self.places[n], REST_TERMS) for n in relative}
-        return {n: np.array(found[0]) for n, found in series.items()}
 
     def values(self, s: NDArray[Any]) -> Complex:
         """The transfer functions (signals, ...) at s; infinite at their poles."""

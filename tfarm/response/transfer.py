@@ -15,19 +15,12 @@ from tfarm.arm.checks import number, positive, whole
 from tfarm.arrays import Complex
 from tfarm.errors import MISSING, ParameterError
 from tfarm.exact.balls import nearest_float
-from tfarm.exact.chain import ElementChain
-from tfarm.exact.chaining import chain_of
 from tfarm.exact.loads import is_load, load_of, loaded_value
 from tfarm.exact.methods import Method, Roads, by_roads, known_method, slow_values, why_no_appendix
 from tfarm.exact.outputs import Output, output
+from tfarm.exact.series import expansions_at_zero
 from tfarm.exact.system import System, system_of
-from tfarm.exact.values import (
-    differentiate_outputs,
-    digits_of,
-    evaluate_outputs,
-    expansions_at_zero,
-    kernel_table,
-)
+from tfarm.exact.values import differentiate_outputs, digits_of, evaluate_outputs
 
 from .roots import Roots, poles_of, zeros_of
 
@@ -88,9 +81,7 @@ class TransferFunction:
         if not asked:
             raise ParameterError(key="outputs", value=outputs, remedy="name at least one output")
         self.rows: tuple[Output, ...] = tuple(output(each) for each in asked)
-        # the exact system that it is read from
-        self.system: System = system_of(arm, wanted=self.rows) if self.load is None else chain_of(arm)
-        self._table = kernel_table(self.system, self.rows)
+        self.system: System = system_of(arm)  # the exact system that it is read from
         self.x = self._place(x)
 
     @property
@@ -167,7 +158,7 @@ class TransferFunction:
         )
 
     def _values(self, s: Complex) -> Complex:
-        if self.load is not None and isinstance(self.system, ElementChain):
+        if self.load is not None:
             of_load = np.empty((len(self.rows), s.size), complex)
             for row, each in enumerate(self.rows):
                 balls = (loaded_value(self.system, self.load, each, complex(at), self.share) for at in s)
@@ -176,11 +167,11 @@ class TransferFunction:
         if self.method != "closed-form":
             return slow_values(self.method, self.arm, self.system, self.rows, s, self.share)
         if s.size <= POINTS_AT_ONCE:
-            return evaluate_outputs(self.system, self.rows, self._table, s, self.share)
+            return evaluate_outputs(self.system, self.rows, s, self.share)
         values = np.empty((len(self.outputs), s.size), complex)
         for start in range(0, s.size, POINTS_AT_ONCE):
             part = slice(start, start + POINTS_AT_ONCE)
-            values[:, part] = evaluate_outputs(self.system, self.rows, self._table, s[part], self.share)
+            values[:, part] = evaluate_outputs(self.system, self.rows, s[part], self.share)
         return values
 
     def _shaped(self, values: Complex) -> Any:

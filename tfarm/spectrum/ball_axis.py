@@ -1,28 +1,23 @@
-"""An arm without damping on the imaginary axis in real ball arithmetic: D(i w), the count, and a root finder.
+"""A system without damping on the imaginary axis in real ball arithmetic: D(i w), the count, and a root finder.
 
-The steps of a chain's count are those of `tfarm.exact.chain_axis`, each sign certain or not.
+The steps of the count are those of `tfarm.exact.count`, each sign certain or not.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 import flint
 
-from tfarm.exact.balls import Ball, rational
-from tfarm.exact.chain import ElementChain
-from tfarm.exact.chain_balls import Sweep, drive_of
-from tfarm.exact.closed_form import from_waves, hub_condition, tip_conditions
-from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.balls import Ball, Sweep, into_own, out_of_own
 from tfarm.exact.compiled import python_of
 from tfarm.exact.compound import Plane, across_waves
-from tfarm.exact.elements import Element, Segment, Spring
+from tfarm.exact.elements import Segment, Spring
+from tfarm.exact.layout import Layout
 from tfarm.exact.system import System
 
-from .counting import end_row, steps_of
-
-_minors, _across_waves = python_of(from_waves), python_of(across_waves)
-_tip_conditions, _hub_condition = python_of(tip_conditions), python_of(hub_condition)
+_across_waves = python_of(across_waves)
 
 MOST_AXIS_BITS = 40_000  # of working precision: a root that needs more is double
 BITS_A_DIGIT, SPARE_BITS = 3.33, 80  # log2 10, rounded up; and beyond the digits asked for, for what cancels
@@ -63,60 +58,25 @@ def pinned_count(squares: Iterable[Ball]) -> int | None:
     return number + (travelling == 2)
 
 
-class ArmAxis:
-    """The arm on the imaginary axis in real balls, at the working precision at which it is made."""
-
-    def __init__(self, k: Coefficients) -> None:
-        self._a, self._b, self._g = rational(k.a), rational(k.b), rational(k.g)
-        rows, self._steps = steps_of(k)
-        self._rows = [[rational(number) for number in row] for row in rows]
-        self._own = [rational(number) for number in end_row(k)]
-
-    def drive(self, omega: Ball) -> Ball:
-        """D(i omega) times a positive factor."""
-        return self._drive(self._waves(omega), self._own)
-
-    def count(self, omega: Ball) -> int | None:
-        """N(omega), the rigid-body mode included; None if a sign or a half wave is not certain."""
-        waves = self._waves(omega)
-        number = pinned_count(wave[2] for wave in waves[1])
-        for row, step in zip(self._rows, self._steps, strict=True):
-            value = self._drive(waves, row)
-            if number is None or not (value > 0 or value < 0):
-                return None
-            number += step * ((number % 2 == 1) != bool(value < 0))
-        return number
-
-    def _waves(self, omega: Ball) -> tuple[Ball, tuple[tuple[Ball, ...], ...]]:
-        S = -omega * omega
-        return S, real_waves(self._a, self._b, self._g, S)
-
-    def _drive(self, waves: tuple[Ball, tuple[tuple[Ball, ...], ...]], row: list[Ball]) -> Ball:
-        S, (one, two) = waves
-        theta, M0, _, _ = _minors(*one, *two, self._g * S, flint.arb(1), *_tip_conditions(row, S))
-        return -_hub_condition(row, S, theta, M0)  # the sign of g S is minus
-
-
 class UncertainError(Exception):
     """A sign, or a number of half waves, that these balls do not determine."""
 
 
 class AxisSweep(Sweep):
-    """The sweep at s = i omega, in real balls: `s` stands for 0, `S` for -omega^2.  It counts on its way."""
+    """The sweep at s = i omega, in real balls: its s is 0, its S is -omega^2.  It counts on its way."""
 
-    def __init__(self, chain: ElementChain, omega: Ball, counting: bool) -> None:
-        self._omega, self._counting = omega, counting
-        self.number = 0
-        self._free = sum(not isinstance(end, float) for end in (chain.tip_mass, chain.tip_inertia))
-        super().__init__(chain.at(), flint.arb(0), -omega * omega)
+    def __init__(self, system: System, omega: Ball, counting: bool) -> None:
+        self._counting, self.number = counting, 0
+        self._free = sum(not isinstance(end, float) for end in (system.tip_mass, system.tip_inertia))
+        layout = system.kept.setdefault("layout", Layout(system))
+        super().__init__(layout, flint.arb(0), -omega * omega)
 
     @property
     def drive(self) -> Ball:
         """D(i omega)."""
-        drive = self.layout.chain.drive
-        return drive_of(drive, flint.arb(0), self.theta, self.M) + self.S * rational(drive.of_angle[2]) * self.theta
+        return self.input + self.S * self.numbers.of_angle[2] * self.theta
 
-    def _inside(self, element: Element, p: Plane) -> Plane:
+    def _inside(self, element: Any, p: Plane) -> Plane:
         if isinstance(element, Segment):
             return self._joined(element, p)
         p = super()._inside(element, p)
@@ -124,21 +84,19 @@ class AxisSweep(Sweep):
             self._step(p[0], 1)
         return p
 
-    def _joined(self, element: Segment, p: Plane) -> Plane:
-        w, m, q = (rational(unit) for unit in element.units)
-        own = p[0] * w, p[1] * (w * m), p[2] * m, p[3] * q, p[4] * (m * q)
-        a, b, g = (rational(number) for number in element[:3])
-        (one, two), gS = real_waves(a, b, g, self.S), self.S * g
+    def _joined(self, element: Any, p: Plane) -> Plane:
+        units, (a, b, g), S = element.units, element[:3], self.S
+        own, gS, (one, two) = into_own(p, *units), S * g, real_waves(a, b, g, S)
         gap = one[2] - two[2]
         unit = 1 / (gS * gap * gap)
-        inside = tuple(part * unit for part in _across_waves(*one, *two, gS, flint.arb(1), self.S * (a - b), own))
+        inside = tuple(part * unit for part in _across_waves(*one, *two, gS, flint.arb(1), S * (a - b), own))
         if self._counting:
             zero = flint.arb(0)
             held = (zero, zero, zero, zero, flint.arb(1))
-            r = [part * unit for part in _across_waves(*one, *two, gS, flint.arb(1), self.S * (a - b), held)]
+            r = [part * unit for part in _across_waves(*one, *two, gS, flint.arb(1), S * (a - b), held)]
             self._count_segment([one[2], two[2]], own, inside, r)
         self._free = 2
-        return inside[0] / w, inside[1] / (w * m), inside[2] / m, inside[3] / q, inside[4] / (m * q)
+        return out_of_own(inside, *units)
 
     def _count_segment(self, z: Sequence[Ball], p: Plane, q: Plane, r: Sequence[Ball]) -> None:
         outside, pinned = self.number, pinned_count(z)
@@ -168,30 +126,25 @@ class AxisSweep(Sweep):
         return self.number
 
 
-class ChainAxis:
-    """A chain on the imaginary axis in real balls, at the working precision, as `ArmAxis` is of an arm."""
+class RealAxis:
+    """A system without its damping on the imaginary axis in real balls, at the working precision."""
 
-    def __init__(self, chain: ElementChain) -> None:
-        self._chain = chain.with_damping(0.0)
+    def __init__(self, system: System) -> None:
+        self._system = system if system.is_undamped else system.with_damping(0.0)
 
     def drive(self, omega: Ball) -> Ball:
         """D(i omega) times a positive factor."""
-        return AxisSweep(self._chain, omega, counting=False).drive
+        return AxisSweep(self._system, omega, counting=False).drive
 
     def count(self, omega: Ball) -> int | None:
         """N(omega), the rigid-body mode included; None if a sign or a half wave is not certain."""
         try:
-            return AxisSweep(self._chain, omega, counting=True).released()
+            return AxisSweep(self._system, omega, counting=True).released()
         except UncertainError:
             return None
 
 
-def axis_of(k: System) -> ArmAxis | ChainAxis:
-    """The system on the imaginary axis, at the working precision."""
-    return ChainAxis(k) if isinstance(k, ElementChain) else ArmAxis(k)
-
-
-def secant(axis: ArmAxis | ChainAxis, omega: float, digits: int) -> Ball | None:
+def secant(axis: RealAxis, omega: float, digits: int) -> Ball | None:
     """The root next to omega by the secant method on midpoints; None if it does not settle close by."""
     before, now = flint.arb(omega), flint.arb(omega) * (1 + flint.arb(2) ** -SECOND_START)
     value_before = axis.drive(before).mid()

@@ -26,7 +26,7 @@ from tfarm.exact.balls import precision, rational
 from tfarm.exact.system import System
 from tfarm.records import record
 
-from .ball_axis import axis_of, axis_precisions, secant
+from .ball_axis import RealAxis, axis_precisions, secant
 
 COUNTED_AT = tuple(Fraction(*share) for share in ((1, 2), (2, 5), (3, 5), (1, 7), (6, 7)))  # of a gap: tried in turn
 COUNTING_BITS = (128, 512, 4096)  # of working precision, tried there: a count is certain unless it is on a half wave
@@ -69,7 +69,7 @@ def _bracket(k: System, omega: float, digits: int) -> tuple[Fraction, Fraction]:
     unit = Fraction(10) ** exponent
     for bits in axis_precisions(digits):
         with precision(bits):
-            axis = axis_of(k)
+            axis = RealAxis(k)
             root = secant(axis, omega, digits)
             if root is None:
                 continue
@@ -91,7 +91,7 @@ def _count_above(k: System, last: Fraction, above: float) -> tuple[int, str]:
         point = Fraction(float(last + gap * share))
         for bits in COUNTING_BITS:
             with precision(bits):
-                count = axis_of(k).count(rational(point)) if point > last else None
+                count = RealAxis(k).count(rational(point)) if point > last else None
                 if count is not None:
                     return count, repr(float(point))
     raise CertificationError(f"no proven count between {float(last):.10g} and {above:.10g} rad/s")

@@ -28,7 +28,6 @@ from tfarm.exact.characteristic import (
     quick_characteristics,
     zeros_at_origin,
 )
-from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.system import System
 from tfarm.records import record
 
@@ -325,7 +324,7 @@ class Branches:
                 lost = error
                 self._lost[key] = C, error
                 continue
-            self._met[key] = [*met, *nodes[1:]] if isinstance(k, Coefficients) else []  # one C is not all there is
+            self._met[key] = [*met, *nodes[1:]] if undamped.arm.is_uniform else []  # one C is not all there is
             return nodes[-1].zeros if C == 0 else polished(member(k), nodes[-1].zeros)
         assert lost is not None
         raise lost
@@ -383,8 +382,6 @@ def origin_of(k: System, s: complex) -> str:
     By differences: ds = -dD/D'(s).  Of -b/J and of -k/b the one of b is 1, of -R/L_a that of the lag, of a pair
     s^2 = -K^2/(J L_a) that of either 1/2; of a mode it is no more than the loss there does to its frequency.
     """
-    if isinstance(k, Coefficients):
-        return NOT_ASSIGNED
     at, found = np.array([s]), []
     here = member(k).function(at)
     for part, name in DRIVE_PARTS.items():
@@ -405,8 +402,6 @@ def entered(damped: DampedModes) -> Real:
     from scipy.optimize import brentq  # takes half a second to load, and no undamped arm comes here
 
     k = damped.undamped.system
-    if isinstance(k, Coefficients):
-        return np.empty(0)
     lowest, last = first_frequency(damped.undamped.arm), float(damped.natural_frequency.max())
     reach = TOWARD_SINGULAR / k.damping if k.damping else last
     at = -np.geomspace(min(SLOWEST * lowest, reach / 2), reach, REAL_POINTS)
@@ -429,8 +424,6 @@ def level_of(k: System) -> float:
 def single_zeros(undamped: Modes, share: float = 1.0) -> list[float]:
     """Real eigenvalues [1/s] that no flexible mode goes over into, under a share of the damping: -b/J, and -R/L_a."""
     k = undamped.system
-    if isinstance(k, Coefficients):
-        return []
     friction = float((k.drive.friction + k.drive.back_emf) * k.EI / k.length)
     turning = [-share * friction / undamped.arm.total_inertia] if k.at_rest == 1 else []
     return turning + ([-1.0 / float(k.drive.lag)] if k.drive.lag else [])

@@ -8,7 +8,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.exact.balls import precision
 from tfarm.exact.system import System
 
-from .ball_axis import axis_of, axis_precisions, secant
+from .ball_axis import RealAxis, axis_precisions, secant
 
 
 def refine(k: System, omega: float, digits: int) -> str:
@@ -19,7 +19,7 @@ def refine(k: System, omega: float, digits: int) -> str:
     """
     for bits in axis_precisions(digits):
         with precision(bits):
-            axis = axis_of(k.with_damping(0.0))
+            axis = RealAxis(k)
             root = secant(axis, omega, digits)
             if root is None:
                 continue

@@ -16,8 +16,8 @@ from tfarm.errors import ConvergenceError
 from tfarm.exact.balls import precision, rational
 from tfarm.exact.system import System
 
-from .ball_axis import axis_of
-from .counting import ChainCounter, Counter, counter_of
+from .ball_axis import RealAxis
+from .counting import Counter
 
 CLOSE_SHARE = 1e-3  # share of the mean spacing; further apart, rounding moves neither by more than a few last units
 PAIR_REACH = 4e-6  # relative width in which float64 surely has each of a close pair
@@ -38,13 +38,13 @@ def natural_frequencies(k: System, first: int, last: int) -> NDArray[np.float64]
     """
     lowest = min(first, 1 + k.has_rigid_mode)  # not the rigid body at zero: bisection would run down all exponents
     number = np.arange(max(first - 1, lowest), last + 2)  # with both neighbours: one of them may be close
-    count = counter_of(k)
+    count = Counter(k)
     omega = count.first_reaching(number, _upper_bound(count, k, int(number[-1])))
     close = np.diff(omega) * number[1:] < CLOSE_SHARE * omega[1:]
     for i in np.nonzero(np.r_[close, False] | np.r_[False, close])[0]:
         low, high = float(omega[i] * (1 - PAIR_REACH)), float(omega[i] * (1 + PAIR_REACH))
         with precision(PAIR_BITS):
-            axis = axis_of(k)
+            axis = RealAxis(k)
             while low < (middle := 0.5 * (low + high)) < high:
                 below = axis.count(rational(middle))
                 below = int(count(np.array([middle]))[0]) if below is None else below
@@ -57,10 +57,10 @@ def natural_frequencies(k: System, first: int, last: int) -> NDArray[np.float64]
 
 def count_below(k: System, omega: float) -> int:
     """How many natural frequencies lie below omega [rad/s]."""
-    return int(counter_of(k)(np.array([omega]))[0])
+    return int(Counter(k)(np.array([omega]))[0])
 
 
-def _upper_bound(count: Counter | ChainCounter, k: System, last: int) -> float:
+def _upper_bound(count: Counter, k: System, last: int) -> float:
     """A frequency above the last one wanted: the Euler-Bernoulli estimate, doubled until the count says so."""
     omega = unit = ((last + 1) * math.pi) ** 2 / k.transit**2
     while omega < HIGHEST_BOUND * unit:

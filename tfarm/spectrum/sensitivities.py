@@ -27,11 +27,10 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.arrays import Real
-from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.elements import Place, Segment
+from tfarm.exact.layout import Layout
 
-from .chain_shapes import ChainShapes
-from .shapes import Shapes
+from .shapes import AT_HUB, Shapes
 
 Doubled = dict[str, Real]  # 2 d ln w/d ln p of each mode (modes,)
 
@@ -39,38 +38,24 @@ LINK = ("length", "density", "youngs_modulus", "shear_modulus", "shear_factor", 
 PARAMETERS = (*LINK, "hub_inertia", "payload_mass", "payload_inertia")  # of every arm; a rig has more
 
 
-def arm_sensitivities(k: Coefficients, shapes: Shapes) -> dict[str, Real]:
-    """d ln w/d ln p of the uniform arm, by parameter, for each mode of `shapes`.
+def sensitivities(arm: Arm, shapes: Shapes) -> dict[str, Real]:
+    """d ln w/d ln p of the arm's own parameters, by parameter, for each mode of `shapes`.
 
-    From energies of bending, shear, its cross term; of translation, rotation, payload's two and hub.
+    All have those of the link, hub and payload (of a rig those of all segments together); "segment_1_length", ... of
+    each where there are several; "attachment_1_x", ... and the springs, rotor and offsets that it has.  A length takes
+    along what is attached to it.
     """
-    energies, sigma = [], float(k.sigma)
-    for block in shapes.blocks():
-        part = shapes.part(block.start, block.stop)
-        x, weight = part.quadrature()
-        W, Psi, M, Q = part(x)
-        tip, theta, square = part.tip(), part.theta(), part.omega**2
-        potential = (M**2 @ weight, sigma * Q**2 @ weight, (Q * (Psi + sigma * Q)) @ weight)
-        kinetic = [float(k.g) * W**2 @ weight, float(k.a) * Psi**2 @ weight]
-        for held, motion in ((k.tip_mass, tip[0]), (k.tip_inertia, tip[1]), (k.hub_inertia, theta)):
-            kinetic.append(float(held) * motion**2 if math.isfinite(held) else np.zeros_like(theta))
-        energies.append((*(energy / square for energy in potential), *kinetic))
-    *beam, mass, inertia, hub = map(np.concatenate, zip(*energies, strict=True))
-    bodies = {"hub_inertia": -hub, "payload_mass": -mass, "payload_inertia": -inertia}
-    return _halved(_of_link(*beam) | bodies)
+    parts = [_of_modes(arm, part) for part in shapes.blocks()]
+    return {name: np.concatenate([each[name] for each in parts]) / 2 + 0.0 for name in parts[0]}
 
 
-def chain_sensitivities(arm: Arm, shapes: ChainShapes) -> dict[str, Real]:
-    """d ln w/d ln p of a rig's own parameters, by parameter, for each mode of `shapes`.
-
-    A rig has those of the arm, of all segments together; "segment_1_length", ... of each where there are several;
-    "attachment_1_x", ... and the springs, rotor and offsets that it has.  A length takes along what is attached to it.
-    """
-    ends = list(accumulate(Fraction(link.length) / shapes.chain.length for link in arm.links))  # from the hub outwards
-    totals = [np.zeros((5, shapes.omega.size)) for _ in arm.links]
-    for piece, weight, at in shapes.panels():
-        terms = _densities(piece, shapes.omega[:, None], *shapes.states(at)[0])
-        totals[bisect(ends, at[0].share)] += np.array([term @ weight for term in terms])
+def _of_modes(arm: Arm, shapes: Shapes) -> Doubled:
+    ends = list(accumulate(Fraction(link.length) / shapes.system.length for link in arm.links))  # from the hub outwards
+    totals, start = [np.zeros((5, shapes.omega.size)) for _ in arm.links], Fraction(0)
+    for piece, weight, fields in shapes.panels():
+        terms = _densities(piece, shapes.omega[:, None], *fields)
+        totals[bisect(ends, start)] += np.array([term @ weight for term in terms])
+        start += piece.length
     segments = [_of_link(*total) for total in totals]
     found = {name: np.sum([each[name] for each in segments], axis=0) for name in LINK}
     found |= _hub(arm, shapes) | _payload(arm, shapes)
@@ -78,11 +63,7 @@ def chain_sensitivities(arm: Arm, shapes: ChainShapes) -> dict[str, Real]:
         found |= {f"segment_{number}_{name}": values for name, values in each.items()}
     for number in range(len(arm.attachments)):
         found |= {f"attachment_{number + 1}_{name}": values for name, values in _attachment(arm, shapes, number)}
-    return _halved(found)
-
-
-def _halved(found: Doubled) -> dict[str, Real]:
-    return {name: values / 2 + 0.0 for name, values in found.items()}
+    return found
 
 
 def _of_link(bend: Real, shear: Real, slide: Real, move: Real, turn: Real) -> Doubled:
@@ -115,11 +96,11 @@ def _densities(piece: Segment, omega: Any, W: Any, Psi: Any, M: Any, Q: Any) -> 
     )
 
 
-def _hub(arm: Arm, shapes: ChainShapes) -> Doubled:
+def _hub(arm: Arm, shapes: Shapes) -> Doubled:
     """Of hub, rotor, clamp and joint: behind the clamp the link turns by Psi - M/k, W = r times that, theta at last."""
-    chain, hub, square = shapes.chain, arm.hub, shapes.omega**2
+    chain, hub, square = shapes.system, arm.hub, shapes.omega**2
     per_rotation, theta = float(chain.length / chain.EI), shapes.theta()
-    _, Psi, M, Q = shapes.states((Place(Fraction(0), "inner"),))[0][..., 0]
+    _, Psi, M, Q = shapes.states((AT_HUB,))[0][..., 0]
     found = {"hub_inertia": -hub.inertia * per_rotation * theta**2 if not arm.is_locked else np.zeros_like(theta)}
     if not arm.clamp.is_rigid:
         found["clamp_stiffness"] = M**2 / (arm.clamp.stiffness * per_rotation) / square
@@ -137,9 +118,9 @@ def _hub(arm: Arm, shapes: ChainShapes) -> Doubled:
     return found
 
 
-def _payload(arm: Arm, shapes: ChainShapes) -> Doubled:
+def _payload(arm: Arm, shapes: Shapes) -> Doubled:
     """Of the payload: it moves by W + e Psi."""
-    chain, square = shapes.chain, shapes.omega**2
+    chain, square = shapes.system, shapes.omega**2
     W, Psi, _, Q = shapes.tip()
     motions = (("mass", chain.tip_mass, W + float(chain.offset) * Psi), ("inertia", chain.tip_inertia, Psi))
     found = {
@@ -151,16 +132,16 @@ def _payload(arm: Arm, shapes: ChainShapes) -> Doubled:
     return found
 
 
-def _attachment(arm: Arm, shapes: ChainShapes, number: int) -> Iterator[tuple[str, Real]]:
+def _attachment(arm: Arm, shapes: Shapes, number: int) -> Iterator[tuple[str, Real]]:
     """Of an attachment what it has; its place too, where the link is uniform around it and nothing else is there."""
-    each, chain, square = arm.attachments[number], shapes.chain, shapes.omega**2
+    each, chain, square = arm.attachments[number], shapes.system, shapes.omega**2
     share = min(Fraction(each.x) / chain.length, Fraction(1))
     sides = Place(share, "inner"), Place(share, "outer")
     inner, outer = shapes.states(sides)[0].transpose(2, 0, 1)
     per_motion, per_rotation = float(chain.length**3 / chain.EI), float(chain.length / chain.EI)
     joints = list(accumulate((Fraction(link.length) for link in arm.links), initial=Fraction(0)))
     if Fraction(each.x) not in joints and sum(other.x == each.x for other in arm.attachments) == 1:
-        pieces = chain.at(sides).read
+        pieces = Layout(chain, sides).read
         beyond, within = (
             _of_link(*_densities(piece, shapes.omega, *state))["length"]
             for piece, state in zip(pieces[::-1], (outer, inner), strict=True)

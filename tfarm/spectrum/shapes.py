@@ -1,8 +1,14 @@
-"""Mode shapes: the null vector of the end conditions in a basis that neither grows nor becomes parallel.
+"""Mode shapes: the free response at the natural frequencies, in float64, of unit modal mass.
 
-Where waves travel or decay appreciably each mode is a sum of four of them, two running (or decaying) from the root and
-two from the tip.  At low frequency, |z| < 6, it is carried from the root by the transition functions.
-A double frequency has two modes: its null space is taken whole and made orthogonal in the modal mass.
+At an eigenvalue the state that the axis allows (W = 0) meets the plane of the payload's states everywhere along the
+link, so the sweeps of the response give the states at both ends of every segment.  Between them each wave is what
+decays from the inner end and what decays from the outer one,
+
+    W_j(x) = P_j e^{-t_j x} + R_j e^{-t_j (1 - x)},     2 P_j = W_j(0) - t_j s_j(0),     2 R_j = W_j(1) + t_j s_j(1),
+
+with W_j' = z_j s_j, so that nothing grows or cancels; slow segments are crossed by their transition functions.
+Of a double frequency the whole plane obeys both conditions of the hub: two others pick two modes of it, which are made
+orthogonal in the modal mass.
 """
 
 from __future__ import annotations
@@ -10,210 +16,275 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from copy import copy
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from tfarm.arrays import LEAST_SIZE, Complex, Real
-from tfarm.exact.closed_form import SERIES_RADIUS, even_functions
-from tfarm.exact.coefficients import Coefficients, EndCondition
+from tfarm.arrays import Complex, Real
+from tfarm.errors import ConvergenceError
 from tfarm.exact.compiled import python_of
-from tfarm.exact.fields import Wave, free_root, from_root, tip_condition, waves
+from tfarm.exact.compound import transition_rows
+from tfarm.exact.elements import Body, Place, Segment
+from tfarm.exact.layout import kernel_row
+from tfarm.exact.system import System
+from tfarm.exact.values import free_fields
+from tfarm.exact.waves import SERIES_RADIUS, even_functions, fill_wave_numbers, transition_series
 
-_even = python_of(even_functions)
+_even, _rows, _series = python_of(even_functions), python_of(transition_rows), python_of(transition_series)
 
 GAUSS_POINTS = 16  # a panel; exact for the products of waves once a panel holds a few radians
 PANEL_WAVES = 4.0  # rad of the fastest wave in a panel: there 16 points integrate products of two to the last digit
-LEAST_PANELS = 4  # of a beam, however slow its waves: more than they need
-DOUBLE = 4e-15  # relative gap under which two frequencies are one, with two modes
+LEAST_PANELS = 2  # of a segment, however slow its waves: more than they need
+DOUBLE = 1e-15  # relative gap under which two frequencies are one, with two modes
 CLOSE_MODES = 1e-5  # relative gap under which rounding would leave two modes not quite orthogonal
 QUADRATURE_BLOCK = 2**17  # modes times points that are evaluated at once, each of 256 bytes: memory, whatever the count
 FIRST_BLOCK = 4  # modes, of which each next block has twice as many, as their panels differ: time alone
 NO_MOTION = 1e-9  # of another motion of the tip or hub: a smaller one is rounding, and has no sign
+AT_HUB, AT_TIP = Place(Fraction(0), "inner"), Place(Fraction(1))
 
 
 class Shapes:
-    """The modes of an undamped arm at its natural frequencies, dimensionless, of unit modal mass times EI/L.
+    """The modes of an undamped system at its natural frequencies, dimensionless, of unit modal mass times EI/L.
 
-    Call it with x (shares of the length, 1-D) for W, Psi, M, Q, each of shape (modes, x).
+    Call it with x (shares of the length, 1-D) for W, Psi, M, Q, each of shape (modes, x); at a joint or a body they are
+    those of its outer side.  Raises ConvergenceError for a mode without a shape of its own.
     """
 
-    def __init__(self, k: Coefficients, omega: Real) -> None:
-        self.k, self.omega = k, omega
-        S, _, gS, one, two = waves(k, 1j * omega)
-        self._S, self._gS, self._one, self._two = S.real, gS.real, one, two
-        self._low = np.maximum(abs(one.z), abs(two.z)) < SERIES_RADIUS
-        self._root = np.array(free_root(k, self._S[self._low], 1.0))
-        self._weights = self._null_vectors()
+    def __init__(self, system: System, omega: Real) -> None:
+        self.system, self.omega = system, omega
+        inner = list(reversed(system.segments))
+        edges = np.cumsum([0.0, *(float(each.length) for each in inner)])
+        self._segments, self._edges = inner, edges / edges[-1]
+        # Each mode is a sum of four responses, two of its own and two of the neighbour below that a close one is freed
+        # of: frequency, condition on the axis (`_condition`), scale and factor of each, of shape (4, modes).
+        gap = np.r_[np.inf, np.diff(omega) / omega[1:], np.inf]
+        is_first, is_second = gap[1:] < DOUBLE, gap[:-1] < DOUBLE
+        close = np.minimum(gap[1:], gap[:-1]) < CLOSE_MODES
+        left = np.array([self._at_axis(which) for which in (0, 1)])
+        best = (abs(left[1]).max(axis=0) > abs(left[0]).max(axis=0)).astype(int)  # the one of which more is left
+        Psi, M, Q = np.where(best, left[1], left[0])
+        own = np.array([Q, -Psi if system.drive.turns else -M])
+        own = np.where(is_first, [[1.0], [0.0]], np.where(is_second, [[0.0], [1.0]], own))
+        which = np.array([np.where(close, 2, best), np.full(omega.size, 3)])
+        self._factors = np.concatenate([np.where(close, own, [[1.0], [0.0]]), np.zeros((2, omega.size))])
+        self._which = np.concatenate([which, np.roll(which, 1, axis=1)])
+        self._omegas = np.array([omega, omega, np.roll(omega, 1), np.roll(omega, 1)])
+        size = free_fields(system, 1j * omega, ())[2].real  # a system that is cut has other scales
+        self._sizes = np.array([size, size, np.roll(size, 1), np.roll(size, 1)])
         self._normalise()
 
     def __call__(self, x: Real) -> Real:
+        number = np.clip(np.searchsorted(self._edges, x, side="right") - 1, 0, len(self._segments) - 1)
         result = np.empty((4, self.omega.size, x.size))
-        low, high = self._low, ~self._low
-        if low.any():
-            S, root = self._S[low, None], self._root[:, :, None]
-            Y, Phi, M, Q = from_root(self.k, S, 1.0, root, x[None, :])
-            result[:, low] = Y + x * root[0], Phi + root[0], M, Q
-        if high.any():
-            result[:, high] = np.einsum("sm,fsmx->fmx", self._weights, self._basis(x)).real
+        for n in np.unique(number):
+            here, (low, high) = number == n, self._edges[n : n + 2]
+            result[:, :, here] = self._along(int(n), np.clip((x[here] - low) / (high - low), 0.0, 1.0))
         return result
 
     def part(self, first: int, last: int) -> Shapes:
-        """The same with the modes first..last - 1 alone, as they are normalised here."""
+        """The same with the modes first..last - 1 alone."""
         part = copy(self)
-        here = slice(first, last)
-        lows = int(self._low[:first].sum()), int(self._low[:last].sum())
-        low, high = slice(*lows), slice(first - lows[0], last - lows[1])
-        part.omega, part._S, part._gS, part._low = self.omega[here], self._S[here], self._gS[here], self._low[here]
-        part._one, part._two = (Wave._make(p[here] for p in wave) for wave in (self._one, self._two))
-        part._root, part._weights = self._root[:, low], self._weights[:, high]
+        for name in ("omega", "_omegas", "_which", "_sizes", "_factors"):
+            setattr(part, name, getattr(self, name)[..., first:last])
         return part
 
-    def blocks(self) -> Iterator[slice]:
-        """Neighbouring modes, so few at a time that `quadrature` has `QUADRATURE_BLOCK` points for them in all."""
+    def blocks(self) -> Iterator[Shapes]:
+        """Parts of neighbouring modes, so few that `panels` have `QUADRATURE_BLOCK` points for them in all."""
         first = 0
         while first < self.omega.size:
             last = min(2 * first + FIRST_BLOCK, self.omega.size)
-            while last > first + 1 and (last - first) * GAUSS_POINTS * self.part(first, last).panels > QUADRATURE_BLOCK:
+            while last > first + 1 and (last - first) * self.part(first, last)._points > QUADRATURE_BLOCK:
                 last = (first + last) // 2
-            yield slice(first, last)
+            yield self.part(first, last)
             first = last
 
     def tip(self) -> Real:
         """W, Psi, M, Q of each mode at the tip, (4, modes)."""
-        return self(np.array([1.0]))[..., 0]
+        return self.states((AT_TIP,))[0][..., 0]
 
     def theta(self) -> Real:
-        """Hub angle of each mode; from the hub's own balance where its inertia leads, so that no digit is lost."""
-        root = self(np.zeros(1))[..., 0]
-        hub = EndCondition.of(self.k.hub_inertia)
-        if self.k.is_locked:
-            return np.zeros_like(self.omega)
-        inertia, force = float(hub.inertia) * self._S, float(hub.force)
-        heavy = abs(inertia) > force
-        return np.where(heavy, force * root[2] / np.where(heavy, inertia, 1.0), root[1])
+        """Hub angle of each mode, 0 of a hub that is held.
 
-    @property
-    def panels(self) -> int:
-        """Panels of 0..1 that are short against every wave of these modes."""
-        fastest = max(abs(self._one.t).max(), abs(self._two.t).max())
-        return LEAST_PANELS + math.ceil(fastest / PANEL_WAVES)
+        From the hub's own balance A theta = M where A, its inertia and spring, leads, so that no digit is lost.
+        """
+        drive = self.system.drive
+        if not drive.turns:
+            return np.zeros(self.omega.size)
+        fields, theta = self.states((AT_HUB,))
+        _, _, M, Q = fields[..., 0]
+        A = float(drive.stiffness) - float(drive.inertia) * self.omega**2
+        heavy = abs(A) > 1.0
+        return np.where(heavy, (M + float(self.system.radius) * Q) / np.where(heavy, A, 1.0), theta)
 
-    def quadrature(self) -> tuple[Real, Real]:
-        """Gauss points and weights on 0..1 for products of these modes."""
-        panels = self.panels
-        nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
-        start = np.arange(panels)[:, None]
-        return ((start + (nodes + 1) / 2) / panels).ravel(), np.tile(weights / 2 / panels, panels)
+    def masses(self) -> Real:
+        """The modal masses."""
+        return np.sum([weight @ motion**2 for weight, motion in self._moving()], axis=0)
 
     def mass_matrix(self) -> Real:
         """Modal masses (diagonal) and products of different modes, in EI/L: the identity, if all is well."""
-        W, Psi, weight, ends = self._moving()
-        mass = float(self.k.g) * (W * weight) @ W.T + float(self.k.a) * (Psi * weight) @ Psi.T
-        return mass + sum(inertia * np.outer(motion, motion) for inertia, motion in ends)
+        return np.asarray(sum((motion.T * weight) @ motion for weight, motion in self._moving()))
 
-    def masses(self) -> Real:
-        """The modal masses alone."""
-        W, Psi, weight, ends = self._moving()
-        mass = float(self.k.g) * W**2 @ weight + float(self.k.a) * Psi**2 @ weight
-        return mass + sum(inertia * motion**2 for inertia, motion in ends)
+    def states(self, places: tuple[Place, ...]) -> tuple[Real, Real]:
+        """W, Psi, M, Q (fields, modes, places) and the hub angle (modes,)."""
+        fields, theta = np.zeros((4, self.omega.size, len(places))), np.zeros(self.omega.size)
+        for row in range(len(self._factors)):
+            (used,) = np.nonzero(self._factors[row])
+            if used.size:
+                more, turned = self._raw(row, used, places)
+                fields[:, used], theta[used] = fields[:, used] + more, theta[used] + turned
+        return fields, theta
 
-    def _moving(self) -> tuple[Real, Real, Real, list[tuple[float, Real]]]:
-        """What moves: W and Psi at the points of `quadrature`, its weights; the ends' finite inertias and motions."""
-        x, weight = self.quadrature()
-        W, Psi, _, _ = self(x)
-        tip, k = self.tip(), self.k
-        ends = ((k.tip_mass, tip[0]), (k.tip_inertia, tip[1]), (k.hub_inertia, self.theta()))
-        return W, Psi, weight, [(float(inertia), motion) for inertia, motion in ends if math.isfinite(inertia)]
+    def panels(self) -> Iterator[tuple[Segment, Real, Real]]:
+        """Each segment with weights of Gauss points along it, as shares of the whole length, and W, Psi, M, Q there."""
+        nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+        for number, (each, count) in enumerate(zip(self._segments, self._counts, strict=True)):
+            shares = ((np.arange(count)[:, None] + (nodes + 1) / 2) / count).ravel()
+            yield each, np.tile(weights / 2 / count, count) * float(each.length), self._along(number, shares)
 
-    def _basis(self, x: Real) -> Complex:
-        """The four waves of the modes above the low ones, at x: shape (4 fields, 4 waves, modes, x).
+    # ------------------------------------------------------------ inside
 
-        Of each of the two wave numbers two solutions: from the root and from the tip, or even and odd in x.
-        """
-        high = np.flatnonzero(~self._low)
-        found = np.empty((2, 2, 4, high.size, x.size), complex)
-        for wave, pair in zip((self._one, self._two), found, strict=True):
-            slow = abs(wave.z[high]) < 1.0
-            for rows, solutions in ((slow, _even_and_odd), (~slow, _from_the_ends)):
-                if rows.any():
-                    part = Wave._make(each[high[rows], None] for each in wave)
-                    pair[:, :, rows] = solutions(part, self._gS[high[rows], None], x)
-        return found.reshape(4, 4, high.size, x.size).transpose(1, 0, 2, 3)
+    @property
+    def _counts(self) -> list[int]:
+        """Panels of each segment that are short against every wave of these modes."""
+        S = self.omega.max() ** 2
+        waves = [(float(each.g) * S) ** 0.25 + math.sqrt(S * float(each.a + each.b)) for each in self._segments]
+        return [LEAST_PANELS + math.ceil(each / PANEL_WAVES) for each in waves]
 
-    def _null_vectors(self) -> Complex:
-        """Weights of the four waves, (4, modes), that satisfy the four end conditions."""
-        high = ~self._low
-        S = self._S[high]
-        if not S.size:
-            return np.empty((4, 0), complex)
-        root, tip = self._basis(np.array([0.0, 1.0])).transpose(3, 0, 1, 2)
-        hub = EndCondition.of(self.k.hub_inertia)
-        tip_mass, shear, tip_inertia, moment = tip_condition(self.k, S)
-        drive = float(hub.rest) + float(hub.inertia) * S
-        rows = np.array([
-            root[0], drive * root[1] - float(hub.force) * root[2],
-            tip_mass * tip[0] + shear * tip[3], tip_inertia * tip[1] + moment * tip[2],
-        ]).transpose(2, 0, 1)  # fmt: skip
-        columns = np.maximum(abs(rows / abs(rows).max(axis=2, keepdims=True)).max(axis=1), LEAST_SIZE)
-        rows = rows / columns[:, None, :]
-        rows = rows / abs(rows).max(axis=2, keepdims=True)
-        _, _, right = np.linalg.svd(rows)
-        omega = self.omega[high]
-        second = np.r_[False, np.diff(omega) < DOUBLE * omega[1:]]  # the upper one of a double frequency
-        vectors = np.where(second[:, None], right[:, 2].conj(), right[:, 3].conj()) / columns
-        return vectors.T
+    @property
+    def _points(self) -> int:
+        return GAUSS_POINTS * sum(self._counts)
+
+    def _at_axis(self, which: int) -> Real:
+        """Psi, M and Q (3, modes) on the axis of the state that a condition leaves of the plane at each frequency."""
+        axis = self._condition(which, self.omega)
+        fields, theta, _ = free_fields(self.system, 1j * self.omega, (AT_HUB,), axis)
+        _, _, M, Q = fields[..., 0]
+        return np.array([theta, M + float(self.system.radius) * Q, Q]).real
+
+    def _condition(self, which: int, omega: Real) -> Real:
+        """The condition (4, modes) on the axis: W = 0, the hub's balance A Psi = M, or one of two for close modes."""
+        A = float(self.system.drive.stiffness) - float(self.system.drive.inertia) * omega**2
+        moment = 1.0 if self.system.drive.turns else 0.0
+        size = np.maximum(abs(A), moment) if moment else np.ones(omega.size)
+        balance = np.array([0.0 * A, A / size if moment else size, -moment / size, 0.0 * A])
+        units = np.eye(4)[:, :, None] * np.ones(omega.size)
+        return (units[0], balance, units[1] if moment else units[2], units[3])[which]
+
+    def _raw(self, row: int, modes: Any, places: tuple[Place, ...]) -> tuple[Real, Real]:
+        """States and hub angles of those modes in one of their four responses."""
+        omega, which = self._omegas[row, modes], self._which[row, modes]
+        fields, theta = np.empty((4, omega.size, len(places))), np.empty(omega.size)
+        for number in np.unique(which):
+            here, axis = which == number, self._condition(int(number), omega)
+            if here.any():
+                states, turned, scale = free_fields(self.system, 1j * omega[here], places, axis[:, here])
+                unit = np.exp(scale - self._sizes[row, modes][here]) * self._factors[row, modes][here]
+                fields[:, here], theta[here] = (states * unit[:, None]).real, (turned * unit).real  # real on the axis
+        return fields, theta
+
+    def _along(self, number: int, x: Real) -> Real:
+        """W, Psi, M, Q (4, modes, x) at the shares x of a segment, in the units of the system."""
+        segment, ends = self._segments[number], Fraction(0)
+        for each in self._segments[:number]:
+            ends += each.length
+        places = Place(ends, "outer"), Place(min(ends + segment.length, Fraction(1)), "inner")
+        units = np.array([float(each) for each in segment.units])
+        own = np.array([units[0], 1.0, units[1], units[2]])[:, None]
+        result = np.zeros((4, self.omega.size, x.size))
+        for row in range(len(self._factors)):
+            (used,) = np.nonzero(self._factors[row])
+            if used.size:
+                states, _ = self._raw(row, used, places)
+                result[:, used] += _of_segment(segment, self._omegas[row, used], states, own, x)
+        return result
+
+    def _moving(self) -> list[tuple[Real, Real]]:
+        """Inertias (n,) and the motions (n, modes) that they have: along the segments, of bodies, payload and hub."""
+        system, parts = self.system, []
+        for piece, weights, (W, Psi, _, _) in self.panels():
+            parts.append((float(piece.g * piece.stiffness / piece.length**4) * weights, W.T))
+            parts.append((float(piece.a * piece.stiffness / piece.length**2) * weights, Psi.T))
+        for share, body in self._bodies():
+            W, Psi = self.states((Place(share, "inner"),))[0][:2, :, 0]
+            parts += [(np.array([float(body.mass)]), W[None]), (np.array([float(body.inertia)]), Psi[None])]
+        W, Psi, *_ = self.tip()
+        ends = (
+            (system.tip_mass, W + float(system.offset) * Psi),
+            (system.tip_inertia, Psi),
+            (system.drive.inertia, self.theta()),
+        )
+        return parts + [(np.array([float(size)]), motion[None]) for size, motion in ends if math.isfinite(size)]
+
+    def _bodies(self) -> Iterator[tuple[Fraction, Body]]:
+        """Each body with its place."""
+        position = Fraction(1)
+        for each in self.system.elements:
+            if isinstance(each, Segment):
+                position -= each.length
+            elif isinstance(each, Body):
+                yield position, each
 
     def _normalise(self) -> None:
-        """Real phase, modes of a double frequency orthogonal, unit modal mass, tip (else its rotation) positive."""
-        parts = [self.part(block.start, block.stop) for block in self.blocks()]
-        turned = [part._weights * part._phase() for part in parts]
-        self._weights = np.concatenate([self._weights[:, :0], *turned], axis=1)
-        parts = [self.part(block.start, block.stop) for block in self.blocks()]
-        self._scale(1.0 / np.sqrt(np.concatenate([part.masses() for part in parts])))
-        self._orthogonalise()
+        """Unit modal mass, modes of close frequencies orthogonal, tip (else its rotation, else the hub) positive."""
+        if not self.omega.size:
+            return
+        with np.errstate(all="ignore"):
+            self._factors[:2] /= np.sqrt(np.concatenate([part.masses() for part in self.blocks()]))
+        lost = ~np.isfinite(self._factors).all(axis=0)
+        if lost.any():
+            worst = float(self.omega[lost][0])
+            raise ConvergenceError(f"the mode at {worst:.10g} rad/s has no shape of its own", worst, 0.0)
+        for lower in map(int, np.flatnonzero(np.diff(self.omega) < CLOSE_MODES * self.omega[1:])):
+            overlap = self.part(lower, lower + 2).mass_matrix()[0, 1]
+            self._factors[2:, lower + 1] = -overlap * self._factors[:2, lower]
+            self._factors[:, lower + 1] /= math.sqrt(self.part(lower + 1, lower + 2).masses()[0])
         tip, theta = self.tip(), self.theta()
-        motion = np.where(
-            abs(tip[0]) > NO_MOTION * abs(tip[1]), tip[0], np.where(abs(tip[1]) > NO_MOTION * abs(theta), tip[1], theta)
+        turned = np.where(abs(tip[1]) > NO_MOTION * abs(theta), tip[1], theta)
+        motion = np.where(abs(tip[0]) > NO_MOTION * abs(tip[1]), tip[0], turned)
+        self._factors = self._factors * np.where(motion < 0, -1.0, 1.0)
+
+
+def _of_segment(segment: Segment, omega: Real, ends: Real, own: Real, x: Real) -> Real:
+    """W, Psi, M, Q (4, modes, x) from the states (4, modes, 2) at inner and outer end; `own` leads to its own units."""
+    numbers = np.empty((6, omega.size), complex)
+    fill_wave_numbers(1j * omega, np.array(kernel_row(segment)), numbers)
+    inner, outer = ends[..., 0] * own, ends[..., 1] * own
+    low = np.maximum(abs(numbers[0]), abs(numbers[3])) < SERIES_RADIUS
+    result = np.empty((4, omega.size, x.size))
+    result[:, low] = _by_series(segment, omega[low], inner[:, low], x)
+    result[:, ~low] = _by_waves(segment, omega[~low], numbers[:, ~low], inner[:, ~low], outer[:, ~low], x)
+    result[:, :, x == 0.0], result[:, :, x == 1.0] = inner[..., None], outer[..., None]
+    return result / own[..., None]
+
+
+def _by_series(segment: Segment, omega: Real, inner: Real, x: Real) -> Real:
+    """W, Psi, M, Q in a slow segment's own units, carried outwards: there Psi and Q have the other sign."""
+    a, b, g, sigma = (float(each) for each in segment[:4])
+    S, outwards = -(omega[:, None] ** 2), np.array([1.0, -1.0, 1.0, -1.0])[:, None]
+    F0, F1, F2, F3, _, _ = _series(S * (a + b) * x**2, S * (a * b * S + g) * x**4)
+    rows = _rows(x**3 * F0, x**2 * F1, x * F2, F3, S, 1.0, a, b, g, sigma)
+    state = (inner * outwards)[..., None]
+    carried = [sum(entry * part for entry, part in zip(row, state, strict=True)) for row in rows]
+    return np.array(carried).reshape(4, omega.size, x.size) * outwards[..., None]
+
+
+def _by_waves(segment: Segment, omega: Real, numbers: Complex, inner: Real, outer: Real, x: Real) -> Real:
+    """W, Psi, M, Q in a fast segment's own units, of both waves."""
+    gS = -float(segment.g) * omega**2
+    pairs = (numbers[:3], numbers[3:]), (numbers[3:], numbers[:3])
+    fields: Any = np.zeros((4, omega.size, x.size), complex)
+    for (z, v, t), (other, v_other, _) in pairs:
+        (W0, s0), (W1, s1) = (
+            ((M - v_other * W) / (z - other), (Psi - v_other * Q / gS) / (z - other)) for W, Psi, M, Q in (inner, outer)
         )
-        self._scale(np.where(motion < 0, -1.0, 1.0))
-
-    def _phase(self) -> Complex:
-        """The factor of each mode of waves that makes it real."""
-        if not self._weights.size:
-            return np.empty(0, complex)
-        fields = np.einsum("sm,fsmx->fmx", self._weights, self._basis(self.quadrature()[0])[:2])
-        W = fields[0] + fields[1] / max(1.0, abs(fields[1]).max())
-        peak = np.take_along_axis(W, abs(W).argmax(axis=1)[:, None], axis=1)[:, 0]
-        return abs(peak) / peak
-
-    def _scale(self, factor: Real) -> None:
-        self._root = self._root * factor[self._low]
-        self._weights = self._weights * factor[~self._low]
-
-    def _orthogonalise(self) -> None:
-        """Gram-Schmidt in the modal mass within each pair of close or double frequencies."""
-        (pairs,) = np.nonzero(np.diff(self.omega) < CLOSE_MODES * self.omega[1:])
-        for first in map(int, pairs):
-            overlap = self.part(first, first + 2).mass_matrix()[0, 1]
-            above = first - int(self._low[: first + 1].sum())
-            self._weights[:, above + 1] -= overlap * self._weights[:, above]
-            factor = np.ones_like(self.omega)
-            factor[first + 1] = 1.0 / math.sqrt(self.part(first + 1, first + 2).masses()[0])
-            self._scale(factor)
-
-
-def _even_and_odd(wave: Wave, gS: Any, x: Real) -> Any:
-    """For a wave that hardly turns along the arm."""
-    z, v = wave.z, wave.v
-    c, s = _even(z * x**2)
-    s = x * s
-    return (c, v * s, v * c, gS * s), (z * s, v * c, v * z * s, gS * c)
-
-
-def _from_the_ends(wave: Wave, gS: Any, x: Real) -> Any:
-    """e^(-t x) and e^(-t (1 - x)), neither of which grows."""
-    v, t = wave.v, wave.t
-    from_start, from_end = np.exp(-t * x), np.exp(-t * (1 - x))
-    one = (from_start, -v / t * from_start, v * from_start, -gS / t * from_start)
-    return one, (from_end, v / t * from_end, v * from_end, gS / t * from_end)
+        slow = abs(z) < 1.0  # it hardly turns along the segment: P and R would cancel
+        z, t = (np.where(is_used, part, 1.0)[:, None] for is_used, part in ((slow, z), (~slow, t)))
+        from_inner = (W0 - t[:, 0] * s0)[:, None] / 2 * np.exp(-t * x)
+        from_outer = (W1 + t[:, 0] * s1)[:, None] / 2 * np.exp(-t * (1 - x))
+        c, s = _even(z * x**2)
+        even, odd, is_slow = W0[:, None], s0[:, None], slow[:, None]
+        W = np.where(is_slow, even * c + z * odd * x * s, from_inner + from_outer)
+        slope = np.where(is_slow, odd * c + even * x * s, (from_outer - from_inner) / t)
+        fields += np.array([W, v[:, None] * slope, v[:, None] * W, gS[:, None] * slope])
+    return np.asarray(fields.real)

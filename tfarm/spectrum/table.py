@@ -16,8 +16,6 @@ from tfarm.arrays import Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import natural_frequency, roots_near
-from tfarm.exact.chain import ElementChain
-from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.methods import (
     APPENDIX_DIGITS,
     Method,
@@ -31,10 +29,9 @@ from tfarm.exact.system import System, shear_flexibility, system_of
 from tfarm.records import record
 
 from .certify import Certificate, certify
-from .chain_shapes import ChainShapes
 from .precise import refine
 from .search import count_below, natural_frequencies
-from .sensitivities import arm_sensitivities, chain_sensitivities
+from .sensitivities import sensitivities
 from .shapes import Shapes
 
 BEYOND_DOUBLE = 20  # digits of a bracket: it is a ten-thousandth of a float64's rounding
@@ -188,12 +185,7 @@ class Modes:
         Exact (`sensitivities`).  Each parameter varies alone: Young's modulus with G held, the area with I held.  An
         infinite or zero inertia counts as zero.  A rig has entries for its own parts, and for each of its segments.
         """
-        shapes = self._shapes
-        if isinstance(shapes, ChainShapes):
-            found = chain_sensitivities(self.arm, shapes)
-        else:
-            assert isinstance(self._k, Coefficients)
-            found = arm_sensitivities(self._k, shapes)
+        found = sensitivities(self.arm, self._shapes)
         return {name: np.r_[[0.0] * self._rigid, values] for name, values in found.items()}
 
     # ------------------------------------------------------------ inside
@@ -208,9 +200,8 @@ class Modes:
         return math.sqrt(float(self._k.length / self._k.EI))
 
     @cached_property
-    def _shapes(self) -> Shapes | ChainShapes:
-        k, flexible = self._k, self.natural_frequency[self._rigid :]
-        return ChainShapes(k, flexible) if isinstance(k, ElementChain) else Shapes(k, flexible)
+    def _shapes(self) -> Shapes:
+        return Shapes(self._k, self.natural_frequency[self._rigid :])
 
     def _field(self, which: int, x: NDArray[np.float64] | float) -> Real:
         share = np.asarray(x, dtype=float) / float(self._k.length)

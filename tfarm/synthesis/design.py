@@ -24,7 +24,7 @@ from tfarm.loop.law_answers import law_answer
 from tfarm.loop.loop import Loop
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import record
-from tfarm.synthesis.judge import judges_of
+from tfarm.synthesis.judge import Judge, judges_of
 from tfarm.synthesis.minimax import LOST, ScoredPoint
 from tfarm.synthesis.objectives import OBJECTIVES
 from tfarm.synthesis.search import Search, Worst, flat_part, search
@@ -123,54 +123,76 @@ def design(
         raise ParameterError(key="objective", value=objective, remedy=remedy)
     ends = {key: (float(low), float(high)) for key, (low, high) in (ranges or {}).items()}
     box = ArmBox(arm, ends) if ends else None
-    arms, tell, chain = arms_of(arm, also, box), progress or (lambda text: None), chain_or_usual(chain)
+    arms, chain = arms_of(arm, also, box), chain_or_usual(chain)
     same_input(arms)
     bounds = {"K1": K1, "K2": K2}
     form = structure_of(structure, arm, Kp=Kp, modes=modes, period=chain.sampling.period, bounds=bounds)
     for each in arms:
         Loop(each.arm, as_law(form.record_at(form.origin)))
         check_bounds(form, each.arm)
+    tell = progress or (lambda text: None)
+    task = _Task(arm, objective, form, modes, chain, "continuous" if continuous else "sampled", tell)
+    return task.design(*for_the_worst(arms, box, task.find, task.score_on, tell))
 
-    def judges(on: Arm) -> Iterator[Any]:
-        return judges_of(on, arm, chain, objective, form, modes, continuous=continuous)
 
-    def find(named: Sequence[NamedArm]) -> _Choice:
+@dataclass(frozen=True)
+@record
+class _Task:
+    """What is asked of a design: one arm, for which slews are made, an objective, and a structure with its bounds."""
+
+    arm: Arm
+    objective: str
+    form: Structure
+    modes: int
+    chain: Chain
+    loop: LoopKind
+    tell: Tell
+
+    def judges(self, on: Arm) -> Iterator[Judge]:
+        """Judges on an arm, of ever more modes."""
+        continuous = self.loop == "continuous"
+        return judges_of(on, self.arm, self.chain, self.objective, self.form, self.modes, continuous=continuous)
+
+    def find(self, named: Sequence[NamedArm]) -> _Choice:
+        """The best law that holds on all arms.  Raises ConvergenceError where none is found."""
         nearest: ScoredPoint | None = None
-        for several in in_step([judges(each.arm) for each in named]):
+        for several in in_step([self.judges(each.arm) for each in named]):
             worst = Worst(several)
-            found = search(worst, form, tell)
+            found = search(worst, self.form, self.tell)
             nearest = min([*([nearest] if nearest else []), found.found[0]], key=itemgetter(0))
             for score, x in found.found:
                 law = found.form.record_at(x)
                 if score < LOST and all(judge.holds(law) for judge in several):
                     return _Choice(worst, found, score, x, law)
         assert nearest is not None  # there is at least one judge
-        law = form.record_at(nearest[1])
-        raise ConvergenceError(_why_none(named, form, law, None if continuous else chain), law, nearest[0])
+        law = self.form.record_at(nearest[1])
+        chain = self.chain if self.loop == "sampled" else None
+        raise ConvergenceError(_why_none(named, self.form, law, chain), law, nearest[0])
 
-    def score_on(choice: _Choice, on: Arm) -> float:
-        score = next(judges(on)).score(choice.law)
+    def score_on(self, choice: _Choice, on: Arm) -> float:
+        """What a law minimised, on another arm; inf where the loop does not hold."""
+        score = next(self.judges(on)).score(choice.law)
         return score if score < LOST else np.inf
 
-    choice, named, case = for_the_worst(arms, box, find, score_on, tell)
-    on_arms = tuple(
-        OnArm(each.name, each.numbers, judge.value(choice.law), stability(each.arm, choice.law),
-              sampled_brief(each.arm, choice.law, chain))
-        for each, judge in zip(named, choice.worst.judges, strict=True)
-    )  # fmt: skip
-    own, x = choice.search.form, choice.x
-    at_ends = own.at_ends(x)
-    return Design(
-        objective=objective, structure=structure, law=choice.law,
-        coefficients=own.fixed | dict(zip(own.names, own.coefficients(x).tolist(), strict=True)),
-        value=OBJECTIVES[objective].worst([each.value for each in on_arms]), verdict=on_arms[0].verdict,
-        bounds={each.name: each.bounds for each in own.free}, flat=flat_part(choice.worst, own, x, choice.score),
-        modes=modes, at_bound=tuple(own.names[place] for place, _ in at_ends),
-        at_limit=tuple(own.names[place] for place, end in at_ends if own.is_physical(place, end)),
-        widened=choice.search.widened, loop="continuous" if continuous else "sampled", chain=chain,
-        sampled=on_arms[0].sampled, arms=on_arms, starts=choice.search.starts, agreed=choice.search.agreed,
-        worst_case=case,
-    )  # fmt: skip
+    def design(self, choice: _Choice, named: Sequence[NamedArm], case: WorstCase) -> Design:
+        """The record of a law that was chosen for these arms."""
+        law, x, own = choice.law, choice.x, choice.search.form
+        on_arms = tuple(
+            OnArm(each.name, each.numbers, judge.value(law), stability(each.arm, law),
+                  sampled_brief(each.arm, law, self.chain))
+            for each, judge in zip(named, choice.worst.judges, strict=True)
+        )  # fmt: skip
+        at_ends = own.at_ends(x)
+        return Design(
+            objective=self.objective, structure=own.name, law=law,
+            coefficients=own.fixed | dict(zip(own.names, own.coefficients(x).tolist(), strict=True)),
+            value=OBJECTIVES[self.objective].worst([each.value for each in on_arms]), verdict=on_arms[0].verdict,
+            bounds={each.name: each.bounds for each in own.free}, flat=flat_part(choice.worst, own, x, choice.score),
+            modes=self.modes, at_bound=tuple(own.names[place] for place, _ in at_ends),
+            at_limit=tuple(own.names[place] for place, end in at_ends if own.is_physical(place, end)),
+            widened=choice.search.widened, loop=self.loop, chain=self.chain, sampled=on_arms[0].sampled, arms=on_arms,
+            starts=choice.search.starts, agreed=choice.search.agreed, worst_case=case,
+        )  # fmt: skip
 
 
 def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Chain | None) -> str:

@@ -11,13 +11,15 @@ clamped inner end allows at the joint, r_PsiQ p_WPsi - r_WPsi p_PsiQ where W is 
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .axis import half_waves, real_functions
-from .chain import (
+from .compiled import compiled, inlined
+from .compound import across_rows, across_waves, end_plane, inside_body, inside_offset, inside_spring, transition_rows
+from .layout import (
     BODY,
     COMPLIANCE,
     GROUND,
@@ -37,11 +39,7 @@ from .chain import (
     TURNING_GROUND,
     Layout,
 )
-from .closed_form import SERIES_RADIUS, tip_conditions, transition_series
-from .compiled import compiled, inlined
-from .compound import across_rows, across_waves, end_plane, inside_body, inside_offset, inside_spring, transition_rows
-from .dispersion import dispersion
-from .vector import SIGMA, A, B, G
+from .waves import SERIES_RADIUS, SIGMA, A, B, G, dispersion, even_functions, tip_conditions, transition_series
 
 FREE_MOTIONS = 12  # where the vector of ends says how many motions the payload leaves the tip
 
@@ -143,3 +141,23 @@ def bisect_chain(number: Any, rows: Any, ends: Any, low: Any, high: Any) -> None
                 high[i] = middle
             else:
                 low[i] = middle
+
+
+@inlined
+def half_waves(z: complex, t: complex, dt: complex) -> int:
+    """How many whole half waves fit strictly inside the length: n pi < k, for a travelling wave e^{i k x}."""
+    return max(0, math.ceil((abs(t.imag) + math.copysign(1.0, t.imag) * dt.imag) / math.pi) - 1) if z.real < 0.0 else 0
+
+
+@inlined
+def real_functions(z: float, t: complex, dt: complex) -> tuple[float, float, float]:
+    """c, S, e of `compound.across_waves` for real z: scaled where it decays, plain where it travels."""
+    if abs(z) < 1.0:
+        c, s = even_functions(z)
+        return c, s, 1.0
+    if z > 0.0:
+        e = math.exp(-t.real) * (1.0 - dt.real)
+        return 0.5 * (1.0 + e * e), 0.5 * (1.0 - e * e) / (t.real + dt.real), e
+    k, dk = t.imag, dt.imag
+    cosine, sine = math.cos(k), math.sin(k)
+    return cosine - sine * dk, (sine + cosine * dk) / (k + dk), 1.0
