@@ -10,7 +10,7 @@ import tfarm
 from tfarm.arm import HubFeedback
 from tfarm.loop.locus import Locus, locus
 from tfarm.loop.reduced_locus import open_loop, reduced_locus
-from tfarm.spectrum.enclose import enclosed
+from tfarm.spectrum.proofs import enclosed
 
 from .reference import Complex
 from .rows import Row, Target

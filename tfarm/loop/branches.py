@@ -20,8 +20,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import damped_modes, modes
-from tfarm.spectrum.continuation import Node, follow, through_nodes
-from tfarm.spectrum.correction import corrected
+from tfarm.spectrum.continuation import Node, corrected, follow, through_nodes
 from tfarm.spectrum.damped import COMPANY, single_zeros
 from tfarm.spectrum.scales import rate_unit
 

@@ -24,8 +24,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
-from tfarm.spectrum.continuation import follow
-from tfarm.spectrum.correction import Member, corrected
+from tfarm.spectrum.continuation import Member, corrected, follow
 
 from .branches import MAY_PASS_ORIGIN, NOBODY, Stretch, followed, ordered
 from .crossings import BranchCrossing, branch_crossings, in_words

@@ -15,7 +15,7 @@ from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, gains_of, loop_system, quick_characteristics, zeros_at_origin
 from tfarm.exact.system import System
 from tfarm.records import record
-from tfarm.spectrum.correction import Member
+from tfarm.spectrum.continuation import Member
 
 from .lines import NO_FEEDBACK, Line
 from .loop import Loop
