@@ -54,7 +54,8 @@ def test_an_arm_keeps_nothing_itself():
 
 def test_each_timed_call_works_out_all_that_the_first_does(bench):
     """Counted where the work is: the undamped frequencies are searched for anew at every call."""
-    searched = next(one for name, one in bench.caches.caches().items() if name.startswith("tfarm.spectrum.search."))
+    caches = bench.caches.caches()
+    searched = next(one for name, one in caches.items() if name.startswith("tfarm.spectrum.frequencies."))
     seen = []
 
     def call():
@@ -70,7 +71,7 @@ def test_each_timed_call_works_out_all_that_the_first_does(bench):
 
 def test_a_call_that_a_cache_answers_is_refused(bench, monkeypatch):
     kept = cache(lambda: tfarm.modes(ARM, 20))
-    with pytest.raises(bench.caches.AnsweredByCacheError, match=r"tfarm\.spectrum\.search"):
+    with pytest.raises(bench.caches.AnsweredByCacheError, match=r"tfarm\.spectrum\.frequencies"):
         bench.timing.interleaved({"one that remembers": kept}, 2)
     bench.timing.interleaved({"one that remembers": kept}, 2, warm=True)
     bench.caches.empty()

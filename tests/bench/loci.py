@@ -12,7 +12,7 @@ from tfarm.exact.characteristic import gains_of
 from tfarm.loop.locus import Locus, locus
 from tfarm.loop.loop import Loop
 from tfarm.loop.reduced_locus import open_loop, reduced_locus
-from tfarm.spectrum.enclose import enclosed
+from tfarm.spectrum.proofs import enclosed
 
 from .reference import Complex
 from .rows import Row, Target

@@ -21,7 +21,7 @@ from tfarm.dsp import Actuator, Chain, Sampling, Simulator, pulse_transfer, scen
 from tfarm.dsp.plant import is_analog
 from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.reduced.sensed import sensed_model
+from tfarm.reduced.conversions import sensed_model
 from tfarm.response.signals import Signals
 from tfarm.spectrum.scales import first_frequency
 

@@ -31,7 +31,7 @@ from tfarm.dsp.edges import figure, most_modes, shown_windows, whole_loop
 from tfarm.dsp.sampled import resized
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum import continuation, damped, modes
-from tfarm.spectrum.complete_box import TOWARD_SINGULAR
+from tfarm.spectrum.box import TOWARD_SINGULAR
 from tfarm.spectrum.damped import damped_modes
 
 

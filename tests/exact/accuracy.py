@@ -24,7 +24,7 @@ from tfarm.exact.layout import readings
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exact.system import system_of
 from tfarm.exact.values import free_outputs
-from tfarm.spectrum.search import natural_frequencies
+from tfarm.spectrum.frequencies import natural_frequencies
 
 BOUND = 1e-14
 UNKNOWN = ("strain", "current")  # a random section has no depth, a random rig no motor

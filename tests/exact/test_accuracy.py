@@ -27,7 +27,7 @@ from tests.test_transition import rig
 from tests.transition import response
 from tfarm.exact import balls
 from tfarm.exact.system import system_of
-from tfarm.spectrum.search import count_below, natural_frequencies
+from tfarm.spectrum.frequencies import count_below, natural_frequencies
 
 
 def assert_accurate(points):

@@ -28,7 +28,7 @@ from tfarm.exact.sweep import AXIS, fill_free
 from tfarm.exact.system import system_of
 from tfarm.exact.uniform import fill_ends
 from tfarm.exact.values import free_fields
-from tfarm.spectrum.search import natural_frequencies
+from tfarm.spectrum.frequencies import natural_frequencies
 
 EPS = np.finfo(float).eps
 LOST = 1e-13  # error over 1 + condition: 20 times what 5,000 rigs of `accuracy` have at most

@@ -25,7 +25,7 @@ from tfarm.loop.poles import closed_loop_poles
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import winding_number
 from tfarm.spectrum.damped import member
-from tfarm.spectrum.enclose import proven_count
+from tfarm.spectrum.proofs import proven_count
 
 PROVEN = 20
 STEP = 0.5  # rad: longer steps of the phase are halved

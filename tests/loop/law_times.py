@@ -24,7 +24,7 @@ from tfarm.dsp.verdict import sampled, sampled_law_answer
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.answers import margins_answer
 from tfarm.loop.margins import margins
-from tfarm.reduced.sensed import closed, sensed_model
+from tfarm.reduced.conversions import closed, sensed_model
 from tfarm.response.signals import Signals
 from tfarm.tables.files import to_json
 

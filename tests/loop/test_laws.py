@@ -21,7 +21,7 @@ from tfarm.loop.margins import loop_margins
 from tfarm.loop.poles import closed_loop_poles, poles_below
 from tfarm.loop.stability import stability
 from tfarm.loop.theorem import definite, is_hurwitz, on_axis, polynomial, signs_of
-from tfarm.reduced.sensed import sensed_model
+from tfarm.reduced.conversions import sensed_model
 from tfarm.response.signals import Signals
 
 LAB, BARE, RIG = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))

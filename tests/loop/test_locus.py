@@ -22,7 +22,7 @@ from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.spectrum.damped import damped_modes
-from tfarm.spectrum.enclose import enclosed
+from tfarm.spectrum.proofs import enclosed
 
 EPS = np.finfo(float).eps
 LAB, PAPER, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))

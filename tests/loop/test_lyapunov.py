@@ -16,7 +16,7 @@ from tfarm.loop.loop import Loop
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.poles import closed_loop_poles, poles_below
 from tfarm.spectrum import modes_below
-from tfarm.spectrum.enclose import enclosed
+from tfarm.spectrum.proofs import enclosed
 
 ARM = tfarm.load("sasaki2012")
 LAB = tfarm.load("sasaki2012-lab")

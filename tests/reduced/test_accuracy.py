@@ -9,7 +9,14 @@ import tfarm
 from tests.reduced.errors import measure
 from tests.shared import thinned
 from tfarm.reduced import modal_model, reduce
-from tfarm.reduced.accuracy import EXACT_ROUNDING, FOUND_TO_WORST, Ruler, axis_slope, distance, frequencies_around
+from tfarm.reduced.partial_fractions import (
+    EXACT_ROUNDING,
+    FOUND_TO_WORST,
+    Ruler,
+    axis_slope,
+    distance,
+    frequencies_around,
+)
 
 
 @pytest.fixture(scope="module")

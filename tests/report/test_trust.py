@@ -27,8 +27,8 @@ from tfarm.report.trust_proofs import (
     shared_digits,
     written_proofs,
 )
-from tfarm.response import accuracy
-from tfarm.response.accuracy import worst_error
+from tfarm.response import frequency
+from tfarm.response.frequency import worst_error
 
 ARM = tfarm.load("stocky-steel")
 BRACKET = ("71.50568246689014371", "71.505682466890143711")
@@ -147,7 +147,7 @@ def test_the_accuracy_is_measured_and_a_wrong_digit_would_show(proof, monkeypatc
             return self.G(s) * (1 + 1e-9)
 
     exact = tfarm.transfer
-    monkeypatch.setattr(accuracy, "transfer", Off)
+    monkeypatch.setattr(frequency, "transfer", Off)
     assert 1e-10 < worst_error(ARM, "root_moment", proof.band) <= 1e-9
 
 

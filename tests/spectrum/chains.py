@@ -21,7 +21,7 @@ from tests.survey import Finding
 from tests.transition import determinant
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.spectrum.damped import damped_modes
-from tfarm.spectrum.search import count_below
+from tfarm.spectrum.frequencies import count_below
 
 MODES = 20
 AGREED = 1e-7  # of the elements with a frequency: it is a matter of which, not of digits

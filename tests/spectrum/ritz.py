@@ -22,8 +22,7 @@ from tfarm.arm import THEORIES
 from tfarm.exact import balls
 from tfarm.exact.layout import Layout
 from tfarm.exact.system import system_of
-from tfarm.spectrum.counting import Counter
-from tfarm.spectrum.search import count_below, natural_frequencies
+from tfarm.spectrum.frequencies import Counter, count_below, natural_frequencies
 
 EPS = np.finfo(float).eps
 UNITS = (1, 2, 4, 8)  # in the last place, between which a sign change is sought

@@ -13,8 +13,15 @@ from tests.strategies import BOUNDARY_CASES, some_arm
 from tfarm.arm import THEORIES
 from tfarm.exact import balls
 from tfarm.exact.system import system_of
-from tfarm.spectrum.ball_axis import AXIS_STEPS, MOST_AXIS_BITS, RealAxis, axis_precisions, pinned_count, secant
-from tfarm.spectrum.counting import Counter
+from tfarm.spectrum.frequencies import (
+    AXIS_STEPS,
+    MOST_AXIS_BITS,
+    Counter,
+    RealAxis,
+    axis_precisions,
+    pinned_count,
+    secant,
+)
 
 COUNT = 7
 

@@ -13,9 +13,9 @@ from tests.shared import sized
 from tfarm import Arm, CertificationError, Hub, Payload
 from tfarm.exact import appendix
 from tfarm.exact.system import system_of
-from tfarm.spectrum import ball_axis as room
-from tfarm.spectrum.certify import certify
-from tfarm.spectrum.search import natural_frequencies
+from tfarm.spectrum import frequencies as room
+from tfarm.spectrum.frequencies import natural_frequencies
+from tfarm.spectrum.proofs import certify
 
 
 def last_unit(text: str, digits: int) -> Decimal:

@@ -17,7 +17,7 @@ from tests.transition import response
 from tfarm import Attachment, Hub, Payload, RotarySpring
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exact.system import system_of
-from tfarm.reduced.residues import end_residues, undamped_residues
+from tfarm.reduced.modal import end_residues, undamped_residues
 
 NAMES = ("hub_angle", "root_moment", "root_shear", "tip_displacement", "tip_deflection")
 

@@ -10,10 +10,8 @@ from tests.spectrum.damped import some_damped_arm
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.spectrum import box as box_module
-from tfarm.spectrum.box import Box, winding_number, zeros_in_box
-from tfarm.spectrum.complete_box import complete_box
-from tfarm.spectrum.continuation import Node, follow, predicted
-from tfarm.spectrum.correction import Member, improved
+from tfarm.spectrum.box import Box, complete_box, winding_number, zeros_in_box
+from tfarm.spectrum.continuation import Member, Node, follow, improved, predicted
 from tfarm.spectrum.damped import COMPANY, all_damped_modes, damped_modes, member
 
 

@@ -6,7 +6,7 @@ import pytest
 from tests.spectrum.test_continuation import with_zeros
 from tfarm.arrays import LEAST_SIZE
 from tfarm.exact.characteristic import Analytic
-from tfarm.spectrum.correction import Member, _gaps, _together, corrected, improved, neighbours_of
+from tfarm.spectrum.continuation import Member, _gaps, _together, corrected, improved, neighbours_of
 
 
 @pytest.mark.parametrize("pair", [(-3 + 0.1j, -3 - 0.1j), (-2.9, -3.1), (-3 + 1e-5j, -3 - 1e-5j)])

@@ -13,7 +13,7 @@ from tests.strategies import arm_of
 from tfarm.exact import balls
 from tfarm.exact.layout import Layout
 from tfarm.exact.system import system_of
-from tfarm.spectrum.search import count_below, natural_frequencies
+from tfarm.spectrum.frequencies import count_below, natural_frequencies
 
 EPS = np.finfo(float).eps
 

@@ -18,9 +18,9 @@ from tfarm import CertificationError, HubFeedback
 from tfarm.exact.balls import point, precision
 from tfarm.exact.characteristic import NO_GAINS, characteristic, gains_of, zeros_at_origin
 from tfarm.exact.system import system_of
-from tfarm.spectrum import ball_axis, enclose
+from tfarm.spectrum import frequencies, proofs
 from tfarm.spectrum.box import Box
-from tfarm.spectrum.enclose import Disc, _holds_one, disjoint, enclosed, proven_count
+from tfarm.spectrum.proofs import Disc, _holds_one, disjoint, enclosed, proven_count
 
 LAB = tfarm.load("sasaki2012-lab")
 
@@ -84,7 +84,7 @@ def test_a_double_eigenvalue_has_no_disc(monkeypatch: pytest.MonkeyPatch) -> Non
     omega = tfarm.modes(rigid, 2, theory="euler-bernoulli").natural_frequency
     arm = replace(rigid, link=replace(rigid.link, damping=2 / float(omega[1])))
     k = system_of(arm, "euler-bernoulli")
-    monkeypatch.setattr(ball_axis, "MOST_AXIS_BITS", 1000)
+    monkeypatch.setattr(frequencies, "MOST_AXIS_BITS", 1000)
     with pytest.raises(CertificationError) as refused:
         enclosed(k, complex(-omega[1]) * (1 + 1e-4), 5)
     assert "\n" not in str(refused.value)
@@ -300,6 +300,6 @@ def test_a_contour_that_takes_too_many_pieces_is_given_up(monkeypatch):
     k = system_of(tfarm.load("sasaki2012-lab"))
     box = Box(-300.0, 100.0, -400.0, 400.0)
     assert proven_count(k, box) > 0
-    monkeypatch.setattr(enclose, "MOST_PIECES", 20)
+    monkeypatch.setattr(proofs, "MOST_PIECES", 20)
     with pytest.raises(CertificationError, match="takes more than 20 pieces: prove a shorter list"):
         proven_count(k, box)

@@ -8,8 +8,7 @@ import pytest
 from tests.spectrum.test_continuation import with_zeros
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
-from tfarm.spectrum.continuation import Node, _exchange, _jumped, _next_zero, follow, predicted, through_nodes
-from tfarm.spectrum.correction import Member
+from tfarm.spectrum.continuation import Member, Node, _exchange, _jumped, _next_zero, follow, predicted, through_nodes
 
 PLACES = (0.0, 0.3, 0.7)
 

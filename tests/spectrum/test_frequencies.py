@@ -20,8 +20,7 @@ from tests.strategies import some_arm
 from tfarm import Hub
 from tfarm.arm import THEORIES
 from tfarm.exact.system import system_of
-from tfarm.spectrum.counting import Counter
-from tfarm.spectrum.search import natural_frequencies
+from tfarm.spectrum.frequencies import Counter, natural_frequencies
 
 EPS = np.finfo(float).eps
 

@@ -21,7 +21,7 @@ from tfarm.exact import balls
 from tfarm.exact.layout import Layout
 from tfarm.exact.system import system_of
 from tfarm.spectrum import PARAMETERS
-from tfarm.spectrum.precise import refine
+from tfarm.spectrum.frequencies import refine
 from tfarm.spectrum.table import flexible_frequencies
 
 EPS = np.finfo(float).eps

@@ -8,7 +8,7 @@ from tests.spectrum.test_certify import random_arm
 from tests.survey import each_of, tally
 from tfarm import CertificationError
 from tfarm.spectrum import Modes
-from tfarm.spectrum.certify import Certificate
+from tfarm.spectrum.proofs import Certificate
 
 
 def test_random_arms_are_proven_and_none_wrongly() -> None:

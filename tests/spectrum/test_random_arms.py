@@ -10,7 +10,7 @@ from tests.spectrum.test_certify import random_arm
 from tfarm import Arm, Hub, Payload
 from tfarm.exact.system import system_of
 from tfarm.spectrum import modes_below
-from tfarm.spectrum.counting import Counter
+from tfarm.spectrum.frequencies import Counter
 
 ARMS = 81
 

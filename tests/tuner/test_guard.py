@@ -21,7 +21,7 @@ from tests.tuner.bounded import adversary
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import CertificationError, ParameterError
-from tfarm.exact.whole import as_integers, is_positive_definite
+from tfarm.exact.rationals import as_integers, is_positive_definite
 from tfarm.tuner import find_guard, guard, slew_trial
 from tfarm.tuner.guard import upper_modes_are_quiet
 from tfarm.tuner.sector import RADIUS_SHARE, MovingGain, _peak, common_lyapunov

@@ -50,8 +50,7 @@ from tfarm.dsp.sampling import SLOW, phi
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import modes
-from tfarm.spectrum.box import Box, winding_number
-from tfarm.spectrum.complete_box import TOWARD_SINGULAR
+from tfarm.spectrum.box import TOWARD_SINGULAR, Box, winding_number
 from tfarm.spectrum.damped import member
 
 MACHINE_EPS = float(np.finfo(float).eps)  # of a float64, times the counts of operations beside it

@@ -12,7 +12,7 @@ For the characteristic function a law is kept as factors in delta = z - 1, from 
     p_i = g prod(delta - zeros),  q = prod(delta - poles)
 
 The coefficients of a law of high order are products of roots next to z = 1, and rounding loses those.  So the roots are
-those of the given numbers (`tfarm.exact.block_factors`), and an integrator is one that is 0.  A hub rate that a chain
+those of the given numbers (`tfarm.exact.rationals`), and an integrator is one that is 0.  A hub rate that a chain
 has as the filtered difference of the encoder is (1 - a)/T (z - 1)/(z - a) times the angle, a part of the law.
 """
 
@@ -329,7 +329,7 @@ def law_in_z(law: Law, acting: Law, chain: Chain) -> LawInZ:
 
 def _factors(part: Part, law: Law, chain: Chain) -> PartFactors:
     """The factors of one part, in z."""
-    from tfarm.exact.block_factors import block_factors  # FLINT, which few commands need
+    from tfarm.exact.rationals import block_factors  # FLINT, which few commands need
 
     T = chain.sampling.period
     rule = "none" if law.is_discrete else law.rule

@@ -25,12 +25,12 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.outputs import Output
 from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
-from tfarm.reduced.remainder import SLOW_POLES_FROM, slow_remainder
+from tfarm.reduced.modal import SLOW_POLES_FROM, slow_remainder
 from tfarm.response import transfer
 from tfarm.response.signals import Signals
 from tfarm.spectrum import DampedModes, Modes
 from tfarm.spectrum.damped import all_damped_modes
-from tfarm.spectrum.search import LISTS_KEPT
+from tfarm.spectrum.frequencies import LISTS_KEPT
 
 Branching = Callable[[Modes], DampedModes]
 

@@ -37,7 +37,7 @@ from tfarm.dsp.plant import USUAL_MODES, Branching, Plant, SensedPlant, is_analo
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
-from tfarm.reduced.sensed import closed
+from tfarm.reduced.conversions import closed
 from tfarm.spectrum.damped import all_damped_modes
 
 STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes

@@ -21,8 +21,8 @@ from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.response import TransferFunction, transfer
 from tfarm.response.frequency import without_cancelled
-from tfarm.response.roots import Roots
 from tfarm.response.signals import Signals
+from tfarm.response.transfer import Roots
 
 from .reading import check_signal
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.spectrum import flexible_frequencies, modes, modes_below
-from tfarm.spectrum.search import ARMS_KEPT
+from tfarm.spectrum.frequencies import ARMS_KEPT
 
 NEAREST_TO_STEEP, FARTHEST_FROM_STEEP = 1e-10, 0.06  # distances from a steep place, as shares of its frequency
 POINTS_BESIDE_STEEP = 14  # of a grid on either side of a steep place, one and a half a decade

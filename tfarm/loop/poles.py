@@ -21,12 +21,11 @@ from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import gains_of
 from tfarm.records import record
-from tfarm.reduced.sensed import closed, in_series, pade, sensed_model
+from tfarm.reduced.conversions import closed, in_series, pade, sensed_model
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.spectrum import modes_below
-from tfarm.spectrum.box import TRIED_HEIGHTS, Box, complete
-from tfarm.spectrum.complete_box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR
-from tfarm.spectrum.enclose import Disc, disjoint, enclosed, proven_count
+from tfarm.spectrum.box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR, TRIED_HEIGHTS, Box, complete
+from tfarm.spectrum.proofs import Disc, disjoint, enclosed, proven_count
 from tfarm.spectrum.scales import first_frequency
 
 from .frequencies import band_of, steep_places

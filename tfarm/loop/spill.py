@@ -18,7 +18,7 @@ from tfarm.columns import Column
 from tfarm.digits import general, plain, singly
 from tfarm.errors import ParameterError
 from tfarm.records import record
-from tfarm.reduced.sensed import sensed_model
+from tfarm.reduced.conversions import sensed_model
 from tfarm.spectrum import modes
 
 from .poles import poles_of_model

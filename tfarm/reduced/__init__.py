@@ -1,11 +1,10 @@
 """Reduced models of the exact arm: the one place where its exactness is left, with the error printed."""
 
-from tfarm.reduced.answers import reduced_answer
 from tfarm.reduced.conversions import discrete, save_mat, to_pymor, transfer_function
 from tfarm.reduced.modal import ModalModel, modal_model, relaxed_model, slow_model
 from tfarm.reduced.partial_fractions import PartialFractions
 from tfarm.reduced.rational import RationalModel, rational_model
-from tfarm.reduced.reduction import BAND, ReducedModel, reduce
+from tfarm.reduced.reduction import BAND, ReducedModel, reduce, reduced_answer
 
 __all__ = [
     "BAND",

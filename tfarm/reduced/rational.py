@@ -26,9 +26,8 @@ from tfarm.exact.series import expansions_at_zero
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import modes_below
 
-from .accuracy import distance, frequencies_around, norm
 from .modal import MOST_MODELLED, modal_model
-from .partial_fractions import PartialFractions
+from .partial_fractions import PartialFractions, distance, frequencies_around, norm
 
 BEYOND_BAND = 1.02  # modes up to so much above the band's end are taken exactly: a pole nearer to the band would show
 REMAINDER_POINTS = 300  # of the band, denser towards its end, where poles above it show most

@@ -13,8 +13,7 @@ from tfarm.plots.frequency import draw_bode
 from tfarm.report.sections import PageSection, Picture
 from tfarm.report.words import upper
 from tfarm.response.answers import bode_table, roots_table
-from tfarm.response.extrema import Extremum
-from tfarm.response.frequency import AXIS_SHARE, Bode, bode
+from tfarm.response.frequency import AXIS_SHARE, Bode, Extremum, bode
 
 MAGNITUDE = attrgetter("magnitude")
 ROOTS_CAPTION = (

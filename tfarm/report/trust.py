@@ -31,7 +31,7 @@ from tfarm.report.trust_proofs import (
     digits_table,
     hash_of,
 )
-from tfarm.response.accuracy import BAND_POINTS
+from tfarm.response.frequency import BAND_POINTS
 from tfarm.tables.files import save_table
 
 TRUST_FOLDER = "trust"

@@ -29,7 +29,7 @@ from tfarm.report.damped_table import PROVEN_DIGITS, proven_damped_modes
 from tfarm.report.kept import keep, kept
 from tfarm.report.loop_laws import has_loop
 from tfarm.report.words import typeset
-from tfarm.response.accuracy import BAND_POINTS, worst_error
+from tfarm.response.frequency import BAND_POINTS, worst_error
 from tfarm.spectrum import DampedModes, Modes
 from tfarm.spectrum.scales import default_gains
 

@@ -12,8 +12,7 @@ from tfarm.digits import general, lined, scientific, singly, unit, within
 from tfarm.exact.methods import roads_answer
 from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
-from .extrema import Extremum
-from .frequency import Bode
+from .frequency import Bode, Extremum
 from .transfer import TransferFunction
 
 HERTZ = 2 * math.pi  # rad/s

@@ -18,7 +18,7 @@ from tfarm.errors import MISSING, CertificationError, ConvergenceError
 from tfarm.exact.methods import Method, roads_answer
 
 from .damped import NOT_ASSIGNED, DampedModes, damped_modes
-from .enclose import Disc
+from .proofs import Disc
 from .table import FEWEST_LISTED, Modes, compare_theories, hub_locked
 
 SHAPE_DIGITS = 10  # in a report's files, of what shapes are needed for: these differ by 1e-14 between processors
@@ -119,7 +119,7 @@ def modes_answer(
 ) -> dict[str, Any]:
     """The modal table, frequencies as strings of so many digits where more than 15 are asked for.
 
-    With `certify` each flexible mode gets its proven bracket, and the whole the count that proves it complete; `method`
+    With `proofs` each flexible mode gets its proven bracket, and the whole the count that proves it complete; `method`
     is the road to the frequencies.  Beside each stands that of the same number with the hub locked.  Where damped modes
     cannot be found or proven, `damped_failure` is why.
     """

@@ -31,14 +31,12 @@ from tfarm.exact.characteristic import (
 from tfarm.exact.system import System
 from tfarm.records import record
 
-from .box import Box
-from .complete_box import TOWARD_SINGULAR, complete_box, filled_box
-from .complex_shapes import mode_field
-from .continuation import Node, follow
-from .correction import BELIEVED_SHARE, Member, improved
-from .enclose import Disc, disjoint, enclosed, proven_count
+from .box import TOWARD_SINGULAR, Box, complete_box, filled_box
+from .continuation import BELIEVED_SHARE, Member, Node, follow, improved
+from .frequencies import LISTS_KEPT
+from .proofs import Disc, disjoint, enclosed, proven_count
 from .scales import first_frequency
-from .search import LISTS_KEPT
+from .shapes import mode_field
 from .table import Modes, modes
 
 COMPANY = (6, 11, 17, 29)  # modes followed beyond those wanted, lest the last be led astray: the next if that fails

@@ -15,7 +15,7 @@ import numpy as np
 from tfarm.arm import GAINS, Arm, HubFeedback, input_words, load, must_be_arm, written_unit
 from tfarm.errors import ParameterError
 
-from .search import ARMS_KEPT
+from .frequencies import ARMS_KEPT
 from .table import modes
 
 PAPER_GAINS = HubFeedback(K1=0.3, K2=0.3)  # of the paper's arms

@@ -28,9 +28,8 @@ from tfarm.exact.methods import (
 from tfarm.exact.system import System, shear_flexibility, system_of
 from tfarm.records import record
 
-from .certify import Certificate, certify
-from .precise import refine
-from .search import count_below, natural_frequencies
+from .frequencies import count_below, natural_frequencies, refine
+from .proofs import Certificate, certify
 from .sensitivities import sensitivities
 from .shapes import Shapes
 

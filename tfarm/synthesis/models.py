@@ -29,7 +29,7 @@ from tfarm.dsp.plant import sensed_plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.loop.frequencies import band_of, grid
 from tfarm.records import record
-from tfarm.reduced.sensed import ALGEBRAIC, sensed_model
+from tfarm.reduced.conversions import ALGEBRAIC, sensed_model
 from tfarm.response.signals import Signals
 from tfarm.synthesis.structures import IMAGINARY_STEP, Entry, Numbers
 

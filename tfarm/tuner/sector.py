@@ -29,7 +29,7 @@ from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 from tfarm.arm import MOMENT_GAIN
 from tfarm.arrays import Real
 from tfarm.dsp import Sampled
-from tfarm.exact.whole import as_integers, falls, is_positive_definite
+from tfarm.exact.rationals import as_integers, falls, is_positive_definite
 from tfarm.records import record
 
 SLACKS = (1e-3, 1e-5, 1e-7, 1e-9)  # how strictly the inequality is asked for, in balanced states

@@ -1,4 +1,7 @@
-"""Zeros and poles in z of a block of a law, from its doubles as rational numbers, each as delta = z - 1 (FLINT).
+"""Doubles as the rational numbers they are (FLINT): what is shown of these is shown exactly.
+
+Matrices of whole numbers over a power of two, and the zeros and poles in z of a block of a law, each as
+delta = z - 1:
 
     tustin   s - r = (c - r)(delta - 2 r/(c - r))/(delta + 2)
     matched  delta = e^{rT} - 1, with the same value at rest
@@ -17,6 +20,43 @@ import numpy as np
 
 from tfarm.arm.blocks import LawBlock, Rational
 from tfarm.arrays import Complex, Real
+
+IntegerMatrix = list[list[int]]
+
+
+def as_integers(matrix: Real) -> tuple[IntegerMatrix, int]:
+    """The whole numbers N and the shift k with matrix = N / 2^k, exactly."""
+    pairs = [[float(value).as_integer_ratio() for value in row] for row in matrix]
+    shift = max(bottom.bit_length() - 1 for row in pairs for _, bottom in row)
+    return [[top << (shift - bottom.bit_length() + 1) for top, bottom in row] for row in pairs], shift
+
+
+def is_positive_definite(matrix: IntegerMatrix) -> bool:
+    """Whether a symmetric matrix of whole numbers has only positive leading minors (Bareiss' elimination).
+
+    FLINT's whole numbers, as the minors have thousands of digits.
+    """
+    M, before = [[flint.fmpz(value) for value in row] for row in matrix], flint.fmpz(1)
+    n = len(M)
+    for k in range(n):
+        top = M[k]
+        pivot = top[k]
+        if pivot <= 0:
+            return False
+        for i in range(k + 1, n):
+            row, factor = M[i], top[i]
+            for j in range(i, n):
+                row[j] = (pivot * row[j] - factor * top[j]) // before
+        before = pivot
+    return True
+
+
+def falls(P: IntegerMatrix, A: Real) -> bool:
+    """Whether P - A^T P A > 0."""
+    numbers, shift = as_integers(A)
+    N, form = flint.fmpz_mat(numbers), flint.fmpz_mat(P)
+    return is_positive_definite((form * 4**shift - N.transpose() * form * N).tolist())
+
 
 AT_MINUS_ONE = -2.0  # delta of z = -1, where Tustin's rule puts what is at infinity in s
 BITS_A_STATE, SPARE_STATES = 64, 8  # of the precision with which a held block begins, doubled until it is enough

@@ -1,21 +1,56 @@
-"""A system without damping on the imaginary axis in real ball arithmetic: D(i w), the count, and a root finder.
+"""Natural frequencies from a count alone, which cannot miss, to the last float64 digit or to any number of digits.
 
-The steps of the count are those of `tfarm.exact.count`, each sign certain or not.
+Wittrick and Williams (1971) count through the pivots of a dynamic stiffness; Howson and Williams (1973) start from the
+beam whose frequencies are known in closed form.  Put together for a chain of segments the count becomes a climb from
+the payload to the hub, each step a sign (`tfarm.exact.count`):
+
+* with both ends of a segment pinned, n pi < k counts the waves that fit (and W = 0, Psi = const above the cut-off);
+* releasing a motion, or adding inertia to it, raises the count by 0 or 1, holding it lowers the count by 0 or 1
+  (Rayleigh's theorem on one constraint);
+* the parity of each count is the sign of that system's characteristic function D(i w).
+
+A double root changes no sign and still raises the count by two.  Between two close frequencies D(i w) is a small
+product, whose sign drowns in rounding: float64 alone would leave a pair with a relative gap of 1e-9 right to 1e-11
+only.  Such pairs are bisected again with the count in real balls, where each sign is certain or not.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
 from typing import Any
 
 import flint
+import numpy as np
+from numpy.typing import NDArray
 
-from tfarm.exact.balls import Ball, Sweep, into_own, out_of_own
+from tfarm.errors import ConvergenceError
+from tfarm.exact.balls import Ball, Sweep, into_own, out_of_own, precision, rational
 from tfarm.exact.compiled import python_of
 from tfarm.exact.compound import Plane, across_waves
+from tfarm.exact.count import bisect_chain, chain_counts, rows_to_count
 from tfarm.exact.elements import Segment, Spring
 from tfarm.exact.layout import Layout
 from tfarm.exact.system import System
+
+
+class Counter:
+    """N(omega) of a system: how many natural frequencies [rad/s] lie below omega, the rigid-body mode included."""
+
+    def __init__(self, system: System) -> None:
+        self._rows, self._ends = rows_to_count(Layout(system.with_damping(0.0)))
+
+    def __call__(self, omega: NDArray[np.float64]) -> NDArray[np.int64]:
+        """The counts, in the shape of omega (1-D, rad/s, positive)."""
+        return chain_counts(np.ascontiguousarray(omega, dtype=float), self._rows, self._ends)
+
+    def first_reaching(self, number: NDArray[np.int64], below: float) -> NDArray[np.float64]:
+        """The smallest floats [rad/s] with a count of `number` at least, by bisection of 0..below."""
+        low, high = np.zeros(number.size), np.full(number.size, below)
+        bisect_chain(number, self._rows, self._ends, low, high)
+        return high
+
 
 _across_waves = python_of(across_waves)
 
@@ -168,3 +203,74 @@ def axis_precisions(digits: int) -> Iterator[int]:
     while bits < MOST_AXIS_BITS:
         yield bits
         bits *= 2
+
+
+CLOSE_SHARE = 1e-3  # share of the mean spacing; further apart, rounding moves neither by more than a few last units
+PAIR_REACH = 4e-6  # relative width in which float64 surely has each of a close pair
+PAIR_BITS = 256  # of working precision, for a double frequency to its last float64 digit
+HIGHEST_BOUND = 1e12  # times what a slender beam has: a count that has not got there by then never will
+LISTS_KEPT = 32  # lists of modes, of arms asked for again and again: memory against time, of no effect on an answer
+ARMS_KEPT = 64  # arms whose single numbers are kept, likewise
+
+
+@lru_cache(maxsize=LISTS_KEPT)  # a table of sampled verdicts asks for the same undamped arm some twenty times
+def natural_frequencies(k: System, first: int, last: int) -> NDArray[np.float64]:
+    """The natural frequencies [rad/s] number first..last of the undamped arm, counted from 1, double ones twice.
+
+    Each is the point where the count steps from below its number to it, bisected to neighbouring floats: no
+    start value, no sign change needed, so close and double roots are like any other.  Those close to a neighbour are
+    bisected by the count in balls, or in float64 where a ball cannot tell.
+    Raises ConvergenceError if the count does not reach `last` (up to `HIGHEST_BOUND`).
+    """
+    lowest = min(first, 1 + k.has_rigid_mode)  # not the rigid body at zero: bisection would run down all exponents
+    number = np.arange(max(first - 1, lowest), last + 2)  # with both neighbours: one of them may be close
+    count = Counter(k)
+    omega = count.first_reaching(number, _upper_bound(count, k, int(number[-1])))
+    close = np.diff(omega) * number[1:] < CLOSE_SHARE * omega[1:]
+    for i in np.nonzero(np.r_[close, False] | np.r_[False, close])[0]:
+        low, high = float(omega[i] * (1 - PAIR_REACH)), float(omega[i] * (1 + PAIR_REACH))
+        with precision(PAIR_BITS):
+            axis = RealAxis(k)
+            while low < (middle := 0.5 * (low + high)) < high:
+                below = axis.count(rational(middle))
+                below = int(count(np.array([middle]))[0]) if below is None else below
+                low, high = (low, middle) if below >= number[i] else (middle, high)
+        omega[i] = high
+    found = omega[(first <= number) & (number <= last)]
+    found.flags.writeable = False
+    return found
+
+
+def count_below(k: System, omega: float) -> int:
+    """How many natural frequencies lie below omega [rad/s]."""
+    return int(Counter(k)(np.array([omega]))[0])
+
+
+def _upper_bound(count: Counter, k: System, last: int) -> float:
+    """A frequency above the last one wanted: the Euler-Bernoulli estimate, doubled until the count says so."""
+    omega = unit = ((last + 1) * math.pi) ** 2 / k.transit**2
+    while omega < HIGHEST_BOUND * unit:
+        if count(np.array([omega]))[0] >= last:
+            return omega
+        omega *= 2.0
+    raise ConvergenceError(f"the count does not reach {last} below {omega:.3g} rad/s", omega, last)
+
+
+def refine(k: System, omega: float, digits: int) -> str:
+    """The natural frequency next to omega [rad/s], with that many right digits, as a decimal string.
+
+    The sign of D(i w) is proven to change within a tenth of the last digit of the root that is printed.
+    Raises ConvergenceError where it does not: for a double frequency, or a pair closer than float64 can tell.
+    """
+    for bits in axis_precisions(digits):
+        with precision(bits):
+            axis = RealAxis(k)
+            root = secant(axis, omega, digits)
+            if root is None:
+                continue
+            tenth = root * flint.arb(10) ** -(digits + 1)
+            if axis.drive(root - tenth) * axis.drive(root + tenth) < 0:
+                return str(root.str(digits, radius=False))
+    raise ConvergenceError(
+        f"no {digits} digits of the frequency near {omega:.10g} rad/s: no sign change", omega, digits
+    )
