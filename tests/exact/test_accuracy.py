@@ -19,6 +19,7 @@ from tests.exact.accuracy import (
     link_by_a_frequency,
     measure,
     near,
+    next_to_the_singularity,
     run,
 )
 from tests.shared import sized
@@ -75,6 +76,11 @@ def test_next_to_the_essential_singularity():
         arm = some_arm(rng, damping=10 ** rng.uniform(-6, -2))
         points += measure(arm, complex(near(rng, -1 / arm.link.damping, 1e-6, 1e-3)), 0.5, AT_ENDS)
     assert_accurate(points)
+
+
+def test_two_waves_that_have_faded_alike_both_stay():
+    """Next to -1/C both waves decay at one rate: of seed 2 some beyond e^-322, where one of them was once left out."""
+    assert_accurate(next_to_the_singularity(60, seed=2))
 
 
 def equal_waves(arm):

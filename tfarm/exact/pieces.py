@@ -9,6 +9,7 @@ Arrays of a block lie one behind the other in flat buffers: component j of point
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,7 +39,7 @@ C1, S1, E1, C2, S2, E2 = (BLOCK * j for j in range(6))
 
 PLANE_SIZE, ROW_SIZE, NUMBERS_SIZE, FUNCTIONS_SIZE = (BLOCK * parts for parts in (5, 4, 11, 6))  # of the flat buffers
 SLOW_WAVE = 1.0  # |z_2| below which a wave hardly turns along a segment: next to its shear cut-off
-FADED = 1e-140  # |e^{-t}| below which a wave has no part in the other's
+FADED = 1e-140  # |e^{-t}| below which its reciprocal would overflow
 
 
 class Kept(NamedTuple):
@@ -197,17 +198,28 @@ def cross_back(points: Any, row: Any, f: Any, outer: Any, scale: Any, faded: Any
             take_where(low, other, outer)
 
 
+@inlined
+def _ratio(e1: complex, e2: complex, t1: complex, t2: complex) -> complex:
+    """e^{-t} of the faster wave over that of the slower: of two that both have faded it may still be near 1."""
+    if t1.real < t2.real:
+        e1, e2, t1, t2 = e2, e1, t2, t1
+    if magnitude(e2) > FADED:
+        return e1 * reciprocal(e2)
+    decay, turn = math.exp(t2.real - t1.real), t2.imag - t1.imag
+    return complex(decay * math.cos(turn), decay * math.sin(turn))
+
+
 @compiled
 def _fade(numbers: Any, functions: Any, faded: Any, scale: Any, low: Any) -> None:
     """c and s of both waves by the scale of the faster one; the other's is taken out."""
     for i in range(BLOCK):
         c1, s1, c2, s2 = functions[C1 + i], functions[S1 + i], functions[C2 + i], functions[S2 + i]
-        e1, e2, t1, t2 = functions[E1 + i], functions[E2 + i], numbers[T1 + i], numbers[T2 + i]
+        t1, t2 = numbers[T1 + i] + numbers[DT1 + i], numbers[T2 + i] + numbers[DT2 + i]
+        left = t2 if t1.real >= t2.real else t1
+        ratio = _ratio(functions[E1 + i], functions[E2 + i], t1, t2)
         if t1.real >= t2.real:
-            ratio, left = e1 * reciprocal(e2) if magnitude(e2) > FADED else complex(0.0, 0.0), t2 + numbers[DT2 + i]
             c2, s2 = c2 * ratio, s2 * ratio
         else:
-            ratio, left = e2 * reciprocal(e1) if magnitude(e1) > FADED else complex(0.0, 0.0), t1 + numbers[DT1 + i]
             c1, s1 = c1 * ratio, s1 * ratio
         faded[i], faded[BLOCK + i], faded[2 * BLOCK + i], faded[3 * BLOCK + i] = c1, s1, c2, s2
         if not low[i]:

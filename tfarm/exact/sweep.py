@@ -65,7 +65,8 @@ class Work(NamedTuple):
     """What a block is worked in: planes (2) here and beyond, and at marks; conditions (2); the scales of all.
 
     `powers` (elements, points) are those of two that the plane was divided by after each; a mark's state times e^scale
-    2^shift goes with the plane at the axis.  `inner` are the planes at the inner side of each element; `lift`, `turn`
+    2^shift goes with the plane at the axis.  `inner` are the planes at the inner side of each element, `inside`
+    is W there of the last spring on the way back; `lift`, `turn`
     are W - r theta and Psi - theta on the way back, r the distance from the axis, as long as all segments are `slow`,
     and `yielded` both at each mark, where `known`.  `watched` are points next to a segment's shear cut-off.
     """
@@ -80,6 +81,7 @@ class Work(NamedTuple):
     shifts: NDArray[np.int64]
     theta: NDArray[np.complex128]
     inner: NDArray[np.complex128]
+    inside: NDArray[np.complex128]
     lift: NDArray[np.complex128]
     turn: NDArray[np.complex128]
     slow: NDArray[np.bool_]
@@ -114,6 +116,7 @@ def _work(rows: Any) -> Work:
         np.empty((marks, BLOCK), np.int64),
         np.empty(BLOCK, number),
         np.empty((len(rows), PLANE_SIZE), number),
+        np.empty(BLOCK, number),
         np.empty(BLOCK, number),
         np.empty(BLOCK, number),
         np.empty(BLOCK, np.bool_),
@@ -202,7 +205,7 @@ def _go_back(points: Any, rows: Any, axis: Any, work: Work, differs: bool, lost:
     f, beyond, plane = work.conditions[0], work.conditions[1], work.planes[0]
     for i in range(BLOCK):
         work.theta[i] = axis[0, i] * plane[i] + axis[2, i] * plane[2 * BLOCK + i] - axis[3, i] * plane[3 * BLOCK + i]
-    left, number = len(work.marked), len(work.kept.low)
+    left, number, of_spring = len(work.marked), len(work.kept.low), False
     scale, shift, raised = np.zeros(BLOCK, np.complex128), np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
     work.lift[:], work.turn[:], work.slow[:], reach = 0.0, 0.0, True, 0.0
     for part in range(4):
@@ -212,6 +215,7 @@ def _go_back(points: Any, rows: Any, axis: Any, work: Work, differs: bool, lost:
             return
         row = rows[j]
         shift -= work.powers[j]
+        of_spring = row[ROW_KIND] == SPRING or (of_spring and row[ROW_KIND] == MARK)
         if differs or row[ROW_KIND] != SEGMENT:
             reach = _yield(points, row, f, work.inner[j], shift, reach, work)
         if row[ROW_KIND] == SEGMENT:
@@ -227,11 +231,9 @@ def _go_back(points: Any, rows: Any, axis: Any, work: Work, differs: bool, lost:
             if number < len(work.kept.low):  # of W, M and Q little may be left there
                 for i in range(BLOCK):
                     lost[i] = lost[i] or work.watched[i]
-            else:
+            elif of_spring:  # W is what it was inside of the spring
                 for i in range(BLOCK):
-                    state, own = work.marked[mark], math.ldexp(1.0, -shift[i])
-                    state[i] = times(reach * work.theta[i] + work.lift[i], own)
-                    state[BLOCK + i] = times(work.theta[i] + work.turn[i], own)
+                    work.marked[mark, i] = times(work.inside[i], math.ldexp(1.0, -shift[i]))
         else:
             _small_back(points, row, f)
         _brought_back(f, 4, raised)
@@ -277,7 +279,9 @@ def _yield(points: Any, row: Any, f: Any, plane: Any, shift: Any, reach: float, 
         s, theta, lift, turn = points[i], work.theta[i], work.lift[i], work.turn[i]
         own = f[i], f[BLOCK + i], f[2 * BLOCK + i], f[3 * BLOCK + i]
         p = plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i]
-        _, _, M, Q = met(own, p)
+        W, _, M, Q = met(own, p)
+        if row[ROW_KIND] == SPRING:
+            work.inside[i] = times(W, math.ldexp(1.0, shift[i]))
         M, Q = times(M, math.ldexp(1.0, shift[i])), times(Q, math.ldexp(1.0, shift[i]))
         if row[ROW_KIND] == SEGMENT:
             lift, turn = _beyond_slow(s, row, reach, theta, lift, turn, M, Q)
