@@ -96,7 +96,10 @@ def free_fields(
 
     Of the states that the payload allows those with axis . (W, Psi, M, Q) = 0 on the hub's axis: W = 0 by default.
     """
-    layout = Layout(chain, tuple(dict.fromkeys(places)))
+    different = tuple(dict.fromkeys(places))
+    if different not in chain.kept:
+        chain.kept[different] = Layout(chain, different)
+    layout = chain.kept[different]
     order = [layout.places.index(place) for place in places]
     table = np.zeros((4 * len(layout.places) + 1, 9))
     table[:, 8], table[-1, 0], table[-1, 5] = 1.0, -1.0, 1.0
