@@ -206,6 +206,7 @@ def _go_back(points: Any, rows: Any, axis: Any, work: Work, differs: bool, lost:
     for i in range(BLOCK):
         work.theta[i] = axis[0, i] * plane[i] + axis[2, i] * plane[2 * BLOCK + i] - axis[3, i] * plane[3 * BLOCK + i]
     left, number, of_spring = len(work.marked), len(work.kept.low), False
+    is_rigid = True
     scale, shift, raised = np.zeros(BLOCK, np.complex128), np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
     work.lift[:], work.turn[:], work.slow[:], reach = 0.0, 0.0, True, 0.0
     for part in range(4):
@@ -216,6 +217,7 @@ def _go_back(points: Any, rows: Any, axis: Any, work: Work, differs: bool, lost:
         row = rows[j]
         shift -= work.powers[j]
         of_spring = row[ROW_KIND] == SPRING or (of_spring and row[ROW_KIND] == MARK)
+        is_rigid = is_rigid and row[ROW_KIND] != SPRING and row[ROW_KIND] != SEGMENT
         if differs or row[ROW_KIND] != SEGMENT:
             reach = _yield(points, row, f, work.inner[j], shift, reach, work)
         if row[ROW_KIND] == SEGMENT:
@@ -231,6 +233,9 @@ def _go_back(points: Any, rows: Any, axis: Any, work: Work, differs: bool, lost:
             if number < len(work.kept.low):  # of W, M and Q little may be left there
                 for i in range(BLOCK):
                     lost[i] = lost[i] or work.watched[i]
+            elif is_rigid:  # nothing yields between the axis and the mark
+                for i in range(BLOCK):
+                    work.marked[mark, i] = times(work.theta[i], reach * math.ldexp(1.0, -shift[i]))
             elif of_spring:  # W is what it was inside of the spring
                 for i in range(BLOCK):
                     work.marked[mark, i] = times(work.inside[i], math.ldexp(1.0, -shift[i]))
