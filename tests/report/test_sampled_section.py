@@ -99,7 +99,7 @@ def test_the_edges_at_the_default_gains_are_published_ones(section):
         ends = [column[0][side] for column in sampled.stable_intervals[stable]]
         edges.append(np.interp(0.3, sampled.K1[stable], ends))
     assert edges == pytest.approx([1.0305, -0.1526, 1.1639], abs=2e-3)  # linear between columns 12 % apart
-    assert "K2 < 1.030 continuous, −0.153 … 1.164 sampled" in blocks_of(section)["sampled-overlay"].caption
+    assert "K2 < 1.031 continuous, −0.153 … 1.164 sampled" in blocks_of(section)["sampled-overlay"].caption
 
 
 def test_without_damping_the_layers_are_nested_at_the_gains_and_say_for_how_many_modes(monkeypatch):

@@ -15,9 +15,6 @@ import tfarm
 from tests.hostile import NAME
 from tests.report.full import ARM
 from tests.report.walked import Walk, columns_of, numbers_of, read, read_arm, shown_in, told, untraced, untraced_cells
-from tfarm.dsp import Chain
-from tfarm.dsp.chain import Sampling
-from tfarm.dsp.verdict import sampled_brief
 from tfarm.report.locus_section import RANGE_OF_K2
 from tfarm.spectrum.scales import default_gains, rate_unit
 
@@ -34,8 +31,6 @@ PROSE = {  # phrases with numbers that are no results, and what they are
     r"^mode \d+": "headings of columns",
     r"SHA-256|tfarm \d+\.\d+\.\d+": "names",
     r"0\.00642 J": "the share of the default gain, in the paper's letters",
-    r"6 bits of ADC over ±53 N m, 1 sample of delay|at most 24 N m|motor's 24 N m|steps of 1\.66 N m": "an example's "
-    "settings, with its step 2 x 53/2^6",
     r"first \d+ modes|First natural frequencies|first two modes": "how many are drawn",
 }
 COMMANDS = {  # what the sections' numbers are held against
@@ -101,8 +96,7 @@ def derived(answers):
     moment, tip = (answers[f"bode {output}"] for output in ("root_moment", "tip_displacement"))
     J, hub = ARM.total_inertia, ARM.hub.inertia
     sampled, law = answers["sampled"], default_gains(ARM)
-    later = sampled_brief(ARM, law, replace(Chain(), sampling=Sampling(delay_samples=1.0)))
-    left = [answers[each]["residual_moment_rms"] for each in ("simulate K2", "simulate")]
+    runs = [tfarm.simulate(ARM, replace(law, K2=K2)) for K2 in (0.0, law.K2)]
     band = answers["nyquist"]["band_rad_s"]
     below = int((tfarm.modes(ARM, count=20).natural_frequency < band).sum())
     return {
@@ -117,11 +111,9 @@ def derived(answers):
         "locus": [J / (J - hub)],
         "margins-nyquist": [below],
         "sampled": [
-            math.log(2) * sampled["period_s"] / sampled["log_spectral_radius"],
+            sampled["period_s"] / abs(sampled["log_spectral_radius"]),
             100 * sampled["required_damping_s"] * modes[1] / 2,
-            left[0] / left[1],
-            later.log_radius,  # of the example with a delay
-            2.0 / sampled["period_s"] + 1,  # samples of a record of 2 s
+            *(math.degrees(run.at_samples.hub_angle[-1] - run.scenario.hub_angle[-1]) for run in runs),
         ],
         "assumptions": [
             ARM.link.section.area,

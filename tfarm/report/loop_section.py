@@ -64,7 +64,7 @@ NYQUIST_WORDS = (
     "Every size r of L(iω) is drawn as r/(1 + r): nothing is cut off, infinity is the outer rim. The loop is stable "
     "where the curve encircles −1 counter-clockwise as often as L has poles right of the axis{own}. Poles of L on the "
     "imaginary axis are passed on their right: there the curve turns clockwise through half a circle at infinity (a "
-    "quarter at a single pole at 0), drawn dashed beyond the rim, one arc for all that turn alike, with their number."
+    "quarter at a single pole at s = 0), drawn dashed beyond the rim, one arc for all that turn alike, with its number."
 )
 MOST_SPILLED = 12  # flexible modes of the largest model that is put beside the exact loop
 CROSSINGS_CAPTION = (
