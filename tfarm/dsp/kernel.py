@@ -12,7 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import Complex, Real, Whole
+from tfarm.dsp.chain import Sampling
+from tfarm.dsp.plant import Plant
+from tfarm.dsp.sampling import held_amplitude
 from tfarm.exact.compiled import compiled, inlined
 
 ANGLE, RATE, MOMENT = 0, 1, 2  # of the outputs, which begin with what is fed back (`tfarm.arm.FED_BACK`)
@@ -40,6 +43,24 @@ class Model(NamedTuple):
     rates: Real
     static: Real
     hub: Complex
+
+
+def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: int) -> Model:
+    """A plant's poles `kept`, and so many records in each sample; `hub` is the row of the hub angle."""
+    p, T, f = plant.poles[kept], sampling.period, sampling.fraction
+    records = T * (np.arange(between) + 1) / (between + 1)
+    ends = np.unique(np.r_[records, [f * T] if f else [], T])
+    starts = np.r_[0.0, ends[:-1]]
+    weights = np.ascontiguousarray(plant.residues[:, kept] * np.where(p.imag > 0, 2.0, 1.0))
+    return Model(
+        turn=np.exp(p * (ends - starts)[:, None]),
+        push=np.array([held_amplitude(p, float(each)) for each in ends - starts]),
+        piece=np.c_[ends - starts, starts >= f * T, np.isin(ends, records)].astype(float),
+        weights=weights,
+        rates=np.array(plant.rigid),  # in one layout: the compiled loop is compiled anew for each
+        static=np.array(plant.static),
+        hub=np.r_[plant.rigid[hub], weights[hub]].astype(complex),
+    )
 
 
 class State(NamedTuple):

@@ -28,7 +28,6 @@ from tfarm.dsp.chain import Chain
 from tfarm.dsp.discretise import acting_law, with_all_gains
 from tfarm.dsp.kernel import DAC, HIGHEST, LOWEST
 from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, sensed_plant
-from tfarm.dsp.sampling import held_amplitude
 from tfarm.dsp.scenarios import Scenario
 from tfarm.errors import ParameterError, must_be_known
 from tfarm.exact.outputs import OUTPUTS
@@ -364,23 +363,8 @@ class Simulator:
 
     def _prepared(self) -> kernel.Model:
         """What the compiled loop takes of the plant, with the records between two samples."""
-        plant, kept, p = self.plant, self._kept, self.plant.poles[self._kept]
-        T, f = self.chain.sampling.period, self.chain.sampling.fraction
-        records = T * (np.arange(self.between) + 1) / (self.between + 1)
-        ends = np.unique(np.r_[records, [f * T] if f else [], T])
-        starts = np.r_[0.0, ends[:-1]]
-        durations = ends - starts
-        weights = np.ascontiguousarray(plant.residues[:, kept] * np.where(p.imag > 0, 2.0, 1.0))
-        row = plant.outputs.index("hub_angle", len(self.measured))
-        return kernel.Model(
-            turn=np.exp(p * durations[:, None]),
-            push=np.array([held_amplitude(p, float(each)) for each in durations]),
-            piece=np.c_[durations, starts >= f * T, np.isin(ends, records)].astype(float),
-            weights=weights,
-            rates=np.array(plant.rigid),  # in one layout: the compiled loop is compiled anew for each
-            static=np.array(plant.static),
-            hub=np.r_[plant.rigid[row], weights[row]].astype(complex),
-        )
+        row = self.plant.outputs.index("hub_angle", len(self.measured))
+        return kernel.model_of(self.plant, self._kept, self.chain.sampling, self.between, row)
 
     def _trace(self, t: Real, record: Real) -> Trace:
         """The recorded outputs."""
