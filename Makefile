@@ -34,7 +34,7 @@ SURVEYS := \
 	loop.law_counts \
 	loop.number_windows \
 	loop.law_times \
-	synthesis.designs \
+	synthesis.optima \
 	synthesis.held_designs \
 	loop.nyquist_counts \
 	reduced.errors \

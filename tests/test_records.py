@@ -13,7 +13,7 @@ import pytest
 import tfarm
 from tfarm import HubFeedback
 from tfarm.dsp import Chain
-from tfarm.dsp.regions import sampled_map
+from tfarm.dsp.crossings import sampled_map
 from tfarm.dsp.scenarios import slew
 from tfarm.dsp.simulate import Simulator
 from tfarm.loop.locus import locus

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from tfarm.response import bode, transfer
     from tfarm.spectrum import damped_modes, modes
     from tfarm.spectrum.scales import default_gains
-    from tfarm.synthesis.chosen import design
+    from tfarm.synthesis.design import design
     from tfarm.tuner import tune
 
 __version__ = "0.1.0"
@@ -100,7 +100,7 @@ __all__ = [
 
 _ROOMS = {  # where a name stands; what it is called there after a colon, if not the same
     "bode": "response",
-    "design": "synthesis.chosen",
+    "design": "synthesis.design",
     "locus": "loop.closed",
     "nyquist": "loop.nyquist",
     "closed_loop_poles": "loop.poles",

@@ -13,7 +13,7 @@ from tfarm.arm import to_toml
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
 from tfarm.dsp.verdict import sampled_brief
-from tfarm.synthesis import chosen
+from tfarm.synthesis import design
 
 LAB = tfarm.load("sasaki2012-lab")
 
@@ -31,7 +31,7 @@ def test_the_radius_is_that_of_an_independent_model(K1, K2, period):
 
 def test_gains_that_fail_when_sampled_are_not_recommended_without_a_word(capsys, monkeypatch):
     """At 10 ms, which no file of a preset says and which is said to be a default."""
-    remember(monkeypatch, chosen, "design")  # two commands ask for the same
+    remember(monkeypatch, design, "design")  # two commands ask for the same
     found = answer(capsys, "design", "sasaki2012-lab", "--continuous")["sampled"]
     assert (found["period_s"], found["period_is_default"], found["stable"]) == (0.01, True, False)
     assert found["spectral_radius"] > 2

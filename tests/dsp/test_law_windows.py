@@ -41,7 +41,7 @@ def test_between_crossings_along_one_part_the_count_is_what_they_say():
             own = loop.number(name)
             values = own * np.r_[1.0, -(10 ** rng.uniform(-4, 3, 3)), 10 ** rng.uniform(-4, 3, 3)]
             loops = [loop.having(**{name: value}) for value in values.tolist()]
-            passed = number_crossings(circle_grid(loop), name, loop.row).passed(values)
+            passed = number_crossings(circle_grid(loop), name, loop.row[None])[0].passed(values)
             counts = np.array([(each.poles.log_radius > 0).sum() for each in loops])
             assert (counts - counts[0] == passed - passed[0]).all(), name
             compared += 1

@@ -17,8 +17,7 @@ from tfarm.dsp import (
     sampled_loop,
     sampled_map,
 )
-from tfarm.dsp.crossings import around, circle_grid, number_crossings, stable_windows
-from tfarm.dsp.regions import ENDS_AT, ends_of_K1
+from tfarm.dsp.crossings import ENDS_AT, around, circle_grid, ends_of_K1, number_crossings, stable_windows
 from tfarm.dsp.verdict import sampled_answer, sampled_verdict
 from tfarm.errors import ParameterError
 
@@ -81,7 +80,7 @@ def test_between_crossings_the_counts_are_those_of_the_eigenvalues(name, delay):
     grid = circle_grid(loop)
     for gain, other in (("K2", 0.3), ("K2", 7.0), ("K1", 0.3), ("K1", -0.1)):
         held = loop.having(K1=other, K2=other)
-        found = number_crossings(grid, gain, held.row)
+        (found,) = number_crossings(grid, gain, held.row[None])
         middles = np.r_[found.gain[0] - 1, (found.gain[1:] + found.gain[:-1]) / 2, found.gain[-1] + 1]
         counts = [growing(held.having(**{gain: m})) for m in middles]
         np.testing.assert_array_equal(np.diff(counts), found.change)
@@ -90,7 +89,7 @@ def test_between_crossings_the_counts_are_those_of_the_eigenvalues(name, delay):
 def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
     """Sixty samples turn the loop's phase sixty times round the circle; a grid ten times coarser loses a pair."""
     loop = sampled_loop(lab, GAINS, Chain(sampling=Sampling(delay_samples=60.0)), count=6)
-    found = number_crossings(circle_grid(loop), "K1", loop.having(K1=0.0, K2=0.3).row)
+    (found,) = number_crossings(circle_grid(loop), "K1", loop.having(K1=0.0, K2=0.3).row[None])
     gaps = np.nonzero(np.diff(found.gain) > 1e-6)[0]
     middles = np.r_[found.gain[0] - 1, (found.gain[gaps + 1] + found.gain[gaps]) / 2, found.gain[-1] + 1]
     passed = np.r_[0, np.cumsum(found.change)][np.searchsorted(found.gain, middles)]
@@ -107,6 +106,18 @@ def test_the_map_counts_as_the_eigenvalues_do(name, hub_rate):
     rng = np.random.default_rng(5)
     for i, j in zip(rng.integers(28, size=60), rng.integers(31, size=60), strict=True):
         assert growing(loop.having(K1=float(plane.K1[i]), K2=float(plane.K2[j]))) == plane.unstable[i, j]
+
+
+@pytest.mark.parametrize("vary", [("K1", "Kp"), ("hub_rate", "tip_acceleration.gain")])
+def test_a_map_over_two_numbers_of_any_law_counts_as_the_eigenvalues_do(lab, vary):
+    """With the angle held, and of a law with a filter, whose other numbers stay as they are."""
+    of_signals = tfarm.Law({"hub_rate": 0.3, "hub_angle": 2.0, "tip_acceleration": ([0.05], [0.02, 1.0])})
+    loop = sampled_loop(lab, GAINS.having("Kp", 3.0) if vary[1] == "Kp" else of_signals, count=7)
+    plane = sampled_map(loop, np.linspace(0.05, 4.0, 7), np.linspace(-3.0, 30.0, 9), vary)
+    assert plane.vary == vary
+    for i, j in np.ndindex(7, 9):
+        assert growing(loop.having(**{vary[0]: plane.x[i], vary[1]: plane.y[j]})) == plane.unstable[i, j]
+    assert len(np.unique(plane.unstable)) > 1
 
 
 def test_the_map_has_exact_edges(lab):
@@ -158,7 +169,7 @@ def test_the_required_damping_is_where_the_verdict_turns(lossless):
 def test_at_a_crossing_the_closed_loop_matrix_has_an_eigenvalue_at_its_angle(lab, gain):
     """Not only the gain of a crossing is right, but the place on the circle, too."""
     loop = sampled_loop(lab, GAINS, count=6)
-    found = number_crossings(circle_grid(loop), gain, loop.row)
+    (found,) = number_crossings(circle_grid(loop), gain, loop.row[None])
     assert found.gain.size > 3
     for value, angle in zip(found.gain.tolist(), found.at.tolist(), strict=True):
         eigenvalues = loop.having(**{gain: value}).eigenvalues

@@ -61,8 +61,8 @@ def is_clear(verdict):
     if abs(loop.poles.log_spectral_radius) < SLOW:
         return False
     grid = circle_grid(loop)
-    near_K1 = abs(number_crossings(grid, "K1", loop.row).gain - gains.K1) < CLOSE * max(1, abs(gains.K1))
-    near_K2 = abs(number_crossings(grid, "K2", loop.row).gain - gains.K2) < CLOSE
+    near_K1 = abs(number_crossings(grid, "K1", loop.row[None])[0].gain - gains.K1) < CLOSE * max(1, abs(gains.K1))
+    near_K2 = abs(number_crossings(grid, "K2", loop.row[None])[0].gain - gains.K2) < CLOSE
     return not (near_K1.any() or near_K2.any())
 
 

@@ -14,8 +14,8 @@ from tests.shared import thinned
 from tests.spectrum.test_double import pinned_pinned, steel
 from tests.strategies import BOUNDARY_CASES, some_arm
 from tfarm import Hub, ParameterError, Payload
-from tfarm.arm import FED_BACK, Arm, Link, Section
-from tfarm.reduced import modal_model, reduce, relaxed_model, slow_model, tailed_model
+from tfarm.arm import Arm, Link, Section
+from tfarm.reduced import modal_model, reduce, relaxed_model, slow_model
 from tfarm.response import transfer
 
 pytestmark = pytest.mark.kernels
@@ -70,31 +70,6 @@ def test_hub_angle_residues_are_squares_of_the_participation(arm):
     np.testing.assert_allclose(model.participation, abs(b), rtol=1e-12)
     moment = -arm.hub.inertia * w**2 * b**2  # modal moment -I_h w^2 b, times b
     np.testing.assert_allclose(model.residues[1, :, 0] * 2j * w, moment, rtol=1e-12)
-
-
-@pytest.mark.parametrize("preset", ["sasaki2012", "sasaki2012-lab", "stocky-steel"])
-@pytest.mark.parametrize("heavier", [1, 1000])
-def test_a_tail_stands_for_all_modes_left_out(preset, heavier):
-    """Rate and moment gain three digits: their static remainders lack the first power of s."""
-    arm = tfarm.load(preset)
-    arm = replace(arm, link=replace(arm.link, density=heavier * arm.link.density, damping=0.0))
-    tailed, modal = tailed_model(arm, 6), modal_model(arm, FED_BACK, 6)
-    s = 1j * np.linspace(0.3, 1.3, 20) * modal.natural_frequency[0]
-    G = tfarm.transfer(arm, FED_BACK)(s)
-    off = [abs(each(s) - G).max(axis=1) for each in (tailed, modal)]
-    assert (off[0] < [0.2, 1e-3, 1e-3] * off[1]).all()
-    assert tailed.matrices()[0].shape == (16, 16)
-
-
-def test_a_tail_is_damped_as_what_it_stands_for():
-    """Of Kelvin-Voigt bending alone: on a slender arm, where each mode's w^2 becomes w^2 (1 + C s)."""
-    arm = tfarm.load("sasaki2012")
-    arm = replace(arm, link=replace(arm.link, density=1e5 * arm.link.density, damping=3e-4))
-    tailed, modal = tailed_model(arm, 6), modal_model(arm, FED_BACK, 6)
-    s = 1j * np.linspace(0.3, 1.3, 20) * tailed.natural_frequency[0]
-    G = tfarm.transfer(arm, FED_BACK)(s)
-    off = [abs(each(s) - G).max(axis=1) for each in (tailed, modal)]
-    assert (off[0] < [0.2, 1e-3, 1.0] * off[1]).all()  # the moment's share relaxes with 1 + C s besides
 
 
 @pytest.mark.parametrize("preset", ["sasaki2012", "sasaki2012-lab"])

@@ -8,7 +8,7 @@ import pytest
 import tfarm
 from tfarm.arm import Motor
 from tfarm.dsp import pulse_transfer
-from tfarm.reduced.modal import modal_model, tailed_model
+from tfarm.reduced.modal import modal_model
 
 MEASURED = ("hub_angle", "hub_rate", "root_moment")
 S = np.array([0.01 + 0.02j, 5 + 40j, 3 - 20j])
@@ -24,7 +24,6 @@ def test_a_model_with_friction_is_the_exact_rig_at_low_frequency(arm):
     exact = tfarm.transfer(arm, MEASURED)(S)
     model = modal_model(arm, MEASURED, 7)
     np.testing.assert_allclose(model(S), exact, rtol=1e-4)
-    np.testing.assert_allclose(tailed_model(arm, 7)(S), exact, rtol=1e-5)
     assert model.order == 14 + 1 + model.single.size == len(model.states)
     A, B, C, D = model.matrices()
     for s, values in zip(S, model(S).T, strict=True):

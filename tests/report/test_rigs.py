@@ -10,7 +10,7 @@ from matplotlib.patches import Rectangle
 import tfarm
 from tfarm import plots
 from tfarm.arm import Gauge, written_unit
-from tfarm.dsp.regions import sampled_map
+from tfarm.dsp.crossings import sampled_map
 from tfarm.plots.sketch import sketch
 from tfarm.plots.style import blank
 from tfarm.report.arm_section import arm_section

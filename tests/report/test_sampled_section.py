@@ -104,7 +104,7 @@ def test_the_edges_at_the_default_gains_are_published_ones(section):
 
 def test_without_damping_the_layers_are_nested_at_the_gains_and_say_for_how_many_modes(monkeypatch):
     monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
-    monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
+    monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
     data = stable_regions(PAPER, GAINS, Chain())
     assert [layer.loop.plant.arm.damping for layer in data.sampled] == [1e-4, 1e-6, 0.0]
     assert data.sampled[-1].modes_used == 20
@@ -230,7 +230,7 @@ def test_loci_are_the_poles_at_their_gains_and_aliased_modes_are_told_apart():
 @pytest.mark.survey
 def test_the_same_bytes_twice(tmp_path, monkeypatch):
     monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
-    monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
+    monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
     loop = sampled_verdict(LAB, GAINS).loop
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
@@ -256,7 +256,7 @@ def test_an_arm_without_a_loop_gets_one_sentence(inertia):
 
 def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
     monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
-    monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
+    monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
     monkeypatch.setattr("tfarm.dsp.verdict.PERIOD_SHARES", (1.0,))
     section = sampled_section(replace(LAB, payload=tfarm.Payload(mass=math.inf)), Chain())
     assert "no slew" in section.words[-1]

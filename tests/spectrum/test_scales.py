@@ -25,7 +25,7 @@ from tfarm.spectrum.scales import (
     rate_unit,
     turning_inertia,
 )
-from tfarm.synthesis.design import best_gains
+from tfarm.synthesis.design import design
 
 STOCKY, LAB = tfarm.load("stocky-steel"), tfarm.load("sasaki2012-lab")
 EPS = 2.0**-52
@@ -93,7 +93,7 @@ def test_windows_and_designs_of_a_large_arm_are_those_of_a_similar_small_one():
     laws = [HubFeedback(K1=2 * rate_unit(arm), K2=0.3) for arm in arms]
     ends = [stable_windows(sampled_loop(*each, count=4), "K1") for each in zip(arms, laws, chains, strict=True)]
     assert np.ravel(ends[1]) * time / inertia == pytest.approx(np.ravel(ends[0]), rel=1e-6)
-    found = [best_gains(arm, "damping", chain=chain) for arm, chain in zip(arms, chains, strict=True)]
+    found = [design(arm, "damping", chain=chain) for arm, chain in zip(arms, chains, strict=True)]
     assert found[1].law.K1 * time / inertia == pytest.approx(found[0].law.K1, rel=1e-3)
     assert found[1].value == pytest.approx(found[0].value, rel=1e-6)
 

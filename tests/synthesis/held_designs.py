@@ -1,6 +1,6 @@
 """What `tfarm design` recommends, on another model:  python -m tests.synthesis.held_designs SIZE SEED
 
-Plausible arms at random (see `designs`) with damping in the link, the first mode turning by 0.2 to 2 rad in a sample;
+Plausible arms at random (see `arms`) with damping in the link, the first mode turning by 0.2 to 2 rad in a sample;
 for each a structure at random.  The law recommended, and the same a quarter larger and smaller, has to
 hold by a Galerkin model of 20 terms under a hold: no modes, no residues.  Reported: those that do not, by how much, and
 how many arms were refused.
@@ -13,14 +13,14 @@ from dataclasses import replace
 import numpy as np
 
 import tfarm
-from tests.synthesis.designs import log, some_arm
+from tests.synthesis.arms import log, some_arm
 from tests.synthesis.held_loop import HeldLoop
-from tfarm import ConvergenceError, HubFeedback, Law
-from tfarm.arm import TWO_GAINS
+from tfarm import ConvergenceError
+from tfarm.arm import TWO_GAINS, as_law
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
-from tfarm.synthesis.chosen import design
-from tfarm.synthesis.sampled import RESERVE
+from tfarm.synthesis.design import design
+from tfarm.synthesis.judge import RESERVE
 from tfarm.synthesis.structures import STRUCTURES
 
 EDGE = 1e-6  # the Ritz model's radius is right to that, and on the edge of the reserve it is 1
@@ -33,12 +33,12 @@ def damped_arm(rng):
     return arm if arm.damping else replace(arm, link=replace(arm.link, damping=2 * log(rng, 1e-3, 2e-2) / first)), first
 
 
-def excess(rng, structures=(TWO_GAINS, *STRUCTURES)):
+def excess(rng, structures=tuple(STRUCTURES)):
     """By how much the largest radius, with the reserve, is above 1 on the other model; the arm's name and the law's."""
     arm, first = damped_arm(rng)
     chain, structure = Chain(sampling=Sampling(period=1 / (first * rng.uniform(0.5, 5.0)))), str(rng.choice(structures))
     found = design(arm, structure=structure, chain=chain, modes=1)
-    law = Law.of_gains(found.law) if isinstance(found.law, HubFeedback) else found.law
+    law = as_law(found.law)
     held, radii = HeldLoop(arm, chain.sampling.period, 20), []
     for share in (1 / RESERVE, 1.0, RESERVE):
         z = held.closed_loop_poles(law.times(share))

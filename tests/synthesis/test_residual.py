@@ -14,15 +14,14 @@ from scipy.linalg import expm
 
 import tfarm
 from tests.shell import run
+from tests.synthesis.judged import judge_of
 from tfarm import HubFeedback, tuner
 from tfarm.dsp import Chain, Slew
 from tfarm.dsp.chain import Sampling
 from tfarm.dsp.results import simulated_answer
 from tfarm.reduced import modal_model
-from tfarm.synthesis import design as gains_design
-from tfarm.synthesis.answers import slew_duration
-from tfarm.synthesis.design import best_gains
-from tfarm.synthesis.law_design import law_score_on
+from tfarm.synthesis import search
+from tfarm.synthesis.design import design, slew_duration
 from tfarm.tuner.tuning import controlled_answer
 
 DATA = Path(__file__).parents[1] / "data" / "reproductions"
@@ -79,17 +78,17 @@ def test_a_simulation_finds_the_arms_own_moment_less_the_rigid_arms(chain):
 @pytest.mark.parametrize("chain", CHAINS, ids=NAMED)
 def test_a_design_promises_what_a_simulation_finds(chain, monkeypatch):
     """To the last bit; what was minimised, of eight modes, is the same but for the modes left out."""
-    monkeypatch.setattr(gains_design, "POLISHED", 1)
-    found = best_gains(LAB, "residual", chain=chain, K1=(0.1, 3.0), K2=(-0.5, 0.5))
+    monkeypatch.setattr(search, "WHOLE", search.Effort(4, 1))
+    found = design(LAB, "residual", chain=chain, K1=(0.1, 3.0), K2=(-0.5, 0.5))
     assert found.value == simulated_answer(LAB, found.law, chain, "slew", slew_duration(found))["residual_moment_rms"]
-    assert gains_design.gains_score_on(found, LAB) == pytest.approx(found.value, rel=1e-4)
+    assert judge_of(LAB, found.law, "residual", chain).score(found.law) == pytest.approx(found.value, rel=1e-4)
 
 
 @pytest.mark.parametrize("chain", CHAINS[-1:], ids=NAMED[-1:])
 def test_so_does_a_design_of_a_law(chain):
     found = tfarm.design(LAB, "residual", structure="PD", chain=chain)
     assert found.value == simulated_answer(LAB, found.law, chain, "slew", slew_duration(found))["residual_moment_rms"]
-    assert law_score_on(found, LAB) == pytest.approx(found.value, rel=1e-4)
+    assert judge_of(LAB, found.law, "residual", chain).score(found.law) == pytest.approx(found.value, rel=1e-4)
 
 
 @pytest.mark.parametrize("chain", CHAINS, ids=NAMED)

@@ -9,12 +9,13 @@ import pytest
 import tfarm
 from tests.shared import thinned
 from tests.synthesis.held_loop import HeldLoop
+from tests.synthesis.judged import judge_of
 from tfarm import ConvergenceError, HubFeedback, ParameterError
 from tfarm.dsp import Chain, Slew, sampled_verdict
 from tfarm.dsp.chain import Sampling
-from tfarm.synthesis import design as gains_design
-from tfarm.synthesis.design import best_gains
-from tfarm.synthesis.sampled import RESERVE, sampled_judges
+from tfarm.synthesis import search
+from tfarm.synthesis.design import design
+from tfarm.synthesis.judge import RESERVE
 from tfarm.tuner.baselines import best_constant
 from tfarm.tuner.trial import slew_trial
 
@@ -25,7 +26,7 @@ HELD = HeldLoop(LAB, 0.01)
 @pytest.mark.parametrize("name", thinned(tfarm.presets(), 8))
 def test_what_is_recommended_holds_when_sampled(name) -> None:
     """By the whole verdict, at the gains and a quarter to either side, and without a clock."""
-    found = best_gains(tfarm.load(name), chain=tfarm.dsp.load_chain(name))
+    found = design(tfarm.load(name), chain=tfarm.dsp.load_chain(name))
     laws = [found.law.times(share) for share in (1 / RESERVE, 1.0, RESERVE)]
     assert all(sampled_verdict(tfarm.load(name), law, found.chain).is_stable for law in laws)
     assert found.sampled.is_stable
@@ -34,7 +35,7 @@ def test_what_is_recommended_holds_when_sampled(name) -> None:
 
 @pytest.fixture(scope="module")
 def found():
-    return {objective: best_gains(LAB, objective) for objective in ("damping", "margin", "residual")}
+    return {objective: design(LAB, objective) for objective in ("damping", "margin", "residual")}
 
 
 def test_the_gains_that_are_best_without_a_clock_do_not_hold(found) -> None:
@@ -69,11 +70,11 @@ def test_random_gains_are_no_better(found) -> None:
 
 def test_the_disk_margin_is_that_of_the_circle(found) -> None:
     law = HubFeedback(K1=3.0, K2=0.3)
-    judge = next(sampled_judges(LAB, Chain(), "margin", HubFeedback(), 2))
+    judge = judge_of(LAB, law, "margin")
     q = np.r_[np.linspace(1e-4, np.pi, 4000)]
     L = HELD.loop(law, q)
-    assert judge.disk(law) == pytest.approx((2 * abs(1 + L) / abs(1 - L)).min(), rel=1e-3)
-    assert found["margin"].value == pytest.approx(judge.disk(found["margin"].law), rel=1e-3)
+    assert judge.value(law) == pytest.approx((2 * abs(1 + L) / abs(1 - L)).min(), rel=1e-3)
+    assert found["margin"].value == pytest.approx(judge.value(found["margin"].law), rel=1e-3)
 
 
 def slewed(arm, law, chain):
@@ -93,25 +94,27 @@ def slewed(arm, law, chain):
 
 @pytest.mark.parametrize("Kp", thinned([4.0, 0.0], 2))
 def test_the_residual_is_that_of_the_simulated_slew(Kp, monkeypatch) -> None:
-    monkeypatch.setattr(gains_design, "POLISHED", 1)  # of the minima found: what the best leaves is asked, not which
+    monkeypatch.setattr(
+        search, "WHOLE", search.Effort(4, 1)
+    )  # of the minima found: what the best leaves is asked, not which
     chain = Chain(sampling=Sampling(period=0.008, delay_samples=0.5), slew=Slew(rise_time=0.5, travel=0.4))
-    found = best_gains(LAB, "residual", Kp=Kp, chain=chain, K1=(0.1, 5.0), K2=(-0.5, 0.8))
+    found = design(LAB, "residual", Kp=Kp, chain=chain, K1=(0.1, 5.0), K2=(-0.5, 0.8))
     assert found.value == pytest.approx(slewed(LAB, found.law, chain), rel=1e-3)  # of 8 modes beside 20
 
 
 def test_the_cost_is_that_of_the_tuners_trial_and_no_gains_cost_less() -> None:
     """Its trial has another model, of six modes; neighbours and the best constant K of the default K1 cost more."""
-    found = best_gains(LAB, "cost", K1=(0.05, 5.0), K2=(-0.9, 0.9))
+    found = design(LAB, "cost", K1=(0.05, 5.0), K2=(-0.9, 0.9))
     gains = [(found.law.K1, found.law.K2), (0.3, best_constant(slew_trial(LAB, K1=0.3)).gain)]
     gains += [(found.law.K1 * a, found.law.K2 + b) for a, b in ((0.9, 0.0), (1.1, 0.0), (1.0, -0.02), (1.0, 0.02))]
     first, *others = (slew_trial(LAB, K1=K1).with_constant(K2).cost for K1, K2 in gains)
     assert found.value == pytest.approx(first, rel=1e-4)
     assert all(each >= first * (1 - 1e-6) for each in others) or found.at_bound
     with pytest.raises(ParameterError, match="samples"):
-        best_gains(LAB, "cost", continuous=True)
+        design(LAB, "cost", continuous=True)
 
 
 def test_where_nothing_holds_nothing_is_recommended() -> None:
     late = Chain(sampling=Sampling(delay_samples=3.0))
     with pytest.raises(ConvergenceError, match="widen the bounds"):
-        best_gains(replace(LAB, name="late"), K1=(30.0, 60.0), K2=(-3.0, -2.0), chain=late)
+        design(replace(LAB, name="late"), K1=(30.0, 60.0), K2=(-3.0, -2.0), chain=late)

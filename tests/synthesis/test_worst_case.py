@@ -11,8 +11,8 @@ from tests.synthesis.held_loop import HeldLoop
 from tfarm import HubFeedback
 from tfarm.arm import Hub
 from tfarm.synthesis import worst_case
-from tfarm.synthesis.chosen import design
-from tfarm.synthesis.sampled import RESERVE
+from tfarm.synthesis.design import design
+from tfarm.synthesis.judge import RESERVE
 from tfarm.synthesis.worst_case import MUCH_WORSE, ArmBox, varied, worst_inside
 
 LAB, T = tfarm.load("sasaki2012-lab"), 0.01

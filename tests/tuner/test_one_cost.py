@@ -8,12 +8,11 @@ import pytest
 
 import tfarm
 from tests.shell import answer, run
+from tests.synthesis.judged import judge_of
 from tfarm.dsp import Chain
 from tfarm.dsp.results import simulated_answer
 from tfarm.report import tuner_words
 from tfarm.report.tuner_section import comparison_table
-from tfarm.synthesis.law_judge import law_judge
-from tfarm.synthesis.sampled import sampled_judges
 from tfarm.tuner.tuning import trial_of, usual_plan
 
 SMALL = Path(__file__).parents[1] / "data" / "reproductions" / "r3.toml"
@@ -70,18 +69,14 @@ def test_text_json_page_and_file_have_one_cost(capsys, saved, page):
 
 
 def test_a_design_counts_the_same_cost():
-    """Both judges, beside a trial of as many modes."""
+    """Compared with a trial of as many modes."""
     plan = usual_plan(ARM)
-    judge = next(sampled_judges(ARM, Chain(), "cost", tfarm.HubFeedback(Kp=1.0), 2))
     trial = trial_of(ARM, plan, Chain())
-    alike = tfarm.tuner.slew_trial(
-        ARM, K1=0.8, Kp=1.0, cost=trial.cost, duration=plan.duration, count=judge.loop.plant.count
-    ).with_constant(0.2)
-    assert judge.cost(np.array([[0.8], [0.2]])) == pytest.approx([alike.cost], rel=1e-9)
-    read = {"hub_angle": 1.0, "hub_rate": 0.8, "root_moment": 0.2}
-    parts = tfarm.Law(read, references=tuple(read))
-    found = law_judge(ARM, Chain(), parts, "cost", 2, judge.loop.plant.count).score(parts)
-    assert found == pytest.approx(alike.cost, rel=1e-9)
+    alike = tfarm.tuner.slew_trial(ARM, K1=0.8, Kp=1.0, cost=trial.cost, duration=plan.duration, count=8).with_constant(
+        0.2
+    )
+    law = tfarm.HubFeedback(Kp=1.0, K1=0.8, K2=0.2)
+    assert judge_of(ARM, law, "cost").score(law) == pytest.approx(alike.cost, rel=1e-9)
 
 
 def test_the_reading_of_the_chain_is_that_of_a_trial(capsys, tmp_path):

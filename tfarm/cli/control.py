@@ -31,9 +31,7 @@ HELP_ON_MAP = (
     f"How many poles are unstable over the plane of {' and '.join(PLANE)}, and the exact boundary; "
     "or over two numbers of a law."
 )
-HELP_ON_OBJECTIVE = (
-    "damping, margin, residual or cost (of the tuner's trial); of another structure sensitivity or delay too"
-)
+HELP_ON_OBJECTIVE = "damping, margin, sensitivity, delay, residual or cost (of the tuner's trial)"
 HELP_ON_STRUCTURE = f"{TWO_GAINS}, PD, PD+notch, lead, PPF or strain-rate"
 USUAL_RANGES = {  # of a map
     RATE_GAIN: f"by default -1,3 on the paper's arm, -3.33 to 10 times the default {RATE_GAIN} on a rig",
@@ -205,8 +203,8 @@ def design(
     from tfarm.arm.writing import save_law
     from tfarm.cli.control_tables import print_design
     from tfarm.cli.tables import hand_out
-    from tfarm.synthesis.answers import design_answer
-    from tfarm.synthesis.chosen import design as find_law
+    from tfarm.synthesis.design import design as find_law
+    from tfarm.synthesis.design import design_answer
 
     found = find_law(
         subject, objective, structure=structure, **within, modes=number, chain=chain,

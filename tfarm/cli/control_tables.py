@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from tfarm.arm import ANGLE_GAIN, NAMES, PLANE
+from tfarm.arm import ANGLE_GAIN, PLANE
 from tfarm.columns import Column, Table
 from tfarm.digits import general, singly
 from tfarm.loop.answers import POLE_COLUMNS, WINDOW_COLUMNS, gain_rows, margin_rows
@@ -79,7 +79,7 @@ def _print_loop_margins(found: Margins, answer: dict[str, Any]) -> None:
 
 
 def _pair(pair: Any) -> str:
-    return f"({pair[0]:.8g}, {pair[1]:.8g})"
+    return f"({pair[0]:.8g}, {pair[1]:.8g})" if pair else ""
 
 
 def print_spill(answer: dict[str, Any]) -> None:
@@ -118,33 +118,48 @@ def print_law_map(answer: dict[str, Any]) -> None:
 
 
 def print_design(answer: dict[str, Any]) -> None:
-    """The law and what it reaches, then a row an arm."""
-    (_print_coefficients if "coefficients" in answer else _print_gains)(answer)
+    """The law and what it reaches, how sure the optimum is, then a row an arm."""
+    loop = f"the {answer['designed_for']} loop, {answer['modes']} modes"
+    told = f"{answer['structure']}, objective {answer['objective']} of {loop}: {answer['value']:.6g}"
+    print(f"{answer['arm']}, {told}")
+    _print_coefficients(answer)
+    sampled = answer["sampled"]
+    words = (
+        sampled["in_words"] if "gain_units" in answer else sampled["in_words"].replace("these gains are", "it is", 1)
+    )
+    print(f"{'' if sampled['stable'] else 'BUT '}{words}")
+    beyond = "" if answer["known_beyond_the_band"] else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
+    print(f"without a clock it is {answer['verdict']}{beyond}; --save FILE keeps it for --law FILE")
+    print(f"{answer['starts_agreed']} of {answer['starts']} descents agree within half a per cent")
+    _print_bounds(answer)
     _print_record(answer)
     _print_arms(answer)
     print(answer["sign_convention"])
 
 
-def _print_gains(answer: dict[str, Any]) -> None:
-    loop = f"the {answer['designed_for']} loop, {answer['modes']} modes in the band"
-    print(f"{answer['arm']}, objective {answer['objective']} of {loop}: {answer['verdict']} without a clock")
-    units = {name: "" if unit == "1" else f" {unit}" for name, unit in answer["gain_units"].items()}
-    searched = [f"{name} = {answer[name]:.6g}{units[name]}" for name in PLANE]
-    held = [f"{name} = {answer[name]:.6g}" for name in NAMES if name not in PLANE]
-    print(f"{', '.join(searched + held)}: {answer['value']:.6g}")
-    sampled = answer["sampled"]
-    warning = "" if sampled["stable"] else "BUT "
-    print(f"{warning}{sampled['in_words']}")
-    flat = [f"{name} {_pair(answer[f'flat_{name}'])}" for name in PLANE]
-    print(f"within one per cent of it: {', '.join(flat)}")
+def _print_coefficients(answer: dict[str, Any]) -> None:
+    """A row a coefficient: its value, how flat the optimum is along it, and where it was searched."""
+    names, bounds = list(answer["coefficients"]), answer["bounds"]
+    columns = (
+        Column("coefficient", "coefficient", of=names),
+        Column("value", "value", of=list(answer["coefficients"].values()), digits=singly(general, 7)),
+        Column("flat", "within one per cent", of=[_pair(answer.get(f"flat_{name}")) for name in names]),
+        Column("bounds", "searched", of=[_pair(bounds.get(name)) for name in names]),
+    )
+    show(Table(columns=columns))
+
+
+def _print_bounds(answer: dict[str, Any]) -> None:
+    """Which bounds were widened, and where the search was cut off."""
+    values = answer["coefficients"]
     for name in answer["widened"]:
         wider = _pair(answer["bounds"][name])
-        print(f"the bounds of {name} were widened to {wider}: the best gains lay on the first ones")
+        print(f"the bounds of {name} were widened to {wider}: the best law lay on the first ones")
     for name in answer["at_limit"]:
-        print(f"{name} = {answer[name]:.6g} is at the physical end of {_pair(answer['bounds'][name])}")
+        print(f"{name} = {values[name]:.6g} is at the physical end of {_pair(answer['bounds'][name])}")
     cut = [name for name in answer["at_bound"] if name not in answer["at_limit"]]
     if cut:
-        ends = [f"{name} = {answer[name]:.6g} of {_pair(answer['bounds'][name])}" for name in cut]
+        ends = [f"{name} = {values[name]:.6g} of {_pair(answer['bounds'][name])}" for name in cut]
         print(f"no optimum: {' and '.join(ends)} is where the search was cut off; it may get better beyond")
 
 
@@ -169,18 +184,3 @@ def _print_arms(answer: dict[str, Any]) -> None:
     )
     show(Table(columns=columns))
     print(f"{answer['value']:.6g} is {answer['worst_case_in_words']}; {answer['worst_arm']} is the worst")
-
-
-def _print_coefficients(answer: dict[str, Any]) -> None:
-    told = f"{answer['structure']}, objective {answer['objective']} of the sampled loop, {answer['modes']} modes"
-    print(f"{answer['arm']}, {told}: {answer['value']:.6g}")
-    columns = (
-        Column("coefficient", "coefficient", of=list(answer["coefficients"])),
-        Column("value", "value", of=list(answer["coefficients"].values()), digits=singly(general, 7)),
-    )
-    show(Table(columns=columns))
-    if answer["at_limit"]:
-        print(f"as fast as samples tell: {', '.join(answer['at_limit'])}")
-    print(answer["sampled"]["in_words"].replace("these gains are", "it is", 1))
-    beyond = "" if answer["known_beyond_the_band"] else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
-    print(f"without a clock it is {answer['verdict']}{beyond}; --save FILE keeps it for --law FILE")

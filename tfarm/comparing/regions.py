@@ -16,7 +16,7 @@ from tfarm.arm import PLANE, Arm, HubFeedback, shown_unit
 from tfarm.arrays import Complex, Real
 from tfarm.columns import Column, Table
 from tfarm.dsp import Chain, GainMap, sampled_map, sampled_verdict
-from tfarm.dsp.regions import ends_of_K1, rounded_map, with_both_sides, with_more
+from tfarm.dsp.crossings import ends_of_K1, rounded_map, with_both_sides, with_more
 from tfarm.errors import ConvergenceError
 from tfarm.loop.edges import Axis, rate_columns
 from tfarm.loop.plane import Plane, gain_map

@@ -1,9 +1,8 @@
 """The sampled loop of the exact arm: hold, delay, converters, verdicts and simulations at 10 ms or any other period."""
 
 from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew, load_chain
-from tfarm.dsp.crossings import stable_windows
+from tfarm.dsp.crossings import GainMap, sampled_map, stable_windows
 from tfarm.dsp.edges import delay_margin, required_damping
-from tfarm.dsp.regions import GainMap, sampled_map
 from tfarm.dsp.sampled import Sampled, sampled_loop
 from tfarm.dsp.sampling import PulseTransfer, pulse_transfer
 from tfarm.dsp.scenarios import Scenario, scenario

@@ -1,4 +1,6 @@
-"""Where along a number of the law the sampled loop changes its count of unstable poles: `tfarm.crossing` on the circle.
+"""Where along a number of the law, or over two, the sampled loop changes its count of unstable poles.
+
+It is `tfarm.crossing` on the unit circle.
 
 On z = e^{iq} the characteristic function is A + g B, g one number of the law, or a factor on all of it, and A what is
 without it.  Each open-loop pole near the circle gives A and B a feature as narrow as its residue: so the grid in q is
@@ -9,17 +11,20 @@ z = -1 a single pole crosses (see also Ackermann, Robust Control, 1993, ch. 4).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tfarm.arm import NAMES
+from tfarm.arm import NAMES, PLANE
 from tfarm.arm.feedback import ON
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.crossing import Crossing, Crossings, Window, brackets, confirmed, solved
+from tfarm.crossing import Crossing, Crossings, Window, brackets, confirmed, counts_over, intervals, pieces, solved
+from tfarm.crossing.turning import loose_columns
 from tfarm.dsp.sampled import Sampled
+from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum.scales import most_gain
 
@@ -33,6 +38,13 @@ STILL = 1e-8  # of the way from z = 1 to the nearest pole of an arm that somethi
 # still, its rate is rounding, and a gain on it would have to be so many times too large to move a pole
 LEAST_FACTOR = 1e-9  # on a law, that is looked at: with less it is none
 MOST_FACTOR = 1e9  # with more its gain is beyond any number
+MOST_GAINS = 4000  # of a map, along one gain
+ENDS_AT = (-0.9, 0.3, 0.9)  # K2 at which upright edges are looked for, of what balances a torque
+MOST_COLUMNS = 400  # of K1 in a picture
+OUTLINE_ROUNDS = 12  # of halving where its outline bends
+BESIDE_EDGE = 1e-9  # relative: so far to either side of such an edge a region is cut
+CLEAR_OF_CIRCLE = 1e-9  # of ln|z|: a pole nearer to the circle may be counted on either side
+GOLDEN = 0.6180339887498949  # of a range: a place that no rounded number of a person or a grid falls on
 
 
 @dataclass(frozen=True)
@@ -118,48 +130,59 @@ def geometric(edge: float, width: float) -> Real:
     return np.union1d(near, even[even < edge])
 
 
-def number_crossings(grid: CircleGrid, name: str, weights: Real) -> Crossings:
+def number_crossings(grid: CircleGrid, name: str, rows: Real) -> list[Crossings]:
     """Where poles cross the circle, at angles `at`, as one number of the law runs over all its values; to rounding.
 
-    The others are those of `weights` (1 + parts,), as `Sampled.row`.  A gain at the hub runs as far as `most_gain`.
+    The others are those of each of `rows` (lines, 1 + parts), as `Sampled.row`.  A gain at the hub runs as far as
+    `most_gain`.
     """
     place = 1 + grid.loop.place(name)
-    others, alone = np.array(weights), np.zeros(weights.size)
-    others[place], alone[place] = 0.0, 1.0
+    others, alone = np.array(rows), np.zeros(rows.shape[1])
+    others[:, place], alone[place] = 0.0, 1.0
     gain = ON.get(name, name)
-    most = most_gain(grid.loop.plant.arm, gain) if gain in NAMES else MOST_FACTOR * (abs(weights[place]) or 1.0)
-    return Crossings.of(each for each in _crossed(grid, others, alone) if abs(each.t) <= most)
+    most = most_gain(grid.loop.plant.arm, gain) if gain in NAMES else MOST_FACTOR * (abs(rows[0, place]) or 1.0)
+    return [Crossings.of(each for each in line if abs(each.t) <= most) for line in _crossed(grid, others, alone)]
 
 
 def crossing_factors(loop: Sampled) -> Crossings:
     """The positive factors on the law at which poles are on the circle, `at` which angle [rad a sample]."""
     whole, fed_back = loop.row.copy(), loop.row.copy()
     whole[1:], fed_back[0] = 0.0, 0.0
-    found = _crossed(circle_grid(loop), whole, fed_back)
+    (found,) = _crossed(circle_grid(loop), whole[None], fed_back)
     return Crossings.of(each for each in found if LEAST_FACTOR < each.t < MOST_FACTOR)
 
 
-def _crossed(grid: CircleGrid, others: Real, alone: Real) -> list[Crossing]:
-    """The crossings of A + g B as g grows, A and B the `terms` under two rows of weights.
+def _crossed(grid: CircleGrid, others: Real, alone: Real) -> list[list[Crossing]]:
+    """The crossings of A + g B as g grows along each of some lines, all solved for at once.
 
-    Each is solved for by its angle from a pole next to it, down to its last bit.  At z = 1 and z = -1, where a single
-    pole crosses, h = Im(A conj B) vanishes: so it falls towards the end where it is positive just before.
+    A are the `terms` under the weights `others` (lines, 1 + parts) of each line, B those under `alone` (1 + parts,).
+    Each crossing is solved for by its angle from a pole next to it, down to its last bit.  At z = 1 and z = -1, where a
+    single pole crosses, h = Im(A conj B) vanishes: so it falls towards the end where it is positive just before.
     """
-    both = np.array([others, alone])
-    A, B = both @ grid.terms
+    A, B = others @ grid.terms, alone @ grid.terms
     h = (A * B.conj()).imag
-    (step,), change = brackets(h)
+    (line, step), change = brackets(h)
     base, low = grid.base[step], grid.shift[step]  # where the next point has another pole, both are as far away
     high = np.where(base == grid.base[step + 1], grid.shift[step + 1], grid.q[step + 1] - grid.angles[base])
-    shift, gain = solved(lambda shift: tuple(both @ grid.at(base, shift)), low, high)
-    found = [Crossing(*each) for each in zip(gain, grid.angles[base] + shift, change, strict=True)]
-    A, B = both @ grid.loop.terms(np.array([-1.0 + 0j]), None, np.ones(1))
-    found.append(Crossing(_real_gain(A[0], B[0]), math.pi, 1 if h[-1] >= 0 else -1))
-    lowest, at_one = _lowest(grid.loop.near_one(others))
+
+    def parts(shift: Real) -> tuple[Complex, Complex]:
+        terms = grid.at(base, shift)
+        return (others[line].T * terms).sum(axis=0), alone @ terms
+
+    shift, gain = solved(parts, low, high)
+    found: list[list[Crossing]] = [[] for _ in others]
+    for number, *each in zip(line.tolist(), gain, grid.angles[base] + shift, change, strict=True):
+        found[number].append(Crossing(*each))
+    at_end = grid.loop.terms(np.array([-1.0 + 0j]), None, np.ones(1))[:, 0]
     least, moving = _lowest(grid.loop.near_one(alone))
-    if least <= lowest:  # A and B go there as the same power of x = 1 - 1/z, or A as a higher one: it is there at 0
-        first = -1 if h[0] >= 0 else 1
-        found.append(Crossing(_real_gain(at_one, moving) if least == lowest else 0.0, 0.0, first))
+    for here, row, first, last in zip(found, others, h[:, 0], h[:, -1], strict=True):
+        here.append(
+            Crossing(_real_gain(complex(row @ at_end), complex(alone @ at_end)), math.pi, 1 if last >= 0 else -1)
+        )
+        lowest, at_one = _lowest(grid.loop.near_one(row))
+        if least <= lowest:  # A and B go there as the same power of x = 1 - 1/z, or A as a higher one: it is there at 0
+            static = _real_gain(at_one, moving) if least == lowest else 0.0
+            here.append(Crossing(static, 0.0, -1 if first >= 0 else 1))
     return found
 
 
@@ -180,7 +203,7 @@ def _real_gain(A: complex, B: complex) -> float:
 def stable_windows(loop: Sampled, name: str) -> list[Window]:
     """Every open interval of one number of the law in which the loop is stable, the others as they are, as its poles
     confirm."""
-    found = number_crossings(circle_grid(loop), name, loop.row)
+    (found,) = number_crossings(circle_grid(loop), name, loop.row[None])
     return confirmed(found, -math.inf, math.inf, lambda value: loop.having(**{name: value}).poles.is_stable)
 
 
@@ -192,3 +215,133 @@ def stable_factors(loop: Sampled) -> list[Window]:
 def around(windows: list[Window], gain: float) -> Window | None:
     """The window that a gain lies in."""
     return next((window for window in windows if window[0] < gain < window[1]), None)
+
+
+# ------------------------------------------------------------ planes
+
+
+@dataclass(frozen=True)
+@record
+class GainMap:
+    """`unstable` (len(x), len(y)): how many poles grow, apart from z = 1 of a free hub angle; stable where it is zero.
+
+    `vary` names both numbers of the law, `x` and `y` are their values: K1 and K2, by default.  `crossings[i]`: at which
+    y the count changes at x[i], exact and not tied to the grid.
+    """
+
+    loop: Sampled
+    vary: tuple[str, str]
+    x: Real
+    y: Real
+    unstable: NDArray[np.int64]
+    crossings: list[Crossings]
+
+    @property
+    def axes(self) -> tuple[Real, Real]:
+        """The values of both numbers: across the plane, and up it."""
+        return self.x, self.y
+
+    @property
+    def K1(self) -> Real:
+        """The values across, of the plane of K1 and K2."""
+        return self.x
+
+    @property
+    def K2(self) -> Real:
+        """The values up, of the plane of K1 and K2."""
+        return self.y
+
+    @property
+    def modes_used(self) -> int:
+        """How many flexible modes the loop has."""
+        return self.loop.plant.count
+
+    @property
+    def stable_intervals(self) -> list[list[Window]]:
+        """For each x the intervals of y, cut to the map, in which nothing grows: the region with exact edges."""
+        low, high = float(self.y[0]), float(self.y[-1])
+        return [
+            intervals(found, low, high, low, int(unstable))
+            for found, unstable in zip(self.crossings, self.unstable[:, 0], strict=True)
+        ]
+
+
+def sampled_map(
+    loop: Sampled, x: Sequence[float] | Real, y: Sequence[float] | Real, vary: tuple[str, str] = PLANE
+) -> GainMap:
+    """The map over two numbers of the law of a loop, x and y (both ascending), all others as those of the loop.
+
+    `vary` names them as `Law.part_gains` does, or "K1", "K2" and "Kp" of gains at the hub.  From the exact crossings of
+    every column (D-decomposition) and one count by eigenvalues; those at three corners must agree with what the
+    crossings say, or a ConvergenceError is raised.
+    """
+    x, y = _ascending(vary[0], x), _ascending(vary[1], y)
+
+    def at(first: float, second: float) -> Sampled:
+        return loop.having(**{vary[0]: first, vary[1]: second})
+
+    grid, start = circle_grid(loop), at(_off_the_edge(x), _off_the_edge(y))
+    (across, up), there = (start.number(name) for name in vary), np.array([start.poles.unstable])
+    at_start = counts_over(x, number_crossings(grid, vary[0], start.row[None]), across, there)[0]
+    found = number_crossings(grid, vary[1], np.array([at(float(value), up).row for value in x]))
+    plane = GainMap(loop, vary, x, y, counts_over(y, found, up, at_start), found)
+    for i, j in ((0, 0), (-1, 0), (-1, -1)):
+        corner = at(float(x[i]), float(y[j]))
+        is_clear = abs(corner.poles.log_radius).min() >= CLEAR_OF_CIRCLE  # else on an edge, or too close to it
+        if is_clear and (count := corner.poles.unstable) != plane.unstable[i, j]:
+            where = ", ".join(f"{name} = {corner.number(name):g}" for name in vary)
+            message = f"at {where} the crossings count {plane.unstable[i, j]} growing poles, not {count}"
+            raise ConvergenceError(message, plane, abs(count - int(plane.unstable[i, j])))
+    return plane
+
+
+def rounded_map(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainMap:
+    """The same region at more values of K1, until its outline has no corner in a picture that the region has not.
+
+    `drawn` says where points of the plane are in the picture, 1 high.
+    """
+    for _ in range(OUTLINE_ROUNDS):
+        more = loose_columns(plane.x, pieces(plane.x, plane.stable_intervals), drawn)
+        if not more.size or plane.x.size + more.size > MOST_COLUMNS:
+            break
+        plane = with_more(plane, more)
+    return plane
+
+
+def with_more(plane: GainMap, x: Real) -> GainMap:
+    """The map with further values across, of those that it has not."""
+    fresh = np.setdiff1d(x, plane.x)
+    if not fresh.size:
+        return plane
+    more = sampled_map(plane.loop, fresh, plane.y, plane.vary)
+    both = np.r_[plane.x, more.x]
+    order = np.argsort(both, kind="stable")
+    found = plane.crossings + more.crossings
+    unstable = np.concatenate([plane.unstable, more.unstable])[order]
+    return GainMap(plane.loop, plane.vary, both[order], plane.y, unstable, [found[n] for n in order])
+
+
+def ends_of_K1(loop: Sampled) -> Real:
+    """Where stable intervals of K1 end, but at 0, at a few K2: there the region has upright edges."""
+    unit = loop.plant.arm.input_per_torque
+    found = [window for K2 in ENDS_AT for window in stable_windows(loop.having(K2=unit * K2), "K1")]
+    return np.array(sorted({end for window in found for end in window if math.isfinite(end) and end}))
+
+
+def with_both_sides(K1: Real, ends: Real) -> Real:
+    """Values of K1 ascending, and among them either side of each upright edge."""
+    return np.unique(np.concatenate([K1, ends * (1 - BESIDE_EDGE), ends * (1 + BESIDE_EDGE)]))
+
+
+def _off_the_edge(values: Real) -> float:
+    """A gain inside the range that no rounded edge falls on."""
+    return float(values[0] + GOLDEN * (values[-1] - values[0])) if values.size > 1 else float(values[0])
+
+
+def _ascending(name: str, values: Sequence[float] | Real) -> Real:
+    gains = np.array(values, dtype=float)
+    if gains.ndim != 1 or not 1 <= gains.size <= MOST_GAINS or not np.isfinite(gains).all():
+        raise ParameterError(key=name, value=gains.shape, remedy=f"a list of 1 to {MOST_GAINS} finite gains")
+    if (np.diff(gains) <= 0).any():
+        raise ParameterError(key=name, value=float(gains[0]), remedy="the gains of a map ascend, each once")
+    return gains

@@ -28,7 +28,6 @@ from tfarm.spectrum.box import Box, newton, zeros_in_box
 from tfarm.spectrum.scales import first_frequency
 
 from .crossings import BranchCrossing, crossing_answers, in_words
-from .damping import NO_PART
 from .family import line_crossings
 from .frequencies import band_of
 from .law_answers import signals_answer
@@ -38,6 +37,8 @@ from .variation import ARM_PARAMETERS, must_be_way
 
 MOST_LAW_LOCUS_POINTS = 5000  # values: at each all poles of a box are found
 MOST_LAW_BRANCHES = 60  # flexible modes below the top of the box
+NO_PART = 1e-9  # of a pole's size: a smaller real or imaginary part is rounding, as is a smaller distance of two
+NO_PART = 1e-9  # of a pole's size: a smaller real or imaginary part is rounding, as is a smaller distance of two
 PLAIN_MOVE = 0.35  # of the distance to the next pole: one that moves by less is itself
 AT_EDGE = 0.05  # of the box's height or width: poles so near to its edge come and go
 STEP_HALVINGS = 3  # halvings of a step where poles are not plainly told apart; then a branch may end and another begin

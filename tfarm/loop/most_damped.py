@@ -5,15 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tfarm.arm import NAMES, many_laws
+from tfarm.arm import NAMES, Arm, many_laws
 from tfarm.arrays import LEAST_SIZE, Complex, Real
+from tfarm.exact.characteristic import dimensionless, loop_system, quick_characteristics
 from tfarm.records import record
 
-from .damping import exact_poles_next_to
 from .locus import Locus, locus
 
 ROUND_POINTS = 17  # of each round between two neighbours, so that it is an eighth as wide as the one before
+CORRECTIONS = 6  # of Newton's method: the start is right to a few digits, so the last ones change nothing
+LONGEST_CORRECTION = 0.1  # of |s|: a longer one would land anywhere, and more than WHOLE_CORRECTION in all is refused
+LAST_CORRECTION = 1e-9  # of |s|: squared by the quadratic convergence, far below the last digit
+WHOLE_CORRECTION = 0.05  # of |s|: farther from its start a pole may be another's
 NARROWEST_ROUND = 1e-7  # of the gain: where rounds end; a damping ratio, flat there, is known to 1e-14 of its curvature
 
 
@@ -76,3 +81,26 @@ def _between(found: Locus, gain: Real, branch: Complex) -> tuple[float, float]:
         best = float(grid[at]), float(ratios[at])
         gain, branch = grid[at - 1 : at + 2], poles[at - 1 : at + 2]
     return best
+
+
+def exact_poles_next_to(arm: Arm, starts: Complex, laws: Real) -> tuple[Complex, NDArray[np.bool_]]:
+    """The exact poles next to the starts (n, slots), and which settled there; nan where there is no start.
+
+    `laws` (gains, n) are those of `many_laws`.
+    """
+    k = loop_system(arm)
+    laws = dimensionless(k, laws)
+    rows, columns = np.nonzero(~np.isnan(starts))
+    s = starts[rows, columns]
+    begin, move = s.copy(), np.zeros_like(s)
+    for _ in range(CORRECTIONS):
+        at = quick_characteristics(k, s, laws[:, rows])
+        with np.errstate(all="ignore"):  # a start that runs away has not settled
+            move = at.value / at.slope
+        most = LONGEST_CORRECTION * abs(s)
+        move = np.where(np.isfinite(move), move, LONGEST_CORRECTION * s)
+        s = s - np.where(abs(move) > most, move * (most / np.maximum(abs(move), LEAST_SIZE)), move)
+    polished, settled = np.full(starts.shape, np.nan, complex), np.ones(starts.shape, bool)
+    polished[rows, columns] = s
+    settled[rows, columns] = (abs(move) < LAST_CORRECTION * abs(s)) & (abs(s - begin) < WHOLE_CORRECTION * abs(s))
+    return polished, settled

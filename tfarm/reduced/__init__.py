@@ -2,7 +2,7 @@
 
 from tfarm.reduced.answers import reduced_answer
 from tfarm.reduced.conversions import discrete, save_mat, to_pymor, transfer_function
-from tfarm.reduced.modal import ModalModel, modal_model, relaxed_model, slow_model, tailed_model
+from tfarm.reduced.modal import ModalModel, modal_model, relaxed_model, slow_model
 from tfarm.reduced.partial_fractions import PartialFractions
 from tfarm.reduced.rational import RationalModel, rational_model
 from tfarm.reduced.reduction import BAND, ReducedModel, reduce
@@ -21,7 +21,6 @@ __all__ = [
     "relaxed_model",
     "save_mat",
     "slow_model",
-    "tailed_model",
     "to_pymor",
     "transfer_function",
 ]

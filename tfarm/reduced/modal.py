@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import FED_BACK, Arm
+from tfarm.arm import Arm
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
@@ -35,7 +35,6 @@ from .residues import contour_residues, end_residues, undamped_residues
 MOST_MODELLED = 1000  # of a model: its matrices of 2000 states take 32 MB
 MOST_PROPER = 2  # power of s: a mode's share r s^2/(s^2 + w^2) is bounded, and one of s^3 is not
 NEXT_TO_REST = 1e-3  # of the first frequency: a pole nearer to 0 leaves 1e-15 of itself five terms on
-PULLED_APART = 1e-6  # of its size: what parts the two of a double pole
 
 
 class ModalModel(PartialFractions):
@@ -133,42 +132,6 @@ def slow_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) ->
         residues=np.concatenate([model.residues, residues], axis=1),
         static=model.static - shares.sum(axis=1),
         participation=np.r_[model.participation, 0.0 * none],
-    )
-
-
-def tailed_model(arm: Arm, count: int) -> ModalModel:
-    """The modal model of what a law feeds back, with one pair of poles more in the place of all modes left out.
-
-    To the hub angle these add  sum of b^2/(s^2 + w^2 (1 + C s)) ~ rho/(s^2 + W^2 (1 + C s)),  and to the root moment
-    -I_h w^2 times as much; rho and W such that without damping both sides agree at s = 0 and s = w of the last mode.
-    Where a law changes what the hub weighs few modes do then: those of a free hub make up a clamped one but slowly.
-    The root moment of a rig agrees at s = w, too, its hub inertia being no longer all that stands before the gauge.
-    """
-    model, lossless = modal_model(arm, FED_BACK, count), arm.elastic
-    if not arm.is_uniform:  # without anything that dissipates, driven by a torque
-        lossless = replace(arm.lossless, input="hub_torque")
-    undamped = modal_model(lossless, ("hub_angle",) if arm.is_uniform else ("hub_angle", "root_moment"), count)
-    s, whole = float(undamped.natural_frequency[-1]), float(undamped.static[0])
-    fallen, *others = (undamped(s) - transfer(undamped.arm, undamped.outputs)(s)).real.tolist()
-    if not 0 < fallen < whole:  # what is left out drowns in rounding
-        return model
-    W2 = s**2 * (whole - fallen) / fallen
-    rho, half = whole * W2, arm.damping * W2 / 2
-    root = complex(np.emath.sqrt(half**2 - W2)) or PULLED_APART * half  # a double pole has no residues
-    p = -half + root * np.array([1.0, -1.0])
-    moment = others[0] * W2 * (s**2 + W2) / s**2 if others else -arm.hub_inertia * W2 * rho
-    if others:
-        rho, moment = rho / arm.input_per_torque, moment / arm.input_per_torque
-    numerators = {"hub_angle": rho + 0 * p, "hub_rate": rho * p, "root_moment": moment + 0 * p}
-    tail = np.array([numerators[each.name] for each in model.rows]) / (2 * root) * np.array([1.0, -1.0])
-    return replace(
-        model,
-        index=np.r_[model.index, 0],
-        natural_frequency=np.r_[model.natural_frequency, math.sqrt(W2)],
-        eigenvalues=np.r_[model.eigenvalues, p[None]],
-        residues=np.concatenate([model.residues, tail[:, None]], axis=1),
-        static=model.static + (tail / p).real.sum(axis=1),
-        participation=np.r_[model.participation, math.sqrt(rho)],
     )
 
 

@@ -14,7 +14,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.loop.margins import Margins, margins
 from tfarm.report.given_laws import GivenLaw, LawOnArm, cases_of, continuous_laws, on_arm, on_hub
 from tfarm.response import transfer
-from tfarm.synthesis.design import Design, best_gains
+from tfarm.synthesis.design import Design, design
 
 DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
 SIGN_WORDS = (
@@ -82,7 +82,7 @@ def best(arm: Arm, chain: Chain) -> Design | None:
     if not has_loop(arm):
         return None
     try:
-        found = best_gains(arm, modes=DESIGNED_MODES, chain=chain)
+        found = design(arm, modes=DESIGNED_MODES, chain=chain)
     except ConvergenceError:
         return None
     return None if found.at_limit else found  # the gain at which the hub stands still is no law to draw

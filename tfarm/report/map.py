@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import PLANE, Arm, HubFeedback, laws_at, shown_unit
+from tfarm.arm import GAINS, PLANE, Arm, shown_unit
 from tfarm.arrays import Real
 from tfarm.columns import Column, Table
 from tfarm.comparing.regions import sampled_region
 from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp.verdict import SampledBrief
-from tfarm.loop.damping import least_damping
 from tfarm.loop.edges import Axis, edge, moment_axis, rate_axis
 from tfarm.loop.frequencies import band_of
 from tfarm.loop.plane import Plane, gain_map
@@ -26,8 +25,11 @@ from tfarm.plots.style import blank, headline, legend_below, style
 from tfarm.records import record
 from tfarm.report.given_laws import LawOnArm
 from tfarm.report.loop_laws import DESIGNED_MODES, best, brief_on, continuous_cases
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.scales import default_gains, first_frequency
 from tfarm.synthesis.design import Design
+from tfarm.synthesis.models import continuous_model
+from tfarm.synthesis.objectives import least_damping
+from tfarm.synthesis.structures import ONE, Entry
 
 if TYPE_CHECKING:
     from tfarm.plots.style import Figure
@@ -36,6 +38,8 @@ if TYPE_CHECKING:
 GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
 MARKERS = {"default": plane.DIAMOND, "best": plane.STAR}
 DAMPING_EVERY = 4  # every so many of them the damping is computed
+DAMPING_MODES = 8  # of the model whose poles that is of: it is right to a few digits, more than a contour shows
+GAINS_AT_ONCE = 500  # of them: memory, whatever the grid
 
 
 @dataclass(frozen=True)
@@ -90,13 +94,22 @@ def map_of_arm(arm: Arm, chain: Chain | None = None) -> MapOfArm:
         np.r_[axis.low, each[half::DAMPING_EVERY], axis.high] for axis, each in zip((x, y), found.axes, strict=True)
     )
     points = np.reshape(np.meshgrid(across, up), (2, -1))
-    damping = least_damping(arm, laws_at(HubFeedback(), points), DESIGNED_MODES).reshape(up.size, across.size)
+    damping = _damping(arm, points).reshape(up.size, across.size)
     named = continuous_cases(arm, chain)
     briefs = tuple(brief_on(arm, each.law, chain) for each in named)
     sampled = sampled_region(arm, x, y, chain)
     return MapOfArm(
         arm, x, y, found, edge(found, x, y), (across, up), damping, named, best(arm, chain), chain, sampled, briefs
     )
+
+
+def _damping(arm: Arm, points: Real) -> Real:
+    """The least damping ratio (n,) at points (2, n) of the plane, by poles of a modal model."""
+    signals = tuple(each.output for name in PLANE for each in GAINS if each.name == name)
+    model = continuous_model(arm, signals, DESIGNED_MODES, DAMPING_MODES, first_frequency(arm))
+    parts = np.array_split(points, math.ceil(points.shape[1] / GAINS_AT_ONCE), axis=1)
+    laws = ([Entry(name, row[None], ONE) for name, row in zip(signals, part, strict=True)] for part in parts)
+    return np.concatenate([least_damping(model, law) for law in laws])
 
 
 def draw_map_of_arm(data: MapOfArm) -> Figure:

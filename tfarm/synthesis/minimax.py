@@ -24,7 +24,7 @@ PRICE = 100.0  # of a g above -WITHIN: tuned on the laws of all structures for t
 WITHIN = 1e-5  # below 0, so that what is found holds: tuned with it
 # The others are customary, or were chosen by hand.
 TURNS = 120  # steps of the first part
-GO_ON = 2  # of the points that it comes to, the second part begins at
+GO_ON = 3  # of the points that it comes to, the second part begins at
 LENGTHS_TRIED = 25  # trials of a step's length
 TURNS_A_CHECK = 15  # turns after which a gain below LEAST_PROGRESS ends the first part
 LEAST_PROGRESS = 1e-4  # relative
@@ -69,32 +69,35 @@ class Pieces(NamedTuple):
 
 PiecesAt = Callable[[Real], Pieces]
 ScoredPoint = tuple[float, Real]  # score and point
+Box = tuple[Real, Real]  # the least and the largest x (n,)
 
 
 def minimax(
-    pieces: PiecesAt, starts: Sequence[Real], upper: Real, tell: Callable[[int, float], None]
+    pieces: PiecesAt, starts: Sequence[Real], box: Box, tell: Callable[[int, float], None]
 ) -> list[ScoredPoint]:
-    """Scores and points x <= upper that the search from so many starts comes to, the lowest first.
+    """Scores and points x in a box that the search comes to, one from each of the starts, the lowest first.
 
-    The best of them go on along tangents.  `tell` is told how many are done, and the lowest score.
+    The best of them go on along tangents.  `tell` is called with how many are done, and the lowest score.
     """
     found: list[ScoredPoint] = []
     for n, start in enumerate(starts, 1):
-        then = descended(pieces, start, upper)
-        found += [(pieces(x).score, x) for x in (start, then)]
+        ends = [(pieces(x).score, x) for x in (np.clip(start, *box), descended(pieces, start, box))]
+        found.append(min(ends, key=itemgetter(0)))
         tell(n, min(found, key=itemgetter(0))[0])
-    found += [along_tangents(pieces, x, upper) for _, x in sorted(found, key=itemgetter(0))[:GO_ON]]
+    found.sort(key=itemgetter(0))
+    found[:GO_ON] = [along_tangents(pieces, x, box) for _, x in found[:GO_ON]]
     return sorted(found, key=itemgetter(0))
 
 
-def descended(pieces: PiecesAt, start: Real, upper: Real) -> Real:
+def descended(pieces: PiecesAt, start: Real, box: Box) -> Real:
     """Where the quasi-Newton search on the price ends."""
 
     def priced(x: Real) -> tuple[float, Real]:
-        value, slope = pieces(np.minimum(x, upper)).priced()
-        return value, np.where(x <= upper, slope, 0.0)
+        inside = np.clip(x, *box)
+        value, slope = pieces(inside).priced()
+        return value, np.where(x == inside, slope, 0.0)
 
-    x, inverse = np.minimum(start, upper), np.eye(start.size)
+    x, inverse = np.clip(start, *box), np.eye(start.size)
     value, slope = priced(x)
     before = np.inf
     for turn in range(TURNS):
@@ -117,7 +120,7 @@ def descended(pieces: PiecesAt, start: Real, upper: Real) -> Real:
             inverse = left @ inverse @ left.T + np.outer(step, step) / turned
         if abs(step).max() < LEAST_RADIUS:
             break
-    return np.asarray(np.minimum(x, upper))
+    return np.asarray(np.clip(x, *box))
 
 
 def _weak_wolfe(
@@ -137,12 +140,12 @@ def _weak_wolfe(
     return share, then, new
 
 
-def along_tangents(pieces: PiecesAt, start: Real, upper: Real) -> tuple[float, Real]:
+def along_tangents(pieces: PiecesAt, start: Real, box: Box) -> tuple[float, Real]:
     """The score and the point that linear programmes over the tangents come to."""
     x, radius = start, FIRST_RADIUS
     now = pieces(x)
     for _ in range(TANGENT_STEPS):
-        step, foretold = _tangent_step(now, -radius, np.minimum(radius, upper - x))
+        step, foretold = _tangent_step(now, np.maximum(-radius, box[0] - x), np.minimum(radius, box[1] - x))
         if foretold <= LEAST_GAIN * abs(now.score):
             break
         then = pieces(x + step)
@@ -158,7 +161,7 @@ def along_tangents(pieces: PiecesAt, start: Real, upper: Real) -> tuple[float, R
     return now.score, x
 
 
-def _tangent_step(now: Pieces, low: float, high: Real) -> tuple[Real, float]:
+def _tangent_step(now: Pieces, low: Real, high: Real) -> tuple[Real, float]:
     """The step d of least max f + f' d in a box, with g + g' d <= GROWTH_KEPT g; and by how much it lowers the score.
 
     Where some g is not below 0, that of least max g + g' d.
@@ -170,7 +173,7 @@ def _tangent_step(now: Pieces, low: float, high: Real) -> tuple[Real, float]:
         rows = np.r_[rows, np.c_[now.growth_slopes, np.zeros(len(now.growth))]]
         right = np.r_[right, (GROWTH_KEPT - 1.0) * now.growth]
     n = slopes.shape[1]
-    bounds = [*((low, float(top)) for top in high), (None, None)]
+    bounds = [*zip(low.tolist(), high.tolist(), strict=True), (None, None)]
     size = np.maximum(abs(rows[:, :n]).max(axis=1, initial=0.0), 1.0)
     rows, right, price = rows / size[:, None], right / size, np.r_[np.zeros(n), 1.0]
     done: Any = linprog(price, A_ub=rows, b_ub=right, bounds=bounds, method="highs")

@@ -1,118 +1,209 @@
-"""What a law may look like: its structure, with free coefficients x on scales of the arm's own.
+"""Structures of a law: its entries as functions of free coefficients, each on a scale and within bounds of its own.
 
-    PD            v = -Kp theta - K1 theta_t                                     of hub angle and hub rate
+    K1-K2         v = -Kp theta - K1 theta_t - K2 M                              the gains of the paper's law
+    PD            v = -Kp theta - K1 theta_t
     PD+notch      v = -(Kp + K1 s/(1 + s/pole)) N(s) theta                       of the hub angle alone
     lead          v = -Kp (1 + s/zero)/(1 + s/pole) theta
     PPF           PD, and -sum g_i w_i^2/(s^2 + 2 zeta_i w_i s + w_i^2) M        positive position feedback
     strain-rate   PD, and -g s/(1 + s/pole) M
 
-N(s) = (s^2 + 2 a w s + w^2)/(s^2 + 2 b w s + w^2).  M is the root moment: of either sign, as g is.  Kp is held: it says
-how fast the angle answers, sqrt(Kp/J), and the objectives would have it small.  Signals enter less their references.
+N(s) = (s^2 + 2 a w s + w^2)/(s^2 + 2 b w s + w^2).  M is the root moment: of either sign, as g and K2 are.  Kp is
+fixed: it is the speed of the angle, sqrt(Kp/J), and the objectives would have it small.  Signals enter less their
+references.
 A pole faster than 2/T is none when sampled by Tustin's rule, but rings: there the search ends.
+
+A coefficient is c = unit sinh(x), x the coordinate of the search: linear below its unit and logarithmic above.  So a
+positive one, far above its unit, is searched by decades, and one of either sign through 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, Law
+from tfarm.arm import ANGLE_GAIN, PLANE, TWO_GAINS, AnyLaw, Arm, HubFeedback, Law, must_not_be_algebraic
 from tfarm.arrays import Real
+from tfarm.errors import ParameterError, did_you_mean
+from tfarm.loop.frequencies import band_of
 from tfarm.records import record
 from tfarm.spectrum import modes as natural_modes
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.scales import check_gains, first_frequency, rate_unit, turning_inertia
 
+Bounds = tuple[float, float]
 Numbers = NDArray[Any]  # real, or complex for a derivative
 
-ANGLE_SPEED = 0.1  # of the first frequency, and rad a sample: how fast the angle answers unless it is said
-LARGEST_X = 40.0  # of x
-AT_LIMIT = 1e-9  # relative: a coefficient so near to its limit is there
-ONE = np.ones(1)
-IMAGINARY_STEP = 1e-30  # of a step: its square is nothing beside 1 in float64
+ANGLE_SPEED = 0.1  # of the first frequency, and rad a sample: how fast the angle answers unless Kp is given
+LOGARITHMIC = 1e-8  # of the usual size: the unit of a positive coefficient
+REACH = np.exp(4.0)  # of a coefficient's usual size, up and down: its first bounds
+FILTER_REACH = np.exp(2.0)  # the same of the frequency and damping of a notch or filter
+AT_END = 1e-3  # of the range of x: a coefficient so near to an end of its bounds is there
+IMAGINARY_STEP = 1e-30  # of a derivative: its square is nothing beside 1 in float64
 
 
 class Entry(NamedTuple):
-    """What a signal is multiplied by: polynomials in s, descending, of the coefficients."""
+    """What a signal is multiplied by: polynomials in s, descending, (degree + 1, laws); proper."""
 
     signal: str
     num: Numbers
     den: Numbers
 
 
-class Slope(NamedTuple):
-    """An entry, and d num/dx_j and d den/dx_j (n, degrees) by the coordinates of the search."""
+class Coefficient(NamedTuple):
+    """A free coefficient: its name, `unit` of its scale, first bounds, and `ends` that are physical: no wider bounds.
 
-    entry: Entry
-    num: Real
-    den: Real
+    `start` is where the search has one sensible point.
+    """
+
+    name: str
+    unit: float
+    bounds: Bounds
+    ends: Bounds
+    start: float
+
+
+def positive(name: str, start: float, most: float = np.inf, reach: float = REACH) -> Coefficient:
+    """A coefficient above 0, at most `most`, that is usually of the size `start`."""
+    return Coefficient(name, LOGARITHMIC * start, (start / reach, min(start * reach, most)), (0.0, most), start)
+
+
+def signed(name: str, size: float) -> Coefficient:
+    """A coefficient of either sign that is usually of this size; 0 is its start."""
+    return Coefficient(name, size, (-REACH * size, REACH * size), (-np.inf, np.inf), 0.0)
 
 
 @dataclass(frozen=True)
 @record
 class Structure:
-    """A law with free coefficients: their `names`, where they `start` (n,) and end (`most`), and its entries.
+    """A law with `free` coefficients, and `fixed` ones, which are not searched.
 
-    Coefficient i is start e^x where `is_positive`, else start sinh(x).  `entries` makes polynomials of coefficients, by
-    operations that are analytic in them.
+    `entries` maps coefficients (n, laws) to the entries, by operations that are analytic in them; the bounds of the
+    coefficients named in `given` are not to be widened.
     """
 
     name: str
-    names: tuple[str, ...]
-    start: Real
-    is_positive: tuple[bool, ...]
-    most: Real
+    free: tuple[Coefficient, ...]
+    fixed: dict[str, float]
     entries: Callable[[Numbers], tuple[Entry, ...]]
-
-    def at_limit(self, x: Real) -> tuple[str, ...]:
-        """The names of coefficients that are as large as they may be."""
-        near = (1 - AT_LIMIT) * self.most
-        return tuple(n for n, c, most in zip(self.names, self.coefficients(x), near, strict=True) if c >= most)
-
-    def coefficients(self, x: Real) -> Real:
-        """The coefficients at x."""
-        signs = np.array(self.is_positive)
-        x = np.clip(x, -LARGEST_X, LARGEST_X)
-        return np.asarray(np.minimum(np.where(signs, self.start * np.exp(x), self.start * np.sinh(x)), self.most))
-
-    def law(self, x: Real) -> Law:
-        """The law at x."""
-        entries = self.entries(self.coefficients(x))
-        blocks = {each.signal: (tuple(each.num.tolist()), tuple(each.den.tolist())) for each in entries}
-        return Law(blocks, name=self.name, references=tuple(blocks))
-
-    def slopes(self, x: Real) -> tuple[Slope, ...]:
-        """The entries at x and their derivatives by x, exact to rounding: f'(c) = Im f(c + i h)/h as h -> 0.
-
-        (Squire and Trapp, 1998.)
-        """
-        c, stepped = self.coefficients(x), np.where(self.is_positive, np.exp(x), np.cosh(x)) * self.start
-        steps = 1j * IMAGINARY_STEP * np.diag(stepped)
-        moved = [self.entries(c + step) for step in steps]
-        return tuple(
-            Slope(
-                entry,
-                np.array([row[n].num.imag / IMAGINARY_STEP for row in moved]),
-                np.array([row[n].den.imag / IMAGINARY_STEP for row in moved]),
-            )
-            for n, entry in enumerate(self.entries(c))
-        )
+    given: tuple[str, ...] = ()
 
     @property
-    def upper(self) -> Real:
-        """The largest x (n,): where a coefficient is as large as it may be."""
-        with np.errstate(over="ignore"):
-            share = self.most / self.start
-        return np.where(np.isfinite(share), np.log(np.abs(share)), LARGEST_X)
+    def names(self) -> tuple[str, ...]:
+        """The names of the free coefficients."""
+        return tuple(each.name for each in self.free)
+
+    @property
+    def size(self) -> int:
+        """How many are free."""
+        return len(self.free)
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """The signals of the law."""
+        return tuple(dict.fromkeys(each.signal for each in self.entries(self.coefficients(self.origin[:, None]))))
+
+    @property
+    def units(self) -> Real:
+        """The unit (n,) of each scale."""
+        return np.array([each.unit for each in self.free])
 
     @property
     def origin(self) -> Real:
-        """x of the start, where a gain of either sign is 0."""
-        return np.zeros(len(self.names))
+        """x (n,) of the start, within the bounds."""
+        return np.clip(self.at([each.start for each in self.free]), *self.box)
+
+    @property
+    def box(self) -> tuple[Real, Real]:
+        """The least and the largest x (n,); from a bound of 0 that is a physical end, a unit is left out."""
+        low, high = np.array([each.bounds for each in self.free]).T
+        ends = np.array([each.ends for each in self.free]).T
+        return self.at(np.where((low == 0) & (ends[0] == 0), self.units, low)), self.at(high)
+
+    def at(self, coefficients: Any) -> Real:
+        """x of these coefficients (n,)."""
+        return np.asarray(np.arcsinh(np.asarray(coefficients) / self.units))
+
+    def coefficients(self, x: Real) -> Real:
+        """The coefficients at x (n, laws)."""
+        return np.asarray((self.units * np.sinh(x.T)).T)
+
+    def stepped(self, x: Real) -> Numbers:
+        """The coefficients (n, n) at x (n,), in each column another moved along the imaginary axis.
+
+        So a derivative by x is that of an analytic function to rounding, Im f/h (Squire and Trapp, 1998).
+        """
+        return self.coefficients(x)[:, None] + 1j * IMAGINARY_STEP * np.diag(self.units * np.cosh(x))
+
+    def record_at(self, x: Real) -> AnyLaw:
+        """The law at x (n,), as a record."""
+        c = self.coefficients(x)
+        if self.name == TWO_GAINS:
+            return HubFeedback(**self.fixed, **dict(zip(self.names, c.tolist(), strict=True)))
+        entries = self.entries(c[:, None])
+        blocks = {each.signal: (tuple(each.num[:, 0].tolist()), tuple(each.den[:, 0].tolist())) for each in entries}
+        return Law(blocks, name=self.name, references=tuple(blocks))
+
+    def at_ends(self, x: Real) -> list[tuple[int, int]]:
+        """The places of coefficients at an end of their bounds, and at which, 0 or 1."""
+        low, high = self.box
+        share = (x - low) / (high - low)
+        found = [*zip(*np.nonzero(np.array([share, 1 - share]).T < AT_END), strict=True)]
+        return [(int(place), int(end)) for place, end in found]
+
+    def is_physical(self, place: int, end: int) -> bool:
+        """Whether that end of its bounds is a physical one, which the bounds had of their own."""
+        each = self.free[place]
+        return each.name not in self.given and each.bounds[end] == each.ends[end]
+
+    def wider(self, ends: list[tuple[int, int]], by: float) -> Structure:
+        """The same with these bounds farther out, `by` of x, not beyond physical ends."""
+        free, box = list(self.free), self.box
+        for place, end in ends:
+            each, way = free[place], 1 if end else -1
+            bound = each.unit * np.sinh(box[end][place] + way * by)
+            bound = min(bound, each.ends[1]) if end else max(bound, each.ends[0])
+            low, high = each.bounds
+            free[place] = each._replace(bounds=(low, float(bound)) if end else (float(bound), high))
+        return replace(self, free=tuple(free))
+
+
+def structure_of(
+    name: str, arm: Arm, *, Kp: float, modes: int, period: float, bounds: Mapping[str, Bounds | None]
+) -> Structure:
+    """The structure of that name for an arm at a sampling period [s]; `Kp` [input/rad] of 0 is chosen but of K1-K2.
+
+    `bounds` of coefficients are those to be searched, where not None.
+    Raises ParameterError for an unknown structure, bad bounds or Kp, and for gains too large for the arm.
+    """
+    if name not in STRUCTURES:
+        raise ParameterError(key="structure", value=name, remedy=did_you_mean(name, list(STRUCTURES)))
+    if name != TWO_GAINS and not (0.0 <= Kp < np.inf):
+        raise ParameterError(key=ANGLE_GAIN, value=Kp, remedy="the hub angle gain is zero (chosen) or positive")
+    form = STRUCTURES[name](arm, Kp if name == TWO_GAINS else Kp or usual_angle_gain(arm, period), modes, period)
+    if "root_moment" in form.signals:
+        must_not_be_algebraic(arm, "structure", name)
+    given = {key: pair for key, pair in bounds.items() if pair is not None}
+    for key, pair in given.items():
+        if key not in form.names or name != TWO_GAINS:
+            raise ParameterError(key=key, value=pair, remedy=f"goes with the structure {TWO_GAINS} alone")
+        low, high = pair
+        if not (np.isfinite([low, high]).all() and low < high):
+            raise ParameterError(key=key, value=pair, remedy="bounds are two finite numbers, the lower first")
+    free = tuple(
+        each._replace(bounds=(float(given[each.name][0]), float(given[each.name][1]))) if each.name in given else each
+        for each in form.free
+    )
+    return replace(form, free=free, given=tuple(given))
+
+
+def check_bounds(form: Structure, arm: Arm) -> None:
+    """Raise ParameterError where the bounds have gains that are too large for the arm."""
+    for bounds in zip(*(each.bounds for each in form.free), strict=True):
+        if form.name == TWO_GAINS:
+            check_gains(arm, HubFeedback(**form.fixed, **dict(zip(form.names, bounds, strict=True))))
 
 
 def usual_angle_gain(arm: Arm, period: float) -> float:
@@ -121,73 +212,118 @@ def usual_angle_gain(arm: Arm, period: float) -> float:
     return float(f"{arm.turned_inertia * speed**2:.3g}")
 
 
-def _rate_gain(arm: Arm, Kp: float) -> float:
-    """K1 that damps the rigid arm under Kp by 1/sqrt(2), without its losses."""
-    return float(np.sqrt(2 * Kp * arm.turned_inertia))
+def product(first: Numbers, second: Numbers) -> Numbers:
+    """The product of polynomials (degree + 1, laws)."""
+    shape = (len(first) + len(second) - 1, max(first.shape[1], second.shape[1]))
+    total = np.zeros(shape, np.result_type(first, second))
+    for n, row in enumerate(first):
+        total[n : n + len(second)] += row * second
+    return total
 
 
-def _servo_entries(Kp: float, c: Numbers) -> tuple[Entry, Entry]:
-    """Kp on the angle, the first coefficient on its rate."""
-    return Entry("hub_angle", Kp * ONE, ONE), Entry("hub_rate", c[:1], ONE)
+def polynomial(*coefficients: Any) -> Numbers:
+    """A polynomial (degree + 1, laws) of coefficients that are numbers or (laws,)."""
+    return np.array(np.broadcast_arrays(*(np.atleast_1d(each) for each in coefficients)))
+
+
+ONE = np.ones((1, 1))
+
+
+def _rate_gain(arm: Arm, Kp: float) -> Coefficient:
+    """K1, usually such that it damps the rigid arm under Kp by 1/sqrt(2), without its losses."""
+    return positive("K1", float(np.sqrt(2 * Kp * arm.turned_inertia)))
+
+
+def _servo(Kp: float, K1: Numbers) -> tuple[Entry, Entry]:
+    """Kp on the angle, K1 (laws,) on its rate."""
+    return Entry("hub_angle", polynomial(Kp), ONE), Entry("hub_rate", polynomial(K1), ONE)
+
+
+def _second_order(w: Numbers, damping: Numbers) -> Numbers:
+    """s^2 + 2 damping w s + w^2."""
+    return polynomial(1.0, 2 * damping * w, w * w)
+
+
+def _two_gains(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
+    """The hub does not brake at K1 = 0 and stands still at K2 = 1 (of a torque): physical ends of both."""
+    unit = arm.input_per_torque
+    most = 2.0 * turning_inertia(arm) * band_of(arm, 1)
+    K1 = Coefficient("K1", LOGARITHMIC * rate_unit(arm), (0.0, most), (0.0, np.inf), 0.1 * rate_unit(arm))
+    K2 = Coefficient("K2", unit, (-3.0 * unit, unit), (-np.inf, unit), 0.0)
+
+    def entries(c: Numbers) -> tuple[Entry, ...]:
+        angle, rate = _servo(Kp, c[0])
+        return (*((angle,) if Kp else ()), rate, Entry("root_moment", polynomial(c[1]), ONE))
+
+    assert (K1.name, K2.name) == PLANE
+    return Structure(TWO_GAINS, (K1, K2), {ANGLE_GAIN: Kp}, entries)
 
 
 def _pd(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
-    start = np.array([_rate_gain(arm, Kp)])
-    return Structure("PD", ("K1",), start, (True,), np.array([np.inf]), partial(_servo_entries, Kp))
+    return Structure("PD", (_rate_gain(arm, Kp),), {ANGLE_GAIN: Kp}, lambda c: _servo(Kp, c[0]))
 
 
 def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
     def entries(c: Numbers) -> tuple[Entry, ...]:
         K1, pole, w, a, b = c
-        num = np.polymul([K1 + Kp / pole, Kp], [1.0, 2 * a * w, w * w])
-        den = np.polymul([1 / pole, 1.0], [1.0, 2 * b * w, w * w])
-        return (Entry("hub_angle", num, den),)
+        num = product(polynomial(K1 + Kp / pole, Kp), _second_order(w, a))
+        return (Entry("hub_angle", num, product(polynomial(1 / pole, 1.0), _second_order(w, b))),)
 
-    names = ("K1", "pole_rad_s", "notch_rad_s", "notch_zero_damping", "notch_pole_damping")
-    start = np.array(
-        [_rate_gain(arm, Kp), 2 / period, min(first_frequency(arm), 1 / period), 0.1, 0.7]
-    )  # a derivative as fast as samples tell
-    most = np.array([np.inf, 2 / period, 2 / period, np.inf, np.inf])
-    return Structure("PD+notch", names, start, (True,) * 5, most, entries)
+    free = (
+        _rate_gain(arm, Kp),
+        positive("pole_rad_s", 2 / period, 2 / period),  # a derivative as fast as samples tell
+        positive("notch_rad_s", min(first_frequency(arm), 1 / period), 2 / period),
+        positive("notch_zero_damping", 0.1),
+        positive("notch_pole_damping", 0.7),
+    )
+    return Structure("PD+notch", free, {ANGLE_GAIN: Kp}, entries)
 
 
 def _lead(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
     def entries(c: Numbers) -> tuple[Entry, ...]:
         zero, pole = c
-        return (Entry("hub_angle", np.array([Kp / zero, Kp]), np.array([1 / pole, 1.0])),)
+        return (Entry("hub_angle", polynomial(Kp / zero, Kp), polynomial(1 / pole, 1.0)),)
 
-    start, most = np.array([Kp / _rate_gain(arm, Kp), 2 / period]), np.array([np.inf, 2 / period])
-    return Structure("lead", ("zero_rad_s", "pole_rad_s"), start, (True, True), most, entries)
+    free = positive("zero_rad_s", Kp / _rate_gain(arm, Kp).start), positive("pole_rad_s", 2 / period, 2 / period)
+    return Structure("lead", free, {ANGLE_GAIN: Kp}, entries)
 
 
 def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
-    frequencies = natural_modes(arm, modes).natural_frequency[-modes:]
+    frequencies = natural_modes(arm, modes).natural_frequency[-modes:].tolist()
 
     def entries(c: Numbers) -> tuple[Entry, ...]:
-        num, den = np.zeros(1), ONE
-        for g, w, zeta in c[1:].reshape(modes, 3):
-            own = np.array([1.0, 2 * zeta * w, w * w])
-            num = np.polyadd(np.polymul(num, own), g * w * w * den)
-            den = np.polymul(den, own)
-        return (*_servo_entries(Kp, c), Entry("root_moment", num, den))
+        num, den = np.zeros((1, c.shape[1])), ONE
+        for g, w, zeta in c[1:].reshape(modes, 3, -1):
+            own = _second_order(w, zeta)
+            more = product(polynomial(g * w * w), den)
+            num = product(num, own)
+            num = np.concatenate([num[: len(num) - len(more)], num[len(num) - len(more) :] + more])
+            den = product(den, own)
+        return (*_servo(Kp, c[0]), Entry("root_moment", num, den))
 
-    names = ("K1", *(f"{each}_{n}" for n in range(1, modes + 1) for each in ("gain", "filter_rad_s", "filter_damping")))
-    unit = 0.1 * arm.input_per_torque
-    start = np.r_[_rate_gain(arm, Kp), np.array([[unit, min(w, 1 / period), 0.3] for w in frequencies]).ravel()]
-    most = np.r_[np.inf, np.tile([np.inf, 2 / period, np.inf], modes)]
-    return Structure("PPF", names, start, (True, *(False, True, True) * modes), most, entries)
+    free = [_rate_gain(arm, Kp)]
+    for n, w in enumerate(frequencies, 1):
+        free += [
+            signed(f"gain_{n}", 0.1 * arm.input_per_torque),
+            positive(f"filter_rad_s_{n}", min(w, 1 / period), 2 / period, FILTER_REACH),
+            positive(f"filter_damping_{n}", 0.3, reach=FILTER_REACH),
+        ]
+    return Structure("PPF", tuple(free), {ANGLE_GAIN: Kp}, entries)
 
 
 def _strain_rate(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
     def entries(c: Numbers) -> tuple[Entry, ...]:
-        _, g, pole = c
-        return (*_servo_entries(Kp, c), Entry("root_moment", np.array([g, 0.0]), np.array([1 / pole, 1.0])))
+        K1, g, pole = c
+        return (*_servo(Kp, K1), Entry("root_moment", polynomial(g, 0.0), polynomial(1 / pole, 1.0)))
 
-    start = np.array([_rate_gain(arm, Kp), 0.1 * arm.input_per_torque / first_frequency(arm), 2 / period])
-    most = np.array([np.inf, np.inf, 2 / period])
-    return Structure("strain-rate", ("K1", "gain_s", "pole_rad_s"), start, (True, False, True), most, entries)
+    free = (
+        _rate_gain(arm, Kp),
+        signed("gain_s", 0.1 * arm.input_per_torque / first_frequency(arm)),
+        positive("pole_rad_s", 2 / period, 2 / period),
+    )
+    return Structure("strain-rate", free, {ANGLE_GAIN: Kp}, entries)
 
 
 STRUCTURES: dict[str, Callable[[Arm, float, int, float], Structure]] = {
-    "PD": _pd, "PD+notch": _pd_notch, "lead": _lead, "PPF": _ppf, "strain-rate": _strain_rate,
+    TWO_GAINS: _two_gains, "PD": _pd, "PD+notch": _pd_notch, "lead": _lead, "PPF": _ppf, "strain-rate": _strain_rate,
 }  # fmt: skip

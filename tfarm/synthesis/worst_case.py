@@ -22,10 +22,10 @@ from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
-from tfarm.synthesis.search import Bounds
+from tfarm.synthesis.structures import Bounds
 
 _Found = TypeVar("_Found")
-Tell = Callable[[str], None]
+Tell = Callable[[str], None]  # is called with one line of progress
 
 MOST_RANGES = 4  # 16 corners: a search takes so many times as long
 MOST_ARMS = 8  # of a list, for the same reason
@@ -161,8 +161,8 @@ WITHOUT_BOX = WorstCase({}, 0)  # of a list, or of one arm
 def for_the_worst(
     arms: Sequence[NamedArm], box: ArmBox | None, find: Callable[[Sequence[NamedArm]], _Found],
     score_on: Callable[[_Found, Arm], float], tell: Tell,
-) -> tuple[_Found, WorstCase]:  # fmt: skip
-    """What `find` finds for the arms, and for those inside the box on which it is worse.
+) -> tuple[_Found, list[NamedArm], WorstCase]:  # fmt: skip
+    """What `find` finds for the arms, and for those inside the box on which it is worse; all of these arms.
 
     `score_on` is what is minimised, of one arm, inf where the law does not hold.  Raises ConvergenceError where no law
     is found that holds on all arms that are named, or one inside the box stays on which it does not.
@@ -174,19 +174,19 @@ def for_the_worst(
         except ConvergenceError as error:
             if len(named) == 1:
                 raise
-            text = f"{error.message}; asked of {len(named)} arms at once: {'; '.join(each.name for each in named)}"
+            text = f"{error.message}; for {len(named)} arms at once: {'; '.join(each.name for each in named)}"
             raise ConvergenceError(text, error.best, error.residual) from None
         if box is None:
-            return found, WITHOUT_BOX
+            return found, named, WITHOUT_BOX
         limit = max(score_on(found, each.arm) for each in named)
         worst, score, number = worst_inside(box, partial(score_on, found))
         tried += number
         if score <= limit + MUCH_WORSE * abs(limit):
-            return found, WorstCase(box.ranges, tried)
+            return found, named, WorstCase(box.ranges, tried)
         if len(named) == len(arms) + MOST_EXCHANGES:
             if math.isinf(score):
                 raise ConvergenceError(f"no law found holds on {worst.name}: narrow the ranges", None, None)
-            return found, WorstCase(box.ranges, tried, worst.name)
+            return found, named, WorstCase(box.ranges, tried, worst.name)
         tell(f"{worst.name} is worse than the {len(named)} arms before: the law is chosen for it too")
         named.append(worst)
 

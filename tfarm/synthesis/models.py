@@ -1,0 +1,289 @@
+"""Loops of few modes under many laws at once: closed-loop matrices, poles, loop functions, and their slopes.
+
+A law is a list of entries (`structures`), each in controllable form in p = s/c, c = 2/T.  Sampled by Tustin's rule,
+p = (z - 1)/(z + 1), it becomes
+
+    (1 - A)^-1 (1 + A),  2 (1 - A)^-1 B,  C (1 - A)^-1,  D + C (1 - A)^-1 B.
+
+The closed loop is then analytic in the coefficients.  So of its matrix M, with eigenvalues z and eigenvectors V,
+
+    dM = Im M(c + i h dc)/h,   dz = diag(V^-1 dM V),
+
+and of the loop function L = sum of C_i H_i, C_i = num/den,  dC_i = (dnum - C_i dden)/den.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.arm.blocks import Matrices
+from tfarm.arrays import LEAST_SIZE, Complex, Real
+from tfarm.dsp import Chain
+from tfarm.dsp.plant import sensed_plant
+from tfarm.dsp.sampling import PulseTransfer
+from tfarm.loop.frequencies import band_of, grid
+from tfarm.records import record
+from tfarm.reduced.sensed import ALGEBRAIC, sensed_model
+from tfarm.response.signals import Signals
+from tfarm.synthesis.structures import IMAGINARY_STEP, Entry, Numbers
+
+GROWTH_OF_MODEL = 1e-6  # of |s|: an eigenvalue so little right of the axis may be the model's own, of modes left out
+AT_NYQUIST = 1e-12  # of z = -1, where Tustin's s is infinite
+POLE_OFFSETS = np.geomspace(1e-9, 0.5, 40)  # rad, to either side of the open loop's poles
+EVEN_ANGLES = 400  # points of the circle at equal distances
+LOST_GROWTH = 1e6  # of a matrix that is not finite
+
+
+@dataclass(frozen=True)
+@record
+class Model:
+    """A, B, C, D from the input to `signals`, of few modes; at samples of `period` [s], or in continuous time (None).
+
+    `speed` [1/s] is c, the unit of a law's s.  `grid` gives angles (m,) of the circle [rad] or frequencies [rad/s], and
+    `response` the signals (signals, k) at k of them.  The damping of poles counts below `band` [rad/s], apart from one
+    each about the poles of open-loop modes `higher`, the highest first.  `last` is the state that keeps the input of
+    the sample before; `own_moment` (n,) reads the arm's own root moment of the states, ahead of the anti-alias filter.
+    """
+
+    plant: Matrices
+    signals: tuple[str, ...]
+    speed: float
+    period: float | None
+    grid: Callable[[], Real]
+    response: Callable[[Real], Complex]
+    band: float
+    higher: tuple[complex, ...]
+    last: int
+    own_moment: Real
+
+    # ------------------------------------------------------------ laws in states
+
+    def states(self, entries: Sequence[Entry]) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+        """A (laws, k, k), B (laws, k, signals), C (laws, 1, k), D (laws, 1, signals) of laws."""
+        number = max(each.num.shape[1] for each in entries)
+        order, kind = sum(len(each.den) - 1 for each in entries), np.result_type(*(each.num for each in entries), float)
+        kind = np.result_type(kind, *(each.den for each in entries))
+        A, B = np.zeros((number, order, order), kind), np.zeros((number, order, len(self.signals)), kind)
+        C, D = np.zeros((number, 1, order), kind), np.zeros((number, 1, len(self.signals)), kind)
+        first = 0
+        for signal, num, den in entries:
+            n, column = len(den) - 1, self.signals.index(signal)
+            scale = self.speed ** np.arange(n, -1.0, -1.0)[:, None]
+            num = np.concatenate([np.zeros((n + 1 - len(num), num.shape[1])), num]) * scale
+            num, den = num / (den[0] * scale[0]), den * scale / (den[0] * scale[0])
+            D[:, 0, column] += num[0]
+            if n:
+                own = slice(first, first + n)
+                A[:, first, own], B[:, first, column] = -den[1:].T, 1.0
+                A[:, np.arange(first + 1, first + n), np.arange(first, first + n - 1)] = 1.0
+                C[:, 0, own] = (num[1:] - num[0] * den[1:]).T
+            first += n
+        if self.period is None:
+            return self.speed * A, self.speed * B, C, D
+        unit = np.eye(order)
+        within = np.linalg.inv(unit - A)
+        return within @ (unit + A), 2 * within @ B, C @ within, D + C @ within @ B
+
+    def closed(self, entries: Sequence[Entry], share: float = 1.0) -> Numbers:
+        """Closed-loop matrices (laws, n, n), the plant's states first; nan of algebraic loops.
+
+        `share` is a factor on the whole law.
+        """
+        A, B, C, D = self.plant
+        Ak, Bk, Ck, Dk = self.states(entries)
+        whole = 1.0 + share * (Dk @ D)
+        whole = np.where(abs(whole) < ALGEBRAIC, np.nan, whole)
+        number, n, k = len(Ak), len(A), Ak.shape[1]
+        v = -share * np.concatenate([Dk @ C, Ck], axis=2) / whole
+        y = np.concatenate([np.broadcast_to(C, (number, *C.shape)), np.zeros((number, len(C), k))], axis=2) + D @ v
+        found = np.zeros((number, n + k, n + k), v.dtype)
+        found[:, :n, :n], found[:, n:, n:] = A, Ak
+        found[:, :n] += B @ v
+        found[:, n:] += Bk @ y
+        return found
+
+    # ------------------------------------------------------------ poles
+
+    def poles(self, entries: Sequence[Entry], share: float = 1.0) -> Complex:
+        """Closed-loop poles (laws, n); of a matrix that is not finite they are far outside."""
+        found = self.closed(entries, share)
+        bad = ~np.isfinite(found).all(axis=(1, 2))
+        found[bad] = LOST_GROWTH * np.eye(found.shape[1])
+        return np.linalg.eigvals(found).astype(complex)
+
+    def moved_poles(self, entries: Sequence[Entry], stepped: Sequence[Entry], share: float) -> tuple[Complex, Complex]:
+        """Poles (n,) of one law, and their slopes (n, coefficients); `stepped` are those of `Structure.stepped`."""
+        poles, V = np.linalg.eig(self.closed(entries, share)[0])
+        moves = self.closed(stepped, share).imag / IMAGINARY_STEP
+        slopes = ((np.linalg.inv(V) @ moves) * V.T).sum(axis=2)
+        return poles.astype(complex), np.asarray(slopes.T.astype(complex))
+
+    def growth(self, poles: Complex) -> Real:
+        """ln |z| of poles, or Re s/|s| less what the model may have of its own: to be below 0."""
+        size = np.maximum(abs(poles), LEAST_SIZE)
+        return np.log(size) if self.period is not None else poles.real / size - GROWTH_OF_MODEL
+
+    def growth_slopes(self, poles: Complex, moves: Complex) -> Real:
+        """The slopes of that."""
+        if self.period is not None:
+            return (moves / np.where(poles == 0, 1.0, poles)[:, None]).real
+        return damping_slopes(poles, moves)
+
+    def in_s(self, poles: Complex) -> Complex:
+        """s of poles, times the period of a sampled loop; those at z = 0 are at 1."""
+        return poles if self.period is None else np.log(np.where(poles == 0, np.e, poles))
+
+    # ------------------------------------------------------------ loop function
+
+    @cached_property
+    def angles(self) -> Real:
+        """The grid (m,)."""
+        return np.asarray(self.grid())
+
+    @cached_property
+    def responses(self) -> Complex:
+        """The signals (signals, m) at all angles."""
+        return self.response(self.angles)
+
+    def in_p(self, angles: Real) -> Complex:
+        """s/c at angles."""
+        if self.period is None:
+            return 1j * angles / self.speed
+        z = np.exp(1j * angles)
+        return (z - 1) / np.where(abs(z + 1) < AT_NYQUIST, AT_NYQUIST, z + 1)
+
+    def loop(self, entries: Sequence[Entry], angles: Real | None = None) -> Complex:
+        """L (laws, m) at the model's own angles, or at others."""
+        own = angles is None
+        response = self.responses if own else self.response(np.asarray(angles))
+        p, total = self.in_p(self.angles if own else np.asarray(angles)), 0.0
+        for signal, num, den in entries:
+            total = total + self._at(num, p) / self._at(den, p) * response[self.signals.index(signal)]
+        return np.asarray(total)
+
+    def loop_slopes(self, entries: Sequence[Entry], stepped: Sequence[Entry], places: NDArray[np.int64]) -> Complex:
+        """dL/dx (places, coefficients) of one law at some of the model's own angles, by their places."""
+        p, total = self.in_p(self.angles[places]), 0.0
+        for (signal, num, den), (_, moved_num, moved_den) in zip(entries, stepped, strict=True):
+            whole = self._at(den, p)
+            steps = (self._at(each.imag / IMAGINARY_STEP, p) for each in (moved_num, moved_den))
+            d_num, d_den = steps
+            change = (d_num - self._at(num, p) / whole * d_den) / whole
+            total = total + change * self.responses[self.signals.index(signal), places]
+        return np.asarray(total).T
+
+    def _at(self, rows: Numbers, p: Complex) -> Complex:
+        """Polynomials (degree + 1, laws) in s at p: (laws, m)."""
+        found = np.zeros((rows.shape[1], p.size), complex)
+        for row in rows:
+            found = found * (self.speed * p) + row[:, None]
+        return found
+
+
+def damping_slopes(s: Complex, moves: Complex) -> Real:
+    """The slopes (n, coefficients) of Re s/|s| of poles: of an oscillating one that is its -zeta."""
+    size = np.maximum(abs(s), LEAST_SIZE)
+    return np.asarray(moves.real / size[:, None] - (s.real / size**3)[:, None] * (s.conj()[:, None] * moves).real)
+
+
+def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int, speed: float) -> Model:
+    """The loop without sampling, of `count` flexible modes; its response is that of the exact arm."""
+    A, B, C, D = sensed_model(arm, signals, count)
+    if arm.has_rigid_mode and "hub_angle" not in signals:  # an angle that nothing reads is no state of the loop
+        A, B, C = A[1:, 1:], B[1:], C[:, 1:]
+    read, top = Signals(arm, signals), band_of(arm, modes)
+    moment = C[signals.index("root_moment")] if "root_moment" in signals else np.zeros(len(A))
+    return Model(
+        (A, B, C, D), signals, speed, None, lambda: grid(arm, top), lambda w: read.values(1j * w), top, (), 0, moment
+    )
+
+
+def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, count: int) -> Model:
+    """The loop at the samples of a chain, of `count` flexible modes.
+
+    Poles of higher modes, which alias into the same angles, are told by where the open loop has them: a held torque
+    moves a pole less the higher its mode.
+    """
+    T, by_difference = chain.sampling.period, "hub_rate" in signals and chain.converters.hub_rate == "difference"
+    read = (*signals, *(("hub_angle",) if by_difference and "hub_angle" not in signals else ()))
+    sensed = sensed_plant(arm, chain, read, count)
+    pulse = PulseTransfer(sensed.together, chain.sampling).folded()
+    A, B, C = pulse.matrices()
+    own = C[0] * 0.0
+    if "root_moment" in signals:
+        beside = sensed.together.beside(sensed.unfiltered.rows(["root_moment"]))
+        own = np.asarray(PulseTransfer(beside, chain.sampling).folded().matrices()[2][-1])
+    first = pulse.integrals_at
+    damped, felt = bool(arm.rate_loss or chain.actuator.hub_damping), arm.has_rigid_mode
+    gone = [first] if damped or not felt else []
+    gone += [] if felt else [first + 1]
+    angle = first + damped
+    response: Callable[[Complex], Complex] = pulse
+    if by_difference:
+        estimate, n = _Difference(float(np.exp(-chain.converters.rate_filter * T)), T), read.index("hub_angle")
+        A, B, C = estimate.states(A, B, C, n, signals.index("hub_rate"), angle if felt else None)
+        own = np.append(own, 0.0)
+        response = estimate.response(pulse, n, signals.index("hub_rate"))
+    if felt and "hub_angle" not in signals:
+        gone.append(angle)
+    A, B, C = np.delete(np.delete(A, gone, 0), gone, 1), np.delete(B, gone), np.delete(C, gone, 1)[: len(signals)]
+    return Model(
+        (A, B[:, None], C, np.zeros((len(C), 1))), signals, 2 / T, T, lambda: circle_angles(pulse),
+        lambda q: response(np.exp(1j * q))[: len(signals)], np.inf, tuple(higher_poles(pulse, modes)),
+        first + 2 - len(gone), np.delete(own, gone),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Difference:
+    """The rate as the filtered difference of the angle, (1 - a)/T (z - 1)/(z - a), `a` the pole of its filter."""
+
+    a: float
+    period: float
+
+    def states(self, A: Real, B: Real, C: Real, n: int, row: int, angle: int | None) -> tuple[Real, Real, Real]:
+        """One state g more, a g + theta of the next sample, less its share of the state that turns with the arm.
+
+        `n` is the row of the angle, `row` that of the rate; nothing but the angle is then made of the state `angle`.
+        """
+        through, size = (1 - self.a) / self.period, len(A)
+        A, B, C = np.pad(A, (0, 1)), np.append(B, 0.0), np.pad(C, ((0, 0), (0, 1)))
+        A[size, :size], A[size, size] = C[n, :size], self.a
+        C[row] = through * C[n]
+        C[row, size] = through * (self.a - 1)
+        if angle is not None:
+            turned = np.eye(size + 1)
+            turned[size, angle] = -C[n, angle] / (1 - self.a)
+            back = 2 * np.eye(size + 1) - turned
+            A, B, C = turned @ A @ back, turned @ B, C @ back
+        return A, B, C
+
+    def response(self, pulse: PulseTransfer, n: int, row: int) -> Callable[[Complex], Complex]:
+        """The response of the plant in z, with that rate."""
+
+        def values(z: Complex) -> Complex:
+            found = pulse(z)
+            found[row] = (1 - self.a) / self.period * (z - 1) / (z - self.a) * found[n]
+            return found
+
+        return values
+
+
+def higher_poles(pulse: PulseTransfer, modes: int) -> list[complex]:
+    """Open-loop poles in z, Im z >= 0, of the modes beyond the first ones: the highest come first."""
+    places = np.nonzero((pulse.mode > modes) & (pulse.poles.imag >= 0))[0]
+    z = pulse.multipliers[places[np.argsort(-pulse.mode[places], kind="stable")]]
+    return [complex(each.real, abs(each.imag)) for each in z]
+
+
+def circle_angles(pulse: PulseTransfer) -> Real:
+    """Angles (0, pi] of the circle, dense about the poles of the open loop."""
+    angle = abs(np.angle(pulse.multipliers))
+    close = (angle[:, None] + np.r_[-POLE_OFFSETS, POLE_OFFSETS]).ravel()
+    return np.unique(np.r_[np.linspace(0, np.pi, EVEN_ANGLES + 1)[1:], close[(close > 0) & (close <= np.pi)]])
