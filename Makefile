@@ -19,7 +19,7 @@ SURVEYS := \
 	golden \
 	plausible \
 	properties \
-	audit.slips \
+	audit.test_planted_slips \
 	exact.accuracy \
 	exact.chain_accuracy \
 	response.rigid \

@@ -1,4 +1,7 @@
-"""The guard: sectors against the circle criterion by transfer functions, switching, exact proofs, empty guards."""
+"""The guard: sectors against the circle criterion by transfer functions, switching, exact proofs, empty guards.
+
+A small sample of `python -m tests.tuner.bounded 1000`, and that its adversary has teeth.
+"""
 
 import re
 from dataclasses import replace
@@ -12,6 +15,9 @@ from scipy.linalg import eigh, solve_discrete_lyapunov
 import tfarm
 from tests.dsp.roads import aliased_loop
 from tests.shared import sized, thinned
+from tests.survey import tally
+from tests.tuner import bounded
+from tests.tuner.bounded import adversary
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import CertificationError, ParameterError
@@ -137,8 +143,6 @@ def test_the_exact_arm_obeys_the_criterion_too(lab, loop):
 
 
 # ---------------------------------------------------------------- exact proofs
-
-
 def test_positive_definite_in_whole_numbers():
     rng = np.random.default_rng(0)
     for n in range(1, 9):
@@ -200,8 +204,6 @@ def test_a_proof_does_not_depend_on_the_units_of_the_states(loop, unit):
 
 
 # ---------------------------------------------------------------- the guard that is chosen
-
-
 def test_the_default_sector(lab):
     guard = find_guard(slew_trial(lab).loop, "time-varying", 0.336)
     assert guard.is_proven
@@ -330,3 +332,17 @@ def test_the_middle_of_the_default_sector_by_closed_forms(monkeypatch, best, rad
     monkeypatch.setattr(guard, "constant_windows", lambda loop: [(0.0, 2.0)])
     found = guard._middle(SimpleNamespace(loop=None, radius=radius), best)
     assert found == (None if middle is None else pytest.approx(middle, abs=2.0 / 61 / 2**11))
+
+
+def test_guarded_runs_stay_bounded_and_in_the_guard():
+    outcomes, _, wrong = tally(bounded.runs, 2, 1)  # whose first arm has a sector, found soon
+    assert (outcomes["run"], wrong) == (2, 0)
+
+
+def test_the_adversary_has_teeth():
+    """HubFeedback that are stable one by one: beyond a sector it drives the loop unstable, inside one it cannot."""
+    loop = MovingGain(sampled_loop(tfarm.load("sasaki2012-lab"), HubFeedback(K1=0.3, K2=1.0), count=6))
+    grown = {ends: adversary(loop, *ends, np.random.default_rng(0), 1) for ends in ((0, 1.1), (0.1, 0.6), (0.31, 0.63))}
+    assert grown[0, 1.1] > 50
+    assert grown[0.1, 0.6] > 5
+    assert grown[0.31, 0.63] < 0
