@@ -24,9 +24,9 @@ from tfarm.errors import one_line
 from tfarm.fitting.recording import beside_exact, load_run, overshoot
 from tfarm.report import making, writing
 from tfarm.report.given_laws import GivenLaw, Subject, on_arm
-from tfarm.report.law_loop_section import law_margins_section, law_nyquist_section, law_poles_section
 from tfarm.report.law_measured import overshoot_table
 from tfarm.report.law_section import law_section, written_polynomial
+from tfarm.report.loop_section import margins_section, nyquist_section, poles_section
 from tfarm.report.page import file_of
 from tfarm.report.sampled_section import sampled_section
 from tfarm.tables.files import to_json
@@ -76,7 +76,7 @@ def table(section, stem):
 def test_margins_on_the_page_are_those_of_the_command(capsys, file, given, monkeypatch):
     room = import_module("tfarm.loop.margins")
     monkeypatch.setattr(room, "windows_of", cache(room.windows_of))  # of the same loop both times
-    section, found = law_margins_section(LAB, Chain(), given), answer(capsys, "margins", LAB.name, "--law", str(file))
+    section, found = margins_section(LAB, Chain(), given), answer(capsys, "margins", LAB.name, "--law", str(file))
     shown = table(section, "margins")
     exact = dict(zip(shown["quantity"], shown["law_exact"], strict=True))
     assert (exact["verdict"], exact["unstable poles"]) == (found["verdict"], found["unstable_roots"])
@@ -103,9 +103,9 @@ def test_margins_on_the_page_are_those_of_the_command(capsys, file, given, monke
 
 
 def test_turns_and_poles_on_the_page_are_those_of_the_commands(capsys, file, given):
-    counted = table(law_nyquist_section(LAB, Chain(), given), "nyquist-count")
+    counted = table(nyquist_section(LAB, Chain(), given), "nyquist-count")
     assert counted["unstable_by_nyquist"] == counted["unstable_in_box"] == [0]
-    shown = table(law_poles_section(LAB, Chain(), given), "law-poles")
+    shown = table(poles_section(LAB, Chain(), given), "law-poles")
     poles = answer(capsys, "poles", LAB.name, "--law", str(file))["poles"]
     assert list(map(list, zip(shown["real_1_s"], shown["imaginary_rad_s"], strict=True))) == poles
 
@@ -125,7 +125,7 @@ def test_radii_on_the_page_are_those_of_the_command_at_each_delay(capsys, file, 
 
 def test_gains_that_are_typed_have_their_windows_and_their_proof():
     gains = HubFeedback(K1=0.5, K2=0.3, Kp=2.0)
-    section, found = law_margins_section(BARE, Chain(), (GivenLaw(gains),)), tfarm.margins(BARE, gains)
+    section, found = margins_section(BARE, Chain(), (GivenLaw(gains),)), tfarm.margins(BARE, gains)
     shown = table(section, "margins")
     assert dict(zip(shown["quantity"], shown["law_band"], strict=True))["delay margin"] == found.in_band.delay
     assert table(section, "windows")["value"] == [0.5, 0.3, 2.0]
@@ -134,7 +134,7 @@ def test_gains_that_are_typed_have_their_windows_and_their_proof():
 
 def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
     law = Law({"hub_angle": -5.0, "hub_rate": ([1.0], [0.01, 1.0])}, name="backwards")
-    section = law_margins_section(LAB, Chain(), (GivenLaw(law),))
+    section = margins_section(LAB, Chain(), (GivenLaw(law),))
     assert section.facts[0].value == "UNSTABLE"
     assert {block.stem for block in section.blocks} == {"law-bode", "law-spill", "windows"}
     assert set(table(section, "windows")["stable_around_it"]) == {"none: not stable"}

@@ -32,8 +32,9 @@ from tfarm.plots.roots import zoomed
 from tfarm.plots.style import BLUE
 from tfarm.report import loop_laws, loop_section, making, map, write
 from tfarm.report.frame import signs
+from tfarm.report.given_laws import on_hub
 from tfarm.report.locus_section import _more_damping, beyond_table
-from tfarm.report.loop_laws import NamedLaw, has_loop, laws, margins_of
+from tfarm.report.loop_laws import continuous_cases, has_loop, margins_of
 from tfarm.report.loop_section import map_section, margins_section
 from tfarm.report.map import draw_map_of_arm, map_data, map_of_arm
 from tfarm.report.margins_table import NOT_STABLE, margin_table, verdict_fact
@@ -183,12 +184,13 @@ def test_levels_are_round_and_between():
 
 def test_the_verdict_comes_before_any_margin():
     """On the page and in the table; and where the loop is not stable there is no margin at all."""
-    section = margins_section(LAB)
+    section = margins_section(LAB, Chain())
     assert all(fact.value == "STABLE" for fact in section.facts)
-    quantity, exact = section.blocks[0].columns[0], section.blocks[0].columns[2]
+    (table,) = (block for block in section.blocks if block.stem == "margins")
+    quantity, exact = table.columns[0], table.columns[2]
     assert quantity.values[0] == "verdict"
     assert exact.values[0] == "stable"
-    wrong = NamedLaw("wrong", "wrong", HubFeedback(K1=0.3, K2=1.5))
+    wrong = on_hub(PURE, HubFeedback(K1=0.3, K2=1.5), "wrong", "wrong")
     table = margin_table([wrong], [margins_of(PURE, wrong.law)], True)
     assert table.columns[2].values[0] == "unstable"
     assert table.columns[2].values[3:] == [NOT_STABLE] * 9
@@ -198,7 +200,7 @@ def test_margins_are_those_of_the_loop_room():
     """Every number of the table, and 0 for the exact delay margin at C = 0."""
     for arm in (LAB, PURE):
         found = margins_of(arm, default_gains(arm))
-        table = margin_table([NamedLaw("default gains", "default", default_gains(arm))], [found], arm is PURE)
+        table = margin_table([on_hub(arm, default_gains(arm), "default gains", "default")], [found], arm is PURE)
         rows = dict(zip(table.columns[0].values, zip(*(c.values for c in table.columns[2:]), strict=True), strict=True))
         assert rows["delay margin"] == (found.exact_delay, found.in_band.delay, found.in_band.at["delay"])
         assert rows["phase margin"][1] == found.in_band.phase
@@ -309,7 +311,7 @@ def test_the_sign_convention_is_the_pages_and_no_sections(coarse, monkeypatch):
     """It stands once, at the foot of the page: tests/report/test_writing.py counts it there."""
     monkeypatch.setattr(loop_laws, "best", lambda arm, chain: None)
     assert "Sign of K2" in signs(PURE)
-    for section in (coarse, margins_section(PURE)):
+    for section in (coarse, margins_section(PURE, Chain())):
         texts = [*section.words, *(block.caption for block in section.blocks)]
         assert not any("Sign of K2" in text for text in texts)
 
@@ -338,12 +340,12 @@ def test_the_star_holds_at_the_clock_of_its_page(lab, section):
     labels = [text.get_text() for text in draw_map_of_arm(lab).legends[0].get_texts()]
     assert any(label.startswith("best damping") and "stable when sampled every 10 ms" in label for label in labels)
     assert any("Sampled every 10 ms (tfarm's default period) these gains are stable" in w for w in section.words)
-    facts = margins_section(LAB).facts
+    facts = margins_section(LAB, Chain()).facts
     assert all(fact.beside.endswith("; stable when sampled every 10 ms") for fact in facts)
     quick = Chain(sampling=Sampling(period=2e-3))
     assert all(fact.beside.endswith("; stable when sampled every 2 ms") for fact in margins_section(LAB, quick).facts)
-    assert laws(LAB, quick)[1].law.K1 > laws(LAB, Chain())[1].law.K1
-    lost = NamedLaw("best without a clock", "best", HubFeedback(K1=26.0, K2=-3.0))
+    assert continuous_cases(LAB, quick)[1].law.K1 > continuous_cases(LAB, Chain())[1].law.K1
+    lost = on_hub(LAB, HubFeedback(K1=26.0, K2=-3.0), "best without a clock", "best")
     fact = verdict_fact(lost, margins_of(LAB, lost.law), f"; {sampled_brief(LAB, lost.law, Chain()).short}")
     assert fact.beside.endswith("UNSTABLE when sampled every 10 ms")
     assert set(map_data(lab).columns[0].values) == {"grid", "boundary", "sampled boundary"}

@@ -101,12 +101,14 @@ def on_arm(arm: Arm, laws: Sequence[GivenLaw]) -> tuple[LawOnArm, ...]:
     return tuple(found)
 
 
+def on_hub(arm: Arm, gains: HubFeedback, name: str, key: str) -> LawOnArm:
+    """Gains at the hub under a name of their own."""
+    return LawOnArm(arm, gains, GivenLaw(gains), name, key)
+
+
 def cases_of(arm: Arm, laws: Sequence[GivenLaw]) -> tuple[LawOnArm, ...]:
     """The controllers that a section is about: the laws given, else the default gains."""
-    if laws:
-        return on_arm(arm, laws)
-    gains = default_gains(arm)
-    return (LawOnArm(arm, gains, GivenLaw(gains), "default gains", "default"),)
+    return on_arm(arm, laws) if laws else (on_hub(arm, default_gains(arm), "default gains", "default"),)
 
 
 def check_laws(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> None:

@@ -11,13 +11,15 @@ from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, HubFeedback, shown_unit, writ
 from tfarm.arrays import Real
 from tfarm.columns import Column, Table
 from tfarm.digits import how_many, listed, plain, scientific, significant, singly
+from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
 from tfarm.loop.loci import Loci, loci
 from tfarm.loop.most_damped import most_damped
 from tfarm.loop.stability import MARGIN_OF_ZERO, Stability, stability
 from tfarm.plots.roots import draw_loci
 from tfarm.report.locus_tables import crossing_table, gap_table, loci_data
-from tfarm.report.loop_laws import edge_of_K2, has_loop, margins_of
+from tfarm.report.loop_laws import continuous_cases, edge_of_K2, has_loop, margins_of
+from tfarm.report.loop_section import poles_of
 from tfarm.report.sections import PageSection, Picture
 from tfarm.spectrum.scales import default_gains, rate_unit
 
@@ -58,8 +60,8 @@ LISTED_RATE_GAINS = (
 )  # times J w1: values of K1 whose poles are listed for want of a locus
 
 
-def locus_section(arm: Arm) -> PageSection:
-    """Where the poles go as each gain grows, and what K2 = 1 and beyond does."""
+def locus_section(arm: Arm, chain: Chain) -> PageSection:
+    """Root loci along each gain, poles at K2 = 1 and beyond, and those of the default and the best gains."""
     words, blocks = [], list[Picture | Table]()
     held = default_gains(arm)
     low, high = (share * arm.input_per_torque for share in RANGE_OF_K2)
@@ -80,7 +82,8 @@ def locus_section(arm: Arm) -> PageSection:
             blocks.append(crossing_table(data, f"locus-{name}-crossings"))
     if has_loop(arm):
         blocks.append(beyond_table(arm, held))
-    return PageSection(anchor="locus", title="Where do the poles go?", words=words, blocks=blocks)
+    more, tables = poles_of(continuous_cases(arm, chain))
+    return PageSection(anchor="locus", title="Root loci", words=[*words, *more], blocks=[*blocks, *tables])
 
 
 def _more_damping(data: Loci) -> str:

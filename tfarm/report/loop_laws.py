@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import Protocol
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, input_words
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, HubFeedback, input_words
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
 from tfarm.dsp.verdict import SampledBrief, sampled_brief
 from tfarm.errors import ConvergenceError
 from tfarm.loop.margins import Margins, margins
-from tfarm.plots.words import gains_words
+from tfarm.report.given_laws import GivenLaw, LawOnArm, cases_of, continuous_laws, on_arm, on_hub
 from tfarm.response import transfer
-from tfarm.spectrum.scales import default_gains
 from tfarm.synthesis.design import Design, design
 
 DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
@@ -29,36 +27,6 @@ NO_PLACE_FOR_K2 = (
     f"The hub of this arm has no inertia: {{gauge}}, so feeding it back by {MOMENT_GAIN} would be an algebraic loop. "
     f"There is no map of {' and '.join(PLANE)}; what {RATE_GAIN} does at {MOMENT_GAIN} = 0 is said below."
 )
-
-
-class Named(Protocol):
-    """A law as tables and pictures name it."""
-
-    @property
-    def name(self) -> str:
-        """In words."""
-
-    @property
-    def key(self) -> str:
-        """In keys."""
-
-    @property
-    def gains(self) -> str:
-        """Its gains with their values, or what it reads."""
-
-
-@dataclass(frozen=True, slots=True)
-class NamedLaw:
-    """A law and what it is called in words and in keys."""
-
-    name: str
-    key: str
-    law: HubFeedback
-
-    @property
-    def gains(self) -> str:
-        """Each gain with its value, for reading."""
-        return gains_words(self.law)
 
 
 def has_loop(arm: Arm) -> bool:
@@ -121,19 +89,20 @@ def best(arm: Arm, chain: Chain) -> Design | None:
 
 
 @lru_cache(maxsize=64)
-def brief_on(arm: Arm, law: HubFeedback, chain: Chain) -> SampledBrief:
-    """Whether gains hold when sampled, computed once for all sections."""
+def brief_on(arm: Arm, law: AnyLaw, chain: Chain) -> SampledBrief:
+    """Stability of the sampled loop, computed once for all sections."""
     return sampled_brief(arm, law, chain)
 
 
 @lru_cache(maxsize=64)
-def margins_of(arm: Arm, law: HubFeedback) -> Margins:
+def margins_of(arm: Arm, law: AnyLaw) -> Margins:
     """Verdict and margins, computed once for all sections."""
     return margins(arm, law)
 
 
-def laws(arm: Arm, chain: Chain) -> tuple[NamedLaw, ...]:
-    """The default gains, and the best ones at the clock of a chain if there are any."""
+def continuous_cases(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> tuple[LawOnArm, ...]:
+    """The continuous-time controllers of a page: those given, else the default gains and the best ones."""
+    if laws:
+        return continuous_laws(on_arm(arm, laws))
     found = best(arm, chain)
-    default = NamedLaw("default gains", "default", default_gains(arm))
-    return (default,) if found is None else (default, NamedLaw("best damping", "best", found.law))
+    return (*cases_of(arm, ()), *([] if found is None else [on_hub(arm, found.law, "best damping", "best")]))

@@ -1,37 +1,34 @@
-"""The continuous loop on an arm's page: the map of its gains, verdict and margins, Nyquist (loci: `locus_section`)."""
+"""The continuous loop on an arm's page: map of the gains, verdict and margins, Nyquist plot, poles."""
 
 from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
 
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, unit_of, written_unit
+from tfarm.columns import Column, Table
 from tfarm.digits import how_many, plain, significant
 from tfarm.dsp import Chain
-from tfarm.errors import ConvergenceError
+from tfarm.errors import TfarmError
+from tfarm.loop.answers import CROSSOVERS, POLE_COLUMNS, crossovers
 from tfarm.loop.edges import DEEPEST_MOMENT_GAIN
-from tfarm.loop.nyquist import Nyquist, nyquist_of
-from tfarm.loop.stability import stability
+from tfarm.loop.margins import Margins, loop_curve
+from tfarm.loop.nyquist import nyquist_of
+from tfarm.loop.poles import Poles, closed_loop_poles
+from tfarm.loop.spill import SPILL, Spill, spill
 from tfarm.loop.windows import Windows
 from tfarm.plots.disc import draw_nyquist
-from tfarm.report.loop_laws import (
-    DESIGNED_MODES,
-    NamedLaw,
-    brief_on,
-    edge_of_K2,
-    has_loop,
-    laws,
-    margins_of,
-    why_no_loop,
-)
+from tfarm.plots.loop import draw_loop
+from tfarm.report.given_laws import GivenLaw, LawOnArm
+from tfarm.report.loop_laws import DESIGNED_MODES, brief_on, continuous_cases, margins_of, why_no_loop
 from tfarm.report.map import MapOfArm, draw_map_of_arm, map_data, map_of_arm
 from tfarm.report.margins_table import margin_table, verdict_fact, verdict_words, window_table
-from tfarm.report.nyquist import RINGS_CAPTION, TO_COMPARE, PlotOfLaw, count_table, curve_data
+from tfarm.report.nyquist import RINGS_CAPTION, PlotOfLaw, count_table, curve_data
 from tfarm.report.sections import PageSection, Picture
 from tfarm.report.words import typeset, upper
 from tfarm.spectrum.scales import default_gains, default_words, rate_unit
-
-UNSTABLE_K2 = 1.5  # at least, of the law whose encirclements are counted for comparison
-TIMES_THE_EDGE = 1.2  # and at least so many times the K2 at which the loop loses its stability
 
 MAP_SEEN = (
     "Green: every pole is in the left half-plane{apart}; orange: the number of unstable poles. The black edge and the "
@@ -64,23 +61,28 @@ SAMPLED_SEEN = (
 SAMPLED_NOT_SEEN = " Where the loop is stable when it is sampled every {clock} could not be settled and is not drawn."
 DEPTH_WORDS = " For this map unstable windows below K2 = {deepest} were not looked for."
 NYQUIST_WORDS = (
-    "Every size of L(iω) from 0 to infinity is in the picture: a size r is drawn as r/(1 + r), so nothing is cut off, "
-    "and infinity is the outer rim. The loop is stable when the curve does not turn around −1. {poles}"
+    "Every size r of L(iω) is drawn as r/(1 + r): nothing is cut off, infinity is the outer rim. The loop is stable "
+    "where the curve encircles −1 counter-clockwise as often as L has poles right of the axis{own}. Poles of L on the "
+    "imaginary axis are passed on their right: there the curve turns clockwise through half a circle at infinity (a "
+    "quarter at a single pole at s = 0), drawn dashed beyond the rim, one arc for all that turn alike, with its number."
 )
-ONE_POLE = (
-    "L has one pole on the imaginary axis, at s = 0 (the rigid arm turning): there the contour steps to the right, and "
-    "the curve turns through a quarter circle at infinity, drawn dashed beyond the rim."
+MOST_SPILLED = 12  # flexible modes of the largest model that is put beside the exact loop
+CROSSINGS_CAPTION = (
+    "Every frequency up to the band where |L| = 1, with the phase margin there, above 0 for lag that the loop bears "
+    "and below 0 for lead; and every one where L is real and below 0, with the factor on the whole law that puts a "
+    "pole there."
 )
-ALL_POLES = (
-    "Without damping L has a pole on the imaginary axis at 0 and at every natural frequency. At each the contour steps "
-    "to the right, and the curve turns clockwise through half a circle at infinity, drawn dashed beyond the rim: "
-    "of the {count} poles up to {band} rad/s one arc for all that turn alike, with their number."
+BODE_CAPTION = (
+    "Diamonds: |L| = 1, with the phase margin there, green for lag and purple for lead. Dots: L is real and below 0, "
+    "and the dashed line is the way to −1, with the factor on the whole law that goes it."
 )
-HELD_POLES = (
-    "Without damping L has a pole on the imaginary axis at every natural frequency; past each the curve turns "
-    "clockwise through half a circle at infinity, drawn dashed beyond the rim, one arc for all that turn alike."
+SPILL_CAPTION = (
+    "What models of so many flexible modes say of the same law: how many poles are unstable, and the rightmost."
 )
-NO_POLE = "L has no pole on the imaginary axis."
+POLES_CAPTION = (
+    "Poles with Im s ≥ 0, those below the real axis being their mirror images. All of the box {box} 1/s are here, by "
+    "the winding number around it."
+)
 
 
 def no_loop_section(arm: Arm) -> PageSection:
@@ -208,72 +210,144 @@ def proof_words(arm: Arm) -> str:
 # ------------------------------------------------------------ margins
 
 
-def margins_section(arm: Arm, chain: Chain | None = None) -> PageSection:
-    """The verdict on each law, continuous and at the chain's clock, then its margins."""
-    chain = Chain() if chain is None else chain
-    named = laws(arm, chain)
-    found = [margins_of(arm, each.law) for each in named]
-    both = list(zip(named, found, strict=True))
-    return PageSection(
-        anchor="margins",
-        title="Is the loop stable, and by how much?",
-        facts=[verdict_fact(each, it, f"; {brief_on(arm, each.law, chain).short}") for each, it in both],
-        words=[verdict_words(f"{upper(each.name)}, {each.gains}", it) for each, it in both],
-        blocks=(margin_table(named, found, arm.is_told_by_lyapunov), window_table(named, found)),
+def margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> PageSection:
+    """Verdict, margins, crossings and spillover of each case, with the verdict on its sampled loop."""
+    cases = continuous_cases(arm, chain, laws)
+    found = [margins_of(each.arm, each.law) for each in cases]
+    both = list(zip(cases, found, strict=True))
+    undamped = arm.is_told_by_lyapunov and all(it.stability.loop.gains is not None for it in found)
+    blocks: list[Picture | Table] = [_bode_picture(*each) for each in both]
+    if any(it.in_band is not None for it in found):
+        blocks.append(margin_table(cases, found, undamped))
+    blocks += [crossings_table(each, it) for each, it in both if it.in_band is not None]
+    if windowed := [(each, it) for each, it in both if it.windows]:
+        blocks.append(window_table([each for each, _ in windowed], [it for _, it in windowed]))
+    facts, words = [], []
+    for each, it in both:
+        far = "" if it.stability.is_known_beyond or it.stability.verdict == "unstable" else ", not known beyond"
+        facts.append(verdict_fact(each, it, f"{far}; {brief_on(each.arm, each.law, chain).short}"))
+        words.append(verdict_words(f"{upper(each.name)}, {each.gains}", it))
+        try:
+            spilled = spill(each.arm, each.any_law, MOST_SPILLED)
+        except TfarmError as error:
+            words.append(f"Spillover of {each.name} is not determined: {typeset(str(error))}.")
+            continue
+        words.append(f"Spillover of {each.name}: {typeset(spilled.in_words)}.")
+        blocks.append(spill_table(each, spilled))
+    title = "Is the loop stable, and by how much?"
+    return PageSection(anchor="margins", title=title, facts=facts, words=words, blocks=blocks)
+
+
+def _bode_picture(each: LawOnArm, found: Margins) -> Picture:
+    omega, L = loop_curve(found)
+    stem = f"{each.key.replace('_', '-')}-bode"
+    none = "" if found.in_band is not None else " No margin is marked: the loop is not stable, and has none."
+    columns = (
+        Column("omega_rad_s", "angular frequency", "rad/s", of=omega),
+        Column("re_L", "Re L", of=L.real),
+        Column("im_L", "Im L", of=L.imag),
+    )
+    return Picture(
+        stem=stem,
+        title=f"The loop function of {each.name}",
+        caption=(BODE_CAPTION if found.in_band is not None else "Size and phase of L(iω).") + none,
+        alt=f"Bode plot of the loop function of {each.name}, {found.stability.verdict}.",
+        figure=draw_loop(found, each.name),
+        data=Table(stem=f"{stem}-data", title=f"The loop function of {each.name}", columns=columns),
+    )
+
+
+def crossings_table(each: LawOnArm, found: Margins) -> Table:
+    """Every crossing of |L| = 1 and of L < 0 in the band, ascending."""
+    assert found.in_band is not None
+    rows = sorted(itertools.chain(*crossovers(found.in_band)), key=lambda row: row.omega_rad_s)
+    return Table(
+        stem=f"{each.key.replace('_', '-')}-crossings",
+        title=f"Every crossing of {each.name}",
+        caption=CROSSINGS_CAPTION if rows else "Nowhere in the band is |L| = 1, or L real and below 0.",
+        columns=CROSSOVERS,
+        record=rows,
+    )
+
+
+def spill_table(each: LawOnArm, found: Spill) -> Table:
+    """A row a model, what the exact loop says in the caption."""
+    return Table(
+        stem=f"{each.key.replace('_', '-')}-spill",
+        title=f"Models of few modes under {each.name}",
+        caption=f"{SPILL_CAPTION} {upper(typeset(found.in_words))}.",
+        columns=SPILL,
+        record=found,
     )
 
 
 # ------------------------------------------------------------ Nyquist
 
 
-def nyquist_section(arm: Arm, chain: Chain | None = None) -> PageSection:
-    """The loop function on a contour that hides nothing."""
-    named = laws(arm, Chain() if chain is None else chain)
-    plots = [PlotOfLaw(each, nyquist_of(margins_of(arm, each.law).stability)) for each in named]
-    every = [*plots, *_to_compare(arm)]
-    picture = Picture(
-        stem="nyquist",
-        title="Nyquist plots of the exact loop function",
-        caption=RINGS_CAPTION,
-        alt="; ".join(
-            f"{p.named.name}: {p.data.verdict.verdict}, {p.data.encirclements} encirclements of −1" for p in plots
-        ),
-        figure=draw_nyquist(arm.name, {plot.named.name: plot.data for plot in plots}),
-        data=curve_data(plots),
-    )  # fmt: skip
-    names = [f"{plot.named.name}: {plot.named.gains}" for plot in every]
-    answer = "; ".join(
-        f"{named.name}: {p.verdict.verdict}, {how_many(abs(p.encirclements), 'turn')} around −1 and "
-        f"{how_many(p.verdict.unstable_roots, 'unstable pole')}"
-        for named, p in plots
+def nyquist_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> PageSection:
+    """The loop function of each case on a contour that hides nothing, two in a picture, its encirclements counted."""
+    cases = continuous_cases(arm, chain, laws)
+    plots = [PlotOfLaw(each, nyquist_of(margins_of(each.arm, each.law).stability)) for each in cases]
+    counts = {}  # of each case: encirclements, poles of its own, and the unstable poles that follow
+    for named, found in plots:
+        own = f", {how_many(found.unstable_open, 'unstable pole')} of its own" if found.unstable_open else ""
+        poles = how_many(found.verdict.unstable_roots, "unstable pole")
+        turns = how_many(abs(found.encirclements), "encirclement")
+        counts[named.name] = f"{named.name}: {found.verdict.verdict}, {turns} of −1{own}, {poles} of the loop."
+    blocks: list[Picture | Table] = []
+    for first in range(0, len(plots), 2):
+        pair = plots[first : first + 2]
+        stem = "nyquist" if first == 0 else f"nyquist-{1 + first // 2}"
+        blocks.append(Picture(
+            stem=stem, title="Nyquist plots of the exact loop function", caption=RINGS_CAPTION,
+            alt="; ".join(counts[plot.named.name] for plot in pair),
+            figure=draw_nyquist(arm.name, {plot.named.name: plot.data for plot in pair}),
+            data=curve_data(pair, f"{stem}-data"),
+        ))  # fmt: skip
+    own = "" if any(plot.data.unstable_open for plot in plots) else ", which here is never"
+    names = [f"{plot.named.name}: {plot.named.gains}" for plot in plots]
+    words = [*map(upper, counts.values()), NYQUIST_WORDS.format(own=own)]
+    title = "Nyquist plot: encirclements of −1"
+    return PageSection(anchor="margins-nyquist", title=title, words=words, blocks=[*blocks, count_table(plots, names)])
+
+
+# ------------------------------------------------------------ poles
+
+
+def poles_of(cases: Sequence[LawOnArm]) -> tuple[list[str], list[Table]]:
+    """The first closed-loop poles of each case, complete in a box: the dominant one in words, and the tables."""
+    words, tables = [], []
+    for each in cases:
+        try:
+            poles = closed_loop_poles(each.arm, each.law)
+        except TfarmError as error:
+            words.append(f"{upper(each.name)}: poles not determined, {typeset(str(error))}.")
+            continue
+        moving = poles.moving
+        found = "no pole but those at 0 lies in the box"
+        if moving.size:
+            furthest = moving[int(np.argmax(moving.real))]
+            imaginary = f" ± {significant(furthest.imag, 6)} i" if furthest.imag else ""
+            found = f"rightmost pole {significant(furthest.real, 6)}{imaginary} 1/s"
+        words.append(f"{upper(each.name)}: {found}.")
+        tables.append(_poles_table(each, poles))
+    return words, tables
+
+
+def poles_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageSection:
+    """The closed-loop poles of the laws given."""
+    words, tables = poles_of(continuous_cases(arm, chain, laws))
+    return PageSection(anchor="locus", title="Closed-loop poles", words=words, blocks=tables)
+
+
+def _poles_table(each: LawOnArm, poles: Poles) -> Table:
+    """Poles with Im s >= 0, with their damping ratio."""
+    left, right, _, top = poles.box
+    box = f"{plain(left, 5)} < Re s < {plain(right, 5)} and |Im s| < {plain(top, 6)}"
+    return Table(
+        stem=f"{each.key.replace('_', '-')}-poles",
+        title=f"Closed-loop poles under {each.name}",
+        caption=POLES_CAPTION.format(box=box),
+        columns=POLE_COLUMNS,
+        record=poles.values.tolist(),
     )
-    words = (f"{upper(answer)}.", NYQUIST_WORDS.format(poles=_poles_words(plots[0].data)))
-    title = "Nyquist: does the loop function turn around −1?"
-    return PageSection(anchor="margins-nyquist", title=title, words=words, blocks=(picture, count_table(every, names)))
-
-
-def _to_compare(arm: Arm) -> list[PlotOfLaw]:
-    """An unstable law whose turns are counted too: K2 beyond its edge, on a free pin K1 < 0; none where neither counts.
-
-    K1 is small there: without inertia at the hub a large K1 < 0 drives poles unstable at any frequency.
-    """
-    law = default_gains(arm)
-    beyond = float(f"{TIMES_THE_EDGE * (edge_of_K2(arm, law) or arm.input_per_torque):.3g}")
-    drives = (
-        law.having(MOMENT_GAIN, max(UNSTABLE_K2 * arm.input_per_torque, beyond))
-        if has_loop(arm)
-        else law.having(RATE_GAIN, float(f"{-law[RATE_GAIN] / 10:.3g}"))
-    )
-    try:
-        return [PlotOfLaw(NamedLaw(TO_COMPARE, "unstable", drives), nyquist_of(stability(arm, drives)))]
-    except ConvergenceError:
-        return []
-
-
-def _poles_words(plot: Nyquist) -> str:
-    arm, count = plot.verdict.loop.arm, plot.poles.size
-    if not arm.is_undamped:
-        return ONE_POLE if count else NO_POLE
-    if not arm.has_rigid_mode:
-        return HELD_POLES
-    return ALL_POLES.format(count=count, band=significant(plot.verdict.band, 5))

@@ -23,8 +23,9 @@ from tfarm.loop.plane import Plane, gain_map
 from tfarm.plots import plane
 from tfarm.plots.style import blank, headline, legend_below, style
 from tfarm.records import record
-from tfarm.report.loop_laws import DESIGNED_MODES, NamedLaw, best, brief_on, laws
-from tfarm.spectrum.scales import first_frequency
+from tfarm.report.given_laws import LawOnArm
+from tfarm.report.loop_laws import DESIGNED_MODES, best, brief_on, continuous_cases
+from tfarm.spectrum.scales import default_gains, first_frequency
 from tfarm.synthesis.design import Design
 from tfarm.synthesis.models import continuous_model
 from tfarm.synthesis.objectives import least_damping
@@ -60,7 +61,7 @@ class MapOfArm:
     edge: Real
     axes: tuple[Real, Real]
     damping: Real
-    laws: tuple[NamedLaw, ...]
+    laws: tuple[LawOnArm, ...]
     design: Design | None
     chain: Chain
     sampled: SampledMap | None
@@ -94,7 +95,7 @@ def map_of_arm(arm: Arm, chain: Chain | None = None) -> MapOfArm:
     )
     points = np.reshape(np.meshgrid(across, up), (2, -1))
     damping = _damping(arm, points).reshape(up.size, across.size)
-    named = laws(arm, chain)
+    named = continuous_cases(arm, chain)
     briefs = tuple(brief_on(arm, each.law, chain) for each in named)
     sampled = sampled_region(arm, x, y, chain)
     return MapOfArm(
@@ -123,8 +124,9 @@ def draw_map_of_arm(data: MapOfArm) -> Figure:
         plane.draw_sampled(data.sampled, ax)
         if data.arm.is_uniform:
             plane.draw_proven(data.arm, x, y, ax)
-        for law, brief in zip(data.laws, data.briefs, strict=True):
-            plane.law_mark(law.law, MARKERS[law.key], f"{law.name}: {law.gains};\n{brief.short}", ax)
+        points = (default_gains(data.arm), *([] if data.design is None else [data.design.law]))
+        for law, gains, brief in zip(data.laws, points, data.briefs, strict=True):
+            plane.law_mark(gains, MARKERS[law.key], f"{law.name}: {law.gains};\n{brief.short}", ax)
         if data.design is not None:
             plane.search_frame(data.design.bounds, ax)
         plane.count_labels(found, x, y, ax)

@@ -12,7 +12,7 @@ from tfarm.loop.answers import MARGIN_COLUMNS, NOT_STABLE, WINDOW_COLUMNS, gain_
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
 from tfarm.loop.theorem import signs_of_loop
-from tfarm.report.loop_laws import Named
+from tfarm.report.given_laws import LawOnArm
 from tfarm.report.sections import Fact
 from tfarm.report.words import typeset, upper
 
@@ -43,7 +43,7 @@ QUANTITIES = (
 MarginRow = tuple[str, str, float | str, float | str, float | str]  # quantity, unit, exact, in the band, at
 
 
-def verdict_fact(named: Named, found: Margins, more: str) -> Fact:
+def verdict_fact(named: LawOnArm, found: Margins, more: str) -> Fact:
     """The verdict, large, how many poles are unstable up to where, and what more is to be said beside it."""
     it = found.stability
     number = how_many(it.unstable_roots, "unstable pole")
@@ -69,7 +69,7 @@ def verdict_words(name: str, found: Margins) -> str:
     return f"{name}: {it.verdict.upper()}, with {poles}{apart}; {typeset(it.tail)}. {theorem}"
 
 
-def margin_table(laws: Sequence[Named], found: Sequence[Margins], is_undamped: bool) -> Table:
+def margin_table(laws: Sequence[LawOnArm], found: Sequence[Margins], is_undamped: bool) -> Table:
     """A row a quantity, the verdict first; for each law the exact value, that in the band, and where.
 
     The caption says what a phase margin below 0 means, for each law that has one.
@@ -112,7 +112,7 @@ def _rows(found: Margins) -> Iterator[MarginRow]:
         yield name, row.column.unit, row.exact, row.in_band, row.at
 
 
-def window_table(laws: Sequence[Named], found: Sequence[Margins]) -> Table:
+def window_table(laws: Sequence[LawOnArm], found: Sequence[Margins]) -> Table:
     """A row a law and gain; none for the moment on a free pin, where it has no loop."""
     rows = [
         (law.name, each.stability.verdict, row)

@@ -9,24 +9,22 @@ from typing import NamedTuple
 from tfarm.columns import Column, Table
 from tfarm.digits import significant, singly
 from tfarm.loop.nyquist import Nyquist, nyquist_table
-from tfarm.report.loop_laws import Named
+from tfarm.report.given_laws import LawOnArm
 
 COUNT_CAPTION = (
     "{open}, so each clockwise turn around −1 (counted negative) is one unstable "
     "closed-loop pole. The count in a box was made without Nyquist, by finding every pole; poles whose real part is "
     "less than 10⁻¹² of their size are not told apart from the axis there (undecided), though their turns around −1 "
-    "are counted.{last}"
+    "are counted."
 )
 NO_OPEN, OWN_OPEN = "L has no pole right of the contour", "Beside the poles that a law itself has right of the contour"
-TO_COMPARE = "to compare"
-LAST_COUNTED = " The last law is there to show that the count is not always 0."
 RINGS_CAPTION = "Rings: sizes of L; −1 lies on the ring 1. Broad: ω > 0, arrows as ω rises; thin: its mirror image."
 
 
 class PlotOfLaw(NamedTuple):
     """One law's plot: its name, and the counted contour."""
 
-    named: Named
+    named: LawOnArm
     data: Nyquist
 
 
@@ -40,10 +38,7 @@ def count_table(plots: Sequence[PlotOfLaw], names: Sequence[str]) -> Table:
     return Table(
         stem="nyquist-count",
         title="Encirclements beside unstable poles",
-        caption=COUNT_CAPTION.format(
-            open=NO_OPEN if not any(p.unstable_open for _, p in plots) else OWN_OPEN,
-            last=LAST_COUNTED if plots[-1].named.name == TO_COMPARE and plots[-1].data.expected else "",
-        ),
+        caption=COUNT_CAPTION.format(open=NO_OPEN if not any(p.unstable_open for _, p in plots) else OWN_OPEN),
         columns=(
             Column("law", "law", of=names),
             Column("verdict", "verdict", of=words),

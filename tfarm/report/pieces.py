@@ -12,11 +12,10 @@ from tfarm.report.assumptions_section import assumptions_section
 from tfarm.report.bode_section import bode_section
 from tfarm.report.fit_section import fit_section, measured_section
 from tfarm.report.given_laws import Subject, continuous_laws, on_arm
-from tfarm.report.law_loop_section import law_margins_section, law_nyquist_section, law_poles_section
 from tfarm.report.law_section import law_section
 from tfarm.report.locus_section import locus_section
 from tfarm.report.loop_laws import has_loop, has_rate_loop
-from tfarm.report.loop_section import map_section, margins_section, no_loop_section, nyquist_section
+from tfarm.report.loop_section import map_section, margins_section, no_loop_section, nyquist_section, poles_section
 from tfarm.report.modes_section import modes_section
 from tfarm.report.paper import is_from_paper, paper_section
 from tfarm.report.sampled_section import sampled_section
@@ -88,7 +87,7 @@ ARM_PIECES = (
     Piece("modes", "modes", modes_section, title="Modes", seconds=1.0),
     Answer("no loop", "no-loop", no_loop_section, lambda arm: not has_loop(arm), is_also_on=is_of_the_loop),
     Answer("margins", "margins", margins_section, has_rate_loop, "Gains and margins", of=SAMPLED),
-    Answer("root loci", "locus", locus_section, has_rate_loop, "Root loci", seconds=2.0),
+    Answer("root loci", "locus", locus_section, has_rate_loop, "Root loci", seconds=2.0, of=SAMPLED),
     Piece("Nyquist", "margins-nyquist", nyquist_section, has_rate_loop, of=SAMPLED),
     Answer("sampled loop", "sampled", sampled_section, has_loop, "The sampled loop", seconds=8.0, of=SAMPLED),
     Answer("gain tuner", "tune", tuner_section, has_loop, "The gain tuner", seconds=10.0, of=SAMPLED),
@@ -96,11 +95,11 @@ ARM_PIECES = (
 )
 QUESTIONS = {piece.page: piece.title for piece in ARM_PIECES if piece.title}  # pages that may be asked for alone
 LAW_PIECES = (
-    Answer("margins", "margins", law_margins_section, has_rate_loop, of=LAWS, in_s=True),
+    Answer("margins", "margins", margins_section, has_rate_loop, of=LAWS, in_s=True),
     Answer("sampled loop", "sampled", sampled_section, has_rate_loop, seconds=8.0, of=LAWS),
     Answer("the law", "law", law_section, has_rate_loop, is_also_on=is_of_the_loop, of=LAWS),
-    Piece("Nyquist", "margins-nyquist", law_nyquist_section, has_rate_loop, of=LAWS, in_s=True),
-    Answer("poles", "locus", law_poles_section, has_rate_loop, seconds=2.0, of=LAWS, in_s=True),
+    Piece("Nyquist", "margins-nyquist", nyquist_section, has_rate_loop, of=LAWS, in_s=True),
+    Answer("poles", "locus", poles_section, has_rate_loop, seconds=2.0, of=LAWS, in_s=True),
     Answer("no loop", "no-loop", no_loop_section, lambda arm: not has_rate_loop(arm), is_also_on=is_of_the_loop),
     *(
         piece

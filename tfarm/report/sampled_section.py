@@ -25,7 +25,7 @@ from tfarm.plots.regions import draw_overlay
 from tfarm.plots.roots import draw_sampled_loci
 from tfarm.plots.style import safe
 from tfarm.records import record
-from tfarm.report.given_laws import GivenLaw, LawOnArm, cases_of, on_arm
+from tfarm.report.given_laws import GivenLaw, LawOnArm, cases_of, on_hub
 from tfarm.report.law_measured import measured_blocks
 from tfarm.report.loop_laws import has_loop, margins_of, what_holds, why_no_loop
 from tfarm.report.sections import Fact, PageSection, Picture
@@ -119,8 +119,7 @@ def sampled_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> Pa
 def without_moment(arm: Arm, found: SampledCase) -> LawOnArm:
     """The gains of a case without the feedback of the root moment."""
     gains = found.analysis.loop.gains.having(MOMENT_GAIN, 0.0)
-    (each,) = on_arm(arm, (GivenLaw(gains),))
-    return replace(each, name=f"{MOMENT_GAIN} = 0", key="without")
+    return on_hub(arm, gains, f"{MOMENT_GAIN} = 0", "without")
 
 
 # ------------------------------------------------------------ verdict
