@@ -8,7 +8,7 @@ import pytest
 
 import tfarm
 from tfarm.errors import ParameterError
-from tfarm.fitting.ratio import Ratio
+from tfarm.fitting.overlay import Ratio
 
 BARE, LAB, RIG = tfarm.load("sasaki2012"), tfarm.load("sasaki2012-lab"), tfarm.load("tests/rigs/bench-rig.toml")
 S = 1j * np.array([3.0, 40.0, 150.0, 300.0]) + 0.2

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tfarm.errors import ParameterError
-from tfarm.fitting.reading import data_of, measured_of, read_measured
+from tfarm.fitting.data import data_of, measured_of, read_measured
 from tfarm.fitting.recording import read_recording
 
 HZ = np.array([1.0, 1.5, 2.25, 40.0])

@@ -2,7 +2,7 @@
 
 import tfarm
 from tests.shell import answer, run
-from tfarm.fitting.reading import read_measured
+from tfarm.fitting.data import read_measured
 from tfarm.report import making
 from tfarm.report.fit_section import measured_section
 

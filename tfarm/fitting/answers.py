@@ -22,13 +22,12 @@ from tfarm.files import write_file
 from tfarm.response.answers import HERTZ
 
 from .data import CONFIDENCE, Measured
-from .fit import Fit
+from .fit import WIDER, Fit, repeats
 from .model import Response
-from .possible import WIDER, repeats
-from .ratio import Ratio
+from .overlay import Ratio
+from .recording import Estimate
 from .resonances import PEAKS_BEYOND, clear_peaks, match, near_poles
 from .ringdown import Ring
-from .spectra import Estimate
 
 PEAK_REACH = 0.1  # of ln w, and the damping ratio: a peak farther from all of the arm's is not one of them
 BROADER = 2.0  # times the damping ratio: what a broad peak may lie off its pole

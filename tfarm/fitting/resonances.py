@@ -27,7 +27,7 @@ from tfarm.response.answers import HERTZ
 from tfarm.response.signals import Signals
 
 from .data import Measured, in_parts
-from .parameters import NUDGE, drive_behind, under_drive
+from .model import NUDGE, drive_behind, under_drive
 
 PROMINENCE = math.log(2)  # a peak is twice what is around it
 CLEAR_OF_NOISE = 5.0  # deviations of the noise that it stands above

@@ -14,9 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MultipleLocator, NullFormatter
 
 from tfarm.digits import plain
-from tfarm.fitting.fit import Fit
+from tfarm.fitting.fit import Fit, Possible, response_band, share_stable
 from tfarm.fitting.overlay import Overlay
-from tfarm.fitting.possible import Possible, response_band, share_stable
 
 from .drawn import drawn
 from .frequency import RAD_PER_CYCLE, wrapped_phase

@@ -15,9 +15,8 @@ from tfarm.digits import general, listed, plain, singly
 from tfarm.errors import ConvergenceError
 from tfarm.fitting.answers import fit_in_words, known, parameters_table, resonances
 from tfarm.fitting.data import Measured
-from tfarm.fitting.fit import Fit
+from tfarm.fitting.fit import ARMS, Fit, Possible, extremes, loop_on_all, possible
 from tfarm.fitting.overlay import curves_table, overlay, overlay_answer, required_table
-from tfarm.fitting.possible import ARMS, Possible, extremes, loop_on_all, possible
 from tfarm.loop.plane import ranges_of
 from tfarm.plots.fitted import draw_band, draw_fit, draw_measured, draw_share
 from tfarm.plots.words import gains_words
