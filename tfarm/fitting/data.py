@@ -8,7 +8,7 @@ Comma, semicolon or tab separate the columns, whichever the header has; behind t
 byte order mark, Windows line ends, empty lines and lines that begin with # are passed over.  A unit in brackets behind
 a name, "t [s]", is not part of it.
 
-Measured responses from files: CSV, UFF 58; and from arrays of python-control.
+Measured responses from files: CSV, UFF 58.
 
     hz, re, im, coherence          hz or rad_s; re, im or abs, deg or db, deg; coherence or sigma and averages as known
     1.00, 0.312, -0.004, 0.998
@@ -19,11 +19,13 @@ Values are in SI units, sigma (of the real and of the imaginary part, each) in t
 from __future__ import annotations
 
 import hashlib
+import itertools
+import math
 import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +37,6 @@ from tfarm.errors import MISSING, ParameterError, did_you_mean, naming
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.files import read_file
 from tfarm.records import record
-
-if TYPE_CHECKING:
-    import control
 
 CONFIDENCE = 0.95  # of every interval of a fit: the usual one
 LEAST_SHARE = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence says
@@ -80,32 +79,30 @@ class Measured:
             if held is not None and held.shape != self.omega.shape:
                 remedy = f"one for each of the {self.omega.size} frequencies"
                 raise ParameterError(key=f"{self.name} {name}", value=held.shape, remedy=remedy)
-        if not (self.omega > 0).all() or not np.isfinite(self.omega).all():
-            bad = float(self.omega[~((self.omega > 0) & np.isfinite(self.omega))][0])
-            raise ParameterError(key="frequency", value=bad, remedy="positive and finite; leave other rows out")
-        steps = np.diff(self.omega)
-        if (steps <= 0).any():
-            at = float(self.omega[1:][steps <= 0][0])
-            remedy = "repeated or not in ascending order; sort the rows, and average those of one frequency"
-            raise ParameterError(key="frequency", value=at, remedy=remedy)
-        if not np.isfinite(self.values).all():
-            at = float(self.omega[~np.isfinite(self.values)][0])
-            raise ParameterError(key=f"value at {at:g} rad/s", value="no number", remedy="leave the row out")
-        if not self.values.any():
-            raise ParameterError(key=f"{self.name} values", value=0.0, remedy="0 everywhere: nothing was measured")
-        if self.sigma is not None and not ((self.sigma > 0) & np.isfinite(self.sigma)).all():
-            raise ParameterError(key="sigma", value=float(self.sigma.min()), remedy="a standard deviation is positive")
+        w, ordered = self.omega, "repeated or not in ascending order; sort the rows, and average those of one frequency"
+        _check("frequency", w, (w > 0) & np.isfinite(w), "positive and finite; leave other rows out")
+        _check("frequency", w[1:], np.diff(w) > 0, ordered)
+        _check("frequency", w, np.isfinite(self.values), "has a value that is no number; leave the row out")
+        nothing = "0 everywhere: nothing was measured"
+        _check(f"{self.name} values", np.zeros(1), np.atleast_1d(self.values.any()), nothing)
+        if self.sigma is not None:
+            positive = (self.sigma > 0) & np.isfinite(self.sigma)
+            _check("sigma", self.sigma, positive, "a standard deviation is positive")
         if self.coherence is not None:
-            if not ((self.coherence >= 0) & (self.coherence <= 1)).all():
-                raise ParameterError(key="coherence", value=float(self.coherence.max()), remedy="between 0 and 1")
-            if not self.coherence.any():
-                remedy = "0 everywhere: nothing was measured; leave it out"
-                raise ParameterError(key="coherence", value=0.0, remedy=remedy)
+            g = self.coherence
+            _check("coherence", g, (g >= 0) & (g <= 1), "between 0 and 1")
+            _check("coherence", np.zeros(1), np.atleast_1d(g.any()), f"{nothing}; leave it out")
 
     @property
     def name(self) -> str:
         """What is measured, as the command line has it: tip_acceleration/hub_angle."""
         return f"{self.output}/{self.input}"
+
+
+def _check(key: str, values: Real, good: NDArray[np.bool_], remedy: str) -> None:
+    """Raise ParameterError for the first of the values that is not good."""
+    if not good.all():
+        raise ParameterError(key=key, value=float(values[~good][0]), remedy=remedy)
 
 
 def in_parts(values: Complex) -> Real:
@@ -177,8 +174,7 @@ def _scatter(values: NDArray[Any]) -> Real:
 MOST_RECORD_BYTES = 256 * 1024 * 1024  # of a record; an hour of two signals at 1 kHz as text has 150 MB
 FREQUENCIES = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}  # its unit, and rad/s in one
 VALUE_PAIRS = (("re", "im"), ("abs", "deg"), ("db", "deg"))
-OTHER_COLUMNS = ("coherence", "sigma", "averages")
-KNOWN_COLUMNS = (*FREQUENCIES, "re", "im", "abs", "db", "deg", *OTHER_COLUMNS)
+KNOWN_COLUMNS = (*FREQUENCIES, "re", "im", "abs", "db", "deg", "coherence", "sigma", "averages")
 DATA_FORM = "OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv"
 UFF = (".uff", ".unv", ".uf")
 UFF_RESPONSE = 4  # in UFF 58 the type of a function that is a frequency response
@@ -188,29 +184,19 @@ UFF_FREQUENCY = 18  # and the kind of an abscissa that is a frequency
 @dataclass(frozen=True, slots=True)
 @record
 class Sheet:
-    """Columns `values` (columns, rows) with their `names` and `units` ("" where there is none) and each row's line."""
+    """Columns of numbers by name, their `units` ("" where there is none), and the line of each row in the file."""
 
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    values: Real
+    columns: dict[str, Real]
+    units: dict[str, str]
     lines: tuple[int, ...]
     digest: str
-
-    def __getitem__(self, name: str) -> Real:
-        return self.values[self.names.index(name)]
-
-    def get(self, name: str) -> Real | None:
-        """The column of that name, if there is one."""
-        return dict(zip(self.names, self.values, strict=True)).get(name)
-
-    def __contains__(self, name: str) -> bool:
-        return name in self.names
 
     def refuse(self, name: str, wrong: NDArray[np.bool_], remedy: str) -> None:
         """Raise ParameterError for the first row (rows,) in which a column is wrong, naming its line."""
         if wrong.any():
             at = int(wrong.argmax())
-            raise ParameterError(key=f"line {self.lines[at]}, {name}", value=float(self[name][at]), remedy=remedy)
+            value = float(self.columns[name][at])
+            raise ParameterError(key=f"line {self.lines[at]}, {name}", value=value, remedy=remedy)
 
 
 def digest_of(data: bytes) -> str:
@@ -226,77 +212,68 @@ def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
     """
     data = read_file(path, MOST_RECORD_BYTES, key=key, what="a .csv file")
     with naming(path):
-        return sheet_of(data)
+        text = decoded(data, "is not UTF-8 text; save the file as CSV in UTF-8")
+        numbered = enumerate(text.splitlines(), start=1)
+        rows = [(number, line) for number, line in numbered if line.strip() and not line.lstrip().startswith("#")]
+        if not rows:
+            remedy = "the file is empty; begin with the names of columns"
+            raise ParameterError(key="header", value=MISSING, remedy=remedy)
+        separator = next((each for each in "\t;" if each in rows[0][1]), ",")
+        units = _header(_cells(rows[0][1], separator))
+        if len(rows) == 1:
+            raise ParameterError(key="rows", value=0, remedy="a header and nothing below it")
+        values = _numbers(list(units), rows[1:], separator)
+    return Sheet(
+        columns=dict(zip(units, values.T, strict=True)),
+        units=units,
+        lines=tuple(number for number, _ in rows[1:]),
+        digest=digest_of(data),
+    )
 
 
-def sheet_of(data: bytes) -> Sheet:
-    """The columns of a text file's bytes; errors name no file."""
-    text = decoded(data, "is not UTF-8 text; save the file as CSV in UTF-8")
-    lines = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if not lines:
-        raise ParameterError(key="header", value=MISSING, remedy="the file is empty; begin with the names of columns")
-    head = lines[0][1]
-    separator = next((each for each in "\t;" if each in head), ",")
-    names, units = _header(_cells(head, separator))
-    rows = []
-    for number, line in lines[1:]:
-        cells = _cells(line, separator)
-        if len(cells) != len(names):
-            remedy = f"{len(cells)} columns where the header names {len(names)}"
-            raise ParameterError(key=f"line {number}", value=line, remedy=remedy)
-        rows.append(cells if separator == "," else [cell.replace(",", ".") for cell in cells])
-    if not rows:
-        raise ParameterError(key="rows", value=0, remedy="a header and nothing below it")
-    numbers = tuple(number for number, _ in lines[1:])
-    return Sheet(names, units, _numbers(names, numbers, rows).T, numbers, digest_of(data))
-
-
-def _header(cells: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names and units; a first line of numbers is a header left out."""
-    found = [re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", cell.strip()) for cell in cells]
-    names = tuple(each[1] if each else cell for each, cell in zip(found, cells, strict=True))
-    units = tuple((each[2] or "").strip() if each else "" for each in found)
-    if any(_is_number(name) for name in names):
-        remedy = "the first line holds numbers; begin the file with the names of its columns"
-        raise ParameterError(key="header", value=MISSING, remedy=remedy)
-    for place, name in enumerate(names, start=1):
-        if not name or name in names[: place - 1]:
+def _header(cells: Sequence[str]) -> dict[str, str]:
+    """The unit of each column by its name; a first line of numbers is a header left out."""
+    units: dict[str, str] = {}
+    for place, cell in enumerate(cells, start=1):
+        found = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", cell)
+        name, unit = found.groups() if found else (cell, None)
+        if math.isfinite(_number(name)):
+            remedy = "the first line holds numbers; begin the file with the names of its columns"
+            raise ParameterError(key="header", value=MISSING, remedy=remedy)
+        if not name or name in units:
             remedy = "each column has a name of its own"
             raise ParameterError(key=f"header, column {place}", value=name, remedy=remedy)
-    return names, units
+        units[name] = (unit or "").strip()
+    return units
 
 
 def _cells(line: str, separator: str) -> list[str]:
-    return [cell.strip().strip('"') for cell in line.split(separator)]
+    return [cell.strip().strip('"').strip() for cell in line.split(separator)]
 
 
-def _numbers(names: Sequence[str], lines: Sequence[int], rows: list[list[str]]) -> Real:
-    """The cells (rows, columns) as numbers, all at once; one by one only to say which of them is none."""
+def _numbers(names: Sequence[str], rows: Sequence[tuple[int, str]], separator: str) -> Real:
+    """The cells (rows, columns) of numbered lines as numbers."""
+    values = np.empty((len(rows), len(names)))
+    for at, (line, text) in enumerate(rows):
+        cells = _cells(text, separator)
+        if len(cells) != len(names):
+            remedy = f"{len(cells)} columns where the header names {len(names)}"
+            raise ParameterError(key=f"line {line}", value=text, remedy=remedy)
+        values[at] = [_number(cell if separator == "," else cell.replace(",", ".")) for cell in cells]
+        if not np.isfinite(values[at]).all():
+            wrong = int(np.isnan(values[at]).argmax())
+            remedy = "no finite number; leave the row out, or write numbers as 50, 0.5 or 5e1"
+            raise ParameterError(key=f"line {line}, {names[wrong]}", value=cells[wrong], remedy=remedy)
+    return values
+
+
+def _number(text: str) -> float:
+    """The finite number that a cell holds; nan for anything else."""
     try:
-        values = np.array(rows, dtype=float)
+        value = float(text)
     except ValueError:
-        values = np.full((1, 1), np.nan)
-    if np.isfinite(values).all() and all(cell.isascii() and "_" not in cell for row in rows for cell in row):
-        return values
-    at, name, cell = next(
-        (number, name, cell)
-        for number, row in zip(lines, rows, strict=True)
-        for name, cell in zip(names, row, strict=True)
-        if not _is_number(cell)
-    )
-    remedy = "no finite number; leave the row out, or write numbers as 50, 0.5 or 5e1"
-    raise ParameterError(key=f"line {at}, {name}", value=cell, remedy=remedy)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        return bool(np.isfinite(float(text))) and text.isascii() and "_" not in text
-    except ValueError:
-        return False
+        return math.nan
+    return value if math.isfinite(value) and text.isascii() and "_" not in text else math.nan
 
 
 def data_of(text: str, key: str = "--data") -> Measured:
@@ -330,46 +307,12 @@ def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Meas
             input=input,
             omega=omega,
             values=values,
-            sigma=sheet.get("sigma"),
-            coherence=sheet.get("coherence"),
+            sigma=sheet.columns.get("sigma"),
+            coherence=sheet.columns.get("coherence"),
             averages=_averages(sheet),
             source=name,
             digest=sheet.digest,
         )
-
-
-def measured_of(
-    response: control.FrequencyResponseData,
-    output: str,
-    input: str,
-    *,
-    sigma: Real | None = None,
-    coherence: Real | None = None,
-    averages: int | None = None,
-) -> Measured:
-    """One response of `control.FrequencyResponseData`, by its signals' names where it has several.
-
-    Raises ParameterError where it has several and none is of these names, and for what no measurement can be.
-    """
-    data = np.asarray(response.frdata)
-    places = []
-    for labels, wanted, size, key in (
-        (response.output_labels, output, data.shape[0], "output"),
-        (response.input_labels, input, data.shape[1], "input"),
-    ):
-        if wanted not in labels and size > 1:
-            raise ParameterError(key=key, value=wanted, remedy=did_you_mean(wanted, labels))
-        places.append(labels.index(wanted) if wanted in labels else 0)
-    return Measured(
-        output=output,
-        input=input,
-        omega=np.asarray(response.omega, dtype=float),
-        values=data[places[0], places[1]],
-        sigma=sigma,
-        coherence=coherence,
-        averages=averages,
-        source=str(response.name),
-    )
 
 
 def check_signal(name: str, key: str) -> None:
@@ -385,50 +328,46 @@ def check_signal(name: str, key: str) -> None:
 # ------------------------------------------------------------ CSV
 def _frequencies(sheet: Sheet) -> Real:
     """The frequencies [rad/s], once the header is known to be one and they ascend."""
-    for name in sheet.names:
+    for name in sheet.columns:
         if name not in KNOWN_COLUMNS:
             raise ParameterError(key="header", value=name, remedy=did_you_mean(name.lower(), KNOWN_COLUMNS))
-    given = [name for name in FREQUENCIES if name in sheet]
+    given = [name for name in FREQUENCIES if name in sheet.columns]
     if len(given) != 1:
         remedy = "one column of frequencies: hz or rad_s"
-        raise ParameterError(key="header", value=", ".join(sheet.names), remedy=remedy)
+        raise ParameterError(key="header", value=", ".join(sheet.columns), remedy=remedy)
     (name,) = given
     unit, scale = FREQUENCIES[name]
-    if sheet.units[sheet.names.index(name)].lower() not in ("", unit.lower()):
-        said = sheet.units[sheet.names.index(name)]
-        raise ParameterError(key=f"unit of {name}", value=said, remedy=f"{name} is in {unit}")
-    frequency = sheet[name]
+    if sheet.units[name].lower() not in ("", unit.lower()):
+        raise ParameterError(key=f"unit of {name}", value=sheet.units[name], remedy=f"{name} is in {unit}")
+    frequency = sheet.columns[name]
     sheet.refuse(name, ~(frequency > 0), "a frequency is positive; leave the row out")
     back = np.r_[False, np.diff(frequency) <= 0]
-    at = int(back.argmax())
-    again = bool(np.any(frequency[:at] == frequency[at]))
+    again = frequency[back.argmax()] in frequency[: back.argmax()]
     sheet.refuse(name, back, "is there twice; average its rows" if again else "is below the one before; sort the rows")
     return frequency * scale
 
 
 def _values(sheet: Sheet) -> Complex:
     """The complex response, of whichever two columns there are."""
-    given = [pair for pair in VALUE_PAIRS if pair[0] in sheet or (pair[1] in sheet and pair[1] != "deg")]
-    if len(given) != 1 or not all(name in sheet for name in given[0]):
-        remedy = "one pair of columns for the value: re, im or abs, deg or db, deg"
-        raise ParameterError(key="header", value=", ".join(sheet.names), remedy=remedy)
-    first, second = (sheet[name] for name in given[0])
-    if given[0] == ("re", "im"):
-        if "deg" in sheet:
-            raise ParameterError(key="header", value="deg", remedy="re and im say it all; leave deg out")
+    given = tuple(name for name in KNOWN_COLUMNS if name in sheet.columns and name in itertools.chain(*VALUE_PAIRS))
+    if given not in VALUE_PAIRS:
+        remedy = "one pair of columns for the value: re, im or abs, deg or db, deg; leave others out"
+        raise ParameterError(key="header", value=", ".join(sheet.columns), remedy=remedy)
+    first, second = (sheet.columns[name] for name in given)
+    if given == ("re", "im"):
         return np.asarray(first + 1j * second)
-    if given[0][0] == "abs":
+    if given == ("abs", "deg"):
         sheet.refuse("abs", first < 0, "a magnitude is not negative; is it db?")
     with np.errstate(over="ignore"):
-        size = first if given[0][0] == "abs" else 10.0 ** (first / 20)
+        size = first if given == ("abs", "deg") else 10.0 ** (first / 20)
     return np.asarray(size * np.exp(1j * np.radians(second)))
 
 
 def _averages(sheet: Sheet) -> int | None:
     """The number of independent averages, which is one for all rows."""
-    if "averages" not in sheet:
+    if "averages" not in sheet.columns:
         return None
-    found = sheet["averages"]
+    found = sheet.columns["averages"]
     wrong = (found != found[0]) | (found < 1) | (found != np.round(found))
     sheet.refuse("averages", wrong, "a whole number of averages, the same in every row")
     return int(found[0])

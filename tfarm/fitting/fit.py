@@ -22,10 +22,9 @@ from typing import Any
 import numpy as np
 from scipy.special import gammaincinv
 
-from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
+from tfarm.arm import Arm, must_be_arm
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.loop.margins import margins
 from tfarm.loop.plane import gain_map
 from tfarm.records import record
 from tfarm.response import transfer
@@ -230,40 +229,6 @@ def possible(fit: Fit, count: int) -> Possible:
     raise ConvergenceError(message, kept, len(kept))
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
-class LoopOnAll:
-    """A law on each possible arm: how many it holds, and the margins of those (stable arms,) in SI and degrees."""
-
-    law: HubFeedback
-    stable: int
-    of: int
-    gain_up: Real
-    phase: Real
-    delay: Real
-    disk: Real
-
-
-def loop_on_all(those: Possible, law: HubFeedback) -> LoopOnAll:
-    """The verdict on each arm, and its margins where it holds: None of an arm where a margin is not."""
-    found = [margins(arm, law) for arm in those.arms]
-    bands = [each.in_band for each in found if each.in_band is not None]
-
-    def column(name: str) -> Real:
-        return np.array([float(value) for each in bands if (value := getattr(each, name, None)) is not None])
-
-    ups = [each.windows[MOMENT_GAIN].around for each in found if each.in_band is not None]
-    return LoopOnAll(
-        law=law,
-        stable=len(bands),
-        of=len(found),
-        gain_up=np.array([pair[1] for pair in ups if pair is not None]),
-        phase=column("phase"),
-        delay=column("delay"),
-        disk=column("disk"),
-    )
-
-
 def share_stable(those: Possible, across: Real, up: Real) -> Real:
     """The share of the arms on which both gains hold (up, across), without a clock."""
     return np.asarray(np.mean([gain_map(arm, across, up).unstable == 0 for arm in those.arms], axis=0))
@@ -273,11 +238,6 @@ def response_band(those: Possible, output: str, omega: Real) -> tuple[Real, Real
     """The lowest and highest magnitude of the possible arms, and the best one's, at frequencies [rad/s]."""
     sizes = [abs(transfer(arm, output)(1j * omega)) for arm in those.arms]
     return np.min(sizes, axis=0), np.max(sizes, axis=0), np.asarray(abs(transfer(those.fit.arm, output)(1j * omega)))
-
-
-def extremes(values: Any) -> tuple[float, float] | None:
-    """Lowest and highest; None of nothing."""
-    return (float(np.min(values)), float(np.max(values))) if len(values) else None
 
 
 @dataclass(frozen=True)

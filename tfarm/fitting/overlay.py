@@ -63,12 +63,6 @@ class RatioRoots:
     at_zero: int
     up_to: float
 
-    @property
-    def resonances(self) -> Complex:
-        """The poles that oscillate, Im s > 0, by |s|."""
-        upper = self.poles[self.poles.imag > 0]
-        return upper[np.argsort(abs(upper))]
-
 
 @dataclass(frozen=True)
 class Ratio:
@@ -265,12 +259,13 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
     roots = ratio.roots(PARTNERS_BEYOND * high)
     places = peaks_of(measured, noise.sigma)
     own = peaks_among(roots.poles)
-    own = own[own >= low / PARTNERS_BEYOND]
-    pairs, _ = matched_peaks(measured.omega[places], own, (low, high))
-    if len(pairs) < max(places.size, int(((own >= low) & (own <= high)).sum())):
+    own = own[abs(own) >= low / PARTNERS_BEYOND]
+    w = abs(own)
+    pairs, _ = matched_peaks(measured.omega[places], w, (low, high))
+    if len(pairs) < max(places.size, int(((w >= low) & (w <= high)).sum())):
         check_unit(arm, measured)
     at = {j: int(places[i]) for i, j in pairs}
-    shown = [(w, at.get(j)) for j, w in enumerate(own) if j in at or low <= w <= high]
+    shown = [(pole, at.get(j)) for j, pole in enumerate(own.tolist()) if j in at or low <= abs(pole) <= high]
     grid = refined_grid((low, high), np.r_[roots.poles, roots.zeros]) if low < high else measured.omega
     omega = np.asarray(grid, dtype=float)
     return Overlay(
@@ -288,19 +283,19 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
 
 
 def _counterparts(
-    ratio: Ratio, roots: RatioRoots, measured: Measured, noise: Noise, shown: list[tuple[float, int | None]]
+    ratio: Ratio, roots: RatioRoots, measured: Measured, noise: Noise, shown: list[tuple[complex, int | None]]
 ) -> tuple[Counterpart, ...]:
-    """A row a pole: of each |s| [rad/s] that is shown, with the place of its measured peak, if it has one.
+    """A row a pole: of each pole [1/s] that is shown, with the place of its measured peak, if it has one.
 
     The arm's modes are told where they are the poles of the ratio, each by the nearest natural frequency.
     """
-    up_to = (1 + SAME_MODE) * max((w for w, _ in shown), default=0.0)
+    up_to = (1 + SAME_MODE) * max((abs(pole) for pole, _ in shown), default=0.0)
     are_modes = ratio.is_driven and up_to > 0 and modes_below(ratio.driven, up_to) > 0
     table = modes_of(ratio.driven, up_to=up_to) if are_modes else None
-    others, upper = np.r_[roots.poles, roots.zeros, 0.0], roots.resonances
+    others = np.r_[roots.poles, roots.zeros, 0.0]
     found = []
-    for w, place in shown:
-        pole, mode = complex(upper[np.argmin(abs(abs(upper) - w))]), None
+    for pole, place in shown:
+        mode = None
         if table is not None:
             away = abs(table.natural_frequency / abs(pole) - 1)
             at = int(np.argmin(away))
@@ -345,19 +340,14 @@ def _known(value: Any) -> Any:
     return MISSING if value is None else value
 
 
-def _of(row: Counterpart, what: str) -> Any:
-    """A number of the resonance that was measured, if one was told."""
-    one, level = row.measured, row.level
-    if one is None or (level is None and what in ("db", "deg")):
-        return MISSING
-    return {
-        "hz": abs(one.pole) / HERTZ,
-        "std": one.std[1] / HERTZ,
-        "zeta": one.damping_ratio,
-        "zeta_std": one.std[0] / abs(one.pole),
-        "db": 20 * math.log10(abs(level)) if level else MISSING,
-        "deg": math.degrees(np.angle(level)) if level else MISSING,
-    }[what]
+def _fitted(of: Any) -> Any:
+    """A number of the resonance that was measured, if one was fitted."""
+    return lambda row: MISSING if row.measured is None else of(row)
+
+
+def _level(of: Any) -> Any:
+    """A number of the residue's level, if it has one."""
+    return lambda row: of(row.level) if row.level else MISSING
 
 
 COUNTERPARTS = (
@@ -370,7 +360,7 @@ COUNTERPARTS = (
         of=lambda row: _known(None if row.frequency_ratio is None else row.frequency_ratio * abs(row.pole) / HERTZ),
         digits=_or_dash(7),
     ),
-    Column("measured_std_hz", "+-", "Hz", of=lambda row: _of(row, "std"), digits=_or_dash(2)),
+    Column("measured_std_hz", "+-", "Hz", of=_fitted(lambda row: row.measured.std[1] / HERTZ), digits=_or_dash(2)),
     Column(
         "frequency_residual_percent",
         "off",
@@ -379,10 +369,19 @@ COUNTERPARTS = (
         digits=_or_dash(3),
     ),
     Column("exact_damping_ratio", "damping exact", of="damping_ratio", digits=singly(general, 4)),
-    Column("measured_damping_ratio", "measured", of=lambda row: _of(row, "zeta"), digits=_or_dash(4)),
-    Column("measured_damping_ratio_std", "+-", of=lambda row: _of(row, "zeta_std"), digits=_or_dash(2)),
-    Column("level_db", "residue", "dB", of=lambda row: _of(row, "db"), digits=_or_dash(3)),
-    Column("level_degrees", "turned", "deg", of=lambda row: _of(row, "deg"), digits=_or_dash(3)),
+    Column(
+        "measured_damping_ratio", "measured", of=_fitted(lambda row: row.measured.damping_ratio), digits=_or_dash(4)
+    ),
+    Column(
+        "measured_damping_ratio_std",
+        "+-",
+        of=_fitted(lambda row: row.measured.std[0] / abs(row.measured.pole)),
+        digits=_or_dash(2),
+    ),
+    Column("level_db", "residue", "dB", of=_level(lambda level: 20 * math.log10(abs(level))), digits=_or_dash(3)),
+    Column(
+        "level_degrees", "turned", "deg", of=_level(lambda level: math.degrees(np.angle(level))), digits=_or_dash(3)
+    ),
     Column("is_peak_only", of=lambda row: row.peak is not None and row.measured is None, on=(JSON,)),
 )
 

@@ -111,8 +111,7 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
         digest = digest_of(data)
     else:
         sheet = read_sheet(name, key="record")
-        held, digest = dict(zip(sheet.names, sheet.values, strict=True)), sheet.digest
-        units = dict(zip(sheet.names, sheet.units, strict=True))
+        held, units, digest = dict(sheet.columns), sheet.units, sheet.digest
     with naming(name):
         for each in TIMES:
             if units.get(each, "") not in ("", "s"):
