@@ -49,37 +49,33 @@ STEPS = 40  # evaluations, of each share
 FIT_SEED = 852780  # of all that a fit draws: the number of the paper's article, any would do
 
 
-class Starts:
-    """Points of the search that the complex residuals may be minimised from, the likeliest first."""
+def starts(problem: Problem) -> Iterator[tuple[Problem, Real]]:
+    """Points that the complex residuals may be minimised from, the likeliest first, and the problem there."""
+    zero = np.zeros(len(problem.parameters))
+    yield _start_near(problem, zero, LADDERS[0], 0)
+    for shares in LADDERS:
+        yield _start_near(problem, zero, shares, DRAWS)
+    rng = np.random.default_rng(FIT_SEED)
+    for _ in range(STRAYED):
+        with suppress(ParameterError):  # no arm there
+            yield _start_near(problem, SPREAD * rng.standard_normal(zero.size), LADDERS[-1], DRAWS)
 
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
 
-    def __iter__(self) -> Iterator[tuple[Problem, Real]]:
-        zero = np.zeros(len(self.problem.parameters))
-        yield self._near(zero, LADDERS[0], 0)
-        for shares in LADDERS:
-            yield self._near(zero, shares, DRAWS)
-        rng = np.random.default_rng(FIT_SEED)
-        for _ in range(STRAYED):
-            with suppress(ParameterError):  # no arm there
-                yield self._near(SPREAD * rng.standard_normal(zero.size), LADDERS[-1], DRAWS)
+def _start_near(problem: Problem, point: Real, shares: tuple[float, ...], draws: int) -> tuple[Problem, Real]:
+    """The problem, its sensors' gains by the sign that they have, and where the equation errors lead from a point.
 
-    def _near(self, point: Real, shares: tuple[float, ...], draws: int) -> tuple[Problem, Real]:
-        """The problem, its sensors' gains by the sign that they have, and where the equation errors lead from a point.
-
-        Of the `draws` as far from there as these know it, that of the least squares: the true side of a line.
-        """
-        point = self.problem.inside(point)
-        for share in shares:
-            whole, first = with_gains(self.problem, point)
-            thin = thinned(whole, LINES)
-            found = least_errors(thin, first, share)
-            point = np.asarray(found.x)
-        _, sizes, axes = np.linalg.svd(found.jac, full_matrices=False)
-        deviation = math.sqrt(2 * found.cost / found.fun.size) / sizes
-        drawn = np.random.default_rng(FIT_SEED).standard_normal((draws, point.size)) * DRAWN * deviation
-        return whole, min((point, *map(thin.inside, point + drawn @ axes)), key=partial(sum_of_squares, thin))
+    Of the `draws` as far from there as these know it, that of the least squares: the true side of a line.
+    """
+    point = problem.inside(point)
+    for share in shares:
+        whole, first = with_gains(problem, point)
+        thin = thinned(whole, LINES)
+        found = least_errors(thin, first, share)
+        point = np.asarray(found.x)
+    _, sizes, axes = np.linalg.svd(found.jac, full_matrices=False)
+    deviation = math.sqrt(2 * found.cost / found.fun.size) / sizes
+    drawn = np.random.default_rng(FIT_SEED).standard_normal((draws, point.size)) * DRAWN * deviation
+    return whole, min((point, *map(thin.inside, point + drawn @ axes)), key=partial(sum_of_squares, thin))
 
 
 def least_errors(problem: Problem, first: Real, share: float) -> OptimizeResult:
@@ -206,7 +202,7 @@ class Solution:
 def best_solution(problem: Problem) -> Solution:
     """The least sum of squares over all starts; those of noise alone end the search early."""
     found: list[Solution] = []
-    for subject, start in Starts(problem):
+    for subject, start in starts(problem):
         found.append(_rescaled(nearest_minimum(subject, start)))
         best = min(found, key=lambda each: each.misfit)
         is_near = len(found) > len(LADDERS) and best.chi_squared < MUCH_MISFIT * best.freedom
@@ -268,15 +264,9 @@ def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None
         full[free] = x
         return full
 
-    def residuals(x: Real) -> Real:
-        return problem.residuals(whole(x))
-
-    def jacobian(x: Real) -> Real:
-        return np.asarray(problem.jacobian(whole(x))[:, free])
-
-    inside = problem.inside(point)[free]
     found = least_squares(
-        walled(residuals), inside, jac=jacobian, bounds=(low, high), x_scale="jac",
+        walled(lambda x: problem.residuals(whole(x))), problem.inside(point)[free],
+        jac=lambda x: problem.jacobian(whole(x))[:, free], bounds=(low, high), x_scale="jac",
         xtol=FIRM_POINT, ftol=FIRM_SUM, gtol=None, max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
     full, slopes = whole(found.x), np.zeros((found.fun.size, start.size))
