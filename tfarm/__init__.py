@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from tfarm.reduced import reduce
     from tfarm.response import bode, transfer
     from tfarm.spectrum import damped_modes, modes
-    from tfarm.spectrum.scales import default_gains
+    from tfarm.spectrum.table import default_gains
     from tfarm.synthesis.design import design
     from tfarm.tuner import tune
 
@@ -105,7 +105,7 @@ _ROOMS = {  # where a name stands; what it is called there after a colon, if not
     "closed_loop_poles": "loop.poles",
     "compare": "comparing",
     "damped_modes": "spectrum",
-    "default_gains": "spectrum.scales",
+    "default_gains": "spectrum.table",
     "map": "loop.plane:gain_map",
     "margins": "loop.margins",
     "Measured": "fitting.data",

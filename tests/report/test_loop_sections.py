@@ -37,7 +37,7 @@ from tfarm.report.loop_laws import NamedLaw, has_loop, laws, margins_of
 from tfarm.report.loop_section import map_section, margins_section
 from tfarm.report.map import draw_map_of_arm, map_data, map_of_arm
 from tfarm.report.margins_table import NOT_STABLE, margin_table, verdict_fact
-from tfarm.spectrum.scales import PAPER_GAINS, default_gains, rate_unit
+from tfarm.spectrum.table import PAPER_GAINS, default_gains, rate_unit
 from tfarm.tables.files import as_json
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))

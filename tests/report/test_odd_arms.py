@@ -34,7 +34,7 @@ from tfarm.report.loop_section import margins_section, nyquist_section
 from tfarm.report.margins_table import margin_table
 from tfarm.report.modes_section import modal_table, places
 from tfarm.spectrum import DampedModes
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 ARMS = odd_arms()
 DAMPED = [name for name, arm in ARMS.items() if arm.link.damping]

@@ -26,7 +26,7 @@ from tfarm.records import record
 from tfarm.response.frequency import Bode, bode, resonant_band
 from tfarm.spectrum import Modes, damped_modes
 from tfarm.spectrum import modes as modes_of
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 from .clocked import Clocked, Reach, clocked
 from .pairing import poles_by_mode

@@ -20,7 +20,7 @@ from tfarm.dsp.crossings import ends_of_K1, rounded_map, with_both_sides, with_m
 from tfarm.errors import ConvergenceError
 from tfarm.loop.edges import Axis, rate_columns
 from tfarm.loop.plane import Plane, gain_map
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 K2_RANGE = (-1.0, 1.5)  # of what balances a torque: 1 where the input is one, less where it is a motor's current
 CUT_RANGE = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge

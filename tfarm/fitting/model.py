@@ -29,14 +29,13 @@ from tfarm.arm import INPUTS, Arm, Input
 from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError, did_you_mean
-from tfarm.exact.gradients import Direction, response_gradients
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.exact.series import Jet
+from tfarm.exact.series import Direction, Jet, response_gradients
 from tfarm.exact.system import System, system_of
 from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum import modes
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 
 from .data import Measured, Noise, check_signal, in_parts
 

@@ -28,7 +28,7 @@ from tfarm.report.pieces import QUESTIONS
 from tfarm.report.sections import PICTURES, Fact
 from tfarm.report.words import in_ms
 from tfarm.response.frequency import bode
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 FACTS = 4  # of the headline numbers
 INDEX_COLUMNS = ("law", "verdict", *PLANE, "sampled")  # columns of the index's table of arms

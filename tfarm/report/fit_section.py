@@ -24,7 +24,7 @@ from tfarm.plots.words import gains_words
 from tfarm.report.loop_laws import has_loop
 from tfarm.report.sections import PageSection, Picture
 from tfarm.report.words import typeset
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 LEVEL_WORDS = (
     "The interval holds the true number in 95 of 100 measurements, if the arm is right and the noise is as said."

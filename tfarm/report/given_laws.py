@@ -17,7 +17,7 @@ from tfarm.loop.loop import Loop
 from tfarm.plots.words import gains_words
 from tfarm.records import record
 from tfarm.response.signals import Signals
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 GIVEN_GAINS = "the gains given"
 LONGEST_LAW_NAME = 60  # characters of a law's name in a heading

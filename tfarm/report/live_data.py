@@ -28,7 +28,7 @@ from tfarm.loop.positions import Positions, Sensor, positions, sensed_places
 from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
 from tfarm.report.live_sampled import packed, sampled_numbers, slew_numbers
-from tfarm.spectrum.scales import angle_unit, default_gains
+from tfarm.spectrum.table import angle_unit, default_gains
 
 LIVE_COLUMNS = 90  # values of the gain across at which the continuous region is cut
 ANGLE_RANGE = 0.1  # of J w1^2: the largest gain on the hub angle of the page

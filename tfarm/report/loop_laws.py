@@ -15,7 +15,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.loop.margins import Margins, margins
 from tfarm.plots.words import gains_words
 from tfarm.response import transfer
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 from tfarm.synthesis.design import Design, design
 
 DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it

@@ -28,7 +28,7 @@ from tfarm.report.margins_table import margin_table, verdict_fact, verdict_words
 from tfarm.report.nyquist import RINGS_CAPTION, TO_COMPARE, PlotOfLaw, count_table, curve_data
 from tfarm.report.sections import PageSection, Picture
 from tfarm.report.words import typeset, upper
-from tfarm.spectrum.scales import default_gains, default_words, rate_unit
+from tfarm.spectrum.table import default_gains, default_words, rate_unit
 
 UNSTABLE_K2 = 1.5  # at least, of the law whose encirclements are counted for comparison
 TIMES_THE_EDGE = 1.2  # and at least so many times the K2 at which the loop loses its stability

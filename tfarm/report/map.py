@@ -24,7 +24,7 @@ from tfarm.plots import plane
 from tfarm.plots.style import blank, headline, legend_below, style
 from tfarm.records import record
 from tfarm.report.loop_laws import DESIGNED_MODES, NamedLaw, best, brief_on, laws
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.design import Design
 from tfarm.synthesis.models import continuous_model
 from tfarm.synthesis.objectives import least_damping

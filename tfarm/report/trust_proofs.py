@@ -31,7 +31,7 @@ from tfarm.report.loop_laws import has_loop
 from tfarm.report.words import typeset
 from tfarm.response.frequency import BAND_POINTS, worst_error
 from tfarm.spectrum import DampedModes, Modes
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 PROVEN_MODES, BRACKET_DIGITS = (
     10,

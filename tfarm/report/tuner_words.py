@@ -14,9 +14,9 @@ from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.records import record
 from tfarm.report.sections import Fact
 from tfarm.report.words import typeset
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 from tfarm.tuner import LearningCurves, Plan, Tuning, compare_controllers, learning_curves, tried_loops, tune
-from tfarm.tuner.comparison import Outcomes, quantised_chain
+from tfarm.tuner.baselines import Outcomes, quantised_chain
 from tfarm.tuner.training import QUARTILES
 from tfarm.tuner.tuning import tip_errors, usual_plan
 
