@@ -262,7 +262,6 @@ def impedance(S: float, k: Any) -> float:
     return min(inertia, math.sqrt(math.sqrt(inertia)) + math.sqrt(S * (k[A] + k[B])))
 
 
-Number = Any
 Plane = tuple[Number, Number, Number, Number, Number]  # p_WPsi, p_WM, p_WQ = -p_PsiM, p_PsiQ, p_MQ
 Row = tuple[Number, Number, Number, Number]  # f_W, f_Psi, f_M, f_Q
 

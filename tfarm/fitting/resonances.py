@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +63,9 @@ def peaks_of(data: Measured, sigma: Real) -> NDArray[np.intp]:
     return np.asarray(places[rise > CLEAR_OF_NOISE * sigma[places]])
 
 
-def matched_peaks(measured: Real, own: Real, band: tuple[float, float]) -> tuple[list[tuple[int, int]], float]:
+def matched_peaks(
+    measured: NDArray[Any], own: NDArray[Any], band: tuple[float, float]
+) -> tuple[list[tuple[int, int]], float]:
     """Pairs of places in two ascending rows of frequencies, in order, with the least cost, and that cost.
 
     The cost of a pair is |ln w/w'|; one of a row that is left alone costs UNPAIRED, but an own one outside of the band.

@@ -229,9 +229,13 @@ def least_squares(t: Real, y: Real, start: Real | None) -> tuple[Real, Real, Rea
     if start is None:
         return None
 
-    found = minimised(
-        lambda x: model(x, t)[0] - y, start, jac=lambda x: model(x, t)[1], method="lm", x_scale="jac", xtol=1e-12
-    )
+    def residuals(x: Real) -> Real:
+        return np.asarray(model(x, t)[0] - y)
+
+    def slopes(x: Real) -> Real:
+        return model(x, t)[1]
+
+    found = minimised(residuals, start, jac=slopes, method="lm", x_scale="jac", xtol=1e-12)
     w, sigma = found.x[1:-LINEAR:EACH], found.x[:-LINEAR:EACH]
     period = t[1] - t[0]
     inside = (w > 0) & (w < np.pi / period) & (abs(sigma) < 2 / period)

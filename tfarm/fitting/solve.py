@@ -264,10 +264,12 @@ def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None
         full[free] = x
         return full
 
+    def slopes(x: Real) -> Real:
+        return np.asarray(problem.jacobian(whole(x))[:, free])
+
     found = least_squares(
-        walled(lambda x: problem.residuals(whole(x))), problem.inside(point)[free],
-        jac=lambda x: problem.jacobian(whole(x))[:, free], bounds=(low, high), x_scale="jac",
-        xtol=FIRM_POINT, ftol=FIRM_SUM, gtol=None, max_nfev=MOST_EVALUATIONS,
+        walled(lambda x: problem.residuals(whole(x))), problem.inside(point)[free], jac=slopes,
+        bounds=(low, high), x_scale="jac", xtol=FIRM_POINT, ftol=FIRM_SUM, gtol=None, max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
     full, slopes = whole(found.x), np.zeros((found.fun.size, start.size))
     slopes[:, free] = np.asarray(found.jac)

@@ -162,7 +162,7 @@ def to_text(tuner: SavedTuner) -> str:
         "b": tuner.cost.b,
         "guard_kind": tuner.guard_kind,
         "guard": None if tuner.guard_kind == "none" else [tuner.lo, tuner.hi],
-        **weights_answer(tuner.kernel),
+        **weights_answer(tuner.network),
     }
     return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
