@@ -264,11 +264,11 @@ def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None
         full[free] = x
         return full
 
-    def slopes(x: Real) -> Real:
+    def jacobian(x: Real) -> Real:
         return np.asarray(problem.jacobian(whole(x))[:, free])
 
     found = least_squares(
-        walled(lambda x: problem.residuals(whole(x))), problem.inside(point)[free], jac=slopes,
+        walled(lambda x: problem.residuals(whole(x))), problem.inside(point)[free], jac=jacobian,
         bounds=(low, high), x_scale="jac", xtol=FIRM_POINT, ftol=FIRM_SUM, gtol=None, max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
     full, slopes = whole(found.x), np.zeros((found.fun.size, start.size))
