@@ -49,7 +49,7 @@ SENSOR_PIECES = 16  # pieces of the arm between two positions
 SENSED_MODES = 6  # whose frequencies and zeros the chart of sensors has
 SENSOR_DIGITS = 6  # of what that chart draws and tells: far more than a screen has
 LIVE_PAGE, ASSETS = "live.html", "assets"
-RUNTIME, SCRIPT = f"vega-{vl_convert.get_vega_version()}.js", "live.js"
+CHARTS, RUNTIME, SCRIPT = "live_charts.json", f"vega-{vl_convert.get_vega_version()}.js", "live.js"
 BUNDLED = "window.vegaEmbed = vegaEmbed;"
 SCRIPT_PARTS = tuple(f"live_{name}.js" for name in ("loop", "sampled", "locus", "sets", "player", "sensor", "page"))
 
@@ -300,7 +300,7 @@ def save_live(subject: Subject, folder: Path) -> None:
     """
     arm, chain, laws = subject.arm, subject.chain, subject.laws
     title, out = f"{arm.name}: live loop", folder / LIVE_PAGE
-    given = [each.law for each in laws if isinstance(each.law, HubFeedback)]
+    given = [gains for each in laws if (gains := as_law(each.law).gains) is not None]
     try:
         data = live_data(arm, chain, given[0] if given else None)
     except TfarmError as error:
@@ -318,9 +318,10 @@ def write_assets(folder: Path) -> None:
     """Vega's runtime, as vl-convert carries it, and this page's own script with its charts."""
     folder.mkdir(exist_ok=True)
     (folder / RUNTIME).write_text(vl_convert.javascript_bundle(BUNDLED), encoding="utf-8", newline="")
-    from tfarm.report.live_charts import charts  # and Altair, which the processes that make pages do not need
-
-    named = json.dumps(charts(), separators=(",", ":"), sort_keys=True)
+    drawn = json.loads((TEMPLATES / CHARTS).read_text(encoding="utf-8"))
+    config = drawn.pop("config")  # of every chart; its colours are set by the page, for a light screen or a dark one
+    charts = {name: vl_convert.vegalite_to_vega({**chart, "config": config}) for name, chart in drawn.items()}
+    named = json.dumps(charts, separators=(",", ":"), sort_keys=True)
     scripts = "".join((TEMPLATES / name).read_text(encoding="utf-8") for name in SCRIPT_PARTS)
     own = f"(() => {{\nconst LIVE_CHARTS = {named};\n{scripts}}})();\n"  # the runtime has names of its own
     (folder / SCRIPT).write_text(own, encoding="utf-8", newline="")
