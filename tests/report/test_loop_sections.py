@@ -104,8 +104,9 @@ def test_no_part_of_the_edge_is_missing(lab):
         for row, column in np.argwhere(np.diff(lab.region.unstable, axis=axis)):
             if axis == 1 and lab.region.K1[column] < 0 < lab.region.K1[column + 1]:
                 continue  # the line K1 = 0 is drawn on its own
-            beside = across[column] + (0.5 / map.GRID_COLUMNS) * axis, up[row] + (0.5 / map.GRID_ROWS) * (1 - axis)
-            assert np.hypot(*(edge - beside).T).min() < edges.SHORT_SEGMENT
+            half = (0.5 / map_room.GRID_COLUMNS) * axis, (0.5 / map_room.GRID_ROWS) * (1 - axis)
+            middle = across[column] + half[0], up[row] + half[1]
+            assert np.hypot(*(edge - middle).T).min() < edges.SHORT_SEGMENT
 
 
 @pytest.mark.parametrize("column", [20, 120, 200])
@@ -113,7 +114,7 @@ def test_the_colours_are_the_counts_of_the_poles(lab, column):
     """On either side of the upper edge, by finding all poles in a box."""
     stable = lab.region.stable[:, column]
     top = int(np.flatnonzero(stable)[-1]) if stable.any() else 100
-    for row in (50, top, min(top + 3, map.GRID_ROWS - 1)):
+    for row in (50, top, min(top + 3, map_room.GRID_ROWS - 1)):
         law = HubFeedback(K1=float(lab.region.K1[column]), K2=float(lab.region.K2[row]))
         assert stability(LAB, law).unstable_roots == lab.region.unstable[row, column]
 

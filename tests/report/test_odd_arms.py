@@ -22,7 +22,7 @@ from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
-from tfarm.report import assumptions_section, cases, loop_section, writing
+from tfarm.report import assumptions_section, cases, map_section, writing
 from tfarm.report.arm_section import arm_section, derived_table
 from tfarm.report.cases import GivenLaw, Subject, has_loop, on_hub
 from tfarm.report.locus_section import beyond_table, locus_section
@@ -148,7 +148,7 @@ def is_stable(arm, law, up_to):
 def test_how_far_K2_may_go_is_what_the_poles_say(name):
     """On either side of an edge; at the end of a search nothing happens, and no edge is claimed."""
     arm, law = ARMS[name], default_gains(ARMS[name])
-    words = loop_section._answer(arm).partition("at that K1, ")[2].partition("; at that K2, ")[0]
+    words = map_section._answer(arm).partition("at that K1, ")[2].partition("; at that K2, ")[0]
     assert "without limit" not in words
     up = number(re.search(r"go up (?:to|with no limit found as far as) (\S+?)[,;]", f"{words};")[1])
     band = 3 * tfarm.modes(arm, 3).natural_frequency[-1]
