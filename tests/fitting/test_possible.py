@@ -12,7 +12,7 @@ import tfarm
 from tests.fitting.test_fit import LAB, PAIRS, measured
 from tests.shared import thinned
 from tfarm.fitting.fit import fit, possible, repeats, response_band, share_stable
-from tfarm.report.fit_section import fit_section
+from tfarm.report.response_sections import fit_section
 from tfarm.spectrum.table import default_gains
 
 

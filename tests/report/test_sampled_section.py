@@ -25,11 +25,10 @@ from tfarm.plots.files import save_figure
 from tfarm.plots.regions import draw_overlay
 from tfarm.plots.roots import draw_sampled_loci
 from tfarm.report import sampled_section as page
-from tfarm.report.given_laws import cases_of
-from tfarm.report.loop_laws import sign_words, what_holds
+from tfarm.report.cases import cases_of, sign_words, what_holds
+from tfarm.report.motion import CURVE_DIGITS
 from tfarm.report.sampled_section import SampledCase, loci_table, sampled_section
-from tfarm.report.time_responses import CURVE_DIGITS
-from tfarm.report.words import spans
+from tfarm.report.sections import spans
 from tfarm.spectrum.table import default_gains
 from tfarm.tables.files import as_csv, as_json
 
