@@ -8,11 +8,11 @@ from functools import cache
 
 import numpy as np
 import pytest
+from tfarm.comparing.regions import CUT_RANGE, K2_RANGE, regions_table, stable_regions
 
 import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.arm import HubFeedback
-from tfarm.comparing.regions import CUT_RANGE, K2_RANGE, regions_table, stable_regions
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, plain
 from tfarm.dsp import Chain, Simulator, sampled_loop, sampled_verdict, scenario, stable_windows

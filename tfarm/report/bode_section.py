@@ -9,7 +9,7 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.digits import how_many, plain, significant
-from tfarm.plots.frequency import draw_bode
+from tfarm.plots.frequency import bode as bode_plot
 from tfarm.report.sections import PageSection, Picture
 from tfarm.report.words import upper
 from tfarm.response.answers import bode_table, roots_table
@@ -34,7 +34,7 @@ def bode_section(arm: Arm, output: str) -> PageSection:
         title=upper(f"{data.input_label} to {data.label}: magnitude and phase"),
         caption=f"{what_is_seen(data)} {what_it_means(data)}",
         alt=alt_text(data),
-        figure=draw_bode(data),
+        figure=bode_plot.figure(data),
         data=bode_table(data, f"{anchor}-data"),
     )
     if not data.poles.size and not data.zeros.size:

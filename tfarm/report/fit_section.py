@@ -19,7 +19,8 @@ from tfarm.fitting.fit import Fit
 from tfarm.fitting.overlay import curves_table, overlay, overlay_answer, required_table
 from tfarm.fitting.possible import ARMS, Possible, extremes, loop_on_all, possible
 from tfarm.loop.plane import ranges_of
-from tfarm.plots.fitted import draw_band, draw_fit, draw_measured, draw_share
+from tfarm.plots.fitted import draw_band, draw_share, fitted
+from tfarm.plots.fitted import measured as measured_plot
 from tfarm.plots.words import gains_words
 from tfarm.report.loop_laws import has_loop
 from tfarm.report.sections import PageSection, Picture
@@ -64,7 +65,7 @@ def fit_section(fit: Fit, count: int = ARMS) -> PageSection:
         caption = f"Points: {names} as measured. Blue: the fitted arm, exact; grey: the arm that the search began with."
         blocks.append(Picture(
             stem="fit-overlay", title="Measured over fitted", caption=caption,
-            alt=f"Measured and computed responses: {names}.", figure=draw_fit(fit),
+            alt=f"Measured and computed responses: {names}.", figure=fitted.figure(fit),
         ))  # fmt: skip
     blocks.append(parameters_table(fit))
     if rows := resonances(fit):
@@ -127,7 +128,7 @@ def measured_section(arm: Arm, measured: Sequence[Measured]) -> PageSection:
         curves = replace(curves_table(found), stem=f"measured{label}-data", title=name)
         blocks.append(Picture(
             stem=f"measured{label}", title=name, caption=CURVES_CAPTION,
-            alt=f"Measured and exact response {name}.", figure=draw_measured(found), data=curves,
+            alt=f"Measured and exact response {name}.", figure=measured_plot.figure(found), data=curves,
         ))  # fmt: skip
         if len(answer["modes"]):
             table = replace(answer["modes"], stem=f"measured-modes{label}", title="Mode by mode", caption=MODES_CAPTION)

@@ -20,7 +20,7 @@ from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.loop.spill import SPILL, Spill, spill
 from tfarm.loop.stability import Stability
 from tfarm.plots.disc import draw_nyquist
-from tfarm.plots.loop import draw_loop
+from tfarm.plots.frequency import draw_loop
 from tfarm.report.given_laws import GivenLaw, LawOnArm, continuous_laws, on_arm
 from tfarm.report.margins_table import margin_table, verdict_fact, verdict_words, window_table
 from tfarm.report.nyquist import RINGS_CAPTION, PlotOfLaw, count_table, curve_data

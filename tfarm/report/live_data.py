@@ -13,7 +13,6 @@ from typing import Any, get_args
 import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, GAINS, MOMENT_GAIN, PLANE, Arm, HubFeedback, as_law, unit_of
-from tfarm.comparing.regions import BEYOND_PICTURE, sampled_region
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits
 from tfarm.dsp import Chain
@@ -27,6 +26,7 @@ from tfarm.loop.plane import gain_map
 from tfarm.loop.positions import Positions, Sensor, positions, sensed_places
 from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
+from tfarm.plots.regions import BEYOND_PICTURE, sampled_region
 from tfarm.report.live_sampled import packed, sampled_numbers, slew_numbers
 from tfarm.spectrum.scales import angle_unit, default_gains
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from tfarm.arm import GAINS, PLANE, Arm, shown_unit
 from tfarm.arrays import Real
 from tfarm.columns import Column, Table
-from tfarm.comparing.regions import sampled_region
 from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp.verdict import SampledBrief
@@ -21,6 +20,7 @@ from tfarm.loop.edges import Axis, edge, moment_axis, rate_axis
 from tfarm.loop.frequencies import band_of
 from tfarm.loop.plane import Plane, gain_map
 from tfarm.plots import plane
+from tfarm.plots.regions import sampled_region
 from tfarm.plots.style import blank, headline, legend_below, style
 from tfarm.records import record
 from tfarm.report.loop_laws import DESIGNED_MODES, NamedLaw, best, brief_on, laws
@@ -127,7 +127,6 @@ def draw_map_of_arm(data: MapOfArm) -> Figure:
             plane.law_mark(law.law, MARKERS[law.key], f"{law.name}: {law.gains};\n{brief.short}", ax)
         if data.design is not None:
             plane.search_frame(data.design.bounds, ax)
-        plane.count_labels(found, x, y, ax)
         legend_below(figure)
         headline(figure, f"{data.arm.name}: how high may the gains go?")
     return figure

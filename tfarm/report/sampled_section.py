@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit
 from tfarm.columns import Column, Table
-from tfarm.comparing.regions import StableRegions, regions_table, stable_regions
 from tfarm.crossing import Window
 from tfarm.digits import how_many, plain, scientific, significant, singly
 from tfarm.dsp import Analysis, Chain, Simulation, Verdict, sampled_verdict
@@ -20,8 +19,8 @@ from tfarm.dsp.results import drawn, residual_moment_rms, settling_time
 from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.dsp.verdict import SampledNumber, at_periods, sampled
 from tfarm.errors import ParameterError
-from tfarm.plots.motion import draw_responses
-from tfarm.plots.regions import draw_overlay
+from tfarm.plots.motion import slew as slew_plot
+from tfarm.plots.regions import StableRegions, draw_overlay, regions_table, stable_regions
 from tfarm.plots.roots import draw_sampled_loci
 from tfarm.plots.style import safe
 from tfarm.records import record
@@ -385,7 +384,7 @@ def slew(arm: Arm, chain: Chain, cases: Sequence[LawOnArm]) -> tuple[list[Pictur
         title="The slew",
         caption=f"{SLEW_CAPTION}{figures}{clipped_words(runs)}{resolution_words(runs.values())}",
         alt=f"Root moment, tip and motor in a slew of {what}. {figures}",
-        figure=draw_responses(driven, shown, what),
+        figure=slew_plot.figure(driven, shown, what),
         data=responses_table("sampled-slew-data", "The slew in time", driven, {e.key: runs[e.name] for e in simulated}),
     )
     return [picture], words
