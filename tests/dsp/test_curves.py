@@ -19,7 +19,7 @@ from tfarm.dsp.traces import (
     reference_angle,
     root_moment,
 )
-from tfarm.report.time_responses import responses_table
+from tfarm.report.motion import responses_table
 from tfarm.spectrum.scales import default_gains
 
 STEEL = tfarm.load("stocky-steel")

@@ -13,7 +13,7 @@ from tests.fitting.test_fit import LAB, PAIRS, measured
 from tests.shared import thinned
 from tfarm.fitting.fit import fit
 from tfarm.fitting.possible import extremes, loop_on_all, possible, repeats, response_band, share_stable
-from tfarm.report.fit_section import fit_section
+from tfarm.report.response_sections import fit_section
 
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
 

@@ -40,7 +40,7 @@ COMMANDS = {  # what the sections' numbers are held against
     "bode-root-moment": ("bode root_moment",),
     "bode-tip-displacement": ("bode tip_displacement",),
     "modes": ("modes",),
-    "locus": ("margins", "locus K1", "locus K2"),
+    "locus": ("margins", "poles", "locus K1", "locus K2"),
     "margins-nyquist": ("nyquist", "modes"),
     "sampled": ("sampled", "margins", "simulate K2", "simulate"),
     "tune": (),
@@ -61,6 +61,7 @@ def answers(pages):
     asked = {
         "modes": ("modes", file, "--certify"),
         "margins": ("margins", file),
+        "poles": ("poles", file),
         "sampled": ("sampled", file),
         "bode root_moment": ("bode", file, "--output", "root_moment"),
         "bode tip_displacement": ("bode", file, "--output", "tip_displacement"),

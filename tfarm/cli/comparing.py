@@ -56,7 +56,7 @@ def compare(
     found = find(subjects, laws, names=names, modes=count, output=output, chain=chain)
     page = None
     if out is not None:
-        from tfarm.report.comparison_page import write_comparison
+        from tfarm.report.writing import write_comparison
 
         page = write_comparison(found, out)
     hand_out(lambda: compared_answer(found), partial(_print, found), json, png=png, picture=(found,), also=(page,))
