@@ -155,10 +155,11 @@ def hand_out(
     if csv is not None and table is not None:
         write_csv(table(), csv)
     if png is not None:
-        from tfarm.plots.drawn import picture_of
+        import tfarm.plots  # noqa: F401  every picture is known once they are loaded
         from tfarm.plots.files import save_png
+        from tfarm.plots.style import FIGURES
 
-        save_png(picture_of(*picture), png)
+        save_png(FIGURES[type(picture[0])](*picture), png)
     if say_written(*also, csv, png) or json:
         give(answer(), json, printed)
 

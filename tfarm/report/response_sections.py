@@ -19,8 +19,9 @@ from tfarm.fitting.fit import ARMS, Fit, Possible, possible
 from tfarm.fitting.overlay import curves_table, overlay, overlay_answer, required_table
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import ranges_of
-from tfarm.plots.fitted import draw_band, draw_fit, draw_measured, draw_share
-from tfarm.plots.frequency import draw_bode
+from tfarm.plots.fitted import draw_band, draw_share, fitted
+from tfarm.plots.fitted import measured as measured_plot
+from tfarm.plots.frequency import bode as bode_plot
 from tfarm.plots.words import gains_words
 from tfarm.report.cases import has_loop
 from tfarm.report.sections import PageSection, Picture, typeset, upper
@@ -72,7 +73,7 @@ def bode_section(arm: Arm, output: str) -> PageSection:
         title=upper(f"{data.input_label} to {data.label}: magnitude and phase"),
         caption=f"{what_is_seen(data)} {what_it_means(data)}",
         alt=alt_text(data),
-        figure=draw_bode(data),
+        figure=bode_plot.figure(data),
         data=bode_table(data, f"{anchor}-data"),
     )
     if not data.poles.size and not data.zeros.size:
@@ -167,7 +168,7 @@ def fit_section(fit: Fit, count: int = ARMS) -> PageSection:
         caption = f"Points: {names} as measured. Blue: the fitted arm, exact; grey: the arm that the search began with."
         blocks.append(Picture(
             stem="fit-overlay", title="Measured over fitted", caption=caption,
-            alt=f"Measured and computed responses: {names}.", figure=draw_fit(fit),
+            alt=f"Measured and computed responses: {names}.", figure=fitted.figure(fit),
         ))  # fmt: skip
     blocks.append(parameters_table(fit))
     if rows := resonances(fit):
@@ -234,7 +235,7 @@ def measured_section(arm: Arm, measured: Sequence[Measured]) -> PageSection:
         curves = replace(curves_table(found), stem=f"measured{label}-data", title=name)
         blocks.append(Picture(
             stem=f"measured{label}", title=name, caption=CURVES_CAPTION,
-            alt=f"Measured and exact response {name}.", figure=draw_measured(found), data=curves,
+            alt=f"Measured and exact response {name}.", figure=measured_plot.figure(found), data=curves,
         ))  # fmt: skip
         if len(answer["modes"]):
             table = replace(answer["modes"], stem=f"measured-modes{label}", title="Mode by mode", caption=MODES_CAPTION)
