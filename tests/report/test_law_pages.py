@@ -22,11 +22,11 @@ from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.sampled import sampled_loop
 from tfarm.errors import one_line
 from tfarm.fitting.recording import beside_exact, load_run, overshoot
-from tfarm.report import making, writing
-from tfarm.report.given_laws import GivenLaw, Subject, on_arm
-from tfarm.report.law_measured import overshoot_table
+from tfarm.report import writing
+from tfarm.report.cases import GivenLaw, Subject, on_arm
 from tfarm.report.law_section import law_section, written_polynomial
 from tfarm.report.loop_section import margins_section, nyquist_section, poles_section
+from tfarm.report.motion import overshoot_table
 from tfarm.report.page import file_of
 from tfarm.report.sampled_section import sampled_section
 from tfarm.tables.files import to_json
@@ -157,8 +157,8 @@ def test_every_entry_is_in_the_table_with_every_digit(given):
 
 def test_a_page_is_about_its_law_and_its_file_says_it_again(file, tmp_path, monkeypatch, capsys):
     plain_cards(monkeypatch.setattr)
-    few = [piece for piece in making.LAW_PIECES if piece.anchor == "law"]
-    monkeypatch.setattr(making, "LAW_PIECES", few)
+    few = [piece for piece in writing.LAW_PIECES if piece.anchor == "law"]
+    monkeypatch.setattr(writing, "LAW_PIECES", few)
     code, out, err = run(
         capsys, "report", LAB.name, "--law", str(file), "--period", "0.004", "--only", "margins", "--out", str(tmp_path)
     )
@@ -189,13 +189,15 @@ def test_gains_typed_are_in_the_file_of_the_page():
 def test_each_loop_page_of_laws_has_a_section_that_says_what_it_is_about():
     subject = Subject(LAB, Chain(), (GivenLaw(Law({"hub_rate": ([1.0], [0.01, 1.0])})),))
     for page in ("margins", "locus", "sampled", "tune"):
-        assert "law" in [each.anchor for each in making.pieces_of(subject) if each.is_on(page) and each.is_for(subject)]
+        assert "law" in [
+            each.anchor for each in writing.pieces_of(subject) if each.is_on(page) and each.is_for(subject)
+        ]
     discrete = Subject(LAB, Chain(), (GivenLaw(Law({"hub_rate": 0.3}, period=0.01)),))
-    anchors = {each.anchor for each in making.pieces_of(discrete) if each.is_for(discrete)}
+    anchors = {each.anchor for each in writing.pieces_of(discrete) if each.is_for(discrete)}
     assert not anchors & {"margins", "margins-nyquist", "locus", "margins-map", "tune"}
     assert "sampled loop" in law_section(*discrete[:3]).words[1]
     held = replace(LAB, hub=tfarm.Hub(inertia=math.inf))
-    first = (each.anchor for each in making.LAW_PIECES if each.is_for(Subject(held, Chain(), subject.laws)))
+    first = (each.anchor for each in writing.LAW_PIECES if each.is_for(Subject(held, Chain(), subject.laws)))
     assert next(first) == "no-loop"
 
 

@@ -30,15 +30,14 @@ from tfarm.loop.stability import stability
 from tfarm.plots.plane import nice_levels
 from tfarm.plots.roots import zoomed
 from tfarm.plots.style import BLUE
-from tfarm.report import loop_laws, loop_section, making, map, write
-from tfarm.report.frame import signs
-from tfarm.report.given_laws import on_hub
+from tfarm.report import cases, write, writing
+from tfarm.report import map_section as map_room
+from tfarm.report.cases import continuous_cases, has_loop, margins_of, on_hub
 from tfarm.report.locus_section import _more_damping, beyond_table
-from tfarm.report.loop_laws import continuous_cases, has_loop, margins_of
-from tfarm.report.loop_section import map_section, margins_section
-from tfarm.report.map import draw_map_of_arm, map_data, map_of_arm
-from tfarm.report.margins_table import NOT_STABLE, margin_table, verdict_fact
-from tfarm.spectrum.scales import PAPER_GAINS, default_gains, rate_unit
+from tfarm.report.loop_section import NOT_STABLE, margin_table, margins_section, verdict_fact
+from tfarm.report.map_section import draw_map_of_arm, map_data, map_of_arm, map_section
+from tfarm.report.page import signs
+from tfarm.spectrum.table import PAPER_GAINS, default_gains, rate_unit
 from tfarm.tables.files import as_json
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
@@ -54,7 +53,7 @@ def lab():
 def section(lab):
     """The map of the lab's gains on its page."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loop_section, "map_of_arm", lambda arm, chain: {(LAB, None): lab}[arm, chain])
+        patch.setattr(map_room, "map_of_arm", lambda arm, chain: {(LAB, None): lab}[arm, chain])
         return map_section(LAB)
 
 
@@ -65,7 +64,7 @@ def coarse():
     That takes longest and has its own tests.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(map, "best", lambda arm, chain: None)
+        patch.setattr(map_room, "best", lambda arm, chain: None)
         coarsen(patch.setattr)
         return map_section(PURE)
 
@@ -105,8 +104,9 @@ def test_no_part_of_the_edge_is_missing(lab):
         for row, column in np.argwhere(np.diff(lab.region.unstable, axis=axis)):
             if axis == 1 and lab.region.K1[column] < 0 < lab.region.K1[column + 1]:
                 continue  # the line K1 = 0 is drawn on its own
-            beside = across[column] + (0.5 / map.GRID_COLUMNS) * axis, up[row] + (0.5 / map.GRID_ROWS) * (1 - axis)
-            assert np.hypot(*(edge - beside).T).min() < edges.SHORT_SEGMENT
+            half = (0.5 / map_room.GRID_COLUMNS) * axis, (0.5 / map_room.GRID_ROWS) * (1 - axis)
+            middle = across[column] + half[0], up[row] + half[1]
+            assert np.hypot(*(edge - middle).T).min() < edges.SHORT_SEGMENT
 
 
 @pytest.mark.parametrize("column", [20, 120, 200])
@@ -114,7 +114,7 @@ def test_the_colours_are_the_counts_of_the_poles(lab, column):
     """On either side of the upper edge, by finding all poles in a box."""
     stable = lab.region.stable[:, column]
     top = int(np.flatnonzero(stable)[-1]) if stable.any() else 100
-    for row in (50, top, min(top + 3, map.GRID_ROWS - 1)):
+    for row in (50, top, min(top + 3, map_room.GRID_ROWS - 1)):
         law = HubFeedback(K1=float(lab.region.K1[column]), K2=float(lab.region.K2[row]))
         assert stability(LAB, law).unstable_roots == lab.region.unstable[row, column]
 
@@ -285,7 +285,7 @@ def test_nothing_is_cut_off_by_the_compression():
 @pytest.mark.parametrize(("inertia", "reason"), [(math.inf, "locked"), (0.0, "no inertia")])
 def test_an_arm_without_a_loop_gets_a_sentence(tmp_path, monkeypatch, inertia, reason):
     for kept in ("save_proof", "save_card"):  # which have their own tests
-        monkeypatch.setattr(making, kept, lambda *_: None)
+        monkeypatch.setattr(writing, kept, lambda *_: None)
     arm = replace(PURE, name="held", hub=Hub(inertia=inertia))
     assert not has_loop(arm)
     page = write([arm], tmp_path, only=("margins",)).read_text()
@@ -309,7 +309,7 @@ def test_the_map_says_what_is_proven(coarse, section):
 
 def test_the_sign_convention_is_the_pages_and_no_sections(coarse, monkeypatch):
     """It stands once, at the foot of the page: tests/report/test_writing.py counts it there."""
-    monkeypatch.setattr(loop_laws, "best", lambda arm, chain: None)
+    monkeypatch.setattr(cases, "best", lambda arm, chain: None)
     assert "Sign of K2" in signs(PURE)
     for section in (coarse, margins_section(PURE, Chain())):
         texts = [*section.words, *(block.caption for block in section.blocks)]

@@ -22,19 +22,16 @@ from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
-from tfarm.report import assumptions_section, loop_laws, loop_section, making
+from tfarm.report import assumptions_section, cases, map_section, writing
 from tfarm.report.arm_section import arm_section, derived_table
-from tfarm.report.bode_section import bode_section
-from tfarm.report.damped_table import damped_table
-from tfarm.report.frame import signs
-from tfarm.report.given_laws import GivenLaw, Subject, on_hub
+from tfarm.report.cases import GivenLaw, Subject, has_loop, on_hub
 from tfarm.report.locus_section import beyond_table, locus_section
-from tfarm.report.loop_laws import has_loop
-from tfarm.report.loop_section import margins_section, nyquist_section
-from tfarm.report.margins_table import margin_table
-from tfarm.report.modes_section import modal_table, places
+from tfarm.report.loop_section import margin_table, margins_section, nyquist_section
+from tfarm.report.modes_section import damped_table, modal_table, places
+from tfarm.report.page import signs
+from tfarm.report.response_sections import bode_section
 from tfarm.spectrum import DampedModes
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 ARMS = odd_arms()
 DAMPED = [name for name, arm in ARMS.items() if arm.link.damping]
@@ -151,7 +148,7 @@ def is_stable(arm, law, up_to):
 def test_how_far_K2_may_go_is_what_the_poles_say(name):
     """On either side of an edge; at the end of a search nothing happens, and no edge is claimed."""
     arm, law = ARMS[name], default_gains(ARMS[name])
-    words = loop_section._answer(arm).partition("at that K1, ")[2].partition("; at that K2, ")[0]
+    words = map_section._answer(arm).partition("at that K1, ")[2].partition("; at that K2, ")[0]
     assert "without limit" not in words
     up = number(re.search(r"go up (?:to|with no limit found as far as) (\S+?)[,;]", f"{words};")[1])
     band = 3 * tfarm.modes(arm, 3).natural_frequency[-1]
@@ -164,7 +161,7 @@ def test_how_far_K2_may_go_is_what_the_poles_say(name):
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_sentences_about_the_pole_at_0_and_J_are_for_arms_that_turn_freely(name, monkeypatch):
-    monkeypatch.setattr(loop_laws, "best", lambda arm, chain: None)
+    monkeypatch.setattr(cases, "best", lambda arm, chain: None)
     section = margins_section(ARMS[name], Chain())
     (windows,) = (block for block in section.blocks if block.stem == "windows")
     words = " ".join([*section.words, windows.caption, signs(ARMS[name])])
@@ -231,13 +228,13 @@ def test_branches_that_cannot_be_followed_are_left_out_with_a_word(monkeypatch):
 def test_a_free_pin_has_its_rate_loop(monkeypatch):
     """K1 at K2 = 0: verdict, windows and locus; no K2, and the gauge as it is."""
     arm = ARMS["free-pin"]
-    assert "−u/(1 + C s)" in loop_laws.why_no_loop(arm)
-    assert "at every instant" in loop_laws.why_no_loop(replace(arm, link=replace(arm.link, damping=0.0)))
+    assert "−u/(1 + C s)" in cases.why_no_loop(arm)
+    assert "at every instant" in cases.why_no_loop(replace(arm, link=replace(arm.link, damping=0.0)))
     section = margins_section(arm, Chain())
     assert section.facts[0].value == "STABLE"
     (windows,) = (block for block in section.blocks if block.stem == "windows")
     assert set(column(windows, "gain").values) == {"K1", "Kp"}
-    loop = [piece for piece in making.ARM_PIECES if any(map(piece.is_on, ("margins", "locus", "sampled", "tune")))]
+    loop = [piece for piece in writing.ARM_PIECES if any(map(piece.is_on, ("margins", "locus", "sampled", "tune")))]
     names = [piece.name for piece in loop if piece.is_for(Subject(arm, Chain()))]
     assert names == ["the arm", "no loop", "margins", "root loci", "Nyquist"]
 
@@ -257,16 +254,16 @@ def test_a_free_pin_has_its_nyquist_plot():
 
 
 def test_a_margin_without_end_has_no_frequency(monkeypatch):
-    monkeypatch.setattr(loop_laws, "best", lambda arm, chain: None)
+    monkeypatch.setattr(cases, "best", lambda arm, chain: None)
     named = on_hub(ARMS["pinned"], HubFeedback(K1=5.0338, K2=-3.0), "default gains", "default")
-    found = loop_laws.margins_of(ARMS["pinned"], named.law)
+    found = cases.margins_of(ARMS["pinned"], named.law)
     table = margin_table([named], [found], False)
     rows = dict(
         zip(column(table, "quantity").values, zip(*(c.values for c in table.columns[3:5]), strict=True), strict=True)
     )
     assert rows["phase lead"] == (math.inf, "")
     assert rows["phase lag"][1] == pytest.approx(488.89, rel=1e-4)
-    passive = loop_laws.margins_of(ARMS["free-pin"], HubFeedback(K1=0.283))
+    passive = cases.margins_of(ARMS["free-pin"], HubFeedback(K1=0.283))
     table = margin_table([named], [passive], False)
     assert dict(zip(column(table, "quantity").values, table.columns[4].values, strict=True))["disk margin α"] == ""
 

@@ -1,65 +1,74 @@
-"""The continuous loop on an arm's page: map of the gains, verdict and margins, Nyquist plot, poles."""
+"""The continuous loop on an arm's page: verdict and margins, Nyquist plot, poles."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, unit_of, written_unit
+from tfarm.arm import MOMENT_GAIN, Arm
 from tfarm.columns import Column, Table
-from tfarm.digits import how_many, plain, significant
+from tfarm.digits import how_many, plain, significant, singly
 from tfarm.dsp import Chain
 from tfarm.errors import TfarmError
-from tfarm.loop.answers import CROSSOVERS, POLE_COLUMNS, crossovers
-from tfarm.loop.edges import DEEPEST_MOMENT_GAIN
+from tfarm.loop.answers import (
+    CROSSOVERS,
+    MARGIN_COLUMNS,
+    NOT_STABLE,
+    POLE_COLUMNS,
+    WINDOW_COLUMNS,
+    crossovers,
+    gain_rows,
+    margin_rows,
+    unsettled,
+)
+from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins, loop_curve
-from tfarm.loop.nyquist import nyquist_of
+from tfarm.loop.nyquist import Nyquist, nyquist_of, nyquist_table
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.loop.spill import SPILL, Spill, spill
-from tfarm.loop.windows import Windows
+from tfarm.loop.theorem import signs_of_loop
 from tfarm.plots.disc import draw_nyquist
-from tfarm.plots.loop import draw_loop
-from tfarm.report.given_laws import GivenLaw, LawOnArm
-from tfarm.report.loop_laws import DESIGNED_MODES, brief_on, continuous_cases, margins_of, why_no_loop
-from tfarm.report.map import MapOfArm, draw_map_of_arm, map_data, map_of_arm
-from tfarm.report.margins_table import margin_table, verdict_fact, verdict_words, window_table
-from tfarm.report.nyquist import RINGS_CAPTION, PlotOfLaw, count_table, curve_data
-from tfarm.report.sections import PageSection, Picture
-from tfarm.report.words import typeset, upper
-from tfarm.spectrum.scales import default_gains, default_words, rate_unit
+from tfarm.plots.frequency import draw_loop
+from tfarm.report.cases import GivenLaw, LawOnArm, brief_on, continuous_cases, margins_of, why_no_loop
+from tfarm.report.sections import Fact, PageSection, Picture, typeset, upper
 
-MAP_SEEN = (
-    "Green: every pole is in the left half-plane{apart}; orange: the number of unstable poles. The black edge and the "
-    "counts are exact, of the arm itself and no reduced model{reach}. Blue: damping ratio of the least damped pole "
-    "below {band} rad/s. {proof} K1 is scaled by J ω₁ = {unit}{held}."
+MARGINS_CAPTION = (
+    "Exact: of the infinite-dimensional loop; not known where nothing bounds L beyond the band. "
+    "In the band: as far as the poles were computed{undamped}. Gain margin: "
+    "factors on the whole law between which the loop stays stable. Phase margin: where |L| = 1, the angle from −1 "
+    "to L of least size, above 0 for lag that the loop bears and below 0 for lead; lag and lead: the least of each. "
+    "Delay: what may be lost at the worst frequency. Disk margin: gain and phase may be off together by "
+    "(2 + αδ)/(2 − αδ), |δ| < 1."
 )
-APART_FROM_HUB, WITH_INERTIA = (
-    ", that of the hub angle at 0 apart",
-    ", with J the inertia of what turns: hub, link and finite payload",
+DELAY_UNDAMPED = (
+    "; without damping (C = 0) any delay, however short, destabilises some mode far enough up, so the exact delay and "
+    "disk margins are 0, and only a band gives them a size"
 )
-ALL_MODES, UP_TO = ", with all its infinitely many modes", ", with every crossing up to {band} rad/s"
-PROOF = "The purple frame is what the Lyapunov argument proves at C = 0: K1 > 0 and K2 < 1, all of the stable region."
-NO_PROOF = (
-    "The dashed frame is what the Lyapunov argument proves for an arm without damping; it is not a proof here, because "
-    "the gauge does not feel C. At C > 0 it proves K2 = 0 alone (solid line). The true edge is the black line."
+CAPTION_OF_WINDOWS = (
+    "The others held, each gain, or number of a law, may move within its window before the first pole reaches the "
+    "axis. Ends ±∞ are proven; an end with a star is no edge: up to there none was found, and beyond none was looked "
+    "for."
 )
-OF_ELASTIC = (
-    "Lyapunov's argument proves all with K1 > {least} and K2 < {whole}: the links are elastic, and what hub, clamp and "
-    "joint lose only adds to K1."
+MARGIN_TITLES = {"disk": "disk margin α"}
+QUANTITIES = (
+    "gain margin, down",
+    "gain margin, up",
+    *(MARGIN_TITLES.get(each.of, each.title) for each in MARGIN_COLUMNS),
 )
-OF_DAMPED = "At C > 0 Lyapunov's argument proves K2 = 0 alone, as the gauge does not feel C; the edge is computed."
-OF_OTHER_GAUGE = (
-    "The gauge does not read the moment on the hub, so Lyapunov's argument proves K2 = 0 alone; the edge is computed."
+MarginRow = tuple[str, str, float | str, float | str, float | str]  # quantity, unit, exact, in the band, at
+COUNT_CAPTION = (
+    "{open}, so each clockwise turn around −1 (counted negative) is one unstable "
+    "closed-loop pole. The count in a box was made without Nyquist, by finding every pole; poles whose real part is "
+    "less than 10⁻¹² of their size are not told apart from the axis there (undecided), though their turns around −1 "
+    "are counted."
 )
-OF_LAG = "The voltage comes late through an inductance, so Lyapunov's argument proves nothing; the edge is computed."
-SAMPLED_SEEN = (
-    " Hatched: what is stable when the loop is sampled every {clock}, its edge exact for the first {modes} modes; with "
-    "that clock no gains outside the hatching hold, whatever the continuous loop promises."
-)
-SAMPLED_NOT_SEEN = " Where the loop is stable when it is sampled every {clock} could not be settled and is not drawn."
-DEPTH_WORDS = " For this map unstable windows below K2 = {deepest} were not looked for."
+NO_OPEN, OWN_OPEN = "L has no pole right of the contour", "Beside the poles that a law itself has right of the contour"
+RINGS_CAPTION = "Rings: sizes of L; −1 lies on the ring 1. Broad: ω > 0, arrows as ω rises; thin: its mirror image."
 NYQUIST_WORDS = (
     "Every size r of L(iω) is drawn as r/(1 + r): nothing is cut off, infinity is the outer rim. The loop is stable "
     "where the curve encircles −1 counter-clockwise as often as L has poles right of the axis{own}. Poles of L on the "
@@ -85,126 +94,137 @@ POLES_CAPTION = (
 )
 
 
+def verdict_fact(named: LawOnArm, found: Margins, more: str) -> Fact:
+    """The verdict, large, how many poles are unstable up to where, and what more is to be said beside it."""
+    it = found.stability
+    number = how_many(it.unstable_roots, "unstable pole")
+    count = "infinitely many unstable poles" if it.unstable_roots_infinite else number
+    beside = f"{count}, up to {significant(it.band, 5)} rad/s{more}"
+    return Fact(label=f"{named.name}: {named.gains}", value=it.verdict.upper(), beside=beside)
+
+
+def verdict_words(name: str, found: Margins) -> str:
+    """The verdict on the law of that name, what is known beyond the band, and what Lyapunov or the law's sign adds."""
+    it, loop = found.stability, found.stability.loop
+    free = it.poles.moving.size < it.poles.values.size
+    apart = ", the one at 0 that the hub angle leaves apart" if free else ""
+    if loop.gains is None:
+        signs = signs_of_loop(loop)
+        kind = f"it is {signs.kind}" if signs.kind else "no theorem on its sign helps"
+        theorem = f"Beside that, {kind}: {typeset(signs.reason)}."
+        theorem += "".join(f" Warning: {typeset(text)}." for text in loop.warnings)
+    else:
+        proof = lyapunov(loop.arm, loop.gains)
+        theorem = f"Lyapunov: {'proven' if proof.proven else 'no proof'}, {typeset(proof.reason)}."
+    poles = f"{how_many(it.unstable_roots, 'unstable pole')} up to {significant(it.band, 5)} rad/s"
+    return f"{name}: {it.verdict.upper()}, with {poles}{apart}; {typeset(it.tail)}. {theorem}"
+
+
+def margin_table(laws: Sequence[LawOnArm], found: Sequence[Margins], is_undamped: bool) -> Table:
+    """A row a quantity, the verdict first; for each law the exact value, that in the band, and where.
+
+    The caption says what a phase margin below 0 means, for each law that has one.
+    """
+    rows, leads = [list(_rows(each)) for each in found], ""
+    columns = [
+        Column("quantity", "quantity", of=[row[0] for row in rows[0]]),
+        Column("unit", "unit", of=[row[1] for row in rows[0]]),
+    ]
+    number = singly(lambda value: plain(value, 6) if value.is_integer() else significant(value, 5))
+    for named, each, part in zip(laws, found, rows, strict=True):
+        group, band = f"{named.name}: {named.gains}", each.in_band
+        for i, (key, title) in enumerate((("exact", "exact"), ("band", "in the band"), ("at_rad_s", "at rad/s")), 2):
+            columns.append(Column(f"{named.key}_{key}", title, of=[row[i] for row in part], digits=number, group=group))
+        if band is not None and band.phase < 0:
+            lead = f"{significant(band.phase, 5)} deg at {significant(band.at['phase'], 5)} rad/s"
+            leads += f" {upper(named.name)}: {lead} is lead; not an instability."
+    return Table(
+        stem="margins",
+        title="Verdict and margins",
+        caption=MARGINS_CAPTION.format(undamped=DELAY_UNDAMPED if is_undamped else "") + leads,
+        columns=tuple(columns),
+    )
+
+
+def _rows(found: Margins) -> Iterator[MarginRow]:
+    """The verdict before any margin."""
+    it, band = found.stability, found.in_band
+    count = math.inf if it.unstable_roots_infinite else float(it.unstable_roots)
+    yield "verdict", "", it.verdict, "", ""
+    yield "unstable poles", "", count, float(it.unstable_roots), ""
+    yield "band", "rad/s", "", it.band, ""
+    if band is None:
+        for name in QUANTITIES:
+            yield name, "", NOT_STABLE, "", ""
+        return
+    yield "gain margin, down", "factor", band.gain[0], "", ""
+    yield "gain margin, up", "factor", band.gain[1], "", ""
+    for name, row in zip(QUANTITIES[2:], margin_rows(found, band), strict=True):
+        yield name, row.column.unit, row.exact, row.in_band, row.at
+
+
+def window_table(laws: Sequence[LawOnArm], found: Sequence[Margins]) -> Table:
+    """A row a law and gain; none for the moment on a free pin, where it has no loop."""
+    rows = [
+        (law.name, each.stability.verdict, row)
+        for law, each in zip(laws, found, strict=True)
+        for row in gain_rows(each)
+        if row.gain != MOMENT_GAIN or not each.stability.loop.arm.has_massless_hub
+    ]
+    names, verdicts, gains = zip(*rows, strict=True)
+    open_ends = ((law.name, unsettled(each)) for law, each in zip(laws, found, strict=True))  # windows of a band
+    more = "".join(f" {upper(name)}: {typeset(text)}." for name, text in open_ends if text)
+    return Table(
+        stem="windows",
+        title="How far each gain may go alone",
+        caption=CAPTION_OF_WINDOWS + more,
+        columns=(Column("law", "law", of=names), Column("verdict", "verdict", of=verdicts), *WINDOW_COLUMNS),
+        record=gains,
+    )
+
+
+class PlotOfLaw(NamedTuple):
+    """One law's plot: its name, and the counted contour."""
+
+    named: LawOnArm
+    data: Nyquist
+
+
+def count_table(plots: Sequence[PlotOfLaw], names: Sequence[str]) -> Table:
+    """Verdict, encirclements and unstable poles of each law."""
+    whole = partial(Column, digits=singly(lambda n: str(n).replace("-", "−")))
+    unstable = partial(whole, group="unstable poles")
+    words = [
+        f"{it.verdict}{', infinitely many in all' * it.unstable_roots_infinite}" for it in (p.verdict for _, p in plots)
+    ]
+    return Table(
+        stem="nyquist-count",
+        title="Encirclements beside unstable poles",
+        caption=COUNT_CAPTION.format(open=NO_OPEN if not any(p.unstable_open for _, p in plots) else OWN_OPEN),
+        columns=(
+            Column("law", "law", of=names),
+            Column("verdict", "verdict", of=words),
+            whole("encirclements", "turns around −1", of="data.encirclements"),
+            unstable("unstable_by_nyquist", "by Nyquist", of="data.expected"),
+            unstable("unstable_in_box", "in a box", of="data.verdict.unstable_roots"),
+            unstable("on_axis_in_box", "undecided", of="data.on_axis"),
+            Column("band_rad_s", "up to", "rad/s", of="data.verdict.band", digits=singly(significant, 6)),
+        ),
+        record=list(plots),
+    )
+
+
+def curve_data(plots: Sequence[PlotOfLaw], stem: str = "nyquist-data") -> Table:
+    """L on the contour of every law."""
+    return nyquist_table(*(plot.data for plot in plots), stem=stem, laws=[plot.named.key for plot in plots])
+
+
 def no_loop_section(arm: Arm) -> PageSection:
     """One sentence for an arm that has no loop."""
     return PageSection(anchor="no-loop", title="The loop", words=(why_no_loop(arm),))
 
 
 # ------------------------------------------------------------ the map
-
-
-def map_section(arm: Arm, chain: Chain | None = None) -> PageSection:
-    """How high may the gains go?  And how high when the loop is sampled by the chain's clock?"""
-    data = map_of_arm(arm, chain)
-    picture = Picture(
-        stem="map",
-        title="The plane of both gains",
-        caption=_map_caption(data),
-        alt="Map of K1 and K2: the stable gains, and how many poles are unstable elsewhere; how far each gain may go "
-        "is said above.",
-        figure=draw_map_of_arm(data),
-        data=map_data(data),
-    )
-    words = (_answer(arm), _best_words(data))
-    return PageSection(
-        anchor="margins-map", title="How high may the gains go?", words=[w for w in words if w], blocks=(picture,)
-    )
-
-
-def _answer(arm: Arm) -> str:
-    """The windows of both gains through the default ones, in words."""
-    found = margins_of(arm, default_gains(arm))
-    start = f"With the default gains {typeset(default_words(arm))} the loop is {found.stability.verdict}"
-    across, up = PLANE
-    if any(found.windows[name].around is None for name in PLANE):
-        return f"{start}; the picture shows which gains are stable."
-    many = len(found.windows[up].all)
-    again = f" {up} has {many} separate stable windows at that {across}, listed below." if many > 1 else ""
-    more = {name: _room(found.windows[name], written_unit(name, arm)) for name in PLANE}
-    return f"{start}: at that {across}, {up} may {more[up]}; at that {up}, {across} may {more[across]}.{again}"
-
-
-def _room(windows: Windows, unit: str) -> str:
-    """How far a gain may go up and down: to an edge and what happens there, to where the search ends, or anywhere."""
-    assert windows.around is not None
-    ways = []
-    for value, way in zip(reversed(windows.around), ("up", "down"), strict=True):
-        place = f"{plain(value, 5)}{unit}"
-        if windows.end(value) == "no limit":
-            ways.append(f"go {way} without limit")
-        elif windows.end(value) == "search bound":
-            ways.append(f"go {way} with no limit found as far as {place}")
-        else:
-            ways.append(f"go {way} to {place}{_crossing_there(windows, value)}")
-    return ", and may ".join(ways)
-
-
-def _crossing_there(windows: Windows, value: float) -> str:
-    """What reaches the axis at that edge."""
-    crossing = next((each for each in windows.crossings if each.t == value), None)
-    if crossing is None:
-        return ""
-    if crossing.at == 0:
-        return ", where a real pole passes through 0"
-    if not np.isfinite(crossing.at):
-        return ", where every flexible mode crosses at once"
-    return f", where poles cross at {significant(crossing.at, 4)} rad/s"
-
-
-def _best_words(data: MapOfArm) -> str:
-    found = data.design
-    if found is None:
-        return ""
-    cut = " and ".join(
-        found.law.told(name, lambda gain: plain(gain, 4)) for name in found.at_bound if name not in found.at_limit
-    )
-    gains = " and ".join(found.law.told(name, lambda gain: significant(gain, 4), data.arm) for name in PLANE)
-    brief = data.briefs[-1]
-    words = typeset(brief.words)
-    sampled = f"{words[0].upper()}{words[1:]}" if brief.is_stable else f"But {words}"
-    edge = f" That is no optimum: the dotted frame cuts the search off at {cut}, and there is more beyond." * bool(cut)
-    return (
-        f"The best damping of the first {DESIGNED_MODES} modes that the sampled loop holds within the dotted frame is "
-        f"{significant(100 * found.value, 3)} % of critical, at {gains} (tfarm design), without a clock "
-        f"{found.verdict.verdict}.{edge} {sampled}."
-    )
-
-
-def _map_caption(data: MapOfArm) -> str:
-    proof = proof_words(data.arm)
-    unit = f"{plain(rate_unit(data.arm), 4)} {unit_of(RATE_GAIN, data.arm)}"
-    reach = ALL_MODES if data.region.is_known else UP_TO.format(band=significant(data.region.band, 5))
-    free = data.arm.has_rigid_mode
-    seen = MAP_SEEN.format(
-        band=significant(data.band, 5),
-        proof=proof,
-        unit=unit,
-        reach=reach,
-        apart=APART_FROM_HUB * free,
-        held=WITH_INERTIA * (not free),
-    )
-    sampled = SAMPLED_NOT_SEEN if data.sampled is None else SAMPLED_SEEN
-    clock = f"{plain(1e3 * data.chain.sampling.period)} ms"
-    modes = 0 if data.sampled is None else data.sampled.modes_used
-    deepest = plain(DEEPEST_MOMENT_GAIN * data.arm.input_per_torque, 4)
-    depth = "" if data.arm.loses_at_hub_alone else DEPTH_WORDS.format(deepest=deepest)  # by a theorem, however deep
-    return seen + sampled.format(clock=clock, modes=modes) + depth
-
-
-def proof_words(arm: Arm) -> str:
-    """What Lyapunov's argument proves in the plane of gains, as the margins' table says it of each law."""
-    if arm.is_uniform:
-        return PROOF if arm.is_undamped else NO_PROOF
-    if arm.input_lags:
-        return OF_LAG
-    if not arm.reads_hub_moment:
-        return OF_OTHER_GAUGE
-    if not arm.has_elastic_link:
-        return OF_DAMPED
-    whole, least = arm.input_per_torque, 0.0 - arm.rate_loss
-    return OF_ELASTIC.format(
-        whole=plain(whole, 5) + written_unit(MOMENT_GAIN, arm), least=plain(least, 5) + written_unit(RATE_GAIN, arm)
-    )
 
 
 # ------------------------------------------------------------ margins
