@@ -204,7 +204,7 @@ def test_a_count_goes_on_into_shear_where_bending_is_overdamped() -> None:
 
 
 @pytest.mark.parametrize("K2", [0.0, -3.0])
-@pytest.mark.parametrize("K1", [1e-7, -1e-12, 1e-60, 1e-300])
+@pytest.mark.parametrize("K1", [1e-7, -1e-12, 1e-60, 1e-99])
 def test_a_gain_far_too_small_for_the_flexible_arm_moves_the_pole_of_the_rigid_one(K1, K2) -> None:
     """J s^2 + K1 s with J the effective inertia; the others are those at K1 = 0."""
     J = LAB.hub.inertia + (1 - K2) * (LAB.total_inertia - LAB.hub.inertia)

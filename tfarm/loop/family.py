@@ -74,33 +74,27 @@ def _ends(law: Law, name: str, reach: float) -> tuple[float, float]:
     return 0.0, reach
 
 
-def _affine(law: Law, name: str, reach: float, s: Complex) -> tuple[Complex, Complex]:
-    """The weights of a law without one number, and what they gain with each unit of it."""
-    low, high = _ends(law, name, reach)
-    first, last = (weights(law.having(name, end), s) for end in (low, high))
-    slope = (last - first) / (high - low)
-    return first - low * slope, slope
-
-
 def along(loop: Loop, ranges: Mapping[str, tuple[float, float]]) -> Family:
     """The lines of loops along each of some numbers, all others held, at places s."""
-    reach = {name: max(map(abs, pair)) for name, pair in ranges.items()}
+    ends = {name: _ends(loop.law, name, max(map(abs, pair))) for name, pair in ranges.items()}
+    laws = [([loop.law.having(name, end) for end in pair], pair) for name, pair in ends.items()]
 
-    def of(name: str, s: Complex, terms: Complex) -> tuple[Complex, Complex]:
-        base, slope = _affine(loop.law, name, reach[name], s)
-        return (base * terms).sum(axis=0), (slope * terms).sum(axis=0)
+    def of(line: int, s: Complex, terms: Complex) -> tuple[Complex, Complex]:
+        pair, (low, high) = laws[line]
+        first, last = ((weights(law, s) * terms).sum(axis=0) for law in pair)
+        slope = (last - first) / (high - low)
+        return first - low * slope, slope
 
     def on(s: Complex) -> tuple[Complex, Complex]:
         terms = rows(loop, s)
-        A, B = zip(*(of(name, s, terms) for name in ranges), strict=True)
+        A, B = zip(*(of(line, s, terms) for line in range(len(laws))), strict=True)
         return np.array(A), np.array(B)
 
     def at(line: NDArray[np.int64], s: Complex) -> tuple[Complex, Complex]:
         terms, found = rows(loop, s), np.empty((2, s.size), complex)
-        for number, name in enumerate(ranges):
+        for number in np.unique(line):
             here = line == number
-            if here.any():
-                found[:, here] = of(name, s[here], terms[:, here])
+            found[:, here] = of(number, s[here], terms[:, here])
         return found[0], found[1]
 
     return Family(on, at)
@@ -109,29 +103,28 @@ def along(loop: Loop, ranges: Mapping[str, tuple[float, float]]) -> Family:
 def columns(loop: Loop, names: tuple[str, str], x: Real, reach: tuple[float, float]) -> Family:
     """The lines of loops along the second of two numbers, one for each value x of the first, at places s."""
     first, second = names
+    is_delay = first == "delay"  # x stands for e^{-s tau} then, 0 where nothing is fed back
+    law = loop.law.having("delay", 0.0) if is_delay else loop.law
+    low, high = (0.0, 1.0) if is_delay else _ends(law, first, reach[0])
+    bottom, top = _ends(law, second, reach[1])
+    across = [{} if is_delay else {first: each} for each in (low, high)]
+    laws = [[with_numbers(law, held | {second: each}) for each in (bottom, top)] for held in across]
 
-    def of_delay(s: Complex) -> Complex:
-        terms, law = rows(loop, s), loop.law.having("delay", 0.0)
-        return np.array([
-            part for each in _affine(law, second, reach[1], s)
-            for part in (each[0] * terms[0], (each[1:] * terms[1:]).sum(axis=0))
-        ])  # fmt: skip
+    def corners(s: Complex) -> Complex:
+        terms = rows(loop, s)
+        parts = np.array([[weights(each, s) * terms for each in pair] for pair in laws])
+        if is_delay:
+            parts[0, :, 1:] = 0.0
+        D = parts.sum(axis=2)
+        D01 = (D[:, 1] - D[:, 0]) / (top - bottom)
+        D00 = D[:, 0] - bottom * D01
+        by_x = [(each[1] - each[0]) / (high - low) for each in (D00, D01)]
+        return np.array([D00[0] - low * by_x[0], by_x[0], D01[0] - low * by_x[1], by_x[1]])
 
-    def of_numbers(s: Complex) -> Complex:
-        (low, high), (bottom, top) = (_ends(loop.law, *each) for each in zip(names, reach, strict=True))
-        at = [[weights(with_numbers(loop.law, {first: a, second: b}), s) for b in (bottom, top)] for a in (low, high)]
-        W00, W01 = at[0][0], (at[0][1] - at[0][0]) / (top - bottom)
-        W10 = (at[1][0] - at[0][0]) / (high - low)
-        W11 = (at[1][1] - at[1][0] - at[0][1] + at[0][0]) / ((top - bottom) * (high - low))
-        W00, W10 = W00 - bottom * W01, W10 - bottom * W11
-        W00, W01 = W00 - low * W10, W01 - low * W11
-        return np.array([(each * rows(loop, s)).sum(axis=0) for each in (W00, W10, W01, W11)])
+    def factors(s: Complex) -> Complex:
+        return np.exp(-x[:, None] * s) if is_delay else x[:, None] + 0j
 
-    def across(s: Complex) -> Complex:
-        return np.exp(-x[:, None] * s) if first == "delay" else x[:, None] + 0j
-
-    corners = of_delay if first == "delay" else of_numbers
-    return family_of(corners, across, x.size)
+    return family_of(corners, factors, x.size)
 
 
 def crossed(

@@ -9,6 +9,7 @@ Gains at the hub are a law of order 0 on hub angle, hub rate and root moment.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, cast
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback, Law, as_law, cancelled, full_law, must_be_arm, must_not_be_algebraic
 from tfarm.arm.law import Part
-from tfarm.arrays import LEAST_SIZE, Complex
+from tfarm.arrays import Complex
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, LoopParts, deflated, difference_steps
 from tfarm.exact.system import System
@@ -31,7 +32,7 @@ UNDISPERSED = 1e11  # of w1: where waves are no longer dispersed
 FALL_FACTOR = 0.5  # L must fall by this there, from one to the next
 SOMEWHERE = 0.31 + 0.71j  # of w1: where it is seen whether a signal is fed back at all; no law has its zero there
 NO_ORDER = 99  # of a zero at s = 0, of what is not fed back: above that of any part
-SMALLEST_NORMAL = float(np.finfo(float).tiny)  # a smaller double has not all its digits
+LEAST_GAIN = 1e-100  # N m s/rad, N m/rad or pure: the squares of what is slower than such a gain makes are no doubles
 NEAREST_TO_ORIGIN = 1e-12  # of w1: where a function, its zeros at 0 divided out, is taken for its value at 0
 ROUNDING_AT_REST = 1e-13  # of the terms of D: less is left by their rounding where they cancel at s = 0
 ORDER_READ_AT = (2e-5, 1e-5)  # of w1: where the order of a zero at s = 0 is read off
@@ -124,8 +125,9 @@ class Loop:
     def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
         """Denominator and numerator of L at s, up to one factor: finite at poles too."""
         s = np.asarray(s, dtype=complex)
-        drive, fed_back, _ = self._parts(s, self.signals.kept(s))
-        return drive, fed_back
+        drive, numerators, _ = self.signals.kept(s)
+        entries, whole = self.law.polynomials(s)
+        return drive * whole, np.exp(-s * self.law.delay) * (entries * numerators).sum(axis=0)
 
     def loop_function(self, s: NDArray[Any]) -> Complex:
         """L(s): closed-loop poles are at L = -1.  Infinite at poles of the rig or of the law."""
@@ -169,13 +171,12 @@ class Loop:
     def function(self, s: Complex) -> Analytic:
         """D/s^n, n = `zeros_at_origin`, with slopes from differences."""
         s = np.where(s == 0, NEAREST_TO_ORIGIN * first_frequency(self.arm), np.asarray(s, dtype=complex))
-        h = difference_steps(self.k, s)
-        at = np.array([s, s + h, s - h])
-        drive, fed_back, scale = self._parts(at, self.signals.parts(at))
-        scale = scale - self.delay_of_waves * at
-        with np.errstate(over="ignore", invalid="ignore"):  # far from where it is large: no number, and no start
-            up, down = (drive + fed_back)[1:] * np.exp(scale[1:] - scale[0])
-            return deflated((drive + fed_back)[0], (up - down) / (2 * h), scale[0], s, self.zeros_at_origin)
+
+        def characteristic(at: Complex) -> tuple[Complex, Complex]:
+            of_rig = self.signals.parts(at)
+            return self.characteristic(at, of_rig), of_rig.scale - self.delay_of_waves * at
+
+        return by_differences(self.k, characteristic, s, self.zeros_at_origin)
 
     @cached_property
     def delay_of_waves(self) -> float:
@@ -189,17 +190,6 @@ class Loop:
         entries, whole = self.law.polynomials(s)
         late = np.exp(-s * self.law.delay)
         return np.asarray(of_rig.drive * whole + late * (entries * of_rig.numerators).sum(axis=0))
-
-    def _parts(self, s: Complex, of_rig: LoopParts) -> tuple[Complex, Complex, Complex]:
-        """drive q, the fed back sum, both times e^{-scale}, and scale."""
-        drive, numerators, scale = of_rig
-        entries, whole = self.law.polynomials(s)
-        fed_back = (entries * numerators).sum(axis=0)
-        late = s * self.law.delay
-        shift = np.maximum(0.0, -late.real)  # left of the axis the delayed part is the larger one
-        drive, fed_back = drive * whole * np.exp(-shift), fed_back * np.exp(-late - shift)
-        size = np.maximum(np.maximum(abs(drive), abs(fed_back)), LEAST_SIZE)
-        return drive / size, fed_back / size, scale + shift + np.log(size)
 
     def _must_fall(self) -> None:
         """Refuse a law that asks for more than the rig gives at once: then its loop is algebraic."""
@@ -226,6 +216,17 @@ class Loop:
         return cancelled(self.law)
 
 
+def by_differences(
+    k: System, characteristic: Callable[[Complex], tuple[Complex, Complex]], s: Complex, at_zero: int
+) -> Analytic:
+    """D/s^at_zero at s (n,), not 0, with slopes from differences; `characteristic` gives D e^{-scale} and scale."""
+    h = difference_steps(k, s)
+    with np.errstate(over="ignore", invalid="ignore"):  # far from where it is large: no number, and no start
+        D, scale = characteristic(np.array([s, s + h, s - h]))
+        up, down = D[1:] * np.exp(scale[1:] - scale[0])
+        return deflated(D[0], (up - down) / (2 * h), scale[0], s, at_zero)
+
+
 def _passes_moment_on(part: Part) -> bool:
     """Whether a part of a law takes the root moment and gives some of it at once."""
     if "root_moment" not in part.signals or part.block.excess != 0:
@@ -238,9 +239,9 @@ def _must_be_possible(arm: Arm, gains: HubFeedback) -> None:
     if gains.K2 and arm.is_undamped and not (arm.hub_side_inertia or arm.reads_hub_moment):
         remedy = "with hub.inertia = 0 and no damping K2 moves poles through infinity; use K2 = 0 or some inertia"
         raise ParameterError(key="K2", value=gains.K2, remedy=remedy)
-    least = SMALLEST_NORMAL * max(1.0, arm.total_inertia if arm.has_rigid_mode else 1.0)
+    least = LEAST_GAIN * max(1.0, arm.total_inertia if arm.has_rigid_mode else 1.0)
     for name, value in gains.by_name.items():
         if 0 < abs(value) < least:
-            remedy = f"0, or at least {least:.1e} in size: of less the double has not all its digits"
+            remedy = f"0, or at least {least:.1e} in size: poles that are slower by far than any arm are not told from 0"
             raise ParameterError(key=name, value=value, remedy=remedy)
     check_gains(arm, gains)

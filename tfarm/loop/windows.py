@@ -156,7 +156,11 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
     pairs = [(float(low), float(high)) for low, high in itertools.pairwise(edges)]
     middles = np.array([(low + high) / 2 for low, high in pairs])
     count, at = verdict.unstable_roots, value
-    if verdict.verdict == "marginal" or not any(low < value < high for low, high in pairs):
+    resting = [each.change for each in found if each.t == value and each.at == 0]
+    is_known = verdict.verdict != "marginal"
+    if is_known and resting in ([1], [-1]):  # the verdict is apart from that pole
+        count += resting[0] > 0
+    elif not (is_known and any(low < value < high for low, high in pairs)):
         at = float(middles[middles.size // 2])
         there = verdict_on(loop.having(name, at), band)
         count = 0 if there.is_stable else max(1, there.unstable_roots)
