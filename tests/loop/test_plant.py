@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tfarm.loop.lines import effective_inertia
 
 import tfarm
 from tests.loop.arms import some_loop
 from tfarm import Hub, HubFeedback, ParameterError
-from tfarm.loop.lines import effective_inertia
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import closed_loop_poles
 

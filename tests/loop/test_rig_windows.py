@@ -3,11 +3,11 @@
 import math
 
 import pytest
+from tfarm.loop.lines import along, line_crossings
 
 import tfarm
 from tests.shell import run
 from tfarm.loop.answers import margins_answer
-from tfarm.loop.lines import along, line_crossings
 from tfarm.loop.margins import margins
 from tfarm.spectrum.scales import default_gains
 

@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm import HubFeedback, Law
+from tfarm import Law
 from tfarm.errors import ConvergenceError
 from tfarm.loop import panels, positions
-from tfarm.loop.family import columns, critical, crossed
-from tfarm.loop.lines import along, crossing_at_zero, line_crossings
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import dense
 
@@ -63,18 +61,6 @@ def test_a_slow_pair_is_no_real_pole_to_a_locus():
     np.testing.assert_allclose(slow, [w * complex(-ratio, math.sqrt(1 - ratio**2))], rtol=1e-4)
 
 
-def test_one_cell_of_a_grid_shows_the_crossing_that_is_in_it():
-    line = line_crossings(LAB, along("K2", HubFeedback(K1=0.3)), 100.0)
-    for t, at, change in list(line)[:3]:
-        if at:
-            cell = at * np.array([1 - 1e-3, 1 + 1e-3])
-            loop = Loop(LAB, HubFeedback())
-            lines = columns(loop, ("K1", "K2"), np.array([0.3]), (1.0, 10.0))
-            (found,) = crossed(loop, lines, [("K2", (-10.0, 10.0))], cell, [lambda one=loop: one])
-            ((mine, where, step),) = [each for each in found if each.at]
-            assert (mine, where, step) == (pytest.approx(t, rel=1e-9), pytest.approx(at, rel=1e-9), change)
-
-
 def test_without_losses_no_law_is_quiet_however_little_it_feeds_back(monkeypatch):
     """At each of its modes |L| is infinite, though between them it is 1e-12: what is exact is not told."""
     monkeypatch.setattr("tfarm.loop.margins.windows_of", lambda _: {})  # which take longest
@@ -82,24 +68,6 @@ def test_without_losses_no_law_is_quiet_however_little_it_feeds_back(monkeypatch
     assert found.stability.is_stable
     assert found.in_band is not None
     assert (found.exact_delay, found.exact_disk, found.exact_peak) == (None, None, None)
-
-
-@pytest.mark.parametrize("name", ["K1", "Kp"])
-def test_a_crossing_at_0_is_at_0_and_not_below_it(name):
-    found = crossing_at_zero(LAB, along(name, HubFeedback()))
-    assert (found.t, math.copysign(1.0, found.t)) == (0.0, 1.0)
-
-
-@pytest.mark.parametrize(
-    ("name", "limits", "asked"),
-    [
-        ("hub_rate.den.0", (-0.1, 0.5), (-0.1, 0.0, 0.5)),
-        ("hub_rate.den.0", (0.5, 2.0), (0.5, 2.0)),
-        ("hub_rate.den.1", (-0.1, 0.5), (-0.1, 0.5)),
-    ],
-)
-def test_a_leading_coefficient_is_asked_about_at_0_where_it_passes_there(name, limits, asked):
-    assert critical(name, limits) == asked
 
 
 def test_models_that_nothing_damps_are_not_unstable_by_rounding():

@@ -18,8 +18,7 @@ from tfarm.columns import Column, Table
 from tfarm.dsp import Chain, GainMap, sampled_map, sampled_verdict
 from tfarm.dsp.crossings import ends_of_K1, rounded_map, with_both_sides, with_more
 from tfarm.errors import ConvergenceError
-from tfarm.loop.edges import Axis, rate_columns
-from tfarm.loop.plane import Plane, gain_map
+from tfarm.loop.plane import Axis, Plane, gain_map, rate_columns
 from tfarm.spectrum.scales import default_gains
 
 K2_RANGE = (-1.0, 1.5)  # of what balances a torque: 1 where the input is one, less where it is a motor's current

@@ -27,8 +27,7 @@ from tfarm.crossing import brackets, crossed, zeros_between
 from tfarm.records import record
 from tfarm.spectrum.scales import first_frequency
 
-from .frequencies import grid
-from .loop import Loop
+from .loop import Loop, grid
 from .stability import Stability, is_quiet, stability
 from .theorem import theorem_of
 from .windows import Windows, windows_of
@@ -43,7 +42,8 @@ ROUND_POINTS, ROUNDS = 17, 7  # of ever narrower grids around a dip, an eighth e
 LOWEST = 6  # local minima on the grid that are refined
 AT_POLE = 1e-9  # a factor on L so small belongs to a pole of L on the axis, where L changes its sign through infinity
 REST = 1e-3  # of the size of -1/L: what its imaginary part and its way from half the lowest frequency on may be at rest
-BELOW_SLOWEST_POLE, SLOW_POINTS = 0.05, 400  # of the slowest pole's size: so far down |L| may cross 1, and points up to the grid
+BELOW_SLOWEST_POLE = 0.05  # of its size: so far down |L| may cross 1
+SLOW_POINTS = 400  # from there to the grid of the arm
 NEAR_POLES = np.geomspace(0.05, 20.0, 12)  # points about a pole, in its distances from the axis
 
 

@@ -28,8 +28,7 @@ from tfarm.spectrum.box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR, TRI
 from tfarm.spectrum.proofs import Disc, disjoint, enclosed, proven_count
 from tfarm.spectrum.scales import first_frequency
 
-from .frequencies import band_of, steep_places
-from .loop import UNDISPERSED, Loop
+from .loop import UNDISPERSED, Loop, band_of, steep_places
 from .theorem import CONSERVES, GIVES, theorem_of
 
 MOST_POLES = 1000  # that may be asked for

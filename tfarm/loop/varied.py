@@ -23,8 +23,7 @@ from tfarm.response.signals import Signals
 from tfarm.spectrum.box import Box, winding_number, zeros_in_box
 from tfarm.spectrum.scales import first_frequency
 
-from .frequencies import band_of
-from .loop import NEAREST_TO_ORIGIN, ORDER_READ_AT, Loop, by_differences
+from .loop import NEAREST_TO_ORIGIN, ORDER_READ_AT, Loop, band_of, by_differences
 from .poles import SLOW_SHARE, box_of, slow_poles, starting_points
 
 OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, as of the arm's below

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tfarm.digits import significant
+from tfarm.loop.loci import ReducedLocus
 from tfarm.loop.locus import Locus
 from tfarm.loop.plane import Plane
-from tfarm.loop.reduced_locus import ReducedLocus
 
 from .drawn import drawn
 from .plane import colours, draw_map, gain_counts, words_of_count
@@ -24,7 +24,7 @@ def locus(exact: Locus, *, reduced: ReducedLocus | None = None, ax: Axes | None 
 
     Broad lines: the branches [1/s], a colour a mode, with values between those of `exact` where they bend; a cross
     where the gain is 0, an open circle at another beginning, dots at a few values, one of them that which damps the
-    first mode best, and a diamond where one crosses the axis.  Thin: those of `reduced` (`tfarm.loop.reduced_locus`),
+    first mode best, and a diamond where one crosses the axis.  Thin: those of `reduced` (`tfarm.loop.loci`),
     which a locus of gains at the hub has.
     """
     must_be(Locus, exact, "tfarm.locus returns")

@@ -49,7 +49,7 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
         colours = DAMPING_BLUES[1:2] if len(planes) == 1 else DAMPING_BLUES
         for plane, colour in zip(planes, colours, strict=True):
             keys.append(_fill(ax, plane, colour, BLUE, f"stable, sampled{sampled_label(continuous, plane)}"))
-        if continuous.arm.is_uniform:  # of a rig the argument needs more: see `tfarm.loop.lyapunov`
+        if continuous.arm.is_uniform:  # of a rig the argument needs more: see `tfarm.loop.theorem`
             (line,) = ax.plot(ax.get_xlim(), (1.0, 1.0), color=INK, lw=1.1, ls=(0, (5, 3)), zorder=4)
             line.set_label(f"below it: proven by energy at C = 0 ({LYAPUNOV})")
             keys.append(line)

@@ -16,9 +16,8 @@ from tfarm.arrays import Complex
 from tfarm.digits import kept_digits, plain, significant
 from tfarm.dsp.loci import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
 from tfarm.errors import one_line
-from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, held_branches
+from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, ReducedLocus, held_branches
 from tfarm.loop.locus import Locus, frame, rounded
-from tfarm.loop.reduced_locus import ReducedLocus
 from tfarm.spectrum import modes
 
 from .labels import OFFSETS_BESIDE, Label

@@ -19,12 +19,9 @@ from tfarm.digits import kept_digits
 from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.errors import TfarmError
-from tfarm.loop.edges import moment_axis, rate_axis, rate_columns
-from tfarm.loop.frequencies import steep_places
-from tfarm.loop.loop import Loop
-from tfarm.loop.panels import Panels, loop_panels
-from tfarm.loop.plane import gain_map
-from tfarm.loop.positions import Positions, Sensor, positions, sensed_places
+from tfarm.loop.loop import Loop, steep_places
+from tfarm.loop.panels import Panels, Positions, Sensor, loop_panels, positions, sensed_places
+from tfarm.loop.plane import gain_map, moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
 from tfarm.report.live_sampled import packed, sampled_numbers, slew_numbers

@@ -12,8 +12,7 @@ from tfarm.arrays import Real
 from tfarm.columns import Column, Table
 from tfarm.digits import how_many, listed, plain, scientific, significant, singly
 from tfarm.errors import ConvergenceError
-from tfarm.loop.loci import Loci, loci
-from tfarm.loop.most_damped import most_damped
+from tfarm.loop.loci import Loci, loci, most_damped
 from tfarm.loop.stability import MARGIN_OF_ZERO, Stability, stability
 from tfarm.plots.roots import draw_loci
 from tfarm.report.locus_tables import crossing_table, gap_table, loci_data

@@ -8,8 +8,8 @@ from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, unit_of, written_unit
 from tfarm.digits import how_many, plain, significant
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
-from tfarm.loop.edges import DEEPEST_MOMENT_GAIN
 from tfarm.loop.nyquist import Nyquist, nyquist_of
+from tfarm.loop.plane import DEEPEST_MOMENT_GAIN
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Windows
 from tfarm.plots.disc import draw_nyquist

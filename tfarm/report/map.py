@@ -17,9 +17,8 @@ from tfarm.comparing.regions import sampled_region
 from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp.verdict import SampledBrief
-from tfarm.loop.edges import Axis, edge, moment_axis, rate_axis
-from tfarm.loop.frequencies import band_of
-from tfarm.loop.plane import Plane, gain_map
+from tfarm.loop.loop import band_of
+from tfarm.loop.plane import Axis, Plane, edge, gain_map, moment_axis, rate_axis
 from tfarm.plots import plane
 from tfarm.plots.style import blank, headline, legend_below, style
 from tfarm.records import record

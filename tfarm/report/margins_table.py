@@ -9,9 +9,8 @@ from tfarm.arm import MOMENT_GAIN
 from tfarm.columns import Column, Table
 from tfarm.digits import how_many, plain, significant, singly
 from tfarm.loop.answers import MARGIN_COLUMNS, NOT_STABLE, WINDOW_COLUMNS, gain_rows, margin_rows, unsettled
-from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
-from tfarm.loop.theorem import signs_of_loop
+from tfarm.loop.theorem import lyapunov, signs_of_loop
 from tfarm.report.loop_laws import Named
 from tfarm.report.sections import Fact
 from tfarm.report.words import typeset, upper
