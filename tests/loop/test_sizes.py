@@ -9,7 +9,7 @@ import pytest
 import tfarm
 from tfarm import Law
 from tfarm.errors import ConvergenceError
-from tfarm.loop import panels, positions
+from tfarm.loop import panels
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import dense
 
@@ -29,10 +29,10 @@ class Scaled:
 
 @pytest.mark.parametrize("size", [1e-12, 1e12])
 def test_zeros_of_a_sensor_are_the_same_in_any_unit_or_refused_in_any(size, monkeypatch):
-    line = positions._Panels.of(LAB, "moment", 1j, 300.0)
+    line = panels._Panels.of(LAB, "moment", 1j, 300.0)
     np.testing.assert_allclose(line.zeros(Scaled(size)), line.zeros(Scaled(1.0)), rtol=1e-9)
-    monkeypatch.setattr(positions, "STEEP_A_SENSOR_PANEL", 400)  # panels too wide for their polynomials
-    wide = positions._Panels.of(LAB, "moment", 1j, 2e4)
+    monkeypatch.setattr(panels, "STEEP_A_SENSOR_PANEL", 400)  # panels too wide for their polynomials
+    wide = panels._Panels.of(LAB, "moment", 1j, 2e4)
     with pytest.raises(ConvergenceError, match="do not follow the numerator of moment"):
         wide.zeros(Scaled(size))
 
