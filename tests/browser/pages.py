@@ -25,7 +25,7 @@ from tfarm.loop.margins import LoopMargins, margins
 from tfarm.loop.plane import gain_map
 from tfarm.loop.stability import stability
 from tfarm.report import write
-from tfarm.report.given_laws import Subject
+from tfarm.report.cases import Subject
 from tfarm.report.live import ASSETS, save_live, write_assets
 
 Real = NDArray[np.float64]

@@ -24,14 +24,14 @@ from tests.report.full import ARM, report_elsewhere
 from tests.shared import once
 from tfarm.dsp import load_chain
 from tfarm.fitting.fit import fit
-from tfarm.report import making, write, writing
-from tfarm.report.comparison_page import write_comparison
-from tfarm.report.given_laws import GivenLaw, Subject
+from tfarm.report import write, writing
+from tfarm.report.cases import GivenLaw, Subject
 from tfarm.report.live import ASSETS, save_live, write_assets
+from tfarm.report.writing import write_comparison
 
 LAB = replace(tfarm.load("sasaki2012-lab"), name=NAME, assumptions=ARM.assumptions)
 LAW = tfarm.Law({"hub_angle": ([2.0, 8.0], [0.02, 1.0]), "hub_rate": 0.4}, name=TEXT)
-PIECES = making.ARM_PIECES
+PIECES = writing.ARM_PIECES
 SCREENS = 8.0  # of 1400 x 900 pixels, after the answers
 NEWER = "Unknown pseudo-element or pseudo-class “::details-content”"  # which prints what is folded: CSS of 2024
 HIDDEN = """() => [...document.querySelectorAll("body *")].filter(e => {
@@ -51,18 +51,18 @@ def few(tmp_path_factory):
     out = tmp_path_factory.mktemp("few")
     chain = load_chain("sasaki2012-lab")
     few = [piece for piece in PIECES if piece.anchor in ("arm", "modes", "margins")]
-    laws = [piece for piece in making.LAW_PIECES if piece.anchor in ("law", "margins")]
+    laws = [piece for piece in writing.LAW_PIECES if piece.anchor in ("law", "margins")]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(making, "ARM_PIECES", tuple(few))
-        patch.setattr(making, "LAW_PIECES", tuple(laws))
-        patch.setattr(making, "save_proof", lambda *_: None)
+        patch.setattr(writing, "ARM_PIECES", tuple(few))
+        patch.setattr(writing, "LAW_PIECES", tuple(laws))
+        patch.setattr(writing, "save_proof", lambda *_: None)
         write([LAB], out, only=("modes", "margins"))
         write([replace(LAB, name="law")], out, laws=[[GivenLaw(LAW)]], only=("margins",))
         omega = np.geomspace(8.0, 300.0, 30)
         H = tfarm.transfer(LAB, "root_moment")(1j * omega)
         seen = tfarm.Measured(output="root_moment", input="hub_torque", omega=omega, values=H, sigma=abs(H))
         found = fit(LAB, [seen], free=["hub.inertia"], profile=False)
-        patch.setattr(making, "ARM_PIECES", tuple(piece for piece in PIECES if piece.anchor in ("fit", "arm")))
+        patch.setattr(writing, "ARM_PIECES", tuple(piece for piece in PIECES if piece.anchor in ("fit", "arm")))
         _arm_page(Subject(replace(found.arm, name="fitted"), chain, (), found), out / "fitted")
     save_live(Subject(LAB, chain), out / NAME)
     write_assets(out / ASSETS)
@@ -75,8 +75,8 @@ def _arm_page(subject: Subject, folder: Path) -> None:
     """The full page on a subject, of the sections that there are."""
     folder.mkdir()
     sections = [
-        making.save_section(making.section_or_why_not(piece, subject), folder)
-        for piece in making.ARM_PIECES
+        writing.save_section(writing.section_or_why_not(piece, subject), folder)
+        for piece in writing.ARM_PIECES
         if piece.is_for(subject)
     ]
     writing._write_pages(subject, folder, sections, None, "", folder)

@@ -11,9 +11,8 @@ from tests.shell import run
 from tfarm.comparing.answers import compared_answer
 from tfarm.dsp import Chain
 from tfarm.errors import one_line
-from tfarm.report.comparison_page import write_comparison
-from tfarm.report.given_laws import Subject
-from tfarm.report.writing import _write_pages
+from tfarm.report.cases import Subject
+from tfarm.report.writing import _write_pages, write_comparison
 from tfarm.tables.files import json_value
 
 LAB = tfarm.load("sasaki2012-lab")

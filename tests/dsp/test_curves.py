@@ -19,8 +19,8 @@ from tfarm.dsp.traces import (
     reference_angle,
     root_moment,
 )
-from tfarm.report.time_responses import responses_table
-from tfarm.spectrum.scales import default_gains
+from tfarm.report.motion import responses_table
+from tfarm.spectrum.table import default_gains
 
 STEEL = tfarm.load("stocky-steel")
 

@@ -10,7 +10,7 @@ import tfarm
 from tests.shell import answer, run
 from tfarm.dsp import Actuator
 from tfarm.plots import slew
-from tfarm.report.time_responses import responses_table
+from tfarm.report.motion import responses_table
 
 RIG = "quanser-2dsfl"
 UNITS = {"motor_voltage": "V", "motor_current": "A", "hub_torque": "N m"}

@@ -26,6 +26,7 @@ SPREAD = 1e-3  # of a score, relative, over the kernels of BLAS; it may improve
 # Command and path, relative tolerance, and whether it is relative to the largest number of its list; the first match.
 LOOSER = (
     (r".*(poles|eigenvalue|zeros|value|residue)s?\[\]\[\]", TOLERANCE, True),  # [real, imaginary]
+    (r"reduce D\[\]\[\]", 1e-7, True),  # what fitted tails, known to 5e-9, leave of static terms some times as large
     (r"reduce [A-D]\[\]\[\]", TOLERANCE, True),  # a matrix: its small entries are sums of large ones
     (r"locus gap_.*", 1e-2, False),  # what rounding the polynomials of python-control leaves
     (r"reduce .*errors?(\..*)?", 1e-4, False),  # the difference of two responses that agree to 1e-10

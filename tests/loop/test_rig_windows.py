@@ -10,7 +10,7 @@ from tfarm.loop.answers import margins_answer
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import margins
 from tfarm.loop.windows import line_crossings
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 
 def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():

@@ -21,7 +21,7 @@ from tfarm.loop.panels import CHEBYSHEV, loop_panels
 from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.stability import stability
 from tfarm.loop.theorem import lyapunov
-from tfarm.spectrum.scales import rate_unit
+from tfarm.spectrum.table import rate_unit
 
 LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 LAWS = {"stable": HubFeedback(K1=0.3, K2=0.3), "unstable": HubFeedback(K1=0.3, K2=1.5)}

@@ -1,15 +1,15 @@
 """Pages on coarse grids, for tests of words, links and bytes: where a boundary lies has tests of its own."""
 
-from tfarm.comparing import regions
 from tfarm.dsp import crossings as sampled_regions
 from tfarm.dsp import loci as sampled_loci
 from tfarm.dsp import verdict
 from tfarm.loop import loci
-from tfarm.report import assumptions_section, card, live_data, making, map
+from tfarm.plots import regions
+from tfarm.report import assumptions_section, cards, live, map_section, writing
 
 COARSE = (
-    (map, "GRID_COLUMNS", 48),
-    (map, "GRID_ROWS", 40),
+    (map_section, "GRID_COLUMNS", 48),
+    (map_section, "GRID_ROWS", 40),
     (regions, "SAMPLED_COLUMNS", 24),
     (regions, "OVERLAY_COLUMNS", 8),
     (sampled_regions, "MOST_COLUMNS", 0),  # with the corners that so few have
@@ -17,9 +17,9 @@ COARSE = (
     (sampled_loci, "SAMPLED_LOCUS_VALUES", 31),
     (verdict, "PERIOD_SHARES", (1.0, 5.0)),
     (assumptions_section, "CURVE_POINTS", 9),
-    (making, "MOST_WORKERS", 1),  # a second process would have its own grids
-    (map, "sampled_region", regions.sampled_region.__wrapped__),  # what is kept of it is of other grids
-    (live_data, "sampled_region", regions.sampled_region.__wrapped__),
+    (writing, "MOST_WORKERS", 1),  # a second process would have its own grids
+    (map_section, "sampled_region", regions.sampled_region.__wrapped__),  # what is kept of it is of other grids
+    (live, "sampled_region", regions.sampled_region.__wrapped__),
 )
 
 
@@ -31,6 +31,6 @@ def coarsen(put=setattr):
 
 def plain_cards(put):
     """Cards of the index with an empty picture, for tests that are not about it: a response and a drawing each."""
-    put(card, "bode", lambda *_: None)
-    put(card, "draw_card", lambda _: None)
-    put(card, "save_figure", lambda _, folder, stem, formats: (folder / f"{stem}.svg").write_text("<svg/>"))
+    put(cards, "bode", lambda *_: None)
+    put(cards, "draw_card", lambda _: None)
+    put(cards, "save_figure", lambda _, folder, stem, formats: (folder / f"{stem}.svg").write_text("<svg/>"))

@@ -8,10 +8,10 @@ import tfarm
 from tests.hostile import NAME, TEXT, check_drawing, check_page
 from tfarm.dsp import Chain
 from tfarm.fitting.fit import fit
-from tfarm.report import making, writing
-from tfarm.report.fit_section import fit_section
-from tfarm.report.given_laws import Subject
+from tfarm.report import writing
+from tfarm.report.cases import Subject
 from tfarm.report.live import save_live
+from tfarm.report.response_sections import fit_section
 from tfarm.report.sections import PageSection, save_section
 
 LAB = replace(tfarm.load("sasaki2012-lab"), name=NAME)
@@ -42,8 +42,8 @@ def test_of_a_section_and_a_live_page_that_cannot_be_made(tmp_path, monkeypatch)
     monkeypatch.setattr("tfarm.report.live.live_data", fails)
     save_live(Subject(LAB, Chain()), tmp_path)
     check_page((tmp_path / "live.html").read_text(encoding="utf-8"), NAME, TEXT)
-    piece = replace(making.ARM_PIECES[1], make=fails)
-    section = making.section_or_why_not(piece, Subject(LAB, Chain()))
+    piece = replace(writing.ARM_PIECES[1], make=fails)
+    section = writing.section_or_why_not(piece, Subject(LAB, Chain()))
     assert isinstance(section, PageSection)
     saved = save_section(section, tmp_path)
     writing._write_pages(Subject(LAB, Chain()), tmp_path, [saved], None, "", tmp_path)

@@ -4,8 +4,8 @@ import pytest
 
 import tfarm
 from tfarm.dsp import Chain, load_chain
-from tfarm.report.card import save_card, written_cards
-from tfarm.report.given_laws import GivenLaw
+from tfarm.report.cards import save_card, written_cards
+from tfarm.report.cases import GivenLaw
 from tfarm.report.page import index_page
 
 LAB = tfarm.load("sasaki2012-lab")

@@ -22,11 +22,11 @@ from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.sampled import sampled_loop
 from tfarm.errors import one_line
 from tfarm.fitting.recording import beside_exact, load_run, overshoot
-from tfarm.report import making, writing
-from tfarm.report.given_laws import GivenLaw, Subject, on_arm
-from tfarm.report.law_loop_section import law_margins_section, law_nyquist_section, law_poles_section
-from tfarm.report.law_measured import overshoot_table
+from tfarm.report import writing
+from tfarm.report.cases import GivenLaw, Subject, on_arm
 from tfarm.report.law_section import law_section, written_polynomial
+from tfarm.report.loop_section import margins_section, nyquist_section, poles_section
+from tfarm.report.motion import overshoot_table
 from tfarm.report.page import file_of
 from tfarm.report.sampled_section import sampled_section
 from tfarm.tables.files import to_json
@@ -76,7 +76,7 @@ def table(section, stem):
 def test_margins_on_the_page_are_those_of_the_command(capsys, file, given, monkeypatch):
     room = import_module("tfarm.loop.margins")
     monkeypatch.setattr(room, "windows_of", cache(room.windows_of))  # of the same loop both times
-    section, found = law_margins_section(LAB, Chain(), given), answer(capsys, "margins", LAB.name, "--law", str(file))
+    section, found = margins_section(LAB, Chain(), given), answer(capsys, "margins", LAB.name, "--law", str(file))
     shown = table(section, "margins")
     exact = dict(zip(shown["quantity"], shown["law_exact"], strict=True))
     assert (exact["verdict"], exact["unstable poles"]) == (found["verdict"], found["unstable_roots"])
@@ -103,9 +103,9 @@ def test_margins_on_the_page_are_those_of_the_command(capsys, file, given, monke
 
 
 def test_turns_and_poles_on_the_page_are_those_of_the_commands(capsys, file, given):
-    counted = table(law_nyquist_section(LAB, Chain(), given), "nyquist-count")
+    counted = table(nyquist_section(LAB, Chain(), given), "nyquist-count")
     assert counted["unstable_by_nyquist"] == counted["unstable_in_box"] == [0]
-    shown = table(law_poles_section(LAB, Chain(), given), "law-poles")
+    shown = table(poles_section(LAB, Chain(), given), "law-poles")
     poles = answer(capsys, "poles", LAB.name, "--law", str(file))["poles"]
     assert list(map(list, zip(shown["real_1_s"], shown["imaginary_rad_s"], strict=True))) == poles
 
@@ -125,7 +125,7 @@ def test_radii_on_the_page_are_those_of_the_command_at_each_delay(capsys, file, 
 
 def test_gains_that_are_typed_have_their_windows_and_their_proof():
     gains = HubFeedback(K1=0.5, K2=0.3, Kp=2.0)
-    section, found = law_margins_section(BARE, Chain(), (GivenLaw(gains),)), tfarm.margins(BARE, gains)
+    section, found = margins_section(BARE, Chain(), (GivenLaw(gains),)), tfarm.margins(BARE, gains)
     shown = table(section, "margins")
     assert dict(zip(shown["quantity"], shown["law_band"], strict=True))["delay margin"] == found.in_band.delay
     assert table(section, "windows")["value"] == [0.5, 0.3, 2.0]
@@ -134,7 +134,7 @@ def test_gains_that_are_typed_have_their_windows_and_their_proof():
 
 def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
     law = Law({"hub_angle": -5.0, "hub_rate": ([1.0], [0.01, 1.0])}, name="backwards")
-    section = law_margins_section(LAB, Chain(), (GivenLaw(law),))
+    section = margins_section(LAB, Chain(), (GivenLaw(law),))
     assert section.facts[0].value == "UNSTABLE"
     assert {block.stem for block in section.blocks} == {"law-bode", "law-spill", "windows"}
     assert set(table(section, "windows")["stable_around_it"]) == {"none: not stable"}
@@ -157,8 +157,8 @@ def test_every_entry_is_in_the_table_with_every_digit(given):
 
 def test_a_page_is_about_its_law_and_its_file_says_it_again(file, tmp_path, monkeypatch, capsys):
     plain_cards(monkeypatch.setattr)
-    few = [piece for piece in making.LAW_PIECES if piece.anchor == "law"]
-    monkeypatch.setattr(making, "LAW_PIECES", few)
+    few = [piece for piece in writing.LAW_PIECES if piece.anchor == "law"]
+    monkeypatch.setattr(writing, "LAW_PIECES", few)
     code, out, err = run(
         capsys, "report", LAB.name, "--law", str(file), "--period", "0.004", "--only", "margins", "--out", str(tmp_path)
     )
@@ -189,13 +189,15 @@ def test_gains_typed_are_in_the_file_of_the_page():
 def test_each_loop_page_of_laws_has_a_section_that_says_what_it_is_about():
     subject = Subject(LAB, Chain(), (GivenLaw(Law({"hub_rate": ([1.0], [0.01, 1.0])})),))
     for page in ("margins", "locus", "sampled", "tune"):
-        assert "law" in [each.anchor for each in making.pieces_of(subject) if each.is_on(page) and each.is_for(subject)]
+        assert "law" in [
+            each.anchor for each in writing.pieces_of(subject) if each.is_on(page) and each.is_for(subject)
+        ]
     discrete = Subject(LAB, Chain(), (GivenLaw(Law({"hub_rate": 0.3}, period=0.01)),))
-    anchors = {each.anchor for each in making.pieces_of(discrete) if each.is_for(discrete)}
+    anchors = {each.anchor for each in writing.pieces_of(discrete) if each.is_for(discrete)}
     assert not anchors & {"margins", "margins-nyquist", "locus", "margins-map", "tune"}
     assert "sampled loop" in law_section(*discrete[:3]).words[1]
     held = replace(LAB, hub=tfarm.Hub(inertia=math.inf))
-    first = (each.anchor for each in making.LAW_PIECES if each.is_for(Subject(held, Chain(), subject.laws)))
+    first = (each.anchor for each in writing.LAW_PIECES if each.is_for(Subject(held, Chain(), subject.laws)))
     assert next(first) == "no-loop"
 
 

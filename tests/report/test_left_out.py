@@ -18,10 +18,10 @@ from tests.shell import run
 from tfarm import processes
 from tfarm.arm import to_toml
 from tfarm.dsp import Chain, load_chain
-from tfarm.report import card as card_room
-from tfarm.report import frame, making, write
-from tfarm.report.given_laws import Subject
-from tfarm.report.pieces import QUESTIONS
+from tfarm.report import cards as card_room
+from tfarm.report import page, write, writing
+from tfarm.report.cases import Subject
+from tfarm.report.page import QUESTIONS
 from tfarm.report.sections import PageSection
 
 
@@ -33,8 +33,8 @@ def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
         seen.append((arm.name, chain))
         return PageSection(anchor="sampled", title="The sampled loop")
 
-    monkeypatch.setattr(making, "ARM_PIECES", (making.Piece("s", "sampled", section, of=("arm", "chain")),))
-    monkeypatch.setattr(making, "save_proof", lambda *_: None)
+    monkeypatch.setattr(writing, "ARM_PIECES", (writing.Piece("s", "sampled", section, of=("arm", "chain")),))
+    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
     file = tmp_path / "bench.toml"
     tables = "[sampling]\nperiod = 0.004\n[converters]\nmoment_bits = 12\nmoment_range = 5.0\n[slew]\ntravel = 0.7\n"
@@ -50,10 +50,10 @@ def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
 
 def without_a_section(monkeypatch, error):
     """A report of two sections, the second of which meets that error."""
-    pieces = {piece.name: piece for piece in making.ARM_PIECES}
+    pieces = {piece.name: piece for piece in writing.ARM_PIECES}
     broken = replace(pieces["root loci"], make=Unmakeable(error))
-    monkeypatch.setattr(making, "ARM_PIECES", (pieces["the arm"], broken))
-    monkeypatch.setattr(making, "save_proof", lambda *_: None)
+    monkeypatch.setattr(writing, "ARM_PIECES", (pieces["the arm"], broken))
+    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
 
 
@@ -102,7 +102,7 @@ def test_a_bug_of_ours_stays_loud(tmp_path, monkeypatch):
 
 def test_every_piece_knows_the_anchor_of_its_section(pages):
     ids = links_of(pages / NAME / "index.html").ids
-    assert [piece.anchor for piece in making.ARM_PIECES if piece.is_for(Subject(ARM, Chain()))] == [
+    assert [piece.anchor for piece in writing.ARM_PIECES if piece.is_for(Subject(ARM, Chain()))] == [
         i for i in ids if i in ANCHORS
     ]
 
@@ -125,7 +125,8 @@ def test_each_page_asked_for_alone_has_its_sections():
     assert [page for page in QUESTIONS if page in PAGES] == list(PAGES)  # and others that came later
     found = {
         page: tuple(
-            tuple(each.anchor for each in those if each.is_on(page)) for those in (making.ARM_PIECES, making.LAW_PIECES)
+            tuple(each.anchor for each in those if each.is_on(page))
+            for those in (writing.ARM_PIECES, writing.LAW_PIECES)
         )
         for page in PAGES
     }
@@ -135,17 +136,17 @@ def test_each_page_asked_for_alone_has_its_sections():
 def test_sections_that_answer_and_those_that_are_begun_first():
     """What lasts seconds is begun before all else; the card, which shares proofs with the modes, right after these."""
     answers = {"margins-map", "margins", "locus", "sampled", "tune", "fit", "law", "no-loop"}
-    assert answers == frame.ANSWERS
-    slow = sorted((each for each in making.ARM_PIECES if each.seconds), key=attrgetter("seconds"), reverse=True)
+    assert answers == page.ANSWERS
+    slow = sorted((each for each in writing.ARM_PIECES if each.seconds), key=attrgetter("seconds"), reverse=True)
     assert [each.anchor for each in slow] == ["tune", "sampled", "locus", "modes"]
-    assert 0 < making.CARD_SECONDS < slow[-1].seconds
+    assert 0 < writing.CARD_SECONDS < slow[-1].seconds
 
 
 def test_a_page_has_the_same_sections_whatever_is_written_with_it(tmp_path, monkeypatch):
     """Of an arm without a loop: what says so stands on the pages of the loop, and on no other."""
-    kept = tuple(replace(each, make=partial(bare, each.anchor)) for each in making.ARM_PIECES)
-    monkeypatch.setattr(making, "ARM_PIECES", kept)
-    monkeypatch.setattr(making, "save_proof", lambda *_: None)
+    kept = tuple(replace(each, make=partial(bare, each.anchor)) for each in writing.ARM_PIECES)
+    monkeypatch.setattr(writing, "ARM_PIECES", kept)
+    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
     for only in (("modes",), ("locus",), ("modes", "locus")):
         write([HELD], tmp_path, only=only)
@@ -187,7 +188,7 @@ STRANGE_CARDS = (
 
 @pytest.mark.usefixtures("audited")
 def test_other_files_in_the_folder_are_kept_and_strange_cards_passed_over(tmp_path, monkeypatch):
-    monkeypatch.setattr(making, "ARM_PIECES", ())
+    monkeypatch.setattr(writing, "ARM_PIECES", ())
     (tmp_path / NAME).mkdir()
     (tmp_path / NAME / "mine.txt").write_text("mine")
     for i, card in enumerate(STRANGE_CARDS):

@@ -22,10 +22,8 @@ from tfarm.loop.loop import Loop
 from tfarm.loop.margins import margins
 from tfarm.loop.panels import MOST_MISS, loop_panels
 from tfarm.loop.stability import stability
-from tfarm.report.given_laws import Subject
-from tfarm.report.live import save_live
-from tfarm.report.live_data import live_data, sensor_numbers
-from tfarm.report.live_sampled import slew_numbers
+from tfarm.report.cases import Subject
+from tfarm.report.live import live_data, save_live, sensor_numbers, slew_numbers
 
 SIGNALS = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
 ARMS = ("sasaki2012-lab", "stocky-steel", "quanser-flexlink")
@@ -209,7 +207,7 @@ def test_where_zeros_of_sensors_cannot_be_told_the_page_says_why(case, monkeypat
     def fails(*_):
         raise tfarm.ConvergenceError("no polynomial follows", 0.0, 1.0)
 
-    monkeypatch.setattr("tfarm.report.live_data.positions", fails)
+    monkeypatch.setattr("tfarm.report.live.positions", fails)
     arm = tfarm.load("sasaki2012-lab")
     found = sensor_numbers(arm)
     assert found == {"sensor": None, "no_sensor": "no polynomial follows"}

@@ -30,14 +30,14 @@ from tfarm.loop.stability import stability
 from tfarm.plots.plane import nice_levels
 from tfarm.plots.roots import zoomed
 from tfarm.plots.style import BLUE
-from tfarm.report import loop_laws, loop_section, making, map, write
-from tfarm.report.frame import signs
+from tfarm.report import cases, write, writing
+from tfarm.report import map_section as map_room
+from tfarm.report.cases import continuous_cases, has_loop, margins_of, on_hub
 from tfarm.report.locus_section import _more_damping, beyond_table
-from tfarm.report.loop_laws import NamedLaw, has_loop, laws, margins_of
-from tfarm.report.loop_section import map_section, margins_section
-from tfarm.report.map import draw_map_of_arm, map_data, map_of_arm
-from tfarm.report.margins_table import NOT_STABLE, margin_table, verdict_fact
-from tfarm.spectrum.scales import PAPER_GAINS, default_gains, rate_unit
+from tfarm.report.loop_section import NOT_STABLE, margin_table, margins_section, verdict_fact
+from tfarm.report.map_section import draw_map_of_arm, map_data, map_of_arm, map_section
+from tfarm.report.page import signs
+from tfarm.spectrum.table import PAPER_GAINS, default_gains, rate_unit
 from tfarm.tables.files import as_json
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
@@ -53,7 +53,7 @@ def lab():
 def section(lab):
     """The map of the lab's gains on its page."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loop_section, "map_of_arm", lambda arm, chain: {(LAB, None): lab}[arm, chain])
+        patch.setattr(map_room, "map_of_arm", lambda arm, chain: {(LAB, None): lab}[arm, chain])
         return map_section(LAB)
 
 
@@ -64,7 +64,7 @@ def coarse():
     That takes longest and has its own tests.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(map, "best", lambda arm, chain: None)
+        patch.setattr(map_room, "best", lambda arm, chain: None)
         coarsen(patch.setattr)
         return map_section(PURE)
 
@@ -104,8 +104,9 @@ def test_no_part_of_the_edge_is_missing(lab):
         for row, column in np.argwhere(np.diff(lab.region.unstable, axis=axis)):
             if axis == 1 and lab.region.K1[column] < 0 < lab.region.K1[column + 1]:
                 continue  # the line K1 = 0 is drawn on its own
-            beside = across[column] + (0.5 / map.GRID_COLUMNS) * axis, up[row] + (0.5 / map.GRID_ROWS) * (1 - axis)
-            assert np.hypot(*(edge - beside).T).min() < edges.SHORT_SEGMENT
+            half = (0.5 / map_room.GRID_COLUMNS) * axis, (0.5 / map_room.GRID_ROWS) * (1 - axis)
+            middle = across[column] + half[0], up[row] + half[1]
+            assert np.hypot(*(edge - middle).T).min() < edges.SHORT_SEGMENT
 
 
 @pytest.mark.parametrize("column", [20, 120, 200])
@@ -113,7 +114,7 @@ def test_the_colours_are_the_counts_of_the_poles(lab, column):
     """On either side of the upper edge, by finding all poles in a box."""
     stable = lab.region.stable[:, column]
     top = int(np.flatnonzero(stable)[-1]) if stable.any() else 100
-    for row in (50, top, min(top + 3, map.GRID_ROWS - 1)):
+    for row in (50, top, min(top + 3, map_room.GRID_ROWS - 1)):
         law = HubFeedback(K1=float(lab.region.K1[column]), K2=float(lab.region.K2[row]))
         assert stability(LAB, law).unstable_roots == lab.region.unstable[row, column]
 
@@ -183,12 +184,13 @@ def test_levels_are_round_and_between():
 
 def test_the_verdict_comes_before_any_margin():
     """On the page and in the table; and where the loop is not stable there is no margin at all."""
-    section = margins_section(LAB)
+    section = margins_section(LAB, Chain())
     assert all(fact.value == "STABLE" for fact in section.facts)
-    quantity, exact = section.blocks[0].columns[0], section.blocks[0].columns[2]
+    (table,) = (block for block in section.blocks if block.stem == "margins")
+    quantity, exact = table.columns[0], table.columns[2]
     assert quantity.values[0] == "verdict"
     assert exact.values[0] == "stable"
-    wrong = NamedLaw("wrong", "wrong", HubFeedback(K1=0.3, K2=1.5))
+    wrong = on_hub(PURE, HubFeedback(K1=0.3, K2=1.5), "wrong", "wrong")
     table = margin_table([wrong], [margins_of(PURE, wrong.law)], True)
     assert table.columns[2].values[0] == "unstable"
     assert table.columns[2].values[3:] == [NOT_STABLE] * 9
@@ -198,7 +200,7 @@ def test_margins_are_those_of_the_loop_room():
     """Every number of the table, and 0 for the exact delay margin at C = 0."""
     for arm in (LAB, PURE):
         found = margins_of(arm, default_gains(arm))
-        table = margin_table([NamedLaw("default gains", "default", default_gains(arm))], [found], arm is PURE)
+        table = margin_table([on_hub(arm, default_gains(arm), "default gains", "default")], [found], arm is PURE)
         rows = dict(zip(table.columns[0].values, zip(*(c.values for c in table.columns[2:]), strict=True), strict=True))
         assert rows["delay margin"] == (found.exact_delay, found.in_band.delay, found.in_band.at["delay"])
         assert rows["phase margin"][1] == found.in_band.phase
@@ -283,7 +285,7 @@ def test_nothing_is_cut_off_by_the_compression():
 @pytest.mark.parametrize(("inertia", "reason"), [(math.inf, "locked"), (0.0, "no inertia")])
 def test_an_arm_without_a_loop_gets_a_sentence(tmp_path, monkeypatch, inertia, reason):
     for kept in ("save_proof", "save_card"):  # which have their own tests
-        monkeypatch.setattr(making, kept, lambda *_: None)
+        monkeypatch.setattr(writing, kept, lambda *_: None)
     arm = replace(PURE, name="held", hub=Hub(inertia=inertia))
     assert not has_loop(arm)
     page = write([arm], tmp_path, only=("margins",)).read_text()
@@ -307,9 +309,9 @@ def test_the_map_says_what_is_proven(coarse, section):
 
 def test_the_sign_convention_is_the_pages_and_no_sections(coarse, monkeypatch):
     """It stands once, at the foot of the page: tests/report/test_writing.py counts it there."""
-    monkeypatch.setattr(loop_laws, "best", lambda arm, chain: None)
+    monkeypatch.setattr(cases, "best", lambda arm, chain: None)
     assert "Sign of K2" in signs(PURE)
-    for section in (coarse, margins_section(PURE)):
+    for section in (coarse, margins_section(PURE, Chain())):
         texts = [*section.words, *(block.caption for block in section.blocks)]
         assert not any("Sign of K2" in text for text in texts)
 
@@ -338,12 +340,12 @@ def test_the_star_holds_at_the_clock_of_its_page(lab, section):
     labels = [text.get_text() for text in draw_map_of_arm(lab).legends[0].get_texts()]
     assert any(label.startswith("best damping") and "stable when sampled every 10 ms" in label for label in labels)
     assert any("Sampled every 10 ms (tfarm's default period) these gains are stable" in w for w in section.words)
-    facts = margins_section(LAB).facts
+    facts = margins_section(LAB, Chain()).facts
     assert all(fact.beside.endswith("; stable when sampled every 10 ms") for fact in facts)
     quick = Chain(sampling=Sampling(period=2e-3))
     assert all(fact.beside.endswith("; stable when sampled every 2 ms") for fact in margins_section(LAB, quick).facts)
-    assert laws(LAB, quick)[1].law.K1 > laws(LAB, Chain())[1].law.K1
-    lost = NamedLaw("best without a clock", "best", HubFeedback(K1=26.0, K2=-3.0))
+    assert continuous_cases(LAB, quick)[1].law.K1 > continuous_cases(LAB, Chain())[1].law.K1
+    lost = on_hub(LAB, HubFeedback(K1=26.0, K2=-3.0), "best without a clock", "best")
     fact = verdict_fact(lost, margins_of(LAB, lost.law), f"; {sampled_brief(LAB, lost.law, Chain()).short}")
     assert fact.beside.endswith("UNSTABLE when sampled every 10 ms")
     assert set(map_data(lab).columns[0].values) == {"grid", "boundary", "sampled boundary"}

@@ -2,9 +2,9 @@
 
 import tfarm
 from tests.shell import answer, run
-from tfarm.fitting.reading import read_measured
-from tfarm.report import making
-from tfarm.report.fit_section import measured_section
+from tfarm.fitting.data import read_measured
+from tfarm.report import writing
+from tfarm.report.response_sections import measured_section
 
 FILE = "tests/data/sweep/tip.csv"
 GIVEN = f"tip_acceleration/hub_torque={FILE}"
@@ -23,8 +23,10 @@ def test_the_tables_are_those_of_the_command(capsys):
 
 def test_the_page_says_how_it_is_made_again(tmp_path, capsys, monkeypatch):
     for kept in ("save_proof", "save_card"):  # which have their own tests
-        monkeypatch.setattr(making, kept, lambda *_: None)
-    monkeypatch.setattr(making, "ARM_PIECES", [each for each in making.ARM_PIECES if each.name == "measured responses"])
+        monkeypatch.setattr(writing, kept, lambda *_: None)
+    monkeypatch.setattr(
+        writing, "ARM_PIECES", [each for each in writing.ARM_PIECES if each.name == "measured responses"]
+    )
     given = ("report", "sasaki2012-lab", "--only", "bode", "--measured", GIVEN, "--out", str(tmp_path))
     code, out, _ = run(capsys, *given)
     assert code == 0

@@ -22,19 +22,16 @@ from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
-from tfarm.report import assumptions_section, loop_laws, loop_section, making
+from tfarm.report import assumptions_section, cases, map_section, writing
 from tfarm.report.arm_section import arm_section, derived_table
-from tfarm.report.bode_section import bode_section
-from tfarm.report.damped_table import damped_table
-from tfarm.report.frame import signs
-from tfarm.report.given_laws import Subject
+from tfarm.report.cases import GivenLaw, Subject, has_loop, on_hub
 from tfarm.report.locus_section import beyond_table, locus_section
-from tfarm.report.loop_laws import has_loop
-from tfarm.report.loop_section import margins_section, nyquist_section
-from tfarm.report.margins_table import margin_table
-from tfarm.report.modes_section import modal_table, places
+from tfarm.report.loop_section import margin_table, margins_section, nyquist_section
+from tfarm.report.modes_section import damped_table, modal_table, places
+from tfarm.report.page import signs
+from tfarm.report.response_sections import bode_section
 from tfarm.spectrum import DampedModes
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 ARMS = odd_arms()
 DAMPED = [name for name, arm in ARMS.items() if arm.link.damping]
@@ -151,7 +148,7 @@ def is_stable(arm, law, up_to):
 def test_how_far_K2_may_go_is_what_the_poles_say(name):
     """On either side of an edge; at the end of a search nothing happens, and no edge is claimed."""
     arm, law = ARMS[name], default_gains(ARMS[name])
-    words = loop_section._answer(arm).partition("at that K1, ")[2].partition("; at that K2, ")[0]
+    words = map_section._answer(arm).partition("at that K1, ")[2].partition("; at that K2, ")[0]
     assert "without limit" not in words
     up = number(re.search(r"go up (?:to|with no limit found as far as) (\S+?)[,;]", f"{words};")[1])
     band = 3 * tfarm.modes(arm, 3).natural_frequency[-1]
@@ -164,13 +161,14 @@ def test_how_far_K2_may_go_is_what_the_poles_say(name):
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_sentences_about_the_pole_at_0_and_J_are_for_arms_that_turn_freely(name, monkeypatch):
-    monkeypatch.setattr(loop_laws, "best", lambda arm, chain: None)
-    section = margins_section(ARMS[name])
-    words = " ".join([*section.words, section.blocks[1].caption, signs(ARMS[name])])
+    monkeypatch.setattr(cases, "best", lambda arm, chain: None)
+    section = margins_section(ARMS[name], Chain())
+    (windows,) = (block for block in section.blocks if block.stem == "windows")
+    words = " ".join([*section.words, windows.caption, signs(ARMS[name])])
     turns = ARMS[name].has_rigid_mode
     assert ("the hub angle leaves apart" in words) == ("(J − I_h)/J" in words) == turns
     assert not re.search(r"\de-\d", words)
-    pairs = zip(*(column(section.blocks[1], key).cells for key in ("stable_around_it", "looked_at")), strict=True)
+    pairs = zip(*(column(windows, key).cells for key in ("stable_around_it", "looked_at")), strict=True)
     for around, looked_at in pairs:
         ends = [set(text.strip("()").split(", ")) for text in (around, looked_at)]
         assert {end.rstrip("*") for end in ends[0] if "*" in end} == {end.rstrip("*") for end in ends[0]} & ends[1]
@@ -215,11 +213,12 @@ def test_branches_that_cannot_be_followed_are_left_out_with_a_word(monkeypatch):
         return locus(arm, law, vary, start, stop, points, branches)
 
     monkeypatch.setattr(loci_room, "locus", follow)
-    section = locus_section(arm)
+    section = locus_section(arm, Chain())
     words = " ".join(section.words)
     assert "told from its neighbours" not in words
     assert "Along K1 the branches of this arm could not be followed" in words
-    assert [block.stem for block in section.blocks][:3] == ["rates", "locus-K2", "locus-K2-gap"]
+    stems = ["rates", "locus-K2", "locus-K2-gap", "locus-K2-crossings", "beyond"]
+    assert [block.stem for block in section.blocks][:5] == stems
     rates = section.blocks[0]
     for K1, count in zip(column(rates, "K1").values, column(rates, "unstable_poles").values, strict=True):
         law = replace(default_gains(arm), K1=K1)
@@ -229,40 +228,42 @@ def test_branches_that_cannot_be_followed_are_left_out_with_a_word(monkeypatch):
 def test_a_free_pin_has_its_rate_loop(monkeypatch):
     """K1 at K2 = 0: verdict, windows and locus; no K2, and the gauge as it is."""
     arm = ARMS["free-pin"]
-    assert "−u/(1 + C s)" in loop_laws.why_no_loop(arm)
-    assert "at every instant" in loop_laws.why_no_loop(replace(arm, link=replace(arm.link, damping=0.0)))
-    section = margins_section(arm)
+    assert "−u/(1 + C s)" in cases.why_no_loop(arm)
+    assert "at every instant" in cases.why_no_loop(replace(arm, link=replace(arm.link, damping=0.0)))
+    section = margins_section(arm, Chain())
     assert section.facts[0].value == "STABLE"
-    assert set(column(section.blocks[1], "gain").values) == {"K1", "Kp"}
-    loop = [piece for piece in making.ARM_PIECES if any(map(piece.is_on, ("margins", "locus", "sampled", "tune")))]
+    (windows,) = (block for block in section.blocks if block.stem == "windows")
+    assert set(column(windows, "gain").values) == {"K1", "Kp"}
+    loop = [piece for piece in writing.ARM_PIECES if any(map(piece.is_on, ("margins", "locus", "sampled", "tune")))]
     names = [piece.name for piece in loop if piece.is_for(Subject(arm, Chain()))]
     assert names == ["the arm", "no loop", "margins", "root loci", "Nyquist"]
 
 
 def test_a_free_pin_has_its_nyquist_plot():
-    """The default K1, and a negative one to compare: as many turns as poles in a box."""
-    section = nyquist_section(ARMS["free-pin"])
-    table = section.blocks[1]
+    """Under the default K1, and a negative one: as many encirclements as poles in a box."""
+    arm = ARMS["free-pin"]
+    law = default_gains(arm)
+    laws = (GivenLaw(law), GivenLaw(replace(law, K1=-law.K1 / 10)))
+    table = nyquist_section(arm, Chain(), laws).blocks[-1]
     turns, by_nyquist, in_box = (
         list(column(table, key).values) for key in ("encirclements", "unstable_by_nyquist", "unstable_in_box")
     )
     assert by_nyquist == in_box == [-turn for turn in turns]
     assert by_nyquist[0] == 0 < by_nyquist[1]
-    assert all("K2 = 0" in law for law in column(table, "law").values)
-    assert "the last law" in table.caption.lower()
+    assert all("K2 = 0" in name for name in column(table, "law").values)
 
 
 def test_a_margin_without_end_has_no_frequency(monkeypatch):
-    monkeypatch.setattr(loop_laws, "best", lambda arm, chain: None)
-    named = loop_laws.NamedLaw("default gains", "default", HubFeedback(K1=5.0338, K2=-3.0))
-    found = loop_laws.margins_of(ARMS["pinned"], named.law)
+    monkeypatch.setattr(cases, "best", lambda arm, chain: None)
+    named = on_hub(ARMS["pinned"], HubFeedback(K1=5.0338, K2=-3.0), "default gains", "default")
+    found = cases.margins_of(ARMS["pinned"], named.law)
     table = margin_table([named], [found], False)
     rows = dict(
         zip(column(table, "quantity").values, zip(*(c.values for c in table.columns[3:5]), strict=True), strict=True)
     )
     assert rows["phase lead"] == (math.inf, "")
     assert rows["phase lag"][1] == pytest.approx(488.89, rel=1e-4)
-    passive = loop_laws.margins_of(ARMS["free-pin"], HubFeedback(K1=0.283))
+    passive = cases.margins_of(ARMS["free-pin"], HubFeedback(K1=0.283))
     table = margin_table([named], [passive], False)
     assert dict(zip(column(table, "quantity").values, table.columns[4].values, strict=True))["disk margin α"] == ""
 

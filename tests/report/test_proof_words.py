@@ -8,7 +8,7 @@ import tfarm
 from tfarm import Hub, HubFeedback
 from tfarm.arm import Motor, RotarySpring
 from tfarm.loop.theorem import lyapunov
-from tfarm.report.loop_section import proof_words
+from tfarm.report.map_section import proof_words
 
 ARM, LAB, FLEX = (tfarm.load(name) for name in ("sasaki2012", "sasaki2012-lab", "quanser-flexlink"))
 FRICTION = replace(ARM, hub=Hub(inertia=ARM.hub_inertia, friction=0.05, stiffness=3.0))

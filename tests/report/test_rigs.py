@@ -15,7 +15,7 @@ from tfarm.plots.sketch import sketch
 from tfarm.plots.style import blank
 from tfarm.report.arm_section import arm_section
 from tfarm.report.assumptions_section import assumptions_section
-from tfarm.report.loop_laws import has_loop, sign_words
+from tfarm.report.cases import has_loop, sign_words
 from tfarm.report.modes_section import locked_table, locked_words
 from tfarm.report.page import summary
 from tfarm.report.tuner_section import why_not

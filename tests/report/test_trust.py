@@ -14,19 +14,10 @@ from tests.report import full
 from tfarm.arm import to_toml
 from tfarm.audit import published
 from tfarm.audit.published import PublishedRow
-from tfarm.report import making, trust_proofs, write
-from tfarm.report.modes_section import modal_table
-from tfarm.report.trust import Evidence, sources_table, write_trust
-from tfarm.report.trust_audit import in_letters
-from tfarm.report.trust_proofs import (
-    boxes_tables,
-    how_proven,
-    prove,
-    rounds_to,
-    save_proof,
-    shared_digits,
-    written_proofs,
-)
+from tfarm.report import trust_proofs, write, writing
+from tfarm.report.modes_section import how_proven, modal_table, rounds_to
+from tfarm.report.trust import Evidence, in_letters, sources_table, write_trust
+from tfarm.report.trust_proofs import boxes_tables, prove, save_proof, shared_digits, written_proofs
 from tfarm.response import frequency
 from tfarm.response.frequency import worst_error
 
@@ -235,8 +226,8 @@ def test_one_page_of_an_arm_does_not_wait_for_the_audit(tmp_path, monkeypatch, e
 
     The page of loci, which for an arm without a loop is made at once.
     """
-    monkeypatch.setattr(making, "gather", lambda: pytest.fail("the audit ran"))
-    monkeypatch.setattr(making, "save_card", lambda *_: None)
+    monkeypatch.setattr(writing, "gather", lambda: pytest.fail("the audit ran"))
+    monkeypatch.setattr(writing, "save_card", lambda *_: None)
     monkeypatch.setattr(trust_proofs, "prove", lambda arm, chain: replace(proof, name=arm.name))
     arm = replace(ARM, name="mine", hub=tfarm.Hub(inertia=np.inf))
     page = write([arm], tmp_path, only=("locus",))

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import pytest
 
 from tfarm.audit import claims
-from tfarm.report.trust_audit import (
+from tfarm.report.trust import (
     GREEK_LETTERS,
     INDENT_TEX,
     WIDEST_LINE,

@@ -18,10 +18,9 @@ from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.traces import away
 from tfarm.errors import CertificationError
 from tfarm.plots.files import save_figure
-from tfarm.plots.learning import draw_curves
+from tfarm.plots.motion import draw_curves
 from tfarm.report import tuner_section as tuner_section_room
-from tfarm.report import tuner_words
-from tfarm.report.given_laws import Subject
+from tfarm.report.cases import Subject
 from tfarm.report.sections import save_section
 from tfarm.report.tuner_section import section_of, tuner_section
 from tfarm.report.writing import _write_pages
@@ -45,15 +44,15 @@ def each_loop_once():
 def small(each_loop_once, tmp_path_factory):
     """The section and its numbers with few seeds and the first four conditions."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tuner_words, "LONG_TRIAL", 300)
         patch.setattr(tuner_section_room, "LONG_TRIAL", 300)
-        patch.setattr(tuner_words, "CURVE_SAMPLES", SEEDS * Plan().trials * 301)
+        patch.setattr(tuner_section_room, "LONG_TRIAL", 300)
+        patch.setattr(tuner_section_room, "CURVE_SAMPLES", SEEDS * Plan().trials * 301)
         data = pickle.loads(once(tmp_path_factory, "tuner", save_study).read_bytes())
         return data, section_of(data)
 
 
 def save_study(file):
-    file.write_bytes(pickle.dumps(tuner_words.tuner_numbers(LAB, Chain())))
+    file.write_bytes(pickle.dumps(tuner_section_room.tuner_numbers(LAB, Chain())))
 
 
 def blocks_of(section):
@@ -202,7 +201,7 @@ def test_limits_of_long_trials_are_stated(small):
 @pytest.mark.parametrize(("samples", "seeds"), [(301, 20), (40_000, 20), (60_000, 13), (1_000_000, 1)])
 def test_long_trials_have_fewer_seeds(samples, seeds):
     """At most 80 million samples in all of trainings of 100 trials, but one training always."""
-    assert tuner_words.curve_seeds(100 * samples) == seeds
+    assert tuner_section_room.curve_seeds(100 * samples) == seeds
 
 
 def test_a_slew_of_too_many_samples_has_no_study_but_its_number(monkeypatch):
@@ -225,7 +224,7 @@ def values(small, walked):
     rows = [read(folder / "data" / f"tune-{name}.json")["rows"] for name in ("comparison", "residual")]
     coarse = next(iter(data.coarse.values())).chain.converters
     settings = [coarse.moment_bits, coarse.moment_range, coarse.torque_bits, coarse.torque_range, coarse.encoder_counts]
-    drawn = [SEEDS, tuner_words.CURVE_SEEDS, len(data.rows), data.curves.diverged, data.curves.died]
+    drawn = [SEEDS, tuner_section_room.CURVE_SEEDS, len(data.rows), data.curves.diverged, data.curves.died]
     late = [1e3 * each["arrives_later_by_s"] for each in own["shaped"].values()]
     off = [1e3 * abs(each) for each in (*(own[key] for key in TIPS), held["tip_error_m"])]
     more = [*_learned(own), *settings, *drawn, *late, *off]

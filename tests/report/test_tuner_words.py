@@ -6,8 +6,8 @@ import numpy as np
 
 from tests.odd_arms import odd_arms
 from tfarm.dsp.traces import away
-from tfarm.report.tuner_words import drift_words, shaping_words, tuner_in_short
-from tfarm.report.words import typeset
+from tfarm.report.sections import typeset
+from tfarm.report.tuner_section import drift_words, shaping_words, tuner_in_short
 from tfarm.tuner import LearningCurves
 
 ARMS = odd_arms()

@@ -16,7 +16,7 @@ from tests.hostile import NAME
 from tests.report.full import ARM
 from tests.report.walked import Walk, columns_of, numbers_of, read, read_arm, shown_in, told, untraced, untraced_cells
 from tfarm.report.locus_section import RANGE_OF_K2
-from tfarm.spectrum.scales import default_gains, rate_unit
+from tfarm.spectrum.table import default_gains, rate_unit
 
 PROSE = {  # phrases with numbers that are no results, and what they are
     r"around −1|−1 lies on the ring 1|encirclements of −1": "the critical point of Nyquist's criterion",
@@ -40,7 +40,7 @@ COMMANDS = {  # what the sections' numbers are held against
     "bode-root-moment": ("bode root_moment",),
     "bode-tip-displacement": ("bode tip_displacement",),
     "modes": ("modes",),
-    "locus": ("margins", "locus K1", "locus K2"),
+    "locus": ("margins", "poles", "locus K1", "locus K2"),
     "margins-nyquist": ("nyquist", "modes"),
     "sampled": ("sampled", "margins", "simulate K2", "simulate"),
     "tune": (),
@@ -61,6 +61,7 @@ def answers(pages):
     asked = {
         "modes": ("modes", file, "--certify"),
         "margins": ("margins", file),
+        "poles": ("poles", file),
         "sampled": ("sampled", file),
         "bode root_moment": ("bode", file, "--output", "root_moment"),
         "bode tip_displacement": ("bode", file, "--output", "tip_displacement"),

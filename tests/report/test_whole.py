@@ -11,7 +11,7 @@ from tests.hostile import NAME
 from tests.report.full import ARM
 from tests.report.written import files_of
 from tfarm.cli import tables as cli_tables
-from tfarm.report import making, write, writing
+from tfarm.report import write, writing
 
 # ------------------------------------------------------------ all or nothing
 
@@ -48,9 +48,9 @@ def test_work_that_fails_leaves_nothing(tmp_path, monkeypatch):
         folder.mkdir()
         (folder / "half.js").write_text("half")
 
-    monkeypatch.setattr(making, "ARM_PIECES", ())
-    monkeypatch.setattr(making, "write_assets", scripts)
-    monkeypatch.setattr(making, "save_card", fail)
+    monkeypatch.setattr(writing, "ARM_PIECES", ())
+    monkeypatch.setattr(writing, "write_assets", scripts)
+    monkeypatch.setattr(writing, "save_card", fail)
     with pytest.raises(tfarm.ConvergenceError):
         write([ARM], tmp_path / "new" / "out")
     assert not (tmp_path / "new").exists()
@@ -62,8 +62,8 @@ def test_work_that_fails_leaves_an_earlier_report_as_it_was(pages, tmp_path, mon
 
     before, out = files_of(pages), tmp_path / "out"
     shutil.copytree(pages, out)
-    monkeypatch.setattr(making, "ARM_PIECES", [piece for piece in making.ARM_PIECES if piece.name == "the arm"])
-    monkeypatch.setattr(making, "save_card", fail)
+    monkeypatch.setattr(writing, "ARM_PIECES", [piece for piece in writing.ARM_PIECES if piece.name == "the arm"])
+    monkeypatch.setattr(writing, "save_card", fail)
     with pytest.raises(tfarm.ConvergenceError):
         write([ARM], out, only=("modes",))
     assert files_of(out) == before

@@ -19,14 +19,13 @@ from tests.report.full import ARM
 from tests.report.written import HELD, Links, files_of, ids_of, links_of, validated
 from tfarm.digits import plain
 from tfarm.dsp import Chain
-from tfarm.report import making, readme_pictures, write
-from tfarm.report.card import written_cards
-from tfarm.report.frame import first_sentence
-from tfarm.report.given_laws import Subject
-from tfarm.report.page import index_page
+from tfarm.report import readme_pictures, write, writing
+from tfarm.report.cards import written_cards
+from tfarm.report.cases import Subject
+from tfarm.report.page import first_sentence, index_page
 from tfarm.report.trust import Evidence, write_trust
 from tfarm.report.trust_proofs import written_proofs
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 # ------------------------------------------------------------ the same bytes
 
@@ -36,9 +35,9 @@ def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_ro
     coarsen(monkeypatch.setattr)
     made = tmp_path / "made"
     made.mkdir()
-    for i, piece in enumerate(making.ARM_PIECES):
+    for i, piece in enumerate(writing.ARM_PIECES):
         if piece.anchor in ("margins-map", "bode-root-moment", "margins", "margins-nyquist"):
-            making.make(Subject(ARM, Chain()), i, made)
+            writing.make(Subject(ARM, Chain()), i, made)
     there = files_of(pages / NAME)
     pictures = ("map", "bode-root-moment", "nyquist")
     assert {f"pictures/{picture}.svg" for picture in pictures} <= set(files_of(made))
@@ -170,9 +169,9 @@ def test_every_cell_of_a_narrow_page_says_what_it_is(pages):
 
 
 def test_the_pages_of_an_arm_lead_to_each_other(tmp_path, monkeypatch):
-    piece = next(piece for piece in making.ARM_PIECES if piece.name == "the arm")
-    monkeypatch.setattr(making, "ARM_PIECES", (piece,))
-    monkeypatch.setattr(making, "save_proof", lambda *_: None)
+    piece = next(piece for piece in writing.ARM_PIECES if piece.name == "the arm")
+    monkeypatch.setattr(writing, "ARM_PIECES", (piece,))
+    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
     write([replace(ARM, name="plain")], tmp_path, only=("modes", "bode"))
     assert "bode.html" in Links(tmp_path / "plain" / "modes.html").targets
@@ -239,6 +238,7 @@ import os, time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from tfarm.processes import leave_with_parent
+from tfarm.report import writing
 if __name__ == "__main__":
     pool = ProcessPoolExecutor(1, get_context("forkserver"), leave_with_parent)
     print(pool.submit(os.getpid).result(), flush=True)

@@ -8,7 +8,7 @@ import pytest
 import tfarm
 from tests.hostile import NAME
 from tests.report.full import ARM
-from tfarm.report.paper import is_from_paper, paper_section
+from tfarm.report.arm_section import is_from_paper, paper_section
 
 
 def tables(pages, stem):

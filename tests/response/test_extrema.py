@@ -7,7 +7,7 @@ import pytest
 
 import tfarm
 from tests.response.extrema import judged, plots
-from tfarm.report.bode_section import alt_text, highest_and_lowest, what_is_seen
+from tfarm.report.response_sections import alt_text, highest_and_lowest, what_is_seen
 from tfarm.response.frequency import extrema
 
 FLEX, BARE = tfarm.load("quanser-flexlink"), tfarm.load("sasaki2012")

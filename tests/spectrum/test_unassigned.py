@@ -18,8 +18,7 @@ from tfarm.arm import Motor
 from tfarm.cli.running import run
 from tfarm.errors import MISSING, ConvergenceError
 from tfarm.loop.locus import open_poles
-from tfarm.report.damped_table import damped_table
-from tfarm.report.modes_section import locked_table, locked_words
+from tfarm.report.modes_section import damped_table, locked_table, locked_words
 from tfarm.spectrum import damped as module
 from tfarm.spectrum.damped import NOT_ASSIGNED, origin_of, searched
 from tfarm.tables.files import json_value

@@ -11,7 +11,7 @@ from tests.shell import answer, run
 from tests.synthesis.judged import judge_of
 from tfarm.dsp import Chain
 from tfarm.dsp.results import simulated_answer
-from tfarm.report import tuner_words
+from tfarm.report import tuner_section
 from tfarm.report.tuner_section import comparison_table
 from tfarm.tuner.tuning import trial_of, usual_plan
 
@@ -28,10 +28,10 @@ def saved(tmp_path_factory):
 def page():
     """What the page has, but with few seeds, and the rows of the arm itself alone."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tuner_words, "CURVE_SEEDS", 1)
-        patch.setattr(tuner_words, "LONG_TRIAL", 1)
-        patch.setattr(tuner_words, "_servo_tuning", lambda *given: None)
-        return tuner_words.tuner_numbers(ARM, Chain())
+        patch.setattr(tuner_section, "CURVE_SEEDS", 1)
+        patch.setattr(tuner_section, "LONG_TRIAL", 1)
+        patch.setattr(tuner_section, "_servo_tuning", lambda *given: None)
+        return tuner_section.tuner_numbers(ARM, Chain())
 
 
 def by_hand(law, duration=3.0):

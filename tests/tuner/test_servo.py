@@ -13,7 +13,7 @@ from tests.tuner.plain import PlainTrial, complex_step, plain_gain
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Chain, Converters, Sampling, Simulator, sampled_loop
 from tfarm.errors import ParameterError
-from tfarm.report import tuner_words
+from tfarm.report import tuner_section
 from tfarm.tuner import (
     Plan,
     TunedGain,
@@ -27,8 +27,8 @@ from tfarm.tuner import (
     tune,
 )
 from tfarm.tuner.controller import to_text
+from tfarm.tuner.guard import RADIUS_SHARE, MovingGain
 from tfarm.tuner.kernel import Limits
-from tfarm.tuner.sector import RADIUS_SHARE, MovingGain
 from tfarm.tuner.trial import usual_rate_gain
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -130,7 +130,7 @@ def test_it_is_held_against_the_same_yardsticks(tuning):
 
 
 def as_trained(tuning):
-    return tfarm.tuner.comparison.NamedLoop("as trained", LAB, tuning.trial.loop.chain)
+    return tfarm.tuner.baselines.NamedLoop("as trained", LAB, tuning.trial.loop.chain)
 
 
 def test_the_usual_rate_gain_damps_the_rigid_arm():
@@ -147,10 +147,10 @@ def test_the_usual_rate_gain_damps_the_rigid_arm():
 
 def test_the_servo_of_a_page_is_slow_for_the_first_mode_and_the_period(monkeypatch):
     """sqrt(Kp/J), to two digits of Kp: a twentieth of the first frequency, or 0.03 rad a sample where that is less."""
-    monkeypatch.setattr(tuner_words, "tune", lambda arm, plan, chain: plan)
+    monkeypatch.setattr(tuner_section, "tune", lambda arm, plan, chain: plan)
     first = tfarm.modes(LAB, 1).natural_frequency[-1]
     for period, speed in ((0.002, first / 20), (0.02, 0.03 / 0.02)):
-        plan = tuner_words._servo_tuning(LAB, Plan(), Chain(sampling=Sampling(period=period)))
+        plan = tuner_section._servo_tuning(LAB, Plan(), Chain(sampling=Sampling(period=period)))
         assert np.sqrt(plan.Kp / LAB.total_inertia) == pytest.approx(speed, rel=0.03)
         assert usual_rate_gain(LAB, plan.Kp) == plan.K1
 

@@ -56,7 +56,7 @@ def compare(
     found = find(subjects, laws, names=names, modes=count, output=output, chain=chain)
     page = None
     if out is not None:
-        from tfarm.report.comparison_page import write_comparison
+        from tfarm.report.writing import write_comparison
 
         page = write_comparison(found, out)
     hand_out(lambda: compared_answer(found), partial(_print, found), json, png=png, picture=(found,), also=(page,))
@@ -90,7 +90,7 @@ def _print(found: Comparison, answer: dict[str, Any]) -> None:
     if found.is_of_arms:
         print("\nnatural frequencies and damping of the arms by themselves:")
         show(answer["modes"])
-    if found.is_clocked:
+    if found.is_sampled:
         print("\none law is a law in z: both loops are compared at their samples, each pole z as s = ln(z)/T")
     print("\noscillating closed-loop poles, by the mode whose open-loop pole each is nearest to:")
     show(answer["poles"])

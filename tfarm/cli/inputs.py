@@ -21,7 +21,7 @@ from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm, HubFeedback, Input, Law
-    from tfarm.report.given_laws import GivenLaw
+    from tfarm.report.cases import GivenLaw
 
 
 Command = Callable[..., None]
@@ -164,7 +164,7 @@ def asked_laws(arm: Arm, name: str, gains: Typed, files: Sequence[str]) -> tuple
     """The laws that a page is about: those of files, gains that are typed, the arm's own [law]; else none."""
     from tfarm.arm.law_tables import load_law
     from tfarm.fitting.recording import load_run
-    from tfarm.report.given_laws import GivenLaw
+    from tfarm.report.cases import GivenLaw
 
     if not files and all(value is None for value in gains.values()) and load_law(name) is None:
         return ()
@@ -186,7 +186,7 @@ def asked_gains(arm: Arm, given: Given) -> tuple[HubFeedback, dict[str, Any]]:
     """
     from dataclasses import replace
 
-    from tfarm.spectrum.scales import default_gains, default_words
+    from tfarm.spectrum.table import default_gains, default_words
 
     if given.law is not None:
         remedy = "this command knows gains at the hub; poles, margins, sampled and simulate take any law"

@@ -33,7 +33,7 @@ from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum import flexible_frequencies, modes, modes_below
 from tfarm.spectrum.frequencies import ARMS_KEPT
-from tfarm.spectrum.scales import check_gains, first_frequency
+from tfarm.spectrum.table import check_gains, first_frequency
 
 FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: how far right an improper law is looked at
 UNDISPERSED = 1e11  # of w1: where waves are no longer dispersed

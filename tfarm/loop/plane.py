@@ -31,8 +31,7 @@ from tfarm.crossing import Crossings, Window, counts_over, intervals
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum import modes
-from tfarm.spectrum.scales import PAPER_GAINS, default_gains, rate_unit
-from tfarm.spectrum.table import hub_locked
+from tfarm.spectrum.table import PAPER_GAINS, default_gains, hub_locked, rate_unit
 
 from .loop import Loop, grid
 from .stability import band_of_family, verdict_on

@@ -33,7 +33,7 @@ from tfarm.crossing import Crossing, Crossings, Family, Window, counts_over, cro
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum.box import FIRST_POINTS, NEAREST_TO_ZERO, TRIED_HEIGHTS, turned
-from tfarm.spectrum.scales import first_frequency, gain_unit, most_gain
+from tfarm.spectrum.table import first_frequency, gain_unit, most_gain
 
 from .loop import SLOWEST, Loop, grid
 from .poles import box_of

@@ -14,9 +14,8 @@ from tfarm.digits import plain, singly
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.loop.answers import law_answer
-from tfarm.report.given_laws import GivenLaw, LawOnArm, on_arm
-from tfarm.report.sections import PageSection
-from tfarm.report.words import typeset, upper
+from tfarm.report.cases import GivenLaw, LawOnArm, on_arm
+from tfarm.report.sections import PageSection, typeset, upper
 from tfarm.response.signals import Signals
 
 NOT_LED, FILES_ALONE = "open", (FILES,)  # a column that nothing is led to

@@ -1,25 +1,288 @@
-"""The live page of an arm's loop, live.html, and the scripts that all such pages share, in assets/."""
+"""The live page of an arm's loop: what it carries as numbers, and the scripts that all such pages share."""
 
 from __future__ import annotations
 
+import base64
 import json
+import math
+from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
+from typing import Any, get_args
 
+import numpy as np
 import vl_convert
+from numpy.typing import NDArray
 
-from tfarm.arm import HubFeedback
-from tfarm.digits import scientific
+from tfarm.arm import ANGLE_GAIN, FED_BACK, GAINS, MOMENT_GAIN, PLANE, Arm, HubFeedback, as_law, unit_of
+from tfarm.crossing import pieces
+from tfarm.digits import kept_digits, scientific
+from tfarm.dsp import Chain, PulseTransfer, Sampled, Scenario, Simulator, scenario
+from tfarm.dsp import GainMap as SampledMap
+from tfarm.dsp.plant import Plant, sensed_plant
+from tfarm.dsp.results import enough_modes, ideal_chain
+from tfarm.dsp.simulate import FOLDED_UP, quantisers
+from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.errors import TfarmError
-from tfarm.loop.panels import PANEL_SAMPLES
-from tfarm.report.given_laws import Subject
-from tfarm.report.live_data import LIVE_COLUMNS, live_data
-from tfarm.report.loop_laws import has_loop, sign_words
+from tfarm.loop.loop import Loop, steep_places
+from tfarm.loop.panels import PANEL_SAMPLES, Panels, Positions, Sensor, loop_panels, positions, sensed_places
+from tfarm.loop.plane import gain_map, moment_axis, rate_axis, rate_columns
+from tfarm.loop.stability import band_of_family, stability
+from tfarm.loop.windows import windows_of
+from tfarm.plots.regions import BEYOND_PICTURE, sampled_region
+from tfarm.report.cases import Subject, has_loop, sign_words
 from tfarm.report.page import TEMPLATES, argument, is_preset, render
+from tfarm.response import transfer
+from tfarm.spectrum.table import angle_unit, default_gains
 
+STATIONS = 24  # places along the arm at which its shape is drawn, besides the clamp
+OFF_A_POLE = 1e-9  # of a pole: where the ratio of two outputs is taken that both have it; the ratio is off by as much
+MOST_LIVE_SAMPLES = 5000  # of a slew: 160 kB of references; a longer one is left to `tfarm simulate`
+LIVE_COLUMNS = 90  # values of the gain across at which the continuous region is cut
+ANGLE_RANGE = 0.1  # of J w1^2: the largest gain on the hub angle of the page
+ANGLE_LINEAR = 1e-4  # of that: where its slider begins to be logarithmic
+EDGE_DIGITS = 7  # of the edges of the map's regions: far more than a screen has
+SENSOR_PIECES = 16  # pieces of the arm between two positions
+SENSED_MODES = 6  # whose frequencies and zeros the chart of sensors has
+SENSOR_DIGITS = 6  # of what that chart draws and tells: far more than a screen has
 LIVE_PAGE, ASSETS = "live.html", "assets"
-RUNTIME, SCRIPT = f"vega-{vl_convert.get_vega_version()}.js", "live.js"
+CHARTS, RUNTIME, SCRIPT = "live_charts.json", f"vega-{vl_convert.get_vega_version()}.js", "live.js"
 BUNDLED = "window.vegaEmbed = vegaEmbed;"
 SCRIPT_PARTS = tuple(f"live_{name}.js" for name in ("loop", "sampled", "locus", "sets", "player", "sensor", "page"))
+
+
+def packed(values: Any) -> str:
+    """The bytes of doubles; of complex numbers real and imaginary parts in turn."""
+    array = np.ascontiguousarray(values)
+    doubles = array.view(float) if np.iscomplexobj(array) else array.astype(float)
+    return base64.b64encode(doubles.astype("<f8").tobytes()).decode("ascii")
+
+
+def sampled_numbers(loop: Sampled) -> dict[str, Any]:
+    """The sampled loop with the modes that it has; `states`: poles at z = 1 that the hub's own motion has.
+
+    These are 2, 1 where it is damped or driven through a motor, or 0.
+    """
+    plant = sensed_plant(loop.plant.arm, loop.chain, FED_BACK, loop.plant.count).together
+    twice, once = plant.rigid[0]
+    states = {"states": 2 if twice else 1 if once else 0, "modes": plant.count}
+    return _clock(loop.chain) | _plant(PulseTransfer(plant, loop.chain.sampling).folded().plant) | states
+
+
+def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback) -> dict[str, Any] | None:
+    """The slew of the chain for three times as long as it takes, with the modes that it takes under `law`, and the
+    arm's shapes; None where there is no such slew."""
+    try:
+        task = scenario("slew", arm, chain, RECORD_LENGTH * chain.slew.rise_time)
+        if task.t.size > MOST_LIVE_SAMPLES:
+            return None
+        linear = ideal_chain(chain)
+        count = enough_modes(lambda number: Simulator(arm, linear, task, count=number).linear(law)).modes
+        plant = Simulator(arm, chain, task, count=count).plant
+        return _clock(chain) | _upper(plant) | _task(task, chain, arm) | {"modes": count} | _shapes(arm, plant)
+    except TfarmError:
+        return None
+
+
+def _clock(chain: Chain) -> dict[str, Any]:
+    """The period [s], the delay in samples, and how the hub rate is had: `smoothing` is the rate filter's pole."""
+    converters, T = chain.converters, chain.sampling.period
+    differences = converters.hub_rate == "difference"
+    return {
+        "period": T,
+        "delay": chain.sampling.whole_delay,
+        "fraction": chain.sampling.fraction,
+        "smoothing": math.exp(-converters.rate_filter * T) if differences else None,
+    }
+
+
+def _plant(plant: Plant) -> dict[str, Any]:
+    """Poles (m,) [1/s] but s = 0, the outputs' residues (outputs, m), and what they have of 1/s^2, 1/s and 1."""
+    return {
+        "eigenvalues": packed(plant.poles.astype(complex)),
+        "residues": packed(plant.residues.astype(complex)),
+        "rigid": plant.rigid.tolist(),
+        "static": plant.static.tolist(),
+    }
+
+
+def _upper(plant: Plant) -> dict[str, Any]:
+    """The same with the poles whose imaginary part is not negative alone, those with a conjugate counted twice."""
+    upper, weight = _kept(plant)
+    mode = plant.mode[upper].tolist()
+    return _plant(plant) | {
+        "eigenvalues": packed(plant.poles[upper].astype(complex)),
+        "residues": packed((plant.residues[:, upper] * weight).astype(complex)),
+        "mode": mode,
+    }
+
+
+def _kept(plant: Plant) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    upper = np.nonzero(plant.poles.imag >= 0)[0]
+    return upper, np.where(plant.poles[upper].imag > 0, 2.0, 1.0)
+
+
+def _task(task: Scenario, chain: Chain, arm: Arm) -> dict[str, Any]:
+    """References a sample, converters, and what a person is told of the slew."""
+    rows = quantisers(chain).tolist()
+    ideal = np.c_[task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment]
+    return {
+        "ideal": packed(ideal),
+        "converters": [[x if math.isfinite(x) else None for x in row] for row in rows],
+        "single": chain.converters.arithmetic == "float32",
+        "bound": FOLDED_UP * arm.bending_scale,
+        "rise": task.busy_until,
+        "drive": arm.input.split("_")[1],
+        "unit": arm.input_unit,
+        "reach": arm.reach,
+        "length": arm.length,
+        "travel": chain.slew.travel_of(arm.reach),
+    }
+
+
+def _shapes(arm: Arm, plant: Plant) -> dict[str, Any]:
+    """Displacement along the arm over that of the tip, (stations, m) at each kept pole, which the clamp's comes first.
+
+    The ratio of residues is that of the numerators, whatever drives the hub.
+    """
+    upper, _ = _kept(plant)
+    s = plant.poles[upper].astype(complex) * (1 + OFF_A_POLE)
+    x = np.linspace(0.0, arm.length, STATIONS + 1)
+    ratios = []
+    for place in x:
+        here, tip = transfer(arm, ["displacement", "tip_displacement"], x=float(place))(s)
+        ratios.append(here / tip)
+    return {"x": x.tolist(), "offset": arm.reach - arm.length, "shapes": packed(np.array(ratios))}
+
+
+def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[str, Any]:
+    """Everything as plain numbers and words.  `law` is where the page begins: the default gains if not given.
+
+    Raises what `gain_map` and `loop_panels` raise.
+    """
+    x = rate_axis(arm)
+    y, stiffest = moment_axis(arm, x), ANGLE_RANGE * angle_unit(arm)
+    axes: dict[str, dict[str, Any]] = {
+        name: {"low": axis.low, "high": axis.high, "linear": None if axis.is_linear else axis.linear}
+        for name, axis in zip(PLANE, (x, y), strict=True)
+    } | {ANGLE_GAIN: {"low": 0.0, "high": stiffest, "linear": ANGLE_LINEAR * stiffest}}
+    reference = default_gains(arm)
+    laws = (dict(zip(axes, each, strict=True)) for each in product(*((of["low"], of["high"]) for of in axes.values())))
+    band, is_quiet = band_of_family(Loop(arm, as_law(HubFeedback(**law))) for law in laws)
+    samples, across = loop_panels(arm, band), rate_columns(arm, x, LIVE_COLUMNS)
+    beyond = np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
+    continuous = gain_map(arm, np.unique(np.r_[across, x.high]), beyond)
+    sampled = sampled_region(arm, x, y, chain)
+    return {
+        "name": arm.name,
+        "units": {gain.name: unit_of(gain.name, arm) for gain in GAINS},
+        "axes": axes,
+        "start": {gain.name: (law or reference)[gain.name] for gain in GAINS},
+        **_samples(samples),
+        **_known(arm, is_quiet),
+        "reference": {name: reference[name] for name in PLANE},
+        "reference_count": stability(arm, reference, band).unstable_roots,
+        "continuous": _areas(continuous.axes[0], continuous.stable_intervals),
+        "sampled_map": None if sampled is None else _sampled(sampled, chain),
+        "sampled_loop": None if sampled is None else sampled_numbers(sampled.loop),
+        "slew": slew_numbers(arm, chain, law or reference),
+        **sensor_numbers(arm),
+        "lyapunov": arm.is_uniform,
+    }
+
+
+def _samples(panels: Panels) -> dict[str, Any]:
+    """The samples as the bytes of doubles, by panel, part and point, and where they are."""
+    return {
+        "samples": packed(panels.values.transpose(1, 0, 2)),
+        "low": panels.low.tolist(),
+        "high": panels.high.tolist(),
+        "order": panels.order,
+        "error": float(f"{panels.error:.0e}"),
+        "places": np.asarray(steep_places(panels.arm, 1.05 * panels.band)).tolist(),
+        "band": panels.band,
+    }
+
+
+def _known(arm: Arm, is_quiet: bool) -> dict[str, Any]:
+    """What a verdict on any gains rests on: theorems and bounds beyond the band, and the static balance."""
+    kind = "reactive" if arm.is_reactive else "quiet" if is_quiet else "band"
+    by_energy = "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"
+    beyond = "beyond the band |L| stays below one half at all gains of this page: no unstable pole there (small gain)"
+    if arm.is_reactive and not arm.is_told_by_lyapunov:
+        by_energy = "C = 0: none of the modes looked at is driven; no theorem tells the others"
+    moments = _stable_moments(arm) if arm.is_reactive else (-math.inf, math.inf)
+    return {
+        "kind": kind,
+        "beyond": beyond if kind == "quiet" else by_energy,
+        "moments": [None if math.isinf(end) else end for end in moments],  # JSON has no infinity
+        "told": arm.has_elastic_link and arm.reads_hub_moment and not arm.input_lags,
+        "hub_alone": arm.loses_at_hub_alone,
+        "whole": arm.input_per_torque,
+        "rate_loss": arm.rate_loss,
+        "inertia": arm.turned_inertia,
+        "gauged": arm.gauged_inertia,
+    }
+
+
+def _stable_moments(arm: Arm) -> tuple[float, float]:
+    """Between which K2 no mode is driven by K1 > 0 without damping; infinite where no limit was found."""
+    found = windows_of(stability(arm, default_gains(arm).having(MOMENT_GAIN, 0.0)), [MOMENT_GAIN])[MOMENT_GAIN]
+    low, high = found.around or (-math.inf, math.inf)
+    return low if found.end(low) == "edge" else -math.inf, high if found.end(high) == "edge" else math.inf
+
+
+def _areas(across: Any, intervals: Sequence[Sequence[tuple[float, float]]]) -> list[dict[str, float]]:
+    """Rows across, low, high of the parts of a region, each part with its number."""
+    parts = enumerate(pieces(across, intervals))
+    keys = ("part", PLANE[0], "low", "high")
+    return [
+        dict(zip(keys, (number, *kept_digits(point, EDGE_DIGITS)), strict=True))
+        for number, piece in parts
+        for point in piece.points
+    ]
+
+
+def _sampled(plane: SampledMap, chain: Chain) -> dict[str, Any]:
+    """The sampled region, its columns with exact ends, and what it holds for."""
+    ms = f"{1e3 * chain.sampling.period:g} ms"
+    C = plane.loop.plant.arm.damping
+    return {
+        "areas": _areas(plane.axes[0], plane.stable_intervals),
+        PLANE[0]: plane.axes[0].tolist(),
+        "intervals": plane.stable_intervals,
+        "words": f"every {ms}" + ("" if C else f", of the first {plane.modes_used} modes"),
+    }
+
+
+# ------------------------------------------------------------ sensors along the arm
+
+
+def sensor_numbers(arm: Arm) -> dict[str, Any]:
+    """`sensor`: participation and zeros at every position, by the kind of sensor, without ends that sense nothing.
+
+    None where they cannot be had, and then `no_sensor` says why.
+    """
+    x, sensors = np.linspace(0.0, arm.length, SENSOR_PIECES + 1), {}
+    try:
+        for kind in get_args(Sensor):
+            places = sensed_places(arm, kind, x, SENSED_MODES)
+            sensors[kind] = _numbers(positions(arm, kind, places, SENSED_MODES))
+    except TfarmError as error:
+        return {"sensor": None, "no_sensor": str(error)}
+    return {"sensor": sensors}
+
+
+def _numbers(found: Positions) -> dict[str, Any]:
+    """The positions in a few digits."""
+    zeros = [np.c_[each.real, each.imag].tolist() for each in found.known_zeros]
+    return {
+        "x": kept_digits(found.x, SENSOR_DIGITS),
+        "band": found.band,
+        "modes": kept_digits(found.natural_frequency, SENSOR_DIGITS),
+        "participation": [kept_digits(column, SENSOR_DIGITS) for column in found.participation.T],
+        "zeros": [[kept_digits(zero, SENSOR_DIGITS) for zero in each] for each in zeros],
+    }
 
 
 def is_live(subject: Subject) -> bool:
@@ -34,7 +297,7 @@ def save_live(subject: Subject, folder: Path) -> None:
     """
     arm, chain, laws = subject.arm, subject.chain, subject.laws
     title, out = f"{arm.name}: live loop", folder / LIVE_PAGE
-    given = [each.law for each in laws if isinstance(each.law, HubFeedback)]
+    given = [gains for each in laws if (gains := as_law(each.law).gains) is not None]
     try:
         data = live_data(arm, chain, given[0] if given else None)
     except TfarmError as error:
@@ -52,9 +315,10 @@ def write_assets(folder: Path) -> None:
     """Vega's runtime, as vl-convert carries it, and this page's own script with its charts."""
     folder.mkdir(exist_ok=True)
     (folder / RUNTIME).write_text(vl_convert.javascript_bundle(BUNDLED), encoding="utf-8", newline="")
-    from tfarm.report.live_charts import charts  # and Altair, which the processes that make pages do not need
-
-    named = json.dumps(charts(), separators=(",", ":"), sort_keys=True)
+    drawn = json.loads((TEMPLATES / CHARTS).read_text(encoding="utf-8"))
+    config = drawn.pop("config")  # of every chart; its colours are set by the page, for a light screen or a dark one
+    charts = {name: vl_convert.vegalite_to_vega({**chart, "config": config}) for name, chart in drawn.items()}
+    named = json.dumps(charts, separators=(",", ":"), sort_keys=True)
     scripts = "".join((TEMPLATES / name).read_text(encoding="utf-8") for name in SCRIPT_PARTS)
     own = f"(() => {{\nconst LIVE_CHARTS = {named};\n{scripts}}})();\n"  # the runtime has names of its own
     (folder / SCRIPT).write_text(own, encoding="utf-8", newline="")

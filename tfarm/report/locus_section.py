@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import partial
 
@@ -10,21 +11,21 @@ import numpy as np
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, HubFeedback, shown_unit, written_unit
 from tfarm.arrays import Real
 from tfarm.columns import Column, Table
-from tfarm.digits import how_many, listed, plain, scientific, significant, singly
+from tfarm.digits import how_many, kept_digits, listed, plain, scientific, significant, singly
+from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
-from tfarm.loop.loci import Loci, loci, most_damped
+from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, branch_columns, held_branches, loci, most_damped
 from tfarm.loop.stability import MARGIN_OF_ZERO, Stability, stability
 from tfarm.plots.roots import draw_loci
-from tfarm.report.locus_tables import crossing_table, gap_table, loci_data
-from tfarm.report.loop_laws import edge_of_K2, has_loop, margins_of
+from tfarm.report.cases import continuous_cases, edge_of_K2, has_loop, margins_of
+from tfarm.report.loop_section import poles_of
 from tfarm.report.sections import PageSection, Picture
-from tfarm.spectrum.scales import default_gains, rate_unit
+from tfarm.spectrum.table import default_gains, rate_unit
 
 LISTED_MOMENT_GAINS = (0.9, 1.0, 1.01, 1.1, 1.5)  # values of K2 whose exact poles are listed
 AROUND_EDGE = (0.9, 1.1)  # times the edge, if that lies above all of them
 RANGE_OF_K2 = (-1.0, 1.6)  # of the locus, times what balances a torque: both sides of 0, and beyond 1
 shortly = partial(plain, digits=4)  # how a gain is written in a sentence
-
 LOCUS_CAPTION = (
     "Broad lines: exact poles, followed along {name}. Dashed: python-control on a modal model of order {order}, its "
     "error band (at most {worst} of |s|) shaded where it is wider than the line. At the left all branches on one "
@@ -57,8 +58,59 @@ LISTED_RATE_GAINS = (
 )  # times J w1: values of K1 whose poles are listed for want of a locus
 
 
-def locus_section(arm: Arm) -> PageSection:
-    """Where the poles go as each gain grows, and what K2 = 1 and beyond does."""
+def crossing_table(data: Loci, stem: str) -> Table:
+    """Where the branches cross the imaginary axis."""
+    found = list(data.exact.crossings)
+    gain, omega = (kept_digits([getattr(each, key) for each in found], POLE_DIGITS) for key in ("gain", "omega"))
+    return Table(
+        stem=stem,
+        title=f"Crossings of the imaginary axis along {data.name}",
+        caption="Solved for gain and frequency together on the exact characteristic function, to the digits shown.",
+        record=found,
+        columns=(
+            Column(data.name, data.name, data.unit, of=gain, digits=singly(significant, 8)),
+            Column("omega_rad_s", "frequency", "rad/s", of=omega, digits=singly(significant, 7)),
+            Column("frequency_hz", "", "Hz", of=[w / (2 * math.pi) for w in omega], digits=singly(significant, 7)),
+            Column(
+                "mode",
+                "mode",
+                of=lambda each: "of no branch" if each.branch is None else int(data.exact.mode[each.branch]),
+            ),
+            Column("becomes", "becomes", of="direction"),
+        ),
+    )
+
+
+def gap_table(data: Loci, stem: str) -> Table:
+    """How far each reduced branch is from the exact one."""
+    gap, names = kept_digits(data.reduced.gap, GAPS_HELD), [f"mode {n}" if n else "rigid body" for n in data.exact.mode]
+    return Table(
+        stem=stem,
+        title=f"How far python-control's locus is from the exact one, along {data.name}",
+        caption=f"Largest distance over the whole range, as a share of |s| (or of the first natural frequency, where "
+        f"that is more). The reduced model has order {data.reduced.order}; its poles are those of "
+        "control.root_locus_map, taken to their last digits by Newton's method.",
+        columns=(
+            Column("branch", "branch from", of=names),
+            Column("gap", "largest gap", "of |s|", of=gap, digits=singly(scientific, 3)),
+        ),
+    )
+
+
+def loci_data(data: Loci, stem: str) -> Table:
+    """The exact and the reduced branches."""
+    first = Column(data.name, data.name, data.unit, of=data.exact.gain)
+    exact, reduced = held_branches(data.exact.branches), held_branches(data.reduced.branches)
+    columns = (
+        first,
+        *branch_columns(exact, "exact_{n}_{part}", "exact branch {n}, {part}"),
+        *branch_columns(reduced, "reduced_{n}_{part}", "reduced branch {n}, {part}"),
+    )
+    return Table(stem=stem, title=f"Loci along {data.name}", columns=columns)
+
+
+def locus_section(arm: Arm, chain: Chain) -> PageSection:
+    """Root loci along each gain, poles at K2 = 1 and beyond, and those of the default and the best gains."""
     words, blocks = [], list[Picture | Table]()
     held = default_gains(arm)
     low, high = (share * arm.input_per_torque for share in RANGE_OF_K2)
@@ -79,7 +131,8 @@ def locus_section(arm: Arm) -> PageSection:
             blocks.append(crossing_table(data, f"locus-{name}-crossings"))
     if has_loop(arm):
         blocks.append(beyond_table(arm, held))
-    return PageSection(anchor="locus", title="Where do the poles go?", words=words, blocks=blocks)
+    more, tables = poles_of(continuous_cases(arm, chain))
+    return PageSection(anchor="locus", title="Root loci", words=[*words, *more], blocks=[*blocks, *tables])
 
 
 def _more_damping(data: Loci) -> str:

@@ -1,86 +1,221 @@
-"""The continuous loop on an arm's page: the map of its gains, verdict and margins, Nyquist (loci: `locus_section`)."""
+"""The continuous loop on an arm's page: verdict and margins, Nyquist plot, poles."""
 
 from __future__ import annotations
 
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import NamedTuple
+
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, unit_of, written_unit
-from tfarm.digits import how_many, plain, significant
+from tfarm.arm import MOMENT_GAIN, Arm
+from tfarm.columns import Column, Table
+from tfarm.digits import how_many, plain, significant, singly
 from tfarm.dsp import Chain
-from tfarm.errors import ConvergenceError
-from tfarm.loop.nyquist import Nyquist, nyquist_of
-from tfarm.loop.plane import DEEPEST_MOMENT_GAIN
-from tfarm.loop.stability import stability
-from tfarm.loop.windows import Windows
+from tfarm.errors import TfarmError
+from tfarm.loop.answers import (
+    CROSSOVERS,
+    MARGIN_COLUMNS,
+    NOT_STABLE,
+    POLE_COLUMNS,
+    WINDOW_COLUMNS,
+    crossovers,
+    gain_rows,
+    margin_rows,
+    unsettled,
+)
+from tfarm.loop.margins import Margins, loop_curve
+from tfarm.loop.nyquist import Nyquist, nyquist_of, nyquist_table
+from tfarm.loop.poles import Poles, closed_loop_poles
+from tfarm.loop.spill import SPILL, Spill, spill
+from tfarm.loop.theorem import lyapunov, signs_of_loop
 from tfarm.plots.disc import draw_nyquist
-from tfarm.report.loop_laws import (
-    DESIGNED_MODES,
-    NamedLaw,
-    brief_on,
-    edge_of_K2,
-    has_loop,
-    laws,
-    margins_of,
-    why_no_loop,
-)
-from tfarm.report.map import MapOfArm, draw_map_of_arm, map_data, map_of_arm
-from tfarm.report.margins_table import margin_table, verdict_fact, verdict_words, window_table
-from tfarm.report.nyquist import RINGS_CAPTION, TO_COMPARE, PlotOfLaw, count_table, curve_data
-from tfarm.report.sections import PageSection, Picture
-from tfarm.report.words import typeset, upper
-from tfarm.spectrum.scales import default_gains, default_words, rate_unit
+from tfarm.plots.frequency import draw_loop
+from tfarm.report.cases import GivenLaw, LawOnArm, brief_on, continuous_cases, margins_of, why_no_loop
+from tfarm.report.sections import Fact, PageSection, Picture, typeset, upper
 
-UNSTABLE_K2 = 1.5  # at least, of the law whose encirclements are counted for comparison
-TIMES_THE_EDGE = 1.2  # and at least so many times the K2 at which the loop loses its stability
-
-MAP_SEEN = (
-    "Green: every pole is in the left half-plane{apart}; orange: the number of unstable poles. The black edge and the "
-    "counts are exact, of the arm itself and no reduced model{reach}. Blue: damping ratio of the least damped pole "
-    "below {band} rad/s. {proof} K1 is scaled by J ω₁ = {unit}{held}."
+MARGINS_CAPTION = (
+    "Exact: of the infinite-dimensional loop; not known where nothing bounds L beyond the band. "
+    "In the band: as far as the poles were computed{undamped}. Gain margin: "
+    "factors on the whole law between which the loop stays stable. Phase margin: where |L| = 1, the angle from −1 "
+    "to L of least size, above 0 for lag that the loop bears and below 0 for lead; lag and lead: the least of each. "
+    "Delay: what may be lost at the worst frequency. Disk margin: gain and phase may be off together by "
+    "(2 + αδ)/(2 − αδ), |δ| < 1."
 )
-APART_FROM_HUB, WITH_INERTIA = (
-    ", that of the hub angle at 0 apart",
-    ", with J the inertia of what turns: hub, link and finite payload",
+DELAY_UNDAMPED = (
+    "; without damping (C = 0) any delay, however short, destabilises some mode far enough up, so the exact delay and "
+    "disk margins are 0, and only a band gives them a size"
 )
-ALL_MODES, UP_TO = ", with all its infinitely many modes", ", with every crossing up to {band} rad/s"
-PROOF = "The purple frame is what the Lyapunov argument proves at C = 0: K1 > 0 and K2 < 1, all of the stable region."
-NO_PROOF = (
-    "The dashed frame is what the Lyapunov argument proves for an arm without damping; it is not a proof here, because "
-    "the gauge does not feel C. At C > 0 it proves K2 = 0 alone (solid line). The true edge is the black line."
+CAPTION_OF_WINDOWS = (
+    "The others held, each gain, or number of a law, may move within its window before the first pole reaches the "
+    "axis. Ends ±∞ are proven; an end with a star is no edge: up to there none was found, and beyond none was looked "
+    "for."
 )
-OF_ELASTIC = (
-    "Lyapunov's argument proves all with K1 > {least} and K2 < {whole}: the links are elastic, and what hub, clamp and "
-    "joint lose only adds to K1."
+MARGIN_TITLES = {"disk": "disk margin α"}
+QUANTITIES = (
+    "gain margin, down",
+    "gain margin, up",
+    *(MARGIN_TITLES.get(each.of, each.title) for each in MARGIN_COLUMNS),
 )
-OF_DAMPED = "At C > 0 Lyapunov's argument proves K2 = 0 alone, as the gauge does not feel C; the edge is computed."
-OF_OTHER_GAUGE = (
-    "The gauge does not read the moment on the hub, so Lyapunov's argument proves K2 = 0 alone; the edge is computed."
+MarginRow = tuple[str, str, float | str, float | str, float | str]  # quantity, unit, exact, in the band, at
+COUNT_CAPTION = (
+    "{open}, so each clockwise turn around −1 (counted negative) is one unstable "
+    "closed-loop pole. The count in a box was made without Nyquist, by finding every pole; poles whose real part is "
+    "less than 10⁻¹² of their size are not told apart from the axis there (undecided), though their turns around −1 "
+    "are counted."
 )
-OF_LAG = "The voltage comes late through an inductance, so Lyapunov's argument proves nothing; the edge is computed."
-SAMPLED_SEEN = (
-    " Hatched: what is stable when the loop is sampled every {clock}, its edge exact for the first {modes} modes; with "
-    "that clock no gains outside the hatching hold, whatever the continuous loop promises."
-)
-SAMPLED_NOT_SEEN = " Where the loop is stable when it is sampled every {clock} could not be settled and is not drawn."
-DEPTH_WORDS = " For this map unstable windows below K2 = {deepest} were not looked for."
+NO_OPEN, OWN_OPEN = "L has no pole right of the contour", "Beside the poles that a law itself has right of the contour"
+RINGS_CAPTION = "Rings: sizes of L; −1 lies on the ring 1. Broad: ω > 0, arrows as ω rises; thin: its mirror image."
 NYQUIST_WORDS = (
-    "Every size of L(iω) from 0 to infinity is in the picture: a size r is drawn as r/(1 + r), so nothing is cut off, "
-    "and infinity is the outer rim. The loop is stable when the curve does not turn around −1. {poles}"
+    "Every size r of L(iω) is drawn as r/(1 + r): nothing is cut off, infinity is the outer rim. The loop is stable "
+    "where the curve encircles −1 counter-clockwise as often as L has poles right of the axis{own}. Poles of L on the "
+    "imaginary axis are passed on their right: there the curve turns clockwise through half a circle at infinity (a "
+    "quarter at a single pole at s = 0), drawn dashed beyond the rim, one arc for all that turn alike, with its number."
 )
-ONE_POLE = (
-    "L has one pole on the imaginary axis, at s = 0 (the rigid arm turning): there the contour steps to the right, and "
-    "the curve turns through a quarter circle at infinity, drawn dashed beyond the rim."
+MOST_SPILLED = 12  # flexible modes of the largest model that is put beside the exact loop
+CROSSINGS_CAPTION = (
+    "Every frequency up to the band where |L| = 1, with the phase margin there, above 0 for lag that the loop bears "
+    "and below 0 for lead; and every one where L is real and below 0, with the factor on the whole law that puts a "
+    "pole there."
 )
-ALL_POLES = (
-    "Without damping L has a pole on the imaginary axis at 0 and at every natural frequency. At each the contour steps "
-    "to the right, and the curve turns clockwise through half a circle at infinity, drawn dashed beyond the rim: "
-    "of the {count} poles up to {band} rad/s one arc for all that turn alike, with their number."
+BODE_CAPTION = (
+    "Diamonds: |L| = 1, with the phase margin there, green for lag and purple for lead. Dots: L is real and below 0, "
+    "and the dashed line is the way to −1, with the factor on the whole law that goes it."
 )
-HELD_POLES = (
-    "Without damping L has a pole on the imaginary axis at every natural frequency; past each the curve turns "
-    "clockwise through half a circle at infinity, drawn dashed beyond the rim, one arc for all that turn alike."
+SPILL_CAPTION = (
+    "What models of so many flexible modes say of the same law: how many poles are unstable, and the rightmost."
 )
-NO_POLE = "L has no pole on the imaginary axis."
+POLES_CAPTION = (
+    "Poles with Im s ≥ 0, those below the real axis being their mirror images. All of the box {box} 1/s are here, by "
+    "the winding number around it."
+)
+
+
+def verdict_fact(named: LawOnArm, found: Margins, more: str) -> Fact:
+    """The verdict, large, how many poles are unstable up to where, and what more is to be said beside it."""
+    it = found.stability
+    number = how_many(it.unstable_roots, "unstable pole")
+    count = "infinitely many unstable poles" if it.unstable_roots_infinite else number
+    beside = f"{count}, up to {significant(it.band, 5)} rad/s{more}"
+    return Fact(label=f"{named.name}: {named.gains}", value=it.verdict.upper(), beside=beside)
+
+
+def verdict_words(name: str, found: Margins) -> str:
+    """The verdict on the law of that name, what is known beyond the band, and what Lyapunov or the law's sign adds."""
+    it, loop = found.stability, found.stability.loop
+    free = it.poles.moving.size < it.poles.values.size
+    apart = ", the one at 0 that the hub angle leaves apart" if free else ""
+    if loop.gains is None:
+        signs = signs_of_loop(loop)
+        kind = f"it is {signs.kind}" if signs.kind else "no theorem on its sign helps"
+        theorem = f"Beside that, {kind}: {typeset(signs.reason)}."
+        theorem += "".join(f" Warning: {typeset(text)}." for text in loop.warnings)
+    else:
+        proof = lyapunov(loop.arm, loop.gains)
+        theorem = f"Lyapunov: {'proven' if proof.proven else 'no proof'}, {typeset(proof.reason)}."
+    poles = f"{how_many(it.unstable_roots, 'unstable pole')} up to {significant(it.band, 5)} rad/s"
+    return f"{name}: {it.verdict.upper()}, with {poles}{apart}; {typeset(it.tail)}. {theorem}"
+
+
+def margin_table(laws: Sequence[LawOnArm], found: Sequence[Margins], is_undamped: bool) -> Table:
+    """A row a quantity, the verdict first; for each law the exact value, that in the band, and where.
+
+    The caption says what a phase margin below 0 means, for each law that has one.
+    """
+    rows, leads = [list(_rows(each)) for each in found], ""
+    columns = [
+        Column("quantity", "quantity", of=[row[0] for row in rows[0]]),
+        Column("unit", "unit", of=[row[1] for row in rows[0]]),
+    ]
+    number = singly(lambda value: plain(value, 6) if value.is_integer() else significant(value, 5))
+    for named, each, part in zip(laws, found, rows, strict=True):
+        group, band = f"{named.name}: {named.gains}", each.in_band
+        for i, (key, title) in enumerate((("exact", "exact"), ("band", "in the band"), ("at_rad_s", "at rad/s")), 2):
+            columns.append(Column(f"{named.key}_{key}", title, of=[row[i] for row in part], digits=number, group=group))
+        if band is not None and band.phase < 0:
+            lead = f"{significant(band.phase, 5)} deg at {significant(band.at['phase'], 5)} rad/s"
+            leads += f" {upper(named.name)}: {lead} is lead; not an instability."
+    return Table(
+        stem="margins",
+        title="Verdict and margins",
+        caption=MARGINS_CAPTION.format(undamped=DELAY_UNDAMPED if is_undamped else "") + leads,
+        columns=tuple(columns),
+    )
+
+
+def _rows(found: Margins) -> Iterator[MarginRow]:
+    """The verdict before any margin."""
+    it, band = found.stability, found.in_band
+    count = math.inf if it.unstable_roots_infinite else float(it.unstable_roots)
+    yield "verdict", "", it.verdict, "", ""
+    yield "unstable poles", "", count, float(it.unstable_roots), ""
+    yield "band", "rad/s", "", it.band, ""
+    if band is None:
+        for name in QUANTITIES:
+            yield name, "", NOT_STABLE, "", ""
+        return
+    yield "gain margin, down", "factor", band.gain[0], "", ""
+    yield "gain margin, up", "factor", band.gain[1], "", ""
+    for name, row in zip(QUANTITIES[2:], margin_rows(found, band), strict=True):
+        yield name, row.column.unit, row.exact, row.in_band, row.at
+
+
+def window_table(laws: Sequence[LawOnArm], found: Sequence[Margins]) -> Table:
+    """A row a law and gain; none for the moment on a free pin, where it has no loop."""
+    rows = [
+        (law.name, each.stability.verdict, row)
+        for law, each in zip(laws, found, strict=True)
+        for row in gain_rows(each)
+        if row.gain != MOMENT_GAIN or not each.stability.loop.arm.has_massless_hub
+    ]
+    names, verdicts, gains = zip(*rows, strict=True)
+    open_ends = ((law.name, unsettled(each)) for law, each in zip(laws, found, strict=True))  # windows of a band
+    more = "".join(f" {upper(name)}: {typeset(text)}." for name, text in open_ends if text)
+    return Table(
+        stem="windows",
+        title="How far each gain may go alone",
+        caption=CAPTION_OF_WINDOWS + more,
+        columns=(Column("law", "law", of=names), Column("verdict", "verdict", of=verdicts), *WINDOW_COLUMNS),
+        record=gains,
+    )
+
+
+class PlotOfLaw(NamedTuple):
+    """One law's plot: its name, and the counted contour."""
+
+    named: LawOnArm
+    data: Nyquist
+
+
+def count_table(plots: Sequence[PlotOfLaw], names: Sequence[str]) -> Table:
+    """Verdict, encirclements and unstable poles of each law."""
+    whole = partial(Column, digits=singly(lambda n: str(n).replace("-", "−")))
+    unstable = partial(whole, group="unstable poles")
+    words = [
+        f"{it.verdict}{', infinitely many in all' * it.unstable_roots_infinite}" for it in (p.verdict for _, p in plots)
+    ]
+    return Table(
+        stem="nyquist-count",
+        title="Encirclements beside unstable poles",
+        caption=COUNT_CAPTION.format(open=NO_OPEN if not any(p.unstable_open for _, p in plots) else OWN_OPEN),
+        columns=(
+            Column("law", "law", of=names),
+            Column("verdict", "verdict", of=words),
+            whole("encirclements", "turns around −1", of="data.encirclements"),
+            unstable("unstable_by_nyquist", "by Nyquist", of="data.expected"),
+            unstable("unstable_in_box", "in a box", of="data.verdict.unstable_roots"),
+            unstable("on_axis_in_box", "undecided", of="data.on_axis"),
+            Column("band_rad_s", "up to", "rad/s", of="data.verdict.band", digits=singly(significant, 6)),
+        ),
+        record=list(plots),
+    )
+
+
+def curve_data(plots: Sequence[PlotOfLaw], stem: str = "nyquist-data") -> Table:
+    """L on the contour of every law."""
+    return nyquist_table(*(plot.data for plot in plots), stem=stem, laws=[plot.named.key for plot in plots])
 
 
 def no_loop_section(arm: Arm) -> PageSection:
@@ -91,189 +226,147 @@ def no_loop_section(arm: Arm) -> PageSection:
 # ------------------------------------------------------------ the map
 
 
-def map_section(arm: Arm, chain: Chain | None = None) -> PageSection:
-    """How high may the gains go?  And how high when the loop is sampled by the chain's clock?"""
-    data = map_of_arm(arm, chain)
-    picture = Picture(
-        stem="map",
-        title="The plane of both gains",
-        caption=_map_caption(data),
-        alt="Map of K1 and K2: the stable gains, and how many poles are unstable elsewhere; how far each gain may go "
-        "is said above.",
-        figure=draw_map_of_arm(data),
-        data=map_data(data),
-    )
-    words = (_answer(arm), _best_words(data))
-    return PageSection(
-        anchor="margins-map", title="How high may the gains go?", words=[w for w in words if w], blocks=(picture,)
-    )
-
-
-def _answer(arm: Arm) -> str:
-    """The windows of both gains through the default ones, in words."""
-    found = margins_of(arm, default_gains(arm))
-    start = f"With the default gains {typeset(default_words(arm))} the loop is {found.stability.verdict}"
-    across, up = PLANE
-    if any(found.windows[name].around is None for name in PLANE):
-        return f"{start}; the picture shows which gains are stable."
-    many = len(found.windows[up].all)
-    again = f" {up} has {many} separate stable windows at that {across}, listed below." if many > 1 else ""
-    more = {name: _room(found.windows[name], written_unit(name, arm)) for name in PLANE}
-    return f"{start}: at that {across}, {up} may {more[up]}; at that {up}, {across} may {more[across]}.{again}"
-
-
-def _room(windows: Windows, unit: str) -> str:
-    """How far a gain may go up and down: to an edge and what happens there, to where the search ends, or anywhere."""
-    assert windows.around is not None
-    ways = []
-    for value, way in zip(reversed(windows.around), ("up", "down"), strict=True):
-        place = f"{plain(value, 5)}{unit}"
-        if windows.end(value) == "no limit":
-            ways.append(f"go {way} without limit")
-        elif windows.end(value) == "search bound":
-            ways.append(f"go {way} with no limit found as far as {place}")
-        else:
-            ways.append(f"go {way} to {place}{_crossing_there(windows, value)}")
-    return ", and may ".join(ways)
-
-
-def _crossing_there(windows: Windows, value: float) -> str:
-    """What reaches the axis at that edge."""
-    crossing = next((each for each in windows.crossings if each.t == value), None)
-    if crossing is None:
-        return ""
-    if crossing.at == 0:
-        return ", where a real pole passes through 0"
-    if not np.isfinite(crossing.at):
-        return ", where every flexible mode crosses at once"
-    return f", where poles cross at {significant(crossing.at, 4)} rad/s"
-
-
-def _best_words(data: MapOfArm) -> str:
-    found = data.design
-    if found is None:
-        return ""
-    cut = " and ".join(
-        found.law.told(name, lambda gain: plain(gain, 4)) for name in found.at_bound if name not in found.at_limit
-    )
-    gains = " and ".join(found.law.told(name, lambda gain: significant(gain, 4), data.arm) for name in PLANE)
-    brief = data.briefs[-1]
-    words = typeset(brief.words)
-    sampled = f"{words[0].upper()}{words[1:]}" if brief.is_stable else f"But {words}"
-    edge = f" That is no optimum: the dotted frame cuts the search off at {cut}, and there is more beyond." * bool(cut)
-    return (
-        f"The best damping of the first {DESIGNED_MODES} modes that the sampled loop holds within the dotted frame is "
-        f"{significant(100 * found.value, 3)} % of critical, at {gains} (tfarm design), without a clock "
-        f"{found.verdict.verdict}.{edge} {sampled}."
-    )
-
-
-def _map_caption(data: MapOfArm) -> str:
-    proof = proof_words(data.arm)
-    unit = f"{plain(rate_unit(data.arm), 4)} {unit_of(RATE_GAIN, data.arm)}"
-    reach = ALL_MODES if data.region.is_known else UP_TO.format(band=significant(data.region.band, 5))
-    free = data.arm.has_rigid_mode
-    seen = MAP_SEEN.format(
-        band=significant(data.band, 5),
-        proof=proof,
-        unit=unit,
-        reach=reach,
-        apart=APART_FROM_HUB * free,
-        held=WITH_INERTIA * (not free),
-    )
-    sampled = SAMPLED_NOT_SEEN if data.sampled is None else SAMPLED_SEEN
-    clock = f"{plain(1e3 * data.chain.sampling.period)} ms"
-    modes = 0 if data.sampled is None else data.sampled.modes_used
-    deepest = plain(DEEPEST_MOMENT_GAIN * data.arm.input_per_torque, 4)
-    depth = "" if data.arm.loses_at_hub_alone else DEPTH_WORDS.format(deepest=deepest)  # by a theorem, however deep
-    return seen + sampled.format(clock=clock, modes=modes) + depth
-
-
-def proof_words(arm: Arm) -> str:
-    """What Lyapunov's argument proves in the plane of gains, as the margins' table says it of each law."""
-    if arm.is_uniform:
-        return PROOF if arm.is_undamped else NO_PROOF
-    if arm.input_lags:
-        return OF_LAG
-    if not arm.reads_hub_moment:
-        return OF_OTHER_GAUGE
-    if not arm.has_elastic_link:
-        return OF_DAMPED
-    whole, least = arm.input_per_torque, 0.0 - arm.rate_loss
-    return OF_ELASTIC.format(
-        whole=plain(whole, 5) + written_unit(MOMENT_GAIN, arm), least=plain(least, 5) + written_unit(RATE_GAIN, arm)
-    )
-
-
 # ------------------------------------------------------------ margins
 
 
-def margins_section(arm: Arm, chain: Chain | None = None) -> PageSection:
-    """The verdict on each law, continuous and at the chain's clock, then its margins."""
-    chain = Chain() if chain is None else chain
-    named = laws(arm, chain)
-    found = [margins_of(arm, each.law) for each in named]
-    both = list(zip(named, found, strict=True))
-    return PageSection(
-        anchor="margins",
-        title="Is the loop stable, and by how much?",
-        facts=[verdict_fact(each, it, f"; {brief_on(arm, each.law, chain).short}") for each, it in both],
-        words=[verdict_words(f"{upper(each.name)}, {each.gains}", it) for each, it in both],
-        blocks=(margin_table(named, found, arm.is_told_by_lyapunov), window_table(named, found)),
+def margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> PageSection:
+    """Verdict, margins, crossings and spillover of each case, with the verdict on its sampled loop."""
+    cases = continuous_cases(arm, chain, laws)
+    found = [margins_of(each.arm, each.law) for each in cases]
+    both = list(zip(cases, found, strict=True))
+    undamped = arm.is_told_by_lyapunov and all(it.stability.loop.gains is not None for it in found)
+    blocks: list[Picture | Table] = [_bode_picture(*each) for each in both]
+    if any(it.in_band is not None for it in found):
+        blocks.append(margin_table(cases, found, undamped))
+    blocks += [crossings_table(each, it) for each, it in both if it.in_band is not None]
+    if windowed := [(each, it) for each, it in both if it.windows]:
+        blocks.append(window_table([each for each, _ in windowed], [it for _, it in windowed]))
+    facts, words = [], []
+    for each, it in both:
+        far = "" if it.stability.is_known_beyond or it.stability.verdict == "unstable" else ", not known beyond"
+        facts.append(verdict_fact(each, it, f"{far}; {brief_on(each.arm, each.law, chain).short}"))
+        words.append(verdict_words(f"{upper(each.name)}, {each.gains}", it))
+        try:
+            spilled = spill(each.arm, each.any_law, MOST_SPILLED)
+        except TfarmError as error:
+            words.append(f"Spillover of {each.name} is not determined: {typeset(str(error))}.")
+            continue
+        words.append(f"Spillover of {each.name}: {typeset(spilled.in_words)}.")
+        blocks.append(spill_table(each, spilled))
+    title = "Is the loop stable, and by how much?"
+    return PageSection(anchor="margins", title=title, facts=facts, words=words, blocks=blocks)
+
+
+def _bode_picture(each: LawOnArm, found: Margins) -> Picture:
+    omega, L = loop_curve(found)
+    stem = f"{each.key.replace('_', '-')}-bode"
+    none = "" if found.in_band is not None else " No margin is marked: the loop is not stable, and has none."
+    columns = (
+        Column("omega_rad_s", "angular frequency", "rad/s", of=omega),
+        Column("re_L", "Re L", of=L.real),
+        Column("im_L", "Im L", of=L.imag),
+    )
+    return Picture(
+        stem=stem,
+        title=f"The loop function of {each.name}",
+        caption=(BODE_CAPTION if found.in_band is not None else "Size and phase of L(iω).") + none,
+        alt=f"Bode plot of the loop function of {each.name}, {found.stability.verdict}.",
+        figure=draw_loop(found, each.name),
+        data=Table(stem=f"{stem}-data", title=f"The loop function of {each.name}", columns=columns),
+    )
+
+
+def crossings_table(each: LawOnArm, found: Margins) -> Table:
+    """Every crossing of |L| = 1 and of L < 0 in the band, ascending."""
+    assert found.in_band is not None
+    rows = sorted(itertools.chain(*crossovers(found.in_band)), key=lambda row: row.omega_rad_s)
+    return Table(
+        stem=f"{each.key.replace('_', '-')}-crossings",
+        title=f"Every crossing of {each.name}",
+        caption=CROSSINGS_CAPTION if rows else "Nowhere in the band is |L| = 1, or L real and below 0.",
+        columns=CROSSOVERS,
+        record=rows,
+    )
+
+
+def spill_table(each: LawOnArm, found: Spill) -> Table:
+    """A row a model, what the exact loop says in the caption."""
+    return Table(
+        stem=f"{each.key.replace('_', '-')}-spill",
+        title=f"Models of few modes under {each.name}",
+        caption=f"{SPILL_CAPTION} {upper(typeset(found.in_words))}.",
+        columns=SPILL,
+        record=found,
     )
 
 
 # ------------------------------------------------------------ Nyquist
 
 
-def nyquist_section(arm: Arm, chain: Chain | None = None) -> PageSection:
-    """The loop function on a contour that hides nothing."""
-    named = laws(arm, Chain() if chain is None else chain)
-    plots = [PlotOfLaw(each, nyquist_of(margins_of(arm, each.law).stability)) for each in named]
-    every = [*plots, *_to_compare(arm)]
-    picture = Picture(
-        stem="nyquist",
-        title="Nyquist plots of the exact loop function",
-        caption=RINGS_CAPTION,
-        alt="; ".join(
-            f"{p.named.name}: {p.data.verdict.verdict}, {p.data.encirclements} encirclements of −1" for p in plots
-        ),
-        figure=draw_nyquist(arm.name, {plot.named.name: plot.data for plot in plots}),
-        data=curve_data(plots),
-    )  # fmt: skip
-    names = [f"{plot.named.name}: {plot.named.gains}" for plot in every]
-    answer = "; ".join(
-        f"{named.name}: {p.verdict.verdict}, {how_many(abs(p.encirclements), 'turn')} around −1 and "
-        f"{how_many(p.verdict.unstable_roots, 'unstable pole')}"
-        for named, p in plots
+def nyquist_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> PageSection:
+    """The loop function of each case on a contour that hides nothing, two in a picture, its encirclements counted."""
+    cases = continuous_cases(arm, chain, laws)
+    plots = [PlotOfLaw(each, nyquist_of(margins_of(each.arm, each.law).stability)) for each in cases]
+    counts = {}  # of each case: encirclements, poles of its own, and the unstable poles that follow
+    for named, found in plots:
+        own = f", {how_many(found.unstable_open, 'unstable pole')} of its own" if found.unstable_open else ""
+        poles = how_many(found.verdict.unstable_roots, "unstable pole")
+        turns = how_many(abs(found.encirclements), "encirclement")
+        counts[named.name] = f"{named.name}: {found.verdict.verdict}, {turns} of −1{own}, {poles} of the loop."
+    blocks: list[Picture | Table] = []
+    for first in range(0, len(plots), 2):
+        pair = plots[first : first + 2]
+        stem = "nyquist" if first == 0 else f"nyquist-{1 + first // 2}"
+        blocks.append(Picture(
+            stem=stem, title="Nyquist plots of the exact loop function", caption=RINGS_CAPTION,
+            alt="; ".join(counts[plot.named.name] for plot in pair),
+            figure=draw_nyquist(arm.name, {plot.named.name: plot.data for plot in pair}),
+            data=curve_data(pair, f"{stem}-data"),
+        ))  # fmt: skip
+    own = "" if any(plot.data.unstable_open for plot in plots) else ", which here is never"
+    names = [f"{plot.named.name}: {plot.named.gains}" for plot in plots]
+    words = [*map(upper, counts.values()), NYQUIST_WORDS.format(own=own)]
+    title = "Nyquist plot: encirclements of −1"
+    return PageSection(anchor="margins-nyquist", title=title, words=words, blocks=[*blocks, count_table(plots, names)])
+
+
+# ------------------------------------------------------------ poles
+
+
+def poles_of(cases: Sequence[LawOnArm]) -> tuple[list[str], list[Table]]:
+    """The first closed-loop poles of each case, complete in a box: the dominant one in words, and the tables."""
+    words, tables = [], []
+    for each in cases:
+        try:
+            poles = closed_loop_poles(each.arm, each.law)
+        except TfarmError as error:
+            words.append(f"{upper(each.name)}: poles not determined, {typeset(str(error))}.")
+            continue
+        moving = poles.moving
+        found = "no pole but those at 0 lies in the box"
+        if moving.size:
+            furthest = moving[int(np.argmax(moving.real))]
+            imaginary = f" ± {significant(furthest.imag, 6)} i" if furthest.imag else ""
+            found = f"rightmost pole {significant(furthest.real, 6)}{imaginary} 1/s"
+        words.append(f"{upper(each.name)}: {found}.")
+        tables.append(_poles_table(each, poles))
+    return words, tables
+
+
+def poles_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageSection:
+    """The closed-loop poles of the laws given."""
+    words, tables = poles_of(continuous_cases(arm, chain, laws))
+    return PageSection(anchor="locus", title="Closed-loop poles", words=words, blocks=tables)
+
+
+def _poles_table(each: LawOnArm, poles: Poles) -> Table:
+    """Poles with Im s >= 0, with their damping ratio."""
+    left, right, _, top = poles.box
+    box = f"{plain(left, 5)} < Re s < {plain(right, 5)} and |Im s| < {plain(top, 6)}"
+    return Table(
+        stem=f"{each.key.replace('_', '-')}-poles",
+        title=f"Closed-loop poles under {each.name}",
+        caption=POLES_CAPTION.format(box=box),
+        columns=POLE_COLUMNS,
+        record=poles.values.tolist(),
     )
-    words = (f"{upper(answer)}.", NYQUIST_WORDS.format(poles=_poles_words(plots[0].data)))
-    title = "Nyquist: does the loop function turn around −1?"
-    return PageSection(anchor="margins-nyquist", title=title, words=words, blocks=(picture, count_table(every, names)))
-
-
-def _to_compare(arm: Arm) -> list[PlotOfLaw]:
-    """An unstable law whose turns are counted too: K2 beyond its edge, on a free pin K1 < 0; none where neither counts.
-
-    K1 is small there: without inertia at the hub a large K1 < 0 drives poles unstable at any frequency.
-    """
-    law = default_gains(arm)
-    beyond = float(f"{TIMES_THE_EDGE * (edge_of_K2(arm, law) or arm.input_per_torque):.3g}")
-    drives = (
-        law.having(MOMENT_GAIN, max(UNSTABLE_K2 * arm.input_per_torque, beyond))
-        if has_loop(arm)
-        else law.having(RATE_GAIN, float(f"{-law[RATE_GAIN] / 10:.3g}"))
-    )
-    try:
-        return [PlotOfLaw(NamedLaw(TO_COMPARE, "unstable", drives), nyquist_of(stability(arm, drives)))]
-    except ConvergenceError:
-        return []
-
-
-def _poles_words(plot: Nyquist) -> str:
-    arm, count = plot.verdict.loop.arm, plot.poles.size
-    if not arm.is_undamped:
-        return ONE_POLE if count else NO_POLE
-    if not arm.has_rigid_mode:
-        return HELD_POLES
-    return ALL_POLES.format(count=count, band=significant(plot.verdict.band, 5))

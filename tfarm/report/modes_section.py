@@ -1,30 +1,59 @@
-"""Modes: the modal table, the shapes, the four beam theories side by side, and what each parameter does.
-
-The hub-locked frequencies of a rig beside its free ones, with and without what its hub loses.
-"""
+"""Modes: undamped, damped and hub-locked frequencies, shapes, the four beam theories, sensitivities."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from functools import partial
+from collections.abc import Mapping, Sequence
+from decimal import Decimal, localcontext
+from functools import lru_cache, partial
 
 import numpy as np
 
 import tfarm
 from tfarm.arm import Arm, Theory
 from tfarm.arrays import Real
-from tfarm.columns import REPORT, Column, Table
-from tfarm.digits import fixed, lined, listed, significant, singly
-from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.plots.shapes import DrawnMode, draw_differences, draw_shapes, shapes_of, theory_name
-from tfarm.report.damped_table import damped_table
-from tfarm.report.sections import PageSection, Picture
-from tfarm.report.trust_proofs import how_proven
-from tfarm.spectrum import Modes, answers
+from tfarm.columns import FILES, REPORT, Column, Table
+from tfarm.digits import fixed, lined, listed, plain, significant, singly
+from tfarm.errors import MISSING, CertificationError, ConvergenceError
+from tfarm.plots.shapes import SHAPE_POINTS, draw_differences, scaled, theory_name
+from tfarm.plots.shapes import modes as shapes_plot
+from tfarm.report.sections import PageSection, Picture, typeset
+from tfarm.spectrum import DampedModes, Modes, answers, damped_modes, modes
+from tfarm.spectrum.answers import DAMPED_MODE_COLUMNS, beyond_the_box
 from tfarm.spectrum.damped import damped_at_hub
 from tfarm.spectrum.table import hub_locked
 
+PROVEN_MODES, BRACKET_DIGITS = (
+    10,
+    20,
+)  # flexible modes of each arm, as its page lists them; five digits beyond a double's
+PLAIN_DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
+TWO_PI = Decimal("6.2831853071795864769252867665590057683943387987502")
+
+DAMPED_CAPTION = (
+    "Eigenvalues of the arm with its own damping, C = {C} s, each continued from the undamped mode of its number. "
+    "Each is enclosed in a disc of 12 digits that holds exactly one. All {count} eigenvalues with {left} < Re s < "
+    "{right} 1/s and |Im s| < {top} rad/s are listed (conjugates counted{rigid}): the argument principle in ball "
+    "arithmetic counts those in this box. {outside}Beyond any such box there are more: {beyond}."
+)
+NO_C_CAPTION = (
+    "Eigenvalues of the rig with what its hub, clamp and joint lose (C = {C} in the link), each continued from the "
+    "undamped mode of its number. Each is enclosed in a disc of 12 digits that holds exactly one. All {count} "
+    "eigenvalues with {left} < Re s < {right} 1/s and |Im s| < {top} rad/s are listed (conjugates counted{rigid}): the "
+    "argument principle in ball arithmetic counts those in this box. {outside}Beyond any such box there are more, at "
+    "ever higher frequency: {beyond}."
+)
+UNASSIGNED_NOTE = (
+    "Rows without a number are eigenvalues that continue from no mode for certain, named after the part of the drive "
+    "that sets them, where one does; a mode that is “not assigned” has one of them, or none in the box. "
+)
+NOT_LISTED = "Modes above {last} are not listed: their branches cannot be told apart. "
+OUTSIDE_NOTE = (
+    "Rows that are “outside” lie, with one eigenvalue or both, beyond the box: beside them others may exist that are "
+    "not listed. "
+)
+PROVEN_DIGITS = 12  # of an eigenvalue: more than a page prints of any
+BOX_WORDS = "in the box", "outside"
 TABLED_MODES, DRAWN_MODES = 10, 6  # as `tfarm modes` lists them; shapes in three rows of two
 SIMPLER: tuple[Theory, ...] = ("shear", "rayleigh", "euler-bernoulli")
 NEGLECTED = 5e-7  # a sensitivity that never exceeds this reads as zero
@@ -83,6 +112,60 @@ SWINGS = "; with its hub's own losses at {omega} rad/s, {ratio} % of critical"
 CREEPS = "; with its hub's own losses its first mode no longer swings"
 
 
+@lru_cache(maxsize=8)  # the arm's page and the page on trust speak of the same ones, and a proof takes seconds
+def proven_damped_modes(arm: Arm, count: int) -> DampedModes:
+    """The arm's first damped modes, each enclosed to 12 digits, none missing in their box.
+
+    Raises CertificationError where that cannot be proven, ConvergenceError where they cannot be told apart.
+    """
+    found = damped_modes(modes(arm, count))
+    found.certify(PROVEN_DIGITS)
+    return found
+
+
+def damped_table(undamped: Modes) -> Table:
+    """The table of the arm's damped modes, each number proven to 12 digits and printed to fewer."""
+    arm = undamped.arm
+    damped = proven_damped_modes(arm, int(undamped.index[-1]))
+    C, box = arm.damping, damped.box
+    edges = {"left": box.re_min, "right": box.re_max, "top": box.im_max}
+    resisted = damped.single.size - len(damped.others)
+    rigid = ""
+    if arm.has_rigid_mode:
+        rigid = ", with 0 twice" if damped.eigenvalues[0, 1] == 0 else ", with 0"
+    if arm.has_rigid_mode and resisted:
+        rigid = f", with 0 and the {significant(damped.single[0], 6)} 1/s to which friction resists the turning rig"
+    for each in damped.others:
+        rigid += f"; {significant(each, 6)} 1/s, of the motor's circuit, is one of no mode"
+    words = {name: plain(round(x)) if abs(x) >= 100 else plain(x, 3) for name, x in edges.items()}
+    every = np.concatenate([damped.eigenvalues, damped.unassigned_pairs])
+    inside = np.all(box.holds(every) | np.isnan(every), axis=1)
+    words_of = np.where(np.isnan(every[:, 0]), "-", np.where(inside, *BOX_WORDS))
+    notes = NOT_LISTED.format(last=damped.index[-1]) if damped.left_out else ""
+    if damped.unassigned or not damped.is_assigned.all():
+        notes += UNASSIGNED_NOTE
+    names = [*[MISSING] * len(damped.index), *(each.origin for each in damped.unassigned)]
+    origins = [Column("origin", of=names, on=(FILES,))] if damped.unassigned else []
+    return Table(
+        stem="damped-modes",
+        title="Damped modes",
+        caption=(DAMPED_CAPTION if C else NO_C_CAPTION).format(
+            C=plain(C),
+            count=damped.count,
+            rigid=rigid,
+            outside=("" if inside.all() else OUTSIDE_NOTE) + notes,
+            beyond=typeset(beyond_the_box(arm)),
+            **words,
+        ),
+        columns=(
+            *DAMPED_MODE_COLUMNS,
+            Column("complete", "list complete", of=words_of),
+            *origins,
+        ),
+        record=damped,
+    )
+
+
 def modes_section(arm: Arm) -> PageSection:
     """Everything about free vibration: at C = 0, and the eigenvalues at the arm's own C."""
     modes = tfarm.modes(arm, count=TABLED_MODES)
@@ -106,7 +189,7 @@ def modes_section(arm: Arm) -> PageSection:
             modal_table(modes),
             *([] if arm.is_uniform else [locked_table(modes)]),
             *damped,
-            _shapes(arm.name, shapes_of(modes, DRAWN_MODES)),
+            _shapes(tfarm.modes(arm, count=DRAWN_MODES)),
             theories_table(exact, theories, differences),
             _differences(arm.name, differences),
             sensitivity_table(modes),
@@ -151,18 +234,20 @@ def places(nodes: Real, length: float) -> tuple[str, ...]:
     return tuple(significant(float(x), 2) if x < near else fixed([float(x)], decimals)[0] for x in nodes)
 
 
-def _shapes(name: str, shapes: tuple[DrawnMode, ...]) -> Picture:
-    counts = ", ".join(str(len(shape.nodes)) for shape in shapes)
-    columns = [Column("x_m", "x", "m", of=shapes[0].x)]
+def _shapes(modes: Modes) -> Picture:
+    shapes = scaled(modes, DRAWN_MODES)
+    counts = ", ".join(str(len(modes.nodes[modes.index.tolist().index(number)])) for number in shapes)
+    columns = [Column("x_m", "x", "m", of=np.linspace(0.0, modes.arm.length, SHAPE_POINTS))]
     columns += [
-        Column(f"mode_{s.number}", f"mode {s.number}", of=np.round(s.w, answers.SHAPE_DIGITS - 1) + 0.0) for s in shapes
+        Column(f"mode_{number}", f"mode {number}", of=np.round(w, answers.SHAPE_DIGITS - 1) + 0.0)
+        for number, w in shapes.items()
     ]
     return Picture(
         stem="mode-shapes",
         title=f"Shapes of the first {len(shapes)} flexible modes",
         caption=MODE_SHAPES,
         alt=f"Mode shapes of the arm, modes 1 to {len(shapes)}; they have {counts} nodes between hub and tip.",
-        figure=draw_shapes(name, shapes),
+        figure=shapes_plot.figure(modes),
         data=Table(stem="mode-shapes-data", title="Mode shapes", columns=tuple(columns)),
     )
 
@@ -280,3 +365,31 @@ def _pair(key: str, group: str, omega: np.ndarray) -> list[Column]:
         Column(f"{key}_rad_s", "frequency", "rad/s", of=omega, digits=lined(8, 7), group=group),
         Column(f"{key}_hz", "", "Hz", of=omega / (2 * math.pi), digits=lined(8, 7), group=group),
     ]
+
+
+def how_proven(modes: Modes, cells: Sequence[str], cells_hz: Sequence[str]) -> str:
+    """Why every digit of these cells [rad/s] and [Hz] is right, or that this is not proven: a sentence or two."""
+    try:
+        proof = modes.certify(BRACKET_DIGITS)
+    except CertificationError as error:
+        return f"The digits are those of double precision, not proven: {error}."
+    rows = np.flatnonzero(modes.index > 0).tolist()
+    pairs = [((cells[row], cells_hz[row]), bracket) for row, bracket in zip(rows, proof.brackets, strict=True)]
+    if not all(rounds_to(w, bracket) and rounds_to(f, bracket, TWO_PI) for (w, f), bracket in pairs):
+        untold = f"in one of them rounding cannot be told at {BRACKET_DIGITS} digits"
+        return f"The digits are those of double precision; {untold}."
+    rigid = ", the rigid body included" if modes.arm.has_rigid_mode else ""
+    return (
+        "Every printed digit of the natural frequencies is proven: each lies between two numbers that round to it "
+        f"(bounds of {BRACKET_DIGITS} digits, ball arithmetic). So is the list: {proof.count} lie below "
+        f"{float(proof.below):.6g} rad/s{rigid}. The other columns come from double precision and show fewer digits "
+        "than it holds."
+    )
+
+
+def rounds_to(cell: str, bracket: tuple[str, str], divisor: Decimal = Decimal(1)) -> bool:
+    """Whether every number in the bracket, divided by the divisor, is rounded to what the cell shows."""
+    mantissa, _, power = cell.partition(" × 10")
+    shown = Decimal(mantissa.translate(PLAIN_DIGITS)).scaleb(int(power.translate(PLAIN_DIGITS) or 0))
+    with localcontext(prec=45):
+        return all((Decimal(end) / divisor).quantize(shown) == shown for end in bracket)

@@ -8,29 +8,20 @@ from dataclasses import dataclass, replace
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit
 from tfarm.columns import Column, Table
-from tfarm.comparing.regions import StableRegions, regions_table, stable_regions
 from tfarm.crossing import Window
 from tfarm.digits import how_many, plain, scientific, significant, singly
-from tfarm.dsp import Analysis, Chain, Simulation, Verdict, sampled_verdict
+from tfarm.dsp import Analysis, Chain, Verdict, sampled_verdict
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.dsp.crossings import around
 from tfarm.dsp.loci import STRONGER, SampledLoci, sampled_loci
 from tfarm.dsp.modes import SAMPLED_MODE_COLUMNS
-from tfarm.dsp.results import drawn, residual_moment_rms, settling_time
-from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.dsp.verdict import SampledNumber, at_periods, sampled
-from tfarm.errors import ParameterError
-from tfarm.plots.motion import draw_responses
-from tfarm.plots.regions import draw_overlay
+from tfarm.plots.regions import StableRegions, draw_overlay, regions_table, stable_regions
 from tfarm.plots.roots import draw_sampled_loci
-from tfarm.plots.style import safe
 from tfarm.records import record
-from tfarm.report.given_laws import GivenLaw, LawOnArm, cases_of, on_arm
-from tfarm.report.law_measured import measured_blocks
-from tfarm.report.loop_laws import has_loop, margins_of, what_holds, why_no_loop
-from tfarm.report.sections import Fact, PageSection, Picture
-from tfarm.report.time_responses import clipped_words, resolution_words, responses_table
-from tfarm.report.words import in_ms, residual_words, span, spans, typeset, upper
+from tfarm.report.cases import GivenLaw, LawOnArm, cases_of, has_loop, margins_of, on_hub, what_holds, why_no_loop
+from tfarm.report.motion import measured_blocks, slew
+from tfarm.report.sections import Fact, PageSection, Picture, in_ms, span, spans, typeset, upper
 
 MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict is given
 PAST_HUB = 1.25  # times the rate gain at which sampling alone makes the hub unstable: the end of its locus
@@ -56,10 +47,6 @@ OVERLAY_CAPTION = (
     "Sand: stability region of the continuous loop, with every mode. Blue: that of the sampled loop. {layers}{proven}"
     "Edges are exact crossings of the imaginary axis or the unit circle. Logarithmic axis: {rate} = 0 lies beyond its "
     "left end at {low}{beyond}."
-)
-SLEW_CAPTION = (
-    "A bang-bang slew with the rigid arm's feedforward. Dotted line: its end. Tip: deviation from a rigid arm on its "
-    "reference. "
 )
 NO_DAMPING_HELPS = "none up to 15 % of critical in the first mode"
 
@@ -119,8 +106,7 @@ def sampled_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> Pa
 def without_moment(arm: Arm, found: SampledCase) -> LawOnArm:
     """The gains of a case without the feedback of the root moment."""
     gains = found.analysis.loop.gains.having(MOMENT_GAIN, 0.0)
-    (each,) = on_arm(arm, (GivenLaw(gains),))
-    return replace(each, name=f"{MOMENT_GAIN} = 0", key="without")
+    return on_hub(arm, gains, f"{MOMENT_GAIN} = 0", "without")
 
 
 # ------------------------------------------------------------ verdict
@@ -360,45 +346,3 @@ def loci_table(data: SampledLoci, stem: str) -> Table:
 
 
 # ------------------------------------------------------------ in time
-
-
-def slew(arm: Arm, chain: Chain, cases: Sequence[LawOnArm]) -> tuple[list[Picture | Table], list[str]]:
-    """The slew of the chain under each case, and why one is not simulated."""
-    runs: dict[str, Simulation] = {}
-    words = []
-    for each in cases:
-        try:
-            runs[each.name] = drawn(each.arm, each.law, chain, "slew", RECORD_LENGTH * chain.slew.rise_time)
-        except ParameterError as error:
-            words.append(f"No slew of {each.name} is simulated: {typeset(str(error))}.")
-    simulated = [each for each in cases if each.name in runs]
-    if not simulated:
-        return [], words
-    driven = simulated[0].arm
-    if any(each.arm.input_unit != driven.input_unit for each in cases):
-        return [], [*words, "The controllers drive inputs of different units: their slews are not drawn together."]
-    what = f"{plain(chain.slew.travel_of(arm.reach), 3)} m of tip travel in {plain(chain.slew.rise_time, 3)} s"
-    shown = {safe(name): run for name, run in runs.items()}
-    figures = " ".join(slew_words(each, runs[each.name]) for each in simulated)
-    picture = Picture(
-        stem="sampled-slew",
-        title="The slew",
-        caption=f"{SLEW_CAPTION}{figures}{clipped_words(runs)}{resolution_words(runs.values())}",
-        alt=f"Root moment, tip and motor in a slew of {what}. {figures}",
-        figure=draw_responses(driven, shown, what),
-        data=responses_table("sampled-slew-data", "The slew in time", driven, {e.key: runs[e.name] for e in simulated}),
-    )
-    return [picture], words
-
-
-def slew_words(each: LawOnArm, run: Simulation) -> str:
-    """Residual moment, settling time and steady-state error of a slew."""
-    if run.stopped is not None:
-        return f"{upper(each.name)}: unstable; stopped at {significant(run.stopped.time, 3)} s, the arm folded up."
-    time = settling_time(run)
-    settled = f"settled at {significant(time, 3)} s" if math.isfinite(time) else "not settled within the record"
-    end = math.degrees(run.at_samples.hub_angle[-1] - run.scenario.hub_angle[-1])
-    return (
-        f"{upper(each.name)}: residual root moment {residual_words(residual_moment_rms(run))}, {settled}, hub error at "
-        f"the end {plain(end, 3)} deg."
-    )

@@ -14,8 +14,6 @@ from decimal import Decimal, localcontext
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import tfarm
 from tfarm.arm import Arm, HubFeedback
 from tfarm.columns import Column, Table
@@ -25,21 +23,15 @@ from tfarm.dsp.chain import file_text
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.plots.words import gains_words
-from tfarm.report.damped_table import PROVEN_DIGITS, proven_damped_modes
-from tfarm.report.kept import keep, kept
-from tfarm.report.loop_laws import has_loop
-from tfarm.report.words import typeset
+from tfarm.report.cards import keep, kept
+from tfarm.report.cases import has_loop
+from tfarm.report.modes_section import BRACKET_DIGITS, PROVEN_DIGITS, PROVEN_MODES, proven_damped_modes
+from tfarm.report.sections import typeset
 from tfarm.response.frequency import BAND_POINTS, worst_error
-from tfarm.spectrum import DampedModes, Modes
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum import DampedModes
+from tfarm.spectrum.table import default_gains
 
-PROVEN_MODES, BRACKET_DIGITS = (
-    10,
-    20,
-)  # flexible modes of each arm, as its page lists them; five digits beyond a double's
 PROVEN_OUTPUTS = ("root_moment", "tip_displacement")
-PLAIN_DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
-TWO_PI = Decimal("6.2831853071795864769252867665590057683943387987502")
 UNPROVEN = "not proven"
 DIGITS_CAPTION = (
     f"First {PROVEN_MODES} flexible modes at C = 0, angular frequency in rad/s. All {BRACKET_DIGITS} digits are "
@@ -174,34 +166,6 @@ def shared_digits(bracket: tuple[str, str], digits: int) -> str:
     lower = Decimal(bracket[0])
     with localcontext(prec=digits + 5):
         return f"{lower.quantize(Decimal(1).scaleb(lower.adjusted() - digits + 1)):f}"
-
-
-def how_proven(modes: Modes, cells: Sequence[str], cells_hz: Sequence[str]) -> str:
-    """Why every digit of these cells [rad/s] and [Hz] is right, or that this is not proven: a sentence or two."""
-    try:
-        proof = modes.certify(BRACKET_DIGITS)
-    except CertificationError as error:
-        return f"The digits are those of double precision, not proven: {error}."
-    rows = np.flatnonzero(modes.index > 0).tolist()
-    pairs = [((cells[row], cells_hz[row]), bracket) for row, bracket in zip(rows, proof.brackets, strict=True)]
-    if not all(rounds_to(w, bracket) and rounds_to(f, bracket, TWO_PI) for (w, f), bracket in pairs):
-        untold = f"in one of them rounding cannot be told at {BRACKET_DIGITS} digits"
-        return f"The digits are those of double precision; {untold}."
-    rigid = ", the rigid body included" if modes.arm.has_rigid_mode else ""
-    return (
-        "Every printed digit of the natural frequencies is proven: each lies between two numbers that round to it "
-        f"(bounds of {BRACKET_DIGITS} digits, ball arithmetic). So is the list: {proof.count} lie below "
-        f"{float(proof.below):.6g} rad/s{rigid}. The other columns come from double precision and show fewer digits "
-        "than it holds."
-    )
-
-
-def rounds_to(cell: str, bracket: tuple[str, str], divisor: Decimal = Decimal(1)) -> bool:
-    """Whether every number in the bracket, divided by the divisor, is rounded to what the cell shows."""
-    mantissa, _, power = cell.partition(" × 10")
-    shown = Decimal(mantissa.translate(PLAIN_DIGITS)).scaleb(int(power.translate(PLAIN_DIGITS) or 0))
-    with localcontext(prec=45):
-        return all((Decimal(end) / divisor).quantize(shown) == shown for end in bracket)
 
 
 def digits_table(proofs: Sequence[ArmProof]) -> Table:

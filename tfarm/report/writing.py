@@ -1,42 +1,160 @@
-"""From arms to a folder of pages: everything is made beside, and moved into place only when all of it is there."""
+"""From arms to a folder of pages: everything is made in a temporary folder, and moved into place when complete."""
 
 from __future__ import annotations
 
 import errno
 import os
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from tfarm.arm import Arm
+from tfarm.arm import PLANE, Arm
+from tfarm.columns import Table
+from tfarm.comparing import Comparison
+from tfarm.comparing.answers import compared_margins, compared_modes, compared_poles, side_words, unpaired_poles
 from tfarm.dsp import Chain
-from tfarm.errors import ParameterError, must_be_known
+from tfarm.errors import ParameterError, TfarmError, must_be_known
 from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
-from tfarm.report.card import written_cards
-from tfarm.report.frame import other_pages
-from tfarm.report.given_laws import GivenLaw, Subject, check_laws
-from tfarm.report.kept import COMPARISON_PAGE, kept_comparison
-from tfarm.report.live import ASSETS, LIVE_PAGE, is_live
-from tfarm.report.making import ReportProgress, make_all, pieces_of
-from tfarm.report.page import arm_page, file_of, index_page
-from tfarm.report.pieces import QUESTIONS
-from tfarm.report.sections import SavedSection
-from tfarm.report.trust import TRUST_FOLDER, write_trust
-from tfarm.report.trust_proofs import written_proofs
+from tfarm.plots.compared import comparison
+from tfarm.processes import may_start_processes, shared
+from tfarm.report.cards import COMPARISON_KIND, COMPARISON_PAGE, keep, kept_comparison, save_card, written_cards
+from tfarm.report.cases import GivenLaw, Subject, check_laws
+from tfarm.report.live import ASSETS, LIVE_PAGE, is_live, save_live, write_assets
+from tfarm.report.page import (
+    ARM_PIECES,
+    LAW_PIECES,
+    QUESTIONS,
+    Piece,
+    arm_page,
+    file_of,
+    index_page,
+    other_pages,
+    render,
+)
+from tfarm.report.sections import PageSection, Picture, SavedSection, save_section, typeset, upper
+from tfarm.report.trust import TRUST_FOLDER, Evidence, gather, write_trust
+from tfarm.report.trust_proofs import save_proof, written_proofs
 from tfarm.stopping import undone_if_stopped
 
+ReportProgress = Callable[[int, int, str], object]
+MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores as a small machine has
+WORTH_A_PROCESS = 8  # pieces for which a second process, which takes a second or two to start, is worth it
+CARD_WORK, CARD_ALONE_WORK = "card", "card alone"  # with the proofs of the arm, and without
+LIVE_WORK = "live loop"
+CARD_SECONDS = 0.9  # less than the modes, which share their proofs and are begun before
+PieceWork = tuple[int, int | str]  # which arm, which piece (or its card and proof)
+Made = SavedSection | Evidence | None
+EVIDENCE_WORK: PieceWork = (-1, "why trust this")  # of no arm
+SCRIPTS_WORK: PieceWork = (-1, "scripts of the live pages")
 Notice = Callable[[str], object]
-
 RESERVED_NAMES = (  # which no arm's folder may have
     "index.html", "README.md", "pictures", "bench.json", "trust", "data", "compare.html", "compare.json", ASSETS,
 )  # fmt: skip
-
-
 TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
 LEFT_OUT_OF = "{name}: the page leaves out “{title}” and says why: {why}"
+LEADING_MINUS = re.compile(r"^-(?=\d)")  # a minus sign before a number
+LEADING_OMEGA = re.compile(r"^w(?= of )")
+NUMBER_WORDS = {"inf": "∞", "-inf": "−∞", "-": "–"}
+DIFFERENCE_NOTE = "Differences are those of the second from the first, in per cent of the first, of angles in degrees."
+PAIRED_NOTE = "By the mode whose open-loop pole each is nearest to."
+UNPAIRED_NOTE = "Of a mode that has no oscillating pole on the other side, or of none."
+IN_Z_NOTE = "One of the laws is a law in z: both loops are compared at their samples, each pole z as s = ln(z)/T."
+AT_SAMPLES_NOTE = "Of the exact loop at its samples, with as many modes as its verdict takes."
+KNOWN_NOTE = (
+    "Exact: of the loop at every frequency. In the band: read up to the verdict's band, no exact value being known."
+)
+
+
+def make_all(
+    subjects: Sequence[Subject],
+    folders: Sequence[Path],
+    only: tuple[str, ...],
+    scripts: Path | None,
+    progress: ReportProgress | None,
+) -> tuple[list[list[SavedSection]], Evidence | None]:
+    """The sections of each arm's page, in the order of PIECES, and the evidence of a full report.
+
+    `scripts` is the folder that the live pages' scripts are made in.
+    """
+    tasks = [EVIDENCE_WORK] * (not only) + [SCRIPTS_WORK] * (scripts is not None)
+    for i, subject in enumerate(subjects):
+        suited = [(j, piece) for j, piece in enumerate(pieces_of(subject)) if piece.is_for(subject)]
+        tasks += [(i, j) for j, piece in suited if not only or any(map(piece.is_on, only))]
+        tasks += [(i, LIVE_WORK)] * (not only and is_live(subject))
+        tasks.append((i, CARD_ALONE_WORK if subject.laws and only else CARD_WORK))
+    done: dict[PieceWork, Made] = {}
+
+    def tell(running: Sequence[PieceWork]) -> None:
+        if progress is not None:
+            progress(len(done), len(tasks), ", ".join(_name_of(subjects, task) for task in running))
+
+    def work(task: PieceWork) -> Callable[[], Made]:
+        if task == EVIDENCE_WORK:
+            return gather
+        if task == SCRIPTS_WORK and scripts is not None:
+            return partial(write_assets, scripts)
+        return partial(make, subjects[task[0]], task[1], folders[task[0]])
+
+    def turn(task: PieceWork) -> tuple[int, float]:  # an arm after the other, and of each the longest work first
+        i, piece = task
+        if isinstance(piece, str):
+            return i, -CARD_SECONDS * (piece == CARD_WORK)
+        return i, -pieces_of(subjects[i])[piece].seconds
+
+    tell(())
+    if len(tasks) < WORTH_A_PROCESS or MOST_WORKERS == 1 or not may_start_processes():
+        for task in tasks:
+            tell([task])
+            done[task] = work(task)()
+    else:
+        ordered = {task: work(task) for task in sorted(tasks, key=turn)}
+        for task, result in shared(ordered, MOST_WORKERS, [__name__], tell):
+            done[task] = result  # noqa: PERF403  `tell` counts them meanwhile
+    tell(())
+    places = range(len(subjects))
+    sections = [[s for t in tasks if t[0] == i and isinstance(s := done[t], SavedSection)] for i in places]
+    evidence = done.get(EVIDENCE_WORK)
+    return sections, evidence if isinstance(evidence, Evidence) else None
+
+
+def make(subject: Subject, piece: int | str, folder: Path) -> Made:
+    """A section of an arm's page, or its card, proof or live page, saved in the arm's folder."""
+    if piece == LIVE_WORK:
+        save_live(subject, folder)
+        return None
+    if isinstance(piece, str):
+        save_card(subject.arm, folder, subject.laws, subject.chain)
+        if piece == CARD_WORK:
+            save_proof(subject.arm, folder, subject.chain)
+        return None
+    return save_section(section_or_why_not(pieces_of(subject)[piece], subject), folder)
+
+
+def pieces_of(subject: Subject) -> Sequence[Piece]:
+    """The sections of a page on this subject, in their order."""
+    return LAW_PIECES if subject.laws else ARM_PIECES
+
+
+def section_or_why_not(piece: Piece, subject: Subject) -> PageSection:
+    """The section, or in its place why tfarm could not make it of this arm; a bug of ours stays loud."""
+    try:
+        return piece.made(subject)
+    except TfarmError as error:
+        words = (f"This section could not be made for this arm: {typeset(str(error))}.",)
+        return PageSection(anchor=piece.anchor, title=upper(piece.name), words=words, failure=str(error))
+
+
+def _name_of(subjects: Sequence[Subject], task: PieceWork) -> str:
+    piece = task[1]
+    if task in (EVIDENCE_WORK, SCRIPTS_WORK):
+        return str(piece)
+    subject = subjects[task[0]]
+    return f"{subject.arm.name}: {piece if isinstance(piece, str) else pieces_of(subject)[piece].name}"
 
 
 def write(
@@ -219,3 +337,68 @@ def move_into(made: Path, folder: Path) -> None:
         place = folder / file.relative_to(made)
         place.parent.mkdir(exist_ok=True)
         os.replace(file, place)
+
+
+def write_comparison(found: Comparison, out: Path) -> Path:
+    """Write compare.html with its picture and tables to a folder: the page.  Raises ParameterError where it cannot.
+
+    It leads to the index and to the arms' own pages, as far as they are in the folder.  An index of reports that is
+    there leads to it from then on, and pages of its arms that are made later.
+    """
+    title, arms = f"{found.one.name} beside {found.other.name}", list(dict.fromkeys(s.arm.name for s in found.sides))
+    lead = "Two arms, exact." if found.is_of_arms else f"Two laws on {found.one.arm.name}, exact."
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with temporary_folder(out) as made:
+            saved = [save_section(section, made) for section in _sections(found)]
+            others = [("index.html", "all arms"), *((f"{name}/index.html", name) for name in arms)]
+            pages = [(file, name) for file, name in others if (out / file).is_file()]
+            page = render(COMPARISON_PAGE, title=title, lead=lead, sections=saved, pages=pages)
+            (made / COMPARISON_PAGE).write_text(page, encoding="utf-8", newline="")
+            keep(made, COMPARISON_KIND, {"title": title, "arms": arms})
+            if (out / "index.html").is_file():
+                trust = TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""
+                index = index_page(written_cards(out), trust=trust, compared=title)
+                (made / "index.html").write_text(index, encoding="utf-8", newline="")
+            move_into(made, out)
+    except OSError as error:
+        remedy = f"cannot be written to ({error.strerror or error}); give a folder that can"
+        raise ParameterError(key="--out", value=str(out), remedy=remedy) from None
+    return out / COMPARISON_PAGE
+
+
+def _sections(found: Comparison) -> Iterator[PageSection]:
+    words = [*(f"{typeset(side_words(side))}." for side in found.sides), *[IN_Z_NOTE] * found.is_sampled]
+    yield PageSection(anchor="verdicts", title="Verdicts", words=words)
+    curves = "exact response" if found.is_of_arms else "loop function"
+    plane = f"{' and '.join(PLANE)}, with exact edges"
+    if found.is_sampled:
+        plane = "further delay and a factor on its law, with exact edges"
+    elif found.regions is None:
+        plane = "a factor on each law and its delay, on a grid"
+    picture = Picture(
+        stem="comparison", title=f"{upper(curves)} and stable region", alt=f"{found.verdict}.",
+        caption=f"The {curves} of both over frequency, and where each loop is stable over {plane}; the points are the "
+        "laws.",
+        figure=comparison.figure(found),
+    )  # fmt: skip
+    yield PageSection(anchor="both", title="Both in one picture", blocks=(picture,))
+    if found.is_of_arms:
+        modes = _set(compared_modes(found), "modes", "Natural frequencies and damping", DIFFERENCE_NOTE)
+        yield PageSection(anchor="modes", title="Modes", blocks=(modes,))
+    poles = [_set(compared_poles(found), "poles", "Those that oscillate", f"{PAIRED_NOTE} {DIFFERENCE_NOTE}")]
+    if len(apart := unpaired_poles(found)):
+        poles.append(_set(apart, "unpaired-poles", "Poles of one side alone", UNPAIRED_NOTE))
+    yield PageSection(anchor="poles", title="Closed-loop poles", blocks=tuple(poles))
+    known = AT_SAMPLES_NOTE if found.is_sampled else KNOWN_NOTE
+    margins = _set(compared_margins(found), "margins", "How far from unstable", f"{known} {DIFFERENCE_NOTE}")
+    yield PageSection(anchor="margins", title="Margins", blocks=(margins,))
+
+
+def _set(table: Table, of: str, title: str, caption: str) -> Table:
+    """The table as pages show such: powers of ten, minus signs, infinity, and w in Greek."""
+    columns = []
+    for each in table.columns:
+        cells = [NUMBER_WORDS.get(cell) or LEADING_MINUS.sub("−", typeset(cell)) for cell in each.cells]
+        columns.append(replace(each, title=LEADING_OMEGA.sub("ω", each.title), shown=cells))
+    return replace(table, stem=f"compare-{of}", title=title, caption=caption, columns=tuple(columns), record=None)

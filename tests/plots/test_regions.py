@@ -7,11 +7,11 @@ import pytest
 
 import tfarm
 from tfarm.arm import HubFeedback
-from tfarm.comparing.regions import sampled_region
 from tfarm.dsp import Chain
 from tfarm.loop.plane import moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import stability
-from tfarm.report.live_data import live_data
+from tfarm.plots.regions import sampled_region
+from tfarm.report.live import live_data
 from tfarm.report.sampled_section import beyond_words
 
 LAB = tfarm.load("sasaki2012-lab")
