@@ -20,7 +20,7 @@ from tfarm.dsp.chain import Sampling
 from tfarm.dsp.sampled import sampled_loop
 from tfarm.dsp.verdict import sampled_brief
 from tfarm.errors import ConvergenceError
-from tfarm.loop import edges
+from tfarm.loop import plane as edges
 from tfarm.loop.loci import held_branches, loci
 from tfarm.loop.loop import Loop
 from tfarm.loop.nyquist import compressed, nyquist, nyquist_of
