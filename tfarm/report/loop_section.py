@@ -248,7 +248,7 @@ def margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> Pa
         facts.append(verdict_fact(each, it, f"{far}; {brief_on(each.arm, each.law, chain).short}"))
         words.append(verdict_words(f"{upper(each.name)}, {each.gains}", it))
         try:
-            spilled = spill(each.arm, each.any_law, MOST_SPILLED)
+            spilled = spill(each.arm, each.law, MOST_SPILLED)
         except TfarmError as error:
             words.append(f"Spillover of {each.name} is not determined: {typeset(str(error))}.")
             continue

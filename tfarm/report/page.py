@@ -25,7 +25,7 @@ from tfarm.errors import ParameterError
 from tfarm.glossary import GLOSSARY_TERMS, Term
 from tfarm.report.arm_section import arm_section, is_from_paper, paper_section
 from tfarm.report.assumptions_section import assumptions_section
-from tfarm.report.cases import Subject, continuous_laws, has_loop, has_rate_loop, on_arm, sign_words
+from tfarm.report.cases import Subject, has_loop, has_rate_loop, sign_words
 from tfarm.report.law_section import law_section
 from tfarm.report.locus_section import locus_section
 from tfarm.report.loop_section import margins_section, no_loop_section, nyquist_section, poles_section
@@ -87,7 +87,7 @@ class Piece:
         """Whether a page on this subject has the section."""
         if not self.suits(subject.arm) or not all(getattr(subject, part) for part in self.of):
             return False
-        return not self.in_s or bool(continuous_laws(on_arm(subject.arm, subject.laws)))
+        return not self.in_s or not all(as_law(each.law).is_discrete for each in subject.laws)
 
     def made(self, subject: Subject) -> PageSection:
         """The section."""
@@ -289,7 +289,7 @@ def arm_page(
         glossary=promises(),
         trust=trust,
         live=live,
-        summary=summary(arm, [each.given_name for each in subject.laws]),
+        summary=summary(arm, [each.name for each in subject.laws]),
         foot=foot(subject, only),
         has_proof=not (subject.laws and only),
     )
