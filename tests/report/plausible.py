@@ -16,12 +16,12 @@ import sys
 import tempfile
 import time
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 
 from tests import survey
+from tests.report.written import Links
 from tests.strategies import some_arm
 from tests.survey import Finding
 from tfarm import Arm
@@ -35,37 +35,14 @@ WRITE = (
 LONGEST = 1800.0  # s that one arm may take, on a machine that others use too
 
 
-class Words(HTMLParser):
-    """The text of a page, and the pictures that it names."""
-
-    def __init__(self, page: Path) -> None:
-        super().__init__()
-        self.text, self.pictures = "", list[str]()
-        self._hidden = 0
-        self.feed(page.read_text(encoding="utf-8"))
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self._hidden += tag in ("style", "footer")
-        if tag == "img":
-            self.pictures.append(str(dict(attrs)["src"]))
-
-    def handle_endtag(self, tag: str) -> None:
-        self._hidden -= tag in ("style", "footer")
-
-    def handle_data(self, data: str) -> None:
-        if not self._hidden:
-            self.text += data
-
-
 def contradictions(folder: Path) -> list[str]:
     """What is wrong with an arm's pages: sentences against the tables beside them."""
     found = []
     for page in sorted(folder.glob("*.html")):
-        words = Words(page)
-        found += [
-            f"{page.name}: {picture} is not there" for picture in words.pictures if not (folder / picture).is_file()
-        ]
-        found += [f"{page.name}: {odd[0]!r}" for odd in re.finditer(r"\bnan\b|Traceback|\d[eE][-+]\d\d", words.text)]
+        pictures = [each for each in Links(page).targets if each.endswith(".svg")]
+        found += [f"{page.name}: {each} is not there" for each in pictures if not (folder / each).is_file()]
+        text = re.sub(r"<(style|footer).*?</\1>|<[^>]*>", " ", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+        found += [f"{page.name}: {odd[0]!r}" for odd in re.finditer(r"\bnan\b|Traceback|\d[eE][-+]\d\d", text)]
     return [*found, *_of_the_loop(folder)]
 
 

@@ -198,12 +198,3 @@ def test_an_arm_that_cannot_turn_freely_has_no_samples():
     arm = tfarm.load("sasaki2012")
     with pytest.raises(tfarm.ParameterError, match="turns freely"):
         loop_panels(arm.having(payload_mass=math.inf), 1000.0)
-
-
-def test_a_page_that_cannot_be_made_says_why(tmp_path, monkeypatch):
-    def fails(*_):
-        raise tfarm.ConvergenceError("no digits left", 0.0, 1.0)
-
-    monkeypatch.setattr("tfarm.report.live.live_data", fails)
-    save_live(Subject(tfarm.load("sasaki2012"), Chain()), tmp_path)
-    assert "no digits left" in (tmp_path / "live.html").read_text(encoding="utf-8")

@@ -16,7 +16,7 @@ from tfarm.plots.files import save_figure
 from tfarm.plots.frequency import draw_card
 from tfarm.report.arm_section import headline_numbers
 from tfarm.report.cases import GivenLaw, LawOnArm, brief_on, cases_of, has_loop, margins_of
-from tfarm.report.page import QUESTIONS, Card, summary
+from tfarm.report.page import QUESTIONS, summary
 from tfarm.report.sections import PICTURES, Fact
 from tfarm.response.frequency import bode
 
@@ -94,16 +94,20 @@ def loop_cells(each: LawOnArm, chain: Chain) -> dict[str, str]:
     return cells
 
 
-def written_cards(out: Path) -> Sequence[Card]:
+def written_cards(out: Path) -> Sequence[Mapping[str, Any]]:
     """The cards of all arms in the folder of reports, by name; what is no card of ours is passed over."""
     return kept(out, "card", _card)
 
 
-def _card(read: dict[str, Any], folder: Path) -> Card | None:
-    """None for an arm that has no page."""
+def _card(read: dict[str, Any], folder: Path) -> Mapping[str, Any] | None:
+    """An arm as the index shows it, `loops` being rows of the table of arms; None for an arm that has no page."""
     pages = tuple((f"{page}.html", title) for page, title in PAGES.items() if (folder / f"{page}.html").is_file())
-    facts = [Fact(label=str(a), value=str(b), unit=str(c), beside=str(d)) for a, b, c, d in read["facts"]]
-    picture = "pictures/card.svg" if read.get("picture", "card.svg") else ""
-    loops = [{key: str(row.get(key, "")) for key in INDEX_COLUMNS} for row in read.get("loops") or [{}]]
-    card = Card(name=folder.name, summary=str(read["summary"]), facts=facts, pages=pages, picture=picture, loops=loops)
+    card = {
+        "name": folder.name,
+        "summary": str(read["summary"]),
+        "facts": [Fact(label=str(a), value=str(b), unit=str(c), beside=str(d)) for a, b, c, d in read["facts"]],
+        "pages": pages,
+        "picture": "pictures/card.svg" if read.get("picture", "card.svg") else "",
+        "loops": [{key: str(row.get(key, "")) for key in INDEX_COLUMNS} for row in read.get("loops") or [{}]],
+    }
     return card if pages else None

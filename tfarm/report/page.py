@@ -33,7 +33,7 @@ from tfarm.report.map_section import map_section
 from tfarm.report.modes_section import modes_section
 from tfarm.report.response_sections import bode_section, fit_section, measured_section
 from tfarm.report.sampled_section import sampled_section
-from tfarm.report.sections import Fact, PageSection, SavedBlock, SavedSection
+from tfarm.report.sections import PageSection, SavedBlock, SavedSection
 from tfarm.report.tuner_section import tuner_section
 from tfarm.tables.html import with_symbols
 
@@ -230,22 +230,6 @@ def other_pages(folder: Path, writing: Sequence[str], page: str) -> Sequence[tup
     return [(f"{name}.html", names[name]) for name in there if name != page]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Card:
-    """An arm on the index: its folder's name, a few numbers, its pages and whether there is a picture.
-
-    `loops` are rows of cells in the table of arms, one a law that its page is about, else of the default gains; all ""
-    where there is no loop.
-    """
-
-    name: str
-    summary: str
-    facts: Sequence[Fact]
-    pages: Sequence[tuple[str, str]]
-    picture: str
-    loops: Sequence[Mapping[str, str]]
-
-
 @cache
 def _templates() -> Environment:
     environment = Environment(
@@ -295,7 +279,7 @@ def arm_page(
     )
 
 
-def index_page(cards: Sequence[Card], *, trust: str, compared: str = "") -> str:
+def index_page(cards: Sequence[Mapping[str, Any]], *, trust: str, compared: str = "") -> str:
     """The page that leads to all others; `compared` is the title of the comparison beside it, if there is one."""
     return render("index.html", title="tfarm reports", cards=cards, trust=trust, compared=compared, looks=BADGES)
 

@@ -76,40 +76,23 @@ PUBLISHED_WORDS = (
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Shown:
-    """One equation of the paper on the page; `corrected` is empty where the print is right."""
-
-    anchor: str
-    equation: Markup
-    verdict: str
-    mark: str
-    words: str
-    printed: list[Markup]
-    corrected: list[Markup]
-    left_printed: str
-    left_corrected: str
-    evidence: Markup
-
-
-def shown_row(row: AuditRow) -> Shown:
-    """A row of the audit, typeset."""
-    mark, words = VERDICT_MARKS[row.verdict]
+def shown_row(row: AuditRow) -> dict[str, Any]:
+    """A row of the audit, typeset; `corrected` is empty where the print is right."""
     is_right = row.printed == row.corrected
-    texts = (row.printed_tex,) if is_right else (row.printed_tex, row.corrected_tex)
-    printed, corrected = (formulas(texts[0]), []) if is_right else compared_formulas(*texts)
-    return Shown(
-        anchor=anchor(row.equation),
-        equation=in_letters(row.equation),
-        verdict=row.verdict,
-        mark=mark,
-        words=words,
-        printed=printed,
-        corrected=corrected,
-        left_printed=_left(row.residual_printed),
-        left_corrected=_left(row.residual_corrected),
-        evidence=in_letters(row.evidence),
-    )
+    both = (row.printed_tex, row.corrected_tex)
+    printed, corrected = (formulas(both[0]), []) if is_right else compared_formulas(*both)
+    return {
+        "anchor": anchor(row.equation),
+        "equation": in_letters(row.equation),
+        "verdict": row.verdict,
+        "mark": VERDICT_MARKS[row.verdict][0],
+        "words": VERDICT_MARKS[row.verdict][1],
+        "printed": printed,
+        "corrected": corrected,
+        "left_printed": _left(row.residual_printed),
+        "left_corrected": _left(row.residual_corrected),
+        "evidence": in_letters(row.evidence),
+    }
 
 
 def in_letters(text: str) -> Markup:
