@@ -35,7 +35,7 @@ from tfarm.report.cases import continuous_cases, has_loop, margins_of, on_hub
 from tfarm.report.locus_section import _along, beyond_table
 from tfarm.report.loop_section import NOT_STABLE, margin_table, margins_section, verdict_fact
 from tfarm.report.map_section import draw_map_of_arm, map_data, map_of_arm, map_section
-from tfarm.spectrum.scales import PAPER_GAINS, default_gains
+from tfarm.spectrum.table import PAPER_GAINS, default_gains
 from tfarm.tables.files import as_json
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))

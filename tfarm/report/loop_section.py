@@ -32,7 +32,7 @@ from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.loop.spill import SPILL, Spill, spill
 from tfarm.loop.theorem import signs_of_loop
 from tfarm.plots.disc import draw_nyquist
-from tfarm.plots.loop import draw_loop
+from tfarm.plots.frequency import draw_loop
 from tfarm.report.cases import GivenLaw, LawOnArm, brief_on, continuous_cases, margins_of, why_no_loop
 from tfarm.report.sections import Fact, PageSection, Picture, typeset, upper
 

@@ -10,23 +10,21 @@ import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, Arm
 from tfarm.columns import Column, Table
-from tfarm.comparing.regions import stable_regions
 from tfarm.digits import how_many, lined, plain, significant, singly, worded
 from tfarm.dsp import Chain, Simulation
 from tfarm.dsp.results import ideal_chain
 from tfarm.dsp.traces import away, resolved
 from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.plots.learning import draw_curves, draw_gain
-from tfarm.plots.motion import draw_responses
+from tfarm.plots.motion import draw_curves, draw_gain, slew
+from tfarm.plots.regions import stable_regions
 from tfarm.records import record
 from tfarm.report.cases import has_loop, what_holds, why_no_loop
 from tfarm.report.motion import clipped_words, resolution_words, responses_table
 from tfarm.report.sampled_section import chain_words
 from tfarm.report.sections import Fact, PageSection, Picture, typeset
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 from tfarm.tuner import LearningCurves, Plan, Tuning, compare_controllers, learning_curves, tried_loops, tune
-from tfarm.tuner.baselines import CONSTANT_GAINS, tried_gains
-from tfarm.tuner.comparison import Outcomes, quantised_chain
+from tfarm.tuner.baselines import CONSTANT_GAINS, Outcomes, quantised_chain, tried_gains
 from tfarm.tuner.training import QUARTILES
 from tfarm.tuner.tuning import tip_errors, usual_plan
 
@@ -342,7 +340,7 @@ def _slew_picture(data: TunerNumbers) -> Picture:
             f"{resolution_words(data.slews.values())}"
         ),
         alt="Root moment, tip and motor torque of the slew, without and with the tuner.",
-        figure=draw_responses(data.arm, data.slews, "the slew, ideal converters"),
+        figure=slew.figure(data.arm, data.slews, "the slew, ideal converters"),
         data=_signals(data.slews, data.arm, "tune-slew-data"),
     )
 
@@ -359,7 +357,7 @@ def _coarse_picture(data: TunerNumbers) -> Picture:
             f"{clipped_words(data.coarse)}{resolution_words(data.coarse.values())}"
         ),
         alt="Root moment, tip and motor torque of the slew with converters and delay, without and with the tuner.",
-        figure=draw_responses(data.arm, data.coarse, "the slew, with converters and delay"),
+        figure=slew.figure(data.arm, data.coarse, "the slew, with converters and delay"),
         data=_signals(data.coarse, data.arm, "tune-dsp-data"),
     )
 
