@@ -72,8 +72,8 @@ def test_a_determinant_has_bars_as_high_as_it():
 
 
 def test_infinity_is_no_operator_and_plus_minus_is_one():
-    (line,) = formulas(r"x = \pm \sqrt{a \pm b},\quad y < \infty")
-    tags = [(leaf.tag, leaf.get("form")) for leaf in leaves([line]) if leaf.text in "±∞"]
+    lines = formulas(r"x = \pm \sqrt{a \pm b},\quad y < \infty")
+    tags = [(leaf.tag, leaf.get("form")) for leaf in leaves(lines) if leaf.text in "±∞"]
     assert tags == [("mo", "prefix"), ("mo", "infix"), ("mi", None)]
 
 

@@ -206,7 +206,7 @@ def _intervals(arm: Arm) -> str:
     """The verdict on the default gains, and the stability interval of each."""
     found = margins_of(arm, default_gains(arm))
     rows = [row for row in gain_rows(found) if row.gain in PLANE]
-    spans = (f"{row.gain}{written_unit(row.gain, arm)} {' '.join(row.spans(plain, 5, *row.windows.all)) or 'none'}"
+    spans = (f"{row.gain} in {' '.join(row.spans(plain, 5, *row.windows.all)) or 'none'}{written_unit(row.gain, arm)}"
              for row in rows)  # fmt: skip
     return (
         f"With the default gains {typeset(default_words(arm))} the loop is {found.stability.verdict}. Stability "

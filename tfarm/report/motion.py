@@ -135,9 +135,8 @@ def overshoot_table(found: Mapping[str, Beside]) -> Table:
         values = [quantity(it.measured, *signals(it)) for it in found.values()]
         name = f"{key}_{which}_{unit.replace('%', 'percent').replace(' ', '_')}"
         columns.append(Column(name, which, unit, of=values, digits=three, group=title))
-    columns.append(
-        Column("apart_rms_deg", "apart, rms", "deg", of=lambda it: math.degrees(it.difference_rms), digits=three)
-    )
+    apart = [math.degrees(it.difference_rms) for it in found.values()]
+    columns.append(Column("apart_rms_deg", "apart, rms", "deg", of=apart, digits=three))
     return Table(
         stem="sampled-overshoot",
         title="Measured and computed, in numbers",
