@@ -16,7 +16,7 @@ from tfarm.errors import ConvergenceError, one_line
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.recording import MeasuredRun
-from tfarm.loop.law_answers import sign_of
+from tfarm.loop.answers import sign_of
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import Margins, margins
 from tfarm.plots.words import gains_words
