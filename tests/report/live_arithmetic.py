@@ -72,7 +72,7 @@ class Page:
         return found + (law.Kp * (law.K1 + loss) < 0)
 
     def _crossed(self, start, end):
-        way = end.plus(start, -1.0)
+        way = HubFeedback(**{name: end[name] - start[name] for name in start.by_name})
 
         def both(w):
             D, N = self.parts(w, start)
