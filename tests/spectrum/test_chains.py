@@ -10,7 +10,7 @@ import pytest
 import tfarm
 from tests.rigs import some_rig
 from tests.shared import sized, thinned
-from tests.spectrum.chains import judge, judge_damped
+from tests.spectrum.chains import judge
 from tests.test_chain_elements import lossless
 from tests.test_transition import rig
 from tests.transition import response
@@ -32,13 +32,6 @@ def test_twenty_frequencies_of_random_rigs(count):
     verdicts = [judge(arm, certify=n == 0) for n, arm in enumerate(rigs(11, count, damped=False))]
     assert [each.reason for each in verdicts if each.outcome != "right"] == []
     assert max(each.distance for each in verdicts) < 1e-8
-
-
-@pytest.mark.parametrize("count", sized(2, 3))
-def test_damped_modes_of_random_rigs(count):
-    verdicts = [judge_damped(arm, 3, certify=n == 1) for n, arm in enumerate(rigs(6, count, damped=True, segments=2))]
-    assert [each.reason for each in verdicts if each.outcome != "right"] == []
-    assert sum(each.inside for each in verdicts) >= 3
 
 
 def test_a_prescribed_angle_has_the_modes_of_a_locked_hub():

@@ -20,17 +20,9 @@ EPS = np.finfo(float).eps
 
 def steel(slenderness, *, hub=0.0, mass=math.inf, inertia=0.0):
     return arm_of(
-        length=1.0,
-        slenderness=slenderness,
-        width=1.0,
-        density=7800.0,
-        E=2e11,
-        nu=0.3,
-        damping=0.0,
-        hub=hub,
-        mass=mass,
-        inertia=inertia,
-    )
+        length=1.0, slenderness=slenderness, width=1.0, density=7800.0, E=2e11, nu=0.3, damping=0.0,
+        hub=hub, mass=mass, inertia=inertia,
+    )  # fmt: skip
 
 
 def pinned_pinned(arm, n):
@@ -83,6 +75,8 @@ def test_the_mode_at_the_cut_off():
     x = np.linspace(0, 1, 11)
     assert abs(modes.shape(x)[row]).max() < 64 * EPS * abs(modes.rotation(x)[row]).max()
     np.testing.assert_allclose(modes.rotation(x)[row], 1 / math.sqrt(arm.link.rhoI), rtol=64 * EPS)
+    assert modes.nodes[row].size == 0
+    assert modes.nodes[row - 1].size > 0
 
 
 @pytest.mark.parametrize("inertia", [1e-9, 1e-7, 1e-5])

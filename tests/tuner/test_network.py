@@ -76,18 +76,6 @@ def test_weights_that_do_not_fit_are_refused(change, key):
     assert caught.value.key == key
 
 
-@pytest.mark.parametrize("seed", [-1, 1.5, True])
-def test_seeds_are_whole(seed):
-    with pytest.raises(ParameterError, match="seed"):
-        initial_network(seed)
-
-
-@pytest.mark.parametrize("hidden", [0, 1001, 2.0])
-def test_neurons_are_whole(hidden):
-    with pytest.raises(ParameterError, match="hidden"):
-        initial_network(0, hidden=hidden)
-
-
 @pytest.fixture(scope="module")
 def tuning():
     return tune(tfarm.load("sasaki2012-lab"), Plan(trials=3, seed=11, seventh_input=True, guard="frozen"))
