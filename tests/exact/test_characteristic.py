@@ -22,7 +22,6 @@ from tfarm.exact.characteristic import (
     characteristic_ball,
     characteristic_over,
     gains_of,
-    loop_system,
     quick_characteristics,
     tangent,
     zeros_at_origin,
@@ -119,7 +118,7 @@ def test_slopes_are_derivatives_of_the_values() -> None:
 @pytest.mark.parametrize("at_zero", [0, 1, 2])
 def test_the_quick_function_is_the_other_without_its_zeros_at_rest(name, at_zero) -> None:
     """Values to rounding and slopes to what differences give: of one link and of a chain."""
-    k, s = loop_system(tfarm.load(name)), np.array([1e-3j, 2.0, -3 + 40j, 2 + 900j, -80 + 5e3j])
+    k, s = system_of(tfarm.load(name)), np.array([1e-3j, 2.0, -3 + 40j, 2 + 900j, -80 + 5e3j])
     gains = gains_of(k, HubFeedback(K1=0.3, K2=0.4))
     exact, quick = characteristic(k, s, gains, at_zero), quick_characteristic(k, s, gains, at_zero)
     ratio = quick.value * np.exp(quick.scale - exact.scale) / exact.value
@@ -130,7 +129,7 @@ def test_the_quick_function_is_the_other_without_its_zeros_at_rest(name, at_zero
 @pytest.mark.parametrize("name", ["sasaki2012-lab", "tests/rigs/bench-rig.toml"])
 def test_with_its_zero_at_rest_divided_out_the_function_is_its_limit_there(name) -> None:
     """(K1 + what the hub loses) theta, not 0: else a box would hold a pole at rest twice."""
-    k = loop_system(tfarm.load(name))
+    k = system_of(tfarm.load(name))
     gains, rest = gains_of(k, HubFeedback(K1=0.3, K2=0.4)), np.array([0j, 1e-9])
     assert zeros_at_origin(k, gains) == 1
     for at in (characteristic(k, rest, gains, 1), quick_characteristic(k, rest, gains, 1)):

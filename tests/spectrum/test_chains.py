@@ -48,7 +48,8 @@ def test_shapes_are_orthogonal_and_of_unit_mass(seed):
     """The mass matrix is the identity, and behind a rigid clamp the root moves with the radius."""
     arm = some_rig(np.random.default_rng([13, seed]), damped=False)
     table = tfarm.modes(arm, 8)
-    assert table.orthogonality() < 1e-9
+    mass = table._shapes.mass_matrix()
+    assert abs(mass - np.eye(len(mass))).max() < 1e-9
     flexible = table.index > 0
     W, Psi = table.shape(0.0)[flexible], table.rotation(0.0)[flexible]
     if arm.clamp.is_rigid:

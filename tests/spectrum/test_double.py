@@ -25,6 +25,12 @@ def steel(slenderness, *, hub=0.0, mass=math.inf, inertia=0.0):
     )  # fmt: skip
 
 
+def orthogonality(modes):
+    """The largest entry of the flexible modes' mass matrix less the identity."""
+    mass = modes._shapes.mass_matrix()
+    return abs(mass - np.eye(len(mass))).max()
+
+
 def pinned_pinned(arm, n):
     """Both frequencies of half wave n: rhoI/kGA w^4 - (1 + q (EI/kGA + rhoI/rhoA)) w^2 + q^2 EI/rhoA = 0."""
     link, q = arm.link, (n * math.pi / arm.link.length) ** 2
@@ -59,7 +65,7 @@ def test_where_the_two_spectra_cross_both_are_listed(bending, shear):
     pair = abs(modes.natural_frequency / omega - 1) < 1e-14
     assert pair.sum() == 2
     x = np.linspace(0, 1, 9)
-    assert modes.orthogonality() < 1e4 * EPS
+    assert orthogonality(modes) < 1e4 * EPS
     shapes = modes.shape(x)[pair]
     for half_waves in (bending, shear):  # both lie in the plane of the two
         wave = np.sin(half_waves * math.pi * x)
@@ -123,10 +129,10 @@ def test_a_true_crossing_of_symmetric_and_antisymmetric_modes():
         k = system_of(modes.arm)
         assert brackets(k, lower, 8)
         assert brackets(k, upper, 8)
-        assert modes.orthogonality() < 1e4 * EPS
+        assert orthogonality(modes) < 1e4 * EPS
     at = tfarm.modes(clamped(crossing), 22)
     assert at.natural_frequency[-1] / at.natural_frequency[-2] - 1 < 8 * EPS
-    assert at.orthogonality() < 1e4 * EPS
+    assert orthogonality(at) < 1e4 * EPS
 
 
 def test_a_double_frequency_is_a_double_zero_of_the_drive():

@@ -118,7 +118,7 @@ def slow_values(method: Method, arm: Arm, k: System, wanted: Sequence[Output], s
 
     must_be_of_appendix(arm, arm.theory, wanted)
 
-    def by_cramer(each: Output, at: complex) -> complex:
-        return complex(appendix.response(arm, each, at, APPENDIX_DIGITS, x * arm.link.length))
-
-    return np.array([[by_cramer(each, complex(at)) for at in s] for each in wanted])
+    place = x * arm.link.length
+    return np.array(
+        [[complex(appendix.response(arm, each, complex(at), APPENDIX_DIGITS, place)) for at in s] for each in wanted]
+    )

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossing, Crossings, crossed
-from tfarm.exact.characteristic import gains_of, loop_parts, loop_system, torque
-from tfarm.exact.system import System
+from tfarm.exact.characteristic import gains_of, loop_parts, torque
+from tfarm.exact.system import System, system_of
 from tfarm.spectrum import flexible_frequencies, modes
 
 from .frequencies import grid
@@ -55,7 +55,7 @@ def along(name: str, law: HubFeedback) -> Line:
 
 def line_crossings(arm: Arm, line: Line, band: float) -> Crossings:
     """All crossings of the imaginary axis at frequencies `at` up to `band` [rad/s], ascending in t."""
-    k, unit, found = loop_system(arm), line.length, static_crossings(arm, line)
+    k, unit, found = system_of(arm), line.length, static_crossings(arm, line)
     if unit:
         unified = Line(line.base, NO_FEEDBACK.plus(line.direction, 1 / unit))
         t, at, change = crossed(np.asarray(grid(arm, band)), lambda w: line_parts(k, unified, 1j * w))
@@ -89,7 +89,7 @@ def crossing_at_zero(arm: Arm, line: Line) -> Crossing | None:
     """
     if not arm.has_rigid_mode:
         small = NEARLY_AT_REST * float(modes(arm, 1).natural_frequency[-1])
-        return through_origin(*line_parts(loop_system(arm), line, small * np.array([1 + 0j, 0.5])))
+        return through_origin(*line_parts(system_of(arm), line, small * np.array([1 + 0j, 0.5])))
     base, way = (slow_terms(arm, law).tolist() for law in (line.base, line.direction))
     if way[0]:
         t = -base[0] / way[0] + 0.0

@@ -20,7 +20,8 @@ import numpy as np
 from tfarm.arm import AT_HUB, FED_BACK, Arm
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.exact.characteristic import float_units, loop_parts, loop_system
+from tfarm.exact.characteristic import float_units, loop_parts
+from tfarm.exact.system import system_of
 from tfarm.records import record
 
 from .frequencies import steep_places
@@ -88,7 +89,7 @@ def _panel(arm: Arm, low: float, high: float) -> tuple[Complex, float]:
 
     Without losses they are real but for rounding, which is taken off: next to a resonance it would be a loss.
     """
-    middle, half, k = (low + high) / 2, (high - low) / 2, loop_system(arm)
+    middle, half, k = (low + high) / 2, (high - low) / 2, system_of(arm)
     s = 1j * (middle + half * np.r_[CHEBYSHEV, BETWEEN_SAMPLES])
     drive, numerators, scale = loop_parts(k, s)
     theta, _, gauge = (float_units(k) * numerators)[[FED_BACK.index(output) for output in AT_HUB]]

@@ -176,11 +176,6 @@ class Modes:
         rigid: tuple[Real, ...] = (np.empty(0),) * self._rigid
         return rigid + tuple(self._nodes(mode) * float(self._k.length) for mode in range(len(self) - self._rigid))
 
-    def orthogonality(self) -> float:
-        """The largest entry of (modal mass matrix - identity), over the flexible modes: rounding, if all is well."""
-        mass = self._shapes.mass_matrix()
-        return float(abs(mass - np.eye(len(mass))).max())
-
     # ------------------------------------------------------------ sensitivities
 
     @cached_property
