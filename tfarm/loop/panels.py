@@ -204,7 +204,7 @@ class _Panels:
         low, high = edges[:-1].copy(), edges[1:]
         low[0] = -high[0] if unit == 1j else 0.0
         s = unit * ((low + high)[:, None] / 2 + (high - low)[:, None] / 2 * np.r_[CHEBYSHEV, BETWEEN_SAMPLES])
-        parts = loop_parts(loop_system(arm), s.ravel())
+        parts = loop_parts(system_of(arm), s.ravel())
         drive, scale = parts.drive.reshape(s.shape), parts.scale.reshape(s.shape)
         factor = drive / s ** POWERS_AT_REST[sensor] * np.exp(scale - scale.real.max(axis=1, keepdims=True))
         return cls(unit, low, high, s, factor, arm.is_reactive)
