@@ -14,8 +14,8 @@ import pytest
 import tfarm
 from tfarm.errors import ParameterError
 from tfarm.tuner import Network, Plan, initial_network, kernel, load_tuner, save_tuner, tune
-from tfarm.tuner.controller import to_text
 from tfarm.tuner.kernel import Limits
+from tfarm.tuner.trial import to_text
 
 
 def test_the_first_weights_are_uniform_and_repeatable():

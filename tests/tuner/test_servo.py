@@ -24,10 +24,9 @@ from tfarm.tuner import (
     slew_trial,
     tune,
 )
-from tfarm.tuner.controller import to_text
 from tfarm.tuner.guard import RADIUS_SHARE, MovingGain
 from tfarm.tuner.kernel import Limits
-from tfarm.tuner.trial import usual_rate_gain
+from tfarm.tuner.trial import to_text, usual_rate_gain
 
 LAB = tfarm.load("sasaki2012-lab")
 KP, K1 = 10.0, 3.6
