@@ -9,6 +9,8 @@ import control
 import numpy as np
 from scipy.optimize import brentq
 
+from tfarm import HubFeedback
+
 POINTS = 24
 X = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
 TO_SERIES = np.cos(np.outer(np.arange(POINTS), np.arccos(X))) * 2 / POINTS
