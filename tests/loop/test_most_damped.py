@@ -5,7 +5,7 @@ import pytest
 
 import tfarm
 from tfarm.loop.most_damped import damping_ratios, most_damped
-from tfarm.spectrum.scales import default_gains, rate_unit
+from tfarm.spectrum.table import default_gains, rate_unit
 
 LAB = tfarm.load("sasaki2012-lab")
 LAW = default_gains(LAB)

@@ -20,7 +20,7 @@ from tfarm.loop.plane import INFINITE, between, gain_map, ranges_of
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 

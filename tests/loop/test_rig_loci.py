@@ -16,7 +16,7 @@ from tfarm.loop.locus import locus
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.reduced_locus import reduced_locus
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 PAPER, LAB, FLEX = (tfarm.load(name) for name in ("sasaki2012", "sasaki2012-lab", "quanser-flexlink"))
 MOTOR = Motor(resistance=2.6, torque_constant=0.0077, inductance=0.02, gear_ratio=70, rotor_inertia=1e-6)

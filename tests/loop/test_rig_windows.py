@@ -9,7 +9,7 @@ from tests.shell import run
 from tfarm.loop.answers import margins_answer
 from tfarm.loop.lines import along, line_crossings
 from tfarm.loop.margins import margins
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 
 def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():

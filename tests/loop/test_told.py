@@ -26,7 +26,7 @@ from tfarm.loop.panels import CHEBYSHEV, loop_panels
 from tfarm.loop.plane import plane
 from tfarm.loop.poles import slow_poles
 from tfarm.loop.stability import stability
-from tfarm.spectrum.scales import rate_unit
+from tfarm.spectrum.table import rate_unit
 
 LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 LAWS = {"stable": HubFeedback(K1=0.3, K2=0.3), "unstable": HubFeedback(K1=0.3, K2=1.5)}

@@ -18,7 +18,7 @@ from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import looked_at, windows_of
-from tfarm.spectrum.scales import most_gain
+from tfarm.spectrum.table import most_gain
 
 LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 

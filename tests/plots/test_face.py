@@ -19,7 +19,7 @@ from tfarm.fitting.data import Measured
 from tfarm.loop.nyquist import compressed
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.plots.plane import colours
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 from tfarm.tuner import Plan
 
 mpl.use("Agg")

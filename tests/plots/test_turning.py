@@ -14,7 +14,7 @@ from tfarm.loop.poles import poles_below
 from tfarm.plots import locus as locus_plot
 from tfarm.plots.regions import sampled_region
 from tfarm.plots.roots import draw_sampled_loci
-from tfarm.spectrum.scales import default_gains, rate_unit
+from tfarm.spectrum.table import default_gains, rate_unit
 
 LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
 MOST = 5.0  # degrees from one piece of a line to the next

@@ -37,7 +37,7 @@ from tfarm.report.locus_section import _more_damping, beyond_table
 from tfarm.report.loop_section import NOT_STABLE, margin_table, margins_section, verdict_fact
 from tfarm.report.map_section import draw_map_of_arm, map_data, map_of_arm, map_section
 from tfarm.report.page import signs
-from tfarm.spectrum.scales import PAPER_GAINS, default_gains, rate_unit
+from tfarm.spectrum.table import PAPER_GAINS, default_gains, rate_unit
 from tfarm.tables.files import as_json
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))

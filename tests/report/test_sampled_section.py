@@ -28,7 +28,7 @@ from tfarm.report.cases import cases_of, sign_words, what_holds
 from tfarm.report.motion import CURVE_DIGITS
 from tfarm.report.sampled_section import SampledCase, loci_table, sampled_section
 from tfarm.report.sections import spans
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 from tfarm.tables.files import as_csv, as_json
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")

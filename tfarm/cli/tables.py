@@ -25,8 +25,8 @@ from tfarm.digits import general, singly
 from tfarm.errors import ParameterError
 from tfarm.exact.methods import METHODS_AGREE, Method, known_method
 from tfarm.files import is_standard_output
+from tfarm.fitting.data import data_of
 from tfarm.fitting.overlay import curves_table, overlay, overlay_answer, required_table
-from tfarm.fitting.reading import data_of
 from tfarm.tables.files import write_csv
 from tfarm.tables.terminal import show
 

@@ -29,7 +29,7 @@ from tfarm.records import record
 from tfarm.response.frequency import Bode, bode, resonant_band
 from tfarm.spectrum import Modes, damped_modes
 from tfarm.spectrum import modes as modes_of
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 MOST_COMPARED = 30  # flexible modes of a table that is read side by side
 LONGEST_SIDE_NAME = 60  # characters of a name: of two in one legend

@@ -26,7 +26,7 @@ from tfarm.crossing.turning import loose_columns
 from tfarm.dsp.sampled import Sampled
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
-from tfarm.spectrum.scales import most_gain
+from tfarm.spectrum.table import most_gain
 
 A_DECADE = 48  # grid points a decade of the distance to a pole
 NARROWEST_WIDTH = 1e-17  # rad, of a pole: closer to it no angle is told from another

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm
 from tfarm.arrays import Real
 from tfarm.spectrum import modes
-from tfarm.spectrum.scales import default_gains, rate_unit
-from tfarm.spectrum.table import hub_locked
+from tfarm.spectrum.table import default_gains, hub_locked, rate_unit
 
 from .loop import Loop
 from .plane import Plane, between, boundary, gain_map

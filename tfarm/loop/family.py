@@ -23,7 +23,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossing, Crossings, Family, crossings, family_of
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.spectrum.box import FIRST_POINTS, NEAREST_TO_ZERO, TRIED_HEIGHTS, turned
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 
 from .frequencies import grid
 from .loop import Loop

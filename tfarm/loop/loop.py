@@ -24,7 +24,7 @@ from tfarm.exact.characteristic import Analytic, LoopParts, deflated, difference
 from tfarm.exact.system import System
 from tfarm.records import record
 from tfarm.response.signals import Signals
-from tfarm.spectrum.scales import check_gains, first_frequency
+from tfarm.spectrum.table import check_gains, first_frequency
 
 FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: how far right an improper law is looked at
 UNDISPERSED = 1e11  # of w1: where waves are no longer dispersed

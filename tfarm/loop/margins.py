@@ -26,7 +26,7 @@ from tfarm.arm import AnyLaw, Arm
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.crossing import brackets, crossed, zeros_between
 from tfarm.records import record
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 
 from .frequencies import grid
 from .loop import Loop

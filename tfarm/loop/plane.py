@@ -26,7 +26,7 @@ from tfarm.arrays import Real
 from tfarm.crossing import Crossings, Window, counts_over, intervals
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
-from tfarm.spectrum.scales import PAPER_GAINS, default_gains
+from tfarm.spectrum.table import PAPER_GAINS, default_gains
 
 from .family import (
     ROUNDED,

@@ -26,7 +26,7 @@ from tfarm.response.frequency import AXIS_SHARE
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR, TRIED_HEIGHTS, Box, complete
 from tfarm.spectrum.proofs import Disc, disjoint, enclosed, proven_count
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 
 from .frequencies import band_of, steep_places
 from .loop import UNDISPERSED, Loop

@@ -21,7 +21,7 @@ from tfarm.exact.characteristic import Analytic, LoopParts, deflated, difference
 from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum.box import Box, winding_number, zeros_in_box
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 
 from .frequencies import band_of
 from .loop import NEAREST_TO_ORIGIN, ORDER_READ_AT, Loop

@@ -20,7 +20,7 @@ from tfarm.arm import MOMENT_GAIN, RATE_GAIN, HubFeedback
 from tfarm.crossing import Crossing, Crossings, Window, counts_over, joined
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
-from tfarm.spectrum.scales import first_frequency, gain_unit, most_gain
+from tfarm.spectrum.table import first_frequency, gain_unit, most_gain
 
 from .family import LEADING, NEAR_ORIGIN, ROUNDED, along, critical, crossed, through_origin, unstable_below
 from .frequencies import SLOWEST, grid

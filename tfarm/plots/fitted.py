@@ -15,9 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from tfarm.digits import plain
-from tfarm.fitting.fit import Fit
+from tfarm.fitting.fit import Fit, Possible, response_band, share_stable
 from tfarm.fitting.overlay import Overlay
-from tfarm.fitting.possible import Possible, response_band, share_stable
 
 from .frequency import RAD_PER_CYCLE, draw_wrapped
 from .style import BLUE, FAINT, GREY, INK, ORANGE, page, picture

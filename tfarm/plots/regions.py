@@ -26,7 +26,7 @@ from tfarm.dsp.crossings import ends_of_K1, rounded_map, with_both_sides, with_m
 from tfarm.errors import ConvergenceError
 from tfarm.loop.edges import Axis, rate_columns
 from tfarm.loop.plane import Plane, gain_map
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 from .plane import draw_region
 from .style import BLUE, GREY, INK, ORANGE, picture

@@ -36,7 +36,7 @@ from tfarm.plots.regions import BEYOND_PICTURE, sampled_region
 from tfarm.report.cases import Subject, has_loop, sign_words
 from tfarm.report.page import TEMPLATES, argument, is_preset, render
 from tfarm.response import transfer
-from tfarm.spectrum.scales import angle_unit, default_gains
+from tfarm.spectrum.table import angle_unit, default_gains
 
 STATIONS = 24  # places along the arm at which its shape is drawn, besides the clamp
 OFF_A_POLE = 1e-9  # of a pole: where the ratio of two outputs is taken that both have it; the ratio is off by as much

@@ -27,7 +27,7 @@ from tfarm.plots.style import blank, headline, legend_below, style
 from tfarm.records import record
 from tfarm.report.cases import DESIGNED_MODES, LawOnArm, best, brief_on, continuous_cases, margins_of
 from tfarm.report.sections import PageSection, Picture, typeset
-from tfarm.spectrum.scales import default_gains, default_words, first_frequency, rate_unit
+from tfarm.spectrum.table import default_gains, default_words, first_frequency, rate_unit
 from tfarm.synthesis.design import Design
 from tfarm.synthesis.models import continuous_model
 from tfarm.synthesis.objectives import least_damping

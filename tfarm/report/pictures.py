@@ -12,7 +12,7 @@ from tfarm.plots.frequency import draw_compared
 from tfarm.plots.regions import draw_overlay, stable_regions
 from tfarm.plots.shapes import modes
 from tfarm.response.frequency import bode, resonant_band
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 README_DOTS = 100  # an inch: pictures of a README are shown at their own size
 README_MODES = 4  # shapes: two rows

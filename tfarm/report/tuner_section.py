@@ -21,10 +21,9 @@ from tfarm.records import record
 from tfarm.report.cases import has_loop, what_holds, why_no_loop
 from tfarm.report.motion import clipped_words, resolution_words, responses_table
 from tfarm.report.sections import Fact, PageSection, Picture, residual_words, typeset
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 from tfarm.tuner import LearningCurves, Plan, Tuning, compare_controllers, learning_curves, tried_loops, tune
-from tfarm.tuner.baselines import CONSTANT_GAINS, tried_gains
-from tfarm.tuner.comparison import Outcomes, quantised_chain
+from tfarm.tuner.baselines import CONSTANT_GAINS, Outcomes, quantised_chain, tried_gains
 from tfarm.tuner.training import QUARTILES
 from tfarm.tuner.tuning import tip_errors, usual_plan
 

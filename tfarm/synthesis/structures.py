@@ -31,7 +31,7 @@ from tfarm.errors import ParameterError, did_you_mean
 from tfarm.loop.frequencies import band_of
 from tfarm.records import record
 from tfarm.spectrum import modes as natural_modes
-from tfarm.spectrum.scales import check_gains, first_frequency, rate_unit, turning_inertia
+from tfarm.spectrum.table import check_gains, first_frequency, rate_unit, turning_inertia
 
 Bounds = tuple[float, float]
 Numbers = NDArray[Any]  # real, or complex for a derivative
