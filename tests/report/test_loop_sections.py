@@ -20,11 +20,11 @@ from tfarm.dsp.chain import Sampling
 from tfarm.dsp.sampled import sampled_loop
 from tfarm.dsp.verdict import sampled_brief
 from tfarm.errors import ConvergenceError
-from tfarm.loop import edges
-from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
+from tfarm.loop import plane as edges
 from tfarm.loop.loci import held_branches, loci
 from tfarm.loop.loop import Loop
 from tfarm.loop.nyquist import compressed, nyquist, nyquist_of
+from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 from tfarm.plots.plane import nice_levels

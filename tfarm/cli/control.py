@@ -216,9 +216,8 @@ def locus(
     """Root locus of the exact arm along a gain or a parameter; crossings of the imaginary axis are solved for."""
     count = whole_number("--branches", branches, 1, 200)
     subject, law, said = given.loop()
-    from tfarm.loop.closed import locus as find
-    from tfarm.loop.loci import branch_columns, locus_answer
-    from tfarm.loop.reduced_locus import reduced_of
+    from tfarm.loop.loci import branch_columns, locus_answer, reduced_of
+    from tfarm.loop.locus import locus as find
 
     number = None if points is None else whole_number("--points", points, 2, 100_000)
     found = find(subject, law, vary, start, stop, number, count)

@@ -24,12 +24,9 @@ from tfarm.dsp.results import enough_modes, ideal_chain
 from tfarm.dsp.simulate import FOLDED_UP, quantisers
 from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.errors import TfarmError
-from tfarm.loop.edges import moment_axis, rate_axis, rate_columns
-from tfarm.loop.frequencies import steep_places
-from tfarm.loop.loop import Loop
-from tfarm.loop.panels import PANEL_SAMPLES, Panels, loop_panels
-from tfarm.loop.plane import gain_map
-from tfarm.loop.positions import Positions, Sensor, positions, sensed_places
+from tfarm.loop.loop import Loop, steep_places
+from tfarm.loop.panels import PANEL_SAMPLES, Panels, Positions, Sensor, loop_panels, positions, sensed_places
+from tfarm.loop.plane import gain_map, moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots.regions import BEYOND_PICTURE, sampled_region

@@ -14,8 +14,7 @@ from tfarm.columns import Column, Table
 from tfarm.digits import how_many, kept_digits, listed, plain, scientific, significant, singly
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
-from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, branch_columns, held_branches, loci
-from tfarm.loop.most_damped import most_damped
+from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, branch_columns, held_branches, loci, most_damped
 from tfarm.loop.stability import MARGIN_OF_ZERO, Stability, stability
 from tfarm.plots.roots import draw_loci
 from tfarm.report.cases import continuous_cases, edge_of_K2, has_loop, margins_of

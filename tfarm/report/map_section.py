@@ -17,9 +17,8 @@ from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp.verdict import SampledBrief
-from tfarm.loop.edges import DEEPEST_MOMENT_GAIN, Axis, edge, moment_axis, rate_axis
-from tfarm.loop.frequencies import band_of
-from tfarm.loop.plane import Plane, gain_map
+from tfarm.loop.loop import band_of
+from tfarm.loop.plane import DEEPEST_MOMENT_GAIN, Axis, Plane, edge, gain_map, moment_axis, rate_axis
 from tfarm.loop.windows import Windows
 from tfarm.plots import plane
 from tfarm.plots.regions import sampled_region
