@@ -7,8 +7,6 @@ import numpy as np
 from tfarm.arm import Arm
 from tfarm.arrays import Real
 from tfarm.audit.assumptions import (
-    HubStudy,
-    SectionStudy,
     Study,
     candidates,
     has_hub_inertia,
@@ -74,14 +72,14 @@ def assumptions_section(arm: Arm) -> PageSection:
         return PageSection(anchor="assumptions", title=title, words=(OF_ONE_BEAM,))
     section = section_study(arm)
     area, slope = plain(arm.link.section.area, 4), fixed(2 * section.sensitivity[section.is_own][0, :1], 3)[0]
-    words = [opening(arm), SECTION_WORDS.format(area=area, slope=slope, **_ends(section.depth, section))]
+    words = [opening(arm), SECTION_WORDS.format(area=area, slope=slope, **_ends(section.values, section))]
     blocks: list[Picture | Table] = [section_picture(section)]
     blocks.append(_table("assumptions-section", "Candidate sections: rectangles of this area", SECTION_TABLE, section))
     if has_hub_inertia(arm):
         hub = hub_study(arm)
         limits = {"locked": significant(float(hub.locked[0]), 5), "pinned": significant(float(hub.pinned[0]), 5)}
         slope = fixed(hub.sensitivity[hub.is_own][0, :1], 3)[0]
-        words.append(HUB_WORDS.format(slope=slope, **limits, **_ends(hub.hub_inertia, hub)))
+        words.append(HUB_WORDS.format(slope=slope, **limits, **_ends(hub.values, hub)))
         blocks += [hub_picture(hub), _table("assumptions-hub", "Candidate hub inertias", HUB_TABLE, hub)]
     else:
         words.append(NO_HUB.format(what="locked" if arm.is_locked else "a free pin"))
@@ -128,31 +126,31 @@ def searched_words(edges: Column) -> str:
 # ------------------------------------------------------------ pictures
 
 
-def section_picture(study: SectionStudy) -> Picture:
+def section_picture(study: Study) -> Picture:
     arm = study.arm
-    curve = section_study(arm, _between(study.depth))
+    curve = section_study(arm, _between(study.values))
     equivalent = "" if arm.link.section.shape == "rectangle" else EQUIVALENT
-    words = _ends_in_words(study, study.depth, "m")
+    words = _ends_in_words(study, study.values, "m")
     return Picture(
         stem="assumptions-depth",
         title="Natural frequencies over the depth of the section",
         caption=SECTION_PICTURE.format(equivalent=equivalent),
         alt=f"Natural frequencies 1 to {len(CURVE_COLOURS)} over depth, {_way(curve)}; {words}",
-        figure=draw_over(curve, curve.depth, study, study.depth, "depth of the rectangle, in the plane of bending [m]"),
-        data=_data("assumptions-depth-data", Column("depth_m", "depth", "m", of=curve.depth), curve),
+        figure=draw_over(curve, study, "depth of the rectangle, in the plane of bending [m]"),
+        data=_data("assumptions-depth-data", Column("depth_m", "depth", "m", of=curve.values), curve),
     )
 
 
-def hub_picture(study: HubStudy) -> Picture:
-    curve = hub_study(study.arm, _between(study.hub_inertia))
-    inertia = Column("hub_inertia_kg_m2", "hub inertia", "kg m^2", of=curve.hub_inertia)
-    words = _ends_in_words(study, study.hub_inertia, "kg m²")
+def hub_picture(study: Study) -> Picture:
+    curve = hub_study(study.arm, _between(study.values))
+    inertia = Column("hub_inertia_kg_m2", "hub inertia", "kg m^2", of=curve.values)
+    words = _ends_in_words(study, study.values, "kg m²")
     return Picture(
         stem="assumptions-inertia",
         title="Natural frequencies over the hub inertia",
         caption=HUB_PICTURE,
         alt=f"Natural frequencies 1 to {len(CURVE_COLOURS)} over hub inertia, {_way(curve)}; {words}",
-        figure=draw_over(curve, curve.hub_inertia, study, study.hub_inertia, "hub inertia [kg m²]"),
+        figure=draw_over(curve, study, "hub inertia [kg m²]"),
         data=_data("assumptions-inertia-data", inertia, curve),
     )
 
