@@ -58,10 +58,10 @@ def closed(arm, law, s):
     return whole * delta(arm, s, Kp=gains["hub_angle"], K1=gains["hub_rate"], K2=gains["root_moment"])
 
 
-def zeros_in(arm, law, middle, radius, points=16):
-    """By how often it turns along a circle."""
+def zeros_in(arm, law, middle, radius, away=0, points=16):
+    """By how often it turns along a circle, whose middle is so many radii away."""
     with mpmath.workdps(90):
-        circle = [middle + radius * mpmath.expjpi(2 * mpmath.mpf(n) / points) for n in range(points)]
+        circle = [middle + away * radius + radius * mpmath.expjpi(2 * mpmath.mpf(n) / points) for n in range(points)]
         values = [closed(arm, law, s) for s in circle]
         turned = sum(cmath.phase(complex(b / a)) for a, b in zip(values, [*values[1:], values[0]], strict=True))
     return round(turned / (2 * math.pi))
@@ -78,7 +78,7 @@ def test_in_each_disc_the_papers_determinant_has_one_zero_and_beside_it_none(nam
             middle, radius = mpmath.mpc(disc.re, disc.im), mpmath.mpf(disc.radius)
         assert abs(complex(middle) - pole) < 1e-11 * abs(pole)
         assert zeros_in(LAB, as_law(law), middle, radius) == 1
-        assert zeros_in(LAB, as_law(law), middle + 5 * radius, radius) == 0
+        assert zeros_in(LAB, as_law(law), middle, radius, away=5) == 0
 
 
 TIP = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)

@@ -17,14 +17,6 @@ def run(capsys, *arguments):
     return stop.value.code, captured.out, captured.err
 
 
-def test_by_order(capsys):
-    code, out, _ = run(capsys, "sasaki2012", "--outputs", "root_moment,hub_rate", "--order", "14", "--json")
-    answer = json.loads(out)
-    assert code == 0
-    assert (answer["order"], answer["method"], answer["band_rad_s"]) == (14, "aaa", [0.1, 1000.0])
-    assert answer["worst_error"] < 1e-8
-
-
 def test_by_error_with_a_band_and_a_file(capsys, tmp_path):
     given = ("--error", "1e-6", "--band", "1,500", "--method", "modal", "--mat", str(tmp_path / "arm.mat"), "--json")
     code, out, _ = run(capsys, "sasaki2012", "--outputs", "tip_displacement", *given)
