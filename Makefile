@@ -37,7 +37,6 @@ SURVEYS := \
 	synthesis.held_designs \
 	loop.nyquist_counts \
 	reduced.errors \
-	dsp.verdicts \
 	dsp.settled \
 	dsp.law_verdicts \
 	dsp.law_orders \

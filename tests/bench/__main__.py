@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from . import elements, fitting, loci, loops, memory, responses, rigs, sampled, spectra, tuning
+from . import elements, fitting, loci, memory, responses, sampled, spectra, tuning
 from .rows import Row, keep, show
 
 
@@ -22,15 +22,14 @@ def measure() -> Iterator[Row]:
     yield memory.memory_row()
     yield from responses.response_rows()
     yield from responses.mpmath_rows()
-    yield from elements.response_rows()
-    yield from rigs.rig_rows()
+    yield elements.response_row()
     yield from spectra.modes_rows()
-    yield from elements.modes_rows()
+    yield elements.mode_row()
     yield spectra.cxroots_row()
-    yield from loops.loop_rows()
+    yield from sampled.loop_rows()
     yield from loci.locus_rows()
     yield from sampled.sampled_rows()
-    yield from tuning.tuner_rows()
+    yield tuning.tuner_row()
     yield from fitting.fit_rows()
 
 

@@ -3,15 +3,16 @@
 import math
 from dataclasses import replace
 
+import mpmath
 import numpy as np
 import pytest
 
 import tfarm
 from tfarm.arm import FED_BACK, Hub, HubFeedback, Law
-from tfarm.dsp import Chain, Sampling, circle, sampled_loop, sampled_map
-from tfarm.dsp.circle import HIGHER, complete_band
+from tfarm.dsp import Chain, Sampling, circle, sampled_loop
+from tfarm.dsp.circle import HIGHER, Circle, Discs, _Arcs, complete_band, product
 from tfarm.dsp.crossings import COARSEST, circle_grid, crossing_factors
-from tfarm.dsp.edges import shown_delay
+from tfarm.dsp.edges import Figure, shown_delay
 from tfarm.dsp.verdict import Verdict
 from tfarm.reduced import modal_model
 
@@ -39,13 +40,6 @@ def test_the_top_of_a_band_is_so_many_times_the_last_pole_of_the_model():
     loop = sampled_loop(LAB.having(damping=1e-3), GAINS, count=4)
     shares = complete_band(loop).top / loop.plant.poles.imag.max() / circle.ABOVE_MODEL
     assert min(abs(shares / factor - 1) for factor in HIGHER) < 1e-12
-
-
-def test_a_map_of_one_point_is_the_count_of_its_poles():
-    loop = sampled_loop(LAB, GAINS, count=4)
-    for K1, K2 in ((0.3, 0.3), (-0.3, 0.3), (0.3, 1.5)):
-        outside = int((abs(loop.having(K1=K1, K2=K2).eigenvalues) > 1).sum())
-        assert sampled_map(loop, [K1], [K2]).unstable.tolist() == [[outside]]
 
 
 def test_no_gap_of_the_grid_on_the_circle_is_twice_as_wide_as_of_the_uniform_one():
@@ -85,3 +79,62 @@ def test_a_law_without_zeros_at_rest_is_seen_to_cross_however_slowly():
     assert found.t == pytest.approx(friction, rel=1e-6)
     assert found.at == pytest.approx(1e-5 * T / math.sqrt(1 + friction * T / 2 / arm.total_inertia), rel=1e-6)
     assert found.change == 2
+
+
+ROOTS = {  # less 1
+    "a constant": [],
+    "a lag": [-0.3],
+    "a notch next to z = 1": [-1e-4 + 1e-3j, -1e-4 - 1e-3j],
+    "a cluster next to z = 1": [-1e-4, -1.1e-4, -9e-5 + 1e-5j, -9e-5 - 1e-5j],
+    "degree 5": [-2.0, -1.7 + 0.4j, -1.7 - 0.4j, -1.0, 0.2],
+}
+
+
+@pytest.mark.parametrize("half", [1e-6, 1e-3, 0.1, 0.8])
+@pytest.mark.parametrize("name", ROOTS)
+def test_a_disc_holds_every_value_on_its_arc_and_is_no_larger_than_its_terms(name, half):
+    """Values at points of the arc with forty digits; their largest distance from the middle is found, not bounded."""
+    roots = np.array(ROOTS[name], dtype=complex)
+    angles = np.array([0.0, 1e-4, 0.7, 2.0, math.pi])
+    radius = np.full(angles.size, 2 * math.sin(half / 2))
+    found = product(Discs(-np.expm1(-1j * angles), radius), roots)
+    away = np.zeros(angles.size)
+    with mpmath.workdps(40):
+        for n, angle in enumerate(angles.tolist()):
+            for share in np.linspace(-1, 1, 41).tolist():
+                x = 1 - mpmath.expj(-mpmath.mpf(angle) - share * mpmath.mpf(half))
+                exact = mpmath.fprod(x * (1 + mpmath.mpc(r)) - mpmath.mpc(r) for r in roots.tolist())
+                away[n] = max(away[n], float(abs(exact - mpmath.mpc(found.middle[n].item()))))
+    assert (away <= found.radius).all()
+    sizes = abs(-np.expm1(-1j * angles)[:, None] * (1 + roots) - roots)
+    most = (sizes + radius[:, None] * abs(1 + roots)).prod(axis=1)
+    assert (found.radius <= most - sizes.prod(axis=1) + 1e-13 * (1 + most)).all()
+
+
+@pytest.mark.parametrize(
+    ("figure", "sharp"),
+    [
+        (Figure(1.2345, 4, 500.0, None), [3, 4]),
+        (Figure(1.2345, 4, None, 12), []),  # of the first modes alone: no digit is proven
+        (Figure(0.0, 0, 500.0, None), [3, 4, 5]),  # nothing is left to be rounded
+    ],
+)
+def test_a_figure_is_sharp_in_the_digits_that_are_proven(figure, sharp):
+    assert [digits for digits in (3, 4, 5) if figure.is_sharp(digits)] == sharp
+
+
+def test_a_disc_about_a_point_is_as_wide_as_rounding_next_to_a_pole_too():
+    """The sum of r/(z - e^{pT}) with forty digits, z from 1e-9 rad beside a pole on."""
+    arm, T = tfarm.load("sasaki2012-lab"), 0.01
+    loop = sampled_loop(arm, HubFeedback(), Chain(), count=3)
+    plant = loop.plant
+    q = np.angle(loop.pulse.multipliers[0]) + np.array([1e-9, 1e-5, 0.3])
+    circle = Circle(loop, np.ones(plant.poles.size, bool), np.zeros(3))
+    found = circle._summed(_Arcs(q, q), plant.poles, plant.residues)
+    with mpmath.workdps(40):
+        z = [mpmath.expj(mpmath.mpf(each)) for each in q]
+        b = [mpmath.exp(mpmath.mpc(each) * T) for each in plant.poles]
+        for row, n in np.ndindex(found.middle.shape):
+            exact = mpmath.fsum(r / (z[n] - each) for r, each in zip(plant.residues[row].tolist(), b, strict=True))
+            assert abs(found.middle[row, n] - exact) <= found.radius[row, n]
+    assert (found.radius < 1e-4 * abs(found.middle)).all()

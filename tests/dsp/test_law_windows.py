@@ -1,6 +1,5 @@
 """How far each number of a law may go at the samples: against eigenvalues, and Jury's conditions."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +8,7 @@ import pytest
 import tfarm
 from tests.dsp.law_verdicts import some_case
 from tests.dsp.test_laws import LAB, LAWS, T
-from tests.shell import answer, run
 from tfarm import HubFeedback, Law
-from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain, sampled_loop, stable_windows
 from tfarm.dsp.crossings import circle_grid, number_crossings
 from tfarm.dsp.verdict import sampled_numbers
@@ -78,17 +75,3 @@ def test_only_a_part_that_one_signal_has_to_itself_has_a_name():
         twice = law.weighted([2.0 if place == part else 1.0 for place in range(2)])
         z = np.array([0.3 + 0.4j])
         np.testing.assert_allclose(twice.values(z), law.having(name, 2 * value).values(z), rtol=1e-14)
-
-
-def test_the_command_lists_each_number_with_its_windows(capsys, tmp_path):
-    path = tmp_path / "law.toml"
-    path.write_text("[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n[law.hub_rate]\ngain = 1.0\n")
-    rows = answer(capsys, "sampled", "sasaki2012-lab", "--law", str(path))["windows"]
-    assert [row["number"] for row in rows] == ["hub_angle.gain", "hub_rate"]
-    found = tfarm.sampled(LAB, load_law(path))
-    for row, number in zip(rows, found.numbers, strict=True):
-        low, high = number.interval
-        assert row["interval"] == [low, high if math.isfinite(high) else "inf"]
-    code, printed, _ = run(capsys, "sampled", "sasaki2012-lab", "--law", str(path))
-    assert code == 0
-    assert f"({low:.6g}, {high:.6g})" in printed

@@ -187,19 +187,6 @@ def test_a_real_pole_crosses_at_rest_where_the_law_is_as_stiff_as_the_hubs_sprin
     assert found.change == after - before == change
 
 
-def test_between_crossings_the_count_is_what_they_say():
-    """Random laws, integrators among them, at random factors."""
-    rng = np.random.default_rng(77)
-    for _ in range(6):
-        case = some_case(rng)
-        loop = case and sampled_loop(*case, count=6)
-        if loop:
-            factors = np.r_[1.0, 10 ** rng.uniform(-4, 3, 5)]
-            passed = crossing_factors(loop).passed(factors)
-            counts = np.array([(loop.times(float(g)).poles.log_radius > 0).sum() for g in factors])
-            assert (counts - counts[0] == passed - passed[0]).all()
-
-
 @pytest.mark.parametrize(
     ("entries", "factor"),
     [({"hub_rate": 1.0}, 1.5), ({"hub_rate": 1.0}, 0.4), ({"hub_rate": 1.0, "root_moment": 0.3}, 1.1)],
@@ -229,13 +216,6 @@ def test_margins_end_where_the_verdict_turns():
     late = LAWS["lead"].delay / T + found.delay_margin.samples
     for more, stable in ((-1e-6, True), (1e-6, False)):
         assert tfarm.sampled(LAB, replace(LAWS["lead"], delay=(late + more) * T)).verdict.is_stable == stable
-
-
-def test_a_law_of_gains_alone_is_taken_for_them():
-    law, gains = Law({"hub_rate": 0.3, "root_moment": 0.3}), HubFeedback(K1=0.3, K2=0.3)
-    mine, theirs = (tfarm.sampled(LAB, each, count=4) for each in (law, gains))
-    assert mine.verdict.sentence == theirs.verdict.sentence
-    assert mine.windows == theirs.windows
 
 
 # ------------------------------------------------------------ bad input, commands

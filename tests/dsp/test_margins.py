@@ -57,21 +57,6 @@ def test_where_the_feedback_outweighs_no_fast_modes_damping_all_delays_are_looke
     assert all(loop.with_delay(delay).poles.is_stable for delay in np.linspace(0.0, 20.0, 9))
 
 
-@pytest.mark.parametrize("gain", ["K1", "K2"])
-@pytest.mark.parametrize("name", ["sasaki2012", "sasaki2012-lab"])
-def test_an_edge_has_a_pole_on_the_circle_and_the_verdict_turns_there(name, gain):
-    loop = sampled_loop(tfarm.load(name), GAINS, Chain(sampling=Sampling(delay_samples=0.3)), count=10)
-    for window in stable_windows(loop, gain):
-        for edge, inward in zip(window, (1, -1), strict=True):
-
-            def at(value):
-                return loop.having(**{gain: value})
-
-            step = 1e-9 * max(1e-3, abs(edge))
-            assert at(edge + inward * step).poles.is_stable
-            assert not at(edge - inward * step).poles.is_stable
-
-
 @pytest.mark.parametrize("name", ["sasaki2012", "sasaki2012-lab"])
 @pytest.mark.parametrize("delay", [0.0, 0.3, 2.5])
 def test_between_crossings_the_counts_are_those_of_the_eigenvalues(name, delay):
@@ -98,21 +83,13 @@ def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
 
 
 @pytest.mark.parametrize("hub_rate", ["ideal", "difference"])
-@pytest.mark.parametrize("name", ["sasaki2012", "sasaki2012-lab"])
-def test_the_map_counts_as_the_eigenvalues_do(name, hub_rate):
-    chain = Chain(converters=Converters(hub_rate=hub_rate, rate_filter=300.0))
-    loop = sampled_loop(tfarm.load(name), GAINS, chain, count=9)
-    plane = sampled_map(loop, np.linspace(-2, 25, 28), np.linspace(-0.7, 2.1, 31))
-    rng = np.random.default_rng(5)
-    for i, j in zip(rng.integers(28, size=60), rng.integers(31, size=60), strict=True):
-        assert growing(loop.having(K1=float(plane.K1[i]), K2=float(plane.K2[j]))) == plane.unstable[i, j]
-
-
-@pytest.mark.parametrize("vary", [("K1", "Kp"), ("hub_rate", "tip_acceleration.gain")])
-def test_a_map_over_two_numbers_of_any_law_counts_as_the_eigenvalues_do(lab, vary):
+@pytest.mark.parametrize("vary", [("K1", "K2"), ("K1", "Kp"), ("hub_rate", "tip_acceleration.gain")])
+def test_a_map_over_two_numbers_of_any_law_counts_as_the_eigenvalues_do(lab, vary, hub_rate):
     """With the angle held, and of a law with a filter, whose other numbers stay as they are."""
     of_signals = tfarm.Law({"hub_rate": 0.3, "hub_angle": 2.0, "tip_acceleration": ([0.05], [0.02, 1.0])})
-    loop = sampled_loop(lab, GAINS.having("Kp", 3.0) if vary[1] == "Kp" else of_signals, count=7)
+    chain = Chain(converters=Converters(hub_rate=hub_rate, rate_filter=300.0))
+    law = {"K2": GAINS, "Kp": GAINS.having("Kp", 3.0)}.get(vary[1], of_signals)
+    loop = sampled_loop(lab, law, chain, count=7)
     plane = sampled_map(loop, np.linspace(0.05, 4.0, 7), np.linspace(-3.0, 30.0, 9), vary)
     assert plane.vary == vary
     for i, j in np.ndindex(7, 9):
@@ -145,10 +122,6 @@ def test_the_delay_margin_is_where_the_verdict_turns(lab, K2):
     assert not loop.with_delay(margin.samples + 1e-6).poles.is_stable
     earlier = np.linspace(0, margin.samples, 41)[:-1]
     assert all(loop.with_delay(float(delay)).poles.is_stable for delay in earlier)
-
-
-def test_without_a_stable_loop_there_is_no_delay_margin(lab):
-    assert delay_margin(sampled_loop(lab, HubFeedback(K1=0.3, K2=2.0), count=10)).samples == 0.0
 
 
 def test_the_required_damping_is_where_the_verdict_turns(lossless):
@@ -200,7 +173,7 @@ def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossl
     assert verdict.is_settled
     assert verdict.sentence.startswith("stable")
     undamped = sampled_verdict(lossless, GAINS)
-    assert not undamped.is_settled
+    assert (undamped.is_settled, undamped.band_rad_s) == (False, None)
     assert "mode 13 grows by 8.62e-09 a sample (holds for the first 20 modes)" in undamped.sentence
     assert sampled_verdict(lossless, GAINS, count=12).sentence.startswith("stable")
     assert sampled_verdict(lossless, HubFeedback(K1=0, K2=0)).sentence.startswith("marginal")
@@ -208,11 +181,7 @@ def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossl
 
 def test_the_answer_is_plain_and_consistent(lab):
     answer = sampled_answer(tfarm.sampled(lab, GAINS))
-    assert answer["stable"] is True
-    assert answer["spectral_radius"] < 1
     low, high = answer["K2_interval"]
-    assert low < 0.3 < high
-    assert answer["K1_interval"][0] == 0.0
     edges = answer["shown"]["K2_intervals"][0]
     assert [float(edge["text"]) for edge in edges] == pytest.approx([low, high], rel=5e-6)
     assert all(edge["settled"] and edge["band_rad_s"] == answer["band_rad_s"] > 1e5 for edge in edges)
@@ -220,14 +189,9 @@ def test_the_answer_is_plain_and_consistent(lab):
         figure = answer["shown"][key]
         assert (figure["settled"], figure["digits"]) == (True, 4)
         assert float(figure["text"]) == pytest.approx(answer[key], rel=5e-4)
-    assert answer["first_unstable_mode"] is None
-    assert [mode["index"] for mode in answer["modes"]] == list(range(1, len(answer["modes"]) + 1))
     unstable = sampled_answer(tfarm.sampled(lab, HubFeedback(K1=0.3, K2=1.3)))
-    assert unstable["stable"] is False
-    assert unstable["spectral_radius"] > 1
-    assert unstable["K2_interval"] is None
+    assert (unstable["K2_interval"], unstable["delay_margin_samples"]) == (None, 0.0)
     assert unstable["K2_intervals"] == answer["K2_intervals"]
-    assert unstable["delay_margin_samples"] == 0.0
     outside = abs(np.linalg.eigvals(sampled_loop(lab, HubFeedback(K1=0.3, K2=1.3)).reduced_matrix())) > 1
     assert unstable["unstable_poles"] == outside.sum() == 2
     assert answer["unstable_poles"] == 0

@@ -1,19 +1,16 @@
 """What a simulation records besides its four signals: any output of the rig, by name, at the samples and between."""
 
-import csv
-import io
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
-from scipy.io import loadmat
 from scipy.linalg import expm
 
 import tfarm
 from tests.rigs import some_rig
 from tests.shared import thinned
-from tests.shell import answer, run
+from tests.shell import answer
 from tfarm.arm import HubFeedback, Law, RotarySpring
 from tfarm.dsp import Actuator, Chain, Sampling, Simulator, scenario
 from tfarm.dsp.plant import RECORDED, undelayed_plant
@@ -126,22 +123,6 @@ def test_the_modes_that_it_takes_are_those_of_every_signal(capsys):
     assert deep["modes_used"] > plain["modes_used"]
     assert deep["modes_change"] > plain["modes_change"]
     assert len(deep["shear@0.5"]) == len(deep["t"])
-
-
-def test_files_have_a_column_for_each(capsys, tmp_path):
-    shown = ["--output", "moment@0.25", "--output", "tip_angle"]
-    words = ["simulate", "sasaki2012-lab", "--duration", "0.1", "--modes", "2", "--between", "1", *shown]
-    assert run(capsys, *words, "--csv", str(tmp_path / "s.csv"), "--mat", str(tmp_path / "s.mat"))[0] == 0
-    told = answer(capsys, *words)
-    rows = list(csv.reader(io.StringIO((tmp_path / "s.csv").read_text())))
-    order = np.argsort([*told["t"], *told["between"]["t"]], kind="stable")
-    for name, unit in told["outputs"].items():
-        column = rows[0].index(f"{name} [{unit}]")
-        written = np.array([float(row[column]) for row in rows[1:]])
-        assert np.array_equal(written, np.array([*told[name], *told["between"][name]])[order])
-    in_matlab = loadmat(tmp_path / "s.mat")
-    np.testing.assert_array_equal(in_matlab["moment_0_25"].ravel(), told["moment@0.25"])
-    np.testing.assert_array_equal(in_matlab["between"]["tip_angle"][0, 0].ravel(), told["between"]["tip_angle"])
 
 
 @pytest.mark.parametrize(

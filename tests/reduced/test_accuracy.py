@@ -8,13 +8,12 @@ import pytest
 import tfarm
 from tests.reduced.errors import measure
 from tests.shared import thinned
-from tfarm.reduced import modal_model, reduce
+from tfarm.reduced import modal_model
 from tfarm.reduced.partial_fractions import (
     EXACT_ROUNDING,
     FOUND_TO_WORST,
     Ruler,
     axis_slope,
-    distance,
     frequencies_around,
 )
 
@@ -91,13 +90,6 @@ def test_an_exact_model_has_the_error_of_rounding(arm):
     ).all()
 
 
-def test_a_lacking_mode_shows(arm):
-    """Four modes lie below 1100 rad/s: without the last one the model is far off, not at its pole but beside it."""
-    band = (0.1, 1100.0)
-    without, whole = (reduce(arm, "root_moment", order=order, method="modal", band=band) for order in (6, 8))
-    assert without.worst_error > 10 * whole.worst_error
-
-
 @pytest.mark.parametrize("preset", ["sasaki2012", "sasaki2012-lab"])
 def test_the_derivative_along_the_arm(preset):
     """Differences across the axis against ball arithmetic, next to a pole too."""
@@ -106,10 +98,6 @@ def test_the_derivative_along_the_arm(preset):
     poles = frequencies_around(arm, 1000.0)
     w = np.array([0.3, 70.0, poles[0] * (1 + 1e-5), 600.0])
     np.testing.assert_allclose(axis_slope(G, w, poles), G.derivative(1j * w), rtol=1e-5)
-
-
-def test_distance_to_the_nearest():
-    np.testing.assert_allclose(distance(np.array([0.5, 1.0, 1.6, 9.0]), np.array([1.0, 2.0])), [0.5, 0.0, 0.4, 7.0])
 
 
 @pytest.mark.parametrize("seed", thinned(range(5), 2))

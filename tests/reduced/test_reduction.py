@@ -85,18 +85,6 @@ def test_deviation_holds_the_exact_curve(arm):
         reduced.deviation([2000.0])
 
 
-def test_the_answer_is_whole(arm):
-    answer = reduced_answer(reduce(arm, ["root_moment", "hub_rate"], order=14))
-    assert answer["order"] == len(answer["A"]) == len(answer["states"]) == 14
-    assert len(answer["C"]) == len(answer["D"]) == len(answer["outputs"]) == 2
-    assert answer["worst_error"] == max(answer["errors"].values())
-    assert answer["band_rad_s"] == [0.1, 1000.0]
-    s = 1j * 33.0
-    A, B, C, D = (np.array(answer[name]) for name in "ABCD")
-    value = C @ np.linalg.solve(s * np.eye(14) - A, B) + D
-    np.testing.assert_allclose(value[:, 0], tfarm.transfer(arm, answer["outputs"])(s), rtol=1e-8)
-
-
 @pytest.mark.parametrize(
     ("given", "key"),
     [
