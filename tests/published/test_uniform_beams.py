@@ -78,7 +78,8 @@ def determinant(rows):
 def root(arm, guess, sign=1):
     """The z nearest to a guess at which the conditions can be met, to thirty digits."""
     guess = mpmath.mpf(guess)
-    return mpmath.findroot(lambda z: determinant(conditions(z, arm, sign)), (guess, guess * (1 + mpmath.mpf(10) ** -6)))
+    pair = guess, guess * (1 + mpmath.mpf(10) ** -6)
+    return mpmath.findroot(lambda z: determinant(conditions(z, arm, sign)), pair, verify=False)  # of what size it is
 
 
 def wave_numbers(arm, count):
