@@ -111,7 +111,7 @@ lint: $(INSTALLED) ## check style, types and which room imports which
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 
-bench: $(BENCH_INSTALLED) ## measure speed and memory, beside other packages
+bench: $(BENCH_INSTALLED) ## measure speed, beside other packages
 	@$(BIN)/python -m tests.bench
 
 clean: ## remove everything that was generated

@@ -1,4 +1,4 @@
-"""Measure speed, memory and accuracy, beside other packages: `make bench`.
+"""Measure speed and accuracy, beside other packages: `make bench`.
 
 Nothing here is a test: times depend on the machine, so they are printed as ratios and medians, and kept in
 reports/bench.json.
@@ -13,13 +13,12 @@ from pathlib import Path
 
 from rich.console import Console
 
-from . import elements, fitting, loci, memory, responses, sampled, spectra, tuning
+from . import elements, loci, responses, sampled, spectra, tuning
 from .rows import Row, keep, show
 
 
 def measure() -> Iterator[Row]:
-    """All rows, group by group; memory first, while this process is small."""
-    yield memory.memory_row()
+    """All rows, group by group."""
     yield from responses.response_rows()
     yield from responses.mpmath_rows()
     yield elements.response_row()
@@ -30,7 +29,6 @@ def measure() -> Iterator[Row]:
     yield from loci.locus_rows()
     yield from sampled.sampled_rows()
     yield tuning.tuner_row()
-    yield from fitting.fit_rows()
 
 
 def main(path: Path) -> None:

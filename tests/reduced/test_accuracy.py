@@ -13,8 +13,6 @@ from tfarm.reduced.partial_fractions import (
     EXACT_ROUNDING,
     FOUND_TO_WORST,
     Ruler,
-    axis_slope,
-    frequencies_around,
 )
 
 
@@ -27,12 +25,12 @@ def test_a_planted_error_is_found_whole(arm):
     """The static remainder moved by d: the error is |d|/(|G| + |w G'|), largest where that norm is smallest."""
     model = modal_model(arm, "root_moment", 60)
     planted = replace(model, static=model.static + 1e-3)
-    worst = Ruler(arm, "root_moment", (0.1, 1000.0)).measure(planted)
+    worst, _ = Ruler(arm, "root_moment", (0.1, 1000.0)).measure(planted)
     w = np.linspace(0.1, 1000, 100_001)
     G = tfarm.transfer(arm, "root_moment")
     exact = G(1j * w)
     true = 1e-3 / (abs(exact) + abs(w * G.derivative(1j * w))).min()
-    assert true <= worst.worst[0] <= 1.03 * FOUND_TO_WORST * true
+    assert true <= worst[0] <= 1.03 * FOUND_TO_WORST * true
 
 
 def test_a_moved_pole_is_seen(arm):
@@ -40,9 +38,9 @@ def test_a_moved_pole_is_seen(arm):
     model = modal_model(arm, "root_moment", 60)
     p = model.eigenvalues.copy()
     p[1] *= 1 + 1.3e-6
-    worst = Ruler(arm, "root_moment", (0.1, 1000.0)).measure(replace(model, eigenvalues=p))
-    assert worst.worst[0] > 1e-6
-    np.testing.assert_allclose(worst.at[0], p[1, 0].imag, rtol=1e-4)
+    worst, at = Ruler(arm, "root_moment", (0.1, 1000.0)).measure(replace(model, eigenvalues=p))
+    assert worst[0] > 1e-6
+    np.testing.assert_allclose(at[0], p[1, 0].imag, rtol=1e-4)
 
 
 def test_peaks_between_the_samples_are_closed_in_on(arm):
@@ -51,7 +49,7 @@ def test_peaks_between_the_samples_are_closed_in_on(arm):
     p = model.eigenvalues.copy()
     p[1] *= 1 + 2.7e-5
     planted, ruler = replace(model, eigenvalues=p), Ruler(arm, "root_moment", (0.1, 1000.0))
-    assert ruler.measure(planted).worst[0] > 10 * ruler.rough(planted)
+    assert ruler.measure(planted)[0][0] > 10 * ruler.rough(planted)
 
 
 def test_the_margin_covers_a_peak_that_is_not_closed_in_on(arm):
@@ -79,25 +77,14 @@ def test_the_margin_covers_a_peak_that_is_not_closed_in_on(arm):
     w = (centre[:, None] + width[:, None] * np.linspace(-1, 1, 401)).ravel()
     s = 1j * w[:, None]
     true = float((abs((r / (s - p) + r / (s - p.conj())).sum(axis=1)) / ruler.norm(w)[0]).max())
-    printed = float(ruler.measure(planted).worst[0])
+    printed = float(ruler.measure(planted)[0][0])
     assert printed / FOUND_TO_WORST < 0.998 * true, "the search found it after all: a test of nothing"
     assert true <= printed
 
 
 def test_an_exact_model_has_the_error_of_rounding(arm):
-    assert (
-        Ruler(arm, "hub_angle", (0.1, 100.0)).measure(modal_model(arm, "hub_angle", 100)).worst < 5 * EXACT_ROUNDING
-    ).all()
-
-
-@pytest.mark.parametrize("preset", ["sasaki2012", "sasaki2012-lab"])
-def test_the_derivative_along_the_arm(preset):
-    """Differences across the axis against ball arithmetic, next to a pole too."""
-    arm = tfarm.load(preset)
-    G = tfarm.transfer(arm, ("moment", "deflection"), x=0.4)
-    poles = frequencies_around(arm, 1000.0)
-    w = np.array([0.3, 70.0, poles[0] * (1 + 1e-5), 600.0])
-    np.testing.assert_allclose(axis_slope(G, w, poles), G.derivative(1j * w), rtol=1e-5)
+    worst, _ = Ruler(arm, "hub_angle", (0.1, 100.0)).measure(modal_model(arm, "hub_angle", 100))
+    assert worst.max() < 5 * EXACT_ROUNDING
 
 
 @pytest.mark.parametrize("seed", thinned(range(5), 2))

@@ -32,7 +32,7 @@ def test_tables_are_the_studies_to_the_last_bit(section):
             assert shown[f"mode_{i + 1}_rad_s"] == study.natural_frequency[:, i].tolist()
             assert shown[f"mode_{i + 1}_sensitivity"] == study.sensitivity[:, i].tolist()
         assert [text == "this arm" for text in shown["is"]] == study.is_own.tolist()
-    assert depth["depth_m"] == section_study(PAPER).depth.tolist()
+    assert depth["depth_m"] == section_study(PAPER).values.tolist()
 
 
 def test_the_words_carry_the_numbers(section):
