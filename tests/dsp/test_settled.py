@@ -8,8 +8,7 @@ import pytest
 from scipy.integrate import quad
 
 import tfarm
-from tests.dsp.hold import HoldModel
-from tests.dsp.settled import hurting, ordinary
+from tests.dsp.settled import HoldModel, hurting, ordinary
 from tests.shared import thinned
 from tests.survey import each_of, tally
 from tfarm.arm import FED_BACK, Arm, Hub, HubFeedback, Link, Payload, Section
