@@ -23,7 +23,7 @@ from tfarm.dsp.traces import away
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.reduced import modal_model
-from tfarm.tuner.controller import tip_off
+from tfarm.tuner.trial import tip_off
 
 LAB = tfarm.load("sasaki2012-lab")
 GAINS = HubFeedback(K1=0.3, K2=0.3)

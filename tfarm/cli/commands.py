@@ -39,7 +39,7 @@ from tfarm.tables.terminal import show
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
-    from tfarm.exact.methods import Method
+    from tfarm.exact.values import Method
 
 Csv = Annotated[Path | None, typer.Option("--csv", help="write the curve to this file")]
 LaidOver = Annotated[
@@ -177,7 +177,7 @@ def response(
 
 def _slow_method(method: str, number: int, digits: int | None, compare: bool) -> Method:
     """The method asked for.  Raises ParameterError for an unknown one, too many points, digits beside a slow one."""
-    from tfarm.exact.methods import known_method
+    from tfarm.exact.values import known_method
 
     chosen = known_method(method)
     if chosen == "closed-form" and not compare:
@@ -210,7 +210,7 @@ def _print_found(answer: dict[str, Any]) -> None:
 
 def _print_compared(answer: dict[str, Any]) -> None:
     """A row a point or a mode: the closed form's number, and how far the others are from it, relatively."""
-    from tfarm.exact.methods import METHODS_AGREE
+    from tfarm.exact.values import METHODS_AGREE
 
     numbers = answer["methods"]["closed-form"]
     if "index" in answer:

@@ -246,7 +246,12 @@ def _print_locus(answer: dict[str, Any]) -> None:
         Column("gap", "gap to reduced", of=answer.get("gap_by_branch"), digits=singly("{:.1e}".format)),
     ]
     show(Table(columns=tuple(column for column in columns if column.of is not None)))
-    _print_crossings(answer)
+    for each in answer["crossings"]:
+        where = f"{name} = {each['gain']:.10g}, {each['omega_rad_s']:.10g} rad/s ({each['frequency_hz']:.6g} Hz)"
+        which = "a pole that is on no branch" if each["branch"] is None else f"branch {each['branch']}"
+        print(f"{which} becomes {each['direction']} at {where}")
+    if not answer["crossings"]:
+        print("no branch crosses the imaginary axis")
     for each in answer["ends"]:
         print(f"branch {each['branch']} is followed to {name} = {each['gain']:.10g}")
     if "gap_to_reduced" in answer:
@@ -257,18 +262,6 @@ def _print_locus(answer: dict[str, Any]) -> None:
         f"poles complete at a few values with {left:.6g} < Re s < {right:.6g} and |Im s| < {top:.6g}; - : not followed"
     )
     print(answer["sign_convention"])
-
-
-def _print_crossings(answer: dict[str, Any]) -> None:
-    """A line a crossing of the imaginary axis."""
-    for each in answer["crossings"]:
-        where = (
-            f"{answer['vary']} = {each['gain']:.10g}, {each['omega_rad_s']:.10g} rad/s ({each['frequency_hz']:.6g} Hz)"
-        )
-        which = "a pole that is on no branch" if each["branch"] is None else f"branch {each['branch']}"
-        print(f"{which} becomes {each['direction']} at {where}")
-    if not answer["crossings"]:
-        print("no branch crosses the imaginary axis")
 
 
 def _complex(point: list[float] | None) -> str:

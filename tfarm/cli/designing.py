@@ -74,7 +74,10 @@ def gain_map(
     """The map over the plane of both gains, or over two numbers of a law."""
     subject, of_law = load_arm(arm, theory), bool(vary or law)
     if of_law:
-        _must_be_none_of(typed | {ANGLE_GAIN: kp or None})
+        for name, value in (typed | {ANGLE_GAIN: kp or None}).items():
+            if value is not None:
+                remedy = "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice"
+                raise ParameterError(key=f"--{name}", value=value, remedy=remedy)
         if len(vary or []) != 2:
             remedy = "twice, such as --vary hub_angle=0,10 --vary delay=0,0.02"
             raise ParameterError(key="--vary", value=vary or [], remedy=remedy)
@@ -99,14 +102,6 @@ def gain_map(
         lambda: law_map_answer(found) if of_law else map_answer(found), _print_map, json,
         csv=csv, table=lambda: plane_table(names, found.x, found.y, found.unstable), png=png, picture=(found,),
     )  # fmt: skip
-
-
-def _must_be_none_of(typed: dict[str, Any]) -> None:
-    """Refuse ranges of gains beside a law, which has numbers of its own."""
-    for name, value in typed.items():
-        if value is not None:
-            remedy = "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice"
-            raise ParameterError(key=f"--{name}", value=value, remedy=remedy)
 
 
 def _range_of(option: str, text: str) -> tuple[str, tuple[float, float]]:
@@ -189,7 +184,9 @@ def _print_design(answer: dict[str, Any]) -> None:
     print(f"without a clock it is {answer['verdict']}{beyond}; --save FILE keeps it for --law FILE")
     print(f"{answer['starts_agreed']} of {answer['starts']} descents agree within half a per cent")
     _print_bounds(answer)
-    _print_record(answer)
+    if (length := answer["slew_duration_s"]) is not None:
+        what = "root moment less the rigid arm's, N m rms" if answer["objective"] == "residual" else "cost of the slew"
+        print(f"{what}, in a record of {length:.6g} s (tfarm simulate --duration {length:.6g})")
     _print_arms(answer)
     print(answer["sign_convention"])
 
@@ -218,13 +215,6 @@ def _print_bounds(answer: dict[str, Any]) -> None:
     if cut:
         ends = [f"{name} = {values[name]:.6g} of {pair_words(answer['bounds'][name])}" for name in cut]
         print(f"no optimum: {' and '.join(ends)} is where the search was cut off; it may get better beyond")
-
-
-def _print_record(answer: dict[str, Any]) -> None:
-    """The record of the slew that a residual or a cost is of."""
-    if (length := answer["slew_duration_s"]) is not None:
-        what = "root moment less the rigid arm's, N m rms" if answer["objective"] == "residual" else "cost of the slew"
-        print(f"{what}, in a record of {length:.6g} s (tfarm simulate --duration {length:.6g})")
 
 
 def _print_arms(answer: dict[str, Any]) -> None:

@@ -75,7 +75,12 @@ def fit(
     )  # fmt: skip
     if save is not None:
         save_fit(found, save)
-    page = _report(found, out) if report else None
+    page = None
+    if report:
+        from tfarm.report import write
+
+        with progress() as advance:
+            page = write([found.arm], out, fits=[found], progress=advance, notice=tell)
     hand_out(lambda: fit_answer(found), partial(_print, found), json, png=png, picture=(found,), also=(save, page))
     if not found.converged:
         raise typer.Exit(3)
@@ -108,13 +113,6 @@ def _numbers(option: str, texts: Iterable[str], count: int) -> Iterable[tuple[st
             form = "KEY=" + ",".join(["NUMBER"] * count)
             raise ParameterError(key=option, value=text, remedy=f"write {form}, in SI units")
         yield key.strip(), values
-
-
-def _report(found: Fit, out: Path) -> Path:
-    from tfarm.report import write
-
-    with progress() as advance:
-        return write([found.arm], out, fits=[found], progress=advance, notice=tell)
 
 
 def _print(found: Fit, answer: dict[str, Any]) -> None:

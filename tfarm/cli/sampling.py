@@ -146,7 +146,7 @@ def simulate(
         subject, law, said = given.loop()
         answer = said | simulated_answer(subject, law, chain, scenario, duration, **how)
     else:
-        from tfarm.tuner.controller import load_tuner
+        from tfarm.tuner.trial import load_tuner
         from tfarm.tuner.tuning import controlled_answer
 
         saved = load_tuner(controller)

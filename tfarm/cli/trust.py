@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tfarm.arm import MOMENT_GAIN
+from tfarm.arm import MOMENT_GAIN, presets
 from tfarm.cli.app import (
     ArmName,
     Json,
@@ -193,8 +193,6 @@ def completion(shell: Annotated[str, typer.Argument(metavar="SHELL", help="bash,
 
 def _bash(verbs: dict[str, tuple[list[str], bool]]) -> str:
     """A case a verb: of each its options, and whether it takes an arm."""
-    from tfarm.arm import presets
-
     cases = [
         f'            {name}) words="{" ".join([*options, *(presets() if takes_arm else ())])}" ;;'
         for name, (options, takes_arm) in verbs.items()
@@ -204,8 +202,6 @@ def _bash(verbs: dict[str, tuple[list[str], bool]]) -> str:
 
 def _fish(verbs: dict[str, tuple[list[str], bool]]) -> str:
     """A line a word: fish completes files by itself."""
-    from tfarm.arm import presets
-
     lines = ["# Completion of tfarm.  Made by `tfarm completion`; make it anew after an update."]
     lines += [f"complete -c tfarm -n __fish_use_subcommand -a {name}" for name in (*verbs, "--version")]
     for name, (options, takes_arm) in verbs.items():
