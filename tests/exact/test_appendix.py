@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.models import Ritz
 from tests.outputs import OF_ONE_LINK
 from tests.shared import thinned
-from tests.strategies import BOUNDARY_CASES, arm_of, some_arm, some_s
+from tests.strategies import BOUNDARY_CASES, some_arm, some_s
 from tests.transition import determinant, response
 from tfarm import Arm, ConvergenceError, Hub, Link, ParameterError, Payload, Section
 from tfarm.exact import appendix
@@ -79,18 +78,6 @@ def test_thirty_digits_are_those_of_the_state_transition_matrix(preset, s):
         for name in OF_ONE_LINK:
             value = appendix.response(arm, name, s, 30, x=x * L)
             assert abs(value / expected[name] - 1) < mpmath.mpf(10) ** -30
-
-
-@pytest.mark.parametrize("s", [3.0 + 40.0j, 700.0j, 90.0 + 0.0j])
-def test_a_ritz_model_agrees(s):
-    """Legendre polynomials for shear strain and curvature, and no wave anywhere: float64, so to rounding."""
-    arm = arm_of(
-        length=1.3, slenderness=12, width=1, density=7800, E=2e11, nu=0.3, damping=2e-5, hub=40.0, mass=0.4, inertia=2.0
-    )
-    model = Ritz(arm)
-    q = model.response(s, model.hub_psi)
-    for name, motion in (("hub_angle", model.hub_psi), ("tip_displacement", model.tip_w)):
-        assert complex(appendix.response(arm, name, s, 15)) == pytest.approx(motion @ q, rel=2e4 * EPS, abs=0)
 
 
 def test_delta_is_the_characteristic_function_without_its_artefacts():

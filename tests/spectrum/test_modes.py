@@ -6,7 +6,6 @@ from dataclasses import replace
 from itertools import pairwise
 
 import flint
-import mpmath
 import numpy as np
 import pytest
 from numpy.polynomial import chebyshev
@@ -194,14 +193,6 @@ def test_sensitivities_add_up(modes):
     metres = metres + 3 * sensitivity["payload_mass"]
     metres = metres + 5 * (sensitivity["hub_inertia"] + sensitivity["payload_inertia"])
     np.testing.assert_allclose(metres[flexible], -1.0, rtol=0, atol=1e4 * EPS)
-
-
-def test_the_root_of_the_paper_s_determinant_is_the_frequency():
-    """With 40 digits, and confirmed by mpmath on the appendix."""
-    modes = tfarm.modes(tfarm.load("stocky-steel"), 6)
-    for text, omega in zip(modes.digits(40), modes.natural_frequency, strict=True):
-        with mpmath.workdps(50):
-            assert abs(mpmath.mpf(text) - float(omega)) <= 4 * EPS * omega
 
 
 def test_no_points_have_no_values():
