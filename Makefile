@@ -21,8 +21,8 @@ SURVEYS := \
 	properties \
 	audit.test_planted_slips \
 	exact.accuracy \
-	response.rigid \
-	response.extrema \
+	response.test_rigid \
+	response.test_extrema \
 	spectrum.proofs \
 	spectrum.ritz \
 	spectrum.damped \
@@ -36,8 +36,7 @@ SURVEYS := \
 	synthesis.optima \
 	synthesis.held_designs \
 	loop.nyquist_counts \
-	reduced.errors \
-	dsp.verdicts \
+	reduced.test_accuracy \
 	dsp.settled \
 	dsp.law_verdicts \
 	dsp.law_orders \

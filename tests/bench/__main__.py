@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from . import elements, loci, loops, responses, rigs, sampled, spectra, tuning
+from . import elements, loci, responses, sampled, spectra, tuning
 from .rows import Row, keep, show
 
 
@@ -21,15 +21,14 @@ def measure() -> Iterator[Row]:
     """All rows, group by group."""
     yield from responses.response_rows()
     yield from responses.mpmath_rows()
-    yield from elements.response_rows()
-    yield from rigs.rig_rows()
+    yield elements.response_row()
     yield from spectra.modes_rows()
-    yield from elements.modes_rows()
+    yield elements.mode_row()
     yield spectra.cxroots_row()
-    yield from loops.loop_rows()
+    yield from sampled.loop_rows()
     yield from loci.locus_rows()
     yield from sampled.sampled_rows()
-    yield from tuning.tuner_rows()
+    yield tuning.tuner_row()
 
 
 def main(path: Path) -> None:
