@@ -50,9 +50,14 @@ def true_value(at):
         return [mpmath.mpc(v) * mpmath.exp(mpmath.mpc(c)) for v, c in zip(at.value, at.scale, strict=True)]
 
 
+def allowed(law, hub):
+    """The gains that a hub may have: without inertia its moment is the torque itself, an algebraic loop."""
+    return {name: gain for name, gain in law.items() if name != "K2" or hub != "zero"}
+
+
 def laws(case):
-    """No feedback, and all three gains where the hub is free to turn."""
-    return ({}, LAW) if case[0] != "infinite" else ({},)
+    """No feedback, and the gains where the hub is free to turn."""
+    return ({}, allowed(LAW, case[0])) if case[0] != "infinite" else ({},)
 
 
 def exact(arm, law):
@@ -141,12 +146,12 @@ def test_feedback_changes_the_hub_row_of_the_papers_matrix(law) -> None:
         ("some", "infinite", "some"),
         ("zero", "some", "zero"),
     ):
-        arm = arm_at(case, seed=8)
+        arm, gains = arm_at(case, seed=8), allowed(law, case[0])
         k = system_of(arm)
         s = S[:5]
-        fed, free = balls(k, s, exact(arm, law)), balls(k, s)
+        fed, free = balls(k, s, exact(arm, gains)), balls(k, s)
         with mpmath.workdps(80):
-            theirs = [delta(arm, at, **law) / delta(arm, at) for at in s]
+            theirs = [delta(arm, at, **gains) / delta(arm, at) for at in s]
             assert max(abs(a / b / t - 1) for a, b, t in zip(fed, free, theirs, strict=True)) < 1e-30
 
 
@@ -171,7 +176,7 @@ def test_zeros_at_the_origin_are_as_many_as_the_order_of_D_there(case) -> None:
     k = system_of(arm)
     small = np.array([1e-3, 1e-4]) * tfarm.modes(arm, 1).natural_frequency[-1]
     for K1, K2, Kp in [(0, 0, 0)] if case[0] == "infinite" else [(0, 0, 0), (1, 0.2, 0), (0, 0.2, 0), (1, 0.2, 3)]:
-        law = {"K1": K1, "K2": K2, "Kp": Kp} if any((K1, K2, Kp)) else {}
+        law = allowed({"K1": K1, "K2": K2, "Kp": Kp} if any((K1, K2, Kp)) else {}, case[0])
         at = small * (1e-9 if K1 else 1.0)  # where K1 s outweighs the inertia
         far, near = (abs(each) for each in balls(k, at.astype(complex), exact(arm, law)))
         order = Loop(arm, HubFeedback(**law)).zeros_at_origin if law else k.at_rest
