@@ -18,12 +18,12 @@ SEED ?= 1
 SURVEYS := \
 	left_out \
 	golden \
-	plausible \
+	plausible.survey \
 	properties \
 	audit.test_planted_slips \
 	exact.accuracy \
-	response.rigid \
-	response.extrema \
+	response.test_rigid \
+	response.test_extrema \
 	spectrum.proofs \
 	spectrum.ritz \
 	spectrum.damped \
@@ -37,8 +37,7 @@ SURVEYS := \
 	synthesis.optima \
 	synthesis.held_designs \
 	loop.nyquist_counts \
-	reduced.errors \
-	dsp.verdicts \
+	reduced.test_accuracy \
 	dsp.settled \
 	dsp.law_verdicts \
 	dsp.law_orders \
@@ -113,7 +112,7 @@ lint: $(INSTALLED) ## check style, types and which room imports which
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 
-bench: $(BENCH_INSTALLED) ## measure speed and memory, beside other packages
+bench: $(BENCH_INSTALLED) ## measure speed, beside other packages
 	@$(BIN)/python -m tests.bench
 
 clean: ## remove everything that was generated

@@ -4,6 +4,8 @@ from pathlib import Path
 from typing import Any
 
 import typer
+from docutils import nodes
+from latex2mathml.converter import convert
 from pydantic_core import PydanticUndefined
 from typer.cli import get_docs_for_click
 
@@ -17,11 +19,12 @@ HERE = Path(__file__).parent
 project = "tfarm"
 author = copyright = "The tfarm authors"
 release = version = tfarm.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 myst_enable_extensions = ["colon_fence", "dollarmath", "deflist"]
 myst_heading_anchors = 3
 suppress_warnings = ["myst.header"]  # Typer's page begins with the command, one level down
 html_theme = "furo"
+html_math_renderer = "mathml"
 html_title = f"tfarm {release}"
 html_show_sphinx = False
 html_copy_source = False
@@ -72,6 +75,14 @@ def write_references(app: Any) -> None:
             path.write_text(text, encoding="utf-8")
 
 
+def write_formula(translator: Any, node: Any) -> None:
+    """A formula as MathML, which browsers draw without a script or the network."""
+    display = "block" if isinstance(node, nodes.math_block) else "inline"
+    translator.body.append(convert(node.astext(), display=display))
+    raise nodes.SkipNode
+
+
 def setup(app: Any) -> None:
     """Sphinx calls this."""
     app.connect("builder-inited", write_references)
+    app.add_html_math_renderer("mathml", (write_formula, None), (write_formula, None))

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from tfarm.fitting.data import Measured, read_measured
     from tfarm.fitting.fit import fit
     from tfarm.fitting.overlay import overlay
-    from tfarm.loop.closed import locus
+    from tfarm.loop.locus import locus
     from tfarm.loop.margins import margins
     from tfarm.loop.nyquist import nyquist
     from tfarm.loop.plane import gain_map as map
@@ -100,7 +100,7 @@ __all__ = [
 _ROOMS = {  # where a name stands; what it is called there after a colon, if not the same
     "bode": "response",
     "design": "synthesis.design",
-    "locus": "loop.closed",
+    "locus": "loop.locus",
     "nyquist": "loop.nyquist",
     "closed_loop_poles": "loop.poles",
     "compare": "comparing",

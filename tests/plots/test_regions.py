@@ -8,7 +8,7 @@ import pytest
 import tfarm
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain
-from tfarm.loop.edges import moment_axis, rate_axis, rate_columns
+from tfarm.loop.plane import moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import stability
 from tfarm.plots.regions import sampled_region
 from tfarm.report.live import live_data

@@ -7,9 +7,9 @@ import tfarm
 from tfarm.crossing import pieces
 from tfarm.dsp import load_chain, sampled_loop
 from tfarm.dsp.loci import sampled_loci
-from tfarm.loop.edges import moment_axis, rate_axis
 from tfarm.loop.locus import locus, rounded
 from tfarm.loop.loop import Loop
+from tfarm.loop.plane import moment_axis, rate_axis
 from tfarm.loop.poles import poles_below
 from tfarm.plots import locus as locus_plot
 from tfarm.plots.regions import sampled_region
@@ -117,7 +117,7 @@ def _near_a_corner(line, n):
 def test_a_locus_under_any_law_is_round_too():
     """No turn beyond 5 degrees but at a corner; the poles of the record stay, those between are zeros of 1 + L."""
     law = tfarm.Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
-    found = locus(LAB, law, "gain", 1.0, 8.0, points=8, branches=1, in_box=True)
+    found = locus(LAB, law, "gain", 1.0, 8.0, points=8, branches=1)
     fine = rounded(found)
     more = np.nonzero(~np.isin(fine.gain, found.gain))[0]
     assert more.size

@@ -18,8 +18,17 @@ from tfarm.arrays import Real
 from tfarm.crossing import Window, pieces
 from tfarm.digits import SUPERSCRIPT, how_many, plain, significant
 from tfarm.dsp import GainMap
-from tfarm.loop.edges import LINEAR_SCALE, Axis, edge, resting_frequencies, seen, stable_edge, static_edges
-from tfarm.loop.plane import INFINITE, Plane
+from tfarm.loop.plane import (
+    INFINITE,
+    LINEAR_SCALE,
+    Axis,
+    Plane,
+    edge,
+    resting_frequencies,
+    seen,
+    stable_edge,
+    static_edges,
+)
 
 from .labels import OFFSET_UPON, OFFSETS_AROUND, Label
 from .style import BLUE, GREY, INK, ORANGE, PURPLE, picture, safe

@@ -24,8 +24,7 @@ from tfarm.digits import plain, scientific
 from tfarm.dsp import Chain, GainMap, sampled_map, sampled_verdict
 from tfarm.dsp.crossings import ends_of_K1, rounded_map, with_both_sides, with_more
 from tfarm.errors import ConvergenceError
-from tfarm.loop.edges import Axis, rate_columns
-from tfarm.loop.plane import Plane, gain_map
+from tfarm.loop.plane import Axis, Plane, gain_map, rate_columns
 from tfarm.spectrum.table import default_gains
 
 from .plane import draw_region
@@ -151,7 +150,7 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
     for region, colour, edge, label in regions:
         draw_region(region.x, region.stable_intervals, edge, 0.9, 2.5, ax, facecolor=colour, edgecolor="none")
         keys.append(Patch(facecolor=colour, edgecolor=edge, linewidth=0.9, label=label))
-    if continuous.arm.is_uniform:  # of a rig the argument needs more: see `tfarm.loop.lyapunov`
+    if continuous.arm.is_uniform:  # of a rig the argument needs more: see `tfarm.loop.theorem`
         keys += ax.plot((low, high), (1.0, 1.0), color=INK, lw=1.1, ls=(0, (5, 3)), zorder=4)
         keys[-1].set_label(f"below it: proven by energy at C = 0 ({LYAPUNOV})")
     keys.append(Patch(facecolor="white", edgecolor=GREY, linewidth=0.9, label="stable in neither"))

@@ -16,9 +16,8 @@ from tfarm.arrays import Complex
 from tfarm.digits import kept_digits, plain, significant
 from tfarm.dsp.loci import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
 from tfarm.errors import one_line
-from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, held_branches
+from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, ReducedLocus, held_branches
 from tfarm.loop.locus import Locus, frame, rounded
-from tfarm.loop.reduced_locus import ReducedLocus
 from tfarm.spectrum import modes
 
 from .labels import OFFSETS_BESIDE, Label
@@ -181,7 +180,7 @@ def locus(exact: Locus, reduced: ReducedLocus | None = None, *, ax: Axes) -> Key
 
     Broad lines: the branches [1/s], a colour a mode, with values between those of `exact` where they bend; a cross
     where the gain is 0, an open circle at another beginning, dots at a few values, one of them that which damps the
-    first mode best, and a diamond where one crosses the axis.  Thin: those of `reduced` (`tfarm.loop.reduced_locus`),
+    first mode best, and a diamond where one crosses the axis.  Thin: those of `reduced` (`tfarm.loop.loci`),
     which a locus of gains at the hub has.
     """
     fine, every = rounded(exact), range(len(exact.branches))

@@ -114,9 +114,6 @@ def highest_and_lowest(data: Bode) -> str:
 
 def what_it_means(data: Bode) -> str:
     """One sentence on what the picture says about control."""
-    if not data.resonances.size and data.output == "root_moment" and data.arm.has_massless_hub:
-        gauge = "−u/(1 + C s)" if data.arm.damping else "−u"
-        return f"Nothing resonates here: a free pin passes the torque on to the link; the gauge there reads {gauge}."
     if not data.resonances.size:
         return "Nothing resonates here: no pole that oscillates shows at this output."
     turned = f"{np.ptp(data.phase):.0f} degrees over the band"
@@ -209,7 +206,7 @@ def _onwards(those: Possible) -> tuple[list[str], list[Picture | Table]]:
         words.append(typeset(f"With {gains} the loop holds on {share}."))
         blocks.append(Picture(
             stem="fit-map", title="Gains on all of these arms",
-            caption="Dark: the gains hold on every arm that the data leave possible; white: on none. Without a clock.",
+            caption="Dark: the gains hold on every arm that the data leave possible; white: on none; continuous time.",
             alt="Map of the share of arms on which gains hold.", figure=draw_share(those, ranges_of(arm)),
         ))  # fmt: skip
         gain_ends = (each.windows[MOMENT_GAIN].around for each in stable)
