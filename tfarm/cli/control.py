@@ -17,7 +17,9 @@ from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
 from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
-    from tfarm.arm import Arm
+    from tfarm.arm import AnyLaw, Arm
+    from tfarm.arrays import Real
+    from tfarm.dsp import Chain
 
 HELP_ON_COUNT = (
     "poles with Im s >= 0, 1 to 1000; if not given ten, or those below the shear cut-off where they are fewer"
@@ -27,6 +29,9 @@ HELP_ON_ALSO = "a further arm that the law has to serve: the objective is the wo
 HELP_ON_RANGE = "numbers that the arm may have, such as payload.mass=0.1,0.5; up to four: corners, and a search inside"
 HELP_ON_VARY = "twice: two numbers of a law and their ranges; gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N"
 
+MapPeriod = Annotated[
+    float | None, typer.Option("--period", help="sampling period [s]: the map of the sampled loop, as with --dsp")
+]
 HELP_ON_MAP = (
     f"How many poles are unstable over the plane of {' and '.join(PLANE)}, and the exact boundary; "
     "or over two numbers of a law."
@@ -104,15 +109,19 @@ def gain_map(
     png: Png = None,
     law: LawFile = None,
     vary: Annotated[list[str] | None, typer.Option("--vary", metavar="NAME=LO,HI", help=HELP_ON_VARY)] = None,
+    period: MapPeriod = None,
+    delay_samples: Delay = None,
+    dsp: DspFile = None,
     json: Json = False,
     *,
     typed: dict[str, str | None],
 ) -> None:
     """The map over the plane of both gains, or over two numbers of a law."""
     number, subject = whole_number("--points", points or "101", 2, 2000), load_arm(arm)
+    chain = None if (period, delay_samples, dsp) == (None,) * 3 else asked_chain(dsp or arm, period, delay_samples)
     if vary or law:
         _must_be_none_of(typed | {ANGLE_GAIN: kp or None})
-        _law_map(subject, arm, law, vary or [], whole_number("--points", points or "60", 2, 400), csv, png, json)
+        _law_map(subject, arm, law, vary or [], whole_number("--points", points or "60", 2, 400), chain, csv, png, json)
         return
     from tfarm.loop.plane import ranges_of
 
@@ -124,6 +133,12 @@ def gain_map(
     from tfarm.loop.plane import between
     from tfarm.loop.plane import gain_map as find
 
+    if chain is not None:
+        from tfarm.spectrum.scales import default_gains
+
+        gains = default_gains(subject).having(ANGLE_GAIN, kp)
+        _sampled_map(subject, gains, chain, PLANE, (between(*x, number), between(*y, number)), csv, png, json)
+        return
     found = find(subject, between(*x, number), between(*y, number), kp)
     hand_out(
         lambda: map_answer(found), print_map, json,
@@ -145,6 +160,7 @@ def _law_map(
     law: str | None,
     vary: list[str],
     number: int,
+    chain: Chain | None,
     csv: Path | None,
     png: Path | None,
     json: bool,
@@ -162,11 +178,33 @@ def _law_map(
     from tfarm.loop.plane import between, plane
 
     x, y = (between(*limits, number) for _, limits in ranges)
+    if chain is not None:
+        _sampled_map(subject, typed, chain, (ranges[0][0], ranges[1][0]), (x, y), csv, png, json)
+        return
     found = plane(Loop(subject, as_law(typed)), (ranges[0][0], ranges[1][0]), x, y)
     names = [name.replace(".", "_").replace("@", "_at_") for name in found.vary]
     hand_out(
         lambda: law_map_answer(found), print_law_map, json,
         csv=csv, table=lambda: plane_table(names, found.x, found.y, found.unstable), png=png, picture=(found,),
+    )  # fmt: skip
+
+
+def _sampled_map(
+    subject: Arm, law: AnyLaw, chain: Chain, vary: tuple[str, str], axes: tuple[Real, Real], csv: Path | None,
+    png: Path | None, json: bool,
+) -> None:  # fmt: skip
+    """The map over two numbers of the law of a sampled loop, with as many modes as the verdict on the law takes."""
+    from tfarm.cli.control_tables import print_sampled_map
+    from tfarm.cli.tables import hand_out
+    from tfarm.dsp.crossings import law_map, map_answer
+    from tfarm.dsp.verdict import sampled_verdict
+    from tfarm.loop.answers import plane_table
+
+    found = law_map(sampled_verdict(subject, law, chain).full, *axes, vary)
+    names = [name.replace(".", "_").replace("@", "_at_") for name in vary]
+    hand_out(
+        lambda: map_answer(found), print_sampled_map, json,
+        csv=csv, table=lambda: plane_table(names, found.x, found.y, found.counts), png=png, picture=(found,),
     )  # fmt: skip
 
 
@@ -184,7 +222,7 @@ def design(
     structure: Annotated[str, typer.Option("--structure", help=HELP_ON_STRUCTURE)] = TWO_GAINS,
     kp: HeldAngle = 0.0,
     modes: Annotated[str, typer.Option("--modes", help="flexible modes in the band, 1 to 30")] = "2",
-    continuous: Annotated[bool, typer.Option("--continuous", help="for the continuous loop, without a clock")] = False,
+    continuous: Annotated[bool, typer.Option("--continuous", help="for the continuous-time loop")] = False,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,

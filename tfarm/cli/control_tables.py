@@ -108,6 +108,15 @@ def _print_plane(answer: dict[str, Any], x: str, y: str, names: Sequence[str] | 
     print(answer["sign_convention"])
 
 
+def print_sampled_map(answer: dict[str, Any]) -> None:
+    """The share of the plane in which the sampled loop is stable, and a coarse picture."""
+    counts, (first, second) = answer["unstable_poles"], answer["vary"]
+    flat = [count for row in counts for count in row]
+    held = f"stable when sampled every {1e3 * answer['period_s']:g} ms (first {answer['modes_used']} modes)"
+    print(f"{answer['arm']}: {flat.count(0)} of {len(flat)} pairs of {first} and {second} are {held}")
+    _print_plane(answer | {"unstable_roots": counts}, "x", "y", (first, second))
+
+
 def print_law_map(answer: dict[str, Any]) -> None:
     """The share of the plane that is stable, and a coarse picture."""
     counts, (first, second) = answer["unstable_roots"], answer["vary"]
@@ -129,8 +138,8 @@ def print_design(answer: dict[str, Any]) -> None:
     )
     print(f"{'' if sampled['stable'] else 'BUT '}{words}")
     beyond = "" if answer["known_beyond_the_band"] else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
-    print(f"without a clock it is {answer['verdict']}{beyond}; --save FILE keeps it for --law FILE")
-    print(f"{answer['starts_agreed']} of {answer['starts']} descents agree within half a per cent")
+    print(f"continuous-time loop: {answer['verdict']}{beyond}; --save FILE keeps the law for --law FILE")
+    print(f"{answer['starts_agreed']} of {answer['starts']} searches agree within half a per cent")
     _print_bounds(answer)
     _print_record(answer)
     _print_arms(answer)
@@ -180,7 +189,7 @@ def _print_arms(answer: dict[str, Any]) -> None:
         Column("arm", "arm", of=[each["name"] for each in arms]),
         Column("value", answer["objective"], of=[each["value"] for each in arms], digits=singly(general, 6)),
         Column("sampled", "sampled", of=held),
-        Column("verdict", "without a clock", of=[each["verdict"] for each in arms]),
+        Column("verdict", "continuous-time", of=[each["verdict"] for each in arms]),
     )
     show(Table(columns=columns))
     print(f"{answer['value']:.6g} is {answer['worst_case_in_words']}; {answer['worst_arm']} is the worst")

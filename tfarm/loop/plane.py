@@ -82,6 +82,16 @@ class Plane:
         return self.x, self.y
 
     @property
+    def counts(self) -> NDArray[np.int64]:
+        """Unstable poles (len(y), len(x))."""
+        return self.unstable
+
+    @property
+    def curve(self) -> str:
+        """Where poles are when their count changes."""
+        return "imaginary axis"
+
+    @property
     def is_of_gains(self) -> bool:
         """Whether it is the plane of K1 and K2."""
         return self.vary == PLANE and self.law.gains is not None

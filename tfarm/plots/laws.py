@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tfarm.digits import significant
+from tfarm.dsp import GainMap
 from tfarm.loop.locus import Locus
 from tfarm.loop.plane import Plane
 from tfarm.loop.reduced_locus import ReducedLocus
@@ -70,17 +71,25 @@ def draw_law_map(found: Plane, new: New = blank) -> Figure:
     return on_own_figure(lambda ax: law_counts(found, ax=ax), (7.0, 5.4), title, new=new)
 
 
-def law_counts(found: Plane, *, ax: Axes) -> None:
+@drawn.register
+def draw_sampled_map(found: GainMap, new: New = blank) -> Figure:
+    """The plane of two numbers of the law of a sampled loop, on a figure of its own."""
+    arm, ms = found.loop.plant.arm.name, 1e3 * found.loop.chain.sampling.period
+    title = f"{arm}: unstable poles when sampled every {significant(ms, 4)} ms, first {found.modes_used} modes"
+    return on_own_figure(lambda ax: law_counts(found, ax=ax), (7.0, 5.4), title, new=new)
+
+
+def law_counts(found: Plane | GainMap, *, ax: Axes) -> None:
     """Colours for the number of unstable poles, black dots for the exact crossings along the second number."""
-    image = colours(found.unstable)
+    image = colours(found.counts)
     ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True, zorder=0.1)
-    for count in np.unique(found.unstable):
-        if np.mean(there := found.unstable == count) > LEAST_NAMED:
+    for count in np.unique(found.counts):
+        if np.mean(there := found.counts == count) > LEAST_NAMED:
             ax.fill_between([], [], [], color=image[there][0], label=words_of_count(int(count)))
     points = [(x, t) for x, each in zip(found.x, found.crossings, strict=False) for t in each.gain]
     if points:
         x, t = np.array(points).T
-        ax.plot(x, t, ".", color=INK, ms=2.0, label="a pole on the imaginary axis, exact")
+        ax.plot(x, t, ".", color=INK, ms=2.0, label=f"a pole on the {found.curve}, exact")
     ax.set_xlim(found.x[0], found.x[-1])
     ax.set_ylim(found.y[0], found.y[-1])
     ax.grid(False)
