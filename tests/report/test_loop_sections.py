@@ -20,11 +20,11 @@ from tfarm.dsp.chain import Sampling
 from tfarm.dsp.sampled import sampled_loop
 from tfarm.dsp.verdict import sampled_brief
 from tfarm.errors import ConvergenceError
-from tfarm.loop import edges
-from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
+from tfarm.loop import plane as edges
 from tfarm.loop.loci import held_branches, loci
 from tfarm.loop.loop import Loop
 from tfarm.loop.nyquist import compressed, nyquist, nyquist_of
+from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 from tfarm.plots.plane import nice_levels
@@ -37,7 +37,7 @@ from tfarm.report.locus_section import _more_damping, beyond_table
 from tfarm.report.loop_section import NOT_STABLE, margin_table, margins_section, verdict_fact
 from tfarm.report.map_section import draw_map_of_arm, map_data, map_of_arm, map_section
 from tfarm.report.page import signs
-from tfarm.spectrum.scales import PAPER_GAINS, default_gains, rate_unit
+from tfarm.spectrum.table import PAPER_GAINS, default_gains, rate_unit
 from tfarm.tables.files import as_json
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))

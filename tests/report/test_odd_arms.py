@@ -31,7 +31,7 @@ from tfarm.report.modes_section import damped_table, modal_table, places
 from tfarm.report.page import signs
 from tfarm.report.response_sections import bode_section
 from tfarm.spectrum import DampedModes
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 ARMS = odd_arms()
 DAMPED = [name for name, arm in ARMS.items() if arm.link.damping]

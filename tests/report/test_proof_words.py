@@ -7,7 +7,7 @@ import pytest
 import tfarm
 from tfarm import Hub, HubFeedback
 from tfarm.arm import Motor, RotarySpring
-from tfarm.loop.lyapunov import lyapunov
+from tfarm.loop.theorem import lyapunov
 from tfarm.report.map_section import proof_words
 
 ARM, LAB, FLEX = (tfarm.load(name) for name in ("sasaki2012", "sasaki2012-lab", "quanser-flexlink"))

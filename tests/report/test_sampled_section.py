@@ -12,7 +12,6 @@ import pytest
 import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.arm import HubFeedback
-from tfarm.comparing.regions import CUT_RANGE, K2_RANGE, regions_table, stable_regions
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, plain
 from tfarm.dsp import Chain, Simulator, sampled_loop, sampled_verdict, scenario, stable_windows
@@ -22,14 +21,14 @@ from tfarm.dsp.modes import dominant, mode_table
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots.files import save_figure
-from tfarm.plots.regions import draw_overlay
+from tfarm.plots.regions import CUT_RANGE, K2_RANGE, draw_overlay, regions_table, stable_regions
 from tfarm.plots.roots import draw_sampled_loci
 from tfarm.report import sampled_section as page
 from tfarm.report.cases import cases_of, sign_words, what_holds
 from tfarm.report.motion import CURVE_DIGITS
 from tfarm.report.sampled_section import SampledCase, loci_table, sampled_section
 from tfarm.report.sections import spans
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 from tfarm.tables.files import as_csv, as_json
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -64,8 +63,8 @@ def values_of(table):
 
 def test_the_picture_of_a_rig_is_as_high_as_its_own_gains(monkeypatch):
     """Driven by its motor's current, K2 balances a torque at 0.112 A/(N m), and not at 1."""
-    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 6)
-    monkeypatch.setattr("tfarm.comparing.regions.LITTLE_DAMPINGS", ())
+    monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 6)
+    monkeypatch.setattr("tfarm.plots.regions.LITTLE_DAMPINGS", ())
     rig = tfarm.load("quanser-2dsfl")
     data = stable_regions(rig, default_gains(rig), Chain())
     low, high = draw_overlay(data).axes[0].get_ylim()
@@ -102,7 +101,7 @@ def test_the_edges_at_the_default_gains_are_published_ones(section):
 
 
 def test_without_damping_the_layers_are_nested_at_the_gains_and_say_for_how_many_modes(monkeypatch):
-    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
+    monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
     data = stable_regions(PAPER, GAINS, Chain())
     assert [layer.loop.plant.arm.damping for layer in data.sampled] == [1e-4, 1e-6, 0.0]
@@ -228,7 +227,7 @@ def test_loci_are_the_poles_at_their_gains_and_aliased_modes_are_told_apart():
 
 @pytest.mark.survey
 def test_the_same_bytes_twice(tmp_path, monkeypatch):
-    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
+    monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
     loop = sampled_verdict(LAB, GAINS).loop
     for name in ("a", "b"):
@@ -254,7 +253,7 @@ def test_an_arm_without_a_loop_gets_one_sentence(inertia):
 
 
 def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
-    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
+    monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
     monkeypatch.setattr("tfarm.dsp.verdict.PERIOD_SHARES", (1.0,))
     section = sampled_section(replace(LAB, payload=tfarm.Payload(mass=math.inf)), Chain())

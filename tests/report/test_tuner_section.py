@@ -18,7 +18,7 @@ from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.traces import away
 from tfarm.errors import CertificationError
 from tfarm.plots.files import save_figure
-from tfarm.plots.learning import draw_curves
+from tfarm.plots.motion import draw_curves
 from tfarm.report import tuner_section as tuner_section_room
 from tfarm.report.cases import Subject
 from tfarm.report.sections import save_section

@@ -25,7 +25,7 @@ from tfarm.report.cases import Subject
 from tfarm.report.page import first_sentence, index_page
 from tfarm.report.trust import Evidence, write_trust
 from tfarm.report.trust_proofs import written_proofs
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 # ------------------------------------------------------------ the same bytes
 

@@ -11,7 +11,7 @@ import tfarm
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, Link, RotarySpring, implausible, input_words, unit_of
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant, singly, unit
-from tfarm.plots.sketch import draw_arm
+from tfarm.plots.sketch import sketch
 from tfarm.report.sections import Fact, PageSection, Picture
 
 HEADLINE_MODES = 3  # natural frequencies among the headline numbers, the rigid body's 0 not shown
@@ -101,7 +101,7 @@ def _picture(arm: Arm) -> Picture:
         caption=f"{drive} Hub and payload are symbols; the link's length and depth are to scale, which shows at "
         f"a glance whether shear can matter.{PARTS * (not arm.is_uniform)}",
         alt=f"Side view of the arm: hub at the left, a link {plain(arm.length, 6)} m long, {tip} at the tip.",
-        figure=draw_arm(arm),
+        figure=sketch.figure(arm),
     )
 
 

@@ -17,7 +17,7 @@ from tfarm.audit.assumptions import (
 )
 from tfarm.columns import Column, Table
 from tfarm.digits import fixed, plain, significant
-from tfarm.plots.assumptions import CURVE_COLOURS, draw_over
+from tfarm.plots.shapes import CURVE_COLOURS, draw_over
 from tfarm.report.arm_section import is_from_paper
 from tfarm.report.sections import PageSection, Picture
 

@@ -22,7 +22,7 @@ from tfarm.report.cases import GivenLaw, LawOnArm, brief_on, has_loop, margins_o
 from tfarm.report.page import QUESTIONS, Card, summary
 from tfarm.report.sections import PICTURES, Fact, in_ms
 from tfarm.response.frequency import bode
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 COMPARISON_KIND = "compare"  # what is kept of a comparison
 COMPARISON_PAGE = "compare.html"

@@ -23,7 +23,7 @@ from tfarm.plots.words import gains_words
 from tfarm.records import record
 from tfarm.response import transfer
 from tfarm.response.signals import Signals
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 from tfarm.synthesis.design import Design, design
 
 GIVEN_GAINS = "the gains given"

@@ -13,7 +13,7 @@ from tfarm.columns import FILES, REPORT, Column, Table
 from tfarm.digits import plain, singly
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import rule_in_words
-from tfarm.loop.law_answers import law_answer
+from tfarm.loop.answers import law_answer
 from tfarm.report.cases import GivenLaw, LawOnArm, on_arm
 from tfarm.report.sections import PageSection, typeset, upper
 from tfarm.response.signals import Signals

@@ -14,14 +14,13 @@ from tfarm.columns import Column, Table
 from tfarm.digits import how_many, kept_digits, listed, plain, scientific, significant, singly
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
-from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, branch_columns, held_branches, loci
-from tfarm.loop.most_damped import most_damped
+from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, branch_columns, held_branches, loci, most_damped
 from tfarm.loop.stability import MARGIN_OF_ZERO, Stability, stability
 from tfarm.plots.roots import draw_loci
 from tfarm.report.cases import continuous_cases, edge_of_K2, has_loop, margins_of
 from tfarm.report.loop_section import poles_of
 from tfarm.report.sections import PageSection, Picture
-from tfarm.spectrum.scales import default_gains, rate_unit
+from tfarm.spectrum.table import default_gains, rate_unit
 
 LISTED_MOMENT_GAINS = (0.9, 1.0, 1.01, 1.1, 1.5)  # values of K2 whose exact poles are listed
 AROUND_EDGE = (0.9, 1.1)  # times the edge, if that lies above all of them

@@ -26,14 +26,13 @@ from tfarm.loop.answers import (
     margin_rows,
     unsettled,
 )
-from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins, loop_curve
 from tfarm.loop.nyquist import Nyquist, nyquist_of, nyquist_table
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.loop.spill import SPILL, Spill, spill
-from tfarm.loop.theorem import signs_of_loop
+from tfarm.loop.theorem import lyapunov, signs_of_loop
 from tfarm.plots.disc import draw_nyquist
-from tfarm.plots.loop import draw_loop
+from tfarm.plots.frequency import draw_loop
 from tfarm.report.cases import GivenLaw, LawOnArm, brief_on, continuous_cases, margins_of, why_no_loop
 from tfarm.report.sections import Fact, PageSection, Picture, typeset, upper
 

@@ -13,21 +13,20 @@ from numpy.typing import NDArray
 from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, shown_unit, unit_of, written_unit
 from tfarm.arrays import Real
 from tfarm.columns import Column, Table
-from tfarm.comparing.regions import sampled_region
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp.verdict import SampledBrief
-from tfarm.loop.edges import DEEPEST_MOMENT_GAIN, Axis, edge, moment_axis, rate_axis
-from tfarm.loop.frequencies import band_of
-from tfarm.loop.plane import Plane, gain_map
+from tfarm.loop.loop import band_of
+from tfarm.loop.plane import DEEPEST_MOMENT_GAIN, Axis, Plane, edge, gain_map, moment_axis, rate_axis
 from tfarm.loop.windows import Windows
 from tfarm.plots import plane
+from tfarm.plots.regions import sampled_region
 from tfarm.plots.style import blank, headline, legend_below, style
 from tfarm.records import record
 from tfarm.report.cases import DESIGNED_MODES, LawOnArm, best, brief_on, continuous_cases, margins_of
 from tfarm.report.sections import PageSection, Picture, typeset
-from tfarm.spectrum.scales import default_gains, default_words, first_frequency, rate_unit
+from tfarm.spectrum.table import default_gains, default_words, first_frequency, rate_unit
 from tfarm.synthesis.design import Design
 from tfarm.synthesis.models import continuous_model
 from tfarm.synthesis.objectives import least_damping
@@ -161,7 +160,6 @@ def draw_map_of_arm(data: MapOfArm) -> Figure:
             plane.law_mark(gains, MARKERS[law.key], f"{law.name}: {law.gains};\n{brief.short}", ax)
         if data.design is not None:
             plane.search_frame(data.design.bounds, ax)
-        plane.count_labels(found, x, y, ax)
         legend_below(figure)
         headline(figure, f"{data.arm.name}: how high may the gains go?")
     return figure

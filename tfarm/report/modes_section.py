@@ -15,7 +15,8 @@ from tfarm.arrays import Real
 from tfarm.columns import FILES, REPORT, Column, Table
 from tfarm.digits import fixed, lined, listed, plain, significant, singly
 from tfarm.errors import MISSING, CertificationError, ConvergenceError
-from tfarm.plots.shapes import DrawnMode, draw_differences, draw_shapes, shapes_of, theory_name
+from tfarm.plots.shapes import SHAPE_POINTS, draw_differences, scaled, theory_name
+from tfarm.plots.shapes import modes as shapes_plot
 from tfarm.report.sections import PageSection, Picture, typeset
 from tfarm.spectrum import DampedModes, Modes, answers, damped_modes, modes
 from tfarm.spectrum.answers import DAMPED_MODE_COLUMNS, beyond_the_box
@@ -188,7 +189,7 @@ def modes_section(arm: Arm) -> PageSection:
             modal_table(modes),
             *([] if arm.is_uniform else [locked_table(modes)]),
             *damped,
-            _shapes(arm.name, shapes_of(modes, DRAWN_MODES)),
+            _shapes(tfarm.modes(arm, count=DRAWN_MODES)),
             theories_table(exact, theories, differences),
             _differences(arm.name, differences),
             sensitivity_table(modes),
@@ -233,18 +234,20 @@ def places(nodes: Real, length: float) -> tuple[str, ...]:
     return tuple(significant(float(x), 2) if x < near else fixed([float(x)], decimals)[0] for x in nodes)
 
 
-def _shapes(name: str, shapes: tuple[DrawnMode, ...]) -> Picture:
-    counts = ", ".join(str(len(shape.nodes)) for shape in shapes)
-    columns = [Column("x_m", "x", "m", of=shapes[0].x)]
+def _shapes(modes: Modes) -> Picture:
+    shapes = scaled(modes, DRAWN_MODES)
+    counts = ", ".join(str(len(modes.nodes[modes.index.tolist().index(number)])) for number in shapes)
+    columns = [Column("x_m", "x", "m", of=np.linspace(0.0, modes.arm.length, SHAPE_POINTS))]
     columns += [
-        Column(f"mode_{s.number}", f"mode {s.number}", of=np.round(s.w, answers.SHAPE_DIGITS - 1) + 0.0) for s in shapes
+        Column(f"mode_{number}", f"mode {number}", of=np.round(w, answers.SHAPE_DIGITS - 1) + 0.0)
+        for number, w in shapes.items()
     ]
     return Picture(
         stem="mode-shapes",
         title=f"Shapes of the first {len(shapes)} flexible modes",
         caption=MODE_SHAPES,
         alt=f"Mode shapes of the arm, modes 1 to {len(shapes)}; they have {counts} nodes between hub and tip.",
-        figure=draw_shapes(name, shapes),
+        figure=shapes_plot.figure(modes),
         data=Table(stem="mode-shapes-data", title="Mode shapes", columns=tuple(columns)),
     )
 

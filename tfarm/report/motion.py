@@ -16,7 +16,8 @@ from tfarm.dsp.results import drawn, residual_moment_rms, settling_time
 from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.errors import ParameterError
 from tfarm.fitting.recording import Beside, beside_exact, overshoot
-from tfarm.plots.motion import draw_beside, draw_responses
+from tfarm.plots.motion import draw_beside
+from tfarm.plots.motion import slew as slew_plot
 from tfarm.plots.style import safe
 from tfarm.report.cases import LawOnArm
 from tfarm.report.sections import Picture, residual_words, typeset, upper
@@ -181,7 +182,7 @@ def slew(arm: Arm, chain: Chain, cases: Sequence[LawOnArm]) -> tuple[list[Pictur
         title="The slew",
         caption=f"{SLEW_CAPTION}{figures}{clipped_words(runs)}{resolution_words(runs.values())}",
         alt=f"Root moment, tip and motor in a slew of {what}. {figures}",
-        figure=draw_responses(driven, shown, what),
+        figure=slew_plot.figure(driven, shown, what),
         data=responses_table("sampled-slew-data", "The slew in time", driven, {e.key: runs[e.name] for e in simulated}),
     )
     return [picture], words

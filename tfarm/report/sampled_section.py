@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit
 from tfarm.columns import Column, Table
-from tfarm.comparing.regions import StableRegions, regions_table, stable_regions
 from tfarm.crossing import Window
 from tfarm.digits import how_many, plain, scientific, significant, singly
 from tfarm.dsp import Analysis, Chain, Verdict, sampled_verdict
@@ -17,7 +16,7 @@ from tfarm.dsp.crossings import around
 from tfarm.dsp.loci import STRONGER, SampledLoci, sampled_loci
 from tfarm.dsp.modes import SAMPLED_MODE_COLUMNS
 from tfarm.dsp.verdict import SampledNumber, at_periods, sampled
-from tfarm.plots.regions import draw_overlay
+from tfarm.plots.regions import StableRegions, draw_overlay, regions_table, stable_regions
 from tfarm.plots.roots import draw_sampled_loci
 from tfarm.records import record
 from tfarm.report.cases import GivenLaw, LawOnArm, cases_of, has_loop, margins_of, on_hub, what_holds, why_no_loop

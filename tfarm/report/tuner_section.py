@@ -10,22 +10,20 @@ import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, Arm
 from tfarm.columns import Column, Table
-from tfarm.comparing.regions import stable_regions
 from tfarm.digits import how_many, lined, plain, significant, worded
 from tfarm.dsp import Chain, Simulation
 from tfarm.dsp.results import ideal_chain
 from tfarm.dsp.traces import away, resolved
 from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.plots.learning import draw_curves, draw_gain
-from tfarm.plots.motion import draw_responses
+from tfarm.plots.motion import draw_curves, draw_gain, slew
+from tfarm.plots.regions import stable_regions
 from tfarm.records import record
 from tfarm.report.cases import has_loop, what_holds, why_no_loop
 from tfarm.report.motion import clipped_words, resolution_words, responses_table
 from tfarm.report.sections import Fact, PageSection, Picture, residual_words, typeset
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 from tfarm.tuner import LearningCurves, Plan, Tuning, compare_controllers, learning_curves, tried_loops, tune
-from tfarm.tuner.baselines import CONSTANT_GAINS, tried_gains
-from tfarm.tuner.comparison import Outcomes, quantised_chain
+from tfarm.tuner.baselines import CONSTANT_GAINS, Outcomes, quantised_chain, tried_gains
 from tfarm.tuner.training import QUARTILES
 from tfarm.tuner.tuning import tip_errors, usual_plan
 
@@ -387,7 +385,7 @@ def _slew_picture(data: TunerNumbers) -> Picture:
             f"{resolution_words(data.slews.values())}"
         ),
         alt=f"Root moment, tip and motor torque of the slew. {_residuals(data, 0)}",
-        figure=draw_responses(data.arm, data.slews, "the slew, ideal converters"),
+        figure=slew.figure(data.arm, data.slews, "the slew, ideal converters"),
         data=_signals(data, 0, "tune-slew-data"),
     )
 
@@ -413,7 +411,7 @@ def _coarse_picture(data: TunerNumbers) -> Picture:
             f"{clipped_words(data.coarse)}{resolution_words(data.coarse.values())}"
         ),
         alt=f"The slew with converters and delay. {_residuals(data, 1)}",
-        figure=draw_responses(data.arm, data.coarse, f"the slew, converters and {how_many(delay, 'sample')} of delay"),
+        figure=slew.figure(data.arm, data.coarse, f"the slew, converters and {how_many(delay, 'sample')} of delay"),
         data=_signals(data, 1, "tune-dsp-data"),
     )
 

@@ -20,7 +20,7 @@ from tfarm.errors import ParameterError, TfarmError, must_be_known
 from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
-from tfarm.plots.compared import draw_comparison
+from tfarm.plots.compared import comparison
 from tfarm.processes import may_start_processes, shared
 from tfarm.report.cards import COMPARISON_KIND, COMPARISON_PAGE, keep, kept_comparison, save_card, written_cards
 from tfarm.report.cases import GivenLaw, Subject, check_laws
@@ -368,11 +368,11 @@ def write_comparison(found: Comparison, out: Path) -> Path:
 
 
 def _sections(found: Comparison) -> Iterator[PageSection]:
-    words = [*(f"{typeset(side_words(side))}." for side in found.sides), *[IN_Z_NOTE] * found.is_clocked]
+    words = [*(f"{typeset(side_words(side))}." for side in found.sides), *[IN_Z_NOTE] * found.is_sampled]
     yield PageSection(anchor="verdicts", title="Verdicts", words=words)
     curves = "exact response" if found.is_of_arms else "loop function"
     plane = f"{' and '.join(PLANE)}, with exact edges"
-    if found.is_clocked:
+    if found.is_sampled:
         plane = "further delay and a factor on its law, with exact edges"
     elif found.regions is None:
         plane = "a factor on each law and its delay, on a grid"
@@ -380,7 +380,7 @@ def _sections(found: Comparison) -> Iterator[PageSection]:
         stem="comparison", title=f"{upper(curves)} and stable region", alt=f"{found.verdict}.",
         caption=f"The {curves} of both over frequency, and where each loop is stable over {plane}; the points are the "
         "laws.",
-        figure=draw_comparison(found),
+        figure=comparison.figure(found),
     )  # fmt: skip
     yield PageSection(anchor="both", title="Both in one picture", blocks=(picture,))
     if found.is_of_arms:
@@ -390,7 +390,7 @@ def _sections(found: Comparison) -> Iterator[PageSection]:
     if len(apart := unpaired_poles(found)):
         poles.append(_set(apart, "unpaired-poles", "Poles of one side alone", UNPAIRED_NOTE))
     yield PageSection(anchor="poles", title="Closed-loop poles", blocks=tuple(poles))
-    known = AT_SAMPLES_NOTE if found.is_clocked else KNOWN_NOTE
+    known = AT_SAMPLES_NOTE if found.is_sampled else KNOWN_NOTE
     margins = _set(compared_margins(found), "margins", "How far from unstable", f"{known} {DIFFERENCE_NOTE}")
     yield PageSection(anchor="margins", title="Margins", blocks=(margins,))
 
