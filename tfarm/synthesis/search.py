@@ -88,7 +88,7 @@ def search(judge: Worst, form: Structure, tell: Tell) -> Search:
     close, best = scores[0] + AGREES * abs(scores[0]), x[:, 0]
     beyond = [each for each in places if (form.box[0] > best, form.box[1] < best)[each[1]][each[0]]]
     widened = tuple(dict.fromkeys(form.names[place] for place, _ in beyond))
-    found = list(zip(scores[:CANDIDATES].tolist(), x.T, strict=False))
+    found = [(float(scores[n]), x[:, n]) for n in _apart(region, x, scores, CANDIDATES)]
     return Search(form.wider(beyond, BEYOND), found, scores.size, int((scores <= close).sum()), widened)
 
 
