@@ -238,7 +238,6 @@ import os, time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from tfarm.processes import leave_with_parent
-from tfarm.report import writing
 if __name__ == "__main__":
     pool = ProcessPoolExecutor(1, get_context("forkserver"), leave_with_parent)
     print(pool.submit(os.getpid).result(), flush=True)

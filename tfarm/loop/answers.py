@@ -56,7 +56,7 @@ LAW_IN_WORDS = f"u = -{SPELT_OUT} + r"
 
 def sign_of(arm: Arm) -> str:
     """The law, and what a gauge reads of a static torque: with it the sign of its gain; of a rig what u is."""
-    if arm.is_uniform:
+    if arm.is_uniform and arm.has_rigid_mode:
         return f"{LAW_IN_WORDS}; a static torque u gives the moment -(J - I_h)/J u"
     if not arm.has_rigid_mode:
         return f"{LAW_IN_WORDS}; u is {input_words(arm)}"

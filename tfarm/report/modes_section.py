@@ -31,18 +31,12 @@ PLAIN_DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-"
 TWO_PI = Decimal("6.2831853071795864769252867665590057683943387987502")
 
 DAMPED_CAPTION = (
-    "Eigenvalues of the arm with its own damping, C = {C} s, each continued from the undamped mode of its number. "
-    "Each is enclosed in a disc of 12 digits that holds exactly one. All {count} eigenvalues with {left} < Re s < "
-    "{right} 1/s and |Im s| < {top} rad/s are listed (conjugates counted{rigid}): the argument principle in ball "
-    "arithmetic counts those in this box. {outside}Beyond any such box there are more: {beyond}."
+    "Eigenvalues of {whose} (C = {C} s), each continued from the undamped mode of its number. Each is enclosed in a "
+    "disc of 12 digits that holds exactly one. All {count} eigenvalues with {left} < Re s < {right} 1/s and |Im s| < "
+    "{top} rad/s are listed (conjugates counted{rigid}): the argument principle in ball arithmetic counts those in "
+    "this box. {outside}Beyond any such box there are more: {beyond}."
 )
-NO_C_CAPTION = (
-    "Eigenvalues of the rig with what its hub, clamp and joint lose (C = {C} in the link), each continued from the "
-    "undamped mode of its number. Each is enclosed in a disc of 12 digits that holds exactly one. All {count} "
-    "eigenvalues with {left} < Re s < {right} 1/s and |Im s| < {top} rad/s are listed (conjugates counted{rigid}): the "
-    "argument principle in ball arithmetic counts those in this box. {outside}Beyond any such box there are more, at "
-    "ever higher frequency: {beyond}."
-)
+OWN_DAMPING, LOSSES = "the arm with its own damping", "the rig with what its hub, clamp and joint lose"
 UNASSIGNED_NOTE = (
     "Rows without a number are eigenvalues that continue from no mode for certain, named after the part of the drive "
     "that sets them, where one does; a mode that is “not assigned” has one of them, or none in the box. "
@@ -103,13 +97,11 @@ WITH_LOSSES = (
     "; between them those of the free hub with what it loses at its own friction (and back-EMF), and nothing else"
 )
 WHICH_IS_MEASURED = (
-    "Which number is it that you measured? Once a slew is over dry friction holds the hub, and the link rings at the "
-    "hub-locked frequencies: first {locked} rad/s ({locked_hz} Hz). The linear rig, whose hub swings along, rings at "
-    "{free} rad/s ({free_hz} Hz){damped}. A peak near the former says that the hub stood still, one near the latter "
-    "that it moved; fit each to its own column."
+    "Which frequency was measured? Once a slew is over dry friction holds the hub, and the link vibrates at the "
+    "hub-locked frequencies. The linear rig, whose hub moves along, vibrates at those of the free hub with its losses. "
+    "A peak near the former shows that the hub stood still, one near the latter that it moved: fit each to its own "
+    "column."
 )
-SWINGS = "; with its hub's own losses at {omega} rad/s, {ratio} % of critical"
-CREEPS = "; with its hub's own losses its first mode no longer swings"
 
 
 @lru_cache(maxsize=8)  # the arm's page and the page on trust speak of the same ones, and a proof takes seconds
@@ -149,7 +141,8 @@ def damped_table(undamped: Modes) -> Table:
     return Table(
         stem="damped-modes",
         title="Damped modes",
-        caption=(DAMPED_CAPTION if C else NO_C_CAPTION).format(
+        caption=DAMPED_CAPTION.format(
+            whose=OWN_DAMPING if C else LOSSES,
             C=plain(C),
             count=damped.count,
             rigid=rigid,
@@ -184,7 +177,7 @@ def modes_section(arm: Arm) -> PageSection:
     return PageSection(
         anchor="modes",
         title="Modes",
-        words=words if arm.is_uniform else [*words, *locked_words(arm)],
+        words=[*words, *[WHICH_IS_MEASURED] * (not (arm.is_uniform or arm.is_locked))],
         blocks=(
             modal_table(modes),
             *([] if arm.is_uniform else [locked_table(modes)]),
@@ -320,21 +313,6 @@ def tint(x: float) -> str:
     strength = 0.45 * min(1.0, abs(x) / 2.0) ** 0.6
     parts = (round(255 - strength * (255 - part)) for part in (RISE_COLOUR if x > 0 else FALL_COLOUR))
     return "#" + "".join(f"{part:02x}" for part in parts)
-
-
-def locked_words(arm: Arm) -> list[str]:
-    """What the two columns mean for a reader with a measured number; nothing where the hub is locked anyway."""
-    if arm.is_locked:
-        return []
-    free, locked = tfarm.modes(arm, 1), hub_locked(tfarm.modes(arm, 1))
-    omega, held = float(free.natural_frequency[-1]), float(locked.natural_frequency[-1])
-    numbers = {"free": omega, "free_hz": omega / (2 * math.pi), "locked": held, "locked_hz": held / (2 * math.pi)}
-    damped = ""
-    lossy = damped_at_hub(arm, 1)  # how the first mode of the free hub rings with its own losses
-    if lossy is not None and lossy.is_assigned.all():
-        s, ratio = complex(lossy.eigenvalues[-1, 0]), significant(100 * float(lossy.damping_ratio[-1]), 3)
-        damped = SWINGS.format(omega=significant(s.imag, 5), ratio=ratio) if s.imag else CREEPS
-    return [WHICH_IS_MEASURED.format(damped=damped, **{name: significant(x, 5) for name, x in numbers.items()})]
 
 
 def locked_table(table: Modes) -> Table:

@@ -114,9 +114,6 @@ def highest_and_lowest(data: Bode) -> str:
 
 def what_it_means(data: Bode) -> str:
     """One sentence on what the picture says about control."""
-    if not data.resonances.size and data.output == "root_moment" and data.arm.has_massless_hub:
-        gauge = "−u/(1 + C s)" if data.arm.damping else "−u"
-        return f"Nothing resonates here: a free pin passes the torque on to the link; the gauge there reads {gauge}."
     if not data.resonances.size:
         return "Nothing resonates here: no pole that oscillates shows at this output."
     turned = f"{np.ptp(data.phase):.0f} degrees over the band"
