@@ -201,6 +201,7 @@ def test_the_loci_are_exact_and_the_gap_is_that_of_what_is_drawn():
     size = np.maximum(abs(data.exact.branches).max(axis=1), tfarm.modes(LAB, 1).natural_frequency[-1])
     assert (apart <= data.reduced.gap * size * (1 + 1e-12)).all()
     assert [round(each.gain, 4) for each in data.exact.crossings] == [1.0305]
+    assert "with K1 = 0.3: a branch becomes unstable at K2 = 1.03054; " in _along(data)
 
 
 def test_beyond_one_infinitely_many_poles_are_unstable_without_damping():
