@@ -17,7 +17,7 @@ SEED ?= 1
 SURVEYS := \
 	left_out \
 	golden \
-	plausible \
+	plausible.survey \
 	properties \
 	audit.test_planted_slips \
 	exact.accuracy \

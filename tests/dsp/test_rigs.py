@@ -16,7 +16,7 @@ from tfarm.dsp.plant import undelayed_plant
 from tfarm.dsp.scenarios import slew
 from tfarm.dsp.traces import away
 from tfarm.errors import ParameterError
-from tfarm.tuner.controller import tip_off
+from tfarm.tuner.trial import tip_off
 
 SLOW = 1e-3  # 1/s: the rig turns as one piece, and s^2 of its next term is beyond the digits compared
 

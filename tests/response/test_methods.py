@@ -9,7 +9,7 @@ import tfarm
 from tests.shell import run
 from tests.strategies import some_arm
 from tfarm.errors import ParameterError
-from tfarm.exact.methods import METHODS, METHODS_AGREE
+from tfarm.exact.values import METHODS, METHODS_AGREE
 
 S = np.array([0.3 + 57.1j, 57.1j, -3.0 + 400.0j, 2.0 + 0j])
 EPS = np.finfo(float).eps

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from itertools import pairwise
 
 import flint
 import mpmath
@@ -12,7 +11,7 @@ import pytest
 import tfarm
 from tests.shared import sized, thinned
 from tests.spectrum.damped import pairs
-from tests.spectrum.damped_roads import delta, newton_root, newton_step, pinned, ritz_eigenvalues, sine_waves
+from tests.spectrum.damped_roads import newton_root, newton_step, pinned, ritz_eigenvalues, sine_waves
 from tests.spectrum.test_damped import damped_arm, listed
 from tfarm import CertificationError, HubFeedback
 from tfarm.exact.balls import point, precision
@@ -171,42 +170,6 @@ def test_counts_are_those_of_a_galerkin_model(hub: float, mass: float, boxes: in
         height = float(10 ** rng.uniform(2.5, 4.2))
         box = Box(-min(0.9 / 4e-5, height * float(rng.uniform(0.2, 3))), height * 0.3, -height, height)
         assert proven_count(k, box) == box.holds(theirs).sum() + zeros_at_origin(k)
-
-
-def turns_of_ratio(arm, box, **gains):
-    """Zeros in a box of the paper's Delta with feedback less those without, by turns of their ratio: it has no cut."""
-    corners = [
-        complex(box.re_max, 0),
-        complex(box.re_max, box.im_max),
-        complex(box.re_min, box.im_max),
-        complex(box.re_min, 0),
-    ]
-
-    def ratio(s):
-        with mpmath.workdps(60):
-            return complex(delta(arm, s, **gains) / delta(arm, s))
-
-    def turned(a, b, at_a, at_b):
-        middle = (a + b) / 2
-        at = ratio(middle)
-        steps = np.angle(at / at_a), np.angle(at_b / at)
-        if abs(b - a) < 20.0 and max(map(abs, steps)) < 0.7:
-            return sum(steps)
-        return turned(a, middle, at_a, at) + turned(middle, b, at, at_b)
-
-    values = [ratio(corner) for corner in corners]
-    pieces = zip(pairwise(corners), pairwise(values), strict=True)
-    return round(sum(turned(*ends, *at) for ends, at in pieces) / math.pi)
-
-
-@pytest.mark.parametrize(("K1", "K2", "unstable"), [(-0.3, 0.9, 3)])
-def test_a_loop_has_as_many_unstable_poles_as_the_papers_matrix(K1: float, K2: float, unstable: int) -> None:
-    """Undamped: K2 > 1 and K1 < 0 destabilise (a strip beside the axis is left out)."""
-    arm = tfarm.load("sasaki2012")
-    k = system_of(arm)
-    box = Box(0.5, 100.0, -100.0, 100.0)
-    assert turns_of_ratio(arm, box, K1=K1, K2=K2) == unstable
-    assert proven_count(k, box, gains_of(k, HubFeedback(K1=K1, K2=K2))) == unstable
 
 
 # ------------------------------------------------------------ refusals

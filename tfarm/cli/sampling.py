@@ -92,7 +92,7 @@ def simulate(
         law, said = asked_law(subject, given)
         answer = said | simulated_answer(subject, law, chain, scenario, duration, **how)
     else:
-        from tfarm.tuner.controller import load_tuner
+        from tfarm.tuner.trial import load_tuner
         from tfarm.tuner.tuning import controlled_answer
 
         saved = load_tuner(controller)

@@ -23,7 +23,7 @@ from tfarm.cli.app import give, load_arm, tell
 from tfarm.columns import Column, Table
 from tfarm.digits import general, singly
 from tfarm.errors import ParameterError
-from tfarm.exact.methods import METHODS_AGREE, Method, known_method
+from tfarm.exact.values import METHODS_AGREE, Method, known_method
 from tfarm.files import is_standard_output
 from tfarm.fitting.data import data_of
 from tfarm.fitting.overlay import curves_table, overlay, overlay_answer, required_table

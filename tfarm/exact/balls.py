@@ -8,8 +8,7 @@ until the digits asked for are proven.  The sweeps are those of `sweep`, with th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -51,11 +50,7 @@ _row_across, _met = python_of(row_across), python_of(met)
 Ball = Any  # flint.acb or flint.arb, which come without types
 
 
-@contextmanager
-def precision(bits: int) -> Iterator[None]:
-    """flint's working precision inside the block, restored after it."""
-    with flint.ctx.workprec(bits):
-        yield
+precision = flint.ctx.workprec  # flint's working precision [bits], inside a `with` block
 
 
 def rational(value: Fraction | float) -> Ball:

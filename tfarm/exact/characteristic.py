@@ -34,7 +34,7 @@ import flint
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, Arm, HubFeedback
+from tfarm.arm import GAINS, HubFeedback
 from tfarm.arrays import Complex, Real
 from tfarm.records import read_only
 
@@ -42,7 +42,7 @@ from .balls import Ball, Sweep, into_own, out_of_own, point, rational, summed
 from .compiled import python_of
 from .layout import Readings, readings
 from .outputs import OUTPUTS, unit_scale
-from .system import Segment, System, system_of
+from .system import Segment, System
 from .values import free_outputs, free_slopes
 from .waves import Plane, Row, across_waves
 
@@ -53,11 +53,6 @@ assert all(each.place != "x" for each in FED)  # a gain is on an output with a p
 TURNING = ("theta", "W", "Psi", "centre")  # quantities that follow the hub's angle where the arm turns slowly
 NEXT_TO_REST = 1e-60  # 1/s, for s = 0: there D over a power of s is its limit to the last digit, and no power is 0
 DIFFERENCE_STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
-
-
-def loop_system(arm: Arm) -> System:
-    """The exact system of an arm under a law."""
-    return system_of(arm)
 
 
 def unit_gains(k: System) -> Gains:
