@@ -348,10 +348,8 @@ def _sections(found: Comparison) -> Iterator[PageSection]:
     yield PageSection(anchor="verdicts", title="Verdicts", words=words)
     curves = "exact response" if found.is_of_arms else "loop function"
     plane = f"{' and '.join(PLANE)}, with exact edges"
-    if found.is_sampled:
+    if found.is_sampled or found.regions is None:
         plane = "further delay and a factor on its law, with exact edges"
-    elif found.regions is None:
-        plane = "a factor on each law and its delay, on a grid"
     picture = Picture(
         stem="comparison", title=f"{upper(curves)} and stable region", alt=f"{found.verdict}.",
         caption=f"The {curves} of both over frequency, and where each loop is stable over {plane}; the points are the "

@@ -20,8 +20,8 @@ from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Tell
 
 POINTS_LOG2 = 11  # of the number of points
-STARTS_EACH = 16  # strategies for each coefficient, from the best of them
-HOPS, HOPS_EACH, HOP_POINTS = 2, 4, 256  # searches about the best of more than two, strategies each, and points
+STARTS_EACH = 12  # strategies for each coefficient, from the best of them
+HOPS, HOPS_EACH, HOP_POINTS = 1, 4, 256  # searches about the best of more than two, strategies each, and points
 CANDIDATES = 8  # laws that the exact verdicts may judge, the best first
 BEYOND = 4.0  # of x: so far beyond its bounds a search may go, a factor e^4 of a coefficient far above its unit
 APART = 0.02  # of the range of x: points that are nearer are not both begun at
