@@ -61,9 +61,9 @@ def sine_waves(arm, number, theory="timoshenko"):
 def delta(arm, s, Kp=0.0, K1=0.0, K2=0.0):
     """The paper's Delta at the working precision of mpmath, with u = -Kp theta - K1 theta_t - K2 E I phi'(0)."""
     at = Appendix(arm, mpmath.mpc(s))
-    rows = [list(row) for row in at.a]
+    rows, (Kp, K1, K2) = [list(row) for row in at.a], map(mpmath.mpmathify, (Kp, K1, K2))
     for j, (l, gamma) in enumerate(at.waves):
-        rows[3][j] += (mpmath.mpf(Kp) + mpmath.mpf(K1) * at.s) * gamma + mpmath.mpf(K2) * at.EI * l * gamma
+        rows[3][j] += (Kp + K1 * at.s) * gamma + K2 * at.EI * l * gamma
     return _determinant(rows)
 
 

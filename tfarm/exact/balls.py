@@ -116,7 +116,7 @@ class Sweep:
         p = _end_plane(*self._end(self.numbers.tip_mass), *self._end(self.numbers.tip_inertia))
         for each in self.numbers.elements:
             if isinstance(each, Mark):
-                self.planes[each.number] = p
+                self.planes[each.number] = self._at_mark(p)
             else:
                 p = self._inside(each, p)
         self.theta, self.M, self.Q = p[:3]
@@ -173,6 +173,9 @@ class Sweep:
     def _end(self, condition: Any) -> tuple[Any, Any]:
         rest, inertia, force = condition
         return self.S * inertia + rest, force
+
+    def _at_mark(self, p: Plane) -> Plane:
+        return p
 
     def _inside(self, element: Any, p: Plane) -> Plane:
         match element:
