@@ -34,8 +34,7 @@ SURVEYS := \
 	loop.law_counts \
 	loop.number_windows \
 	loop.law_times \
-	synthesis.optima \
-	synthesis.held_designs \
+	synthesis.designs \
 	loop.nyquist_counts \
 	reduced.test_accuracy \
 	dsp.settled \

@@ -78,7 +78,7 @@ def test_a_simulation_finds_the_arms_own_moment_less_the_rigid_arms(chain):
 @pytest.mark.parametrize("chain", CHAINS, ids=NAMED)
 def test_a_design_promises_what_a_simulation_finds(chain, monkeypatch):
     """To the last bit; what was minimised, of eight modes, is the same but for the modes left out."""
-    monkeypatch.setattr(search, "WHOLE", search.Effort(4, 1))
+    monkeypatch.setattr(search, "STARTS_EACH", 2)
     found = design(LAB, "residual", chain=chain, K1=(0.1, 3.0), K2=(-0.5, 0.5))
     assert found.value == simulated_answer(LAB, found.law, chain, "slew", slew_duration(found))["residual_moment_rms"]
     assert judge_of(LAB, found.law, "residual", chain).score(found.law) == pytest.approx(found.value, rel=1e-4)

@@ -8,9 +8,11 @@ import pytest
 
 import tfarm
 from tests.shared import thinned
+from tests.synthesis.designs import excess
 from tests.synthesis.held_loop import HeldLoop
 from tests.synthesis.judged import judge_of
 from tfarm import ConvergenceError, HubFeedback, ParameterError
+from tfarm.arm import TWO_GAINS
 from tfarm.dsp import Chain, Slew, sampled_verdict
 from tfarm.dsp.chain import Sampling
 from tfarm.synthesis import search
@@ -94,9 +96,7 @@ def slewed(arm, law, chain):
 
 @pytest.mark.parametrize("Kp", thinned([4.0, 0.0], 2))
 def test_the_residual_is_that_of_the_simulated_slew(Kp, monkeypatch) -> None:
-    monkeypatch.setattr(
-        search, "WHOLE", search.Effort(4, 1)
-    )  # of the minima found: what the best leaves is asked, not which
+    monkeypatch.setattr(search, "STARTS_EACH", 2)  # of the minima found: what the best leaves is asked, not which
     chain = Chain(sampling=Sampling(period=0.008, delay_samples=0.5), slew=Slew(rise_time=0.5, travel=0.4))
     found = design(LAB, "residual", Kp=Kp, chain=chain, K1=(0.1, 5.0), K2=(-0.5, 0.8))
     assert found.value == pytest.approx(slewed(LAB, found.law, chain), rel=1e-3)  # of 8 modes beside 20
@@ -118,3 +118,9 @@ def test_where_nothing_holds_nothing_is_recommended() -> None:
     late = Chain(sampling=Sampling(delay_samples=3.0))
     with pytest.raises(ConvergenceError, match="widen the bounds"):
         design(replace(LAB, name="late"), K1=(30.0, 60.0), K2=(-3.0, -2.0), chain=late)
+
+
+def test_gains_for_a_random_rig_hold_on_another_model():
+    over, own, _ = excess(np.random.default_rng([1, 0]), (TWO_GAINS,))
+    assert over <= 0
+    assert own < 0

@@ -82,7 +82,7 @@ def test_the_delay_is_what_the_loop_bears():
 def found():
     """From one start of six: what is found has to hold, and to be better than any start."""
     with pytest.MonkeyPatch.context() as fewer:
-        fewer.setattr(search, "WHOLE", search.Effort(4, 1))
+        fewer.setattr(search, "STARTS_EACH", 2)
         return design(LAB, "damping", structure="strain-rate")
 
 
@@ -103,7 +103,7 @@ def test_it_damps_better_than_where_the_search_began(found):
 
 
 def test_a_design_is_saved_and_read_back(capsys, monkeypatch, tmp_path):
-    monkeypatch.setattr(search, "WHOLE", search.Effort(4, 1))  # any law that holds will do
+    monkeypatch.setattr(search, "STARTS_EACH", 2)  # any law that holds will do
     file = tmp_path / "lead.toml"
     found = answer(capsys, "design", "sasaki2012-lab", "--structure", "lead", "--save", str(file))
     law = load_law(file)
@@ -135,7 +135,7 @@ def test_an_undamped_link_has_a_mode_that_no_lead_law_damps(capsys, monkeypatch)
     where p is above a right angle.
     """
     bare = tfarm.load("sasaki2012")
-    monkeypatch.setattr(search, "WHOLE", search.Effort(4, 1))  # of a search that finds nothing
+    monkeypatch.setattr(search, "STARTS_EACH", 2)  # of a search that finds nothing
     code, out, err = run(capsys, "design", "sasaki2012", "--structure", "lead")
     assert (code, out, err.count("\n")) == (3, "", 1)
     (mode,) = re.findall(r"mode ([0-9]+) grows", err)

@@ -31,12 +31,18 @@ from tfarm.errors import ParameterError
 from tfarm.tables.terminal import show
 
 if TYPE_CHECKING:
+    from tfarm.arm import AnyLaw, Arm
+    from tfarm.arrays import Real
     from tfarm.comparing import Comparison
+    from tfarm.dsp import Chain, GainMap
 
 HELP_ON_ALSO = "a further arm that the law has to serve: the objective is the worst of all; may be repeated"
 HELP_ON_RANGE = "numbers that the arm may have, such as payload.mass=0.1,0.5; up to four: corners, and a search inside"
 HELP_ON_VARY = "twice: two numbers of a law and their ranges; gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N"
 
+MapPeriod = Annotated[
+    float | None, typer.Option("--period", help="sampling period [s]: the map of the sampled loop, as with --dsp")
+]
 HELP_ON_MAP = (
     f"How many poles are unstable over the plane of {' and '.join(PLANE)}, and the exact boundary; "
     "or over two numbers of a law."
@@ -66,6 +72,9 @@ def gain_map(
     png: Png = None,
     law: LawFile = None,
     vary: Annotated[list[str] | None, typer.Option("--vary", metavar="NAME=LO,HI", help=HELP_ON_VARY)] = None,
+    period: MapPeriod = None,
+    delay_samples: Delay = None,
+    dsp: DspFile = None,
     theory: TheoryName = None,
     json: Json = False,
     *,
@@ -81,6 +90,7 @@ def gain_map(
         if len(vary or []) != 2:
             remedy = "twice, such as --vary hub_angle=0,10 --vary delay=0,0.02"
             raise ParameterError(key="--vary", value=vary or [], remedy=remedy)
+    from tfarm.dsp.crossings import map_answer as sampled_map_answer
     from tfarm.loop.answers import law_map_answer, map_answer, plane_table
     from tfarm.loop.loop import Loop
     from tfarm.loop.plane import between, plane, ranges_of
@@ -96,12 +106,37 @@ def gain_map(
         ranges = [(name, given[name] or usual) for name, usual in zip(PLANE, ranges_of(subject), strict=True)]
         controller = HubFeedback(Kp=kp)
     (first, across), (second, up) = ranges
-    found = plane(Loop(subject, as_law(controller)), (first, second), between(*across, number), between(*up, number))
-    names = [name.replace(".", "_").replace("@", "_at_") for name in found.vary]
+    x, y, names = between(*across, number), between(*up, number), [_column_of(first), _column_of(second)]
+    if (period, delay_samples, dsp) != (None,) * 3:
+        chain = asked_chain(dsp or arm, period, delay_samples)
+        sampled = _sampled_plane(subject, controller if of_law else None, kp, chain, (first, second), (x, y))
+        hand_out(
+            lambda: sampled_map_answer(sampled), _print_sampled_map, json,
+            csv=csv, table=lambda: plane_table(names, x, y, sampled.counts), png=png, picture=(sampled,),
+        )  # fmt: skip
+        return
+    found = plane(Loop(subject, as_law(controller)), (first, second), x, y)
     hand_out(
         lambda: law_map_answer(found) if of_law else map_answer(found), _print_map, json,
-        csv=csv, table=lambda: plane_table(names, found.x, found.y, found.unstable), png=png, picture=(found,),
+        csv=csv, table=lambda: plane_table(names, x, y, found.unstable), png=png, picture=(found,),
     )  # fmt: skip
+
+
+def _column_of(name: str) -> str:
+    """The name of a number as that of a column."""
+    return name.replace(".", "_").replace("@", "_at_")
+
+
+def _sampled_plane(
+    arm: Arm, law: AnyLaw | None, kp: float, chain: Chain, vary: tuple[str, str], axes: tuple[Real, Real]
+) -> GainMap:
+    """The map of the sampled loop, with as many modes as the verdict on the law takes, or on the default gains."""
+    from tfarm.dsp.crossings import law_map
+    from tfarm.dsp.verdict import sampled_verdict
+    from tfarm.spectrum.table import default_gains
+
+    law = default_gains(arm).having(ANGLE_GAIN, kp) if law is None else law
+    return law_map(sampled_verdict(arm, law, chain).full, *axes, vary)
 
 
 def _range_of(option: str, text: str) -> tuple[str, tuple[float, float]]:
@@ -123,6 +158,23 @@ def _print_map(answer: dict[str, Any]) -> None:
     reach = f"have no unstable pole below {answer['band_rad_s']:.6g} rad/s"
     pairs = f"pairs of {first} and {second} {reach}" if of_law else "gain pairs are stable"
     print(f"{answer['arm']}: {flat.count(0)} of {len(flat)} {pairs}")
+    _print_plane(answer, counts, (x, y), (first, second))
+
+
+def _print_sampled_map(answer: dict[str, Any]) -> None:
+    """The share of the plane in which the sampled loop is stable, and a coarse picture."""
+    counts, (first, second) = answer["unstable_poles"], answer["vary"]
+    flat = [count for row in counts for count in row]
+    reach = f"stable when sampled every {1e3 * answer['period_s']:g} ms (first {answer['modes_used']} modes)"
+    print(f"{answer['arm']}: {flat.count(0)} of {len(flat)} pairs of {first} and {second} are {reach}")
+    _print_plane(answer, counts, ("x", "y"), (first, second))
+
+
+def _print_plane(
+    answer: dict[str, Any], counts: list[list[Any]], keys: tuple[str, str], names: tuple[str, str]
+) -> None:
+    """A coarse picture of the counts over the values under two keys."""
+    (x, y), (first, second) = keys, names
     step = max(1, len(counts) // 24), max(1, len(counts[0]) // 60)
     for value, row in list(zip(answer[y], counts, strict=True))[:: -step[0]]:
         print(f"{value:9.3g} " + "".join("." if count == 0 else "#" for count in row[:: step[1]]))
@@ -138,7 +190,7 @@ def design(
     structure: Annotated[str, typer.Option("--structure", help=HELP_ON_STRUCTURE)] = TWO_GAINS,
     kp: HeldAngle = 0.0,
     modes: Annotated[str, typer.Option("--modes", help="flexible modes in the band, 1 to 30")] = "2",
-    continuous: Annotated[bool, typer.Option("--continuous", help="for the continuous loop, without a clock")] = False,
+    continuous: Annotated[bool, typer.Option("--continuous", help="for the continuous-time loop")] = False,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
@@ -181,8 +233,8 @@ def _print_design(answer: dict[str, Any]) -> None:
     )
     print(f"{'' if sampled['stable'] else 'BUT '}{words}")
     beyond = "" if answer["known_beyond_the_band"] else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
-    print(f"without a clock it is {answer['verdict']}{beyond}; --save FILE keeps it for --law FILE")
-    print(f"{answer['starts_agreed']} of {answer['starts']} descents agree within half a per cent")
+    print(f"continuous-time loop: {answer['verdict']}{beyond}; --save FILE keeps the law for --law FILE")
+    print(f"{answer['starts_agreed']} of {answer['starts']} searches agree within half a per cent")
     _print_bounds(answer)
     if (length := answer["slew_duration_s"]) is not None:
         what = "root moment less the rigid arm's, N m rms" if answer["objective"] == "residual" else "cost of the slew"
@@ -227,7 +279,7 @@ def _print_arms(answer: dict[str, Any]) -> None:
         Column("arm", "arm", of=[each["name"] for each in arms]),
         Column("value", answer["objective"], of=[each["value"] for each in arms], digits=singly(general, 6)),
         Column("sampled", "sampled", of=held),
-        Column("verdict", "without a clock", of=[each["verdict"] for each in arms]),
+        Column("verdict", "continuous-time", of=[each["verdict"] for each in arms]),
     )
     show(Table(columns=columns))
     print(f"{answer['value']:.6g} is {answer['worst_case_in_words']}; {answer['worst_arm']} is the worst")

@@ -14,6 +14,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from tfarm.arm.feedback import ON
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing import Crossing, Crossings, Window, brackets, confirmed, counts_over, intervals, pieces, solved
 from tfarm.crossing.turning import loose_columns
+from tfarm.dsp.discretise import described_law
 from tfarm.dsp.sampled import Sampled
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
@@ -136,7 +138,7 @@ def number_crossings(grid: CircleGrid, name: str, rows: Real) -> list[Crossings]
     The others are those of each of `rows` (lines, 1 + parts), as `Sampled.row`.  A gain at the hub runs as far as
     `most_gain`.
     """
-    place = 1 + grid.loop.place(name)
+    place = 1 + grid.loop.part(name)
     others, alone = np.array(rows), np.zeros(rows.shape[1])
     others[:, place], alone[place] = 0.0, 1.0
     gain = ON.get(name, name)
@@ -242,6 +244,11 @@ class GainMap:
         return self.x, self.y
 
     @property
+    def counts(self) -> NDArray[np.int64]:
+        """Unstable poles (len(y), len(x))."""
+        return self.unstable.T
+
+    @property
     def K1(self) -> Real:
         """The values across, of the plane of K1 and K2."""
         return self.x
@@ -293,6 +300,47 @@ def sampled_map(
             message = f"at {where} the crossings count {plane.unstable[i, j]} growing poles, not {count}"
             raise ConvergenceError(message, plane, abs(count - int(plane.unstable[i, j])))
     return plane
+
+
+def law_map(
+    loop: Sampled, x: Sequence[float] | Real, y: Sequence[float] | Real, vary: tuple[str, str] = PLANE
+) -> GainMap:
+    """The map over any two numbers of the law of a loop that `Law.having` names, x and y (both ascending).
+
+    Gains of the parts of a law are those of `sampled_map`.  Along one of them the crossings are exact for each value of
+    any other number; of two others poles are counted at every point.
+    """
+    across, up = (loop.place(name) for name in vary)
+    if across is not None and up is not None:
+        return sampled_map(loop, x, y, vary)
+    if across is not None:
+        turned = law_map(loop, y, x, (vary[1], vary[0]))
+        return GainMap(loop, vary, turned.y, turned.x, turned.unstable.T, [])
+    x, y = _ascending(vary[0], x), _ascending(vary[1], y)
+    loops = [loop.under(loop.given.having(vary[0], value)) for value in x.tolist()]
+    if up is None:
+        points = [[each.under(each.given.having(vary[1], value)) for value in y.tolist()] for each in loops]
+        return GainMap(loop, vary, x, y, np.array([[each.poles.unstable for each in row] for row in points]), [])
+    at = _off_the_edge(y)
+    there = np.array([each.having(**{vary[1]: at}).poles.unstable for each in loops])
+    found = [number_crossings(circle_grid(each), vary[1], each.row[None])[0] for each in loops]
+    return GainMap(loop, vary, x, y, counts_over(y, found, at, there), found)
+
+
+def map_answer(plane: GainMap) -> dict[str, Any]:
+    """The plane as plain lists: poles outside the unit circle, rows of the second number."""
+    arm, sampling = plane.loop.plant.arm, plane.loop.chain.sampling
+    return {
+        "arm": arm.name,
+        **described_law(plane.loop.given, arm),
+        "period_s": sampling.period,
+        "delay_samples": sampling.delay_samples,
+        "modes_used": plane.modes_used,
+        "vary": list(plane.vary),
+        "x": plane.x.tolist(),
+        "y": plane.y.tolist(),
+        "unstable_poles": plane.unstable.T.tolist(),
+    }
 
 
 def rounded_map(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainMap:

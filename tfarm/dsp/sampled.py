@@ -35,7 +35,7 @@ from tfarm.dsp.chain import Chain, chain_or_usual
 from tfarm.dsp.discretise import LawInZ, acting_law, law_in_z, lowest_power, with_all_gains
 from tfarm.dsp.plant import USUAL_MODES, Branching, Plant, SensedPlant, is_analog, sensed_plant
 from tfarm.dsp.sampling import PulseTransfer
-from tfarm.errors import ConvergenceError
+from tfarm.errors import ConvergenceError, ParameterError, did_you_mean
 from tfarm.records import record
 from tfarm.reduced.conversions import closed
 from tfarm.spectrum.damped import all_damped_modes
@@ -136,13 +136,20 @@ class Sampled:
         assert self.is_of_gains
         return law_of(self.weights)
 
-    def place(self, name: str) -> int:
-        """The part that a number is the weight of, by its name in `Law.part_gains`, or as "K1" of a gain at the hub."""
-        return self.law.part_gains[OUTPUT_OF.get(name, name)][0]
+    def place(self, name: str) -> int | None:
+        """The part that a number is the weight of, by its name in `Law.having`; None of any other number."""
+        known, name = self.law.part_gains, OUTPUT_OF.get(name, name).removesuffix(".gain")
+        return next((known[key][0] for key in (name, f"{name}.gain") if key in known), None)
 
     def number(self, name: str) -> float:
         """A number of the law."""
-        return self.weights[self.place(name)]
+        return self.weights[self.part(name)]
+
+    def part(self, name: str) -> int:
+        """The part that a number is the weight of.  Raises ParameterError where it is none."""
+        if (place := self.place(name)) is None:
+            raise ParameterError(key="law", value=name, remedy=did_you_mean(name, list(self.law.part_gains)))
+        return place
 
     def weighted(self, weights: Sequence[float]) -> Sampled:
         """The same loop with other weights; plant and pulse transfer functions, which know no law, are shared."""
@@ -154,7 +161,7 @@ class Sampled:
         """The same loop with other values of the numbers that are named."""
         weights = list(self.weights)
         for name, value in numbers.items():
-            weights[self.place(name)] = value
+            weights[self.part(name)] = value
         return self.weighted(weights)
 
     def times(self, factor: float) -> Sampled:
@@ -171,6 +178,13 @@ class Sampled:
     def with_modes(self, count: int) -> Sampled:
         """The same loop with another number of flexible modes; no work where its models have as many."""
         return replace(self, sensed=self.sensed.with_modes(count))
+
+    def under(self, law: Law) -> Sampled:
+        """Another law on the same arm, with as many modes."""
+        sampling = self.chain.sampling
+        own = max(0.0, sampling.delay_samples - self.law.delay / sampling.period)
+        chain = replace(self.chain, sampling=replace(sampling, delay_samples=own))
+        return sampled_loop(self.plant.arm, law, chain, count=self.plant.count)
 
     def on(self, arm: Arm, count: int, branches: Branching = all_damped_modes) -> Sampled:
         """The same law on another arm, with so many flexible modes."""

@@ -69,6 +69,27 @@ def gain_map(found: Plane, *, ax: Axes) -> None:
         ax.plot(*points.T, ".", color=INK, ms=2.0, label="a pole on the imaginary axis, exact")
 
 
+def _sampled_title(found: GainMap) -> str:
+    ms = significant(1e3 * found.loop.chain.sampling.period, 4)
+    return f"{found.loop.plant.arm.name}: unstable poles when sampled every {ms} ms, first {found.modes_used} modes"
+
+
+@picture((GainMap, "tfarm.dsp.sampled_map returns"), title=_sampled_title, keys=True)
+def sampled_map(found: GainMap, *, ax: Axes) -> None:
+    """The plane of two numbers of the law of a sampled loop: colours for the count, dots for the exact crossings."""
+    counts = found.counts
+    image = colours(counts)
+    ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True, zorder=0.1)
+    for count in np.unique(counts).tolist():
+        ax.fill_between([], [], [], color=image[counts == count][0], label=_words(count))
+    low, high = found.y[0], found.y[-1]
+    points = [(x, t) for x, each in zip(found.x, found.crossings, strict=False) for t in each.within(low, high).gain]
+    if points:
+        ax.plot(*np.array(points).T, ".", color=INK, ms=2.0, label="a pole on the unit circle, exact")
+    ax.grid(False)
+    ax.set(xlabel=safe(found.vary[0]), ylabel=safe(found.vary[1]))
+
+
 def ground(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
     """Both axes, the colours of the count, and words for it in every region that is large enough."""
     for axis, setter, limits, name in (

@@ -1,7 +1,7 @@
 """The law of a structure that serves an objective best, for one arm or for the worst of several.
 
 A search over bounds with a judge of few modes, and the exact verdicts on what it finds: laws that do not hold never
-win.  How many descents agreed, how flat the optimum is, and whether it is one or only where the bounds cut the search
+win.  How many strategies agreed, how flat the optimum is, and whether it is one or only where the bounds cut the search
 off, is part of the record.
 """
 
@@ -24,8 +24,7 @@ from tfarm.loop.answers import law_answer
 from tfarm.loop.loop import Loop
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import record
-from tfarm.synthesis.judge import Judge, judges_of
-from tfarm.synthesis.minimax import LOST, ScoredPoint
+from tfarm.synthesis.judge import LOST, Judge, judges_of
 from tfarm.synthesis.objectives import OBJECTIVES
 from tfarm.synthesis.search import Search, Worst, flat_part, search
 from tfarm.synthesis.slews import slew_and_after, trial_slew
@@ -63,7 +62,7 @@ class Design:
     searched, and those of `widened` are wider than at first.  `flat` has the coefficients between which, the others
     held, the value is within one per cent of the best.  `at_bound` names those that lie at an end of their bounds even
     so: there the search was cut off, and the value is no optimum; `at_limit` those of them at a physical end, K1 = 0,
-    the K2 = 1 that stops the hub, or 2/T of a pole.  Of `starts` descents `agreed` came to the best score.
+    the K2 = 1 that stops the hub, or 2/T of a pole.  Of `starts` strategies `agreed` came to the best score.
     """
 
     objective: str
@@ -155,7 +154,7 @@ class _Task:
 
     def find(self, named: Sequence[NamedArm]) -> _Choice:
         """The best law that holds on all arms.  Raises ConvergenceError where none is found."""
-        nearest: ScoredPoint | None = None
+        nearest: tuple[float, Any] | None = None
         for several in in_step([self.judges(each.arm) for each in named]):
             worst = Worst(several)
             found = search(worst, self.form, self.tell)

@@ -23,7 +23,6 @@ from tfarm.dsp.verdict import UNDAMPED_MODES
 from tfarm.errors import ConvergenceError
 from tfarm.loop.stability import stability
 from tfarm.records import record
-from tfarm.synthesis.minimax import LOST, Pieces
 from tfarm.synthesis.models import Model, continuous_model, sampled_model
 from tfarm.synthesis.objectives import OBJECTIVES, Objective, Reading, lowest
 from tfarm.synthesis.slews import Slews, slew_and_after
@@ -33,8 +32,8 @@ RESERVE = 1.25  # the loop holds with all its gains larger or smaller by this fa
 SEARCH_RESERVE = 1.002 * RESERVE  # by as much in the search: the model's few modes have edges that are off by less
 FEWEST_MODES = 8  # of the first model; more where its best laws do not hold
 CONTINUOUS_TIMES = 2  # as many where the continuous loop is designed: two poles that meet double few digits
-PIECES_SEEN = 40  # poles, or values, that count, those that are highest: by hand
 LAWS_AT_ONCE = 256  # memory, whatever the number of laws
+LOST = 1e3  # score where a condition of stability is not met, and as much for each later one
 
 
 @dataclass(frozen=True)
@@ -87,39 +86,17 @@ class Judge:
 
     def scores_of(self, entries: Sequence[Entry], number: int) -> Real:
         """The same of the entries of so many laws."""
-        scores, alive, poles = np.empty(number), np.arange(number), np.empty(0, complex)
-        for model, share in self._conditions:
+        scores, alive, poles, conditions = np.empty(number), np.arange(number), np.empty(0, complex), self._conditions
+        for left, (model, share) in zip(range(len(conditions), 0, -1), conditions, strict=True):
             poles = model.poles(entries, share)
             growth = model.growth(poles).max(axis=1)
             held = growth < 0.0
-            scores[alive[~held]] = LOST * (1.0 + np.minimum(growth[~held], 1e6))
+            scores[alive[~held]] = LOST * (left + growth[~held] / (1 + growth[~held]))
             alive, poles, entries = alive[held], poles[held], chosen(entries, held)
             if not alive.size:
                 return scores
-        scores[alive] = self.aim.pieces(self._reading(entries, poles)).values.max(axis=1)
+        scores[alive] = self.aim.scores(Reading(self.model, self.slews, entries, poles))
         return scores
-
-    def pieces(self, form: Structure, x: Real) -> Pieces:
-        """What the score at x (n,) is the largest of, with its slopes: growth of poles, and the objective's own."""
-        entries, stepped = form.entries(form.coefficients(x)[:, None]), form.entries(form.stepped(x))
-        growth, slopes = [], []
-        for model, share in self._conditions:
-            poles, moves = model.moved_poles(entries, stepped, share)
-            rate = model.growth(poles)
-            most = np.argsort(-rate, kind="stable")[:PIECES_SEEN]
-            growth.append(rate[most])
-            slopes.append(model.growth_slopes(poles[most], moves[most]))
-        g, dg = np.concatenate(growth), np.concatenate(slopes)
-        if g.max() >= 0.0:
-            return Pieces(np.zeros(1), np.zeros((1, x.size)), g, dg)
-        reading = self._reading(entries, poles[None], moves, stepped)
-        return Pieces(*self.aim.pieces(reading).first(PIECES_SEEN), g, dg)
-
-    def _reading(
-        self, entries: Sequence[Entry], poles: Complex, moves: Complex | None = None, stepped: Sequence[Entry] = ()
-    ) -> Reading:
-        moves = np.empty(0, complex) if moves is None else moves
-        return Reading(self.model, self.slews, entries, poles, moves, stepped)
 
     # ------------------------------------------------------------ beyond it
 

@@ -1,15 +1,9 @@
-"""Loops of few modes under many laws at once: closed-loop matrices, poles, loop functions, and their slopes.
+"""Loops of few modes under many laws at once: closed-loop matrices, poles and loop functions.
 
 A law is a list of entries (`structures`), each in controllable form in p = s/c, c = 2/T.  Sampled by Tustin's rule,
 p = (z - 1)/(z + 1), it becomes
 
     (1 - A)^-1 (1 + A),  2 (1 - A)^-1 B,  C (1 - A)^-1,  D + C (1 - A)^-1 B.
-
-The closed loop is then analytic in the coefficients.  So of its matrix M, with eigenvalues z and eigenvectors V,
-
-    dM = Im M(c + i h dc)/h,   dz = diag(V^-1 dM V),
-
-and of the loop function L = sum of C_i H_i, C_i = num/den,  dC_i = (dnum - C_i dden)/den.
 """
 
 from __future__ import annotations
@@ -19,7 +13,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
@@ -31,7 +24,7 @@ from tfarm.loop.loop import band_of, grid
 from tfarm.records import record
 from tfarm.reduced.conversions import ALGEBRAIC, sensed_model
 from tfarm.response.signals import Signals
-from tfarm.synthesis.structures import IMAGINARY_STEP, Entry, Numbers
+from tfarm.synthesis.structures import Entry
 
 GROWTH_OF_MODEL = 1e-6  # of |s|: an eigenvalue so little right of the axis may be the model's own, of modes left out
 AT_NYQUIST = 1e-12  # of z = -1, where Tustin's s is infinite
@@ -64,13 +57,12 @@ class Model:
 
     # ------------------------------------------------------------ laws in states
 
-    def states(self, entries: Sequence[Entry]) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+    def states(self, entries: Sequence[Entry]) -> tuple[Real, Real, Real, Real]:
         """A (laws, k, k), B (laws, k, signals), C (laws, 1, k), D (laws, 1, signals) of laws."""
         number = max(each.num.shape[1] for each in entries)
-        order, kind = sum(len(each.den) - 1 for each in entries), np.result_type(*(each.num for each in entries), float)
-        kind = np.result_type(kind, *(each.den for each in entries))
-        A, B = np.zeros((number, order, order), kind), np.zeros((number, order, len(self.signals)), kind)
-        C, D = np.zeros((number, 1, order), kind), np.zeros((number, 1, len(self.signals)), kind)
+        order, signals = sum(len(each.den) - 1 for each in entries), len(self.signals)
+        A, B = np.zeros((number, order, order)), np.zeros((number, order, signals))
+        C, D = np.zeros((number, 1, order)), np.zeros((number, 1, signals))
         first = 0
         for signal, num, den in entries:
             n, column = len(den) - 1, self.signals.index(signal)
@@ -87,10 +79,10 @@ class Model:
         if self.period is None:
             return self.speed * A, self.speed * B, C, D
         unit = np.eye(order)
-        within = np.linalg.inv(unit - A)
+        within = np.asarray(np.linalg.inv(unit - A), dtype=float)
         return within @ (unit + A), 2 * within @ B, C @ within, D + C @ within @ B
 
-    def closed(self, entries: Sequence[Entry], share: float = 1.0) -> Numbers:
+    def closed(self, entries: Sequence[Entry], share: float = 1.0) -> Real:
         """Closed-loop matrices (laws, n, n), the plant's states first; nan of algebraic loops.
 
         `share` is a factor on the whole law.
@@ -102,7 +94,7 @@ class Model:
         number, n, k = len(Ak), len(A), Ak.shape[1]
         v = -share * np.concatenate([Dk @ C, Ck], axis=2) / whole
         y = np.concatenate([np.broadcast_to(C, (number, *C.shape)), np.zeros((number, len(C), k))], axis=2) + D @ v
-        found = np.zeros((number, n + k, n + k), v.dtype)
+        found = np.zeros((number, n + k, n + k))
         found[:, :n, :n], found[:, n:, n:] = A, Ak
         found[:, :n] += B @ v
         found[:, n:] += Bk @ y
@@ -117,23 +109,10 @@ class Model:
         found[bad] = LOST_GROWTH * np.eye(found.shape[1])
         return np.linalg.eigvals(found).astype(complex)
 
-    def moved_poles(self, entries: Sequence[Entry], stepped: Sequence[Entry], share: float) -> tuple[Complex, Complex]:
-        """Poles (n,) of one law, and their slopes (n, coefficients); `stepped` are those of `Structure.stepped`."""
-        poles, V = np.linalg.eig(self.closed(entries, share)[0])
-        moves = self.closed(stepped, share).imag / IMAGINARY_STEP
-        slopes = ((np.linalg.inv(V) @ moves) * V.T).sum(axis=2)
-        return poles.astype(complex), np.asarray(slopes.T.astype(complex))
-
     def growth(self, poles: Complex) -> Real:
         """ln |z| of poles, or Re s/|s| less what the model may have of its own: to be below 0."""
         size = np.maximum(abs(poles), LEAST_SIZE)
         return np.log(size) if self.period is not None else poles.real / size - GROWTH_OF_MODEL
-
-    def growth_slopes(self, poles: Complex, moves: Complex) -> Real:
-        """The slopes of that."""
-        if self.period is not None:
-            return (moves / np.where(poles == 0, 1.0, poles)[:, None]).real
-        return damping_slopes(poles, moves)
 
     def in_s(self, poles: Complex) -> Complex:
         """s of poles, times the period of a sampled loop; those at z = 0 are at 1."""
@@ -167,29 +146,12 @@ class Model:
             total = total + self._at(num, p) / self._at(den, p) * response[self.signals.index(signal)]
         return np.asarray(total)
 
-    def loop_slopes(self, entries: Sequence[Entry], stepped: Sequence[Entry], places: NDArray[np.int64]) -> Complex:
-        """dL/dx (places, coefficients) of one law at some of the model's own angles, by their places."""
-        p, total = self.in_p(self.angles[places]), 0.0
-        for (signal, num, den), (_, moved_num, moved_den) in zip(entries, stepped, strict=True):
-            whole = self._at(den, p)
-            steps = (self._at(each.imag / IMAGINARY_STEP, p) for each in (moved_num, moved_den))
-            d_num, d_den = steps
-            change = (d_num - self._at(num, p) / whole * d_den) / whole
-            total = total + change * self.responses[self.signals.index(signal), places]
-        return np.asarray(total).T
-
-    def _at(self, rows: Numbers, p: Complex) -> Complex:
+    def _at(self, rows: Real, p: Complex) -> Complex:
         """Polynomials (degree + 1, laws) in s at p: (laws, m)."""
         found = np.zeros((rows.shape[1], p.size), complex)
         for row in rows:
             found = found * (self.speed * p) + row[:, None]
         return found
-
-
-def damping_slopes(s: Complex, moves: Complex) -> Real:
-    """The slopes (n, coefficients) of Re s/|s| of poles: of an oscillating one that is its -zeta."""
-    size = np.maximum(abs(s), LEAST_SIZE)
-    return np.asarray(moves.real / size[:, None] - (s.real / size**3)[:, None] * (s.conj()[:, None] * moves).real)
 
 
 def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int, speed: float) -> Model:

@@ -2,9 +2,8 @@
 
     x_{k+1} = A x_k + G (r_k + D_k ref_k) + E ref_k,   w = (r + D_k (ref - C x) - C_k x_k)/(1 + D_k D)
 
-A that of the closed loop, r the feed-forward, w the input, D_k what a law passes at once.  All of it is analytic in the
-coefficients, so that a run with stepped ones has the slopes.  In continuous time the reference is a state of its own:
-its angle, rate and acceleration, constant over each half of the slew.
+A that of the closed loop, r the feed-forward, w the input, D_k what a law passes at once.  In continuous time the
+reference is a state of its own: its angle, rate and acceleration, constant over each half of the slew.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from tfarm.dsp.scenarios import TRIAL_SLEWS, trial_weights
 from tfarm.records import record
 from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.models import Model
-from tfarm.synthesis.structures import IMAGINARY_STEP, Entry, Numbers
+from tfarm.synthesis.structures import Entry
 
 SAMPLES_LEFT = 16  # of the record after the slew, where a period of the first mode has fewer
 TAYLOR_REACH, TAYLOR_TERMS = 0.25, 10  # size of a matrix, and terms of its series: 0.25^11/11! is 6e-15
@@ -40,8 +39,8 @@ def trial_slew(known: Arm, chain: Chain) -> Scenario:
     return scenario("slew", known, chain, TRIAL_SLEWS * chain.slew.rise_time)
 
 
-def exponential(matrices: Numbers) -> Numbers:
-    """e^M of matrices (laws, n, n), real or complex: a Taylor series of M/2^k, squared k times.
+def exponential(matrices: Real) -> Real:
+    """e^M of matrices (laws, n, n): a Taylor series of M/2^k, squared k times.
 
     As SciPy's to some 1e-10, but for all at once.
     """
@@ -56,11 +55,6 @@ def exponential(matrices: Numbers) -> Numbers:
     return np.asarray(found)
 
 
-def derivative(values: Numbers) -> Real:
-    """The derivative that stepped values have."""
-    return np.asarray(values.imag / IMAGINARY_STEP)
-
-
 @dataclass(frozen=True)
 @record
 class Slews:
@@ -71,21 +65,19 @@ class Slews:
     known: Arm
     chain: Chain
 
-    def residual(self, entries: Sequence[Entry]) -> tuple[Real, Real]:
-        """Root mean square [N m] of the arm's own moment less the rigid arm's (laws,), and its derivative."""
+    def residual(self, entries: Sequence[Entry]) -> Real:
+        """Root mean square [N m] of the arm's own moment less the rigid arm's (laws,)."""
         left = self._left_in_time(entries) if self.model.period is None else self._left_at_samples(entries)
-        value = np.sqrt((left**2).mean(axis=0))
-        return value.real, derivative(value)
+        return np.sqrt((left**2).mean(axis=0))
 
-    def cost(self, entries: Sequence[Entry]) -> tuple[Real, Real]:
-        """T sum of (a x^2 + b e^2)/2 (laws,), and its derivative."""
+    def cost(self, entries: Sequence[Entry]) -> Real:
+        """T sum of (a x^2 + b e^2)/2 (laws,)."""
         task, (a, b) = self._trial, trial_weights(self.known, self.chain)
         sense = self.model.plant[2][self.model.signals.index("root_moment")]
         moment, u = self._run(task, entries, sense)
         off = moment - task.moment_reference[:, None]
         added = u - (self.chain.slew.reading == "vibration") * task.feedforward[:, None]
-        value = task.period * (a * off**2 + b * added**2).sum(axis=0) / 2
-        return value.real, derivative(value)
+        return task.period * (a * off**2 + b * added**2).sum(axis=0) / 2
 
     @cached_property
     def _slew(self) -> Scenario:
@@ -97,11 +89,11 @@ class Slews:
 
     # ------------------------------------------------------------ at samples
 
-    def _left_at_samples(self, entries: Sequence[Entry]) -> Numbers:
+    def _left_at_samples(self, entries: Sequence[Entry]) -> Real:
         moment, _ = self._run(self._slew, entries, self.model.own_moment)
         return np.asarray((moment.T - self._slew.rigid_moment).T[self._slew.is_after])
 
-    def _run(self, task: Scenario, entries: Sequence[Entry], sense: Real) -> tuple[Numbers, Numbers]:
+    def _run(self, task: Scenario, entries: Sequence[Entry], sense: Real) -> tuple[Real, Real]:
         """A root moment, as a row `sense` reads it of the states, and the input at the samples, (samples, laws)."""
         model = self.model
         A, (_, Bk, _, Dk) = model.closed(entries), model.states(entries)
@@ -109,10 +101,10 @@ class Slews:
         references = np.array([wanted.get(name, 0.0 * task.feedforward) for name in model.signals])
         push = task.feedforward + (Dk[:, 0] @ references)  # (laws, samples)
         n = len(model.plant[0])
-        forced = np.zeros((len(task.t), *A.shape[:2], 1), A.dtype)
+        forced = np.zeros((len(task.t), *A.shape[:2], 1))
         forced[:, :, :n, 0] = push.T[:, :, None] * model.plant[1][:, 0]
         forced[:, :, n:, 0] = -np.moveaxis(Bk @ references, 2, 0)
-        x, moment = np.zeros((*A.shape[:2], 1), A.dtype), np.zeros((len(task.t), len(A)), A.dtype)
+        x, moment = np.zeros((*A.shape[:2], 1)), np.zeros((len(task.t), len(A)))
         u = moment.copy()
         for k, force in enumerate(forced):
             moment[k] = x[:, :n, 0] @ sense
@@ -122,7 +114,7 @@ class Slews:
 
     # ------------------------------------------------------------ in continuous time
 
-    def _left_in_time(self, entries: Sequence[Entry]) -> Numbers:
+    def _left_in_time(self, entries: Sequence[Entry]) -> Real:
         """The moment at points of the first mode's period after the slew: there the rigid arm's is 0.
 
         The moment feedback has no reference here: only angle and rate have.
@@ -137,13 +129,13 @@ class Slews:
                 states[model.signals.index(name), column] = 1.0
         through = 1.0 + Dk @ D
         push = (np.array([0.0, self.known.rate_loss, self.known.turned_inertia]) + Dk @ states) / through
-        whole = np.zeros((number, A.shape[1] + 3, A.shape[1] + 3), A.dtype)
+        whole = np.zeros((number, A.shape[1] + 3, A.shape[1] + 3))
         size = A.shape[1]
         whole[:, :size, :size] = A
         whole[:, :n, size:], whole[:, n:size, size:] = B @ push, Bk @ (D @ push) - Bk @ states
         whole[:, size, size + 1] = whole[:, size + 1, size + 2] = 1.0
         half = exponential(whole * slew.rise_time / 2)
-        x = np.zeros((number, size + 3, 1), A.dtype)
+        x = np.zeros((number, size + 3, 1))
         peak = slew.acceleration(self.known.reach)
         for acceleration in (peak, -peak):
             x[:, -1] = acceleration
@@ -153,7 +145,7 @@ class Slews:
         row, at = model.own_moment, model.signals.index("root_moment")
         passed = D[at, 0] * np.concatenate([-(Dk @ C) / through, -Ck / through, push], axis=2)
         sense = passed + np.r_[row, np.zeros(size + 3 - n)]
-        left = np.zeros((PERIOD_POINTS, number), A.dtype)
+        left = np.zeros((PERIOD_POINTS, number))
         for k in range(PERIOD_POINTS):
             left[k] = (sense @ x)[:, 0, 0]
             x = step @ x

@@ -23,7 +23,6 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import ANGLE_GAIN, PLANE, TWO_GAINS, AnyLaw, Arm, HubFeedback, Law, must_not_be_algebraic
 from tfarm.arrays import Real
@@ -34,22 +33,20 @@ from tfarm.spectrum import modes as natural_modes
 from tfarm.spectrum.table import check_gains, first_frequency, rate_unit, turning_inertia
 
 Bounds = tuple[float, float]
-Numbers = NDArray[Any]  # real, or complex for a derivative
 
 ANGLE_SPEED = 0.1  # of the first frequency, and rad a sample: how fast the angle answers unless Kp is given
 LOGARITHMIC = 1e-8  # of the usual size: the unit of a positive coefficient
 REACH = np.exp(4.0)  # of a coefficient's usual size, up and down: its first bounds
 FILTER_REACH = np.exp(2.0)  # the same of the frequency and damping of a notch or filter
 AT_END = 1e-3  # of the range of x: a coefficient so near to an end of its bounds is there
-IMAGINARY_STEP = 1e-30  # of a derivative: its square is nothing beside 1 in float64
 
 
 class Entry(NamedTuple):
     """What a signal is multiplied by: polynomials in s, descending, (degree + 1, laws); proper."""
 
     signal: str
-    num: Numbers
-    den: Numbers
+    num: Real
+    den: Real
 
 
 class Coefficient(NamedTuple):
@@ -80,14 +77,14 @@ def signed(name: str, size: float) -> Coefficient:
 class Structure:
     """A law with `free` coefficients, and `fixed` ones, which are not searched.
 
-    `entries` maps coefficients (n, laws) to the entries, by operations that are analytic in them; the bounds of the
-    coefficients named in `given` are not to be widened.
+    `entries` maps coefficients (n, laws) to the entries; the bounds of the coefficients named in `given` are not to be
+    widened.
     """
 
     name: str
     free: tuple[Coefficient, ...]
     fixed: dict[str, float]
-    entries: Callable[[Numbers], tuple[Entry, ...]]
+    entries: Callable[[Real], tuple[Entry, ...]]
     given: tuple[str, ...] = ()
 
     @property
@@ -129,13 +126,6 @@ class Structure:
     def coefficients(self, x: Real) -> Real:
         """The coefficients at x (n, laws)."""
         return np.asarray((self.units * np.sinh(x.T)).T)
-
-    def stepped(self, x: Real) -> Numbers:
-        """The coefficients (n, n) at x (n,), in each column another moved along the imaginary axis.
-
-        So a derivative by x is that of an analytic function to rounding, Im f/h (Squire and Trapp, 1998).
-        """
-        return self.coefficients(x)[:, None] + 1j * IMAGINARY_STEP * np.diag(self.units * np.cosh(x))
 
     def record_at(self, x: Real) -> AnyLaw:
         """The law at x (n,), as a record."""
@@ -212,16 +202,16 @@ def usual_angle_gain(arm: Arm, period: float) -> float:
     return float(f"{arm.turned_inertia * speed**2:.3g}")
 
 
-def product(first: Numbers, second: Numbers) -> Numbers:
+def product(first: Real, second: Real) -> Real:
     """The product of polynomials (degree + 1, laws)."""
     shape = (len(first) + len(second) - 1, max(first.shape[1], second.shape[1]))
-    total = np.zeros(shape, np.result_type(first, second))
+    total = np.zeros(shape)
     for n, row in enumerate(first):
         total[n : n + len(second)] += row * second
     return total
 
 
-def polynomial(*coefficients: Any) -> Numbers:
+def polynomial(*coefficients: Any) -> Real:
     """A polynomial (degree + 1, laws) of coefficients that are numbers or (laws,)."""
     return np.array(np.broadcast_arrays(*(np.atleast_1d(each) for each in coefficients)))
 
@@ -234,12 +224,12 @@ def _rate_gain(arm: Arm, Kp: float) -> Coefficient:
     return positive("K1", float(np.sqrt(2 * Kp * arm.turned_inertia)))
 
 
-def _servo(Kp: float, K1: Numbers) -> tuple[Entry, Entry]:
+def _servo(Kp: float, K1: Real) -> tuple[Entry, Entry]:
     """Kp on the angle, K1 (laws,) on its rate."""
     return Entry("hub_angle", polynomial(Kp), ONE), Entry("hub_rate", polynomial(K1), ONE)
 
 
-def _second_order(w: Numbers, damping: Numbers) -> Numbers:
+def _second_order(w: Real, damping: Real) -> Real:
     """s^2 + 2 damping w s + w^2."""
     return polynomial(1.0, 2 * damping * w, w * w)
 
@@ -251,7 +241,7 @@ def _two_gains(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
     K1 = Coefficient("K1", LOGARITHMIC * rate_unit(arm), (0.0, most), (0.0, np.inf), 0.1 * rate_unit(arm))
     K2 = Coefficient("K2", unit, (-3.0 * unit, unit), (-np.inf, unit), 0.0)
 
-    def entries(c: Numbers) -> tuple[Entry, ...]:
+    def entries(c: Real) -> tuple[Entry, ...]:
         angle, rate = _servo(Kp, c[0])
         return (*((angle,) if Kp else ()), rate, Entry("root_moment", polynomial(c[1]), ONE))
 
@@ -264,7 +254,7 @@ def _pd(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
 
 
 def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
-    def entries(c: Numbers) -> tuple[Entry, ...]:
+    def entries(c: Real) -> tuple[Entry, ...]:
         K1, pole, w, a, b = c
         num = product(polynomial(K1 + Kp / pole, Kp), _second_order(w, a))
         return (Entry("hub_angle", num, product(polynomial(1 / pole, 1.0), _second_order(w, b))),)
@@ -280,7 +270,7 @@ def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
 
 
 def _lead(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
-    def entries(c: Numbers) -> tuple[Entry, ...]:
+    def entries(c: Real) -> tuple[Entry, ...]:
         zero, pole = c
         return (Entry("hub_angle", polynomial(Kp / zero, Kp), polynomial(1 / pole, 1.0)),)
 
@@ -291,7 +281,7 @@ def _lead(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
 def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
     frequencies = natural_modes(arm, modes).natural_frequency[-modes:].tolist()
 
-    def entries(c: Numbers) -> tuple[Entry, ...]:
+    def entries(c: Real) -> tuple[Entry, ...]:
         num, den = np.zeros((1, c.shape[1])), ONE
         for g, w, zeta in c[1:].reshape(modes, 3, -1):
             own = _second_order(w, zeta)
@@ -312,7 +302,7 @@ def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
 
 
 def _strain_rate(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
-    def entries(c: Numbers) -> tuple[Entry, ...]:
+    def entries(c: Real) -> tuple[Entry, ...]:
         K1, g, pole = c
         return (*_servo(Kp, K1), Entry("root_moment", polynomial(g, 0.0), polynomial(1 / pole, 1.0)))
 

@@ -190,7 +190,7 @@ class MovingGain:
     def criterion(self, lo: float, hi: float, theta: Real) -> Real:
         """1 + (lo + hi) Re H + lo hi |H|^2 at z = e^{i theta}, by transfer functions."""
         z = np.exp(1j * theta)
-        moment = self.loop.terms(z, None, np.ones(theta.size))[1 + self.loop.place(MOMENT_GAIN)]
+        moment = self.loop.terms(z, None, np.ones(theta.size))[1 + self.loop.part(MOMENT_GAIN)]
         H = moment / self._under(0.0)(z)
         return np.asarray(1 + (lo + hi) * H.real + lo * hi * abs(H) ** 2)
 
