@@ -22,7 +22,6 @@ release = version = tfarm.__version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 myst_enable_extensions = ["colon_fence", "dollarmath", "deflist"]
 myst_heading_anchors = 3
-suppress_warnings = ["myst.header"]  # Typer's page begins with the command, one level down
 html_theme = "furo"
 html_math_renderer = "mathml"
 html_title = f"tfarm {release}"
@@ -32,14 +31,18 @@ autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "imported-members": True}
 add_module_names = False
+napoleon_google_docstring = False
 napoleon_use_rtype = False
 exclude_patterns = ["_build"]
 
 
 def commands_page() -> str:
     """Every command with its arguments and options, as Typer writes them."""
-    command = whole_command()
-    return get_docs_for_click(obj=command, ctx=typer.Context(command), name="tfarm", title="Commands")
+    whole = whole_command()
+    context, commands = typer.Context(whole), whole.commands.values()
+    pages = [get_docs_for_click(obj=each, ctx=context, indent=1, call_prefix="tfarm") for each in commands]
+    rows = [f"| [`{each.name}`](#tfarm-{each.name}) | {each.help.splitlines()[0]} |" for each in commands]
+    return "\n".join(["# Commands", "", "| command | purpose |", "|---|---|", *rows, "", *pages])
 
 
 def arm_file_page() -> str:

@@ -1,4 +1,4 @@
-"""tfarm: a rotating flexible Timoshenko arm in the frequency domain, from its exact solution.
+"""tfarm: a rotating flexible Timoshenko arm in the frequency domain, from its exact solution::
 
     arm = tfarm.load("sasaki2012")            # a preset or a TOML file
     G = tfarm.transfer(arm, "root_moment")    # exact; callable at any complex s
