@@ -171,8 +171,6 @@ CHAINS = {
 def test_to_first_order_a_gain_adds_what_the_poles_say_at_a_tiny_one(arm, name):
     """Through delay, filter, difference and a lag of the motor; an arm's own damping is taken for what it is."""
     arm, chain = tfarm.load(arm), CHAINS[name]
-    if arm.input_lags and chain.actuator.hub_damping:
-        chain = replace(chain, actuator=replace(chain.actuator, hub_damping=0.0))
     loop = sampled_loop(arm, HubFeedback(K1=0.02, K2=0.3), chain, count=5)
     table = mode_table(loop)
     assert table.index.size >= 4

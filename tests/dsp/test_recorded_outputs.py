@@ -16,9 +16,9 @@ from tests.shared import thinned
 from tests.shell import answer, run
 from tfarm.arm import HubFeedback, Law, RotarySpring
 from tfarm.dsp import Actuator, Chain, Sampling, Simulator, scenario
-from tfarm.dsp.plant import RECORDED, undelayed_plant
+from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.sampled import sampled_loop
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ParameterError
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.reduced import modal_model
 
@@ -159,12 +159,3 @@ def test_a_hub_that_its_actuator_damps_is_a_hub_with_that_friction(law, friction
     other = tfarm.simulate(rubbed, law, Chain(), "impulse", 0.3, count=20, outputs=names).at_samples
     for name in one.names:
         np.testing.assert_allclose(one.signal(name), other.signal(name), atol=1e-7 * abs(other.signal(name)).max())
-
-
-def test_a_damping_that_few_modes_would_make_drive_the_hub_is_refused():
-    """Friction far above the modes at hand leaves a negative remainder of the hub's rate: no verdict is made of it."""
-    rig = replace(LAB, hub=replace(LAB.hub, inertia=1e-4, friction=0.1))
-    assert undelayed_plant(rig, Chain(), ["hub_rate"], 6).static[0] < 0
-    assert tfarm.sampled(rig, GAINS, Chain(actuator=Actuator(hub_damping=0.05)), count=6).verdict.is_stable
-    with pytest.raises(ConvergenceError, match=r"ask for more modes, or give it as hub\.friction"):
-        tfarm.sampled(rig, GAINS, Chain(actuator=Actuator(hub_damping=20.0)), count=6)

@@ -182,7 +182,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
         beside = sensed.together.beside(sensed.unfiltered.rows(["root_moment"]))
         own = np.asarray(PulseTransfer(beside, chain.sampling).folded().matrices()[2][-1])
     first = pulse.integrals_at
-    damped, felt = bool(arm.rate_loss or chain.actuator.hub_damping), arm.has_rigid_mode
+    damped, felt = bool(sensed.read.arm.rate_loss), arm.has_rigid_mode
     gone = [first] if damped or not felt else []
     gone += [] if felt else [first + 1]
     angle = first + damped
