@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 import tfarm
-from tfarm.fitting.reading import read_measured
+from tfarm.fitting.data import read_measured
 
 sheet = tfarm.load("sasaki2012-lab")
 softer = replace(sheet.link, youngs_modulus=0.93 * sheet.link.youngs_modulus)

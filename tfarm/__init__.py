@@ -37,11 +37,10 @@ if TYPE_CHECKING:
     from tfarm.dsp.verdict import sampled
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
     from tfarm.exact.outputs import Output
-    from tfarm.fitting.data import Measured
+    from tfarm.fitting.data import Measured, read_measured
     from tfarm.fitting.fit import fit
     from tfarm.fitting.overlay import overlay
-    from tfarm.fitting.reading import read_measured
-    from tfarm.loop.closed import locus
+    from tfarm.loop.locus import locus
     from tfarm.loop.margins import margins
     from tfarm.loop.nyquist import nyquist
     from tfarm.loop.plane import gain_map as map
@@ -50,7 +49,7 @@ if TYPE_CHECKING:
     from tfarm.reduced import reduce
     from tfarm.response import bode, transfer
     from tfarm.spectrum import damped_modes, modes
-    from tfarm.spectrum.scales import default_gains
+    from tfarm.spectrum.table import default_gains
     from tfarm.synthesis.design import design
     from tfarm.tuner import tune
 
@@ -101,12 +100,12 @@ __all__ = [
 _ROOMS = {  # where a name stands; what it is called there after a colon, if not the same
     "bode": "response",
     "design": "synthesis.design",
-    "locus": "loop.closed",
+    "locus": "loop.locus",
     "nyquist": "loop.nyquist",
     "closed_loop_poles": "loop.poles",
     "compare": "comparing",
     "damped_modes": "spectrum",
-    "default_gains": "spectrum.scales",
+    "default_gains": "spectrum.table",
     "map": "loop.plane:gain_map",
     "margins": "loop.margins",
     "Measured": "fitting.data",
@@ -115,7 +114,7 @@ _ROOMS = {  # where a name stands; what it is called there after a colon, if not
     "Output": "exact.outputs",
     "overlay": "fitting.overlay",
     "plots": "plots",
-    "read_measured": "fitting.reading",
+    "read_measured": "fitting.data",
     "reduce": "reduced",
     "sampled": "dsp.verdict",
     "simulate": "dsp.results",

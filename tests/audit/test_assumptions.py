@@ -19,7 +19,7 @@ from tfarm.audit.assumptions import (
     own_depth,
     section_study,
 )
-from tfarm.spectrum.scales import PAPER_GAINS
+from tfarm.spectrum.table import PAPER_GAINS
 from tfarm.tables.files import to_json
 
 PAPER = tfarm.load("sasaki2012")

@@ -9,9 +9,9 @@ import numpy as np
 import tfarm
 from tfarm.arm import HubFeedback
 from tfarm.exact.characteristic import gains_of
+from tfarm.loop.loci import open_loop, reduced_locus
 from tfarm.loop.locus import Locus, locus
 from tfarm.loop.loop import Loop
-from tfarm.loop.reduced_locus import open_loop, reduced_locus
 from tfarm.spectrum.proofs import enclosed
 
 from .reference import Complex

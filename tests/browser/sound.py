@@ -129,6 +129,7 @@ def test_nothing_is_hidden_and_axe_finds_nothing(browser, request, site, width, 
             page.emulate_media(color_scheme="light" if scheme == "dark" else "dark")
             assert axe(page, "color-contrast") == [], file
             assert not opened.said, file
+            assert all(url.startswith(("file://", "data:")) for url in opened.asked), file
 
 
 @pytest.mark.parametrize("site", [pytest.param("few", marks=pytest.mark.quick), "full"])

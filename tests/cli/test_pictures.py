@@ -10,8 +10,6 @@ from matplotlib import image
 import tfarm
 from tests.shared import thinned
 from tests.shell import answer, run
-from tfarm.cli.tables import hand_out
-from tfarm.plots.frequency import draw_bode
 
 LAB = "sasaki2012-lab"
 BENCH = str(Path(__file__).parents[1] / "rigs" / "bench-rig.toml")
@@ -59,13 +57,6 @@ def test_a_picture_is_written_and_said(words, law, tmp_path, capsys):
     assert 0.002 < np.mean(pixels[..., :3].min(axis=-1) < 0.5) < 0.5  # ink on paper
 
 
-def test_what_has_no_picture_is_no_empty_file(tmp_path):
-    """A bug of ours, so it is loud."""
-    with pytest.raises(TypeError, match="Modes has no picture"):
-        hand_out(dict, print, True, png=tmp_path / "none.png", picture=(tfarm.modes(tfarm.load(LAB), 2),))
-    assert not list(tmp_path.iterdir())
-
-
 def test_bode_looks_along_the_arm_at_either_side_of_a_joint_and_from_another_input(capsys):
     """Strain jumps at a joint of two segments: its two sides differ by one factor at all frequencies."""
     rig = tfarm.load(BENCH)
@@ -109,7 +100,7 @@ def test_bode_says_that_an_output_is_zero_and_draws_that(capsys, tmp_path):
     assert (code, out.splitlines()[1:], err) == (0, ["zero at every frequency"], f"written: {tmp_path / 'zero.png'}\n")
     found = tfarm.bode(tfarm.load(LAB), "shear", (1.0, 300.0), x=1.0)
     assert found.is_zero
-    figure = draw_bode(found)
+    figure = tfarm.plots.bode.figure(found)
     assert [each.get_text() for each in figure.axes[0].texts] == ["zero at every frequency"]
 
 

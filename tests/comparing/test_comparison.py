@@ -19,10 +19,8 @@ from tfarm.comparing.answers import (
     compared_poles,
     unpaired_poles,
 )
-from tfarm.comparing.pairing import poles_by_mode
 from tfarm.dsp import Analysis, sampled_verdict
 from tfarm.loop.answers import margins_answer
-from tfarm.plots.compared import draw_comparison
 
 BARE, LAB = tfarm.load("sasaki2012"), tfarm.load("sasaki2012-lab")
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
@@ -124,10 +122,10 @@ def test_a_pole_of_the_law_is_no_mode():
 def test_the_assignment_of_poles_to_modes():
     """By least total distance, one a mode; a factor of e away is none, and two poles below mode 1 are not the hub's."""
     own = {1: 10j, 2: 60j, 3: 200j}
-    assert poles_by_mode(np.array([-1 + 9j, -2 + 61j]), own) == {1: -1 + 9j, 2: -2 + 61j}
-    assert poles_by_mode(np.array([1j, 11j, 12j]), own) == {0: 1j, 1: 11j}
-    assert poles_by_mode(np.array([1j, 1.5j, 11j, 9e5j]), own) == {1: 11j}
-    assert poles_by_mode(np.array([], complex), own) == {}
+    assert comparison.poles_by_mode(np.array([-1 + 9j, -2 + 61j]), own) == {1: -1 + 9j, 2: -2 + 61j}
+    assert comparison.poles_by_mode(np.array([1j, 11j, 12j]), own) == {0: 1j, 1: 11j}
+    assert comparison.poles_by_mode(np.array([1j, 1.5j, 11j, 9e5j]), own) == {1: 11j}
+    assert comparison.poles_by_mode(np.array([], complex), own) == {}
 
 
 def test_a_phase_margins_difference_is_in_degrees(capsys):
@@ -178,7 +176,7 @@ def test_a_law_of_other_signals_is_mapped_over_factor_and_delay(points, monkeypa
         last = plane.y[column].max()
         step = plane.y[1] - plane.y[0]
         assert last - plane.law.delay == pytest.approx(side.margins.exact_delay, abs=2 * step)
-    drawn = draw_comparison(found).axes[1].collections
+    drawn = tfarm.plots.comparison.figure(found).axes[2].collections
     meshes = [each for each in drawn if isinstance(each, QuadMesh)]
     for mesh, plane in zip(meshes, found.delays, strict=True):
         opaque = np.asarray(mesh.get_array())[..., 3] > 0
@@ -188,7 +186,7 @@ def test_a_law_of_other_signals_is_mapped_over_factor_and_delay(points, monkeypa
 def test_gains_as_a_law_in_z_are_the_same_loop_at_the_samples():
     """The same numbers act at the same samples, by another road: poles, factors and delay differ in nothing."""
     found = tfarm.compare(LAB, [LAW, tfarm.Law({"hub_rate": 0.3, "root_moment": 0.3}, period=0.01)], modes=2)
-    assert found.is_clocked
+    assert found.is_sampled
     assert [side.verdict for side in found.sides] == ["stable", "stable"]
     for table in (compared_poles(found), compared_margins(found)):
         apart = [value for row in table for key, value in row.items() if key.endswith("difference_percent")]
@@ -203,15 +201,15 @@ def test_a_law_in_z_beside_gains_is_judged_at_the_clock_of_both():
     found = tfarm.compare(LAB, [LAW, late], modes=1)
     for side, law, plane in zip(found.sides, (LAW, late), found.reaches, strict=True):
         alone = Analysis(sampled_verdict(LAB, tfarm.Law.of_gains(law) if law is LAW else law))
-        assert side.clocked.margins["gain_factor_up"] == alone.gain_factors[1]
+        assert side.sampled_margins[0] == alone.gain_factors[1]
         assert side.sampled.is_stable == alone.verdict.is_stable
         _, L = side.loop_function
         assert abs(1 + alone.gain_factors[1] * L).min() < 1e-2
         assert alone.gain_factors in plane.stable_intervals[0]
         stable = [any(low < 1 < high for low, high in each) for each in plane.stable_intervals]
         last = plane.delay[stable].max()
-        assert last <= side.clocked.margins["delay_margin_s"] < last + plane.delay[1]
-    upper, right = draw_comparison(found).axes[:2]
+        assert last <= side.sampled_margins[2] < last + plane.delay[1]
+    upper, _, right = tfarm.plots.comparison.figure(found).axes
     assert upper.get_xlim()[1] == pytest.approx(np.pi / 0.01, rel=1e-3)  # the last point of its grid
     assert right.get_xlabel() == "further delay [ms]"
     answered = compared_answer(found)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tfarm.crossing.pieces import pieces
+from tfarm.crossing.turning import pieces
 
 
 def area(piece):

@@ -3,7 +3,7 @@
 import math
 
 from tfarm.crossing import Crossings
-from tfarm.crossing.plane import confirmed
+from tfarm.crossing.line import confirmed
 
 TRUE = [(-2.0, 0.7, -2), (3.0, 1.1, 2)]
 FALSE = [

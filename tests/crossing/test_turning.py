@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from tfarm.crossing.pieces import RegionPiece
-from tfarm.crossing.turning import loose, loose_columns
+from tfarm.crossing.turning import RegionPiece, loose, loose_columns
 
 
 def arc(points, radius=1.0, centre=5j):

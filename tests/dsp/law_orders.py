@@ -24,7 +24,7 @@ from tfarm.arm import Arm, Law
 from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 
 BITS = 280
 AT_ONE = 1e-20  # an eigenvalue as near is z = 1: a double one is right to 1e-40

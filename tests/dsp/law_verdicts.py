@@ -23,7 +23,7 @@ from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.reduced.conversions import sensed_model
 from tfarm.response.signals import Signals
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 
 MODES = 40
 CLOSE, SLOW = 1e-9, 1e-3  # ln of the radius from which on models, and simulations, decide

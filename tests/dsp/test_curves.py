@@ -20,7 +20,7 @@ from tfarm.dsp.traces import (
     root_moment,
 )
 from tfarm.report.motion import responses_table
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 STEEL = tfarm.load("stocky-steel")
 

@@ -49,7 +49,7 @@ def test_the_map_of_the_sampled_loop_from_the_command_line(capsys, tmp_path):
     assert found["unstable_poles"][j][i] == poles.unstable
     law_file, table, picture = (tmp_path / name for name in ("law.toml", "map.csv", "map.png"))
     save_law(FOUR, law_file)
-    code, out, err = run(
+    code, out, _ = run(
         capsys, "map", "sasaki2012-lab", "--dsp", "sasaki2012-lab", "--law", str(law_file), "--vary", "delay=0,0.1",
         "--vary", "hub_angle=1,3", "--points", "3", "--csv", str(table), "--png", str(picture),
     )  # fmt: skip

@@ -12,7 +12,7 @@ from tests.similar import EITHER
 from tfarm import HubFeedback, modes
 from tfarm.dsp import Chain, Sampling, delay_margin, sampled_loop, stable_windows
 from tfarm.errors import ConvergenceError
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 STILL_RIG = (6, 28)  # held by a spring near its root: the hub's rate next to z = 1 is rounding
 

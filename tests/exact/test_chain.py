@@ -20,12 +20,11 @@ from tests.transition import determinant, response
 from tfarm import Hub
 from tfarm.arm import THEORIES, Attachment, Motor, RotarySpring
 from tfarm.errors import ParameterError
-from tfarm.exact.elements import Place
 from tfarm.exact.layout import readings
 from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.exact.series import expansions_at_zero
 from tfarm.exact.sweep import AXIS, fill_free
-from tfarm.exact.system import system_of
+from tfarm.exact.system import Place, system_of
 from tfarm.exact.uniform import fill_ends
 from tfarm.exact.values import free_fields
 from tfarm.spectrum.frequencies import natural_frequencies

@@ -18,13 +18,15 @@ from tfarm.exact.characteristic import (
     NO_GAINS,
     as_column,
     characteristic,
+    characteristic_ball,
+    characteristic_over,
     gains_of,
     loop_system,
     quick_characteristics,
+    tangent,
     zeros_at_origin,
 )
 from tfarm.exact.system import system_of
-from tfarm.exact.wide_balls import characteristic_ball, characteristic_over, tangent
 
 EPS = np.finfo(float).eps
 LAW = {"Kp": 2.0, "K1": 0.3, "K2": 0.4}

@@ -8,7 +8,7 @@ import pytest
 import tfarm
 from tests.rigs import some_rig
 from tfarm.errors import ParameterError
-from tfarm.exact.gradients import Direction, response_gradients
+from tfarm.exact.series import Direction, response_gradients
 from tfarm.exact.system import system_of
 from tfarm.response.signals import Signals
 

@@ -23,7 +23,7 @@ from tests.survey import Finding
 from tfarm.arm.writing import KeyedArms
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import fit
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 
 ALWAYS = ("link.youngs_modulus", "hub.inertia", "link.damping")
 SOMETIMES = ("payload.mass", "payload.inertia", "clamp.stiffness", "gain", "delay", "link.section.second_moment")

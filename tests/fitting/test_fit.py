@@ -18,8 +18,8 @@ from tfarm.errors import ParameterError
 from tfarm.fitting.answers import resonances
 from tfarm.fitting.data import noise_of
 from tfarm.fitting.fit import fit
-from tfarm.fitting.ringing import RingMode, mode_of
-from tfarm.fitting.start import equation_errors
+from tfarm.fitting.model import RingMode, mode_of
+from tfarm.fitting.solve import equation_errors
 
 LAB = tfarm.load("sasaki2012-lab")
 OMEGA = np.geomspace(8.0, 1200.0, 160)
@@ -217,7 +217,7 @@ def test_noise_that_is_not_said_comes_from_the_residuals():
 
 def test_an_arm_that_is_wrong_is_not_said_to_explain_anything(monkeypatch):
     """The data are those of an arm with a clamp that yields; with a rigid one the fit ends, and says so."""
-    monkeypatch.setattr("tfarm.fitting.start.STRAYED", 1)  # no start makes a clamp yield
+    monkeypatch.setattr("tfarm.fitting.solve.STRAYED", 1)  # no start makes a clamp yield
     soft = tfarm.Arm(link=LAB.link, hub=LAB.hub, clamp=tfarm.RotarySpring(stiffness=300.0), name="soft")
     found = fit(LAB, measured(soft, PAIRS[:1], omega=OMEGA[::3]), free=["link.youngs_modulus"], profile=False)
     assert found.is_explained is False
@@ -326,7 +326,7 @@ def test_young_s_modulus_takes_the_shear_modulus_along():
 
 def test_a_step_to_no_arm_is_a_wall(monkeypatch):
     """An attachment beside the tip that would pass it where the link grows shorter: the search ends at an arm."""
-    monkeypatch.setattr("tfarm.fitting.start.STRAYED", 1)
+    monkeypatch.setattr("tfarm.fitting.solve.STRAYED", 1)
     rig = tfarm.load("tests/rigs/bench-rig.toml")
     omega = np.geomspace(20, 600, 20)
     H = tfarm.transfer(rig, "tip_acceleration")(1j * omega)

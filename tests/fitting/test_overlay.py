@@ -10,8 +10,7 @@ import tfarm
 from tests.shell import answer, run
 from tfarm.errors import ParameterError
 from tfarm.fitting.data import Measured, noise_of
-from tfarm.fitting.overlay import overlay
-from tfarm.fitting.ratio import Ratio
+from tfarm.fitting.overlay import Ratio, overlay
 from tfarm.fitting.resonances import matched_peaks, must_be_in_unit
 
 LAB = tfarm.load("sasaki2012-lab")

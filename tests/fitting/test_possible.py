@@ -11,11 +11,9 @@ import pytest
 import tfarm
 from tests.fitting.test_fit import LAB, PAIRS, measured
 from tests.shared import thinned
-from tfarm.fitting.fit import fit
-from tfarm.fitting.possible import extremes, loop_on_all, possible, repeats, response_band, share_stable
+from tfarm.fitting.fit import fit, possible, repeats, response_band, share_stable
 from tfarm.report.response_sections import fit_section
-
-LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
+from tfarm.spectrum.table import default_gains
 
 
 @pytest.fixture(scope="module")
@@ -43,12 +41,8 @@ def test_of_an_unknown_pair_the_product_hardly_varies():
     assert np.std(EI) < 1e-3
 
 
-def test_a_loop_on_all_of_them(known):
+def test_gains_and_responses_on_all_of_them(known):
     those = possible(known, count=5)
-    found = loop_on_all(those, LAW)
-    assert (found.stable, found.of) == (5, 5)
-    each = [tfarm.margins(arm, LAW) for arm in those.arms]
-    assert extremes(found.disk) == (min(m.in_band.disk for m in each), max(m.in_band.disk for m in each))
     share = share_stable(those, np.array([0.3, 0.5]), np.array([0.3, 3.0]))
     assert share.tolist() == [[1.0, 1.0], [0.0, 0.0]]
     low, high, best = response_band(those, "root_moment", np.geomspace(10, 300, 50))
@@ -66,6 +60,9 @@ def test_the_section_of_a_page(known):
     assert "the loop holds on 3 of 3 of these arms" in " ".join(section.words)
     table = section.blocks[1]
     assert [row["value"] for row in table] == [each.value for each in known.parameters]
+    each = [tfarm.margins(arm, default_gains(known.arm)).in_band.disk for arm in possible(known, count=3).arms]
+    rows = {row["margin"]: row for row in section.blocks[-1]}
+    assert (rows["disk margin"]["lowest"], rows["disk margin"]["highest"]) == (min(each), max(each))
 
 
 OMEGA = np.geomspace(8.0, 600.0, 60)

@@ -3,12 +3,11 @@
 import hashlib
 import sys
 
-import control
 import numpy as np
 import pytest
 
 from tfarm.errors import ParameterError
-from tfarm.fitting.reading import data_of, measured_of, read_measured
+from tfarm.fitting.data import data_of, read_measured
 from tfarm.fitting.recording import read_recording
 
 HZ = np.array([1.0, 1.5, 2.25, 40.0])
@@ -74,7 +73,7 @@ BAD = {
     "hz,re\n1,2": "header = 'hz, re': one pair of columns",
     "hz,deg\n1,2": "one pair of columns",
     "hz,re,im,db\n1,2,3,4": "one pair of columns",
-    "hz,re,im,deg\n1,2,3,4": "leave deg out",
+    "hz,re,im,deg\n1,2,3,4": "leave others out",
     "hz,re,re\n1,2,3": "header, column 3 = 're'",
     "hz,re,im\n1,2,x": "line 2, im = 'x': no finite number",
     "hz,re,im\n1,2,nan": "line 2, im = 'nan': no finite number",
@@ -123,20 +122,6 @@ def test_signals_along_the_link_and_inputs_of_the_hub_are_known(tmp_path):
     path = tmp_path / "strain.csv"
     path.write_text(WRITTEN["plain"])
     assert data_of(f"strain@0.05/motor_voltage={path}").name == "strain@0.05/motor_voltage"
-
-
-def test_data_of_python_control_are_taken_by_their_names():
-    two = np.array([[VALUES, 2 * VALUES], [3 * VALUES, 4 * VALUES]])
-    names = {"outputs": ["tip_acceleration", "strain"], "inputs": ["hub_torque", "hub_angle"]}
-    response = control.FrequencyResponseData(two, 2 * np.pi * HZ, **names)
-    found = measured_of(response, "strain", "hub_angle", averages=5)
-    assert found.omega.tolist() == (2 * np.pi * HZ).tolist()
-    assert found.values.tolist() == (4 * VALUES).tolist()
-    assert found.averages == 5
-    with pytest.raises(ParameterError, match="input = 'motor_voltage'"):
-        measured_of(response, "strain", "motor_voltage")
-    alone = control.FrequencyResponseData(VALUES, HZ)
-    assert measured_of(alone, *NAMES).values.tolist() == VALUES.tolist()
 
 
 def uff(values, start, step, function=4):

@@ -17,9 +17,8 @@ import pytest
 
 import tfarm
 from tests.shell import answer, run
-from tfarm.fitting.recording import read_recording
-from tfarm.fitting.ringing import mode_of
-from tfarm.fitting.spectra import frequency_response
+from tfarm.fitting.model import mode_of
+from tfarm.fitting.recording import frequency_response, read_recording
 
 DATA = Path(__file__).parent.parent / "data" / "quanser-2dsfl"
 RUNS = ("ring-20deg.csv", "ring-neg-10deg.csv")

@@ -5,7 +5,7 @@ import pytest
 from scipy import signal
 
 from tests.shell import answer, run
-from tfarm.fitting.reading import data_of
+from tfarm.fitting.data import data_of
 
 B, A, T = [0.0, 0.5, 0.2], [1.0, -0.8, 0.4], 0.01
 

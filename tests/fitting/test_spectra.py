@@ -5,8 +5,7 @@ import pytest
 from scipy import signal
 
 from tfarm.errors import ParameterError
-from tfarm.fitting.recording import Recording
-from tfarm.fitting.spectra import frequency_response, independent_averages
+from tfarm.fitting.recording import Recording, frequency_response, independent_averages
 
 T = 0.01
 B, A = [0.0, 0.5, 0.2], [1.0, -0.8, 0.4]  # rings for some ten samples: segments of a hundred leave little of it out

@@ -18,7 +18,7 @@ from tfarm.arm import Law
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.stability import stability
 from tfarm.response.signals import Signals
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 
 SIGNALS = ("hub_angle", "hub_rate", "root_moment", "tip_displacement", "tip_acceleration", "moment@", "deflection@")
 MODELS = (30, 40)  # modes

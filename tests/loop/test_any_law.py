@@ -1,62 +1,17 @@
 """Functions of a loop take gains at the hub and any other law alike, and say what to give where they get neither."""
 
-import json
-
 import numpy as np
 import pytest
 
 import tfarm
-from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
-from tfarm.loop.locus import Locus, locus
 from tfarm.loop.plane import Plane
-from tfarm.loop.stability import stability
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 GAINS = HubFeedback(K1=0.3, K2=0.3, Kp=2.0)
 PLAIN = Law({"hub_rate": 0.3, "root_moment": 0.3, "hub_angle": 2.0})  # the same, as a law of signals
 LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)
 ACROSS, UP = np.array([0.5, 2.0, 6.0]), np.array([0.001, 0.01, 0.03])
-
-
-@pytest.mark.parametrize("vary", ["K2", "all"])
-def test_a_law_that_is_gains_has_the_locus_of_them(vary):
-    mine = tfarm.locus(LAB, PLAIN, vary, 0.1, 1.5, 8, 3)
-    assert isinstance(mine, Locus)
-    assert mine == locus(LAB, GAINS, vary, 0.1, 1.5, 8, 3)
-
-
-def test_a_locus_of_any_law_ends_at_the_poles_of_its_loop():
-    found = tfarm.locus(LAB, LAW, "delay", 0.001, 0.012, 6, 3)
-    poles = tfarm.closed_loop_poles(LAB, LAW.having("delay", 0.012), 8).values
-    last = found.branches[np.isfinite(found.branches[:, -1]), -1]
-    swing = last[last.imag > 0]
-    assert swing.size >= 3
-    assert (abs(swing[:, None] - poles).min(axis=1) < 1e-9 * abs(swing)).all()
-
-
-def test_gains_at_the_hub_have_a_delay_and_a_factor_too():
-    """The pole that crosses at a delay is there with the phase margin's own delay."""
-    found = tfarm.locus(LAB, HubFeedback(K1=0.3, K2=0.3), "delay", 0.001, 0.03, 12, 3)
-    first = found.crossings[0]
-    assert (first.direction, first.gain) == (
-        "unstable", pytest.approx(tfarm.margins(LAB, HubFeedback(K1=0.3, K2=0.3)).in_band.delay, rel=1e-6)
-    )  # fmt: skip
-    scaled = tfarm.locus(LAB, HubFeedback(K1=0.3, K2=0.3), "gain", 0.5, 1.5, 5, 3)
-    poles = tfarm.closed_loop_poles(LAB, HubFeedback(K1=0.45, K2=0.45), 6).values
-    last = scaled.branches[np.isfinite(scaled.branches[:, -1]), -1]
-    swing = last[(last.imag > 0) & (last.imag < poles.imag.max())]
-    assert swing.size >= 2
-    assert (abs(swing[:, None] - poles).min(axis=1) < 1e-9 * abs(swing)).all()
-
-
-def test_a_map_of_any_law_counts_the_unstable_poles_of_its_loops():
-    found = tfarm.map(LAB, ACROSS, UP, law=LAW, vary=("gain", "delay"))
-    assert isinstance(found, Plane)
-    for i, j in ((0, 0), (1, 2), (2, 1)):
-        law = LAW.having("gain", ACROSS[i]).having("delay", UP[j])
-        assert stability(LAB, law, found.band).unstable_roots == found.unstable[j, i]
-    assert len(np.unique(found.unstable)) > 1
 
 
 def test_a_map_of_gains_holds_the_angle_as_their_law_does():
@@ -135,13 +90,3 @@ def test_what_is_no_law_is_refused_everywhere(name, law):
 def test_what_a_function_cannot_take_it_says_how_to_give(call, words):
     with pytest.raises(ParameterError, match=words):
         call()
-
-
-def test_the_command_scales_a_gain_of_a_file_too(capsys, tmp_path):
-    (tmp_path / "law.toml").write_text("[law.hub_rate]\ngain = 0.3\n[law.root_moment]\ngain = 0.3\n")
-    varied = ("--vary", "K2", "--from", "0.1", "--to", "1", "--points", "3", "--branches", "2", "--json")
-    code, out, _ = run(capsys, "locus", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), *varied)
-    mine = json.loads(out)
-    assert (code, mine["vary"], len(mine["gain"])) == (0, "K2", 3)
-    _, out, _ = run(capsys, "locus", "sasaki2012-lab", "--K1", "0.3", "--K2", "0.3", *varied)
-    assert json.loads(out)["branches"] == mine["branches"]

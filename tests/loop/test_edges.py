@@ -9,8 +9,8 @@ from matplotlib.scale import SymmetricalLogTransform
 
 import tfarm
 from tfarm.arm import HubFeedback
-from tfarm.loop.edges import LINEAR_SCALE, Axis, edge, seen, static_edges
 from tfarm.loop.loop import Loop
+from tfarm.loop.plane import LINEAR_SCALE, Axis, edge, seen, static_edges
 from tfarm.loop.stability import stability
 
 LAB = tfarm.load("sasaki2012-lab")

@@ -9,11 +9,11 @@ import pytest
 import tfarm
 from tests.shared import remember, sized, thinned
 from tests.shell import run
-from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
-from tfarm.loop.family import through_infinity, unstable_below
+from tfarm import ConvergenceError, Law, ParameterError
 from tfarm.loop.loop import Loop
 from tfarm.loop.plane import between, plane
-from tfarm.loop.stability import band_of_loop, stability
+from tfarm.loop.stability import stability
+from tfarm.loop.windows import through_infinity, unstable_below
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)
@@ -40,19 +40,6 @@ def test_counts_are_those_of_full_searches(vary, x, y, points):
         assert stability(LAB, law, found.band).unstable_roots == found.unstable[j, i], law
 
 
-@pytest.mark.parametrize("x", [(-1e6, 1.0), (-1.0, 2e6)])
-@pytest.mark.parametrize("y", [(-1e6, 1.0), (-1.0, 1e6)])
-def test_the_band_is_enough_for_each_corner(x, y, monkeypatch):
-    """The more a filter amplifies, the farther up it is to be looked: the largest number once at each of four ends."""
-    module = import_module("tfarm.loop.plane")
-    monkeypatch.setattr(module, "unstable_below", lambda *_: 0)  # a count takes longest
-    monkeypatch.setattr(module, "_must_hold_at_corners", lambda *_: None)
-    vary = "hub_angle.num.0", "tip_acceleration.num.0"
-    found = plane(Loop(LAB, LAW), vary, np.array(x), np.array(y))
-    corners = [LAW.having(vary[0], a).having(vary[1], b) for a in x for b in y]
-    assert found.band == max(band_of_loop(Loop(LAB, law))[0] for law in corners)
-
-
 @pytest.mark.parametrize("vary", [("hub_angle.den.0", "gain"), ("gain", "hub_angle.den.0")])
 def test_where_a_filter_turns_over_a_pole_has_passed_infinity(vary):
     """With T < 0 in T s + 1 a pole is unstable that no crossing of the axis brought there."""
@@ -74,21 +61,6 @@ def test_the_gain_that_takes_up_all_waves_of_an_arm_without_a_hub_brings_a_pole_
     assert (found.at, found.change) == (np.inf, -1)  # right of the axis at smaller gains alone, farther right
     assert found.t == pytest.approx(-impedance, rel=1e-8)
     assert through_infinity(drive * far, rate) is None
-
-
-def test_over_gains_at_the_hub_it_is_their_map():
-    K1, K2 = between(-1, 3, 10), between(-2, 2, 12)
-    law = Law({"hub_rate": 0.1, "root_moment": 0.1})
-    mine = plane(Loop(LAB, law), ("hub_rate", "root_moment"), K1, K2)
-    np.testing.assert_array_equal(mine.unstable, tfarm.map(LAB, K1, K2).unstable)
-
-
-def test_a_count_by_half_a_box_is_that_of_a_list_of_poles():
-    for K1, K2 in ((0.3, 0.3), (0.3, 1.4), (-0.2, 0.5)):
-        law = Law.of_gains(HubFeedback(K1=K1, K2=K2))
-        loop = Loop(LAB, law)
-        poles = tfarm.closed_loop_poles(LAB, HubFeedback(K1=K1, K2=K2), 9)
-        assert unstable_below(loop, poles.box.im_max) == poles.unstable
 
 
 @pytest.mark.parametrize(

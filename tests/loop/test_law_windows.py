@@ -17,8 +17,6 @@ from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
 from tfarm.loop import windows as windows_module
 from tfarm.loop.answers import unsettled
-from tfarm.loop.loop import Loop
-from tfarm.loop.plane import plane
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 
@@ -136,12 +134,6 @@ def test_a_window_has_no_unstable_stretch_inside(law, name, values):
         assert is_inside == stability(LAB, law.having(name, value)).is_stable
 
 
-def test_the_gain_of_a_law_that_a_resonance_limits_is_its_gain_margin():
-    law, name, _ = NARROW["resonator"]
-    found = tfarm.margins(LAB, law)
-    assert found.windows[name].around[1] == pytest.approx(found.in_band.gain[1], rel=1e-9)
-
-
 def test_no_number_of_a_signal_in_two_parts_has_a_window():
     """`having` would not know which; of the rest each has its own."""
     parts = [Part(("hub_angle",), Rational((3.0,), (0.1, 1.0))), Part(("hub_angle",), Rational((-0.5,), (0.1, 1.0)))]
@@ -190,15 +182,6 @@ def test_counts_are_not_carried_through_0_of_a_leading_coefficient_below_a_band_
         is_inside = any(low < value < high for low, high in found.all)
         assert is_inside == (stability(arm, LIFTED.having("tip_acceleration.den.0", value)).unstable_roots == 0)
     assert [pair[0] for pair in found.all] == [-10.0]
-
-
-@pytest.mark.survey
-def test_a_map_through_0_of_a_leading_coefficient_has_the_counts_of_verdicts() -> None:
-    arm = lifted_arm()
-    x, y = np.array([-7.0, -0.1, 0.1]), np.array([1.0, 1.1])
-    found = plane(Loop(arm, LIFTED), ("gain", "tip_acceleration.den.0"), y, x)
-    counts = [stability(arm, LIFTED.having("tip_acceleration.den.0", each), found.band).unstable_roots for each in x]
-    assert found.unstable[:, 0].tolist() == counts
 
 
 def test_a_leading_coefficient_without_which_there_is_no_loop_keeps_its_sign() -> None:

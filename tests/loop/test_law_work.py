@@ -11,9 +11,9 @@ from tests.loop.law_times import of_margins, some_case
 from tests.shared import sized, thinned
 from tfarm import Law
 from tfarm.errors import ConvergenceError
-from tfarm.loop.family import unstable_below
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
+from tfarm.loop.windows import unstable_below
 from tfarm.response.signals import Signals
 
 LAB = tfarm.load("sasaki2012-lab")

@@ -16,15 +16,14 @@ from tests.rigs import some_rig
 from tests.shared import thinned
 from tfarm import HubFeedback, Payload
 from tfarm.arm import Gauge
-from tfarm.loop.family import line_crossings
-from tfarm.loop.frequencies import band_of
-from tfarm.loop.loop import Loop
-from tfarm.loop.lyapunov import lyapunov
+from tfarm.loop.loop import Loop, band_of
 from tfarm.loop.margins import margins
 from tfarm.loop.nyquist import nyquist_of
 from tfarm.loop.plane import gain_map
 from tfarm.loop.stability import stability
-from tfarm.spectrum.scales import default_gains
+from tfarm.loop.theorem import lyapunov
+from tfarm.loop.windows import line_crossings
+from tfarm.spectrum.table import default_gains
 
 ARM = tfarm.load("sasaki2012")
 CANTILEVER = np.array([1.8751040687119611, 4.6940911329741746, 7.8547574382376126, 10.995540734875467])  # k_n L

@@ -9,7 +9,6 @@ import pytest
 import tfarm
 from tests.loop.arms import some_loop
 from tfarm import Hub, HubFeedback, ParameterError
-from tfarm.loop.lines import effective_inertia
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import closed_loop_poles
 
@@ -54,6 +53,6 @@ def test_slow_torque_turns_the_effective_inertia(K2: float, radius: float) -> No
     for K1 in (1e-2, 1e-3):
         slow = closed_loop_poles(arm, HubFeedback(K1=K1, K2=K2), 6).moving
         slow = slow[abs(slow).argmin()].real
-        misses.append(abs(slow * effective_inertia(arm, HubFeedback(K2=K2)) / -K1 - 1))
+        misses.append(abs(slow * Loop(arm, HubFeedback(K2=K2)).at_rest[2] / -K1 - 1))
     assert misses[1] < 1e-3
     assert misses[1] < misses[0] / 30 or misses[1] < 1e-12

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.loop.positions import Positions, positions, sensed_places
+from tfarm.loop.panels import Positions, positions, sensed_places
 
 
 @pytest.mark.parametrize(("sensor", "share"), [("displacement", 0.6), ("moment", 0.3)])

@@ -7,7 +7,6 @@ import pytest
 
 import tfarm
 from tfarm import Hub, HubFeedback, Law, load
-from tfarm.arm import Attachment
 
 LAB = load("sasaki2012-lab")
 SPRING = 3.0  # N m/rad
@@ -34,24 +33,6 @@ def test_without_losses_two_poles_meet_there():
     poles = tfarm.closed_loop_poles(arm, HubFeedback(Kp=-SPRING), 4)
     assert (poles.values == 0).sum() == 2
     assert tfarm.margins(arm, HubFeedback(Kp=-SPRING)).stability.verdict == "marginal"
-
-
-def test_a_mass_on_a_spring_at_the_tip_is_held_by_more_than_the_hub():
-    """By the spring in line with the bending stiffness 3 E I/L^3, and with no shear to speak of."""
-    arm = replace(LAB, attachments=(Attachment(x=1.0, stiffness=200.0),), theory="euler-bernoulli")
-    bending = 3 * arm.link.EI
-    held = 1 / (1 / 200.0 + 1 / bending)  # N m/rad, at a length of 1 m
-    (crossing,) = tfarm.locus(
-        arm, Law({"hub_angle": ([-1.0], [1e-2, 1.0])}), "gain", held / 3, held * 2, 4, 3
-    ).crossings
-    assert crossing.gain == pytest.approx(held, rel=1e-9)
-
-
-@pytest.mark.parametrize(("start", "stop", "way"), [(0.0, 2.0, "unstable"), (2.0, 0.0, "stable")])
-def test_a_locus_may_have_it_among_its_values(start, stop, way):
-    (crossing,) = tfarm.locus(HELD, PUSHES, "gain", start, stop, 3, 3).crossings
-    assert crossing.gain == pytest.approx(1.0, rel=1e-12)
-    assert (crossing.omega, crossing.direction) == (0.0, way)
 
 
 def test_a_map_may_have_it_among_its_points():

@@ -7,9 +7,10 @@ import pytest
 import tfarm
 from tests.shell import run
 from tfarm.loop.answers import margins_answer
-from tfarm.loop.lines import along, line_crossings
+from tfarm.loop.loop import Loop
 from tfarm.loop.margins import margins
-from tfarm.spectrum.scales import default_gains
+from tfarm.loop.windows import line_crossings
+from tfarm.spectrum.table import default_gains
 
 
 def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():
@@ -22,7 +23,7 @@ def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():
     band = answer["K2_band_rad_s"]
     assert math.isfinite(band)
     low = found.windows["K2"].around[0]
-    higher = line_crossings(arm, along("K2", law), 4 * band).gain
+    higher = line_crossings(Loop(arm, law), "K2", 2 * low, 0.0, 4 * band).gain
     assert 0.5 * low < higher[higher < 0].max() < 0
 
 

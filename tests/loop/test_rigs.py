@@ -14,14 +14,12 @@ from tests.rigs import some_rig
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_verdict
-from tfarm.loop.frequencies import band_of
-from tfarm.loop.loop import Loop
+from tfarm.loop.loop import Loop, band_of
 from tfarm.loop.plane import INFINITE, gain_map
 from tfarm.loop.poles import closed_loop_poles, poles_below
-from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
-from tfarm.spectrum.scales import default_gains, gain_unit
+from tfarm.spectrum.table import default_gains, gain_unit
 
 REAL = {name: tfarm.load(name) for name in ("quanser-2dsfl", "quanser-flexlink")}
 REAL["bench-rig"] = tfarm.load(str(Path(__file__).parents[1] / "rigs" / "bench-rig.toml"))
@@ -129,15 +127,3 @@ def test_more_than_the_whole_moment_drives_every_mode_behind_friction(K2):
         arm, np.array([0.5, 1.0]) * law.K1, np.array([1.0, 1.01]) * law.K2 if driven else np.array([1.0, 0.9]) * law.K2
     )
     assert (plane.unstable == (INFINITE if driven else 0)).all()
-
-
-@pytest.mark.parametrize("vary", ["K1", "K2"])
-def test_a_reduced_locus_knows_the_angle_s_pole_at_0_although_no_gain_sees_it(vary):
-    """Friction leaves a pole at 0 and one beside it; the model of python-control has the second alone."""
-    arm = tfarm.load("tests/rigs/bench-rig.toml")
-    law = default_gains(arm)
-    found = tfarm.locus(arm, law, vary, 0.0, 2 * getattr(law, vary), branches=5, points=6)
-    assert (found.branches[0] == 0).all()
-    reduced = reduced_locus(found)
-    assert (reduced.branches[0] == 0).all()
-    assert reduced.worst < 1e-4

@@ -13,7 +13,7 @@ from tests.similar import EITHER, TORQUE
 from tfarm import HubFeedback
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import gain_map
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 LAB, STOCKY, MOTOR = (tfarm.load(name) for name in ("sasaki2012-lab", "stocky-steel", "quanser-flexlink"))
 LEAD = {"hub_angle": ([3.0, 20.0], [0.002, 1.0]), "root_moment": ([0.2], [1e-4, 2e-2, 1.0])}  # num and den in s

@@ -11,22 +11,17 @@ import tfarm
 from tests.loop.arms import window_arm
 from tests.similar import EITHER
 from tfarm import HubFeedback, Law
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError
 from tfarm.loop import panels
 from tfarm.loop.answers import nyquist_answer, poles_answer
-from tfarm.loop.crossings import BranchCrossing, in_words
-from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
-from tfarm.loop.lines import effective_inertia
-from tfarm.loop.locus import frame, open_poles
+from tfarm.loop.locus import BranchCrossing, in_words, open_poles
 from tfarm.loop.loop import Loop
-from tfarm.loop.lyapunov import lyapunov
-from tfarm.loop.margins import _nearest_to_one
 from tfarm.loop.nyquist import nyquist_table, poles_on_axis
 from tfarm.loop.panels import CHEBYSHEV, loop_panels
-from tfarm.loop.plane import plane
-from tfarm.loop.poles import slow_poles
+from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.stability import stability
-from tfarm.spectrum.scales import rate_unit
+from tfarm.loop.theorem import lyapunov
+from tfarm.spectrum.table import rate_unit
 
 LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 LAWS = {"stable": HubFeedback(K1=0.3, K2=0.3), "unstable": HubFeedback(K1=0.3, K2=1.5)}
@@ -116,20 +111,6 @@ def test_the_stable_edge_is_the_boundary_with_stable_points_on_one_side():
     assert stable_edge(plane, blank, x, y).size == 0
 
 
-@pytest.mark.parametrize(("x", "y", "key"), [([1.0, 0.5], [1.0, 2.0], "hub_rate"), ([1.0, 2.0], [1.0, 1.0], "gain")])
-def test_values_of_a_map_that_do_not_ascend_are_refused_by_their_name(x, y, key):
-    with pytest.raises(ParameterError) as told:
-        plane(Loop(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3})), ("hub_rate", "gain"), np.array(x), np.array(y))
-    assert told.value.key == key
-
-
-def test_a_picture_of_no_poles_is_the_unit_square():
-    assert frame(np.full((2, 3), np.nan, complex)) == (0.0, 1.0, 0.0, 1.0)
-    assert frame(np.array([[-2 + 1j, 0.5 + 4j]])) == (-2.0, 0.5, 1.0, 4.0)
-    assert frame(np.array([[-2 + 1j, -1 + 4j]])) == (-2.0, 0.0, 1.0, 4.0)
-    assert frame(np.array([[2 + 1j, 1 + 4j]])) == (0.0, 2.0, 1.0, 4.0)
-
-
 def test_what_a_locus_of_a_damped_rig_begins_with():
     """About -b/J of the hub's friction, then the modes in their order, each of them a pole of the open rig."""
     arm = tfarm.load("quanser-2dsfl")
@@ -191,18 +172,6 @@ def test_between_its_samples_a_panel_is_the_loop_function_too(arm):
 # ------------------------------------------------------------ what theorems and lists take for granted
 
 
-def test_slow_poles_are_zeros_of_the_whole_characteristic_function():
-    """Not of the rigid arm's alone, from which they start: to the last digits a step of Newton's method is none."""
-    law = HubFeedback(K1=1e-4 * rate_unit(LAB), K2=0.3, Kp=3e-9 * rate_unit(LAB))
-    loop = Loop(LAB, law)
-    found = slow_poles(loop, 1.0)
-    assert found.size == 2
-    at = loop.function(found)
-    assert (abs(at.value / at.slope) <= 1e-13 * abs(found)).all()
-    rigid = np.roots([effective_inertia(LAB, law), *loop.at_rest[1::-1]])
-    assert 1e-9 < max(min(abs(each / other - 1) for other in rigid) for each in found) < 1e-2
-
-
 def test_a_contour_passes_the_poles_of_a_law_on_the_axis_below_its_band():
     """Where it rings without damping, and its integrator if the rig has no zero there."""
     slow, fast = ([1.0, 0.0, w**2] for w in (30.0, 900.0))
@@ -224,13 +193,6 @@ def test_lyapunov_counts_what_the_hub_loses_to_the_rate_gain():
         assert found.proven == proven
         assert proven or "feeds energy in" in found.reason
         assert found.a1_over_a2 == (pytest.approx(0.7, rel=1e-15) if proven else None)
-
-
-def test_the_gain_margin_is_the_nearest_factor_on_either_side_of_one():
-    assert _nearest_to_one([0.2, 0.9, 1.3, 5.0]) == (0.9, 1.3)
-    assert _nearest_to_one([-3.0, 0.5]) == (0.5, math.inf)
-    assert _nearest_to_one([1.5, 2.5]) == (0.0, 1.5)
-    assert _nearest_to_one([]) == (0.0, math.inf)
 
 
 def test_resonators_in_one_fraction_are_passed_as_they_are_in_several():

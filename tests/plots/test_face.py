@@ -16,10 +16,10 @@ from tests.shared import thinned
 from tfarm import Law
 from tfarm.dsp import sampled_map
 from tfarm.fitting.data import Measured
+from tfarm.loop.loci import reduced_locus
 from tfarm.loop.nyquist import compressed
-from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.plots.plane import colours
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 from tfarm.tuner import Plan
 
 mpl.use("Agg")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.plots.frequency import broken, draw_bode, draw_magnitude, draw_phase, magnitude_limits
+from tfarm.plots.frequency import broken, draw_magnitude, draw_phase, magnitude_limits
 from tfarm.plots.style import blank, style
 from tfarm.response.frequency import bode, resonant_band
 
@@ -82,7 +82,7 @@ def test_breaking_a_curve_keeps_every_point_in_order():
 
 
 def test_no_label_is_clipped_and_none_overlap(data):
-    figure = draw_bode(data)
+    figure = tfarm.plots.bode.figure(data)
     figure.draw_without_rendering()
     renderer = figure.canvas.get_renderer()
     upper = figure.axes[0]

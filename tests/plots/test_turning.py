@@ -4,16 +4,17 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.comparing.regions import sampled_region
 from tfarm.crossing import pieces
 from tfarm.dsp import load_chain, sampled_loop
 from tfarm.dsp.loci import sampled_loci
-from tfarm.loop.edges import moment_axis, rate_axis
 from tfarm.loop.locus import locus, rounded
 from tfarm.loop.loop import Loop
+from tfarm.loop.plane import moment_axis, rate_axis
 from tfarm.loop.poles import poles_below
-from tfarm.plots.roots import draw_locus, draw_sampled_loci
-from tfarm.spectrum.scales import default_gains, rate_unit
+from tfarm.plots import locus as locus_plot
+from tfarm.plots.regions import sampled_region
+from tfarm.plots.roots import draw_sampled_loci
+from tfarm.spectrum.table import default_gains, rate_unit
 
 LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
 MOST = 5.0  # degrees from one piece of a line to the next
@@ -44,7 +45,7 @@ def seen_turns(line):
 def test_no_branch_turns_by_more_than_five_degrees(arm, vary, start, stop, corners):
     """Two roots that meet on the real axis part at a right angle: a true corner, once on either branch."""
     found = locus(arm, default_gains(arm), vary, start, stop, points=60, branches=5)
-    figure = draw_locus(found)
+    figure = locus_plot.figure(found)
     figure.canvas.draw()
     told = [seen_turns(line) for line in figure.axes[0].lines if line.get_linewidth() == 2.6]
     assert sum(count for _, count in told) == corners
@@ -116,7 +117,7 @@ def _near_a_corner(line, n):
 def test_a_locus_under_any_law_is_round_too():
     """No turn beyond 5 degrees but at a corner; the poles of the record stay, those between are zeros of 1 + L."""
     law = tfarm.Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
-    found = locus(LAB, law, "gain", 1.0, 8.0, points=8, branches=1, in_box=True)
+    found = locus(LAB, law, "gain", 1.0, 8.0, points=8, branches=1)
     fine = rounded(found)
     more = np.nonzero(~np.isin(fine.gain, found.gain))[0]
     assert more.size
@@ -127,7 +128,7 @@ def test_a_locus_under_any_law_is_round_too():
         loop = Loop(LAB, law.having("gain", float(fine.gain[n])))
         told = fine.branches[np.isfinite(fine.branches[:, n]), n]
         assert abs(1 + loop.loop_function(told)).max() < 1e-6
-    figure = draw_locus(found)
+    figure = locus_plot.figure(found)
     figure.canvas.draw()
     told = [seen_turns(line)[0] for line in figure.axes[0].lines if line.get_linewidth() == 2.6]
     assert max(turn.max(initial=0.0) for turn in told) <= MOST

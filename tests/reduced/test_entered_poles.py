@@ -13,7 +13,7 @@ from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.verdict import sampled_verdict
 from tfarm.reduced import modal_model
 from tfarm.spectrum.damped import entered
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 LAB = load("sasaki2012-lab")
 LEFT_OUT = 2e-3  # of a response: what the modes left out add beside their static share at C = 0

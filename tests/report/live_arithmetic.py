@@ -7,7 +7,7 @@ import itertools
 
 import control
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq
 
 POINTS = 24
 X = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
@@ -98,56 +98,6 @@ class Page:
             return "unstable"
         takes = np.sign(law.K1 + data["rate_loss"]) * np.sign(1 - law.K2 / data["whole"]) if data["told"] else 0
         return "unstable" if data["kind"] == "band" and takes < 0 and data["hub_alone"] else "stable"
-
-    def margins(self, law, poles):
-        """Each margin with where it is; `gain`; `crossed`."""
-        away = np.geomspace(0.05, 20.0, 12)
-        close = (poles.imag[:, None] + abs(poles.real[:, None]) * np.r_[-away, 0.0, away]).ravel()
-        omega = np.unique(np.r_[self.grid, close[(close > self.grid[0]) & (close < self.data["band"])]])
-        crossed, _ = self.zeros(lambda w: np.log(abs(self.loop(w, law))), omega)
-        angle = np.degrees(np.angle(-self.loop(crossed, law)))
-        real, _ = self.zeros(lambda w: self.loop(w, law).imag * abs(self.parts(w, law)[0]) ** 2, omega)
-        found = {
-            "phase": self._least(angle, crossed),
-            "phase_lag": self._least(angle[angle > 0], crossed[angle > 0]),
-            "phase_lead": self._least(-angle[angle < 0], crossed[angle < 0]),
-            "delay": self._least(np.radians(np.mod(angle, 360)) / crossed, crossed),
-            "crossed": list(zip(crossed, angle, strict=True)),
-            "gain": self._gain(law, -1 / self.loop(real, law).real),
-        }
-        disk, at = self._lowest(lambda D, N: abs(D + N) / abs(D - N), omega, law)
-        S, at_S = self._lowest(lambda D, N: abs(D + N) / abs(D), omega, law)
-        T, at_T = self._lowest(lambda D, N: abs(D + N) / abs(N), omega, law)
-        return found | {
-            "disk": (2 * disk, at),
-            "peak_sensitivity": (max(1, 1 / S), at_S),
-            "peak_complementary": (1 / T, at_T),
-        }
-
-    @staticmethod
-    def _least(values, places):
-        i = np.argmin(abs(values)) if values.size else None
-        return (np.inf, 0.0) if i is None else (values[i], places[i])
-
-    def _gain(self, law, factors):
-        data = self.data
-        if data["kind"] == "reactive":
-            factors = [m / law.K2 for m in data["moments"] if m is not None and m * law.K2 > 0]
-        loss = data["rate_loss"]
-        rest = 0.0 if law.Kp else 0.0 - loss / law.K1 if law.K1 else data["inertia"] / data["gauged"] / law.K2
-        each = [*factors, rest]
-        return max((t for t in each if 0 <= t < 1), default=0.0), min((t for t in each if t > 1), default=np.inf)
-
-    def _lowest(self, of, omega, law):
-        value = of(*self.parts(omega, law))
-        dips = np.nonzero((value[1:-1] <= value[:-2]) & (value[1:-1] <= value[2:]))[0] + 1
-        best = min(zip(value, omega, strict=True))
-        for i in dips[np.argsort(value[dips])][:6]:
-            low, width = omega[i - 1], omega[i + 1] - omega[i - 1]
-            f = lambda share, low=low, width=width: float(of(*self.parts(low + share * width, law))[0])  # noqa: E731
-            found = minimize_scalar(f, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-8})
-            best = min(best, (found.fun, low + found.x * width))
-        return best
 
 
 def complex_rows(text, rows):

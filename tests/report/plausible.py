@@ -2,15 +2,13 @@
 
     python -m tests.report.plausible SIZE SEED
 
-SIZE arms drawn at random (steel to rubber, 5 cm to 10 m, L/h 5 to 300, rectangles and tubes, hub 1e-2 to 1e2 and
-payload 0 to 1e2 times the beam's, damping ratio 1e-4 to 2e-2 in the first mode, or C = 0), the pages of each written
-by a process of its own.  Budget: a minute or two of CPU an arm.
+SIZE arms drawn at random by tests/strategies.py, the pages of each written by a process of its own.
+Budget: a minute or two of CPU an arm.
 """
 
 from __future__ import annotations
 
 import json
-import math
 import os
 import re
 import subprocess
@@ -18,25 +16,17 @@ import sys
 import tempfile
 import time
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 
-import tfarm
 from tests import survey
+from tests.report.written import Links
+from tests.strategies import some_arm
 from tests.survey import Finding
-from tfarm import Arm, Hub, Link, Payload, Section
+from tfarm import Arm
 from tfarm.arm import to_toml
 
-MATERIALS = {  # density [kg/m^3], Young's modulus [Pa], Poisson's ratio
-    "steel": (7850.0, 2.1e11, 0.3),
-    "aluminium": (2700.0, 7.0e10, 0.33),
-    "CFRP": (1600.0, 1.2e11, 0.3),
-    "titanium": (4430.0, 1.14e11, 0.34),
-    "nylon": (1150.0, 2.5e9, 0.4),
-    "rubber": (1100.0, 5.0e6, 0.49),
-}
 WRITE = (
     "import sys; from pathlib import Path; import tfarm; from tfarm.report import write; "
     "from tfarm.report.pieces import QUESTIONS; "
@@ -45,59 +35,14 @@ WRITE = (
 LONGEST = 1800.0  # s that one arm may take, on a machine that others use too
 
 
-def some_arm(rng: np.random.Generator, name: str) -> Arm:
-    """A plausible arm."""
-
-    def log(low: float, high: float) -> float:
-        return float(f"{10 ** rng.uniform(math.log10(low), math.log10(high)):.4g}")
-
-    density, E, nu = MATERIALS[str(rng.choice(list(MATERIALS)))]
-    length = log(0.05, 10.0)
-    depth = float(f"{length / log(5.0, 300.0):.4g}")
-    if rng.random() < 0.5:
-        section = Section.rectangle(width=depth * log(0.5, 20.0), depth=depth)
-    else:
-        section = Section.tube(outer_diameter=depth, inner_diameter=depth * float(rng.uniform(0.5, 0.95)))
-    link = Link.isotropic(length=length, density=density, youngs_modulus=E, poissons_ratio=nu, section=section)
-    mass = link.rhoA * length
-    payload = Payload() if rng.random() < 0.4 else Payload(mass=mass * log(1e-2, 1e2))
-    arm = Arm(link=link, hub=Hub(inertia=mass * length**2 / 3 * log(1e-2, 1e2)), payload=payload, name=name)
-    ratio = 0.0 if rng.random() < 0.3 else log(1e-4, 2e-2)
-    C = 2 * ratio / float(tfarm.modes(arm, 1).natural_frequency[-1])
-    return replace(arm, link=replace(link, damping=float(f"{C:.3g}")))
-
-
-class Words(HTMLParser):
-    """The text of a page, and the pictures that it names."""
-
-    def __init__(self, page: Path) -> None:
-        super().__init__()
-        self.text, self.pictures = "", list[str]()
-        self._hidden = 0
-        self.feed(page.read_text(encoding="utf-8"))
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self._hidden += tag in ("style", "footer")
-        if tag == "img":
-            self.pictures.append(str(dict(attrs)["src"]))
-
-    def handle_endtag(self, tag: str) -> None:
-        self._hidden -= tag in ("style", "footer")
-
-    def handle_data(self, data: str) -> None:
-        if not self._hidden:
-            self.text += data
-
-
 def contradictions(folder: Path) -> list[str]:
     """What is wrong with an arm's pages: sentences against the tables beside them."""
     found = []
     for page in sorted(folder.glob("*.html")):
-        words = Words(page)
-        found += [
-            f"{page.name}: {picture} is not there" for picture in words.pictures if not (folder / picture).is_file()
-        ]
-        found += [f"{page.name}: {odd[0]!r}" for odd in re.finditer(r"\bnan\b|Traceback|\d[eE][-+]\d\d", words.text)]
+        pictures = [each for each in Links(page).targets if each.endswith(".svg")]
+        found += [f"{page.name}: {each} is not there" for each in pictures if not (folder / each).is_file()]
+        text = re.sub(r"<(style|footer).*?</\1>|<[^>]*>", " ", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+        found += [f"{page.name}: {odd[0]!r}" for odd in re.finditer(r"\bnan\b|Traceback|\d[eE][-+]\d\d", text)]
     return [*found, *_of_the_loop(folder)]
 
 
@@ -150,7 +95,8 @@ def report_on(arm: Arm, folder: Path) -> tuple[float, list[str], list[str]]:
 def arms(size, seed):
     """Of each arm what is wrong, and what was left out."""
     for number in range(size):
-        arm = some_arm(np.random.default_rng([seed, number]), f"plausible-{seed}-{number}")
+        arm = some_arm(np.random.default_rng([seed, number]), ("some", "some", "zero"), slenderness=(5, 300))
+        arm = replace(arm, name=f"plausible-{seed}-{number}")
         with tempfile.TemporaryDirectory() as folder:
             seconds, wrong, left_out = report_on(arm, Path(folder))
         words = "\n  ".join([arm.name, *wrong, *left_out]) if wrong else ""

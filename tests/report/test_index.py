@@ -21,7 +21,7 @@ def rows_of(tmp_path, laws, chain):
     save_card(LAB, folder, laws, chain)
     (folder / "index.html").write_text("a page")
     (card,) = written_cards(tmp_path)
-    return card.loops, index_page([card], trust="")
+    return card["loops"], index_page([card], trust="")
 
 
 @pytest.mark.parametrize("law", [FAST, SLOW])

@@ -2,7 +2,7 @@
 
 import tfarm
 from tests.shell import answer, run
-from tfarm.fitting.reading import read_measured
+from tfarm.fitting.data import read_measured
 from tfarm.report import writing
 from tfarm.report.response_sections import measured_section
 

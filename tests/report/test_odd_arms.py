@@ -15,7 +15,7 @@ from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import implausible
 from tfarm.audit import assumptions
-from tfarm.audit.assumptions import LoopVerdict, has_hub_inertia, hub_study, section_study
+from tfarm.audit.assumptions import LoopVerdict, has_hub_inertia, hub_study
 from tfarm.columns import PAGE
 from tfarm.dsp import Chain
 from tfarm.loop import loci as loci_room
@@ -24,14 +24,14 @@ from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.report import assumptions_section, cases, map_section, writing
 from tfarm.report.arm_section import arm_section, derived_table
-from tfarm.report.cases import GivenLaw, Subject, has_loop, on_hub
+from tfarm.report.cases import GivenLaw, Subject, edge_of_K2, has_loop, on_hub
 from tfarm.report.locus_section import beyond_table, locus_section
 from tfarm.report.loop_section import margin_table, margins_section, nyquist_section
 from tfarm.report.modes_section import damped_table, modal_table, places
 from tfarm.report.page import signs
 from tfarm.report.response_sections import bode_section
 from tfarm.spectrum import DampedModes
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 ARMS = odd_arms()
 DAMPED = [name for name, arm in ARMS.items() if arm.link.damping]
@@ -96,7 +96,6 @@ def test_rows_outside_the_certified_box_are_marked(name, monkeypatch):
 
 def test_a_gauge_on_a_free_pin_reads_the_torque():
     section = bode_section(ARMS["free-pin"], "root_moment")
-    assert "−u/(1 + C s)" in section.blocks[0].caption
     assert "0 poles" not in section.blocks[0].caption
     assert section.words[0].endswith("There are none.")
     assert "zeros ," not in section.words[0]
@@ -129,8 +128,6 @@ def test_a_contradiction_on_a_page_is_found(tmp_path):
     (tmp_path / "data" / "nyquist-count.json").write_text(json.dumps({"rows": [rows]}))
     found = " ".join(plausible.contradictions(tmp_path))
     assert all(word in found for word in ("gone.svg", "'nan'", "'1e-05'", "5 by Nyquist, 7 in a box"))
-    arms = [plausible.some_arm(np.random.default_rng([1, n]), "some") for n in range(3)]
-    assert all(0.05 <= arm.link.length <= 10 and not implausible(arm) for arm in arms)
 
 
 # ------------------------------------------------------------ the loop
@@ -148,14 +145,11 @@ def is_stable(arm, law, up_to):
 def test_how_far_K2_may_go_is_what_the_poles_say(name):
     """On either side of an edge; at the end of a search nothing happens, and no edge is claimed."""
     arm, law = ARMS[name], default_gains(ARMS[name])
-    words = map_section._answer(arm).partition("at that K1, ")[2].partition("; at that K2, ")[0]
-    assert "without limit" not in words
-    up = number(re.search(r"go up (?:to|with no limit found as far as) (\S+?)[,;]", f"{words};")[1])
+    words = map_section._intervals(arm).partition("; K2")[2]
+    down, up = (number(end.strip("*()")) for end in re.search(r"\(.+?\)", words)[0].split(", "))
     band = 3 * tfarm.modes(arm, 3).natural_frequency[-1]
     assert is_stable(arm, replace(law, K2=0.999 * up), band)
-    assert "go up with no limit found" in words or not is_stable(arm, replace(law, K2=1.001 * up), band)
-    assert ("real pole passes through 0" in words) == (name == "pinned")
-    down = number(re.search(r"go down with no limit found as far as (\S+?)[,;]", f"{words};")[1])
+    assert words.count("*") == 2 or not is_stable(arm, replace(law, K2=1.001 * up), band)
     assert is_stable(arm, replace(law, K2=down), band)
 
 
@@ -179,13 +173,11 @@ def test_what_K2_beyond_1_is_said_to_do_is_what_the_rows_show(name):
     arm, law = ARMS[name], default_gains(ARMS[name])
     table = beyond_table(arm, law)
     verdicts, counts = (column(table, key).values for key in ("verdict", "unstable_poles"))
-    edge = number(re.search(r"stable up to K2 = (.+?)\.(?: |$)", table.caption)[1])
+    edge = edge_of_K2(arm, law)
     for K2, verdict, count in zip(column(table, "K2").values, verdicts, counts, strict=True):
-        assert edge == K2 or (verdict == "stable") == (edge > K2)
+        assert abs(edge / K2 - 1) < 1e-9 or (verdict == "stable") == (edge > K2)
         assert verdict != "unstable" or count > 0
     assert "unstable" in verdicts
-    unstable = [count for count in counts if count in range(1, 100)]
-    assert ("more K2 drives more modes" in table.caption) == (len(set(unstable)) > 1)
     assert "∞" not in column(table, "spectral_abscissa_1_s").cells
 
 
@@ -292,12 +284,6 @@ def test_a_K2_where_the_search_ended_has_a_star():
     assert "*" in assumptions_section.searched_words(edges)
     certain = replace(edges, of=edges.of[::2], shown=edges.shown[::2])
     assert not assumptions_section.searched_words(certain)
-
-
-def test_curves_that_fall_are_not_said_to_rise():
-    """The fourth mode of the stubby arm falls at last with more depth: shear has taken over."""
-    ways = [assumptions_section._way(section_study(ARMS["stubby"], depths)) for depths in ([0.01, 0.02], [0.12, 0.17])]
-    assert ways == ["all rising", "not all of them one way"]
 
 
 @pytest.mark.parametrize(("hub", "words"), [(math.inf, "a hub that is locked"), (0.1, "the two values assumed")])

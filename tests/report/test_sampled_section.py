@@ -1,8 +1,6 @@
 """The sampled loop on the page: drawn numbers are those of the rooms, verdicts say for how many modes, same bytes."""
 
-import itertools
 import math
-import re
 from dataclasses import replace
 from functools import cache
 
@@ -12,25 +10,19 @@ import pytest
 import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.arm import HubFeedback
-from tfarm.comparing.regions import CUT_RANGE, K2_RANGE, regions_table, stable_regions
-from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, plain
 from tfarm.dsp import Chain, Simulator, sampled_loop, sampled_verdict, scenario, stable_windows
 from tfarm.dsp.chain import Converters, Sampling
-from tfarm.dsp.loci import sampled_loci
 from tfarm.dsp.modes import dominant, mode_table
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
-from tfarm.plots.files import save_figure
-from tfarm.plots.regions import draw_overlay
-from tfarm.plots.roots import draw_sampled_loci
+from tfarm.plots.regions import CUT_RANGE, K2_RANGE, draw_overlay, stable_regions
 from tfarm.report import sampled_section as page
-from tfarm.report.cases import cases_of, sign_words, what_holds
+from tfarm.report.cases import cases_of, what_holds
 from tfarm.report.motion import CURVE_DIGITS
-from tfarm.report.sampled_section import SampledCase, loci_table, sampled_section
+from tfarm.report.sampled_section import SampledCase, sampled_section
 from tfarm.report.sections import spans
-from tfarm.spectrum.scales import default_gains
-from tfarm.tables.files import as_csv, as_json
+from tfarm.spectrum.table import default_gains
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 GAINS = HubFeedback(K1=0.3, K2=0.3)
@@ -64,8 +56,8 @@ def values_of(table):
 
 def test_the_picture_of_a_rig_is_as_high_as_its_own_gains(monkeypatch):
     """Driven by its motor's current, K2 balances a torque at 0.112 A/(N m), and not at 1."""
-    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 6)
-    monkeypatch.setattr("tfarm.comparing.regions.LITTLE_DAMPINGS", ())
+    monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 6)
+    monkeypatch.setattr("tfarm.plots.regions.LITTLE_DAMPINGS", ())
     rig = tfarm.load("quanser-2dsfl")
     data = stable_regions(rig, default_gains(rig), Chain())
     low, high = draw_overlay(data).axes[0].get_ylim()
@@ -102,7 +94,7 @@ def test_the_edges_at_the_default_gains_are_published_ones(section):
 
 
 def test_without_damping_the_layers_are_nested_at_the_gains_and_say_for_how_many_modes(monkeypatch):
-    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
+    monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
     data = stable_regions(PAPER, GAINS, Chain())
     assert [layer.loop.plant.arm.damping for layer in data.sampled] == [1e-4, 1e-6, 0.0]
@@ -112,19 +104,6 @@ def test_without_damping_the_layers_are_nested_at_the_gains_and_say_for_how_many
     widths = [sum(b - a for a, b in layer.stable_intervals[i]) for layer in data.sampled]
     assert widths[0] > widths[1] > 1.1
     assert widths[2] < 0.05  # C = 0: a sliver
-
-
-def test_a_region_is_cut_into_pieces_that_cover_it_exactly():
-    K1 = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
-    intervals = [[(0.0, 4.0)], [(0.0, 4.0)], [(0.0, 1.0), (3.0, 4.0)], [(0.0, 4.0)], [(0.0, 4.0)], []]
-    found = pieces(K1, intervals)
-    area = 0.0
-    for piece in found:
-        for (x0, a0, b0), (x1, a1, b1) in itertools.pairwise(piece.points):
-            area += (x1 - x0) * ((b0 - a0) + (b1 - a1)) / 2
-    assert area == pytest.approx(4.0 + 3.0 + 3.0 + 4.0)  # whole, split in two about a notch, joined again
-    assert [piece.begins for piece in found].count(True) == 1
-    assert [piece.ends for piece in found].count(True) == 1
 
 
 # ------------------------------------------------------------ words and tables
@@ -213,36 +192,7 @@ def test_the_slew_is_the_simulators_own(section):
             assert abs(shown - signal).max() < half_a_digit * abs(signal).max()
 
 
-def test_loci_are_the_poles_at_their_gains_and_aliased_modes_are_told_apart():
-    loop = sampled_verdict(LAB, GAINS).loop
-    data = sampled_loci(loop, 20.0, (-0.5, 1.5))
-    for locus, i in itertools.product(data.by.values(), (0, 45, 90)):
-        value = float(locus.values[i])
-        z = loop.having(**{locus.gain: value}).poles.z
-        assert np.sort_complex(locus.z[i]) == pytest.approx(np.sort_complex(z), abs=1e-12)
-    assert [data.is_aliased(mode) for mode in (1, 2, 3, 4)] == [False, False, True, True]
-
-
 # ------------------------------------------------------------ bytes and odd arms
-
-
-@pytest.mark.survey
-def test_the_same_bytes_twice(tmp_path, monkeypatch):
-    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
-    monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
-    loop = sampled_verdict(LAB, GAINS).loop
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-        data = stable_regions(LAB, GAINS, Chain())
-        found = sampled_loci(loop, 20.0, (-0.5, 1.5))
-        figures = (draw_overlay(data), draw_sampled_loci(found))
-        for i, figure in enumerate(figures):
-            save_figure(figure, tmp_path / name, str(i), formats=("svg",))
-        table = as_csv(regions_table(data, "t")) + as_json(loci_table(found, "t"))
-        (tmp_path / name / "t").write_text(table, encoding="utf-8")
-    files = sorted(path.name for path in (tmp_path / "a").iterdir())
-    assert files == ["0.svg", "1.svg", "t"]
-    assert all((tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes() for name in files)
 
 
 @pytest.mark.parametrize("inertia", [math.inf, 0.0])
@@ -254,7 +204,7 @@ def test_an_arm_without_a_loop_gets_one_sentence(inertia):
 
 
 def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
-    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
+    monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
     monkeypatch.setattr("tfarm.dsp.verdict.PERIOD_SHARES", (1.0,))
     section = sampled_section(replace(LAB, payload=tfarm.Payload(mass=math.inf)), Chain())
@@ -263,18 +213,7 @@ def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
     assert "sampled-slew" not in blocks_of(section)
 
 
-# ------------------------------------------------------------ rigs that springs hold
-
-SPRUNG = replace(LAB, name="sprung", hub=replace(LAB.hub, stiffness=3.0))
-
-
 def test_an_arm_on_springs_is_not_said_to_be_held_at_its_tip():
-    """Its gauge reads nothing of a torque that lasts; with the tip pinned, too, 3EI/L beside the spring's stiffness."""
-    assert what_holds(SPRUNG) == "Springs hold this arm"
-    assert "a torque that lasts gives 0." in sign_words(SPRUNG)
-    both = replace(SPRUNG, payload=replace(LAB.payload, mass=np.inf))
-    assert what_holds(both) == "The tip of this arm is held"
-    EI, kGA, L = LAB.link.EI, LAB.link.kGA, LAB.link.length
-    stiffness = 1 / (L / (3 * EI) + 1 / (kGA * L))
-    share = re.search(r"gives (−?-?[0-9.]+) times", sign_words(both))[1].replace("−", "-")
-    assert float(share) == pytest.approx(-stiffness / (3.0 + stiffness), abs=6e-6)
+    sprung = replace(LAB, hub=replace(LAB.hub, stiffness=3.0))
+    assert what_holds(sprung) == "Springs hold this arm"
+    assert what_holds(replace(sprung, payload=replace(LAB.payload, mass=np.inf))) == "The tip of this arm is held"

@@ -16,7 +16,7 @@ from tfarm.audit import published
 from tfarm.audit.published import PublishedRow
 from tfarm.report import trust_proofs, write, writing
 from tfarm.report.modes_section import how_proven, modal_table, rounds_to
-from tfarm.report.trust import Evidence, in_letters, sources_table, write_trust
+from tfarm.report.trust import Evidence, sources_table, write_trust
 from tfarm.report.trust_proofs import boxes_tables, prove, save_proof, shared_digits, written_proofs
 from tfarm.response import frequency
 from tfarm.response.frequency import worst_error
@@ -90,15 +90,14 @@ def test_twenty_digits_with_their_zeros(lower, text):
 
 
 @pytest.mark.parametrize(
-    ("cell", "right"),
-    [("71.50568", True), ("71.50569", False), ("7.151 × 10¹", True), ("7.150 × 10¹", False), ("71.505682466890", True)],
-)
-def test_a_cell_is_proven_if_both_ends_round_to_it(cell, right):
-    assert rounds_to(cell, BRACKET) == right
-
-
-def test_a_cell_is_not_proven_where_the_ends_round_apart():
-    assert not rounds_to("0.5", ("0.4499", "0.4501"))
+    ("cell", "bracket", "right"),
+    [
+        ("71.50568", BRACKET, True), ("71.50569", BRACKET, False), ("7.151 × 10¹", BRACKET, True),
+        ("7.150 × 10¹", BRACKET, False), ("71.505682466890", BRACKET, True), ("0.5", ("0.4499", "0.4501"), False),
+    ],
+)  # fmt: skip
+def test_a_cell_is_proven_if_both_ends_round_to_it(cell, bracket, right):
+    assert rounds_to(cell, bracket) == right
 
 
 def test_the_modal_table_says_how_its_digits_are_known(proven_modes, monkeypatch):
@@ -148,15 +147,10 @@ def test_a_response_that_is_zero_throughout_has_no_error():
     assert [output for output, _ in prove(locked).errors] == ["root_moment"]
 
 
-def test_a_proof_is_kept_and_read_again_and_strange_files_are_passed_over(proof, tmp_path, monkeypatch):
+def test_a_proof_is_kept_and_read_again(proof, tmp_path, monkeypatch):
     (tmp_path / ARM.name).mkdir()
     monkeypatch.setattr(trust_proofs, "prove", lambda arm, chain: {(ARM, None): proof}[arm, chain])
     save_proof(ARM, tmp_path / ARM.name)
-    strange = ("", "[]", "null", "{}", '{"tfarm_proof": 1}', '{"tfarm_proof": 1, "name": "x5"}', "[" * 9999)
-    for i, text in enumerate(strange):
-        (tmp_path / f"x{i}").mkdir()
-        (tmp_path / f"x{i}" / "proof.json").write_text(text)
-    (tmp_path / "empty").mkdir()
     (read,) = written_proofs(tmp_path)
     assert read == proof
     assert read.sha256 == trust_proofs.hash_of(tfarm.load("stocky-steel"))
@@ -183,10 +177,6 @@ def test_long_tables_and_claims_are_folded_below_their_answers(page):
     assert re.findall(r'id="(table-[^"]*)"', unfolded) == ["table-counts", "table-accuracy"]
     assert "<article" not in unfolded
     assert unfolded.count('href="#eq-') == len(CHEAP)
-
-
-def test_plain_letters_of_the_audit_are_set():
-    assert in_letters("6e-4 m^2 of theta_t, K2 < 1") == "6 × 10⁻⁴ m² of θ<sub>t</sub>, K2 &lt; 1"
 
 
 def test_what_is_not_proven_is_said(page, proof):
@@ -240,11 +230,6 @@ def test_one_page_of_an_arm_does_not_wait_for_the_audit(tmp_path, monkeypatch, e
     write([arm], tmp_path, only=("locus",))
     assert "../trust/index.html" in page.read_text(encoding="utf-8")
     assert "trust/index.html" in (tmp_path / "index.html").read_text(encoding="utf-8")
-
-
-def test_no_arm_may_be_called_trust(tmp_path):
-    with pytest.raises(tfarm.ParameterError, match="another name"):
-        write([replace(ARM, name="Trust")], tmp_path)
 
 
 def test_damped_modes_and_closed_loop_poles_are_counted_and_kept(tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""TeX of the audit to MathML: well formed, nothing lost, nothing too wide, differences marked where they are."""
+"""TeX of the audit to MathML: well formed, nothing lost, differences marked where they are."""
 
 import re
 from xml.etree import ElementTree
@@ -6,22 +6,11 @@ from xml.etree import ElementTree
 import pytest
 
 from tfarm.audit import claims
-from tfarm.report.trust import (
-    GREEK_LETTERS,
-    INDENT_TEX,
-    WIDEST_LINE,
-    anchor,
-    compared_formulas,
-    formula_lines,
-    formulas,
-    in_letters,
-    width,
-)
+from tfarm.report.trust import GREEK_LETTERS, anchor, compared_formulas, formulas, in_letters
 
 CLAIMS = claims()
 TEXTS = [(claim, text) for claim in CLAIMS for text in (claim.printed, claim.corrected) if text]
 WITH_DW = {"(21)", "(22)"}  # their plain text says dw for the increment
-UNBREAKABLE = {"(A.2)", "appendix as a whole"}  # all under one root
 
 
 def leaves(markup):
@@ -49,17 +38,7 @@ def test_every_greek_letter_of_the_plain_text_is_set(claim, text):
             continue
         count = len(re.findall(rf"(?<![A-Za-z]){name}(?![A-Za-z])", text))
         assert shown.replace("ϕ", "φ").count(letter) == count, name
-
-
-@pytest.mark.parametrize(("claim", "text"), TEXTS, ids=lambda it: getattr(it, "equation", ""))
-def test_breaking_loses_nothing_and_lines_fit(claim, text):
-    tex = claim.typeset(text)
-    broken = formula_lines(tex)
-    bare = re.compile(r"[,;]?\\quad|\s")
-    assert bare.sub("", "".join(line.removeprefix(INDENT_TEX) for line in broken)) == bare.sub("", tex)
-    if claim.equation not in UNBREAKABLE:
-        assert max(width(line) for line in broken) <= WIDEST_LINE
-    assert not re.search("xmlns|http|&#", "".join(formulas(tex)))
+    assert not re.search("xmlns|http|&#", "".join(formulas(claim.typeset(text))))
 
 
 @pytest.mark.parametrize(
@@ -93,8 +72,8 @@ def test_a_determinant_has_bars_as_high_as_it():
 
 
 def test_infinity_is_no_operator_and_plus_minus_is_one():
-    (line,) = formulas(r"x = \pm \sqrt{a \pm b},\quad y < \infty")
-    tags = [(leaf.tag, leaf.get("form")) for leaf in leaves([line]) if leaf.text in "±∞"]
+    lines = formulas(r"x = \pm \sqrt{a \pm b},\quad y < \infty")
+    tags = [(leaf.tag, leaf.get("form")) for leaf in leaves(lines) if leaf.text in "±∞"]
     assert tags == [("mo", "prefix"), ("mo", "infix"), ("mi", None)]
 
 

@@ -16,7 +16,7 @@ from tests.hostile import NAME
 from tests.report.full import ARM
 from tests.report.walked import Walk, columns_of, numbers_of, read, read_arm, shown_in, told, untraced, untraced_cells
 from tfarm.report.locus_section import RANGE_OF_K2
-from tfarm.spectrum.scales import default_gains, rate_unit
+from tfarm.spectrum.table import default_gains, rate_unit
 
 PROSE = {  # phrases with numbers that are no results, and what they are
     r"around −1|−1 lies on the ring 1|encirclements of −1": "the critical point of Nyquist's criterion",

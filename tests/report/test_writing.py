@@ -25,7 +25,7 @@ from tfarm.report.cases import Subject
 from tfarm.report.page import first_sentence, index_page
 from tfarm.report.trust import Evidence, write_trust
 from tfarm.report.trust_proofs import written_proofs
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 # ------------------------------------------------------------ the same bytes
 
@@ -238,7 +238,6 @@ import os, time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from tfarm.processes import leave_with_parent
-from tfarm.report import writing
 if __name__ == "__main__":
     pool = ProcessPoolExecutor(1, get_context("forkserver"), leave_with_parent)
     print(pool.submit(os.getpid).result(), flush=True)

@@ -15,7 +15,7 @@ from tfarm.dsp.sampled import sampled_loop
 from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ParameterError
 from tfarm.loop.stability import stability
-from tfarm.spectrum.scales import (
+from tfarm.spectrum.table import (
     DEFAULT_DIGITS,
     OF_THE_PAPER,
     PAPER_GAINS,

@@ -11,7 +11,7 @@ from tests.rigs import some_rig
 from tests.shared import thinned
 from tests.similar import EITHER, FAST, FREQUENCY, INERTIA, LENGTH, SLOW, TORQUE
 from tfarm.errors import ConvergenceError
-from tfarm.spectrum.scales import (
+from tfarm.spectrum.table import (
     DEFAULT_DIGITS,
     angle_unit,
     check_gains,

@@ -18,7 +18,7 @@ from tfarm.arm import Motor
 from tfarm.cli.running import run
 from tfarm.errors import MISSING, ConvergenceError
 from tfarm.loop.locus import open_poles
-from tfarm.report.modes_section import damped_table, locked_table, locked_words
+from tfarm.report.modes_section import damped_table, locked_table
 from tfarm.spectrum import damped as module
 from tfarm.spectrum.damped import NOT_ASSIGNED, origin_of, searched
 from tfarm.tables.files import json_value
@@ -126,7 +126,6 @@ def test_tables_of_them_hold_every_eigenvalue_and_no_nan(number: int) -> None:
     assert np.isfinite(shapes[known]).all()
     assert np.isnan(shapes[~known]).all()
     assert np.isnan(damped.damping_ratio).sum() == (~damped.is_assigned).sum()
-    locked_words(arm)
     locked_table(undamped)
 
 

@@ -12,7 +12,7 @@ from tfarm import Arm, Hub, Link, Payload, Section
 from tfarm.dsp import Chain, Sampling, Slew
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.tuner import Learning, best_constant, find_guard, initial_network, slew_trial, train
-from tfarm.tuner.sector import MovingGain
+from tfarm.tuner.guard import MovingGain
 
 SEEDS_AN_ARM = 4
 STEPS = 3000

@@ -10,7 +10,7 @@ import pytest
 import tfarm
 from tests.shell import answer, run
 from tfarm.tuner import Plan, compare_controllers, shaped_trial, slew_trial, tune
-from tfarm.tuner.comparison import tried_loops
+from tfarm.tuner.baselines import tried_loops
 from tfarm.tuner.guard import Guard
 
 

@@ -9,7 +9,7 @@ import tfarm
 from tests.shared import thinned
 from tests.tuner.plain import PlainTrial, complex_step, plain_gain
 from tfarm.dsp import Chain, Converters, Sampling
-from tfarm.tuner import initial_network, rules, slew_trial
+from tfarm.tuner import initial_network, slew_trial, training
 from tfarm.tuner.kernel import Limits
 
 pytestmark = pytest.mark.kernels
@@ -52,9 +52,9 @@ def test_reverse_and_forward_accumulation_agree(lab, chain, inputs, hidden):
     trial, network = slew_trial(lab, chain), some_network(1, inputs, hidden)
     cost, gradient = trial.gradient(network, SECTOR)
     total, costs = np.zeros(gradient.size), np.zeros(1)
-    still = rules.Steps(np.zeros(gradient.size), 0.0, np.inf, 0.0)
+    still = training.Steps(np.zeros(gradient.size), 0.0, np.inf, 0.0)
     setting, room = trial.setting(network, SECTOR), trial.room(network)
-    rules.learn_by_sensitivities(setting, still, network.weights, costs, *room, total)
+    training.learn_by_sensitivities(setting, still, network.weights, costs, *room, total)
     assert costs[0] == cost
     np.testing.assert_allclose(total, gradient, atol=1e-12 * abs(gradient).max())
 

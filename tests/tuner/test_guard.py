@@ -23,8 +23,7 @@ from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import CertificationError, ParameterError
 from tfarm.exact.rationals import as_integers, is_positive_definite
 from tfarm.tuner import find_guard, guard, slew_trial
-from tfarm.tuner.guard import upper_modes_are_quiet
-from tfarm.tuner.sector import RADIUS_SHARE, MovingGain, _peak, common_lyapunov
+from tfarm.tuner.guard import RADIUS_SHARE, MovingGain, _peak, common_lyapunov, upper_modes_are_quiet
 
 FINE = np.r_[np.geomspace(1e-6, 1e-2, 500), np.linspace(1e-2, np.pi, 100_001)]
 

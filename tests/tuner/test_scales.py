@@ -8,9 +8,8 @@ import pytest
 import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.dsp import Chain, Sampling, sampled_loop
-from tfarm.spectrum.scales import default_gains
-from tfarm.tuner.baselines import shaper
-from tfarm.tuner.comparison import quantised_chain, tried_loops
+from tfarm.spectrum.table import default_gains
+from tfarm.tuner.baselines import quantised_chain, shaper, tried_loops
 from tfarm.tuner.tuning import trial_of, usual_plan
 
 ARMS = odd_arms()

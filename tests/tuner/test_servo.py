@@ -27,8 +27,8 @@ from tfarm.tuner import (
     tune,
 )
 from tfarm.tuner.controller import to_text
+from tfarm.tuner.guard import RADIUS_SHARE, MovingGain
 from tfarm.tuner.kernel import Limits
-from tfarm.tuner.sector import RADIUS_SHARE, MovingGain
 from tfarm.tuner.trial import usual_rate_gain
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -130,7 +130,7 @@ def test_it_is_held_against_the_same_yardsticks(tuning):
 
 
 def as_trained(tuning):
-    return tfarm.tuner.comparison.NamedLoop("as trained", LAB, tuning.trial.loop.chain)
+    return tfarm.tuner.baselines.NamedLoop("as trained", LAB, tuning.trial.loop.chain)
 
 
 def test_the_usual_rate_gain_damps_the_rigid_arm():

@@ -28,7 +28,7 @@ from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.records import record
 from tfarm.spectrum import modes
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 STUDIED_MODES = 4  # flexible modes, unless told
 AREA = 6.0e-4  # m^2, the paper's

@@ -187,7 +187,7 @@ def report(
 def _written(subjects: list[Arm], out: Path, measured: list[str], **asked: Any) -> Path:
     """The page written, with the responses as they are typed; what is left out is said on standard error at the end."""
     from tfarm.cli.tables import progress
-    from tfarm.fitting.reading import data_of
+    from tfarm.fitting.data import data_of
     from tfarm.report import write
 
     responses = [data_of(text, "--measured") for text in measured]

@@ -90,7 +90,7 @@ def _print(found: Comparison, answer: dict[str, Any]) -> None:
     if found.is_of_arms:
         print("\nnatural frequencies and damping of the arms by themselves:")
         show(answer["modes"])
-    if found.is_clocked:
+    if found.is_sampled:
         print("\none law is a law in z: both loops are compared at their samples, each pole z as s = ln(z)/T")
     print("\noscillating closed-loop poles, by the mode whose open-loop pole each is nearest to:")
     show(answer["poles"])

@@ -134,7 +134,7 @@ def gain_map(
     from tfarm.loop.plane import gain_map as find
 
     if chain is not None:
-        from tfarm.spectrum.scales import default_gains
+        from tfarm.spectrum.table import default_gains
 
         gains = default_gains(subject).having(ANGLE_GAIN, kp)
         _sampled_map(subject, gains, chain, PLANE, (between(*x, number), between(*y, number)), csv, png, json)

@@ -70,10 +70,10 @@ def fit(
 def _fitted(subject: Arm, data: list[str], free: str, modes: list[str], **known: Any) -> Fit:
     """The fit to responses and ring-downs as they are typed, with what is `known` of the numbers that are free."""
     from tfarm.cli.tables import progress
+    from tfarm.fitting.data import data_of
     from tfarm.fitting.fit import fit as find
+    from tfarm.fitting.model import mode_of
     from tfarm.fitting.overlay import check_unit
-    from tfarm.fitting.reading import data_of
-    from tfarm.fitting.ringing import mode_of
 
     measured = [data_of(text) for text in data]
     for each in measured:
@@ -156,8 +156,7 @@ def frf(
     named, columns = zip(*(_named(each) for each in (output, input)), strict=True)
     from tfarm.cli.tables import say_written
     from tfarm.fitting.answers import estimate_answer, measured_table
-    from tfarm.fitting.recording import read_recording
-    from tfarm.fitting.spectra import frequency_response
+    from tfarm.fitting.recording import frequency_response, read_recording
     from tfarm.tables.files import write_csv
     from tfarm.tables.terminal import show
 

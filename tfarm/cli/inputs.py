@@ -186,7 +186,7 @@ def asked_gains(arm: Arm, given: Given) -> tuple[HubFeedback, dict[str, Any]]:
     """
     from dataclasses import replace
 
-    from tfarm.spectrum.scales import default_gains, default_words
+    from tfarm.spectrum.table import default_gains, default_words
 
     if given.law is not None:
         remedy = "this command knows gains at the hub; poles, margins, sampled and simulate take any law"

@@ -45,9 +45,8 @@ def locus(
     count, subject = whole_number("--branches", branches, 1, 200), load_arm(arm)
     law, said = asked_law(subject, given)
     from tfarm.cli.tables import hand_out
-    from tfarm.loop.closed import locus as find
-    from tfarm.loop.loci import locus_answer
-    from tfarm.loop.reduced_locus import reduced_of
+    from tfarm.loop.loci import locus_answer, reduced_of
+    from tfarm.loop.locus import locus as find
 
     number = None if points is None else whole_number("--points", points, 2, 100_000)
     found = find(subject, law, vary, start, stop, number, count)

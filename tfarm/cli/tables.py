@@ -25,8 +25,8 @@ from tfarm.digits import general, singly
 from tfarm.errors import ParameterError
 from tfarm.exact.methods import METHODS_AGREE, Method, known_method
 from tfarm.files import is_standard_output
+from tfarm.fitting.data import data_of
 from tfarm.fitting.overlay import curves_table, overlay, overlay_answer, required_table
-from tfarm.fitting.reading import data_of
 from tfarm.tables.files import write_csv
 from tfarm.tables.terminal import show
 
@@ -155,10 +155,11 @@ def hand_out(
     if csv is not None and table is not None:
         write_csv(table(), csv)
     if png is not None:
-        from tfarm.plots.drawn import picture_of
+        import tfarm.plots  # noqa: F401  every picture is known once they are loaded
         from tfarm.plots.files import save_png
+        from tfarm.plots.style import FIGURES
 
-        save_png(picture_of(*picture), png)
+        save_png(FIGURES[type(picture[0])](*picture), png)
     if say_written(*also, csv, png) or json:
         give(answer(), json, printed)
 

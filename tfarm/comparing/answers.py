@@ -11,14 +11,14 @@ from tfarm.columns import FILES, JSON, Column, Table
 from tfarm.digits import general, singly, within
 from tfarm.dsp.verdict import sampled_law_answer
 from tfarm.loop.answers import MARGIN_COLUMNS, gain_rows, margins_answer, sizes_of
-from tfarm.loop.margins import Margins
 from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
-from .clocked import CLOCKED_MARGINS
 from .comparison import ComparedSide, Comparison
 
 ValuesOfSide = Sequence[float | None]
 MOST_DIGITS_COMPARED = 8  # of a value in its column; fewer where fewer hold
+SAMPLED_MARGINS = {"gain_factor_up": ("stable up to this factor on the law", ""),
+          "gain_factor_down": ("and down to this one", ""), "delay_margin_s": ("delay margin", "s")}  # fmt: skip
 MARGIN_ERROR = 1e-8  # of its size: what a margin may be off, which is found by search on the grid of the loop
 
 
@@ -135,45 +135,33 @@ def compared_margins(found: Comparison) -> Table:
     """A row a margin: what is exact where that is known, else what holds in the band, which `known` says.
 
     Of loops at their samples: between which factors on the law they are stable, and how much later it may act.
+    Differences are in per cent, of angles in degrees.
     """
-    one, other = (_known(side) for side in found.sides)
-    names = (
-        CLOCKED_MARGINS if found.is_clocked else {column.key: (column.title, column.unit) for column in MARGIN_COLUMNS}
-    )
-    columns = (
-        Column(
-            "margin",
-            "margin",
-            of=list(names),
-            shown=[f"{title} [{unit}]" if unit else title for title, unit in names.values()],
-        ),
-        Column("unit", on=(JSON, FILES), of=[unit for _, unit in names.values()]),
-        *_margin_columns(found, [unit for _, unit in names.values()], [v for v, _ in one], [v for v, _ in other]),
-        Column("known_one", f"known of {found.one.name}", of=[known for _, known in one]),
-        Column(
-            "known_other",
-            f"known of {found.other.name}",
-            head=f"of {found.other.name}",
-            of=[known for _, known in other],
-        ),
-    )
-    return Table(columns=columns)
-
-
-def _margin_columns(found: Comparison, units: Sequence[str], one: ValuesOfSide, other: ValuesOfSide) -> list[Column]:
-    """Both sides and the difference, of angles in degrees and not in per cent."""
+    of_loops = {column.key: (column.title, column.unit) for column in MARGIN_COLUMNS}
+    names = SAMPLED_MARGINS if found.is_sampled else of_loops
+    units = [unit for _, unit in names.values()]
+    (one, known_one), (other, known_other) = (zip(*_known(side), strict=True) for side in found.sides)
     quantity = ComparedQuantity("value", "", relative=MARGIN_ERROR)
     first, second, apart = quantity.columns(found, one, other)
-    is_angle = [unit == "deg" for unit in units]
-    degrees = [quantity.difference(*pair) if yes else None for yes, *pair in zip(is_angle, one, other, strict=True)]
-    percent = [None if yes else each for yes, each in zip(is_angle, apart.values, strict=True)]
-    shown = [_degrees(d) if yes else _percent(p) for yes, d, p in zip(is_angle, degrees, percent, strict=True)]
-    return [
+    degrees = [
+        quantity.difference(*pair) if unit == "deg" else None for unit, *pair in zip(units, one, other, strict=True)
+    ]
+    percent = [None if unit == "deg" else each for unit, each in zip(units, apart.values, strict=True)]
+    both = zip(units, degrees, percent, strict=True)
+    shown = [_degrees(angle) if unit == "deg" else _percent(share) for unit, angle, share in both]
+    titles = [f"{title} [{unit}]" if unit else title for title, unit in names.values()]
+    of = found.other.name
+    columns = (
+        Column("margin", "margin", of=list(names), shown=titles),
+        Column("unit", on=(JSON, FILES), of=units),
         first,
         second,
         replace(apart, of=percent, shown=shown),
         Column("value_difference_deg", on=(JSON, FILES), of=degrees),
-    ]
+        Column("known_one", f"known of {found.one.name}", of=known_one),
+        Column("known_other", f"known of {of}", head=f"of {of}", of=known_other),
+    )
+    return Table(columns=columns)
 
 
 def _degrees(value: float | None) -> str:
@@ -196,10 +184,6 @@ def compared_windows(found: Comparison) -> Table | None:
 
 def compared_answer(found: Comparison) -> dict[str, Any]:
     """Names and verdicts, the tables, and of each side the whole answer of `tfarm margins`, or of `tfarm sampled`."""
-    loops: list[dict[str, Any]] = []
-    for side in found.sides:
-        at_samples = {} if side.clocked is None else sampled_law_answer(side.clocked.analysis)
-        loops.append(at_samples if side.margins is None else margins_answer(side.margins))
     return {
         "of": "arms" if found.is_of_arms else "laws",
         "names": [side.name for side in found.sides],
@@ -209,34 +193,38 @@ def compared_answer(found: Comparison) -> dict[str, Any]:
         "poles": compared_poles(found),
         "unpaired_poles": unpaired_poles(found),
         "margins": compared_margins(found),
-        "at_samples": found.is_clocked,
-        "loops": loops,
+        "at_samples": found.is_sampled,
+        "loops": [_loop_answer(side) for side in found.sides],
     }
+
+
+def _loop_answer(side: ComparedSide) -> dict[str, Any]:
+    if side.analysis is not None:
+        return sampled_law_answer(side.analysis)
+    assert side.margins is not None
+    return margins_answer(side.margins)
 
 
 def side_words(side: ComparedSide) -> str:
     """A line: both verdicts on one side, with what is known beyond the band, and its law."""
-    if side.margins is None:
-        return f"{side.name}: {side.verdict.upper()}; {side.sampled.at}: {side.sampled.sentence}"
-    verdict = side.margins.stability
-    far = verdict.verdict == "unstable" or verdict.is_known_beyond
-    reach = "" if far else f" up to {verdict.band:.4g} rad/s, not known beyond"
-    return f"{side.name}: {verdict.verdict.upper()}{reach}; {side.sampled.at}: {side.sampled.sentence}"
+    reach, verdict = "", None if side.margins is None else side.margins.stability
+    if verdict is not None and not (verdict.verdict == "unstable" or verdict.is_known_beyond):
+        reach = f" up to {verdict.band:.4g} rad/s, not known beyond"
+    return f"{side.name}: {side.verdict.upper()}{reach}; {side.sampled.at}: {side.sampled.sentence}"
 
 
 def _known(side: ComparedSide) -> list[tuple[float | None, str]]:
     """Each margin with what is known of it; a phase that a delay takes away has no exact value."""
-    if side.clocked is not None:
-        return [(value, "-" if value is None else side.clocked.known) for value in side.clocked.margins.values()]
+    if side.analysis is not None:
+        words = f"with {side.analysis.verdict.modes_used} modes"
+        return [(value, "-" if value is None else words) for value in side.sampled_margins]
     assert side.margins is not None
-    found: Margins = side.margins
     known: list[tuple[float | None, str]] = []
     for column in MARGIN_COLUMNS:
-        exact, in_band = sizes_of(found)[column.key]
+        exact, in_band = sizes_of(side.margins)[column.key]
+        is_exact = exact is not None and (column.unit != "deg" or bool(side.margins.exact_delay))
         if in_band is None:
             known.append((None, "-"))
-        elif exact is None or (column.unit == "deg" and not found.exact_delay):
-            known.append((in_band, "in the band"))
         else:
-            known.append((exact, "exact"))
+            known.append((exact, "exact") if is_exact else (in_band, "in the band"))
     return known

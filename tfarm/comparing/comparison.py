@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law, must_be_arm
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
+from tfarm.crossing import Window
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual
-from tfarm.dsp.verdict import SampledBrief, brief_of, sampled_verdict
+from tfarm.dsp.crossings import circle_grid, stable_factors
+from tfarm.dsp.verdict import Analysis, SampledBrief, brief_of, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError, one_line
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import Margins, dense
@@ -26,10 +29,7 @@ from tfarm.records import record
 from tfarm.response.frequency import Bode, bode, resonant_band
 from tfarm.spectrum import Modes, damped_modes
 from tfarm.spectrum import modes as modes_of
-from tfarm.spectrum.scales import default_gains
-
-from .clocked import Clocked, Reach, clocked
-from .pairing import poles_by_mode
+from tfarm.spectrum.table import default_gains
 
 MOST_COMPARED = 30  # flexible modes of a table that is read side by side
 LONGEST_SIDE_NAME = 60  # characters of a name: of two in one legend
@@ -43,6 +43,19 @@ FURTHER_DELAYS = 25  # further delays of which the plane of a loop at its sample
 LONGEST_WAIT, BORNE = 2.0, 1.2  # samples up to which these go, or this much beyond what either loop bears
 MOST_DELAYED = 10.0  # samples at most
 CURVE_FROM = 0.05  # of the first mode: where the curve of a loop begins
+FARTHEST = 1.0  # |ln s - ln p|: by more a law moves no mode here, a factor e of its frequency or 57 deg of its angle
+HUB = 0  # stands for the pole below the first mode that no mode of the link is near
+GONE_AFTER_SAMPLE = 1e-3  # |z| of a pole that leaves this much of itself after a sample: of those nothing is compared
+REAL_Z = 1e-12  # imaginary part of a real z: rounding
+
+
+@dataclass(frozen=True)
+@record
+class Reach:
+    """The intervals of a factor on a law in which its loop is stable, at each further delay [s]."""
+
+    delay: Real
+    stable_intervals: tuple[tuple[Window, ...], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,8 +65,8 @@ class ComparedSide:
 
     `damping_ratio` is that of each flexible mode of the arm by itself, None where a mode could not be followed; `poles`
     are closed-loop poles with Im s >= 0, complete in their box; `open_loop` those of the arm with Im s > 0 by flexible
-    mode; `sampled` is the verdict at the chain's clock.  Where one of the laws compared is a law in z there is no loop
-    without a clock on either side: no `margins`, and `clocked` is the loop at its samples, with poles as s = ln(z)/T.
+    mode; `sampled` is the verdict at the chain's clock.  Where one of the laws compared is a law in z there is no
+    continuous-time loop on either side: no `margins`, and `analysis` is of the sampled loop, with poles s = ln(z)/T.
     """
 
     name: str
@@ -65,14 +78,19 @@ class ComparedSide:
     open_loop: dict[int, complex]
     margins: Margins | None
     sampled: SampledBrief
-    clocked: Clocked | None = None
+    analysis: Analysis | None = None
+
+    @property
+    def gains(self) -> HubFeedback | None:
+        """The law as gains at the hub; None where it is more than these."""
+        return as_law(self.law).gains
 
     @property
     def verdict(self) -> str:
-        """Of the loop without a clock, or of that at its samples where there is no other."""
-        if self.margins is None:
-            return "undecided" if self.clocked is None else self.clocked.analysis.verdict.word
-        return self.margins.stability.verdict
+        """Of the continuous-time loop, or of the sampled one where there is no other."""
+        if self.analysis is not None:
+            return self.analysis.verdict.word
+        return "undecided" if self.margins is None else self.margins.stability.verdict
 
     @property
     def oscillating(self) -> Complex:
@@ -88,17 +106,50 @@ class ComparedSide:
     def loop_function(self) -> tuple[Real, Complex]:
         """Frequencies [rad/s] (n,) about every steep place of the loop, and L(i w) there, as far as that is finite.
 
-        L(e^{iwT}), up to half the sample rate, where the loop is one at its samples.
+        L(e^{iwT}), up to half the sample rate, of a sampled loop.
         """
-        if self.margins is None:
-            assert self.clocked is not None
-            omega, L = self.clocked.loop_function
+        if self.analysis is not None:
+            loop, grid = self.analysis.loop, circle_grid(self.analysis.loop)
+            omega = grid.q / loop.chain.sampling.period
+            with np.errstate(all="ignore"):
+                L = np.asarray(loop.weights @ grid.terms[1:] / grid.terms[0], dtype=np.complex128)
         else:
+            assert self.margins is not None
             omega = dense(self.margins.stability)
             L = np.asarray(self.margins.stability.loop.loop_function(1j * omega), dtype=np.complex128)
         flexible = self.modes.natural_frequency[self.modes.index > 0]
-        told = np.isfinite(L) & (L != 0) & (omega > CURVE_FROM * flexible[0])
-        return omega[told], L[told]
+        shown = np.isfinite(L) & (L != 0) & (omega > CURVE_FROM * flexible[0])
+        return omega[shown], L[shown]
+
+    @property
+    def sampled_margins(self) -> tuple[float | None, float | None, float | None]:
+        """Of a sampled loop: the largest and the least stable factor on its law, and its delay margin [s]."""
+        assert self.analysis is not None
+        low, high = self.analysis.gain_factors or (None, None)
+        delay = self.analysis.delay_margin.samples * self.analysis.loop.chain.sampling.period
+        return high, low, delay if self.analysis.verdict.is_stable else None
+
+    def reach(self, samples: Real) -> Reach:
+        """The stable factors on the law of a sampled loop with so much further delay each [samples]."""
+        assert self.analysis is not None
+        loop = self.analysis.loop
+        now = [loop.with_delay(loop.chain.sampling.delay_samples + more) for more in samples.tolist()]
+        return Reach(loop.chain.sampling.period * samples, tuple(tuple(stable_factors(each)) for each in now))
+
+
+def poles_by_mode(poles: Complex, open_loop: Mapping[int, complex]) -> dict[int, complex]:
+    """The poles s with Im s > 0 by the mode whose open-loop pole p is theirs; a single one below all of these is `HUB`.
+
+    One a mode, by the least sum of |ln s - ln p|; what is farther than `FARTHEST` from its own belongs to no mode.
+    """
+    modes, own = list(open_loop), np.array(list(open_loop.values()))
+    apart = np.minimum(abs(np.log(poles)[:, None] - np.log(own)), FARTHEST)
+    rows, columns = linear_sum_assignment(apart)
+    near = apart[rows, columns] < FARTHEST
+    found = {modes[column]: complex(poles[row]) for row, column in zip(rows[near], columns[near], strict=True)}
+    others = np.delete(poles, rows[near])
+    below = others[abs(others) < min((abs(s) for s in found.values()), default=0.0)]
+    return dict(sorted([*found.items(), *([(HUB, complex(below[0]))] if below.size == 1 else [])]))
 
 
 @dataclass(frozen=True)
@@ -118,14 +169,13 @@ class Comparison:
     @property
     def verdict(self) -> str:
         """Both verdicts in a line."""
-        if self.is_clocked:
-            return "; ".join(f"{side.name}: {side.sampled.short}" for side in self.sides)
-        return "; ".join(f"{side.name}: {side.verdict}, {side.sampled.short}" for side in self.sides)
+        each = ("" if self.is_sampled else f"{side.verdict}, " for side in self.sides)
+        return "; ".join(f"{s.name}: {verdict}{s.sampled.short}" for s, verdict in zip(self.sides, each, strict=True))
 
     @property
-    def is_clocked(self) -> bool:
+    def is_sampled(self) -> bool:
         """Whether the loops are compared at their samples, one of the laws being a law in z."""
-        return self.one.clocked is not None
+        return self.one.analysis is not None
 
     @property
     def is_of_arms(self) -> bool:
@@ -143,7 +193,7 @@ class Comparison:
     @cached_property
     def regions(self) -> tuple[Plane, Plane] | None:
         """The plane of both gains for each, on one grid that holds both laws; None where a law is not these gains."""
-        laws = [side.law for side in self.sides if isinstance(side.law, HubFeedback)]
+        laws = [side.gains for side in self.sides if side.gains is not None]
         if len(laws) < 2:
             return None
         ranges = [ranges_of(side.arm) for side in self.sides]
@@ -162,12 +212,9 @@ class Comparison:
     @cached_property
     def reaches(self) -> tuple[Reach, Reach]:
         """Of each loop at its samples the factors on its law that keep it stable, over further delays."""
-        each = [side.clocked for side in self.sides]
-        assert each[0] is not None
-        assert each[1] is not None
-        borne = [found.analysis.delay_margin.samples for found in each if found is not None]
-        samples = np.linspace(0.0, min(max(LONGEST_WAIT, BORNE * max(borne)), MOST_DELAYED), FURTHER_DELAYS)
-        return each[0].reach(samples), each[1].reach(samples)
+        longest = max(each.analysis.delay_margin.samples for each in self.sides if each.analysis is not None)
+        samples = np.linspace(0.0, min(max(LONGEST_WAIT, BORNE * longest), MOST_DELAYED), FURTHER_DELAYS)
+        return self.one.reach(samples), self.other.reach(samples)
 
     @cached_property
     def delays(self) -> tuple[Plane, Plane]:
@@ -201,11 +248,8 @@ def compare(
     if first.input_unit != second.input_unit:
         remedy = f"gains of {called[0]} are in another unit, its input being {first.input}: give both one input"
         raise ParameterError(key="input", value=second.input, remedy=remedy)
-    is_clocked = any(isinstance(law, Law) and law.is_discrete for _, law in pairs)
-    one, other = (
-        _side(name, arm, law, modes, chain_or_usual(chain), is_clocked)
-        for name, (arm, law) in zip(called, pairs, strict=True)
-    )
+    is_sampled, chain = any(as_law(law).is_discrete for _, law in pairs), chain_or_usual(chain)
+    one, other = (_side(name, *pair, modes, chain, is_sampled) for name, pair in zip(called, pairs, strict=True))
     return Comparison(one, other, output)
 
 
@@ -226,43 +270,62 @@ def _pairs(arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None) ->
 def _names(pairs: list[tuple[Arm, AnyLaw]]) -> tuple[str, ...]:
     """The arms' names where they differ, else the laws', else their numbers."""
     arms = [one_line(arm.name, LONGEST_SIDE_NAME) for arm, _ in pairs]
-    laws = [
-        one_line(law.name, LONGEST_SIDE_NAME)
-        if isinstance(law, Law)
-        else ", ".join(law.told(name, "{:.4g}".format) for name in PLANE)
-        for _, law in pairs
-    ]
+    laws = [one_line(_called(as_law(law)), LONGEST_SIDE_NAME) for _, law in pairs]
     return tuple(next((names for names in (arms, laws) if names[0] != names[1]), ["first", "second"]))
 
 
-def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_clocked: bool) -> ComparedSide:
+def _called(law: Law) -> str:
+    gains = law.gains
+    return law.name if gains is None else ", ".join(gains.told(name, "{:.4g}".format) for name in PLANE)
+
+
+def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_sampled: bool) -> ComparedSide:
     """All that is compared of one arm under its law; a verdict or a damping that cannot be settled is left open."""
-    found, more = modes_of(arm, count), modes_of(arm, count + POLES_BEYOND_MODES)
+    most = count + POLES_BEYOND_MODES
+    found, more = modes_of(arm, count), modes_of(arm, most)
     open_loop = dict(zip(more.index.tolist(), (1j * more.natural_frequency).tolist(), strict=True))
-    ratio = dict.fromkeys(range(1, count + 1), 0.0 if arm.is_undamped else None)
-    if not arm.is_undamped:
-        with suppress(ConvergenceError):
-            damped = damped_modes(found)
-            known = damped.is_assigned
-            ratio |= dict(zip(damped.index[known].tolist(), damped.damping_ratio[known].tolist(), strict=True))
-            damped = damped_modes(more)
-            known = damped.is_assigned
+    ratio: dict[int, float] = {}
+    with suppress(ConvergenceError):
+        for damped in map(damped_modes, [] if arm.is_undamped else [found, more]):
+            known, ratios = damped.is_assigned, damped.damping_ratio
+            ratio = dict(zip(damped.index[known].tolist(), ratios[known].tolist(), strict=True)) | ratio
             open_loop |= dict(zip(damped.index[known].tolist(), damped.eigenvalues[known, 0].tolist(), strict=True))
+    analysis, margins = None, None
     try:
-        sampled = brief_of(sampled_verdict(arm, law, chain), chain)
+        verdict = sampled_verdict(arm, as_law(law) if is_sampled else law, chain)
+        sampled = brief_of(verdict, chain)
+        analysis = Analysis(verdict) if is_sampled else None
     except ConvergenceError as error:
+        if is_sampled:
+            raise
         sampled = SampledBrief(sampling=chain.sampling, is_stable=None, log_radius=None, sentence=f"undecided: {error}")
-    at, most = clocked(arm, law, chain) if is_clocked else None, count + POLES_BEYOND_MODES
-    open_loop = open_loop if at is None else at.open_loop
+    if analysis is None:
+        margins, poles = margins_of(arm, law), closed_loop_poles(arm, law, most).values
+    else:
+        poles, open_loop = _sampled_poles(analysis)
     return ComparedSide(
         name=name,
         arm=arm,
         law=law,
         modes=found,
-        damping_ratio=tuple(ratio[n] for n in range(1, count + 1)),
-        poles=closed_loop_poles(arm, law, most).values if at is None else at.poles[:most],
+        damping_ratio=tuple(0.0 if arm.is_undamped else ratio.get(n) for n in range(1, count + 1)),
+        poles=poles[:most] if is_sampled else poles,
         open_loop={n: s for n, s in open_loop.items() if n and s.imag > 0},
-        margins=margins_of(arm, law) if at is None else None,
+        margins=margins,
         sampled=sampled,
-        clocked=at,
+        analysis=analysis,
     )
+
+
+def _sampled_poles(found: Analysis) -> tuple[Complex, dict[int, complex]]:
+    """The poles s = ln(z)/T [1/s] of a sampled loop with Im s >= 0, ascending in Im s, of all that outlives a sample.
+
+    And those of the rig by itself with Im z > 0, by flexible mode.
+    """
+    T, pulse, z = found.loop.chain.sampling.period, found.loop.pulse, found.loop.poles.z
+    z = np.where(abs(z.imag) <= REAL_Z, z.real, z)
+    s = np.log(z[(abs(z) > GONE_AFTER_SAMPLE) & (z.imag >= 0)]) / T
+    upper = np.nonzero((pulse.mode > 0) & (pulse.poles.imag > 0))[0]
+    own = np.log(pulse.multipliers[upper]) / T
+    by_mode = zip(pulse.mode[upper].tolist(), (own.real + 1j * abs(own.imag)).tolist(), strict=True)
+    return np.asarray(s[np.lexsort((s.real, s.imag))]), dict(by_mode)

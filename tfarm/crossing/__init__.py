@@ -8,15 +8,19 @@ from tfarm.crossing.line import (
     Crossings,
     Family,
     Parts,
+    Window,
     brackets,
+    confirmed,
+    counts_over,
     crossed,
     crossings,
     family_of,
+    intervals,
+    joined,
     solved,
     zeros_between,
 )
-from tfarm.crossing.pieces import RegionPiece, pieces
-from tfarm.crossing.plane import Window, confirmed, counts_over, intervals, joined
+from tfarm.crossing.turning import RegionPiece, pieces
 
 __all__ = [
     "Crossing",

@@ -7,11 +7,13 @@ At a point of the curve the zero is there for g = -A/B, which is a gain where it
 vanishes.  As g grows the pair of zeros goes to the left of the curve where h rises along it and to the right where h
 falls (differentiate A + g B = 0).  Up the imaginary axis right is unstable; around the unit circle, counter-clockwise,
 right is outside, unstable too.  (Neimark 1948; Gryazina, Polyak and Tremba 2008.)
+
+Over a plane of two gains the counts beyond the curve follow column by column, from crossings and one count.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -29,6 +31,8 @@ DIP_STEPS = 14  # of a golden section: a thousandth of two steps of the grid is 
 GOLDEN = (5.0**0.5 - 1.0) / 2.0
 ROUNDED = 1e-11  # of |A| |B|: a part beside the real one that may be rounding
 MOST_HALVINGS = 200  # a zero takes ten evaluations; three times 53 where no step but halving is believed
+Window = tuple[float, float]  # two values of a gain, the lower first
+SAME_EDGE = 1e-9  # relative: next to z = 1 one static crossing is read several times, each with an error near 1e-12
 
 
 class Crossing(NamedTuple):
@@ -226,3 +230,49 @@ def solved(parts: Parts, low: Real, high: Real) -> tuple[Real, Real]:
     A, B = parts(place)
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # no B to speak of: beyond any number
         return place, np.asarray(-(A * B.conj()).real / abs(B) ** 2)
+
+
+def counts_over(gains: Real, columns: Sequence[Crossings], reference: float, there: NDArray[Any]) -> Whole:
+    """Zeros beyond the curve at each of the gains (n,) in each column: (columns, n).
+
+    `columns` holds the crossings of each along the gain, `there` (columns,) the count at the gain `reference`.
+    """
+    passed = np.array([each.passed(np.r_[gains, reference]) for each in columns]).reshape(len(columns), gains.size + 1)
+    return np.asarray(np.asarray(there)[:, None] + passed[:, :-1] - passed[:, -1:], dtype=np.int64)
+
+
+def intervals(found: Crossings, low: float, high: float, reference: float, there: int) -> list[Window]:
+    """The intervals between `low` and `high` in which nothing is beyond the curve, `there` the count at `reference`."""
+    ends = np.r_[low, np.unique(found.within(low, high).gain), high]
+    (counts,) = counts_over((ends[1:] + ends[:-1]) / 2, [found], reference, np.array([there]))
+    return joined([(float(a), float(b)) for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True) if n == 0 < b - a])
+
+
+def confirmed(found: Crossings, low: float, high: float, is_stable: Callable[[float], bool]) -> list[Window]:
+    """The intervals between `low` and `high`, which may be infinite, in which nothing is beyond the curve.
+
+    Between two crossings the count is constant, and only where it is least it may be 0: there `is_stable` is asked at
+    one gain.  Gaps that rounding tears between crossings of one gain are none.  Where it is stable in none of these
+    `is_stable` is asked between all: next to z = 1 rounding may have made a crossing, and the counts are wrong.
+    """
+    gains = found.within(low, high).gain
+    edges = np.r_[low, gains[np.r_[True, np.diff(gains) > SAME_EDGE * abs(gains[1:])][: gains.size]], high]
+    beyond = 2 * (abs(edges[np.isfinite(edges)]).max(initial=0.0) or 1.0)  # where nothing crosses: any would do
+    inner = np.clip(edges, -beyond, beyond)
+    middles = (inner[1:] + inner[:-1]) / 2
+    counts = found.passed(middles)  # the same up to a constant
+    is_least = counts == counts.min()
+    stable = [i for i in np.flatnonzero(is_least) if is_stable(float(middles[i]))]
+    stable = stable or [i for i in np.flatnonzero(~is_least) if is_stable(float(middles[i]))]
+    return joined([(float(edges[i]), float(edges[i + 1])) for i in stable])
+
+
+def joined(windows: list[Window]) -> list[Window]:
+    """Neighbours with a common edge are one (two crossings that cancel)."""
+    merged: list[Window] = []
+    for low, high in windows:
+        if merged and merged[-1][1] == low:
+            merged[-1] = (merged[-1][0], high)
+        else:
+            merged.append((low, high))
+    return merged

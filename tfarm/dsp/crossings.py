@@ -28,7 +28,7 @@ from tfarm.dsp.discretise import described_law
 from tfarm.dsp.sampled import Sampled
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
-from tfarm.spectrum.scales import most_gain
+from tfarm.spectrum.table import most_gain
 
 A_DECADE = 48  # grid points a decade of the distance to a pole
 NARROWEST_WIDTH = 1e-17  # rad, of a pole: closer to it no angle is told from another
@@ -247,11 +247,6 @@ class GainMap:
     def counts(self) -> NDArray[np.int64]:
         """Unstable poles (len(y), len(x))."""
         return self.unstable.T
-
-    @property
-    def curve(self) -> str:
-        """Where poles are when their count changes."""
-        return "unit circle"
 
     @property
     def K1(self) -> Real:

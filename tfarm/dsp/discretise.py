@@ -36,7 +36,7 @@ from tfarm.dsp.chain import MOST_DELAY, Chain
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.response.signals import Signals
-from tfarm.spectrum.scales import check_gains
+from tfarm.spectrum.table import check_gains
 
 SAME_PERIOD = 1e-9  # relative: 1/100 s in two files may differ in its last digits
 VANISHED = 1e-12  # of its terms: what several signals give together where they cancel

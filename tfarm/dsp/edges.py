@@ -28,7 +28,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.damped import COMPANY, LITTLE, Branches, all_damped_modes
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 
 LONGEST_DELAY_SAMPLES = 20.0  # samples: the delay margin is looked for up to here
 MOST_STEPS = 2000  # of a scan of the delay

@@ -16,7 +16,7 @@ from tfarm.arrays import Real
 from tfarm.dsp.chain import TIME_ROUNDING, Chain, Reading
 from tfarm.errors import ParameterError, must_be_known
 from tfarm.records import record
-from tfarm.spectrum.scales import turning_inertia
+from tfarm.spectrum.table import turning_inertia
 
 MOST_TASK_SAMPLES = 4_000_000  # of a record, a few hundred MB of signals
 STEP_TORQUE, IMPULSE, TIP_OFFSET = 0.1, 0.01, 0.01  # N m, N m s, m: what the scenarios of the paper's arm start with

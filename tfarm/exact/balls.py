@@ -17,7 +17,10 @@ from typing import Any
 import flint
 
 from .compiled import python_of
-from .compound import (
+from .layout import Layout, Numbers, Reading, constant_of, readings
+from .outputs import Output
+from .system import Body, Mark, Offset, Segment, Spring, System
+from .waves import (
     Plane,
     Row,
     across_rows,
@@ -32,10 +35,6 @@ from .compound import (
     row_across,
     transition_rows,
 )
-from .elements import Body, Mark, Offset, Segment, Spring
-from .layout import Layout, Numbers, Reading, constant_of, readings
-from .outputs import Output
-from .system import System
 
 _end_plane, _inside_offset, _inside_spring = python_of(end_plane), python_of(inside_offset), python_of(inside_spring)
 _inside_body, _across_rows, _transition_rows = (

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiled import compiled, inlined
-from .compound import across_rows, across_waves, end_plane, inside_body, inside_offset, inside_spring, transition_rows
 from .layout import (
     BODY,
     COMPLIANCE,
@@ -39,7 +38,24 @@ from .layout import (
     TURNING_GROUND,
     Layout,
 )
-from .waves import SERIES_RADIUS, SIGMA, A, B, G, dispersion, even_functions, tip_conditions, transition_series
+from .waves import (
+    SERIES_RADIUS,
+    SIGMA,
+    A,
+    B,
+    G,
+    across_rows,
+    across_waves,
+    dispersion,
+    end_plane,
+    even_functions,
+    inside_body,
+    inside_offset,
+    inside_spring,
+    tip_conditions,
+    transition_rows,
+    transition_series,
+)
 
 FREE_MOTIONS = 12  # where the vector of ends says how many motions the payload leaves the tip
 

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from tfarm.errors import ParameterError
 from tfarm.records import read_only
 
-from .elements import Body, Element, EndCondition, Mark, Offset, Place, Segment, Spring, double_double
 from .outputs import Output, unit_scale
-from .system import System
+from .system import Body, Element, EndCondition, Mark, Offset, Place, Segment, Spring, System, double_double
 
 SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
 LENGTH, NUMBER = 0, 0  # of an offset's row of the kernel, and of a mark's

@@ -20,12 +20,11 @@ from tfarm.errors import CertificationError, ParameterError
 
 from .balls import Ball, Sweep, point, precision, rational
 from .compiled import python_of
-from .compound import Plane, Row, met
-from .elements import Body, Mark, Offset, Place, Segment, Spring
 from .layout import Layout, Reading, reading_of
 from .outputs import Output
-from .system import System
+from .system import Body, Mark, Offset, Place, Segment, Spring, System
 from .values import PROVEN_BITS, precisions
+from .waves import Plane, Row, met
 
 _met = python_of(met)
 LOAD_KINDS = {"force": ("N", 3), "moment_pair": ("N m", 2)}  # unit, and which entry of (W, Psi, M, Q) jumps

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiled import compiled, inlined
-from .compound import across_rows, across_waves, row_across, row_across_waves, transition_rows
 from .layout import TO_M, TO_Q, TO_W
 from .waves import (
     DAMPING,
@@ -25,10 +24,15 @@ from .waves import (
     A,
     B,
     G,
+    across_rows,
+    across_waves,
     dispersion,
     is_low,
     magnitude,
     reciprocal,
+    row_across,
+    row_across_waves,
+    transition_rows,
     transition_series,
     wave_functions,
 )

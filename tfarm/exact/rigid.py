@@ -16,11 +16,10 @@ from tfarm.arm import Arm
 from tfarm.arrays import Complex
 
 from .balls import Sweep
-from .compound import Plane, Row
-from .elements import Body, Offset, Place, Segment, Spring
 from .layout import Layout, Numbers, Reading, readings
 from .outputs import Output
-from .system import system_of
+from .system import Body, Offset, Place, Segment, Spring, system_of
+from .waves import Plane, Row
 
 ROUNDING = 64 * float(np.finfo(float).eps)  # share of the hub's motion that rounding leaves of a link that is held
 

@@ -19,16 +19,6 @@ from numpy.typing import NDArray
 from tfarm.records import read_only
 
 from .compiled import compiled, inlined
-from .compound import (
-    beyond_body,
-    beyond_offset,
-    beyond_spring,
-    end_plane,
-    inside_body,
-    inside_offset,
-    inside_spring,
-    met,
-)
 from .layout import (
     COMPLIANCE,
     GROUND,
@@ -51,7 +41,26 @@ from .layout import (
     TURNING_GROUND,
 )
 from .pieces import BLOCK, FUNCTIONS_SIZE, NUMBERS_SIZE, PLANE_SIZE, ROW_SIZE, Kept, cross, cross_back, times
-from .waves import DAMPING, SIGMA, A, B, G, impedance, magnitude, reciprocal, tip_conditions, transition_series
+from .waves import (
+    DAMPING,
+    SIGMA,
+    A,
+    B,
+    G,
+    beyond_body,
+    beyond_offset,
+    beyond_spring,
+    end_plane,
+    impedance,
+    inside_body,
+    inside_offset,
+    inside_spring,
+    magnitude,
+    met,
+    reciprocal,
+    tip_conditions,
+    transition_series,
+)
 
 OVERFLOW, UNDERFLOW = 1e80, 1e-80  # a plane beyond is brought back to 1, by a power of two
 LN_2 = math.log(2.0)

@@ -13,12 +13,11 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import CertificationError, ParameterError
 
 from .balls import Ball, State, nearest_float, point, precision, rational
-from .elements import Place
 from .layout import Layout, Readings, constant_of, readings
 from .outputs import Output
 from .series import expansions_at_zero
 from .sweep import AXIS, fill_free
-from .system import System
+from .system import Place, System
 from .uniform import fill_ends
 
 AT_A_POLE = 4 * float(np.finfo(float).eps)  # nearer than this share of |s|, no digit of the answer can be right

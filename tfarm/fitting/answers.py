@@ -5,6 +5,7 @@ The answers of `tfarm frf` and `tfarm ring`, and their tables.
 
 from __future__ import annotations
 
+import math
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.arm import Arm
 from tfarm.arm.writing import to_toml
 from tfarm.arrays import Real
 from tfarm.columns import ANSWER, FILES, JSON, Column, Table
@@ -22,13 +22,12 @@ from tfarm.files import write_file
 from tfarm.response.answers import HERTZ
 
 from .data import CONFIDENCE, Measured
-from .fit import Fit
+from .fit import WIDER, Fit, repeats
 from .model import Response
-from .possible import WIDER, repeats
-from .ratio import Ratio
-from .resonances import PEAKS_BEYOND, clear_peaks, match, near_poles
+from .overlay import Ratio
+from .recording import Estimate
+from .resonances import PARTNERS_BEYOND, matched_peaks, peaks_among, peaks_of
 from .ringdown import Ring
-from .spectra import Estimate
 
 PEAK_REACH = 0.1  # of ln w, and the damping ratio: a peak farther from all of the arm's is not one of them
 BROADER = 2.0  # times the damping ratio: what a broad peak may lie off its pole
@@ -151,37 +150,27 @@ def resonances(fit: Fit) -> list[tuple[float | None, float | None, float]]:
     """Each measured peak [Hz] of all responses, with the arm's own before and after; None where it has none there.
 
     A peak is a pole of its response: a natural frequency, with the hub held where the response is over the hub's angle.
+    Of a response whose poles are not found completely no peak is listed.
     """
     found = {}
     for each in fit.solution.problem.responses:
-        peaks = clear_peaks(each.data, each.noise.sigma)
-        (before, _), (after, ratio) = (_own_peaks(arm, each.data) for arm in (fit.before, fit.arm))
-        places = dict(match(np.log(peaks), np.log(after)))
-        earlier = dict(match(np.log(after), np.log(before)))
-        for n, peak in enumerate(peaks):
-            own = places.get(n, int(np.argmin(abs(np.log(after / peak)))) if after.size else None)
-            first = earlier.get(own) if own is not None else None
-            hertz = [None if row is None else float(w[row]) / (2 * np.pi) for w, row in ((before, first), (after, own))]
-            if own is None or abs(np.log(after[own] / peak)) > PEAK_REACH + BROADER * ratio[own]:
-                hertz = [None, None]
-            found[each.data.input, round(float(np.log(peak)) / SAME_PEAK)] = (*hertz, float(peak) / (2 * np.pi))
-    return sorted(found.values(), key=lambda row: row[2])  # type: ignore[arg-type]
-
-
-def _own_peaks(arm: Arm, data: Measured) -> tuple[Real, Real]:
-    """|s| [rad/s], ascending, and damping ratio of a response's poles that oscillate, complete as far as was measured.
-
-    Where they cannot be told completely, those near the axis, as if undamped.
-    """
-    try:
-        poles = Ratio(arm, data.output, data.input).poles(PEAKS_BEYOND * float(data.omega[-1])).values
-    except ConvergenceError:
-        w = near_poles(arm, data)
-        return w, 0 * w
-    upper = poles[poles.imag > 0]
-    w = np.abs(upper)
-    order = np.argsort(w)
-    return w[order], (-upper.real / w)[order]
+        data = each.data
+        peaks, band = data.omega[peaks_of(data, each.noise.sigma)], (float(data.omega[0]), float(data.omega[-1]))
+        try:
+            ratios = [Ratio(arm, data.output, data.input) for arm in (fit.before, fit.arm)]
+            before, after = (peaks_among(ratio.poles(PARTNERS_BEYOND * band[1]).values) for ratio in ratios)
+        except ConvergenceError:
+            continue
+        w, first = abs(after), abs(before)
+        places = dict(matched_peaks(peaks, w, band)[0])
+        earlier = dict(matched_peaks(w, first, band)[0])
+        for n, peak in enumerate(peaks.tolist()):
+            own = places.get(n, int(np.argmin(abs(np.log(w / peak)))) if w.size else None)
+            row: list[float | None] = [None, None]
+            if own is not None and abs(math.log(w[own] / peak)) < PEAK_REACH + BROADER * -after[own].real / w[own]:
+                row = [float(first[earlier[own]]) / HERTZ if own in earlier else None, float(w[own]) / HERTZ]
+            found[data.input, round(math.log(peak) / SAME_PEAK)] = (row[0], row[1], peak / HERTZ)
+    return sorted(found.values(), key=lambda row: row[2])
 
 
 def fit_in_words(fit: Fit) -> str:

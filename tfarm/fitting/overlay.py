@@ -1,4 +1,12 @@
-"""A measured response beside the exact one: mode by mode what differs, and which number alone would explain it.
+"""The exact response from any signal of an arm to any other: the ratio of two of its transfer functions.
+
+    H(s) = T_out(s)/T_in(s)
+
+Its zeros are those of T_out, its poles the zeros of T_in: what rings where the signal T_in is held still.  The arm's
+own poles are in neither.  Over an input of the hub (a torque, a voltage, the angle) H is a transfer function itself:
+the angle as input and the angle as a signal that was measured give the same one.
+
+A measured response beside the exact one: mode by mode what differs, and which number alone would explain it.
 
 The answer of `tfarm response --measured`, and its tables.
 """
@@ -7,25 +15,27 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from tfarm.arm import Arm, must_be_arm
+from tfarm.arm import INPUTS, Arm, Input, must_be_arm
 from tfarm.arrays import Complex, Real
 from tfarm.columns import JSON, Column, Table
 from tfarm.digits import general, singly
 from tfarm.errors import MISSING, ConvergenceError, ParameterError
 from tfarm.records import record
+from tfarm.response import TransferFunction, transfer
 from tfarm.response.answers import HERTZ
-from tfarm.response.frequency import refined_grid
+from tfarm.response.frequency import refined_grid, without_cancelled
+from tfarm.response.signals import Signals
+from tfarm.response.transfer import Roots
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum import modes_below
 
-from .data import Measured, Noise, must_be_measured, noise_of
-from .ratio import Ratio, RatioRoots
+from .data import Measured, Noise, check_signal, must_be_measured, noise_of
 from .resonances import (
     PARTNERS_BEYOND,
     Resonance,
@@ -35,6 +45,108 @@ from .resonances import (
     peaks_of,
     resonance_at,
 )
+
+SOMEWHERE = 0.37 + 0.73j  # 1/s: a response that is not 0 throughout is not 0 there
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+@record
+class RatioRoots:
+    """Poles and zeros [1/s] of a ratio with |Im s| <= `up_to` [rad/s], those at s = 0 apart: complete in these ranges.
+
+    `common` are those that both signals have, which cancel; at s = 0 the ratio goes as s^`at_zero`.
+    """
+
+    poles: Complex
+    zeros: Complex
+    common: Complex
+    at_zero: int
+    up_to: float
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """The response `output`/`input` of an arm, exact.  Raises ParameterError for signals that the arm does not have."""
+
+    arm: Arm
+    output: str
+    input: str
+
+    def __post_init__(self) -> None:
+        check_signal(self.output, "output")
+        check_signal(self.input, "input")
+        if self.output == self.input:
+            raise ParameterError(key="input", value=self.input, remedy="a signal over itself is 1")
+        for key, name, each in (("output", self.output, self.above), ("input", self.input, self.below)):
+            if each is not None and each(SOMEWHERE) == 0:
+                raise ParameterError(key=key, value=name, remedy="does not move on this arm: it is held")
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether the input drives the hub, as one of an arm does, so that the arm's modes are the poles."""
+        return self.input in INPUTS
+
+    @cached_property
+    def driven(self) -> Arm:
+        """The arm under the input that is meant: its own where the ratio is of two signals."""
+        return replace(self.arm, input=cast("Input", self.input)) if self.is_driven else self.arm
+
+    @cached_property
+    def above(self) -> TransferFunction:
+        """From the input that drives to the output."""
+        return _transfer(self.driven, self.output)
+
+    @cached_property
+    def below(self) -> TransferFunction | None:
+        """The same to the input that was measured; None where it is the one that drives."""
+        return None if self.is_driven else _transfer(self.arm, self.input)
+
+    @property
+    def unit(self) -> str:
+        """SI unit, such as m/s^2/rad."""
+        below = self.above.input_unit if self.below is None else self.below.units[0]
+        return f"{self.above.units[0]}/{f'({below})' if ' ' in below or '/' in below else below}"
+
+    def __call__(self, s: Any) -> Any:
+        """H(s) at a complex scalar or array of s [1/s]."""
+        return self.above(s) if self.below is None else self.above(s) / self.below(s)
+
+    def roots(self, up_to: float) -> RatioRoots:
+        """Poles and zeros with |Im s| <= up_to [rad/s], as each transfer function has them, complete."""
+        every = self.poles(up_to).values, self.above.zeros(up_to=up_to).values
+        given_poles, given_zeros = (roots[roots != 0] for roots in every)
+        poles, zeros = without_cancelled(given_poles, given_zeros)
+        orders = Signals(self.driven, (self.output,)).orders[0]
+        under = Signals(self.arm, (self.input,)).orders[0] if self.below is not None else self.above.system.at_rest
+        return RatioRoots(
+            poles=poles,
+            zeros=zeros,
+            common=np.array([pole for pole in given_poles if pole not in poles], complex),
+            at_zero=orders - under,
+            up_to=up_to,
+        )
+
+    def poles(self, up_to: float) -> Roots:
+        """What would be its poles if the output showed them all; with those at s = 0."""
+        return self.above.poles(up_to=up_to) if self.below is None else self.below.zeros(up_to=up_to)
+
+    def residue(self, pole: complex, others: Complex) -> complex:
+        """The residue at a simple pole: the mean of H (s - p) on a circle that no other of the roots is within.
+
+        By the trapezoidal rule, whose error is (radius/distance)^16, 1e-10 at a quarter of it.
+        """
+        far = min((abs(pole - each) for each in others if each != pole), default=abs(pole))
+        radius = min(far, abs(pole)) / 4
+        turn = radius * np.exp(2j * np.pi * (np.arange(16) + 0.5) / 16)
+        return complex(np.mean(self(pole + turn) * turn))
+
+
+def _transfer(arm: Arm, name: str) -> TransferFunction:
+    """To a signal with its place behind an @."""
+    signals = Signals(arm, (name,))
+    wanted = signals.outputs[0]
+    return transfer(arm, wanted, x=signals.places[0] * arm.length if wanted.place == "x" else None)
+
 
 SAME_MODE = 0.1  # of its frequency: how near a pole of a damped arm is to that mode of the arm without damping
 LARGEST_FACTOR = 3.0  # the factor on a number beyond which it is no explanation
@@ -147,12 +259,13 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
     roots = ratio.roots(PARTNERS_BEYOND * high)
     places = peaks_of(measured, noise.sigma)
     own = peaks_among(roots.poles)
-    own = own[own >= low / PARTNERS_BEYOND]
-    pairs, _ = matched_peaks(measured.omega[places], own, (low, high))
-    if len(pairs) < max(places.size, int(((own >= low) & (own <= high)).sum())):
+    own = own[abs(own) >= low / PARTNERS_BEYOND]
+    w = abs(own)
+    pairs, _ = matched_peaks(measured.omega[places], w, (low, high))
+    if len(pairs) < max(places.size, int(((w >= low) & (w <= high)).sum())):
         check_unit(arm, measured)
     at = {j: int(places[i]) for i, j in pairs}
-    shown = [(w, at.get(j)) for j, w in enumerate(own) if j in at or low <= w <= high]
+    shown = [(pole, at.get(j)) for j, pole in enumerate(own.tolist()) if j in at or low <= abs(pole) <= high]
     grid = refined_grid((low, high), np.r_[roots.poles, roots.zeros]) if low < high else measured.omega
     omega = np.asarray(grid, dtype=float)
     return Overlay(
@@ -170,19 +283,19 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
 
 
 def _counterparts(
-    ratio: Ratio, roots: RatioRoots, measured: Measured, noise: Noise, shown: list[tuple[float, int | None]]
+    ratio: Ratio, roots: RatioRoots, measured: Measured, noise: Noise, shown: list[tuple[complex, int | None]]
 ) -> tuple[Counterpart, ...]:
-    """A row a pole: of each |s| [rad/s] that is shown, with the place of its measured peak, if it has one.
+    """A row a pole: of each pole [1/s] that is shown, with the place of its measured peak, if it has one.
 
     The arm's modes are told where they are the poles of the ratio, each by the nearest natural frequency.
     """
-    up_to = (1 + SAME_MODE) * max((w for w, _ in shown), default=0.0)
+    up_to = (1 + SAME_MODE) * max((abs(pole) for pole, _ in shown), default=0.0)
     are_modes = ratio.is_driven and up_to > 0 and modes_below(ratio.driven, up_to) > 0
     table = modes_of(ratio.driven, up_to=up_to) if are_modes else None
-    others, upper = np.r_[roots.poles, roots.zeros, 0.0], roots.resonances
+    others = np.r_[roots.poles, roots.zeros, 0.0]
     found = []
-    for w, place in shown:
-        pole, mode = complex(upper[np.argmin(abs(abs(upper) - w))]), None
+    for pole, place in shown:
+        mode = None
         if table is not None:
             away = abs(table.natural_frequency / abs(pole) - 1)
             at = int(np.argmin(away))
@@ -227,19 +340,14 @@ def _known(value: Any) -> Any:
     return MISSING if value is None else value
 
 
-def _of(row: Counterpart, what: str) -> Any:
-    """A number of the resonance that was measured, if one was told."""
-    one, level = row.measured, row.level
-    if one is None or (level is None and what in ("db", "deg")):
-        return MISSING
-    return {
-        "hz": abs(one.pole) / HERTZ,
-        "std": one.std[1] / HERTZ,
-        "zeta": one.damping_ratio,
-        "zeta_std": one.std[0] / abs(one.pole),
-        "db": 20 * math.log10(abs(level)) if level else MISSING,
-        "deg": math.degrees(np.angle(level)) if level else MISSING,
-    }[what]
+def _fitted(of: Any) -> Any:
+    """A number of the resonance that was measured, if one was fitted."""
+    return lambda row: MISSING if row.measured is None else of(row)
+
+
+def _level(of: Any) -> Any:
+    """A number of the residue's level, if it has one."""
+    return lambda row: of(row.level) if row.level else MISSING
 
 
 COUNTERPARTS = (
@@ -252,7 +360,7 @@ COUNTERPARTS = (
         of=lambda row: _known(None if row.frequency_ratio is None else row.frequency_ratio * abs(row.pole) / HERTZ),
         digits=_or_dash(7),
     ),
-    Column("measured_std_hz", "+-", "Hz", of=lambda row: _of(row, "std"), digits=_or_dash(2)),
+    Column("measured_std_hz", "+-", "Hz", of=_fitted(lambda row: row.measured.std[1] / HERTZ), digits=_or_dash(2)),
     Column(
         "frequency_residual_percent",
         "off",
@@ -261,10 +369,19 @@ COUNTERPARTS = (
         digits=_or_dash(3),
     ),
     Column("exact_damping_ratio", "damping exact", of="damping_ratio", digits=singly(general, 4)),
-    Column("measured_damping_ratio", "measured", of=lambda row: _of(row, "zeta"), digits=_or_dash(4)),
-    Column("measured_damping_ratio_std", "+-", of=lambda row: _of(row, "zeta_std"), digits=_or_dash(2)),
-    Column("level_db", "residue", "dB", of=lambda row: _of(row, "db"), digits=_or_dash(3)),
-    Column("level_degrees", "turned", "deg", of=lambda row: _of(row, "deg"), digits=_or_dash(3)),
+    Column(
+        "measured_damping_ratio", "measured", of=_fitted(lambda row: row.measured.damping_ratio), digits=_or_dash(4)
+    ),
+    Column(
+        "measured_damping_ratio_std",
+        "+-",
+        of=_fitted(lambda row: row.measured.std[0] / abs(row.measured.pole)),
+        digits=_or_dash(2),
+    ),
+    Column("level_db", "residue", "dB", of=_level(lambda level: 20 * math.log10(abs(level))), digits=_or_dash(3)),
+    Column(
+        "level_degrees", "turned", "deg", of=_level(lambda level: math.degrees(np.angle(level))), digits=_or_dash(3)
+    ),
     Column("is_peak_only", of=lambda row: row.peak is not None and row.measured is None, on=(JSON,)),
 )
 

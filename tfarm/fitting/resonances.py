@@ -7,27 +7,23 @@ Near a resonance a response is, for any linear system,
 with the rest of the system in the c.  Pole and residue are fitted by Gaussian least squares to the lines around a
 peak, up to the neighbouring dips, so that they need no model of the arm.  In an arm's order peaks are matched with its
 poles; where they would match far better 2 pi times lower or higher, the file's frequencies are in another unit.
-
-Peaks: of a measured response, and of an arm, whose poles near the imaginary axis they are.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.response.answers import HERTZ
-from tfarm.response.signals import Signals
 
 from .data import Measured, in_parts
-from .parameters import NUDGE, drive_behind, under_drive
 
 PROMINENCE = math.log(2)  # a peak is twice what is around it
 CLEAR_OF_NOISE = 5.0  # deviations of the noise that it stands above
@@ -40,13 +36,6 @@ CLOSE_IN_UNIT = 0.3  # of ln w, in the mean of the peaks: how well they fit in t
 ALIKE_IN_UNIT = 0.15  # and how far they may differ in that
 PEAK_ALONE = math.log(2.0)  # of ln w: farther from every pole a peak has nothing to do with one
 PEAKS_THAT_TELL = 3  # peaks, whose spacing tells one match from another
-PEAK_PROMINENCE = 0.35  # of ln |H|: what stands out by a factor of 1.4 is a peak, if the noise is below a quarter
-NOISY = 4.0  # deviations of the noise
-PEAKS_BEYOND = 1.6  # so far beyond both ends of a band the arm's own peaks are looked for
-PEAK_GRID = 600  # points at which they are
-BROAD = 0.3  # of its frequency: a pole farther from the axis is no peak
-POLE_STEPS = 6  # of Newton's method from a grid's point
-UNMATCHED_PEAK = 0.25  # of ln w: what a peak that is matched with nothing costs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,46 +63,31 @@ def peaks_of(data: Measured, sigma: Real) -> NDArray[np.intp]:
     return np.asarray(places[rise > CLEAR_OF_NOISE * sigma[places]])
 
 
-def matched_peaks(measured: Real, own: Real, band: tuple[float, float]) -> tuple[list[tuple[int, int]], float]:
+def matched_peaks(
+    measured: NDArray[Any], own: NDArray[Any], band: tuple[float, float]
+) -> tuple[list[tuple[int, int]], float]:
     """Pairs of places in two ascending rows of frequencies, in order, with the least cost, and that cost.
 
     The cost of a pair is |ln w/w'|; one of a row that is left alone costs UNPAIRED, but an own one outside of the band.
+    Each has a partner of its own to be left alone with; of pairs that cross the same places in order cost no more.
     """
-    alone = np.where((own >= band[0]) & (own <= band[1]), UNPAIRED, 0.0)
-    return aligned(abs(np.log(measured)[:, None] - np.log(own)), UNPAIRED, alone)
+    from scipy.optimize import linear_sum_assignment
+
+    n, m = measured.size, own.size
+    cost = np.zeros((n + m, m + n))
+    cost[:n, :m] = abs(np.log(measured)[:, None] - np.log(own))
+    cost[:n, m:] = UNPAIRED
+    cost[n:, :m] = np.where((own >= band[0]) & (own <= band[1]), UNPAIRED, 0.0)
+    rows, columns = linear_sum_assignment(cost)
+    paired = (rows < n) & (columns < m)
+    pairs = zip(rows[paired].tolist(), sorted(columns[paired].tolist()), strict=True)
+    return list(pairs), float(cost[rows, columns].sum())
 
 
-def aligned(gaps: Real, measured_alone: float, own_alone: Real) -> tuple[list[tuple[int, int]], float]:
-    """Pairs of places in both rows, in order, of the least cost in sum, and that cost.
-
-    A pair costs its entry of `gaps` (measured, own); one left alone `measured_alone`, or its own of `own_alone` (own,).
-    """
-    n, m = gaps.shape
-    cost, ways = np.zeros((n + 1, m + 1)), np.zeros((n + 1, m + 1), dtype=int)
-    cost[1:, 0], cost[0, 1:] = measured_alone * np.arange(1, n + 1), np.cumsum(own_alone)
-    ways[1:, 0], ways[0, 1:] = 1, 2
-    for i in range(1, n + 1):
-        for j in range(1, m + 1):
-            choices = (
-                cost[i - 1, j - 1] + gaps[i - 1, j - 1],
-                cost[i - 1, j] + measured_alone,
-                cost[i, j - 1] + own_alone[j - 1],
-            )
-            ways[i, j] = int(np.argmin(choices))
-            cost[i, j] = choices[ways[i, j]]
-    pairs, i, j = [], n, m
-    while i or j:
-        way = ways[i, j]
-        if way == 0:
-            pairs.append((i - 1, j - 1))
-        i, j = i - (way != 2), j - (way != 1)
-    return pairs[::-1], float(cost[-1, -1])
-
-
-def peaks_among(poles: Complex) -> Real:
-    """|s| (n,) [rad/s], ascending, of those poles that make a peak."""
+def peaks_among(poles: Complex) -> Complex:
+    """Those poles (n,) [1/s] that make a peak, Im s > 0, by |s|."""
     upper = poles[(poles.imag > 0) & (-poles.real < WIDEST_PEAK * abs(poles))]
-    return np.sort(abs(upper))
+    return upper[np.argsort(abs(upper))]
 
 
 def must_be_in_unit(data: Measured, sigma: Real, poles: Complex) -> None:
@@ -122,7 +96,7 @@ def must_be_in_unit(data: Measured, sigma: Real, poles: Complex) -> None:
     `poles` are those of the response, complete up to PARTNERS_BEYOND 2 pi times the highest frequency.  They fit as
     they are where no more than two partners are missing; one peak alone decides only where it has no partner.
     """
-    peaks, own = data.omega[peaks_of(data, sigma)], peaks_among(poles)
+    peaks, own = data.omega[peaks_of(data, sigma)], abs(peaks_among(poles))
     if not peaks.size or not own.size:
         return
     band = float(data.omega[0]), float(data.omega[-1])
@@ -202,50 +176,3 @@ def _around(data: Measured, place: int) -> slice:
         return at
 
     return slice(end(-1), end(1) + 1)
-
-
-def clear_peaks(data: Measured, sigma: Real) -> Real:
-    """Peaks [rad/s] of a measured response, ascending: those that stand out of its noise."""
-    from scipy.signal import find_peaks  # here, because it takes half a second to load
-
-    size = np.maximum(abs(data.values), np.finfo(float).tiny)
-    at, how = find_peaks(np.log(size), prominence=PEAK_PROMINENCE)
-    noise = np.minimum(sigma / size, 10.0)
-    near = np.array([np.median(noise[max(0, n - 3) : n + 4]) for n in at])
-    return np.asarray(data.omega[at[how["prominences"] > NOISY * near]] if at.size else np.empty(0))
-
-
-def near_poles(arm: Arm, data: Measured) -> Real:
-    """Im s [rad/s] of the response's poles near the axis.
-
-    From where they are without the links' damping, smallest values on a grid, Newton's method leads to them.
-    """
-    from scipy.signal import find_peaks
-
-    driven = drive_behind(arm, data.input)
-    is_driven = data.input == driven
-    signals = Signals(under_drive(arm, driven), (data.output if is_driven else data.input,))
-
-    def logarithm(own: Signals, s: Complex) -> Complex:
-        parts = own.parts(s)
-        return np.asarray(np.log(parts.drive if is_driven else parts.numerators[0]) + parts.scale)
-
-    grid = np.geomspace(data.omega[0] / PEAKS_BEYOND, data.omega[-1] * PEAKS_BEYOND, PEAK_GRID)
-    undamped = replace(signals, arm=signals.arm.having(damping=0.0))
-    w = grid[find_peaks(-logarithm(undamped, 1j * grid).real)[0]]
-    s = 1j * w
-    for _ in range(POLE_STEPS):
-        with np.errstate(all="ignore"):
-            ratio = np.exp(logarithm(signals, s * (1 + NUDGE)) - logarithm(signals, s)) - 1
-            step = np.where(abs(ratio) > 0, s * NUDGE / ratio, 0.0)
-        s = s - np.where(np.isfinite(step), step, 0.0)
-    return np.asarray(s.imag[(abs(s.real) < BROAD * w) & (abs(s.imag / w - 1) < BROAD)])
-
-
-def match(measured: Real, own: Real) -> list[tuple[int, int]]:
-    """Pairs of places in two ascending rows, in order, with the least sum of squared gaps.
-
-    To skip one costs UNMATCHED_PEAK^2; of the arm's own, those that nothing was measured at cost nothing.
-    """
-    gaps = (measured[:, None] - own) ** 2
-    return aligned(gaps, UNMATCHED_PEAK**2, np.zeros(own.size))[0]

@@ -151,7 +151,9 @@ def ring(
         word = "oscillation" if modes == 1 else f"{modes} oscillations"
         raise ConvergenceError(f"no {word} found in the decay: choose other times, or fewer modes", None, None)
     x, J, e = found
-    order = np.argsort(-mode_energy(x, t[-1] - t[0]), kind="stable")
+    cosine, sine = J[:, 2:-LINEAR:EACH], J[:, 3:-LINEAR:EACH]
+    energy = ((cosine * x[2:-LINEAR:EACH] + sine * x[3:-LINEAR:EACH]) ** 2).sum(axis=0)
+    order = np.argsort(-energy, kind="stable")
     freedom = y.size - x.size
     white = whiteness(e) if e @ e > y.size * (RING_ROUNDING * abs(y).max()) ** 2 else 1.0
     spread = covariance(J, e, freedom, is_white=white >= NOT_WHITE)
@@ -202,8 +204,9 @@ def _halves(t: Real, y: Real, x: Real, order: NDArray[np.intp]) -> tuple[Real, R
     middle = t.size // 2
     pairs = []
     for part in (slice(None, middle), slice(middle, None)):
-        shifted = counted_from(x, t[part][0])
-        found = least_squares(t[part] - t[part][0], y[part], shifted) if y[part].size > 2 * x.size else None
+        own_t = t[part] - t[part][0]
+        s = -x[:-LINEAR:EACH] + 1j * x[1:-LINEAR:EACH]
+        found = least_squares(own_t, y[part], _linear(s, own_t, y[part])[1]) if y[part].size > 2 * x.size else None
         if found is None:
             pairs.append((x[1:-LINEAR:EACH], np.full(order.size, np.inf)))
             continue
@@ -299,13 +302,6 @@ def _poles(y: Real, count: int) -> Complex:
     return np.asarray(np.log(z[z != 0]))
 
 
-def mode_energy(x: Real, duration: float) -> Real:
-    """Of each mode: amplitude squared times the integral of exp(-2 sigma t)."""
-    sigma, a, b = (x[place:-LINEAR:EACH] for place in (0, 2, 3))
-    decay = np.where(abs(sigma) * duration < 1e-9, 1e-9 / duration, sigma)
-    return np.asarray((a**2 + b**2) * -np.expm1(np.clip(-2 * decay * duration, -700, 700)) / (2 * decay))
-
-
 def covariance(J: Real, e: Real, freedom: int, *, is_white: bool) -> Real:
     """Of the parameters (parameters, parameters); the columns of J are scaled for the inverse's sake."""
     scale = np.sqrt((J**2).sum(axis=0))
@@ -343,13 +339,3 @@ def _autocovariance(e: Real) -> Real:
     size = 2 ** math.ceil(math.log2(2 * e.size))
     power = abs(np.fft.rfft(e, size)) ** 2
     return np.asarray(np.fft.irfft(power, size)[: e.size] / e.size)
-
-
-def counted_from(x: Real, by: float) -> Real:
-    """The parameters of the same decay with t counted from `by` [s] on."""
-    found = x.copy()
-    for at in range(0, x.size - LINEAR, EACH):
-        sigma, w, a, b = x[at : at + EACH]
-        turned = (a - 1j * b) * np.exp((-sigma + 1j * w) * by)
-        found[at + 2], found[at + 3] = turned.real, -turned.imag
-    return found

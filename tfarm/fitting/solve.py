@@ -1,25 +1,145 @@
-"""The end of a fit: complex residuals over their deviations, least squares, from one start after another.
+"""Where a fit begins: numerator and denominator of a response agree with the data first, then their ratio.
+
+The squares of H - D, of a response H = N/P and its measured values D, have a minimum for every pole of H that lies
+between two other lines than the true one.  The equation error of Levy (1959)
+
+    e = (N - D P)/W,    W = |N(s + share w)| + (|D| + sigma) |P(s + share w)|    at s = i w
+
+has no poles: N and P are entire in s and smooth in the arm's numbers, and so is W, their size right of the axis, where
+neither has zeros.  So its squares have few minima, and a pole comes to where N and P have it, between lines too.  It is
+biased by noise (Sanathanan and Koerner 1963), and only where a search begins.  With a larger `share` W is smoother.
+Tuned on the survey `tests.fitting.planted`: the constants below.
+
+The end of a fit: complex residuals over their deviations, least squares, from one start after another.
 
 A robust loss is no likelihood and the logarithm of a noisy value is biased at an antiresonance, so what is reported,
 and every interval, rests on Gaussian residuals alone.
+
+How sure a fit is: covariance, what the data do not determine, and intervals by the profile of the likelihood.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, brentq, least_squares
 from scipy.special import chdtrc, ndtri, stdtrit
 
 from tfarm.arrays import Real
+from tfarm.errors import ParameterError
 from tfarm.records import record
 
-from .data import CONFIDENCE
-from .model import Problem, walled
-from .start import LADDERS, Starts
+from .data import CONFIDENCE, in_parts
+from .model import Around, Problem, ring_residuals, walled
+
+LADDERS = ((0.1,), (1.0, 0.3, 0.1))  # shares of w, one after another, of the first starts
+DRAWS = 300  # points about one that the equation errors lead to
+DRAWN = 2.0  # times the deviation that they know it with
+STRAYED = 6  # starts beyond these, strayed from the first point by
+SPREAD = 0.3  # of ln p
+START_DEVIATION = 50.0  # of ln p, over that of an equation error: what the data do not know stays where it is
+LINES = 400  # of a response, at most
+LOSS = 0.1  # of an equation error: those beyond count less and less
+STEPS = 40  # evaluations, of each share
+FIT_SEED = 852780  # of all that a fit draws: the number of the paper's article, any would do
+
+
+def starts(problem: Problem) -> Iterator[tuple[Problem, Real]]:
+    """Points that the complex residuals may be minimised from, the likeliest first, and the problem there."""
+    zero = np.zeros(len(problem.parameters))
+    yield _start_near(problem, zero, LADDERS[0], 0)
+    for shares in LADDERS:
+        yield _start_near(problem, zero, shares, DRAWS)
+    rng = np.random.default_rng(FIT_SEED)
+    for _ in range(STRAYED):
+        with suppress(ParameterError):  # no arm there
+            yield _start_near(problem, SPREAD * rng.standard_normal(zero.size), LADDERS[-1], DRAWS)
+
+
+def _start_near(problem: Problem, point: Real, shares: tuple[float, ...], draws: int) -> tuple[Problem, Real]:
+    """The problem, its sensors' gains by the sign that they have, and where the equation errors lead from a point.
+
+    Of the `draws` as far from there as these know it, that of the least squares: the true side of a line.
+    """
+    point = problem.inside(point)
+    for share in shares:
+        whole, first = with_gains(problem, point)
+        thin = thinned(whole, LINES)
+        found = least_errors(thin, first, share)
+        point = np.asarray(found.x)
+    _, sizes, axes = np.linalg.svd(found.jac, full_matrices=False)
+    deviation = math.sqrt(2 * found.cost / found.fun.size) / sizes
+    drawn = np.random.default_rng(FIT_SEED).standard_normal((draws, point.size)) * DRAWN * deviation
+    return whole, min((point, *map(thin.inside, point + drawn @ axes)), key=partial(sum_of_squares, thin))
+
+
+def least_errors(problem: Problem, first: Real, share: float) -> OptimizeResult:
+    """Where the equation errors are least, next to a point, under a loss for outliers."""
+
+    def errors(x: Real) -> Real:
+        return np.concatenate([equation_errors(problem, x, share), (x - first) / START_DEVIATION])
+
+    return least_squares(
+        walled(errors), first, bounds=problem.bounds, loss="soft_l1", f_scale=LOSS, max_nfev=STEPS, xtol=1e-4, ftol=1e-4
+    )
+
+
+def sum_of_squares(problem: Problem, point: Real) -> float:
+    """Of the complex residuals over their deviations; inf where there is no arm."""
+    try:
+        residuals = problem.residuals(point)
+    except ParameterError:
+        return math.inf
+    return float(residuals @ residuals)
+
+
+def equation_errors(problem: Problem, point: Real, share: float) -> Real:
+    """Real and imaginary parts of e at each frequency, and ln of each decay's frequency over the measured one."""
+    errors = []
+    pairs = zip(problem.fractions(point), problem.fractions(point, share), problem.responses, strict=True)
+    for (N, P, here), (smooth_N, smooth_P, there), each in pairs:
+        D = each.data.values
+        W = (abs(smooth_N) + (abs(D) + each.noise.sigma) * abs(smooth_P)) * np.exp(there - here)
+        errors.append(in_parts((N - D * P) / W))
+    if problem.rings:
+        decays = ring_residuals(Around(problem.arm(point), ()), problem.rings, point.size)[0]
+        shares = [(each.frequency_deviation / each.frequency, each.ratio is None) for each in problem.rings]
+        weights = np.concatenate([[size] if is_alone else [size, 0.0] for size, is_alone in shares])
+        errors.append(decays * weights)
+    return np.concatenate(errors)
+
+
+def with_gains(problem: Problem, point: Real) -> tuple[Problem, Real]:
+    """The problem with the sign of each sensor's gain as the data have it at a point; the point with its size."""
+    parameters, point = list(problem.parameters), point.copy()
+    for H, each in zip(problem.computed(point), problem.responses, strict=True):
+        if each.gain is not None:
+            ratio = each.data.values / H
+            own = parameters[each.gain]
+            if np.median(ratio.real / abs(ratio)) < 0:
+                parameters[each.gain] = replace(own, start=-own.start)
+            point[each.gain] += float(np.median(np.log(abs(ratio))))
+    return replace(problem, parameters=tuple(parameters)), point
+
+
+def thinned(problem: Problem, most: int) -> Problem:
+    """The problem at so many of each response's frequencies at most."""
+    responses = []
+    for each in problem.responses:
+        size = each.data.omega.size
+        kept = np.unique(np.linspace(0, size - 1, min(size, most)).astype(int))
+        kept = kept[np.isfinite(each.noise.sigma[kept]) & (each.data.values[kept] != 0)]
+        data = replace(
+            each.data, omega=each.data.omega[kept], values=each.data.values[kept], sigma=None, coherence=None
+        )
+        responses.append(replace(each, data=data, noise=replace(each.noise, sigma=each.noise.sigma[kept])))
+    return replace(problem, responses=tuple(responses))
+
 
 NOISE_ALONE = 1e-6  # a sum of squares that noise alone exceeds so rarely is no noise: another start may do better
 MUCH_MISFIT = 4.0  # times its degrees of freedom: a best sum beyond is tried from strayed starts too
@@ -82,7 +202,7 @@ class Solution:
 def best_solution(problem: Problem) -> Solution:
     """The least sum of squares over all starts; those of noise alone end the search early."""
     found: list[Solution] = []
-    for subject, start in Starts(problem):
+    for subject, start in starts(problem):
         found.append(_rescaled(nearest_minimum(subject, start)))
         best = min(found, key=lambda each: each.misfit)
         is_near = len(found) > len(LADDERS) and best.chi_squared < MUCH_MISFIT * best.freedom
@@ -144,16 +264,12 @@ def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None
         full[free] = x
         return full
 
-    def residuals(x: Real) -> Real:
-        return problem.residuals(whole(x))
-
     def jacobian(x: Real) -> Real:
         return np.asarray(problem.jacobian(whole(x))[:, free])
 
-    inside = problem.inside(point)[free]
     found = least_squares(
-        walled(residuals), inside, jac=jacobian, bounds=(low, high), x_scale="jac",
-        xtol=FIRM_POINT, ftol=FIRM_SUM, gtol=None, max_nfev=MOST_EVALUATIONS,
+        walled(lambda x: problem.residuals(whole(x))), problem.inside(point)[free], jac=jacobian,
+        bounds=(low, high), x_scale="jac", xtol=FIRM_POINT, ftol=FIRM_SUM, gtol=None, max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
     full, slopes = whole(found.x), np.zeros((found.fun.size, start.size))
     slopes[:, free] = np.asarray(found.jac)
@@ -171,3 +287,157 @@ def _rescaled(found: Solution) -> Solution:
             responses.append(replace(each, noise=replace(each.noise, sigma=each.noise.sigma * max(factor, 1e-12))))
         found = nearest_minimum(replace(found.problem, responses=tuple(responses)), found.point)
     return found
+
+
+ToldInterval = Callable[[int, int, str], object]
+
+TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
+ROUND = 0.02  # a power so near to 1 is written as 1
+LEVEL_REACHED = 0.01  # of a deviation: where a profile has reached its level
+BETTER = 0.05  # of a sum of squares: a profile that falls by more has left the valley of the best
+SECANT_STEPS = 12  # steps of the secant: three do but in a crooked valley
+REACHES = (0.5, 1.0, 2.0, 4.0, 6.0, 9.0)  # of ln p: where a number that does not matter is tried
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class Fitted:
+    """A fitted number: `value` in SI units, the ends of its 95 % interval, its standard deviation by the covariance.
+
+    What the data do not determine has no interval.
+    """
+
+    key: str
+    value: float
+    low: float | None
+    high: float | None
+    deviation: float | None
+    identified: bool
+
+    @property
+    def half_known(self) -> str:
+        """What is known of a number whose interval has one end, in words; nothing of others."""
+        if (self.low is None) == (self.high is None):
+            return ""
+        side = f"at least {self.low:.4g}" if self.high is None else f"at most {self.high:.4g}"
+        return f"{self.key} is {side}: these data say no more"
+
+
+class BetterError(Exception):
+    """A profile has come to a lower sum of squares than the best: carries where."""
+
+    def __init__(self, found: Solution) -> None:
+        super().__init__(found)
+        self.found = found
+
+
+def sureness(
+    found: Solution, *, profile: bool, progress: ToldInterval | None = None
+) -> tuple[tuple[Fitted, ...], tuple[str, ...]]:
+    """A solution's numbers with their intervals, and what is not determined, in words.
+
+    The intervals are by profiles, or by the covariance where these are not asked for.
+    Along an open axis nothing changes, so one number of it is held while the others are profiled.  `progress` is told
+    (done, total, key) before each.  Raises BetterError where a profile comes to a lower sum than the solution's.
+    """
+    sizes, axes = principal_axes(found.jacobian)
+    is_open = sizes < 1.0 / OPEN_DEVIATION
+    covariance = (axes[~is_open].T / sizes[~is_open] ** 2) @ axes[~is_open]
+    unsure: list[bool] = np.any(abs(axes[is_open]) > TAKES_PART, axis=0).tolist()
+    held = {int(abs(axis).argmax()): float(found.point[abs(axis).argmax()]) for axis in axes[is_open]}
+    quantile = found.quantile
+    fitted, words = [], [_said(axis, [each.key for each in found.problem.parameters]) for axis in axes[is_open]]
+    alone = {int(abs(axis).argmax()): n for n, axis in enumerate(axes[is_open]) if (abs(axis) > TAKES_PART).sum() == 1}
+    for n, each in enumerate(found.problem.parameters):
+        if progress is not None:
+            progress(n, len(found.problem.parameters), f"interval of {each.key}")
+        value, slope = each.value(float(found.point[n])), abs(each.slope(float(found.point[n])))
+        low = high = deviation = None
+        if not unsure[n]:
+            deviation = math.sqrt(covariance[n, n])
+            ends = [found.point[n] - quantile * deviation, found.point[n] + quantile * deviation]
+            if profile:
+                ends = [_end(found, n, way, deviation, quantile, held) for way in (-1, 1)]
+            low, high = sorted(each.value(float(end)) for end in ends)
+            low, high = each.known_ends(ends, (low, high))
+        elif n in alone and (side := _one_sided(found, n, quantile)) is not None:
+            low, high = side
+            words[alone[n]] = ""
+        fitted.append(
+            Fitted(
+                key=each.key, value=value, low=low, high=high, identified=low is not None and high is not None,
+                deviation=None if deviation is None else slope * deviation,
+            )
+        )  # fmt: skip
+    words += [each.half_known for each in fitted]
+    return tuple(fitted), tuple(word for word in words if word)
+
+
+def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float, float | None] | None:
+    """The interval of a number that does not matter where it is, but would if it were larger, or smaller.
+
+    A payload of next to nothing is at most so heavy, a clamp that is all but rigid at least so stiff.  The others are
+    held: what they could take back is no more than a factor of the end.
+    """
+    each, limits = found.problem.parameters[n], (found.problem.bounds[0][n], found.problem.bounds[1][n])
+    if not each.by_logarithm:
+        return None
+
+    def excess(at: float) -> float:
+        point = found.point.copy()
+        point[n] = at
+        residuals = found.problem.residuals(point)
+        return float(residuals @ residuals) - found.chi_squared - quantile**2
+
+    ends: list[float | None] = []
+    for way in (-1, 1):
+        steps = (found.point[n] + way * reach for reach in REACHES)
+        inside = [float(at) for at in steps if limits[0] <= at <= limits[1]]
+        beyond = next((at for at in inside if excess(at) > 0), None)
+        ends.append(None if beyond is None else float(brentq(excess, found.point[n], beyond, xtol=1e-4)))
+    if ends == [None, None]:
+        return None
+    low, high = ends
+    return 0.0 if low is None else each.value(low), None if high is None else each.value(high)
+
+
+def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, held: dict[int, float]) -> float:
+    """Where the least sum of squares with coordinate n held has grown by quantile^2, on one side of the best.
+
+    The root of that growth is nearly linear in the coordinate, so a secant finds it in two or three steps.
+    """
+    low, high = found.problem.bounds[0][n], found.problem.bounds[1][n]
+    rest = [m for m in range(found.point.size) if m != n and m not in held]
+    slope = np.zeros(found.point.size)  # of the others where n is held elsewhere
+    slope[rest] = -np.linalg.lstsq(found.jacobian[:, rest], found.jacobian[:, n], rcond=None)[0]
+    slope[n] = 1.0
+    near, root_near = float(found.point[n]), 0.0
+    at = near + way * quantile * deviation
+    for _ in range(SECANT_STEPS):
+        at = float(np.clip(at, low, high))
+        start = found.point + slope * (at - found.point[n])
+        there = nearest_minimum(found.problem, start, held | {n: at})
+        growth = there.chi_squared - found.chi_squared
+        if growth < -BETTER:
+            raise BetterError(there)
+        root = math.sqrt(max(growth, 0.0))
+        if abs(root - quantile) < LEVEL_REACHED or (at in (low, high) and root < quantile):
+            return at
+        step = (quantile - root) * (at - near) / (root - root_near) if root != root_near else 2 * (at - near)
+        near, root_near, at = at, root, at + float(np.clip(step, -3 * abs(at - near), 3 * abs(at - near)))
+    return at
+
+
+def _said(axis: Real, keys: Sequence[str]) -> str:
+    """A direction along which nothing changes, in words; of two numbers, the combination that is known instead."""
+    part = [n for n in np.argsort(-abs(axis)) if abs(axis[n]) > TAKES_PART]
+    names = [keys[n] for n in part]
+    if len(part) == 1:
+        return f"{names[0]} is not determined by these data"
+    if len(part) == 2:
+        power = -axis[part[0]] / axis[part[1]]  # first * second^power does not change along the axis
+        known = f"{names[0]} {'*' if power > 0 else '/'} {names[1]}"
+        known += "" if abs(abs(power) - 1) < ROUND else f"^{abs(power):.3g}"
+        return f"{names[0]} and {names[1]} are not determined by these data: only {known} is"
+    shares = ", ".join(f"{name} {axis[n] / abs(axis[part[0]]):+.3g} %" for name, n in zip(names, part, strict=True))
+    return f"not determined by these data: {shares} together change nothing"

@@ -8,22 +8,33 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, PLANE, as_law, shown_unit
+from tfarm.arm import (
+    ANGLE_GAIN,
+    LISTED,
+    PLANE,
+    SPELT_OUT,
+    AnyLaw,
+    Arm,
+    Law,
+    as_law,
+    input_words,
+    shown_unit,
+    unit_of,
+)
 from tfarm.arrays import Real, Whole
 from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
 from tfarm.crossing import Window
 from tfarm.digits import general, lined, plain, significant, singly, within
 from tfarm.response.answers import HERTZ
+from tfarm.response.signals import Signals
 from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
-from .law_answers import convention, law_answer, signals_answer
-from .lyapunov import lyapunov
 from .margins import LoopMargins, Margins
 from .nyquist import Nyquist
 from .plane import INFINITE, Plane
 from .poles import Poles
 from .spill import SPILL, Spill
-from .theorem import signs_of_loop
+from .theorem import lyapunov, signs_of_loop
 from .windows import Windows, reach_words
 
 WINDOW_DIGITS, PAGE_WINDOW_DIGITS = 8, 5  # of the ends of a window, on a terminal and on a page
@@ -38,6 +49,47 @@ POLE_COLUMNS = (  # of complex poles [1/s]
     Column("damping_percent", "damping ratio", "%", digits=singly(significant, 4), on=REPORT,
            of=lambda pole: -100 * pole.real / abs(pole) + 0.0 if pole else ""),
 )  # fmt: skip
+
+
+LAW_IN_WORDS = f"u = -{SPELT_OUT} + r"
+
+
+def sign_of(arm: Arm) -> str:
+    """The law, and what a gauge reads of a static torque: with it the sign of its gain; of a rig what u is."""
+    if arm.is_uniform and arm.has_rigid_mode:
+        return f"{LAW_IN_WORDS}; a static torque u gives the moment -(J - I_h)/J u"
+    if not arm.has_rigid_mode:
+        return f"{LAW_IN_WORDS}; u is {input_words(arm)}"
+    share = arm.gauged_inertia / arm.total_inertia
+    static = f"a static torque at the hub gives the moment {-share:.6g} times as much"
+    return f"{LAW_IN_WORDS}; u is {input_words(arm)}, and {static}"
+
+
+def law_answer(law: AnyLaw, arm: Arm) -> dict[str, Any]:
+    """The gains, with the sign convention that they need, and what the loop closes through; or what a law reads."""
+    plain = as_law(law)
+    return signals_answer(plain, arm) if plain.gains is None else plain.gains.by_name | convention(arm)
+
+
+def signals_answer(law: Law, arm: Arm) -> dict[str, Any]:
+    """What a law reads, of which order, how late, and what it drives."""
+    sign = "-" if law.sign < 0 else "+"
+    late = f", {law.delay:g} s late" if law.delay else ""
+    words = f"v = {sign}sum of C_i(s) y_i{late}; v is {input_words(arm)}, y = ({', '.join(law.signals)})"
+    return {
+        "law": law.name,
+        "signals": dict(zip(law.signals, Signals(arm, law.signals).units, strict=True)),
+        "law_order": law.order,
+        "delay_s": law.delay,
+        "sign_convention": words,
+        "input": arm.input,
+    }
+
+
+def convention(arm: Arm) -> dict[str, Any]:
+    """Of the answers of every loop: the sign of the moment's gain, the input, and each gain's unit."""
+    units = {gain.name: unit_of(gain.name, arm) for gain in LISTED}
+    return {"sign_convention": sign_of(arm), "input": arm.input, "gain_units": units}
 
 
 class GainRow(NamedTuple):

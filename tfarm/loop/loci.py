@@ -1,27 +1,40 @@
-"""The exact locus of a gain with that of a reduced model, and a locus as plain data."""
+"""A locus beside that of a reduced model, where it damps the first mode most, and as plain data.
+
+Where a gain varies the reduced locus is `control.root_locus_map` on the loop of a modal model opened at that gain, the
+other gains closed before; for a parameter of the arm, which python-control cannot vary, the poles of a reduced closed
+loop at a few values.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
-from tfarm.arm import NAMES, Arm, HubFeedback, as_law, unit_of
-from tfarm.arrays import Complex
+from tfarm.arm import FED_BACK, NAMES, Arm, HubFeedback, as_law, unit_of
+from tfarm.arm.blocks import Matrices
+from tfarm.arm.checks import whole
+from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.columns import Column
+from tfarm.crossing.following import between
+from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
+from tfarm.reduced import modal_model
+from tfarm.spectrum import modes
 
-from .crossings import crossing_answers
-from .law_answers import law_answer, signals_answer
-from .locus import Locus, locus
-from .most_damped import most_damped
-from .reduced_locus import ReducedLocus, reduced_locus
-from .varied import ARM_PARAMETERS
+from .answers import law_answer, signals_answer
+from .locus import Locus, crossing_answers, locus
+from .varied import ARM_PARAMETERS, OF_THE_LAW
+
+if TYPE_CHECKING:
+    import control
 
 LOCUS_POINTS, LOCUS_BRANCHES = 300, 7  # values of the gain, and branches
 POLE_DIGITS = 10  # digits of |s| that are drawn and written: poles differ from processor to processor by 1e-14 at most
-GAPS_HELD = 5  # digits of a gap, 1e-5 of |s| or less between two such poles
+GAPS_HELD = 3  # digits of a gap, 1e-5 of |s| or less: a reduced pole is right to 1e-12 of that
 GAP_NOTE = (
     "largest distance of a branch from the reduced one, over |s| or the arm's first flexible frequency, the larger"
 )
@@ -31,6 +44,141 @@ BRANCHES_NOTE = (
     "followed: beyond -1/C, where real poles accumulate; outside the box of a law. Crossings of poles on no branch are "
     "listed too (branch null)."
 )
+LEAST_ORDER = 20  # of the model, ten modes, where no order is asked for
+MODES_BEYOND_BRANCHES = 2  # modes of the reduced model above the last branch, if the order is not said
+REDUCED_VALUES = 9  # values at which an arm is reduced anew, where a parameter of it varies
+ROUND_POINTS = 17  # of each round between two neighbours, so that it is an eighth as wide as the one before
+NARROWEST_ROUND = 1e-7  # of the gain: where rounds end; a damping ratio, flat there, is known to 1e-14 of its curvature
+
+
+@dataclass(frozen=True)
+@record
+class ReducedLocus:
+    """Poles of a reduced closed loop of that `order`, next to the exact branches, at the values `gain` (m,).
+
+    `branches` (b, m) [1/s] are the reduced poles paired one to one with the exact ones so that the sum of distances is
+    least; `gap` (b,) is the largest distance of each branch, as a share of |s| or, if that is more, of the arm's first
+    flexible frequency.
+    """
+
+    order: int
+    gain: Real
+    branches: Complex
+    gap: Real
+
+    @property
+    def worst(self) -> float:
+        """The largest gap of all branches."""
+        return float(self.gap.max())
+
+
+def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
+    """The locus by python-control on a modal model of that order, or of one two modes beyond the last branch.
+
+    Raises ParameterError if the order is odd or has no room for as many poles as there are branches.
+    """
+    arm, rigid = exact.arm, exact.arm.has_rigid_mode
+    least = int(exact.mode.max()) + rigid
+    if order is None:
+        order = max(LEAST_ORDER, 2 * (least + MODES_BEYOND_BRANCHES))
+    remedy = f"an even number from {2 * least}: two a mode"
+    order = whole("order", order, 2 * least, math.inf, remedy)
+    if order % 2:
+        raise ParameterError(key="order", value=order, remedy=remedy)
+    count = order // 2 - rigid
+    if exact.vary in OF_THE_LAW:
+        which = np.arange(exact.gain.size)
+        poles = root_locus(arm, exact.gains, exact.vary, exact.gain, count)
+    else:
+        which = np.unique(np.linspace(0, exact.gain.size - 1, REDUCED_VALUES).round().astype(int))
+        arms = [exact.varied.at(float(value)).arm for value in exact.gain[which]]
+        none = np.zeros(len(FED_BACK))
+        closed = [_closed(each, np.array(exact.gains.row), count, none)[0][0] for each in arms]
+        poles = np.array([np.linalg.eigvals(A) for A in closed])
+    branches = exact.branches[:, which]
+    paired = np.full(branches.shape, np.nan, complex)
+    for n, (zeros, found) in enumerate(zip(branches.T, poles, strict=True)):
+        _, chosen = linear_sum_assignment(np.nan_to_num(abs(zeros[:, None] - found)))
+        paired[:, n] = np.where(np.isnan(zeros), np.nan, found[chosen])
+    size = np.maximum(abs(branches), modes(arm, 1).natural_frequency[-1])
+    return ReducedLocus(order, exact.gain[which], paired, np.fmax.reduce(abs(paired - branches) / size, axis=1))
+
+
+def reduced_of(exact: Locus) -> ReducedLocus | None:
+    """The same of gains at the hub, of which there is a reduced locus; None of another law or number."""
+    return None if exact.in_box else reduced_locus(exact)
+
+
+def root_locus(arm: Arm, law: HubFeedback, vary: str, gain: Real, count: int) -> Complex:
+    """`control.root_locus_map` of the loop opened at what varies, a modal model of `count` modes: (gains, order)."""
+    import control
+
+    try:
+        return np.asarray(control.root_locus_map(open_loop(arm, law, vary, count), gain).loci)
+    except np.linalg.LinAlgError as error:  # it works with coefficients of s^n, which overflow at high frequencies
+        raise ConvergenceError(f"python-control cannot follow a model of this arm: {error}", arm.name, count) from None
+
+
+def open_loop(arm: Arm, law: HubFeedback, vary: str, count: int) -> control.StateSpace:
+    """The loop function to be multiplied by the varied gain, all other gains closed; state space of a modal model."""
+    import control
+
+    moving = np.array(law.row) if vary == "all" else np.array(HubFeedback().having(vary, 1.0).row)
+    fixed = np.zeros(moving.size) if vary == "all" else np.array(law.having(vary, 0.0).row)
+    (A, B, C, D), row = _closed(arm, fixed, count, moving)
+    return control.StateSpace(A, B, row @ C, row @ D)
+
+
+def _closed(arm: Arm, fixed: Real, count: int, moving: Real) -> tuple[Matrices, Real]:
+    """The model of the outputs that either row of gains uses, closed by the fixed one, and the other on its outputs."""
+    used = (fixed != 0) | (moving != 0)
+    used[FED_BACK.index("hub_rate")] |= not used.any()
+    used[FED_BACK.index("hub_angle")] |= bool(arm.rate_loss) and arm.has_rigid_mode  # or its pole at 0 is not a state
+    model = modal_model(arm, [name for name, is_used in zip(FED_BACK, used, strict=True) if is_used], count)
+    return model.closed(fixed[used]), moving[None, used]
+
+
+@dataclass(frozen=True)
+@record
+class MostDamped:
+    """The `gain` at which mode 1 has its largest `damping_ratio`, and whether it still swings on all of the way there
+    from it (`swings_on`) and is damped less beyond (`falls`)."""
+
+    gain: float
+    damping_ratio: float
+    swings_on: bool
+    falls: bool
+
+
+def most_damped(found: Locus) -> MostDamped | None:
+    """The first mode's largest damping ratio along a gain; None where its branch is not followed all the way.
+
+    Where it is the largest of the locus's values with a neighbour on either side that swings too, it is looked for
+    between these, on ever narrower grids; at an end of the range it is that of the locus's own value.
+    """
+    rows = found.branches[(found.mode == 1) & (found.branches.imag > 0).any(axis=1)]
+    rows = rows[~np.isnan(rows).any(axis=1)]
+    if found.vary not in NAMES or not rows.size:
+        return None
+    way, ratios = int(np.sign(found.gain[-1] - found.gain[0])), damping_ratios(rows[0])
+    at = int(np.argmax(ratios))
+    best, near = (float(found.gain[at]), float(ratios[at])), slice(at - 1, at + 2)
+    gain, branch = found.gain[near][::way], rows[0][near][::way]
+    inside = 0 < at < ratios.size - 1 and (branch.imag > 0).all()
+    while inside and gain[2] - gain[0] > NARROWEST_ROUND * abs(gain[1]):
+        grid = np.linspace(gain[0], gain[2], ROUND_POINTS)
+        found_there = between(found.varied, gain, branch[:, None], grid)[:, 0]
+        top = int(np.nanargmax(damping_ratios(found_there)))
+        if not 0 < top < ROUND_POINTS - 1:
+            break
+        gain, branch = grid[top - 1 : top + 2], found_there[top - 1 : top + 2]
+        best = float(gain[1]), float(damping_ratios(branch[1:2])[0])
+    return MostDamped(*best, bool((rows[0][at:].imag > 0).all()), at < ratios.size - 1)
+
+
+def damping_ratios(s: Complex) -> Real:
+    """-Re s/|s| of poles that swing; -inf of real ones."""
+    return np.where(s.imag > 0, -s.real / np.maximum(abs(s), LEAST_SIZE), -np.inf)
 
 
 @dataclass(frozen=True)

@@ -3,30 +3,41 @@
 At a few values the winding number says how many poles a box holds: there the list is complete.  In between each pole
 is followed (`tfarm.crossing.following`), vectorised over values and poles.  Branches are named after the modes of the
 rig without feedback: the whole law grows from 0 to what it is at the first value, and each pole is followed there.
+
+Crossings are solved for gain and frequency together, not interpolated.  Along a number of the law in which D is linear
+D-decomposition has every one (`tfarm.crossing`); each is that of the branch that changes sides there, or of a pole on
+none.  Along another number the branch is followed to it.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import cast
+from itertools import pairwise
+from typing import Any, cast
 
 import numpy as np
+from scipy.optimize import brentq
 
-from tfarm.arm import AnyLaw, Arm, HubFeedback
+from tfarm.arm import FED_BACK, NAMES, PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real, Whole
+from tfarm.crossing import Crossing, crossed
 from tfarm.crossing.following import assigned, between, follow
 from tfarm.crossing.turning import loose
-from tfarm.errors import ConvergenceError
+from tfarm.errors import ConvergenceError, ParameterError, must_be_known
 from tfarm.records import record
+from tfarm.response.frequency import AXIS_SHARE
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.damped import single_zeros
 
-from .crossings import BranchCrossing, branch_crossings, in_words
-from .varied import Varied
+from .loop import grid
+from .varied import ARM_PARAMETERS, OF_THE_LAW, Varied
+from .windows import line_crossings
 
+LOCUS_VALUES, LAW_LOCUS_VALUES = 500, 100  # values of a locus by default: of gains, of any other law
 MOST_LOCUS_POINTS = 100_000  # values, those between that make it round among them
 MOST_BRANCHES = 200  # and flexible modes below the top of the box
 COMPANY = 2  # flexible modes followed beyond the box, whose poles may come into it
@@ -34,6 +45,13 @@ NODES = 3  # values after the first at which the poles of the box are counted
 SAME_POLE = 1e-6  # of its size: a pole found by two searches
 HALVING_ROUNDS = 24  # of halving at most: where two branches meet their distance goes with the root of that of the gain
 LEAST_WIDTH, LEAST_HEIGHT = 1e-12, 1e-9  # of a picture, of the size of its poles: less is rounding of one that stands
+AT_ORIGIN = 1e-9  # of the largest of its branch: a pole so near to 0 is there but for the last step of its correction
+SAME_CROSSING = 1e-3  # of the highest frequency: so near is a crossing of a branch to where its points say that it is
+AT_END = 1e-9  # of the range: a crossing so near to an end is at the end, and not between
+GAIN_KNOWN = 1e-15  # of the larger end of a step: the value at which a branch crosses
+JUST_ABOVE = 1.01  # times the highest frequency of a branch: between two values it may be higher
+STEP = 1e-6  # of a frequency, for a difference
+CROSSINGS_SHOWN = 3  # of a locus in words
 
 
 @dataclass(frozen=True)
@@ -93,13 +111,28 @@ class Locus:
 
 
 def locus(
-    arm: Arm, law: AnyLaw, vary: str, start: float, stop: float, points: int, branches: int, in_box: bool = False
+    arm: Arm, law: AnyLaw, vary: str, start: float, stop: float, points: int | None = None, branches: int = 10
 ) -> Locus:
-    """Return the exact locus at `points` equally spaced values from `start` to `stop`.
+    """The closed-loop poles of the exact arm as one number goes from `start` to `stop`, at equally spaced values.
 
-    It has the first `branches` branches; with `in_box` those in a box as high as so many flexible modes.  Raises
-    ParameterError for what is no loop or no range, ConvergenceError where branches cannot be told apart.
+    `vary` is a gain, "all" (a scale on the gains), payload_mass, payload_inertia, hub_inertia, length or damping; of a
+    law of signals "gain" (a factor on it), "delay", a signal, "SIGNAL.num.N" or "SIGNAL.den.N", too.  Along these, and
+    of any other `Law` than gains at the hub, the record has all poles of a box as high as the first `branches` flexible
+    modes, with 100 values unless `points` says otherwise; else that many branches, with 500.
+    Raises ParameterError for what is no law, no loop or no range, ConvergenceError where branches cannot be told apart.
     """
+    (arm, plain), gains = arm_and_law(arm, law), as_law(law).gains
+    if not isinstance(vary, str):
+        raise ParameterError(key="vary", value=vary, remedy=f"the name of what varies, such as {PLANE[1]} or length")
+    known = (*OF_THE_LAW, *ARM_PARAMETERS)
+    in_box = gains is None or vary not in known
+    if gains is not None:
+        must_be_known("vary", vary.partition(".")[0], (*known, "gain", "delay", *FED_BACK))
+        if vary == "all" and gains == HubFeedback():
+            remedy = f"every gain is 0: give {' or '.join(NAMES)} to be scaled"
+            raise ParameterError(key="vary", value="all", remedy=remedy)
+    law = as_law(law) if in_box else plain
+    points = (LAW_LOCUS_VALUES if in_box else LOCUS_VALUES) if points is None else points
     points = whole("points", points, 2, MOST_LOCUS_POINTS, f"a whole number from 2 to {MOST_LOCUS_POINTS}")
     branches = whole("branches", branches, 1, MOST_BRANCHES, f"a whole number from 1 to {MOST_BRANCHES}")
     number = branches if in_box else max(1, branches - 2 * arm.has_rigid_mode)
@@ -241,3 +274,139 @@ def frame(branches: Complex) -> tuple[float, float, float, float]:
     wide = max(right - left, LEAST_WIDTH * float(abs(points).max())) or 1.0  # where no pole moves from 0
     tall = max(high - low, LEAST_HEIGHT * high) or wide  # where none of them swings
     return left, left + wide, low, low + tall
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BranchCrossing:
+    """One branch of a locus crosses the imaginary axis at s = i `omega` [rad/s], where what varies is `gain`.
+
+    `omega` is 0 or infinite where a real pole goes through the origin or through infinity.  `branch` is its number in
+    the locus, None for a pole on none of them, or between two points; `direction` is "unstable" where the real part
+    becomes positive as the locus runs, and "stable" where it becomes negative.
+    """
+
+    gain: float
+    omega: float
+    branch: int | None
+    direction: str
+
+    @property
+    def frequency_hz(self) -> float:
+        """omega in Hz."""
+        return self.omega / (2 * math.pi)
+
+
+def in_words(vary: str, crossings: Sequence[BranchCrossing]) -> str:
+    """Where poles cross the imaginary axis as one number varies, the first `CROSSINGS_SHOWN` of them."""
+    if not crossings:
+        return "no branch crosses the imaginary axis"
+    first = ", ".join(f"{each.direction} at {vary} = {each.gain:.6g}" for each in crossings[:CROSSINGS_SHOWN])
+    more = len(crossings) - CROSSINGS_SHOWN
+    return f"a pole becomes {first}{f' and {more} more' if more > 0 else ''}"
+
+
+def crossing_answers(found: Iterable[BranchCrossing]) -> list[dict[str, Any]]:
+    """The crossings as plain dictionaries."""
+    return [
+        {
+            "gain": each.gain,
+            "omega_rad_s": each.omega,
+            "frequency_hz": each.frequency_hz,
+            "branch": each.branch,
+            "direction": each.direction,
+        }
+        for each in found
+    ]
+
+
+def branch_crossings(family: Varied, gain: Real, branches: Complex, top: float) -> tuple[BranchCrossing, ...]:
+    """Return the crossings of the imaginary axis in the order in which they come.
+
+    Of a damped rig along a number of its law those of poles on no branch too, up to `top` [rad/s].
+    """
+    sign, span = float(np.sign(gain[-1] - gain[0])), abs(float(gain[-1] - gain[0]))
+    changes, is_damped = _changes(branches), not family.is_reactive
+    band = max(top, JUST_ABOVE * float(np.nanmax(branches.imag, initial=0.0)))
+    known = _on_line(family, gain, band) if changes or is_damped else []
+    found: list[BranchCrossing] = []
+    for number, low, high in changes:
+        ends, points = gain[[low, high]], branches[number, [low, high]]
+        at, omega = _crossed(family, ends, points, known, top)
+        direction = "unstable" if points[1].real > points[0].real else "stable"
+        found.append(BranchCrossing(gain=at, omega=omega, branch=number, direction=direction))
+    seen = {(each.gain, each.omega) for each in found}
+    for t, omega, change in known if is_damped else ():
+        is_between = AT_END * span < sign * (t - float(gain[0])) < (1 - AT_END) * span
+        if is_between and not top < omega < math.inf and (t, omega) not in seen:
+            direction = "unstable" if sign * change > 0 else "stable"
+            found.append(BranchCrossing(gain=t, omega=omega, branch=None, direction=direction))
+    return tuple(sorted(found, key=lambda each: (sign * each.gain, each.omega)))
+
+
+def _on_line(family: Varied, gain: Real, top: float) -> list[Crossing]:
+    """The crossings by D-decomposition where D is linear in the number; else none."""
+    if family.is_of_arm or family.vary == "delay":
+        return []
+    loop = family.first.under(family.full)
+    if family.is_reactive:
+        t, at, change = crossed(np.asarray(grid(loop.arm, top)), family.on_axis)
+        return [Crossing(*each) for each in zip(_corrected(family, t, at), at, change, strict=True)]
+    name = "gain" if family.vary == "all" else family.vary
+    return list(line_crossings(loop, name, float(gain.min()), float(gain.max()), top))
+
+
+def _corrected(family: Varied, t: Real, at: Real) -> Real:
+    """The gains for what a frequency is off in its last bit, by a step of Newton's method for both.
+
+    Of D + B dt + D' dw = 0 the part across D' is one for dt alone.
+    """
+    (A, B), (after, by_after), (before, by_before) = (family.on_axis(at * (1 + d)) for d in (0.0, STEP, -STEP))
+    slope = (after + t * by_after) - (before + t * by_before)
+    with np.errstate(all="ignore"):
+        return np.asarray(t - ((A + t * B) * slope.conj()).imag / (B * slope.conj()).imag)
+
+
+def _changes(branches: Complex) -> list[tuple[int, int, int]]:
+    """Each branch that changes sides with the numbers of its last value before and the first after.
+
+    Points on the axis are left out; one of them that is at i w becomes a real one off it, too.  A mirror image is not
+    listed.
+    """
+    size = abs(branches)
+    largest = np.nanmax(np.where(np.isnan(size), 0.0, size), axis=1)[:, None]
+    on_axis = (abs(branches.real) <= AXIS_SHARE * size) | (size <= AT_ORIGIN * largest)
+    side = np.where(on_axis | np.isnan(branches), 0, np.sign(branches.real)).astype(int)
+    found = []
+    for number, (sides, poles) in enumerate(zip(side, branches, strict=True)):
+        across = [(a, b) for a, b in pairwise(np.flatnonzero(sides)) if sides[a] != sides[b]]
+        left = np.flatnonzero((sides[:-1] == 0) & (sides[1:] != 0))
+        away = [(n, n + 1) for n in left if poles[n].imag > 0 == poles[n + 1].imag]
+        listed = [(int(a), int(b)) for a, b in sorted({*across, *away}) if poles[a].imag >= 0 <= poles[b].imag]
+        found += [(number, a, b) for a, b in listed if not np.isnan(poles[a : b + 1]).any()]
+    return found
+
+
+def _crossed(family: Varied, ends: Real, points: Complex, known: Sequence[Crossing], top: float) -> tuple[float, float]:
+    """The value between two at which a branch is on the axis, and the frequency there."""
+    low, high = sorted(ends.tolist())
+    omegas = sorted(abs(points.imag).tolist())
+    wide = SAME_CROSSING * top + (omegas[1] - omegas[0])
+    near = [each for each in known if low <= each.t <= high and omegas[0] - wide <= each.at <= omegas[1] + wide]
+    if near:
+        share = points.real[0] / (points.real[0] - points.real[1])
+        best = min(near, key=lambda each: abs(each.at - abs((points[0] + share * (points[1] - points[0])).imag)))
+        return best.t, best.at
+    tolerance = GAIN_KNOWN * max(abs(low), abs(high))
+    if not points.imag.all() and family.at_rest(low) * family.at_rest(high) <= 0:
+        return float(brentq(family.at_rest, low, high, xtol=tolerance)), 0.0
+
+    def pole(value: float) -> complex:
+        share = (value - ends[0]) / (ends[1] - ends[0])
+        found = family.near(np.array([value]), np.array([[points[0] + share * (points[1] - points[0])]]))[0, 0]
+        if np.isnan(found):
+            text = f"a crossing of the imaginary axis near {family.vary} = {value:.6g} could not be solved for"
+            raise ConvergenceError(text, value, found)
+        return complex(found)
+
+    at = float(brentq(lambda value: pole(value).real, low, high, xtol=tolerance))
+    return at, abs(pole(at).imag)

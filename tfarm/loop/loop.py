@@ -5,12 +5,19 @@
 q being the common denominator of the law and p_i/q its entries: D has no poles but those of a damped link's -1/C, so
 its zeros can be counted.  Where the law and the rig share a zero and a pole D keeps both: what is cancelled is seen.
 Gains at the hub are a law of order 0 on hub angle, hub rate and root moment.
+
+Along s = i w the loop function is steep at the arm's natural frequencies, at those with the hub locked (zeros of the
+hub angle) and with the hub free of inertia (zeros of the root moment); at small C these features are as narrow as C
+w^2. So a grid has points at geometric distances around each.
 """
 
 from __future__ import annotations
 
+import itertools
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, cast
 
 import numpy as np
@@ -18,23 +25,34 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback, Law, as_law, cancelled, full_law, must_be_arm, must_not_be_algebraic
 from tfarm.arm.law import Part
-from tfarm.arrays import LEAST_SIZE, Complex
+from tfarm.arrays import Complex
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, LoopParts, deflated, difference_steps
 from tfarm.exact.system import System
 from tfarm.records import record
 from tfarm.response.signals import Signals
-from tfarm.spectrum.scales import check_gains, first_frequency
+from tfarm.spectrum import flexible_frequencies, modes, modes_below
+from tfarm.spectrum.frequencies import ARMS_KEPT
+from tfarm.spectrum.table import check_gains, first_frequency
 
 FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: how far right an improper law is looked at
 UNDISPERSED = 1e11  # of w1: where waves are no longer dispersed
 FALL_FACTOR = 0.5  # L must fall by this there, from one to the next
 SOMEWHERE = 0.31 + 0.71j  # of w1: where it is seen whether a signal is fed back at all; no law has its zero there
 NO_ORDER = 99  # of a zero at s = 0, of what is not fed back: above that of any part
-SMALLEST_NORMAL = float(np.finfo(float).tiny)  # a smaller double has not all its digits
+LEAST_GAIN = 1e-100  # N m s/rad, N m/rad or pure: the squares of what is slower than such a gain makes are no doubles
 NEAREST_TO_ORIGIN = 1e-12  # of w1: where a function, its zeros at 0 divided out, is taken for its value at 0
 ROUNDING_AT_REST = 1e-13  # of the terms of D: less is left by their rounding where they cancel at s = 0
 ORDER_READ_AT = (2e-5, 1e-5)  # of w1: where the order of a zero at s = 0 is read off
+NEAREST_TO_STEEP, FARTHEST_FROM_STEEP = 1e-10, 0.06  # distances from a steep place, as shares of its frequency
+POINTS_BESIDE_STEEP = 14  # of a grid on either side of a steep place, one and a half a decade
+POINTS_BETWEEN_STEEP = 24  # and between two of them
+STEEP_BEYOND = 1.05  # of the end of a grid: the points of steep places up to there reach below it
+SLOWEST = 1e-6  # of the first steep place: where a grid begins, as nothing bends there
+POINTS_BELOW_STEEP = 60  # from there to that place, ten a decade
+QUIET_REACH = 100.0  # bands up to which |L| is looked at beyond a band: two decades of its fall
+MOST_RESONANCES = 2000  # looked at in them: 20 ms
+MOST_BAND_MODES = 150  # flexible: what is not settled within so many is left open
 
 
 @dataclass(frozen=True)
@@ -124,8 +142,9 @@ class Loop:
     def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
         """Denominator and numerator of L at s, up to one factor: finite at poles too."""
         s = np.asarray(s, dtype=complex)
-        drive, fed_back, _ = self._parts(s, self.signals.kept(s))
-        return drive, fed_back
+        drive, numerators, _ = self.signals.kept(s)
+        entries, whole = self.law.polynomials(s)
+        return drive * whole, np.exp(-s * self.law.delay) * (entries * numerators).sum(axis=0)
 
     def loop_function(self, s: NDArray[Any]) -> Complex:
         """L(s): closed-loop poles are at L = -1.  Infinite at poles of the rig or of the law."""
@@ -169,13 +188,12 @@ class Loop:
     def function(self, s: Complex) -> Analytic:
         """D/s^n, n = `zeros_at_origin`, with slopes from differences."""
         s = np.where(s == 0, NEAREST_TO_ORIGIN * first_frequency(self.arm), np.asarray(s, dtype=complex))
-        h = difference_steps(self.k, s)
-        at = np.array([s, s + h, s - h])
-        drive, fed_back, scale = self._parts(at, self.signals.parts(at))
-        scale = scale - self.delay_of_waves * at
-        with np.errstate(over="ignore", invalid="ignore"):  # far from where it is large: no number, and no start
-            up, down = (drive + fed_back)[1:] * np.exp(scale[1:] - scale[0])
-            return deflated((drive + fed_back)[0], (up - down) / (2 * h), scale[0], s, self.zeros_at_origin)
+
+        def characteristic(at: Complex) -> tuple[Complex, Complex]:
+            of_rig = self.signals.parts(at)
+            return self.characteristic(at, of_rig), of_rig.scale - self.delay_of_waves * at
+
+        return by_differences(self.k, characteristic, s, self.zeros_at_origin)
 
     @cached_property
     def delay_of_waves(self) -> float:
@@ -189,17 +207,6 @@ class Loop:
         entries, whole = self.law.polynomials(s)
         late = np.exp(-s * self.law.delay)
         return np.asarray(of_rig.drive * whole + late * (entries * of_rig.numerators).sum(axis=0))
-
-    def _parts(self, s: Complex, of_rig: LoopParts) -> tuple[Complex, Complex, Complex]:
-        """drive q, the fed back sum, both times e^{-scale}, and scale."""
-        drive, numerators, scale = of_rig
-        entries, whole = self.law.polynomials(s)
-        fed_back = (entries * numerators).sum(axis=0)
-        late = s * self.law.delay
-        shift = np.maximum(0.0, -late.real)  # left of the axis the delayed part is the larger one
-        drive, fed_back = drive * whole * np.exp(-shift), fed_back * np.exp(-late - shift)
-        size = np.maximum(np.maximum(abs(drive), abs(fed_back)), LEAST_SIZE)
-        return drive / size, fed_back / size, scale + shift + np.log(size)
 
     def _must_fall(self) -> None:
         """Refuse a law that asks for more than the rig gives at once: then its loop is algebraic."""
@@ -226,6 +233,17 @@ class Loop:
         return cancelled(self.law)
 
 
+def by_differences(
+    k: System, characteristic: Callable[[Complex], tuple[Complex, Complex]], s: Complex, at_zero: int
+) -> Analytic:
+    """D/s^at_zero at s (n,), not 0, with slopes from differences; `characteristic` gives D e^{-scale} and scale."""
+    h = difference_steps(k, s)
+    with np.errstate(over="ignore", invalid="ignore"):  # far from where it is large: no number, and no start
+        D, scale = characteristic(np.array([s, s + h, s - h]))
+        up, down = D[1:] * np.exp(scale[1:] - scale[0])
+        return deflated(D[0], (up - down) / (2 * h), scale[0], s, at_zero)
+
+
 def _passes_moment_on(part: Part) -> bool:
     """Whether a part of a law takes the root moment and gives some of it at once."""
     if "root_moment" not in part.signals or part.block.excess != 0:
@@ -238,9 +256,61 @@ def _must_be_possible(arm: Arm, gains: HubFeedback) -> None:
     if gains.K2 and arm.is_undamped and not (arm.hub_side_inertia or arm.reads_hub_moment):
         remedy = "with hub.inertia = 0 and no damping K2 moves poles through infinity; use K2 = 0 or some inertia"
         raise ParameterError(key="K2", value=gains.K2, remedy=remedy)
-    least = SMALLEST_NORMAL * max(1.0, arm.total_inertia if arm.has_rigid_mode else 1.0)
+    least = LEAST_GAIN * max(1.0, arm.total_inertia if arm.has_rigid_mode else 1.0)
     for name, value in gains.by_name.items():
         if 0 < abs(value) < least:
-            remedy = f"0, or at least {least:.1e} in size: of less the double has not all its digits"
+            remedy = f"0, or at least {least:.1e} in size: no double has the square of what is as slow"
             raise ParameterError(key=name, value=value, remedy=remedy)
     check_gains(arm, gains)
+
+
+@lru_cache(maxsize=ARMS_KEPT)
+def steep_places(arm: Arm, up_to: float) -> Any:
+    """Natural frequencies [rad/s] with the arm's own hub, with a locked one and with none, ascending; read-only."""
+    pin = replace(arm, hub=replace(arm.hub, inertia=0.0, friction=0.0, stiffness=0.0), motor=None, input="hub_torque")
+    others = (arm, arm.having(hub_inertia=math.inf), pin)
+    places = np.unique(np.concatenate([flexible_frequencies(each, up_to) for each in others]))
+    places.flags.writeable = False
+    return places
+
+
+@lru_cache(maxsize=ARMS_KEPT)
+def grid(arm: Arm, up_to: float) -> Any:
+    """Frequencies [rad/s] from a millionth of the first natural one to `up_to`, dense at steep places; read-only."""
+    places = np.asarray(steep_places(arm, STEEP_BEYOND * up_to))
+    lowest = SLOWEST * min(up_to, places[0] if places.size else up_to)
+    away = np.geomspace(NEAREST_TO_STEEP, FARTHEST_FROM_STEEP, POINTS_BESIDE_STEEP)
+    close = (places[:, None] * (1 + np.r_[-away[::-1], away])).ravel()
+    corners = np.r_[lowest, places[places < up_to], up_to]
+    between = np.concatenate(
+        [np.linspace(a, b, POINTS_BETWEEN_STEEP, endpoint=False) for a, b in itertools.pairwise(corners)]
+    )
+    slow = np.geomspace(lowest, corners[1], POINTS_BELOW_STEEP)
+    omega = np.unique(np.concatenate([close, between, slow]))
+    omega = np.append(omega[(omega >= lowest) & (omega < up_to)], up_to)
+    omega.flags.writeable = False
+    return omega
+
+
+@lru_cache(maxsize=ARMS_KEPT)
+def band_of(arm: Arm, number: int) -> float:
+    """A frequency [rad/s] half-way between two natural ones, with so many flexible modes below."""
+    omega = modes(arm, number + 1).natural_frequency
+    return float((omega[-1] + omega[-2]) / 2)
+
+
+@lru_cache(maxsize=ARMS_KEPT)
+def quiet_places(arm: Arm, band: float, points: int) -> Any:
+    """Frequencies [rad/s] in two decades from a band on, where a damped loop is seen to be quiet or not; read-only.
+
+    So many at equal ratios, and the natural ones, the first `MOST_RESONANCES`, up to where bending is overdamped, 2/C
+    of the segment with the least C: a resonance narrower than their spacing would stand between them.
+    """
+    places = band * np.geomspace(1.0, QUIET_REACH, points)
+    if arm.least_damping:
+        first, last = (modes_below(arm, min(end, 2 / arm.least_damping)) for end in (band, QUIET_REACH * band))
+        many = min(last - first, MOST_RESONANCES)
+        if many:
+            places = np.unique(np.r_[places, modes(arm, first + many).natural_frequency[-many:]])
+    places.flags.writeable = False
+    return places

@@ -20,17 +20,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.crossing import brackets, crossed, zeros_between
 from tfarm.records import record
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 
-from .frequencies import grid
-from .loop import Loop
-from .poles import LEAST_SQUARABLE
+from .loop import Loop, grid
 from .stability import Stability, is_quiet, stability
 from .theorem import theorem_of
 from .windows import Windows, windows_of
@@ -41,10 +38,12 @@ NEXT_DOUBLES = 2.0**-52 * np.arange(-16, 17, 4)  # on either side of a frequency
 FARTHER = 8.0 ** np.arange(-16, -5)  # the same, until rounding does not decide any more on which side of the axis L is
 BELOW_SLOWEST = 20.0  # of the slowest thing that is to be seen: where the curve of L begins
 ABOVE_NOISE = 4.0  # times what neighbours differ by
-BOTTOM = 1e-6  # of the gap between grid points: a dip's bottom is flat, so its depth is right to the square of that
+ROUND_POINTS, ROUNDS = 17, 7  # of ever narrower grids around a dip, an eighth each time: 1e-6 of the first is left
 LOWEST = 6  # local minima on the grid that are refined
 AT_POLE = 1e-9  # a factor on L so small belongs to a pole of L on the axis, where L changes its sign through infinity
 REST = 1e-3  # of the size of -1/L: what its imaginary part and its way from half the lowest frequency on may be at rest
+BELOW_SLOWEST_POLE = 0.05  # of its size: so far down |L| may cross 1
+SLOW_POINTS = 400  # from there to the grid of the arm
 NEAR_POLES = np.geomspace(0.05, 20.0, 12)  # points about a pole, in its distances from the axis
 
 
@@ -129,8 +128,9 @@ def loop_margins(verdict: Stability) -> LoopMargins:
     loop, band = verdict.loop, verdict.band
     omega = dense(verdict)
     crossed = unit_crossings(loop, omega)
-    apart = _spread(lambda w: minus_loop(loop, w), crossed)  # of size 1: what its angle moves by [rad]
-    angle = held(np.degrees(np.angle(minus_loop(loop, crossed))), np.degrees(apart), CROSSOVER_DIGITS)  # 0 where L = -1
+    apart = _spread(lambda w: loop.loop_function(1j * w), crossed)  # of size 1: what its angle moves by [rad]
+    minus = -loop.loop_function(1j * crossed)
+    angle = held(np.degrees(np.angle(minus)), np.degrees(apart), CROSSOVER_DIGITS)  # 0 where L = -1
     delay = held(
         np.radians(np.mod(angle, 360)) / np.where(crossed == 0, 1, crossed), apart / np.where(crossed == 0, 1, crossed)
     )
@@ -240,9 +240,9 @@ def dense(verdict: Stability) -> Real:
     poles = np.r_[poles, own[own.imag > 0]]
     close = (poles.imag[:, None] + abs(poles.real[:, None]) * away).ravel()
     omega = np.asarray(grid(verdict.loop.arm, verdict.band))
-    slow = np.outer(rigid_crossings(verdict.loop), [0.5, 2.0]).ravel()
-    more = np.concatenate([close[close < omega[-1]], slow[slow < omega[0]]])
-    return np.unique(np.concatenate([omega, more[more > LEAST_SQUARABLE]]))
+    slowest = abs(verdict.poles.moving).min(initial=omega[0])
+    slow = np.geomspace(BELOW_SLOWEST_POLE * slowest, omega[0], SLOW_POINTS) if slowest < omega[0] else omega[:0]
+    return np.unique(np.concatenate([omega, close[(close < omega[-1]) & (close > 0)], slow]))
 
 
 def loop_curve(found: Margins) -> tuple[Real, NDArray[np.complex128]]:
@@ -257,42 +257,6 @@ def loop_curve(found: Margins) -> tuple[Real, NDArray[np.complex128]]:
     L = np.asarray(found.stability.loop.loop_function(1j * omega), dtype=np.complex128)
     told = np.isfinite(L) & (L != 0) & (omega >= lowest)
     return omega[told], L[told]
-
-
-def minus_loop(loop: Loop, omega: Real) -> Complex:
-    """-L(i w); below `LEAST_SQUARABLE` that of the rigid arm, from which the arm's own cannot be told there."""
-    rigid = omega <= LEAST_SQUARABLE
-    value = -loop.loop_function(1j * np.where(rigid, 1.0, omega))
-    if rigid.any() and loop.at_rest is not None:
-        a, b, k = _rigid(loop)
-        w = omega[rigid]
-        value[rigid] = k + b / w / w + 1j * (a / w)
-    return np.asarray(value)
-
-
-def rigid_crossings(loop: Loop) -> Real:
-    """Frequencies [rad/s] where the loop function of the rigid arm has size 1; none of an arm that cannot turn.
-
-    -L = k + b/w^2 + i a/w with a = K1/J, b = Kp/J, k = K2 (J - I_h)/J, so (1 - k^2) w^4 - (2 b k + a^2) w^2 - b^2 = 0.
-    Of a hub with friction the drive is not J s^2, and these are none of its own.
-    """
-    if loop.at_rest is None or loop.arm.rate_loss:
-        return np.empty(0)
-    a, b, k = _rigid(loop)
-    if not (a or b):
-        return np.empty(0)
-    unit = max(abs(a), math.sqrt(abs(b)))
-    a, b = a / unit, b / unit / unit
-    squares = np.roots([1 - k * k, -(2 * b * k + a * a), -b * b])
-    return np.asarray(unit * np.sqrt(squares.real[(squares.imag == 0) & (squares.real > 0)]))
-
-
-def _rigid(loop: Loop) -> tuple[float, float, float]:
-    """K1/J [1/s], Kp/J [1/s^2] and K2 (J - I_h)/J of an arm that turns."""
-    assert loop.at_rest is not None
-    c, b, effective = loop.at_rest
-    J = loop.arm.turned_inertia
-    return (b - loop.arm.rate_loss) / J, c / J, 1.0 - effective / J
 
 
 def gain_edges(loop: Loop, by_phase: tuple[tuple[float, float], ...]) -> list[float]:
@@ -319,25 +283,24 @@ def unit_crossings(loop: Loop, omega: Real) -> Real:
             return np.asarray(np.log(abs(loop.loop_function(1j * w))))
 
     (before,), _ = brackets(size(omega))
-    slow = rigid_crossings(loop)
-    return np.concatenate([slow[slow <= LEAST_SQUARABLE], zeros_between(size, omega[before], omega[before + 1])])
+    return zeros_between(size, omega[before], omega[before + 1])
 
 
 def lowest(f: Callable[[Real], Real], omega: Real) -> tuple[float, float]:
     """The least value of f over the grid's range and where, its lowest dips refined between grid points."""
     values = f(omega)
-    dips = np.nonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:]))[0] + 1
     best = int(np.argmin(values))
-    least, at = float(values[best]), float(omega[best])
-    for i in dips[np.argsort(values[dips])][:LOWEST]:
-        low, width = float(omega[i - 1]), float(omega[i + 1] - omega[i - 1])
-
-        def value(share: float, low: float = low, width: float = width) -> float:
-            return float(f(np.array([low + share * width]))[0])
-
-        found = minimize_scalar(value, bounds=(0.0, 1.0), method="bounded", options={"xatol": BOTTOM})
-        if found.fun < least:
-            least, at = float(found.fun), low + float(found.x) * width
+    dips = np.nonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:]))[0] + 1
+    dips = np.r_[best, dips[np.argsort(values[dips])][:LOWEST]]
+    low, high = omega[np.maximum(dips - 1, 0)], omega[np.minimum(dips + 1, omega.size - 1)]
+    for _ in range(ROUNDS):
+        inside = np.linspace(low, high, ROUND_POINTS)
+        depth = f(inside.ravel()).reshape(inside.shape)
+        lowest_one = depth.argmin(axis=0)[None]
+        low, high = (
+            np.take_along_axis(inside, np.clip(lowest_one + way, 0, ROUND_POINTS - 1), 0)[0] for way in (-1, 1)
+        )
+    least, at = min(zip(depth.ravel().tolist(), inside.ravel().tolist(), strict=True))
     (least,) = held(np.array([least]), _spread(f, np.array([at])))
     return float(least), at
 

@@ -22,8 +22,7 @@ from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.spectrum import flexible_frequencies
 
-from .frequencies import band_of, grid
-from .loop import Loop
+from .loop import Loop, band_of, grid
 from .poles import count_with_mirrors
 from .stability import Stability, stability
 

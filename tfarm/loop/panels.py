@@ -8,22 +8,31 @@ in the gains: whoever has the samples has the loop for any gains, without the ar
     L(s) = gains . (theta, s theta, s^2 m) / (s^n d),   drive = s^n d, gauge = s^2 m,  n = 2, or 1 where the hub loses
 
 The powers of s are taken out so that slow gains lose no digits next to s = 0.
+
+From the hub's input to a sensor at x the numerator N = G drive is a function along s = i w like those:
+without poles or branches (but for s = -1/C), so that its zeros near the axis are those of polynomials through exact
+samples of it, and so are those near the positive real axis, which no law outruns.  A law at the hub leaves them where
+they are: it changes the drive alone.
 """
 
 from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
-from tfarm.arm import AT_HUB, FED_BACK, Arm
+from tfarm.arm import AT_HUB, FED_BACK, Arm, must_turn
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.characteristic import float_units, loop_parts, loop_system
 from tfarm.records import record
+from tfarm.response import TransferFunction, transfer
+from tfarm.spectrum import Modes, modes
 
-from .frequencies import steep_places
+from .loop import band_of, steep_places
 
 PANEL_SAMPLES = 24  # of order 1/2 as the parts are, few more never help where a panel holds one mode
 STEEP_A_PANEL = 3  # steep places a panel: each mode has one of the own, the locked and the free hub
@@ -33,6 +42,21 @@ BETWEEN_SAMPLES = np.linspace(-0.97, 0.97, 40)  # where they are compared, in th
 _ANGLES = np.pi * (np.arange(PANEL_SAMPLES) + 0.5) / PANEL_SAMPLES
 CHEBYSHEV = np.cos(_ANGLES)  # points of the first kind, where the samples are: none in the middle
 BARYCENTRIC = (-1.0) ** np.arange(PANEL_SAMPLES) * np.sin(_ANGLES)  # weights of the polynomial through them
+Sensor = Literal["displacement", "moment"]
+
+MOST_SENSOR_MISS = 1e-8  # of the numerator on a panel, between samples: zeros are shown to five digits
+NOT_SENSED = 1e-9  # of a mode's largest: what reads no more of any mode is no sensor
+SERIES_END = 1e-13  # of the largest coefficient: a series ends where it is that
+BESIDE_LINE = 1.0  # of a panel's half width: how far from the axis zeros are looked for
+PAST_EDGE = 1e-7  # of a panel's half width: panels end at modes, where a sensor at a node has its zero
+BEHIND_ORIGIN = 1e-9  # of a panel's outer end: a zero at s = 0 may come out so far on the wrong side
+SAME_SENSOR_ZERO = 1e-5  # relative: a zero near both lines is found from both
+POWERS_AT_REST = {"displacement": 0, "moment": 2}  # powers of s that a sensor's numerator has at s = 0
+AS_SERIES = np.cos(np.outer(np.arange(PANEL_SAMPLES), np.arccos(CHEBYSHEV))) * 2 / PANEL_SAMPLES  # samples to a series
+AS_SERIES[0] /= 2
+STEEP_A_SENSOR_PANEL = 4  # steep places a panel
+ROOM_TO_SINGULAR = 0.7  # of its middle's way to -1/C: the half width of a panel at most, so that 24 samples leave 1e-9
+GRADING_HALVINGS = 40  # of a panel next to -1/C
 
 
 @dataclass(frozen=True)
@@ -99,3 +123,120 @@ def _panel(arm: Arm, low: float, high: float) -> tuple[Complex, float]:
     weights = BARYCENTRIC / (BETWEEN_SAMPLES[:, None] - CHEBYSHEV)
     missed = abs(values @ weights.T / weights.sum(axis=1) - between)
     return values, float((missed.max(axis=1) / abs(values).max(axis=1)).max())
+
+
+@dataclass(frozen=True)
+@record
+class Positions:
+    """Of the first flexible modes with `natural_frequency` (modes,) [rad/s] what a sensor at each `x` (n,) [m] from the
+    clamp sees: `participation` (modes, n), a mode's largest 1 in size.  `zeros` [1/s] of each position are those near
+    the imaginary and the positive real axis up to `band` [rad/s], with Im s >= 0.
+    """
+
+    x: Real
+    band: float
+    natural_frequency: Real
+    participation: Real
+    zeros: tuple[Complex, ...]
+
+    @property
+    def known_zeros(self) -> tuple[Complex, ...]:
+        """The same, a part of a zero 0 where that is all that is known of it."""
+        parts = ((s, MOST_SENSOR_MISS * abs(s)) for s in self.zeros)
+        return tuple(
+            np.where(abs(s.real) > least, s.real, 0.0) + 1j * np.where(abs(s.imag) > least, s.imag, 0.0)
+            for s, least in parts
+        )
+
+
+def sensed_places(arm: Arm, sensor: Sensor, x: Real, count: int) -> Real:
+    """Those of the places x [m] at which a sensor sees any of the first modes: not an end that none moves, or bends."""
+    size = _fields(modes(arm, count), sensor, x)
+    return np.asarray(x[(abs(size) > NOT_SENSED * abs(size).max(axis=1, keepdims=True)).any(axis=0)])
+
+
+def _fields(found: Modes, sensor: Sensor, x: Real) -> Real:
+    """What a sensor at each x reads of each flexible mode (modes, n)."""
+    return np.asarray((found.shape if sensor == "displacement" else found.moment)(x)[found.index > 0])
+
+
+def positions(arm: Arm, sensor: Sensor, x: Real, count: int) -> Positions:
+    """Participation of the first `count` modes, and the zeros below the next, from hub input to a sensor at each x [m].
+
+    Raises ParameterError for an arm that cannot turn, ConvergenceError where the numerator is not resolved.
+    """
+    must_turn(arm)
+    found = modes(arm, count)
+    field = _fields(found, sensor, x)
+    band, zeros = band_of(arm, count), []
+    lines = [_Panels.of(arm, sensor, unit, band) for unit in (1j, 1.0 + 0j)]
+    for place in x.tolist():
+        G = transfer(arm, sensor, x=place)
+        known: list[complex] = []
+        for s in (s for line in lines for s in line.zeros(G)):
+            is_real = abs(s.imag) < SAME_SENSOR_ZERO * abs(s)
+            is_new = all(abs(s - each) > SAME_SENSOR_ZERO * abs(s) for each in known)
+            if is_new and (s.real > 0 if is_real else s.imag > 0):
+                known.append(complex(s.real, 0.0) if is_real else s)
+        zeros.append(np.array(sorted(known, key=lambda s: (s.imag, s.real)), dtype=complex))
+    participation = field / abs(field).max(axis=1, keepdims=True)
+    return Positions(x, band, found.natural_frequency[found.index > 0], participation, tuple(zeros))
+
+
+@dataclass(frozen=True)
+class _Panels:
+    """Panels of a line through s = 0 in the direction of `unit`, from `low` to `high` (n,) [rad/s]; `s` (n, points) are
+    the samples and the places between, `factor` (n, points) is what makes the numerator of a sensor's G there."""
+
+    unit: complex
+    low: Real
+    high: Real
+    s: Complex
+    factor: Complex
+    is_real: bool
+
+    @classmethod
+    def of(cls, arm: Arm, sensor: Sensor, unit: complex, band: float) -> _Panels:
+        """Panels of the line up to the band: along the imaginary axis the first begins at -`high`, as all is even."""
+        places = np.asarray(steep_places(arm, band))[STEEP_A_SENSOR_PANEL - 1 :: STEEP_A_SENSOR_PANEL]
+        edges = _graded(np.r_[0.0, places[places < band], band], unit, arm.damping)
+        low, high = edges[:-1].copy(), edges[1:]
+        low[0] = -high[0] if unit == 1j else 0.0
+        s = unit * ((low + high)[:, None] / 2 + (high - low)[:, None] / 2 * np.r_[CHEBYSHEV, BETWEEN_SAMPLES])
+        parts = loop_parts(loop_system(arm), s.ravel())
+        drive, scale = parts.drive.reshape(s.shape), parts.scale.reshape(s.shape)
+        factor = drive / s ** POWERS_AT_REST[sensor] * np.exp(scale - scale.real.max(axis=1, keepdims=True))
+        return cls(unit, low, high, s, factor, arm.is_reactive)
+
+    def zeros(self, G: TransferFunction) -> list[complex]:
+        """The zeros of a sensor along the line and near it.  Raises ConvergenceError where they are not resolved."""
+        values = G(self.s.ravel()).reshape(self.s.shape) * self.factor
+        values = values.real + 0j if self.is_real else values
+        found: list[complex] = []
+        for low, high, both in zip(self.low, self.high, values, strict=True):
+            series = AS_SERIES @ both[:PANEL_SAMPLES]
+            missed = abs(chebyshev.chebval(BETWEEN_SAMPLES, series) - both[PANEL_SAMPLES:]).max() / abs(both).max()
+            if missed > MOST_SENSOR_MISS:
+                raise ConvergenceError(f"polynomials do not follow the numerator of {G.outputs[0]}", high, missed)
+            last = int(np.nonzero(abs(series) > SERIES_END * abs(series).max())[0].max())
+            roots = np.asarray(chebyshev.chebroots(series[: last + 1]), dtype=complex)
+            roots = roots[(abs(roots.real) <= 1 + PAST_EDGE) & (abs(roots.imag) <= BESIDE_LINE)]
+            roots = (low + high) / 2 + (high - low) / 2 * roots
+            found += [self.unit * z for z in roots if z.real > -BEHIND_ORIGIN * high]
+        return found
+
+
+def _graded(edges: Real, unit: complex, C: float) -> Real:
+    """Edges of panels of a line, more of them where it is so near to -1/C that a polynomial would not follow.
+
+    The first panel of the imaginary axis is twice as wide as from 0 to its edge.
+    """
+    for _ in range(GRADING_HALVINGS if C else 0):
+        middle, half = (edges[1:] + edges[:-1]) / 2, np.diff(edges) / 2
+        if unit == 1j:
+            middle[0], half[0] = 0.0, edges[1]
+        near = half > ROOM_TO_SINGULAR * abs(unit * middle + 1 / C)
+        if not near.any():
+            break
+        edges = np.sort(np.r_[edges, ((edges[1:] + edges[:-1]) / 2)[near]])
+    return edges

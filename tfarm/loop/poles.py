@@ -26,10 +26,9 @@ from tfarm.response.frequency import AXIS_SHARE
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR, TRIED_HEIGHTS, Box, complete
 from tfarm.spectrum.proofs import Disc, disjoint, enclosed, proven_count
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 
-from .frequencies import band_of, steep_places
-from .loop import UNDISPERSED, Loop
+from .loop import UNDISPERSED, Loop, band_of, steep_places
 from .theorem import CONSERVES, GIVES, theorem_of
 
 MOST_POLES = 1000  # that may be asked for
@@ -38,7 +37,6 @@ MOST_BOX_MODES = 4000  # flexible, below the highest box that is searched for as
 SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are the rigid arm's, and known beforehand
 SLOW_STEPS = 4  # of Newton's method from there
 NEAR_RIGID = 0.01  # of its size: how far it may be from the rigid arm's
-LEAST_SQUARABLE = 1e-140  # 1/s: whose square is still a full double
 LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
 RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is looked at again
 FAR_RIGHT, BEYOND_CORNER = 1e5, 10.0  # times that edge, and a law's fastest corner: so far a real pole is looked for
@@ -211,20 +209,19 @@ def quiet_edge(loop: Loop, right: float, height: float) -> float:
 def slow_poles(loop: Loop, below: float) -> Complex:
     """Poles [1/s] but 0 of the turning arm under small gains, of size up to `below`: zeros of J s^2 + b s + c.
 
-    These are `Loop.at_rest`.  They are corrected on the characteristic function if their squares are full doubles;
-    smaller ones are right as they are, flexibility and damping adding terms of the order |s|/w1 and C |s|.
+    These are `Loop.at_rest`, corrected on the characteristic function.
     """
     if loop.at_rest is None:
         return np.empty(0, complex)
     c, b, J = loop.at_rest
-    unit = max(abs(b), math.sqrt(abs(c)) * math.sqrt(abs(J)), LEAST_SIZE)  # b and sqrt(c J) alike
+    unit = max(abs(b), math.sqrt(abs(c * J)), LEAST_SIZE)  # b and sqrt(c J) alike
     with np.errstate(over="ignore"):
         roots = unit * np.roots([J, b / unit, c / unit / unit]).astype(complex)
     slow = roots[(roots != 0) & (abs(roots) <= below)]
     exact = slow.copy()
-    for _ in range(SLOW_STEPS):
-        at = loop.function(np.where(abs(exact) > LEAST_SQUARABLE, exact, 1.0))
-        exact = exact - np.where(abs(exact) > LEAST_SQUARABLE, at.value / at.slope, 0.0)
+    for _ in range(SLOW_STEPS if slow.size else 0):
+        at = loop.function(exact)
+        exact = exact - at.value / at.slope
     return exact[abs(exact - slow) <= NEAR_RIGID * abs(slow)]
 
 

@@ -30,8 +30,7 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum import modes, modes_below
 
-from .frequencies import MOST_BAND_MODES, QUIET_REACH, band_of, quiet_places
-from .loop import Loop
+from .loop import MOST_BAND_MODES, QUIET_REACH, Loop, band_of, quiet_places
 from .poles import Poles, box_of, poles_below
 from .theorem import GIVES, TAKES, Theorem, theorem_of
 

@@ -14,17 +14,16 @@ from functools import cached_property
 
 import numpy as np
 
-from tfarm.arm import LISTED, RATE_GAIN, AnyLaw, Arm, Law, full_law
+from tfarm.arm import LISTED, RATE_GAIN, AnyLaw, Arm, Law, arm_and_law, full_law
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.exact.characteristic import Analytic, LoopParts, deflated, difference_steps
+from tfarm.exact.characteristic import Analytic, LoopParts
 from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum.box import Box, winding_number, zeros_in_box
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 
-from .frequencies import band_of
-from .loop import NEAREST_TO_ORIGIN, ORDER_READ_AT, Loop
+from .loop import NEAREST_TO_ORIGIN, ORDER_READ_AT, Loop, band_of, by_differences
 from .poles import SLOW_SHARE, box_of, slow_poles, starting_points
 
 OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, as of the arm's below
@@ -37,7 +36,7 @@ SETTLED = 1e-10  # of its size: one step more is taken where Newton's method sti
 SERIES_RADIUS, SERIES_POINTS = 0.2, 16  # of the first frequency: where a power series next to 0 is read off
 NO_PART = 1e-9  # of a pole's size: a smaller imaginary part is rounding
 EMPTY = Box(0.0, 0.0, 0.0, 0.0)
-LOOPS_KEPT = 200  # at values asked for again: memory against time, of no effect on an answer
+ARMS_KEPT = 200  # at values needed again: memory against time, of no effect on an answer
 
 
 @dataclass(frozen=True)
@@ -101,22 +100,28 @@ class Varied:
 
     def at(self, value: float) -> Loop:
         """The loop where the number has that value."""
-        if value not in self._loops:
-            if len(self._loops) > LOOPS_KEPT:
-                self._loops.clear()
-            is_other = value != self.start and not self.is_of_arm
-            arm = self.arm.having(**{self.vary: value}) if self.is_of_arm else self.arm
-            self._loops[value] = self.first.under(self.law_at(value)) if is_other else Loop(arm, self.law_at(value))
-        return self._loops[value]
-
-    @cached_property
-    def _loops(self) -> dict[float, Loop]:
-        return {}
+        if not self.is_of_arm:
+            return self.first.under(self.law_at(value))
+        signals = self._signals(value)
+        return Loop(signals.arm, self.full, signals)
 
     @cached_property
     def first(self) -> Loop:
         """The loop where the way begins, of whose rig the others are."""
-        return self.at(self.start)
+        return self.at(self.start) if self.is_of_arm else Loop(self.arm, self.law_at(self.start))
+
+    def _signals(self, value: float) -> Signals:
+        """The signals of the arm whose number has that value."""
+        if value not in self._arms:
+            if len(self._arms) > ARMS_KEPT:
+                self._arms.clear()
+            arm, _ = arm_and_law(self.arm.having(**{self.vary: value}), self.law)
+            self._arms[value] = Signals(arm, self.full.signals)
+        return self._arms[value]
+
+    @cached_property
+    def _arms(self) -> dict[float, Signals]:
+        return {}
 
     @cached_property
     def pinned(self) -> int:
@@ -135,7 +140,7 @@ class Varied:
         found = np.empty((2 + len(self.full.signals), *s.shape), complex)
         for value in np.unique(values):
             here = values == value
-            part = Signals(self.at(float(value)).arm, self.full.signals).parts(s[:, here])
+            part = self._signals(float(value)).parts(s[:, here])
             found[0, :, here], found[1, :, here], found[2:, :, here] = part.drive.T, part.scale.T, part.numerators
         return LoopParts(found[0], found[2:], found[1])
 
@@ -161,10 +166,7 @@ class Varied:
     def function(self, s: Complex, values: Real) -> Analytic:
         """D/s^n at s (n,), each at a value of its own (n,), n = `pinned`, with slopes from differences."""
         s = np.where(s == 0, NEAREST_TO_ORIGIN * self.frequency, s)
-        h = difference_steps(self.first.k, s)
-        D, scale = self._characteristic(np.array([s, s + h, s - h]), values)
-        up, down = D[1:] * np.exp(scale[1:] - scale[0])
-        return deflated(D[0], (up - down) / (2 * h), scale[0], s, self.pinned)
+        return by_differences(self.first.k, lambda at: self._characteristic(at, values), s, self.pinned)
 
     def _characteristic(self, s: Complex, values: Real) -> tuple[Complex, Complex]:
         """D e^{-scale} and scale at s (k, n), each column at a value of its own (n,)."""
@@ -262,7 +264,7 @@ class Varied:
         """-1/C of the damped segments, at m values (m, p)."""
         if not self.is_of_arm:
             return np.tile(np.array(self.first.k.singular), (values.size, 1))
-        return np.array([self.at(float(value)).k.singular for value in values])
+        return np.array([self._signals(float(value)).system.singular for value in values])
 
     # ------------------------------------------------------------ complete in a box
 

@@ -10,10 +10,10 @@ from tfarm.plots.compared import comparison
 from tfarm.plots.disc import nyquist
 from tfarm.plots.fitted import measured
 from tfarm.plots.frequency import bode
-from tfarm.plots.laws import gain_map, locus
-from tfarm.plots.learning import tuned_gain
-from tfarm.plots.motion import slew
+from tfarm.plots.motion import slew, tuned_gain
+from tfarm.plots.plane import gain_map
 from tfarm.plots.regions import overlay
+from tfarm.plots.roots import locus
 from tfarm.plots.shapes import modes
 from tfarm.plots.sketch import sketch
 

@@ -17,9 +17,8 @@ from tfarm.arrays import Complex
 from tfarm.digits import plain, significant
 from tfarm.loop.nyquist import Nyquist, compressed
 
-from .drawn import drawn
 from .labels import OFFSET_UPON, OFFSETS_FURTHER, Label
-from .style import BLUE, FAINT, GREY, ORANGE, Keys, New, blank, headline, must_be, on_own_figure, safe, style, window
+from .style import BLUE, FAINT, GREY, ORANGE, Keys, legend_below, page, picture, safe
 from .words import gains_words
 
 RING_SIZES = (0.1, 0.3, 1.0, 3.0, 10.0)  # |L| of the rings
@@ -31,43 +30,45 @@ ARROWS_AT = np.array([0.12, 0.4, 0.75])  # of the drawn length of the curve, arc
 RING_HALO: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
 
 
-def nyquist(data: Nyquist, *, ax: Axes | None = None, name: str = "") -> Axes:
+def _legend() -> Keys:
+    handles = [
+        Line2D([], [], color=BLUE, lw=1.3),
+        Line2D([], [], color=BLUE, lw=0.6, alpha=0.55),
+        Line2D([], [], color=BLUE, lw=0.8, ls=(0, (3, 1.5))),
+        Line2D([], [], color=ORANGE, ls="none", marker="+", ms=9, mew=2.0),
+    ]
+    return handles, ["ω > 0, arrows as it rises", "ω < 0", "past poles on the axis", "the point −1"]
+
+
+@picture(
+    (Nyquist, "tfarm.nyquist returns"), size=(5.0, 5.8), keys=True,
+    title=lambda data: f"{data.verdict.loop.arm.name}: the loop function L(iω)",
+)  # fmt: skip
+def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> Keys:
     """L on Nyquist's contour (what `tfarm.nyquist` returns), verdict and encirclements above it; the axes.
 
     A size r of L is drawn as r/(1 + r): the rim is infinity, -1 lies half way.  `name`: what the law is called.
     """
-    must_be(Nyquist, data, "tfarm.nyquist returns")
-    if ax is None:
-        return draw_disc(data, name, window).axes[0]
-    with style():
-        _disc(ax)
-        _curve(data, ax)
-        verdict = data.verdict
-        led, told = safe(name), safe(gains_words(verdict.loop.law).removeprefix(f"{name}, "))
-        ax.set_title(
-            f"{led}{': ' * bool(name)}{verdict.verdict.upper()}\n{told}\n"
-            f"encirclements of −1: {data.encirclements:d};  unstable poles: {verdict.unstable_roots}",
-            fontsize=9.0, loc="center",
-        )  # fmt: skip
-    return ax
-
-
-@drawn.register(Nyquist)
-def draw_disc(data: Nyquist, name: str = "", new: New = blank) -> Figure:
-    """One disc, on a figure of its own."""
-    title = f"{data.verdict.loop.arm.name}: the loop function L(iω)"
-    return on_own_figure(lambda own: nyquist(data, ax=own, name=name), (5.0, 5.8), title, _legend(), new)
+    _disc(ax)
+    _curve(data, ax)
+    verdict = data.verdict
+    led, told = safe(name), safe(gains_words(verdict.loop.law).removeprefix(f"{name}, "))
+    ax.set_title(
+        f"{led}{': ' * bool(name)}{verdict.verdict.upper()}\n{told}\n"
+        f"encirclements of −1: {data.encirclements:d};  unstable poles: {verdict.unstable_roots}",
+        fontsize=9.0, loc="center",
+    )  # fmt: skip
+    return _legend()
 
 
 def draw_nyquist(title: str, plots: Mapping[str, Nyquist]) -> Figure:
     """One disc a law, of at most two, by the laws' names."""
-    with style():
-        figure = blank(9.0 if len(plots) > 1 else 5.6, 5.3)
-        for ax, (name, data) in zip(figure.subplots(1, len(plots), squeeze=False)[0], plots.items(), strict=True):
+    band = significant(max(data.verdict.band for data in plots.values()), 5)
+    title = f"{title}: the loop function L(iω) up to {band} rad/s"
+    with page(9.0 if len(plots) > 1 else 5.6, 5.3, title, ncols=len(plots), squeeze=False) as (figure, axes):
+        for ax, (name, data) in zip(axes[0], plots.items(), strict=True):
             nyquist(data, ax=ax, name=name)
-        figure.legend(*_legend(), loc="outside lower left", ncols=2 * len(plots), fontsize=8.5)
-        band = significant(max(data.verdict.band for data in plots.values()), 5)
-        headline(figure, f"{title}: the loop function L(iω) up to {band} rad/s")
+        legend_below(figure, _legend())
     return figure
 
 
@@ -83,13 +84,10 @@ def _disc(ax: Axes) -> None:
     ax.plot([-1, 1], [0, 0], color=FAINT, lw=0.7, zorder=0.5)
     ax.plot([0, 0], [-1, 1], color=FAINT, lw=0.7, zorder=0.5)
     ax.plot([-0.5], [0], "+", color=ORANGE, ms=11, mew=2.2, zorder=6)
-    minus_one = Label("−1", [(-0.5, 0.0)], OFFSETS_FURTHER, fontsize=10.0, color=ORANGE, weight="bold")
-    minus_one.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
-    ax.add_artist(minus_one)
-    ax.set_aspect("equal")
-    ax.set_xticks([])
-    ax.set_yticks([])
-    ax.set_frame_on(False)
+    halo = [withStroke(linewidth=2.0, foreground="white")]
+    looks: dict[str, Any] = {"fontsize": 10.0, "color": ORANGE, "weight": "bold", "path_effects": halo}
+    ax.add_artist(Label("−1", [(-0.5, 0.0)], OFFSETS_FURTHER, **looks))
+    ax.set(aspect="equal", xticks=[], yticks=[], frame_on=False)
 
 
 def _curve(data: Nyquist, ax: Axes) -> None:
@@ -111,14 +109,15 @@ def _curve(data: Nyquist, ax: Axes) -> None:
     length = np.r_[0.0, np.cumsum(abs(np.diff(z[along])))]
     for n in np.searchsorted(length, length[-1] * ARROWS_AT):
         _arrow(z[along[max(0, n - 1) : n + 1]], ax)
-    ax.set_xlim(-LAST_RADIUS - RADIUS_STEP, LAST_RADIUS + RADIUS_STEP)
-    ax.set_ylim(-LAST_RADIUS - RADIUS_STEP, LAST_RADIUS + RADIUS_STEP)
+    reach = (-LAST_RADIUS - RADIUS_STEP, LAST_RADIUS + RADIUS_STEP)
+    ax.set(xlim=reach, ylim=reach)
 
 
 def _arc(data: Nyquist, z: Complex, pieces: list[NDArray[np.int64]], radius: float, ax: Axes) -> None:
     """The first of some arcs that turn alike, and how many they are."""
     piece = pieces[0]
-    ring = arc_on_ring(data.L[piece], radius)
+    angle = np.unwrap(np.angle(data.L[piece]))
+    ring = radius * np.exp(1j * np.interp(np.linspace(0, 1, 61), np.linspace(0, 1, angle.size), angle))
     ends = np.r_[z[max(0, piece[0] - 1)], ring, z[min(z.size - 1, piece[-1] + 1)]]
     ends = ends[1:] if piece[0] == 0 else ends
     ax.plot(ends.real, ends.imag, color=BLUE, lw=0.8, ls=(0, (3, 1.5)), zorder=3)
@@ -126,13 +125,6 @@ def _arc(data: Nyquist, z: Complex, pieces: list[NDArray[np.int64]], radius: flo
     if len(pieces) > 1:
         places = [(float(s.real), float(s.imag)) for s in ARC_COUNT * ring[10:-10:5] / radius]
         ax.add_artist(Label(f"{len(pieces)} ×", places, OFFSET_UPON, fontsize=8.0, color=BLUE))
-
-
-def arc_on_ring(L: Complex, radius: float) -> Complex:
-    """The directions of L on an arc around a pole, drawn at one radius beyond the rim."""
-    angle = np.unwrap(np.angle(L))
-    fine = np.interp(np.linspace(0, 1, 61), np.linspace(0, 1, angle.size), angle)
-    return np.asarray(radius * np.exp(1j * fine))
 
 
 def _arrow(piece: Complex, ax: Axes) -> None:
@@ -145,13 +137,3 @@ def _arrow(piece: Complex, ax: Axes) -> None:
         "", (stop.real + 0.012 * way.real, stop.imag + 0.012 * way.imag), (stop.real, stop.imag), zorder=4,
         arrowprops={"arrowstyle": "-|>", "color": BLUE, "lw": 0.8, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 9},
     )  # fmt: skip
-
-
-def _legend() -> Keys:
-    handles = [
-        Line2D([], [], color=BLUE, lw=1.3),
-        Line2D([], [], color=BLUE, lw=0.6, alpha=0.55),
-        Line2D([], [], color=BLUE, lw=0.8, ls=(0, (3, 1.5))),
-        Line2D([], [], color=ORANGE, ls="none", marker="+", ms=9, mew=2.0),
-    ]
-    return handles, ["ω > 0, arrows as it rises", "ω < 0", "past poles on the axis", "the point −1"]

@@ -27,9 +27,7 @@ def save_figure(figure: Figure, folder: Path, stem: str, formats: tuple[str, ...
     """The figure as folder/stem.svg and .png, or as one of these."""
     with _laid_out(figure):
         for kind in formats:
-            picture = io.BytesIO()
-            figure.savefig(picture, format=kind, dpi=dpi, metadata=METADATA[kind])
-            content = picture.getvalue()
+            content = _written(figure, kind, dpi)
             (folder / f"{stem}.{kind}").write_bytes(_shorter(content) if kind == "svg" else content)
 
 
@@ -50,10 +48,14 @@ def _shorter(svg: bytes) -> bytes:
 
 def save_png(figure: Figure, path: Path) -> None:
     """The figure as one PNG file, written beside and renamed.  Raises ParameterError, naming --png, where it cannot."""
-    picture = io.BytesIO()
     with _laid_out(figure):
-        figure.savefig(picture, format="png", dpi=PICTURE_DOTS, metadata=METADATA["png"])
-    write_file(path, picture.getvalue(), key="--png")
+        write_file(path, _written(figure, "png", PICTURE_DOTS), key="--png")
+
+
+def _written(figure: Figure, kind: str, dpi: int) -> bytes:
+    picture = io.BytesIO()
+    figure.savefig(picture, format=kind, dpi=dpi, metadata=METADATA[kind])
+    return picture.getvalue()
 
 
 @contextmanager

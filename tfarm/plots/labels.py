@@ -5,7 +5,9 @@ Only then is known how large the axes are; so the same holds in a window that is
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from itertools import product, takewhile
 from typing import Any
 
 import numpy as np
@@ -32,19 +34,18 @@ PADDING = 1.5  # pixels around words that nothing else comes into
 class Label(Annotation):
     """Words at the first of some places, and of some offsets from it, where they are clear; else at the best of them.
 
-    `own` is a line that they may lie on.  Those that `may_go` are left out where no place is clear.
+    `own` is a line that they may lie on.  Those that `may_go` are left out where no place is clear.  Where there is a
+    `short` form, words stand upright where they have no room across, and else it takes their place.
     """
 
     def __init__(
         self, text: str, places: Sequence[tuple[float, float]], offsets: Sequence[LabelOffset] = OFFSETS_AROUND, *,
-        own: Any = None, may_go: bool = False, fontsize: float = 8.0, color: str = INK, weight: str = "normal",
-        bbox: Any = None,
+        own: Any = None, may_go: bool = False, short: str = "", **looks: Any,
     ) -> None:  # fmt: skip
-        super().__init__(
-            text, places[0], xytext=offsets[0], textcoords="offset points", zorder=6.0, fontsize=fontsize, color=color,
-            weight=weight, bbox=bbox,
-        )  # fmt: skip
-        self.places, self.offsets, self.own, self.may_go = places, offsets, own, may_go
+        looks = {"zorder": 6.0, "fontsize": 8.0, "color": INK, **looks}
+        super().__init__(text, places[0], xytext=offsets[0], textcoords="offset points", **looks)
+        forms = [(text, 0), (text, 90), (short, 0)] if short else [(text, 0)]
+        self.tried, self.own, self.may_go = list(product(forms, places, offsets)), own, may_go
         self.set_in_layout(False)
         self.box: Bbox | None = None
 
@@ -53,30 +54,24 @@ class Label(Annotation):
         axes = self.axes
         assert isinstance(axes, Axes)
         curves, words = _curves(axes, self.own), _words(axes, self, renderer)
-        best: tuple[float, tuple[float, float], LabelOffset] | None = None
-        for place in self.places:
-            for offset in self.offsets:
-                box = self._box(place, offset, renderer)
-                met = _met(box, axes, curves, words)
-                if best is None or met < best[0]:
-                    best = (met, place, offset)
-                if not met:
-                    break
-            if best is not None and not best[0]:
+        least, best = math.inf, 0
+        for number in range(len(self.tried)):
+            met = _met(self._box(number, renderer), axes, curves, words)
+            if met < least:
+                least, best = met, number
+            if not met:
                 break
-        assert best is not None
-        self.set_visible(not best[0] or not self.may_go)
-        box = self._box(best[1], best[2], renderer)
+        self.set_visible(not least or not self.may_go)
+        box = self._box(best, renderer)
         self.box = box if self.get_visible() else None
         super().draw(renderer)
 
-    def _box(self, place: tuple[float, float], offset: LabelOffset, renderer: Any) -> Bbox:
+    def _box(self, number: int, renderer: Any) -> Bbox:
         """Where the words would be [pixels]."""
-        self.xy = place
-        self.set_position(offset)
-        x, y = offset
-        self.set_horizontalalignment("left" if x > 0 else "right" if x < 0 else "center")
-        self.set_verticalalignment("bottom" if y > 0 else "top" if y < 0 else "center")
+        (text, turn), self.xy, (x, y) = self.tried[number]
+        self.set(text=text, rotation=turn, position=(x, y))
+        self.set(ha="left" if x > 0 else "right" if x < 0 else "center")
+        self.set(va="bottom" if y > 0 else "top" if y < 0 else "center")
         self.update_positions(renderer)
         return Text.get_window_extent(self, renderer).padded(PADDING)
 
@@ -98,12 +93,8 @@ def _curves(axes: Axes, own: Any) -> list[tuple[Real, Real]]:
 
 def _words(axes: Axes, mine: Label, renderer: Any) -> list[Bbox]:
     """The boxes of the words that stand already: all that have one place, and the labels before this one."""
-    found = []
-    for text in axes.texts:
-        if text is mine:
-            break
-        if isinstance(text, Label):
-            found += [text.box] if text.box is not None else []
+    before = takewhile(lambda text: text is not mine, axes.texts)
+    found = [text.box for text in before if isinstance(text, Label) and text.box is not None]
     others = [text for text in axes.texts if not isinstance(text, Label) and text.get_visible() and text.get_text()]
     return found + [Text.get_window_extent(text, renderer) for text in others]
 

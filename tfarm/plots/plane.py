@@ -3,35 +3,41 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter, SymmetricalLogLocator
+from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback
 from tfarm.arrays import Real
-from tfarm.crossing import RegionPiece, pieces
+from tfarm.crossing import Window, pieces
 from tfarm.digits import SUPERSCRIPT, how_many, plain, significant
 from tfarm.dsp import GainMap
-from tfarm.loop.edges import LINEAR_SCALE, Axis, edge, resting_frequencies, seen, stable_edge, static_edges
-from tfarm.loop.plane import INFINITE, Plane
+from tfarm.loop.plane import (
+    INFINITE,
+    LINEAR_SCALE,
+    Axis,
+    Plane,
+    edge,
+    resting_frequencies,
+    seen,
+    stable_edge,
+    static_edges,
+)
 
 from .labels import OFFSET_UPON, OFFSETS_AROUND, Label
-from .style import BLUE, GREY, INK, ORANGE, PURPLE, New, blank, on_own_figure
+from .style import BLUE, GREY, INK, ORANGE, PURPLE, picture, safe
 from .words import LYAPUNOV, name_axes
 
 STABLE_COLOUR, FEWEST_COLOUR, MOST_COLOUR, BOUNDLESS_COLOUR = "#dcefe6", "#fbeadd", "#eebd95", "#f3d9c6"
 CONTOUR_STEPS, MOST_CONTOURS = (1.0, 2.0, 5.0), 7  # of the contours
 LEAST_AREA = 0.004  # of the picture: smaller regions are not labelled
-LETTER = (0.01, 0.018)  # of the picture's width and height: what a letter takes, across and upright
-TALL = 2.5  # letters' widths: what a line takes across its letters, with room
+PLACES_TRIED = 150  # of a region, from its middle outwards, for the words of its count
 RESTING_NAMED = 3  # frequencies of the hub at rest that stand beside their common edge
 MOST_MARKED = 7  # frequencies written along the boundary: with more they touch
 DIAMOND, STAR = "D", "*"  # of laws
@@ -40,42 +46,96 @@ NUMBER_HALO: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad":
 TICKS_UP = (-50, -20, -10, -5, -2, -1, 0, 1, 2)  # moment gains on a logarithmic axis, of them those in the picture
 
 
-def gain_counts(found: Plane, *, ax: Axes) -> None:
-    """Colours for the number of unstable poles, a black line for the exact boundary, frequencies [rad/s] along it."""
+def _title(found: Plane) -> str:
+    if found.is_of_gains:
+        return f"{found.arm.name}: unstable poles over the plane of both gains"
+    return f"{found.arm.name}: unstable poles below {significant(found.band, 5)} rad/s under {found.law.name}"
+
+
+@picture((Plane, "tfarm.map returns"), title=_title, keys=True)
+def gain_map(found: Plane, *, ax: Axes) -> None:
+    """The plane of both gains, or of two numbers of a law (what `tfarm.map` returns), in the axes given or in new ones.
+
+    Colours for the number of unstable poles; a black line for the exact boundary with frequencies [rad/s] along it, of
+    a law dots where a pole is on the axis.  Returns the axes.
+    """
     x, y = map(Axis.of, found.axes)
     ground(found, x, y, ax)
-    draw_boundary(found, edge(found, x, y), x, y, ax)
-    count_labels(found, x, y, ax)
+    if found.is_of_gains:
+        draw_boundary(found, edge(found, x, y), x, y, ax)
+        return
+    points = np.array([(x, t) for x, each in zip(found.x, found.crossings, strict=False) for t in each.gain])
+    if points.size:
+        ax.plot(*points.T, ".", color=INK, ms=2.0, label="a pole on the imaginary axis, exact")
 
 
-def draw_map(found: Plane, new: New = blank) -> Figure:
-    """The plane, on a figure of its own."""
-    title = f"{found.arm.name}: unstable poles over the plane of both gains"
-    return on_own_figure(lambda own: gain_counts(found, ax=own), (7.0, 5.4), title, new=new)
+def _sampled_title(found: GainMap) -> str:
+    ms = significant(1e3 * found.loop.chain.sampling.period, 4)
+    return f"{found.loop.plant.arm.name}: unstable poles when sampled every {ms} ms, first {found.modes_used} modes"
+
+
+@picture((GainMap, "tfarm.dsp.sampled_map returns"), title=_sampled_title, keys=True)
+def sampled_map(found: GainMap, *, ax: Axes) -> None:
+    """The plane of two numbers of the law of a sampled loop: colours for the count, dots for the exact crossings."""
+    counts = found.counts
+    image = colours(counts)
+    ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True, zorder=0.1)
+    for count in np.unique(counts).tolist():
+        ax.fill_between([], [], [], color=image[counts == count][0], label=_words(count))
+    low, high = found.y[0], found.y[-1]
+    points = [(x, t) for x, each in zip(found.x, found.crossings, strict=False) for t in each.within(low, high).gain]
+    if points:
+        ax.plot(*np.array(points).T, ".", color=INK, ms=2.0, label="a pole on the unit circle, exact")
+    ax.grid(False)
+    ax.set(xlabel=safe(found.vary[0]), ylabel=safe(found.vary[1]))
 
 
 def ground(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
-    """Both axes, and the colours of the count."""
+    """Both axes, the colours of the count, and words for it in every region that is large enough."""
     for axis, setter, limits, name in (
         (x, ax.set_xscale, ax.set_xlim, ax.xaxis),
         (y, ax.set_yscale, ax.set_ylim, ax.yaxis),
     ):
         if not axis.is_linear:
             setter("symlog", linthresh=axis.linear, linscale=LINEAR_SCALE)
-            name.set_major_locator(SymmetricalLogLocator(base=10, linthresh=axis.linear))
             name.set_major_formatter(FuncFormatter(_tick))
-            name.set_minor_formatter(NullFormatter())
         limits(axis.low, axis.high)
     if not y.is_linear and found.arm.input_per_torque == 1.0:
         ax.set_yticks([tick for tick in TICKS_UP if y.low <= tick <= y.high])
     ax.grid(False)
-    stretched = "" if x.is_linear or x.low >= x.linear else f"; linear up to {plain(x.linear)}, logarithmic beyond"
-    name_axes(found.arm, ax)
-    ax.set_xlabel(ax.get_xlabel() + stretched)
+    ax.set(xlabel=safe(found.vary[0]), ylabel=safe(found.vary[1]))
+    if found.is_of_gains:
+        name_axes(found.arm, ax)
+    if not x.is_linear and x.low < x.linear:
+        ax.set_xlabel(f"{ax.get_xlabel()}; linear up to {plain(x.linear)}, logarithmic beyond")
+    grid = seen(found, x, y)
+    image = colours(grid.unstable)
     ax.imshow(
-        colours(seen(found, x, y).unstable), extent=(0, 1, 0, 1), transform=ax.transAxes, origin="lower", aspect="auto",
-        interpolation="nearest", zorder=0.1,
+        image, extent=(0, 1, 0, 1), transform=ax.transAxes, origin="lower", aspect="auto", interpolation="nearest",
+        zorder=0.1,
     )  # fmt: skip
+    for count in np.unique(grid.unstable).tolist():
+        parts, number = ndimage.label(grid.unstable == count)
+        for part in range(1, number + 1):
+            cells = np.argwhere(parts == part)
+            if len(cells) < LEAST_AREA * parts.size:
+                continue
+            cells = cells[np.argsort(((cells - cells.mean(axis=0)) ** 2).sum(axis=1), kind="stable")]
+            places = [(grid.x[column], grid.y[row]) for row, column in cells[:: 1 + len(cells) // PLACES_TRIED]]
+            looks: dict[str, Any] = {
+                "fontsize": 9.0,
+                "color": INK if count else "#00543f",
+                "bbox": {"facecolor": image[tuple(cells[0])], "edgecolor": "none", "pad": 1.5},
+            }
+            short = str(count).replace("-1", "∞")
+            ax.add_artist(Label(_words(count), places, OFFSET_UPON, may_go=True, short=short, **looks))
+
+
+def _words(count: int) -> str:
+    """What a number of unstable poles means."""
+    if count == 0:
+        return "stable"
+    return "every flexible mode unstable" if count == INFINITE else how_many(count, "unstable pole")
 
 
 def colours(unstable: NDArray[np.int64]) -> Real:
@@ -183,24 +243,29 @@ def draw_sampled(plane: GainMap | None, ax: Axes) -> None:
     if plane is None:
         return
     ms = plain(1e3 * plane.loop.chain.sampling.period)
-    across, _ = plane.axes
-    parts = pieces(across, plane.stable_intervals)
-    for piece in parts:
-        x, low, high = np.array(piece.points).T
-        ax.fill_between(x, low, high, facecolor="none", edgecolor=ORANGE, alpha=0.45, hatch="////", lw=0, zorder=1)
-        outline(replace(piece, begins=piece.begins and x[0] > across[0]), ORANGE, 1.2, 4.5, ax)
+    looks: dict[str, Any] = {"facecolor": "none", "edgecolor": ORANGE, "hatch": "////"}
+    parts = draw_region(plane.x, plane.stable_intervals, ORANGE, 1.2, 4.5, ax, alpha=0.45, lw=0, **looks)
     none = "" if parts else ": nowhere in this picture"
     label = f"stable when sampled every {ms} ms (first {plane.modes_used} modes){none}"
-    ax.fill_between([], [], [], facecolor="none", edgecolor=ORANGE, hatch="////", lw=1.0, label=label)
+    ax.fill_between([], [], [], lw=1.0, label=label, **looks)
 
 
-def outline(piece: RegionPiece, colour: str, width: float, zorder: float, ax: Axes) -> None:
-    """The edges of a part of a region, upright ones where the region itself begins or ends."""
-    x, low, high = np.array(piece.points).T
-    for line in (low, high):
-        ax.plot(x, line, color=colour, lw=width, zorder=zorder)
-    for end in np.nonzero([piece.begins, piece.ends])[0]:
-        ax.plot([x[-end]] * 2, [low[-end], high[-end]], color=colour, lw=width, zorder=zorder)
+def draw_region(
+    across: Real, stable: Sequence[Sequence[Window]], edge: str, width: float, zorder: float, ax: Axes, **looks: Any
+) -> int:
+    """The intervals up at each value across, filled, with edges of that colour; in how many parts.
+
+    Edges are upright where the region itself begins or ends.
+    """
+    parts = pieces(across, stable)
+    for piece in parts:
+        x, low, high = np.array(piece.points).T
+        ax.fill_between(x, low, high, zorder=1, **looks)
+        for line in (low, high):
+            ax.plot(x, line, color=edge, lw=width, zorder=zorder)
+        for end in np.nonzero([piece.begins and x[0] > across[0], piece.ends])[0]:
+            ax.plot([x[-end]] * 2, [low[-end], high[-end]], color=edge, lw=width, zorder=zorder)
+    return len(parts)
 
 
 def _chosen(points: Real, x: Axis, y: Axis) -> Real:
@@ -232,74 +297,6 @@ def draw_proven(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
     ax.plot([corner, corner, x.high], [y.low, inset, inset], color=PURPLE, lw=1.6, ls=dashes, label=label)
     if not arm.is_undamped:
         ax.plot([0, x.high], [0, 0], color=PURPLE, lw=1.6, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven")
-
-
-def count_labels(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
-    """In every region that is large enough, how many poles are unstable there."""
-    grid = seen(found, x, y)
-    across, up = grid.axes
-    image, clear = colours(grid.unstable), ~_taken(grid.unstable.shape, ax)
-    for count in np.unique(grid.unstable):
-        parts, number = ndimage.label(grid.unstable == count)
-        for part in range(1, number + 1):
-            inside = np.asarray(parts == part)
-            if inside.mean() < LEAST_AREA:
-                continue
-            placed = _placed(inside & clear, words_of_count(int(count)), str(count).replace("-1", "∞"))
-            if placed is None:
-                continue
-            row, column, words, turn = placed
-            ax.annotate(
-                words, (across[column], up[row]), ha="center", va="center", rotation=turn, zorder=4,
-                fontsize=9.0, color=INK if count else "#00543f",
-                bbox={"facecolor": image[row, column], "edgecolor": "none", "pad": 1.5},
-            )  # fmt: skip
-
-
-def _placed(clear: NDArray[np.bool_], words: str, short: str) -> tuple[int, int, str, int] | None:
-    """Row, column, words and rotation: across if that fits, else upright, else the bare number; None if not even that.
-
-    Of the places where the words fit that nearest to the middle of what is clear.
-    """
-    if not clear.any():
-        return None
-    middle = np.argwhere(clear).mean(axis=0)
-    rows, columns = clear.shape
-    for text, turn in ((words, 0), (words, 90), (short, 0)):
-        sides = (TALL * LETTER[1] * rows, len(text) * LETTER[0] * columns)
-        if turn:
-            sides = (len(text) * LETTER[1] * rows, TALL * LETTER[0] * columns)
-        size = tuple(2 * math.ceil(max(0.0, side - 1) / 2) + 1 for side in sides)  # odd: about the words
-        fits = np.argwhere(ndimage.minimum_filter(clear, size=size, mode="constant", cval=False))
-        if fits.size:
-            row, column = fits[np.argmin(((fits - middle) ** 2).sum(axis=1))].tolist()
-            return row, column, text, turn
-    return None
-
-
-def _taken(shape: tuple[int, ...], ax: Axes) -> NDArray[np.bool_]:
-    """Which cells of a grid over the axes have a line or a mark in them."""
-    taken = np.zeros(shape, np.bool_)
-    rows, columns = shape
-    for line in ax.lines:
-        data = np.asarray(line.get_xydata(), dtype=float)
-        at = (line.get_transform() - ax.transAxes).transform(data) * (columns, rows)
-        if line.get_linestyle() != "None" and len(at) > 1:  # with points between, closer than a cell
-            steps = np.nan_to_num(abs(np.diff(at, axis=0)).max(axis=1), posinf=0.0)
-            more = np.clip(np.ceil(2 * steps), 1, 4 * (rows + columns)).astype(int)
-            share = np.concatenate([np.arange(n) / n for n in more])
-            first = np.repeat(np.arange(more.size), more)
-            at = np.vstack([at[first] + share[:, None] * (at[first + 1] - at[first]), at[-1:]])
-        at = at[np.isfinite(at).all(axis=1) & (at >= 0).all(axis=1) & (at < (columns, rows)).all(axis=1)].astype(int)
-        taken[at[:, 1], at[:, 0]] = True
-    return taken
-
-
-def words_of_count(count: int) -> str:
-    """What a number of unstable poles means."""
-    if count == 0:
-        return "stable"
-    return "every flexible mode unstable" if count == INFINITE else how_many(count, "unstable pole")
 
 
 def law_mark(law: HubFeedback, marker: str, label: str, ax: Axes) -> None:

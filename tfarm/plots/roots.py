@@ -16,13 +16,12 @@ from tfarm.arrays import Complex
 from tfarm.digits import kept_digits, plain, significant
 from tfarm.dsp.loci import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
 from tfarm.errors import one_line
-from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, held_branches
+from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, ReducedLocus, held_branches
 from tfarm.loop.locus import Locus, frame, rounded
-from tfarm.loop.reduced_locus import ReducedLocus
 from tfarm.spectrum import modes
 
 from .labels import OFFSETS_BESIDE, Label
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Keys, New, blank, headline, on_own_figure, style
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Keys, legend_below, page, picture
 from .words import gains_words
 
 ZOOMED = 4  # modes drawn on their own
@@ -32,25 +31,6 @@ CROSS_AT_ZERO: dict[str, Any] = {"ls": "none", "marker": "x", "ms": 6, "mew": 1.
 CIRCLE_AT_FIRST: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6, "mfc": "white", "mew": 1.2}  # at the start
 LONGEST_LAW = 40  # characters of what is said of a law in a title
 QUARTERS = (0.25, 0.5, 0.75)  # of the way that the modes go, on average: where a value is marked along each branch
-
-
-def branches_of(exact: Locus, reduced: ReducedLocus | None, *, ax: Axes) -> None:
-    """The branches of a locus and its crossings, and thin those of `reduced`."""
-    _all(rounded(exact), exact, reduced, ax)
-
-
-def draw_locus(exact: Locus, reduced: ReducedLocus | None = None, new: New = blank) -> Figure:
-    """All branches in one panel, on a figure of its own."""
-    title, fine = f"{exact.arm.name}: closed-loop poles as {_range(exact)}", rounded(exact)
-    return on_own_figure(lambda ax: _all(fine, exact, reduced, ax), (7.0, 5.6), title, _legend(fine, reduced), new)
-
-
-def _all(fine: Locus, exact: Locus, reduced: ReducedLocus | None, ax: Axes) -> None:
-    every = range(len(exact.branches))
-    _panel(fine, exact, reduced, every, ax, named=[*every, None])
-    _frame(held_branches(fine.branches), ax)
-    ax.set_xlabel("Re s [1/s]")
-    ax.set_ylabel("Im s [rad/s]")
 
 
 def zoomed(exact: Locus) -> list[int]:
@@ -67,36 +47,29 @@ def color_of(exact: Locus, branch: int) -> str:
 
 def draw_loci(data: Loci) -> Figure:
     """All branches in one panel, and each mode enlarged beside it."""
-    exact, fine = data.exact, rounded(data.exact)
-    with style():
-        figure = blank(9.0, 5.6)
-        grid = figure.add_gridspec(2, 4, width_ratios=[1.7, 1.7, 1.3, 1.3])
-        whole = figure.add_subplot(grid[:, :2])
-        numbers = range(len(exact.branches))
-        _panel(fine, exact, data.reduced, numbers, whole, named=sorted(set(numbers) - set(zoomed(exact))))
-        _frame(held_branches(fine.branches), whole)
+    exact, fine, chosen = data.exact, rounded(data.exact), zoomed(data.exact)
+    with page(9.0, 5.6, _title(exact), mosaic="AABC;AADE", width_ratios=[1.7, 1.7, 1.3, 1.3]) as (figure, axes):
+        whole, numbers = axes["A"], range(len(exact.branches))
+        _panel(fine, exact, data.reduced, numbers, whole, named=sorted(set(numbers) - set(chosen)))
         whole.set_title("all of them", fontsize=9.0)
         whole.xaxis.set_major_locator(MaxNLocator(5))
-        whole.set_xlabel("Re s [1/s]")
-        whole.set_ylabel("Im s [rad/s]")
-        for place, n in enumerate(zoomed(exact)):
-            ax = figure.add_subplot(grid[place // 2, 2 + place % 2])
+        whole.set(xlabel="Re s [1/s]", ylabel="Im s [rad/s]")
+        for n, ax in zip(chosen, list(axes.values())[1:], strict=False):
             _panel(fine, exact, data.reduced, [n], ax, named=[n])
             ax.xaxis.set_major_locator(MaxNLocator(3))
-            branch = held_branches(fine.branches[n])
-            _frame(branch[branch.imag >= 0], ax)
             name = f"mode {exact.mode[n]}" if exact.mode[n] else "rigid body"
             ax.set_title(name, fontsize=9.0, color=color_of(exact, n))
             ax.tick_params(labelsize=7.5)
-        figure.legend(*_legend(fine, data.reduced), loc="outside lower left", ncols=5, fontsize=8.2, columnspacing=1.2)
-        headline(figure, f"{exact.arm.name}: closed-loop poles as {_range(exact)}")
+        for ax in list(axes.values())[1 + len(chosen) :]:
+            ax.remove()
+        legend_below(figure, _legend(fine, data.reduced))
     return figure
 
 
-def _range(exact: Locus) -> str:
+def _title(exact: Locus, *_: object) -> str:
     first, last = (plain(float(exact.gain[i]), 4) for i in (0, -1))
     law = one_line(gains_words(exact.law, but=exact.vary).partition(", of ")[0], LONGEST_LAW)
-    return f"{exact.vary} goes from {first} to {last} with {law}"
+    return f"{exact.arm.name}: closed-loop poles as {exact.vary} goes from {first} to {last} with {law}"
 
 
 def _marked(exact: Locus) -> tuple[float, list[float]]:
@@ -162,6 +135,10 @@ def _panel(
                 continue
             text = f"{exact.vary} = {plain(each.gain, 5)}\n{significant(each.omega, 4)} rad/s"
             ax.add_artist(Label(text, [(0, omega)], OFFSETS_BESIDE, fontsize=7.5))
+    shown = branches[list(numbers)]
+    left, right, low, high = frame(shown if everything else shown[shown.imag >= 0])
+    ax.set_xlim(left - ROOM_AROUND * (right - left), right + 2 * ROOM_AROUND * (right - left))
+    ax.set_ylim(low - ROOM_AROUND * (high - low), high + ROOM_AROUND * (high - low))
 
 
 def _reduced_branch(exact: Locus, reduced: ReducedLocus, n: int, color: str, ax: Axes) -> None:
@@ -182,13 +159,6 @@ def _reduced_branch(exact: Locus, reduced: ReducedLocus, n: int, color: str, ax:
             ls=(0, (2, 1.5)), zorder=3)  # fmt: skip
 
 
-def _frame(points: Complex, ax: Axes) -> None:
-    """Limits with all of the branch, the axis and some room: nothing is cut off."""
-    left, right, low, high = frame(points)
-    ax.set_xlim(left - ROOM_AROUND * (right - left), right + 2 * ROOM_AROUND * (right - left))
-    ax.set_ylim(low - ROOM_AROUND * (high - low), high + ROOM_AROUND * (high - low))
-
-
 def _legend(exact: Locus, reduced: ReducedLocus | None) -> Keys:
     begins, others = _marked(exact)
     keys = {"exact": Line2D([], [], color=GREY, lw=2.6, alpha=0.4)}
@@ -204,46 +174,51 @@ def _legend(exact: Locus, reduced: ReducedLocus | None) -> Keys:
     return list(keys.values()), list(keys)
 
 
+@picture((Locus, "tfarm.locus returns"), size=(7.0, 5.6), title=_title, keys=True)
+def locus(exact: Locus, reduced: ReducedLocus | None = None, *, ax: Axes) -> Keys:
+    """Closed-loop poles as one number varies (what `tfarm.locus` returns), in the axes given or in new ones; the axes.
+
+    Broad lines: the branches [1/s], a colour a mode, with values between those of `exact` where they bend; a cross
+    where the gain is 0, an open circle at another beginning, dots at a few values, one of them that which damps the
+    first mode best, and a diamond where one crosses the axis.  Thin: those of `reduced` (`tfarm.loop.loci`),
+    which a locus of gains at the hub has.
+    """
+    fine, every = rounded(exact), range(len(exact.branches))
+    _panel(fine, exact, reduced, every, ax, named=[*every, None])
+    ax.set(xlabel="Re s [1/s]", ylabel="Im s [rad/s]")
+    return _legend(fine, reduced)
+
+
 def draw_sampled_loci(data: SampledLoci) -> Figure:
     """The z-plane with the locus along each gain."""
-    with style():
-        figure = blank(9.0, 3.4)
-        for locus, ax in zip(data.by.values(), figure.subplots(1, 2), strict=True):
-            z_plane(data, locus, ax=ax)
-        arm, ms = data.loop.plant.arm.name, plain(1e3 * data.loop.chain.sampling.period)
-        headline(figure, f"{arm}: poles of the loop sampled every {ms} ms")
+    arm, ms = data.loop.plant.arm.name, plain(1e3 * data.loop.chain.sampling.period)
+    with page(9.0, 3.4, f"{arm}: poles of the loop sampled every {ms} ms", ncols=2) as (figure, axes):
+        for along, ax in zip(data.by.values(), axes, strict=True):
+            _z_plane(data, along, ax)
     return figure
 
 
-def z_plane(data: SampledLoci, locus: SampledLocus, *, ax: Axes) -> None:
+def _z_plane(data: SampledLoci, along: SampledLocus, ax: Axes) -> None:
     """The upper half of the z-plane with one gain's locus; open circles at its start, dots at the loop's gains."""
     angle = np.linspace(0.0, math.pi, 181)
     ax.fill_between(DRAWN_RADIUS * np.cos(angle), 0, DRAWN_RADIUS * np.sin(angle), color="#f7e9de", zorder=0)
     ax.fill_between(np.cos(angle), 0, np.sin(angle), color="white", zorder=0.2)
     ax.plot(np.cos(angle), np.sin(angle), color=INK, lw=0.9, zorder=1)
-    here = int(abs(locus.values - data.loop.number(locus.gain)).argmin())
-    for branch in np.argsort(locus.mode):
-        z, mode = locus.z[:, branch], int(locus.mode[branch])
+    here = int(abs(along.values - data.loop.number(along.gain)).argmin())
+    for branch in np.argsort(along.mode):
+        z, mode = along.z[:, branch], int(along.mode[branch])
         visible = np.where((z.imag >= -1e-12) & (abs(z) < DRAWN_RADIUS), z, np.nan)
         if not np.isfinite(visible).any():
             continue
-        colour = _colour(data, mode) if mode else GREY
+        colour = GREY if not mode else ORANGE if data.is_aliased(mode) else BLUE
         ax.plot(visible.real, visible.imag, color=colour, lw=1.4, zorder=3)
         if np.isfinite(visible[0]):
             ax.plot(z[0].real, z[0].imag, "o", mfc="white", mec=colour, mew=1.1, ms=4.5, zorder=4)
         if np.isfinite(visible[here]):
             ax.plot(z[here].real, z[here].imag, "o", color=colour, ms=4.5, zorder=5)
-    ax.set_xlim(-RIM, RIM)
-    ax.set_xticks([-1.0, -0.5, 0.0, 0.5, 1.0])
-    ax.set_ylim(0.0, RIM)
-    ax.set_aspect("equal")
+    span = f"{plain(along.values[0], 2)} to {plain(along.values[-1], 3)}"
+    held = gains_words(data.loop.gains, 10, but=along.gain)
+    ax.set(xlim=(-RIM, RIM), xticks=[-1.0, -0.5, 0.0, 0.5, 1.0], ylim=(0.0, RIM), aspect="equal")
+    ax.set(xlabel="Re z", ylabel="Im z")
     ax.grid(False)
-    span = f"{plain(locus.values[0], 2)} to {plain(locus.values[-1], 3)}"
-    held = gains_words(data.loop.gains, 10, but=locus.gain)
-    ax.set_title(f"z-plane, {locus.gain} from {span} ({held})", fontsize=9.5)
-    ax.set_xlabel("Re z")
-    ax.set_ylabel("Im z")
-
-
-def _colour(data: SampledLoci, mode: int) -> str:
-    return ORANGE if data.is_aliased(mode) else BLUE
+    ax.set_title(f"z-plane, {along.gain} from {span} ({held})", fontsize=9.5)

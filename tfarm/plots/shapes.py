@@ -1,131 +1,97 @@
-"""Pictures of the modes: their shapes, and how far the simpler beam theories are off."""
+"""Pictures of the modes: their shapes, how far the simpler beam theories are off, and frequencies over a parameter."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from tfarm.arrays import Real
+from tfarm.audit.assumptions import HubStudy, Study
 from tfarm.digits import plain, significant
-from tfarm.records import record
 from tfarm.spectrum import Modes
 
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, must_be, style, window
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, page, picture
 
 SHAPE_POINTS = 401  # of a drawn mode: about one to a pixel of its picture
 ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [-]"
+CURVE_COLOURS = (BLUE, ORANGE, GREEN, PURPLE)  # of natural frequencies, from the first mode on
 HUB_WIDTH = 0.06  # width of the drawn hub, as a share of the length
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-@record
-class DrawnMode:
-    """One mode as drawn: w(x) over its largest value, x and nodes in m."""
+def scaled(found: Modes, count: int) -> dict[int, Real]:
+    """w(x) of the first `count` flexible modes by their number, at `SHAPE_POINTS` places even along the arm.
 
-    number: int
-    natural_frequency: float
-    x: Real
-    w: Real
-    nodes: Real
-    has_payload: bool
-
-
-def shapes_of(found: Modes, count: int) -> tuple[DrawnMode, ...]:
-    """The first flexible modes, each scaled to a largest displacement of one, the tip's side positive."""
+    Each is scaled to a largest displacement of one, the tip's side positive.
+    """
     x = np.linspace(0.0, found.arm.length, SHAPE_POINTS)
-    payload = found.arm.payload
-    shapes = []
-    for i, w in enumerate(found.shape(x)):
-        if found.index[i] == 0 or found.index[i] > count:
-            continue
-        largest = float(abs(w).max())
-        shape = DrawnMode(
-            number=int(found.index[i]),
-            natural_frequency=float(found.natural_frequency[i]),
-            x=x,
-            w=w / largest if largest > 0 else w,
-            nodes=found.nodes[i],
-            has_payload=payload.mass > 0 or payload.inertia > 0,
-        )
-        shapes.append(shape)
-    return tuple(shapes)
+    rows = zip(found.index.tolist(), found.shape(x), strict=True)
+    return {number: w / (float(abs(w).max()) or 1.0) for number, w in rows if 0 < number <= count}
 
 
-def modes(found: Modes, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, ...]:
+def _grid(figure: Figure, found: Modes) -> None:
+    count = _flexible(found)
+    axes = figure.subplots(math.ceil(count / 2), 2, sharex=True, sharey=True).ravel()
+    for ax in axes[count:]:
+        ax.remove()
+    for ax in axes[max(0, count - 2) : count]:
+        ax.tick_params(labelbottom=True)
+    figure.supylabel(DISPLACEMENT, fontsize=10.0, color=INK)
+
+
+def _flexible(found: Modes) -> int:
+    return int((found.index > 0).sum())
+
+
+@picture(
+    (Modes, "tfarm.modes returns"), size=lambda found: (9.0, 0.7 + 1.75 * math.ceil(_flexible(found) / 2)),
+    grid=_grid, title=lambda found: f"{found.arm.name}: mode shapes",
+)  # fmt: skip
+def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
     """The shapes of flexible modes (what `tfarm.modes` returns), an axes each, in those given or in new ones; these.
 
     Displacement along the arm [m], largest 1, with the places of the nodes [m].  Of more modes than axes the first are
     drawn.
     """
-    must_be(Modes, found, "tfarm.modes returns")
-    shapes = shapes_of(found, int(found.index[-1]))
-    with style():
-        if ax is None:
-            return tuple(draw_shapes(found.arm.name, shapes, window).axes)
-        each = tuple(np.ravel(np.asarray(ax, dtype=object)))[: len(shapes)]
-        for one, shape in zip(each, shapes, strict=False):
-            draw_shape(shape, ax=one)
-            one.set_xlabel(ALONG)
-            one.set_ylabel(DISPLACEMENT)
-    return each
+    payload, length, count = found.arm.payload, found.arm.length, _flexible(found)
+    for one, (number, w) in zip(ax, scaled(found, count).items(), strict=False):
+        row = int(np.flatnonzero(found.index == number)[0])
+        _draw_shape(w, found.nodes[row], length, payload.mass > 0 or payload.inertia > 0, one)
+        omega, hertz = (significant(float(of[row]), 7) for of in (found.natural_frequency, found.natural_frequency_hz))
+        one.set_title(f"Mode {number}:  {omega} rad/s  ({hertz} Hz)", fontsize=9.5)
+        is_own = bool(one.figure.get_supylabel())
+        one.set(xlabel=ALONG if not is_own or number > count - 2 else "", ylabel="" if is_own else DISPLACEMENT)
 
 
-def draw_shapes(name: str, shapes: tuple[DrawnMode, ...], new: New = blank) -> Figure:
-    """Small pictures, two in a row, one a mode."""
-    with style():
-        rows = math.ceil(len(shapes) / 2)
-        figure = new(9.0, 0.7 + 1.75 * rows)
-        axes = np.atleast_1d(figure.subplots(rows, 2, sharex=True, sharey=True)).ravel()
-        for ax, shape in zip(axes, shapes, strict=False):
-            draw_shape(shape, ax=ax)
-        for ax in axes[len(shapes) :]:
-            ax.remove()
-        for ax in axes[max(0, len(shapes) - 2) : len(shapes)]:
-            ax.set_xlabel(ALONG)
-            ax.tick_params(labelbottom=True)
-        figure.supylabel(DISPLACEMENT, fontsize=10.0, color=INK)
-        headline(figure, f"{name}: mode shapes")
-    return figure
-
-
-def draw_shape(shape: DrawnMode, *, ax: Axes) -> None:
+def _draw_shape(w: Real, nodes: Real, length: float, has_payload: bool, ax: Axes) -> None:
     """One mode: its line, the arm at rest, hub, payload, and the nodes with their places."""
-    length = float(shape.x[-1])
+    x = np.linspace(0.0, length, w.size)
     ax.axhline(0.0, color=GREY, lw=0.8)
-    ax.plot(shape.x, shape.w, color=BLUE, lw=1.8)
+    ax.plot(x, w, color=BLUE, lw=1.8)
     ax.add_patch(Rectangle((-HUB_WIDTH * length, -0.25), HUB_WIDTH * length, 0.5, fc=GREY, ec="none", zorder=3))
-    if shape.has_payload:
-        ax.plot(length, shape.w[-1], "s", ms=8.0, mfc=GREY, mec="none", zorder=3)
-    ax.plot(shape.nodes, np.zeros(len(shape.nodes)), "o", ms=5.5, mfc="white", mec=ORANGE, mew=1.3, zorder=4)
+    if has_payload:
+        ax.plot(length, w[-1], "s", ms=8.0, mfc=GREY, mec="none", zorder=3)
+    ax.plot(nodes, np.zeros(len(nodes)), "o", ms=5.5, mfc="white", mec=ORANGE, mew=1.3, zorder=4)
     decimals = max(0, 3 - round(math.log10(length)))
-    for node in shape.nodes:  # its place [m] at its right, on the side of the line that the curve leaves free
-        slope = np.interp(node + 0.01 * length, shape.x, shape.w) - np.interp(node - 0.01 * length, shape.x, shape.w)
+    for node in nodes:  # its place [m] at its right, on the side of the line that the curve leaves free
+        rises = np.interp(node + 0.01 * length, x, w) > np.interp(node - 0.01 * length, x, w)
         if round(float(node), decimals) > 0:
             ax.annotate(
-                f"{node:.{decimals}f}", (node, 0.0), textcoords="offset points",
-                xytext=(4, -6 if slope > 0 else 6), va="top" if slope > 0 else "bottom", fontsize=7.5, color=ORANGE,
+                f"{node:.{decimals}f}", (node, 0.0), textcoords="offset points", xytext=(4, -6 if rises else 6),
+                va="top" if rises else "bottom", fontsize=7.5, color=ORANGE,
             )  # fmt: skip
-    ax.set_xlim(-0.085 * length, 1.11 * length)
-    ax.set_ylim(-1.28, 1.28)
-    ax.set_yticks([-1, 0, 1])
-    w = significant(shape.natural_frequency, 7)
-    f = significant(shape.natural_frequency / (2 * math.pi), 7)
-    ax.set_title(f"Mode {shape.number}:  {w} rad/s  ({f} Hz)", fontsize=9.5)
+    ax.set(xlim=(-0.085 * length, 1.11 * length), ylim=(-1.28, 1.28), yticks=[-1, 0, 1])
 
 
 def draw_differences(name: str, differences: Mapping[str, Real]) -> Figure:
     """How far each simpler theory's frequencies lie above the Timoshenko theory's [%], mode by mode."""
     looks = {"euler-bernoulli": (ORANGE, "s"), "rayleigh": (PURPLE, "D"), "shear": (GREEN, "o")}
-    with style():
-        figure = blank(9.0, 3.6)
-        ax = figure.subplots()
+    with page(9.0, 3.6, f"{name}: simpler beam theories against the Timoshenko theory") as (figure, ax):
         for theory, values in differences.items():
             color, marker = looks[theory]
             numbers = np.arange(1, len(values) + 1)
@@ -134,10 +100,8 @@ def draw_differences(name: str, differences: Mapping[str, Real]) -> Figure:
             ax.set_yscale("log")
             ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: plain(y, 3)))
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-        ax.set_xlabel("mode")
-        ax.set_ylabel("frequency above Timoshenko's [%]")
+        ax.set(xlabel="mode", ylabel="frequency above Timoshenko's [%]")
         ax.legend(loc="upper left")
-        headline(figure, f"{name}: simpler beam theories against the Timoshenko theory")
     return figure
 
 
@@ -145,3 +109,42 @@ def theory_name(theory: str) -> str:
     """As a person writes it: Euler-Bernoulli, Rayleigh, shear, Timoshenko."""
     names = {"timoshenko": "Timoshenko", "rayleigh": "Rayleigh", "euler-bernoulli": "Euler-Bernoulli"}
     return names.get(theory, theory)
+
+
+def draw_over(curve: Study, x: Real, study: Study, candidates: Real, label: str) -> Figure:
+    """Frequencies over one assumed parameter: curves, the candidates of the table as rings, the arm itself filled."""
+    is_own = study.is_own
+    parameter = "hub inertia" if isinstance(study, HubStudy) else "depth of the section, at this area"
+    title = f"{study.arm.name}: natural frequencies over the {parameter}"
+    with page(9.0, 4.6, title) as (figure, ax):
+        ax.set(xscale="log", yscale="log", xlabel=label, ylabel="natural frequency [rad/s]")
+        ax.axvline(candidates[is_own][0], color=INK, lw=1.0, ls=(0, (4, 3)), zorder=1.5)
+        for number, (color, omega) in enumerate(zip(CURVE_COLOURS, curve.natural_frequency.T, strict=True), 1):
+            ax.plot(x, omega, color=color)
+            marked = study.natural_frequency[:, number - 1]
+            ax.plot(candidates[~is_own], marked[~is_own], "o", ms=4.5, mfc="white", mec=color, mew=1.1)
+            ax.plot(candidates[is_own], marked[is_own], "o", ms=7.0, mfc=color, mec="white", mew=0.8, zorder=4)
+            ax.annotate(
+                f"mode {number}", (candidates[-1], marked[-1]), textcoords="offset points", xytext=(8, 0), va="center",
+                color=color, fontsize=9.0,
+            )  # fmt: skip
+        if isinstance(study, HubStudy):
+            _mark_limits(study, ax)
+        ax.margins(y=0.09)
+        for axis in (ax.xaxis, ax.yaxis):
+            axis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0)))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, 3)))
+            axis.set_minor_formatter(NullFormatter())
+        span = float(x[-1] / x[0])
+        ax.set_xlim(x[0] / span**0.06, x[-1] * span**0.13)  # room for the bars, and for these and the modes' names
+    return figure
+
+
+def _mark_limits(study: HubStudy, ax: Axes) -> None:
+    """Short bars at the left edge for the free pin, at the right edge for the locked hub."""
+    for omegas, low, high in ((study.pinned, 0.0, 0.018), (study.locked, 0.982, 1.0)):
+        for color, omega in zip(CURVE_COLOURS, omegas, strict=True):
+            if omega > 0:  # the first of an arm that its tip holds falls to 0: beyond a logarithmic axis
+                ax.axhline(omega, low, high, color=color, lw=2.4)
+    for place, text, side in ((0.0, "free pin", "left"), (1.0, "locked hub", "right")):
+        ax.text(place, 1.015, text, transform=ax.transAxes, ha=side, fontsize=9.0, color=GREY)

@@ -6,13 +6,13 @@ A page's figure (`blank`) knows nothing of pyplot: nothing global, nothing on a 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from types import UnionType
+from functools import wraps
+from typing import Any, Protocol, cast
 
 import matplotlib.style
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Figure  # which pages name too
 from matplotlib.lines import Line2D
@@ -66,10 +66,12 @@ def style() -> Iterator[None]:
         yield
 
 
-def must_be(kind: type | UnionType, value: object, wanted: str) -> None:
-    """Raise ParameterError for what is no record of that kind, saying which is `wanted`: "tfarm.bode returns"."""
-    if not isinstance(value, kind):
-        raise ParameterError(key="plot", value=value, remedy=f"give what {wanted}")
+def must_be(kind: Any, value: object, wanted: str) -> None:
+    """Raise ParameterError for what is no record of that kind, or several, saying which is `wanted`."""
+    values = list(value.values()) if isinstance(value, Mapping) else value
+    for each in (values or [None]) if isinstance(values, list | tuple) else [values]:
+        if not isinstance(each, kind):
+            raise ParameterError(key="plot", value=each, remedy=f"give what {wanted}")
 
 
 def blank(width: float, height: float) -> Figure:
@@ -87,39 +89,98 @@ def window(width: float, height: float) -> Figure:
     return pyplot.figure(figsize=(width, height), layout="constrained")
 
 
-def on_own_figure(
-    draw: Callable[[Axes], object], size: tuple[float, float], title: str, keys: Keys | None = None, new: New = blank
-) -> Figure:
-    """A picture in a figure of its own, of that size [inches], its axes the first; a legend of `keys` or labels."""
+@contextmanager
+def page(width: float, height: float, title: str, **grid: Any) -> Iterator[tuple[Figure, Any]]:
+    """A figure of that size [inches] with axes as `subplots` makes them of `grid`, to draw on; then its headline."""
     with style():
-        figure = new(*size)
-        draw(figure.subplots())
-        if keys is not None or any(ax.get_legend_handles_labels()[0] for ax in figure.axes):
-            figure.legend(*(keys or ()), loc="outside lower left", ncols=2, fontsize=8.5)
+        figure = blank(width, height)
+        yield figure, figure.subplot_mosaic(**grid) if "mosaic" in grid else figure.subplots(**grid)
         headline(figure, title)
-    return figure
 
 
-def legend_below(figure: Figure) -> None:
-    """A legend of all labels below the axes, in as many columns, up to three, as fit into the figure."""
-    for number in (3, 2, 1):
+class Drawing(Protocol):
+    """A picture of a record: in the axes given, which it returns, or in new ones; `figure` makes one to be saved."""
+
+    figure: Callable[..., Figure]
+
+    def __call__(self, *found: Any, ax: Any = None, **how: Any) -> Any:
+        """Draw it."""
+
+
+FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the kind of a record what draws it on a figure of its own
+
+
+def picture(
+    *of: tuple[Any, str], size: Any = (7.0, 5.4), title: Callable[..., str], rows: Sequence[float] = (1.0,),
+    grid: Callable[..., Any] | None = None, keys: bool = False,
+) -> Callable[[Callable[..., Keys | None]], Drawing]:  # fmt: skip
+    """Make of a function that draws records in `ax` (its axes, or a list of several) a `Drawing`.
+
+    Parameters
+    ----------
+    of
+        Kind of each record, and what returns one ("tfarm.bode returns"): others are refused by ParameterError.
+    size
+        Width and height [inches] of a figure of its own, or a function of the records.
+    title
+        A function of the records: the headline of that figure.
+    rows
+        Relative heights of axes above each other; a `grid` of axes is a function of the figure and the records.
+    keys
+        Whether that figure has a legend: of all labels, or of what the function returns.
+    """
+
+    def decorated(draw: Callable[..., Keys | None]) -> Drawing:
+        is_one = grid is None and len(rows) == 1
+
+        def figure(*found: Any, new: New = blank, **how: Any) -> Figure:
+            with style():
+                drawn = new(*(size(*found) if callable(size) else size))
+                if grid is None:
+                    drawn.subplots(len(rows), 1, sharex=True, height_ratios=rows)
+                else:
+                    grid(drawn, *found)
+                told = draw(*found, ax=drawn.axes[0] if is_one else drawn.axes, **how)
+                for ax in drawn.axes[:-1] if grid is None else []:
+                    ax.set_xlabel("")
+                if told or (keys and any(ax.get_legend_handles_labels()[0] for ax in drawn.axes)):
+                    legend_below(drawn, told)
+                headline(drawn, title(*found))
+            return drawn
+
+        @wraps(draw)
+        def shown(*found: Any, ax: Any = None, **how: Any) -> Any:
+            for (kind, wanted), value in zip(of, found, strict=False):
+                must_be(kind, value, wanted)
+            if ax is None:
+                axes = figure(*found, new=window, **how).axes
+                return axes[0] if is_one else tuple(axes)
+            axes = list(np.ravel(np.asarray(ax, dtype=object)))
+            if grid is None and len(axes) != len(rows):
+                remedy = f"{len(rows)} axes, as figure.subplots({len(rows)}) makes them"
+                raise ParameterError(key="ax", value=len(axes), remedy=remedy)
+            with style():
+                draw(*found, ax=axes[0] if is_one else axes, **how)
+            return axes[0] if is_one else tuple(axes)
+
+        if len(of) == 1:
+            FIGURES[of[0][0]] = figure
+        shown.figure = figure  # type: ignore[attr-defined]
+        return cast("Drawing", shown)
+
+    return decorated
+
+
+def legend_below(figure: Figure, keys: Keys | None = None) -> None:
+    """A legend of all labels, or of `keys`, below the axes, in as many columns, up to five, as fit into the figure."""
+    for number in (5, 3, 2, 1):
         legend = figure.legend(
-            loc="outside lower left", ncols=number, fontsize=8.2, handlelength=1.8, columnspacing=1.2
+            *(keys or ()), loc="outside lower left", ncols=number, fontsize=8.2, handlelength=1.8, columnspacing=1.2
         )
-        width = legend.get_window_extent(figure.canvas.get_renderer()).width  # type: ignore[attr-defined]
+        width = legend.get_window_extent().width
         if number == 1 or width < WIDEST_LEGEND * figure.bbox.width:
             return
         legend.remove()
-
-
-def taken(ax: Sequence[Axes], number: int) -> list[Axes]:
-    """The axes given, in any shape that `subplots` returns.  Raises ParameterError where they are not so many."""
-    axes = list(np.ravel(np.asarray(ax, dtype=object)))
-    if len(axes) != number:
-        raise ParameterError(
-            key="ax", value=len(axes), remedy=f"{number} axes, as figure.subplots({number}) makes them"
-        )
-    return axes
 
 
 def headline(figure: Figure, text: str) -> None:

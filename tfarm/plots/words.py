@@ -21,9 +21,8 @@ def gains_words(law: AnyLaw, digits: int = 4, but: str = "") -> str:
     return ", ".join(f"{name} = {plain(gains[name], digits)}" for name in named if name != but)
 
 
-def name_axes(arm: Arm, ax: Axes, label: str = "{name}, gain on the {output} [{unit}]", pure: str = "−") -> None:
-    """Along the axes of the plane of gains: their names, what they act on, and their units, `pure` for none."""
+def name_axes(arm: Arm, ax: Axes) -> None:
+    """Along the axes of the plane of gains: their names, what they act on, and their units."""
     outputs = {gain.name: gain.output.replace("_", " ") for gain in GAINS}
-    across, up = (label.format(name=name, output=outputs[name], unit=shown_unit(name, arm) or pure) for name in PLANE)
-    ax.set_xlabel(across)
-    ax.set_ylabel(up)
+    across, up = (f"{name}, gain on the {outputs[name]} [{shown_unit(name, arm) or '−'}]" for name in PLANE)
+    ax.set(xlabel=across, ylabel=up)

@@ -11,7 +11,7 @@ import tfarm
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, Link, RotarySpring, implausible, input_words, unit_of
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant, singly, unit
-from tfarm.plots.sketch import draw_arm
+from tfarm.plots.sketch import sketch
 from tfarm.report.sections import Fact, PageSection, Picture
 
 HEADLINE_MODES = 3  # natural frequencies among the headline numbers, the rigid body's 0 not shown
@@ -36,6 +36,16 @@ THEORY_WORDS = {
     "rayleigh": "Rayleigh's, without shear",
     "euler-bernoulli": "Euler and Bernoulli's, without shear and rotary inertia",
 }
+MOTOR_ROWS = (
+    ("resistance", "R", "resistance", "ohm"),
+    ("inductance", "L_a", "inductance", "H"),
+    ("torque constant", "Kt", "torque_constant", "N m/A"),
+    ("back-EMF constant", "Ke", "back_emf_constant", "V s/rad"),
+    ("gear ratio", "N", "gear_ratio", ""),
+    ("gear efficiency, motor to hub", "η", "gear_efficiency", ""),
+    ("rotor inertia, before the gear", "J_m", "rotor_inertia", "kg m^2"),
+    ("rotor friction, before the gear", "b_m", "rotor_friction", "N m s/rad"),
+)
 QuantityRow = tuple[str, str, float, str]
 
 
@@ -101,31 +111,14 @@ def _picture(arm: Arm) -> Picture:
         caption=f"{drive} Hub and payload are symbols; the link's length and depth are to scale, which shows at "
         f"a glance whether shear can matter.{PARTS * (not arm.is_uniform)}",
         alt=f"Side view of the arm: hub at the left, a link {plain(arm.length, 6)} m long, {tip} at the tip.",
-        figure=draw_arm(arm),
+        figure=sketch.figure(arm),
     )
 
 
 def derived_table(arm: Arm) -> Table:
     """What follows from the parameters alone."""
     waves = BELOW_CUTOFF if arm.has_cutoff else ONE_PAIR
-    if not arm.is_uniform:
-        return _table("derived", "What follows from them", waves, derived_rows(arm), digits=8)
-    link, J = arm.link, arm.total_inertia
-    ratio = ("Poisson's ratio of an isotropic material", "E/2G − 1", link.poissons_ratio, "")
-    isotropic = [ratio] if -1 < link.poissons_ratio <= MOST_POISSON else []
-    rows: list[QuantityRow] = [
-        ("mass of the link", "ρAL", link.rhoA * link.length, "kg"),
-        ("bending stiffness", "EI", link.EI, "N m^2"),
-        ("shear stiffness", "κGA", link.kGA, "N"),
-        *isotropic,
-        ("radius of gyration", "√(I/A)", link.section.radius_of_gyration, "m"),
-        ("slenderness", "L/√(I/A)", link.slenderness, ""),
-        ("total inertia about the hub", "J", J, "kg m^2"),
-        *cutoff_rows(arm),
-    ]
-    if arm.has_rigid_mode and not arm.is_locked:
-        rows.insert(7, ("root moment per torque at rest", "−(J − I_h)/J", -(J - arm.hub.inertia) / J, "N m/(N m)"))
-    return _table("derived", "What follows from them", waves, rows, digits=8)
+    return _table("derived", "What follows from them", waves, derived_rows(arm), digits=8)
 
 
 def _table(stem: str, title: str, caption: str, rows: list[QuantityRow], digits: int = 10) -> Table:
@@ -201,17 +194,8 @@ def _spring(spring: RotarySpring, name: str) -> Iterator[QuantityRow]:
 
 
 def _motor(arm: Arm) -> Iterator[QuantityRow]:
-    motor = arm.motor
-    if motor is None:
-        return
-    yield "motor: resistance", "R", motor.resistance, "ohm"
-    yield "motor: inductance", "L_a", motor.inductance, "H"
-    yield "motor: torque constant", "Kt", motor.torque_constant, "N m/A"
-    yield "motor: back-EMF constant", "Ke", motor.back_emf_constant, "V s/rad"
-    yield "motor: gear ratio", "N", motor.gear_ratio, ""
-    yield "motor: gear efficiency, motor to hub", "η", motor.gear_efficiency, ""
-    yield "motor: rotor inertia, before the gear", "J_m", motor.rotor_inertia, "kg m^2"
-    yield "motor: rotor friction, before the gear", "b_m", motor.rotor_friction, "N m s/rad"
+    for name, symbol, key, its_unit in MOTOR_ROWS if arm.motor is not None else ():
+        yield f"motor: {name}", symbol, getattr(arm.motor, key), its_unit
 
 
 def derived_rows(arm: Arm) -> list[QuantityRow]:
@@ -224,13 +208,17 @@ def derived_rows(arm: Arm) -> list[QuantityRow]:
             (f"{prefix}mass", "ρAL", link.rhoA * link.length, "kg"),
             (f"{prefix}bending stiffness", "EI", link.EI, "N m^2"),
             (f"{prefix}shear stiffness", "κGA", link.kGA, "N"),
+            (f"{prefix}Poisson's ratio of an isotropic material", "E/2G − 1", link.poissons_ratio, ""),
+            (f"{prefix}radius of gyration", "√(I/A)", link.section.radius_of_gyration, "m"),
             (f"{prefix}slenderness", "L/√(I/A)", link.slenderness, ""),
         ]
+    rows = [row for row in rows if row[1] != "E/2G − 1" or -1 < row[2] <= MOST_POISSON]
     rows.append(("total inertia about the axis", "J", arm.total_inertia, "kg m^2"))
     if arm.motor is not None:
         rows.append(("rotor as the hub feels it", "N² J_m", arm.motor.reflected_inertia, "kg m^2"))
     if arm.has_rigid_mode and not arm.is_locked:
-        rows.append(("root moment per torque at rest", "", -arm.gauged_inertia / arm.total_inertia, "N m/(N m)"))
+        symbol = "−(J − I_h)/J" * arm.is_uniform
+        rows.append(("root moment per torque at rest", symbol, -arm.gauged_inertia / arm.total_inertia, "N m/(N m)"))
     if arm.input_per_torque != 1.0:
         rows.append(("input for a torque of 1 N m", "", arm.input_per_torque, unit_of(MOMENT_GAIN, arm)))
     if arm.rate_loss:
@@ -277,7 +265,10 @@ TABLE_1 = {
 EQUAL_IN_PAPER = ("length", "area", "E", "kappa", "G")  # equal in all these, an arm is the paper's
 
 
-DENSITY_MISPRINT = 1000.0  # the density is printed a thousand times too small
+DENSITIES = {  # remarks on the density used, by its ratio to the printed one
+    1.0: "kept as printed, to show what the misprint does: aluminium has a thousand times as much",
+    1000.0: "misprint: aluminium has a thousand times the printed density",
+}
 
 
 def values_of(arm: Arm) -> dict[str, float]:
@@ -333,17 +324,14 @@ def paper_section(arm: Arm) -> PageSection:
 def remark(key: str, used: float) -> str:
     """Why the value used is not the printed one, or what is odd about it; empty where all is well."""
     printed = TABLE_1[key].value
-    if key == "density":
-        if math.isclose(used, printed or 0.0):
-            return "kept as printed, to show what the misprint does: aluminium has a thousand times as much"
-        if math.isclose(used, DENSITY_MISPRINT * (printed or 0.0)):
-            return "misprint: aluminium has a thousand times the printed density"
-        return "another density than the printed one, itself a misprint (aluminium: 2766.7 kg/m³)"
     if key == "C":
         value = "" if used == 0 else "; the value is chosen here"
         return f"a time, since it enters as E (1 + C s): s, not kg/s{value}"
     if printed is None:
         return "needed, but not in the paper: an assumption"
+    if key == "density":
+        known = (words for factor, words in DENSITIES.items() if math.isclose(used, factor * printed))
+        return next(known, "another density than the printed one, itself a misprint (aluminium: 2766.7 kg/m³)")
     return "" if math.isclose(used, printed) else "chosen here"
 
 

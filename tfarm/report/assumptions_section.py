@@ -17,7 +17,7 @@ from tfarm.audit.assumptions import (
 )
 from tfarm.columns import Column, Table
 from tfarm.digits import fixed, plain, significant
-from tfarm.plots.assumptions import CURVE_COLOURS, draw_over
+from tfarm.plots.shapes import CURVE_COLOURS, draw_over
 from tfarm.report.arm_section import is_from_paper
 from tfarm.report.sections import PageSection, Picture
 
@@ -64,7 +64,6 @@ HUB_PICTURE = (
     "First natural frequencies over the hub inertia, exact (C = 0), both axes logarithmic. The dashed line and the "
     "filled dots are this arm. Bars at the edges are the limits of each mode: a free pin (left), a locked hub (right)."
 )
-RISING, FALLING = "all rising", "all falling"
 
 
 def assumptions_section(arm: Arm) -> PageSection:
@@ -129,54 +128,36 @@ def searched_words(edges: Column) -> str:
 
 
 def section_picture(study: SectionStudy) -> Picture:
-    arm = study.arm
-    curve = section_study(arm, _between(study.depth))
-    equivalent = "" if arm.link.section.shape == "rectangle" else EQUIVALENT
-    words = _ends_in_words(study, study.depth, "m")
-    return Picture(
-        stem="assumptions-depth",
-        title="Natural frequencies over the depth of the section",
-        caption=SECTION_PICTURE.format(equivalent=equivalent),
-        alt=f"Natural frequencies 1 to {len(CURVE_COLOURS)} over depth, {_way(curve)}; {words}",
-        figure=draw_over(curve, curve.depth, study, study.depth, "depth of the rectangle, in the plane of bending [m]"),
-        data=_data("assumptions-depth-data", Column("depth_m", "depth", "m", of=curve.depth), curve),
-    )
+    """Frequencies over the depth of the section."""
+    curve = section_study(study.arm, _between(study.depth))
+    depth = Column("depth_m", "depth of the rectangle, in the plane of bending", "m", of=curve.depth)
+    equivalent = "" if study.arm.link.section.shape == "rectangle" else EQUIVALENT
+    return _picture("depth", SECTION_PICTURE.format(equivalent=equivalent), depth, curve, study, study.depth)
 
 
 def hub_picture(study: HubStudy) -> Picture:
+    """Frequencies over the hub inertia."""
     curve = hub_study(study.arm, _between(study.hub_inertia))
-    inertia = Column("hub_inertia_kg_m2", "hub inertia", "kg m^2", of=curve.hub_inertia)
-    words = _ends_in_words(study, study.hub_inertia, "kg m²")
+    inertia = Column("hub_inertia_kg_m2", "hub inertia", "kg m²", of=curve.hub_inertia)
+    return _picture("inertia", HUB_PICTURE, inertia, curve, study, study.hub_inertia)
+
+
+def _picture(stem: str, caption: str, x: Column, curve: Study, study: Study, values: Real) -> Picture:
+    """The curves over x, and the candidates on them."""
+    ends = _ends(values, study)
+    modes = (Column(f"mode_{i}_rad_s", f"mode {i}", "rad/s", of=omega)
+             for i, omega in enumerate(curve.natural_frequency.T, 1))  # fmt: skip
     return Picture(
-        stem="assumptions-inertia",
-        title="Natural frequencies over the hub inertia",
-        caption=HUB_PICTURE,
-        alt=f"Natural frequencies 1 to {len(CURVE_COLOURS)} over hub inertia, {_way(curve)}; {words}",
-        figure=draw_over(curve, curve.hub_inertia, study, study.hub_inertia, "hub inertia [kg m²]"),
-        data=_data("assumptions-inertia-data", inertia, curve),
+        stem=f"assumptions-{stem}",
+        title=f"Natural frequencies over the {x.title.partition(',')[0]}",
+        caption=caption,
+        alt=f"Natural frequencies 1 to {len(CURVE_COLOURS)} over the {x.title}; the first between {ends['low']} and "
+        f"{ends['high']} rad/s.",
+        figure=draw_over(curve, np.asarray(x.values), study, values, f"{x.title} [{x.unit}]"),
+        data=Table(stem=f"assumptions-{stem}-data", title="Natural frequencies", columns=(x, *modes)),
     )
-
-
-def _way(curve: Study) -> str:
-    """Whether all curves rise, all fall, or neither."""
-    steps = np.diff(curve.natural_frequency, axis=0)
-    return RISING if (steps > 0).all() else FALLING if (steps < 0).all() else "not all of them one way"
 
 
 def _between(values: Real) -> list[float]:
     """The range of the candidates, evenly on a logarithmic axis."""
     return [float(x) for x in np.geomspace(values.min(), values.max(), CURVE_POINTS)]
-
-
-def _ends_in_words(study: Study, values: Real, of: str) -> str:
-    low, high = (significant(float(study.natural_frequency[i, 0]), 5) for i in (0, -1))
-    least, most = (plain(float(values[i]), 4) for i in (0, -1))
-    return f"the first goes from {low} rad/s at {least} {of} to {high} rad/s at {most} {of}."
-
-
-def _data(stem: str, values: Column, curve: Study) -> Table:
-    columns = [
-        Column(f"mode_{i}_rad_s", f"mode {i}", "rad/s", of=omega)
-        for i, omega in enumerate(curve.natural_frequency.T, 1)
-    ]
-    return Table(stem=stem, title="Natural frequencies", columns=(values, *columns))

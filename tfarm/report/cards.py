@@ -11,18 +11,14 @@ from typing import Any, TypeVar
 from tfarm.arm import PLANE, Arm
 from tfarm.digits import plain
 from tfarm.dsp import Chain
-from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import TfarmError
-from tfarm.loop.stability import stability as continuous_verdict
 from tfarm.plots.files import save_figure
 from tfarm.plots.frequency import draw_card
-from tfarm.plots.words import gains_words
 from tfarm.report.arm_section import headline_numbers
-from tfarm.report.cases import GivenLaw, LawOnArm, brief_on, has_loop, margins_of, on_arm
-from tfarm.report.page import QUESTIONS, Card, summary
-from tfarm.report.sections import PICTURES, Fact, in_ms
+from tfarm.report.cases import GivenLaw, LawOnArm, brief_on, cases_of, has_loop, margins_of
+from tfarm.report.page import QUESTIONS, summary
+from tfarm.report.sections import PICTURES, Fact
 from tfarm.response.frequency import bode
-from tfarm.spectrum.scales import default_gains
 
 COMPARISON_KIND = "compare"  # what is kept of a comparison
 COMPARISON_PAGE = "compare.html"
@@ -67,65 +63,51 @@ def kept(out: Path, kind: str, made_of: Callable[[dict[str, Any], Path], T | Non
 
 def save_card(arm: Arm, folder: Path, laws: Sequence[GivenLaw], chain: Chain) -> None:
     """pictures/card.svg and card.json; a picture that cannot be made is left out, as its section on the page is."""
-    try:
-        (folder / PICTURES).mkdir(exist_ok=True)
+    (folder / PICTURES).mkdir(exist_ok=True)
+    picture = ""
+    with suppress(TfarmError):
         save_figure(draw_card(bode(arm, "root_moment")), folder / PICTURES, "card", formats=("svg",))
-    except TfarmError:
-        picture = ""
-    else:
         picture = "card.svg"
-    facts = [[f.label, f.value, f.unit, f.beside] for f in headline_numbers(arm)[:FACTS]]
-    loops = [law_cells(each, chain) for each in on_arm(arm, laws)] if laws else [default_cells(arm, chain)]
-    told = summary(arm, [each.given_name for each in laws])
     what = {
         "name": arm.name,
-        "summary": told,
-        "facts": facts,
+        "summary": summary(arm, [each.name for each in laws]),
+        "facts": [[f.label, f.value, f.unit, f.beside] for f in headline_numbers(arm)[:FACTS]],
         "picture": picture,
-        "loops": [row for row in loops if row],
+        "loops": [loop_cells(each, chain) for each in cases_of(arm, laws)] if laws or has_loop(arm) else [],
     }
     keep(folder, "card", what)
 
 
-def default_cells(arm: Arm, chain: Chain) -> dict[str, str]:
-    """The loop of the default gains, in cells of the table of arms by INDEX_COLUMNS; empty where it has no verdict."""
-    if not has_loop(arm):
-        return {}
-    law = default_gains(arm)
-    try:
-        found, sampled = margins_of(arm, law), brief_on(arm, law, chain)
-    except TfarmError:
-        return {}
-    cells = {"law": gains_words(law), "verdict": found.stability.verdict}
-    for name in PLANE:  # from where to where the gain may move; a star at an end where no limit was found
-        windows = found.windows[name]
-        ends = (plain(end, 5) + "*" * (windows.end(end) == "search bound") for end in windows.around or ())
-        cells[name] = " … ".join(ends) or "none"
-    return cells | {"sampled": sampled.short}
-
-
-def law_cells(each: LawOnArm, chain: Chain) -> dict[str, str]:
-    """The loop of a law that the page is about; a verdict that cannot be given is left out, as it is on the page."""
-    cells = {"law": each.given.given_name}
+def loop_cells(each: LawOnArm, chain: Chain) -> dict[str, str]:
+    """A controller in cells of the table of arms by INDEX_COLUMNS; a verdict that cannot be had is left out."""
+    cells = {"law": each.given.name}
     with suppress(TfarmError):
-        if not each.is_discrete:
-            cells["verdict"] = continuous_verdict(each.arm, each.law).verdict
+        if not each.law.is_discrete:
+            found = margins_of(each.arm, each.law)
+            cells["verdict"] = found.stability.verdict
+            for name in found.windows.keys() & PLANE:  # a star at an end where no limit was found
+                windows = found.windows[name]
+                ends = (plain(end, 5) + "*" * (windows.end(end) == "search bound") for end in windows.around or ())
+                cells[name] = " … ".join(ends) or "none"
     with suppress(TfarmError):
-        word = sampled_verdict(each.arm, each.law, chain).word
-        cells["sampled"] = f"{word.upper() if word == 'unstable' else word} when sampled every {in_ms(chain)} ms"
+        cells["sampled"] = brief_on(each.arm, each.law, chain).short
     return cells
 
 
-def written_cards(out: Path) -> Sequence[Card]:
+def written_cards(out: Path) -> Sequence[Mapping[str, Any]]:
     """The cards of all arms in the folder of reports, by name; what is no card of ours is passed over."""
     return kept(out, "card", _card)
 
 
-def _card(read: dict[str, Any], folder: Path) -> Card | None:
-    """None for an arm that has no page."""
+def _card(read: dict[str, Any], folder: Path) -> Mapping[str, Any] | None:
+    """An arm as the index shows it, `loops` being rows of the table of arms; None for an arm that has no page."""
     pages = tuple((f"{page}.html", title) for page, title in PAGES.items() if (folder / f"{page}.html").is_file())
-    facts = [Fact(label=str(a), value=str(b), unit=str(c), beside=str(d)) for a, b, c, d in read["facts"]]
-    picture = "pictures/card.svg" if read.get("picture", "card.svg") else ""
-    loops = [{key: str(row.get(key, "")) for key in INDEX_COLUMNS} for row in read.get("loops") or [{}]]
-    card = Card(name=folder.name, summary=str(read["summary"]), facts=facts, pages=pages, picture=picture, loops=loops)
+    card = {
+        "name": folder.name,
+        "summary": str(read["summary"]),
+        "facts": [Fact(label=str(a), value=str(b), unit=str(c), beside=str(d)) for a, b, c, d in read["facts"]],
+        "pages": pages,
+        "picture": "pictures/card.svg" if read.get("picture", "card.svg") else "",
+        "loops": [{key: str(row.get(key, "")) for key in INDEX_COLUMNS} for row in read.get("loops") or [{}]],
+    }
     return card if pages else None

@@ -8,33 +8,31 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law, input_words
-from tfarm.digits import plain, significant
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import discretised, with_all_gains
-from tfarm.dsp.verdict import SampledBrief, sampled_brief
+from tfarm.dsp.verdict import sampled_brief
 from tfarm.errors import ConvergenceError, one_line
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.recording import MeasuredRun
+from tfarm.loop.answers import sign_of
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import Margins, margins
 from tfarm.plots.words import gains_words
 from tfarm.records import record
-from tfarm.response import transfer
+from tfarm.report.sections import typeset
 from tfarm.response.signals import Signals
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 from tfarm.synthesis.design import Design, design
 
 GIVEN_GAINS = "the gains given"
 LONGEST_LAW_NAME = 60  # characters of a law's name in a heading
 DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
 SIGN_WORDS = (
-    f"Law: u = −{RATE_GAIN} dθ/dt − {MOMENT_GAIN} E I φ′(0) + r. Sign of {MOMENT_GAIN}: the strain gauge reads "
-    f"E I φ′(0), positive where it accelerates the hub; {{rest}}. With the gauge reversed every "
-    f"{MOMENT_GAIN} changes its sign."
+    f"Sign of {MOMENT_GAIN}: the strain gauge reads E I φ′(0), positive where it accelerates the hub. With the gauge "
+    f"reversed every {MOMENT_GAIN} changes its sign."
 )
-TORQUE_AT_REST = "a torque u at rest gives −(J − I_h)/J u"
 NO_PLACE_FOR_K2 = (
     f"The hub of this arm has no inertia: {{gauge}}, so feeding it back by {MOMENT_GAIN} would be an algebraic loop. "
     f"There is no map of {' and '.join(PLANE)}; what {RATE_GAIN} does at {MOMENT_GAIN} = 0 is said below."
@@ -51,9 +49,10 @@ class GivenLaw:
     measured: MeasuredRun | None = None
 
     @property
-    def given_name(self) -> str:
+    def name(self) -> str:
         """What it is called, or its gains with their values."""
-        return gains_words(self.law) if isinstance(self.law, HubFeedback) else one_line(self.law.name, LONGEST_LAW_NAME)
+        law = as_law(self.law)
+        return one_line(law.name, LONGEST_LAW_NAME) if law.gains is None else gains_words(law)
 
 
 class Subject(NamedTuple):
@@ -73,13 +72,13 @@ class Subject(NamedTuple):
 @dataclass(frozen=True)
 @record
 class LawOnArm:
-    """A given law on an arm: `arm` has the input that it drives, and `law` is gains at the hub where it is no more.
+    """A controller on an arm: `arm` has the input that `law` drives, `given` is where it is from.
 
     `name` is for reading, `key` for the columns and names of files, "law" or of several "law_1", "law_2" ...
     """
 
     arm: Arm
-    law: AnyLaw
+    law: Law
     given: GivenLaw
     name: str
     key: str
@@ -87,41 +86,26 @@ class LawOnArm:
     @property
     def gains(self) -> str:
         """Its gains with their values, or what it reads."""
-        if isinstance(self.law, HubFeedback):
-            return gains_words(self.law)
-        return f"order {self.law.order}, of {', '.join(self.law.signals)}"
-
-    @property
-    def any_law(self) -> Law:
-        """The law as one of signals, gains at the hub too."""
-        return as_law(self.law)
-
-    @property
-    def is_discrete(self) -> bool:
-        """Whether it is a law in z, which acts at samples only."""
-        return self.any_law.is_discrete
-
-    @property
-    def measured(self) -> MeasuredRun | None:
-        """The run that was measured under it."""
-        return self.given.measured
+        law = self.law
+        return f"order {law.order}, of {', '.join(law.signals)}" if law.gains is None else gains_words(law)
 
 
 def on_arm(arm: Arm, laws: Sequence[GivenLaw]) -> tuple[LawOnArm, ...]:
     """Each law on the arm, under a name that no other has."""
     found: list[LawOnArm] = []
     for number, given in enumerate(laws, 1):
-        driven, law = arm_and_law(arm, given.law)
-        name = GIVEN_GAINS if isinstance(law, HubFeedback) else one_line(law.name, LONGEST_LAW_NAME)
+        law = as_law(given.law)
+        name = one_line(law.name, LONGEST_LAW_NAME) if law.gains is None else GIVEN_GAINS
         if name in {each.name for each in found}:
             name = f"{name} ({number})"
-        found.append(LawOnArm(driven, law, given, name, f"law_{number}" if len(laws) > 1 else "law"))
+        key = f"law_{number}" if len(laws) > 1 else "law"
+        found.append(LawOnArm(arm_and_law(arm, law)[0], law, given, name, key))
     return tuple(found)
 
 
 def on_hub(arm: Arm, gains: HubFeedback, name: str, key: str) -> LawOnArm:
     """Gains at the hub under a name of their own."""
-    return LawOnArm(arm, gains, GivenLaw(gains), name, key)
+    return LawOnArm(arm, as_law(gains), GivenLaw(gains), name, key)
 
 
 def cases_of(arm: Arm, laws: Sequence[GivenLaw]) -> tuple[LawOnArm, ...]:
@@ -134,18 +118,11 @@ def check_laws(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> None:
     if arm.is_locked:
         return  # its page says that there is no loop
     for each in on_arm(arm, laws):
-        if isinstance(each.law, HubFeedback):
-            with_all_gains(each.arm, each.law)
-            continue
-        _ = Signals(each.arm, each.law.signals)
-        if not each.is_discrete:
-            Loop(each.arm, each.law)
-        discretised(each.law, chain.sampling.period)
-
-
-def continuous_laws(laws: Sequence[LawOnArm]) -> tuple[LawOnArm, ...]:
-    """Those that act on the continuous loop."""
-    return tuple(each for each in laws if not each.is_discrete)
+        law = with_all_gains(*arm_and_law(each.arm, each.law))
+        Signals(each.arm, law.signals)
+        if not law.is_discrete:
+            Loop(each.arm, law)
+        discretised(law, chain.sampling.period)
 
 
 def has_loop(arm: Arm) -> bool:
@@ -169,18 +146,7 @@ def why_no_loop(arm: Arm) -> str:
 
 def sign_words(arm: Arm) -> str:
     """The law, and the sign of its moment gain."""
-    if arm.is_uniform and arm.has_rigid_mode:
-        return SIGN_WORDS.format(rest=TORQUE_AT_REST)
-    if arm.has_rigid_mode:
-        share = significant(arm.gauged_inertia / arm.total_inertia, 5)
-        rest = f"a torque that turns the whole arm gives −{share} times as much"
-    else:
-        static = transfer(arm, "root_moment").static * arm.input_per_torque
-        rest = (
-            f"a torque that lasts gives {plain(static, 5)} times as much" if static else "a torque that lasts gives 0"
-        )
-    driven = "" if arm.is_uniform else f"Here u is {input_words(arm)}. "
-    return driven + SIGN_WORDS.format(rest=rest)
+    return f"Law: {typeset(sign_of(arm))}. {SIGN_WORDS}"
 
 
 def what_holds(arm: Arm) -> str:
@@ -191,8 +157,7 @@ def what_holds(arm: Arm) -> str:
 def edge_of_K2(arm: Arm, law: HubFeedback) -> float | None:
     """The moment gain at which the loop loses its stability as it grows alone; None where none was found."""
     windows = margins_of(arm, law).windows[MOMENT_GAIN]
-    top = math.inf if windows.around is None else windows.around[1]
-    return top if windows.around is not None and windows.end(top) == "edge" else None
+    return windows.around[1] if windows.around and windows.end(windows.around[1]) == "edge" else None
 
 
 @lru_cache(maxsize=16)
@@ -207,21 +172,17 @@ def best(arm: Arm, chain: Chain) -> Design | None:
     return None if found.at_limit else found  # the gain at which the hub stands still is no law to draw
 
 
-@lru_cache(maxsize=64)
-def brief_on(arm: Arm, law: AnyLaw, chain: Chain) -> SampledBrief:
-    """Stability of the sampled loop, computed once for all sections."""
-    return sampled_brief(arm, law, chain)
+brief_on = lru_cache(maxsize=64)(sampled_brief)  # each computed once for all sections of a page
+_margins = lru_cache(maxsize=64)(margins)
 
 
-@lru_cache(maxsize=64)
 def margins_of(arm: Arm, law: AnyLaw) -> Margins:
     """Verdict and margins, computed once for all sections."""
-    return margins(arm, law)
+    return _margins(arm, as_law(law))
 
 
 def continuous_cases(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> tuple[LawOnArm, ...]:
     """The continuous-time controllers of a page: those given, else the default gains and the best ones."""
-    if laws:
-        return continuous_laws(on_arm(arm, laws))
-    found = best(arm, chain)
-    return (*cases_of(arm, ()), *([] if found is None else [on_hub(arm, found.law, "best damping", "best")]))
+    found = None if laws else best(arm, chain)
+    more = () if found is None else (on_hub(arm, found.law, "best damping", "best"),)
+    return tuple(each for each in (*cases_of(arm, laws), *more) if not each.law.is_discrete)

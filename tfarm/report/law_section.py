@@ -13,7 +13,7 @@ from tfarm.columns import FILES, REPORT, Column, Table
 from tfarm.digits import plain, singly
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import rule_in_words
-from tfarm.loop.law_answers import law_answer
+from tfarm.loop.answers import law_answer
 from tfarm.report.cases import GivenLaw, LawOnArm, on_arm
 from tfarm.report.sections import PageSection, typeset, upper
 from tfarm.response.signals import Signals
@@ -39,7 +39,7 @@ def law_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageSection
     """Each law: what it reads and drives, its entries, how it is sampled, and what a person should know of it."""
     named, ms, words = on_arm(arm, laws), plain(1e3 * chain.sampling.period), []
     for each in named:
-        law, file = each.any_law, f" ({each.given.file})" * bool(each.given.file)
+        law, file = each.law, f" ({each.given.file})" * bool(each.given.file)
         told = typeset(str(law_answer(law, each.arm)["sign_convention"]))
         told = told.replace("C_i(s)", "C_i(z)") if law.is_discrete else told
         enter = f" {', '.join(law.references)} enter{'s' * (len(law.references) == 1)} less what it should be."
@@ -47,7 +47,7 @@ def law_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageSection
         warned = "".join(f" Warning: {typeset(text)}." for text in cancelled(law))
         rule = f"On the loop sampled every {ms} ms it is {rule_in_words(law)}."
         words.append(f"{upper(each.name)}{file}, order {law.order}: {told}.{led} {rule}{warned}")
-    discrete = [each for each in named if each.is_discrete]
+    discrete = [each for each in named if each.law.is_discrete]
     if discrete:
         which = "it" if len(named) == 1 else " and of ".join(each.name for each in discrete)
         words.append(IN_Z_ALONE.format(which=which))
@@ -80,7 +80,7 @@ EntryRow = tuple[str, str, str, str, str, str, str, float | str, float | str]
 
 def _entries(each: LawOnArm) -> Iterator[EntryRow]:
     """Of each signal: numerator and denominator with every digit, their letter before them, or where matrices stand."""
-    law, letter = each.any_law, "z" if each.is_discrete else "s"
+    law, letter = each.law, "z" if each.law.is_discrete else "s"
     sign, period = "−" if law.sign < 0 else "+", "" if law.period is None else law.period
     for part in law.parts:
         num, den = "matrices, below", ""
@@ -117,12 +117,12 @@ def written_polynomial(text: str) -> str:
 def matrices_tables(each: LawOnArm) -> list[Table]:
     """A, B, C and D of each part of a law that has matrices, as one block [A B; C D]; its columns by their signals."""
     found = []
-    for number, part in enumerate(each.any_law.parts, 1):
+    for number, part in enumerate(each.law.parts, 1):
         if not isinstance(part.block, StateSpace):
             continue
         A, B, C, D = part.block.matrices()
         n, whole = len(A), np.block([[A, B], [C, D]])
-        step = "next " if each.is_discrete else "d/dt "
+        step = "next " if each.law.is_discrete else "d/dt "
         titles = [f"x{i}" for i in range(1, n + 1)] + [name or NOT_LED for name in part.signals]
         keys = [f"x{i}" for i in range(1, n + 1)] + [f"{i}_{name or 'open'}" for i, name in enumerate(part.signals, 1)]
         columns = (

@@ -15,7 +15,6 @@ import vl_convert
 from numpy.typing import NDArray
 
 from tfarm.arm import ANGLE_GAIN, FED_BACK, GAINS, MOMENT_GAIN, PLANE, Arm, HubFeedback, as_law, unit_of
-from tfarm.comparing.regions import BEYOND_PICTURE, sampled_region
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, scientific
 from tfarm.dsp import Chain, PulseTransfer, Sampled, Scenario, Simulator, scenario
@@ -25,18 +24,16 @@ from tfarm.dsp.results import enough_modes, ideal_chain
 from tfarm.dsp.simulate import FOLDED_UP, quantisers
 from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.errors import TfarmError
-from tfarm.loop.edges import moment_axis, rate_axis, rate_columns
-from tfarm.loop.frequencies import steep_places
-from tfarm.loop.loop import Loop
-from tfarm.loop.panels import PANEL_SAMPLES, Panels, loop_panels
-from tfarm.loop.plane import gain_map
-from tfarm.loop.positions import Positions, Sensor, positions, sensed_places
+from tfarm.loop.loop import Loop, steep_places
+from tfarm.loop.panels import PANEL_SAMPLES, Panels, Positions, Sensor, loop_panels, positions, sensed_places
+from tfarm.loop.plane import gain_map, moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
+from tfarm.plots.regions import BEYOND_PICTURE, sampled_region
 from tfarm.report.cases import Subject, has_loop, sign_words
 from tfarm.report.page import TEMPLATES, argument, is_preset, render
 from tfarm.response import transfer
-from tfarm.spectrum.scales import angle_unit, default_gains
+from tfarm.spectrum.table import angle_unit, default_gains
 
 STATIONS = 24  # places along the arm at which its shape is drawn, besides the clamp
 OFF_A_POLE = 1e-9  # of a pole: where the ratio of two outputs is taken that both have it; the ratio is off by as much

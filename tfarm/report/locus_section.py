@@ -8,20 +8,19 @@ from functools import partial
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, HubFeedback, shown_unit, written_unit
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit, written_unit
 from tfarm.arrays import Real
 from tfarm.columns import Column, Table
-from tfarm.digits import how_many, kept_digits, listed, plain, scientific, significant, singly
+from tfarm.digits import how_many, kept_digits, plain, scientific, significant, singly
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
-from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, branch_columns, held_branches, loci
-from tfarm.loop.most_damped import most_damped
+from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, branch_columns, held_branches, loci, most_damped
 from tfarm.loop.stability import MARGIN_OF_ZERO, Stability, stability
 from tfarm.plots.roots import draw_loci
-from tfarm.report.cases import continuous_cases, edge_of_K2, has_loop, margins_of
+from tfarm.report.cases import continuous_cases, edge_of_K2, has_loop
 from tfarm.report.loop_section import poles_of
 from tfarm.report.sections import PageSection, Picture
-from tfarm.spectrum.scales import default_gains, rate_unit
+from tfarm.spectrum.table import default_gains, rate_unit
 
 LISTED_MOMENT_GAINS = (0.9, 1.0, 1.01, 1.1, 1.5)  # values of K2 whose exact poles are listed
 AROUND_EDGE = (0.9, 1.1)  # times the edge, if that lies above all of them
@@ -38,8 +37,7 @@ BEYOND_UNDAMPED = (
     "longer feels the arm, and every mode with the hub at rest stays undamped. Any K2 above 1 makes every flexible "
     "mode unstable."
 )
-BEYOND_DAMPED = "Exact poles, each list complete in its box. {edge}"
-MORE_MODES = " From the first unstable row on, more K2 drives more modes."
+BEYOND_DAMPED = "Exact poles, each list complete in its box."
 BACKWARDS = " At K1 = 0 a real pole is unstable from K2 = J/(J − I_h) = {K2} on: torque then turns the arm backwards."
 NOT_FOLLOWED = (
     "Along {name} the branches of this arm could not be followed: on the way poles come too near to each other, or to "
@@ -123,10 +121,7 @@ def locus_section(arm: Arm, chain: Chain) -> PageSection:
             words.append(NOT_FOLLOWED.format(name=name))
             blocks += [rates_table(arm, held)] * (name == RATE_GAIN)
             continue
-        size = scientific(data.reduced.worst, 2)
-        gap = f"python-control's locus of order {data.reduced.order} is within {size} of |s| of the exact one."
-        ended = "".join(BRANCH_ENDS.format(name=name, gain=significant(gain, 3)) for _, gain in data.exact.ends)
-        words.append(f"{_more_damping(data) if name == RATE_GAIN else _more_moment(data)}; {gap}{ended}")
+        words.append(_along(data))
         blocks += [_locus_picture(data), gap_table(data, f"locus-{name}-gap")]
         if data.exact.crossings:
             blocks.append(crossing_table(data, f"locus-{name}-crossings"))
@@ -136,38 +131,23 @@ def locus_section(arm: Arm, chain: Chain) -> PageSection:
     return PageSection(anchor="locus", title="Root loci", words=[*words, *more], blocks=[*blocks, *tables])
 
 
-def _more_damping(data: Loci) -> str:
-    """How the damping of the first mode rises, and whether it falls again."""
-    exact, found = data.exact, most_damped(data.exact)
-    held = exact.gains.told(MOMENT_GAIN, plain)
-    if found is None:
-        return f"More {data.name}, with {held} held"
-    start = f"More {data.name} ({held} held)"
-    at = f"{data.name} = {significant(found.gain, 3)}{written_unit(data.name, exact.arm)}"
-    if not found.swings_on:
-        return f"{start} damps the first mode until it no longer swings, a little above {at}"
-    share = f"{significant(100 * found.damping_ratio, 3)} % of critical"
-    if found.gain == exact.gain[0]:
-        return f"{start} only takes damping from the first mode, which has {share} at {at}"
-    then = ", and less from there on: the hub is then held too firmly to take energy out" * found.falls
-    return f"{start} damps the first mode up to {share} at {at}{then}"
-
-
-def _more_moment(data: Loci) -> str:
-    """From where on the loop is unstable."""
-    exact = data.exact
-    held = exact.gains.told(RATE_GAIN, shortly)
-    more = f"More {data.name} ({held} held)"
-    unstable = [each for each in exact.crossings if each.direction == "unstable"]
-    if not unstable:
-        return f"{more} makes no branch that is drawn unstable in this range"
-    first = min(each.gain for each in unstable)
-    there = [each.omega for each in unstable if abs(each.gain - first) <= 1e-6 * abs(first)]
-    many = [significant(omega, 4) for omega in there if omega > 0]
-    how = f"poles cross at {listed(many)} rad/s" if many else "a real pole passes through 0"
-    on = "from" if not any(each.direction == "stable" and each.gain > first for each in exact.crossings) else "at"
-    edge = f"{data.name} = {significant(first, 6)}{' on' * (on == 'from')}"
-    return f"{more} makes the loop unstable {on} {edge}, where {how}"
+def _along(data: Loci) -> str:
+    """The first crossing of the imaginary axis, where mode 1 is damped most, and the gap to python-control's locus."""
+    exact, found, name = data.exact, most_damped(data.exact), data.name
+    unit, fixed = written_unit(name, exact.arm), [exact.gains.told(each, shortly) for each in PLANE if each != name]
+    unstable = [each.gain for each in exact.crossings if each.direction == "unstable"]
+    parts = ["no drawn branch becomes unstable"]
+    if unstable:
+        parts = [f"a branch becomes unstable at {name} = {significant(min(unstable), 6)}{unit}"]
+    if found is not None:
+        damped = f"is damped most, {significant(100 * found.damping_ratio, 3)} % of critical, at" * found.swings_on
+        parts.append(
+            f"mode 1 {damped or 'no longer oscillates a little above'} {name} = {significant(found.gain, 3)}{unit}"
+        )
+    size = scientific(data.reduced.worst, 2)
+    parts.append(f"python-control's locus of order {data.reduced.order} is within {size} of |s| of the exact one")
+    ended = "".join(BRANCH_ENDS.format(name=name, gain=significant(gain, 3)) for _, gain in exact.ends)
+    return f"Along {name}, with {fixed[0]}: {'; '.join(parts)}.{ended}"
 
 
 def _locus_picture(data: Loci) -> Picture:
@@ -199,7 +179,7 @@ def beyond_table(arm: Arm, held: HubFeedback) -> Table:
     found = [None if on else _judged(arm, law) for law, on in zip(laws, on_edge, strict=True)]
     one = held.having(MOMENT_GAIN, unit).told(MOMENT_GAIN, shortly, arm)
     title = f"What {one} and beyond does, at {held.told(RATE_GAIN, shortly)}"
-    return _poles_table("beyond", title, _beyond_caption(arm, held, found), MOMENT_GAIN, arm, gains, found)
+    return _poles_table("beyond", title, _beyond_caption(arm), MOMENT_GAIN, arm, gains, found)
 
 
 def rates_table(arm: Arm, held: HubFeedback) -> Table:
@@ -257,17 +237,8 @@ def _first_pairs(it: Stability | None) -> str:
     return ",  ".join(f"{plain(p.real, 4)} ± {significant(p.imag, 5)} i" for p in swinging)
 
 
-def _beyond_caption(arm: Arm, held: HubFeedback, found: Sequence[Stability | None]) -> str:
-    """Up to which K2 the loop stays stable, from the windows of the gains held, and what lies beyond."""
+def _beyond_caption(arm: Arm) -> str:
+    """What is known without damping, and where torque turns the arm backwards."""
     J, hub = arm.total_inertia, arm.hub.inertia
     backwards = BACKWARDS.format(K2=significant(J / (J - hub), 5)) if arm.has_rigid_mode and arm.is_uniform else ""
-    if arm.is_uniform and not arm.damping:
-        return BEYOND_UNDAMPED + backwards
-    around, edge, words = margins_of(arm, held).windows[MOMENT_GAIN].around, edge_of_K2(arm, held), ""
-    if edge is not None:
-        words = f"At this K1 the loop is stable up to K2 = {plain(edge, 6)}."
-    elif around is not None:
-        words = f"At this K1 no K2 up to {plain(around[1], 6)} makes the loop unstable."
-    counts = [it.unstable_roots for it in found if it is not None and it.unstable_roots]
-    more = MORE_MODES if len(counts) > 1 and counts[-1] > counts[0] and counts == sorted(counts) else ""
-    return BEYOND_DAMPED.format(edge=words) + more + backwards
+    return (BEYOND_UNDAMPED if arm.is_uniform and not arm.damping else BEYOND_DAMPED) + backwards

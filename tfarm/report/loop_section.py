@@ -6,7 +6,6 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,14 +25,13 @@ from tfarm.loop.answers import (
     margin_rows,
     unsettled,
 )
-from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins, loop_curve
 from tfarm.loop.nyquist import Nyquist, nyquist_of, nyquist_table
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.loop.spill import SPILL, Spill, spill
-from tfarm.loop.theorem import signs_of_loop
+from tfarm.loop.theorem import lyapunov, signs_of_loop
 from tfarm.plots.disc import draw_nyquist
-from tfarm.plots.loop import draw_loop
+from tfarm.plots.frequency import draw_loop
 from tfarm.report.cases import GivenLaw, LawOnArm, brief_on, continuous_cases, margins_of, why_no_loop
 from tfarm.report.sections import Fact, PageSection, Picture, typeset, upper
 
@@ -183,40 +181,29 @@ def window_table(laws: Sequence[LawOnArm], found: Sequence[Margins]) -> Table:
     )
 
 
-class PlotOfLaw(NamedTuple):
-    """One law's plot: its name, and the counted contour."""
-
-    named: LawOnArm
-    data: Nyquist
-
-
-def count_table(plots: Sequence[PlotOfLaw], names: Sequence[str]) -> Table:
+def count_table(names: Sequence[str], plots: Sequence[Nyquist]) -> Table:
     """Verdict, encirclements and unstable poles of each law."""
     whole = partial(Column, digits=singly(lambda n: str(n).replace("-", "−")))
     unstable = partial(whole, group="unstable poles")
     words = [
-        f"{it.verdict}{', infinitely many in all' * it.unstable_roots_infinite}" for it in (p.verdict for _, p in plots)
+        f"{it.verdict}{', infinitely many in all' * it.unstable_roots_infinite}"
+        for it in (plot.verdict for plot in plots)
     ]
     return Table(
         stem="nyquist-count",
         title="Encirclements beside unstable poles",
-        caption=COUNT_CAPTION.format(open=NO_OPEN if not any(p.unstable_open for _, p in plots) else OWN_OPEN),
+        caption=COUNT_CAPTION.format(open=NO_OPEN if not any(plot.unstable_open for plot in plots) else OWN_OPEN),
         columns=(
             Column("law", "law", of=names),
             Column("verdict", "verdict", of=words),
-            whole("encirclements", "turns around −1", of="data.encirclements"),
-            unstable("unstable_by_nyquist", "by Nyquist", of="data.expected"),
-            unstable("unstable_in_box", "in a box", of="data.verdict.unstable_roots"),
-            unstable("on_axis_in_box", "undecided", of="data.on_axis"),
-            Column("band_rad_s", "up to", "rad/s", of="data.verdict.band", digits=singly(significant, 6)),
+            whole("encirclements", "turns around −1", of="encirclements"),
+            unstable("unstable_by_nyquist", "by Nyquist", of="expected"),
+            unstable("unstable_in_box", "in a box", of="verdict.unstable_roots"),
+            unstable("on_axis_in_box", "undecided", of="on_axis"),
+            Column("band_rad_s", "up to", "rad/s", of="verdict.band", digits=singly(significant, 6)),
         ),
         record=list(plots),
     )
-
-
-def curve_data(plots: Sequence[PlotOfLaw], stem: str = "nyquist-data") -> Table:
-    """L on the contour of every law."""
-    return nyquist_table(*(plot.data for plot in plots), stem=stem, laws=[plot.named.key for plot in plots])
 
 
 def no_loop_section(arm: Arm) -> PageSection:
@@ -248,7 +235,7 @@ def margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> Pa
         facts.append(verdict_fact(each, it, f"{far}; {brief_on(each.arm, each.law, chain).short}"))
         words.append(verdict_words(f"{upper(each.name)}, {each.gains}", it))
         try:
-            spilled = spill(each.arm, each.any_law, MOST_SPILLED)
+            spilled = spill(each.arm, each.law, MOST_SPILLED)
         except TfarmError as error:
             words.append(f"Spillover of {each.name} is not determined: {typeset(str(error))}.")
             continue
@@ -307,7 +294,7 @@ def spill_table(each: LawOnArm, found: Spill) -> Table:
 def nyquist_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> PageSection:
     """The loop function of each case on a contour that hides nothing, two in a picture, its encirclements counted."""
     cases = continuous_cases(arm, chain, laws)
-    plots = [PlotOfLaw(each, nyquist_of(margins_of(each.arm, each.law).stability)) for each in cases]
+    plots = [(each, nyquist_of(margins_of(each.arm, each.law).stability)) for each in cases]
     counts = {}  # of each case: encirclements, poles of its own, and the unstable poles that follow
     for named, found in plots:
         own = f", {how_many(found.unstable_open, 'unstable pole')} of its own" if found.unstable_open else ""
@@ -320,15 +307,15 @@ def nyquist_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> Pa
         stem = "nyquist" if first == 0 else f"nyquist-{1 + first // 2}"
         blocks.append(Picture(
             stem=stem, title="Nyquist plots of the exact loop function", caption=RINGS_CAPTION,
-            alt="; ".join(counts[plot.named.name] for plot in pair),
-            figure=draw_nyquist(arm.name, {plot.named.name: plot.data for plot in pair}),
-            data=curve_data(pair, f"{stem}-data"),
+            alt="; ".join(counts[named.name] for named, _ in pair),
+            figure=draw_nyquist(arm.name, {named.name: data for named, data in pair}),
+            data=nyquist_table(*(data for _, data in pair), stem=f"{stem}-data", laws=[named.key for named, _ in pair]),
         ))  # fmt: skip
-    own = "" if any(plot.data.unstable_open for plot in plots) else ", which here is never"
-    names = [f"{plot.named.name}: {plot.named.gains}" for plot in plots]
+    own = "" if any(data.unstable_open for _, data in plots) else ", which here is never"
+    table = count_table([f"{named.name}: {named.gains}" for named, _ in plots], [data for _, data in plots])
     words = [*map(upper, counts.values()), NYQUIST_WORDS.format(own=own)]
     title = "Nyquist plot: encirclements of −1"
-    return PageSection(anchor="margins-nyquist", title=title, words=words, blocks=[*blocks, count_table(plots, names)])
+    return PageSection(anchor="margins-nyquist", title=title, words=words, blocks=[*blocks, table])
 
 
 # ------------------------------------------------------------ poles

@@ -10,24 +10,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, shown_unit, unit_of, written_unit
+from tfarm.arm import GAINS, PLANE, RATE_GAIN, Arm, shown_unit, unit_of, written_unit
 from tfarm.arrays import Real
 from tfarm.columns import Column, Table
-from tfarm.comparing.regions import sampled_region
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp.verdict import SampledBrief
-from tfarm.loop.edges import DEEPEST_MOMENT_GAIN, Axis, edge, moment_axis, rate_axis
-from tfarm.loop.frequencies import band_of
-from tfarm.loop.plane import Plane, gain_map
-from tfarm.loop.windows import Windows
+from tfarm.loop.answers import gain_rows
+from tfarm.loop.loop import band_of
+from tfarm.loop.plane import DEEPEST_MOMENT_GAIN, Axis, Plane, edge, gain_map, moment_axis, rate_axis
 from tfarm.plots import plane
+from tfarm.plots.regions import sampled_region
 from tfarm.plots.style import blank, headline, legend_below, style
 from tfarm.records import record
 from tfarm.report.cases import DESIGNED_MODES, LawOnArm, best, brief_on, continuous_cases, margins_of
-from tfarm.report.sections import PageSection, Picture, typeset
-from tfarm.spectrum.scales import default_gains, default_words, first_frequency, rate_unit
+from tfarm.report.sections import PageSection, Picture, in_ms, typeset
+from tfarm.spectrum.table import default_gains, default_words, first_frequency, rate_unit
 from tfarm.synthesis.design import Design
 from tfarm.synthesis.models import continuous_model
 from tfarm.synthesis.objectives import least_damping
@@ -48,15 +47,6 @@ NO_PROOF = (
     "The dashed frame is what the Lyapunov argument proves for an arm without damping; it is not a proof here, because "
     "the gauge does not feel C. At C > 0 it proves K2 = 0 alone (solid line). The true edge is the black line."
 )
-OF_ELASTIC = (
-    "Lyapunov's argument proves all with K1 > {least} and K2 < {whole}: the links are elastic, and what hub, clamp and "
-    "joint lose only adds to K1."
-)
-OF_DAMPED = "At C > 0 Lyapunov's argument proves K2 = 0 alone, as the gauge does not feel C; the edge is computed."
-OF_OTHER_GAUGE = (
-    "The gauge does not read the moment on the hub, so Lyapunov's argument proves K2 = 0 alone; the edge is computed."
-)
-OF_LAG = "The voltage comes late through an inductance, so Lyapunov's argument proves nothing; the edge is computed."
 SAMPLED_SEEN = (
     " Hatched: what is stable when the loop is sampled every {clock}, its edge exact for the first {modes} modes; with "
     "that clock no gains outside the hatching hold, whatever the continuous loop promises."
@@ -161,7 +151,6 @@ def draw_map_of_arm(data: MapOfArm) -> Figure:
             plane.law_mark(gains, MARKERS[law.key], f"{law.name}: {law.gains};\n{brief.short}", ax)
         if data.design is not None:
             plane.search_frame(data.design.bounds, ax)
-        plane.count_labels(found, x, y, ax)
         legend_below(figure)
         headline(figure, f"{data.arm.name}: how high may the gains go?")
     return figure
@@ -208,103 +197,46 @@ def map_section(arm: Arm, chain: Chain | None = None) -> PageSection:
         figure=draw_map_of_arm(data),
         data=map_data(data),
     )
-    words = (_answer(arm), _best_words(data))
-    return PageSection(
-        anchor="margins-map", title="How high may the gains go?", words=[w for w in words if w], blocks=(picture,)
-    )
+    words = [_intervals(arm), *([] if data.design is None else [_best_words(data, data.design)])]
+    return PageSection(anchor="margins-map", title="How high may the gains go?", words=words, blocks=(picture,))
 
 
-def _answer(arm: Arm) -> str:
-    """The windows of both gains through the default ones, in words."""
+def _intervals(arm: Arm) -> str:
+    """The verdict on the default gains, and the stability interval of each."""
     found = margins_of(arm, default_gains(arm))
-    start = f"With the default gains {typeset(default_words(arm))} the loop is {found.stability.verdict}"
-    across, up = PLANE
-    if any(found.windows[name].around is None for name in PLANE):
-        return f"{start}; the picture shows which gains are stable."
-    many = len(found.windows[up].all)
-    again = f" {up} has {many} separate stable windows at that {across}, listed below." if many > 1 else ""
-    more = {name: _room(found.windows[name], written_unit(name, arm)) for name in PLANE}
-    return f"{start}: at that {across}, {up} may {more[up]}; at that {up}, {across} may {more[across]}.{again}"
-
-
-def _room(windows: Windows, unit: str) -> str:
-    """How far a gain may go up and down: to an edge and what happens there, to where the search ends, or anywhere."""
-    assert windows.around is not None
-    ways = []
-    for value, way in zip(reversed(windows.around), ("up", "down"), strict=True):
-        place = f"{plain(value, 5)}{unit}"
-        if windows.end(value) == "no limit":
-            ways.append(f"go {way} without limit")
-        elif windows.end(value) == "search bound":
-            ways.append(f"go {way} with no limit found as far as {place}")
-        else:
-            ways.append(f"go {way} to {place}{_crossing_there(windows, value)}")
-    return ", and may ".join(ways)
-
-
-def _crossing_there(windows: Windows, value: float) -> str:
-    """What reaches the axis at that edge."""
-    crossing = next((each for each in windows.crossings if each.t == value), None)
-    if crossing is None:
-        return ""
-    if crossing.at == 0:
-        return ", where a real pole passes through 0"
-    if not np.isfinite(crossing.at):
-        return ", where every flexible mode crosses at once"
-    return f", where poles cross at {significant(crossing.at, 4)} rad/s"
-
-
-def _best_words(data: MapOfArm) -> str:
-    found = data.design
-    if found is None:
-        return ""
-    cut = " and ".join(
-        found.law.told(name, lambda gain: plain(gain, 4)) for name in found.at_bound if name not in found.at_limit
-    )
-    gains = " and ".join(found.law.told(name, lambda gain: significant(gain, 4), data.arm) for name in PLANE)
-    brief = data.briefs[-1]
-    words = typeset(brief.words)
-    sampled = f"{words[0].upper()}{words[1:]}" if brief.is_stable else f"But {words}"
-    edge = f" That is no optimum: the dotted frame cuts the search off at {cut}, and there is more beyond." * bool(cut)
+    rows = [row for row in gain_rows(found) if row.gain in PLANE]
+    spans = (f"{row.gain} in {' '.join(row.spans(plain, 5, *row.windows.all)) or 'none'}{written_unit(row.gain, arm)}"
+             for row in rows)  # fmt: skip
     return (
-        f"The best damping of the first {DESIGNED_MODES} modes that the sampled loop holds within the dotted frame is "
-        f"{significant(100 * found.value, 3)} % of critical, at {gains} (tfarm design), without a clock "
-        f"{found.verdict.verdict}.{edge} {sampled}."
+        f"With the default gains {typeset(default_words(arm))} the loop is {found.stability.verdict}. Stability "
+        f"intervals, the other gain fixed: {'; '.join(spans)}. A star: no limit found up to there."
+    )
+
+
+def _best_words(data: MapOfArm, found: Design) -> str:
+    """The gains that damp the sampled loop best, and the verdicts on them."""
+    gains = ", ".join(found.law.told(name, lambda gain: significant(gain, 4), data.arm) for name in PLANE)
+    cut = ", ".join(name for name in found.at_bound if name not in found.at_limit)
+    edge = f" That is no optimum: {cut} lies on the dotted frame, the bound of the search." * bool(cut)
+    return (
+        f"Best damping of the first {DESIGNED_MODES} modes of the sampled loop within the dotted frame (tfarm design): "
+        f"{significant(100 * found.value, 3)} % of critical at {gains}; continuous-time loop {found.verdict.verdict}, "
+        f"{data.briefs[-1].short}.{edge}"
     )
 
 
 def _map_caption(data: MapOfArm) -> str:
-    proof = proof_words(data.arm)
-    unit = f"{plain(rate_unit(data.arm), 4)} {unit_of(RATE_GAIN, data.arm)}"
-    reach = ALL_MODES if data.region.is_known else UP_TO.format(band=significant(data.region.band, 5))
-    free = data.arm.has_rigid_mode
+    """The colours and lines of the map, and how far each is known."""
+    arm, region, sampled = data.arm, data.region, data.sampled
     seen = MAP_SEEN.format(
         band=significant(data.band, 5),
-        proof=proof,
-        unit=unit,
-        reach=reach,
-        apart=APART_FROM_HUB * free,
-        held=WITH_INERTIA * (not free),
+        proof=(PROOF if arm.is_undamped else NO_PROOF) if arm.is_uniform else "",
+        unit=f"{plain(rate_unit(arm), 4)} {unit_of(RATE_GAIN, arm)}",
+        reach=ALL_MODES if region.is_known else UP_TO.format(band=significant(region.band, 5)),
+        apart=APART_FROM_HUB * arm.has_rigid_mode,
+        held=WITH_INERTIA * (not arm.has_rigid_mode),
     )
-    sampled = SAMPLED_NOT_SEEN if data.sampled is None else SAMPLED_SEEN
-    clock = f"{plain(1e3 * data.chain.sampling.period)} ms"
-    modes = 0 if data.sampled is None else data.sampled.modes_used
-    deepest = plain(DEEPEST_MOMENT_GAIN * data.arm.input_per_torque, 4)
-    depth = "" if data.arm.loses_at_hub_alone else DEPTH_WORDS.format(deepest=deepest)  # by a theorem, however deep
-    return seen + sampled.format(clock=clock, modes=modes) + depth
-
-
-def proof_words(arm: Arm) -> str:
-    """What Lyapunov's argument proves in the plane of gains, as the margins' table says it of each law."""
-    if arm.is_uniform:
-        return PROOF if arm.is_undamped else NO_PROOF
-    if arm.input_lags:
-        return OF_LAG
-    if not arm.reads_hub_moment:
-        return OF_OTHER_GAUGE
-    if not arm.has_elastic_link:
-        return OF_DAMPED
-    whole, least = arm.input_per_torque, 0.0 - arm.rate_loss
-    return OF_ELASTIC.format(
-        whole=plain(whole, 5) + written_unit(MOMENT_GAIN, arm), least=plain(least, 5) + written_unit(RATE_GAIN, arm)
-    )
+    also = SAMPLED_NOT_SEEN if sampled is None else SAMPLED_SEEN
+    seen += also.format(clock=f"{in_ms(data.chain)} ms", modes=0 if sampled is None else sampled.modes_used)
+    deepest = plain(DEEPEST_MOMENT_GAIN * arm.input_per_torque, 4)
+    return seen + DEPTH_WORDS.format(deepest=deepest) * (not arm.loses_at_hub_alone)  # by a theorem, however deep

@@ -15,7 +15,8 @@ from tfarm.arrays import Real
 from tfarm.columns import FILES, REPORT, Column, Table
 from tfarm.digits import fixed, lined, listed, plain, significant, singly
 from tfarm.errors import MISSING, CertificationError, ConvergenceError
-from tfarm.plots.shapes import DrawnMode, draw_differences, draw_shapes, shapes_of, theory_name
+from tfarm.plots.shapes import SHAPE_POINTS, draw_differences, scaled, theory_name
+from tfarm.plots.shapes import modes as shapes_plot
 from tfarm.report.sections import PageSection, Picture, typeset
 from tfarm.spectrum import DampedModes, Modes, answers, damped_modes, modes
 from tfarm.spectrum.answers import DAMPED_MODE_COLUMNS, beyond_the_box
@@ -30,18 +31,12 @@ PLAIN_DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-"
 TWO_PI = Decimal("6.2831853071795864769252867665590057683943387987502")
 
 DAMPED_CAPTION = (
-    "Eigenvalues of the arm with its own damping, C = {C} s, each continued from the undamped mode of its number. "
-    "Each is enclosed in a disc of 12 digits that holds exactly one. All {count} eigenvalues with {left} < Re s < "
-    "{right} 1/s and |Im s| < {top} rad/s are listed (conjugates counted{rigid}): the argument principle in ball "
-    "arithmetic counts those in this box. {outside}Beyond any such box there are more: {beyond}."
+    "Eigenvalues of {whose} (C = {C} s), each continued from the undamped mode of its number. Each is enclosed in a "
+    "disc of 12 digits that holds exactly one. All {count} eigenvalues with {left} < Re s < {right} 1/s and |Im s| < "
+    "{top} rad/s are listed (conjugates counted{rigid}): the argument principle in ball arithmetic counts those in "
+    "this box. {outside}Beyond any such box there are more: {beyond}."
 )
-NO_C_CAPTION = (
-    "Eigenvalues of the rig with what its hub, clamp and joint lose (C = {C} in the link), each continued from the "
-    "undamped mode of its number. Each is enclosed in a disc of 12 digits that holds exactly one. All {count} "
-    "eigenvalues with {left} < Re s < {right} 1/s and |Im s| < {top} rad/s are listed (conjugates counted{rigid}): the "
-    "argument principle in ball arithmetic counts those in this box. {outside}Beyond any such box there are more, at "
-    "ever higher frequency: {beyond}."
-)
+OWN_DAMPING, LOSSES = "the arm with its own damping", "the rig with what its hub, clamp and joint lose"
 UNASSIGNED_NOTE = (
     "Rows without a number are eigenvalues that continue from no mode for certain, named after the part of the drive "
     "that sets them, where one does; a mode that is “not assigned” has one of them, or none in the box. "
@@ -102,13 +97,11 @@ WITH_LOSSES = (
     "; between them those of the free hub with what it loses at its own friction (and back-EMF), and nothing else"
 )
 WHICH_IS_MEASURED = (
-    "Which number is it that you measured? Once a slew is over dry friction holds the hub, and the link rings at the "
-    "hub-locked frequencies: first {locked} rad/s ({locked_hz} Hz). The linear rig, whose hub swings along, rings at "
-    "{free} rad/s ({free_hz} Hz){damped}. A peak near the former says that the hub stood still, one near the latter "
-    "that it moved; fit each to its own column."
+    "Which frequency was measured? Once a slew is over dry friction holds the hub, and the link vibrates at the "
+    "hub-locked frequencies. The linear rig, whose hub moves along, vibrates at those of the free hub with its losses. "
+    "A peak near the former shows that the hub stood still, one near the latter that it moved: fit each to its own "
+    "column."
 )
-SWINGS = "; with its hub's own losses at {omega} rad/s, {ratio} % of critical"
-CREEPS = "; with its hub's own losses its first mode no longer swings"
 
 
 @lru_cache(maxsize=8)  # the arm's page and the page on trust speak of the same ones, and a proof takes seconds
@@ -148,7 +141,8 @@ def damped_table(undamped: Modes) -> Table:
     return Table(
         stem="damped-modes",
         title="Damped modes",
-        caption=(DAMPED_CAPTION if C else NO_C_CAPTION).format(
+        caption=DAMPED_CAPTION.format(
+            whose=OWN_DAMPING if C else LOSSES,
             C=plain(C),
             count=damped.count,
             rigid=rigid,
@@ -183,12 +177,12 @@ def modes_section(arm: Arm) -> PageSection:
     return PageSection(
         anchor="modes",
         title="Modes",
-        words=words if arm.is_uniform else [*words, *locked_words(arm)],
+        words=[*words, *[WHICH_IS_MEASURED] * (not (arm.is_uniform or arm.is_locked))],
         blocks=(
             modal_table(modes),
             *([] if arm.is_uniform else [locked_table(modes)]),
             *damped,
-            _shapes(arm.name, shapes_of(modes, DRAWN_MODES)),
+            _shapes(tfarm.modes(arm, count=DRAWN_MODES)),
             theories_table(exact, theories, differences),
             _differences(arm.name, differences),
             sensitivity_table(modes),
@@ -233,18 +227,20 @@ def places(nodes: Real, length: float) -> tuple[str, ...]:
     return tuple(significant(float(x), 2) if x < near else fixed([float(x)], decimals)[0] for x in nodes)
 
 
-def _shapes(name: str, shapes: tuple[DrawnMode, ...]) -> Picture:
-    counts = ", ".join(str(len(shape.nodes)) for shape in shapes)
-    columns = [Column("x_m", "x", "m", of=shapes[0].x)]
+def _shapes(modes: Modes) -> Picture:
+    shapes = scaled(modes, DRAWN_MODES)
+    counts = ", ".join(str(len(modes.nodes[modes.index.tolist().index(number)])) for number in shapes)
+    columns = [Column("x_m", "x", "m", of=np.linspace(0.0, modes.arm.length, SHAPE_POINTS))]
     columns += [
-        Column(f"mode_{s.number}", f"mode {s.number}", of=np.round(s.w, answers.SHAPE_DIGITS - 1) + 0.0) for s in shapes
+        Column(f"mode_{number}", f"mode {number}", of=np.round(w, answers.SHAPE_DIGITS - 1) + 0.0)
+        for number, w in shapes.items()
     ]
     return Picture(
         stem="mode-shapes",
         title=f"Shapes of the first {len(shapes)} flexible modes",
         caption=MODE_SHAPES,
         alt=f"Mode shapes of the arm, modes 1 to {len(shapes)}; they have {counts} nodes between hub and tip.",
-        figure=draw_shapes(name, shapes),
+        figure=shapes_plot.figure(modes),
         data=Table(stem="mode-shapes-data", title="Mode shapes", columns=tuple(columns)),
     )
 
@@ -317,21 +313,6 @@ def tint(x: float) -> str:
     strength = 0.45 * min(1.0, abs(x) / 2.0) ** 0.6
     parts = (round(255 - strength * (255 - part)) for part in (RISE_COLOUR if x > 0 else FALL_COLOUR))
     return "#" + "".join(f"{part:02x}" for part in parts)
-
-
-def locked_words(arm: Arm) -> list[str]:
-    """What the two columns mean for a reader with a measured number; nothing where the hub is locked anyway."""
-    if arm.is_locked:
-        return []
-    free, locked = tfarm.modes(arm, 1), hub_locked(tfarm.modes(arm, 1))
-    omega, held = float(free.natural_frequency[-1]), float(locked.natural_frequency[-1])
-    numbers = {"free": omega, "free_hz": omega / (2 * math.pi), "locked": held, "locked_hz": held / (2 * math.pi)}
-    damped = ""
-    lossy = damped_at_hub(arm, 1)  # how the first mode of the free hub rings with its own losses
-    if lossy is not None and lossy.is_assigned.all():
-        s, ratio = complex(lossy.eigenvalues[-1, 0]), significant(100 * float(lossy.damping_ratio[-1]), 3)
-        damped = SWINGS.format(omega=significant(s.imag, 5), ratio=ratio) if s.imag else CREEPS
-    return [WHICH_IS_MEASURED.format(damped=damped, **{name: significant(x, 5) for name, x in numbers.items()})]
 
 
 def locked_table(table: Modes) -> Table:

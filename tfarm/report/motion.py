@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -16,7 +17,8 @@ from tfarm.dsp.results import drawn, residual_moment_rms, settling_time
 from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.errors import ParameterError
 from tfarm.fitting.recording import Beside, beside_exact, overshoot
-from tfarm.plots.motion import draw_beside, draw_responses
+from tfarm.plots.motion import draw_beside
+from tfarm.plots.motion import slew as slew_plot
 from tfarm.plots.style import safe
 from tfarm.report.cases import LawOnArm
 from tfarm.report.sections import Picture, residual_words, typeset, upper
@@ -96,9 +98,8 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
 
 def measured_blocks(named: Sequence[LawOnArm], chain: Chain) -> list[Picture | Table]:
     """Each measured run with the exact loop over it, and both in numbers."""
-    found = {
-        each.name: beside_exact(each.arm, each.law, chain, each.measured) for each in named if each.measured is not None
-    }
+    runs = [(each, each.given.measured) for each in named if each.given.measured is not None]
+    found = {each.name: beside_exact(each.arm, each.law, chain, run) for each, run in runs}
     sources = " ".join(f"{name}: {it.measured.source}." for name, it in found.items() if it.measured.source)
     steps = ", ".join(f"{name} by {plain(math.degrees(it.measured.step), 3)} deg" for name, it in found.items())
     picture = Picture(
@@ -107,36 +108,41 @@ def measured_blocks(named: Sequence[LawOnArm], chain: Chain) -> list[Picture | T
         caption=MEASURED_CAPTION.format(sources=sources, assumed=ASSUMED_WORDS),
         alt=f"Hub angle and root moment over time, measured and computed: {steps}.",
         figure=draw_beside("Measured steps, and the exact sampled loop", found),
-        data=beside_table({each.key: found[each.name] for each in named if each.name in found}),
+        data=beside_table({each.key: found[each.name] for each, _ in runs}),
     )
     angles = {name: it for name, it in found.items() if it.measured.hub_angle.size}
     return [picture, *([overshoot_table(angles)] if angles else [])]
 
 
+MEASURED_QUANTITIES = (  # key, title and unit, of the run and its signals: hub angle and root moment
+    ("overshoot", "overshoot", "%", lambda it, angle, _: 100 * overshoot(angle, it.step, float(it.reference[-1]))),
+    ("end", "off at the end", "deg", lambda it, angle, _: math.degrees(angle[-1] - it.reference[-1])),
+    ("moment", "largest |moment|", "N m", lambda it, _, moment: float(abs(moment).max()) if moment.size else ""),
+)
+SIGNALS = (
+    ("measured", lambda it: (it.measured.hub_angle, it.measured.root_moment)),
+    ("computed", lambda it: (it.hub_angle, it.run.at_samples.root_moment)),
+)
+
+
 def overshoot_table(found: Mapping[str, Beside]) -> Table:
     """A row a law: overshoot, where it ends, and the greatest moment, measured and computed."""
-    rows: list[dict[str, list[float | str]]] = []
-    for it in found.values():
-        measured, end, angles = it.measured, float(it.measured.reference[-1]), (it.measured.hub_angle, it.hub_angle)
-        moment, computed = measured.root_moment, float(abs(it.run.at_samples.root_moment).max())
-        rows.append({
-            "overshoot": [100 * overshoot(angle, measured.step, end) for angle in angles],
-            "end": [math.degrees(angle[-1] - end) for angle in angles],
-            "moment": [float(abs(moment).max()) if moment.size else "", computed],
-        })  # fmt: skip
-    titles = {"overshoot": ("overshoot", "%"), "end": ("off at the end", "deg"), "moment": ("largest |moment|", "N m")}
+    three = singly(significant, 3)
     columns = [Column("law", "law", of=list(found)),
                Column("step_deg", "step", "deg", of=[math.degrees(it.measured.step) for it in found.values()],
                       digits=singly(plain, 4))]  # fmt: skip
-    for key, (title, unit) in titles.items():
-        for place, which in enumerate(("measured", "computed")):
-            values = [row[key][place] for row in rows]
-            name = f"{key}_{which}_{unit.replace('%', 'percent').replace(' ', '_')}"
-            columns.append(Column(name, which, unit, of=values, digits=singly(significant, 3), group=title))
+    for (key, title, unit, quantity), (which, signals) in product(MEASURED_QUANTITIES, SIGNALS):
+        values = [quantity(it.measured, *signals(it)) for it in found.values()]
+        name = f"{key}_{which}_{unit.replace('%', 'percent').replace(' ', '_')}"
+        columns.append(Column(name, which, unit, of=values, digits=three, group=title))
     apart = [math.degrees(it.difference_rms) for it in found.values()]
-    columns.append(Column("apart_rms_deg", "apart, rms", "deg", of=apart, digits=singly(significant, 3)))
-    title = "Measured and computed, in numbers"
-    return Table(stem="sampled-overshoot", title=title, caption=OVERSHOOT_CAPTION, columns=tuple(columns))
+    columns.append(Column("apart_rms_deg", "apart, rms", "deg", of=apart, digits=three))
+    return Table(
+        stem="sampled-overshoot",
+        title="Measured and computed, in numbers",
+        caption=OVERSHOOT_CAPTION,
+        columns=tuple(columns),
+    )
 
 
 def beside_table(found: Mapping[str, Beside]) -> Table:
@@ -181,7 +187,7 @@ def slew(arm: Arm, chain: Chain, cases: Sequence[LawOnArm]) -> tuple[list[Pictur
         title="The slew",
         caption=f"{SLEW_CAPTION}{figures}{clipped_words(runs)}{resolution_words(runs.values())}",
         alt=f"Root moment, tip and motor in a slew of {what}. {figures}",
-        figure=draw_responses(driven, shown, what),
+        figure=slew_plot.figure(driven, shown, what),
         data=responses_table("sampled-slew-data", "The slew in time", driven, {e.key: runs[e.name] for e in simulated}),
     )
     return [picture], words

@@ -25,7 +25,7 @@ from tfarm.errors import ParameterError
 from tfarm.glossary import GLOSSARY_TERMS, Term
 from tfarm.report.arm_section import arm_section, is_from_paper, paper_section
 from tfarm.report.assumptions_section import assumptions_section
-from tfarm.report.cases import Subject, continuous_laws, has_loop, has_rate_loop, on_arm, sign_words
+from tfarm.report.cases import Subject, has_loop, has_rate_loop, sign_words
 from tfarm.report.law_section import law_section
 from tfarm.report.locus_section import locus_section
 from tfarm.report.loop_section import margins_section, no_loop_section, nyquist_section, poles_section
@@ -33,7 +33,7 @@ from tfarm.report.map_section import map_section
 from tfarm.report.modes_section import modes_section
 from tfarm.report.response_sections import bode_section, fit_section, measured_section
 from tfarm.report.sampled_section import sampled_section
-from tfarm.report.sections import Fact, PageSection, SavedBlock, SavedSection
+from tfarm.report.sections import PageSection, SavedBlock, SavedSection
 from tfarm.report.tuner_section import tuner_section
 from tfarm.tables.html import with_symbols
 
@@ -87,7 +87,7 @@ class Piece:
         """Whether a page on this subject has the section."""
         if not self.suits(subject.arm) or not all(getattr(subject, part) for part in self.of):
             return False
-        return not self.in_s or bool(continuous_laws(on_arm(subject.arm, subject.laws)))
+        return not self.in_s or not all(as_law(each.law).is_discrete for each in subject.laws)
 
     def made(self, subject: Subject) -> PageSection:
         """The section."""
@@ -230,22 +230,6 @@ def other_pages(folder: Path, writing: Sequence[str], page: str) -> Sequence[tup
     return [(f"{name}.html", names[name]) for name in there if name != page]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Card:
-    """An arm on the index: its folder's name, a few numbers, its pages and whether there is a picture.
-
-    `loops` are rows of cells in the table of arms, one a law that its page is about, else of the default gains; all ""
-    where there is no loop.
-    """
-
-    name: str
-    summary: str
-    facts: Sequence[Fact]
-    pages: Sequence[tuple[str, str]]
-    picture: str
-    loops: Sequence[Mapping[str, str]]
-
-
 @cache
 def _templates() -> Environment:
     environment = Environment(
@@ -289,13 +273,13 @@ def arm_page(
         glossary=promises(),
         trust=trust,
         live=live,
-        summary=summary(arm, [each.given_name for each in subject.laws]),
+        summary=summary(arm, [each.name for each in subject.laws]),
         foot=foot(subject, only),
         has_proof=not (subject.laws and only),
     )
 
 
-def index_page(cards: Sequence[Card], *, trust: str, compared: str = "") -> str:
+def index_page(cards: Sequence[Mapping[str, Any]], *, trust: str, compared: str = "") -> str:
     """The page that leads to all others; `compared` is the title of the comparison beside it, if there is one."""
     return render("index.html", title="tfarm reports", cards=cards, trust=trust, compared=compared, looks=BADGES)
 

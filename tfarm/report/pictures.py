@@ -5,15 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import tfarm
-from tfarm.comparing.regions import stable_regions
 from tfarm.digits import plain
 from tfarm.dsp import load_chain
 from tfarm.plots.files import save_figure
 from tfarm.plots.frequency import draw_compared
-from tfarm.plots.regions import draw_overlay
-from tfarm.plots.shapes import draw_shapes, shapes_of
+from tfarm.plots.regions import draw_overlay, stable_regions
+from tfarm.plots.shapes import modes
 from tfarm.response.frequency import bode, resonant_band
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 README_DOTS = 100  # an inch: pictures of a README are shown at their own size
 README_MODES = 4  # shapes: two rows
@@ -31,7 +30,7 @@ def readme_pictures(out: Path) -> tuple[Path, ...]:
     figures = {
         "bode-root-moment": draw_compared(main, other, labels),
         "gains": draw_overlay(stable_regions(lab, default_gains(lab), load_chain(lab.name))),
-        "mode-shapes": draw_shapes(lab.name, shapes_of(tfarm.modes(lab, count=README_MODES), README_MODES)),
+        "mode-shapes": modes.figure(tfarm.modes(lab, count=README_MODES)),
     }
     for stem, figure in figures.items():
         save_figure(figure, out, stem, formats=("png",), dpi=README_DOTS)

@@ -15,18 +15,19 @@ from tfarm.digits import general, how_many, listed, plain, significant, singly
 from tfarm.errors import ConvergenceError
 from tfarm.fitting.answers import fit_in_words, known, parameters_table, resonances
 from tfarm.fitting.data import Measured
-from tfarm.fitting.fit import Fit
+from tfarm.fitting.fit import ARMS, Fit, Possible, possible
 from tfarm.fitting.overlay import curves_table, overlay, overlay_answer, required_table
-from tfarm.fitting.possible import ARMS, Possible, extremes, loop_on_all, possible
+from tfarm.loop.margins import margins
 from tfarm.loop.plane import ranges_of
-from tfarm.plots.fitted import draw_band, draw_fit, draw_measured, draw_share
-from tfarm.plots.frequency import draw_bode
+from tfarm.plots.fitted import draw_band, draw_share, fitted
+from tfarm.plots.fitted import measured as measured_plot
+from tfarm.plots.frequency import bode as bode_plot
 from tfarm.plots.words import gains_words
 from tfarm.report.cases import has_loop
 from tfarm.report.sections import PageSection, Picture, typeset, upper
 from tfarm.response.answers import bode_table, roots_table
 from tfarm.response.frequency import AXIS_SHARE, Bode, Extremum, bode
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 MAGNITUDE = attrgetter("magnitude")
 ROOTS_CAPTION = (
@@ -42,8 +43,7 @@ FIT_MARGINS = (
     Column("lowest", "lowest", of=lambda row: row[2][0], digits=singly(general, 4)),
     Column("highest", "highest", of=lambda row: row[2][1], digits=singly(general, 4)),
 )
-SPANS_ON_ALL = (  # title, unit and name of what the loops on all arms have
-    (f"{MOMENT_GAIN} up to", "", "gain_up"),
+SPANS_ON_ALL = (  # title, unit and name of a margin in the band
     ("phase margin", "deg", "phase"),
     ("delay margin", "s", "delay"),
     ("disk margin", "", "disk"),
@@ -73,7 +73,7 @@ def bode_section(arm: Arm, output: str) -> PageSection:
         title=upper(f"{data.input_label} to {data.label}: magnitude and phase"),
         caption=f"{what_is_seen(data)} {what_it_means(data)}",
         alt=alt_text(data),
-        figure=draw_bode(data),
+        figure=bode_plot.figure(data),
         data=bode_table(data, f"{anchor}-data"),
     )
     if not data.poles.size and not data.zeros.size:
@@ -114,9 +114,6 @@ def highest_and_lowest(data: Bode) -> str:
 
 def what_it_means(data: Bode) -> str:
     """One sentence on what the picture says about control."""
-    if not data.resonances.size and data.output == "root_moment" and data.arm.has_massless_hub:
-        gauge = "−u/(1 + C s)" if data.arm.damping else "−u"
-        return f"Nothing resonates here: a free pin passes the torque on to the link; the gauge there reads {gauge}."
     if not data.resonances.size:
         return "Nothing resonates here: no pole that oscillates shows at this output."
     turned = f"{np.ptp(data.phase):.0f} degrees over the band"
@@ -168,7 +165,7 @@ def fit_section(fit: Fit, count: int = ARMS) -> PageSection:
         caption = f"Points: {names} as measured. Blue: the fitted arm, exact; grey: the arm that the search began with."
         blocks.append(Picture(
             stem="fit-overlay", title="Measured over fitted", caption=caption,
-            alt=f"Measured and computed responses: {names}.", figure=draw_fit(fit),
+            alt=f"Measured and computed responses: {names}.", figure=fitted.figure(fit),
         ))  # fmt: skip
     blocks.append(parameters_table(fit))
     if rows := resonances(fit):
@@ -203,19 +200,23 @@ def _onwards(those: Possible) -> tuple[list[str], list[Picture | Table]]:
     arm = those.fit.arm
     if has_loop(arm):
         law = default_gains(arm)
-        found, gains = loop_on_all(those, law), gains_words(law)
-        share = f"{found.stable} of {found.of} of these arms ({plain(100 * found.stable / found.of, 3)} %)"
+        every, gains = [margins(each, law) for each in those.arms], gains_words(law)
+        stable = [each for each in every if each.in_band is not None]
+        share = f"{len(stable)} of {len(every)} of these arms ({plain(100 * len(stable) / len(every), 3)} %)"
         words.append(typeset(f"With {gains} the loop holds on {share}."))
         blocks.append(Picture(
             stem="fit-map", title="Gains on all of these arms",
             caption="Dark: the gains hold on every arm that the data leave possible; white: on none. Without a clock.",
             alt="Map of the share of arms on which gains hold.", figure=draw_share(those, ranges_of(arm)),
         ))  # fmt: skip
-        spans = ((title, unit, extremes(getattr(found, name))) for title, unit, name in SPANS_ON_ALL)
-        if rows := [row for row in spans if row[2] is not None]:
+        gain_ends = (each.windows[MOMENT_GAIN].around for each in stable)
+        spans = [(f"{MOMENT_GAIN} up to", "", [ends[1] for ends in gain_ends if ends is not None])]
+        spans += [(title, unit, [getattr(each.in_band, name) for each in stable]) for title, unit, name in SPANS_ON_ALL]
+        known_values = ((title, unit, [each for each in own if each is not None]) for title, unit, own in spans)
+        if rows := [(title, unit, (min(own), max(own))) for title, unit, own in known_values if own]:
             blocks.append(Table(
                 columns=FIT_MARGINS, record=rows, stem="fit-margins", title="Margins over these arms",
-                caption=f"Of {gains} over the {found.stable} arms on which it holds.",
+                caption=f"Of {gains} over the {len(stable)} arms on which it holds.",
             ))  # fmt: skip
     return words, blocks
 
@@ -231,7 +232,7 @@ def measured_section(arm: Arm, measured: Sequence[Measured]) -> PageSection:
         curves = replace(curves_table(found), stem=f"measured{label}-data", title=name)
         blocks.append(Picture(
             stem=f"measured{label}", title=name, caption=CURVES_CAPTION,
-            alt=f"Measured and exact response {name}.", figure=draw_measured(found), data=curves,
+            alt=f"Measured and exact response {name}.", figure=measured_plot.figure(found), data=curves,
         ))  # fmt: skip
         if len(answer["modes"]):
             table = replace(answer["modes"], stem=f"measured-modes{label}", title="Mode by mode", caption=MODES_CAPTION)

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit
 from tfarm.columns import Column, Table
-from tfarm.comparing.regions import StableRegions, regions_table, stable_regions
 from tfarm.crossing import Window
 from tfarm.digits import how_many, plain, scientific, significant, singly
 from tfarm.dsp import Analysis, Chain, Verdict, sampled_verdict
@@ -17,7 +16,7 @@ from tfarm.dsp.crossings import around
 from tfarm.dsp.loci import STRONGER, SampledLoci, sampled_loci
 from tfarm.dsp.modes import SAMPLED_MODE_COLUMNS
 from tfarm.dsp.verdict import SampledNumber, at_periods, sampled
-from tfarm.plots.regions import draw_overlay
+from tfarm.plots.regions import StableRegions, draw_overlay, regions_table, stable_regions
 from tfarm.plots.roots import draw_sampled_loci
 from tfarm.records import record
 from tfarm.report.cases import GivenLaw, LawOnArm, cases_of, has_loop, margins_of, on_hub, what_holds, why_no_loop
@@ -91,11 +90,11 @@ def sampled_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> Pa
         blocks = [overlay_picture(stable_regions(arm, gains, chain), found[0]), *blocks]
         blocks += [periods_table(arm, gains, chain), loci_picture(found[0].analysis)]
     blocks += [modes_table(each) for each in found]
-    if any(each.measured is not None for each in cases):
+    if any(each.given.measured is not None for each in cases):
         blocks += measured_blocks(cases, chain)
     if not arm.has_rigid_mode:
         words.append(f"{what_holds(arm)}: no slew is simulated.")
-    elif any(each.measured is None for each in cases):
+    elif any(each.given.measured is None for each in cases):
         slewed = cases if laws else (without_moment(arm, found[0]), *cases)
         pictures, said = slew(arm, chain, slewed)
         blocks += pictures
@@ -155,19 +154,22 @@ def facts_of(found: SampledCase) -> list[Fact]:
 def chain_words(arm: Arm, chain: Chain) -> str:
     """Every part of the chain that is not ideal."""
     sampling, converters, actuator = chain.sampling, chain.converters, chain.actuator
-    parts = [f"sampled every {in_ms(chain)} ms"]
-    parts += [f"{how_many(sampling.delay_samples, 'sample')} of delay"] * bool(sampling.delay_samples)
-    if not math.isinf(sampling.antialias_corner):
-        parts.append(f"an anti-alias filter at {plain(sampling.antialias_corner)} rad/s")
-    parts += [f"an encoder of {converters.encoder_counts} counts a turn"] * (converters.encoder_counts is not None)
-    parts += ["the hub rate differenced from the encoder"] * (converters.hub_rate == "difference")
-    parts += [f"a moment read with {converters.moment_bits} bits"] * (converters.moment_bits is not None)
-    if not math.isinf(actuator.torque_limit):
-        parts.append(f"an input of at most {plain(actuator.torque_limit)} {arm.input_unit}")
-    parts += [f"hub damping of {plain(actuator.hub_damping)} N m s/rad"] * bool(actuator.hub_damping)
+    sides = (("moment read", converters.moment_bits, converters.moment_range),
+             ("torque written", converters.torque_bits, converters.torque_range))  # fmt: skip
+    parts = (
+        (True, f"sampled every {in_ms(chain)} ms"),
+        (sampling.delay_samples, f"{how_many(sampling.delay_samples, 'sample')} of delay"),
+        (math.isfinite(sampling.antialias_corner), f"an anti-alias filter at {plain(sampling.antialias_corner)} rad/s"),
+        (converters.encoder_counts, f"an encoder of {converters.encoder_counts} counts a turn"),
+        (converters.hub_rate == "difference", "the hub rate differenced from the encoder"),
+        *((bits, f"a {name} with {bits} bits{'' if span is None else f' over ±{plain(span, 3)} N m'}")
+          for name, bits, span in sides),
+        (math.isfinite(actuator.torque_limit), f"an input of at most {plain(actuator.torque_limit)} {arm.input_unit}"),
+        (actuator.hub_damping, f"hub damping of {plain(actuator.hub_damping)} N m s/rad"),
+    )  # fmt: skip
     steps = " Verdicts are of the linear loop; steps and limits act in the simulations." * (not chain.is_linear)
     paper = " These are the paper's: the arm's file has no chain of its own." * (chain == Chain())
-    return f"The chain: {', '.join(parts)}.{steps}{paper}"
+    return f"The chain: {', '.join(text for has, text in parts if has)}.{steps}{paper}"
 
 
 def numbers_table(found: Sequence[SampledCase]) -> Table:
@@ -204,7 +206,7 @@ def delays_table(found: Sequence[SampledCase], chain: Chain) -> Table:
     for it in found:
         for more in MORE_DELAY:
             delay = chain.sampling.delay_samples + more
-            if more and delay + it.each.any_law.delay / T > MOST_DELAY:
+            if more and delay + it.each.law.delay / T > MOST_DELAY:
                 continue
             late = replace(chain, sampling=replace(chain.sampling, delay_samples=delay))
             verdict = sampled_verdict(it.each.arm, it.each.law, late) if more else it.verdict

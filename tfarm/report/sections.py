@@ -25,10 +25,11 @@ if TYPE_CHECKING:
 
 EVERYWHERE = (-math.inf, math.inf)  # gains of any size: an interval that has no end but its own
 TYPESET = {
-    "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", "L(iw)": "L(iω)", "J w1": "J ω₁",
+    "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", " theta": " θ", "phi'(0)": "φ′(0)",
+    "L(iw)": "L(iω)", "J w1": "J ω₁",
     "(alpha_c, eta_c)": "momentum and learning rate",
 }  # fmt: skip
-POWER_WRITTEN, MINUS_WRITTEN = re.compile(r"\d(?:\.\d+)?e[-+]\d+"), re.compile(r"(?<= )-(?=\w)")
+POWER_WRITTEN, MINUS_WRITTEN = re.compile(r"\d(?:\.\d+)?e[-+]\d+"), re.compile(r"(?<= )-(?= ?[\w(])")
 PICTURES, DATA = "pictures", "data"  # the folders of an arm's folder, beside its pages
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from importlib.metadata import version
@@ -38,16 +38,10 @@ GREEK_LETTERS = dict(
         strict=True,
     )
 )
-WIDEST_BESIDE = 46  # characters of the widest line up to which two formulas stand side by side
 MathElement = ElementTree.Element
-STATEMENT_END = re.compile(r"([,;]\\quad)\s*")
-OPENS, CLOSES = ("\\left", "\\begin", "{"), ("\\right", "\\end", "}")
-TEX_TOKEN = re.compile(r"\\left|\\right|\\begin|\\end|[{}]|[^\\{}]|\\[A-Za-z]+|\\.")
-SUM_SIGN = re.compile(r" [-+] ")
+STATEMENT_END = re.compile(r"(?<=[,;])\\quad\s*")
 LEAVES = ("mi", "mo", "mn", "mtext")
-WIDEST_LINE = 92  # characters of a line, as `width` estimates them: what fits beside the margins of a desktop's page
-SHORT_STATEMENT = 24  # statements up to that width share a line, as far as it goes
-INDENT_TEX = r"\qquad "
+LONG_TEX = 300  # characters of a line from which it is set smaller
 TRUST_FOLDER = "trust"
 PACKAGES = (
     "numpy",
@@ -82,42 +76,23 @@ PUBLISHED_WORDS = (
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Shown:
-    """One equation of the paper on the page; `corrected` is empty where the print is right."""
-
-    anchor: str
-    equation: Markup
-    verdict: str
-    mark: str
-    words: str
-    printed: list[Markup]
-    corrected: list[Markup]
-    is_wide: bool
-    left_printed: str
-    left_corrected: str
-    evidence: Markup
-
-
-def shown_row(row: AuditRow) -> Shown:
-    """A row of the audit, typeset."""
-    mark, words = VERDICT_MARKS[row.verdict]
+def shown_row(row: AuditRow) -> dict[str, Any]:
+    """A row of the audit, typeset; `corrected` is empty where the print is right."""
     is_right = row.printed == row.corrected
-    texts = (row.printed_tex,) if is_right else (row.printed_tex, row.corrected_tex)
-    printed, corrected = (formulas(texts[0]), []) if is_right else compared_formulas(*texts)
-    return Shown(
-        anchor=anchor(row.equation),
-        equation=in_letters(row.equation),
-        verdict=row.verdict,
-        mark=mark,
-        words=words,
-        printed=printed,
-        corrected=corrected,
-        is_wide=is_right or max(width(line) for tex in texts for line in formula_lines(tex)) > WIDEST_BESIDE,
-        left_printed=_left(row.residual_printed),
-        left_corrected=_left(row.residual_corrected),
-        evidence=in_letters(row.evidence),
-    )
+    both = (row.printed_tex, row.corrected_tex)
+    printed, corrected = (formulas(both[0]), []) if is_right else compared_formulas(*both)
+    return {
+        "anchor": anchor(row.equation),
+        "equation": in_letters(row.equation),
+        "verdict": row.verdict,
+        "mark": VERDICT_MARKS[row.verdict][0],
+        "words": VERDICT_MARKS[row.verdict][1],
+        "printed": printed,
+        "corrected": corrected,
+        "left_printed": _left(row.residual_printed),
+        "left_corrected": _left(row.residual_corrected),
+        "evidence": in_letters(row.evidence),
+    }
 
 
 def in_letters(text: str) -> Markup:
@@ -173,65 +148,13 @@ def compared_formulas(printed: str, corrected: str) -> tuple[list[Markup], list[
     return [_text(line) for line in both[0]], [_text(line) for line in both[1]]
 
 
-def formula_lines(tex: str) -> list[str]:
-    """The TeX of each line: a statement, several short ones, or as many terms of a long one as fit."""
-    found = []
-    for group in _groups(tex):
-        line = ""
-        for term in _terms(group):
-            if line and width(line + term) > WIDEST_LINE:
-                found.append(line)
-                line = INDENT_TEX
-            line += term
-        found.append(line)
-    return found
-
-
-def width(tex: str) -> int:
-    """About how many characters wide a line is set; the two halves of a fraction share their place."""
-
-    def wider(halves: re.Match[str]) -> str:
-        return "x" * max(width(halves[1]), width(halves[2]))
-
-    text = re.sub(r"\\begin\{vmatrix\}.*?\\end\{vmatrix\}", "x" * 16, tex, flags=re.DOTALL)
-    text = re.sub(r"\\frac\{((?:[^{}]|\{[^{}]*\})*)\}\{((?:[^{}]|\{[^{}]*\})*)\}", wider, text)
-    text = re.sub(r"\\(?:mathrm|text|left|right|sqrt|,|quad|qquad)", "", text)
-    text = re.sub(r"\\[A-Za-z]+ ?", "x", text)
-    return len(re.sub(r"[{}^_]", "", text))
-
-
-def _groups(tex: str) -> Iterator[str]:
-    """Statements, neighbours that are short together."""
-    group = last = ""
-    for statement in STATEMENT_END.split(tex)[::2]:
-        are_short = max(width(last), width(statement)) <= SHORT_STATEMENT
-        if group and not (are_short and width(group + statement) <= 2 * SHORT_STATEMENT):
-            yield group
-            group = ""
-        group += rf",\quad {statement}" if group else statement
-        last = statement
-    yield group
-
-
-def _terms(statement: str) -> Iterator[str]:
-    """The terms of a sum, each with its sign in front; what is in brackets stays together."""
-    depth, start = 0, 0
-    for match in TEX_TOKEN.finditer(statement):
-        token, place = match.group(), match.start()
-        depth += (token in OPENS) - (token in CLOSES)
-        if depth == 0 and place > start and SUM_SIGN.match(statement, place):
-            yield statement[start:place]
-            start = place
-    yield statement[start:]
-
-
 def _set(tex: str) -> list[MathElement]:
     """A formula a line, without the name space that a file of XML would need and a page of HTML does not."""
     found = []
-    for line in formula_lines(tex):
+    for line in STATEMENT_END.split(tex):
         upright = re.sub(r"\\mathrm\{(\w)\}", r"\\text{\1}", line.strip())  # a single letter would be slanted
         root = ElementTree.fromstring(re.sub(r' xmlns="[^"]*"', "", convert(upright, display="block"), count=1))
-        if width(line) > WIDEST_LINE:
+        if len(line) > LONG_TEX:
             root.set("class", "long")
         _mend(root)
         found.append(root)

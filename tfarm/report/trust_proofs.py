@@ -29,7 +29,7 @@ from tfarm.report.modes_section import BRACKET_DIGITS, PROVEN_DIGITS, PROVEN_MOD
 from tfarm.report.sections import typeset
 from tfarm.response.frequency import BAND_POINTS, worst_error
 from tfarm.spectrum import DampedModes
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 
 PROVEN_OUTPUTS = ("root_moment", "tip_displacement")
 UNPROVEN = "not proven"

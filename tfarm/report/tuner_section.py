@@ -10,22 +10,21 @@ import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, Arm
 from tfarm.columns import Column, Table
-from tfarm.comparing.regions import stable_regions
-from tfarm.digits import how_many, lined, plain, significant, worded
+from tfarm.digits import how_many, lined, plain, significant, singly, worded
 from tfarm.dsp import Chain, Simulation
 from tfarm.dsp.results import ideal_chain
 from tfarm.dsp.traces import away, resolved
 from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.plots.learning import draw_curves, draw_gain
-from tfarm.plots.motion import draw_responses
+from tfarm.plots.motion import draw_curves, draw_gain, slew
+from tfarm.plots.regions import stable_regions
 from tfarm.records import record
 from tfarm.report.cases import has_loop, what_holds, why_no_loop
 from tfarm.report.motion import clipped_words, resolution_words, responses_table
-from tfarm.report.sections import Fact, PageSection, Picture, residual_words, typeset
-from tfarm.spectrum.scales import first_frequency
+from tfarm.report.sampled_section import chain_words
+from tfarm.report.sections import Fact, PageSection, Picture, typeset
+from tfarm.spectrum.table import first_frequency
 from tfarm.tuner import LearningCurves, Plan, Tuning, compare_controllers, learning_curves, tried_loops, tune
-from tfarm.tuner.baselines import CONSTANT_GAINS, tried_gains
-from tfarm.tuner.comparison import Outcomes, quantised_chain
+from tfarm.tuner.baselines import CONSTANT_GAINS, Outcomes, quantised_chain, tried_gains
 from tfarm.tuner.training import QUARTILES
 from tfarm.tuner.tuning import tip_errors, usual_plan
 
@@ -34,12 +33,10 @@ CURVE_SEEDS = 20  # of the learning curves
 CURVE_SAMPLES = 80_000_000  # that their trials may have together, some 35 s of one core
 LONG_TRIAL = 16_000  # samples: the comparison of a longer one is of the arm itself alone
 LONGEST_TRIAL = 70_000  # samples: a page has no longer one
-AS_TRAINED, QUANTISED_AND_LATE = 0, 3  # rows of the comparison, which begins with those of the arm itself
+QUANTISED_AND_LATE = 3  # row of the comparison, which begins with those of the arm itself
 SERVO_SPEED = 1 / 20  # of the first frequency: the servo's angle loop is so slow that it leaves the mode alone
 SERVO_TURN = 0.03  # rad a sample, where that is slower
-SERVO_GAINS = (ANGLE_GAIN, RATE_GAIN)
 ON_TARGET = 1e-10  # of the tip's travel: no slew ends nearer its target than rounding tells
-MUCH_MORE = 3.0  # times as far off its target is more, and no coincidence
 SAME_COST = 1e-4  # relative difference of two costs below which they are called the same
 TUNER_TITLE = "The gain tuner: does a self-tuning gain help?"
 NOT_WITHOUT_DAMPING = (
@@ -51,6 +48,23 @@ NOT_ON_ELASTIC = (
     "The link of this rig has no damping (C = 0), and what its hub, clamp or joint lose reaches high modes ever less. "
     "When it is sampled no range of moving gains can be proven for all of them, and the tuner is not trained here: "
     "give the link a measured damping, or see what tfarm tune makes of the first modes."
+)
+DRIFT_WORDS = (
+    "The cost does not see the angle at the end. The law regulates the hub rate alone, and the torque of the moment "
+    f"feedback adds up to an angle of its integral over {RATE_GAIN}. A tuner for use needs {ANGLE_GAIN} (tfarm tune "
+    f"--{ANGLE_GAIN})."
+)
+SHAPING_WORDS = (
+    "Input shaping: the reference shaped, no moment feedback, judged by its own slew. It cannot answer disturbances, "
+    "which feedback can."
+)
+BOUND_WORDS = (
+    "Bound: the linear-quadratic optimum that knows the whole state and the slew beforehand. The tuner's gain stays in "
+    "{guard}."
+)
+SERVO_CAPTION = (
+    "{gains}. The slew with the tuner: {end}. Guard: "
+    f"{MOMENT_GAIN} from {{low}} to {{high}}, {{proven}} for any K(t)."
 )
 RUNS_AWAY = (
     f"No tuner here: at the default {RATE_GAIN} and this period the slew without moment feedback runs away, so that "
@@ -130,142 +144,81 @@ def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
     return {WITHOUT: without, "with the tuner": tuned}
 
 
-# ------------------------------------------------------------ in words
-
-
 def tuner_in_short(data: TunerNumbers) -> str:
-    """How much the tuner gains over the best constant gain, and what that does by itself."""
-    tuning, final, median = data.tuning, data.curves.final, data.curves.final_quantile(0.5)
-    constant, best, without = tuning.best_constant.gain, tuning.best_constant.cost, tuning.without.cost
-    below = int((final < best).sum())
-    gain = 100 * (1 - median / best)
-    lead = "A little" if 100 * SAME_COST < gain < 15 else "Yes" if gain >= 15 else "No"
-    by_itself, again = f"No constant {MOMENT_GAIN} takes anything off the cost of a slew", ""
-    costs = f"{significant(without, 3)} without it"
-    if best < (1 - SAME_COST) * without:
-        off, again = significant(100 * (1 - best / without), 2), "another "
-        by_itself = (
-            f"A constant {MOMENT_GAIN} of {significant(constant, 3)} already takes {off} % off the cost of a slew"
-        )
-        costs = f"{significant(without, 3)} without moment feedback, {significant(best, 3)} with it"
-    verb = {"below": f"lowers it by {again}", "above": "raises it by "}.get(_side(median, best), "")
-    moves = f"{verb}{significant(abs(gain), 2)} %, to" if verb else "leaves it as it is, at"
+    """The median cost of the tuner over its seeds, against the best constant gain."""
+    final, best, median = data.curves.final, data.tuning.best_constant.cost, data.curves.final_quantile(0.5)
+    gain, below = 100 * (1 - median / best), int((final < best).sum())
+    lead = "Yes" if gain >= 15 else "A little" if gain > 100 * SAME_COST else "No"
+    side = (
+        "the cost of"
+        if abs(gain) <= 100 * SAME_COST
+        else f"{significant(abs(gain), 2)} % {'below' if gain > 0 else 'above'}"
+    )
     return (
-        f"{lead}. {by_itself} ({costs}); a gain that tunes itself {moves} "
-        f"{significant(median, 3)} in the median of {final.size} seeds. {below} of {final.size} seeds end below the "
-        "best constant gain."
+        f"{lead}. The median cost over {final.size} seeds is {significant(median, 3)}, {side} the best constant gain "
+        f"({significant(best, 3)}); {below} of {final.size} seeds end below that."
     )
 
 
-def _side(cost: float, yardstick: float) -> str:
-    """Whether a cost is below or above another one, or the same."""
-    if abs(cost - yardstick) <= SAME_COST * yardstick:
-        return "the same"
-    return "below" if cost < yardstick else "above"
-
-
-def drift_words(data: TunerNumbers) -> str:
-    """What the cost does not see: the angle that a moving gain leaves, as nothing regulates it."""
-    tuned, constant = off_target(data)
-    more = "a gain that moves leaves more of it than a constant one" if tuned > MUCH_MORE * constant else ""
-    less = "here a gain that moves leaves no more of it than a constant one" if tuned <= constant else ""
-    what = more or less or "here a gain that moves leaves about as much of it as a constant one"
-    return (
-        f"What the cost does not see: the arm ends off its target, the tip {significant(1e3 * tuned, 2)} mm with the "
-        f"tuner and {significant(1e3 * constant, 2)} mm with the best constant gain. The law regulates the hub rate "
-        f"alone, and the moment feedback's torque adds up to an angle of its integral over {RATE_GAIN}: {what}. A "
-        f"tuner for use needs {ANGLE_GAIN} (tfarm tune --{ANGLE_GAIN})."
-    )
-
-
-def servo_words(data: TunerNumbers) -> str:
-    """The same with the angle held: where the slew ends then, and what the tuner is worth beside its yardsticks."""
-    if data.servo is None:
-        return ""
-    tuning, guard = data.servo, data.servo.training.guard
-    law = tuning.plan.servo
-    gains = " and ".join(law.told(name, lambda gain: significant(gain, 3), data.arm) for name in SERVO_GAINS)
-    off = tip_errors(tuning)["tip_error_m"]
-    end = "runs away" if off is None else f"ends {significant(1e3 * abs(off), 2)} mm off its target"
-    if off is not None and abs(off) < ON_TARGET * data.arm.reach * float(abs(tuning.trial.task.hub_angle).max()):
-        end = "ends on its target"
-    proven = "proven" if guard.is_proven else "of the first modes alone"
-    costs = {
-        "no moment feedback": tuning.without.cost,
-        "the best constant gain": tuning.best_constant.cost,
-        "the tuner": tuning.training.result.cost,
-        **{f"the shaper {kind}": cost for kind, cost in tuning.shaped_costs.items()},
-        "the bound": tuning.bound.cost,
-    }
-    told = ", ".join(f"{name} {significant(cost, 3)}" for name, cost in costs.items())
-    return (
-        f"With the angle held, {gains}, the tuned slew {end}. The guard there is {MOMENT_GAIN} from "
-        f"{significant(guard.lo, 3)} to {significant(guard.hi, 3)}, {proven} for any K(t). Costs of that slew: {told}."
-    )
-
-
-def off_target(data: TunerNumbers) -> tuple[float, float]:
-    """How far off the tip ends [m], with the tuner and with the best constant gain."""
-    runs = data.slews["with the tuner"], data.constant
+def off_target(data: TunerNumbers, error: float) -> str:
+    """How far from its target the tip ends [mm]; 0 where rounding is all there is of it."""
     travel = data.arm.reach * float(abs(data.constant.scenario.hub_angle).max())
-    tuned, constant = (abs(float(away(data.arm, each)[-1])) for each in runs)
-    return tuned * (tuned > ON_TARGET * travel), constant * (constant > ON_TARGET * travel)
+    return significant(1e3 * abs(error) * (abs(error) > ON_TARGET * travel), 2)
 
 
-def shaping_words(data: TunerNumbers) -> str:
-    """What input shaping does instead."""
-    tuning, median = data.tuning, data.curves.final_quantile(0.5)
-    costs, late = tuning.shaped_costs, tuning.shaped_delays
-    if not any(late.values()):
-        return (
-            "Input shaping, which one would try first, has nothing to do here: no mode of the loop lies below half the "
-            "sample rate, and a shaper would be shorter than a sample."
-        )
-    told = " and ".join(
-        f"{kind} has {significant(costs[kind], 2)}, arriving {significant(1e3 * late[kind], 3)} ms later"
-        for kind in costs
-    )
-    rival = min(median, tuning.best_constant.cost)
-    verdicts = {"below": "is cheaper", "above": "is dearer here", "the same": "costs the same"}
-    verdict = verdicts[_side(min(costs.values()), rival)]
-    return (
-        f"What one would try first {verdict}: shaping the reference, with no moment feedback at all, {told} (each "
-        "judged by its own slew). Shaping cannot answer disturbances, which feedback can."
-    )
-
-
-def bound_words(data: TunerNumbers) -> str:
-    """How far everything is from what is possible, and what is proven."""
-    bound, guard = data.tuning.bound.cost, data.tuning.training.guard
-    return (
-        f"No controller of this slew gets below {significant(bound, 3)}, the linear-quadratic optimum that knows the "
-        f"whole state and the slew beforehand. The tuner's gain stays in {typeset(guard.sentence)}."
+def servo_table(data: TunerNumbers, held: Tuning) -> Table:
+    """The costs of the slew with the angle held too."""
+    guard, law, error = held.training.guard, held.plan.servo, tip_errors(held)["tip_error_m"]
+    costs = {
+        "no moment feedback": held.without.cost,
+        "best constant gain": held.best_constant.cost,
+        "tuner": held.training.result.cost,
+        **held.shaped_costs,
+        "bound": held.bound.cost,
+    }
+    caption = SERVO_CAPTION.format(
+        gains=", ".join(law.told(name, lambda x: significant(x, 3), data.arm) for name in (ANGLE_GAIN, RATE_GAIN)),
+        end="unstable" if error is None else f"tip {off_target(data, error)} mm off its target at the end",
+        low=significant(guard.lo, 3), high=significant(guard.hi, 3),
+        proven="proven" if guard.is_proven else "of the first modes alone,",
+    )  # fmt: skip
+    return Table(
+        stem="tune-servo",
+        title="Cost of the slew with the angle held",
+        caption=caption,
+        columns=(
+            Column("controller", "controller", of=list(costs)),
+            Column("cost", "cost", of=list(costs.values()), digits=singly(significant, 4)),
+        ),
     )
 
 
 def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
     """The costs, from nothing to what is possible."""
-    tuning, final = data.tuning, data.curves.final
+    tuning, final, guard = data.tuning, data.curves.final, data.tuning.training.guard
     low, median, high = (data.curves.final_quantile(share) for share in QUARTILES)
     gain = 100 * (1 - median / tuning.best_constant.cost)
-    guard = tuning.training.guard
-    off, off_constant = (significant(1e3 * x, 2) for x in off_target(data))
-    helps = f"by {significant(gain, 2)} %" if gain > 100 * SAME_COST else "no"
-    held = "proven stable" if guard.is_proven else f"proven for the first {guard.modes_used} modes"
-    half = f"half between {significant(low, 4)} and {significant(high, 4)}"
-    shaped = min((cost, kind) for kind, cost in tuning.shaped_costs.items())
-    how = f"{shaped[1]}, a later slew" if any(tuning.shaped_delays.values()) else "no mode slow enough to shape"
-    K = f"{MOMENT_GAIN} = {significant(tuning.best_constant.gain, 3)}"
-    return (
-        Fact(label="does tuning beat a constant gain?", value=helps, beside=f"median of {final.size} seeds"),
-        Fact(label="cost without moment feedback", value=significant(tuning.without.cost, 4)),
-        Fact(label="best constant gain", value=significant(tuning.best_constant.cost, 4), beside=K),
-        Fact(label="tuner", value=significant(median, 4), beside=half),
-        Fact(label="nothing is below", value=significant(tuning.bound.cost, 4), beside="linear-quadratic optimum"),
-        Fact(label="input shaping instead", value=significant(shaped[0], 3), beside=how),
-        Fact(label="tip off its target at the end", value=off, unit="mm", beside=f"constant gain: {off_constant} mm"),
-        Fact(label="guard", value=f"{guard.lo:.3f} … {guard.hi:.3f}", beside=f"any K(t) in it: {held}"),
+    tuned, constant = (
+        off_target(data, float(away(data.arm, run)[-1])) for run in (data.slews["with the tuner"], data.constant)
     )
+    late = tuning.shaped_delays
+    shaped = [f"{kind} {significant(cost, 2)}, {significant(1e3 * late[kind], 3)} ms later"
+              for kind, cost in tuning.shaped_costs.items() if late[kind]]  # fmt: skip
+    held = "proven stable" if guard.is_proven else f"proven for the first {guard.modes_used} modes"
+    return (
+        Fact(label="does tuning beat a constant gain?", beside=f"median of {final.size} seeds",
+             value=f"by {significant(gain, 2)} %" if gain > 100 * SAME_COST else "no"),
+        Fact(label="cost without moment feedback", value=significant(tuning.without.cost, 4)),
+        Fact(label="best constant gain", value=significant(tuning.best_constant.cost, 4),
+             beside=f"{MOMENT_GAIN} = {significant(tuning.best_constant.gain, 3)}"),
+        Fact(label="tuner", value=significant(median, 4),
+             beside=f"half between {significant(low, 4)} and {significant(high, 4)}"),
+        Fact(label="bound", value=significant(tuning.bound.cost, 4), beside="linear-quadratic optimum"),
+        Fact(label="input shaping", value=significant(min(tuning.shaped_costs.values()), 3),
+             beside="; ".join(shaped) or "no mode slow enough to shape"),
+        Fact(label="tip off its target at the end", value=tuned, unit="mm", beside=f"constant gain: {constant} mm"),
+        Fact(label="guard", value=f"{guard.lo:.3f} … {guard.hi:.3f}", beside=f"any K(t) in it: {held}"),
+    )  # fmt: skip
 
 
 def tuner_section(arm: Arm, chain: Chain | None = None) -> PageSection:
@@ -292,11 +245,10 @@ def section_of(data: TunerNumbers) -> PageSection:
         facts=tuner_facts(data),
         words=(
             tuner_in_short(data),
-            drift_words(data),
-            shaping_words(data),
-            bound_words(data),
+            DRIFT_WORDS,
+            SHAPING_WORDS,
+            BOUND_WORDS.format(guard=typeset(data.tuning.training.guard.sentence)),
             *fewer_words(data),
-            *([servo_words(data)] if data.servo else []),
         ),
         blocks=(
             _gain_picture(data),
@@ -304,6 +256,7 @@ def section_of(data: TunerNumbers) -> PageSection:
             _coarse_picture(data),
             comparison_table(data),
             residual_table(data),
+            *([] if data.servo is None else [servo_table(data, data.servo)]),
             _curves_picture(data),
         ),
     )
@@ -382,55 +335,35 @@ def _slew_picture(data: TunerNumbers) -> Picture:
         stem="tune-slew",
         title="The slew without and with the tuner",
         caption=(
-            f"Root moment, tip and motor with ideal converters (the paper's Figures 4 and 6). {_residuals(data, 0)} "
+            f"Root moment, tip and motor with ideal converters (the paper's Figures 4 and 6). "
             "The dotted line is the end of the slew; dashed, the rigid arm."
             f"{resolution_words(data.slews.values())}"
         ),
-        alt=f"Root moment, tip and motor torque of the slew. {_residuals(data, 0)}",
-        figure=draw_responses(data.arm, data.slews, "the slew, ideal converters"),
-        data=_signals(data, 0, "tune-slew-data"),
+        alt="Root moment, tip and motor torque of the slew, without and with the tuner.",
+        figure=slew.figure(data.arm, data.slews, "the slew, ideal converters"),
+        data=_signals(data.slews, data.arm, "tune-slew-data"),
     )
 
 
 def _coarse_picture(data: TunerNumbers) -> Picture:
     """The slew, and what stands between the controller and the arm in it."""
     chain = next(iter(data.coarse.values())).chain
-    c, delay = chain.converters, chain.sampling.delay_samples
-    ranges = [
-        f"{bits}-bit {name} over ±{plain(span, 3)} N m"
-        for name, bits, span in (("ADC", c.moment_bits, c.moment_range), ("DAC", c.torque_bits, c.torque_range))
-        if bits is not None and span is not None
-    ]
-    if c.hub_rate == "difference":
-        ranges.append(f"a hub rate differenced from an encoder of {c.encoder_counts} counts")
-    ranges.append(f"{how_many(delay, 'sample')} of delay")
     return Picture(
         stem="tune-dsp",
         title="The same with the DSP's effects on",
         caption=(
-            f"With {', '.join(ranges)} (the paper's Figures 8 and 9). {_residuals(data, 1)} Nothing regulates the hub "
-            f"angle (no {ANGLE_GAIN}), so what it loses to delay and steps it keeps."
+            f"{chain_words(data.arm, chain)} (The paper's Figures 8 and 9.) Nothing regulates the hub angle (no "
+            f"{ANGLE_GAIN}), so what it loses to delay and steps it keeps."
             f"{clipped_words(data.coarse)}{resolution_words(data.coarse.values())}"
         ),
-        alt=f"The slew with converters and delay. {_residuals(data, 1)}",
-        figure=draw_responses(data.arm, data.coarse, f"the slew, converters and {how_many(delay, 'sample')} of delay"),
-        data=_signals(data, 1, "tune-dsp-data"),
+        alt="Root moment, tip and motor torque of the slew with converters and delay, without and with the tuner.",
+        figure=slew.figure(data.arm, data.coarse, "the slew, with converters and delay"),
+        data=_signals(data.coarse, data.arm, "tune-dsp-data"),
     )
 
 
-def _residuals(data: TunerNumbers, which: int) -> str:
-    """What is left after the slew, from the table's rows: as trained, or with converters and delay."""
-    row = data.rows[(AS_TRAINED, QUANTISED_AND_LATE)[which]]
-    return (
-        f"Left after the slew: {residual_words(row.without.residual)} without moment feedback, "
-        f"{residual_words(row.tuner.residual)} with the tuner, {residual_words(row.best_constant.residual)} "
-        "with the best constant gain."
-    )
-
-
-def _signals(data: TunerNumbers, which: int, stem: str) -> Table:
-    without, tuned = (data.slews, data.coarse)[which].values()
-    return responses_table(stem, "The slew", data.arm, {"without": without, "tuner": tuned})
+def _signals(runs: Mapping[str, Simulation], arm: Arm, stem: str) -> Table:
+    return responses_table(stem, "The slew", arm, dict(zip(("without", "tuner"), runs.values(), strict=True)))
 
 
 def _curves_picture(data: TunerNumbers) -> Picture:

@@ -20,7 +20,7 @@ from tfarm.errors import ParameterError, TfarmError, must_be_known
 from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
-from tfarm.plots.compared import draw_comparison
+from tfarm.plots.compared import comparison
 from tfarm.processes import may_start_processes, shared
 from tfarm.report.cards import COMPARISON_KIND, COMPARISON_PAGE, keep, kept_comparison, save_card, written_cards
 from tfarm.report.cases import GivenLaw, Subject, check_laws
@@ -46,7 +46,6 @@ MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores a
 WORTH_A_PROCESS = 8  # pieces for which a second process, which takes a second or two to start, is worth it
 CARD_WORK, CARD_ALONE_WORK = "card", "card alone"  # with the proofs of the arm, and without
 LIVE_WORK = "live loop"
-CARD_SECONDS = 0.9  # less than the modes, which share their proofs and are begun before
 PieceWork = tuple[int, int | str]  # which arm, which piece (or its card and proof)
 Made = SavedSection | Evidence | None
 EVIDENCE_WORK: PieceWork = (-1, "why trust this")  # of no arm
@@ -81,43 +80,35 @@ def make_all(
 
     `scripts` is the folder that the live pages' scripts are made in.
     """
-    tasks = [EVIDENCE_WORK] * (not only) + [SCRIPTS_WORK] * (scripts is not None)
-    for i, subject in enumerate(subjects):
-        suited = [(j, piece) for j, piece in enumerate(pieces_of(subject)) if piece.is_for(subject)]
-        tasks += [(i, j) for j, piece in suited if not only or any(map(piece.is_on, only))]
-        tasks += [(i, LIVE_WORK)] * (not only and is_live(subject))
-        tasks.append((i, CARD_ALONE_WORK if subject.laws and only else CARD_WORK))
+    work: dict[PieceWork, Callable[[], Made]] = {} if only else {EVIDENCE_WORK: gather}
+    if scripts is not None:
+        work[SCRIPTS_WORK] = partial(write_assets, scripts)
+    for i, (subject, folder) in enumerate(zip(subjects, folders, strict=True)):  # of each the longest work first
+        suited = {j: piece for j, piece in enumerate(pieces_of(subject)) if piece.is_for(subject)}
+        wanted = [j for j, piece in suited.items() if not only or any(map(piece.is_on, only))]
+        pieces: list[int | str] = [*sorted(wanted, key=lambda j: -suited[j].seconds)]
+        pieces += [LIVE_WORK] * (not only and is_live(subject))
+        pieces.append(CARD_ALONE_WORK if subject.laws and only else CARD_WORK)
+        work |= {(i, piece): partial(make, subject, piece, folder) for piece in pieces}
     done: dict[PieceWork, Made] = {}
 
     def tell(running: Sequence[PieceWork]) -> None:
         if progress is not None:
-            progress(len(done), len(tasks), ", ".join(_name_of(subjects, task) for task in running))
-
-    def work(task: PieceWork) -> Callable[[], Made]:
-        if task == EVIDENCE_WORK:
-            return gather
-        if task == SCRIPTS_WORK and scripts is not None:
-            return partial(write_assets, scripts)
-        return partial(make, subjects[task[0]], task[1], folders[task[0]])
-
-    def turn(task: PieceWork) -> tuple[int, float]:  # an arm after the other, and of each the longest work first
-        i, piece = task
-        if isinstance(piece, str):
-            return i, -CARD_SECONDS * (piece == CARD_WORK)
-        return i, -pieces_of(subjects[i])[piece].seconds
+            progress(len(done), len(work), ", ".join(_name_of(subjects, task) for task in running))
 
     tell(())
-    if len(tasks) < WORTH_A_PROCESS or MOST_WORKERS == 1 or not may_start_processes():
-        for task in tasks:
+    if len(work) < WORTH_A_PROCESS or MOST_WORKERS == 1 or not may_start_processes():
+        for task, call in work.items():
             tell([task])
-            done[task] = work(task)()
+            done[task] = call()
     else:
-        ordered = {task: work(task) for task in sorted(tasks, key=turn)}
-        for task, result in shared(ordered, MOST_WORKERS, [__name__], tell):
+        for task, result in shared(work, MOST_WORKERS, [__name__], tell):
             done[task] = result  # noqa: PERF403  `tell` counts them meanwhile
     tell(())
-    places = range(len(subjects))
-    sections = [[s for t in tasks if t[0] == i and isinstance(s := done[t], SavedSection)] for i in places]
+    sections = [
+        [s for j in range(len(pieces_of(subject))) if isinstance(s := done.get((i, j)), SavedSection)]
+        for i, subject in enumerate(subjects)
+    ]
     evidence = done.get(EVIDENCE_WORK)
     return sections, evidence if isinstance(evidence, Evidence) else None
 
@@ -202,10 +193,8 @@ def _subjects(
     measured: Sequence[Measured],
 ) -> list[Subject]:
     """What each arm's page is about.  Raises ParameterError where an arm or its clock can make nothing of a law."""
-    chains = [Chain()] * len(arms) if chains is None else chains
-    laws = [()] * len(arms) if laws is None else laws
-    fits = [None] * len(arms) if fits is None else fits
-    each = zip(arms, chains, laws, fits, strict=True)
+    n = len(arms)
+    each = zip(arms, chains or [Chain()] * n, laws or [()] * n, fits or [None] * n, strict=True)
     subjects = [Subject(arm, chain, tuple(own), fit, tuple(measured)) for arm, chain, own, fit in each]
     for subject in subjects:
         check_laws(subject.arm, subject.chain, subject.laws)
@@ -368,11 +357,11 @@ def write_comparison(found: Comparison, out: Path) -> Path:
 
 
 def _sections(found: Comparison) -> Iterator[PageSection]:
-    words = [*(f"{typeset(side_words(side))}." for side in found.sides), *[IN_Z_NOTE] * found.is_clocked]
+    words = [*(f"{typeset(side_words(side))}." for side in found.sides), *[IN_Z_NOTE] * found.is_sampled]
     yield PageSection(anchor="verdicts", title="Verdicts", words=words)
     curves = "exact response" if found.is_of_arms else "loop function"
     plane = f"{' and '.join(PLANE)}, with exact edges"
-    if found.is_clocked:
+    if found.is_sampled:
         plane = "further delay and a factor on its law, with exact edges"
     elif found.regions is None:
         plane = "a factor on each law and its delay, on a grid"
@@ -380,7 +369,7 @@ def _sections(found: Comparison) -> Iterator[PageSection]:
         stem="comparison", title=f"{upper(curves)} and stable region", alt=f"{found.verdict}.",
         caption=f"The {curves} of both over frequency, and where each loop is stable over {plane}; the points are the "
         "laws.",
-        figure=draw_comparison(found),
+        figure=comparison.figure(found),
     )  # fmt: skip
     yield PageSection(anchor="both", title="Both in one picture", blocks=(picture,))
     if found.is_of_arms:
@@ -390,7 +379,7 @@ def _sections(found: Comparison) -> Iterator[PageSection]:
     if len(apart := unpaired_poles(found)):
         poles.append(_set(apart, "unpaired-poles", "Poles of one side alone", UNPAIRED_NOTE))
     yield PageSection(anchor="poles", title="Closed-loop poles", blocks=tuple(poles))
-    known = AT_SAMPLES_NOTE if found.is_clocked else KNOWN_NOTE
+    known = AT_SAMPLES_NOTE if found.is_sampled else KNOWN_NOTE
     margins = _set(compared_margins(found), "margins", "How far from unstable", f"{known} {DIFFERENCE_NOTE}")
     yield PageSection(anchor="margins", title="Margins", blocks=(margins,))
 

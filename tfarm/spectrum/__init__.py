@@ -1,7 +1,7 @@
 """Natural frequencies and mode shapes: counted, so that none is missing, then found to the last digit."""
 
 from tfarm.spectrum.damped import DampedModes, damped_modes
-from tfarm.spectrum.sensitivities import PARAMETERS
+from tfarm.spectrum.shapes import PARAMETERS
 from tfarm.spectrum.table import Modes, compare_theories, flexible_frequencies, modes, modes_below
 
 __all__ = [

@@ -35,9 +35,8 @@ from .box import TOWARD_SINGULAR, Box, complete_box, filled_box
 from .continuation import BELIEVED_SHARE, Member, Node, follow, improved
 from .frequencies import LISTS_KEPT
 from .proofs import Disc, disjoint, enclosed, proven_count
-from .scales import first_frequency
 from .shapes import mode_field
-from .table import Modes, modes
+from .table import Modes, first_frequency, modes
 
 COMPANY = (6, 11, 17, 29)  # modes followed beyond those wanted, lest the last be led astray: the next if that fails
 FEWER_MODES = (300, 150, 60, 20, 5, 1)  # that are tried where more are asked for, or not all can be followed

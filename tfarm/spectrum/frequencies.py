@@ -28,11 +28,10 @@ from numpy.typing import NDArray
 from tfarm.errors import ConvergenceError
 from tfarm.exact.balls import Ball, Sweep, into_own, out_of_own, precision, rational
 from tfarm.exact.compiled import python_of
-from tfarm.exact.compound import Plane, across_waves
 from tfarm.exact.count import bisect_chain, chain_counts, rows_to_count
-from tfarm.exact.elements import Segment, Spring
 from tfarm.exact.layout import Layout
-from tfarm.exact.system import System
+from tfarm.exact.system import Segment, Spring, System
+from tfarm.exact.waves import Plane, across_waves
 
 
 class Counter:

@@ -36,9 +36,8 @@ from numpy.typing import NDArray
 
 from tfarm.errors import CertificationError
 from tfarm.exact.balls import Ball, point, precision, rational
-from tfarm.exact.characteristic import NO_GAINS, Gains
+from tfarm.exact.characteristic import NO_GAINS, Gains, characteristic_over, tangent
 from tfarm.exact.system import System
-from tfarm.exact.wide_balls import characteristic_over, tangent
 from tfarm.records import record
 
 from .box import Box

@@ -22,7 +22,7 @@ import numpy as np
 
 from tfarm.arrays import Real, Whole
 
-POINTS = 16  # of each strategy in a round
+POINTS = 12  # of each strategy in a round
 HALVED_EVERY, FINALISTS = 10, 4  # rounds after which the better half goes on, down to so many
 MOST_ROUNDS = 160  # a ridge in five coordinates takes most of them
 FIRST_STEP = 0.05  # of the box: short, as good valleys are narrow

@@ -20,7 +20,7 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import sensed_plant
 from tfarm.dsp.sampling import PulseTransfer
-from tfarm.loop.frequencies import band_of, grid
+from tfarm.loop.loop import band_of, grid
 from tfarm.records import record
 from tfarm.reduced.conversions import ALGEBRAIC, sensed_model
 from tfarm.response.signals import Signals

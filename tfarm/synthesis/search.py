@@ -1,8 +1,8 @@
 """The search for the best law: many points of the bounds, strategies from the best of them, and wider bounds.
 
 The points are those of Sobol's sequence, which leave no large gap (Sobol, 1967).  From those that are best, each apart
-from the others, evolution strategies go down (`evolution`), also beyond bounds that are neither given nor physical
-ends.  Bounds that the best law lies beyond are those of the wider region.
+from the others, evolution strategies go down (`evolution`), and then from points about the best; all also beyond bounds
+that are neither given nor physical ends.  Bounds that the best law lies beyond are those of the wider region.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Tell
 
 POINTS_LOG2 = 11  # of the number of points
-STARTS_EACH = 12  # strategies for each coefficient, from the best of them
+STARTS_EACH = 16  # strategies for each coefficient, from the best of them
+HOPS, HOPS_EACH, HOP_POINTS = 2, 4, 256  # searches about the best of more than two, strategies each, and points
 CANDIDATES = 8  # laws that the exact verdicts may judge, the best first
 BEYOND = 4.0  # of x: so far beyond its bounds a search may go, a factor e^4 of a coefficient far above its unit
 APART = 0.02  # of the range of x: points that are nearer are not both begun at
-SEED = 0  # of the sequence's scrambling
+SEED = 0  # of the sequence's scrambling, and of points about the best
 AGREES = 5e-3  # relative: a strategy that ends with so nearly the best score agrees
 FLAT_WITHIN = 0.01  # laws whose score is worse by less than this share bound the flat part
 FLAT_STEPS, FLAT_HALVINGS = 60, 30  # of the way to the bounds, each 1.4 times the one before; of an interval
@@ -68,16 +69,26 @@ def search(judge: Worst, form: Structure, tell: Tell) -> Search:
     places = [(place, end) for place in range(form.size) for end in (0, 1) if not is_final(form, place, end)]
     region = form.wider(places, BEYOND)
     points = np.c_[form.origin, sobol(*form.box, POINTS_LOG2)]
-    first = points[:, _apart(region, points, judge.scores(region, points), STARTS_EACH * form.size)]
 
     def told(number: int, score: float) -> None:
         tell(f"{form.name}: round {number} of {MOST_ROUNDS}, best so far {score:.6g}")
 
-    x, scores = evolved(lambda at: judge.scores(region, at), first, region.box, told)
+    def best_from(points: Real, each: int) -> tuple[Real, Real]:
+        first = points[:, _apart(region, points, judge.scores(region, points), each * form.size)]
+        return evolved(lambda at: judge.scores(region, at), first, region.box, told)
+
+    x, scores = best_from(points, STARTS_EACH)
+    rng = np.random.default_rng(SEED)
+    for _ in range(HOPS if form.size > 2 else 0):
+        around = x[:, :1] + rng.standard_normal((form.size, HOP_POINTS))
+        further = best_from(np.c_[x[:, :1], np.clip(around.T, *region.box).T], HOPS_EACH)
+        x, scores = np.c_[x, further[0]], np.r_[scores, further[1]]
+        order = np.argsort(scores, kind="stable")
+        x, scores = x[:, order], scores[order]
     close, best = scores[0] + AGREES * abs(scores[0]), x[:, 0]
     beyond = [each for each in places if (form.box[0] > best, form.box[1] < best)[each[1]][each[0]]]
     widened = tuple(dict.fromkeys(form.names[place] for place, _ in beyond))
-    found = list(zip(scores[:CANDIDATES].tolist(), x.T, strict=False))
+    found = [(float(scores[n]), x[:, n]) for n in _apart(region, x, scores, CANDIDATES)]
     return Search(form.wider(beyond, BEYOND), found, scores.size, int((scores <= close).sum()), widened)
 
 

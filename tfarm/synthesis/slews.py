@@ -19,7 +19,7 @@ from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.dsp import Chain, Scenario, scenario
 from tfarm.dsp.scenarios import TRIAL_SLEWS, trial_weights
 from tfarm.records import record
-from tfarm.spectrum.scales import first_frequency
+from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.models import Model
 from tfarm.synthesis.structures import Entry
 

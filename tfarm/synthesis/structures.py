@@ -27,10 +27,10 @@ import numpy as np
 from tfarm.arm import ANGLE_GAIN, PLANE, TWO_GAINS, AnyLaw, Arm, HubFeedback, Law, must_not_be_algebraic
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError, did_you_mean
-from tfarm.loop.frequencies import band_of
+from tfarm.loop.loop import band_of
 from tfarm.records import record
 from tfarm.spectrum import modes as natural_modes
-from tfarm.spectrum.scales import check_gains, first_frequency, rate_unit, turning_inertia
+from tfarm.spectrum.table import check_gains, first_frequency, rate_unit, turning_inertia
 
 Bounds = tuple[float, float]
 

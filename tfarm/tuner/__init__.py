@@ -1,10 +1,18 @@
 """The neural gain tuner: a network that sets the moment gain while the arm slews, kept where that is proven stable."""
 
-from tfarm.tuner.baselines import BestConstant, best_constant, extra_insensitive, lq_bound, shaped_trial, zero_vibration
-from tfarm.tuner.comparison import compare_controllers, tried_loops
+from tfarm.tuner.baselines import (
+    BestConstant,
+    best_constant,
+    compare_controllers,
+    extra_insensitive,
+    lq_bound,
+    shaped_trial,
+    tried_loops,
+    zero_vibration,
+)
 from tfarm.tuner.controller import SavedTuner, TunedGain, load_tuner, save_tuner, simulated
 from tfarm.tuner.guard import Guard, find_guard
-from tfarm.tuner.network import Network, initial_network
+from tfarm.tuner.kernel import Network, initial_network
 from tfarm.tuner.training import Learning, LearningCurves, Stopped, Training, train
 from tfarm.tuner.trial import Cost, Record, Trial, residual_rms, slew_trial
 from tfarm.tuner.tuning import Plan, Tuning, curves_answer, learning_curves, tune, tune_answer

@@ -23,8 +23,7 @@ from tfarm.errors import MISSING, ParameterError, TfarmError
 from tfarm.files import read_file, write_file
 from tfarm.records import record
 from tfarm.tuner.guard import GuardKind
-from tfarm.tuner.kernel import Limits
-from tfarm.tuner.network import MOST_HIDDEN, Network
+from tfarm.tuner.kernel import MOST_HIDDEN, Limits, Network
 from tfarm.tuner.trial import Cost, Record, Trial
 
 FORMAT = "tfarm tuner 1"

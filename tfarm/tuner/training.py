@@ -1,4 +1,6 @@
-"""Learning: the paper's momentum update over trials or at every sample, and what came of it.
+"""The compiled learning rules of the tuner: after each trial, or at every sample.
+
+Learning: the paper's momentum update over trials or at every sample, and what came of it.
 
     dw(t) = -eta_c dE/dw + alpha_c dw(t-1)   (21),      w(t+1) = w(t) + dw(t)   ((22) with its sign mended)
 
@@ -16,24 +18,224 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from math import isfinite, sqrt
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
 from tfarm.arm.checks import not_negative, positive, whole
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError, must_be_known
+from tfarm.exact.compiled import compiled, inlined
 from tfarm.records import record
-from tfarm.tuner import rules
 from tfarm.tuner.guard import Guard
-from tfarm.tuner.network import Network
+from tfarm.tuner.kernel import Network
 from tfarm.tuner.trial import Record, Trial
+
+from .kernel import (
+    Run,
+    Setting,
+    Work,
+    act,
+    backward,
+    copied,
+    forward,
+    gain_gradient,
+    sample_gradient,
+    sense,
+    trial_cost,
+)
+
+NEVER, ENOUGH = -1, -2  # in place of the sample where a trial was stopped: none was, or x had become small enough
+PLAIN_RULE, CLIPPED_RULE, BACKTRACKING_RULE = range(3)  # as compiled code tells them
+X, U, E, K = range(4)  # rows of the derivatives that `_derive` carries, of the signals now
+BEFORE = 4  # rows further are those of the sample before, and as many further again those of the one before that
+INPUT_ROWS = (U, U + BEFORE, E + BEFORE, E + 2 * BEFORE, X, X + BEFORE, K + BEFORE)  # of each input of the network
+SHARE_FALLS, SHARE_GROWS = 0.5, 1.2  # times: a step of learning halves at once, and is whole after four good trials
+
+
+class Steps(NamedTuple):
+    """How (21) and (22) are taken: rates of learning (weights,), the momentum, the norm that a gradient is cut to (inf:
+    never), and the root mean square of x [N m] over a trial that is small enough to stop."""
+
+    rates: Real
+    momentum: float
+    longest: float
+    enough: float
+
+
+@compiled
+def _rms(x: Real) -> float:
+    """The root of the mean square of x."""
+    total = 0.0
+    for k in range(x.size):
+        total += x[k] ** 2
+    return sqrt(total / x.size)
+
+
+@compiled
+def _step(weights: Real, change: Real, gradient: Real, steps: Steps, share: float) -> None:
+    """(21) and (22) with the sign mended: dw = -eta g + alpha dw, w = w + dw; eta times `share`, g cut to `longest`."""
+    norm = 0.0
+    for i in range(gradient.size):
+        norm += gradient[i] ** 2
+    norm = sqrt(norm)
+    cut = steps.longest / norm if norm > steps.longest else 1.0
+    for i in range(weights.size):
+        change[i] = -share * steps.rates[i] * cut * gradient[i] + steps.momentum * change[i]
+        weights[i] += change[i]
+
+
+@compiled
+def learn_by_trials(
+    setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, rule: int
+) -> tuple[int, int]:
+    """Learning after each trial; fills `costs`, changes `weights`.
+
+    Returns how many trials were made and the sample at which the last one passed the bound, NEVER or ENOUGH; where it
+    passed it, `weights` are those of the last trial that did not.  Under BACKTRACKING_RULE a trial that costs more than
+    the last accepted one is taken back, its step shortened and the momentum set to zero; an accepted one lets the step
+    grow again, up to its full size.
+    """
+    n, size = run.x.size, weights.size
+    gradient, change, kept, slope = np.zeros(size), np.zeros(size), weights.copy(), np.zeros(size)
+    best, share = np.inf, 1.0
+    for trial in range(costs.size):
+        done = forward(setting, weights, run, work)
+        cost = trial_cost(done, setting.numbers, run) if done == n else np.inf
+        costs[trial] = cost
+        if rule == BACKTRACKING_RULE and not cost <= best and best < np.inf:
+            share *= SHARE_FALLS
+            copied(kept, weights)
+            change.fill(0.0)
+            _step(weights, change, slope, steps, share)
+            continue
+        if not isfinite(cost):
+            copied(kept, weights)
+            return trial + 1, done
+        if _rms(run.x) < steps.enough:
+            return trial + 1, ENOUGH
+        backward(setting, weights, run, work, gradient)
+        copied(weights, kept)
+        if rule == BACKTRACKING_RULE:
+            copied(gradient, slope)
+            share = min(1.0, SHARE_GROWS * share)
+            best = cost
+        _step(weights, change, gradient, steps, share)
+    if rule == BACKTRACKING_RULE:
+        copied(kept, weights)
+    return costs.size, NEVER
+
+
+@compiled
+def learn_by_samples(
+    setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, reply: float
+) -> tuple[int, int]:
+    """Learning at every sample (the paper's delta rule): as x arrives, the weights that it answers to are corrected.
+
+    A torque is answered `lag` samples later.  `reply` is the derivative of that x by the torque.
+    """
+    n, size, numbers = run.x.size, weights.size, setting.numbers
+    gradient, change, past = np.zeros(size), np.zeros(size), np.zeros((numbers.lag, size))
+    kept = weights.copy()
+    for trial in range(costs.size):
+        work.state.fill(0.0)
+        copied(weights, kept)
+        for k in range(n):
+            if not sense(k, setting, run, work):
+                costs[trial] = np.inf
+                copied(kept, weights)
+                return trial + 1, k
+            made = past[k % numbers.lag]  # the weights that made the torque which x answers now
+            if k >= numbers.lag:
+                sample_gradient(k - numbers.lag, numbers, reply, run.x[k], run, made, gradient)
+                _step(weights, change, gradient, steps, 1.0)
+            copied(weights, made)
+            act(k, setting, weights, run, work)
+        costs[trial] = trial_cost(n, numbers, run)
+        if _rms(run.x) < steps.enough:
+            return trial + 1, ENOUGH
+    return costs.size, NEVER
+
+
+@inlined
+def _derive(k: int, setting: Setting, weights: Real, run: Run, S: Real, spare: Real, D: Real) -> None:
+    """Derivatives at sample k by every weight, forward: rows of D are those of x, u, e, K now and one, two samples ago.
+
+    S (n, weights) is the state's; it is taken one sample on.
+    """
+    model, hidden, m, h = setting.model, run.hidden[k], run.inputs.shape[1], run.hidden.shape[1]
+    for row in range(D.shape[0] - 1, BEFORE - 1, -1):
+        copied(D[row - BEFORE], D[row])
+    for row in range(BEFORE):
+        D[row].fill(0.0)
+    for i in range(S.shape[0]):
+        for p in range(S.shape[1]):
+            D[X, p] += model.moment[i] * S[i, p]
+            D[U, p] -= model.servo[i] * S[i, p]
+    gain_gradient(weights, run.inputs[k], hidden, run.slope[k], D[K])
+    for i in range(m):
+        by_input = 0.0
+        for j in range(h):
+            by_input += weights[h * m + j] * hidden[j] * (1.0 - hidden[j]) * weights[j * m + i]
+        share = run.slope[k] * by_input / setting.scales[i]
+        for p in range(S.shape[1]):
+            D[K, p] += share * D[INPUT_ROWS[i], p]
+    for p in range(S.shape[1]):
+        D[E, p] = D[U, p] - run.K[k] * D[X, p] - run.x[k] * D[K, p]
+    spare.fill(0.0)
+    for i in range(S.shape[0]):
+        for j in range(S.shape[0]):
+            if model.A[i, j] != 0.0:
+                for p in range(S.shape[1]):
+                    spare[i, p] += model.A[i, j] * S[j, p]
+        for p in range(S.shape[1]):
+            spare[i, p] += model.B[i] * D[E, p]
+    for i in range(S.shape[0]):
+        copied(spare[i], S[i])
+
+
+@compiled
+def learn_by_sensitivities(
+    setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, total: Real
+) -> tuple[int, int]:
+    """Learning at every sample with the whole sensitivity of the plant, carried forward since the trial began.
+
+    The gradient of a x^2/2 + b e^2/2 now, by weights taken for constant all the trial (Williams and Zipser, 1989).
+    `total` collects T times the gradients of a trial: with rates of zero that is the gradient of its cost.
+    """
+    n, size, states, (a, b, T, _, _) = run.x.size, weights.size, work.state.size, setting.numbers
+    gradient, change, kept = np.zeros(size), np.zeros(size), weights.copy()
+    S, room, D = np.zeros((states, size)), np.zeros((states, size)), np.zeros((3 * BEFORE, size))
+    for trial in range(costs.size):
+        copied(weights, kept)
+        work.state.fill(0.0)
+        total.fill(0.0)
+        S.fill(0.0)
+        D.fill(0.0)
+        for k in range(n):
+            if not sense(k, setting, run, work):
+                costs[trial] = np.inf
+                copied(kept, weights)
+                return trial + 1, k
+            act(k, setting, weights, run, work)
+            _derive(k, setting, weights, run, S, room, D)
+            x, e = run.x[k], run.e[k]
+            for p in range(size):
+                gradient[p] = a * x * D[X, p] + b * e * D[E, p]
+                total[p] += T * gradient[p]
+            _step(weights, change, gradient, steps, 1.0)
+        costs[trial] = trial_cost(n, setting.numbers, run)
+        if _rms(run.x) < steps.enough:
+            return trial + 1, ENOUGH
+    return costs.size, NEVER
+
 
 Mode = Literal["trial", "online"]
 Rule = Literal["dynamic", "clipped", "plain"]
 Sensitivity = Literal["one-step", "whole"]
 
-RULE_NUMBERS = {"dynamic": rules.BACKTRACKING_RULE, "clipped": rules.CLIPPED_RULE, "plain": rules.PLAIN_RULE}
+RULE_NUMBERS = {"dynamic": BACKTRACKING_RULE, "clipped": CLIPPED_RULE, "plain": PLAIN_RULE}
 MOST_TRIALS = 1_000_000  # of a tuning: a bound on what a slip of the hand may ask for
 QUARTILES = (0.25, 0.5, 0.75)  # of learning curves over the seeds
 NO_GAIN = 1e-3  # of K: a network that gives less all along a trial has driven its gain to nothing
@@ -155,15 +357,15 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
     trials = whole("trials", trials, 1, MOST_TRIALS, f"a whole number of trials from 1 to {MOST_TRIALS}")
     weights, costs = network.weights, np.zeros(trials)
     longest = math.inf if learning.rule == "plain" else float(learning.clip)
-    steps = rules.Steps(learning.rates(weights.size), float(learning.alpha), longest, float(learning.enough))
+    steps = Steps(learning.rates(weights.size), float(learning.alpha), longest, float(learning.enough))
     common = (trial.setting(network, guard.limits), steps, weights, costs, *trial.room(network))
     if learning.mode == "trial":
-        made, sample = rules.learn_by_trials(*common, RULE_NUMBERS[learning.rule])
+        made, sample = learn_by_trials(*common, RULE_NUMBERS[learning.rule])
     elif learning.sensitivity == "whole":
-        made, sample = rules.learn_by_sensitivities(*common, np.zeros(weights.size))
+        made, sample = learn_by_sensitivities(*common, np.zeros(weights.size))
     else:
-        made, sample = rules.learn_by_samples(*common, trial.reply)
+        made, sample = learn_by_samples(*common, trial.reply)
     learnt = network.with_weights(weights)
     result = trial.with_network(learnt, guard.limits)
     stopped = Stopped(made - 1, int(sample), trial.numbers.bound) if sample >= 0 else None
-    return Training(learnt, guard, costs[:made], result, stopped, sample == rules.ENOUGH)
+    return Training(learnt, guard, costs[:made], result, stopped, sample == ENOUGH)

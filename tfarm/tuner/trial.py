@@ -31,9 +31,9 @@ from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.dsp.simulate import FOLDED_UP
 from tfarm.errors import ParameterError, must_be_known
 from tfarm.records import record
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.table import default_gains
 from tfarm.tuner import kernel
-from tfarm.tuner.network import PAPER_INPUTS, Network
+from tfarm.tuner.kernel import PAPER_INPUTS, Network
 
 SILENT = Network(np.zeros((1, PAPER_INPUTS)), np.zeros(1), np.ones(PAPER_INPUTS))  # for a guard that leaves no choice
 TRIAL_MODES = 6  # flexible modes of a trial, unless told

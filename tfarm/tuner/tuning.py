@@ -17,12 +17,11 @@ from tfarm.dsp.results import enough_modes, ideal_chain, residual_moment_rms, re
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
 from tfarm.errors import ParameterError
 from tfarm.records import record
-from tfarm.spectrum.scales import default_gains
-from tfarm.tuner.baselines import SHAPERS, BestConstant, best_constant, lq_bound, shaped_trial
-from tfarm.tuner.comparison import Outcomes
+from tfarm.spectrum.table import default_gains
+from tfarm.tuner.baselines import SHAPERS, BestConstant, Outcomes, best_constant, lq_bound, shaped_trial
 from tfarm.tuner.controller import SavedTuner, TunedGain, tip_off, weights_answer
 from tfarm.tuner.guard import GuardKind, find_guard
-from tfarm.tuner.network import PAPER_HIDDEN, PAPER_INPUTS, initial_network
+from tfarm.tuner.kernel import PAPER_HIDDEN, PAPER_INPUTS, initial_network
 from tfarm.tuner.training import QUARTILES, Learning, LearningCurves, Training, train
 from tfarm.tuner.trial import (
     TRIAL_MODES,

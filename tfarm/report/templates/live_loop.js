@@ -52,7 +52,7 @@ class LiveLoop {
     return [drive, add(mul([law.Kp, law.K1 * w], theta), mul(times(law.K2, s2), m))];
   }
 
-  // Steep places closely, evenly between, slowly below: `tfarm.loop.frequencies.grid`
+  // Steep places closely, evenly between, slowly below: `tfarm.loop.loop.grid`
   grid() {
     const { places, band } = this, lowest = 1e-6 * Math.min(band, places[0]), below = places.filter(w => w < band);
     const corners = [lowest, ...below, band], away = geometric(1e-10, 0.06, 14);

@@ -7,10 +7,10 @@ import pytest
 
 import tfarm
 from tfarm.arm import HubFeedback
-from tfarm.comparing.regions import sampled_region
 from tfarm.dsp import Chain
-from tfarm.loop.edges import moment_axis, rate_axis, rate_columns
+from tfarm.loop.plane import moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import stability
+from tfarm.plots.regions import sampled_region
 from tfarm.report.live import live_data
 from tfarm.report.sampled_section import beyond_words
 
