@@ -29,8 +29,8 @@ from tfarm.loop.stability import stability
 from tfarm.plots.plane import nice_levels
 from tfarm.plots.roots import zoomed
 from tfarm.plots.style import BLUE
+from tfarm.report import cases, write, writing
 from tfarm.report import map_section as map_room
-from tfarm.report import write, writing
 from tfarm.report.cases import continuous_cases, has_loop, margins_of, on_hub
 from tfarm.report.locus_section import _along, beyond_table
 from tfarm.report.loop_section import NOT_STABLE, margin_table, margins_section, verdict_fact
@@ -62,7 +62,8 @@ def coarse():
     That takes longest and has its own tests.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(map_room, "best", lambda arm, chain: None)
+        for room in (cases, map_room):
+            patch.setattr(room, "best", lambda arm, chain: None)
         coarsen(patch.setattr)
         return map_section(PURE)
 
@@ -201,6 +202,7 @@ def test_the_loci_are_exact_and_the_gap_is_that_of_what_is_drawn():
     size = np.maximum(abs(data.exact.branches).max(axis=1), tfarm.modes(LAB, 1).natural_frequency[-1])
     assert (apart <= data.reduced.gap * size * (1 + 1e-12)).all()
     assert [round(each.gain, 4) for each in data.exact.crossings] == [1.0305]
+    assert "with K1 = 0.3: a branch becomes unstable at K2 = 1.03054; " in _along(data)
 
 
 def test_beyond_one_infinitely_many_poles_are_unstable_without_damping():

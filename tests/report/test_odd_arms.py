@@ -160,7 +160,7 @@ def test_sentences_about_the_pole_at_0_and_J_are_for_arms_that_turn_freely(name,
     (windows,) = (block for block in section.blocks if block.stem == "windows")
     words = " ".join([*section.words, windows.caption, signs(ARMS[name])])
     turns = ARMS[name].has_rigid_mode
-    assert ("the hub angle leaves apart" in words) == ("(J − I_h)/J" in words) == turns
+    assert ("of the free hub angle" in words) == ("(J − I_h)/J" in words) == turns
     assert not re.search(r"\de-\d", words)
     pairs = zip(*(column(windows, key).cells for key in ("stable_around_it", "looked_at")), strict=True)
     for around, looked_at in pairs:

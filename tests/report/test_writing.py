@@ -151,7 +151,7 @@ def test_long_matter_is_folded_away_and_answers_stand_first(pages):
     assert "<table" not in re.sub(r"<details>.*?</details>", "", text, flags=re.DOTALL)
     assert text.count("<details>") == text.count("</details>")
     contents = text.partition('class="contents"')[2].partition("</nav>")[0]
-    assert 'href="#margins">Is the loop stable, and by how much? <span class="verdict ok">stable</span>' in contents
+    assert 'href="#margins">Stability and stability margins <span class="verdict ok">stable</span>' in contents
     answers = text.partition('id="answers"')[2].partition("</section>")[0]
     assert "the loop is stable" in answers
     assert {f'href="#{anchor}"' for anchor in ("margins-map", "margins", "sampled")} <= set(

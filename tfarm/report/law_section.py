@@ -26,8 +26,8 @@ NOT_ON_PAGE = (
     "poles over any two numbers of a law, tfarm locus --law FILE follows them along one."
 )
 IN_Z_ALONE = (
-    "A law in z acts at its samples alone: all that is said of {which} is said of the sampled loop, and there is no "
-    "loop function of s, no margin and no pole without a clock."
+    "A law in z acts at its samples alone: the sections on {which} are of the sampled loop, without a loop function of "
+    "s, its margins and poles."
 )
 ENTRIES_CAPTION = (
     "As it was read, in the files with every digit: coefficients in descending powers of s, of z where the law is "

@@ -105,7 +105,7 @@ def verdict_words(name: str, found: Margins) -> str:
     """The verdict on the law of that name, what is known beyond the band, and what Lyapunov or the law's sign adds."""
     it, loop = found.stability, found.stability.loop
     free = it.poles.moving.size < it.poles.values.size
-    apart = ", the one at 0 that the hub angle leaves apart" if free else ""
+    apart = ", apart from the pole at 0 of the free hub angle" if free else ""
     if loop.gains is None:
         signs = signs_of_loop(loop)
         kind = f"it is {signs.kind}" if signs.kind else "no theorem on its sign helps"
@@ -191,7 +191,7 @@ def count_table(names: Sequence[str], plots: Sequence[Nyquist]) -> Table:
     ]
     return Table(
         stem="nyquist-count",
-        title="Encirclements beside unstable poles",
+        title="Encirclements and unstable poles",
         caption=COUNT_CAPTION.format(open=NO_OPEN if not any(plot.unstable_open for plot in plots) else OWN_OPEN),
         columns=(
             Column("law", "law", of=names),
@@ -241,7 +241,7 @@ def margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> Pa
             continue
         words.append(f"Spillover of {each.name}: {typeset(spilled.in_words)}.")
         blocks.append(spill_table(each, spilled))
-    title = "Is the loop stable, and by how much?"
+    title = "Stability and stability margins"
     return PageSection(anchor="margins", title=title, facts=facts, words=words, blocks=blocks)
 
 

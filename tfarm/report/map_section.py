@@ -152,7 +152,7 @@ def draw_map_of_arm(data: MapOfArm) -> Figure:
         if data.design is not None:
             plane.search_frame(data.design.bounds, ax)
         legend_below(figure)
-        headline(figure, f"{data.arm.name}: how high may the gains go?")
+        headline(figure, f"{data.arm.name}: stability region of both gains")
     return figure
 
 
@@ -186,7 +186,7 @@ def map_data(data: MapOfArm) -> Table:
 
 
 def map_section(arm: Arm, chain: Chain | None = None) -> PageSection:
-    """How high may the gains go?  And how high when the loop is sampled by the chain's clock?"""
+    """The stability regions of both gains, continuous and sampled, and the gains that damp best."""
     data = map_of_arm(arm, chain)
     picture = Picture(
         stem="map",
@@ -198,7 +198,7 @@ def map_section(arm: Arm, chain: Chain | None = None) -> PageSection:
         data=map_data(data),
     )
     words = [_intervals(arm), *([] if data.design is None else [_best_words(data, data.design)])]
-    return PageSection(anchor="margins-map", title="How high may the gains go?", words=words, blocks=(picture,))
+    return PageSection(anchor="margins-map", title="Stability region of both gains", words=words, blocks=(picture,))
 
 
 def _intervals(arm: Arm) -> str:

@@ -60,7 +60,7 @@ class Piece:
     make, where that is long: the longest are begun first.
 
     `make` takes these parts of the page's subject (`of`), and a page where one is missing has no such section; `in_s`:
-    only where one of the laws acts without a clock.
+    only where one of the laws acts in continuous time.
     """
 
     name: str

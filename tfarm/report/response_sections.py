@@ -206,7 +206,7 @@ def _onwards(those: Possible) -> tuple[list[str], list[Picture | Table]]:
         words.append(typeset(f"With {gains} the loop holds on {share}."))
         blocks.append(Picture(
             stem="fit-map", title="Gains on all of these arms",
-            caption="Dark: the gains hold on every arm that the data leave possible; white: on none. Without a clock.",
+            caption="Dark: the gains hold on every arm that the data leave possible; white: on none; continuous time.",
             alt="Map of the share of arms on which gains hold.", figure=draw_share(those, ranges_of(arm)),
         ))  # fmt: skip
         gain_ends = (each.windows[MOMENT_GAIN].around for each in stable)

@@ -38,7 +38,7 @@ SERVO_SPEED = 1 / 20  # of the first frequency: the servo's angle loop is so slo
 SERVO_TURN = 0.03  # rad a sample, where that is slower
 ON_TARGET = 1e-10  # of the tip's travel: no slew ends nearer its target than rounding tells
 SAME_COST = 1e-4  # relative difference of two costs below which they are called the same
-TUNER_TITLE = "The gain tuner: does a self-tuning gain help?"
+TUNER_TITLE = "The gain tuner against baselines"
 NOT_WITHOUT_DAMPING = (
     "This arm has no damping. When it is sampled its high modes then neither decay by themselves nor are they all "
     "damped by the loop, so no range of moving gains can be proven for all of them, and the tuner is not trained here. "
@@ -407,7 +407,7 @@ def comparison_table(data: TunerNumbers) -> Table:
     away_from_it = "; ∞ where the loop ran away" if any(math.isinf(row.tuner.cost) for row in data.rows) else ""
     return Table(
         stem="tune-comparison",
-        title="Cost of the slew, beside what it has to beat",
+        title="Cost of the slew, compared with baselines",
         caption=(
             "Every controller knows the arm by its name plate only: what was trained or chosen as trained is used on "
             f"all others. None: no moment feedback. Constant: the best constant gain as trained, {MOMENT_GAIN} = "
