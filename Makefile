@@ -17,12 +17,12 @@ SEED ?= 1
 SURVEYS := \
 	left_out \
 	golden \
-	plausible \
+	plausible.survey \
 	properties \
 	audit.test_planted_slips \
 	exact.accuracy \
-	response.rigid \
-	response.extrema \
+	response.test_rigid \
+	response.test_extrema \
 	spectrum.proofs \
 	spectrum.ritz \
 	spectrum.damped \
@@ -35,8 +35,7 @@ SURVEYS := \
 	loop.law_times \
 	synthesis.designs \
 	loop.nyquist_counts \
-	reduced.errors \
-	dsp.verdicts \
+	reduced.test_accuracy \
 	dsp.settled \
 	dsp.law_verdicts \
 	dsp.law_orders \
@@ -111,7 +110,7 @@ lint: $(INSTALLED) ## check style, types and which room imports which
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 
-bench: $(BENCH_INSTALLED) ## measure speed and memory, beside other packages
+bench: $(BENCH_INSTALLED) ## measure speed, beside other packages
 	@$(BIN)/python -m tests.bench
 
 clean: ## remove everything that was generated

@@ -1,14 +1,12 @@
-"""Two other solutions of the arm's equations, which share nothing with tfarm but the equations themselves.
+"""Another solution of the arm's equations, which shares nothing with tfarm but the equations themselves.
 
 `Ritz`: shear strain and curvature as Legendre series, Psi and W by integration.  The strain energy is then diagonal, so
 that low frequencies keep their digits at any slenderness, and natural end conditions need nothing.
-`shooting`: the state (w, psi, M, Q) carried along the arm by the matrix exponential, in mpmath.
 """
 
 import math
 from functools import lru_cache
 
-import mpmath
 import numpy as np
 from numpy.polynomial import legendre
 from scipy.linalg import eigh, null_space
@@ -91,60 +89,3 @@ def _integrals(terms, share):
         return np.stack([legendre.legval(at, p) for p in integrals], axis=-1)
 
     return integral(1), integral(2)
-
-
-def shooting(arm, s, *, x=(), torque=1, tip_force=0, digits=40):
-    """(w, psi, M, Q) at 0, at each x and at L [m], by mpmath.expm, for a hub torque and a force on the tip.
-
-    Where the hub is locked `torque` is the hub angle.  mpmath numbers, with about `digits` right digits.
-    """
-    link, payload = arm.link, arm.payload
-    guard = int(2 * abs(link.length * max(_rates(arm, s)))) + 30 + max(0, int(-6 * math.log10(abs(s) + 1e-300)))
-    with mpmath.workdps(digits + guard):
-        s = mpmath.mpc(s)
-        E, I, A = (mpmath.mpf(v) for v in (link.youngs_modulus, link.section.second_moment, link.section.area))
-        rho, L = mpmath.mpf(link.density), mpmath.mpf(link.length)
-        kGA = mpmath.mpf(link.shear_factor) * mpmath.mpf(link.shear_modulus) * A
-        EI = E * I * (1 + mpmath.mpf(link.damping) * s)
-        march = mpmath.matrix([
-            [0, 1, 0, 1 / kGA],
-            [0, 0, 1 / EI, 0],
-            [0, rho * I * s**2, 0, -1],
-            [rho * A * s**2, 0, 0, 0],
-        ])  # fmt: skip
-        T = mpmath.expm(march * L)
-        m, m_force = _body(payload.mass, s)
-        Ic, Ic_force = _body(payload.inertia, s)
-        Ih, Ih_force = _body(arm.hub.inertia, s)
-        rows = [
-            [m * T[0, j] + m_force * T[3, j] for j in (1, 2, 3)],
-            [Ic * T[1, j] + Ic_force * T[2, j] for j in (1, 2, 3)],
-            [Ih, -Ih_force, 0],
-        ]
-        psi, M, Q = _cramer(rows, [m_force * tip_force, 0, torque])
-        root = mpmath.matrix([0, psi, M, Q])
-        return [root, *(mpmath.expm(march * mpmath.mpf(at)) * root for at in x), T * root]
-
-
-def _body(inertia, s):
-    return (mpmath.mpf(1), 0) if math.isinf(inertia) else (mpmath.mpf(inertia) * s**2, 1)
-
-
-def _cramer(a, b):
-    def det(m):
-        (a, b, c), (d, e, f), (g, h, i) = m
-        return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
-
-    whole = det(a)
-    return [
-        det([[b[r] if j == column else a[r][j] for j in range(3)] for r in range(3)]) / whole for column in range(3)
-    ]
-
-
-def _rates(arm, s):
-    """Rough sizes of the two wave numbers [1/m]."""
-    link = arm.link
-    d = 1 + link.damping * s
-    quartic = [1, 0, -(s**2) * (link.rhoI / (link.EI * d) + link.rhoA / link.kGA), 0, 0]
-    quartic[4] = s**2 * link.rhoA / (link.EI * d) * (1 + s**2 * link.rhoI / link.kGA)
-    return abs(np.roots(quartic))

@@ -11,7 +11,7 @@ import pytest
 from tests.shell import run
 from tfarm.audit import published
 from tfarm.audit.published import ALL as SOURCES
-from tfarm.audit.published import agrees, validate, validate_answer
+from tfarm.audit.published import agrees, validate
 from tfarm.errors import CertificationError
 
 
@@ -36,11 +36,11 @@ def test_every_row_agrees_or_says_why() -> None:
         assert math.isfinite(row.ours)
 
 
-def test_every_source_has_a_test_named_after_it() -> None:
-    """tests/published holds a file a source."""
-    files = {path.stem for path in (Path(__file__).parent.parent / "published").glob("test_*.py")}
-    expected = {source.key.removesuffix("-appendix-d").replace("-", "_").replace(".", "") for source in SOURCES}
-    assert {f"test_{key}" for key in expected} <= files
+def test_every_source_has_a_test_that_names_it() -> None:
+    texts = [
+        path.read_text(encoding="utf-8") for path in (Path(__file__).parent.parent / "published").glob("test_*.py")
+    ]
+    assert {source.key for source in SOURCES if source.key not in "".join(texts)} == set()
 
 
 def test_keys_are_unique_and_every_arm_is_whole() -> None:
@@ -88,15 +88,6 @@ def test_another_arm_is_noticed() -> None:
     payload = replace(case.arm.payload, mass=1.01 * case.arm.payload.mass)
     with pytest.raises(CertificationError, match=r"mode 1.*mode 5"):
         validate((changed("wang-2017", arm=replace(case.arm, payload=payload)),))
-
-
-def test_the_answer_counts_its_rows() -> None:
-    answer = validate_answer()
-    assert set(answer) == {"sources", "rows", "agree", "explained"}
-    assert answer["agree"] + answer["explained"] == len(answer["rows"])
-    assert {row["source"] for row in answer["rows"]} == {source["key"] for source in answer["sources"]}
-    keys = {"source", "case", "mode", "quantity", "printed", "ours", "difference", "agrees", "why"}
-    assert all(set(row) == keys for row in answer["rows"])
 
 
 def test_the_verb_prints_the_table_or_one_object(capsys: pytest.CaptureFixture[str]) -> None:

@@ -61,13 +61,6 @@ def test_formulas_are_typeset(rows, name):
         assert formula.count(r"\left") == formula.count(r"\right")
 
 
-def test_typesetting_by_example(rows):
-    assert rows["(14)"].corrected_tex == r"\Phi \left(0,s\right) = 0"
-    assert rows["(3)"].printed_tex == (
-        r"I_{h}\,\frac{\partial^{2} \theta }{\partial t^{2}} = E\,I\,\frac{\partial \phi (t,0)}{\partial x} + u"
-    )
-
-
 DRAWN = [name for name in VERDICTS if name != "Delta, Delta k_i"]
 
 
@@ -77,20 +70,18 @@ def test_matplotlib_can_draw_them_but_for_the_determinants(rows, name):
         assert MathTextParser("path").parse(f"${tex}$")[0] > 0
 
 
-def test_a_square_of_a_derivative_has_brackets(rows):
-    assert r"\left(\frac{\partial \theta }{\partial t}\right)^{2}" in rows["(20)"].printed_tex
-
-
 @pytest.mark.parametrize(
     ("name", "formula"),
     [
         ("Table 1 (rho)", r"\rho  = 2766.7\ \mathrm{kg/m^3}"),
         ("Table 1 (C's unit)", r"C: \ \mathrm{s}"),
         ("section 5: alpha_c", r"\alpha_{c} = 0.6"),
+        ("(14)", r"\Phi \left(0,s\right) = 0"),
     ],
 )
-def test_typesetting_of_values(rows, name, formula):
+def test_typesetting_by_example(rows, name, formula):
     assert rows[name].corrected_tex == formula
+    assert r"\left(\frac{\partial \theta }{\partial t}\right)^{2}" in rows["(20)"].printed_tex
 
 
 @pytest.mark.usefixtures("audited")

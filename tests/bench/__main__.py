@@ -1,4 +1,4 @@
-"""Measure speed, memory and accuracy, beside other packages: `make bench`.
+"""Measure speed and accuracy, beside other packages: `make bench`.
 
 Nothing here is a test: times depend on the machine, so they are printed as ratios and medians, and kept in
 reports/bench.json.
@@ -13,25 +13,22 @@ from pathlib import Path
 
 from rich.console import Console
 
-from . import elements, fitting, loci, loops, memory, responses, rigs, sampled, spectra, tuning
+from . import elements, loci, responses, sampled, spectra, tuning
 from .rows import Row, keep, show
 
 
 def measure() -> Iterator[Row]:
-    """All rows, group by group; memory first, while this process is small."""
-    yield memory.memory_row()
+    """All rows, group by group."""
     yield from responses.response_rows()
     yield from responses.mpmath_rows()
-    yield from elements.response_rows()
-    yield from rigs.rig_rows()
+    yield elements.response_row()
     yield from spectra.modes_rows()
-    yield from elements.modes_rows()
+    yield elements.mode_row()
     yield spectra.cxroots_row()
-    yield from loops.loop_rows()
+    yield from sampled.loop_rows()
     yield from loci.locus_rows()
     yield from sampled.sampled_rows()
-    yield from tuning.tuner_rows()
-    yield from fitting.fit_rows()
+    yield tuning.tuner_row()
 
 
 def main(path: Path) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 
 import tfarm
 from tfarm.arm import HubFeedback
-from tfarm.exact.characteristic import gains_of
 from tfarm.loop.loci import open_loop, reduced_locus
 from tfarm.loop.locus import Locus, locus
 from tfarm.loop.loop import Loop
@@ -70,7 +69,7 @@ def _error(exact: Locus, values: Complex) -> float:
         loop = Loop(exact.arm, exact.law.having("K1", float(exact.gain[n])))
         for near, value in zip(exact.branches[:, n], values[:, n], strict=True):
             if near:
-                disc = enclosed(loop.k, complex(near), DIGITS, gains_of(loop.k, loop.gains))
+                disc = enclosed(loop.k, complex(near), DIGITS, loop.exact)
                 true = complex(float(disc.re), float(disc.im))
                 worst = max(worst, abs(value - true) / abs(true))
     return worst

@@ -1,4 +1,4 @@
-"""The sampled loop: a slew, a map of gains at 10 ms, and proofs of modes, beside the limits that were set for them."""
+"""The closed loop, continuous and sampled, and proofs of modes: beside the limits that were set for them."""
 
 from __future__ import annotations
 
@@ -9,13 +9,31 @@ import numpy as np
 import tfarm
 from tfarm import Arm, HubFeedback
 from tfarm.dsp import Chain, Simulator, sampled_map, sampled_verdict, scenario
+from tfarm.loop.margins import margins
+from tfarm.loop.plane import between, gain_map
 
 from .rows import Row, Target
 from .timing import interleaved, once
 
-GROUP = "The sampled loop, and proofs"
+CLOSED, GROUP = "The closed loop", "The sampled loop, and proofs"
 LAW = HubFeedback(K1=0.3, K2=0.3)
 POINTS, MODES, DURATION = 200, 20, 3.0
+
+
+def loop_rows() -> Iterator[Row]:
+    """Margins, and a map of 200 x 200 gains, of the damped preset."""
+    arm = tfarm.load("sasaki2012-lab")
+    seconds = interleaved({"tfarm": lambda: margins(arm, LAW)}, 9).median("tfarm")
+    yield Row(
+        group=CLOSED, what="tfarm: verdict, windows, margins", n=1, each="loop", seconds=seconds,
+        target=Target(measured=1e3 * seconds, limit=100.0, unit="ms"),
+    )  # fmt: skip
+    with once() as watch:
+        gain_map(arm, between(-1, 3, POINTS), between(-2, 2, POINTS))
+    yield Row(
+        group=CLOSED, what="tfarm: unstable poles over a map", n=POINTS**2, each="point",
+        seconds=watch.seconds / POINTS**2, target=Target(measured=watch.seconds, limit=2.0, unit="s for all"),
+    )  # fmt: skip
 
 
 def sampled_rows() -> Iterator[Row]:

@@ -1,6 +1,5 @@
 """`tfarm assumptions` as a shell sees it."""
 
-import json
 import math
 import subprocess
 import sys
@@ -12,18 +11,10 @@ import tfarm
 from tests.shell import heard
 from tests.shell import run as shell
 from tfarm.arm import to_toml
-from tfarm.audit.assumptions import assumptions_answer
-from tfarm.tables.files import to_json
 
 
 def run(capsys, *arguments):
     return shell(capsys, "assumptions", *arguments)
-
-
-def test_json_is_the_room_s_answer(capsys):
-    code, out, err = run(capsys, "stocky-steel", "--count", "2", "--json")
-    assert (code, err) == (0, "")
-    assert json.loads(out) == json.loads(to_json(assumptions_answer(tfarm.load("stocky-steel"), 2)))
 
 
 def test_the_table_marks_the_arm_and_gives_the_limits(capsys):

@@ -1,7 +1,6 @@
 """The commands on rigs: every part that the paper's arm does not have, from a file to what is printed."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -51,15 +50,6 @@ def test_what_friction_makes_of_a_rigid_body_is_its_second_eigenvalue(capsys):
     assert "0 and -18.486" in out
     assert "motor's circuit" in out
     assert "-1/C" not in out
-
-
-def test_theory_is_the_files_own_unless_another_is_asked_for(capsys, tmp_path):
-    file = tmp_path / "rig.toml"
-    file.write_text(
-        f'theory = "euler-bernoulli"\n{Path(RIGS["bench-rig"]).read_text(encoding="utf-8")}', encoding="utf-8"
-    )
-    assert answer(capsys, "modes", str(file), "--count", "1")["theory"] == "euler-bernoulli"
-    assert answer(capsys, "modes", str(file), "--count", "1", "--theory", "shear")["theory"] == "shear"
 
 
 QUICK = {  # each verb, as short as it goes

@@ -5,10 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib import image
-from matplotlib.collections import QuadMesh
 
 import tfarm
-from tests.shared import sized
 from tests.shell import answer, run
 from tfarm.comparing import comparison
 from tfarm.comparing.answers import (
@@ -164,23 +162,24 @@ def test_without_damping_phases_are_of_the_band_alone():
     assert rows["phase_lag_deg"]["known_other"] == "exact"
 
 
-@pytest.mark.parametrize("points", sized(20, comparison.DELAY_PLANE_POINTS))
-def test_a_law_of_other_signals_is_mapped_over_factor_and_delay(points, monkeypatch):
-    """The delay where each loop ends at its own gain is its delay margin."""
-    monkeypatch.setattr(comparison, "DELAY_PLANE_POINTS", points)
+def test_a_law_of_other_signals_is_mapped_over_factor_and_delay():
+    """At the delay margin a stable interval of factors ends at 1, and at no further delay at the gain margin."""
     late = tfarm.Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
     found = tfarm.compare(LAB, [LAW, late], modes=1)
     assert found.regions is None
-    for plane, side in zip(found.delays, found.sides, strict=True):
-        column = plane.stable[:, int(np.argmin(abs(plane.x - 1.0)))]
-        last = plane.y[column].max()
-        step = plane.y[1] - plane.y[0]
-        assert last - plane.law.delay == pytest.approx(side.margins.exact_delay, abs=2 * step)
-    drawn = tfarm.plots.comparison.figure(found).axes[2].collections
-    meshes = [each for each in drawn if isinstance(each, QuadMesh)]
-    for mesh, plane in zip(meshes, found.delays, strict=True):
-        opaque = np.asarray(mesh.get_array())[..., 3] > 0
-        assert np.array_equal(opaque, plane.stable)
+    for side, reach in zip(found.sides, found.reaches, strict=True):
+        (around,) = (each for each in reach.stable_intervals[0] if each[0] < 1 < each[1])
+        factors = [factor for factor in side.margins.in_band.gain if 0.1 < factor < 3.9]
+        assert [end for end in around if 0.1 < end < 3.9] == pytest.approx(factors, rel=1e-6)
+        at, delay = side.reach(np.array([0.0, 1.0]) * side.margins.exact_delay), side.margins.exact_delay
+        ends = [end for window in at.stable_intervals[1] for end in window]
+        assert min(abs(end - 1.0) for end in ends) < 1e-6
+        assert 0 < delay < reach.delay[-1]
+    right = tfarm.plots.comparison.figure(found).axes[2]
+    drawn = {(float(x), float(y)) for line in right.lines for x, y in zip(*line.get_data(), strict=True)}
+    for reach in found.reaches:
+        columns = zip((1e3 * reach.delay).tolist(), reach.stable_intervals, strict=True)
+        assert {(delay, end) for delay, column in columns for window in column for end in window} <= drawn
 
 
 def test_gains_as_a_law_in_z_are_the_same_loop_at_the_samples():

@@ -1,5 +1,4 @@
-"""Roads to the sampled arm that share no code with tfarm.dsp: the exact transfer function, aliased or inverted
-numerically.
+"""A road to the sampled arm that shares no code with tfarm.dsp: the exact transfer function, aliased.
 
 A sample sees every frequency s + 2 pi i n/T at once: with a zero-order hold and a delay tau the pulse transfer function
 is
@@ -39,15 +38,3 @@ def aliased_loop(arm, z, period, delay=0.0, terms=20_000):
     f = delay - whole
     hub = period * ((1 - f) + f / z) / (z - 1) / inertia / z**whole
     return aliased(rest, z, period, delay, terms) + np.array([hub, 0])
-
-
-def durbin(Y, duration, points, shift):
-    """y(t) at t = k duration/points from its Laplace transform Y(s): the trapezoid rule on Re s = shift, one FFT.
-
-    Durbin (1974); wrong by e^{-shift duration} from wrapping round, and by the tail of Y beyond the last frequency.
-    """
-    k = np.arange(points)
-    values = Y(shift + 2j * np.pi * k / duration)
-    values[0] /= 2
-    t = duration * k / points
-    return t, 2 * np.exp(shift * t) / duration * (np.fft.ifft(values) * points).real

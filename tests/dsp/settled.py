@@ -1,4 +1,4 @@
-"""Verdicts called settled on loops drawn to hurt, against a hold model; and how many ordinary loops are settled.
+"""Verdicts called settled, on loops drawn to hurt and on ordinary ones, against a hold model.
 
     python -m tests.dsp.settled 2000 [SEED]
 
@@ -7,13 +7,13 @@ that put one of the modes 10 to 60 where sampled rate feedback destabilises it, 
 must agree, or one of 240 polynomials decides; where the growth is below 1e-7 a sample nobody can tell.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag, expm
 
 from tests import survey
-from tests.dsp.hold import HoldModel
-from tests.dsp.verdicts import Case, some_case
+from tests.models import Ritz
 from tests.strategies import arm_of
 from tests.survey import Finding, each_of
 from tfarm.arm import HubFeedback
@@ -23,33 +23,55 @@ from tfarm.errors import ConvergenceError
 from tfarm.spectrum import modes
 
 FAINT = 1e-7
+PERIOD = 0.01  # s, of the ordinary ones
+
+
+@dataclass(frozen=True)
+class Case:
+    arm: object
+    gains: HubFeedback
+    chain: Chain
+
+
+def _log(rng, low, high):
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def beam_of(rng, longest, stockiest):
+    """What a slender beam without hub and damping is drawn from, and its inertia about the hub [kg m^2]."""
+    draw = {
+        "length": _log(rng, 0.3, longest),
+        "slenderness": _log(rng, stockiest, 300),
+        "width": _log(rng, 1, 20),
+        "density": _log(rng, 1500, 8000),
+        "E": _log(rng, 1e10, 2e11),
+        "nu": float(rng.uniform(0.1, 0.4)),
+        "mass": float(rng.choice([0.0, _log(rng, 0.01, 1)])),
+        "inertia": 0.0,
+    }
+    return draw, arm_of(**draw, damping=0.0, hub=1.0).total_inertia - 1.0
+
+
+def ordinary_case(rng):
+    """A slender arm with a hub of its size, damped, and gains on both sides of the edges."""
+    draw, beam = beam_of(rng, 2.0, 30)
+    arm = arm_of(**draw, damping=_log(rng, 3e-6, 3e-4), hub=beam * _log(rng, 0.05, 5))
+    gains = HubFeedback(K1=arm.total_inertia / PERIOD * _log(rng, 1e-3, 3), K2=float(rng.uniform(-0.6, 1.8)))
+    delay = float(rng.choice([0.0, 1.0, 2.0, rng.uniform(0, 2)]))
+    return Case(arm, gains, Chain(sampling=Sampling(period=PERIOD, delay_samples=delay)))
 
 
 def hurting_case(rng):
     """A light hub, little damping, and a period short enough for the modes 10 to 60 to matter."""
-
-    def log(low, high):
-        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-    draw = {
-        "length": log(0.3, 3.0),
-        "slenderness": log(20, 300),
-        "width": log(1, 20),
-        "density": log(1500, 8000),
-        "E": log(1e10, 2e11),
-        "nu": float(rng.uniform(0.1, 0.4)),
-        "mass": float(rng.choice([0.0, log(0.01, 1)])),
-        "inertia": 0.0,
-    }
-    beam = arm_of(**draw, damping=0.0, hub=1.0).total_inertia - 1.0
-    share = float(rng.choice([0.0, log(1e-4, 1e-1), log(1e-4, 1e-1), log(1e-4, 1e-1)]))
+    draw, beam = beam_of(rng, 3.0, 20)
+    share = float(rng.choice([0.0, *(_log(rng, 1e-4, 1e-1) for _ in range(3))]))
     arm = arm_of(**draw, damping=0.0, hub=beam * share)
     w = modes(arm, 60).natural_frequency
-    arm = replace(arm, link=replace(arm.link, damping=2 * log(1e-6, 1e-3) / float(w[1])))
+    arm = replace(arm, link=replace(arm.link, damping=2 * _log(rng, 1e-6, 1e-3) / float(w[1])))
     period = float(rng.uniform(1.0, 2.0) * np.pi / w[rng.integers(10, 61)])
     delay = float(rng.choice([0.0, 0.5, 1.0, rng.uniform(0, 2)]))
     felt = float(rng.choice([arm.total_inertia, max(arm.hub.inertia, 1e-4 * beam)]))
-    gains = HubFeedback(K1=felt / period * log(1e-3, 1), K2=float(rng.uniform(-0.4, 1.4)) if share else 0.0)
+    gains = HubFeedback(K1=felt / period * _log(rng, 1e-3, 1), K2=float(rng.uniform(-0.4, 1.4)) if share else 0.0)
     return Case(arm, gains, Chain(sampling=Sampling(period=period, delay_samples=delay)))
 
 
@@ -89,7 +111,54 @@ def hurting(rng):
 
 
 def ordinary(rng):
-    return settled(some_case(rng))
+    return settled(ordinary_case(rng))
+
+
+class HoldModel:
+    """A damped arm, by no code of tfarm: the lowest quarter of the modes that `terms` polynomials a strain give.
+
+    `terms`/2 modes, that is: those are right to 1e-13, the last of them to 1e-9; higher ones are the polynomials' own.
+
+    States: w q and q_t of each mode, the angle and rate of the rigid arm, and the gauge's moment g, from the hub's
+    balance  g + C g_t = I_h theta_tt - u,  which also has what the modes left out would bear at once.
+    """
+
+    def __init__(self, arm, terms=80):
+        ritz, C = Ritz(arm, terms), arm.link.damping
+        flexibility, shapes = (part[..., : terms // 2] for part in ritz.flexibilities())
+        shapes = shapes / np.sqrt(flexibility)
+        w, b = 1 / np.sqrt(flexibility), ritz.hub_psi @ shapes
+        damping = C * (shapes.T * ritz.bending) @ shapes
+        rigid = 1 / np.sqrt(arm.total_inertia)
+        n, inertia, W = w.size, arm.hub.inertia, np.diag(w)
+        A = block_diag(np.block([[np.zeros((n, n)), W], [-W, -damping]]), [[0.0, 1.0], [0.0, 0.0]], [[-1 / C]])
+        B = np.r_[np.zeros(n), b, 0.0, rigid, 0.0]
+        self.angle, self.rate = np.r_[b / w, np.zeros(n), rigid, 0.0, 0.0], np.r_[np.zeros(n), b, 0.0, rigid, 0.0]
+        A[-1] += inertia / C * (self.rate @ A)
+        B[-1] = (inertia * (b @ b + rigid**2) - 1) / C
+        self.A, self.B = A, B
+
+    def log_radius(self, gains, chain):
+        """The largest ln|z|, the hub angle's own pole at z = 1 apart (Kp = 0)."""
+        T, delay = chain.sampling.period, chain.sampling.delay_samples
+        d, n = int(np.floor(delay)), self.B.size
+        (before, late), (after, early) = self._held((delay - d) * T), self._held((1 - delay + d) * T)
+        step, newest = np.zeros((n + d + 1, n + d + 1)), np.zeros(n + d + 1)  # then u_{k-1} ... u_{k-d-1}
+        step[:n, :n], step[:n, -1] = after @ before, after @ late
+        if d:
+            step[:n, -2], newest[n] = early, 1.0
+            step[np.arange(n + 1, n + d + 1), np.arange(n, n + d)] = 1.0
+        else:
+            newest[:n], newest[n] = early, 1.0
+        step[:, :n] -= np.outer(newest, gains.K1 * self.rate + gains.K2 * np.eye(n)[-1])
+        z = np.linalg.eigvals(step)
+        return float(np.log(abs(np.delete(z, abs(z - 1).argmin())).max()))
+
+    def _held(self, time):
+        """What a time [s] makes of the states, and what a unit torque held so long adds."""
+        n = self.B.size
+        whole = expm(np.block([[self.A, self.B[:, None]], [np.zeros((1, n + 1))]]) * time)
+        return whole[:n, :n], whole[:n, n]
 
 
 if __name__ == "__main__":

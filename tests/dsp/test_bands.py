@@ -1,19 +1,20 @@
-"""What a band leaves out, the filter's own error, and how high it reaches; edges shown without a band, grids."""
+"""Bands and discs on the unit circle: what they leave out and hold, next to slow poles too; grids, digits shown."""
 
 import math
 from dataclasses import replace
 
+import mpmath
 import numpy as np
 import pytest
 
 import tfarm
 from tfarm.arm import FED_BACK, Hub, HubFeedback, Law
-from tfarm.dsp import Chain, Sampling, circle, sampled_loop, sampled_map
-from tfarm.dsp.circle import HIGHER, complete_band
-from tfarm.dsp.crossings import COARSEST, circle_grid, crossing_factors
-from tfarm.dsp.edges import shown_delay
+from tfarm.dsp import Chain, Converters, Sampling, circle, pulse_transfer, sampled_loop, sampled_verdict
+from tfarm.dsp.circle import HIGHER, Circle, Discs, _Arcs, complete_band, product
+from tfarm.dsp.crossings import COARSEST, circle_grid, crossing_factors, stable_windows
+from tfarm.dsp.edges import Figure, shown_delay, whole_loop
 from tfarm.dsp.verdict import Verdict
-from tfarm.reduced import modal_model
+from tfarm.reduced import modal_model, relaxed_model
 
 LAB = tfarm.load("sasaki2012-lab")
 GAINS = HubFeedback(K1=0.3, K2=0.3)
@@ -39,13 +40,6 @@ def test_the_top_of_a_band_is_so_many_times_the_last_pole_of_the_model():
     loop = sampled_loop(LAB.having(damping=1e-3), GAINS, count=4)
     shares = complete_band(loop).top / loop.plant.poles.imag.max() / circle.ABOVE_MODEL
     assert min(abs(shares / factor - 1) for factor in HIGHER) < 1e-12
-
-
-def test_a_map_of_one_point_is_the_count_of_its_poles():
-    loop = sampled_loop(LAB, GAINS, count=4)
-    for K1, K2 in ((0.3, 0.3), (-0.3, 0.3), (0.3, 1.5)):
-        outside = int((abs(loop.having(K1=K1, K2=K2).eigenvalues) > 1).sum())
-        assert sampled_map(loop, [K1], [K2]).unstable.tolist() == [[outside]]
 
 
 def test_no_gap_of_the_grid_on_the_circle_is_twice_as_wide_as_of_the_uniform_one():
@@ -85,3 +79,148 @@ def test_a_law_without_zeros_at_rest_is_seen_to_cross_however_slowly():
     assert found.t == pytest.approx(friction, rel=1e-6)
     assert found.at == pytest.approx(1e-5 * T / math.sqrt(1 + friction * T / 2 / arm.total_inertia), rel=1e-6)
     assert found.change == 2
+
+
+ROOTS = {  # less 1
+    "a constant": [],
+    "a lag": [-0.3],
+    "a notch next to z = 1": [-1e-4 + 1e-3j, -1e-4 - 1e-3j],
+    "a cluster next to z = 1": [-1e-4, -1.1e-4, -9e-5 + 1e-5j, -9e-5 - 1e-5j],
+    "degree 5": [-2.0, -1.7 + 0.4j, -1.7 - 0.4j, -1.0, 0.2],
+}
+
+
+@pytest.mark.parametrize("half", [1e-6, 1e-3, 0.1, 0.8])
+@pytest.mark.parametrize("name", ROOTS)
+def test_a_disc_holds_every_value_on_its_arc_and_is_no_larger_than_its_terms(name, half):
+    """Values at points of the arc with forty digits; their largest distance from the middle is found, not bounded."""
+    roots = np.array(ROOTS[name], dtype=complex)
+    angles = np.array([0.0, 1e-4, 0.7, 2.0, math.pi])
+    radius = np.full(angles.size, 2 * math.sin(half / 2))
+    found = product(Discs(-np.expm1(-1j * angles), radius), roots)
+    away = np.zeros(angles.size)
+    with mpmath.workdps(40):
+        for n, angle in enumerate(angles.tolist()):
+            for share in np.linspace(-1, 1, 41).tolist():
+                x = 1 - mpmath.expj(-mpmath.mpf(angle) - share * mpmath.mpf(half))
+                exact = mpmath.fprod(x * (1 + mpmath.mpc(r)) - mpmath.mpc(r) for r in roots.tolist())
+                away[n] = max(away[n], float(abs(exact - mpmath.mpc(found.middle[n].item()))))
+    assert (away <= found.radius).all()
+    sizes = abs(-np.expm1(-1j * angles)[:, None] * (1 + roots) - roots)
+    most = (sizes + radius[:, None] * abs(1 + roots)).prod(axis=1)
+    assert (found.radius <= most - sizes.prod(axis=1) + 1e-13 * (1 + most)).all()
+
+
+@pytest.mark.parametrize(
+    ("figure", "sharp"),
+    [
+        (Figure(1.2345, 4, 500.0, None), [3, 4]),
+        (Figure(1.2345, 4, None, 12), []),  # of the first modes alone: no digit is proven
+        (Figure(0.0, 0, 500.0, None), [3, 4, 5]),  # nothing is left to be rounded
+    ],
+)
+def test_a_figure_is_sharp_in_the_digits_that_are_proven(figure, sharp):
+    assert [digits for digits in (3, 4, 5) if figure.is_sharp(digits)] == sharp
+
+
+def test_a_disc_about_a_point_is_as_wide_as_rounding_next_to_a_pole_too():
+    """The sum of r/(z - e^{pT}) with forty digits, z from 1e-9 rad beside a pole on."""
+    arm, T = tfarm.load("sasaki2012-lab"), 0.01
+    loop = sampled_loop(arm, HubFeedback(), Chain(), count=3)
+    plant = loop.plant
+    q = np.angle(loop.pulse.multipliers[0]) + np.array([1e-9, 1e-5, 0.3])
+    circle = Circle(loop, np.ones(plant.poles.size, bool), np.zeros(3))
+    found = circle._summed(_Arcs(q, q), plant.poles, plant.residues)
+    with mpmath.workdps(40):
+        z = [mpmath.expj(mpmath.mpf(each)) for each in q]
+        b = [mpmath.exp(mpmath.mpc(each) * T) for each in plant.poles]
+        for row, n in np.ndindex(found.middle.shape):
+            exact = mpmath.fsum(r / (z[n] - each) for r, each in zip(plant.residues[row].tolist(), b, strict=True))
+            assert abs(found.middle[row, n] - exact) <= found.radius[row, n]
+    assert (found.radius < 1e-4 * abs(found.middle)).all()
+
+
+BRAKED = replace(LAB, hub=replace(LAB.hub, friction=0.01))  # its slow pole is at -b/J = -0.015 1/s
+LOOSE = replace(LAB, hub=replace(LAB.hub, friction=1e-7))
+SPRUNG = replace(LAB, hub=replace(LAB.hub, stiffness=1e-3))  # and here a slow pair, of the hub on its spring
+CHAINS = {
+    "plain": Chain(),
+    "late": Chain(sampling=Sampling(period=0.005, delay_samples=1.3)),
+    "encoder": Chain(sampling=Sampling(period=0.002), converters=Converters(hub_rate="difference")),
+}
+LEAD = Law({"hub_angle": ([0.1, 1.0], [0.01, 1.0]), "hub_rate": 0.3})
+HELD = HubFeedback(K1=0.3, K2=0.3, Kp=1.0)
+
+
+@pytest.mark.parametrize("chain", CHAINS.values(), ids=CHAINS)
+@pytest.mark.parametrize("arm", [BRAKED, LOOSE, SPRUNG], ids=["friction", "hardly any", "spring"])
+def test_discs_hold_the_pulse_transfer_functions(arm, chain):
+    """x^n H, through the law, at a point of each arc, by `Sampled.terms`."""
+    loop = whole_loop(arm, HELD, chain)
+    circle = complete_band(loop).circle()
+    assert circle.is_slow.any()
+    rng = np.random.default_rng(3)
+    arcs = np.arange(4, circle.low.size)
+    q = circle.low[arcs] + rng.uniform(0, 1, arcs.size) * (circle.high - circle.low)[arcs]
+    z = np.exp(1j * q)
+    terms = loop.terms(z, None, np.ones(q.size))
+    for row, (_, signal, gain, roots) in enumerate(circle.terms):
+        disc, order = circle.parts[1 + row], circle.orders[signal] - int((roots == 0).sum())
+        value = (1 - 1 / z) ** order * terms[row] / gain * z**-loop.in_z.poles.size
+        assert (abs(value - disc.middle[arcs]) <= disc.radius[arcs]).all()
+
+
+@pytest.mark.parametrize("chain", CHAINS.values(), ids=CHAINS)
+@pytest.mark.parametrize("law", [HELD, replace(HELD, Kp=0.01), LEAD], ids=["PD", "soft", "lead"])
+@pytest.mark.parametrize("arm", [BRAKED, LOOSE], ids=["friction", "hardly any"])
+def test_a_verdict_on_a_hub_with_friction_is_proven(arm, chain, law):
+    verdict = sampled_verdict(arm, law, chain)
+    assert verdict.is_settled
+    assert verdict.is_stable == (np.abs(np.linalg.eigvals(verdict.loop.reduced_matrix())).max() < 1)
+
+
+@pytest.mark.parametrize("chain", CHAINS.values(), ids=CHAINS)
+def test_with_ever_less_friction_the_loop_is_ever_nearer_to_that_without(chain):
+    """Radius and edge of Kp are smooth in b: what b does at 1e-7 is the share of it that it does at 1e-3."""
+    found = {}
+    for b in (0.0, 1e-3, 1e-5, 1e-7):
+        loop = sampled_loop(replace(LAB, hub=replace(LAB.hub, friction=b)), HELD, chain, count=6)
+        ((low, high),) = stable_windows(loop, "Kp")
+        assert low == 0.0
+        found[b] = np.array([loop.poles.log_spectral_radius, high])
+    slope = (found[1e-3] - found[0.0]) / 1e-3
+    for b in (1e-5, 1e-7):  # R/s and r/(s - p) cancel to first order: some last bits of J/(b T)
+        rounding = 20 * np.finfo(float).eps * LAB.total_inertia / (b * chain.sampling.period)
+        np.testing.assert_allclose(found[b], found[0.0] + slope * b, rtol=1e-7 + rounding)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.3, 1.0, 2.6])
+def test_the_state_space_of_a_braked_hub_is_its_pulse_transfer_function(delay):
+    """C (z - A)^-1 B against the sum over poles, with friction that leaves both their digits."""
+    arm = replace(LAB, hub=replace(LAB.hub, friction=0.3))
+    pulse = pulse_transfer(arm, ["hub_angle", "hub_rate", "root_moment"], Sampling(period=0.01, delay_samples=delay))
+    assert pulse.plant.braked(0.1 / 0.01) is not None
+    A, B, C = pulse.matrices()
+    z = np.array([1.2j, 0.95 * np.exp(0.3j), -1.1 + 0.2j])
+    states = np.array([C @ np.linalg.solve(each * np.eye(len(A)) - A, B) for each in z]).T
+    np.testing.assert_allclose(states, pulse(z), rtol=1e-9)
+
+
+@pytest.mark.parametrize("model", [modal_model, relaxed_model])
+def test_a_model_has_its_statics_whatever_the_friction(model):
+    """Exact values at low frequencies, where -r/p of the slow pole, up to 1e14, and what is at rest nearly cancel."""
+    names = ["hub_angle", "hub_rate", "root_moment", "tip_displacement"]
+    s = np.array([0.1j, 3j])
+    off = []
+    for b in (1e-1, 1e-3, 1e-5, 1e-7):
+        arm = replace(LAB, hub=replace(LAB.hub, friction=b))
+        off.append(abs(model(arm, names, 6)(s) / tfarm.transfer(arm, names)(s) - 1).max())
+    assert max(off) < 2 * off[0] + 1e-16 * LAB.total_inertia * 3 / 1e-7  # R/s and r/(s - p) cancel to first order
+
+
+def test_a_pole_left_of_the_line_is_not_bounded_twice():
+    """What is left of it is in `missing` already: then the integral of the rate stands by itself."""
+    loop = whole_loop(BRAKED, HELD, Chain())
+    band = complete_band(loop)
+    left = band.kept & (np.arange(band.kept.size) != band.circle().braked)
+    assert Circle(loop, left, band.missing).braked is None

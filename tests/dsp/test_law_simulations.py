@@ -10,8 +10,7 @@ from scipy.io import loadmat
 import tfarm
 from tests.dsp.law_verdicts import radius_of, stepped
 from tests.shared import thinned
-from tests.shell import answer, run
-from tfarm import HubFeedback, Law, ParameterError
+from tfarm import Law, ParameterError
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, load_chain, scenario
 from tfarm.dsp.sampled import sampled_loop
@@ -94,45 +93,10 @@ def test_a_column_of_references_is_a_reference():
     assert_close(*(Simulator(LAB, Chain(), task, law, count=6).run() for law in (one, other)))
 
 
-def test_what_a_law_of_gains_follows_are_its_references():
-    gains = HubFeedback(K1=0.3, K2=0.3)
-    led = tfarm.simulate(LAB, Law.of_gains(gains), count=6)
-    assert_close(led, tfarm.simulate(LAB, gains, count=6), 0.0)
-    braked = tfarm.simulate(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3}), count=6)
-    assert abs(braked.at_samples.hub_angle[-1]) < 0.9 * abs(led.at_samples.hub_angle[-1])
-
-
-def test_the_limit_of_the_input_is_that_of_the_law():
-    chain = Chain(actuator=Actuator(torque_limit=2.0))
-    found = tfarm.simulate(LAB, Law({"hub_rate": ([1.0], [0.01, 1.0])}), chain, count=6)
-    assert abs(found.torque).max() == 2.0
-    assert found.saturated["torque"] > 10
-
-
-def test_a_loop_that_grows_is_stopped():
-    found = tfarm.simulate(LAB, Law({"hub_angle": ([-50.0, 45.0], [1.0, 0.0])}, period=T), count=6)
-    assert found.stopped is not None
-
-
-def test_no_reference_is_made_up(capsys, tmp_path):
+def test_no_reference_is_made_up():
     with pytest.raises(ParameterError) as error:
         tfarm.simulate(LAB, Law({"tip_displacement": 1.0}, references=("tip_displacement",)))
     assert error.value.key == "references"
-    (tmp_path / "law.toml").write_text("[law]\nperiod = 0.004\n[law.hub_rate]\nnum = [1.0, 0.0]\nden = [1.0, 0.5]\n")
-    code, _, err = run(capsys, "simulate", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"))
-    assert code == 2
-    assert err.count("\n") == 1
-
-
-def test_the_command_simulates_a_law(capsys, tmp_path):
-    text = "[law]\nname = 'PD'\nreferences = ['hub_angle']\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
-    (tmp_path / "law.toml").write_text(text)
-    typed = ("simulate", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), "--modes", "6")
-    found = answer(capsys, *typed)
-    law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, references=("hub_angle",))
-    assert found["hub_angle"] == tfarm.simulate(LAB, law, count=6).at_samples.hub_angle.tolist()
-    assert (found["law"], found["rule"], found["references"]) == ("PD", "tustin", ["hub_angle"])
-    assert "Tustin's rule" in run(capsys, *typed)[1]
 
 
 # ------------------------------------------------------------ controllers of a real rig

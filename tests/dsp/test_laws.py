@@ -1,4 +1,4 @@
-"""Any linear law on the sampled loop: against python-control, models stepped otherwise, and edges."""
+"""Any linear law on the sampled loop: against python-control, models stepped otherwise, edges, Jury's conditions."""
 
 from dataclasses import replace
 
@@ -12,13 +12,14 @@ from tests.odd_arms import odd_arms
 from tests.shared import sized
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
-from tfarm.dsp import Chain, Converters, Sampling, sampled_loop
+from tfarm.arm.blocks import Rational, StateSpace
+from tfarm.dsp import Chain, Converters, Sampling, sampled_loop, stable_windows
 from tfarm.dsp.circle import complete_band
-from tfarm.dsp.crossings import crossing_factors, stable_factors
-from tfarm.dsp.discretise import discretised
+from tfarm.dsp.crossings import circle_grid, crossing_factors, number_crossings, stable_factors
+from tfarm.dsp.discretise import discretised, matched, tustin, zero_order_hold
 from tfarm.dsp.edges import whole_loop
 from tfarm.dsp.modes import mode_table
-from tfarm.dsp.verdict import sampled_verdict
+from tfarm.dsp.verdict import sampled_numbers, sampled_verdict
 
 T = 0.01
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -187,19 +188,6 @@ def test_a_real_pole_crosses_at_rest_where_the_law_is_as_stiff_as_the_hubs_sprin
     assert found.change == after - before == change
 
 
-def test_between_crossings_the_count_is_what_they_say():
-    """Random laws, integrators among them, at random factors."""
-    rng = np.random.default_rng(77)
-    for _ in range(6):
-        case = some_case(rng)
-        loop = case and sampled_loop(*case, count=6)
-        if loop:
-            factors = np.r_[1.0, 10 ** rng.uniform(-4, 3, 5)]
-            passed = crossing_factors(loop).passed(factors)
-            counts = np.array([(loop.times(float(g)).poles.log_radius > 0).sum() for g in factors])
-            assert (counts - counts[0] == passed - passed[0]).all()
-
-
 @pytest.mark.parametrize(
     ("entries", "factor"),
     [({"hub_rate": 1.0}, 1.5), ({"hub_rate": 1.0}, 0.4), ({"hub_rate": 1.0, "root_moment": 0.3}, 1.1)],
@@ -229,13 +217,6 @@ def test_margins_end_where_the_verdict_turns():
     late = LAWS["lead"].delay / T + found.delay_margin.samples
     for more, stable in ((-1e-6, True), (1e-6, False)):
         assert tfarm.sampled(LAB, replace(LAWS["lead"], delay=(late + more) * T)).verdict.is_stable == stable
-
-
-def test_a_law_of_gains_alone_is_taken_for_them():
-    law, gains = Law({"hub_rate": 0.3, "root_moment": 0.3}), HubFeedback(K1=0.3, K2=0.3)
-    mine, theirs = (tfarm.sampled(LAB, each, count=4) for each in (law, gains))
-    assert mine.verdict.sentence == theirs.verdict.sentence
-    assert mine.windows == theirs.windows
 
 
 # ------------------------------------------------------------ bad input, commands
@@ -283,8 +264,6 @@ def test_the_command_says_which_rule_it_took(capsys, tmp_path):
     assert code == 0
     assert "Tustin's rule, exact at 20 rad/s" in out
     assert f"spectral radius {found['spectral_radius']:.12g}" in out
-    typed = answer(capsys, "sampled", str(tmp_path / "arm.toml"), "--K1", "0.3", "--modes", "3")
-    assert typed["K1"] == 0.3
 
 
 @pytest.mark.parametrize("arm", ["free", "damped", "held"])
@@ -318,3 +297,126 @@ def test_from_the_required_damping_on_a_law_is_stable():
     found = tfarm.sampled(LAB, law).damping
     sides = [sampled_verdict(LAB.having(damping=share * found.value), law) for share in (0.999, 1.001)]
     assert (found.is_settled, [each.is_stable for each in sides]) == (True, [False, True])
+
+
+BLOCKS = {
+    "lead": Rational((2.0, 1.0), (0.01, 1.0)),
+    "notch": Rational((1.0, 0.4, 900.0), (1.0, 24.0, 900.0)),
+    "integrator": Rational((1.0, 3.0), (1.0, 40.0, 0.0)),
+    "washout": Rational((1.0, 0.0), (1.0, 5.0)),
+}
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+@pytest.mark.parametrize("rule", ["tustin", "prewarped", "zoh", "matched"])
+def test_the_rules_are_those_of_python_control(name, rule):
+    block, warp = BLOCKS[name], 25.0
+    continuous = control.tf(block.num, block.den)
+    mine = {
+        "tustin": lambda: tustin(block, T),
+        "prewarped": lambda: tustin(block, T, warp),
+        "zoh": lambda: zero_order_hold(block, T),
+        "matched": lambda: matched(block, T),
+    }[rule]()
+    method = {"tustin": "bilinear", "prewarped": "bilinear"}.get(rule, rule)
+    others = {"prewarp_frequency": warp} if rule == "prewarped" else {}
+    if rule == "matched" and name in (
+        "integrator",
+        "washout",
+    ):  # python-control matches a value at rest that is 0 or inf
+        z = np.exp(1e-6j)
+        mine_there = mine.numerators(np.array([z]))[0, 0] / mine.denominator(np.array([z]))[0]
+        assert mine_there == pytest.approx(complex(continuous(np.log(z) / T)), rel=1e-5)
+        return
+    theirs = control.sample_system(continuous, T, method=method, **others)
+    z = np.exp(1j * np.array([0.1, 0.7, 2.0, 3.0]))
+    values = mine.numerators(z)[0] / mine.denominator(z)
+    np.testing.assert_allclose(values, theirs(z), rtol=1e-9)  # polynomials of python-control lose some digits
+
+
+def test_prewarping_keeps_the_values_where_it_says():
+    block, w0 = BLOCKS["notch"], 30.0
+    z = np.exp(np.array([1j * w0 * T]))
+    s = np.array([1j * w0])
+    exact = block.numerators(s)[0] / block.denominator(s)
+    for w, same in ((w0, True), (0.0, False)):
+        found = tustin(block, T, w)
+        assert np.allclose(found.numerators(z)[0] / found.denominator(z), exact, rtol=1e-12) == same
+
+
+def test_tustins_derivative_is_the_trapezoidal_rule_backwards():
+    law = discretised(Law({"hub_angle": ([1.0, 0.0], [1.0])}), T)
+    z = np.exp(1j * np.array([0.3, 2.0]))
+    np.testing.assert_allclose(law.values(z)[0], 2 / T * (z - 1) / (z + 1), rtol=1e-13)
+
+
+def test_several_signals_at_once_are_discretised_as_each_alone():
+    A, B, C, D = [[-3.0, 40.0], [-40.0, -3.0]], [[1.0, 0.5], [2.0, -1.0]], [[1.0, 2.0]], [[0.3, 0.0]]
+    both = Law.of_matrices(A, B, C, D, ["hub_angle", "root_moment"], rule="zoh")
+    z = np.exp(1j * np.array([0.3, 2.0]))
+    for column, values in enumerate(discretised(both, T).values(z)):
+        one = zero_order_hold(StateSpace(A, np.array(B)[:, [column]], C, np.array(D)[:, [column]]), T)
+        np.testing.assert_allclose(values, one.numerators(z)[0] / one.denominator(z), rtol=1e-12)
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_a_number_is_in_a_window_where_all_eigenvalues_are_inside_the_circle(law):
+    """At random factors of either sign on one part; near an edge eigenvalues tell nothing."""
+    rng, told = np.random.default_rng(5), set()
+    loop = sampled_loop(LAB, law, Chain(), count=6)
+    for name, value, windows in sampled_numbers(loop):
+        for factor in (*-(10 ** rng.uniform(-3, 2, 4)), *10 ** rng.uniform(-3, 2, 8)):
+            radius = abs(np.linalg.eigvals(loop.having(**{name: factor * value}).reduced_matrix())).max()
+            inside = any(low < factor * value < high for low, high in windows)
+            assert abs(radius - 1) < 1e-6 or inside == (radius < 1), (name, factor)
+            told.add(inside)
+    assert told == {True, False}
+
+
+def test_between_crossings_along_one_part_the_count_is_what_they_say():
+    """Random laws, integrators and unstable ones among them, at random factors of either sign."""
+    rng, compared = np.random.default_rng(77), 0
+    for _ in range(6):
+        case = some_case(rng)
+        loop = case and sampled_loop(*case, count=6)
+        for name in loop.law.part_gains if loop else ():
+            own = loop.number(name)
+            values = own * np.r_[1.0, -(10 ** rng.uniform(-4, 3, 3)), 10 ** rng.uniform(-4, 3, 3)]
+            loops = [loop.having(**{name: value}) for value in values.tolist()]
+            passed = number_crossings(circle_grid(loop), name, loop.row[None])[0].passed(values)
+            counts = np.array([(each.poles.log_radius > 0).sum() for each in loops])
+            assert (counts - counts[0] == passed - passed[0]).all(), name
+            compared += 1
+    assert compared > 5
+
+
+def test_of_a_stiff_arm_angle_and_rate_gain_reach_as_far_as_jury_says():
+    """z^2 - 2z + 1 + Kp T^2 (z + 1)/2J + K1 T (z - 1)/J: Kp > 0, K1 > Kp T/2 and K1 < 2J/T."""
+    stiff = LAB.having(length=0.1)
+    gains = HubFeedback(K1=0.4 * stiff.turned_inertia / T, Kp=1.0)
+    loop = sampled_loop(stiff, gains, Chain(), count=1)
+    np.testing.assert_allclose(stable_windows(loop, "Kp"), [(0.0, 2 * gains.K1 / T)], rtol=1e-2)
+    np.testing.assert_allclose(stable_windows(loop, "K1"), [(T / 2, 2 * stiff.turned_inertia / T)], rtol=1e-2)
+
+
+def test_an_angle_gain_that_is_0_lies_at_the_edge_of_its_interval():
+    """Apart from z = 1 of the free angle the loop is stable there, and from there on the angle is held."""
+    found = tfarm.sampled(LAB, HubFeedback(K1=14.7, K2=-0.26), Chain(), count=6)
+    low, high = found.interval("Kp")
+    assert (low, found.verdict.is_stable) == (0.0, True)
+    held = (found.loop.having(Kp=Kp) for Kp in (1e-3, high * 0.999))
+    assert all(each.poles.is_stable for each in held)
+    driven = replace(found, verdict=replace(found.verdict, loop=found.verdict.loop.having(K1=-0.1), band=None))
+    assert driven.interval("Kp") is None  # whatever its windows
+
+
+def test_only_a_part_that_one_signal_has_to_itself_has_a_name():
+    both = Law.of_matrices([[0.5]], [[1.0, 1.0]], [[1.0]], [[0.1, 0.2]], ["hub_rate", "root_moment"], period=T)
+    assert both.part_gains == {}
+    law = LAWS["in z"]
+    assert law.part_gains == {"hub_angle.gain": (0, 1.0), "root_moment.gain": (1, 1.0)}
+    assert LAWS["lead"].part_gains == {"hub_angle.gain": (0, 1.0), "root_moment": (1, 0.1)}
+    for name, (part, value) in law.part_gains.items():
+        twice = law.weighted([2.0 if place == part else 1.0 for place in range(2)])
+        z = np.array([0.3 + 0.4j])
+        np.testing.assert_allclose(twice.values(z), law.having(name, 2 * value).values(z), rtol=1e-14)

@@ -1,12 +1,17 @@
 """Edges of the gains, the map, the delay margin and the damping that cures: each against poles on both of its sides."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 
 import tfarm
 from tests.odd_arms import odd_arms
+from tests.rigs import some_rig
+from tests.shared import thinned
+from tests.similar import EITHER
+from tfarm import modes
 from tfarm.arm import HubFeedback
 from tfarm.dsp import (
     Chain,
@@ -19,7 +24,8 @@ from tfarm.dsp import (
 )
 from tfarm.dsp.crossings import ENDS_AT, around, circle_grid, ends_of_K1, number_crossings, stable_windows
 from tfarm.dsp.verdict import sampled_answer, sampled_verdict
-from tfarm.errors import ParameterError
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.spectrum.table import default_gains
 
 GAINS = HubFeedback(K1=0.3, K2=0.3)
 
@@ -57,21 +63,6 @@ def test_where_the_feedback_outweighs_no_fast_modes_damping_all_delays_are_looke
     assert all(loop.with_delay(delay).poles.is_stable for delay in np.linspace(0.0, 20.0, 9))
 
 
-@pytest.mark.parametrize("gain", ["K1", "K2"])
-@pytest.mark.parametrize("name", ["sasaki2012", "sasaki2012-lab"])
-def test_an_edge_has_a_pole_on_the_circle_and_the_verdict_turns_there(name, gain):
-    loop = sampled_loop(tfarm.load(name), GAINS, Chain(sampling=Sampling(delay_samples=0.3)), count=10)
-    for window in stable_windows(loop, gain):
-        for edge, inward in zip(window, (1, -1), strict=True):
-
-            def at(value):
-                return loop.having(**{gain: value})
-
-            step = 1e-9 * max(1e-3, abs(edge))
-            assert at(edge + inward * step).poles.is_stable
-            assert not at(edge - inward * step).poles.is_stable
-
-
 @pytest.mark.parametrize("name", ["sasaki2012", "sasaki2012-lab"])
 @pytest.mark.parametrize("delay", [0.0, 0.3, 2.5])
 def test_between_crossings_the_counts_are_those_of_the_eigenvalues(name, delay):
@@ -98,21 +89,13 @@ def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
 
 
 @pytest.mark.parametrize("hub_rate", ["ideal", "difference"])
-@pytest.mark.parametrize("name", ["sasaki2012", "sasaki2012-lab"])
-def test_the_map_counts_as_the_eigenvalues_do(name, hub_rate):
-    chain = Chain(converters=Converters(hub_rate=hub_rate, rate_filter=300.0))
-    loop = sampled_loop(tfarm.load(name), GAINS, chain, count=9)
-    plane = sampled_map(loop, np.linspace(-2, 25, 28), np.linspace(-0.7, 2.1, 31))
-    rng = np.random.default_rng(5)
-    for i, j in zip(rng.integers(28, size=60), rng.integers(31, size=60), strict=True):
-        assert growing(loop.having(K1=float(plane.K1[i]), K2=float(plane.K2[j]))) == plane.unstable[i, j]
-
-
-@pytest.mark.parametrize("vary", [("K1", "Kp"), ("hub_rate", "tip_acceleration.gain")])
-def test_a_map_over_two_numbers_of_any_law_counts_as_the_eigenvalues_do(lab, vary):
+@pytest.mark.parametrize("vary", [("K1", "K2"), ("K1", "Kp"), ("hub_rate", "tip_acceleration.gain")])
+def test_a_map_over_two_numbers_of_any_law_counts_as_the_eigenvalues_do(lab, vary, hub_rate):
     """With the angle held, and of a law with a filter, whose other numbers stay as they are."""
     of_signals = tfarm.Law({"hub_rate": 0.3, "hub_angle": 2.0, "tip_acceleration": ([0.05], [0.02, 1.0])})
-    loop = sampled_loop(lab, GAINS.having("Kp", 3.0) if vary[1] == "Kp" else of_signals, count=7)
+    chain = Chain(converters=Converters(hub_rate=hub_rate, rate_filter=300.0))
+    law = {"K2": GAINS, "Kp": GAINS.having("Kp", 3.0)}.get(vary[1], of_signals)
+    loop = sampled_loop(lab, law, chain, count=7)
     plane = sampled_map(loop, np.linspace(0.05, 4.0, 7), np.linspace(-3.0, 30.0, 9), vary)
     assert plane.vary == vary
     for i, j in np.ndindex(7, 9):
@@ -145,10 +128,6 @@ def test_the_delay_margin_is_where_the_verdict_turns(lab, K2):
     assert not loop.with_delay(margin.samples + 1e-6).poles.is_stable
     earlier = np.linspace(0, margin.samples, 41)[:-1]
     assert all(loop.with_delay(float(delay)).poles.is_stable for delay in earlier)
-
-
-def test_without_a_stable_loop_there_is_no_delay_margin(lab):
-    assert delay_margin(sampled_loop(lab, HubFeedback(K1=0.3, K2=2.0), count=10)).samples == 0.0
 
 
 def test_the_required_damping_is_where_the_verdict_turns(lossless):
@@ -200,7 +179,7 @@ def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossl
     assert verdict.is_settled
     assert verdict.sentence.startswith("stable")
     undamped = sampled_verdict(lossless, GAINS)
-    assert not undamped.is_settled
+    assert (undamped.is_settled, undamped.band_rad_s) == (False, None)
     assert "mode 13 grows by 8.62e-09 a sample (holds for the first 20 modes)" in undamped.sentence
     assert sampled_verdict(lossless, GAINS, count=12).sentence.startswith("stable")
     assert sampled_verdict(lossless, HubFeedback(K1=0, K2=0)).sentence.startswith("marginal")
@@ -208,11 +187,7 @@ def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossl
 
 def test_the_answer_is_plain_and_consistent(lab):
     answer = sampled_answer(tfarm.sampled(lab, GAINS))
-    assert answer["stable"] is True
-    assert answer["spectral_radius"] < 1
     low, high = answer["K2_interval"]
-    assert low < 0.3 < high
-    assert answer["K1_interval"][0] == 0.0
     edges = answer["shown"]["K2_intervals"][0]
     assert [float(edge["text"]) for edge in edges] == pytest.approx([low, high], rel=5e-6)
     assert all(edge["settled"] and edge["band_rad_s"] == answer["band_rad_s"] > 1e5 for edge in edges)
@@ -220,14 +195,9 @@ def test_the_answer_is_plain_and_consistent(lab):
         figure = answer["shown"][key]
         assert (figure["settled"], figure["digits"]) == (True, 4)
         assert float(figure["text"]) == pytest.approx(answer[key], rel=5e-4)
-    assert answer["first_unstable_mode"] is None
-    assert [mode["index"] for mode in answer["modes"]] == list(range(1, len(answer["modes"]) + 1))
     unstable = sampled_answer(tfarm.sampled(lab, HubFeedback(K1=0.3, K2=1.3)))
-    assert unstable["stable"] is False
-    assert unstable["spectral_radius"] > 1
-    assert unstable["K2_interval"] is None
+    assert (unstable["K2_interval"], unstable["delay_margin_samples"]) == (None, 0.0)
     assert unstable["K2_intervals"] == answer["K2_intervals"]
-    assert unstable["delay_margin_samples"] == 0.0
     outside = abs(np.linalg.eigvals(sampled_loop(lab, HubFeedback(K1=0.3, K2=1.3)).reduced_matrix())) > 1
     assert unstable["unstable_poles"] == outside.sum() == 2
     assert answer["unstable_poles"] == 0
@@ -265,3 +235,62 @@ def test_windows_of_the_rate_gain_of_a_damped_hub_begin_where_its_losses_are_tak
     assert low == pytest.approx(-friction, rel=1e-13)
     sides = -1.005 * friction, -0.995 * friction, 0.99 * high, 1.01 * high
     assert [loop.having(K1=K1).poles.is_stable for K1 in sides] == [False, True, True, False]
+
+
+STILL_RIG = (6, 28)  # held by a spring near its root: the hub's rate next to z = 1 is rounding
+
+
+def some_sampled(seed):
+    """A rig that turns under a law, gains about its own, and a clock about its first mode's period."""
+    rng = np.random.default_rng(seed)
+    rigs = (some_rig(rng) for _ in range(20))
+    arm = next(arm for arm in rigs if arm.input != "hub_angle" and not arm.is_locked)
+    usual = default_gains(arm)
+    law = HubFeedback(K1=usual.K1 * float(10 ** rng.uniform(-1, 2)), K2=usual.K2 * float(rng.uniform(-2, 3)))
+    T = float(rng.uniform(0.05, 2)) / float(modes(arm, 1).natural_frequency[-1])
+    delay, corner = float(rng.choice([0, 0.4, 1.3])), float(rng.choice([np.inf, 2 / T]))
+    return arm, law, Chain(sampling=Sampling(period=T, delay_samples=delay, antialias_corner=corner))
+
+
+def answers(arm, law, chain, units):
+    """Windows of K1 and K2 in units of those of the law, delay margin, poles in z; None where modes are not told."""
+    try:
+        loop = sampled_loop(arm, law, chain, count=6)
+    except ConvergenceError:
+        return None
+    windows = [np.array(stable_windows(loop, name)) / units[name] for name in ("K1", "K2")]
+    return windows, delay_margin(loop), loop.poles.z
+
+
+SEEDS = [STILL_RIG, *((6, n) for n in range(24))]
+
+
+@pytest.mark.parametrize(("seed", "units"), thinned(product(SEEDS, EITHER.values()), 27))
+def test_a_sampled_loop_has_the_same_windows_delay_and_poles(seed, units):
+    arm, law, chain = some_sampled(seed)
+    sampling = chain.sampling
+    other = replace(
+        sampling, period=sampling.period * units.time, antialias_corner=sampling.antialias_corner / units.time
+    )
+    here = answers(arm, law, chain, HubFeedback(K1=1.0, K2=1.0))
+    ones = units.law(arm, HubFeedback(K1=1.0, K2=1.0))
+    there = answers(units.arm(arm), units.law(arm, law), replace(chain, sampling=other), ones)
+    assert (here is None) == (there is None)
+    if here is None:
+        return
+    for mine, theirs in zip(here[0], there[0], strict=True):
+        np.testing.assert_allclose(theirs, mine, rtol=1e-6)
+    assert there[1].samples == pytest.approx(here[1].samples, abs=1e-6)
+    assert there[1].is_bound == here[1].is_bound
+    assert abs(there[2][:, None] - here[2]).min(axis=1).max() < 1e-9
+
+
+def test_an_arm_that_something_holds_has_its_whole_window():
+    """By the poles on either side of both ends, and at gains in between."""
+    arm, law, chain = some_sampled(STILL_RIG)
+    loop = sampled_loop(arm, law, chain, count=6)
+    ((low, high),) = stable_windows(loop, "K1")
+    inside = low + (high - low) * np.array([1e-6, 0.1, 0.35, 0.6, 0.9, 1 - 1e-6])
+    assert all(loop.having(K1=float(K1)).poles.is_stable for K1 in inside)
+    for K1 in (low - 1e-6 * (high - low), high + 1e-6 * (high - low)):
+        assert not loop.having(K1=float(K1)).poles.is_stable

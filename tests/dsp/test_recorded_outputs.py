@@ -1,26 +1,29 @@
-"""What a simulation records besides its four signals: any output of the rig, by name, at the samples and between."""
+"""What a simulation records besides its four signals, at the samples and between; and simulated rigs."""
 
-import csv
-import io
 from dataclasses import replace
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.io import loadmat
 from scipy.linalg import expm
 
 import tfarm
+from tests.dsp.law_verdicts import stepped
 from tests.rigs import some_rig
 from tests.shared import thinned
-from tests.shell import answer, run
+from tests.shell import answer
 from tfarm.arm import HubFeedback, Law, RotarySpring
-from tfarm.dsp import Actuator, Chain, Sampling, Simulator, scenario
-from tfarm.dsp.plant import RECORDED
+from tfarm.dsp import Actuator, Chain, Sampling, Simulator, sampled_verdict, scenario
+from tfarm.dsp.chain import Slew
+from tfarm.dsp.plant import RECORDED, sensed_plant
 from tfarm.dsp.sampled import sampled_loop
+from tfarm.dsp.scenarios import slew
+from tfarm.dsp.traces import away
 from tfarm.errors import ParameterError
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.reduced import modal_model
+from tfarm.tuner.trial import tip_off
 
 LAB = tfarm.load("sasaki2012-lab")
 GAINS = HubFeedback(K1=0.3, K2=0.3)
@@ -128,22 +131,6 @@ def test_the_modes_that_it_takes_are_those_of_every_signal(capsys):
     assert len(deep["shear@0.5"]) == len(deep["t"])
 
 
-def test_files_have_a_column_for_each(capsys, tmp_path):
-    shown = ["--output", "moment@0.25", "--output", "tip_angle"]
-    words = ["simulate", "sasaki2012-lab", "--duration", "0.1", "--modes", "2", "--between", "1", *shown]
-    assert run(capsys, *words, "--csv", str(tmp_path / "s.csv"), "--mat", str(tmp_path / "s.mat"))[0] == 0
-    told = answer(capsys, *words)
-    rows = list(csv.reader(io.StringIO((tmp_path / "s.csv").read_text())))
-    order = np.argsort([*told["t"], *told["between"]["t"]], kind="stable")
-    for name, unit in told["outputs"].items():
-        column = rows[0].index(f"{name} [{unit}]")
-        written = np.array([float(row[column]) for row in rows[1:]])
-        assert np.array_equal(written, np.array([*told[name], *told["between"][name]])[order])
-    in_matlab = loadmat(tmp_path / "s.mat")
-    np.testing.assert_array_equal(in_matlab["moment_0_25"].ravel(), told["moment@0.25"])
-    np.testing.assert_array_equal(in_matlab["between"]["tip_angle"][0, 0].ravel(), told["between"]["tip_angle"])
-
-
 @pytest.mark.parametrize(
     "friction", thinned([0.02, 0.0], 2)
 )  # with friction the hub's rate does not feel the rigid body
@@ -159,3 +146,61 @@ def test_a_hub_that_its_actuator_damps_is_a_hub_with_that_friction(law, friction
     other = tfarm.simulate(rubbed, law, Chain(), "impulse", 0.3, count=20, outputs=names).at_samples
     for name in one.names:
         np.testing.assert_allclose(one.signal(name), other.signal(name), atol=1e-7 * abs(other.signal(name)).max())
+
+
+SLOW = 1e-3  # 1/s: the rig turns as one piece, and s^2 of its next term is beyond the digits compared
+
+
+@pytest.mark.parametrize("name", ["tests/rigs/bench-rig.toml", "quanser-2dsfl", "quanser-flexlink"])
+def test_the_feedforward_of_a_slew_turns_the_rig_against_its_friction(name):
+    """Input over angle of the slowly turning exact rig is loss s + J s^2 + ..., and its gauge reads -J_g s^2."""
+    arm = tfarm.load(name)
+    task = slew(arm, Chain(), 1.5)
+    forth, back = (1 / tfarm.transfer(arm, "hub_angle")(s) for s in (SLOW, -SLOW))
+    loss, inertia = (forth - back) / (2 * SLOW), (forth + back) / (2 * SLOW**2)
+    mean = np.r_[np.diff(task.hub_angle), 0.0] / task.period
+    acceleration = np.r_[np.diff(task.hub_rate), 0.0] / task.period
+    wanted = (loss * mean + inertia * acceleration).real[:-1]
+    np.testing.assert_allclose(task.feedforward[:-1], wanted, rtol=1e-3, atol=1e-6 * abs(wanted).max())
+    gauge = (tfarm.transfer(arm, "root_moment")(1j * SLOW) / tfarm.transfer(arm, "hub_angle")(1j * SLOW)).real
+    np.testing.assert_allclose(task.rigid_moment[1:], gauge / -(SLOW**2) * np.diff(task.hub_rate) / task.period,
+                               rtol=1e-4, atol=1e-9)  # fmt: skip
+
+
+def test_analog_damping_is_friction_whatever_the_input():
+    """A torque -d theta_t on the hub of a rig driven by current is the same rig with so much more friction."""
+    arm, d = tfarm.load("quanser-2dsfl"), 0.7
+    plant = sensed_plant(arm, Chain(actuator=Actuator(hub_damping=d)), ("hub_rate", "root_moment"), 8).unfiltered
+    stiffer = replace(arm, hub=replace(arm.hub, friction=arm.hub.friction + d))
+    s = 4 + 9j
+    np.testing.assert_allclose(plant(s), tfarm.transfer(stiffer, ["hub_rate", "root_moment"])(s), rtol=1e-4)
+
+
+@pytest.mark.parametrize("name", thinned(["tests/rigs/bench-rig.toml", "quanser-2dsfl", "quanser-flexlink"], 2))
+@pytest.mark.parametrize("factor", [1.0, -40.0])
+def test_the_verdict_on_a_damped_rig_is_proven(name, factor):
+    """Poles of friction and of the circuit are among those that are counted; as many grow as in a stepped model."""
+    arm = tfarm.load(name).having(damping=2e-5)
+    gains = tfarm.default_gains(arm).times(factor)
+    verdict = sampled_verdict(arm, gains)
+    assert verdict.is_settled
+    z = np.linalg.eigvals(stepped(arm, Law.of_gains(gains), Chain(), verdict.modes_used))
+    grow = int((np.log(abs(z)) > 1e-9).sum())
+    assert grow == (verdict.loop.poles.log_radius > 0).sum()
+    assert (grow > 0) == (factor < 0)
+
+
+def test_the_tip_of_a_slew_goes_where_a_rigid_arm_on_the_hub_s_radius_has_it():
+    """G_tip/G_angle at rest is r + L: with the angle held the slew ends on its travel, as it does without a radius."""
+    bench = tfarm.load("tests/rigs/bench-rig.toml")
+    r, L = bench.hub.radius, bench.length
+    assert r > 0.05 * L
+    tip, angle = tfarm.transfer(bench, ["tip_displacement", "hub_angle"])(1e-3j)
+    assert bench.reach == pytest.approx((tip / angle).real, rel=1e-6)
+    for chain, travel in ((Chain(), 1.15 * (r + L)), (Chain(slew=Slew(travel=0.2)), 0.2)):
+        run = tfarm.simulate(bench, tfarm.HubFeedback(K1=0.05, Kp=0.5), chain, duration=10.0, count=4)
+        assert run.scenario.hub_angle[-1] == pytest.approx(travel / (r + L), rel=1e-12)
+        assert run.at_samples.tip_displacement[-1] == pytest.approx(travel, abs=1e-4)
+        assert abs(away(bench, run)[-1]) < 1e-4
+        of_trial = SimpleNamespace(arm=bench, loop=SimpleNamespace(chain=chain))
+        assert abs(tip_off(run, of_trial)) < 1e-4

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.models import Ritz, shooting
 from tests.outputs import OF_ONE_LINK
 from tests.shared import thinned
-from tests.strategies import BOUNDARY_CASES, arm_of, some_arm, some_s
+from tests.strategies import BOUNDARY_CASES, some_arm, some_s
+from tests.transition import determinant, response
 from tfarm import Arm, ConvergenceError, Hub, Link, ParameterError, Payload, Section
 from tfarm.exact import appendix
 from tfarm.exact.system import system_of
@@ -45,13 +45,20 @@ def test_forty_digits_are_those_of_the_balls(case):
     assert compared > 6
 
 
+def states(arm, s, x, digits):
+    """(w, psi, M, Q) at the root, at x [m] and at the tip, by transition matrices."""
+    names = ("displacement", "rotation", "moment", "shear")
+    found = list(response(arm, s, [(name, at) for at in (0.0, x, math.inf) for name in names], digits).values())
+    return found[:4], found[4:8], found[8:]
+
+
 @pytest.mark.parametrize("s", thinned([2.0 + 31.0j, 900.0j, -3.0 + 4000.0j, 250.0 + 0.0j], 2))
 @pytest.mark.parametrize("preset", ["sasaki2012-lab", "stocky-steel"])
 def test_thirty_digits_are_those_of_the_state_transition_matrix(preset, s):
     """exp(A(s) L) of the equations (1)-(7) as a first-order system, with payload and damping."""
     arm = replace(tfarm.load(preset), payload=Payload(mass=0.3, inertia=0.02))
     L, x = arm.link.length, 0.3
-    root, inside, tip = shooting(arm, s, x=[x * L], digits=40)
+    root, inside, tip = states(arm, s, x * L, 40)
     with mpmath.workdps(40):
         theta, damper = root[1], 1 + mpmath.mpf(arm.link.damping) * s
         expected = {
@@ -73,46 +80,18 @@ def test_thirty_digits_are_those_of_the_state_transition_matrix(preset, s):
             assert abs(value / expected[name] - 1) < mpmath.mpf(10) ** -30
 
 
-@pytest.mark.parametrize("s", [3.0 + 40.0j, 700.0j, 90.0 + 0.0j])
-def test_a_ritz_model_agrees(s):
-    """Legendre polynomials for shear strain and curvature, and no wave anywhere: float64, so to rounding."""
-    arm = arm_of(
-        length=1.3, slenderness=12, width=1, density=7800, E=2e11, nu=0.3, damping=2e-5, hub=40.0, mass=0.4, inertia=2.0
-    )
-    model = Ritz(arm)
-    q = model.response(s, model.hub_psi)
-    for name, motion in (("hub_angle", model.hub_psi), ("tip_displacement", model.tip_w)):
-        assert complex(appendix.response(arm, name, s, 15)) == pytest.approx(motion @ q, rel=2e4 * EPS, abs=0)
-
-
 def test_delta_is_the_characteristic_function_without_its_artefacts():
-    """Delta = 4 E I (1 + C s) rho A s^2 (l1^2 - l2^2)^2/(l1 l2) D, with D the end conditions' minor of exp(A L)."""
+    """Delta = 4 E I (1 + C s) rho A s^2 (l1^2 - l2^2)^2/(l1 l2) D, D of the transition matrices."""
     arm = replace(tfarm.load("sasaki2012-lab"), payload=Payload(mass=0.3, inertia=0.02))
+    ratios = []
     for s in (3 + 60j, 0.2j, 5e3j):
         Delta = appendix.determinant(arm, s, 30)
         with mpmath.workdps(60):
             at = appendix.Appendix(arm, mpmath.mpc(s))
             l1, l2, rhoA = at.lambdas[0], at.lambdas[1], at.rho * at.A
             D = Delta * l1 * l2 / (4 * at.EI * at.damper * rhoA * at.s**2 * (l1**2 - l2**2) ** 2)
-            assert abs(D / characteristic(arm, at.s) - 1) < mpmath.mpf(10) ** -29
-
-
-def characteristic(arm, s):
-    """The determinant of hub and tip conditions on exp(A(s) L), for the states (psi, M, Q) of the root."""
-    link = arm.link
-    E, I, A, rho, L = (
-        mpmath.mpf(v)
-        for v in (link.youngs_modulus, link.section.second_moment, link.section.area, link.density, link.length)
-    )
-    EI, kGA = E * I * (1 + link.damping * s), mpmath.mpf(link.shear_factor) * link.shear_modulus * A
-    march = [[0, 1, 0, 1 / kGA], [0, 0, 1 / EI, 0], [0, rho * I * s**2, 0, -1], [rho * A * s**2, 0, 0, 0]]
-    T = mpmath.expm(mpmath.matrix(march) * L)
-    rows = [
-        [arm.payload.mass * s**2 * T[0, j] + T[3, j] for j in (1, 2, 3)],
-        [arm.payload.inertia * s**2 * T[1, j] + T[2, j] for j in (1, 2, 3)],
-        [mpmath.mpf(arm.hub.inertia) * s**2, -1, 0],
-    ]
-    return mpmath.det(mpmath.matrix(rows))
+            ratios.append(D / determinant(arm, s))
+    assert max(abs(each / ratios[0] - 1) for each in ratios) < mpmath.mpf(10) ** -29
 
 
 @pytest.mark.parametrize("digits", thinned([15, 5, 150, 40], 2))
@@ -149,7 +128,7 @@ def powers_of_two(*, damping=0.0, hub=0.25, mass=0.5, inertia=0.125):
 def test_where_two_waves_coincide_to_the_last_bit(name, s):
     """The cut-off, and the real s of equal waves: the appendix is 0/0, float64 flags it, and all give the value."""
     arm, output, x = powers_of_two(), OF_ONE_LINK[name], 0.4
-    root, inside, tip = shooting(arm, s, x=[x], digits=30)
+    root, inside, tip = states(arm, s, x, 30)
     place, state = {"root": (0.0, root), "tip": (1.0, tip), "x": (mpmath.mpf(x), inside)}[output.place]
     with mpmath.workdps(30):
         w, psi, M, Q = state

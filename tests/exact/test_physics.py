@@ -8,9 +8,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import tfarm
-from tests.models import shooting
 from tests.outputs import OF_ONE_LINK
 from tests.strategies import arms, dampings, finite, frequencies, undamped
+from tests.transition import response
 
 EPS = np.finfo(float).eps
 ENDS = [name for name, output in OF_ONE_LINK.items() if output.place != "x"]
@@ -77,7 +77,7 @@ def test_reciprocity_of_torque_and_tip_force(arm, omega, angle):
     s = complex(size * math.cos(angle), size * math.sin(angle))
     tip = values(arm, ["tip_displacement"], s)[0]
     slope = abs(s * tfarm.transfer(arm, "tip_displacement").derivative(s) / tip)
-    turned = shooting(arm, s, torque=0, tip_force=1, digits=20)[0][1]
+    turned = response(arm, s, ["hub_angle"], 20, input=("force", link.length))["hub_angle"]
     assert tip == pytest.approx(complex(turned), rel=90 * EPS * (1 + slope), abs=0)
 
 

@@ -19,7 +19,6 @@ from tests.loop.arms import some_loop
 from tests.spectrum.damped_roads import newton_step
 from tests.survey import Finding
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
-from tfarm.exact.characteristic import gains_of
 from tfarm.exact.system import system_of
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.spectrum import modes_below
@@ -56,7 +55,7 @@ def judge(arm, law, count, *, balls=False) -> Verdict:
     counts = [nyquist_count(poles.loop, poles.box)]
     if balls:
         try:
-            counts.append(proven_count(poles.loop.k, poles.box, gains_of(poles.loop.k, poles.loop.gains)))
+            counts.append(proven_count(poles.loop.k, poles.box, poles.loop.exact))
         except CertificationError as error:
             return Verdict("refused", f"proof: {error}")
     step = max((newton_step(arm, complex(s), K1=law.K1, K2=law.K2, Kp=law.Kp) for s in poles.moving[-1:]), default=0.0)

@@ -57,7 +57,6 @@ def some_case(seed, number):
 def plausible(seed, rng):
     """One of the arms of `tests.plausible`, some with friction at the hub."""
     table = tomllib.loads(draw(int(rng.integers(10_000)), seed).toml)
-    table.pop("slew")
     if rng.random() < 0.3:
         table["hub"]["friction"] = table["hub"]["inertia"] * log(rng, 1e-2, 1e1)
     return arm_of_table(table)

@@ -210,7 +210,6 @@ def test_commands_take_a_law_from_a_file_or_the_arm_s_own(capsys, tmp_path, monk
     assert json.loads(out)["K1"] == 0.3  # gains that are typed come before the file's law
     assert run(capsys, "margins", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), "--K1", "1")[0] == 2
     assert run(capsys, "margins", "sasaki2012-lab", "--law", "sasaki2012")[0] == 2
-    assert run(capsys, "poles", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), "--certify")[0] == 3
 
 
 def with_a_notch():

@@ -16,7 +16,6 @@ from tests.shared import thinned
 from tests.shell import run
 from tfarm import Arm, Hub, HubFeedback, Law, Link, ParameterError, Payload, Section
 from tfarm.arm import Attachment, Motor
-from tfarm.exact.characteristic import gains_of
 from tfarm.loop import loci as room
 from tfarm.loop.loci import damping_ratios, held_branches, loci, most_damped, reduced_locus
 from tfarm.loop.locus import frame, locus, rounded
@@ -270,7 +269,7 @@ def test_the_known_edge_of_the_lab_arm_to_its_last_digits():
     side = []
     for value in (found.gain * (1 - 1e-13), found.gain * (1 + 1e-13)):
         loop = Loop(LAB, HubFeedback(K1=0.3, K2=value))
-        disc = enclosed(loop.k, 1j * found.omega, 30, gains_of(loop.k, loop.gains))
+        disc = enclosed(loop.k, 1j * found.omega, 30, loop.exact)
         assert found.omega == pytest.approx(float(disc.im), rel=1e-12)
         side.append(float(disc.re))
     assert side[0] < 0 < side[1]

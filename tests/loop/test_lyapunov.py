@@ -11,7 +11,6 @@ from tests.loop.arms import some_loop, window_arm, with_damping
 from tests.shared import thinned
 from tests.spectrum.damped_roads import newton_step
 from tfarm import Hub, HubFeedback, ParameterError, Payload
-from tfarm.exact.characteristic import gains_of
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import closed_loop_poles, poles_below
 from tfarm.loop.theorem import lyapunov
@@ -134,7 +133,7 @@ def test_the_unstable_root_of_the_counterexample() -> None:
     (root,) = poles.values[poles.values.real > 1]
     assert root == pytest.approx(24.7 + 35236j, abs=0.5)
     assert newton_step(window_arm(), root, K1=1.0, K2=-10.0) < 1e-14  # the paper's determinant, hub row changed
-    disc = enclosed(poles.loop.k, complex(root), 20, gains_of(poles.loop.k, poles.loop.gains))
+    disc = enclosed(poles.loop.k, complex(root), 20, poles.loop.exact)
     assert float(disc.re) == pytest.approx(root.real, rel=1e-9)
 
 

@@ -80,16 +80,8 @@ class Law:
 
 
 @dataclass(frozen=True)
-class Slew:
-    """A bang-bang slew: tip travel [m] and the time it takes [s]."""
-
-    travel: float
-    rise_time: float
-
-
-@dataclass(frozen=True)
 class Case:
-    """One arm of the survey: its file, its model's numbers, a law, and a clock; `rng_seed` draws what a verb asks."""
+    """One arm of the survey: its file, its model's numbers, and a law; `rng_seed` draws what a verb asks."""
 
     number: int
     rng_seed: int
@@ -97,9 +89,6 @@ class Case:
     beam: Beam
     first: float  # rad/s, of the first flexible mode, undamped
     law: Law
-    period: float
-    delay: float
-    slew: Slew
 
     @property
     def rng(self):
@@ -138,13 +127,8 @@ def draw(number, seed):
         "[hub]", f"inertia = {hub!r}",
         "[payload]", f"mass = {mass!r}", f"inertia = {inertia!r}",
     ]  # fmt: skip
-    period = log(rng, 1e-4, 0.1)
-    delay = float(rng.choice([0.0, 0.5, 1.0, rng.uniform(0, 2)]))
-    law = _law(rng, beam, first, period)
-    rise = max(20 * period, 2 * math.pi / first * log(rng, 1, 10))
-    slew = Slew(travel=length * float(rng.uniform(0.05, 1.0)), rise_time=rise)
-    text += ["[slew]", f"travel = {slew.travel!r}", f"rise_time = {slew.rise_time!r}"]
-    return Case(number, int(rng.integers(2**62)), "\n".join(text) + "\n", beam, first, law, period, delay, slew)
+    law = _law(rng, beam, first)
+    return Case(number, int(rng.integers(2**62)), "\n".join(text) + "\n", beam, first, law)
 
 
 def _section(rng, depth, slenderness, material):
@@ -169,11 +153,10 @@ def _section(rng, depth, slenderness, material):
     return shape, lines, area, second, CFRP_FACTOR[shape] if cowper is None else cowper
 
 
-def _law(rng, beam, first, period):
-    """K1 a few hundredths to three times J w1, or of J/T where that is less, one in ten negative; K2 in (-2, 1.5)."""
+def _law(rng, beam, first):
+    """K1 a few hundredths to three times J w1, one in ten negative; K2 in (-2, 1.5)."""
     J = beam.total_inertia
-    unit = J * (min(first, 1 / period) if rng.random() < 0.5 else first)
-    K1 = unit * log(rng, 0.02, 3.0) * (-1 if rng.random() < 0.1 else 1)
+    K1 = J * first * log(rng, 0.02, 3.0) * (-1 if rng.random() < 0.1 else 1)
     K2 = float(rng.uniform(-2.0, 1.5))
     Kp = J * first**2 * log(rng, 1e-3, 1.0) if rng.random() < 0.3 else 0.0
     return Law(K1, K2, Kp)

@@ -2,6 +2,7 @@
 
 import os
 import re
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -77,19 +78,11 @@ def test_a_folder_that_is_not_there(reduced, tmp_path):
 
 
 def test_pymor(reduced):
-    pymor = pytest.importorskip("pymor.models.iosys", reason="pyMOR is not installed") if _has_pymor() else None
-    if pymor is None:
+    if find_spec("pymor") is None:
         with pytest.raises(ParameterError, match="pip install pymor"):
             to_pymor(reduced)
     else:
-        model = to_pymor(reduced)
-        np.testing.assert_allclose(model.transfer_function.eval_tf(60j)[:, 0], reduced(60j), rtol=1e-9)
-
-
-def _has_pymor():
-    from importlib.util import find_spec
-
-    return find_spec("pymor") is not None
+        np.testing.assert_allclose(to_pymor(reduced).transfer_function.eval_tf(60j)[:, 0], reduced(60j), rtol=1e-9)
 
 
 def test_a_script_that_is_another_files_is_left_alone(reduced, tmp_path):

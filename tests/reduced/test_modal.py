@@ -105,14 +105,6 @@ def test_lossless_to_the_bit_at_no_damping(arm):
     np.testing.assert_allclose(rotation @ rotation.T, np.eye(60), atol=1e-12)
 
 
-def test_named_signals(arm):
-    system = modal_model(arm, ("root_moment", "hub_rate"), 2).state_space()
-    assert system.input_labels == ["hub_torque"]
-    assert system.output_labels == ["root_moment", "hub_rate"]
-    assert system.state_labels[:4] == ["rigid_angle", "rigid_rate", "mode1_position", "mode1_rate"]
-    assert modal_model(replace(arm, hub=Hub(inertia=math.inf)), "root_moment", 1).input == "hub_angle"
-
-
 def test_static_model_without_modes(arm):
     model = modal_model(arm, "root_moment", 0)
     A, B, C, D = model.matrices()

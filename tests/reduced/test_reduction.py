@@ -1,5 +1,6 @@
-"""reduce(): by order, by error, by method; what it carries, and what it refuses."""
+"""reduce() and its command: by order, by error, by method; what it carries, prints, and refuses."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.shell import run
 from tfarm import ConvergenceError, Hub, ParameterError
 from tfarm.reduced import reduce, reduced_answer, transfer_function
 
@@ -85,18 +87,6 @@ def test_deviation_holds_the_exact_curve(arm):
         reduced.deviation([2000.0])
 
 
-def test_the_answer_is_whole(arm):
-    answer = reduced_answer(reduce(arm, ["root_moment", "hub_rate"], order=14))
-    assert answer["order"] == len(answer["A"]) == len(answer["states"]) == 14
-    assert len(answer["C"]) == len(answer["D"]) == len(answer["outputs"]) == 2
-    assert answer["worst_error"] == max(answer["errors"].values())
-    assert answer["band_rad_s"] == [0.1, 1000.0]
-    s = 1j * 33.0
-    A, B, C, D = (np.array(answer[name]) for name in "ABCD")
-    value = C @ np.linalg.solve(s * np.eye(14) - A, B) + D
-    np.testing.assert_allclose(value[:, 0], tfarm.transfer(arm, answer["outputs"])(s), rtol=1e-8)
-
-
 @pytest.mark.parametrize(
     ("given", "key"),
     [
@@ -129,3 +119,54 @@ def test_outputs_without_a_model(arm):
         reduce(replace(arm, hub=Hub(inertia=math.inf)), "hub_rate", order=4)
     with pytest.raises(ParameterError, match="once"):
         reduce(arm, ["root_moment", "root_moment"], order=4)
+
+
+def test_by_error_with_a_band_and_a_file(capsys, tmp_path):
+    given = ("--error", "1e-6", "--band", "1,500", "--method", "modal", "--mat", str(tmp_path / "arm.mat"), "--json")
+    code, out, _ = run(capsys, "reduce", "sasaki2012", "--outputs", "tip_displacement", *given)
+    answer = json.loads(out)
+    assert code == 0
+    assert answer["worst_error"] <= 1e-6
+    assert answer["method"] == "modal"
+    assert (tmp_path / "arm.mat").exists()
+
+
+def test_for_a_person(capsys):
+    code, out, _ = run(capsys, "reduce", "sasaki2012", "--order", "14")
+    assert code == 0
+    assert "order 14" in out
+    assert "first mode it lacks: 5" in out
+    assert out.count("pole") == 6
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["--order", "13"],
+        ["--order", "some"],
+        ["--order", "8", "--band", ""],
+        ["--order", "8", "--outputs", "tip"],
+        ["--order", "8", "--outputs", ""],
+        ["--order", "8", "--mat", "/nowhere/a.mat"],
+    ],
+)
+def test_bad_input_is_one_line(capsys, arguments):
+    code, out, err = run(capsys, "reduce", "sasaki2012", *arguments)
+    assert code == 2
+    assert out == ""
+    assert err.count("\n") == 1
+
+
+def test_an_error_out_of_reach(capsys):
+    code, _, err = run(capsys, "reduce", "sasaki2012", "--error", "1.1e-14", "--method", "aaa", "--band", "1,100")
+    assert code == 3
+    assert err.count("\n") == 1
+
+
+def test_an_error_below_that_of_the_exact_values_is_refused_at_once(capsys):
+    code, out, err = run(capsys, "reduce", "sasaki2012-lab", "--error", "1e-30")
+    assert (code, out) == (2, "")
+    assert err == (
+        "tfarm: error = 1e-30: the exact values it is measured against are float64 numbers; ask for 1e-14 or more\n"
+    )

@@ -9,6 +9,8 @@ import control
 import numpy as np
 from scipy.optimize import brentq
 
+from tfarm import HubFeedback
+
 POINTS = 24
 X = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
 TO_SERIES = np.cos(np.outer(np.arange(POINTS), np.arccos(X))) * 2 / POINTS
@@ -72,7 +74,7 @@ class Page:
         return found + (law.Kp * (law.K1 + loss) < 0)
 
     def _crossed(self, start, end):
-        way = end.plus(start, -1.0)
+        way = HubFeedback(**{name: end[name] - start[name] for name in start.by_name})
 
         def both(w):
             D, N = self.parts(w, start)

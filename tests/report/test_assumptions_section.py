@@ -8,7 +8,6 @@ import pytest
 
 import tfarm
 from tests.report.coarse import coarsen
-from tfarm.audit.assumptions import hub_study, section_study
 from tfarm.report.assumptions_section import assumptions_section
 
 PAPER = tfarm.load("sasaki2012")
@@ -21,18 +20,6 @@ def section():
 
 def values_of(table):
     return {column.key: list(column.values) for column in table.columns}
-
-
-def test_tables_are_the_studies_to_the_last_bit(section):
-    depth, hub = (
-        values_of(block) for block in section.blocks if block.stem in ("assumptions-section", "assumptions-hub")
-    )
-    for shown, study in ((depth, section_study(PAPER)), (hub, hub_study(PAPER))):
-        for i in range(4):
-            assert shown[f"mode_{i + 1}_rad_s"] == study.natural_frequency[:, i].tolist()
-            assert shown[f"mode_{i + 1}_sensitivity"] == study.sensitivity[:, i].tolist()
-        assert [text == "this arm" for text in shown["is"]] == study.is_own.tolist()
-    assert depth["depth_m"] == section_study(PAPER).depth.tolist()
 
 
 def test_the_words_carry_the_numbers(section):

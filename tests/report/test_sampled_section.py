@@ -195,14 +195,6 @@ def test_the_slew_is_the_simulators_own(section):
 # ------------------------------------------------------------ bytes and odd arms
 
 
-@pytest.mark.parametrize("inertia", [math.inf, 0.0])
-def test_an_arm_without_a_loop_gets_one_sentence(inertia):
-    section = sampled_section(replace(LAB, hub=tfarm.Hub(inertia=inertia)), Chain())
-    assert len(section.words) == 1
-    assert not section.blocks
-    assert not section.facts
-
-
 def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
     monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)

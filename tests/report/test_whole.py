@@ -10,7 +10,7 @@ import tfarm
 from tests.hostile import NAME
 from tests.report.full import ARM
 from tests.report.written import files_of
-from tfarm.cli import tables as cli_tables
+from tfarm.cli import app as cli_app
 from tfarm.report import write, writing
 
 # ------------------------------------------------------------ all or nothing
@@ -75,8 +75,8 @@ def test_the_folder_of_an_arm_is_small(pages):
 
 
 def test_progress_is_told_in_a_pipe_too(monkeypatch, capsys):
-    monkeypatch.setattr(cli_tables, "PROGRESS_EVERY", 0.02)
-    with cli_tables.progress() as advance:
+    monkeypatch.setattr(cli_app, "PROGRESS_EVERY", 0.02)
+    with cli_app.progress() as advance:
         advance(3, 7, "a section")
         deadline = time.monotonic() + 30
         seen = ""

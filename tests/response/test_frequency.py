@@ -137,8 +137,6 @@ def test_from_another_input_it_is_the_ratio_of_two_responses():
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
-        ({"output": "moment"}, "say where moment is meant"),
-        ({"output": "moment", "x": 7.0}, "between 0 and 1 m"),
         ({"output": "root_moment", "x": 0.5}, "leave x out"),
         ({"output": "root_moment", "input": "force@0.3"}, "known for an input at the hub"),
         ({"output": "root_moment", "input": "motor_voltage"}, "there is no motor"),

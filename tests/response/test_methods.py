@@ -7,9 +7,8 @@ import pytest
 
 import tfarm
 from tests.shell import run
-from tests.strategies import some_arm
 from tfarm.errors import ParameterError
-from tfarm.exact.methods import METHODS, METHODS_AGREE
+from tfarm.exact.values import METHODS, METHODS_AGREE
 
 S = np.array([0.3 + 57.1j, 57.1j, -3.0 + 400.0j, 2.0 + 0j])
 EPS = np.finfo(float).eps
@@ -27,16 +26,6 @@ def test_three_methods_give_one_number(preset):
     balls, determinant = (table.frequencies(method) for method in METHODS[1:])
     assert balls == pytest.approx(determinant, rel=EPS, abs=0)  # both are more than 15 digits, rounded once
     assert table.natural_frequency == pytest.approx(balls, rel=FLOAT64, abs=0)
-
-
-def test_random_arms_too():
-    rng = np.random.default_rng(12)
-    for _ in range(5):
-        arm = some_arm(rng)
-        w = tfarm.modes(arm, 2).natural_frequency[-1]
-        fast, *slow = (tfarm.transfer(arm, "tip_displacement", method=each)([0.3j * w, 0.1 * w]) for each in METHODS)
-        for each in slow:
-            assert each == pytest.approx(fast, rel=1e-13, abs=0)  # fast: 6e-14 at worst (tests.exact.accuracy)
 
 
 def test_a_road_that_is_broken_shows(monkeypatch, capsys):
@@ -108,6 +97,8 @@ def test_python_has_the_roads_beside_each_other():
     assert "one Timoshenko beam" in rig.by_methods().left_out["appendix"]
     with pytest.raises(ParameterError, match="one Timoshenko beam"):
         rig.frequencies("appendix")
+    with pytest.raises(ParameterError, match="closed-form, balls, appendix"):
+        tfarm.transfer(arm, "hub_rate", method="fem")
     with pytest.raises(ParameterError, match="input at the hub"):
         tfarm.transfer(arm, "root_moment", input="force@0.3").by_methods(S)
 
@@ -128,8 +119,3 @@ def test_what_cannot_be_asked_for_is_one_line(capsys, arguments, words):
     code, out, err = run(capsys, *arguments)
     assert (code, out) == (2, "")
     assert words in err
-
-
-def test_python_says_so_too():
-    with pytest.raises(ParameterError, match="closed-form, balls, appendix"):
-        tfarm.transfer(tfarm.load("sasaki2012"), "hub_rate", method="fem")

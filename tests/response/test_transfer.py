@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 import tfarm
 from tests.outputs import OF_ONE_LINK
 from tests.shared import thinned
-from tfarm import Arm, Hub, ParameterError, Payload
+from tfarm import Arm, Hub, ParameterError
 from tfarm.exact import appendix, balls, values
 from tfarm.exact.system import system_of
 
@@ -210,18 +210,6 @@ def test_blocks_of_points_do_not_matter() -> None:
     assert (G(s) == np.array([G(point) for point in s])).all()
 
 
-def test_frequency_response_is_python_control_data_with_names() -> None:
-    import control
-
-    arm = tfarm.load("sasaki2012-lab")
-    omega = np.geomspace(1, 100, 7)
-    data = tfarm.transfer(arm, ["root_moment", "hub_angle"]).frequency_response(omega)
-    assert isinstance(data, control.FrequencyResponseData)
-    assert data.input_labels == ["hub_torque"]
-    assert data.output_labels == ["root_moment", "hub_angle"]
-    assert (data.frdata[:, 0] == tfarm.transfer(arm, ["root_moment", "hub_angle"])(1j * omega)).all()
-
-
 @pytest.mark.parametrize(
     ("outputs", "x", "message"),
     [
@@ -242,10 +230,3 @@ def test_refusals(outputs: str, x: float | None, message: str) -> None:
 def test_s_is_finite(s: complex) -> None:
     with pytest.raises(ParameterError, match="finite"):
         tfarm.transfer(tfarm.load("sasaki2012"), "hub_rate")(s)
-
-
-def test_a_held_output_is_constant() -> None:
-    arm = replace(tfarm.load("sasaki2012"), payload=Payload(mass=math.inf))
-    G = tfarm.transfer(arm, ["tip_displacement", "tip_acceleration"])
-    assert (G([1j, 3 + 4j, 2e3j]) == 0).all()
-    assert tfarm.transfer(arm, "tip_displacement").zeros(up_to=100.0).values.size == 0

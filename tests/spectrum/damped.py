@@ -22,7 +22,6 @@ from tests.spectrum.damped_roads import ritz_eigenvalues
 from tests.strategies import some_arm
 from tests.survey import Finding, each_of
 from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.exact.characteristic import zeros_at_origin
 from tfarm.spectrum.damped import damped_modes
 
 MOST_MODES = 24
@@ -66,7 +65,7 @@ def judge(arm, count, *, certify=True, model=True):
     flexible = damped.eigenvalues[damped.index > 0].ravel()
     inside = flexible[damped.box.holds(flexible)]
     wrong = []
-    if inside.size + zeros_at_origin(damped.undamped.system) != damped.count:
+    if inside.size + damped.undamped.system.at_rest != damped.count:
         wrong.append(f"{inside.size} flexible eigenvalues listed in the box of {damped.count}")
     if model:
         wrong += compared(arm, damped, inside)
@@ -100,7 +99,7 @@ def judge_rig(arm, count, *, certify=True):
     every = np.r_[damped.eigenvalues.ravel(), damped.single, damped.unassigned_pairs.ravel()]
     every = np.unique(every[np.isfinite(every) & (every != 0)])
     inside = every[damped.box.holds(every)]
-    at_rest = zeros_at_origin(damped.undamped.system)
+    at_rest = damped.undamped.system.at_rest
     wrong = [] if inside.size + at_rest == damped.count else ["not so many are listed"]
     mine, theirs = inside[inside.imag >= 0], eigenvalues(arm, abs(damped.box.corners).max())
     theirs = theirs[damped.box.holds(theirs) & (abs(theirs) > NEXT_TO_REST[at_rest] * abs(mine).max(initial=0.0))]

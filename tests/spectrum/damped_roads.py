@@ -1,7 +1,7 @@
 """Eigenvalues of damped arms by roads that share nothing with tfarm's characteristic function.
 
 `ritz_eigenvalues`: a Galerkin model's quadratic eigenvalue problem.  `sine_waves`: the pinned-pinned arm's closed form.
-`delta`: the paper's 4x4 determinant, its hub row changed by feedback.  `shot`: the same from a matrix exponential.
+`delta`: the paper's 4x4 determinant, its hub row changed by feedback.
 """
 
 import math
@@ -61,9 +61,9 @@ def sine_waves(arm, number, theory="timoshenko"):
 def delta(arm, s, Kp=0.0, K1=0.0, K2=0.0):
     """The paper's Delta at the working precision of mpmath, with u = -Kp theta - K1 theta_t - K2 E I phi'(0)."""
     at = Appendix(arm, mpmath.mpc(s))
-    rows = [list(row) for row in at.a]
+    rows, (Kp, K1, K2) = [list(row) for row in at.a], map(mpmath.mpmathify, (Kp, K1, K2))
     for j, (l, gamma) in enumerate(at.waves):
-        rows[3][j] += (mpmath.mpf(Kp) + mpmath.mpf(K1) * at.s) * gamma + mpmath.mpf(K2) * at.EI * l * gamma
+        rows[3][j] += (Kp + K1 * at.s) * gamma + K2 * at.EI * l * gamma
     return _determinant(rows)
 
 
@@ -93,36 +93,3 @@ def newton_root(arm, s, digits):
 def _guard(arm, s):
     with mpmath.workdps(30):
         return int(sum(abs(mpmath.re(l)) for l in Appendix(arm, mpmath.mpc(s)).lambdas) * arm.link.length) + 10
-
-
-def shot(arm, s, Kp=0.0, K1=0.0, K2=0.0, digits=60):
-    """Determinant of the three end conditions on (psi, M, Q) at the root, carried along the arm by mpmath.expm.
-
-    Entire in s but for -1/C, and without waves: for any arm it is D of tfarm but for a constant.
-    """
-    link, payload = arm.link, arm.payload
-    with mpmath.workdps(digits + 2 * _guard(arm, s)):
-        s = mpmath.mpc(s)
-        kGA = mpmath.mpf(link.shear_factor) * mpmath.mpf(link.shear_modulus) * mpmath.mpf(link.section.area)
-        I = mpmath.mpf(link.section.second_moment)
-        rhoA, rhoI = mpmath.mpf(link.density) * mpmath.mpf(link.section.area), mpmath.mpf(link.density) * I
-        damper = 1 + mpmath.mpf(link.damping) * s
-        EI = mpmath.mpf(link.youngs_modulus) * I * damper
-        march = mpmath.matrix(
-            [[0, 1, 0, 1 / kGA], [0, 0, 1 / EI, 0], [0, rhoI * s**2, 0, -1], [rhoA * s**2, 0, 0, 0]]
-        )  # w, psi, M, Q
-        T = mpmath.expm(march * mpmath.mpf(link.length))
-        m, force = _body(payload.mass, s)
-        Ic, moment = _body(payload.inertia, s)
-        Ih, torque = _body(arm.hub.inertia, s)
-        hub = [Ih + Kp + mpmath.mpf(K1) * s, -torque + mpmath.mpf(K2) / damper, 0]
-        rows = [
-            [m * T[0, j] + force * T[3, j] for j in (1, 2, 3)],
-            [Ic * T[1, j] + moment * T[2, j] for j in (1, 2, 3)],
-        ]
-        (a, b, c), (d, e, f), (g, h, i) = *rows, hub
-        return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
-
-
-def _body(inertia, s):
-    return (mpmath.mpf(1), mpmath.mpf(0)) if math.isinf(inertia) else (mpmath.mpf(inertia) * s**2, mpmath.mpf(1))

@@ -1,4 +1,4 @@
-"""Listed frequencies against a Ritz model, the count and ball arithmetic:  python -m tests.spectrum.ritz 1000 [seed]
+"""Listed frequencies against a Ritz model, the count and ball arithmetic:  python -m tests.spectrum.ritz SIZE SEED
 
 Random arms with every combination of zero, finite and infinite inertias in turn.  Of each the first twelve flexible
 frequencies are those of a Ritz model, and no others; thirty are what the count says under one of the four theories; and
@@ -6,18 +6,14 @@ between floats next to the first twelve, D changes sign in balls.
 """
 
 import math
-import os
-import sys
-from collections import Counter as Tally
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import flint
 import numpy as np
 
+from tests import survey
 from tests.models import Ritz
 from tests.strategies import BOUNDARY_CASES, some_arm
+from tests.survey import Finding
 from tfarm.arm import THEORIES
 from tfarm.exact import balls
 from tfarm.exact.layout import Layout
@@ -99,26 +95,30 @@ def arms_for_places(slenderness, count, seed=5):
     return [some_arm(rng, BOUNDARY_CASES[i % 27], damping=0.0, slenderness=slenderness) for i in range(count)]
 
 
-def main(number, seed):
-    """Three searches; whether nothing was wrong."""
-    found = [(against_ritz(arm), arm) for arm in random_arms(seed, number)]
-    found += [(against_count(arm, THEORIES[i % 4]), arm) for i, arm in enumerate(random_arms(seed + 1, number))]
-    wrong = [(text, arm) for text, arm in found if text]
+def verdict(text, arm):
+    """The finding of what is wrong with an arm; nothing where it is right."""
+    return Finding("wrong" if text else "right", f"{text} {arm}" if text else "", bool(text))
+
+
+def model(size, seed):
+    return (verdict(against_ritz(arm), arm) for arm in random_arms(seed, size))
+
+
+def count(size, seed):
+    return (verdict(against_count(arm, THEORIES[n % 4]), arm) for n, arm in enumerate(random_arms(seed + 1, size)))
+
+
+def places(size, seed):
+    """Eight units in the last place at most, and one for nine frequencies of ten."""
     for slenderness in SLENDERNESS:
-        arms = arms_for_places(slenderness, max(27, number // 4), seed)
-        places = [last_places(arm) for arm in arms]
-        wrong += [("more than 8 units off", arm) for arm, each in zip(arms, places, strict=True) if max(each) > 8]
-        tally = Tally(each for some in places for each in some)
-        print(f"L/h {slenderness}: right within units in the last place: {dict(sorted(tally.items()))}")
-        if tally[1] <= 0.9 * tally.total():
-            wrong.append(("fewer than nine of ten right within one unit", slenderness))
-    print(f"{number} arms against a Ritz model, {number} lists against the count: {len(wrong)} wrong")
-    for text, where in wrong:
-        print(text, where)
-    return not wrong
+        every = []
+        for arm in arms_for_places(slenderness, max(27, size // 4), seed):
+            every += (units := last_places(arm))
+            yield verdict("more than 8 units off" if max(units) > 8 else "", arm)
+        yield verdict(
+            "fewer than nine of ten within one unit" if np.mean(np.array(every) == 1) <= 0.9 else "", slenderness
+        )
 
 
 if __name__ == "__main__":
-    NUMBER = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
-    SEED = int(sys.argv[2]) if len(sys.argv) > 2 else 1
-    sys.exit(not main(NUMBER, SEED))
+    survey.main(model, count, places, size=1000)

@@ -10,7 +10,7 @@ import pytest
 import tfarm
 from tests.rigs import some_rig
 from tests.shared import sized, thinned
-from tests.spectrum.chains import judge, judge_damped
+from tests.spectrum.chains import judge
 from tests.test_chain_elements import lossless
 from tests.test_transition import rig
 from tests.transition import response
@@ -34,13 +34,6 @@ def test_twenty_frequencies_of_random_rigs(count):
     assert max(each.distance for each in verdicts) < 1e-8
 
 
-@pytest.mark.parametrize("count", sized(2, 3))
-def test_damped_modes_of_random_rigs(count):
-    verdicts = [judge_damped(arm, 3, certify=n == 1) for n, arm in enumerate(rigs(6, count, damped=True, segments=2))]
-    assert [each.reason for each in verdicts if each.outcome != "right"] == []
-    assert sum(each.inside for each in verdicts) >= 3
-
-
 def test_a_prescribed_angle_has_the_modes_of_a_locked_hub():
     """However heavy the hub that is turned: no rigid body, and none of its frequencies left out."""
     arm = lossless(rig())
@@ -55,7 +48,8 @@ def test_shapes_are_orthogonal_and_of_unit_mass(seed):
     """The mass matrix is the identity, and behind a rigid clamp the root moves with the radius."""
     arm = some_rig(np.random.default_rng([13, seed]), damped=False)
     table = tfarm.modes(arm, 8)
-    assert table.orthogonality() < 1e-9
+    mass = table._shapes.mass_matrix()
+    assert abs(mass - np.eye(len(mass))).max() < 1e-9
     flexible = table.index > 0
     W, Psi = table.shape(0.0)[flexible], table.rotation(0.0)[flexible]
     if arm.clamp.is_rigid:

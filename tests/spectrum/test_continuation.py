@@ -11,7 +11,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.spectrum import box as box_module
 from tfarm.spectrum.box import Box, complete_box, winding_number, zeros_in_box
-from tfarm.spectrum.continuation import Member, Node, follow, improved, predicted
+from tfarm.spectrum.continuation import Member, Node, follow, improved
 from tfarm.spectrum.damped import COMPANY, all_damped_modes, damped_modes, member
 
 
@@ -91,39 +91,6 @@ def test_a_pair_meets_on_the_axis_and_parts_again() -> None:
         np.testing.assert_allclose(sorted_pair(ours), sorted_pair(theirs), rtol=1e-5)
 
 
-def test_a_real_zero_that_nobody_follows_takes_over_the_pair() -> None:
-    """An overdamped pair's fast zero meets a third one: the two leave as a conjugate pair, the slow one stays alone."""
-
-    def exact(C):
-        meeting = np.sqrt(complex(0.25 - C)) * 4
-        return np.array([-1.0, -8 + meeting, -8 - meeting])
-
-    start = Node(0.0, np.array([[-1.0, -6.0], [-3 + 20j, -3 - 20j]]))
-    others = np.array([-3 + 20j, -3 - 20j])
-    nodes = follow(lambda C: Member(with_zeros([*exact(C), *others])), start, 1.0, 0.01, 2)
-    np.testing.assert_allclose(nodes[-1].zeros[0], [-8 + 1j * math.sqrt(12), -8 - 1j * math.sqrt(12)], rtol=1e-5)
-    np.testing.assert_allclose(nodes[-1].zeros[1], others, rtol=1e-5)
-
-
-def test_a_real_zero_ends_where_it_comes_to_the_singular_point_and_its_partner_goes_on() -> None:
-    """One of two real zeros runs to -2, where nothing can be followed; the other crosses 0 without it."""
-
-    def exact(C):
-        return np.array([0.3 * C - 0.2, -1 - C, -0.1 + 9j, -0.1 - 9j])
-
-    def family(C):
-        return Member(with_zeros(exact(C)), -2.0, 1e-3, 0.05)
-
-    start = Node(0.0, exact(0.0).reshape(2, 2))
-    nodes = follow(family, start, 3.0, 0.05, 2)
-    ended = next(node for node in nodes if np.isnan(node.zeros).any())
-    assert 0.9 <= ended.at < 1.0
-    assert [node.at for node in nodes].count(ended.at) == 2
-    assert np.isnan(nodes[-1].zeros[0, 1])
-    np.testing.assert_allclose(nodes[-1].zeros[0, 0], 0.7, rtol=1e-6)
-    np.testing.assert_allclose(nodes[-1].zeros[1], exact(3.0)[2:], rtol=1e-6)
-
-
 def test_a_wanted_pair_that_ends_is_an_error_and_not_a_shorter_list() -> None:
     """A zero that jumps cannot be followed; what is behind it only keeps company."""
 
@@ -139,30 +106,6 @@ def test_a_wanted_pair_that_ends_is_an_error_and_not_a_shorter_list() -> None:
     assert len(nodes[-1].zeros) == 2
     with pytest.raises(ConvergenceError):
         follow(family, Node(0.0, exact(0.0)), 1.0, 0.05, 3)
-
-
-def test_prediction_is_exact_where_mean_and_distance_are_polynomials() -> None:
-    omega = np.array([1.0, 3.0])
-    _, exact = of_oscillators(omega)
-    nodes = [Node(C, np.array([sorted_pair(pair) for pair in exact(C)])) for C in (0.0, 0.1, 0.25)]
-    for C in (0.3, 0.6):
-        for ours, theirs in zip(predicted(nodes, C), exact(C), strict=True):
-            np.testing.assert_allclose(sorted_pair(ours), sorted_pair(theirs), rtol=1e-12)
-
-
-def test_correction_converges_at_least_quadratically_from_afar_for_all_pairs_at_once() -> None:
-    omega = np.arange(1.0, 9.0)
-    _, exact = of_oscillators(omega)
-    truth = exact(0.05)
-    zeros = truth * (1 + 0.02j)
-    zeros[:, 1] = zeros[:, 0].conj()
-    errors = []
-    for _ in range(6):
-        zeros, moved = improved(Member(with_zeros(truth)), zeros)
-        errors.append(abs(zeros - truth).max())
-    assert errors[-1] < 1e-13
-    assert errors[1] < 10 * errors[0] ** 2 + 1e-14
-    assert (moved < 1e-12).all()
 
 
 def test_correction_keeps_conjugates_and_real_zeros_apart() -> None:
@@ -235,20 +178,6 @@ def test_random_zeros_are_counted_and_found(seed: int) -> None:
         assert winding_number(function, box) == inside.sum()
     found = zeros_in_box(with_zeros(zeros, 3.0), box, np.empty(0, complex))
     np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(zeros[inside]), atol=1e-5)
-
-
-def test_a_zero_on_the_contour_is_told() -> None:
-    function = with_zeros([0.0, 0.5 + 1j])
-    for box in (Box(-1, 1, -1, 1), Box(0, 1, -0.5, 0.7), Box(-1, 0.5, -2, 2)):
-        with pytest.raises(ConvergenceError, match="on the contour"):
-            winding_number(function, box)
-
-
-def test_a_zero_close_to_the_contour_is_on_its_side() -> None:
-    for away in (1e-3, 1e-6, 1e-9):
-        box = Box(-1, 1, -1, 1)
-        assert winding_number(with_zeros([1 - away + 0.1234j, 3.0]), box) == 1
-        assert winding_number(with_zeros([1 + away + 0.1234j, 0.2]), box) == 1
 
 
 # ------------------------------------------------------------ boxes

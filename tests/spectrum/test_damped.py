@@ -225,19 +225,6 @@ def test_asking_for_more_modes_changes_none() -> None:
     np.testing.assert_allclose(many[:6], few, rtol=1e-13)
 
 
-def test_units_do_not_matter() -> None:
-    """Time in ten thousandths: E 1e-8, C 1e4 and every eigenvalue 1e-4 times as large."""
-    arm = damped_arm(2e-5, hub=0.3, mass=0.4, slenderness=12.0)
-    link = replace(
-        arm.link,
-        youngs_modulus=arm.link.youngs_modulus * 1e-8,
-        shear_modulus=arm.link.shear_modulus * 1e-8,
-        damping=0.2,
-    )
-    slow = replace(arm, link=link)
-    np.testing.assert_allclose(pairs(listed(slow, 10)), 1e-4 * pairs(listed(arm, 10)), rtol=1e-13)
-
-
 # ------------------------------------------------------------ shapes
 
 
@@ -294,6 +281,20 @@ def test_shapes_tend_to_the_undamped_ones(hub: float, mass: float) -> None:
         real = getattr(undamped, name)(x)[undamped.index > 0]
         for j in (0, 1):
             np.testing.assert_allclose(getattr(damped, name)(x)[:, j], real, rtol=1e-6, atol=1e-6 * abs(real).max())
+
+
+@pytest.mark.parametrize("name", ["shape", "rotation", "moment"])
+def test_a_hub_that_is_held_is_the_limit_of_a_heavy_one(name: str) -> None:
+    """They differ by the arm's inertia over the hub's: nothing of a shape is lost where the hub hardly turns."""
+    lab = tfarm.load("sasaki2012-lab")
+    held, *heavy = (
+        getattr(listed(lab.having(hub_inertia=inertia), 2), name)(np.linspace(0.0, lab.length, 7))
+        for inertia in (math.inf, 1e9, 1e12)
+    )
+    size = abs(held).max()
+    assert size > 0.1
+    for inertia, found in zip((1e9, 1e12), heavy, strict=True):
+        np.testing.assert_allclose(found, held, rtol=0, atol=(3.0 / inertia + 1e-14) * size)
 
 
 def test_shapes_are_conjugate_and_of_the_shape_of_x() -> None:

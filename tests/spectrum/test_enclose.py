@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from itertools import pairwise
 
 import flint
 import mpmath
@@ -12,12 +11,12 @@ import pytest
 import tfarm
 from tests.shared import sized, thinned
 from tests.spectrum.damped import pairs
-from tests.spectrum.damped_roads import delta, newton_root, newton_step, pinned, ritz_eigenvalues, sine_waves
+from tests.spectrum.damped_roads import newton_root, newton_step, pinned, ritz_eigenvalues, sine_waves
 from tests.spectrum.test_damped import damped_arm, listed
 from tfarm import CertificationError, HubFeedback
 from tfarm.exact.balls import point, precision
-from tfarm.exact.characteristic import NO_GAINS, characteristic, gains_of, zeros_at_origin
 from tfarm.exact.system import system_of
+from tfarm.loop.loop import Loop
 from tfarm.spectrum import frequencies, proofs
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.proofs import Disc, _holds_one, disjoint, enclosed, proven_count
@@ -92,13 +91,12 @@ def test_a_double_eigenvalue_has_no_disc(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_a_closed_loop_pole_is_enclosed() -> None:
-    k = system_of(LAB)
-    gains = gains_of(k, HubFeedback(K1=0.3, K2=0.3))
+    loop = Loop(LAB, HubFeedback(K1=0.3, K2=0.3))
     s = np.array([-3 + 70j])
     for _ in range(60):
-        at = characteristic(k, s, gains)
+        at = loop.function(s)
         s = s - at.value / at.slope
-    disc = enclosed(k, complex(s[0]), 30, gains)
+    disc = enclosed(loop.k, complex(s[0]), 30, loop.exact)
     near = complex(float(disc.re), float(disc.im))
     assert newton_step(LAB, near, K1=0.3, K2=0.3) < 1e-15
     assert abs(near - s[0]) < 1e-12 * abs(near)
@@ -132,10 +130,10 @@ def test_rouches_theorem_is_right_about_discs_of_any_size() -> None:
             zero = zeros[rng.integers(8)]
             radius = 10 ** rng.uniform(-4, 0.5) * abs(zero)
             middle = complex(zero + radius * rng.uniform(0, 1.5) * np.exp(2j * math.pi * rng.random()))
-            if _holds_one(k, NO_GAINS, point(middle), flint.arb(float(radius))):
+            if _holds_one(k, None, point(middle), flint.arb(float(radius))):
                 assert (abs(zeros - middle) <= radius).sum() == 1
                 said += 1
-        assert all(_holds_one(k, NO_GAINS, point(complex(z)), flint.arb(float(1e-3 * abs(z)))) for z in zeros[:8])
+        assert all(_holds_one(k, None, point(complex(z)), flint.arb(float(1e-3 * abs(z)))) for z in zeros[:8])
     assert said > 20
 
 
@@ -156,7 +154,7 @@ def test_counts_of_sine_waves_are_those_of_the_closed_form(theory: str, boxes: i
             height = float(first * 10 ** rng.uniform(-0.5, 1.2))
             reach = height * float(rng.uniform(0.05, 1.5))
             box = box_of(height, min(reach, 0.9 * float(first) / Cw) if Cw else reach)
-            inside = int(box.holds(exact).sum()) + zeros_at_origin(k)
+            inside = int(box.holds(exact).sum()) + k.at_rest
             assert proven_count(k, box) == inside, (Cw, box)
 
 
@@ -170,43 +168,7 @@ def test_counts_are_those_of_a_galerkin_model(hub: float, mass: float, boxes: in
     for _ in range(boxes):
         height = float(10 ** rng.uniform(2.5, 4.2))
         box = Box(-min(0.9 / 4e-5, height * float(rng.uniform(0.2, 3))), height * 0.3, -height, height)
-        assert proven_count(k, box) == box.holds(theirs).sum() + zeros_at_origin(k)
-
-
-def turns_of_ratio(arm, box, **gains):
-    """Zeros in a box of the paper's Delta with feedback less those without, by turns of their ratio: it has no cut."""
-    corners = [
-        complex(box.re_max, 0),
-        complex(box.re_max, box.im_max),
-        complex(box.re_min, box.im_max),
-        complex(box.re_min, 0),
-    ]
-
-    def ratio(s):
-        with mpmath.workdps(60):
-            return complex(delta(arm, s, **gains) / delta(arm, s))
-
-    def turned(a, b, at_a, at_b):
-        middle = (a + b) / 2
-        at = ratio(middle)
-        steps = np.angle(at / at_a), np.angle(at_b / at)
-        if abs(b - a) < 20.0 and max(map(abs, steps)) < 0.7:
-            return sum(steps)
-        return turned(a, middle, at_a, at) + turned(middle, b, at, at_b)
-
-    values = [ratio(corner) for corner in corners]
-    pieces = zip(pairwise(corners), pairwise(values), strict=True)
-    return round(sum(turned(*ends, *at) for ends, at in pieces) / math.pi)
-
-
-@pytest.mark.parametrize(("K1", "K2", "unstable"), [(-0.3, 0.9, 3)])
-def test_a_loop_has_as_many_unstable_poles_as_the_papers_matrix(K1: float, K2: float, unstable: int) -> None:
-    """Undamped: K2 > 1 and K1 < 0 destabilise (a strip beside the axis is left out)."""
-    arm = tfarm.load("sasaki2012")
-    k = system_of(arm)
-    box = Box(0.5, 100.0, -100.0, 100.0)
-    assert turns_of_ratio(arm, box, K1=K1, K2=K2) == unstable
-    assert proven_count(k, box, gains_of(k, HubFeedback(K1=K1, K2=K2))) == unstable
+        assert proven_count(k, box) == box.holds(theirs).sum() + k.at_rest
 
 
 # ------------------------------------------------------------ refusals
@@ -255,7 +217,7 @@ def test_a_forged_list_is_refused(name: str) -> None:
     zeros = np.concatenate([damped.eigenvalues[:1], FORGERIES[name](damped.eigenvalues[1:])])
     undamped = replace(damped.undamped, index=np.arange(len(zeros)))
     forged = replace(damped, undamped=undamped, eigenvalues=zeros)
-    consistent = int(forged.box.holds(zeros).sum()) + zeros_at_origin(damped.undamped.system) - 2
+    consistent = int(forged.box.holds(zeros).sum()) + damped.undamped.system.at_rest - 2
     for count in {damped.count, consistent}:
         with pytest.raises(CertificationError) as refused:
             replace(forged, count=count).certify()

@@ -6,7 +6,6 @@ from dataclasses import replace
 from itertools import pairwise
 
 import flint
-import mpmath
 import numpy as np
 import pytest
 from numpy.polynomial import chebyshev
@@ -15,12 +14,10 @@ import tfarm
 from tests.models import Ritz
 from tests.shared import thinned
 from tests.strategies import BOUNDARY_CASES, some_arm
-from tfarm import Hub, Link, ParameterError, Payload, Section
-from tfarm.arm import THEORIES
+from tfarm import Hub, ParameterError, Payload
 from tfarm.exact import balls
 from tfarm.exact.layout import Layout
 from tfarm.exact.system import system_of
-from tfarm.spectrum import PARAMETERS
 from tfarm.spectrum.frequencies import refine
 from tfarm.spectrum.table import flexible_frequencies
 
@@ -184,41 +181,6 @@ def test_shapes_and_nodes_are_those_of_a_ritz_model(case):
         assert (abs(modes.shape(nodes)[row]) <= rounding).all()
 
 
-def varied(arm, name, factor):
-    """The arm with one parameter multiplied."""
-    if name in ("hub_inertia", "payload_mass", "payload_inertia"):
-        hub, payload = arm.hub, arm.payload
-        if name == "hub_inertia":
-            return replace(arm, hub=Hub(inertia=hub.inertia * factor))
-        part = name.removeprefix("payload_")
-        return replace(arm, payload=replace(payload, **{part: getattr(payload, part) * factor}))
-    link, section = arm.link, arm.link.section
-    parts = {"area": section.area, "second_moment": section.second_moment, "shear_factor": link.shear_factor}
-    numbers = {n: getattr(link, n) for n in ("length", "density", "youngs_modulus", "shear_modulus")}
-    for group in (parts, numbers):
-        if name in group:
-            group[name] *= factor
-    return replace(arm, link=Link(**numbers, section=Section.general(**parts)))
-
-
-@pytest.mark.parametrize("theory", thinned(THEORIES, 2))
-@pytest.mark.parametrize("case", [("some",) * 3, ("zero", "infinite", "some"), ("infinite", "zero", "infinite")])
-def test_sensitivities_are_central_differences(case, theory):
-    """Of the logarithms, fourth order with 4 h: their error is h^4 of the fifth derivative and eps/h."""
-    arm = arm_for(case)
-    exact, h = tfarm.modes(arm, COUNT, theory=theory), 2.0**-10
-    kept = exact.index > 0
-    for name in PARAMETERS:
-        log = {
-            n: np.log(tfarm.modes(varied(arm, name, math.exp(n * h)), COUNT, theory=theory).natural_frequency[kept])
-            for n in (-2, -1, 1, 2)
-        }
-        if math.isinf({"hub_inertia": arm.hub.inertia}.get(name, 0.0)):
-            continue
-        difference = (8 * (log[1] - log[-1]) - (log[2] - log[-2])) / (12 * h)
-        np.testing.assert_allclose(exact.sensitivity[name][kept], difference, rtol=0, atol=50 * (h**4 + EPS / h))
-
-
 def test_sensitivities_add_up(modes):
     """Scaling laws: E, G and all inertias together leave w as it is; so do metres, with what they measure."""
     sensitivity = modes.sensitivity
@@ -231,14 +193,6 @@ def test_sensitivities_add_up(modes):
     metres = metres + 3 * sensitivity["payload_mass"]
     metres = metres + 5 * (sensitivity["hub_inertia"] + sensitivity["payload_inertia"])
     np.testing.assert_allclose(metres[flexible], -1.0, rtol=0, atol=1e4 * EPS)
-
-
-def test_the_root_of_the_paper_s_determinant_is_the_frequency():
-    """With 40 digits, and confirmed by mpmath on the appendix."""
-    modes = tfarm.modes(tfarm.load("stocky-steel"), 6)
-    for text, omega in zip(modes.digits(40), modes.natural_frequency, strict=True):
-        with mpmath.workdps(50):
-            assert abs(mpmath.mpf(text) - float(omega)) <= 4 * EPS * omega
 
 
 def test_no_points_have_no_values():

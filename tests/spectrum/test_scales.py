@@ -8,7 +8,8 @@ import pytest
 
 import tfarm
 from tests.shell import answer, run
-from tfarm import Hub, HubFeedback, Link, Payload, Section
+from tests.similar import INERTIA, Units
+from tfarm import Hub, HubFeedback, Payload
 from tfarm.dsp import Chain, stable_windows
 from tfarm.dsp.chain import Sampling
 from tfarm.dsp.sampled import sampled_loop
@@ -33,17 +34,8 @@ EPS = 2.0**-52
 
 def similar(arm, size, stiffness, density):
     """The arm with its lengths, moduli and densities multiplied: times grow by size sqrt(density/stiffness)."""
-    link, section = arm.link, arm.link.section
-    section = Section.general(
-        area=section.area * size**2, second_moment=section.second_moment * size**4, shear_factor=link.shear_factor
-    )
-    time, inertia = size * math.sqrt(density / stiffness), density * size**5
-    link = Link(
-        length=link.length * size, density=link.density * density, youngs_modulus=link.youngs_modulus * stiffness,
-        shear_modulus=link.shear_modulus * stiffness, section=section, damping=link.damping * time,
-    )  # fmt: skip
-    payload = Payload(mass=arm.payload.mass * density * size**3, inertia=arm.payload.inertia * inertia)
-    return replace(arm, link=link, hub=Hub(inertia=arm.hub.inertia * inertia), payload=payload), time, inertia
+    units = Units(density * size**3, size, size * math.sqrt(density / stiffness))
+    return units.arm(arm), units.time, units.of(INERTIA)
 
 
 @pytest.mark.parametrize("arm", [STOCKY, LAB], ids=lambda arm: arm.name)

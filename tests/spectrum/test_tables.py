@@ -151,3 +151,18 @@ def test_as_many_modes_as_lie_below():
 def test_what_is_asked_for_makes_sense(given, words):
     with pytest.raises(ParameterError, match=words):
         tfarm.modes(LAB, **given)
+
+
+@pytest.mark.parametrize("theory", ["timoshenko", "shear", "rayleigh"])
+def test_every_theory_tends_to_euler_bernoulli_as_the_beam_gets_slender(theory):
+    """The correction is (depth/length)^2."""
+    differences = []
+    for depth in (0.02, 0.01, 0.005):
+        section = tfarm.Section.rectangle(width=0.1, depth=depth)
+        link = tfarm.Link.isotropic(length=1.0, density=2.7e3, youngs_modulus=7e10, poissons_ratio=0.3, section=section)
+        arm = tfarm.Arm(link=link, hub=tfarm.Hub(inertia=math.inf))
+        omega = (tfarm.modes(arm, 3, theory=each).natural_frequency[-3:] for each in (theory, "euler-bernoulli"))
+        mine, reference = omega
+        differences.append(1 - mine / reference)
+    order = np.log2(differences[0] / differences[1]), np.log2(differences[1] / differences[2])
+    np.testing.assert_allclose(order, 2.0, atol=0.02)

@@ -110,15 +110,6 @@ def test_the_page_has_the_cells_of_the_files_rounded(table):
     assert "text" not in page.attributes[2][1]["class"]
 
 
-def test_one_line_more_is_a_column_more_everywhere():
-    double = Column("double_rad_s", "twice", "rad/s", of=lambda found: 2 * found.omega, digits=singly(significant, 3))
-    more = Table(columns=(*COLUMNS, double), record=Found())
-    assert next(csv.reader(io.StringIO(as_csv(more))))[-1] == "double_rad_s"
-    assert json.loads(as_json(more))["rows"][0]["double_rad_s"] == 2 * Found().omega[0]
-    assert json.loads(to_json({"found": more}))["found"][0]["double_rad_s"] == 2 * Found().omega[0]
-    assert [row[-1] for row in Parsed(as_html(more)).rows] == ["", "twicerad/s", "143", "2.00 × 10⁻⁹", "∞"]
-
-
 def test_a_column_may_be_for_some_outputs_only():
     columns = (Column("a", of=[1]), Column("b", of=[2], on=ANSWER), Column("c", of=[3], on=REPORT))
     table = Table(columns=columns)

@@ -11,25 +11,22 @@ from tests.dsp.roads import aliased, aliased_loop
 from tests.shell import answer, run
 from tests.tuner.plain import PlainTrial, complex_step, plain_gain
 from tfarm.arm import Hub, HubFeedback
-from tfarm.dsp import Chain, Converters, Sampling, Simulator, sampled_loop
+from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import ParameterError
 from tfarm.report import tuner_section
 from tfarm.tuner import (
     Plan,
-    TunedGain,
     compare_controllers,
     find_guard,
     initial_network,
     load_tuner,
     save_tuner,
-    simulated,
     slew_trial,
     tune,
 )
-from tfarm.tuner.controller import to_text
 from tfarm.tuner.guard import RADIUS_SHARE, MovingGain
 from tfarm.tuner.kernel import Limits
-from tfarm.tuner.trial import usual_rate_gain
+from tfarm.tuner.trial import to_text, usual_rate_gain
 
 LAB = tfarm.load("sasaki2012-lab")
 KP, K1 = 10.0, 3.6
@@ -51,22 +48,6 @@ def test_trial_and_gradient_are_those_of_plain_numpy(signals):
     assert record.cost == pytest.approx(cost.real, rel=1e-10)
     right = complex_step(lambda w: plain.cost(w, 6, network.scales, SECTOR), network.weights)
     np.testing.assert_allclose(trial.gradient(network, SECTOR)[1], right, atol=1e-9 * abs(right).max())
-
-
-@pytest.mark.parametrize(
-    "chain",
-    [
-        Chain(sampling=Sampling(delay_samples=0.7)),
-        Chain(converters=Converters(hub_rate="difference", rate_filter=100.0)),
-    ],
-)
-def test_a_trial_is_that_of_the_simulator(chain):
-    trial, network = slew_trial(LAB, chain, K1=K1, Kp=KP), initial_network(3)
-    record = trial.with_network(network, SECTOR)
-    gain = TunedGain(network, SECTOR, HubFeedback(K1=K1, Kp=KP), "vibration")
-    other = simulated(Simulator(LAB, trial.loop.chain, trial.task, count=6), gain, trial.cost)
-    np.testing.assert_allclose(other.K, record.K, atol=1e-10)
-    np.testing.assert_allclose(other.e, record.e, atol=1e-9)
 
 
 def test_the_exact_arm_obeys_the_criterion_with_its_angle_held():

@@ -7,7 +7,7 @@ import pytest
 
 import tfarm
 from tfarm.errors import ParameterError
-from tfarm.tuner import Guard, Learning, find_guard, initial_network, residual_rms, slew_trial, train
+from tfarm.tuner import Learning, find_guard, initial_network, residual_rms, slew_trial, train
 
 BEST_CONSTANT = 0.9531
 
@@ -80,13 +80,6 @@ def test_the_dynamic_rule_takes_back_what_costs_more(trial, guards, kind, eta):
     np.testing.assert_allclose(training.costs, costs, rtol=1e-9)
     np.testing.assert_allclose(training.network.weights, network.weights, rtol=1e-7)
     assert training.stopped is None
-
-
-@pytest.mark.parametrize("kind", ["time-varying", "frozen", "none"])
-def test_the_dynamic_rule_ends_with_its_lowest_cost(trial, guards, kind):
-    training = train(trial, initial_network(2), guards[kind], Learning(), 60)
-    assert training.result.cost == pytest.approx(training.costs.min(), rel=1e-12)
-    assert training.result.cost < training.costs[0]
 
 
 @pytest.mark.parametrize(("kind", "worst"), [("time-varying", BEST_CONSTANT), ("frozen", 0.90)])
@@ -209,29 +202,9 @@ def test_memory_does_not_grow_with_the_trials(trial, guards):
 
 
 @pytest.mark.parametrize(
-    ("change", "key"),
-    [
-        ({"eta": -0.1}, "eta"),
-        ({"eta": 0.0}, "eta"),
-        ({"eta": np.array([0.1, np.nan])}, "eta"),
-        ({"alpha": 1.0}, "alpha"),
-        ({"alpha": -0.1}, "alpha"),
-        ({"clip": 0.0}, "clip"),
-        ({"enough": -1.0}, "enough"),
-        ({"mode": "batch"}, "mode"),
-        ({"rule": "adam"}, "rule"),
-        ({"sensitivity": "two-step"}, "sensitivity"),
-    ],
+    "change", [{"eta": np.array([0.1, np.nan])}, {"clip": 0.0}, {"enough": -1.0}, {"sensitivity": 2}]
 )
-def test_bad_learning_is_refused(change, key):
+def test_bad_learning_is_refused(change):
     with pytest.raises(ParameterError) as caught:
         Learning(**change)
-    assert caught.value.key == key
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("trials", [0, -1, 2.5, True])
-def test_trials_are_counted_in_whole_numbers(trial, trials):
-    guard = Guard("none", 0.0, np.inf, 6, False)
-    with pytest.raises(ParameterError, match="whole number of trials"):
-        train(trial, initial_network(0), guard, Learning(), trials)
+    assert caught.value.key == next(iter(change))

@@ -1,7 +1,6 @@
 """What is analysed: the arm as frozen records, its TOML file and the presets."""
 
 from tfarm.arm.checks import INPUT_UNITS, INPUTS, THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Input, Theory
-from tfarm.arm.driving import AnyLaw, arm_and_law, as_law, cancelled, full_law, must_not_be_algebraic, tracked
 from tfarm.arm.feedback import (
     ANGLE_GAIN,
     AT_HUB,
@@ -20,13 +19,11 @@ from tfarm.arm.feedback import (
     driven,
     input_words,
     law_of,
-    laws_at,
-    many_laws,
     shown_unit,
     unit_of,
     written_unit,
 )
-from tfarm.arm.law import Law
+from tfarm.arm.law import AnyLaw, Law, arm_and_law, as_law, cancelled, full_law, must_not_be_algebraic, tracked
 from tfarm.arm.link import Link, Section
 from tfarm.arm.plausible import implausible
 from tfarm.arm.reading import load, presets
@@ -75,9 +72,7 @@ __all__ = [
     "implausible",
     "input_words",
     "law_of",
-    "laws_at",
     "load",
-    "many_laws",
     "must_be_arm",
     "must_not_be_algebraic",
     "must_turn",

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tfarm.arm.checks import INPUT_UNITS, LARGEST_NUMBER, number
 from tfarm.arm.records import Arm
@@ -106,10 +106,6 @@ class HubFeedback:
         """Every gain times a number."""
         return HubFeedback(**{gain.name: factor * self[gain.name] for gain in GAINS})
 
-    def plus(self, other: HubFeedback, factor: float = 1.0) -> HubFeedback:
-        """This law and so many times another one at once: their torques add."""
-        return HubFeedback(**{gain.name: self[gain.name] + factor * other[gain.name] for gain in GAINS})
-
 
 def unit_of(name: str, arm: Arm) -> str:
     """The SI unit of the gain of that name on an arm whose loop closes through its own input: N m, A or V.
@@ -144,17 +140,6 @@ def input_words(arm: Arm) -> str:
 def driven(arm: Arm) -> str:
     """A clause that says what u is, where it is no torque."""
     return f"; u is {input_words(arm)}" if shown_unit(MOMENT_GAIN, arm) else ""
-
-
-def many_laws(law: HubFeedback, **varied: ArrayLike) -> NDArray[np.float64]:
-    """Rows (gains, n) in the order of `GAINS`: the law's gains, but for those named, which take n values together."""
-    columns = [np.asarray(varied.get(gain.name, law[gain.name]), dtype=float) for gain in GAINS]
-    return np.array(np.broadcast_arrays(*(np.atleast_1d(column) for column in columns)))
-
-
-def laws_at(held: HubFeedback, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows (gains, n) in the order of `GAINS`: the law with its gains of the plane at n points (2, n) of it."""
-    return many_laws(held, **dict(zip(PLANE, points, strict=True)))
 
 
 def law_of(row: ArrayLike) -> HubFeedback:

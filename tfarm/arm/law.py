@@ -8,6 +8,7 @@ simplest of them: a number on hub angle, hub rate and root moment.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,11 +20,13 @@ import numpy as np
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace, block_of
 from tfarm.arm.checks import INPUTS, check_fields, not_negative, number, positive
 from tfarm.arm.feedback import AT_HUB, GAINS, ON, OUTPUT_OF, HubFeedback
+from tfarm.arm.records import Arm
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError, did_you_mean, must_be_known
 from tfarm.records import record
 
 MOST_SIGNALS = 12  # of a law: more than any rig measures
+CANCELLED = 1e-6  # of its size: a zero of the law so near to an unstable pole of it cancels that
 REFERENCE = "reference:"  # before the name of a signal: what that should be
 SAMPLING_RULES = ("tustin", "zoh", "matched")  # by which a continuous law is made discrete
 
@@ -329,3 +332,71 @@ def _varied(block: LawBlock, rest: str, value: float, key: str) -> LawBlock:
             return replace(block, **{polynomial: tuple(numbers)})
     remedy = "a number of the law is named signal, signal.num.N or signal.den.N with N counted from 0"
     raise ParameterError(key="law", value=key, remedy=remedy)
+
+
+AnyLaw = HubFeedback | Law
+
+# ------------------------------------------------------------ what a law drives, and whether it is gains at the hub
+
+
+def as_law(law: AnyLaw) -> Law:
+    """The law as one of signals, gains at the hub too.  Raises ParameterError for what is no law."""
+    if isinstance(law, HubFeedback):
+        return Law.of_gains(law)
+    if not isinstance(law, Law):
+        raise ParameterError(key="law", value=law, remedy="give a HubFeedback or a Law")
+    return law
+
+
+def full_law(law: AnyLaw) -> Law:
+    """The law as one of signals; gains at the hub as a law on all of their signals, also those with a gain of 0."""
+    gains = as_law(law).gains
+    if gains is None:
+        return as_law(law)
+    return Law({gain.output: gains[gain.name] for gain in GAINS}, name="gains at the hub", references=AT_HUB)
+
+
+def arm_and_law(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
+    """The arm with the input that the law drives, and the law as gains at the hub where it is no more than those.
+
+    Raises ParameterError for what is no law.
+    """
+    law = as_law(law)
+    if law.input is not None and law.input != arm.input:
+        arm = replace(arm, input=law.input)  # type: ignore[arg-type]  # the record refuses what is none
+    return arm, law.gains or law
+
+
+def tracked(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
+    """The same for a loop that is led: gains at the hub follow references in all that they feed back.
+
+    So a law that is no more than gains is taken for them where each of its signals is among its references.
+    """
+    (driven, plain), led = arm_and_law(arm, law), as_law(law)
+    return driven, plain if set(led.signals) <= set(led.references) else law
+
+
+def must_not_be_algebraic(arm: Arm, key: str, value: object) -> None:
+    """Raise ParameterError where the hub has no inertia: its root moment, fed back, is the torque itself."""
+    if arm.has_massless_hub:
+        remedy = (
+            "with hub.inertia = 0 the root moment is -u itself, so that moment feedback is an algebraic loop; "
+            "give the hub an inertia, or feed no moment back"
+        )
+        raise ParameterError(key=key, value=value, remedy=remedy)
+
+
+def cancelled(law: Law) -> tuple[str, ...]:
+    """Warnings: the law's own poles right of the axis, or outside the unit circle, that its own zeros cancel."""
+    found = []
+    for part in law.parts:
+        zeros = getattr(part.block, "zeros", np.empty(0, complex))
+        for pole in part.block.poles:
+            gap = abs(zeros - pole).min() if zeros.size else math.inf
+            grows = abs(pole) >= 1 if law.is_discrete else pole.real >= 0
+            if grows and gap <= CANCELLED * max(abs(pole), 1e-12):
+                where = f"z = {pole:.6g}" if law.is_discrete else f"{pole:.6g} 1/s"
+                found.append(
+                    f"the law cancels its own unstable pole {where} on {', '.join(part.signals)}: it is not stable"
+                )
+    return tuple(found)

@@ -38,16 +38,6 @@ class NamedShape:
     cowper: Callable[..., float]
 
 
-def cowper_rectangle(nu: float, **_: float) -> float:
-    """kappa = 10 (1 + nu) / (12 + 11 nu)."""
-    return 10 * (1 + nu) / (12 + 11 * nu)
-
-
-def cowper_round(nu: float, **_: float) -> float:
-    """kappa = 6 (1 + nu) / (7 + 6 nu)."""
-    return 6 * (1 + nu) / (7 + 6 * nu)
-
-
 def cowper_tube(nu: float, *, outer_diameter: float, inner_diameter: float) -> float:
     """kappa = 6 (1 + nu) (1 + m^2)^2 / ((7 + 6 nu) (1 + m^2)^2 + (20 + 12 nu) m^2),  m = inner/outer."""
     m2 = (inner_diameter / outer_diameter) ** 2
@@ -59,13 +49,13 @@ SHAPES: Mapping[str, NamedShape] = {
         dimensions=("width", "depth"),
         area=lambda width, depth: width * depth,
         second_moment=lambda width, depth: width * depth**3 / 12,
-        cowper=cowper_rectangle,
+        cowper=lambda nu, **_: 10 * (1 + nu) / (12 + 11 * nu),
     ),
     "round": NamedShape(
         dimensions=("diameter",),
         area=lambda diameter: math.pi * diameter**2 / 4,
         second_moment=lambda diameter: math.pi * diameter**4 / 64,
-        cowper=cowper_round,
+        cowper=lambda nu, **_: 6 * (1 + nu) / (7 + 6 * nu),
     ),
     "tube": NamedShape(
         dimensions=("outer_diameter", "inner_diameter"),

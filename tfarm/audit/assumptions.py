@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -39,43 +39,24 @@ OWN_VALUE = 1e-9  # relative: so near to the arm's own value a candidate is that
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 @record
-class SectionStudy:
-    """Frequencies over rectangles of the arm's own area, a row a candidate.
+class Study:
+    """Frequencies over the candidates of one assumed parameter, a row a candidate.
 
-    `depth` in the plane of bending, `width` = A/depth [m] and `second_moment` I = A depth^2/12 [m^4] have shape (n,);
-    `natural_frequency` [rad/s] and `sensitivity`, d ln w/d ln I with area, shear factor and all else held, have shape
-    (n, count), flexible modes from the first.  `is_own` marks the arm's own section, or for another shape the
-    rectangle with its area and second moment: only these two and the shear factor enter.
+    `values` (n,) are depths [m] of rectangles of the arm's own area, in the plane of bending, or hub inertias [kg m^2].
+    `natural_frequency` [rad/s] and `sensitivity`, d ln w/d ln of the second moment (area, shear factor and all else
+    held) or of the inertia, are (n, count), flexible modes from the first.  `is_own` marks the arm's own value, or for
+    another shape the rectangle with its area and second moment: only these two and the shear factor enter.  `pinned`
+    and `locked` [rad/s] are the limits of every column for a free pin and for the locked hub; empty of a section.
     """
 
     arm: Arm
     arms: tuple[Arm, ...]
-    depth: Real
-    width: Real
-    second_moment: Real
+    values: Real
     natural_frequency: Real
     sensitivity: Real
     is_own: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-@record
-class HubStudy:
-    """Frequencies over hub inertias, a row a candidate.
-
-    `hub_inertia` I_h [kg m^2] has shape (n,); `natural_frequency` [rad/s] and `sensitivity`, d ln w/d ln I_h, are
-    (n, count).  `locked` [rad/s] holds the limits of every column for I_h -> inf, `pinned` those for I_h = 0.  `is_own`
-    marks the arm's own inertia.
-    """
-
-    arm: Arm
-    arms: tuple[Arm, ...]
-    hub_inertia: Real
-    natural_frequency: Real
-    sensitivity: Real
-    locked: Real
-    pinned: Real
-    is_own: NDArray[np.bool_]
+    pinned: Real = field(default_factory=lambda: np.empty(0))
+    locked: Real = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +73,7 @@ class LoopVerdict:
     is_edge: bool = False
 
 
-def loop_verdicts(study: SectionStudy | HubStudy) -> tuple[LoopVerdict, ...] | None:
+def loop_verdicts(study: Study) -> tuple[LoopVerdict, ...] | None:
     """The verdict on each candidate under the default gains of the arm itself.
 
     None where the hub is locked or a free pin: the moment has no loop there.
@@ -143,7 +124,7 @@ def has_hub_inertia(arm: Arm) -> bool:
     return 0.0 < arm.hub.inertia < math.inf
 
 
-def section_study(arm: Arm, depths: Sequence[float] | None = None, *, count: int = STUDIED_MODES) -> SectionStudy:
+def section_study(arm: Arm, depths: Sequence[float] | None = None, *, count: int = STUDIED_MODES) -> Study:
     """The first `count` flexible frequencies over rectangles of the arm's area with these depths [m].
 
     Without depths those of `candidate_depths`.  The shear factor is the arm's own throughout.
@@ -159,38 +140,32 @@ def section_study(arm: Arm, depths: Sequence[float] | None = None, *, count: int
     ]
     arms = [replace(arm, link=replace(link, section=section)) for section in sections]
     frequency, sensitivity = _frequencies(arms, count, "second_moment")
-    return SectionStudy(
-        arm=arm,
-        arms=tuple(arms),
-        depth=depth,
-        width=area / depth,
-        second_moment=second_moment,
-        natural_frequency=frequency,
-        sensitivity=sensitivity,
-        is_own=abs(depth / own_depth(arm) - 1) < OWN_VALUE,
+    own = abs(depth / own_depth(arm) - 1) < OWN_VALUE
+    return Study(
+        arm=arm, arms=tuple(arms), values=depth, natural_frequency=frequency, sensitivity=sensitivity, is_own=own
     )
 
 
-def hub_study(arm: Arm, inertias: Sequence[float] | None = None, *, count: int = STUDIED_MODES) -> HubStudy:
+def hub_study(arm: Arm, inertias: Sequence[float] | None = None, *, count: int = STUDIED_MODES) -> Study:
     """The first `count` flexible frequencies over hub inertias [kg m^2]; without them those of `candidate_inertias`.
 
     Raises ParameterError for an inertia that is not positive and finite.
     """
     meaning = "the hub inertia of a candidate is a positive, finite number of kg m^2"
     chosen = candidate_inertias(arm) if inertias is None else inertias
-    values = [positive("inertias", inertia, meaning) for inertia in chosen]
-    arms = [arm.having(hub_inertia=inertia) for inertia in values]
+    values = np.array([positive("inertias", inertia, meaning) for inertia in chosen])
+    arms = [arm.having(hub_inertia=inertia) for inertia in values.tolist()]
     frequency, sensitivity = _frequencies(arms, count, "hub_inertia")
     pinned, _ = _frequencies([arm.having(hub_inertia=0.0)], count, "hub_inertia")
-    return HubStudy(
+    return Study(
         arm=arm,
         arms=tuple(arms),
-        hub_inertia=np.array(values),
+        values=values,
         natural_frequency=frequency,
         sensitivity=sensitivity,
-        locked=_locked(arm, count),
+        is_own=abs(values - arm.hub.inertia) < OWN_VALUE * values,
         pinned=pinned[0],
-        is_own=abs(np.array(values) - arm.hub.inertia) < OWN_VALUE * np.array(values),
+        locked=_locked(arm, count),
     )
 
 
@@ -215,7 +190,6 @@ def _with_own(candidates: Any, own: float) -> tuple[float, ...]:
     return tuple(sorted([*(value for value in candidates if abs(value / own - 1) >= OWN_VALUE), own]))
 
 
-Study = SectionStudy | HubStudy
 HELD_SECTION = "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice"
 HELD_HUB = "all else held"
 OWN = "#eaf1f8"  # on a page behind the row of the arm itself
@@ -228,16 +202,22 @@ def _tints(study: Study) -> list[str]:
 
 _size = partial(Column, digits=singly(plain, 4), printed=singly(general, 4), tint=_tints)
 SECTION_COLUMNS = (
-    _size("depth_m", "depth", "m", of="depth"),
-    _size("width_m", "width", "m", of="width"),
-    _size("second_moment_m4", "I", "m⁴", of="second_moment", head="I [m^4]"),
+    _size("depth_m", "depth", "m", of="values"),
+    _size("width_m", "width", "m", of=lambda study: study.arm.link.section.area / study.values),
+    _size(
+        "second_moment_m4",
+        "I",
+        "m⁴",
+        head="I [m^4]",
+        of=lambda study: study.arm.link.section.area * study.values**2 / 12,
+    ),
 )
-HUB_COLUMNS = (_size("hub_inertia_kg_m2", "I_h", "kg m²", of="hub_inertia", head="I_h [kg m^2]"),)
+HUB_COLUMNS = (_size("hub_inertia_kg_m2", "I_h", "kg m²", of="values", head="I_h [kg m^2]"),)
 
 
 def candidates(study: Study) -> Table:
     """A row a candidate: its size, frequencies [rad/s], sensitivities, and what becomes of the default loop."""
-    size, parameter = (HUB_COLUMNS, "I_h") if isinstance(study, HubStudy) else (SECTION_COLUMNS, "I")
+    size, parameter = (HUB_COLUMNS, "I_h") if study.pinned.size else (SECTION_COLUMNS, "I")
     columns = (
         Column("is_own", head="", printed=lambda values: ["*" * own for own in values], on=ANSWER),
         Column("is", of=["this arm" if own else "" for own in study.is_own], tint=_tints, on=REPORT),

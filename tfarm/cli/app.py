@@ -4,56 +4,26 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
-from contextlib import suppress
-from functools import cache, wraps
-from inspect import Parameter, signature
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+from threading import Event, Thread
 from typing import IO, TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from tfarm.errors import ParameterError, one_line
+from tfarm.files import is_standard_output
+from tfarm.tables.files import to_json, write_csv
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
+    from tfarm.columns import Table
     from tfarm.exact.outputs import Output
 
 
-class Asked(str):
-    """A preset's name or a file as it is typed, and the theory that is asked for instead of the arm's own."""
-
-    theory: str | None = None
-
-
-class Verbs(typer.Typer):
-    """The application, whose commands on an ARM all take --theory."""
-
-    def command(self, *arguments: Any, **options: Any) -> Callable[[Any], Any]:
-        """The decorator that makes a command of a function."""
-        register = super().command(*arguments, **options)
-        return lambda function: register(of_an_arm(function))
-
-
-def of_an_arm(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with an option --theory before its last one, if it takes an ARM: what it gets is `Asked`."""
-    whole_signature = signature(command, eval_str=True)
-    *rest, last = whole_signature.parameters.values()
-    if "arm" not in whole_signature.parameters:
-        return command
-
-    @wraps(command)
-    def with_theory(arm: str, theory: str | None, **arguments: Any) -> None:
-        asked = Asked(arm)
-        asked.theory = theory
-        command(arm=asked, **arguments)
-
-    shown = [*rest, Parameter("theory", Parameter.KEYWORD_ONLY, default=None, annotation=TheoryName), last]
-    keywords = [each.replace(kind=Parameter.KEYWORD_ONLY) for each in shown]
-    with_theory.__signature__ = whole_signature.replace(parameters=keywords)  # type: ignore[attr-defined]
-    return with_theory
-
-
-app = Verbs(
+app = typer.Typer(
     name="tfarm",
     add_completion=False,
     rich_markup_mode=None,
@@ -89,6 +59,7 @@ TheoryName = Annotated[
     str | None,
     typer.Option("--theory", help="timoshenko, shear, rayleigh or euler-bernoulli; the arm's own if not said"),
 ]
+PROGRESS_EVERY = 4.0  # seconds from one line of progress to the next: few lines in a log, and no long silence
 INPUT_REMEDY = "Set input to hub_torque, motor_voltage or motor_current at the top of the file."
 SideName = Annotated[
     str | None, typer.Option("--side", help="outer (if not said) or inner side of a joint, for outputs along the arm")
@@ -103,7 +74,7 @@ DigitCount = Annotated[str | None, typer.Option("--digits", metavar="D", help="r
 
 
 def load_arm(name: str, theory: str | None = None, driven: str | None = None) -> Arm:
-    """The preset or file of that name, under that theory, or what is `Asked`, or its own.
+    """The preset or file of that name, under that theory or its own.
 
     Values that look like a slip of units, and a motor without an input (`driven` or the file's), are named on standard
     error.
@@ -116,8 +87,8 @@ def load_arm(name: str, theory: str | None = None, driven: str | None = None) ->
     arm = arm_in(table, file)
     if "motor" in table and "input" not in table and driven is None:
         tell(f"warning: {file}: input: not given with a [motor], {arm.input} is assumed. {INPUT_REMEDY}")
-    if (other := theory or getattr(name, "theory", None)) is not None:
-        arm = arm.under(cast("Any", other))
+    if theory is not None:
+        arm = arm.under(cast("Any", theory))
     if texts := implausible(arm):
         tell(f"warning: {arm.name}: {'; '.join(texts)}")
     return arm
@@ -130,18 +101,83 @@ def read_on(names: list[str], side: str | None) -> list[str | Output]:
     return [name if side is None else on_side(name, cast("Any", side)) for name in names]
 
 
-def give(answer: dict[str, Any], json: bool, show: Callable[[dict[str, Any]], None]) -> None:
-    """The answer as one JSON object, or as `show` prints it, then what is not known and which gains are defaults."""
+def give(answer: dict[str, Any], json: bool, printed: Callable[[dict[str, Any]], None]) -> None:
+    """The answer as one JSON object, or as it is `printed`, then what is not known and which gains are defaults."""
     if json:
-        from tfarm.tables.files import to_json
-
         print(to_json(answer))
         return
-    show(answer)
+    printed(answer)
     if answer.get("windows_note"):
         print(answer["windows_note"])
     if answer.get("default_gains"):
         print(f"by default {answer['default_gains_in_words']}")
+
+
+def hand_out(
+    answer: Callable[[], dict[str, Any]],
+    printed: Callable[[dict[str, Any]], None],
+    json: bool,
+    *,
+    csv: Path | None = None,
+    table: Callable[[], Table] | None = None,
+    png: Path | None = None,
+    picture: Sequence[object] = (),
+    also: Sequence[Path | None] = (),
+) -> None:
+    """What was found: its table and its picture to the files asked for, then the answer, as JSON or `printed`.
+
+    `picture` is the record that is drawn, with what stands beside it; `also` are files that are written already.
+    Nothing is printed where standard output holds one of them.
+    """
+    if csv is not None and table is not None:
+        write_csv(table(), csv)
+    if png is not None:
+        import tfarm.plots  # noqa: F401  every picture is known once they are loaded
+        from tfarm.plots.files import save_png
+        from tfarm.plots.style import FIGURES
+
+        save_png(FIGURES[type(picture[0])](*picture), png)
+    if say_written(*also, csv, png) or json:
+        give(answer(), json, printed)
+
+
+def say_written(*paths: Path | None) -> bool:
+    """Say on standard error which files were written; False where one is standard output, which holds the table."""
+    given = [path for path in paths if path is not None]
+    if any(map(is_standard_output, given)):
+        return False
+    for path in given:
+        print(f"written: {path}", file=sys.stderr)
+    return True
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[int, int, str], None] | None]:
+    """A progress bar on a terminal; in a pipe a line every few seconds, of what runs."""
+    if sys.stderr.isatty():
+        from rich.console import Console
+        from rich.progress import Progress
+
+        with Progress(console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task("", total=None)
+            yield lambda done, total, text: bar.update(task, completed=done, total=total, description=text)
+        return
+    state, over = ["starting"], Event()
+
+    def advance(done: int, total: int, text: str) -> None:
+        state[0] = f"{done} of {total} done" + f", running: {text}" * bool(text)
+
+    def speak() -> None:
+        while not over.wait(PROGRESS_EVERY):
+            tell(state[0])
+
+    speaker = Thread(target=speak, daemon=True)
+    speaker.start()
+    try:
+        yield advance
+    finally:
+        over.set()
+        speaker.join()
 
 
 def right_digits(text: str | None) -> int | None:
@@ -190,7 +226,7 @@ def say_when_compiling() -> None:
 
     numba keeps what it has compiled, so this is the first use after an installation or an update.
     """
-    from numba.core.event import Event, Listener, register
+    from numba.core.event import Listener, register
 
     class Announcement(Listener):  # type: ignore[misc]  # numba comes without types
         said = False

@@ -1,49 +1,37 @@
-"""The verbs of the continuous loop: poles, margins, map and design."""
+"""The verbs of the continuous loop: poles, margins, Nyquist, spill-over and locus."""
 
 from __future__ import annotations
 
-import math
-import sys
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, TWO_GAINS, as_law
-from tfarm.cli.app import ArmName, Json, app, give, load_arm, plain_number, tell, whole_number
-from tfarm.cli.inputs import Given, HeldAngle, LawFile, Png, asked_law, range_option, under_a_law, with_options
-from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
-from tfarm.errors import ParameterError
+from tfarm.arm import ANGLE_GAIN, NAMES
+from tfarm.cli.app import ArmName, Json, app, give, hand_out, whole_number
+from tfarm.cli.inputs import Given, Png, under_a_law
+from tfarm.columns import Column, Table
+from tfarm.digits import general, singly
+from tfarm.tables.terminal import heading, show
 
 if TYPE_CHECKING:
-    from tfarm.arm import AnyLaw, Arm
-    from tfarm.arrays import Real
-    from tfarm.dsp import Chain
+    from tfarm.loop.margins import Margins
 
+Csv = Annotated[Path | None, typer.Option("--csv", help="write the curve to this file")]
 HELP_ON_COUNT = (
     "poles with Im s >= 0, 1 to 1000; if not given ten, or those below the shear cut-off where they are fewer"
 )
-
-HELP_ON_ALSO = "a further arm that the law has to serve: the objective is the worst of all; may be repeated"
-HELP_ON_RANGE = "numbers that the arm may have, such as payload.mass=0.1,0.5; up to four: corners, and a search inside"
-HELP_ON_VARY = "twice: two numbers of a law and their ranges; gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N"
-
-MapPeriod = Annotated[
-    float | None, typer.Option("--period", help="sampling period [s]: the map of the sampled loop, as with --dsp")
+Vary = Annotated[
+    str,
+    typer.Option(
+        "--vary",
+        help=f"{', '.join(NAMES)}, all (a scale on all of them), payload_mass, payload_inertia, hub_inertia, length or "
+        "damping; or gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N",
+    ),
 ]
-HELP_ON_MAP = (
-    f"How many poles are unstable over the plane of {' and '.join(PLANE)}, and the exact boundary; "
-    "or over two numbers of a law."
-)
-HELP_ON_OBJECTIVE = "damping, margin, sensitivity, delay, residual or cost (of the tuner's trial)"
-HELP_ON_STRUCTURE = f"{TWO_GAINS}, PD, PD+notch, lead, PPF or strain-rate"
-USUAL_RANGES = {  # of a map
-    RATE_GAIN: f"by default -1,3 on the paper's arm, -3.33 to 10 times the default {RATE_GAIN} on a rig",
-    MOMENT_GAIN: "by default -2,2, times what one N m takes of the input of a rig",
-}
-RANGES = {name: range_option(name, f"range of {name}; {usual}") for name, usual in USUAL_RANGES.items()}
-BOUNDS = {name: range_option(name, f"bounds of {name}") for name in PLANE}
+HELP_ON_POINTS = "values, equally spaced; 500, along a gain, delay or signal of a law 100"
+HELP_ON_BRANCHES = "branches, 1 to 200; along those the flexible modes below the top of the box"
 
 
 @app.command()
@@ -57,27 +45,131 @@ def poles(
     given: Given,
 ) -> None:
     """Closed-loop poles of the exact arm, complete in a printed box."""
-    number, subject = None if count is None else whole_number("--count", count, 1, 1000), load_arm(arm)
-    law, said = asked_law(subject, given)
-    from tfarm.cli.control_tables import print_poles
+    number = None if count is None else whole_number("--count", count, 1, 1000)
+    subject, law, said = given.loop()
     from tfarm.loop.answers import poles_answer
     from tfarm.loop.poles import closed_loop_poles
 
-    give(poles_answer(closed_loop_poles(subject, law, number), certify) | said, json, print_poles)
+    give(poles_answer(closed_loop_poles(subject, law, number), certify) | said, json, _print_poles)
+
+
+def _print_poles(answer: dict[str, Any]) -> None:
+    """A row a pole, then the box."""
+    from tfarm.loop.answers import POLE_COLUMNS
+
+    show(Table(columns=POLE_COLUMNS, record=[complex(*pole) for pole in answer["poles"]]))
+    left, right, _, top = answer["box"]
+    proven = "proven" if "discs" in answer else "by winding number"
+    print(f"all poles with {left:.6g} < Re s < {right:.6g} and |Im s| < {top:.6g} ({proven}),")
+    print(f"{answer['unstable']} of them unstable")
+    if answer["ends_at_shear_cutoff"]:
+        print(f"no more lie below sqrt(kGA/rhoI), {answer['shear_cutoff_rad_s']:.6g} rad/s, where the list ends;")
+        print("--count goes on above it, in Timoshenko's theory into shear, which that hardly damps")
+    print(answer["sign_convention"])
 
 
 @app.command()
 @under_a_law
 def margins(arm: ArmName, json: Json = False, *, given: Given) -> None:
     """The verdict on a loop, the windows of each gain, and the margins of the exact loop function."""
-    subject = load_arm(arm)
-    law, said = asked_law(subject, given)
-    from tfarm.cli.control_tables import print_margins
+    subject, law, said = given.loop()
     from tfarm.loop.answers import margins_answer
     from tfarm.loop.margins import margins as find_margins
 
     found = find_margins(subject, law)
-    give(margins_answer(found) | said, json, partial(print_margins, found))
+    give(margins_answer(found) | said, json, partial(_print_margins, found))
+
+
+def _print_margins(found: Margins, answer: dict[str, Any]) -> None:
+    """The verdict, then everything else: of gains at the hub Lyapunov's argument, and how far each may go alone."""
+    from tfarm.loop.answers import WINDOW_COLUMNS, gain_rows
+    from tfarm.loop.windows import BEYOND_LAW
+
+    far = answer["verdict"] == "unstable" or answer["known_beyond_the_band"]
+    reach = "" if far else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
+    poles = found.stability.poles
+    is_of_gains = "lyapunov" in answer
+    why = f"that {ANGLE_GAIN} = 0 leaves" if is_of_gains else "of a hub whose angle is not held"
+    apart = f" (apart from the pole at 0 {why})" if poles.moving.size < poles.values.size else ""
+    print(f"{answer['arm']}: {answer['verdict'].upper()}{reach}{apart}")
+    more = " (infinitely many in all)" if answer["unstable_roots_infinite"] else ""
+    print(f"unstable poles up to {answer['band_rad_s']:.6g} rad/s: {answer['unstable_roots']}{more}")
+    print(answer["beyond_the_band"])
+    for warning in answer.get("warnings", ()):
+        print(f"warning: {warning}")
+    ends = "no limit was found up to there, and beyond none was looked for"
+    if is_of_gains:
+        print(f"Lyapunov: {answer['lyapunov']['reason']}")
+        show(Table(columns=WINDOW_COLUMNS, record=gain_rows(found)))
+        ranges = ((name, *each.looked_at) for name, each in found.windows.items())
+        spans = ", ".join(f"{name} ({low:.6g}, {high:.6g})" for name, low, high in ranges)
+        print(f"looked at: {spans}; * {ends}")
+    elif answer["passivity"]["kind"]:
+        print(answer["passivity"]["reason"])
+    if found.windows and not is_of_gains:
+        show(answer["windows"])
+        print(f"each looked at up to {BEYOND_LAW:g} times its size, of either sign; * {ends}")
+    if answer["in_band"] is not None:
+        _print_loop_margins(found, answer)
+    print(answer["sign_convention"])
+
+
+def _print_loop_margins(found: Margins, answer: dict[str, Any]) -> None:
+    """Each margin, exact and in the band, then the crossovers."""
+    from tfarm.loop.answers import margin_rows
+
+    assert found.in_band is not None
+    rows, band, six = list(margin_rows(found, found.in_band)), answer["in_band"], singly(general, 6)
+    columns = (
+        Column("margin", "margin", of=["gain (factors)", *(heading(row.column) for row in rows)]),
+        Column("exact", "exact", of=[pair_words(answer["gain_margin"]), *(row.exact for row in rows)], digits=six),
+        Column("band", f"up to {band['band_rad_s']:.6g} rad/s", of=["", *(row.in_band for row in rows)], digits=six),
+        Column("at", "at", "rad/s", of=["", *("-" if row.at == "" else row.at for row in rows)], digits=six),
+    )
+    show(Table(columns=columns))
+    for key, empty in (("gain_crossovers", "|L| = 1"), ("phase_crossovers", "L < 0")):
+        if answer[key]:
+            show(answer[key])
+        else:
+            print(f"nowhere in the band {empty}")
+    phase = band["phase_margin_deg"]
+    if phase < 0:
+        print(f"phase margin {phase:.6g} deg: lead; not an instability")
+
+
+def pair_words(pair: Any) -> str:
+    return f"({pair[0]:.8g}, {pair[1]:.8g})" if pair else ""
+
+
+@app.command()
+@under_a_law
+def nyquist(arm: ArmName, png: Png = None, csv: Csv = None, json: Json = False, *, given: Given) -> None:
+    """Nyquist plot of the exact loop: the turns around -1 counted, beside the poles found in a box."""
+    subject, law, said = given.loop()
+    from tfarm.loop.answers import nyquist_answer
+    from tfarm.loop.nyquist import nyquist as find
+    from tfarm.loop.nyquist import nyquist_table
+
+    found = find(subject, law)
+    hand_out(
+        lambda: nyquist_answer(found) | said, _print_nyquist, json,
+        csv=csv, table=lambda: nyquist_table(found), png=png, picture=(found,),
+    )  # fmt: skip
+
+
+def _print_nyquist(answer: dict[str, Any]) -> None:
+    """The verdict, then the two counts."""
+    reach = f"up to {answer['band_rad_s']:.6g} rad/s"
+    print(f"{answer['arm']}: {answer['verdict'].upper()}")
+    print(f"turns around -1 {reach}, counter-clockwise positive: {answer['encirclements']}")
+    print(f"poles of L right of the contour: {answer['unstable_open']}")
+    print(
+        f"unstable poles by Nyquist's criterion: {answer['unstable_by_nyquist']}, in a box: {answer['unstable_roots']}"
+    )
+    if answer["on_axis"]:
+        print(f"undecided: {answer['on_axis']} that lie on the axis to working precision")
+    print(answer["beyond_the_band"])
+    print(answer["sign_convention"])
 
 
 @app.command()
@@ -90,182 +182,90 @@ def spill(
     given: Given,
 ) -> None:
     """Does a law drive a mode that its design model leaves out?  The exact loop beside models of 1, 2, 3 ... modes."""
-    number, subject = whole_number("--modes", modes, 1, 60), load_arm(arm)
-    law, said = asked_law(subject, given)
-    from tfarm.cli.control_tables import print_spill
+    number = whole_number("--modes", modes, 1, 60)
+    subject, law, said = given.loop()
     from tfarm.loop.answers import spill_answer
     from tfarm.loop.spill import spill as find
 
-    give(spill_answer(find(subject, law, number)) | said, json, print_spill)
+    give(spill_answer(find(subject, law, number)) | said, json, _print_spill)
 
 
-@app.command("map", help=HELP_ON_MAP)
-@with_options(RANGES, after="arm")
-def gain_map(
-    arm: ArmName,
-    kp: HeldAngle = 0.0,
-    points: Annotated[str | None, typer.Option("--points", help="grid points along each; 101, of a law 60")] = None,
-    csv: Annotated[Path | None, typer.Option("--csv", help="write both numbers and the count to this file")] = None,
-    png: Png = None,
-    law: LawFile = None,
-    vary: Annotated[list[str] | None, typer.Option("--vary", metavar="NAME=LO,HI", help=HELP_ON_VARY)] = None,
-    period: MapPeriod = None,
-    delay_samples: Delay = None,
-    dsp: DspFile = None,
-    json: Json = False,
-    *,
-    typed: dict[str, str | None],
-) -> None:
-    """The map over the plane of both gains, or over two numbers of a law."""
-    number, subject = whole_number("--points", points or "101", 2, 2000), load_arm(arm)
-    chain = None if (period, delay_samples, dsp) == (None,) * 3 else asked_chain(dsp or arm, period, delay_samples)
-    if vary or law:
-        _must_be_none_of(typed | {ANGLE_GAIN: kp or None})
-        _law_map(subject, arm, law, vary or [], whole_number("--points", points or "60", 2, 400), chain, csv, png, json)
-        return
-    from tfarm.loop.plane import ranges_of
-
-    usual, given = ranges_of(subject), _bounds_of(typed)
-    x, y = (given[name] or known for name, known in zip(PLANE, usual, strict=True))
-    from tfarm.cli.control_tables import print_map
-    from tfarm.cli.tables import hand_out
-    from tfarm.loop.answers import map_answer, plane_table
-    from tfarm.loop.plane import between
-    from tfarm.loop.plane import gain_map as find
-
-    if chain is not None:
-        from tfarm.spectrum.table import default_gains
-
-        gains = default_gains(subject).having(ANGLE_GAIN, kp)
-        _sampled_map(subject, gains, chain, PLANE, (between(*x, number), between(*y, number)), csv, png, json)
-        return
-    found = find(subject, between(*x, number), between(*y, number), kp)
-    hand_out(
-        lambda: map_answer(found), print_map, json,
-        csv=csv, table=lambda: plane_table(PLANE, *found.axes, found.unstable), png=png, picture=(found,),
-    )  # fmt: skip
-
-
-def _must_be_none_of(typed: dict[str, Any]) -> None:
-    """Refuse ranges of gains beside a law, which has numbers of its own."""
-    for name, value in typed.items():
-        if value is not None:
-            remedy = "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice"
-            raise ParameterError(key=f"--{name}", value=value, remedy=remedy)
-
-
-def _law_map(
-    subject: Arm,
-    name: str,
-    law: str | None,
-    vary: list[str],
-    number: int,
-    chain: Chain | None,
-    csv: Path | None,
-    png: Path | None,
-    json: bool,
-) -> None:
-    """The map over two numbers of a law, those of a file or of the arm's own."""
-    if len(vary) != 2:
-        remedy = "twice, such as --vary hub_angle=0,10 --vary delay=0,0.02"
-        raise ParameterError(key="--vary", value=vary, remedy=remedy)
-    ranges = [_range_of("--vary", each) for each in vary]
-    typed = asked_law(subject, Given({}, law, name))[0]
-    from tfarm.cli.control_tables import print_law_map
-    from tfarm.cli.tables import hand_out
-    from tfarm.loop.answers import law_map_answer, plane_table
-    from tfarm.loop.loop import Loop
-    from tfarm.loop.plane import between, plane
-
-    x, y = (between(*limits, number) for _, limits in ranges)
-    if chain is not None:
-        _sampled_map(subject, typed, chain, (ranges[0][0], ranges[1][0]), (x, y), csv, png, json)
-        return
-    found = plane(Loop(subject, as_law(typed)), (ranges[0][0], ranges[1][0]), x, y)
-    names = [name.replace(".", "_").replace("@", "_at_") for name in found.vary]
-    hand_out(
-        lambda: law_map_answer(found), print_law_map, json,
-        csv=csv, table=lambda: plane_table(names, found.x, found.y, found.unstable), png=png, picture=(found,),
-    )  # fmt: skip
-
-
-def _sampled_map(
-    subject: Arm, law: AnyLaw, chain: Chain, vary: tuple[str, str], axes: tuple[Real, Real], csv: Path | None,
-    png: Path | None, json: bool,
-) -> None:  # fmt: skip
-    """The map over two numbers of the law of a sampled loop, with as many modes as the verdict on the law takes."""
-    from tfarm.cli.control_tables import print_sampled_map
-    from tfarm.cli.tables import hand_out
-    from tfarm.dsp.crossings import law_map, map_answer
-    from tfarm.dsp.verdict import sampled_verdict
-    from tfarm.loop.answers import plane_table
-
-    found = law_map(sampled_verdict(subject, law, chain).full, *axes, vary)
-    names = [name.replace(".", "_").replace("@", "_at_") for name in vary]
-    hand_out(
-        lambda: map_answer(found), print_sampled_map, json,
-        csv=csv, table=lambda: plane_table(names, found.x, found.y, found.counts), png=png, picture=(found,),
-    )  # fmt: skip
-
-
-def _range_of(option: str, text: str) -> tuple[str, tuple[float, float]]:
-    """A name and its range, of NAME=LO,HI."""
-    name, _, limits = text.partition("=")
-    return name, bounds(f"{option} {name}", limits)
+def _print_spill(answer: dict[str, Any]) -> None:
+    """What it means, then a row a model."""
+    print(f"{answer['arm']}: {answer['in_words']}")
+    print(answer["beyond_the_band"])
+    show(answer["models"])
+    print(answer["sign_convention"])
 
 
 @app.command()
-@with_options(BOUNDS, after="structure")
-def design(
+@under_a_law
+def locus(
     arm: ArmName,
-    objective: Annotated[str, typer.Option("--objective", help=HELP_ON_OBJECTIVE)] = "damping",
-    structure: Annotated[str, typer.Option("--structure", help=HELP_ON_STRUCTURE)] = TWO_GAINS,
-    kp: HeldAngle = 0.0,
-    modes: Annotated[str, typer.Option("--modes", help="flexible modes in the band, 1 to 30")] = "2",
-    continuous: Annotated[bool, typer.Option("--continuous", help="for the continuous-time loop")] = False,
-    period: Period = None,
-    delay_samples: Delay = None,
-    dsp: DspFile = None,
-    also: Annotated[list[str] | None, typer.Option("--also", metavar="ARM", help=HELP_ON_ALSO)] = None,
-    over: Annotated[list[str] | None, typer.Option("--range", metavar="KEY=LO,HI", help=HELP_ON_RANGE)] = None,
-    save: Annotated[Path | None, typer.Option("--save", help="write the law to this TOML file, for --law")] = None,
+    vary: Vary,
+    start: Annotated[float, typer.Option("--from", help="value at which the locus begins")],
+    stop: Annotated[float, typer.Option("--to", help="value at which it ends")],
+    points: Annotated[str | None, typer.Option("--points", metavar="N", help=HELP_ON_POINTS)] = None,
+    branches: Annotated[str, typer.Option("--branches", metavar="N", help=HELP_ON_BRANCHES)] = "10",
+    png: Png = None,
+    csv: Annotated[Path | None, typer.Option("--csv", help="write the branches to this file")] = None,
     json: Json = False,
     *,
-    typed: dict[str, str | None],
+    given: Given,
 ) -> None:
-    """The law that serves an objective best in the sampled loop, at the file's period or else 10 ms."""
-    number, subject = whole_number("--modes", modes, 1, 30), load_arm(arm)
-    chain = asked_chain(dsp or arm, period, delay_samples)
-    within: Any = {**_bounds_of(typed), ANGLE_GAIN: kp}
-    ranges = dict(_range_of("--range", each) for each in over or [])
-    from tfarm.arm.writing import save_law
-    from tfarm.cli.control_tables import print_design
-    from tfarm.cli.tables import hand_out
-    from tfarm.synthesis.design import design as find_law
-    from tfarm.synthesis.design import design_answer
+    """Root locus of the exact arm along a gain or a parameter; crossings of the imaginary axis are solved for."""
+    count = whole_number("--branches", branches, 1, 200)
+    subject, law, said = given.loop()
+    from tfarm.loop.loci import branch_columns, locus_answer, reduced_of
+    from tfarm.loop.locus import locus as find
 
-    found = find_law(
-        subject, objective, structure=structure, **within, modes=number, chain=chain,
-        continuous=continuous, progress=tell if sys.stderr.isatty() else None,
-        also=[load_arm(name) for name in also or []], ranges=ranges,
+    number = None if points is None else whole_number("--points", points, 2, 100_000)
+    found = find(subject, law, vary, start, stop, number, count)
+    reduced = reduced_of(found)
+    answer = locus_answer(found, reduced)
+    columns = (
+        Column(answer["vary"], unit=answer["unit"], of=answer["gain"]),
+        *branch_columns(found.branches, "{part}_{n}"),
+    )
+    hand_out(
+        lambda: answer | said, _print_locus, json,
+        csv=csv, table=lambda: Table(columns=columns), png=png, picture=(found, reduced),
     )  # fmt: skip
-    if save is not None:
-        save_law(as_law(found.law), save)
-    hand_out(lambda: design_answer(found), print_design, json, also=(save,))
 
 
-def _bounds_of(typed: dict[str, str | None]) -> dict[str, tuple[float, float] | None]:
-    """The ranges of gains, None where not typed."""
-    return {name: None if text is None else bounds(f"--{name}", text) for name, text in typed.items()}
+def _print_locus(answer: dict[str, Any]) -> None:
+    """A row a branch, then the crossings, how far the reduced branches are, and the box."""
+    from tfarm.tables.terminal import show
+
+    first, last, name, branches = answer["gain"][0], answer["gain"][-1], answer["vary"], answer["branches"]
+    columns = [
+        Column("branch", "branch", of=range(len(branches))),
+        Column("mode", "mode", of=answer["mode"]),
+        Column("first", f"s [1/s] at {name} = {first:g}", of=[_complex(branch[0]) for branch in branches]),
+        Column("last", f"at {name} = {last:g}", of=[_complex(branch[-1]) for branch in branches]),
+        Column("gap", "gap to reduced", of=answer.get("gap_by_branch"), digits=singly("{:.1e}".format)),
+    ]
+    show(Table(columns=tuple(column for column in columns if column.of is not None)))
+    for each in answer["crossings"]:
+        where = f"{name} = {each['gain']:.10g}, {each['omega_rad_s']:.10g} rad/s ({each['frequency_hz']:.6g} Hz)"
+        which = "a pole that is on no branch" if each["branch"] is None else f"branch {each['branch']}"
+        print(f"{which} becomes {each['direction']} at {where}")
+    if not answer["crossings"]:
+        print("no branch crosses the imaginary axis")
+    for each in answer["ends"]:
+        print(f"branch {each['branch']} is followed to {name} = {each['gain']:.10g}")
+    if "gap_to_reduced" in answer:
+        gap, order = answer["gap_to_reduced"], answer["reduced_order"]
+        print(f"largest gap to python-control on a model of order {order}: {gap:.1e}")
+    left, right, _, top = answer["box"]
+    print(
+        f"poles complete at a few values with {left:.6g} < Re s < {right:.6g} and |Im s| < {top:.6g}; - : not followed"
+    )
+    print(answer["sign_convention"])
 
 
-def bounds(key: str, text: str) -> tuple[float, float]:
-    """Two numbers separated by a comma, the lower first."""
-    remedy = "two numbers, the lower first, such as -1,3"
-    try:
-        low, high = (plain_number(part) for part in text.split(","))
-    except ValueError:
-        raise ParameterError(key=key, value=text, remedy=remedy) from None
-    if not -math.inf < low < high < math.inf:
-        raise ParameterError(key=key, value=text, remedy=remedy)
-    return low, high
+def _complex(point: list[float] | None) -> str:
+    if point is None:
+        return "-"
+    re, im = point
+    return f"{re:.10g}{im:+.10g}i" if im else f"{re:.10g}"

@@ -13,8 +13,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, give, load_arm, tell, whole_number
+from tfarm.cli.app import (
+    ArmName,
+    Json,
+    TheoryName,
+    app,
+    give,
+    hand_out,
+    load_arm,
+    progress,
+    say_written,
+    tell,
+    whole_number,
+)
 from tfarm.errors import ParameterError
+from tfarm.tables.files import write_csv
+from tfarm.tables.terminal import show
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
@@ -48,20 +62,25 @@ def fit(
         bool, typer.Option("--report", help="write the fitted arm's pages, with what the data leave open")
     ] = False,
     out: Annotated[Path, typer.Option("--out", help="the folder of the pages")] = Path("reports"),
+    theory: TheoryName = None,
     json: Json = False,
 ) -> None:
     """The numbers of an arm that explain what was measured of it, with intervals, and what is left open."""
-    from tfarm.cli.tables import hand_out
     from tfarm.fitting.answers import fit_answer, save_fit
 
     found = _fitted(
-        load_arm(arm), data or [], free, mode or [], profile=not covariance,
+        load_arm(arm, theory), data or [], free, mode or [], profile=not covariance,
         start={key: value for key, (value,) in _numbers("--start", start or [], 1)},
         bounds=dict(_numbers("--bounds", bounds or [], 2)), priors=dict(_numbers("--prior", prior or [], 2)),
     )  # fmt: skip
     if save is not None:
         save_fit(found, save)
-    page = _report(found, out) if report else None
+    page = None
+    if report:
+        from tfarm.report import write
+
+        with progress() as advance:
+            page = write([found.arm], out, fits=[found], progress=advance, notice=tell)
     hand_out(lambda: fit_answer(found), partial(_print, found), json, png=png, picture=(found,), also=(save, page))
     if not found.converged:
         raise typer.Exit(3)
@@ -69,7 +88,6 @@ def fit(
 
 def _fitted(subject: Arm, data: list[str], free: str, modes: list[str], **known: Any) -> Fit:
     """The fit to responses and ring-downs as they are typed, with what is `known` of the numbers that are free."""
-    from tfarm.cli.tables import progress
     from tfarm.fitting.data import data_of
     from tfarm.fitting.fit import fit as find
     from tfarm.fitting.model import mode_of
@@ -97,17 +115,8 @@ def _numbers(option: str, texts: Iterable[str], count: int) -> Iterable[tuple[st
         yield key.strip(), values
 
 
-def _report(found: Fit, out: Path) -> Path:
-    from tfarm.cli.tables import progress
-    from tfarm.report import write
-
-    with progress() as advance:
-        return write([found.arm], out, fits=[found], progress=advance, notice=tell)
-
-
 def _print(found: Fit, answer: dict[str, Any]) -> None:
     from tfarm.fitting.answers import PEAK_REACH, parameters_table
-    from tfarm.tables.terminal import show
 
     print(f"{answer['arm_name']}: {answer['in_words']}")
     show(parameters_table(found))
@@ -154,11 +163,8 @@ def frf(
 ) -> None:
     """The frequency response of a record over time, by averaged cross-spectra, with coherence."""
     named, columns = zip(*(_named(each) for each in (output, input)), strict=True)
-    from tfarm.cli.tables import say_written
     from tfarm.fitting.answers import estimate_answer, measured_table
     from tfarm.fitting.recording import frequency_response, read_recording
-    from tfarm.tables.files import write_csv
-    from tfarm.tables.terminal import show
 
     how = {"estimator": estimator, "window": window}
     found = frequency_response(read_recording(record), *named, columns=columns, segment=segment, overlap=overlap, **how)
@@ -214,7 +220,6 @@ def _estimated(answer: dict[str, Any]) -> None:
 
 
 def _rung(answer: dict[str, Any]) -> None:
-    from tfarm.tables.terminal import show
 
     show(answer["modes"])
     span = f"{answer['from_s']:g} to {answer['to_s']:g} s, {answer['samples']} samples"

@@ -16,7 +16,7 @@ import typer
 from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, GAINS, LISTED, MOMENT_GAIN, RATE_GAIN, Gain
-from tfarm.cli.app import whole_number
+from tfarm.cli.app import TheoryName, load_arm, plain_number, whole_number
 from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -35,6 +35,12 @@ class Given:
     gains: Typed
     law: str | None = None
     arm: str = ""
+    theory: str | None = None
+
+    def loop(self) -> tuple[Arm, HubFeedback | Law, dict[str, Any]]:
+        """The arm, its law, and what the answer says of gains that were not given."""
+        subject = load_arm(self.arm, self.theory)
+        return subject, *asked_law(subject, self)
 
 
 HELP_ON_GAINS = {  # of the gains that have a default of their own
@@ -100,9 +106,10 @@ def under_a_law(command: Command) -> Command:
     """The command with options for each gain and for a law's file after its arm, instead of its last argument."""
 
     def given(typed: dict[str, Any], others: Mapping[str, Any]) -> Given:
-        return Given({gain.name: typed[gain.name] for gain in GAINS}, typed["law"], others["arm"])
+        gains = {gain.name: typed[gain.name] for gain in GAINS}
+        return Given(gains, typed["law"], others["arm"], typed["theory"])
 
-    return with_options({**GAIN_OPTIONS, "law": LawFile}, "arm", given)(command)
+    return with_options({**GAIN_OPTIONS, "law": LawFile, "theory": TheoryName}, "arm", given)(command)
 
 
 MOST_GRID = 1_000_000  # points of a response, as many lines of a table: more are a slip of the keyboard
@@ -120,9 +127,21 @@ def points_on(s: str | None, omega: str | None, start: float, stop: float, point
         remedy = "write numbers in 1/s such as 0.3+57.1j,10j"
         return np.array([_number("--s", part, complex, remedy) for part in s.split(",")])
     if omega is None:
-        return s_grid(start, stop, points)
+        must_be_band(start, stop)
+        return np.asarray(1j * np.geomspace(start, stop, whole_number("--points", points, 2, MOST_GRID)))
     remedy = "write frequencies in rad/s such as 1,10,100"
     return 1j * np.array([_number("--omega", part, float, remedy) for part in omega.split(",")])
+
+
+def bounds(key: str, text: str, remedy: str = "two numbers, the lower first, such as -1,3") -> tuple[float, float]:
+    """Two numbers separated by a comma, the lower first."""
+    try:
+        low, high = (plain_number(part) for part in text.split(","))
+    except ValueError:
+        raise ParameterError(key=key, value=text, remedy=remedy) from None
+    if not -math.inf < low < high < math.inf:
+        raise ParameterError(key=key, value=text, remedy=remedy)
+    return low, high
 
 
 def must_be_band(start: float, stop: float) -> None:
@@ -131,13 +150,6 @@ def must_be_band(start: float, stop: float) -> None:
         raise ParameterError(key="--from", value=start, remedy="a positive frequency in rad/s")
     if not start < stop < math.inf:
         raise ParameterError(key="--to", value=stop, remedy=f"a frequency above --from, {start:g} rad/s")
-
-
-def s_grid(start: float, stop: float, points: str) -> NDArray[np.complex128]:
-    """s = i omega for logarithmically spaced frequencies from start to stop [rad/s]."""
-    must_be_band(start, stop)
-    frequencies: NDArray[np.float64] = np.geomspace(start, stop, whole_number("--points", points, 2, MOST_GRID))
-    return np.asarray(1j * frequencies, dtype=np.complex128)
 
 
 def asked_law(arm: Arm, given: Given) -> tuple[HubFeedback | Law, dict[str, Any]]:

@@ -14,17 +14,7 @@ import typer
 from typer.exceptions import TyperException
 
 from tfarm.arm import GAINS
-from tfarm.cli import (  # noqa: F401  each adds its verbs to the application
-    commands,
-    comparing,
-    control,
-    fitting,
-    help,
-    loops,
-    pictures,
-    sampling,
-    tuning,
-)
+from tfarm.cli import commands, control, designing, fitting, sampling, trust, tuning  # noqa: F401  each adds its verbs
 from tfarm.cli.app import discard, tell, whole_command
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, did_you_mean
 from tfarm.files import STANDARD_OUTPUT

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import io
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 
-from tfarm.arm import MOMENT_GAIN, RATE_GAIN, TAKEN_OFF
-from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole_number
-from tfarm.cli.inputs import Given, asked_law, under_a_law
+from tfarm.arm import LISTED, MOMENT_GAIN, RATE_GAIN, TAKEN_OFF
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, say_written, tell, whole_number
+from tfarm.cli.inputs import Given, under_a_law
+from tfarm.columns import Column, Table
+from tfarm.files import write_file
+from tfarm.tables.files import write_csv
+from tfarm.tables.terminal import show
 
 if TYPE_CHECKING:
     from tfarm.dsp import Chain
@@ -50,17 +58,63 @@ def sampled(
 ) -> None:
     """Verdict, intervals, modes and margins of the loop when it is sampled."""
     count = None if modes is None else whole_number("--modes", modes, 1, 400)
-    subject, chain = load_arm(arm), asked_chain(dsp or arm, period, delay_samples)
-    law, said = asked_law(subject, given)
-    from tfarm.cli.sampling_tables import print_sampled, print_sampled_law
+    subject, law, said = given.loop()
+    chain = asked_chain(dsp or arm, period, delay_samples)
     from tfarm.dsp.verdict import sampled as analysed
     from tfarm.dsp.verdict import sampled_answer, sampled_law_answer
 
     found = analysed(subject, law, chain, count=count)
     if found.loop.is_of_gains:
-        give(sampled_answer(found) | said, json, print_sampled)
+        give(sampled_answer(found) | said, json, _print_sampled)
     else:
-        give(sampled_law_answer(found) | said, json, print_sampled_law)
+        give(sampled_law_answer(found) | said, json, _print_sampled_law)
+
+
+def _print_sampled(answer: dict[str, Any]) -> None:
+    """A row a mode, then the verdict."""
+    show(answer["modes"])
+    print(answer["law"])
+    shown, band = answer["shown"], answer["band_rad_s"]
+    for gain in LISTED:
+        windows = shown[f"{gain.name}_intervals"]
+        spans = " and ".join(f"({low['text']}, {high['text']})" for low, high in windows)
+        known = _held([edge for pair in windows for edge in pair], band) if windows else "no interval"
+        print(f"stable, the other gains held, for {gain.name} in {spans}{known}")
+    delay, damping = shown["delay_margin_samples"], shown["required_damping_s"]
+    more = " or more" if answer["delay_margin_is_lower_bound"] else ""
+    print(f"further delay it bears: {delay['text']} samples{more}{_held([delay], band)}")
+    print(f"damping C from which these gains are safe: {damping['text']} s{_held([damping], band)}")
+    print(f"{answer['arm']}: {answer['verdict_in_words']}; spectral radius {answer['spectral_radius']:.12g}")
+
+
+def _print_sampled_law(answer: dict[str, Any]) -> None:
+    """What a law is, how far it is from its edges, then the verdict."""
+    print(f"{answer['law']}, order {answer['law_order']}, {answer['rule_in_words']}: {answer['sign_convention']}")
+    late = f", {answer['delay_samples']:g} of them late" if answer["delay_samples"] else ""
+    print(f"samples every {answer['period_s']:g} s{late}; {answer['modes_used']} flexible modes in what follows")
+    for warning in answer["warnings"]:
+        print(f"warning: {warning}")
+    if answer["free_hub_angle"]:
+        print("nothing regulates the hub's angle: its pole at z = 1 is left out")
+    for low, high in answer["stable_gain_factors"]:
+        print(f"stable with the whole law times {low:.6g} to {high:.6g}")
+    if answer["stable"]:
+        more = " or more" if answer["delay_margin_is_lower_bound"] else ""
+        seconds = f"{1e3 * answer['delay_margin_s']:.4g} ms"
+        print(f"further delay it bears: {answer['delay_margin_samples']:.4g} samples{more}, {seconds}")
+    elif not answer["stable_gain_factors"]:
+        print("stable with no factor on the law")
+    show(answer["windows"])
+    print(f"{answer['arm']}: {answer['verdict_in_words']}; spectral radius {answer['spectral_radius']:.12g}")
+
+
+def _held(figures: list[dict[str, Any]], band: float | None) -> str:
+    """For which modes the figures hold; nothing where that is the band of the verdict."""
+    modes = [figure["modes"] for figure in figures if not figure["settled"]]
+    if modes:
+        return f" (holds for the first {max(modes)} modes)"
+    narrowest = min(figure["band_rad_s"] for figure in figures)
+    return "" if band is not None and narrowest >= band else f" (proven below {narrowest:.3g} rad/s)"
 
 
 @app.command()
@@ -85,41 +139,103 @@ def simulate(
     """The sampled loop in time: hub angle, tip, root moment and torque, exact between the samples."""
     count = None if modes is None else whole_number("--modes", modes, 1, 400)
     how: Any = {"count": count, "between": whole_number("--between", between, 0, 1000), "outputs": output or ()}
-    subject, chain = load_arm(arm), asked_chain(dsp or arm, period, delay_samples)
-    from tfarm.dsp.results import simulated_answer
-
+    chain = asked_chain(dsp or arm, period, delay_samples)
     if controller is None:
-        law, said = asked_law(subject, given)
+        from tfarm.dsp.results import simulated_answer
+
+        subject, law, said = given.loop()
         answer = said | simulated_answer(subject, law, chain, scenario, duration, **how)
     else:
-        from tfarm.tuner.controller import load_tuner
+        from tfarm.tuner.trial import load_tuner
         from tfarm.tuner.tuning import controlled_answer
 
         saved = load_tuner(controller)
-        answer = controlled_answer(subject, saved, chain, scenario, duration, **how)
-    _show(answer, csv, mat, json)
-
-
-def _show(answer: dict[str, Any], csv: Path | None, mat: Path | None, json: bool) -> None:
-    """The signals to the files asked for, and to standard output as JSON or as a summary."""
-    from tfarm.cli import sampling_tables
-    from tfarm.cli.tables import say_written
-
+        answer = controlled_answer(load_arm(arm, given.theory), saved, chain, scenario, duration, **how)
     if csv is not None:
-        sampling_tables.write_signals(answer, csv)
+        _write_signals(answer, csv)
     if mat is not None:
-        sampling_tables.write_mat(answer, mat)
-    sampling_tables.warn_of_runaway(answer)
+        _write_mat(answer, mat)
+    if answer["stopped_at_s"] is not None:
+        what = f"mode {answer['growing_mode']}" if answer["growing_mode"] else "the hub"
+        tell(f"unstable: stopped at {answer['stopped_at_s']:.6g} s, {what} grows")
     if say_written(csv, mat) or json:
-        give(answer, json, sampling_tables.print_simulation)
+        give(answer, json, _print_simulation)
         if not json and csv is None and mat is None:
             print("--json, --csv or --mat give the signals")
 
 
+def _print_simulation(answer: dict[str, Any]) -> None:
+    """What the simulation comes to."""
+    if "rule_in_words" in answer:
+        print(f"{answer['law']}, order {answer['law_order']}, {answer['rule_in_words']}: {answer['sign_convention']}")
+    print(f"{answer['arm']}, {answer['scenario_in_words']}: {len(answer['t'])} samples of {answer['period_s']:g} s")
+    change, known = answer["modes_change"], "as asked"
+    if change is not None:
+        known = f"half of them change the signals by {change:.2g} of their largest"
+    print(f"{answer['modes_used']} flexible modes{', ' if change is None else ': '}{known}")
+    print(f"residual root moment, less the rigid arm's: {_residual(answer)}")
+    settled = answer["settling_time_s"]
+    print(f"not settled within {answer['t'][-1]:.4g} s" if settled is None else f"settled (5 %) at: {settled:.4g} s")
+    print(f"saturated samples: {', '.join(f'{k} {n}' for k, n in answer['saturated_samples'].items())}")
+    if answer["limit_cycle"] is not None:
+        cycle = answer["limit_cycle"]
+        at = cycle["frequency_rad_s"]
+        size = f"root moment +-{cycle['root_moment_amplitude']:.4g} N m at {at:.4g} rad/s"
+        print(f"limit cycle, kept up by {cycle['kept_up_by']}: {size}")
+
+
+def _residual(answer: dict[str, Any]) -> str:
+    """What is left after the slew, or why that was not computed."""
+    residual, stopped = answer["residual_moment_rms"], answer["stopped_at_s"]
+    if residual is not None:
+        return f"{residual:.6g} N m rms"
+    ends = "the record ends before the slew" if stopped is None else f"the run stops at {stopped:.6g} s"
+    return f"not computed, as {ends}"
+
+
+def _write_signals(answer: dict[str, Any], path: Path) -> None:
+    """The signals as a table in the order of time, written beside and then renamed.
+
+    Rows between the samples leave empty what changes at the samples only: torque, gain and volts.
+    """
+    finer = answer.get("between", {"t": []})
+    empty, order = [""] * len(finer["t"]), np.argsort([*answer["t"], *finer["t"]], kind="stable")
+    columns = []
+    for column in _present(answer):
+        values = [*answer[column.key], *finer.get(column.key, empty)]
+        columns.append(replace(column, of=[values[i] for i in order]))
+    write_csv(Table(columns=tuple(columns)), path)
+
+
+def _write_mat(answer: dict[str, Any], path: Path) -> None:
+    """The signals at the samples, and those between them, as a MATLAB file (level 5)."""
+    from scipy.io import savemat
+
+    signals: dict[str, Any] = {_variable(each.key): np.array(answer[each.key]) for each in _present(answer)}
+    if "between" in answer:
+        signals["between"] = {_variable(name): np.array(values) for name, values in answer["between"].items()}
+    data = io.BytesIO()
+    savemat(data, signals, oned_as="column")  # type: ignore[arg-type]  # a stream will do
+    content = data.getvalue()
+    header = b"MATLAB 5.0 MAT-file, tfarm".ljust(116)  # scipy writes the date here
+    write_file(path, header + content[116:], key="--mat")
+
+
+def _variable(name: str) -> str:
+    """A signal's name as MATLAB takes it: strain_0_05 of strain@0.05."""
+    return re.sub(r"\W", "_", name)
+
+
+def _present(answer: dict[str, Any]) -> list[Column]:
+    """The columns of the signals that there are."""
+    from tfarm.dsp.results import AT_SAMPLES_COLUMNS, traced_columns
+
+    units, columns = {"torque": answer["torque_unit"]}, (*traced_columns(answer["outputs"]), *AT_SAMPLES_COLUMNS)
+    return [replace(each, unit=units.get(each.key, each.unit)) for each in columns if answer.get(each.key)]
+
+
 def asked_chain(source: str, period: float | None, delay_samples: float | None) -> Chain:
     """The chain of a file, with what the command line says instead."""
-    from dataclasses import replace
-
     from tfarm.dsp.chain import load_chain
 
     chain = load_chain(source)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
-from tfarm.cli.app import ArmName, Json, app, load_arm, whole_number
+from tfarm.cli.app import ArmName, Json, TheoryName, app, hand_out, load_arm, progress, tell, whole_number
 from tfarm.cli.inputs import HELP_ON_GAINS, Given, asked_gains, with_options
 from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
+from tfarm.columns import Column, Table
+from tfarm.digits import general, singly
+from tfarm.tables.terminal import show
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
@@ -60,6 +64,7 @@ OF_LEARNING, AS_TYPED = (
     ("mode", "rule", "sensitivity", "eta", "alpha", "enough"),
     ("signals", "guard", "duration", "seventh_input"),
 )
+FOUR = singly(general, 4)  # digits of a cost
 
 
 @app.command()
@@ -73,15 +78,15 @@ def tune(
     dsp: DspFile = None,
     compare: Annotated[bool, typer.Option("--compare", help="with converters, delay, and on other arms too")] = False,
     save: Annotated[Path | None, typer.Option("--save", help="write the tuner to this JSON file")] = None,
+    theory: TheoryName = None,
     json: Json = False,
     *,
     typed: dict[str, Any],
 ) -> None:
     """Train the network that sets the moment gain during a slew, and hold it against simpler remedies."""
     whole = {name: whole_number(f"--{name}", typed[name], *limits) for name, limits in WHOLE.items()}
-    subject, chain = load_arm(arm), asked_chain(dsp or arm, period, delay_samples)
+    subject, chain = load_arm(arm, theory), asked_chain(dsp or arm, period, delay_samples)
     from tfarm import tuner
-    from tfarm.cli.tables import progress
     from tfarm.tuner.tuning import outcomes_answer
 
     plan, said = _plan(subject, chain, typed, whole)
@@ -95,13 +100,13 @@ def tune(
         answer["comparison"] = outcomes_answer(rows)
     if save is not None:
         tuner.save_tuner(tuning.saved(), save)
-    _show(answer, save, json)
+    if answer["stopped"] is not None:
+        tell(f"{answer['stopped']}; the tuner is that of the trial before")
+    hand_out(lambda: answer, _print_tuning, json, also=(save,))
 
 
 def _plan(subject: Arm, chain: Chain, typed: dict[str, Any], whole: dict[str, int]) -> tuple[Plan, dict[str, Any]]:
     """The plan that is typed, and what the answer says of a rate gain that was not."""
-    from dataclasses import replace
-
     from tfarm import tuner
     from tfarm.tuner.tuning import usual_plan
 
@@ -133,10 +138,64 @@ def _servo_gains(subject: Arm, on_rate: float | None, on_angle: float) -> tuple[
     return {RATE_GAIN: usual, ANGLE_GAIN: on_angle}, said
 
 
-def _show(answer: dict[str, Any], save: Path | None, json: bool) -> None:
-    """The answer as JSON or as a summary; that a run has stopped is said either way."""
-    from tfarm.cli import tuning_tables
-    from tfarm.cli.tables import hand_out
+def _print_tuning(answer: dict[str, Any]) -> None:
+    """The tuner beside its yardsticks."""
+    costs = {
+        "no moment feedback": answer["cost_without"],
+        f"best constant gain, K = {answer['best_constant_gain']:.4g}": answer["cost_best_constant"],
+        f"tuner, after {answer['trials']} trials": answer["cost_tuned"],
+    }
+    for kind, values in answer["shaped"].items():
+        costs[f"input shaping, {kind}, {1e3 * values['arrives_later_by_s']:.0f} ms later"] = values["cost"]
+    costs["linear-quadratic bound of the unshaped slew"] = answer["cost_lq_bound"]
+    columns = Column("", of=list(costs)), Column("cost", "cost of a slew", of=list(costs.values()), digits=FOUR)
+    show(Table(columns=columns))
+    if (unit := answer["cost_unit_N_m"]) != 1.0:
+        print(f"costs count moments and torques in units of {unit:g} N m")
+    print(f"guard {answer['guard_says']}")
+    K = answer["gain"]["K"]
+    print(f"gain: K from {min(K):.4g} to {max(K):.4g}")
+    print(f"residual root moment, less the rigid arm's: {_residual(answer)}")
+    errors = [answer[f"tip_error{which}_m"] for which in ("", "_best_constant", "_without")]
+    tuned, constant, free = ("ran away" if each is None else f"{1e3 * each:.3g} mm" for each in errors)
+    name = ANGLE_GAIN
+    held = f"{name} = {answer[name]:g} holds the angle" if answer[name] else f"nothing holds the angle: --{name} does"
+    print(f"tip off its target at the end: {tuned}, {constant} with the best constant gain, {free} without ({held})")
+    if "curves" in answer:
+        _print_curves(answer["curves"], answer["cost_best_constant"])
+    if "comparison" in answer:
+        _print_comparison(answer["comparison"])
 
-    tuning_tables.warn_of_divergence(answer)
-    hand_out(lambda: answer, tuning_tables.print_tuning, json, also=(save,))
+
+def _residual(answer: dict[str, Any]) -> str:
+    """With the tuner, and as a share of that without moment feedback."""
+    residual, without = answer["residual_moment_rms"], answer["residual_without"]
+    if residual is None:
+        return "not computed, as the loop ran away"
+    share = f", {residual / without:.3g} of that without moment feedback" if without else ""
+    return f"{residual:.6g} N m rms{share}"
+
+
+def _print_curves(curves: dict[str, Any], best_constant: float) -> None:
+    lower, median, upper = curves["final_quartiles"]
+    counts = {
+        "below the best constant gain": sum(cost < best_constant for cost in curves["final_cost"]),
+        "diverged": curves["diverged"],
+        "died at K = 0": curves["died"],
+    }
+    print(f"learning curves, {curves['seeds']} seeds: final cost {median:.4g}, quartiles {lower:.4g} and {upper:.4g}")
+    print("seeds: " + ", ".join(f"{number} {what}" for what, number in counts.items()))
+
+
+def _print_comparison(rows: list[dict[str, Any]]) -> None:
+    names = ("without", "best_constant", "own_constant", "ZV", "EI", "tuner", "bound")
+    heads = ("no moment feedback", "constant", "own constant", "ZV", "EI", "tuner", "LQ bound")
+    columns = (
+        Column("condition", "condition", of=[row["condition"] for row in rows]),
+        *(
+            Column(name, head, of=[row[name]["cost"] for row in rows], digits=FOUR)
+            for name, head in zip(names, heads, strict=True)
+        ),
+        Column("proven", "guard proven", of=["yes" if row["proven"] else "no" for row in rows]),
+    )
+    show(Table(columns=columns))

@@ -37,9 +37,8 @@ POLES_BEYOND_MODES = 6  # poles with Im s >= 0 beyond the modes: real ones, thos
 REGION_COLUMNS, REGION_ROWS = 80, 40  # of the plane of both gains; its edges upwards are exact
 FIRST_COLUMN = 1e-6  # of the largest rate gain: where the first column beyond 0 is, from which most regions begin
 BEYOND_LAWS = 1.5  # how far the plane reaches beyond the laws' own gains
-DELAY_PLANE_POINTS = 40  # values along each axis of the plane of a factor and a delay
-MOST_FACTOR, DELAY_SHOWN = 4.0, 0.02  # where that plane ends: factor on the law, delay [s] where no law has more
-FURTHER_DELAYS = 25  # further delays of which the plane of a loop at its samples consists
+FURTHER_DELAYS = 25  # of which the plane of a factor on each law and its further delay consists
+MOST_FACTOR, FACTORS = 4.0, 40  # of a continuous-time law: where that plane ends, and values at which it is counted
 LONGEST_WAIT, BORNE = 2.0, 1.2  # samples up to which these go, or this much beyond what either loop bears
 MOST_DELAYED = 10.0  # samples at most
 CURVE_FROM = 0.05  # of the first mode: where the curve of a loop begins
@@ -122,19 +121,31 @@ class ComparedSide:
         return omega[shown], L[shown]
 
     @property
+    def delay_margin(self) -> float | None:
+        """How much later its law may act [s]; of the continuous-time loop as far as that is known."""
+        if self.margins is not None:
+            in_band = self.margins.in_band
+            return None if in_band is None else self.margins.exact_delay or in_band.delay
+        assert self.analysis is not None
+        delay = self.analysis.delay_margin.samples * self.analysis.loop.chain.sampling.period
+        return delay if self.analysis.verdict.is_stable else None
+
+    @property
     def sampled_margins(self) -> tuple[float | None, float | None, float | None]:
         """Of a sampled loop: the largest and the least stable factor on its law, and its delay margin [s]."""
         assert self.analysis is not None
         low, high = self.analysis.gain_factors or (None, None)
-        delay = self.analysis.delay_margin.samples * self.analysis.loop.chain.sampling.period
-        return high, low, delay if self.analysis.verdict.is_stable else None
+        return high, low, self.delay_margin
 
-    def reach(self, samples: Real) -> Reach:
-        """The stable factors on the law of a sampled loop with so much further delay each [samples]."""
-        assert self.analysis is not None
-        loop = self.analysis.loop
-        now = [loop.with_delay(loop.chain.sampling.delay_samples + more) for more in samples.tolist()]
-        return Reach(loop.chain.sampling.period * samples, tuple(tuple(stable_factors(each)) for each in now))
+    def reach(self, delay: Real) -> Reach:
+        """The stable factors on the law with so much further delay each [s]."""
+        if self.analysis is None:
+            loop, factors = Loop(self.arm, as_law(self.law)), between(0.0, MOST_FACTOR, FACTORS)
+            found = plane(loop, ("delay", "gain"), loop.law.delay + delay, factors)
+            return Reach(delay, tuple(map(tuple, found.stable_intervals)))
+        sampling, late = self.analysis.loop.chain.sampling, self.analysis.loop.with_delay
+        now = [late(sampling.delay_samples + more) for more in (delay / sampling.period).tolist()]
+        return Reach(delay, tuple(tuple(stable_factors(each)) for each in now))
 
 
 def poles_by_mode(poles: Complex, open_loop: Mapping[int, complex]) -> dict[int, complex]:
@@ -211,21 +222,12 @@ class Comparison:
 
     @cached_property
     def reaches(self) -> tuple[Reach, Reach]:
-        """Of each loop at its samples the factors on its law that keep it stable, over further delays."""
-        longest = max(each.analysis.delay_margin.samples for each in self.sides if each.analysis is not None)
-        samples = np.linspace(0.0, min(max(LONGEST_WAIT, BORNE * longest), MOST_DELAYED), FURTHER_DELAYS)
-        return self.one.reach(samples), self.other.reach(samples)
-
-    @cached_property
-    def delays(self) -> tuple[Plane, Plane]:
-        """The plane of a factor on each law and its whole delay [s]: for laws that are more than gains at the hub."""
-        laws = [as_law(side.law) for side in self.sides]
-        longest = max(DELAY_SHOWN, *(2 * law.delay for law in laws))
-        x, y = between(0.0, MOST_FACTOR, DELAY_PLANE_POINTS), between(0.0, longest, DELAY_PLANE_POINTS)
-        first, second = (
-            plane(Loop(side.arm, law), ("gain", "delay"), x, y) for side, law in zip(self.sides, laws, strict=True)
-        )
-        return first, second
+        """Of each loop the factors on its law that keep it stable, over further delays."""
+        T = self.one.sampled.sampling.period
+        borne = [each.delay_margin for each in self.sides]
+        longest = max([LONGEST_WAIT * T, *(BORNE * each for each in borne if each is not None)])
+        delay = np.linspace(0.0, min(longest, MOST_DELAYED * T), FURTHER_DELAYS)
+        return self.one.reach(delay), self.other.reach(delay)
 
 
 def compare(

@@ -8,8 +8,7 @@ until the digits asked for are proven.  The sweeps are those of `sweep`, with th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -51,11 +50,7 @@ _row_across, _met = python_of(row_across), python_of(met)
 Ball = Any  # flint.acb or flint.arb, which come without types
 
 
-@contextmanager
-def precision(bits: int) -> Iterator[None]:
-    """flint's working precision inside the block, restored after it."""
-    with flint.ctx.workprec(bits):
-        yield
+precision = flint.ctx.workprec  # flint's working precision [bits], inside a `with` block
 
 
 def rational(value: Fraction | float) -> Ball:
@@ -121,7 +116,7 @@ class Sweep:
         p = _end_plane(*self._end(self.numbers.tip_mass), *self._end(self.numbers.tip_inertia))
         for each in self.numbers.elements:
             if isinstance(each, Mark):
-                self.planes[each.number] = p
+                self.planes[each.number] = self._at_mark(p)
             else:
                 p = self._inside(each, p)
         self.theta, self.M, self.Q = p[:3]
@@ -178,6 +173,9 @@ class Sweep:
     def _end(self, condition: Any) -> tuple[Any, Any]:
         rest, inertia, force = condition
         return self.S * inertia + rest, force
+
+    def _at_mark(self, p: Plane) -> Plane:
+        return p
 
     def _inside(self, element: Any, p: Plane) -> Plane:
         match element:

@@ -26,66 +26,31 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
-from functools import reduce
-from operator import add
+from functools import cached_property, reduce
+from operator import add, mul
 from typing import Any, NamedTuple, cast
 
 import flint
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, Arm, HubFeedback
+from tfarm.arm import GAINS, Law
+from tfarm.arm.blocks import LawBlock, Rational
 from tfarm.arrays import Complex, Real
 from tfarm.records import read_only
 
 from .balls import Ball, Sweep, into_own, out_of_own, point, rational, summed
 from .compiled import python_of
-from .layout import Readings, readings
-from .outputs import OUTPUTS, unit_scale
-from .system import Segment, System, system_of
+from .layout import Layout, Readings, laid_out, readings
+from .outputs import OUTPUTS, Output, unit_scale
+from .system import Segment, System
 from .values import free_outputs, free_slopes
 from .waves import Plane, Row, across_waves
 
-Gains = tuple[Fraction, ...]  # of a law without dimensions, in the order of `GAINS`, exact
-NO_GAINS: Gains = (Fraction(0),) * len(GAINS)
 FED = tuple(OUTPUTS[gain.output] for gain in GAINS)
 assert all(each.place != "x" for each in FED)  # a gain is on an output with a place of its own
-TURNING = ("theta", "W", "Psi", "centre")  # quantities that follow the hub's angle where the arm turns slowly
 NEXT_TO_REST = 1e-60  # 1/s, for s = 0: there D over a power of s is its limit to the last digit, and no power is 0
 DIFFERENCE_STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
-
-
-def loop_system(arm: Arm) -> System:
-    """The exact system of an arm under a law."""
-    return system_of(arm)
-
-
-def unit_gains(k: System) -> Gains:
-    """What a gain of one SI unit is without dimensions: worked out once for each system."""
-    if "unit gains" not in k.kept:
-        k.kept["unit gains"] = tuple(unit_scale(OUTPUTS[gain.output], k) for gain in GAINS)
-    return cast("Gains", k.kept["unit gains"])
-
-
-def gains_of(k: System, law: HubFeedback) -> Gains:
-    """The gains of a law without dimensions."""
-    return tuple(Fraction(gain) * unit for gain, unit in zip(law.row, unit_gains(k), strict=True))
-
-
-def dimensionless(k: System, laws: Real) -> Real:
-    """Rows (gains, ...) of gains in SI units, in the order of `GAINS`, without dimensions, as doubles."""
-    units = np.array([float(unit) for unit in unit_gains(k)])
-    return np.asarray(units.reshape(-1, *[1] * (laws.ndim - 1)) * laws)
-
-
-def torque(gains: Iterable[Any], fed_back: Iterable[Any]) -> Any:
-    """gains . numerators, for any kind of number; a gain may be an array of one value a point.
-
-    Plain gains of 0 are left out, but for the last: half of most laws.
-    """
-    *terms, last = zip(gains, fed_back, strict=True)
-    used = [each for each in terms if not (isinstance(each[0], float) and each[0] == 0)]
-    return reduce(add, (part * gain for gain, part in [*used, last]))
 
 
 class Analytic(NamedTuple):
@@ -104,15 +69,11 @@ class LoopParts(NamedTuple):
     scale: Complex
 
 
-def characteristic(k: System, s: Complex, gains: Gains = NO_GAINS, at_zero: int = 0) -> Analytic:
-    """D(s)/s^at_zero and its derivative at s (1-D, complex), in float64."""
+def characteristic(k: System, s: Complex, at_zero: int = 0) -> Analytic:
+    """D(s)/s^at_zero of a system without a law and its derivative at s (1-D, complex), in float64."""
     s = off_rest(s) if at_zero else s
-    used = [each for each, gain in zip(FED, gains, strict=True) if gain]
-    here, slopes = free_slopes(k, used, s, 0.0)
-    units = [float(gain / unit) for gain, unit in zip(gains, unit_gains(k), strict=True) if gain]  # outputs are SI
-    both = (here, slopes)
-    value, slope = (each.drive + np.tensordot(units, each.outputs, 1) if units else each.drive for each in both)
-    return deflated(value, slope, here.scale, s, at_zero)
+    here, slopes = free_slopes(k, [], s, 0.0)
+    return deflated(here.drive, slopes.drive, here.scale, s, at_zero)
 
 
 def off_rest(s: Complex) -> Complex:
@@ -128,29 +89,21 @@ def deflated(value: Complex, slope: Complex, scale: Complex, s: Complex, at_zero
     return Analytic(value, slope, scale)
 
 
-def as_column(gains: Gains) -> Real:
-    """Gains without dimensions as the one row of them that all points have (gains, 1)."""
-    return np.array([[float(gain)] for gain in gains])
-
-
-def quick_characteristics(k: System, s: Complex, rows: Real, at_zero: int = 0) -> Analytic:
-    """`characteristic` with slopes from differences, right to about 1e-8: thirty times as fast for a hundred points.
-
-    With gains of their own at each point, rows (gains, n), or one `as_column` (gains, 1), dimensionless.
-    """
+def quick_characteristics(k: System, s: Complex, at_zero: int = 0) -> Analytic:
+    """`characteristic` with slopes from differences, right to about 1e-8: thirty times as fast for a hundred points."""
     s = off_rest(np.asarray(s, dtype=complex))
     h = difference_steps(k, s)
     at = np.array([s, s + h, s - h])
     parts = loop_parts(k, at)
-    values = (parts.drive + (rows[:, None, :] * parts.numerators).sum(axis=0)) / at**at_zero
+    values = parts.drive / at**at_zero
     up, down = values[1:] * np.exp(parts.scale[1:] - parts.scale[0])
     return Analytic(values[0], (up - down) / (2.0 * h), parts.scale[0])
 
 
 def float_units(k: System) -> Real:
-    """`unit_gains` as a column of doubles: SI outputs per numerator without dimensions."""
+    """What a gain of one SI unit is without dimensions, as a column of doubles: SI outputs per numerator."""
     if "float units" not in k.kept:
-        k.kept["float units"] = read_only(np.array([[float(unit)] for unit in unit_gains(k)]))
+        k.kept["float units"] = read_only(np.array([[float(unit_scale(output, k))] for output in FED]))
     return cast("Real", k.kept["float units"])
 
 
@@ -161,22 +114,13 @@ def difference_steps(k: System, s: Complex) -> Real:
 
 
 def loop_parts(k: System, s: NDArray[Any]) -> LoopParts:
-    """Drive, numerators and scale at s: what a law makes of them is linear, D = drive + torque(gains, numerators)."""
+    """Drive, numerators and scale at s: what gains make of them is linear, D = drive + gains . numerators."""
     free = free_outputs(k, FED, np.asarray(s, dtype=complex).ravel(), 0.0)
     numerators = free.outputs / float_units(k)
     return LoopParts(*(part.reshape(*part.shape[:-1], *s.shape) for part in (free.drive, numerators, free.scale)))
 
 
-def zeros_at_origin(k: System, gains: Sequence[Fraction | float] = NO_GAINS) -> int:
-    """How often D vanishes at s = 0: twice where the whole arm turns freely, once where the hub's rate is fed back.
-
-    Not where its angle is, or what turns with it.  (A third time under the moment's gain J/(J - I_h) alone, where gauge
-    and inertia cancel: that zero is left in D.)
-    """
-    used = [each for each, value in zip(FED, gains, strict=True) if value]
-    return min(k.at_rest, *(each.power for each in used if each.quantity in TURNING), 2)
-
-
+Polynomial = Any  # flint.fmpq_poly, which comes without types
 Series = Any  # flint.acb_series, which comes without types
 
 _across_waves = python_of(across_waves)
@@ -184,7 +128,7 @@ _across_waves = python_of(across_waves)
 LONG_WAVE = 0.3  # |z| below which a wave is not separated from the others
 TAYLOR_TERMS = 4  # of D over a piece of a contour, the last of them over the wide ball
 SLOW_WAVES = 6.0  # |z1| + |z2| below which a segment is crossed by power series
-WIDE_TERMS = 40  # of them: of arguments up to twice that the tail is below 1e-60
+WIDE_TERMS = 40  # of them at least: of arguments up to twice that the tail is below 1e-60; two a wave more
 
 
 class InseparableError(Exception):
@@ -224,10 +168,15 @@ class WideSweep(Sweep):
         over_d = 1 / (self.s * segment.damping + 1)
         return self.S * (over_d * a + b), self.S * (self.S * (a * b) + g) * over_d
 
-    def _transition(self, segment: Any) -> tuple[Row, ...]:
-        if not self._is_slow(segment):
-            raise InseparableError
-        return super()._transition(segment)
+    def _at_mark(self, p: Plane) -> Plane:
+        grown = self.phase.exp()
+        return p[0] * grown, p[1] * grown, p[2] * grown, p[3] * grown, p[4] * grown
+
+    @cached_property
+    def states(self) -> dict[int, Row]:
+        """W, Psi, M and Q at each mark, in the scale of the plane at the axis; carried there at full size."""
+        shrunk, full = (-self.phase).exp(), super().states
+        return {n: (W * shrunk, Psi * shrunk, M * shrunk, Q * shrunk) for n, (W, Psi, M, Q) in full.items()}
 
     def _functions(self, z_sum: Series, z_product: Series) -> tuple[Series, ...]:
         """F0..F3 as truncated power series, the tail added as a ball to every coefficient.
@@ -236,13 +185,14 @@ class WideSweep(Sweep):
         |z1 z2|^(1/2), and the terms left out below sum to less than twice the first of them.
         """
         q = _size(z_sum) + _size(z_product).sqrt()
-        tail = (WIDE_TERMS + 1) * q**WIDE_TERMS * rational(Fraction(2, math.factorial(2 * WIDE_TERMS)))
-        if not q < WIDE_TERMS**2:  # then each term is less than half of the one before
+        count = WIDE_TERMS + 2 * math.isqrt(int(float(q)))
+        tail = (count + 1) * q**count * rational(Fraction(2, math.factorial(2 * count)))
+        if not q < count**2:  # then each term is less than half of the one before
             raise InseparableError
         ball = flint.acb(flint.arb(0, tail.upper()), flint.arb(0, tail.upper()))
         terms_kept = z_sum.prec
         rest = flint.acb_series([ball] * terms_kept, prec=terms_kept)
-        return tuple(total + rest for total in summed(z_sum, z_product, WIDE_TERMS))
+        return tuple(total + rest for total in summed(z_sum, z_product, count))
 
 
 def _size(series: Series) -> Ball:
@@ -253,62 +203,115 @@ def _size(series: Series) -> Ball:
     return total.upper() if hasattr(total, "upper") else total
 
 
-def characteristic_ball(k: System, s: Ball, gains: Gains = NO_GAINS) -> Ball:
+class Feedback(NamedTuple):
+    """A law in s, exactly: e^{-s tau} p_i/q times each output `read`; `whole` is q, `entries` p_i, `delay` tau [s]."""
+
+    read: Readings
+    whole: Polynomial
+    entries: tuple[Polynomial, ...]
+    delay: float
+
+
+def characteristic_ball(k: System, s: Ball, law: Feedback | None = None) -> Ball:
     """D(s) enclosed, at the working precision: for points, at any s."""
-    return _fed_back(k, Sweep(_read(k, gains).layout, s), gains)
+    return _fed_back(Sweep(_layout(k, law), s), law)
 
 
-def characteristic_over(k: System, s: Ball, gains: Gains = NO_GAINS) -> Ball:
+def characteristic_over(k: System, s: Ball, law: Feedback | None = None) -> Ball:
     """D enclosed over the wide ball s, but for a factor that depends on its middle alone and is positive."""
     middle, is_point = s.mid(), s.real.is_exact() and s.imag.is_exact()
-    here = _by_waves(k, middle, gains, None, LONG_WAVE, 1 if is_point else TAYLOR_TERMS - 1)
+    here = _by_waves(k, middle, law, None, LONG_WAVE, 1 if is_point else TAYLOR_TERMS - 1)
     if here is not None and is_point:
         return here[0][0] * flint.acb(0, here[1].imag).exp()
-    there = None if here is None else _by_waves(k, s, gains, here[1], LONG_WAVE, TAYLOR_TERMS)
+    there = None if here is None else _by_waves(k, s, law, here[1], LONG_WAVE, TAYLOR_TERMS)
     if here is None or there is None:
-        return characteristic_ball(k, s, gains)
+        return characteristic_ball(k, s, law)
     away, value = s - middle, flint.acb(0)
     for order in range(TAYLOR_TERMS - 1, -1, -1):
         value = value * away + (there if order == TAYLOR_TERMS - 1 else here)[0][order]
     return value * flint.acb(0, here[1].imag).exp()
 
 
-def tangent(k: System, m: Ball, r: Ball, gains: Gains = NO_GAINS) -> tuple[Ball, Ball, Ball] | None:
+def tangent(k: System, m: Ball, r: Ball, law: Feedback | None = None) -> tuple[Ball, Ball, Ball] | None:
     """D(m), D'(m) and D''/2 over the disc of radius r around m, apart from one factor; None where waves may be one."""
-    here = _by_waves(k, m, gains, None, 0.0, 2)
+    here = _by_waves(k, m, law, None, 0.0, 2)
     disc = flint.acb(flint.arb(m.real.mid(), r), flint.arb(m.imag.mid(), r))
-    there = None if here is None else _by_waves(k, disc, gains, here[1], 0.0, 3)
+    there = None if here is None else _by_waves(k, disc, law, here[1], 0.0, 3)
     return None if here is None or there is None else (here[0][0], here[0][1], there[0][2])
 
 
 def _by_waves(
-    k: System, at: Ball, gains: Gains, scale: Ball | None, shortest: float, terms: int
+    k: System, at: Ball, law: Feedback | None, scale: Ball | None, shortest: float, terms: int
 ) -> tuple[Series, Ball] | None:
     """D e^{-scale} as a series of so many terms around `at`, and scale: t1 + t2 there if none is given.
 
     None where waves may be one.
     """
     try:
-        sweep = WideSweep(_read(k, gains).layout, flint.acb_series([at, 1], prec=terms), shortest)
-        value = _fed_back(k, sweep, gains)
+        sweep = WideSweep(_layout(k, law), flint.acb_series([at, 1], prec=terms), shortest)
+        value = _fed_back(sweep, law)
     except InseparableError:
         return None
     scale = sweep.phase[0] if scale is None else scale
     return value * (sweep.phase - scale).exp(), scale
 
 
-def _read(k: System, gains: Gains) -> Readings:
-    """The outputs with a gain that is not 0."""
-    return readings(k, tuple(each for each, gain in zip(FED, gains, strict=True) if gain), 0.0)
+def _layout(k: System, law: Feedback | None) -> Layout:
+    return readings(k, (), 0.0).layout if law is None else law.read.layout
 
 
-def _fed_back(k: System, sweep: Sweep, gains: Gains) -> Any:
-    """drive + gains . numerators of a sweep, for balls and for series."""
-    value, used = sweep.input, iter(_read(k, gains).each)
-    for gain, unit in zip(gains, unit_gains(k), strict=True):
-        if gain:
-            value = value + sweep.output(next(used)) * rational(gain / unit)  # outputs are in SI
-    return value
+def _fed_back(sweep: Sweep, law: Feedback | None) -> Any:
+    """drive q + e^{-s tau} sum of p_i numerator_i of a sweep, for balls and for series."""
+    if law is None:
+        return sweep.input
+    s = sweep.s
+    parts = [_at(p, s) * sweep.output(one) for p, one in zip(law.entries, law.read.each, strict=True)]
+    value = sweep.input * _at(law.whole, s)
+    return value + (s * rational(-law.delay)).exp() * reduce(add, parts) if parts else value
+
+
+def feedback(k: System, law: Law, outputs: Sequence[Output], shares: Sequence[float]) -> Feedback:
+    """What a law in s feeds back of these outputs, those of its signals, each read at a share of the length."""
+    blocks = [_exactly(part.block) for part in law.parts]
+    entries = dict.fromkeys(law.signals, flint.fmpq_poly([0]))
+    for n, (part, (nums, _)) in enumerate(zip(law.parts, blocks, strict=True)):
+        others = _product(den for m, (_, den) in enumerate(blocks) if m != n) * -law.sign
+        for name, num in zip(part.signals, nums, strict=True):
+            if name in entries:
+                entries[name] += num * others
+    used = [n for n, each in enumerate(entries.values()) if each]
+    read = laid_out(k, [outputs[n] for n in used], [shares[n] for n in used])
+    return Feedback(read, _product(den for _, den in blocks), tuple(filter(None, entries.values())), law.delay)
+
+
+def _exactly(block: LawBlock) -> tuple[list[Polynomial], Polynomial]:
+    """Numerators of a block and its denominator; of matrices det(s - A + B_j C) + (D_j - 1) det(s - A) of each j."""
+    if isinstance(block, Rational):
+        num, den = (flint.fmpq_poly([_fraction(each) for each in reversed(row)]) for row in (block.num, block.den))
+        return [num], den
+    A, C = _matrix(block.A), _matrix(block.C)
+    whole, nums = A.charpoly(), []
+    for b, d in zip(block.B.T, block.D[0], strict=True):
+        nums.append((A - _matrix(b[:, None]) * C).charpoly() + (_fraction(d) - 1) * whole)
+    return nums, whole
+
+
+def _matrix(values: Real) -> Any:
+    rows, columns = values.shape
+    return flint.fmpq_mat(rows, columns, [_fraction(each) for each in values.ravel()])
+
+
+def _fraction(value: float) -> Any:
+    return flint.fmpq(*float(value).as_integer_ratio())
+
+
+def _product(polynomials: Iterable[Polynomial]) -> Polynomial:
+    return reduce(mul, polynomials, flint.fmpq_poly([1]))
+
+
+def _at(polynomial: Polynomial, s: Any) -> Any:
+    """A polynomial at s, by Horner's rule."""
+    return reduce(lambda value, each: value * s + flint.arb(each), reversed(polynomial.coeffs()), 0 * s)
 
 
 def _waves(

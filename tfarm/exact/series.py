@@ -122,28 +122,23 @@ def expansions_at_zero(
     chain: System, wanted: Sequence[Output], x: float = 0.0
 ) -> list[tuple[float, float, float, float]]:
     """Coefficients of s^-2, s^-1, 1 and s in each output's expansion at s = 0."""
-    return [(each[0], each[1], each[2], each[3]) for each in series_at_zero(chain, wanted, x)]
-
-
-def series_at_zero(chain: System, wanted: Sequence[Output], x: float, terms: int = SERIES_ORDER) -> list[list[float]]:
-    """Coefficients from s^-2 on in each output's expansion at s = 0, `terms` less two of them at least."""
-    return [list(_series_at_zero(chain, each, x, terms)) for each in wanted]
+    return [_series_at_zero(chain, each, x) for each in wanted]
 
 
 @lru_cache(SERIES_KEPT)  # loops, models and pages ask for the same few of a rig again and again
-def _series_at_zero(chain: System, output: Output, x: float, terms: int) -> tuple[float, ...]:
+def _series_at_zero(chain: System, output: Output, x: float) -> tuple[float, float, float, float]:
     """The same of one output."""
-    coefficients = _quotient_at_zero(chain, output, x, terms).c
-    order = _leading(_drive_at_zero(chain, terms))
-    return (*[0.0] * (2 - order), *(float(c.mid()) if hasattr(c, "mid") else float(c) for c in coefficients))
+    coefficients = [float(c.mid()) if hasattr(c, "mid") else float(c) for c in _quotient_at_zero(chain, output, x).c]
+    padded = [0.0] * (2 - _leading(_drive_at_zero(chain))) + coefficients
+    return padded[0], padded[1], padded[2], padded[3]
 
 
-def _quotient_at_zero(chain: System, output: Output, x: float, terms: int) -> Jet:
+def _quotient_at_zero(chain: System, output: Output, x: float) -> Jet:
     """The output's expansion from s^-n on, n the order of the drive's zero, in balls."""
-    drive = _drive_at_zero(chain, terms)
+    drive = _drive_at_zero(chain)
     order = _leading(drive)
     with precision(SERIES_BITS):
-        return Jet(_numerator_at_zero(chain, output, x, terms).c[: terms - order]) / drive.shifted(order)
+        return Jet(_numerator_at_zero(chain, output, x).c[: SERIES_ORDER - order]) / drive.shifted(order)
 
 
 def beside_slow_pole(chain: System, wanted: Sequence[Output], x: float) -> list[tuple[float, float]]:
@@ -152,7 +147,7 @@ def beside_slow_pole(chain: System, wanted: Sequence[Output], x: float) -> list[
     Of r/(s - p) they are c_k = -r/p^(k+1), beside which those of all other poles vanish from some n on: so what is left
     is c_k - p^(n-k) c_n, right to (p/w)^(n-k), w the next pole.  In float64 -r/p alone would drown it.
     """
-    drive = _drive_at_zero(chain, SERIES_ORDER)
+    drive = _drive_at_zero(chain)
     first = _leading(drive)
     with precision(SERIES_BITS):
         of_drive = drive.shifted(first)
@@ -163,7 +158,7 @@ def beside_slow_pole(chain: System, wanted: Sequence[Output], x: float) -> list[
             )
         found = []
         for each in wanted:
-            constant, slope, *others, last = _quotient_at_zero(chain, each, x, SERIES_ORDER).c[first:]
+            constant, slope, *others, last = _quotient_at_zero(chain, each, x).c[first:]
             power = p ** (len(others) + 1)
             found.append((float((constant - last * power * p).mid()), float((slope - last * power).mid())))
     return found
@@ -172,20 +167,20 @@ def beside_slow_pole(chain: System, wanted: Sequence[Output], x: float) -> list[
 def order_at_zero(chain: System, wanted: Output, x: float = 0.0) -> int:
     """How often an output of the free response vanishes at s = 0."""
     with precision(SERIES_BITS):
-        return _leading(_numerator_at_zero(chain, wanted, x, SERIES_ORDER))
+        return _leading(_numerator_at_zero(chain, wanted, x))
 
 
 @lru_cache(SERIES_KEPT)
-def _drive_at_zero(chain: System, terms: int) -> Jet:
+def _drive_at_zero(chain: System) -> Jet:
     """The drive as a power series in s at 0, exact zeros told from rounding."""
     with precision(SERIES_BITS):
-        return _cleared(SlowSweep.of(readings(chain, (), 0.0).layout, terms).input)
+        return _cleared(SlowSweep.of(readings(chain, (), 0.0).layout, SERIES_ORDER).input)
 
 
-def _numerator_at_zero(chain: System, output: Output, x: float, terms: int) -> Jet:
+def _numerator_at_zero(chain: System, output: Output, x: float) -> Jet:
     """An output of the free response so."""
     those = readings(chain, (output,), x)
-    return _cleared(SlowSweep.of(those.layout, terms).output(those.each[0]))
+    return _cleared(SlowSweep.of(those.layout, SERIES_ORDER).output(those.each[0]))
 
 
 def _leading(series: Jet) -> int:

@@ -101,13 +101,6 @@ class Fit:
             return "not converged"
         return "fitted, but the arm does not explain the data" if self.is_explained is False else "fitted"
 
-    def chi_squared_at(self, values: Mapping[str, float]) -> float:
-        """The sum of squared residuals at other numbers, by key."""
-        own = self.solution.problem
-        point = np.array([each.coordinate(values[each.key]) for each in own.parameters])
-        residuals = own.residuals(point)
-        return float(residuals @ residuals)
-
 
 def fit(
     arm: Arm,

@@ -27,7 +27,7 @@ from tfarm.arm import Arm, HubFeedback, Law, as_law, cancelled, full_law, must_b
 from tfarm.arm.law import Part
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError
-from tfarm.exact.characteristic import Analytic, LoopParts, deflated, difference_steps
+from tfarm.exact.characteristic import Analytic, Feedback, LoopParts, deflated, difference_steps, feedback
 from tfarm.exact.system import System
 from tfarm.records import record
 from tfarm.response.signals import Signals
@@ -138,6 +138,11 @@ class Loop:
     def k(self) -> System:
         """The exact system."""
         return self.signals.system
+
+    @cached_property
+    def exact(self) -> Feedback:
+        """What the law feeds back, exactly, for proofs in ball arithmetic."""
+        return feedback(self.k, self.law, self.signals.outputs, self.signals.places)
 
     def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
         """Denominator and numerator of L at s, up to one factor: finite at poles too."""

@@ -27,7 +27,8 @@ from numpy.polynomial import chebyshev
 from tfarm.arm import AT_HUB, FED_BACK, Arm, must_turn
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.exact.characteristic import float_units, loop_parts, loop_system
+from tfarm.exact.characteristic import float_units, loop_parts
+from tfarm.exact.system import system_of
 from tfarm.records import record
 from tfarm.response import TransferFunction, transfer
 from tfarm.spectrum import Modes, modes
@@ -112,7 +113,7 @@ def _panel(arm: Arm, low: float, high: float) -> tuple[Complex, float]:
 
     Without losses they are real but for rounding, which is taken off: next to a resonance it would be a loss.
     """
-    middle, half, k = (low + high) / 2, (high - low) / 2, loop_system(arm)
+    middle, half, k = (low + high) / 2, (high - low) / 2, system_of(arm)
     s = 1j * (middle + half * np.r_[CHEBYSHEV, BETWEEN_SAMPLES])
     drive, numerators, scale = loop_parts(k, s)
     theta, _, gauge = (float_units(k) * numerators)[[FED_BACK.index(output) for output in AT_HUB]]
@@ -203,7 +204,7 @@ class _Panels:
         low, high = edges[:-1].copy(), edges[1:]
         low[0] = -high[0] if unit == 1j else 0.0
         s = unit * ((low + high)[:, None] / 2 + (high - low)[:, None] / 2 * np.r_[CHEBYSHEV, BETWEEN_SAMPLES])
-        parts = loop_parts(loop_system(arm), s.ravel())
+        parts = loop_parts(system_of(arm), s.ravel())
         drive, scale = parts.drive.reshape(s.shape), parts.scale.reshape(s.shape)
         factor = drive / s ** POWERS_AT_REST[sensor] * np.exp(scale - scale.real.max(axis=1, keepdims=True))
         return cls(unit, low, high, s, factor, arm.is_reactive)

@@ -172,17 +172,13 @@ def gain_map(
     though no pole need be right of the axis there, nor is K1 = 0 where the hub angle is free.
     Raises ParameterError for what is no law, no loop or no range, ConvergenceError where poles cannot be counted.
     """
-    if isinstance(K1, HubFeedback | Law):
-        raise ParameterError(key="K1", value=K1, remedy="a range of values; give the law as law=, its numbers as vary=")
     if law is None:
         if vary is not None:
             raise ParameterError(key="law", value=None, remedy="give the HubFeedback or Law whose numbers vary names")
         return plane(Loop(arm, as_law(HubFeedback(Kp=Kp))), PLANE, K1, K2)
-    if not isinstance(law, HubFeedback | Law):
-        raise ParameterError(key="law", value=law, remedy="give a HubFeedback or a Law")
+    loop = Loop(arm, as_law(law))
     if Kp:
         raise ParameterError(key=ANGLE_GAIN, value=Kp, remedy="the law holds the angle: give Kp in it, or no law")
-    loop = Loop(arm, as_law(law))
     if vary is None and loop.gains is not None:
         vary = PLANE
     if not isinstance(vary, tuple | list) or len(vary) != 2 or not all(isinstance(each, str) for each in vary):
@@ -328,7 +324,7 @@ def ascending(name: str, values: Any, most: int) -> Real:
     except (TypeError, ValueError):  # no numbers
         values = np.empty(0)
     if not (2 <= values.size <= most and np.isfinite(values).all() and (np.diff(values) > 0).all()):
-        remedy = f"an ascending range of 2 to {most} values"
+        remedy = f"an ascending range of 2 to {most} values (give the law as law=, its numbers as vary=)"
         raise ParameterError(key=name, value=f"{values.size} values", remedy=remedy)
     return np.asarray(values)
 

@@ -19,7 +19,6 @@ from tfarm.arm.checks import whole
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
-from tfarm.exact.characteristic import gains_of
 from tfarm.records import record
 from tfarm.reduced.conversions import closed, in_series, pade, sensed_model
 from tfarm.response.frequency import AXIS_SHARE
@@ -109,14 +108,11 @@ class Poles:
 
         Raises CertificationError where something cannot be proven.
         """
-        if self.loop.gains is None:
-            raise CertificationError("discs are proven for gains at the hub; of a law the poles are counted in the box")
-        k = self.loop.k
-        gains = gains_of(k, self.loop.gains)
-        discs = tuple(enclosed(k, complex(pole), digits, gains) for pole in self.moving)
+        k, law = self.loop.k, self.loop.exact
+        discs = tuple(enclosed(k, complex(pole), digits, law) for pole in self.moving)
         if not disjoint(discs):
             raise CertificationError("the discs of two poles touch: ask for more digits")
-        proven = proven_count(k, self.box, gains)
+        proven = proven_count(k, self.box, law)
         if proven != self.count:
             raise CertificationError(f"{self.count} poles in the box are listed, but {proven} are there")
         return discs

@@ -7,14 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 
 from tfarm.arrays import Real
 from tfarm.comparing import Comparison
 from tfarm.crossing import Window
-from tfarm.digits import plain
 from tfarm.loop.plane import Plane
 
 from .frequency import draw_wrapped, hertz_axis, magnitude_limits
@@ -38,8 +35,8 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
     """Magnitude, phase and map of both (what `tfarm.compare` returns), in three axes, those given or new ones: these.
 
     Of two arms the exact responses, of two laws the loop functions L; the map is that of both gains, with exact edges,
-    or, where a law is more than these gains, of a factor on each law and its delay, counted on a grid.  With a law in z
-    all is of the loops at their samples, and the map has the exact factors over further delays.
+    or, where a law is more than these gains, or one in z, of a factor on each law and its further delay.  With a law
+    in z all is of the loops at their samples.
     """
     upper, lower, right = ax
     low, high = _responses(data, upper, lower) if data.is_of_arms else _loops(data, upper, lower)
@@ -48,10 +45,8 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
     hertz_axis(upper, 1.0)
     upper.legend(loc="best")
     right.grid(False)
-    if data.is_sampled:
+    if data.is_sampled or data.regions is None:
         _reaches(data, right)
-    elif data.regions is None:
-        _delays(data, right)
     else:
         _regions(data, data.regions, right)
     right.legend(loc="upper left", bbox_to_anchor=(0.0, -0.1), borderaxespad=0.0)
@@ -116,15 +111,3 @@ def _reaches(data: Comparison, ax: Axes) -> None:
     ax.axhline(1.0, color=INK, lw=0.6)
     ax.set(xlim=(0.0, 1e3 * data.reaches[0].delay[-1]), ylim=(0.0, min(1.15 * highest, MOST_DRAWN)))
     ax.set(xlabel="further delay [ms]", ylabel="factor on the law")
-
-
-def _delays(data: Comparison, ax: Axes) -> None:
-    for found, side, colour in zip(data.delays, data.sides, SIDE_COLOURS, strict=True):
-        image = np.zeros((*found.stable.shape, 4))
-        image[found.stable] = to_rgba(colour, 0.3)
-        ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True)
-        ax.fill_between([], [], [], facecolor=colour, alpha=0.4, label=safe(f"{side.name}: stable"))
-        ax.plot([1.0], [found.law.delay], "o", mfc=colour, mec="white", ms=7.5, zorder=7, clip_on=False)
-    ax.set(xlabel="factor on the law", ylabel="delay of the law [ms]")
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda seconds, _: plain(1e3 * seconds, 3)))
-    ax.axvline(1.0, color=INK, lw=0.6)

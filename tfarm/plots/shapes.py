@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from tfarm.arrays import Real
-from tfarm.audit.assumptions import HubStudy, Study
+from tfarm.audit.assumptions import Study
 from tfarm.digits import plain, significant
 from tfarm.spectrum import Modes
 
@@ -111,10 +111,10 @@ def theory_name(theory: str) -> str:
     return names.get(theory, theory)
 
 
-def draw_over(curve: Study, x: Real, study: Study, candidates: Real, label: str) -> Figure:
+def draw_over(curve: Study, study: Study, label: str) -> Figure:
     """Frequencies over one assumed parameter: curves, the candidates of the table as rings, the arm itself filled."""
-    is_own = study.is_own
-    parameter = "hub inertia" if isinstance(study, HubStudy) else "depth of the section, at this area"
+    is_own, x, candidates = study.is_own, curve.values, study.values
+    parameter = "hub inertia" if study.pinned.size else "depth of the section, at this area"
     title = f"{study.arm.name}: natural frequencies over the {parameter}"
     with page(9.0, 4.6, title) as (figure, ax):
         ax.set(xscale="log", yscale="log", xlabel=label, ylabel="natural frequency [rad/s]")
@@ -128,8 +128,8 @@ def draw_over(curve: Study, x: Real, study: Study, candidates: Real, label: str)
                 f"mode {number}", (candidates[-1], marked[-1]), textcoords="offset points", xytext=(8, 0), va="center",
                 color=color, fontsize=9.0,
             )  # fmt: skip
-        if isinstance(study, HubStudy):
-            _mark_limits(study, ax)
+        if study.pinned.size:
+            _mark_limits(study.pinned, study.locked, ax)
         ax.margins(y=0.09)
         for axis in (ax.xaxis, ax.yaxis):
             axis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0)))
@@ -140,9 +140,9 @@ def draw_over(curve: Study, x: Real, study: Study, candidates: Real, label: str)
     return figure
 
 
-def _mark_limits(study: HubStudy, ax: Axes) -> None:
+def _mark_limits(pinned: Real, locked: Real, ax: Axes) -> None:
     """Short bars at the left edge for the free pin, at the right edge for the locked hub."""
-    for omegas, low, high in ((study.pinned, 0.0, 0.018), (study.locked, 0.982, 1.0)):
+    for omegas, low, high in ((pinned, 0.0, 0.018), (locked, 0.982, 1.0)):
         for color, omega in zip(CURVE_COLOURS, omegas, strict=True):
             if omega > 0:  # the first of an arm that its tip holds falls to 0: beyond a logarithmic axis
                 ax.axhline(omega, low, high, color=color, lw=2.4)

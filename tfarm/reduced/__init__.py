@@ -3,14 +3,13 @@
 from tfarm.reduced.conversions import discrete, save_mat, to_pymor, transfer_function
 from tfarm.reduced.modal import ModalModel, modal_model, relaxed_model, slow_model
 from tfarm.reduced.partial_fractions import PartialFractions
-from tfarm.reduced.rational import RationalModel, rational_model
+from tfarm.reduced.rational import rational_model
 from tfarm.reduced.reduction import BAND, ReducedModel, reduce, reduced_answer
 
 __all__ = [
     "BAND",
     "ModalModel",
     "PartialFractions",
-    "RationalModel",
     "ReducedModel",
     "discrete",
     "modal_model",

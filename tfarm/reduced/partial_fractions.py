@@ -207,19 +207,9 @@ SAMPLES_PER_DECADE = 60  # of the even grid; peaks between are closed in on
 LEAST_SAMPLES, EVEN_SAMPLES, BETWEEN_POLES = 200, 400, 24  # beside these, along the band, and between two poles
 DIP_POINTS = 8  # around each dip of |G| or |G'|
 POLES_BEYOND = 1.5  # times the end of a band: samples keep clear of poles up to there
-SLOPE_STEP, ON_A_POLE = 1e-3, 1e-6  # of the distance to a pole, or of w where w is nearer than that: for differences
 MOST_PEAKS = 12  # local maxima of the error that are closed in on, the highest first
 HIGH_PEAK = 0.2  # of the highest: lower ones between samples do not reach it
 PEAK_CLOSINGS, CLOSING_POINTS = 3, 17  # times that such a peak is closed in on, each to an eighth of its width
-
-
-@dataclass(frozen=True)
-@record
-class Accuracy:
-    """`worst` (outputs,): an upper figure of the error over the band; `at` (outputs,) [rad/s]: where it is worst."""
-
-    worst: Real
-    at: Real
 
 
 class Ruler:
@@ -236,14 +226,14 @@ class Ruler:
 
     def norm(self, w: Real) -> Real:
         """|G| + |w dG/dw| (outputs, w) of the exact arm at w [rad/s], 1-D, off its natural frequencies."""
-        return norm(self.G, w, self.G(1j * w), self._poles)
+        return norm(self.G, w, self.G(1j * w))
 
     def rough(self, model: PartialFractions) -> float:
         """The largest error at the samples: a little less than the worst."""
         return float(_errors(model, self.w, self._values, self._size).max())
 
-    def measure(self, model: PartialFractions) -> Accuracy:
-        """The worst error of each output, every high peak between the samples closed in on."""
+    def measure(self, model: PartialFractions) -> tuple[Real, Real]:
+        """An upper figure of the error of each output, every high peak between the samples closed in on; and where."""
         errors = _errors(model, self.w, self._values, self._size)
         worst, at = errors.max(axis=1), self.w[errors.argmax(axis=1)]
         for row, error in enumerate(errors):
@@ -257,7 +247,7 @@ class Ruler:
                 if found[top[best], best] > worst[row]:
                     worst[row], at[row] = found[top[best], best], inner[top[best], best]
                 low, high = (inner[np.clip(top + way, 0, CLOSING_POINTS - 1), columns] for way in (-1, 1))
-        return Accuracy(worst * FOUND_TO_WORST + EXACT_ROUNDING, at)
+        return worst * FOUND_TO_WORST + EXACT_ROUNDING, at
 
     def _brackets(self, error: Real) -> tuple[Real, Real]:
         """The samples on either side of each high local maximum."""
@@ -277,14 +267,13 @@ class Ruler:
 
     def _exact(self, w: Real) -> tuple[Complex, Real]:
         values = self.G(1j * w)
-        return values, norm(self.G, w, values, self._poles)
+        return values, norm(self.G, w, values)
 
     def _dips(self, w: Real) -> Real:
         """Points around the dips of |G| and |G'|, where the norm is small on one side."""
-        slopes = axis_slope(self.G, w, self._poles)
         dips = [
             np.flatnonzero((size[1:-1] < size[:-2]) & (size[1:-1] < size[2:])) + 1
-            for size in abs(np.concatenate([self.G(1j * w), slopes]))
+            for size in abs(np.concatenate([self.G(1j * w), self.G.derivative(1j * w)]))
         ]
         where = np.unique(np.concatenate(dips))
         return np.linspace(w[where - 1], w[where + 1], DIP_POINTS).ravel()
@@ -296,14 +285,9 @@ class Ruler:
         return distance(w, self._poles) > CLEAR_OF_POLES * w
 
 
-def norm(G: TransferFunction, w: Real, values: Complex, poles: Real) -> Real:
+def norm(G: TransferFunction, w: Real, values: Complex) -> Real:
     """|G| + |w dG/dw| (outputs, w) on the imaginary axis, given G(i w)."""
-    return abs(values) + abs(w * axis_slope(G, w, poles))
-
-
-def axis_slope(G: TransferFunction, w: Real, poles: Real) -> Complex:
-    """dG/ds (outputs, w) at i w."""
-    return np.atleast_2d(G.derivative(1j * w))
+    return abs(values) + abs(w * np.atleast_2d(G.derivative(1j * w)))
 
 
 def distance(w: Real, poles: Real) -> Real:

@@ -41,10 +41,6 @@ ERRORS_ALIKE = 5e-14  # errors below this are all alike
 ERROR_FLOOR = 1e-14  # a weighted error below this is rounding; more poles would fit noise
 
 
-class RationalModel(PartialFractions):
-    """The band's modes exactly and a few poles of index 0 for all above (see `PartialFractions`)."""
-
-
 @dataclass(frozen=True)
 class _Remainders:
     """What the exact modes leave, F (outputs, S), zero at S = 0; weights that make it |dG|/(|G| + |w G'|).
@@ -69,7 +65,7 @@ def modes_in(arm: Arm, high: float) -> int:
     return count
 
 
-def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float | None = None) -> RationalModel:
+def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float | None = None) -> PartialFractions:
     """The lossless model of so many pairs of poles: every mode below `high` [rad/s] exactly, the rest by AAA.
 
     Where more poles bring nothing but rounding, further modes are taken exactly instead; fewer pairs come out where too
@@ -86,7 +82,7 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
     hub = "root_moment" if arm.is_locked else "hub_rate"
     G = transfer(arm, (hub, *rows), x=x)
     frequencies = frequencies_around(arm, high)
-    found: list[tuple[tuple[float, int], RationalModel]] = []
+    found: list[tuple[tuple[float, int], PartialFractions]] = []
     for _ in range(SHARING_ROUNDS):  # first with all the poles asked for, then with those that helped
         inside = modal_model(arm, G.rows, exact, x)
         rest = _remainders(G, inside, high, frequencies)
@@ -113,7 +109,7 @@ def _remainders(G: TransferFunction, inside: PartialFractions, high: float, freq
     base = (values / (1j * w) ** power).real
     shared = 1 / (S + square[:, None])
     F = np.where(by_S, base * S - at_zero[:, :1] - (r @ shared) * S, base - at_zero[:, 2:3] + (r / square @ shared) * S)
-    size = norm(G, w, values, frequencies)
+    size = norm(G, w, values)
     weight = np.divide(w**power, size, out=np.zeros_like(size), where=size > 0) / np.where(by_S, abs(S), 1.0)
     kinds = [(each.quantity, each.place, kind) for each, kind in zip(bases, by_S[:, 0], strict=True)]
     for kind in set(kinds):  # a power of s apart: one fit for both, or the rate would not be that of the angle
@@ -200,7 +196,7 @@ def _zeros_of_denominator(nodes: Real, weights: Real) -> NDArray[Any]:
     return numerator[finite] / denominator[finite]
 
 
-def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares: Real) -> RationalModel:
+def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares: Real) -> PartialFractions:
     """The exact modes and the poles above them as one model, without the hub's own output."""
     power = np.array([[each.power] for each in inside.rows])
     s = 1j * poles
@@ -210,7 +206,7 @@ def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares:
     ends = np.stack([s, s.conj()], axis=1)
     static = inside.static + (added / ends).real.sum(axis=(1, 2))
     strict = rest.by_S & (power[:, 0] < 2)  # no static remainder: the poles above the band stand for it
-    return RationalModel(
+    return PartialFractions(
         arm=inside.arm,
         rows=inside.rows[1:],
         x=inside.x,

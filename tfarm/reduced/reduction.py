@@ -144,8 +144,13 @@ def reduce(
     if (order is None) == (error is None):
         remedy = "give either an order (a number of states) or an error"
         raise ParameterError(key="order", value=MISSING if order is None else order, remedy=remedy)
-    bench = _Bench(arm, rows, band, x, method)
-    return bench.of_order(order) if order is not None else bench.within(_error(error))
+    if order is None:
+        error = positive("error", error, "a positive number, such as 1e-6")
+        if error < EXACT_ROUNDING:
+            remedy = f"the exact values it is measured against are float64 numbers; ask for {EXACT_ROUNDING:g} or more"
+            raise ParameterError(key="error", value=error, remedy=remedy)
+        return _Bench(arm, rows, band, x, method).within(error)
+    return _Bench(arm, rows, band, x, method).of_order(order)
 
 
 class _Bench:
@@ -238,9 +243,7 @@ class _Bench:
         return None
 
     def _measured(self, model: PartialFractions, method: Reduction, note: str) -> ReducedModel:
-        accuracy = self.ruler.measure(model)
-        number, frequency = first_mode_lacking(model)
-        return ReducedModel(model, method, self.band, accuracy.worst, accuracy.at, number, frequency, note)
+        return ReducedModel(model, method, self.band, *self.ruler.measure(model), *first_mode_lacking(model), note)
 
     def _pairs(self, order: object) -> int:
         """Flexible pairs of poles in a model of so many states."""
@@ -261,14 +264,6 @@ def first_mode_lacking(model: PartialFractions) -> tuple[int, float]:
     has = (abs(model.natural_frequency[:, None] - omega) <= POLE_IS_MODE * omega).any(axis=0)
     first = int(np.argmin(has))
     return first + 1, float(omega[first])
-
-
-def _error(error: Any) -> float:
-    asked = positive("error", error, "a positive number, such as 1e-6")
-    if asked < EXACT_ROUNDING:
-        remedy = f"the exact values it is measured against are float64 numbers; ask for {EXACT_ROUNDING:g} or more"
-        raise ParameterError(key="error", value=error, remedy=remedy)
-    return asked
 
 
 NORM = "|dG| / (|G| + |w dG/dw|)"

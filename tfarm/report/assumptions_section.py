@@ -7,8 +7,6 @@ import numpy as np
 from tfarm.arm import Arm
 from tfarm.arrays import Real
 from tfarm.audit.assumptions import (
-    HubStudy,
-    SectionStudy,
     Study,
     candidates,
     has_hub_inertia,
@@ -73,14 +71,14 @@ def assumptions_section(arm: Arm) -> PageSection:
         return PageSection(anchor="assumptions", title=title, words=(OF_ONE_BEAM,))
     section = section_study(arm)
     area, slope = plain(arm.link.section.area, 4), fixed(2 * section.sensitivity[section.is_own][0, :1], 3)[0]
-    words = [opening(arm), SECTION_WORDS.format(area=area, slope=slope, **_ends(section.depth, section))]
+    words = [opening(arm), SECTION_WORDS.format(area=area, slope=slope, **_ends(section.values, section))]
     blocks: list[Picture | Table] = [section_picture(section)]
     blocks.append(_table("assumptions-section", "Candidate sections: rectangles of this area", SECTION_TABLE, section))
     if has_hub_inertia(arm):
         hub = hub_study(arm)
         limits = {"locked": significant(float(hub.locked[0]), 5), "pinned": significant(float(hub.pinned[0]), 5)}
         slope = fixed(hub.sensitivity[hub.is_own][0, :1], 3)[0]
-        words.append(HUB_WORDS.format(slope=slope, **limits, **_ends(hub.hub_inertia, hub)))
+        words.append(HUB_WORDS.format(slope=slope, **limits, **_ends(hub.values, hub)))
         blocks += [hub_picture(hub), _table("assumptions-hub", "Candidate hub inertias", HUB_TABLE, hub)]
     else:
         words.append(NO_HUB.format(what="locked" if arm.is_locked else "a free pin"))
@@ -127,24 +125,24 @@ def searched_words(edges: Column) -> str:
 # ------------------------------------------------------------ pictures
 
 
-def section_picture(study: SectionStudy) -> Picture:
+def section_picture(study: Study) -> Picture:
     """Frequencies over the depth of the section."""
-    curve = section_study(study.arm, _between(study.depth))
-    depth = Column("depth_m", "depth of the rectangle, in the plane of bending", "m", of=curve.depth)
+    curve = section_study(study.arm, _between(study.values))
+    depth = Column("depth_m", "depth of the rectangle, in the plane of bending", "m", of=curve.values)
     equivalent = "" if study.arm.link.section.shape == "rectangle" else EQUIVALENT
-    return _picture("depth", SECTION_PICTURE.format(equivalent=equivalent), depth, curve, study, study.depth)
+    return _picture("depth", SECTION_PICTURE.format(equivalent=equivalent), depth, curve, study)
 
 
-def hub_picture(study: HubStudy) -> Picture:
+def hub_picture(study: Study) -> Picture:
     """Frequencies over the hub inertia."""
-    curve = hub_study(study.arm, _between(study.hub_inertia))
-    inertia = Column("hub_inertia_kg_m2", "hub inertia", "kg m²", of=curve.hub_inertia)
-    return _picture("inertia", HUB_PICTURE, inertia, curve, study, study.hub_inertia)
+    curve = hub_study(study.arm, _between(study.values))
+    inertia = Column("hub_inertia_kg_m2", "hub inertia", "kg m²", of=curve.values)
+    return _picture("inertia", HUB_PICTURE, inertia, curve, study)
 
 
-def _picture(stem: str, caption: str, x: Column, curve: Study, study: Study, values: Real) -> Picture:
+def _picture(stem: str, caption: str, x: Column, curve: Study, study: Study) -> Picture:
     """The curves over x, and the candidates on them."""
-    ends = _ends(values, study)
+    ends = _ends(study.values, study)
     modes = (Column(f"mode_{i}_rad_s", f"mode {i}", "rad/s", of=omega)
              for i, omega in enumerate(curve.natural_frequency.T, 1))  # fmt: skip
     return Picture(
@@ -153,7 +151,7 @@ def _picture(stem: str, caption: str, x: Column, curve: Study, study: Study, val
         caption=caption,
         alt=f"Natural frequencies 1 to {len(CURVE_COLOURS)} over the {x.title}; the first between {ends['low']} and "
         f"{ends['high']} rad/s.",
-        figure=draw_over(curve, np.asarray(x.values), study, values, f"{x.title} [{x.unit}]"),
+        figure=draw_over(curve, study, f"{x.title} [{x.unit}]"),
         data=Table(stem=f"assumptions-{stem}-data", title="Natural frequencies", columns=(x, *modes)),
     )
 

@@ -25,7 +25,7 @@ from tfarm.dsp.simulate import FOLDED_UP, quantisers
 from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.errors import TfarmError
 from tfarm.loop.loop import Loop, steep_places
-from tfarm.loop.panels import PANEL_SAMPLES, Panels, Positions, Sensor, loop_panels, positions, sensed_places
+from tfarm.loop.panels import PANEL_SAMPLES, Positions, Sensor, loop_panels, positions, sensed_places
 from tfarm.loop.plane import gain_map, moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
@@ -178,7 +178,13 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
         "units": {gain.name: unit_of(gain.name, arm) for gain in GAINS},
         "axes": axes,
         "start": {gain.name: (law or reference)[gain.name] for gain in GAINS},
-        **_samples(samples),
+        "samples": packed(samples.values.transpose(1, 0, 2)),  # the bytes of doubles, by panel, part and point
+        "low": samples.low.tolist(),
+        "high": samples.high.tolist(),
+        "order": samples.order,
+        "error": float(f"{samples.error:.0e}"),
+        "places": np.asarray(steep_places(arm, 1.05 * samples.band)).tolist(),
+        "band": samples.band,
         **_known(arm, is_quiet),
         "reference": {name: reference[name] for name in PLANE},
         "reference_count": stability(arm, reference, band).unstable_roots,
@@ -188,19 +194,6 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
         "slew": slew_numbers(arm, chain, law or reference),
         **sensor_numbers(arm),
         "lyapunov": arm.is_uniform,
-    }
-
-
-def _samples(panels: Panels) -> dict[str, Any]:
-    """The samples as the bytes of doubles, by panel, part and point, and where they are."""
-    return {
-        "samples": packed(panels.values.transpose(1, 0, 2)),
-        "low": panels.low.tolist(),
-        "high": panels.high.tolist(),
-        "order": panels.order,
-        "error": float(f"{panels.error:.0e}"),
-        "places": np.asarray(steep_places(panels.arm, 1.05 * panels.band)).tolist(),
-        "band": panels.band,
     }
 
 

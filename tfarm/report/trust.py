@@ -118,12 +118,6 @@ def verdict_counts(rows: Sequence[AuditRow]) -> dict[str, int]:
     return {verdict: found[verdict] for verdict in VERDICT_MARKS}
 
 
-def audit_table(rows: Sequence[AuditRow]) -> Table:
-    """Every row in plain text, for the files."""
-    title = "The paper, equation by equation"
-    return Table(stem="audit", title=title, columns=AUDIT_COLUMNS, record=list(rows))
-
-
 def _left(residual: str) -> str:
     """What a formula leaves in the check, in words."""
     if residual == "0":
@@ -201,7 +195,10 @@ def write_trust(evidence: Evidence, proofs: Sequence[ArmProof], folder: Path) ->
     """index.html and its tables, into a folder of their own."""
     folder.mkdir()
     sections = {s.anchor: save_section(s, folder) for s in _sections(evidence, proofs)}
-    files = save_table(audit_table(evidence.audit), folder / DATA)
+    plain = Table(
+        stem="audit", title="The paper, equation by equation", columns=AUDIT_COLUMNS, record=list(evidence.audit)
+    )
+    files = save_table(plain, folder / DATA)
     page = render(
         "trust.html",
         title="Why trust this",

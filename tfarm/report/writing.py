@@ -173,8 +173,11 @@ def write(
     suit a law; ConvergenceError if a process dies.  If the work itself fails, `out` is as it was.
     """
     _check(arms, only)
-    subjects = _subjects(arms, chains, laws, fits, measured)
-    out = Path(out)
+    out, n = Path(out), len(arms)
+    each = zip(arms, chains or [Chain()] * n, laws or [()] * n, fits or [None] * n, strict=True)
+    subjects = [Subject(arm, chain, tuple(own), fit, tuple(measured)) for arm, chain, own, fit in each]
+    for subject in subjects:
+        check_laws(subject.arm, subject.chain, subject.laws)
     names = [arm.name for arm in arms] + [TRUST_FOLDER, ASSETS] * (not only)
     with _beside(out, names) as beside:
         told = _written(subjects, out, beside, only, progress)
@@ -183,22 +186,6 @@ def write(
             notice(text)
     alone = len(arms) == 1 and only is not None and len(only) == 1
     return out / arms[0].name / f"{only[0]}.html" if alone and only else out / "index.html"
-
-
-def _subjects(
-    arms: Sequence[Arm],
-    chains: Sequence[Chain] | None,
-    laws: Sequence[Sequence[GivenLaw]] | None,
-    fits: Sequence[Fit | None] | None,
-    measured: Sequence[Measured],
-) -> list[Subject]:
-    """What each arm's page is about.  Raises ParameterError where an arm or its clock can make nothing of a law."""
-    n = len(arms)
-    each = zip(arms, chains or [Chain()] * n, laws or [()] * n, fits or [None] * n, strict=True)
-    subjects = [Subject(arm, chain, tuple(own), fit, tuple(measured)) for arm, chain, own, fit in each]
-    for subject in subjects:
-        check_laws(subject.arm, subject.chain, subject.laws)
-    return subjects
 
 
 def _written(
@@ -361,10 +348,8 @@ def _sections(found: Comparison) -> Iterator[PageSection]:
     yield PageSection(anchor="verdicts", title="Verdicts", words=words)
     curves = "exact response" if found.is_of_arms else "loop function"
     plane = f"{' and '.join(PLANE)}, with exact edges"
-    if found.is_sampled:
+    if found.is_sampled or found.regions is None:
         plane = "further delay and a factor on its law, with exact edges"
-    elif found.regions is None:
-        plane = "a factor on each law and its delay, on a grid"
     picture = Picture(
         stem="comparison", title=f"{upper(curves)} and stable region", alt=f"{found.verdict}.",
         caption=f"The {curves} of both over frequency, and where each loop is stable over {plane}; the points are the "

@@ -9,7 +9,7 @@ import numpy as np
 
 from tfarm.columns import ANSWER, REPORT, Column, Table
 from tfarm.digits import general, lined, scientific, singly, unit, within
-from tfarm.exact.methods import roads_answer
+from tfarm.exact.values import roads_answer
 from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
 from .frequency import Bode, Extremum

@@ -22,11 +22,21 @@ from tfarm.exact.balls import nearest_float
 from tfarm.exact.characteristic import Analytic, characteristic, deflated, off_rest
 from tfarm.exact.layout import constant_of
 from tfarm.exact.loads import is_load, load_of, loaded_value
-from tfarm.exact.methods import Method, Roads, by_roads, known_method, slow_values, why_no_appendix
 from tfarm.exact.outputs import Output, output
 from tfarm.exact.series import expansions_at_zero, order_at_zero
 from tfarm.exact.system import System, system_of
-from tfarm.exact.values import differentiate_outputs, digits_of, evaluate_outputs, free_slopes
+from tfarm.exact.values import (
+    Method,
+    Roads,
+    by_roads,
+    differentiate_outputs,
+    digits_of,
+    evaluate_outputs,
+    free_slopes,
+    known_method,
+    slow_values,
+    why_no_appendix,
+)
 from tfarm.records import record
 from tfarm.spectrum import flexible_frequencies
 from tfarm.spectrum.box import REAL_SHARE, TOWARD_SINGULAR, Box, Function, complete
@@ -153,7 +163,7 @@ def transfer(
 
     `outputs` are names of `tfarm.exact.outputs.OUTPUTS`, or an `Output` of your own; `x` [m] is the place of those
     along the arm.  `method` is the road to its values: the closed form in float64, "balls" for ball arithmetic alone,
-    or "appendix" for the paper's own determinant with mpmath, some milliseconds a point (`tfarm.exact.methods`).
+    or "appendix" for the paper's own determinant with mpmath, some milliseconds a point (`tfarm.exact.values`).
     Raises ParameterError for an unknown output or method, or for a place missing or outside the arm.
     """
     return TransferFunction(arm, outputs, x=x, method=method, input=input)
@@ -224,7 +234,7 @@ class TransferFunction:
         return self._shaped(self._values(points.ravel()).reshape(len(self.outputs), *points.shape))
 
     def by_methods(self, s: ArrayLike) -> Roads:
-        """G(s) at an array of s by every method that has it (`tfarm.exact.methods`), and how far these part."""
+        """G(s) at an array of s by every method that has it (`tfarm.exact.values`), and how far these part."""
         self.must_be_of_the_hub("a comparison of methods")
         wanted = self.rows[0] if self.is_single else self.rows
         points = np.atleast_1d(np.asarray(s))

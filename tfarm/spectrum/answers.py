@@ -15,7 +15,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
 from tfarm.digits import DOUBLE_DIGITS, CellsOf, general, kept_digits, lined, significant, singly, within
 from tfarm.errors import MISSING, CertificationError, ConvergenceError
-from tfarm.exact.methods import Method, roads_answer
+from tfarm.exact.values import Method, roads_answer
 
 from .damped import NOT_ASSIGNED, DampedModes, damped_modes
 from .proofs import Disc

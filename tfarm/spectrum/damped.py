@@ -21,12 +21,8 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import (
-    NO_GAINS,
-    Gains,
-    as_column,
     loop_parts,
     quick_characteristics,
-    zeros_at_origin,
 )
 from tfarm.exact.system import System
 from tfarm.records import record
@@ -129,7 +125,7 @@ class DampedModes:
         if not disjoint([disc for pair in discs for disc in pair]):
             raise CertificationError("the discs of two eigenvalues touch: ask for more digits")
         proven = proven_count(k, self.box)
-        listed = int(self.box.holds(self._listed.ravel()).sum()) + zeros_at_origin(k)
+        listed = int(self.box.holds(self._listed.ravel()).sum()) + k.at_rest
         if not listed == self.count == proven:
             text = f"{listed} eigenvalues in the box are listed and {self.count} claimed, but {proven} are there"
             raise CertificationError(text)
@@ -300,7 +296,7 @@ class Branches:
         rigid[:, 1] = np.where(kept[:resisted], single[:resisted, 0], np.nan) if resisted else 0.0
         others = tuple(float(each) for each in single[resisted:][kept[resisted:], 0].real)
         eigenvalues, unassigned = np.concatenate([rigid, pairs]), _with_origins(k, free)
-        return DampedModes(undamped, eigenvalues, box, count + zeros_at_origin(k), others=others, unassigned=unassigned)
+        return DampedModes(undamped, eigenvalues, box, count + k.at_rest, others=others, unassigned=unassigned)
 
     def _followed(self, undamped: Modes, wanted: int) -> Complex:
         """The zeros that the first modes, and those in their company, arrive at."""
@@ -352,7 +348,7 @@ def searched(undamped: Modes, followed: DampedModes | None) -> DampedModes:
     if followed is not None:
         others, beyond = followed.others, followed.unassigned_pairs[:, 0]
         more = np.r_[more, beyond[~box.holds(beyond)]]
-    count = found.size + zeros_at_origin(k)
+    count = found.size + k.at_rest
     return DampedModes(undamped, eigenvalues, box, count, others=others, unassigned=_with_origins(k, more))
 
 
@@ -440,11 +436,10 @@ def _first_node(undamped: Modes, count: int, level: float) -> Node:
     return Node(share * level, polished(start, np.concatenate([single, node.zeros])))
 
 
-def member(k: System, gains: Gains = NO_GAINS) -> Member:
+def member(k: System) -> Member:
     """The characteristic function without its zeros at the origin, to be followed."""
-    at_zero, rows = zeros_at_origin(k, gains), as_column(gains)
     singular = -1.0 / k.damping if k.damping else -np.inf
-    return Member(lambda s: quick_characteristics(k, s, rows, at_zero), singular)
+    return Member(lambda s: quick_characteristics(k, s, k.at_rest), singular)
 
 
 def polished(last: Member, zeros: Complex) -> Complex:

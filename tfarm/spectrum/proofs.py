@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from tfarm.errors import CertificationError
 from tfarm.exact.balls import Ball, point, precision, rational
-from tfarm.exact.characteristic import NO_GAINS, Gains, characteristic_over, tangent
+from tfarm.exact.characteristic import Feedback, characteristic_over, tangent
 from tfarm.exact.system import System
 from tfarm.records import record
 
@@ -147,7 +147,7 @@ class Disc:
         return float(self.im) == 0
 
 
-def proven_count(k: System, box: Box, gains: Gains = NO_GAINS) -> int:
+def proven_count(k: System, box: Box, law: Feedback | None = None) -> int:
     """How many zeros of D lie in a box symmetric about the real axis, with multiplicity, those at s = 0 included.
 
     Raises CertificationError where a zero is too near the contour, where it would take too many pieces, or -1/C is
@@ -160,21 +160,21 @@ def proven_count(k: System, box: Box, gains: Gains = NO_GAINS) -> int:
     with precision(CONTOUR_BITS):
         turned = flint.arb(0)
         for a, b in pairwise(corners):
-            turned += _turning(k, gains, point(a), point(b))
+            turned += _turning(k, law, point(a), point(b))
         number = (turned / flint.arb.pi()).unique_fmpz()
     if number is None:
         raise CertificationError("the turning of D around the box is no certain multiple of pi")
     return int(number)
 
 
-def _turning(k: System, gains: Gains, a: Ball, b: Ball) -> Ball:
+def _turning(k: System, law: Feedback | None, a: Ball, b: Ball) -> Ball:
     """The change of arg D along the piece from a to b."""
     total, start, step, pieces = flint.arb(0), 0.0, FIRST_PIECE, 0
-    here, value = a, characteristic_over(k, a, gains)
+    here, value = a, characteristic_over(k, a, law)
     while start < 1:
         end = min(start + step, 1.0)
         there = (a + (b - a) * end).mid()
-        over = characteristic_over(k, here.union(there), gains)
+        over = characteristic_over(k, here.union(there), law)
         pieces += 1
         if pieces > MOST_PIECES:
             raise CertificationError(f"the edge of the box takes more than {MOST_PIECES} pieces: prove a shorter list")
@@ -183,36 +183,36 @@ def _turning(k: System, gains: Gains, a: Ball, b: Ball) -> Ball:
             if step < SHORTEST_PIECE:
                 raise CertificationError(f"a zero lies on the edge of the box, near {complex(here):.6g}")
             continue
-        end_value = characteristic_over(k, there, gains)
+        end_value = characteristic_over(k, there, law)
         total += (end_value / value).log().imag
         start, here, value, step = end, there, end_value, STEP_GROWTH * step
     return total
 
 
-def enclosed(k: System, near: complex, digits: int, gains: Gains = NO_GAINS) -> Disc:
+def enclosed(k: System, near: complex, digits: int, law: Feedback | None = None) -> Disc:
     """A disc with one zero, its radius one unit in the last of `digits` significant digits of |s| or less.
 
     Raises CertificationError where no disc can be proven, around a double zero for instance.
     """
     for bits in axis_precisions(digits):
         with precision(bits):
-            middle = _newton(k, gains, near, digits)
+            middle = _newton(k, law, near, digits)
             if middle is None:
                 continue
             unit = Fraction(10) ** (int(np.floor(np.log10(abs(complex(middle.mid()))))) - digits + 1)
             re, im = (_rounded(part, unit) for part in (middle.real, middle.imag))
-            if _holds_one(k, gains, flint.acb(rational(re), rational(im)), rational(unit)):
+            if _holds_one(k, law, flint.acb(rational(re), rational(im)), rational(unit)):
                 return Disc(_decimal(re, unit), _decimal(im, unit), f"{float(unit):.0e}")
     raise CertificationError(
         f"no proven disc of {digits} digits around {near:.12g} 1/s: a double zero, or close to one"
     )
 
 
-def _newton(k: System, gains: Gains, near: complex, digits: int) -> Ball | None:
+def _newton(k: System, law: Feedback | None, near: complex, digits: int) -> Ball | None:
     """Newton's method on the middles of balls; real starts stay real."""
     s = point(near)
     for _ in range(BALL_STEPS):
-        parts = tangent(k, s, flint.arb(0), gains)
+        parts = tangent(k, s, flint.arb(0), law)
         if parts is None or parts[1].contains(0):
             return None
         move = (parts[0] / parts[1]).mid()
@@ -223,9 +223,9 @@ def _newton(k: System, gains: Gains, near: complex, digits: int) -> Ball | None:
     return None
 
 
-def _holds_one(k: System, gains: Gains, m: Ball, r: Ball) -> bool:
+def _holds_one(k: System, law: Feedback | None, m: Ball, r: Ball) -> bool:
     """Rouche's theorem with the tangent at m, on the disc of radius r."""
-    parts = tangent(k, m, r, gains)
+    parts = tangent(k, m, r, law)
     if parts is None:
         return False
     value, slope, half_curvature = (abs(part) for part in parts)

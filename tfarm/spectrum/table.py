@@ -23,7 +23,8 @@ from tfarm.arrays import Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import natural_frequency, roots_near
-from tfarm.exact.methods import (
+from tfarm.exact.system import System, shear_flexibility, system_of
+from tfarm.exact.values import (
     APPENDIX_DIGITS,
     Method,
     Roads,
@@ -32,7 +33,6 @@ from tfarm.exact.methods import (
     must_be_of_appendix,
     why_no_appendix,
 )
-from tfarm.exact.system import System, shear_flexibility, system_of
 from tfarm.records import record
 
 from .frequencies import ARMS_KEPT, count_below, natural_frequencies, refine
@@ -96,7 +96,7 @@ class Modes:
         return ["0.0"] * self._rigid + flexible
 
     def frequencies(self, method: Method = "closed-form") -> Real:
-        """The frequencies [rad/s] by another road (`tfarm.exact.methods`), float64, one a mode.
+        """The frequencies [rad/s] by another road (`tfarm.exact.values`), float64, one a mode.
 
         "balls": the middle of each proven bracket, wide as the last of 20 digits, nothing beside a float64's rounding;
         "appendix": the roots of the paper's Delta next to them.
@@ -175,11 +175,6 @@ class Modes:
         """Points x [m] strictly inside the arm where the total displacement of each mode vanishes."""
         rigid: tuple[Real, ...] = (np.empty(0),) * self._rigid
         return rigid + tuple(self._nodes(mode) * float(self._k.length) for mode in range(len(self) - self._rigid))
-
-    def orthogonality(self) -> float:
-        """The largest entry of (modal mass matrix - identity), over the flexible modes: rounding, if all is well."""
-        mass = self._shapes.mass_matrix()
-        return float(abs(mass - np.eye(len(mass))).max())
 
     # ------------------------------------------------------------ sensitivities
 

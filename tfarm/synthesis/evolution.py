@@ -26,7 +26,7 @@ POINTS = 12  # of each strategy in a round
 HALVED_EVERY, FINALISTS = 10, 4  # rounds after which the better half goes on, down to so many
 MOST_ROUNDS = 160  # a ridge in five coordinates takes most of them
 FIRST_STEP = 0.05  # of the box: short, as good valleys are narrow
-LEAST_STEP = 1e-6  # of the box, where all strategies end
+LEAST_PROGRESS, SHORT_STEP = 1e-5, 1e-3  # of the score between halvings, of the box: with less of both all end
 STEP_GROWS = 0.6  # of ln(step) in a round, at most
 LEAST_SPREAD = 1e-20  # of C: an eigenvalue below it is rounding
 STALLED = 1.4  # of the length by chance, and 2/(n + 1): a longer path of the step leaves that of C as it is
@@ -91,17 +91,19 @@ def evolved(
     mean = ((starts - low) / (high - low)).T
     unit = np.repeat(np.eye(n)[None], m, axis=0)
     now = Strategies(mean, np.full(m, FIRST_STEP), unit, none, none, mean, score(starts))
-    of, ended = Constants.of(n), []
+    of, ended, before = Constants.of(n), [], np.inf
     for number in range(MOST_ROUNDS):
         if number and number % HALVED_EVERY == 0:
+            lowest = float(now.score.min())
+            if before - lowest <= LEAST_PROGRESS * abs(lowest) and now.step.max() < SHORT_STEP:
+                break
+            before = lowest
             order = np.argsort(now.score, kind="stable")
             kept, left = np.split(order, [max(FINALISTS, order.size // 2)])
             ended.append(now.some(left))
             now = now.some(kept)
             tell(number, float(now.score[0]))
         now = _next(now, of, lambda x: score(low + (high - low) * x), rng, number)
-        if now.step.max() < LEAST_STEP:
-            break
     found = np.concatenate([each.best for each in (now, *ended)]).T
     scores = np.concatenate([each.score for each in (now, *ended)])
     order = np.argsort(scores, kind="stable")

@@ -20,11 +20,12 @@ from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Tell
 
 POINTS_LOG2 = 11  # of the number of points
-STARTS_EACH = 16  # strategies for each coefficient, from the best of them
-HOPS, HOPS_EACH, HOP_POINTS = 2, 4, 256  # searches about the best of more than two, strategies each, and points
-CANDIDATES = 8  # laws that the exact verdicts may judge, the best first
+STARTS_EACH = 12  # strategies for each coefficient, from the best of them
+HOPS, HOPS_EACH, HOP_POINTS = 1, 4, 256  # searches about the best of more than two, strategies each, and points
+CANDIDATES = 4  # laws that the exact verdicts may judge, the best first
 BEYOND = 4.0  # of x: so far beyond its bounds a search may go, a factor e^4 of a coefficient far above its unit
 APART = 0.02  # of the range of x: points that are nearer are not both begun at
+AS_GOOD = 1e-4  # relative: a coefficient that scores so nearly as well at its physical end is there
 SEED = 0  # of the sequence's scrambling, and of points about the best
 AGREES = 5e-3  # relative: a strategy that ends with so nearly the best score agrees
 FLAT_WITHIN = 0.01  # laws whose score is worse by less than this share bound the flat part
@@ -85,11 +86,22 @@ def search(judge: Worst, form: Structure, tell: Tell) -> Search:
         x, scores = np.c_[x, further[0]], np.r_[scores, further[1]]
         order = np.argsort(scores, kind="stable")
         x, scores = x[:, order], scores[order]
+    x[:, 0] = _at_limits(judge, region, x[:, 0], float(scores[0]))
     close, best = scores[0] + AGREES * abs(scores[0]), x[:, 0]
     beyond = [each for each in places if (form.box[0] > best, form.box[1] < best)[each[1]][each[0]]]
     widened = tuple(dict.fromkeys(form.names[place] for place, _ in beyond))
     found = [(float(scores[n]), x[:, n]) for n in _apart(region, x, scores, CANDIDATES)]
     return Search(form.wider(beyond, BEYOND), found, scores.size, int((scores <= close).sum()), widened)
+
+
+def _at_limits(judge: Worst, form: Structure, x: Real, score: float) -> Real:
+    """The point with each coefficient at its physical end where it scores as well there."""
+    for place, end in [(place, end) for place in range(form.size) for end in (0, 1) if form.is_physical(place, end)]:
+        moved = x.copy()
+        moved[place] = form.box[end][place]
+        if judge.scores(form, moved[:, None])[0] <= score + AS_GOOD * abs(score):
+            x = moved
+    return x
 
 
 def is_final(form: Structure, place: int, end: int) -> bool:

@@ -10,7 +10,6 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import zip_longest
 
 from rich.cells import cell_len
@@ -19,58 +18,6 @@ from tfarm.columns import TERMINAL, Column, Table
 
 COLUMN_GAP = 2  # spaces between two columns
 LEAST_FOLDED = 20  # characters to which a text may be folded
-
-
-@dataclass(frozen=True)
-class Rows:
-    """A table as texts: a title a column, then rows; the columns numbered in `fold` hold texts that may be folded.
-
-    The first `keys` columns say which row it is, and stand in every block.
-    """
-
-    titles: tuple[str, ...]
-    rows: Sequence[tuple[str, ...]]
-    fold: tuple[int, ...] = ()
-    keys: int = 1
-
-    def lines(self, width: int) -> list[str]:
-        """The lines of the table, each in so many characters as far as its widest column allows."""
-        widths = self._widths(width)
-        printed: list[str] = []
-        for block in _blocks(widths, width, self.keys):
-            printed += [""] * bool(printed)
-            for row in (self.titles, *self.rows):
-                printed += self._row(row, widths, block)
-        return printed
-
-    def _widths(self, width: int) -> list[int]:
-        """Of each column: as its cells want it, folded where that does not fit."""
-        columns = list(zip(*self.rows, strict=True)) or [() for _ in self.titles]
-        cells = [max(map(cell_len, column), default=0) for column in columns]
-        natural = [max(cell_len(title), cell) for title, cell in zip(self.titles, cells, strict=True)]
-        if _total(natural) <= width:
-            return natural
-        words = [max(map(len, title.split()), default=0) for title in self.titles]
-        widths = [max(pair) for pair in zip(words, cells, strict=True)]
-        rest = width - _total([w for i, w in enumerate(widths) if i not in self.fold]) - COLUMN_GAP * len(self.fold)
-        for left, i in zip(range(len(self.fold), 0, -1), sorted(self.fold, key=lambda i: widths[i]), strict=True):
-            widths[i] = min(widths[i], max(rest // left, LEAST_FOLDED, words[i]))
-            rest -= widths[i]
-        return widths
-
-    def _row(self, row: Sequence[str], widths: Sequence[int], block: Sequence[int]) -> list[str]:
-        """A row's lines: numbers to the right, what is folded to the left."""
-        parts = [textwrap.wrap(row[i], widths[i]) if cell_len(row[i]) > widths[i] else [row[i]] for i in block]
-        to_left = [i in self.fold and len(part) > 1 for i, part in zip(block, parts, strict=True)]
-        lines = []
-        for texts in zip_longest(*parts, fillvalue=""):
-            cells = (
-                text + pad if left else pad + text
-                for i, text, left in zip(block, texts, to_left, strict=True)
-                for pad in [" " * (widths[i] - cell_len(text))]
-            )
-            lines.append((" " * COLUMN_GAP).join(cells).rstrip())
-        return lines
 
 
 def show(table: Table) -> None:
@@ -83,13 +30,46 @@ def table_lines(table: Table, width: int) -> list[str]:
     """The lines of the table, each in so many characters as far as its widest column allows."""
     columns = table.on(TERMINAL)
     cells = [column.printed(column.values) if column.printed else column.cells for column in columns]
-    rows = Rows(
-        titles=tuple(heading(column) for column in columns),
-        rows=list(zip(*cells, strict=True)),
-        fold=tuple(i for i, column in enumerate(columns) if column.folds),
-        keys=table.keys,
-    )
-    return rows.lines(width)
+    titles, rows = [heading(column) for column in columns], list(zip(*cells, strict=True))
+    fold = [i for i, column in enumerate(columns) if column.folds]
+    widths = _widths(titles, rows, fold, width)
+    printed: list[str] = []
+    for block in _blocks(widths, width, table.keys):
+        printed += [""] * bool(printed)
+        for row in (titles, *rows):
+            printed += _row(row, widths, fold, block)
+    return printed
+
+
+def _widths(titles: Sequence[str], rows: Sequence[Sequence[str]], fold: Sequence[int], width: int) -> list[int]:
+    """Of each column: as its cells want it, folded where that does not fit."""
+    columns = list(zip(*rows, strict=True)) or [() for _ in titles]
+    cells = [max(map(cell_len, column), default=0) for column in columns]
+    natural = [max(cell_len(title), cell) for title, cell in zip(titles, cells, strict=True)]
+    if _total(natural) <= width:
+        return natural
+    words = [max(map(len, title.split()), default=0) for title in titles]
+    widths = [max(pair) for pair in zip(words, cells, strict=True)]
+    rest = width - _total([w for i, w in enumerate(widths) if i not in fold]) - COLUMN_GAP * len(fold)
+    for left, i in zip(range(len(fold), 0, -1), sorted(fold, key=lambda i: widths[i]), strict=True):
+        widths[i] = min(widths[i], max(rest // left, LEAST_FOLDED, words[i]))
+        rest -= widths[i]
+    return widths
+
+
+def _row(row: Sequence[str], widths: Sequence[int], fold: Sequence[int], block: Sequence[int]) -> list[str]:
+    """A row's lines: numbers to the right, what is folded to the left."""
+    parts = [textwrap.wrap(row[i], widths[i]) if cell_len(row[i]) > widths[i] else [row[i]] for i in block]
+    to_left = [i in fold and len(part) > 1 for i, part in zip(block, parts, strict=True)]
+    lines = []
+    for texts in zip_longest(*parts, fillvalue=""):
+        cells = (
+            text + pad if left else pad + text
+            for i, text, left in zip(block, texts, to_left, strict=True)
+            for pad in [" " * (widths[i] - cell_len(text))]
+        )
+        lines.append((" " * COLUMN_GAP).join(cells).rstrip())
+    return lines
 
 
 def heading(column: Column) -> str:

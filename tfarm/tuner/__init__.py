@@ -10,11 +10,21 @@ from tfarm.tuner.baselines import (
     tried_loops,
     zero_vibration,
 )
-from tfarm.tuner.controller import SavedTuner, TunedGain, load_tuner, save_tuner, simulated
 from tfarm.tuner.guard import Guard, find_guard
 from tfarm.tuner.kernel import Network, initial_network
 from tfarm.tuner.training import Learning, LearningCurves, Stopped, Training, train
-from tfarm.tuner.trial import Cost, Record, Trial, residual_rms, slew_trial
+from tfarm.tuner.trial import (
+    Cost,
+    Record,
+    SavedTuner,
+    Trial,
+    TunedGain,
+    load_tuner,
+    residual_rms,
+    save_tuner,
+    simulated,
+    slew_trial,
+)
 from tfarm.tuner.tuning import Plan, Tuning, curves_answer, learning_curves, tune, tune_answer
 
 __all__ = [

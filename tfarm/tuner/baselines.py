@@ -44,9 +44,8 @@ from tfarm.dsp.scenarios import torque_unit
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum.table import first_frequency
 from tfarm.tuner import kernel
-from tfarm.tuner.controller import TunedGain, judged, tip_off
 from tfarm.tuner.guard import Guard, MovingGain, constant_windows
-from tfarm.tuner.trial import Record, Trial, residual_rms
+from tfarm.tuner.trial import Record, Trial, TunedGain, judged, residual_rms, tip_off
 
 CONSTANT_GAINS = 200  # constant gains of a window that are tried, before the best are refined
 LEAST_GAINS = 20  # of them where trials are long

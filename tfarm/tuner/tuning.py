@@ -19,7 +19,6 @@ from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner.baselines import SHAPERS, BestConstant, Outcomes, best_constant, lq_bound, shaped_trial
-from tfarm.tuner.controller import SavedTuner, TunedGain, tip_off, weights_answer
 from tfarm.tuner.guard import GuardKind, find_guard
 from tfarm.tuner.kernel import PAPER_HIDDEN, PAPER_INPUTS, initial_network
 from tfarm.tuner.training import QUARTILES, Learning, LearningCurves, Training, train
@@ -27,9 +26,13 @@ from tfarm.tuner.trial import (
     TRIAL_MODES,
     Cost,
     Record,
+    SavedTuner,
     Trial,
+    TunedGain,
     slew_trial,
+    tip_off,
     usual_rate_gain,
+    weights_answer,
     with_signals,
 )
 

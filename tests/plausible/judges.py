@@ -1,14 +1,143 @@
-"""Judges of the verbs of the continuous loop: poles, margins, map, locus, design."""
+"""Judges of what a command says of an arm: modes, responses, poles, margins and maps against the independent model."""
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from tests.plausible.arms import Law, log
-from tests.plausible.judging import Judged
-from tests.plausible.model import EPS
-from tests.plausible.spectra import SAFETY, pole_check
+from tests.plausible.arms import PLACES, Law, log
+from tests.plausible.model import EPS, Model
+
+BLIND = 1e-2  # relative: a model whose own error is larger says nothing
+
+
+@dataclass
+class Judged:
+    """What the model says of one answer: the checks that failed, the worst error, and how many checks it could make."""
+
+    wrong: list = field(default_factory=list)
+    worst: float = 0.0
+    checks: int = 0
+    blind: int = 0
+
+    def number(self, what, printed, model, tolerance, blind=BLIND):
+        """A printed number beside the model's; all relative to the size that the caller divided by, or absolute."""
+        self.error(what, abs(printed - model), tolerance, blind, f"{printed!r} for {model!r}")
+
+    def error(self, what, error, tolerance, blind=BLIND, text=""):
+        """An error, and the model's own."""
+        if not math.isfinite(tolerance) or tolerance > blind:
+            self.blind += 1
+            return
+        self.checks += 1
+        if not error <= tolerance:
+            self.wrong.append(f"{what}: off by {error:.2g}, tolerance {tolerance:.2g} {text}")
+        self.worst = max(self.worst, float(error))
+
+    def truth(self, what, holds):
+        """Something that is so or not."""
+        self.checks += 1
+        if not holds:
+            self.wrong.append(what)
+
+
+ROUGH, FINE = 56, 72  # Legendre terms of the two models: right to 1e-9 up to modes 27 and 36 (rounding apart)
+ROUNDING = 256  # eps of the model's largest flexibility (tests.spectrum.proofs)
+ENDS = (
+    "hub_angle", "hub_rate", "tip_displacement", "tip_deflection", "tip_acceleration", "root_moment", "root_shear",
+)  # fmt: skip
+ALONG = ("deflection", "rotation", "moment", "shear")
+SAFETY = 20  # times the difference of two models
+
+
+class Models:
+    """The two models of an arm, made once."""
+
+    def __init__(self, beam, rough=ROUGH, fine=FINE):
+        self.beam, self.rough, self.fine = beam, Model(beam, rough), Model(beam, fine)
+
+
+@dataclass(frozen=True)
+class Modes:
+    """`tfarm modes`: frequencies, hub participation, modal moments, eigenvalues, beside eigenvalues of the model."""
+
+    def arguments(self, case):
+        return ["--count", str(int(case.rng.integers(3, 21)))]
+
+    def judge(self, case, models, ran):
+        judged, rows = Judged(), [row for row in ran.answer["modes"] if row["index"]]
+        fine, rough = models.fine, models.rough
+        (omega, shapes), (other, others) = fine.modes, rough.modes
+        rounding = ROUNDING * EPS * (omega / omega[0]) ** 2
+        for row in rows:
+            n = row["index"] - 1
+            w, printed = omega[n], row["natural_frequency_rad_s"]
+            own = SAFETY * abs(other[n] / w - 1) + rounding[n] + 8 * EPS
+            judged.error(f"mode {n + 1}", abs(printed / w - 1), own, 1e-4, f"{printed!r} for {w!r}")
+            b, b2 = abs(fine.b @ shapes[:, n]), abs(rough.b @ others[:, n])
+            size = 1 / np.sqrt(case.beam.total_inertia)  # of a participation: the rigid body's
+            slack = (1e-9 + SAFETY * abs(b - b2) / size) + 1e3 * rounding[n]
+            judged.number(f"participation {n + 1}", abs(row["hub_participation"]) / size, b / size, slack, 1e-4)
+            if "eigenvalue" in row or "eigenvalues" in row:
+                self._eigenvalue(judged, row, models, own)
+        judged.truth("complete", ran.answer["complete"] is True)
+        return judged
+
+    def _eigenvalue(self, judged, row, models, own):
+        zeros = [complex(*row["eigenvalue"])] if "eigenvalue" in row else [complex(p) for p in row["eigenvalues"]]
+        for zero in zeros:
+            pole_check(judged, f"eigenvalue of mode {row['index']}", zero, models, None, own)
+
+
+def pole_check(judged, what, printed, models, law, own=0.0):
+    """A printed pole beside the model's nearest one, relative to its size."""
+    fine, step = models.fine.polished(printed, law)
+    rough, other = models.rough.polished(printed, law)
+    size = abs(fine) or 1.0
+    slack = SAFETY * (abs(fine - rough) + step + other) / size + own + 1e-11
+    judged.error(what, abs(printed - fine) / size, slack, 1e-3, f"{printed} for {fine}")
+
+
+@dataclass(frozen=True)
+class Response:
+    """`tfarm response`: one output on the axis and off it, beside the model's solution at the same s."""
+
+    def arguments(self, case):
+        rng = case.rng
+        name = str(rng.choice([*ENDS, *ENDS, *ALONG]))
+        w = case.first * np.exp(rng.uniform(np.log(1e-3), np.log(60.0), 6))
+        s = [complex(0.0, each) for each in w[:4]] + [complex(each * rng.uniform(-0.3, 1), each) for each in w[4:]]
+        options = ["--output", name, "--s=" + ",".join(f"{p.real!r}{p.imag:+.17g}j" for p in s)]
+        return options + (["--x", repr(case.beam.link.length * float(rng.choice(PLACES)))] if name in ALONG else [])
+
+    def judge(self, case, models, ran):
+        judged, answer = Judged(), ran.answer
+        name, x = answer["output"], answer.get("x")
+        for point, value in zip(answer["s"], answer["value"], strict=True):
+            s, printed = complex(*point), complex(*value)
+            near = s * (1 + np.array([0, 1e-4, -1e-4]))
+            G, size = _with_size(models.fine.response(name, near, x))
+            other = models.rough.response(name, near[:1], x)[0]
+            zero = self._noise(models.fine, name, s)
+            slack = SAFETY * abs(G - other) / size + 1e-9 + zero / size
+            judged.error(f"{name} at {s}", abs(printed - G) / size, slack, 1e-3, f"{printed} for {G}")
+        return judged
+
+    def _noise(self, model, name, s):
+        """The model's rounding in a moment or deflection that is the small difference of large ones."""
+        theta = abs(model.response("hub_angle", np.array([s]))[0])
+        L, J = model.beam.link.length, model.beam.total_inertia
+        of_angle = {"tip_deflection": L, "deflection": L, "rotation": 1.0, "root_moment": J * abs(s) ** 2}
+        of_angle |= {"moment": J * abs(s) ** 2, "shear": J / L * abs(s) ** 2, "root_shear": J / L * abs(s) ** 2}
+        return 1e-11 * theta * of_angle.get(name, 0.0)
+
+
+def _with_size(values):
+    """G and |G| + |s G'| from G at s, and a ten-thousandth of s to either side."""
+    G, right, left = values
+    return G, abs(G) + abs(right - left) / 2e-4
+
 
 BESIDE = 1e-5  # share of a printed edge on either side of which the loop is looked at
 CLEAR = 1e-6  # of |s|: a smaller real part is polished before it is believed
@@ -72,8 +201,6 @@ def side(models, start, law):
 class Poles:
     """`tfarm poles`: each printed pole is one of the model's, and none of the model's in the box is missing."""
 
-    oracle = "inverse iteration from each printed pole, and all eigenvalues of the model in the printed box"
-
     def arguments(self, case):
         return case.law.options
 
@@ -108,8 +235,6 @@ class Poles:
 @dataclass(frozen=True)
 class Margins:
     """`tfarm margins`: verdict, edges, gains inside and outside the windows, and each margin at its frequency."""
-
-    oracle = "poles of the model at the gains, beside each edge, at random gains; its L(i w) at and between the margins"
 
     def arguments(self, case):
         return case.law.options
@@ -261,8 +386,6 @@ def dense(models, law, top):
 class Map:
     """`tfarm map`: the counts at a dozen points of the grid, and boundary points that are poles on the axis."""
 
-    oracle = "poles of the model right of the axis at 12 grid points; inverse iteration from 5 boundary points"
-
     def arguments(self, case):
         unit = case.beam.total_inertia * case.first * log(case.rng, 0.05, 3.0)
         return [f"--K1={-0.3 * unit!r},{unit!r}", "--K2=-2,2", f"--Kp={case.law.Kp!r}", "--points", "21"]
@@ -287,62 +410,3 @@ class Map:
             digits = 8 * EPS * (case.first / w) ** 2  # of K2, where hub and arm nearly balance each other
             pole_check(judged, "boundary", 1j * w, models, Law(K1, K2, case.law.Kp), digits)
         return judged
-
-
-@dataclass(frozen=True)
-class Locus:
-    """`tfarm locus` along K2: its last points are poles of the model."""
-
-    oracle = "inverse iteration from the last points of the branches"
-
-    def arguments(self, case):
-        vary = str(case.rng.choice(["K1", "K2"]))
-        stop = 2.0 if vary == "K2" else 2 * abs(case.law.K1)
-        return ["--vary", vary, "--from", "0", "--to", repr(stop), "--points", "60", *case.law.options]
-
-    def judge(self, case, models, ran):
-        judged, answer = Judged(), ran.answer
-        law = replace(case.law, **{answer["vary"]: answer["gain"][-1]})
-        for branch in (each for each in answer["branches"] if each[-1] is not None):  # of those that have not ended
-            pole = complex(*branch[-1])
-            if abs(pole) > 1e-6 * case.first and abs(pole) < trusted(models):
-                pole_check(judged, "end of a branch", pole, models, law)
-        return judged
-
-
-@dataclass(frozen=True)
-class Design:
-    """`tfarm design`: the gains are stable, have the value printed; random ones within the bounds are no better."""
-
-    oracle = (
-        "least damping ratio of the model's poles in the band, at the gains and at 300 random ones within the bounds"
-    )
-
-    def arguments(self, case):
-        return ["--objective", "damping", "--continuous"]
-
-    def judge(self, case, models, ran):
-        judged, answer = Judged(), ran.answer
-        law = Law(answer["K1"], answer["K2"], answer["Kp"])
-        count = growing(models, law)
-        judged.truth(f"{count} poles grow at the gains recommended", not count)
-        omega = models.fine.modes[0]
-        band = (omega[answer["modes"] - 1] + omega[answer["modes"]]) / 2
-        own = ratio(models.rough, law, band)
-        judged.error("value", abs(own - answer["value"]), 1e-4 + 1e-3 * abs(own), 1.0)
-        bounds, rng = answer["bounds"], np.random.default_rng(1)
-        best, better = own, None
-        for _ in range(300):
-            K1 = bounds["K1"][1] * log(rng, 1e-4, 1) if rng.random() < 0.5 else rng.uniform(*bounds["K1"])
-            other = Law(float(K1), float(rng.uniform(*bounds["K2"])), law.Kp)
-            if ratio(models.coarse, other, band) > 1.02 * best + 1e-3 and growing(models, other) == 0:
-                best, better = ratio(models.rough, other, band), other
-        judged.truth(f"{better} has {best:.6g}, better than {own:.6g}", best <= 1.01 * own + 1e-3)
-        return judged
-
-
-def ratio(model, law, band):
-    """The least damping ratio of the model's oscillating poles below the band [rad/s]."""
-    s = oscillating(model, law, band)
-    s = s[(s.imag > 1e-9 * abs(s)) & (s.imag < band)]
-    return float((-s.real / abs(s)).min(initial=1.0))
