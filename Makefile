@@ -8,6 +8,7 @@ RIG := tests/data/quanser-2dsfl
 INSTALLED := .venv/.installed
 BENCH_INSTALLED := .venv/.bench
 BROWSER_INSTALLED := .venv/.browser
+DOCS_INSTALLED := .venv/.docs
 LOWEST := .venv-lowest
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check install -c requirements.lock
 
@@ -47,7 +48,7 @@ SURVEYS := \
 	report.plausible \
 	report.twice
 
-.PHONY: help install reports modes bode margins locus sampled tune audit reference test lowest test-browser kernels survey lint bench clean
+.PHONY: help install reports modes bode margins locus sampled tune audit docs test lowest test-browser kernels survey lint bench clean
 
 help: ## list these verbs
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r verb what; do \
@@ -80,8 +81,8 @@ tune: $(INSTALLED) ## write one arm's gain tuner beside what it has to beat (ARM
 audit: $(INSTALLED) ## check the paper equation by equation
 	@$(BIN)/tfarm audit
 
-reference: $(INSTALLED) ## write the reference of the public names to reference/index.html
-	@$(BIN)/python -m pdoc --no-show-source -o reference tfarm && echo reference/index.html
+docs: $(DOCS_INSTALLED) ## write the documentation to docs/_build/index.html
+	@$(BIN)/python -m sphinx -q -W --keep-going docs docs/_build && echo docs/_build/index.html
 
 test: $(INSTALLED) ## run the tests
 	@PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --dist worksteal # else each process compiles what it loads
@@ -114,7 +115,7 @@ bench: $(BENCH_INSTALLED) ## measure speed, beside other packages
 	@$(BIN)/python -m tests.bench
 
 clean: ## remove everything that was generated
-	@rm -rf .venv $(LOWEST) build dist reference *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	@rm -rf .venv $(LOWEST) build dist docs/_build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	@find reports -mindepth 1 -maxdepth 1 ! -name README.md ! -name pictures -exec rm -rf {} +
 	@find tfarm tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
@@ -145,10 +146,6 @@ $(LOWEST)/.installed: pyproject.toml
 	@$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct -e '.[dev]'
 	@touch $@
 
-$(BENCH_INSTALLED): $(INSTALLED)
-	@$(PIP) -e '.[bench]'
-	@touch $@
-
-$(BROWSER_INSTALLED): $(INSTALLED)
-	@$(PIP) -e '.[browser]'
+$(BENCH_INSTALLED) $(BROWSER_INSTALLED) $(DOCS_INSTALLED): .venv/.%: $(INSTALLED)
+	@$(PIP) -e '.[$*]'
 	@touch $@

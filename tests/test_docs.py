@@ -1,0 +1,51 @@
+"""The pages of the documentation that are made from the code name every command, option, key and public name."""
+
+import importlib.util
+import inspect
+import re
+from pathlib import Path
+
+import pytest
+
+import tfarm
+from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES
+from tfarm.cli.app import whole_command
+
+DOCS = Path(__file__).parent.parent / "docs"
+
+
+@pytest.fixture(scope="module")
+def conf():
+    """docs/conf.py; it needs no Sphinx to be imported."""
+    spec = importlib.util.spec_from_file_location("docs_conf", DOCS / "conf.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_command_and_option_is_on_the_page_of_commands(conf):
+    sections = dict(re.findall(r"^## `tfarm (\w+)`$(.*?)(?=^## |\Z)", conf.commands_page(), re.MULTILINE | re.DOTALL))
+    commands = whole_command().commands
+    assert sections.keys() == commands.keys()
+    for name, command in commands.items():
+        for each in command.params:
+            assert all(option in sections[name] for option in each.opts if option.startswith("--")), (name, each)
+
+
+def test_every_key_of_an_arm_file_is_on_its_page(conf):
+    page = conf.arm_file_page()
+    for table in (*ARM_TABLES.values(), *SHAPE_TABLES.values()):
+        assert all(f"| `{key}` |" in page for key in table.model_fields)
+    assert "| `friction` | float | `0.0` |" in page
+    assert "| `inertia` | float |  |" in page
+
+
+def test_every_public_name_has_a_docstring():
+    for name in tfarm.__all__:
+        assert inspect.getdoc(getattr(tfarm, name)), name
+
+
+def test_every_page_is_in_a_table_of_contents():
+    listed = set(re.findall(r"^[\w/-]+$", (DOCS / "index.md").read_text(encoding="utf-8"), re.MULTILINE))
+    pages = {str(path.relative_to(DOCS).with_suffix("")) for path in DOCS.rglob("*.md") if "_build" not in path.parts}
+    assert listed == (pages | {"reference/commands", "reference/arm-file"}) - {"index"}
