@@ -151,7 +151,7 @@ def test_a_rigid_inertia_is_stable_up_to_its_known_gain(delay):
 
 def test_a_filter_is_for_what_does_not_drift(lab):
     """The rigid body's rate 1/(J s) is lagged, an angle's 1/(J s^2) refused: encoders have no analog filter."""
-    plain = undelayed_plant(lab, Chain(), ("hub_rate", "root_moment", "hub_angle"), 8)
+    plain = undelayed_plant(lab, ("hub_rate", "root_moment", "hub_angle"), 8)
     lagged = with_filter(plain, [0], 90.0)
     for s in (3.0 + 1j, 200j, -20.0 + 400j):
         rate, moment, _ = lagged(s)

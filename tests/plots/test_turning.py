@@ -6,7 +6,7 @@ import pytest
 import tfarm
 from tfarm.crossing import pieces
 from tfarm.dsp import load_chain, sampled_loop
-from tfarm.dsp.loci import sampled_loci
+from tfarm.dsp.modes import sampled_loci
 from tfarm.loop.locus import locus, rounded
 from tfarm.loop.loop import Loop
 from tfarm.loop.plane import moment_axis, rate_axis

@@ -1,7 +1,7 @@
 """Pages on coarse grids, for tests of words, links and bytes: where a boundary lies has tests of its own."""
 
 from tfarm.dsp import crossings as sampled_regions
-from tfarm.dsp import loci as sampled_loci
+from tfarm.dsp import modes as sampled_loci
 from tfarm.dsp import verdict
 from tfarm.loop import loci
 from tfarm.plots import regions

@@ -23,8 +23,7 @@ from tfarm.arm import TWO_GAINS, as_law
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
 from tfarm.synthesis import design as room
-from tfarm.synthesis.judge import LOST, RESERVE
-from tfarm.synthesis.objectives import OBJECTIVES
+from tfarm.synthesis.judge import LOST, OBJECTIVES, RESERVE
 from tfarm.synthesis.structures import STRUCTURES
 
 ALLOWED = 5e-3  # relative: by so much a law may be better

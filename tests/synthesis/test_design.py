@@ -17,7 +17,7 @@ from tfarm.loop.loop import band_of
 from tfarm.loop.margins import loop_margins
 from tfarm.loop.stability import stability
 from tfarm.synthesis.design import design
-from tfarm.synthesis.slews import PERIOD_POINTS
+from tfarm.synthesis.models import PERIOD_POINTS
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 BOUNDS = {"K1": (0.0, 20.0), "K2": (-2.0, 1.0)}

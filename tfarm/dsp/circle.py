@@ -328,11 +328,11 @@ class Band:
 def complete_band(loop: Sampled) -> Band | None:
     """The highest band in which the loop's plant is complete; None where it cannot be shown to be.
 
-    Not without damping, nor with analog hub damping, whose poles the model has to its own accuracy alone.
+    Not without damping.
     """
     plant, sampling = loop.plant, loop.chain.sampling
     C, remaining = plant.arm.damping, sampling.period * (1 - sampling.fraction)
-    if C == 0.0 or loop.chain.actuator.hub_damping > 0.0:
+    if C == 0.0:
         return None
     line = min(TOWARD_SINGULAR / C, DECAYED_EXPONENT / remaining)
     top = _highest(loop, line)
@@ -345,7 +345,7 @@ def complete_band(loop: Sampled) -> Band | None:
 
 def _highest(loop: Sampled, line: float) -> float | None:
     """The top of the highest box right of the line in which the exact arm has the plant's poles and no other."""
-    plant, function = loop.plant, member(modes(loop.plant.arm, 1).system).function
+    plant, function = loop.plant, member(modes(loop.plant.model.arm, 1).system).function
     poles = np.r_[plant.poles[plant.mode > 0], plant.model.single]
     poles = poles[poles.real > -line]
 

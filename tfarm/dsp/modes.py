@@ -7,12 +7,13 @@ read without any that is, w its frequency, b its hub participation, q = w T and 
     -b^2 sin(q/2) (K1/w) cos((d + 1/2) q)   and   -b^2 sin(q/2) K2 I_h sin((d + 1/2) q):
 
 at d = 0 the hub rate damps from 0 to 1/(2T) [Hz] and destabilises from there to 1/T, and so on in bands, and K2 > 0
-never destabilises.  At finite gains the closed-loop pole itself says it: it is followed from zero gain.
+never destabilises.  At finite gains the closed-loop pole itself says it: it is followed from zero gain.  A locus along
+one gain has as many values as it takes to be round, and each branch is named after the mode that it comes from.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 
@@ -20,8 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from tfarm.arm import PLANE, RATE_GAIN
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.columns import ANSWER, JSON, REPORT, Column
+from tfarm.crossing.turning import loose
 from tfarm.digits import general, lined, scientific, singly
 from tfarm.dsp.sampled import Sampled
 from tfarm.records import record
@@ -30,6 +33,12 @@ from tfarm.spectrum import modes
 FOLLOWING_STEPS = 24  # of the continuation from zero gain
 FIRST_SCALE = 1e-6  # of the gains: there each pole is still at that of the plant
 LOOPS_KEPT = 4  # of which origins are asked for again: memory against time, of no effect on an answer
+SAMPLED_LOCUS_VALUES = 61  # of a gain along its locus, to begin with
+BRANCH_ROUNDS = 24  # of halving the steps where a branch bends, at most
+IMAGINARY_ROUNDING = 1e-12  # imaginary part of a real z: rounding
+RIM = 1.12  # radius up to which the z-plane is shown
+DRAWN_RADIUS = 1.2 * RIM  # and up to which a branch is drawn, so that its line runs out of the picture
+RATE_DECADES, STRONGER = 3, 10.0  # of the rate gain: below the end of its locus, and above its own value
 LISTED_DECAY = -20.0  # modes that lose more than this in ln|a| between two samples are not listed
 
 
@@ -187,3 +196,75 @@ def _matched(ahead: Complex, z: Complex) -> NDArray[np.int64]:
     """Which pole continues which branch: the assignment with the shortest way in all."""
     _, order = linear_sum_assignment(abs(ahead[:, None] - z))
     return order
+
+
+# ------------------------------------------------------------ loci
+
+
+@dataclass(frozen=True)
+@record
+class SampledLocus:
+    """The locus of one number of a law, the others those of `loop`: `z` (values, branches), and each branch's mode.
+
+    The mode is 0 for one that comes from the hub, a filter, the delay or the law.
+    """
+
+    loop: Sampled
+    gain: str
+    values: Real
+    z: Complex
+    mode: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+@record
+class SampledLoci:
+    """Loci of a loop along each of both gains, `by` the gain's name."""
+
+    loop: Sampled
+    by: Mapping[str, SampledLocus]
+
+    @property
+    def half_rate(self) -> float:
+        """1/(2T) [Hz]: what lies above is aliased."""
+        return 0.5 / self.loop.chain.sampling.period
+
+    def is_aliased(self, mode: int) -> bool:
+        """Whether a flexible mode lies above half the sample rate."""
+        pulse = self.loop.pulse
+        return bool((pulse.poles.imag[pulse.mode == mode] > 2 * np.pi * self.half_rate).any())
+
+
+def sampled_loci(loop: Sampled, top: float, moments: tuple[float, float]) -> SampledLoci:
+    """The loci of the rate gain from nearly 0 to `top` and of the moment gain over `moments`, the other as it is.
+
+    That of the rate gain begins below the gain of the loop.
+    """
+    lowest = min(top / 10**RATE_DECADES, loop.number(RATE_GAIN) / STRONGER)
+    values = np.geomspace(lowest, top, SAMPLED_LOCUS_VALUES), np.linspace(*moments, SAMPLED_LOCUS_VALUES)
+    return SampledLoci(loop, {name: sampled_locus(loop, name, each) for name, each in zip(PLANE, values, strict=True)})
+
+
+def sampled_locus(loop: Sampled, gain: str, values: Real) -> SampledLocus:
+    """The locus of a number at these values, that of the loop, and those between at which a branch turns."""
+
+    def poles(value: float) -> Complex:
+        z = loop.having(**{gain: value}).poles.z
+        return np.where(abs(z.imag) <= IMAGINARY_ROUNDING, z.real, z)
+
+    known: dict[float, Complex] = {}
+    own = loop.number(gain)
+    wanted = np.union1d(values, own) if values[0] < own < values[-1] else values
+    for _ in range(BRANCH_ROUNDS):
+        known |= {value: poles(value) for value in wanted.tolist() if value not in known}
+        values = np.array(sorted(known))
+        z = followed_branches([known[value] for value in values.tolist()], values)
+        bent = loose(np.where((z.imag >= 0) & (abs(z) < DRAWN_RADIUS), z, np.nan).T, 2 * RIM, 2 * RIM)
+        if not bent.any():
+            break
+        wanted = (values[:-1] + values[1:])[bent] / 2
+    first = loop.having(**{gain: float(values[0])})
+    origin = origins(first)
+    modes = np.r_[loop.pulse.mode, np.zeros(loop.in_z.poles.size, np.int64)]
+    mode = np.where(origin < 0, 0, modes[origin])
+    return SampledLocus(loop, gain, values, z, mode[[abs(first.poles.z - start).argmin() for start in z[0]]])

@@ -1,10 +1,9 @@
-"""The analog plant that is sampled: poles and residues of the modal model, with an analog filter and analog hub
-damping.
+"""The analog plant that is sampled: poles and residues of the modal model, with an analog filter.
 
     G_o(s) = rigid[o,0]/s^2 + rigid[o,1]/s + static[o] + sum over poles of residues[o,i]/(s - poles[i])
 
-A first-order filter wc/(s + wc) on an output adds one pole and changes residues; so does hub damping, which moves the
-poles.  Both stay in this form, and the discretisation knows nothing of them.
+A first-order filter wc/(s + wc) on an output adds one pole and changes residues; that stays in this form, and the
+discretisation knows nothing of it.  Analog damping of the hub is friction of the arm.
 """
 
 from __future__ import annotations
@@ -16,12 +15,11 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import Arm
 from tfarm.arrays import Complex, Real
 from tfarm.dsp.chain import Chain
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ParameterError
 from tfarm.exact.outputs import Output
 from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
@@ -35,7 +33,6 @@ from tfarm.spectrum.frequencies import LISTS_KEPT
 Branching = Callable[[Modes], DampedModes]
 
 AMPLIFIED = ("M", "Q", "strain", "current")  # what a strain gauge, a load cell or a shunt reads
-AT_DAMPED_HUB = ("hub_angle", "hub_rate")  # read where a chain damps the hub: the angle brings the rigid body's states
 RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")  # of a simulation, not filtered
 USUAL_MODES = 20  # flexible, of a sampled loop or a simulation whose number is not said
 
@@ -46,7 +43,7 @@ class Plant:
     """Poles (m,) [1/s] other than s = 0, conjugates listed too; residues (outputs, m), rigid (outputs, 2), static
     (outputs,).
 
-    `mode` (m,) is the flexible mode that a pole belongs to; 0 for those of a filter or the damped hub.  `model` is what
+    `mode` (m,) is the flexible mode that a pole belongs to; 0 for those of a filter or the hub.  `model` is what
     it was made from; it may have more modes.
     """
 
@@ -102,40 +99,25 @@ class Plant:
         return int(self.mode.max(initial=0))
 
 
-def undelayed_plant(
-    arm: Arm,
-    chain: Chain,
-    outputs: Sequence[str],
-    count: int,
-    branches: Branching = all_damped_modes,
-    x: float | None = None,
-) -> Plant:
-    """The arm with `count` flexible modes and the actuator's analog hub damping, its outputs not filtered.
+def damped_at_hub(arm: Arm, chain: Chain) -> Arm:
+    """The arm with the actuator's analog hub damping, which is friction of its hub."""
+    damping = chain.actuator.hub_damping
+    if damping > 0 and arm.has_massless_hub:
+        remedy = "a hub without inertia has no model of finite order under it; give hub.inertia, or leave it out"
+        raise ParameterError(key="actuator.hub_damping", value=damping, remedy=remedy)
+    return arm if damping == 0 else replace(arm, hub=replace(arm.hub, friction=arm.hub.friction + damping))
 
-    `x` [m] is the place of outputs along the arm.
-    """
+
+def undelayed_plant(
+    arm: Arm, outputs: Sequence[str], count: int, branches: Branching = all_damped_modes, x: float | None = None
+) -> Plant:
+    """The arm with `count` flexible modes, its outputs not filtered; `x` [m] is the place of outputs along the arm."""
     if arm.is_locked:
         remedy = "a locked hub has no loop: no torque turns it; give a finite inertia"
         raise ParameterError(key="hub.inertia", value=math.inf, remedy=remedy)
-    damping = chain.actuator.hub_damping
-    if damping > 0 and arm.has_massless_hub:
-        remedy = (
-            "a hub without inertia has no model of finite order under hub damping; give hub.inertia, or leave it out"
-        )
-        raise ParameterError(key="actuator.hub_damping", value=damping, remedy=remedy)
-    if damping > 0 and arm.input_lags:
-        remedy = "acts on the hub at once, and the input behind an inductance late: give it as hub.friction of the rig"
-        raise ParameterError(key="actuator.hub_damping", value=damping, remedy=remedy)
-    model = _modelled(arm, tuple(outputs), count, x, branches)
-    if damping > 0:
-        model = _beside(model, _modelled(arm, AT_DAMPED_HUB, count, None, branches))
-    return with_modes(model, chain, outputs, count)
-
-
-def _modelled(arm: Arm, names: tuple[str, ...], count: int, x: float | None, branches: Branching) -> ModalModel:
     if branches is all_damped_modes:
-        return _modelled_once(arm, names, count, x)
-    return modal_model(arm, names, count, x, branches=branches)
+        return with_modes(_modelled_once(arm, tuple(outputs), count, x), count)
+    return with_modes(modal_model(arm, tuple(outputs), count, x, branches=branches), count)
 
 
 @lru_cache(maxsize=LISTS_KEPT)  # the simulations of one page ask for the same model some twenty times
@@ -143,38 +125,14 @@ def _modelled_once(arm: Arm, names: tuple[str, ...], count: int, x: float | None
     return modal_model(arm, names, count, x)
 
 
-def _beside(model: ModalModel, hub: ModalModel) -> ModalModel:
-    """A model with the outputs of another, of the same arm and modes, after its own.
-
-    What scales the states comes from that other, so that they are the same to the last bit wherever the first is read.
-    """
-    singles, of_hub = model.single_residues, hub.single_residues
-    return replace(
-        model,
-        rows=(*model.rows, *hub.rows),
-        residues=np.r_[model.residues, hub.residues],
-        rigid=np.r_[model.rigid, hub.rigid],
-        static=np.r_[model.static, hub.static],
-        single_residues=None if singles is None or of_hub is None else np.r_[singles, of_hub],
-        participation=hub.participation,
-    )
-
-
-def with_modes(model: ModalModel, chain: Chain, outputs: Sequence[str], count: int) -> Plant:
-    """The plant with the first `count` modes of a model, the last outputs AT_DAMPED_HUB where it is damped."""
-    damping = chain.actuator.hub_damping * model.arm.input_per_torque
+def with_modes(model: ModalModel, count: int) -> Plant:
+    """The plant with the first `count` modes of a model."""
     some = model if count == model.index.size else model.first(count)
-    plant = _with_hub_damping(some, outputs, damping) if damping > 0 else _of_model(some)
-    exact = transfer(model.arm, [*outputs, "hub_rate"], x=model.x)
-
-    def values(s: Complex) -> Complex:
-        G = exact(s)
-        return G[:-1] / (1 + damping * G[-1])
-
-    plant, C = replace(plant, model=model), model.arm.damping
+    plant, C = replace(_of_model(some), model=model), model.arm.damping
     if C * some.natural_frequency.max(initial=0.0) < SLOW_POLES_FROM:
         return plant
-    corners, shares = slow_remainder(C, lambda s: values(s) - np.array([plant(each) for each in s]).T)
+    exact = transfer(model.arm, model.outputs, x=model.x)
+    corners, shares = slow_remainder(C, lambda s: exact(s) - np.array([plant(each) for each in s]).T)
     return replace(
         plant,
         poles=np.r_[plant.poles, -corners],
@@ -231,44 +189,17 @@ def _of_model(model: ModalModel) -> Plant:
     return Plant(model.arm, model.outputs, poles, residues, model.rigid, model.static, mode, model)
 
 
-def _with_hub_damping(model: ModalModel, outputs: Sequence[str], damping: float) -> Plant:
-    """The poles and residues under the torque -damping theta_t of a model with AT_DAMPED_HUB last, by eigenvectors.
-
-    Raises ConvergenceError where the static remainder of the hub's rate would turn the damping's sign.
-    """
-    if damping * model.static[-1] <= -1.0:
-        why = (
-            f"what {model.index.size} modes leave of the hub's rate would be unstable under actuator.hub_damping: "
-            "ask for more modes, or give it as hub.friction of the rig"
-        )
-        raise ConvergenceError(why, model.index.size, damping * float(model.static[-1]))
-    A, B, C, D = model.closed([0.0] * (len(model.outputs) - 1) + [damping])
-    poles, right = np.linalg.eig(A)
-    drive = np.linalg.solve(right, B.astype(complex))[:, 0]
-    residues = (C @ right) * drive
-    rigid = np.zeros((len(model.outputs), 2))
-    if model.has_rigid_states:  # turning the whole arm by an angle costs nothing: that pole is exactly zero
-        zero = int(np.argmin(abs(poles)))
-        feels = model.rigid[:, 2 - model.rigid_states] != 0
-        rigid[:, 1] = np.where(feels, residues[:, zero].real, 0.0)
-        poles, residues = np.delete(poles, zero), np.delete(residues, zero, axis=1)
-    own = model.eigenvalues.ravel()
-    mode = np.zeros(poles.size, np.int64)
-    new, old = linear_sum_assignment(abs(poles[:, None] - own))
-    mode[new] = np.repeat(model.index, 2)[old]
-    damped = Plant(model.arm, model.outputs, poles, residues, rigid, D[:, 0], mode, model)
-    return damped.rows(outputs)
-
-
 @dataclass(frozen=True)
 @record
 class SensedPlant:
     """An arm's signals with `count` modes: one plant for each place that signals are read at, and all of it together.
 
-    `plants` are not filtered, one for each of `places` [share of the length].  Raises ParameterError as `Signals` does,
-    for a locked hub, and for an output that grows with s without bound.
+    `read` is of the arm with what the actuator damps; `plants` are not filtered, one for each of `places` [share of the
+    length].  Raises ParameterError as `Signals` does, for a locked hub, and for an output that grows with s without
+    bound.
     """
 
+    arm: Arm
     read: Signals
     chain: Chain
     plants: tuple[Plant, ...]
@@ -291,6 +222,7 @@ class SensedPlant:
             rows.append((plant, plant.outputs.index(wanted.name)))
         return replace(
             first,
+            arm=self.arm,
             outputs=self.read.names,
             residues=np.array([plant.residues[n] for plant, n in rows]),
             rigid=np.array([plant.rigid[n] for plant, n in rows]),
@@ -300,23 +232,18 @@ class SensedPlant:
     def with_modes(self, count: int, branches: Branching = all_damped_modes) -> SensedPlant:
         """The same with another number of modes; no work where the models have as many."""
         if count > self.plants[0].model.index.size:
-            return sensed_plant(self.read.arm, self.chain, self.read.names, count, branches)
-        damped = self.chain.actuator.hub_damping > 0
-        shorter = [
-            with_modes(each.model, self.chain, each.model.outputs[: -len(AT_DAMPED_HUB) if damped else None], count)
-            for each in self.plants
-        ]
-        return replace(self, plants=tuple(shorter))
+            return sensed_plant(self.arm, self.chain, self.read.names, count, branches)
+        return replace(self, plants=tuple(with_modes(each.model, count) for each in self.plants))
 
 
 def sensed_plant(
     arm: Arm, chain: Chain, names: Sequence[str], count: int, branches: Branching = all_damped_modes
 ) -> SensedPlant:
-    """The signals of that name with `count` flexible modes."""
-    read, plants = Signals(arm, tuple(names)), []
+    """The signals of that name with `count` flexible modes, of an arm whose hub a chain may damp."""
+    read, plants = Signals(damped_at_hub(arm, chain), tuple(names)), []
     for share in dict.fromkeys(read.places):
         here = zip(read.outputs, read.places, strict=True)
         wanted = list(dict.fromkeys(each.name for each, place in here if place == share))
         along = any(each.place == "x" for each in read.outputs if each.name in wanted)
-        plants.append(undelayed_plant(arm, chain, wanted, count, branches, share * arm.length if along else None))
-    return SensedPlant(read, chain, tuple(plants))
+        plants.append(undelayed_plant(read.arm, wanted, count, branches, share * arm.length if along else None))
+    return SensedPlant(arm, read, chain, tuple(plants))

@@ -15,11 +15,11 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import LISTED, TAKEN_OFF, AnyLaw, Arm, HubFeedback, driven, tracked, unit_of
+from tfarm.arm import AT_HUB, LISTED, TAKEN_OFF, AnyLaw, Arm, driven, tracked, unit_of
 from tfarm.arrays import Real
 from tfarm.columns import Column
 from tfarm.dsp.chain import Chain, chain_or_usual
-from tfarm.dsp.discretise import described_law
+from tfarm.dsp.discretise import described_law, with_all_gains
 from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario
 from tfarm.dsp.simulate import Simulation, Simulator, Trace
@@ -223,14 +223,15 @@ def simulation_answer(
 
 def _led_by(arm: Arm, law: AnyLaw) -> dict[str, Any]:
     """The law, and what it drives."""
-    if not isinstance(law, HubFeedback):
-        return described_law(law, arm) | {"references": list(law.references)}
+    given = with_all_gains(arm, law)
+    if given.gains is None or given.references != AT_HUB:
+        return described_law(given, arm) | {"references": list(given.references)}
     words = f"u = r - {TAKEN_OFF}, with references; a positive root moment M accelerates the hub"
     return {
         "law": words + driven(arm),
         "input": arm.input,
         "gain_units": {gain.name: unit_of(gain.name, arm) for gain in LISTED},
-        **law.by_name,
+        **given.gains.by_name,
     }
 
 

@@ -262,7 +262,7 @@ class Sampled:
     @property
     def is_damped(self) -> bool:
         """Whether friction makes the turning hub a single integral of the input."""
-        return bool(self.plant.arm.rate_loss or self.chain.actuator.hub_damping)
+        return bool(self.plant.model.arm.rate_loss)
 
     @cached_property
     def has_free_angle(self) -> bool:

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import Arm
 from tfarm.arrays import Complex, Real
-from tfarm.dsp.chain import Chain, Sampling
+from tfarm.dsp.chain import Sampling
 from tfarm.dsp.plant import USUAL_MODES, Plant, undelayed_plant
 from tfarm.records import record
 
@@ -240,7 +240,7 @@ def pulse_transfer(
     Raises ParameterError for an unknown output, a locked hub or a count out of range.
     """
     clock = Sampling() if sampling is None else sampling
-    return PulseTransfer(undelayed_plant(arm, Chain(sampling=clock), outputs, count), clock)
+    return PulseTransfer(undelayed_plant(arm, outputs, count), clock)
 
 
 def phi(u: float) -> float:

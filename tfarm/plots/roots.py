@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tfarm.arrays import Complex
 from tfarm.digits import kept_digits, plain, significant
-from tfarm.dsp.loci import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
+from tfarm.dsp.modes import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
 from tfarm.errors import one_line
 from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, ReducedLocus, held_branches
 from tfarm.loop.locus import Locus, frame, rounded

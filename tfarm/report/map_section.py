@@ -28,8 +28,8 @@ from tfarm.report.cases import DESIGNED_MODES, LawOnArm, best, brief_on, continu
 from tfarm.report.sections import PageSection, Picture, in_ms, typeset
 from tfarm.spectrum.table import default_gains, default_words, first_frequency, rate_unit
 from tfarm.synthesis.design import Design
+from tfarm.synthesis.judge import least_damping
 from tfarm.synthesis.models import continuous_model
-from tfarm.synthesis.objectives import least_damping
 from tfarm.synthesis.structures import ONE, Entry
 
 MAP_SEEN = (

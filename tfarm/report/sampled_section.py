@@ -13,8 +13,7 @@ from tfarm.digits import how_many, plain, scientific, significant, singly
 from tfarm.dsp import Analysis, Chain, Verdict, sampled_verdict
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.dsp.crossings import around
-from tfarm.dsp.loci import STRONGER, SampledLoci, sampled_loci
-from tfarm.dsp.modes import SAMPLED_MODE_COLUMNS
+from tfarm.dsp.modes import SAMPLED_MODE_COLUMNS, STRONGER, SampledLoci, sampled_loci
 from tfarm.dsp.verdict import SampledNumber, at_periods, sampled
 from tfarm.plots.regions import StableRegions, draw_overlay, regions_table, stable_regions
 from tfarm.plots.roots import draw_sampled_loci

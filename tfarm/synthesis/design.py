@@ -24,10 +24,9 @@ from tfarm.loop.answers import law_answer
 from tfarm.loop.loop import Loop
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import record
-from tfarm.synthesis.judge import LOST, Judge, judges_of
-from tfarm.synthesis.objectives import OBJECTIVES
+from tfarm.synthesis.judge import LOST, OBJECTIVES, Judge, judges_of
+from tfarm.synthesis.models import slew_and_after, trial_slew
 from tfarm.synthesis.search import Search, Worst, flat_part, search
-from tfarm.synthesis.slews import slew_and_after, trial_slew
 from tfarm.synthesis.structures import Bounds, Structure, check_bounds, structure_of
 from tfarm.synthesis.worst_case import ArmBox, NamedArm, Tell, WorstCase, arms_of, for_the_worst, same_input
 
