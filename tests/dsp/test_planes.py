@@ -11,7 +11,7 @@ from tfarm import HubFeedback, Law
 from tfarm.arm import as_law
 from tfarm.arm.writing import save_law
 from tfarm.dsp import Chain, sampled_loop
-from tfarm.dsp.crossings import law_map
+from tfarm.dsp.crossings import sampled_map
 
 LAB = tfarm.load("sasaki2012-lab")
 FOUR = Law({"hub_angle": ((4.0, 2.0), (0.05, 1.0)), "hub_rate": 1.0, "root_moment": (0.2, (0.01, 1.0))}, delay=0.004)
@@ -29,7 +29,7 @@ def test_the_count_at_a_point_is_that_of_the_poles_of_its_own_loop(law, vary, ac
     """Of a loop made anew for the law at that point; stable and unstable ones are among them."""
     rng = np.random.default_rng(3)
     x, y = (np.sort(rng.uniform(*ends, 4)) for ends in (across, up))
-    plane = law_map(sampled_loop(LAB, law, count=6), x, y, vary)
+    plane = sampled_map(sampled_loop(LAB, law, count=6), x, y, vary)
     counts = []
     for i, j in [(i, j) for i in range(4) for j in range(4) if (i + j) % 2]:
         there = as_law(law).having(vary[0], x[i]).having(vary[1], y[j])
@@ -63,4 +63,4 @@ def test_the_map_of_the_sampled_loop_from_the_command_line(capsys, tmp_path):
 @pytest.mark.parametrize("name", ["hub_angel", "hub_angle.num.7"])
 def test_what_is_no_number_of_the_law_is_refused(name):
     with pytest.raises(tfarm.ParameterError, match="law"):
-        law_map(sampled_loop(LAB, FOUR, count=4), [0.0, 1.0], [0.0, 1.0], (name, "hub_rate"))
+        sampled_map(sampled_loop(LAB, FOUR, count=4), [0.0, 1.0], [0.0, 1.0], (name, "hub_rate"))

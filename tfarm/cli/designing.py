@@ -83,23 +83,15 @@ def gain_map(
     """The map over the plane of both gains, or over two numbers of a law."""
     subject, of_law = load_arm(arm, theory), bool(vary or law)
     if of_law:
-        for name, value in (typed | {ANGLE_GAIN: kp or None}).items():
-            if value is not None:
-                remedy = "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice"
-                raise ParameterError(key=f"--{name}", value=value, remedy=remedy)
-        if len(vary or []) != 2:
-            remedy = "twice, such as --vary hub_angle=0,10 --vary delay=0,0.02"
-            raise ParameterError(key="--vary", value=vary or [], remedy=remedy)
+        _must_be_two_numbers(vary or [], typed | {ANGLE_GAIN: kp or None})
     from tfarm.dsp.crossings import map_answer as sampled_map_answer
-    from tfarm.loop.answers import law_map_answer, map_answer, plane_table
+    from tfarm.loop.answers import map_answer, plane_answer, plane_table
     from tfarm.loop.loop import Loop
     from tfarm.loop.plane import between, plane, ranges_of
 
     if of_law:
-        number, ranges = (
-            whole_number("--points", points or "60", 2, 400),
-            [_range_of("--vary", each) for each in vary or []],
-        )
+        number = whole_number("--points", points or "60", 2, 400)
+        ranges = [_range_of("--vary", each) for each in vary or []]
         controller, _ = asked_law(subject, Given({}, law, arm))
     else:
         number, given = whole_number("--points", points or "101", 2, 2000), _bounds_of(typed)
@@ -117,9 +109,20 @@ def gain_map(
         return
     found = plane(Loop(subject, as_law(controller)), (first, second), x, y)
     hand_out(
-        lambda: law_map_answer(found) if of_law else map_answer(found), _print_map, json,
+        lambda: plane_answer(found) if of_law else map_answer(found), _print_map, json,
         csv=csv, table=lambda: plane_table(names, x, y, found.unstable), png=png, picture=(found,),
     )  # fmt: skip
+
+
+def _must_be_two_numbers(vary: list[str], gains: dict[str, Any]) -> None:
+    """Refuse a plane of a law that does not have two numbers of its own, or has ranges of gains at the hub."""
+    for name, value in gains.items():
+        if value is not None:
+            remedy = "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice"
+            raise ParameterError(key=f"--{name}", value=value, remedy=remedy)
+    if len(vary) != 2:
+        remedy = "twice, such as --vary hub_angle=0,10 --vary delay=0,0.02"
+        raise ParameterError(key="--vary", value=vary, remedy=remedy)
 
 
 def _column_of(name: str) -> str:
@@ -131,12 +134,12 @@ def _sampled_plane(
     arm: Arm, law: AnyLaw | None, kp: float, chain: Chain, vary: tuple[str, str], axes: tuple[Real, Real]
 ) -> GainMap:
     """The map of the sampled loop, with as many modes as the verdict on the law takes, or on the default gains."""
-    from tfarm.dsp.crossings import law_map
+    from tfarm.dsp.crossings import sampled_map
     from tfarm.dsp.verdict import sampled_verdict
     from tfarm.spectrum.table import default_gains
 
     law = default_gains(arm).having(ANGLE_GAIN, kp) if law is None else law
-    return law_map(sampled_verdict(arm, law, chain).full, *axes, vary)
+    return sampled_map(sampled_verdict(arm, law, chain).full, *axes, vary)
 
 
 def _range_of(option: str, text: str) -> tuple[str, tuple[float, float]]:

@@ -276,13 +276,34 @@ class GainMap:
 def sampled_map(
     loop: Sampled, x: Sequence[float] | Real, y: Sequence[float] | Real, vary: tuple[str, str] = PLANE
 ) -> GainMap:
-    """The map over two numbers of the law of a loop, x and y (both ascending), all others as those of the loop.
+    """The map over any two numbers of the law of a loop, x and y (both ascending), all others as those of the loop.
 
-    `vary` names them as `Law.part_gains` does, or "K1", "K2" and "Kp" of gains at the hub.  From the exact crossings of
-    every column (D-decomposition) and one count by eigenvalues; those at three corners must agree with what the
-    crossings say, or a ConvergenceError is raised.
+    `vary` names them as `Law.having` does, or "K1", "K2" and "Kp" of gains at the hub.  Of two gains of its parts the
+    edges are exact (D-decomposition), and along one of them for each value of any other number; of two others poles are
+    counted at every point.  Raises ConvergenceError where the crossings and a count by eigenvalues differ.
     """
     x, y = _ascending(vary[0], x), _ascending(vary[1], y)
+    across, up = (loop.place(name) for name in vary)
+    if across is not None and up is not None:
+        return _map_of_gains(loop, x, y, vary)
+    if across is not None:
+        turned = sampled_map(loop, y, x, (vary[1], vary[0]))
+        return GainMap(loop, vary, turned.y, turned.x, turned.unstable.T, [])
+    loops = [loop.under(loop.given.having(vary[0], value)) for value in x.tolist()]
+    if up is None:
+        points = [[each.under(each.given.having(vary[1], value)) for value in y.tolist()] for each in loops]
+        return GainMap(loop, vary, x, y, np.array([[each.poles.unstable for each in row] for row in points]), [])
+    at = _off_the_edge(y)
+    there = np.array([each.having(**{vary[1]: at}).poles.unstable for each in loops])
+    found = [number_crossings(circle_grid(each), vary[1], each.row[None])[0] for each in loops]
+    return GainMap(loop, vary, x, y, counts_over(y, found, at, there), found)
+
+
+def _map_of_gains(loop: Sampled, x: Real, y: Real, vary: tuple[str, str]) -> GainMap:
+    """The map over two gains of parts of the law, from the exact crossings of every column (D-decomposition).
+
+    One count by eigenvalues starts it; those at three corners must agree, or a ConvergenceError is raised.
+    """
 
     def at(first: float, second: float) -> Sampled:
         return loop.having(**{vary[0]: first, vary[1]: second})
@@ -300,31 +321,6 @@ def sampled_map(
             message = f"at {where} the crossings count {plane.unstable[i, j]} growing poles, not {count}"
             raise ConvergenceError(message, plane, abs(count - int(plane.unstable[i, j])))
     return plane
-
-
-def law_map(
-    loop: Sampled, x: Sequence[float] | Real, y: Sequence[float] | Real, vary: tuple[str, str] = PLANE
-) -> GainMap:
-    """The map over any two numbers of the law of a loop that `Law.having` names, x and y (both ascending).
-
-    Gains of the parts of a law are those of `sampled_map`.  Along one of them the crossings are exact for each value of
-    any other number; of two others poles are counted at every point.
-    """
-    across, up = (loop.place(name) for name in vary)
-    if across is not None and up is not None:
-        return sampled_map(loop, x, y, vary)
-    if across is not None:
-        turned = law_map(loop, y, x, (vary[1], vary[0]))
-        return GainMap(loop, vary, turned.y, turned.x, turned.unstable.T, [])
-    x, y = _ascending(vary[0], x), _ascending(vary[1], y)
-    loops = [loop.under(loop.given.having(vary[0], value)) for value in x.tolist()]
-    if up is None:
-        points = [[each.under(each.given.having(vary[1], value)) for value in y.tolist()] for each in loops]
-        return GainMap(loop, vary, x, y, np.array([[each.poles.unstable for each in row] for row in points]), [])
-    at = _off_the_edge(y)
-    there = np.array([each.having(**{vary[1]: at}).poles.unstable for each in loops])
-    found = [number_crossings(circle_grid(each), vary[1], each.row[None])[0] for each in loops]
-    return GainMap(loop, vary, x, y, counts_over(y, found, at, there), found)
 
 
 def map_answer(plane: GainMap) -> dict[str, Any]:

@@ -383,7 +383,7 @@ def spill_answer(found: Spill) -> dict[str, Any]:
     }
 
 
-def law_map_answer(found: Plane) -> dict[str, Any]:
+def plane_answer(found: Plane) -> dict[str, Any]:
     """Unstable poles over the grid, rows of the second number, as plain lists."""
     return {
         "arm": found.arm.name,
