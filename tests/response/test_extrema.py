@@ -18,6 +18,7 @@ import tfarm
 from tests import survey
 from tests.rigs import some_rig
 from tests.survey import Finding, numbered
+from tfarm.errors import TfarmError
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.report.response_sections import alt_text, highest_and_lowest, what_is_seen
 from tfarm.response.frequency import extrema, resonant_band
@@ -187,7 +188,7 @@ def plots(rng, modes=6):
     """The finding on one Bode plot."""
     try:
         data = some_bode(rng, modes)
-    except tfarm.TfarmError as error:
+    except TfarmError as error:
         return Finding("refused", str(error))
     case = judged(data)
     is_wrong = bool(case.false or case.missed)
