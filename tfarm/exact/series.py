@@ -27,7 +27,7 @@ from .balls import Sweep, into_own, out_of_own, precision, rational, summed
 from .compiled import python_of
 from .layout import Layout, Numbers, Reading, laid_out, readings
 from .outputs import Output
-from .system import Drive, Mark, Segment, System
+from .system import Drive, Mark, Place, Segment, System
 from .waves import SERIES_RADIUS, Plane, Row, across_waves, even_functions, met, row_across_waves, transition_series
 
 SERIES_BITS = 512  # of the power series at s = 0, whose coefficients are sums of small differences
@@ -164,6 +164,7 @@ def beside_slow_pole(chain: System, wanted: Sequence[Output], x: float) -> list[
     return found
 
 
+@lru_cache(SERIES_KEPT)
 def order_at_zero(chain: System, wanted: Output, x: float = 0.0) -> int:
     """How often an output of the free response vanishes at s = 0."""
     with precision(SERIES_BITS):
@@ -174,18 +175,24 @@ def order_at_zero(chain: System, wanted: Output, x: float = 0.0) -> int:
 def _drive_at_zero(chain: System) -> Jet:
     """The drive as a power series in s at 0, exact zeros told from rounding."""
     with precision(SERIES_BITS):
-        return _cleared(SlowSweep.of(readings(chain, (), 0.0).layout, SERIES_ORDER).input)
+        return _cleared(_swept(chain, ()).input)
 
 
 def _numerator_at_zero(chain: System, output: Output, x: float) -> Jet:
     """An output of the free response so."""
     those = readings(chain, (output,), x)
-    return _cleared(SlowSweep.of(those.layout, SERIES_ORDER).output(those.each[0]))
+    return _cleared(_swept(chain, those.layout.places).output(those.each[0]))
+
+
+@lru_cache(SERIES_KEPT)  # angle, rate and drive are read from one sweep
+def _swept(chain: System, places: tuple[Place, ...]) -> SlowSweep:
+    """The sweep of a chain marked at these places."""
+    return SlowSweep.of(Layout(chain, places), SERIES_ORDER)
 
 
 def _leading(series: Jet) -> int:
-    """The number of the first coefficient that is not 0."""
-    return next(n for n, coefficient in enumerate(series.c) if coefficient != 0)
+    """The number of the first coefficient that is not 0, or of them all."""
+    return next((n for n, coefficient in enumerate(series.c) if coefficient != 0), len(series.c))
 
 
 def _cleared(jet: Jet) -> Jet:

@@ -174,7 +174,8 @@ LOST = 1e3  # score where a condition of stability is not met, and as much for e
 class Judge:
     """What laws are worth on an arm, by a `model` of few modes; the models `also` have to be stable, too.
 
-    Slews are made for the arm `known`, and damping is that of the first `modes` modes.
+    Slews are made for the arm `known`, and damping is that of the first `modes` modes.  `is_relaxed`: the sampled loop
+    need hold with larger gains alone, which nearly always decides, and is half the work.
     """
 
     arm: Arm
@@ -184,6 +185,7 @@ class Judge:
     modes: int
     model: Model
     also: tuple[Model, ...]
+    is_relaxed: bool = False
 
     @property
     def is_sampled(self) -> bool:
@@ -203,8 +205,11 @@ class Judge:
     @property
     def _conditions(self) -> list[tuple[Model, float]]:
         """What has to be stable, and a factor on the law: most of what is not fails the first, the last is the loop."""
-        shares = (SEARCH_RESERVE, 1 / SEARCH_RESERVE) if self.is_sampled else ()
-        return [*((self.model, share) for share in shares), *((each, 1.0) for each in self.also), (self.model, 1.0)]
+        own = [(self.model, 1.0)]
+        if not self.is_sampled:
+            return own
+        others = [] if self.is_relaxed else [(self.model, 1 / SEARCH_RESERVE), *((each, 1.0) for each in self.also)]
+        return [(self.model, SEARCH_RESERVE), *others, *own]
 
     # ------------------------------------------------------------ in the model
 
