@@ -25,7 +25,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from tfarm.arm import AnyLaw, Arm, as_law, tracked
 from tfarm.arm.blocks import Rational
@@ -35,6 +34,7 @@ from tfarm.dsp.edges import most_modes
 from tfarm.dsp.results import residual_moment_rms, simulated
 from tfarm.dsp.verdict import UNDAMPED_MODES
 from tfarm.errors import ConvergenceError
+from tfarm.loop.margins import lowest
 from tfarm.loop.stability import stability
 from tfarm.records import record
 from tfarm.synthesis.models import Model, Slews, continuous_model, sampled_model, slew_and_after
@@ -43,7 +43,6 @@ from tfarm.synthesis.structures import Entry, Structure
 REAL_ANGLE = 1e-9  # rad, of ln z or s: a pole at a smaller angle is real
 AS_NEAR = 4.0  # of the least distance to an open-loop pole: as far off a pole may be its own too
 LONGEST_MARGIN = 100.0  # samples, or s: the delay margin where |L| is nowhere 1
-DIPS_REFINED = 5  # lowest points of the grid that are refined
 TIE = 1e-3  # weight of the damping ratio in a disk margin: without sampling rate feedback alone has margin 2
 
 
@@ -124,23 +123,6 @@ def delay(now: Reading) -> Real:
     step = np.mod(turn[:, 1:] - turn[:, :-1] + np.pi, 2 * np.pi) - np.pi
     late = np.mod(turn[:, :-1] + share * step, 2 * np.pi) / (q[:-1] + share * np.diff(q))
     return -unit * np.where(passes, late, LONGEST_MARGIN).min(axis=1, initial=LONGEST_MARGIN)
-
-
-# ------------------------------------------------------------ values of one law
-
-
-def lowest(model: Model, law: Sequence[Entry], of: Callable[[Complex], Real]) -> float:
-    """The least of a function of L on the grid, its lowest dips refined between the points."""
-    q, found = model.angles, of(model.loop(law)[0])
-    best = [float(found.min())]
-    for i in np.argsort(found)[:DIPS_REFINED]:
-        ends = (q[max(i - 1, 0)], q[min(i + 1, q.size - 1)])
-        done = minimize_scalar(
-            lambda at: float(of(model.loop(law, np.array([at]))[0])[0]),
-            bounds=ends, method="bounded", options={"xatol": 1e-9 * (ends[1] - ends[0])},
-        )  # fmt: skip
-        best.append(float(done.fun))
-    return min(best)
 
 
 OBJECTIVES = {
@@ -244,7 +226,8 @@ class Judge:
 
     def lowest(self, law: AnyLaw, of: Callable[[Complex], Real]) -> float:
         """The least of a function of the loop function, between the points of the grid too."""
-        return lowest(self.model, entries_of(law), of)
+        entries = entries_of(law)
+        return lowest(lambda angles: of(self.model.loop(entries, angles)[0]), self.model.angles)[0]
 
     def peak(self, law: AnyLaw) -> float:
         """The largest |S|; in continuous time at least 1."""
