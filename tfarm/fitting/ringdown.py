@@ -210,7 +210,7 @@ def _halves(t: Real, y: Real, poles: Complex) -> tuple[Real, Real, Real]:
         is_clear = found.amplitude**2 > AMPLITUDE_TOLD**2 * (of_a + of_b) / 2
         pairs.append((found.poles.imag, np.where(is_clear, of_w, np.inf)))
     (early, one), (late, other) = pairs
-    return early, late, np.sqrt(one + other)
+    return np.asarray(early), np.asarray(late), np.sqrt(one + other)
 
 
 def basis(poles: Complex, t: Real) -> Real:
@@ -223,7 +223,7 @@ def _linear(poles: Complex, t: Real, y: Real) -> tuple[Real, Real]:
     """Their amplitudes a, then b, and c by least squares, and what is left of y."""
     columns = basis(poles, t)
     linear, *_ = np.linalg.lstsq(columns, y, rcond=None)
-    return linear, y - columns @ linear
+    return linear, np.asarray(y - columns @ linear)
 
 
 @dataclass(frozen=True)
