@@ -222,7 +222,7 @@ def basis(poles: Complex, t: Real) -> Real:
 def _linear(poles: Complex, t: Real, y: Real) -> tuple[Real, Real]:
     """Their amplitudes a, then b, and c by least squares, and what is left of y."""
     columns = basis(poles, t)
-    linear, *_ = np.linalg.lstsq(columns, y, rcond=None)
+    linear = np.asarray(np.linalg.lstsq(columns, y, rcond=None)[0], dtype=float)
     return linear, np.asarray(y - columns @ linear)
 
 
