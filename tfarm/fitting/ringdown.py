@@ -227,6 +227,7 @@ def _linear(poles: Complex, t: Real, y: Real) -> tuple[Real, Real]:
 
 
 @dataclass(frozen=True)
+@record
 class DampedSum:
     """A sum with `poles` (n,), `linear` (2 n + 1,), a, b and c, at times t, and what it leaves of y: e (samples,)."""
 
