@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import tfarm
-from tests.tuner.plain import PlainTrial, complex_step
+from tests.tuner.plain import PlainTrial, complex_step, gradient_of
 from tfarm.tuner import Guard, Learning, Network, Trial, initial_network, slew_trial, train
 
 from .rows import Row, Target
@@ -39,4 +39,4 @@ def tuner_row() -> Row:
 def _gradient_error(trial: Trial, network: Network, guard: Guard) -> float:
     plain = PlainTrial(trial.arm)
     right = complex_step(lambda w: plain.cost(w, 6, network.scales, guard.limits), network.weights)
-    return float(abs(trial.gradient(network, guard.limits)[1] - right).max() / abs(right).max())
+    return float(abs(gradient_of(trial, network, guard.limits)[1] - right).max() / abs(right).max())
