@@ -1,6 +1,5 @@
 """Edges of the gains, the map, the delay margin and the damping that cures: each against poles on both of its sides."""
 
-import csv
 from dataclasses import replace
 from itertools import product
 
@@ -11,13 +10,11 @@ import tfarm
 from tests.odd_arms import odd_arms
 from tests.rigs import some_rig
 from tests.shared import thinned
-from tests.shell import answer, run
 from tests.similar import EITHER
 from tfarm import HubFeedback, Law, modes
-from tfarm.arm import HubFeedback, as_law
-from tfarm.arm.writing import save_law
+from tfarm.arm import as_law
 from tfarm.dsp import Chain, Converters, Sampling, delay_margin, required_damping, sampled_loop, sampled_map
-from tfarm.dsp.crossings import ENDS_AT, around, circle_grid, ends_of_K1, number_crossings, sampled_map, stable_windows
+from tfarm.dsp.crossings import ENDS_AT, around, circle_grid, ends_of_K1, number_crossings, stable_windows
 from tfarm.dsp.verdict import sampled_answer, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.spectrum.table import default_gains
@@ -318,27 +315,6 @@ def test_the_count_at_a_point_is_that_of_the_poles_of_its_own_loop(law, vary, ac
         counts.append(int((abs(poles.z) > 1).sum()))
         assert (plane.unstable[i, j], plane.counts[j, i]) == (counts[-1], counts[-1])
     assert min(counts) == 0 < max(counts)
-
-
-def test_the_map_of_the_sampled_loop_from_the_command_line(capsys, tmp_path):
-    """With the angle held, over the default ranges; and over a delay, which the loop does not survive."""
-    found = answer(capsys, "map", "sasaki2012-lab", "--period", "0.01", "--Kp", "2", "--points", "4")
-    assert (found["vary"], found["period_s"], np.shape(found["unstable_poles"])) == (["K1", "K2"], 0.01, (4, 4))
-    i, j = 3, 2
-    law = HubFeedback(K1=found["x"][i], K2=found["y"][j], Kp=2.0)
-    poles = sampled_loop(LAB, law, count=found["modes_used"]).poles
-    assert found["unstable_poles"][j][i] == poles.unstable
-    law_file, table, picture = (tmp_path / name for name in ("law.toml", "map.csv", "map.png"))
-    save_law(FOUR, law_file)
-    code, out, _ = run(
-        capsys, "map", "sasaki2012-lab", "--dsp", "sasaki2012-lab", "--law", str(law_file), "--vary", "delay=0,0.1",
-        "--vary", "hub_angle=1,3", "--points", "3", "--csv", str(table), "--png", str(picture),
-    )  # fmt: skip
-    assert code == 0
-    assert "pairs of delay and hub_angle are stable when sampled every 10 ms" in out
-    rows = list(csv.DictReader(table.read_text().splitlines()))
-    assert [len(rows), *rows[0]] == [9, "delay", "hub_angle", "unstable_roots"]
-    assert picture.stat().st_size > 5000
 
 
 @pytest.mark.parametrize("name", ["hub_angel", "hub_angle.num.7"])

@@ -1,8 +1,6 @@
 """How far each number of a law may go alone: against windows of gains, verdicts beside each end, and closed forms."""
 
-import json
 from dataclasses import replace
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -13,9 +11,8 @@ from tests.loop import number_windows
 from tests.loop.arms import some_loop, with_damping
 from tests.loop.law_counts import some_delay, some_law
 from tests.loop.law_times import of_margins, some_case
-from tests.shared import remember, sized, thinned
-from tests.shell import run
-from tfarm import ConvergenceError, Hub, HubFeedback, Law, Link, Payload, RotarySpring, Section
+from tests.shared import sized, thinned
+from tfarm import ConvergenceError, Hub, Law, Link, Payload, RotarySpring, Section
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
 from tfarm.loop import windows as windows_module
@@ -28,7 +25,6 @@ from tfarm.response.signals import Signals
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)
-GAINS = HubFeedback(K1=0.3, K2=0.3, Kp=2.0)
 BESIDE, BESIDE_ZERO = 1e-7, 1e-3  # of a window: so far from its end a verdict is asked for; there a pole may be far out
 
 
@@ -93,27 +89,6 @@ def test_a_number_whose_poles_cannot_be_counted_is_named(monkeypatch):
     found = tfarm.margins(LAB, LAW)
     assert LAW.numbers.keys() - found.windows.keys() == {"hub_angle.num.1"}
     assert unsettled(found).endswith("of hub_angle.num.1 poles could not be counted")
-
-
-def test_the_command_has_them(capsys, tmp_path, monkeypatch):
-    remember(monkeypatch, import_module("tfarm.loop.margins"), "margins")  # two commands ask for the same
-    text = "[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
-    (tmp_path / "law.toml").write_text(text)
-    law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
-    found = tfarm.margins(LAB, law).windows
-    words = ("margins", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"))
-    code, out, err = run(capsys, *words, "--json")
-    assert (code, err) == (0, "")
-    answer = json.loads(out)
-    assert {row["number"]: row["interval"] for row in answer["windows"]} == {
-        name: list(each.around) for name, each in found.items()
-    }
-    assert {row["number"]: row["value"] for row in answer["windows"]} == law.numbers
-    assert answer["windows_note"].startswith("window ends are those of poles up to")
-    out = run(capsys, *words)[1]
-    assert f"(0, {found['hub_angle.den.0'].around[1]:.8g}*)" in out
-    assert out.count(answer["windows_note"]) == 1
-    assert np.isfinite(found["gain"].band)
 
 
 @pytest.mark.survey

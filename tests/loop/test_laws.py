@@ -231,19 +231,6 @@ def test_a_law_that_two_modes_bear_drives_the_third():
     assert "models of 1 to 2 modes find nothing unstable" in found.in_words
 
 
-def test_spill_is_a_command(capsys, tmp_path):
-    (tmp_path / "law.toml").write_text(
-        "[law.tip_acceleration]\ngain = 0.02\npoles = [-500.0]\n[law.hub_rate]\ngain = 0.1\n"
-    )
-    code, out, err = run(capsys, "spill", "sasaki2012", "--law", str(tmp_path / "law.toml"), "--modes", "4")
-    assert (code, err) == (0, "")
-    assert out.startswith("sasaki2012: the exact rig is ")
-    code, out, _ = run(capsys, "spill", "sasaki2012", "--K1", "0.3", "--json")
-    answer = json.loads(out)
-    assert [row["unstable"] for row in answer["models"]] == [0] * 20
-    assert answer["stable"]
-
-
 UNSTABLE = {"hub_angle": {"zeros": [-3.0], "poles": [4.0, -60.0], "gain": 900.0}, "hub_rate": 0.5}
 
 
@@ -358,23 +345,6 @@ def test_what_is_no_pair_of_numbers_is_refused(vary, key):
     with pytest.raises(ParameterError) as error:
         plane(Loop(LAB, LAW), vary, between(0, 1, 3), between(0, 1, 3))
     assert error.value.key == key
-
-
-def test_the_command_writes_what_the_map_says(capsys, tmp_path, monkeypatch):
-    remember(monkeypatch, import_module("tfarm.loop.plane"), "plane")  # two commands ask for the same
-    text = "[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
-    (tmp_path / "law.toml").write_text(text)
-    ranges = ("--vary", "gain=0,9", "--vary", "delay=0,0.03", "--points", "3")
-    code, out, err = run(capsys, "map", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), *ranges, "--json")
-    assert (code, err) == (0, "")
-    law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
-    found = plane(Loop(LAB, law), ("gain", "delay"), between(0, 9, 3), between(0, 0.03, 3))
-    assert json.loads(out)["unstable_roots"] == found.unstable.tolist()
-    code, out, _ = run(
-        capsys, "map", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), *ranges, "--csv", str(tmp_path / "m.csv")
-    )
-    assert (tmp_path / "m.csv").read_text().splitlines()[0] == "gain,delay,unstable_roots"
-    assert run(capsys, "map", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), "--vary", "gain=0,9")[0] == 2
 
 
 def test_a_map_around_a_law_s_own_resonance_counts_as_the_verdict_does():

@@ -51,7 +51,6 @@ def test_an_undamped_pole_of_the_law_is_one_of_the_loop_however_slow(w):
 # ------------------------------------------------------------ branches between their nodes, their crossings with
 
 
-MOTOR = tfarm.load("quanser-flexlink")
 # ------------------------------------------------------------ crossings
 
 

@@ -67,19 +67,6 @@ def test_a_column_without_rate_feedback_steps_where_the_effective_inertia_vanish
     assert not found.stable[:, 1].any()
 
 
-def test_columns_and_rows_are_cut_where_the_windows_of_each_gain_end() -> None:
-    law = HubFeedback(K1=1.0, K2=-5.0)
-    verdict = stability(window_arm(), law)
-    K2 = np.linspace(-49.9, 3.0, 400)
-    found = gain_map(window_arm(), np.array([1.0, 2.0]), K2)
-    of_K2 = windows_of(verdict, ["K2"])["K2"].all
-    assert found.stable[:, 0].tolist() == [any(a < value < b for a, b in of_K2) for value in K2]
-    K1 = np.linspace(-2e3, 4e4, 300)
-    found = gain_map(window_arm(), K1, np.array([-10.0, -5.0]))
-    of_K1 = windows_of(stability(window_arm(), replace(law, K2=-10.0)), ["K1"])["K1"].all
-    assert found.stable[0].tolist() == [any(a < value < b for a, b in of_K1) for value in K1]
-
-
 @pytest.mark.parametrize("arm", [LAB, window_arm()], ids=["lab", "window"])
 def test_every_point_of_the_boundary_puts_a_pole_on_the_axis(arm) -> None:
     found = gain_map(arm, between(0.1, 3, 4), between(-20, 2, 4))

@@ -11,7 +11,6 @@ import tfarm
 from tests.loop.agreement import some_cases, some_free_arm
 from tests.loop.arms import hub_units, window_arm
 from tests.loop.ritz_loop import RitzLoop
-from tests.loop.test_lines import held
 from tfarm import Arm, Hub, HubFeedback, Law, Link, Payload, Section
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
@@ -68,26 +67,6 @@ def test_both_signs_wrong_leave_one_real_pole_to_a_negative_hub_inertia() -> Non
     unstable = found.poles.values[found.poles.values.real > 1e-9 * abs(found.poles.values)]
     model = RitzLoop(BARE, 20).eigenvalues(HubFeedback(K1=-0.3, K2=1.5))
     assert unstable[0].real == pytest.approx(model[model.real > 1e-6 * abs(model)].real[0], rel=1e-6)
-
-
-def test_beyond_k2_where_inertia_cancels_a_real_pole_runs_away_even_without_k1() -> None:
-    J, hub = BARE.total_inertia, BARE.hub.inertia
-    edge = J / (J - hub)
-    below, above = (stability(BARE, HubFeedback(K2=edge * share)) for share in (0.999, 1.001))
-    assert (below.verdict, below.unstable_roots) == ("marginal", 0)
-    assert (above.verdict, above.unstable_roots) == ("unstable", 1)
-    (real,) = above.poles.values[above.poles.values.real > 1e-6]
-    assert real.imag == 0
-
-
-@pytest.mark.parametrize("C", [0.0, 1e-4])
-def test_a_negative_spring_fells_a_free_arm_but_not_a_held_one(C) -> None:
-    arm = replace(LAB, link=replace(LAB.link, damping=C))
-    assert stability(arm, HubFeedback(K1=0.3, Kp=-0.01)).unstable_roots == 1
-    link = arm.link
-    stiffness = 1 / (link.length / (3 * link.EI) + 1 / (link.kGA * link.length))
-    near, far = (stability(held(C), HubFeedback(K1=0.3, Kp=-share * stiffness)) for share in (0.999, 1.001))
-    assert (near.verdict, far.verdict, far.unstable_roots) == ("stable", "unstable", 1)
 
 
 HELD_TIPS = (Payload(mass=math.inf), Payload(inertia=math.inf), Payload(mass=math.inf, inertia=math.inf))

@@ -12,7 +12,6 @@ from tests.loop.agreement import some_free_arm, some_gains
 from tests.loop.arms import window_arm
 from tests.loop.ritz_loop import RitzLoop
 from tests.loop.test_lines import held
-from tests.shell import run
 from tfarm import Hub, HubFeedback, Payload
 from tfarm.loop.answers import margins_answer
 from tfarm.loop.loop import Loop
@@ -170,11 +169,6 @@ def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():
     low = found.windows["K2"].around[0]
     higher = line_crossings(Loop(arm, law), "K2", 2 * low, 0.0, 4 * band).gain
     assert 0.5 * low < higher[higher < 0].max() < 0
-
-
-def test_the_table_says_so_too(capsys):
-    _, out, _ = run(capsys, "margins", "quanser-flexlink")
-    assert "window ends are those of poles up to" in out
 
 
 @pytest.mark.parametrize(("name", "reach"), [("sasaki2012", math.inf), ("sasaki2012-lab", None)])

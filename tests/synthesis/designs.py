@@ -111,9 +111,8 @@ def excess(rng, structures=tuple(STRUCTURES)):
         arm = replace(arm, link=replace(arm.link, damping=2 * log(rng, 1e-3, 2e-2) / first))
     structure = str(rng.choice(structures))
     law = as_law(room.design(arm, structure=structure, chain=chain, modes=1).law)
-    other, radii = HeldLoop(arm, chain.sampling.period, 20), []
-    for share in (1 / RESERVE, 1.0, RESERVE):
-        radii.append(other.radius(law.times(share)))
+    other = HeldLoop(arm, chain.sampling.period, 20)
+    radii = [other.radius(law.times(share)) for share in (1 / RESERVE, 1.0, RESERVE)]
     return max(radii[0], radii[2]) - 1 - EDGE, radii[1] - 1, f"{arm.name}, {structure}"
 
 

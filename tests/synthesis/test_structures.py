@@ -10,7 +10,6 @@ from tests.shared import thinned
 from tests.shell import answer, run
 from tests.synthesis.held_loop import HeldLoop
 from tests.synthesis.judged import judge_of
-from tests.synthesis.test_sampled_design import slewed
 from tfarm import Law, ParameterError
 from tfarm.arm import as_law
 from tfarm.arm.law_tables import load_law
@@ -202,10 +201,3 @@ def test_the_cost_is_that_of_the_tuners_trial_with_a_constant_gain(gain):
     trial = slew_trial(LAB, K1=2.0, Kp=4.0)
     score = judge_of(LAB, law, "cost", count=6).score(law)
     assert score == pytest.approx(trial.with_constant(gain).cost, rel=1e-9)
-
-
-def test_the_residual_is_that_of_the_simulated_slew():
-    form = structure_of("PPF", LAB, Kp=4.0, modes=2, period=0.01, bounds={})
-    law = form.record_at(form.origin + 0.1)
-    score = judge_of(LAB, law, "residual", count=20).score(law)
-    assert score == pytest.approx(slewed(LAB, law, Chain()), rel=1e-9)
