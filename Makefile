@@ -6,7 +6,6 @@ ARM ?= sasaki2012-lab
 BIN := .venv/bin
 RIG := tests/data/quanser-2dsfl
 INSTALLED := .venv/.installed
-BENCH_INSTALLED := .venv/.bench
 BROWSER_INSTALLED := .venv/.browser
 DOCS_INSTALLED := .venv/.docs
 LOWEST := .venv-lowest
@@ -111,8 +110,8 @@ lint: $(INSTALLED) ## check style, types and which room imports which
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 
-bench: $(BENCH_INSTALLED) ## measure speed, beside other packages
-	@$(BIN)/python -m tests.bench
+bench: $(INSTALLED) ## measure speed, beside other packages
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.bench
 
 clean: ## remove everything that was generated
 	@rm -rf .venv $(LOWEST) build dist docs/_build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
@@ -146,6 +145,6 @@ $(LOWEST)/.installed: pyproject.toml
 	@$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct -e '.[dev]'
 	@touch $@
 
-$(BENCH_INSTALLED) $(BROWSER_INSTALLED) $(DOCS_INSTALLED): .venv/.%: $(INSTALLED)
+$(BROWSER_INSTALLED) $(DOCS_INSTALLED): .venv/.%: $(INSTALLED)
 	@$(PIP) -e '.[$*]'
 	@touch $@
