@@ -133,7 +133,11 @@ def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
         return np.asarray(found), np.asarray(columns @ found - y)
 
     half = max(_half_width(data, place), (omega[-1] - omega[0]) / (4 * omega.size))
-    found = least_squares(lambda x: linear(x)[1], [half, w], method="lm", x_scale="jac")
+
+    def left(x: Real) -> Real:
+        return linear(x)[1]
+
+    found = least_squares(left, np.array([half, w]), method="lm", x_scale="jac")
     sigma_p, w_p = found.x.tolist()
     if not found.success or not omega[0] < w_p < omega[-1] or abs(sigma_p) > w_p:
         return None
