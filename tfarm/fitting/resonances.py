@@ -128,7 +128,8 @@ def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
     def linear(x: Real) -> tuple[Real, Real]:
         """Re r, Im r and the c that leave least, and what they leave."""
         up, down = 1 / (s + x[0] - 1j * x[1]), 1 / (s + x[0] + 1j * x[1])
-        columns = in_parts(np.array([up + down, 1j * (up - down), *powers], complex) * weight).T
+        terms: Complex = np.array([up + down, 1j * (up - down), *powers], dtype=np.complex128)
+        columns = in_parts(terms * weight).T
         found = np.linalg.lstsq(columns, y, rcond=None)[0]
         return np.asarray(found), np.asarray(columns @ found - y)
 
