@@ -10,8 +10,7 @@ import tomllib
 
 import numpy as np
 
-from tests import survey
-from tests.bench import caches
+from tests import caches, survey
 from tests.dsp.law_orders import some_roots
 from tests.plausible.arms import draw
 from tests.rigs import some_rig

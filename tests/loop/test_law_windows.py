@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.bench import caches
+from tests import caches
 from tests.loop import number_windows
 from tests.loop.arms import some_loop, with_damping
 from tests.loop.law_counts import some_delay, some_law
