@@ -22,7 +22,7 @@ from tfarm.loop.loop import Loop
 from tfarm.loop.nyquist import nyquist_table, poles_on_axis
 from tfarm.loop.panels import CHEBYSHEV, loop_panels
 from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
-from tfarm.loop.poles import Poles, count_with_mirrors, first_poles, near_modes, poles_below, quiet_edge, real_starts
+from tfarm.loop.poles import Poles, count_with_mirrors, first_poles, poles_below, quiet_edge
 from tfarm.loop.stability import stability
 from tfarm.loop.theorem import lyapunov
 from tfarm.loop.windows import looked_at, windows_of
@@ -33,29 +33,6 @@ LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
 
 
 # ------------------------------------------------------------ starts
-
-
-def test_starts_beside_a_mode_are_where_bending_alone_takes_it_and_left_of_that():
-    """s^2 + C w^2 s + w^2 = 0 first; a mode that no longer swings starts at its mean on the real axis."""
-    omega, C = np.array([1.0, 7.0, 30.0]), 0.1
-    starts = near_modes(omega, C).reshape(-1, 3)
-    for n, w in enumerate(omega):
-        roots = np.roots([1.0, C * w**2, w**2])
-        assert starts[0, n] == pytest.approx(roots[np.argmax(roots.imag)] if C * w < 2 else roots.mean(), rel=1e-12)
-    assert len(starts) > 1
-    np.testing.assert_array_equal(starts.imag, np.broadcast_to(starts[0].imag, starts.shape))
-    shares = (starts[0] - starts).real / omega
-    assert (np.diff(shares[:, 0]) > 0).all()
-    np.testing.assert_allclose(shares, np.broadcast_to(shares[:, :1], shares.shape), rtol=1e-12)
-    np.testing.assert_array_equal(near_modes(omega, 0.0).reshape(-1, 3)[0], 1j * omega)
-
-
-def test_real_starts_are_even_in_decades_and_reach_beyond_the_box():
-    starts = real_starts(60.0)
-    assert starts[0] < 60.0 / 100
-    assert starts[-1] > 60.0
-    np.testing.assert_allclose(starts[1:] / starts[:-1], starts[1] / starts[0], rtol=1e-12)
-    assert starts[1] / starts[0] < 1.5
 
 
 @pytest.mark.parametrize("K1", [0.3, -30.0])
