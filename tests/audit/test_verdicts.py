@@ -73,15 +73,15 @@ def test_matplotlib_can_draw_them_but_for_the_determinants(rows, name):
 @pytest.mark.parametrize(
     ("name", "formula"),
     [
-        ("Table 1 (rho)", r"\rho  = 2766.7\ \mathrm{kg/m^3}"),
+        ("Table 1 (rho)", r"\rho = 2766.7\ \mathrm{kg/m^3}"),
         ("Table 1 (C's unit)", r"C: \ \mathrm{s}"),
         ("section 5: alpha_c", r"\alpha_{c} = 0.6"),
-        ("(14)", r"\Phi \left(0,s\right) = 0"),
+        ("(14)", r"\Phi(0,s) = 0"),
     ],
 )
 def test_typesetting_by_example(rows, name, formula):
     assert rows[name].corrected_tex == formula
-    assert r"\left(\frac{\partial \theta }{\partial t}\right)^{2}" in rows["(20)"].printed_tex
+    assert r"\left(\frac{\partial \theta}{\partial t}\right)^{2}" in rows["(20)"].printed_tex
 
 
 @pytest.mark.usefixtures("audited")

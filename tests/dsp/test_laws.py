@@ -16,7 +16,7 @@ from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.dsp import Chain, Converters, Sampling, sampled_loop, stable_windows
 from tfarm.dsp.circle import complete_band
 from tfarm.dsp.crossings import circle_grid, crossing_factors, number_crossings, stable_factors
-from tfarm.dsp.discretise import discretised, matched, tustin, zero_order_hold
+from tfarm.dsp.discretise import by_scipy, discretised, matched, tustin
 from tfarm.dsp.edges import whole_loop
 from tfarm.dsp.modes import mode_table
 from tfarm.dsp.verdict import sampled_numbers, sampled_verdict
@@ -315,7 +315,7 @@ def test_the_rules_are_those_of_python_control(name, rule):
     mine = {
         "tustin": lambda: tustin(block, T),
         "prewarped": lambda: tustin(block, T, warp),
-        "zoh": lambda: zero_order_hold(block, T),
+        "zoh": lambda: by_scipy(block, T, "zoh"),
         "matched": lambda: matched(block, T),
     }[rule]()
     method = {"tustin": "bilinear", "prewarped": "bilinear"}.get(rule, rule)
@@ -355,7 +355,7 @@ def test_several_signals_at_once_are_discretised_as_each_alone():
     both = Law.of_matrices(A, B, C, D, ["hub_angle", "root_moment"], rule="zoh")
     z = np.exp(1j * np.array([0.3, 2.0]))
     for column, values in enumerate(discretised(both, T).values(z)):
-        one = zero_order_hold(StateSpace(A, np.array(B)[:, [column]], C, np.array(D)[:, [column]]), T)
+        one = by_scipy(StateSpace(A, np.array(B)[:, [column]], C, np.array(D)[:, [column]]), T, "zoh")
         np.testing.assert_allclose(values, one.numerators(z)[0] / one.denominator(z), rtol=1e-12)
 
 

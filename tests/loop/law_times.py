@@ -12,8 +12,7 @@ import tomllib
 import numpy as np
 
 import tfarm
-from tests import survey
-from tests.bench import caches
+from tests import caches, survey
 from tests.plausible.arms import draw
 from tests.rigs import some_rig
 from tests.survey import Finding

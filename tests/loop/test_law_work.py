@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.bench import caches
+from tests import caches
 from tests.loop.arms import some_loop
 from tests.loop.law_counts import some_delay, some_law
 from tests.loop.law_times import of_margins, some_case

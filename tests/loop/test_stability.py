@@ -14,10 +14,11 @@ from tests.loop.ritz_loop import RitzLoop
 from tests.loop.test_lines import held
 from tfarm import Arm, Hub, HubFeedback, Link, Payload, Section
 from tfarm.errors import ConvergenceError
+from tfarm.exact.characteristic import Analytic
 from tfarm.loop.loop import Loop
-from tfarm.loop.nyquist import turning
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import band_of_loop, felt, is_felt, is_quiet, stability
+from tfarm.spectrum.box import turned
 
 LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 
@@ -181,11 +182,10 @@ def test_where_the_tail_needs_too_many_modes_it_says_so() -> None:
 def test_a_turn_that_is_no_number_is_refused() -> None:
     """Where 1 + L cannot be evaluated nothing is counted: a NaN is not a slow turn."""
 
-    class Unknown:
-        def loop_function(self, s):
-            return np.where(abs(s - 2j) < 0.5, np.nan, 1.0 / (s + 1.0))
+    def unknown(s):
+        return Analytic(np.where(abs(s - 2j) < 0.5, np.nan, 1 + 1.0 / (s + 1.0)), 0 * s, 0 * s)
 
     path = 1j * np.linspace(0.0, 4.0, 50)
-    with pytest.raises(ConvergenceError, match="its encirclements"):
-        turning(Unknown(), path)
-    assert abs(turning(Unknown(), path[path.imag < 1.4])) < 1.0
+    with pytest.raises(ConvergenceError, match="a zero lies on the contour"):
+        turned(unknown, path, 4.0)
+    assert abs(turned(unknown, path[path.imag < 1.4], 4.0)) < 1.0

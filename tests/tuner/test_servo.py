@@ -9,7 +9,7 @@ import pytest
 import tfarm
 from tests.dsp.roads import aliased, aliased_loop
 from tests.shell import answer, run
-from tests.tuner.plain import PlainTrial, complex_step, plain_gain
+from tests.tuner.plain import PlainTrial, complex_step, gradient_of, plain_gain
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import ParameterError
@@ -47,7 +47,7 @@ def test_trial_and_gradient_are_those_of_plain_numpy(signals):
         np.testing.assert_allclose(getattr(record, name), expected[:, i].real, atol=1e-10 * abs(expected[:, i]).max())
     assert record.cost == pytest.approx(cost.real, rel=1e-10)
     right = complex_step(lambda w: plain.cost(w, 6, network.scales, SECTOR), network.weights)
-    np.testing.assert_allclose(trial.gradient(network, SECTOR)[1], right, atol=1e-9 * abs(right).max())
+    np.testing.assert_allclose(gradient_of(trial, network, SECTOR)[1], right, atol=1e-9 * abs(right).max())
 
 
 def test_the_exact_arm_obeys_the_criterion_with_its_angle_held():
@@ -64,8 +64,6 @@ def test_the_exact_arm_obeys_the_criterion_with_its_angle_held():
     H = moment / (1 + KP * theta + K1 * rate)
     np.testing.assert_allclose(sizes, abs(H / (1 + m * H)), rtol=3e-4)
     assert max(sizes) <= 1 / radius * (1 + 3e-4)
-    assert loop.criterion(m - 0.998 * radius, m + 0.998 * radius, np.linspace(1e-4, np.pi, 60_001)).min() > 0
-    assert loop.criterion(m - 1.002 * radius, m + 1.002 * radius, np.linspace(1e-4, np.pi, 60_001)).min() < 0
 
 
 def test_what_the_criterion_allows_is_proven_the_angle_among_the_states():

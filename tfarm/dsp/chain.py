@@ -104,11 +104,6 @@ class Converters:
             remedy = f"{bits} bits of what? give the range +-R{unit} too, or leave converters.{signal}_bits out"
             raise ParameterError(key=f"converters.{signal}_range", value=span, remedy=remedy)
 
-    @property
-    def is_quantised(self) -> bool:
-        """Whether a signal is rounded to steps anywhere."""
-        return any(n is not None for n in (self.encoder_counts, self.moment_bits, self.torque_bits))
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Actuator:
@@ -178,8 +173,8 @@ class Chain:
     def is_linear(self) -> bool:
         """Whether nothing is rounded to steps and nothing can be clipped."""
         c = self.converters
-        clips = c.moment_range is not None or c.torque_range is not None or self.actuator.torque_limit < math.inf
-        return not c.is_quantised and not clips
+        steps = c.encoder_counts, c.moment_bits, c.moment_range, c.torque_bits, c.torque_range
+        return steps == (None,) * len(steps) and self.actuator.torque_limit == math.inf
 
 
 def chain_or_usual(chain: object) -> Chain:

@@ -71,16 +71,6 @@ class ModeTable:
         """Change of ln|z| per sample by all gains."""
         return self.by_rate + self.by_moment + self.by_others
 
-    @property
-    def rate_alternates(self) -> bool:
-        """Whether to first order the rate gain drives the modes of every other band, from the second on; no other."""
-        return bool(((self.by_rate > 0) == (self.band % 2 == 1))[self.by_rate != 0].all())
-
-    @property
-    def driven_by_moment(self) -> list[int]:
-        """The modes that the moment gain drives, to first order."""
-        return [int(each) for each in self.index[self.by_moment > 0]]
-
 
 def first_order(loop: Sampled, poles: Whole) -> Real:
     """What each part of the law alone changes of ln|z| (parts, poles) at open-loop poles of these numbers."""

@@ -262,6 +262,11 @@ def loop_margins(verdict: Stability) -> LoopMargins:
     """The margins of a stable loop up to the verdict's band."""
     loop, band = verdict.loop, verdict.band
     omega = dense(verdict)
+
+    def disk(w: Real) -> Real:
+        drive, fed_back = loop.parts(1j * w)
+        return np.asarray(2 * abs(drive + fed_back) / np.maximum(abs(drive - fed_back), LEAST_SIZE))
+
     crossed = unit_crossings(loop, omega)
     apart = _spread(lambda w: loop.loop_function(1j * w), crossed)  # of size 1: what its angle moves by [rad]
     minus = -loop.loop_function(1j * crossed)
@@ -275,7 +280,7 @@ def loop_margins(verdict: Stability) -> LoopMargins:
         "phase_lag": _least(angle[lag], crossed[lag]),
         "phase_lead": _least(-angle[lead], crossed[lead]),
         "delay": _least(delay, crossed),
-        "disk": lowest(lambda w: disk_at(loop, w), omega),
+        "disk": lowest(disk, omega),
         "peak_sensitivity": highest(lambda w: inverse_peak(loop, w, of=0), omega),
         "peak_complementary": highest(lambda w: inverse_peak(loop, w, of=1), omega),
     }
@@ -283,7 +288,8 @@ def loop_margins(verdict: Stability) -> LoopMargins:
     values["peak_sensitivity"] = max(1.0, values["peak_sensitivity"])
     places = {name: float(f"{where:.{PLACE_DIGITS}g}") for name, (_, where) in least.items()}
     by_phase = phase_crossovers(loop, omega)
-    gain = _nearest_to_one(gain_edges(loop, by_phase))
+    factors = gain_edges(loop, by_phase)
+    gain = max((t for t in factors if 0 <= t < 1), default=0.0), min((t for t in factors if t > 1), default=math.inf)
     by_gain = tuple(sorted(zip(crossed.tolist(), angle.tolist(), strict=True)))
     return LoopMargins(band=band, gain=gain, **values, at=places, gain_crossovers=by_gain, phase_crossovers=by_phase)
 
@@ -351,17 +357,6 @@ def _factor(loop: Loop, omega: Real) -> Complex:
     """-1/L at i omega, 0 where L is infinite or vanishes."""
     drive, fed_back = loop.parts(1j * omega)
     return np.asarray(-drive / np.where(fed_back == 0, np.inf, fed_back))
-
-
-def _nearest_to_one(factors: list[float]) -> tuple[float, float]:
-    """The largest factor from 0 up to 1, or 0, and the least above 1, or infinity."""
-    return max((t for t in factors if 0 <= t < 1), default=0.0), min((t for t in factors if t > 1), default=math.inf)
-
-
-def disk_at(loop: Loop, omega: Real) -> Real:
-    """2 |(1 + L)/(1 - L)| at i omega."""
-    drive, fed_back = loop.parts(1j * omega)
-    return np.asarray(2 * abs(drive + fed_back) / np.maximum(abs(drive - fed_back), LEAST_SIZE))
 
 
 def dense(verdict: Stability) -> Real:

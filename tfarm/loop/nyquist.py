@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
+from tfarm.exact.characteristic import Analytic
 from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import Quantity
 from tfarm.spectrum import flexible_frequencies
+from tfarm.spectrum.box import turned
 
 from .loop import Loop, band_of, grid
 from .poles import count_with_mirrors
@@ -35,9 +37,8 @@ ARC = np.linspace(-math.pi / 2, math.pi / 2, 41)  # rad, along a semicircle arou
 APPROACH = np.geomspace(1.05, 1e3, 40)  # radii of such an arc: points of the axis on either side, a dozen a decade
 RESIDUE_AT = 1e-6  # of a pole's frequency: so near to it L is the pole's share alone
 WIDEST_INDENT = 1e-3  # of the same: the radius of an arc at most, so that it reaches no neighbour
-FAST = 0.7  # radians: where the argument of 1 + L turns by more between neighbours of the contour it is halved
 LONGEST_PIECE = 0.02  # of the rim's radius: the longest straight piece of a drawn curve
-TURN_ROUNDS = 24  # of halving where it turns more
+TURN_ROUNDS = 24  # of halving where they are longer
 
 
 @dataclass(frozen=True)
@@ -97,16 +98,21 @@ def nyquist_of(verdict: Stability) -> Nyquist:
     s, is_arc = smooth(loop, *upper_contour(loop, poles, band, verdict.poles.moving))
     corner = complex(verdict.poles.box.re_max, band)
     across, down = np.linspace(1j * band, corner, EDGE_POINTS), np.linspace(corner, corner.real, EDGE_POINTS)
-    turned = turning(loop, np.r_[s, across[1:], down[1:]])
+    angle = turned(lambda at: _difference(loop, at), np.r_[s, across[1:], down[1:]], abs(corner))
     own = loop.law.poles
     inside = int(((own.real > AXIS_SHARE * abs(own)) & (abs(own.imag) < band)).sum())
-    plot = Nyquist(s, loop.loop_function(s), is_arc, poles, round(turned / math.pi), verdict, inside)
+    plot = Nyquist(s, loop.loop_function(s), is_arc, poles, round(angle / math.pi), verdict, inside)
     found = min(plot.clear, verdict.unstable_roots)
     if not found <= plot.unstable_by_nyquist <= found + plot.on_axis:
         counted, found_in_box = plot.unstable_by_nyquist, verdict.unstable_roots
         text = f"{counted} unstable poles by the encirclements of -1, {found_in_box} by finding all in a box"
         raise ConvergenceError(text, plot, plot.unstable_by_nyquist - verdict.unstable_roots)
     return plot
+
+
+def _difference(loop: Loop, s: Complex) -> Analytic:
+    """1 + L; its slope is left out, as the contour is dense where it is steep."""
+    return Analytic(1 + loop.loop_function(s), np.zeros_like(s), np.zeros_like(s))
 
 
 def poles_on_axis(loop: Loop, band: float) -> Real:
@@ -168,22 +174,6 @@ def indentation(loop: Loop, pole: float) -> float:
     step = RESIDUE_AT * scale
     near = np.array([step + 0j if pole == 0 else 1j * (pole + step)])
     return min(INDENT_RADIUS * float(abs(loop.loop_function(near)[0])) * step, WIDEST_INDENT * scale)
-
-
-def turning(loop: Loop, path: Complex) -> float:
-    """By how much [rad] the argument of 1 + L grows along a path, halved where it turns fast."""
-    value = 1 + loop.loop_function(path)
-    for _ in range(TURN_ROUNDS):
-        with np.errstate(invalid="ignore"):  # what is no number is refused below
-            step = np.angle(value[1:] / value[:-1])
-        (fast,) = np.nonzero(~(abs(step) <= FAST))
-        if not fast.size:
-            return float(step.sum())
-        if not (np.isfinite(value) & (value != 0)).all():
-            break  # a point without an argument is there after any halving, and each doubles the points around it
-        middle = (path[fast] + path[fast + 1]) / 2
-        path, value = np.insert(path, fast + 1, middle), np.insert(value, fast + 1, 1 + loop.loop_function(middle))
-    raise ConvergenceError("the curve passes -1 too close for its encirclements to be counted", path[fast], step[fast])
 
 
 def compressed(L: Complex) -> Complex:

@@ -42,7 +42,6 @@ from .stability import band_of_family, verdict_on
 from .windows import (
     ROUNDED,
     columns,
-    corner_laws,
     critical,
     crossed,
     held_windows,
@@ -231,7 +230,9 @@ def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real, band: float | Non
     x, y = ascending(vary[0], x, most), ascending(vary[1], y, most)
     across, up = (float(x[0]), float(x[-1])), (float(y[0]), float(y[-1]))
     ends = [critical(name, pair) for name, pair in zip(vary, (across, up), strict=True)]
-    corners = [loop.under(law) for law in corner_laws(loop.law, vary, ends)]
+    corners = [
+        loop.under(with_numbers(loop.law, dict(zip(vary, each, strict=True)))) for each in itertools.product(*ends)
+    ]
     if (
         tuple(ON.get(name, name) for name in vary) == PLANE
         and loop.gains is not None

@@ -145,8 +145,9 @@ def signs_of(law: Law, friction: float = 0.0) -> Signs:
         return Signs("", "the sign of a law tells something where it reads the hub's own angle or rate")
     if not all(isinstance(part.block, Rational) for part in law.parts):
         return Signs("", "matrices are not looked at: give transfer functions")
-    if law.is_static:
-        return _static_signs(law, friction)
+    if law.is_static:  # gains on hub angle and hub rate, by their signs alone
+        values = dict(zip(law.signals, law.values(np.ones(1, complex))[:, 0].real.tolist(), strict=True))
+        return _of_signs(values.get("hub_rate", 0.0) + friction, values.get("hub_angle", 0.0))
     if law.order > MOST_EXACT_DEGREE:
         return Signs("", f"of a law of more than {MOST_EXACT_DEGREE} states the sign is not looked for")
     num, den = polynomial([0.0]), polynomial([1.0])  # of the whole law as one fraction on the angle
@@ -160,12 +161,6 @@ def signs_of(law: Law, friction: float = 0.0) -> Signs:
     if passive is not None and passive.kind:
         return passive
     return _negative_imaginary(num, den) or passive or Signs("", "neither passive nor negative imaginary")
-
-
-def _static_signs(law: Law, friction: float) -> Signs:
-    """`signs_of` for gains on hub angle and hub rate, by their signs alone."""
-    values = dict(zip(law.signals, law.values(np.ones(1, complex))[:, 0].real.tolist(), strict=True))
-    return _of_signs(values.get("hub_rate", 0.0) + friction, values.get("hub_angle", 0.0))
 
 
 def _of_signs(rate: float, at_rest: float) -> Signs:

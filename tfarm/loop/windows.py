@@ -506,8 +506,3 @@ def critical(name: str, limits: tuple[float, float]) -> tuple[float, ...]:
 def turns_over(loop: Loop, name: str, limits: tuple[float, float]) -> bool:
     """Whether a leading coefficient passes through 0 between these values, where without it high modes are driven."""
     return name.endswith(LEADING) and limits[0] < 0 < limits[1] and not is_known_without(loop, name)
-
-
-def corner_laws(law: Law, names: Sequence[str], values: Sequence[Sequence[float]]) -> list[Law]:
-    """The laws with each combination of some values of these numbers."""
-    return [with_numbers(law, dict(zip(names, each, strict=True))) for each in itertools.product(*values)]

@@ -8,7 +8,7 @@ off, is part of the record.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from operator import itemgetter
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar
@@ -26,7 +26,7 @@ from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.synthesis.judge import LOST, OBJECTIVES, Judge, judges_of
 from tfarm.synthesis.models import slew_and_after, trial_slew
-from tfarm.synthesis.search import Search, Worst, flat_part, search
+from tfarm.synthesis.search import CANDIDATES, Search, Worst, flat_part, search
 from tfarm.synthesis.structures import Bounds, Structure, check_bounds, structure_of
 from tfarm.synthesis.worst_case import ArmBox, NamedArm, Tell, WorstCase, arms_of, for_the_worst, same_input
 
@@ -227,17 +227,23 @@ class _Task:
         """The best law that holds on all arms.  Raises ConvergenceError where none is found."""
         nearest: tuple[float, Any] | None = None
         for several in in_step([self.judges(each.arm) for each in named]):
-            worst = Worst(several)
-            found = search(worst, self.form, self.tell)
-            nearest = min([*([nearest] if nearest else []), found.found[0]], key=itemgetter(0))
-            for score, x in found.found:
-                law = found.form.record_at(x)
-                if score < LOST and all(judge.holds(law) for judge in several):
-                    return _Choice(worst, found, score, x, law)
+            for judges, most in self._steps(several):
+                found = search(Worst(judges), self.form, self.tell)
+                nearest = min([*([nearest] if nearest else []), found.found[0]], key=itemgetter(0))
+                for score, x in found.found[:most]:
+                    law = found.form.record_at(x)
+                    if score < LOST and all(judge.holds(law) for judge in several):
+                        return _Choice(Worst(several), found, score, x, law)
         assert nearest is not None  # there is at least one judge
         law = self.form.record_at(nearest[1])
         chain = self.chain if self.loop == "sampled" else None
         raise ConvergenceError(_why_none(named, self.form, law, chain), law, nearest[0])
+
+    def _steps(self, several: tuple[Judge, ...]) -> list[tuple[tuple[Judge, ...], int]]:
+        """Judges to search with, and how many of the laws found are tried: the best under fewer conditions, if it
+        holds, is the best under all."""
+        relaxed = tuple(replace(each, is_relaxed=True) for each in several)
+        return [*([(relaxed, 1)] if self.loop == "sampled" else []), (several, CANDIDATES)]
 
     def score_on(self, choice: _Choice, on: Arm) -> float:
         """What a law minimised, on another arm; inf where the loop does not hold."""

@@ -171,43 +171,17 @@ class Trial:
 
     def with_network(self, network: Network, guard: kernel.Limits) -> Record:
         """The trial with a network as it is; where it was stopped it costs inf."""
-        run, _, done = self._forward(network, guard)
+        run, work = self.room(network)
+        done = kernel.forward(self.setting(network, guard), network.weights, run, work)
         x, u, e, K, moment = (signal[:done].copy() for signal in (run.x, run.u, run.e, run.K, run.moment))
         cost, stopped = float(kernel.trial_cost(done, self.numbers, run)), None
         if done < self.n:
             cost, stopped = np.inf, int(done)
         return Record(self.task.t[:done], x, u, e, K, moment, cost, stopped)
 
-    def _forward(self, network: Network, guard: kernel.Limits) -> tuple[kernel.Run, kernel.Work, int]:
-        """What the trial fills, the room that it takes, and how many samples it makes."""
-        run, work = self.room(network)
-        return run, work, kernel.forward(self.setting(network, guard), network.weights, run, work)
-
     def with_constant(self, K: float) -> Record:
         """The trial with a constant gain: a guard that leaves no choice."""
         return self.with_network(SILENT, kernel.Limits(K, K))
-
-    def gradient(self, network: Network, guard: kernel.Limits) -> tuple[float, Real]:
-        """The cost of the trial and its derivative by every weight, exact: back through network, plant and time.
-
-        Raises ParameterError where the trial runs away: there is no cost then.
-        """
-        (run, work, done), weights = self._forward(network, guard), network.weights
-        gradient = np.zeros(weights.size)
-        if done < self.n:
-            raise ParameterError(key="weights", value=done, remedy="the loop runs away at that sample; guard the gain")
-        kernel.backward(self.setting(network, guard), weights, run, work, gradient)
-        return float(kernel.trial_cost(done, self.numbers, run)), gradient
-
-    def sample_gradient(self, network: Network, guard: kernel.Limits, k: int) -> Real:
-        """The delta rule's gradient: of a x^2/2 at the first sample that feels the torque of sample k, plus b e^2/2.
-
-        x depends on K(k) by the plant's one-step sensitivity, e directly; all earlier signals are data.
-        """
-        (run, _, _), weights, numbers = self._forward(network, guard), network.weights, self.numbers
-        gradient = np.zeros(weights.size)
-        kernel.sample_gradient(k, numbers, self.reply, float(run.x[k + numbers.lag]), run, weights, gradient)
-        return gradient
 
 
 def slew_trial(
