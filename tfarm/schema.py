@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass, replace
-from functools import cache, cached_property, partial
+from functools import cache, cached_property
 from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
@@ -148,20 +148,14 @@ def table(rows: Any, names: Sequence[str] = (), *, stem: str = "", title: str = 
         return Table(columns=(), stem=stem, title=title, caption=caption)
     declared = quantities(type(rows if _is_table(rows) else rows[0]))
     wanted = names or [name for name, of in declared.items() if of.label]
-    read = (
-        (lambda name: list(getattr(rows, name))) if _is_table(rows) else lambda name: [getattr(r, name) for r in rows]
-    )
-    columns = (_column(declared[name], read(name)) for name in wanted)
+    values = [getattr(rows, name) if _is_table(rows) else [getattr(row, name) for row in rows] for name in wanted]
+    columns = (_column(declared[name], list(each)) for name, each in zip(wanted, values, strict=True))
     return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
 
 
 def _column(of: Quantity, values: Sequence[Any]) -> Column:
-    digits = partial(_cells, of.digits)
-    return Column(of.key, of.label, of.unit, of=[to_json_value(value) for value in values], shown=digits(values))
-
-
-def _cells(digits: int, values: Sequence[Any]) -> list[str]:
-    return [text(value, digits) for value in values]
+    cells = [text(value, of.digits) for value in values]
+    return Column(of.key, of.label, of.unit, of=[to_json_value(value) for value in values], shown=cells)
 
 
 def across(
