@@ -243,11 +243,11 @@ class Margins:
         judged, answer, law = Judged(), ran.answer, case.law
         if answer["verdict"] != "marginal":
             self._verdict(judged, models, law, answer["stable"], "the law")
-        for name in ("K1", "K2", "Kp"):
-            self._windows(judged, case, models, name, answer)
+        for row in answer["stability_intervals"]:
+            self._windows(judged, case, models, row)
         if answer["stable"]:
             self._gain_margin(judged, case, models, answer)
-            self._margins(judged, case, models, answer["in_band"])
+            self._margins(judged, case, models, answer["in_range"])
         return judged
 
     def _verdict(self, judged, models, law, stable, what):
@@ -262,9 +262,9 @@ class Margins:
         else:  # the model sees its own modes only: that it finds none proves nothing about the others
             judged.blind += 1
 
-    def _windows(self, judged, case, models, name, answer):
-        low, high = answer[f"{name}_looked_at"]
-        windows = [tuple(map(float, pair)) for pair in answer[f"{name}_windows"]]
+    def _windows(self, judged, case, models, row):
+        name, (low, high) = row["number"], row["search_range"]
+        windows = [(float(each["low"]), float(each["high"])) for each in row["intervals"]]
         ends = [end for pair in windows for end in pair if low < end < high]
         for end in ends[:4]:
             self._edge(judged, models, case.law, name, end, windows)
@@ -294,15 +294,18 @@ class Margins:
 
     def _margins(self, judged, case, models, band):
         """At the frequency printed L has the margin printed; on a grid it has no smaller one."""
-        at, top = band["at_rad_s"], min(band["band_rad_s"], trusted(models))
+        top = min(band["up_to_rad_s"], trusted(models))
         if np.isfinite(float(band["phase_margin_deg"])):
-            self._phase(judged, models, case.law, at["phase"], abs(band["phase_margin_deg"]), band["band_rad_s"])
+            at, size = band["phase_margin_at_rad_s"], abs(band["phase_margin_deg"])
+            self._phase(judged, models, case.law, at, size, band["up_to_rad_s"])
         w = dense(models, case.law, top)
         L = np.array([loop_function(models.rough, case.law, each) for each in w])
         for key, f in (("disk_margin", disk), ("peak_sensitivity", peak)):
-            where, printed = at[{"disk_margin": "disk"}.get(key, key)], float(band[key])
-            if where <= top and (key == "disk_margin" or printed > 1):  # S = 1 at infinite frequency
-                fine, rough = (extreme(f, m, case.law, where, band["band_rad_s"]) for m in (models.fine, models.rough))
+            where, printed = band[f"{key}_at_rad_s"], float(band[key])
+            if (
+                where is not None and where <= top and (key == "disk_margin" or printed > 1)
+            ):  # S = 1 at infinite frequency
+                fine, rough = (extreme(f, m, case.law, where, band["up_to_rad_s"]) for m in (models.fine, models.rough))
                 size = max(abs(fine), 1e-300)
                 judged.error(f"{key} at {where}", abs(printed - fine) / size, 1e-5 + SAFETY * abs(fine - rough) / size)
             least = f(L).min() if key == "disk_margin" else 1 / f(L).max()
@@ -393,14 +396,14 @@ class Map:
     def judge(self, case, models, ran):
         judged, answer, rng = Judged(), ran.answer, case.rng
         for _ in range(12):
-            i, j = rng.integers(len(answer["K1"])), rng.integers(len(answer["K2"]))
-            law = Law(answer["K1"][i], answer["K2"][j], case.law.Kp)
+            i, j = rng.integers(len(answer["x"])), rng.integers(len(answer["y"]))
+            law = Law(answer["x"][i], answer["y"][j], case.law.Kp)
             printed, count = answer["unstable_roots"][j][i], growing(models, law)
             if count is None or abs(law.K2 - 1) < 1e-9:
                 judged.blind += 1
             elif printed == "inf":
                 judged.truth(f"infinitely many for {count} at {law}", count > UNDAMPED)
-            elif answer["band_rad_s"] > trusted(models) and case.beam.link.damping:
+            elif answer["up_to_rad_s"] > trusted(models) and case.beam.link.damping:
                 judged.truth(f"{printed} for at least {count} unstable at {law}", printed >= count)
             else:
                 judged.truth(f"{printed} for {count} unstable at {law}", printed == count)
