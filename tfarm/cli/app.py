@@ -102,13 +102,11 @@ def read_on(names: list[str], side: str | None) -> list[str | Output]:
 
 
 def give(answer: dict[str, Any], json: bool, printed: Callable[[dict[str, Any]], None]) -> None:
-    """The answer as one JSON object, or as it is `printed`, then what is not known and which gains are defaults."""
+    """The answer as one JSON object, or as it is `printed`, then which gains are defaults."""
     if json:
         print(to_json(answer))
         return
     printed(answer)
-    if answer.get("windows_note"):
-        print(answer["windows_note"])
     if answer.get("default_gains"):
         print(f"by default {answer['default_gains_in_words']}")
 
