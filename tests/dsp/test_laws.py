@@ -97,7 +97,7 @@ def test_integrators_of_what_is_0_at_rest_stay_at_one(entries, marginal):
 def test_what_stays_at_one_is_left_out_of_what_is_proven():
     verdict = sampled_verdict(LAB, Law({"hub_rate": 0.3, "root_moment": ([0.001, 0.0], [1.0, -1.0])}, period=T))
     assert (verdict.word, verdict.log_radius, verdict.is_settled) == ("marginal", 0.0, True)
-    assert "a pole of the law neither grows nor decays" in verdict.sentence
+    assert verdict.slowest == "a pole of the law"
 
 
 def test_an_unstable_cancellation_in_the_law_is_said_and_grows(capsys, tmp_path):
@@ -109,9 +109,7 @@ def test_an_unstable_cancellation_in_the_law_is_said_and_grows(capsys, tmp_path)
     assert found.verdict.log_radius == pytest.approx(np.log(1.2), rel=1e-9)
     text = "[law]\nperiod = 0.01\n[law.hub_angle]\nzeros = [1.2]\npoles = [1.2, 0.5]\ngain = 0.1\n"
     (tmp_path / "law.toml").write_text(text)
-    assert (
-        "warning: the law cancels" in run(capsys, "sampled", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"))[1]
-    )
+    assert "the law cancels" in run(capsys, "sampled", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"))[1]
 
 
 def test_filtered_signals_are_what_the_analog_filter_makes_of_them():
@@ -334,7 +332,7 @@ def test_a_number_is_in_a_window_where_all_eigenvalues_are_inside_the_circle(law
     """At random factors of either sign on one part; near an edge eigenvalues tell nothing."""
     rng, told = np.random.default_rng(5), set()
     loop = sampled_loop(LAB, law, Chain(), count=6)
-    for name, value, windows in sampled_numbers(loop):
+    for name, value, windows, _ in sampled_numbers(loop):
         for factor in (*-(10 ** rng.uniform(-3, 2, 4)), *10 ** rng.uniform(-3, 2, 8)):
             radius = abs(np.linalg.eigvals(loop.having(**{name: factor * value}).reduced_matrix())).max()
             inside = any(low < factor * value < high for low, high in windows)

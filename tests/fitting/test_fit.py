@@ -255,7 +255,7 @@ def test_from_a_file_to_margins_in_three_commands(tmp_path, capsys):
     assert found["unexplained_peaks_hz"] == []
     assert answer(capsys, "margins", str(save))["verdict"] == "stable"
     proven = answer(capsys, "poles", str(save), "--count", "3", "--certify")
-    assert proven["proven_complete"]
+    assert proven["completeness"] == "certified"
 
 
 def test_rad_s_given_as_hz_are_asked_about(tmp_path, capsys):

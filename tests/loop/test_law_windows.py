@@ -16,7 +16,6 @@ from tfarm import ConvergenceError, Hub, Law, Link, Payload, RotarySpring, Secti
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
 from tfarm.loop import windows as windows_module
-from tfarm.loop.answers import unsettled
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
@@ -88,7 +87,7 @@ def test_a_number_whose_poles_cannot_be_counted_is_named(monkeypatch):
     monkeypatch.setattr(windows_module, "crossed", lost)
     found = tfarm.margins(LAB, LAW)
     assert LAW.numbers.keys() - found.windows.keys() == {"hub_angle.num.1"}
-    assert unsettled(found).endswith("of hub_angle.num.1 poles could not be counted")
+    assert found.intervals_note.endswith("of hub_angle.num.1 poles could not be counted")
 
 
 @pytest.mark.survey
@@ -123,7 +122,7 @@ def test_no_number_of_a_signal_in_two_parts_has_a_window():
 
 
 def test_of_a_link_without_damping_it_is_said_why_there_are_none():
-    assert "without damping" in unsettled(tfarm.margins(BARE, Law({"hub_rate": ([0.3], [0.01, 1.0])})))
+    assert "without damping" in tfarm.margins(BARE, Law({"hub_rate": ([0.3], [0.01, 1.0])})).intervals_note
 
 
 @pytest.mark.parametrize("damping", [3e-8, 1e-7])

@@ -18,11 +18,11 @@ from tests.odd_arms import odd_arms
 from tests.shared import thinned
 from tests.transition import response as transition
 from tfarm import Hub, HubFeedback
-from tfarm.loop.answers import margins_answer
 from tfarm.loop.loop import Loop, grid
 from tfarm.loop.margins import lowest
 from tfarm.loop.stability import stability
 from tfarm.reduced import relaxed_model
+from tfarm.schema import to_dict
 
 margins = cache(tfarm.margins)  # several tests ask for those of the same loops
 
@@ -222,11 +222,12 @@ def test_at_no_damping_the_exact_margins_are_none_and_those_of_the_band_are_besi
     ],
 )
 def test_no_margin_without_stability(arm, law) -> None:
-    answer = margins_answer(margins(arm, law))
+    answer = to_dict(margins(arm, law))
     assert answer["verdict"] != "stable"
-    keys = ("delay_margin_s", "disk_margin", "gain_margin", "phase_margin_deg", "peak_sensitivity", "in_band")
-    intervals = (f"{name}_interval" for name in ("K1", "K2", "Kp"))
-    assert all(answer[key] is None for key in (*keys, *intervals))
+    keys = ("delay_margin_s", "disk_margin", "gain_margin", "peak_sensitivity", "in_range")
+    assert all(answer[key] is None for key in keys)
+    assert answer["gain_crossovers"] == answer["phase_crossovers"] == []
+    assert [row["interval"] for row in answer["stability_intervals"]] == [None] * 3
 
 
 def test_the_loop_function_of_no_gains_limits_nothing() -> None:

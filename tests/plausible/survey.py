@@ -85,9 +85,10 @@ def poles(case, answer, rough, fine):
 def margins(case, answer, rough, fine):
     """Verdict, and a gain on either side of each edge."""
     tried = [(case.law, answer["stable"])] if answer["verdict"] != "marginal" else []
-    for name in ("K1", "K2", "Kp"):
-        low, high = answer[f"{name}_looked_at"]
-        windows = [tuple(map(float, pair)) for pair in answer[f"{name}_windows"]]
+    for row in answer["stability_intervals"]:
+        name = row["number"]
+        low, high = row["search_range"]
+        windows = [(float(each["low"]), float(each["high"])) for each in row["intervals"]]
         for end in [end for pair in windows for end in pair if low < end < high][:4]:
             step = BESIDE * (abs(end) or abs(getattr(case.law, name)) or 1.0)
             values = [(value, any(a < value < b for a, b in windows)) for value in (end - step, end + step)]

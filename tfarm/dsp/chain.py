@@ -10,13 +10,14 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from tfarm.arm import Arm, schema, to_toml
 from tfarm.arm.checks import extended, not_negative, number, positive, whole
 from tfarm.arm.reading import load_tables
 from tfarm.arm.schema import ArmTable, TomlTable, validated
 from tfarm.errors import ParameterError, did_you_mean, must_be_known, naming
+from tfarm.schema import Quantity
 
 Reading = Literal["vibration", "total"]
 LEAST_BITS, MOST_BITS = 2, 32  # of a converter: of one bit there are no steps, of more than 32 no part
@@ -34,8 +35,8 @@ class Sampling:
     (tachometer) hub rate; inf is none.  An encoder is digital and has none.
     """
 
-    period: float = 0.01
-    delay_samples: float = 0.0
+    period: Annotated[float, Quantity("sampling period", "s")] = 0.01
+    delay_samples: Annotated[float, Quantity("delay in samples")] = 0.0
     antialias_corner: float = math.inf
 
     def __post_init__(self) -> None:

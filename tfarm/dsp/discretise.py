@@ -22,20 +22,18 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import AT_HUB, GAINS, MOMENT_GAIN, AnyLaw, Arm, HubFeedback, must_not_be_algebraic
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace
-from tfarm.arm.feedback import input_words
 from tfarm.arm.law import Law, Part, is_measured
 from tfarm.arrays import Complex, Real
 from tfarm.dsp.chain import MOST_DELAY, Chain
 from tfarm.errors import ParameterError
 from tfarm.records import record
-from tfarm.response.signals import Signals
 from tfarm.spectrum.table import check_gains
 
 SAME_PERIOD = 1e-9  # relative: 1/100 s in two files may differ in its last digits
@@ -68,23 +66,6 @@ def rule_in_words(law: Law) -> str:
         return f"made discrete by Tustin's rule, exact at {law.prewarp:g} rad/s"
     words = {"tustin": "Tustin's rule", "zoh": "zero-order hold", "matched": "matched poles and zeros"}
     return f"made discrete by {words[law.rule]}"
-
-
-def described_law(law: Law, arm: Arm) -> dict[str, Any]:
-    """The law as it was given, how it is sampled, and what it reads and drives."""
-    units = Signals(arm, law.signals).units
-    sign, late = "-" if law.sign < 0 else "+", f", {law.delay:g} s late" if law.delay else ""
-    words = f"v = {sign}sum of C_i(z) y_i{late}; v is {input_words(arm)}, y = ({', '.join(law.signals)})"
-    return {
-        "law": law.name,
-        "signals": dict(zip(law.signals, units, strict=True)),
-        "law_order": law.order,
-        "delay_s": law.delay,
-        "rule": "none" if law.is_discrete else law.rule,
-        "rule_in_words": rule_in_words(law),
-        "sign_convention": words,
-        "input": arm.input,
-    }
 
 
 def _in_z(part: Part, law: Law, period: float) -> LawBlock:

@@ -8,19 +8,19 @@ are counted, not read off: clockwise ones are closed-loop poles inside the conto
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arrays import Complex, Real
-from tfarm.columns import Column, Table
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
+from tfarm.schema import Quantity
 from tfarm.spectrum import flexible_frequencies
 from tfarm.spectrum.box import turned
 
@@ -51,16 +51,16 @@ class Nyquist:
     contour: those of a law that is not stable by itself.
     """
 
-    s: Complex
-    L: Complex
+    s: Annotated[Complex, Quantity("s", "1/s", curve=True)]
+    L: Annotated[Complex, Quantity("L", curve=True)]
     is_arc: NDArray[np.bool_]
     poles: Real
-    encirclements: int
-    verdict: Stability
-    unstable_open: int = 0
+    encirclements: Annotated[int, Quantity("encirclements of -1", help="counter-clockwise positive")]
+    verdict: Annotated[Stability, Quantity(flat=True)]
+    unstable_open: Annotated[int, Quantity("unstable poles of L")] = 0
 
     @property
-    def on_axis(self) -> int:
+    def on_axis(self) -> Annotated[int, Quantity("poles on the axis to working precision")]:
         """Poles of the box that lie on the axis to working precision, apart from that at 0."""
         moving = self.verdict.poles.moving
         near = abs(moving.real) <= AXIS_SHARE * abs(moving)
@@ -73,7 +73,7 @@ class Nyquist:
         return count_with_mirrors(moving[moving.real > AXIS_SHARE * abs(moving)])
 
     @property
-    def expected(self) -> int:
+    def unstable_by_nyquist(self) -> Annotated[int, Quantity("unstable poles by Nyquist's criterion")]:
         """Unstable closed-loop poles by Nyquist's criterion."""
         return self.unstable_open - self.encirclements
 
@@ -103,11 +103,10 @@ def nyquist_of(verdict: Stability) -> Nyquist:
     inside = int(((own.real > AXIS_SHARE * abs(own)) & (abs(own.imag) < band)).sum())
     plot = Nyquist(s, loop.loop_function(s), is_arc, poles, round(angle / math.pi), verdict, inside)
     found = min(plot.clear, verdict.unstable_roots)
-    if not found <= plot.expected <= found + plot.on_axis:
-        text = (
-            f"{plot.expected} unstable poles by the turns around -1, {verdict.unstable_roots} by finding all in a box"
-        )
-        raise ConvergenceError(text, plot, plot.expected - verdict.unstable_roots)
+    if not found <= plot.unstable_by_nyquist <= found + plot.on_axis:
+        counted, found_in_box = plot.unstable_by_nyquist, verdict.unstable_roots
+        text = f"{counted} unstable poles by the encirclements of -1, {found_in_box} by finding all in a box"
+        raise ConvergenceError(text, plot, plot.unstable_by_nyquist - verdict.unstable_roots)
     return plot
 
 
@@ -182,21 +181,3 @@ def compressed(L: Complex) -> Complex:
     size = abs(L)
     inside = np.where(np.isinf(size), 1.0, L)
     return np.asarray(np.where(np.isinf(size), 1.0, inside / (1 + abs(inside))))
-
-
-CONTOUR_COLUMNS = (  # of pairs s, L on the contour of a `Nyquist`
-    Column("re_s", "Re s", "1/s", of=lambda pair: pair[0].real),
-    Column("im_s", "Im s", "rad/s", of=lambda pair: pair[0].imag),
-    Column("re_L", "Re L", of=lambda pair: pair[1].real),
-    Column("im_L", "Im L", of=lambda pair: pair[1].imag),
-)
-
-
-def nyquist_table(*found: Nyquist, stem: str = "", laws: Sequence[str] = ()) -> Table:
-    """L on the contour, a row a point; of several loops, the law of each before it."""
-    pairs = [list(zip(each.s.tolist(), each.L.tolist(), strict=True)) for each in found]
-    named = [name for name, points in zip(laws, pairs, strict=False) for _ in points]
-    first = (Column("law", "law", of=named),) if laws else ()
-    points = [pair for each in pairs for pair in each]
-    title = "The loop function on the contour"
-    return Table(stem=stem, title=title, columns=(*first, *CONTOUR_COLUMNS), record=points)

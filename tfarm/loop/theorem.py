@@ -39,7 +39,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -47,6 +47,7 @@ from tfarm.arm import Arm, HubFeedback, Law, as_law
 from tfarm.arm.blocks import Rational
 from tfarm.records import record
 from tfarm.response import transfer
+from tfarm.schema import Quantity
 
 from .loop import Loop
 
@@ -67,8 +68,8 @@ class Signs:
     `energy` is what it does to each mode: TAKES, CONSERVES, GIVES; None where that is not shown.
     """
 
-    kind: Literal["strictly passive", "passive", "negative imaginary", ""]
-    reason: str
+    kind: Annotated[Literal["strictly passive", "passive", "negative imaginary", ""], Quantity("kind")]
+    reason: Annotated[str, Quantity("reason")]
     at_rest: float = 0.0
     energy: int | None = None
 
@@ -215,10 +216,10 @@ class Lyapunov:
     """
 
     loop: Loop
-    proven: bool
-    a1_over_a2: float | None
+    proven: Annotated[bool, Quantity("stability proven")]
+    a1_over_a2: Annotated[float | None, Quantity("weights a1/a2")]
     kind: Literal["dissipated", "conserved", "unproven"]
-    reason: str
+    reason: Annotated[str, Quantity("reason")]
 
 
 def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:
