@@ -19,11 +19,11 @@ from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.columns import Column
-from tfarm.crossing.following import between
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.reduced import modal_model
 from tfarm.spectrum import modes
+from tfarm.spectrum.following import between
 
 from .answers import law_answer, signals_answer
 from .locus import Locus, crossing_answers, locus
