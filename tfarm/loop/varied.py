@@ -57,6 +57,7 @@ class Varied:
 
     least_step = 1e-10
     most_halvings = 600
+    alone = 0.0
     blur = 0.0
 
     def __post_init__(self) -> None:

@@ -186,19 +186,21 @@ def damped_modes(undamped: Modes) -> DampedModes:
     """
     if not isinstance(undamped, Modes):
         raise ParameterError(key="modes", value=undamped, remedy="give what tfarm.modes returns")
-    return _searched_once(undamped.arm, undamped.theory, int(undamped.index.max()))
+    asked = int(undamped.index.max())
+    count = asked if undamped.arm.is_undamped else min(asked, MOST_MODES)
+    found = _searched_once(undamped.arm, undamped.theory, count)
+    return replace(found, left_out=asked - int(found.index.max()))
 
 
 @lru_cache(maxsize=LISTS_KEPT)  # loops, plants and simulations of one page ask for the same modes some ninety times
-def _searched_once(arm: Arm, theory: Theory, asked: int) -> DampedModes:
-    count = asked if arm.is_undamped else min(asked, MOST_MODES)
-    while True:
-        try:
-            return replace(_searched(modes(arm, count, theory=theory)), left_out=asked - count)
-        except ConvergenceError:
-            if count == 1:
-                raise
-        count //= 2
+def _searched_once(arm: Arm, theory: Theory, count: int) -> DampedModes:
+    """So many modes of an arm, or half as many where their box cannot be searched."""
+    try:
+        return _searched(modes(arm, count, theory=theory))
+    except ConvergenceError:
+        if count == 1:
+            raise
+        return _searched_once(arm, theory, count // 2)
 
 
 def damped_at_hub(arm: Arm, count: int) -> DampedModes | None:
@@ -234,7 +236,7 @@ def _searched(undamped: Modes) -> DampedModes:
         more = found[(found.imag >= 0) & ~is_among(found, np.r_[single, pairs.ravel()])]
         inside, free = found.size, np.r_[free, more]
     if free.size:  # then the drive's own zeros may have taken the places of modes
-        led = np.array([any(origin_of(k, each) != NOT_ASSIGNED for each in pair) for pair in pairs.tolist()])
+        led = np.array([any(origin_of(k, s) != NOT_ASSIGNED for s in pair[np.isfinite(pair)]) for pair in pairs])
         free, pairs[led] = np.r_[free, pairs[led].ravel()], LOST
     for row in lost.tolist():
         if (near := _plainly(omega, row, found, free)) is not None:

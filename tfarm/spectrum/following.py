@@ -28,17 +28,20 @@ PLAIN_MOVE = 0.1  # of the distance to the next root: one that is off its predic
 PLAIN_IN_COUPLE = 0.2  # the same, of the distance to the other one of two that meet or part
 ENDS_BEFORE = 0.05  # of its size: a real root so near to a singular point, right of it, ends there
 JUMP = 0.5  # of its size: a root that is not found nearer, however short the step, is lost
+SAME_ROOT = 1e-9  # of its size: two so near each other are one
 TURNED = 0.5  # of a right angle's cosine: below it the two of a couple have met between two values
 
 
 class Family(Protocol):
     """What is followed: `least_step` is the shortest step, as a share of the way, `blur` a distance that is none.
 
-    `most_halvings` of steps are made; a branch that meets the axis takes some 40.
+    `most_halvings` of steps are made; a branch that meets the axis takes some 40.  Where no more than the share `alone`
+    of the roots is stray these are followed alone in shorter steps.
     """
 
     least_step: float
     most_halvings: int
+    alone: float
     blur: float
 
     def near(self, values: Real, guess: Complex) -> Complex:
@@ -74,9 +77,16 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
         at, last = np.array([value for value, _ in block]), past[-1][1]
         guess = predicted(np.array([value for value, _ in past]), np.array([row for _, row in past]), at, last)
         found = corrected(family, at, guess, last)
-        are_plain = which_plain(family, at, guess, found)
+        are_plain = which_plain(family, at, guess, found, last)
         plain = are_plain.all(axis=1)
         good = len(block) if plain.all() else int(np.argmin(plain))
+        if not good and len(block) == 1 and np.mean(~are_plain[0]) <= family.alone:
+            stray = beside(~are_plain[0], last)
+            try:
+                found[0, stray] = follow(family, np.array([past[-1][0], at[0]]), last[stray])[1]
+            except ConvergenceError as lost:
+                raise ConvergenceError(str(lost), past[-1], stray) from None
+            good = int(not (distances(found[0]).min(axis=1) <= SAME_ROOT * abs(found[0])).any())
         if not good and len(block) == 1:
             if abs(at[0] - past[-1][0]) > family.least_step * span:
                 ahead.append(((past[-1][0] + float(at[0])) / 2, 0))
@@ -96,6 +106,15 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
     return rows
 
 
+def beside(stray: NDArray[np.bool_], last: Complex) -> NDArray[np.bool_]:
+    """These roots, and of each couple and conjugate pair the other one."""
+    both, (first, second) = stray.copy(), couples(last)
+    both[first] |= stray[second]
+    both[second] |= stray[first]
+    mirrored = (last[:, None] == last[stray].conj()).any(axis=1)
+    return both | mirrored
+
+
 def between(family: Family, values: Real, rows: Complex, wanted: Real) -> Complex:
     """Return the roots (m, b) at wanted values (m,) between the known ones (n,), ascending.
 
@@ -108,7 +127,7 @@ def between(family: Family, values: Real, rows: Complex, wanted: Real) -> Comple
         here, near = np.flatnonzero(right == n), slice(low, low + PAST)
         guess = predicted(values[near], rows[near], wanted[here], rows[n - 1])
         found[here] = corrected(family, wanted[here], guess, rows[n - 1])
-        for each in here[~which_plain(family, wanted[here], guess, found[here]).all(axis=1)]:
+        for each in here[~which_plain(family, wanted[here], guess, found[here], rows[n - 1]).all(axis=1)]:
             found[each] = follow(family, np.array([values[n - 1], wanted[each]]), rows[n - 1])[1]
     return found
 
@@ -166,10 +185,10 @@ def corrected(family: Family, values: Real, guess: Complex, base: Complex) -> Co
     partner = np.arange(base.size)
     first, second = couples(np.where(base.imag == 0, base, np.nan))
     partner[first], partner[second] = second, first
-    lower, upper = np.flatnonzero(base.imag < 0), np.flatnonzero(base.imag > 0)
-    if lower.size:
-        partner[lower] = upper[abs(base[lower].conj()[:, None] - base[upper]).argmin(axis=1)]
-    is_lower = guess.imag < 0
+    mirrors = (base[:, None] == base.conj()) & (base.imag < 0)[:, None]
+    lower, upper = np.nonzero(mirrors)
+    partner[lower] = upper
+    is_lower = (guess.imag < 0) & (partner != np.arange(base.size))
     found = family.near(values, np.where(is_lower, np.nan, guess))
     return np.where(is_lower, found[:, partner].conj(), found)
 
@@ -182,8 +201,11 @@ def distances(row: Complex) -> Real:
     return np.asarray(away)
 
 
-def which_plain(family: Family, values: Real, guess: Complex, found: Complex) -> NDArray[np.bool_]:
-    """Which of the roots (m, b) are next to their prediction, compared with the distance to any other."""
+def which_plain(family: Family, values: Real, guess: Complex, found: Complex, base: Complex) -> NDArray[np.bool_]:
+    """Which of the roots (m, b) are next to their prediction, compared with the distance to any other.
+
+    To its mirror image too, of one that has none in the base (b,).
+    """
     away, moved = distances(found), abs(found - guess)
     nearest = away.argmin(axis=2)[..., None]
     own = np.take_along_axis(away, nearest, 2)[..., 0]
@@ -192,6 +214,8 @@ def which_plain(family: Family, values: Real, guess: Complex, found: Complex) ->
     room = away.min(axis=2, initial=np.inf)
     for point in family.singular(values).T:
         room = np.minimum(room, abs(found - point[:, None]))
+    has_mirror = (base[:, None] == base.conj()).any(axis=1) | (base.imag == 0)
+    room = np.where(has_mirror, room, np.minimum(room, 2 * np.minimum(abs(found.imag), abs(base.imag))))
     near = (moved <= np.where(is_couple, PLAIN_IN_COUPLE, PLAIN_MOVE) * own) & (
         np.sign(found.imag) == np.sign(guess.imag)
     )

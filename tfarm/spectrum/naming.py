@@ -7,6 +7,7 @@ s = -inf as C grows from 0.  It meets the fast zero of the overdamped mode; toge
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,7 @@ from .table import Modes, modes
 FIRST_SHARE = 1e-3  # of all damping, or less: there an undamped mode has hardly moved
 NEWTON_STEPS = 8  # from a guess right to some digits: what has not settled then is followed in shorter steps
 SETTLED = 1e-10  # of its size: one step more is taken where Newton's method still moves a zero by this
+DECADES = 3  # of the share at a time: the shortest step is a share of these
 HALVINGS = (250, *[80] * 8)  # of steps until those that are stray are lost, and the others followed alone
 AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])  # starts next to a guess, of it
 NEAR_REAL = 1e-7  # of its size: the imaginary part of a double zero is rounding
@@ -59,8 +61,9 @@ class Damping:
     level: float
     most_halvings: int
 
-    least_step = 1e-9
+    least_step = 1e-7
     blur = 0.0
+    alone = 0.15
 
     def near(self, values: Real, guess: Complex) -> Complex:
         """As `following` wants it."""
@@ -73,7 +76,8 @@ class Damping:
         """Those next to the guesses; the mirror image only of one that a guess below the real axis is next to."""
         unit, wanted = value * self.level, guess[~np.isnan(guess)]
         starts = np.outer(wanted[wanted.imag >= 0] / unit, AROUND).ravel()
-        found = newton(function_of(self.k.with_damping(value)), starts) * unit
+        with np.errstate(all="ignore"):
+            found = newton(function_of(self.k.with_damping(value)), starts) * unit
         found = np.where(abs(found.imag) < NEAR_REAL * abs(found), found.real, found)
         upper, lower = found[found.imag > 0], wanted[wanted.imag < 0].conj()
         away = abs(upper[:, None] - lower).min(axis=1, initial=np.inf)
@@ -108,14 +112,17 @@ def named(undamped: Modes, count: int) -> tuple[Complex, Complex]:
     upper = settled(function_of(k.with_damping(share)), np.r_[single_zeros(undamped, share), 1j * omega])
     pairs = np.stack([upper[len(alone) :], upper[len(alone) :].conj()], axis=1)
     start = np.r_[upper[: len(alone)], pairs.ravel()] * (share * family.level)
-    found = np.full(start.size, LOST)
+    ends = np.geomspace(share, 1.0, 1 + math.ceil(-math.log10(share) / DECADES))[1:].tolist()
     for family.most_halvings in HALVINGS:
         try:
-            found = settled(function_of(k), follow(family, np.array([share, 1.0]), start)[1] / family.level)
+            while ends:
+                start = follow(family, np.array([share, ends[0]]), start)[1]
+                share = ends.pop(0)
             break
         except ConvergenceError as lost:
             (share, start), stray = lost.best, lost.residual
             start = np.where(stray, LOST, start)
+    found = np.full(start.size, LOST) if ends else settled(function_of(k), start / family.level)
     again = np.triu(abs(found[:, None] - found) <= REAL_SHARE * abs(found), 1).any(axis=0)
     found[again] = LOST
     return in_pairs(found[: len(alone)], found[len(alone) :].reshape(-1, 2))
@@ -127,10 +134,10 @@ def in_pairs(single: Complex, pairs: Complex) -> tuple[Complex, Complex]:
     Of two modes the higher has them, and the lower the two left; of a mode and a single zero the mode.
     """
     single, pairs = single.copy(), pairs.copy()
-    for n, pair in enumerate(pairs):
-        rings = np.flatnonzero(np.isfinite(pair) & (pair.imag != 0))
+    for n in (*range(len(pairs)), *range(len(pairs))):  # twice, as one of two may be left with half of another pair
+        rings = np.flatnonzero(np.isfinite(pairs[n]) & (pairs[n].imag != 0))
         if rings.size == 1:
-            one, rest = pair[rings[0]], pair[1 - rings[0]]
+            one, rest = pairs[n, rings[0]], pairs[n, 1 - rings[0]]
             alone, other = (abs(each - one.conj()) <= REAL_SHARE * abs(one) for each in (single, pairs))
             pairs[n] = one, one.conj()
             if other.any():
