@@ -6,7 +6,6 @@ ARM ?= sasaki2012-lab
 BIN := .venv/bin
 RIG := tests/data/quanser-2dsfl
 INSTALLED := .venv/.installed
-BENCH_INSTALLED := .venv/.bench
 BROWSER_INSTALLED := .venv/.browser
 DOCS_INSTALLED := .venv/.docs
 LOWEST := .venv-lowest
@@ -38,7 +37,6 @@ SURVEYS := \
 	loop.nyquist_counts \
 	reduced.test_accuracy \
 	dsp.settled \
-	dsp.law_verdicts \
 	dsp.law_orders \
 	fitting.planted \
 	tuner.bounded \
@@ -111,8 +109,8 @@ lint: $(INSTALLED) ## check style, types and which room imports which
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 
-bench: $(BENCH_INSTALLED) ## measure speed, beside other packages
-	@$(BIN)/python -m tests.bench
+bench: $(INSTALLED) ## measure speed, beside other packages
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.bench
 
 clean: ## remove everything that was generated
 	@rm -rf .venv $(LOWEST) build dist docs/_build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
@@ -120,9 +118,9 @@ clean: ## remove everything that was generated
 	@find tfarm tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # pip alone would byte-compile on one core, with every package's own tests and with what is never imported again: itself
-# and what mypy has as machine code.  Meanwhile seven commands compile the numerical kernels, which numba then keeps on
+# and what mypy has as machine code.  Meanwhile six commands compile the numerical kernels, which numba then keeps on
 # disk: two at a time that need different ones.  A rig under a law is half of it, and without it a report's two
-# processes would each compile those, as tests would the two ways to learn within a trial.
+# processes would each compile those.
 NOT_COMPILED := /tests?/|/(pip|setuptools|pkg_resources|mypy|mypyc)/|/pygments/(lexers|styles)/
 $(INSTALLED): pyproject.toml requirements.lock
 	$(if $(shell $(PYTHON) -c 'import sys; print("yes" * (sys.version_info >= (3, 11)))' 2>/dev/null),,$(error \
@@ -136,8 +134,7 @@ $(INSTALLED): pyproject.toml requirements.lock
 		$(BIN)/tfarm poles sasaki2012-lab > /dev/null && $(BIN)/tfarm simulate sasaki2012-lab > /dev/null; } & \
 		$(BIN)/tfarm simulate $(RIG)/rig.toml --law $(RIG)/lqg.toml --duration 0.1 > /dev/null && \
 		$(BIN)/tfarm tune sasaki2012-lab --trials 1 > /dev/null && \
-		$(BIN)/tfarm tune sasaki2012-lab --trials 1 --mode online > /dev/null && \
-		$(BIN)/tfarm tune sasaki2012-lab --trials 1 --mode online --sensitivity whole > /dev/null && wait $$!
+		$(BIN)/tfarm tune sasaki2012-lab --trials 1 --mode online > /dev/null && wait $$!
 
 # pip itself knows only the newest versions
 $(LOWEST)/.installed: pyproject.toml
@@ -146,6 +143,6 @@ $(LOWEST)/.installed: pyproject.toml
 	@$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct -e '.[dev]'
 	@touch $@
 
-$(BENCH_INSTALLED) $(BROWSER_INSTALLED) $(DOCS_INSTALLED): .venv/.%: $(INSTALLED)
+$(BROWSER_INSTALLED) $(DOCS_INSTALLED): .venv/.%: $(INSTALLED)
 	@$(PIP) -e '.[$*]'
 	@touch $@

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields, is_dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, wraps
 from html import escape
 from typing import Any, TypeVar
 
@@ -82,7 +82,7 @@ def read_only(value: Any) -> Any:
 
 
 def _read_only_result(function: Any) -> Any:
-    return lambda self: read_only(function(self))
+    return wraps(function)(lambda self: read_only(function(self)))
 
 
 def _equal(self: Any, other: Any) -> Any:

@@ -11,8 +11,6 @@ import tfarm
 from tests.shared import thinned
 from tfarm.audit.assumptions import (
     assumptions_answer,
-    candidate_depths,
-    candidate_inertias,
     candidates,
     has_hub_inertia,
     hub_study,
@@ -38,46 +36,35 @@ def own_frequencies(arm, count=4):
 # ------------------------------------------------------------ which candidates
 
 
-def test_the_candidates_of_the_paper_are_those_of_the_issue():
-    depths, inertias = candidate_depths(PAPER), candidate_inertias(PAPER)
+def test_the_candidates_of_the_paper():
+    depths, inertias = section_study(PAPER, count=1).values, hub_study(PAPER, count=1).values
     assert (depths[0], depths[-1]) == (0.002, 0.060)
     assert sum(math.isclose(depth, 0.006) for depth in depths) == 1
-    assert inertias == (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+    assert inertias.tolist() == [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0]
 
 
 def test_another_area_scales_the_depths_and_the_arm_is_among_them():
-    depths = candidate_depths(STOCKY)
+    depths = section_study(STOCKY, count=1).values
     scale = math.sqrt(5e-3 / 6e-4)
     assert [depths[0], depths[-1]] == pytest.approx([0.002 * scale, 0.060 * scale], rel=0.05)  # two digits
     assert depths[0] == 0.0058
     assert own_depth(STOCKY) == pytest.approx(0.10, rel=1e-14)
     assert own_depth(STOCKY) in depths
-    assert list(depths) == sorted(set(depths))
+    assert np.all(np.diff(depths) > 0)
 
 
 @pytest.mark.parametrize("own", [3e-7, 0.0099, 0.03, 40.0])
 def test_an_inertia_outside_moves_the_candidates_by_decades(own):
-    inertias = candidate_inertias(replace(PAPER, hub=tfarm.Hub(inertia=own)))
+    inertias = hub_study(replace(PAPER, hub=tfarm.Hub(inertia=own)), count=1).values
     assert own in inertias
     assert inertias[-1] / inertias[0] == pytest.approx(100.0, rel=1e-12)
     assert math.log10(inertias[0]) == pytest.approx(round(math.log10(inertias[0])), abs=1e-9)
 
 
-def test_a_hub_without_an_inertia_says_so():
+def test_a_hub_without_an_inertia_has_no_candidates():
     assert [has_hub_inertia(arm) for arm in ARMS] == [True, True, False, False]
-    for arm in (LOCKED, PINNED):
-        with pytest.raises(tfarm.ParameterError, match="no inertia to vary"):
-            hub_study(arm)
-        assert assumptions_answer(arm, 1)["hub"] is None
+    assert [assumptions_answer(arm, 1)["hub"] for arm in (LOCKED, PINNED)] == [None, None]
     assert hub_study(LOCKED, [0.1]).natural_frequency[0] == pytest.approx(own_frequencies(PAPER), rel=1e-14)
-
-
-@pytest.mark.parametrize("bad", [0.0, -0.01, math.inf, math.nan, "6 mm"])
-def test_what_is_no_candidate_is_refused(bad):
-    with pytest.raises(tfarm.ParameterError, match="depth"):
-        section_study(PAPER, [bad])
-    with pytest.raises(tfarm.ParameterError, match="hub inertia"):
-        hub_study(PAPER, [bad])
 
 
 # ------------------------------------------------------------ the arm's own values

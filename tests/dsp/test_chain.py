@@ -47,7 +47,7 @@ def test_all_is_ideal_unless_it_is_said_otherwise():
     assert chain == Chain()
     assert (chain.sampling.period, chain.sampling.delay_samples) == (0.01, 0.0)
     assert (chain.slew.travel_of(1.0), chain.slew.rise_time, chain.slew.reading) == (1.15, 1.0, "vibration")
-    assert not chain.converters.is_quantised
+    assert chain.is_linear
     assert Converters(encoder_counts=2**31).encoder_counts == 2**31  # as far as 32 bits count
     assert math.isinf(chain.actuator.torque_limit)
 

@@ -7,27 +7,22 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.dsp.law_verdicts import judge, some_case, stepped
+from tests.dsp.law_orders import some_case
+from tests.dsp.roads import stepped
 from tests.odd_arms import odd_arms
-from tests.shared import sized
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.dsp import Chain, Converters, Sampling, sampled_loop, stable_windows
 from tfarm.dsp.circle import complete_band
 from tfarm.dsp.crossings import circle_grid, crossing_factors, number_crossings, stable_factors
-from tfarm.dsp.discretise import discretised, matched, tustin, zero_order_hold
+from tfarm.dsp.discretise import by_scipy, discretised, matched, tustin
 from tfarm.dsp.edges import whole_loop
 from tfarm.dsp.modes import mode_table
 from tfarm.dsp.verdict import sampled_numbers, sampled_verdict
 
 T = 0.01
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
-CHAINS = {
-    "plain": Chain(),
-    "late and filtered": Chain(sampling=Sampling(delay_samples=1.3, antialias_corner=300.0)),
-    "encoder": Chain(converters=Converters(hub_rate="difference", rate_filter=100.0)),
-}
 LAWS = {
     "lead": Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "root_moment": 0.1}, delay=0.004),
     "acceleration": Law({"hub_rate": ([0.3], [0.02, 1.0]), "tip_acceleration": ([0.002], [0.02, 1.0])}),
@@ -102,7 +97,7 @@ def test_integrators_of_what_is_0_at_rest_stay_at_one(entries, marginal):
 def test_what_stays_at_one_is_left_out_of_what_is_proven():
     verdict = sampled_verdict(LAB, Law({"hub_rate": 0.3, "root_moment": ([0.001, 0.0], [1.0, -1.0])}, period=T))
     assert (verdict.word, verdict.log_radius, verdict.is_settled) == ("marginal", 0.0, True)
-    assert "a pole of the law neither grows nor decays" in verdict.sentence
+    assert verdict.slowest == "a pole of the law"
 
 
 def test_an_unstable_cancellation_in_the_law_is_said_and_grows(capsys, tmp_path):
@@ -114,9 +109,7 @@ def test_an_unstable_cancellation_in_the_law_is_said_and_grows(capsys, tmp_path)
     assert found.verdict.log_radius == pytest.approx(np.log(1.2), rel=1e-9)
     text = "[law]\nperiod = 0.01\n[law.hub_angle]\nzeros = [1.2]\npoles = [1.2, 0.5]\ngain = 0.1\n"
     (tmp_path / "law.toml").write_text(text)
-    assert (
-        "warning: the law cancels" in run(capsys, "sampled", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"))[1]
-    )
+    assert "the law cancels" in run(capsys, "sampled", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"))[1]
 
 
 def test_filtered_signals_are_what_the_analog_filter_makes_of_them():
@@ -136,27 +129,15 @@ def test_filtered_signals_are_what_the_analog_filter_makes_of_them():
 # ------------------------------------------------------------ verdicts and margins
 
 
-@pytest.mark.parametrize("number", sized(2, 4))
-def test_random_laws_have_the_verdict_of_models_and_of_simulations(number):
-    rng, words = np.random.default_rng(3), []
-    while len(words) < number:
-        case = some_case(rng)
-        if case is not None:
-            words.append(judge(*case)[0])
-    assert set(words) <= {"right", "no second road", "too near"}
-    assert words.count("right") >= 2
-
-
 @pytest.mark.parametrize(("number", "seed"), [(2, 3), pytest.param(4, 6, marks=pytest.mark.survey)])
 def test_what_is_proven_of_random_laws_is_the_count_of_their_poles(number, seed):
     """By discs around the circle, against the polished eigenvalues of the loop with every mode of the band."""
     rng, found = np.random.default_rng(seed), []
     while len(found) < number:
         case = some_case(rng)
-        if case is None or not case[0].least_damping or case[2].actuator.hub_damping:
+        if case is None or not case.arm.least_damping:
             continue
-        arm, law, chain = case
-        band = complete_band(whole_loop(arm, law, chain))
+        band = complete_band(whole_loop(case.arm, case.law, case.chain))
         proven = band.circle().count(band.loop.weights)
         found.append(proven)
         assert proven in (None, (band.full.poles.log_radius > 0).sum())
@@ -253,19 +234,6 @@ def test_both_periods_are_named_where_they_differ(capsys, tmp_path):
     assert answer(capsys, *typed, "--period", "0.004")["stable"]
 
 
-def test_the_command_says_which_rule_it_took(capsys, tmp_path):
-    text = "[law]\nname = 'PD'\ndelay = 0.002\nprewarp = 20.0\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
-    (tmp_path / "law.toml").write_text(text)
-    found = answer(capsys, "sampled", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"))
-    assert (found["rule"], found["delay_samples"], found["settled"]) == ("tustin", 0.2, True)
-    (tmp_path / "arm.toml").write_text(tfarm.arm.to_toml(LAB) + "\n" + text)
-    assert answer(capsys, "sampled", str(tmp_path / "arm.toml"))["gain_factors"] == found["gain_factors"]
-    code, out, _ = run(capsys, "sampled", str(tmp_path / "arm.toml"))
-    assert code == 0
-    assert "Tustin's rule, exact at 20 rad/s" in out
-    assert f"spectral radius {found['spectral_radius']:.12g}" in out
-
-
 @pytest.mark.parametrize("arm", ["free", "damped", "held"])
 @pytest.mark.parametrize("law", ["lead", "integrator", "acceleration"])
 def test_next_to_z_1_the_loop_goes_as_the_powers_that_are_named(arm, law):
@@ -315,7 +283,7 @@ def test_the_rules_are_those_of_python_control(name, rule):
     mine = {
         "tustin": lambda: tustin(block, T),
         "prewarped": lambda: tustin(block, T, warp),
-        "zoh": lambda: zero_order_hold(block, T),
+        "zoh": lambda: by_scipy(block, T, "zoh"),
         "matched": lambda: matched(block, T),
     }[rule]()
     method = {"tustin": "bilinear", "prewarped": "bilinear"}.get(rule, rule)
@@ -355,7 +323,7 @@ def test_several_signals_at_once_are_discretised_as_each_alone():
     both = Law.of_matrices(A, B, C, D, ["hub_angle", "root_moment"], rule="zoh")
     z = np.exp(1j * np.array([0.3, 2.0]))
     for column, values in enumerate(discretised(both, T).values(z)):
-        one = zero_order_hold(StateSpace(A, np.array(B)[:, [column]], C, np.array(D)[:, [column]]), T)
+        one = by_scipy(StateSpace(A, np.array(B)[:, [column]], C, np.array(D)[:, [column]]), T, "zoh")
         np.testing.assert_allclose(values, one.numerators(z)[0] / one.denominator(z), rtol=1e-12)
 
 
@@ -364,7 +332,7 @@ def test_a_number_is_in_a_window_where_all_eigenvalues_are_inside_the_circle(law
     """At random factors of either sign on one part; near an edge eigenvalues tell nothing."""
     rng, told = np.random.default_rng(5), set()
     loop = sampled_loop(LAB, law, Chain(), count=6)
-    for name, value, windows in sampled_numbers(loop):
+    for name, value, windows, _ in sampled_numbers(loop):
         for factor in (*-(10 ** rng.uniform(-3, 2, 4)), *10 ** rng.uniform(-3, 2, 8)):
             radius = abs(np.linalg.eigvals(loop.having(**{name: factor * value}).reduced_matrix())).max()
             inside = any(low < factor * value < high for low, high in windows)
@@ -378,7 +346,7 @@ def test_between_crossings_along_one_part_the_count_is_what_they_say():
     rng, compared = np.random.default_rng(77), 0
     for _ in range(6):
         case = some_case(rng)
-        loop = case and sampled_loop(*case, count=6)
+        loop = case and sampled_loop(case.arm, case.law, case.chain, count=6)
         for name in loop.law.part_gains if loop else ():
             own = loop.number(name)
             values = own * np.r_[1.0, -(10 ** rng.uniform(-4, 3, 3)), 10 ** rng.uniform(-4, 3, 3)]

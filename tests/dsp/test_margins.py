@@ -11,20 +11,13 @@ from tests.odd_arms import odd_arms
 from tests.rigs import some_rig
 from tests.shared import thinned
 from tests.similar import EITHER
-from tfarm import modes
-from tfarm.arm import HubFeedback
-from tfarm.dsp import (
-    Chain,
-    Converters,
-    Sampling,
-    delay_margin,
-    required_damping,
-    sampled_loop,
-    sampled_map,
-)
+from tfarm import HubFeedback, Law, modes
+from tfarm.arm import as_law
+from tfarm.dsp import Chain, Converters, Sampling, delay_margin, required_damping, sampled_loop, sampled_map
 from tfarm.dsp.crossings import ENDS_AT, around, circle_grid, ends_of_K1, number_crossings, stable_windows
-from tfarm.dsp.verdict import sampled_answer, sampled_verdict
+from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.schema import to_dict
 from tfarm.spectrum.table import default_gains
 
 GAINS = HubFeedback(K1=0.3, K2=0.3)
@@ -180,24 +173,27 @@ def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossl
     assert verdict.sentence.startswith("stable")
     undamped = sampled_verdict(lossless, GAINS)
     assert (undamped.is_settled, undamped.band_rad_s) == (False, None)
-    assert "mode 13 grows by 8.62e-09 a sample (holds for the first 20 modes)" in undamped.sentence
+    assert (undamped.slowest, undamped.modes_used) == ("mode 13", 20)
+    assert undamped.log_radius == pytest.approx(8.62e-9, rel=1e-3)
+    assert undamped.holds_for == "converged for the first 20 modes, not determined beyond"
     assert sampled_verdict(lossless, GAINS, count=12).sentence.startswith("stable")
     assert sampled_verdict(lossless, HubFeedback(K1=0, K2=0)).sentence.startswith("marginal")
 
 
 def test_the_answer_is_plain_and_consistent(lab):
-    answer = sampled_answer(tfarm.sampled(lab, GAINS))
-    low, high = answer["K2_interval"]
-    edges = answer["shown"]["K2_intervals"][0]
-    assert [float(edge["text"]) for edge in edges] == pytest.approx([low, high], rel=5e-6)
-    assert all(edge["settled"] and edge["band_rad_s"] == answer["band_rad_s"] > 1e5 for edge in edges)
-    for key in ("delay_margin_samples", "required_damping_s"):
-        figure = answer["shown"][key]
-        assert (figure["settled"], figure["digits"]) == (True, 4)
-        assert float(figure["text"]) == pytest.approx(answer[key], rel=5e-4)
-    unstable = sampled_answer(tfarm.sampled(lab, HubFeedback(K1=0.3, K2=1.3)))
-    assert (unstable["K2_interval"], unstable["delay_margin_samples"]) == (None, 0.0)
-    assert unstable["K2_intervals"] == answer["K2_intervals"]
+    answer = to_dict(tfarm.sampled(lab, GAINS))
+    (of_K2,) = (row for row in answer["stability_intervals"] if row["number"] == "K2")
+    (edges,) = of_K2["intervals"]
+    assert [float(edge["text"]) for edge in edges] == pytest.approx(of_K2["interval"], rel=5e-6)
+    assert all(edge["certified"] and edge["up_to_rad_s"] == answer["up_to_rad_s"] > 1e5 for edge in edges)
+    for key in ("delay_margin", "minimum_damping_s"):
+        figure = answer[key]
+        assert (figure["certified"], figure["digits"]) == (True, 4)
+        assert float(figure["text"]) == pytest.approx(figure["value"], rel=5e-4)
+    unstable = to_dict(tfarm.sampled(lab, HubFeedback(K1=0.3, K2=1.3)))
+    (of_unstable,) = (row for row in unstable["stability_intervals"] if row["number"] == "K2")
+    assert (of_unstable["interval"], unstable["delay_margin_samples"]) == (None, 0.0)
+    assert of_unstable["intervals"] == of_K2["intervals"]
     outside = abs(np.linalg.eigvals(sampled_loop(lab, HubFeedback(K1=0.3, K2=1.3)).reduced_matrix())) > 1
     assert unstable["unstable_poles"] == outside.sum() == 2
     assert answer["unstable_poles"] == 0
@@ -294,3 +290,38 @@ def test_an_arm_that_something_holds_has_its_whole_window():
     assert all(loop.having(K1=float(K1)).poles.is_stable for K1 in inside)
     for K1 in (low - 1e-6 * (high - low), high + 1e-6 * (high - low)):
         assert not loop.having(K1=float(K1)).poles.is_stable
+
+
+# ------------------------------------------------------------ planes of any two numbers of the law of a sampled
+
+
+LAB = tfarm.load("sasaki2012-lab")
+FOUR = Law({"hub_angle": ((4.0, 2.0), (0.05, 1.0)), "hub_rate": 1.0, "root_moment": (0.2, (0.01, 1.0))}, delay=0.004)
+WITH_ANGLE = HubFeedback(K1=0.3, K2=0.3, Kp=2.0)
+PLANES = [
+    (WITH_ANGLE, ("Kp", "K2"), (0.2, 8.0), (-1.0, 1.2)),
+    (FOUR, ("delay", "hub_angle"), (0.0, 0.04), (0.1, 6.0)),
+    (FOUR, ("hub_rate", "hub_angle.den.0"), (-3.0, 8.0), (0.01, 0.3)),
+    (FOUR, ("hub_angle.num.0", "root_moment.den.0"), (-9.0, 60.0), (0.002, 0.3)),
+]
+
+
+@pytest.mark.parametrize(("law", "vary", "across", "up"), PLANES)
+def test_the_count_at_a_point_is_that_of_the_poles_of_its_own_loop(law, vary, across, up):
+    """Of a loop made anew for the law at that point; stable and unstable ones are among them."""
+    rng = np.random.default_rng(3)
+    x, y = (np.sort(rng.uniform(*ends, 4)) for ends in (across, up))
+    plane = sampled_map(sampled_loop(LAB, law, count=6), x, y, vary)
+    counts = []
+    for i, j in [(i, j) for i in range(4) for j in range(4) if (i + j) % 2]:
+        there = as_law(law).having(vary[0], x[i]).having(vary[1], y[j])
+        poles = sampled_loop(LAB, there, Chain(), count=6).poles
+        counts.append(int((abs(poles.z) > 1).sum()))
+        assert (plane.unstable[i, j], plane.counts[j, i]) == (counts[-1], counts[-1])
+    assert min(counts) == 0 < max(counts)
+
+
+@pytest.mark.parametrize("name", ["hub_angel", "hub_angle.num.7"])
+def test_what_is_no_number_of_the_law_is_refused(name):
+    with pytest.raises(tfarm.ParameterError, match="law"):
+        sampled_map(sampled_loop(LAB, FOUR, count=4), [0.0, 1.0], [0.0, 1.0], (name, "hub_rate"))

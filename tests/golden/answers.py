@@ -12,11 +12,13 @@ import math
 import re
 from pathlib import Path
 
+from tests.golden.renamed import renamed
 from tfarm.cli import main
 
 HERE = Path(__file__).parent
 TOLERANCE = 1e-8  # relative, of what is well conditioned: a frequency, a pole, a margin, an edge
 MOST_ITEMS = 40  # of a list that is kept whole
+ROW_NAMES = ("quantity", "branch", "mode", "number")  # keys that name a row
 KEPT_ITEMS = 8  # of a longer one, evenly spread
 PHRASES = re.compile(r"(^|[._])(verdict|method|objective|structure|units?(\.\w+)?(\[\])?|theory|name)$")  # no prose
 SEARCHES = {"design": "value", "tune": "cost_tuned", "fit": "chi_squared"}  # what a search is judged by
@@ -89,40 +91,67 @@ def keep(line, answer):
 
 
 def differences(line, before, now):
-    """What differs by more than it may: a list of "path: before, now"."""
+    """What differs by more than it may: a list of "path: before, now".  Keys that are new are no difference."""
     command = line.split()[0]
     if command in SEARCHES:
         return list(_of_search(line, before, now))
-    return [*_differences(command, "", before, now, 0.0)]
+    return [*_differences(line, dict(flat(before)), dict(flat(now)))]
 
 
 def _of_search(line, before, now):
     """The differences of a search: its keys, its verdict, and a score that has become worse."""
     score, sign = SEARCHES[line.split()[0]], -1 if any(each in line for each in LARGER_IS_BETTER) else 1
-    if before.keys() != now.keys():
-        yield f"keys: {sorted(before.keys() ^ now.keys())}"
+    paths = {path.partition("[")[0].partition(".")[0] for path, _ in flat(now)}
+    kept_paths = (renamed(line, path) for path, _ in flat(before))
+    lost = {path.partition("[")[0].partition(".")[0] for path in kept_paths if path is not None} - paths
+    if lost:
+        yield f"keys: {sorted(lost)}"
     if before.get("verdict") != now.get("verdict"):
         yield f"verdict: {before.get('verdict')}, {now.get('verdict')}"
     if sign * (now[score] - before[score]) > SPREAD * abs(before[score]):
         yield f"{score}: {before[score]}, {now[score]}"
 
 
-def _differences(command, path, before, now, scale):
-    """The differences of two values at `path`; `scale` is the size of the list they are in, where that counts."""
-    if isinstance(before, dict) and isinstance(now, dict):
-        yield from (f"{path}.{key}: only {'before' if key in before else 'now'}" for key in before.keys() ^ now.keys())
-        for key in before.keys() & now.keys():
-            yield from _differences(command, f"{path}.{key}".lstrip("."), before[key], now[key], 0.0)
-    elif isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
-        size = max((abs(each) for each in [*before, *now] if _is_number(each)), default=0.0)
-        for one, other in zip(before, now, strict=True):
-            yield from _differences(command, f"{path}[]", one, other, max(size, scale))
-    elif isinstance(before, float) and _is_number(now):
-        tolerance, of_list = allowed(command, path)
-        if abs(before - now) > tolerance * max(abs(before), abs(now), scale * of_list):
-            yield f"{path}: {before!r}, {now!r}"
-    elif not _are_alike(path, before, now):
-        yield f"{path}: {before!r}, {now!r}"
+def flat(value, path="", scale=0.0):
+    """Path, and value with the size of the list that it is in, of every entry.
+
+    A row of a table is called by the first of `ROW_NAMES` that it has, not by its number.
+    """
+    if isinstance(value, dict) and value:
+        for key, each in value.items():
+            yield from flat(each, f"{path}.{key}".lstrip("."))
+    elif isinstance(value, list) and value:
+        size = max((abs(each) for each in value if _is_number(each)), default=0.0)
+        for number, each in enumerate(value):
+            yield from flat(each, f"{path}[{_row_name(each, number)}]", max(size, scale))
+    else:
+        yield path, (value, scale)
+
+
+def _row_name(row, number):
+    """What a row of a table is called, or its number."""
+    keys = [key for key in ROW_NAMES if key in row] if isinstance(row, dict) and "omega_rad_s" not in row else []
+    return row[keys[0]] if keys else number
+
+
+def _differences(line, before, now):
+    """The differences of two flat answers."""
+    for path, (old, scale) in before.items():
+        place = renamed(line, path)
+        if place is None or (place not in now and old in (None, [], {})):
+            continue
+        if place.endswith("_at_rad_s") and old == 0 and now[place][0] is None:  # at no frequency of its own
+            continue
+        if place not in now:
+            yield f"{path}: {place} is not there"
+            continue
+        new, size = now[place]
+        if isinstance(old, float) and _is_number(new):
+            tolerance, of_list = allowed(line.split()[0], re.sub(r"\[[^\]]*\]", "[]", path))
+            if abs(old - new) > tolerance * max(abs(old), abs(new), max(scale, size) * of_list):
+                yield f"{path}: {old!r}, {new!r}"
+        elif not _are_alike(re.sub(r"\[[^\]]*\]", "[]", path), old, new):
+            yield f"{path}: {old!r}, {new!r}"
 
 
 def _is_number(value):

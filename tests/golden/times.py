@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[2]
 
 def serve():
     """Answer each line on standard input by the CPU seconds of that command, or by what went wrong."""
-    from tests.bench import caches
+    from tests import caches
     from tests.golden.answers import asked
 
     for line in sys.stdin:

@@ -1,7 +1,7 @@
 """Published tables of uniform Euler-Bernoulli beams, against the determinant of their end conditions.
 
 blevins-1979, blevins-1979-sliding, thomson-appendix-d, code-aster-v2.05.400, vpcs-sdll15, bir-2010, wang-2017,
-chun-1972, bhat-wagner-1976 and bellezza-lanari-ulivi-1990, as `tfarm.audit.literature` has them; which of their printed
+chun-1972, bhat-wagner-1976 and bellezza-lanari-ulivi-1990, as `tfarm.audit` has them; which of their printed
 digits are ours, and why others are not, `validate` says.
 """
 
@@ -15,8 +15,7 @@ import pytest
 import tfarm
 from tfarm import Hub, Payload
 from tfarm.arm import RotarySpring
-from tfarm.audit.literature import beam
-from tfarm.audit.published import ALL, agrees, computed
+from tfarm.audit.published import ALL, agrees, arm_of_case, computed
 
 inf = math.inf
 SOURCES = {source.key: source.cases for source in ALL}
@@ -24,6 +23,13 @@ UNIFORM = [
     case for cases in SOURCES.values() for case in cases
     if case.theory == "euler-bernoulli" and not case.arm.attachments
 ]  # fmt: skip
+
+
+def beam(root=inf, mass=0.0, inertia=0.0):
+    """A beam of L = rhoA = EI = 1 between a hub of that inertia and a payload."""
+    return arm_of_case({"hub": {"inertia": root}, "payload": {"mass": mass, "inertia": inertia}})
+
+
 ENDS = [  # every pair of ends that an arm can have, of which Blevins has those too that the audit leaves out
     beam(root=root, mass=mass, inertia=inertia) for root in (inf, 0.0) for mass in (0.0, inf) for inertia in (0.0, inf)
 ]
@@ -170,7 +176,7 @@ def test_a_slender_beam_approaches_the_tables(theory):
     excess = []
     for slenderness in (300.0, 3000.0):
         exact, simple = (
-            tfarm.modes(beam(slenderness=slenderness), 3, theory=each).natural_frequency
+            tfarm.modes(arm_of_case({"slenderness": slenderness}), 3, theory=each).natural_frequency
             for each in (theory, "euler-bernoulli")
         )
         excess.append(simple / exact - 1)

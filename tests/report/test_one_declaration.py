@@ -8,16 +8,12 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.columns import Table
-from tfarm.loop.answers import plane_table
-from tfarm.loop.loci import branch_columns
-from tfarm.loop.nyquist import nyquist_table
 from tfarm.loop.plane import INFINITE
 from tfarm.response.answers import bode_answer, roots_table
+from tfarm.schema import curve_table
 from tfarm.tables.files import as_csv, to_json
 
 LAB, PURE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
-LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
 
 
 def read(table):
@@ -58,20 +54,11 @@ def test_of_a_zero_on_the_axis_a_page_leaves_the_rounding_out():
     assert data.zeros.real.any()  # rounding, which a command shows
 
 
-def test_the_contour_of_several_laws_is_that_of_each_after_the_other():
-    laws = {"one": tfarm.nyquist(LAB, LAW), "two": tfarm.nyquist(LAB, LAW.having("K2", 1.5))}
-    page = read(nyquist_table(*laws.values(), laws=list(laws)))
-    assert page["law"] == ["one"] * laws["one"].s.size + ["two"] * laws["two"].s.size
-    s, L = (np.concatenate([getattr(each, name) for each in laws.values()]) for name in ("s", "L"))
-    for name, values in (("s", s), ("L", L)):
-        assert (page[f"re_{name}"], page[f"im_{name}"]) == (values.real.tolist(), values.imag.tolist())
-
-
 def test_a_plane_has_its_counts_where_they_are():
     """Each row of the file, looked up in the record: rows of counts go along the second gain."""
     K1, K2 = np.linspace(-1.0, 1.0, 5), np.linspace(0.25, 1.75, 3)
     found = tfarm.map(PURE, K1, K2)
-    page = read(plane_table(("K1", "K2"), *found.axes, found.unstable))
+    page = read(curve_table(found))
     assert len(page["K1"]) == K1.size * K2.size
     for x, y, count in zip(*page.values(), strict=True):
         there = found.unstable[int(abs(K2 - y).argmin()), int(abs(K1 - x).argmin())]
@@ -80,8 +67,11 @@ def test_a_plane_has_its_counts_where_they_are():
 
 
 def test_a_branch_that_ends_is_empty_beyond():
-    branches = np.array([[-1 + 2j, -1.5 + 2.5j, -2 + 3j], [-4 + 0j, np.nan, np.nan]])
-    page = read(Table(columns=tuple(branch_columns(branches, "{part}_{n}"))))
-    assert list(page) == ["re_0", "im_0", "re_1", "im_1"]
-    assert (page["re_0"], page["im_0"]) == (branches[0].real.tolist(), branches[0].imag.tolist())
-    assert (page["re_1"], page["im_1"]) == ([-4.0, "", ""], [0.0, "", ""])
+    found = tfarm.locus(LAB, tfarm.HubFeedback(), "K1", 0.0, 2000.0, 41, 5)
+    ((branch, last),) = found.ends
+    page = read(curve_table(found))
+    rows = [n for n, gain in enumerate(found.gain) if gain > last]
+    assert rows
+    for part in ("re", "im"):
+        cells = page[next(key for key in page if key.startswith(f"{part}_") and key.endswith(f"_{branch}"))]
+        assert [n for n, cell in enumerate(cells) if cell == ""] == rows

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from tfarm.reduced import modal_model
+from tfarm.tuner import kernel
 
 RISE, TRAVEL = 1.0, 1.15
 
@@ -52,6 +53,23 @@ class PlainTrial:
     def cost(self, weights, hidden, scales, guard):
         """The cost with a network, its weights in the order of `Network.weights`."""
         return self.run(lambda row: plain_gain(row, weights, hidden, scales, guard))[1]
+
+
+def gradient_of(trial, network, guard):
+    """The cost of a trial and its derivative by every weight, as learning has them."""
+    setting, weights, (run, work) = trial.setting(network, guard), network.weights, trial.room(network)
+    done, gradient = kernel.forward(setting, weights, run, work), np.zeros(weights.size)
+    kernel.backward(setting, weights, run, work, gradient)
+    return kernel.trial_cost(done, trial.numbers, run), gradient
+
+
+def gradient_of_sample(trial, network, guard, k):
+    """The delta rule's gradient: of a x^2/2 at the first sample that answers the torque of sample k, plus b e^2/2."""
+    weights, (run, work) = network.weights, trial.room(network)
+    kernel.forward(trial.setting(network, guard), weights, run, work)
+    gradient, answer = np.zeros(weights.size), run.x[k + trial.numbers.lag]
+    kernel.sample_gradient(k, trial.numbers, trial.reply, answer, run, weights, gradient)
+    return gradient
 
 
 def plain_gain(row, weights, hidden, scales, guard):

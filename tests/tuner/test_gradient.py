@@ -7,9 +7,9 @@ import pytest
 
 import tfarm
 from tests.shared import thinned
-from tests.tuner.plain import PlainTrial, complex_step, plain_gain
+from tests.tuner.plain import PlainTrial, complex_step, gradient_of, gradient_of_sample, plain_gain
 from tfarm.dsp import Chain, Converters, Sampling
-from tfarm.tuner import initial_network, slew_trial, training
+from tfarm.tuner import initial_network, kernel, slew_trial, training
 from tfarm.tuner.kernel import Limits
 
 pytestmark = pytest.mark.kernels
@@ -31,8 +31,9 @@ def some_network(seed, inputs=6, hidden=6):
 )
 def test_the_gradient_of_a_trial_is_that_of_complex_steps(lab, signals, guard, inputs):
     network = some_network(inputs, inputs)
-    cost, gradient = slew_trial(lab, signals=signals).gradient(network, guard)
-    plain = PlainTrial(lab, signals=signals)
+    servo = {"K1": 3.6, "Kp": 10.0} if inputs == 7 else {}
+    cost, gradient = gradient_of(slew_trial(lab, signals=signals, **servo), network, guard)
+    plain = PlainTrial(lab, signals=signals, **servo)
     expected = complex_step(lambda w: plain.cost(w, 6, network.scales, guard), network.weights)
     assert cost == pytest.approx(plain.cost(network.weights, 6, network.scales, guard).real, rel=1e-11)
     np.testing.assert_allclose(gradient, expected, atol=1e-9 * abs(expected).max())
@@ -48,14 +49,17 @@ def test_the_gradient_of_a_trial_is_that_of_complex_steps(lab, signals, guard, i
 )
 @pytest.mark.parametrize(("inputs", "hidden"), [(6, 6), (7, 3)])
 def test_reverse_and_forward_accumulation_agree(lab, chain, inputs, hidden):
-    """With learning rates of zero the online gradients with whole sensitivities add up to that of the trial."""
+    """The gradients of the samples with whole sensitivities add up to that of the trial."""
     trial, network = slew_trial(lab, chain), some_network(1, inputs, hidden)
-    cost, gradient = trial.gradient(network, SECTOR)
-    total, costs = np.zeros(gradient.size), np.zeros(1)
-    still = training.Steps(np.zeros(gradient.size), 0.0, np.inf, 0.0)
-    setting, room = trial.setting(network, SECTOR), trial.room(network)
-    training.learn_by_sensitivities(setting, still, network.weights, costs, *room, total)
-    assert costs[0] == cost
+    _, gradient = gradient_of(trial, network, SECTOR)
+    total, weights, setting = np.zeros(gradient.size), network.weights, trial.setting(network, SECTOR)
+    (run, work), T = trial.room(network), trial.numbers.T
+    S, spare, D = (np.zeros((rows, total.size)) for rows in (work.state.size, work.state.size, 3 * training.BEFORE))
+    for k in range(trial.n):
+        assert kernel.sense(k, setting, run, work)
+        kernel.act(k, setting, weights, run, work)
+        training.derive(k, setting, weights, run, S, spare, D)
+        total += T * (trial.cost.a * run.x[k] * D[training.X] + trial.cost.b * run.e[k] * D[training.E])
     np.testing.assert_allclose(total, gradient, atol=1e-12 * abs(gradient).max())
 
 
@@ -63,7 +67,7 @@ def test_reverse_and_forward_accumulation_agree(lab, chain, inputs, hidden):
 def test_the_gradient_of_a_sample_is_that_of_complex_steps(lab, guard, k):
     """E = a x(k+1)^2/2 + b e(k)^2/2 by the gain at k: x(k+1) answers to the torque with the plant's first sample."""
     trial, network = slew_trial(lab), some_network(2)
-    gradient = trial.sample_gradient(network, guard, k)
+    gradient = gradient_of_sample(trial, network, guard, k)
     plain = PlainTrial(lab)
     signals, _ = plain.run(lambda row: plain_gain(row, network.weights, 6, network.scales, guard))
     x, u, e, _ = signals.real.T
@@ -81,7 +85,9 @@ def test_the_gradient_of_a_sample_is_that_of_complex_steps(lab, guard, k):
 def test_the_gradient_of_the_gain_is_that_of_complex_steps():
     network, row = some_network(8, 7, 4), np.linspace(-2, 3, 7)
     for guard in (NONE, SECTOR):
-        K, gradient = network.gain_and_gradient(row, guard)
+        hidden, gradient = np.zeros(4), np.zeros(network.weights.size)
+        K, slope = kernel.network_gain(network.weights, row / network.scales, hidden, guard)
+        kernel.gain_gradient(network.weights, row / network.scales, hidden, slope, gradient)
         expected = complex_step(lambda w, g=guard: plain_gain(row, w, 4, network.scales, g), network.weights)
         np.testing.assert_allclose(K, plain_gain(row, network.weights, 4, network.scales, guard), rtol=1e-14)
         np.testing.assert_allclose(gradient, expected, rtol=1e-13, atol=1e-16)

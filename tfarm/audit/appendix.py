@@ -27,9 +27,10 @@ from .formulas import (
     sides,
     symbol,
     symbols,
+    tex,
 )
 from .motion import LAPLACE
-from .rows import Claim, tex
+from .rows import Claim
 
 Y_TERMS = (
     "Delta_k1/Delta*exp(lambda_1*x) + Delta_k2/Delta*exp(lambda_2*x)"

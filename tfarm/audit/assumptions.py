@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import MOMENT_GAIN, PLANE, Arm, Section
-from tfarm.arm.checks import positive
 from tfarm.arrays import Real
 from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
 from tfarm.digits import fixed, general, plain, significant, singly
@@ -98,27 +97,6 @@ def own_depth(arm: Arm) -> float:
     return math.sqrt(12.0) * arm.link.section.radius_of_gyration
 
 
-def candidate_depths(arm: Arm) -> tuple[float, ...]:
-    """Depths [m]: 2 to 60 mm for the paper's area, scaled with the root of the area to two digits; the arm's own."""
-    scale = math.sqrt(arm.link.section.area / AREA)
-    return _with_own((float(f"{depth * scale:.2g}") for depth in DEPTHS), own_depth(arm))
-
-
-def candidate_inertias(arm: Arm) -> tuple[float, ...]:
-    """Hub inertias [kg m^2]: 0.01 to 1, moved by whole decades if the arm's own lies outside, and the arm's own.
-
-    Raises ParameterError where the hub is locked or a free pin: there is no inertia to choose.
-    """
-    own = arm.hub.inertia
-    if not has_hub_inertia(arm):
-        remedy = "a locked hub or a free pin has no inertia to vary; name the inertias to try, or study the section"
-        raise ParameterError(key="hub.inertia", value=own, remedy=remedy)
-    scale = 1.0
-    while not INERTIAS[0] * scale * (1 - OWN_VALUE) <= own <= INERTIAS[-1] * scale * (1 + OWN_VALUE):
-        scale *= 10.0 if own > INERTIAS[-1] * scale else 0.1
-    return _with_own((inertia * scale for inertia in INERTIAS), own)
-
-
 def has_hub_inertia(arm: Arm) -> bool:
     """Whether the hub has an inertia that could be another: neither locked (inf) nor a free pin (0)."""
     return 0.0 < arm.hub.inertia < math.inf
@@ -127,55 +105,48 @@ def has_hub_inertia(arm: Arm) -> bool:
 def section_study(arm: Arm, depths: Sequence[float] | None = None, *, count: int = STUDIED_MODES) -> Study:
     """The first `count` flexible frequencies over rectangles of the arm's area with these depths [m].
 
-    Without depths those of `candidate_depths`.  The shear factor is the arm's own throughout.
-    Raises ParameterError for a depth that is no positive length.
+    Without depths 2 to 60 mm for the paper's area, scaled with the root of the area to two digits, and the arm's own.
+    The shear factor is the arm's own throughout.
     """
-    meaning = "the depth of a candidate section is a positive, finite number of metres"
-    chosen = [positive("depths", depth, meaning) for depth in (candidate_depths(arm) if depths is None else depths)]
-    depth = np.array(chosen)
-    link, area = arm.link, arm.link.section.area
-    second_moment = area * depth**2 / 12
-    sections = [
-        Section.general(area=area, second_moment=float(I), shear_factor=link.shear_factor) for I in second_moment
-    ]
-    arms = [replace(arm, link=replace(link, section=section)) for section in sections]
-    frequency, sensitivity = _frequencies(arms, count, "second_moment")
-    own = abs(depth / own_depth(arm) - 1) < OWN_VALUE
-    return Study(
-        arm=arm, arms=tuple(arms), values=depth, natural_frequency=frequency, sensitivity=sensitivity, is_own=own
-    )
+    area, own = arm.link.section.area, own_depth(arm)
+    if depths is None:
+        depths = _with_own([float(f"{depth * math.sqrt(area / AREA):.2g}") for depth in DEPTHS], own)
+    second_moments = [area * depth**2 / 12 for depth in depths]
+    sections = (Section.general(area=area, second_moment=I, shear_factor=arm.link.shear_factor) for I in second_moments)
+    arms = [replace(arm, link=replace(arm.link, section=section)) for section in sections]
+    return _study(arm, arms, np.array(depths), own, count, "second_moment")
 
 
 def hub_study(arm: Arm, inertias: Sequence[float] | None = None, *, count: int = STUDIED_MODES) -> Study:
-    """The first `count` flexible frequencies over hub inertias [kg m^2]; without them those of `candidate_inertias`.
+    """The first `count` flexible frequencies over hub inertias [kg m^2] of a hub that has one.
 
-    Raises ParameterError for an inertia that is not positive and finite.
+    Without inertias 0.01 to 1, moved by whole decades if the arm's own lies outside, and the arm's own.
     """
-    meaning = "the hub inertia of a candidate is a positive, finite number of kg m^2"
-    chosen = candidate_inertias(arm) if inertias is None else inertias
-    values = np.array([positive("inertias", inertia, meaning) for inertia in chosen])
-    arms = [arm.having(hub_inertia=inertia) for inertia in values.tolist()]
-    frequency, sensitivity = _frequencies(arms, count, "hub_inertia")
-    pinned, _ = _frequencies([arm.having(hub_inertia=0.0)], count, "hub_inertia")
+    own = arm.hub.inertia
+    if inertias is None:
+        decades = min(0, math.floor(math.log10(own / INERTIAS[0]) + OWN_VALUE))
+        decades += max(0, math.ceil(math.log10(own / INERTIAS[-1]) - OWN_VALUE))
+        inertias = _with_own([inertia * 10.0**decades for inertia in INERTIAS], own)
+    arms = [arm.having(hub_inertia=inertia) for inertia in inertias]
+    pinned, locked = ([arm.having(hub_inertia=limit)] for limit in (0.0, math.inf))
+    limits = {
+        name: _frequencies(one, count, "hub_inertia")[0][0] for name, one in (("pinned", pinned), ("locked", locked))
+    }
+    if not arm.having(hub_inertia=1.0).has_rigid_mode:  # the first falls to 0, a heavy hub on the arm's own stiffness
+        limits["locked"] = np.r_[0.0, limits["locked"][:-1]]
+    return replace(_study(arm, arms, np.array(inertias), own, count, "hub_inertia"), **limits)
+
+
+def _study(arm: Arm, arms: Sequence[Arm], values: Real, own: float, count: int, parameter: str) -> Study:
+    frequency, sensitivity = _frequencies(arms, count, parameter)
     return Study(
         arm=arm,
         arms=tuple(arms),
         values=values,
         natural_frequency=frequency,
         sensitivity=sensitivity,
-        is_own=abs(values - arm.hub.inertia) < OWN_VALUE * values,
-        pinned=pinned[0],
-        locked=_locked(arm, count),
+        is_own=abs(values / own - 1) < OWN_VALUE,
     )
-
-
-def _locked(arm: Arm, count: int) -> Real:
-    """The limits [rad/s] of the first `count` frequencies as the hub grows: those of the locked hub.
-
-    Where the tip holds the arm the first falls to 0, a heavy hub on the arm's own stiffness, and the others are next.
-    """
-    frequencies, _ = _frequencies([arm.having(hub_inertia=math.inf)], count, "hub_inertia")
-    return frequencies[0] if arm.having(hub_inertia=1.0).has_rigid_mode else np.r_[0.0, frequencies[0, :-1]]
 
 
 def _frequencies(arms: Sequence[Arm], count: int, parameter: str) -> tuple[Real, Real]:
@@ -185,9 +156,9 @@ def _frequencies(arms: Sequence[Arm], count: int, parameter: str) -> tuple[Real,
     return frequency, np.array([table.sensitivity[parameter][-count:] + 0.0 for table in tables])
 
 
-def _with_own(candidates: Any, own: float) -> tuple[float, ...]:
+def _with_own(candidates: Sequence[float], own: float) -> list[float]:
     """The candidates and the arm's own value, ascending; one that is it, but for rounding, gives way."""
-    return tuple(sorted([*(value for value in candidates if abs(value / own - 1) >= OWN_VALUE), own]))
+    return sorted([*(value for value in candidates if abs(value / own - 1) >= OWN_VALUE), own])
 
 
 HELD_SECTION = "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice"

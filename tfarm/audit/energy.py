@@ -13,11 +13,13 @@ import mpmath
 import numpy as np
 import sympy as sp
 from mpmath import mpc, mpf
-from numpy.polynomial import legendre
-from numpy.typing import NDArray
+from scipy.linalg import expm
 
 from tfarm.arm import Arm, load
+from tfarm.arrays import Real
+from tfarm.reduced import modal_model
 
+from .appendix import BEAM_NAMES, by_transition
 from .formulas import (
     Expression,
     clauses,
@@ -36,60 +38,33 @@ from .rows import Claim
 
 K1 = 0.3  # N m s/rad
 ROOT_DIGITS = 30  # of a root, of which four are shown
-POLYNOMIALS = 8  # polynomials a field
-Matrix = NDArray[np.float64]
-
-
-def end_determinant(arm: Arm, K2: float, s: Any) -> Any:
-    """Determinant of the ends' conditions, undamped, under (19), by exp(A(s) L) instead of the appendix."""
-    link = arm.link
-    EI, kGA = mpf(link.EI), mpf(link.kGA)
-    rhoA, rhoI = mpf(link.rhoA), mpf(link.rhoI)
-    A = mpmath.matrix([[0, 1, 1 / kGA, 0], [0, 0, 0, 1 / EI], [rhoA * s**2, 0, 0, 0], [0, rhoI * s**2, -1, 0]])
-    T = mpmath.expm(A * mpf(link.length))
-    m_s2, Ic_s2 = arm.payload.mass * s**2, arm.payload.inertia * s**2
-    hub = (mpf(arm.hub.inertia) * s**2 + K1 * s) / (1 - mpf(K2))  # M(0) = hub * theta
-    start = ([0, 1, 0, hub], [0, 0, 1, 0])  # w, psi, Q, M at the root, by theta and by Q(0)
-    columns = [T * mpmath.matrix(each) for each in start]
-    tip = [(c[2] + m_s2 * c[0], c[3] + Ic_s2 * c[1]) for c in columns]
-    return (tip[0][0] * tip[1][1] - tip[0][1] * tip[1][0]) * (1 - mpf(K2)) / s
+MODES = 8  # of the arm whose gain is switched
 
 
 def growth(K2: float, near: complex) -> Any:
-    """The closed-loop root of the default arm near a point, to ROOT_DIGITS digits."""
+    """The root of 1 + K1 s theta + K2 M(0) near a point, both per unit torque, to ROOT_DIGITS digits; default arm."""
     arm = load("sasaki2012")
+    link, section = arm.link, arm.link.section
+    numbers = (
+        link.density, section.area, link.length, link.youngs_modulus, section.second_moment, link.shear_factor,
+        link.shear_modulus, link.damping, arm.payload.mass, arm.payload.inertia, arm.hub.inertia,
+    )  # fmt: skip
+    known = dict(zip(BEAM_NAMES, map(mpf, numbers), strict=False))
+
+    def returned(s: Any) -> Any:
+        theta, _, _, moment = by_transition(known | {"s": s})
+        return 1 + K1 * s * theta + K2 * moment
+
     with mpmath.workdps(2 * ROOT_DIGITS):
-        return mpmath.findroot(lambda s: end_determinant(arm, K2, s), mpc(near), tol=mpf(10) ** (-ROOT_DIGITS))
+        return mpmath.findroot(returned, mpc(near), tol=mpf(10) ** (-ROOT_DIGITS))
 
 
-def matrices(arm: Arm, hub: float) -> tuple[Matrix, Matrix]:
-    """Mass and stiffness of the undamped arm on polynomials: y = x p(x), phi = x q(x), and theta last."""
-    link, n = arm.link, POLYNOMIALS
-    nodes, weights = legendre.leggauss(2 * n)
-    x, weights = (nodes + 1) / 2, weights / 2 * link.length
-    values = legendre.legvander(2 * x - 1, n - 1)
-    slopes = np.stack([legendre.legval(2 * x - 1, legendre.legder(row)) for row in np.eye(n)], axis=1) * 2
-    f, f_x = x[:, None] * values, (values + x[:, None] * slopes) / link.length
-    zero, one = np.zeros_like(f), np.ones((len(x), 1))
-    w, psi = np.hstack([f, zero, x[:, None] * link.length]), np.hstack([zero, f, one])
-    bending, shear = np.hstack([zero, f_x, 0 * one]), np.hstack([f_x, -f, 0 * one])
-    mass = link.rhoA * (w.T * weights) @ w + link.rhoI * (psi.T * weights) @ psi
-    mass[-1, -1] += hub
-    return mass, link.EI * (bending.T * weights) @ bending + link.kGA * (shear.T * weights) @ shear
-
-
-def propagator(arm: Arm, K2: float, duration: float) -> Matrix:
-    """State transition of the loop (19) over a time of constant gains.
-
-    With M(0) = I_h theta_tt - u the law is a hub of inertia I_h/(1 - K2) with a damper K1/(1 - K2).
-    """
-    mass, stiffness = matrices(arm, arm.hub.inertia / (1 - K2))
-    n = len(mass)
-    damper = np.zeros((n, n))
-    damper[-1, -1] = K1 / (1 - K2)
-    A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damper)]])
-    values, vectors = np.linalg.eig(A)
-    return np.asarray((vectors * np.exp(values * duration) @ np.linalg.inv(vectors)).real)
+def propagator(arm: Arm, K2: float, duration: float) -> Real:
+    """State transition of the loop (19) over a time of constant gains, by the arm's first modes."""
+    A, B, C, D = modal_model(arm, ["hub_rate", "root_moment"], MODES).matrices()
+    gains = np.array([K1, K2])
+    fed_back = gains @ C / (1 + gains @ D)
+    return np.asarray(expm((A - np.outer(B, fed_back)) * duration))
 
 
 def pumped(low: float, high: float, first: float, second: float) -> float:
@@ -113,7 +88,7 @@ def pumped_text() -> str:
     low, high, first, second = 0.1, 0.6, 0.027, 0.025
     constant = max(pumped(low, low, first, second), pumped(high, high, first, second))
     return (
-        f"Counterexample: default arm, K1 = {K1}, {POLYNOMIALS} polynomials a field, continuous time: K2 = {low} for "
+        f"Counterexample: default arm, K1 = {K1}, {MODES} modes, continuous time: K2 = {low} for "
         f"{1e3 * first:.0f} ms and {high} for {1e3 * second:.0f} ms grows by {pumped(low, high, first, second):.3f} a "
         f"period, either gain alone by {constant:.6f}, which is the angle at rest."
     )

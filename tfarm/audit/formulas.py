@@ -19,15 +19,18 @@ its equations need them.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 import sympy as sp
+from sympy.printing.latex import LatexPrinter
 
 Expression = Any  # sympy comes without types
 OF_TIME = ("theta", "Theta", "V", "K2", "a1")
 JET = re.compile(r"\b(y|phi|theta|Y|Phi|Theta|V|K2|a1)(?:_(x*t*))?(?!\w)(?:\(([0Lxts]), ?([0Lxts])\))?")
 NAME = re.compile(r"[A-Za-z]\w*")
+LETTERS = {"pm": r"\pm", "lambda_": r"\lambda", **{f"Delta_k{i}": rf"\Delta k_{{{i}}}" for i in (1, 2, 3, 4)}}
 FUNCTIONS = {"sqrt": sp.sqrt, "exp": sp.exp, "integral": sp.Function("integral"), "oo": sp.oo}
 
 
@@ -63,20 +66,61 @@ def jet_parts(s: Expression) -> tuple[str, int, int, str] | None:
 @cache
 def parsed(text: str) -> Expression:
     """The SymPy expression of a text without = or ;."""
+
+    def normal(match: re.Match[str]) -> Expression:
+        field, orders, first, second = match.groups(default="")
+        place, time = (first, second) if first in ("", "0", "L", "x") else (second, first)
+        return jet(field, orders.count("x"), orders.count("t"), f"({place},{time})" if place else "")
+
+    return _read(text, normal)
+
+
+def _read(text: str, jet_of: Callable[[re.Match[str]], Expression], **how: Any) -> Expression:
     names: dict[str, Expression] = dict(FUNCTIONS)
 
     def stand_in(match: re.Match[str]) -> str:
-        field, orders, first, second = match.groups()
-        orders = orders or ""
-        place, time = (first, second) if first in (None, "0", "L", "x") else (second, first)
         name = f"jet{len(names)}"
-        names[name] = jet(field, orders.count("x"), orders.count("t"), f"({place},{time})" if place else "")
+        names[name] = jet_of(match)
         return name
 
     code = JET.sub(stand_in, text).replace("^", "**")
     code = re.sub(r"\blambda\b", "lambda_", code)  # a keyword of Python
     names |= {name: symbol(name) for name in NAME.findall(code) if name not in names}
-    return sp.parse_expr(code, local_dict=names)
+    return sp.parse_expr(code, local_dict=names, **how)
+
+
+class _AsWritten(LatexPrinter):  # type: ignore[misc]
+    """TeX in the order of the text: derivatives as fractions, integrals along the arm."""
+
+    def _print_Symbol(self, expr: Expression, style: str = "plain") -> str:
+        found = JET.fullmatch(expr.name)
+        if found is None:
+            return LETTERS.get(expr.name) or str(super()._print_Symbol(expr, style))
+        field, by = sp.latex(sp.Symbol(found[1])), found[2] or ""
+        field += f"({found[3]},{found[4]})" if found[3] else ""
+        below = " ".join(rf"\partial {letter}" + f"^{n}" * (n > 1) for letter in "xt" if (n := by.count(letter)))
+        above = r"\partial" + f"^{len(by)}" * (len(by) > 1)
+        return rf"\frac{{{above} {field}}}{{{below}}}" if by else field
+
+    def _print_Pow(self, expr: Expression) -> str:
+        return re.sub(r"^(\\frac\{[^{}]*\}\{[^{}]*\})\^", r"\\left(\1\\right)^", str(super()._print_Pow(expr)))
+
+    def _print_Function(self, expr: Expression, exp: str | None = None) -> str:
+        if expr.func.__name__ == "integral":
+            return rf"\int_0^L\left[{self._print(expr.args[0])}\right]dx"
+        return str(super()._print_Function(expr, exp))
+
+
+def tex(text: str) -> str:
+    """The TeX of a text, as it is written."""
+    printer = _AsWritten({"order": "none"})
+
+    def written(part: str) -> str:
+        return printer.doprint(_read(part, lambda match: symbol(match[0]), evaluate=False)) if part else ""
+
+    parts = re.split(r"( = | < |; )", text)
+    found = "".join(part.replace("; ", r",\quad ") if n % 2 else written(part) for n, part in enumerate(parts))
+    return re.sub(r"\b1 (\\cdot )?(?=\\frac\{1\})", "", found.replace(r"+ \pm", r"\pm"))
 
 
 def clauses(text: str) -> list[str]:

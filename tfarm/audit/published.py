@@ -1,36 +1,82 @@
 """Published natural frequencies against the exact ones: their number, ours, the difference, and why there is one.
 
-A row agrees if ours, rounded to the last printed digit, is what they printed.  One that does not must say why
-(`literature.Case.why`), and one that does must not: neither a difference nor an excuse stands alone.
+`literature.toml` has the numbers, with all they need to be computed again.  A row agrees if ours, rounded to the last
+printed digit, is what they printed.  One that does not must say why (`Case.why`), and one that does must not: neither a
+difference nor an excuse stands alone.
 """
 
 from __future__ import annotations
 
+import math
+import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Decimal
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arm import Arm, Theory
+from tfarm.arm.schema import arm_of_table
 from tfarm.columns import JSON, REPORT, Column, Table
 from tfarm.digits import TEXTS, general, powers, significant, singly, worded
 from tfarm.errors import CertificationError
 from tfarm.spectrum import modes
 
-from .literature import ANGULAR, CYCLIC, REDUCED, RIG_SOURCES, SOURCES, WAVE_NUMBER, Case, Source
+SLENDERNESS = 100.0  # L/r of the beam of a case that has no other
 
-__all__ = [
-    "SOURCES",
-    "Case",
-    "PublishedRow",
-    "Source",
-    "agrees",
-    "case_rows",
-    "computed",
-    "validate",
-    "validate_answer",
-]
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """One column of a table: the arm, the theory it was printed for, and what was printed of modes 1, 2, ...
+
+    `quantity` is one of those of `computed`, w in rad/s; `why` has a reason for each mode whose printed digits are not
+    reached.
+    """
+
+    name: str
+    arm: Arm
+    theory: Theory
+    quantity: str
+    printed: tuple[str, ...]
+    why: Mapping[int, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """A publication: `citation` says where its table stands, `reached` by what way its numbers came here."""
+
+    key: str
+    citation: str
+    reached: str
+    cases: tuple[Case, ...]
+
+
+def arm_of_case(case: Mapping[str, Any]) -> Arm:
+    """The arm of a case: a clamped beam of L = rhoA = EI = 1 with the case's own tables in the place of its own."""
+    slenderness = case.get("slenderness", SLENDERNESS)
+    section = {"shape": "general", "area": 1.0, "second_moment": slenderness**-2, "shear_factor": 5 / 6}
+    link = {"length": 1.0, "density": 1.0, "youngs_modulus": slenderness**2, "poissons_ratio": 0.3, "section": section}
+    parts = {key: case[key] for key in ("clamp", "payload", "attachment") if key in case}
+    hub = {"inertia": math.inf} | case.get("hub", {})
+    return arm_of_table({"name": "arm", "link": link | case.get("link", {}), "hub": hub, **parts})
+
+
+def _case(case: Mapping[str, Any]) -> Case:
+    why = dict.fromkeys(case.get("differs", ()), case.get("why", ""))
+    own = {key: case[key] for key in ("name", "theory", "quantity")}
+    return Case(arm=arm_of_case(case), printed=tuple(case["printed"]), why=why, **own)
+
+
+def _source(table: dict[str, Any]) -> Source:
+    """The source of a table, whose theory and quantity are those of its cases but where these have others."""
+    own = {key: table.pop(key) for key in ("key", "citation", "reached")}
+    return Source(cases=tuple(_case(table | each) for each in table["case"]), **own)
+
+
+ALL = tuple(map(_source, tomllib.loads((files("tfarm.audit") / "literature.toml").read_text("utf-8"))["source"]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +99,6 @@ def lettered(text: str) -> str:
     return powers(text.replace("rhoA", "ρA").replace("w^2", "ω^2").replace("w L", "ω L"))
 
 
-ALL = (*SOURCES, *RIG_SOURCES)
 PUBLISHED_COLUMNS = (
     Column("source", "source", on=(JSON, *REPORT)),
     Column("case", "case", digits=worded(lettered), printed=TEXTS, folds=True),
@@ -111,7 +156,12 @@ def computed(case: Case) -> NDArray[np.float64]:
     table = modes(case.arm, count, theory=case.theory)
     omega, hertz = table.natural_frequency[-count:], table.natural_frequency_hz[-count:]
     reduced = omega * link.length**2 * np.sqrt(link.rhoA / link.EI)
-    return {CYCLIC: hertz, ANGULAR: omega, REDUCED: reduced, WAVE_NUMBER: np.sqrt(reduced)}[case.quantity]
+    return {
+        "frequency [Hz]": hertz,
+        "frequency [rad/s]": omega,
+        "w L^2 (rhoA/EI)^(1/2)": reduced,
+        "L (w^2 rhoA/EI)^(1/4)": np.sqrt(reduced),
+    }[case.quantity]
 
 
 def agrees(ours: float, printed: str) -> bool:

@@ -18,41 +18,12 @@ from dataclasses import dataclass
 from tfarm.columns import FILES, JSON, Column
 from tfarm.errors import CertificationError
 
-GREEK_NAMES = {"rho", "kappa", "theta", "phi", "lambda", "eta", "alpha", "Theta", "Phi", "Delta", "tau", "pi"}
-FORMULA_TOKEN = re.compile(
-    r"(?P<jet>\b(?:y|phi|theta|Y|Phi|Theta|V|K2)_x*t*(?!\w)(?:\([0Lxts], ?[0Lxts]\))?)"
-    r"|(?P<name>[A-Za-z]\w*)|(?P<number>\d+(?:\.\d+)?(?:e[-+]?\d+)?)|(?P<power>\^(?:\w+|\((?=[^()]*\))[^()]*\)))"
-    r"|(?P<other>[-+*/()=;<>,.|:]|\s+|.)"
-)
-OPENING_BRACKETS = {"integral": r"\int_0^L\left[", "sqrt": r"\sqrt{", "exp": "e^{", "": r"\left("}
-CLOSING_BRACKETS = {"integral": r"\right]dx", "sqrt": "}", "exp": "}", "": r"\right)"}
-SIGNS = {"*": r"\,", ";": r",\quad ", "oo": r"\infty", "pm": r"\pm", "<": "<"}
-
 
 def tex(text: str) -> str:
     """The TeX of a text in the language of `formulas`."""
-    out: list[str] = []
-    open_calls: list[str] = []
-    call = ""
-    text = text.replace("pm*", "pm ").replace("+ pm", "pm")
-    for match in FORMULA_TOKEN.finditer(text):
-        kind, token = match.lastgroup, match.group()
-        if kind == "name" and token in OPENING_BRACKETS:
-            call = token
-        elif token == "(":
-            out.append(OPENING_BRACKETS[call])
-            open_calls.append(call)
-            call = ""
-        elif token == ")" and open_calls:
-            out.append(CLOSING_BRACKETS[open_calls.pop()])
-        elif kind == "jet":
-            is_raised = text.startswith("^", match.end())
-            out.append(rf"\left({_derivative(token)}\right)" if is_raised else _derivative(token))
-        elif kind == "power":
-            out.append(f"^{{{token[1:].strip('()')}}}")
-        else:
-            out.append(SIGNS[token] if token in SIGNS else _name(token) if kind == "name" else token)
-    return "".join(out)
+    from .formulas import tex as written  # SymPy takes half a second to load, and rows are shown without it
+
+    return written(text)
 
 
 def in_words(text: str) -> str:
@@ -62,40 +33,13 @@ def in_words(text: str) -> str:
         name, sign, rest = clause.partition(" = ") if " = " in clause else clause.partition(": ")
         if not sign:
             name, _, rest = clause.partition(" ")
-            found.append(rf"{_name(name)}\text{{ {rest}}}" if "_" in name else rf"\text{{{clause}}}")
+            found.append(rf"{tex(name)}\text{{ {rest}}}" if "_" in name else rf"\text{{{clause}}}")
             continue
         number, _, unit = rest.partition(" ") if sign == " = " else ("", "", rest)
         number = re.sub(r"e([-+]?\d+)", r"\\cdot 10^{\1}", number)
         unit = unit.replace(" ", r"\,")
-        found.append(rf"{_name(name)}{sign}{number}\ \mathrm{{{unit}}}" if unit else f"{_name(name)}{sign}{number}")
+        found.append(rf"{tex(name)}{sign}{number}\ \mathrm{{{unit}}}" if unit else f"{tex(name)}{sign}{number}")
     return r";\quad ".join(found)
-
-
-def _derivative(token: str) -> str:
-    """phi_xt(0,t) as a partial derivative."""
-    name, _, rest = token.partition("_")
-    orders = re.match(r"[xt]*", rest)
-    by = orders.group() if orders else ""
-    below = "".join(_power(rf"\partial {letter}", by.count(letter)) for letter in "xt" if letter in by)
-    above = _power(r"\partial", len(by))
-    return rf"\frac{{{above} {_name(name)}{rest[len(by) :]}}}{{{below}}}"
-
-
-def _power(what: str, n: int) -> str:
-    return what if n == 1 else f"{what}^{{{n}}}"
-
-
-def _name(name: str) -> str:
-    """lambda_1 as \\lambda_{1}, K1 as K_{1}, words upright."""
-    match = re.fullmatch(r"(Delta_k|[A-Za-z]+?)(?:_?(\d+)|_([a-z]|before|next))?", name)
-    stem, index = (match[1], match[2] or match[3]) if match else (name, None)
-    if stem == "Delta_k":
-        stem = r"\Delta k"
-    elif stem in GREEK_NAMES:
-        stem = rf"\{stem}" if index else rf"\{stem} "
-    elif len(stem) > 1:
-        return rf"\mathrm{{{name}}}"
-    return f"{stem}_{{{index}}}" if index else stem
 
 
 RESIDUAL_NOISE = 1e-25  # relative: numbers are compared at 50 digits

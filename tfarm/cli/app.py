@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -102,13 +102,11 @@ def read_on(names: list[str], side: str | None) -> list[str | Output]:
 
 
 def give(answer: dict[str, Any], json: bool, printed: Callable[[dict[str, Any]], None]) -> None:
-    """The answer as one JSON object, or as it is `printed`, then what is not known and which gains are defaults."""
+    """The answer as one JSON object, or as it is `printed`, then which gains are defaults."""
     if json:
         print(to_json(answer))
         return
     printed(answer)
-    if answer.get("windows_note"):
-        print(answer["windows_note"])
     if answer.get("default_gains"):
         print(f"by default {answer['default_gains_in_words']}")
 
@@ -139,6 +137,55 @@ def hand_out(
         save_png(FIGURES[type(picture[0])](*picture), png)
     if say_written(*also, csv, png) or json:
         give(answer(), json, printed)
+
+
+def emit(
+    found: Any,
+    json: bool,
+    said: Mapping[str, Any] | None = None,
+    *,
+    csv: Path | None = None,
+    png: Path | None = None,
+    also: Sequence[Path | None] = (),
+) -> None:
+    """A record to the outputs asked for: its curves or rows as CSV, its picture, then JSON or text.
+
+    `said` is what else is known of the command, such as its default gains; `also` are files that are written already.
+    Nothing is printed where standard output holds one of them.
+    """
+    from tfarm.schema import curve_table, to_dict
+
+    if csv is not None:
+        write_csv(curve_table(found), csv)
+    if png is not None:
+        import tfarm.plots  # noqa: F401  every picture is known once they are loaded
+        from tfarm.plots.files import save_png
+        from tfarm.plots.style import FIGURES
+
+        save_png(FIGURES[type(found)](found), png)
+    if not (say_written(*also, csv, png) or json):
+        return
+    if json:
+        print(to_json({**to_dict(found), **(said or {})}))
+        return
+    print_record(found)
+    if said and said.get("default_gains"):
+        print(f"by default {said['default_gains_in_words']}")
+
+
+def print_record(found: Any) -> None:
+    """The record as text: single values under their labels, then its tables."""
+    from tfarm.schema import sections
+    from tfarm.tables.terminal import show, show_pairs
+
+    for number, each in enumerate(sections(found)):
+        if number and (each.pairs or each.table or each.drawing):
+            print(f"\n{each.title}" if each.title else "")
+        show_pairs(each.pairs)
+        if each.table is not None:
+            show(each.table)
+        if each.drawing:
+            print(each.drawing)
 
 
 def say_written(*paths: Path | None) -> bool:

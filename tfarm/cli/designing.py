@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import sys
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, TWO_GAINS, HubFeedback, as_law
-from tfarm.cli.app import ArmName, Json, TheoryName, app, hand_out, load_arm, tell, whole_number
-from tfarm.cli.control import pair_words
+from tfarm.cli.app import ArmName, Json, TheoryName, app, emit, load_arm, tell, whole_number
 from tfarm.cli.inputs import (
     GAIN_OPTIONS,
     Given,
@@ -25,15 +23,11 @@ from tfarm.cli.inputs import (
     with_options,
 )
 from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
-from tfarm.columns import Column, Table
-from tfarm.digits import general, singly
 from tfarm.errors import ParameterError
-from tfarm.tables.terminal import show
 
 if TYPE_CHECKING:
     from tfarm.arm import AnyLaw, Arm
     from tfarm.arrays import Real
-    from tfarm.comparing import Comparison
     from tfarm.dsp import Chain, GainMap
 
 HELP_ON_ALSO = "a further arm that the law has to serve: the objective is the worst of all; may be repeated"
@@ -84,8 +78,6 @@ def gain_map(
     subject, of_law = load_arm(arm, theory), bool(vary or law)
     if of_law:
         _must_be_two_numbers(vary or [], typed | {ANGLE_GAIN: kp or None})
-    from tfarm.dsp.crossings import map_answer as sampled_map_answer
-    from tfarm.loop.answers import map_answer, plane_answer, plane_table
     from tfarm.loop.loop import Loop
     from tfarm.loop.plane import between, plane, ranges_of
 
@@ -98,20 +90,17 @@ def gain_map(
         ranges = [(name, given[name] or usual) for name, usual in zip(PLANE, ranges_of(subject), strict=True)]
         controller = HubFeedback(Kp=kp)
     (first, across), (second, up) = ranges
-    x, y, names = between(*across, number), between(*up, number), [_column_of(first), _column_of(second)]
+    x, y = between(*across, number), between(*up, number)
     if (period, delay_samples, dsp) != (None,) * 3:
         chain = asked_chain(dsp or arm, period, delay_samples)
-        sampled = _sampled_plane(subject, controller if of_law else None, kp, chain, (first, second), (x, y))
-        hand_out(
-            lambda: sampled_map_answer(sampled), _print_sampled_map, json,
-            csv=csv, table=lambda: plane_table(names, x, y, sampled.counts), png=png, picture=(sampled,),
-        )  # fmt: skip
+        emit(
+            _sampled_plane(subject, controller if of_law else None, kp, chain, (first, second), (x, y)),
+            json,
+            csv=csv,
+            png=png,
+        )
         return
-    found = plane(Loop(subject, as_law(controller)), (first, second), x, y)
-    hand_out(
-        lambda: plane_answer(found) if of_law else map_answer(found), _print_map, json,
-        csv=csv, table=lambda: plane_table(names, x, y, found.unstable), png=png, picture=(found,),
-    )  # fmt: skip
+    emit(plane(Loop(subject, as_law(controller)), (first, second), x, y), json, csv=csv, png=png)
 
 
 def _must_be_two_numbers(vary: list[str], gains: dict[str, Any]) -> None:
@@ -123,11 +112,6 @@ def _must_be_two_numbers(vary: list[str], gains: dict[str, Any]) -> None:
     if len(vary) != 2:
         remedy = "twice, such as --vary hub_angle=0,10 --vary delay=0,0.02"
         raise ParameterError(key="--vary", value=vary, remedy=remedy)
-
-
-def _column_of(name: str) -> str:
-    """The name of a number as that of a column."""
-    return name.replace(".", "_").replace("@", "_at_")
 
 
 def _sampled_plane(
@@ -151,38 +135,6 @@ def _range_of(option: str, text: str) -> tuple[str, tuple[float, float]]:
 def _bounds_of(typed: dict[str, str | None]) -> dict[str, tuple[float, float] | None]:
     """The ranges of gains, None where not typed."""
     return {name: None if text is None else bounds(f"--{name}", text) for name, text in typed.items()}
-
-
-def _print_map(answer: dict[str, Any]) -> None:
-    """The share of the plane that is stable, and a coarse picture: a dot where nothing is unstable."""
-    counts, of_law = answer["unstable_roots"], "vary" in answer
-    (first, second), (x, y) = answer.get("vary", PLANE), ("x", "y") if of_law else PLANE
-    flat = [count for row in counts for count in row]
-    reach = f"have no unstable pole below {answer['band_rad_s']:.6g} rad/s"
-    pairs = f"pairs of {first} and {second} {reach}" if of_law else "gain pairs are stable"
-    print(f"{answer['arm']}: {flat.count(0)} of {len(flat)} {pairs}")
-    _print_plane(answer, counts, (x, y), (first, second))
-
-
-def _print_sampled_map(answer: dict[str, Any]) -> None:
-    """The share of the plane in which the sampled loop is stable, and a coarse picture."""
-    counts, (first, second) = answer["unstable_poles"], answer["vary"]
-    flat = [count for row in counts for count in row]
-    reach = f"stable when sampled every {1e3 * answer['period_s']:g} ms (first {answer['modes_used']} modes)"
-    print(f"{answer['arm']}: {flat.count(0)} of {len(flat)} pairs of {first} and {second} are {reach}")
-    _print_plane(answer, counts, ("x", "y"), (first, second))
-
-
-def _print_plane(
-    answer: dict[str, Any], counts: list[list[Any]], keys: tuple[str, str], names: tuple[str, str]
-) -> None:
-    """A coarse picture of the counts over the values under two keys."""
-    (x, y), (first, second) = keys, names
-    step = max(1, len(counts) // 24), max(1, len(counts[0]) // 60)
-    for value, row in list(zip(answer[y], counts, strict=True))[:: -step[0]]:
-        print(f"{value:9.3g} " + "".join("." if count == 0 else "#" for count in row[:: step[1]]))
-    print(f"{second} up, {first} from {answer[x][0]:g} to {answer[x][-1]:g} to the right; . stable, # unstable")
-    print(answer["sign_convention"])
 
 
 @app.command()
@@ -212,7 +164,6 @@ def design(
     ranges = dict(_range_of("--range", each) for each in over or [])
     from tfarm.arm.writing import save_law
     from tfarm.synthesis.design import design as find_law
-    from tfarm.synthesis.design import design_answer
 
     found = find_law(
         subject, objective, structure=structure, **within, modes=number, chain=chain,
@@ -221,71 +172,7 @@ def design(
     )  # fmt: skip
     if save is not None:
         save_law(as_law(found.law), save)
-    hand_out(lambda: design_answer(found), _print_design, json, also=(save,))
-
-
-def _print_design(answer: dict[str, Any]) -> None:
-    """The law and what it reaches, how sure the optimum is, then a row an arm."""
-    loop = f"the {answer['designed_for']} loop, {answer['modes']} modes"
-    told = f"{answer['structure']}, objective {answer['objective']} of {loop}: {answer['value']:.6g}"
-    print(f"{answer['arm']}, {told}")
-    _print_coefficients(answer)
-    sampled = answer["sampled"]
-    words = (
-        sampled["in_words"] if "gain_units" in answer else sampled["in_words"].replace("these gains are", "it is", 1)
-    )
-    print(f"{'' if sampled['stable'] else 'BUT '}{words}")
-    beyond = "" if answer["known_beyond_the_band"] else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
-    print(f"continuous-time loop: {answer['verdict']}{beyond}; --save FILE keeps the law for --law FILE")
-    print(f"{answer['starts_agreed']} of {answer['starts']} searches agree within half a per cent")
-    _print_bounds(answer)
-    if (length := answer["slew_duration_s"]) is not None:
-        what = "root moment less the rigid arm's, N m rms" if answer["objective"] == "residual" else "cost of the slew"
-        print(f"{what}, in a record of {length:.6g} s (tfarm simulate --duration {length:.6g})")
-    _print_arms(answer)
-    print(answer["sign_convention"])
-
-
-def _print_coefficients(answer: dict[str, Any]) -> None:
-    """A row a coefficient: its value, how flat the optimum is along it, and where it was searched."""
-    names, bounds = list(answer["coefficients"]), answer["bounds"]
-    columns = (
-        Column("coefficient", "coefficient", of=names),
-        Column("value", "value", of=list(answer["coefficients"].values()), digits=singly(general, 7)),
-        Column("flat", "within one per cent", of=[pair_words(answer.get(f"flat_{name}")) for name in names]),
-        Column("bounds", "searched", of=[pair_words(bounds.get(name)) for name in names]),
-    )
-    show(Table(columns=columns))
-
-
-def _print_bounds(answer: dict[str, Any]) -> None:
-    """Which bounds were widened, and where the search was cut off."""
-    values = answer["coefficients"]
-    for name in answer["widened"]:
-        wider = pair_words(answer["bounds"][name])
-        print(f"the bounds of {name} were widened to {wider}: the best law lay on the first ones")
-    for name in answer["at_limit"]:
-        print(f"{name} = {values[name]:.6g} is at the physical end of {pair_words(answer['bounds'][name])}")
-    cut = [name for name in answer["at_bound"] if name not in answer["at_limit"]]
-    if cut:
-        ends = [f"{name} = {values[name]:.6g} of {pair_words(answer['bounds'][name])}" for name in cut]
-        print(f"no optimum: {' and '.join(ends)} is where the search was cut off; it may get better beyond")
-
-
-def _print_arms(answer: dict[str, Any]) -> None:
-    """A row an arm, where there are several, and how they were chosen."""
-    arms = answer["arms"]
-    if len(arms) == 1:
-        return
-    held = ["undecided" if (s := each["sampled"]["stable"]) is None else "stable" if s else "UNSTABLE" for each in arms]
-    columns = (
-        Column("arm", "arm", of=[each["name"] for each in arms]),
-        Column("value", answer["objective"], of=[each["value"] for each in arms], digits=singly(general, 6)),
-        Column("sampled", "sampled", of=held),
-        Column("verdict", "continuous-time", of=[each["verdict"] for each in arms]),
-    )
-    show(Table(columns=columns))
-    print(f"{answer['value']:.6g} is {answer['worst_case_in_words']}; {answer['worst_arm']} is the worst")
+    emit(found, json, also=(save,))
 
 
 @app.command()
@@ -314,7 +201,6 @@ def compare(
     wanted = [None, None] if not files else files * (2 // len(files))
     laws = [asked_law(arm, Given(gains, file, name))[0] for (arm, name), file in zip(pairs, wanted, strict=True)]
     from tfarm.comparing import compare as find
-    from tfarm.comparing.answers import compared_answer
 
     names = _names_of([arm.name for arm in subjects], files)
     found = find(subjects, laws, names=names, modes=count, output=output, chain=chain)
@@ -323,9 +209,7 @@ def compare(
         from tfarm.report.writing import write_comparison
 
         page = write_comparison(found, out)
-    hand_out(
-        lambda: compared_answer(found), partial(_print_comparison, found), json, png=png, picture=(found,), also=(page,)
-    )
+    emit(found, json, png=png, also=(page,))
 
 
 def _check_number(arms: list[str], files: list[str]) -> None:
@@ -344,27 +228,3 @@ def _names_of(arms: list[str], files: list[str]) -> list[str]:
         if len(names) == 2 and names[0] != names[1]:
             return names
     return ["first", "second"]
-
-
-def _print_comparison(found: Comparison, answer: dict[str, Any]) -> None:
-    """The verdicts, then each table; of two laws on one arm its modes are the same, and left out."""
-    from tfarm.comparing.answers import compared_windows, side_words
-
-    for side in found.sides:
-        print(side_words(side))
-    if found.is_of_arms:
-        print("\nnatural frequencies and damping of the arms by themselves:")
-        show(answer["modes"])
-    if found.is_sampled:
-        print("\none law is a law in z: both loops are compared at their samples, each pole z as s = ln(z)/T")
-    print("\noscillating closed-loop poles, by the mode whose open-loop pole each is nearest to:")
-    show(answer["poles"])
-    if len(answer["unpaired_poles"]):
-        print("\npoles of one side alone:")
-        show(answer["unpaired_poles"])
-    print()
-    show(answer["margins"])
-    if (windows := compared_windows(found)) is not None:
-        show(windows)
-        print("* no limit was found up to there, and beyond none was looked for")
-    print(answer["loops"][0]["sign_convention"])

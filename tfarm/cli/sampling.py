@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from tfarm.arm import LISTED, MOMENT_GAIN, RATE_GAIN, TAKEN_OFF
-from tfarm.cli.app import ArmName, Json, app, give, load_arm, say_written, tell, whole_number
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, TAKEN_OFF
+from tfarm.cli.app import ArmName, Json, app, emit, give, load_arm, say_written, tell, whole_number
 from tfarm.cli.inputs import Given, under_a_law
 from tfarm.columns import Column, Table
 from tfarm.files import write_file
 from tfarm.tables.files import write_csv
-from tfarm.tables.terminal import show
 
 if TYPE_CHECKING:
     from tfarm.dsp import Chain
@@ -61,60 +60,8 @@ def sampled(
     subject, law, said = given.loop()
     chain = asked_chain(dsp or arm, period, delay_samples)
     from tfarm.dsp.verdict import sampled as analysed
-    from tfarm.dsp.verdict import sampled_answer, sampled_law_answer
 
-    found = analysed(subject, law, chain, count=count)
-    if found.loop.is_of_gains:
-        give(sampled_answer(found) | said, json, _print_sampled)
-    else:
-        give(sampled_law_answer(found) | said, json, _print_sampled_law)
-
-
-def _print_sampled(answer: dict[str, Any]) -> None:
-    """A row a mode, then the verdict."""
-    show(answer["modes"])
-    print(answer["law"])
-    shown, band = answer["shown"], answer["band_rad_s"]
-    for gain in LISTED:
-        windows = shown[f"{gain.name}_intervals"]
-        spans = " and ".join(f"({low['text']}, {high['text']})" for low, high in windows)
-        known = _held([edge for pair in windows for edge in pair], band) if windows else "no interval"
-        print(f"stable, the other gains held, for {gain.name} in {spans}{known}")
-    delay, damping = shown["delay_margin_samples"], shown["required_damping_s"]
-    more = " or more" if answer["delay_margin_is_lower_bound"] else ""
-    print(f"further delay it bears: {delay['text']} samples{more}{_held([delay], band)}")
-    print(f"damping C from which these gains are safe: {damping['text']} s{_held([damping], band)}")
-    print(f"{answer['arm']}: {answer['verdict_in_words']}; spectral radius {answer['spectral_radius']:.12g}")
-
-
-def _print_sampled_law(answer: dict[str, Any]) -> None:
-    """What a law is, how far it is from its edges, then the verdict."""
-    print(f"{answer['law']}, order {answer['law_order']}, {answer['rule_in_words']}: {answer['sign_convention']}")
-    late = f", {answer['delay_samples']:g} of them late" if answer["delay_samples"] else ""
-    print(f"samples every {answer['period_s']:g} s{late}; {answer['modes_used']} flexible modes in what follows")
-    for warning in answer["warnings"]:
-        print(f"warning: {warning}")
-    if answer["free_hub_angle"]:
-        print("nothing regulates the hub's angle: its pole at z = 1 is left out")
-    for low, high in answer["stable_gain_factors"]:
-        print(f"stable with the whole law times {low:.6g} to {high:.6g}")
-    if answer["stable"]:
-        more = " or more" if answer["delay_margin_is_lower_bound"] else ""
-        seconds = f"{1e3 * answer['delay_margin_s']:.4g} ms"
-        print(f"further delay it bears: {answer['delay_margin_samples']:.4g} samples{more}, {seconds}")
-    elif not answer["stable_gain_factors"]:
-        print("stable with no factor on the law")
-    show(answer["windows"])
-    print(f"{answer['arm']}: {answer['verdict_in_words']}; spectral radius {answer['spectral_radius']:.12g}")
-
-
-def _held(figures: list[dict[str, Any]], band: float | None) -> str:
-    """For which modes the figures hold; nothing where that is the band of the verdict."""
-    modes = [figure["modes"] for figure in figures if not figure["settled"]]
-    if modes:
-        return f" (holds for the first {max(modes)} modes)"
-    narrowest = min(figure["band_rad_s"] for figure in figures)
-    return "" if band is not None and narrowest >= band else f" (proven below {narrowest:.3g} rad/s)"
+    emit(analysed(subject, law, chain, count=count), json, said)
 
 
 @app.command()

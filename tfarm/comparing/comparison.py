@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -27,6 +27,8 @@ from tfarm.loop.plane import Plane, between, gain_map, plane, ranges_of
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.records import record
 from tfarm.response.frequency import Bode, bode, resonant_band
+from tfarm.schema import Difference, Quantity
+from tfarm.schema import compare as compare_records
 from tfarm.spectrum import Modes, damped_modes
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum.table import default_gains
@@ -131,6 +133,14 @@ class ComparedSide:
         return delay if self.analysis.verdict.is_stable else None
 
     @property
+    def range_words(self) -> str:
+        """The frequency range of the continuous-time verdict where nothing is known beyond it."""
+        verdict = None if self.margins is None else self.margins.stability
+        if verdict is None or verdict.verdict == "unstable" or verdict.is_known_beyond:
+            return ""
+        return f"up to {verdict.band:.4g} rad/s, not determined beyond"
+
+    @property
     def sampled_margins(self) -> tuple[float | None, float | None, float | None]:
         """Of a sampled loop: the largest and the least stable factor on its law, and its delay margin [s]."""
         assert self.analysis is not None
@@ -163,6 +173,24 @@ def poles_by_mode(poles: Complex, open_loop: Mapping[int, complex]) -> dict[int,
     return dict(sorted([*found.items(), *([(HUB, complex(below[0]))] if below.size == 1 else [])]))
 
 
+class SideRow(NamedTuple):
+    """One side in a line."""
+
+    side: Annotated[str, Quantity("side")]
+    name: Annotated[str, Quantity("name")]
+    verdict: Annotated[str, Quantity("stability")]
+    reach: Annotated[str, Quantity("frequency range")]
+    sampled: Annotated[str, Quantity("sampled loop")]
+
+
+class LonePole(NamedTuple):
+    """An oscillating closed-loop pole that one side alone has, of a mode or of none."""
+
+    side: Annotated[str, Quantity("side")]
+    mode: Annotated[str, Quantity("mode")]
+    pole: Annotated[complex, Quantity("pole", "1/s", 8)]
+
+
 @dataclass(frozen=True)
 @record
 class Comparison:
@@ -171,6 +199,72 @@ class Comparison:
     one: ComparedSide
     other: ComparedSide
     output: str
+
+    @property
+    def rows(self) -> Annotated[list[SideRow], Quantity("compared", key="sides")]:
+        """A row a side."""
+        return [
+            SideRow(which, side.name, side.verdict, side.range_words, side.sampled.words)
+            for which, side in zip(("first", "second"), self.sides, strict=True)
+        ]
+
+    @property
+    def of(self) -> Annotated[str, Quantity()]:
+        """Whether two arms or two laws are compared."""
+        return "arms" if self.is_of_arms else "laws"
+
+    @property
+    def at_samples(self) -> Annotated[bool, Quantity("loops compared at their samples, s = ln(z)/T")]:
+        """The same as `is_sampled`."""
+        return self.is_sampled
+
+    @property
+    def mode_differences(self) -> Annotated[list[Difference], Quantity("modes", key="modes")]:
+        """Natural frequencies and damping ratios of both arms, by mode; of one arm none."""
+        if not self.is_of_arms:
+            return []
+        one, other = ([float(w) for w in side.modes.natural_frequency[side.modes.index > 0]] for side in self.sides)
+        ratios = enumerate(zip(self.one.damping_ratio, self.other.damping_ratio, strict=True), 1)
+        frequencies = [Difference(f"frequency of mode {n}", "rad/s", *pair) for n, pair in _numbered(one, other)]
+        return [
+            *frequencies,
+            *(Difference(f"damping ratio of mode {n}", "", *pair) for n, pair in ratios),
+        ]
+
+    @property
+    def pole_differences(self) -> Annotated[list[Difference], Quantity("oscillating closed-loop poles", key="poles")]:
+        """Those that both sides have, paired by mode."""
+        pairs = [(m, self.one.by_mode[m], self.other.by_mode[m]) for m in self.one.by_mode if m in self.other.by_mode]
+        sizes = [Difference(f"abs(s) of {_mode(m)}", "rad/s", abs(a), abs(b)) for m, a, b in pairs]
+        ratio = [Difference(f"damping ratio of {_mode(m)}", "", _ratio(a), _ratio(b)) for m, a, b in pairs]
+        return [*sizes, *ratio]
+
+    @property
+    def unpaired_poles(self) -> Annotated[list[LonePole], Quantity("poles of one side alone")]:
+        """The other oscillating poles."""
+        rows = [
+            (which, next((n for n, s in side.by_mode.items() if s == pole), None), pole, other)
+            for which, side, other in (("first", self.one, self.other), ("second", self.other, self.one))
+            for pole in side.oscillating.tolist()
+        ]
+        return [
+            LonePole(which, "none" if mode is None else _mode(mode), pole)
+            for which, mode, pole, other in rows if mode not in other.by_mode
+        ]  # fmt: skip
+
+    @property
+    def margin_differences(self) -> Annotated[list[Difference], Quantity("stability and margins", key="margins")]:
+        """Every quantity that both loops have."""
+        if self.one.margins is not None and self.other.margins is not None:
+            return compare_records(self.one.margins, self.other.margins)
+        names = (("largest stable factor on the law", ""), ("least stable factor", ""), ("delay margin", "s"))
+        both = zip(names, self.one.sampled_margins, self.other.sampled_margins, strict=True)
+        return [Difference(label, unit, one, other) for (label, unit), one, other in both]
+
+    @property
+    def loops(self) -> Annotated[list[Any], Quantity()]:
+        """Both loops with all that is known of them."""
+        return [side.analysis or side.margins for side in self.sides]
 
     @property
     def sides(self) -> tuple[ComparedSide, ComparedSide]:
@@ -228,6 +322,18 @@ class Comparison:
         longest = max([LONGEST_WAIT * T, *(BORNE * each for each in borne if each is not None)])
         delay = np.linspace(0.0, min(longest, MOST_DELAYED * T), FURTHER_DELAYS)
         return self.one.reach(delay), self.other.reach(delay)
+
+
+def _numbered(one: list[float], other: list[float]) -> Iterator[tuple[int, tuple[float, float]]]:
+    return enumerate(zip(one, other, strict=True), 1)
+
+
+def _mode(mode: int) -> str:
+    return f"mode {mode}" if mode else "the hub"
+
+
+def _ratio(s: complex) -> float:
+    return -s.real / abs(s) + 0.0
 
 
 def compare(

@@ -10,13 +10,14 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from tfarm.arm import Arm, schema, to_toml
 from tfarm.arm.checks import extended, not_negative, number, positive, whole
 from tfarm.arm.reading import load_tables
 from tfarm.arm.schema import ArmTable, TomlTable, validated
 from tfarm.errors import ParameterError, did_you_mean, must_be_known, naming
+from tfarm.schema import Quantity
 
 Reading = Literal["vibration", "total"]
 LEAST_BITS, MOST_BITS = 2, 32  # of a converter: of one bit there are no steps, of more than 32 no part
@@ -34,8 +35,8 @@ class Sampling:
     (tachometer) hub rate; inf is none.  An encoder is digital and has none.
     """
 
-    period: float = 0.01
-    delay_samples: float = 0.0
+    period: Annotated[float, Quantity("sampling period", "s")] = 0.01
+    delay_samples: Annotated[float, Quantity("delay in samples")] = 0.0
     antialias_corner: float = math.inf
 
     def __post_init__(self) -> None:
@@ -102,11 +103,6 @@ class Converters:
             unit = RANGE_UNITS[signal]
             remedy = f"{bits} bits of what? give the range +-R{unit} too, or leave converters.{signal}_bits out"
             raise ParameterError(key=f"converters.{signal}_range", value=span, remedy=remedy)
-
-    @property
-    def is_quantised(self) -> bool:
-        """Whether a signal is rounded to steps anywhere."""
-        return any(n is not None for n in (self.encoder_counts, self.moment_bits, self.torque_bits))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,8 +173,8 @@ class Chain:
     def is_linear(self) -> bool:
         """Whether nothing is rounded to steps and nothing can be clipped."""
         c = self.converters
-        clips = c.moment_range is not None or c.torque_range is not None or self.actuator.torque_limit < math.inf
-        return not c.is_quantised and not clips
+        steps = c.encoder_counts, c.moment_bits, c.moment_range, c.torque_bits, c.torque_range
+        return steps == (None,) * len(steps) and self.actuator.torque_limit == math.inf
 
 
 def chain_or_usual(chain: object) -> Chain:

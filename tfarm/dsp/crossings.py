@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +22,16 @@ from numpy.typing import NDArray
 from tfarm.arm import NAMES, PLANE
 from tfarm.arm.feedback import ON
 from tfarm.arrays import Complex, Real, Whole
+from tfarm.columns import Table
 from tfarm.crossing import Crossing, Crossings, Window, brackets, confirmed, counts_over, intervals, pieces, solved
+from tfarm.crossing.shown import coarse, grid_table
 from tfarm.crossing.turning import loose_columns
-from tfarm.dsp.discretise import described_law
+from tfarm.dsp.chain import Sampling
 from tfarm.dsp.sampled import Sampled
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
+from tfarm.response.controller import Controller, controller
+from tfarm.schema import Quantity
 from tfarm.spectrum.table import most_gain
 
 A_DECADE = 48  # grid points a decade of the distance to a pole
@@ -232,11 +236,36 @@ class GainMap:
     """
 
     loop: Sampled
-    vary: tuple[str, str]
-    x: Real
-    y: Real
+    vary: Annotated[tuple[str, str], Quantity("plane of")]
+    x: Annotated[Real, Quantity(curve=True)]
+    y: Annotated[Real, Quantity(curve=True)]
     unstable: NDArray[np.int64]
     crossings: list[Crossings]
+
+    @property
+    def sampling(self) -> Annotated[Sampling, Quantity(flat=True)]:
+        """Period and delay."""
+        return self.loop.chain.sampling
+
+    @property
+    def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
+        """Arm and law in words, as results name them."""
+        return controller(self.loop.given, self.loop.plant.arm)
+
+    @property
+    def finding(self) -> Annotated[str, Quantity("stability region")]:
+        """At how many points of the grid the loop is stable, in words."""
+        return f"stable at {int((self.unstable == 0).sum())} of {self.unstable.size} points"
+
+    @property
+    def csv_table(self) -> Table:
+        """A row a point of the grid."""
+        return grid_table(self.vary, self.x, self.y, self.counts.tolist())
+
+    @property
+    def drawing(self) -> str:
+        """A coarse picture for a terminal."""
+        return coarse(self.vary, self.x, self.y, self.counts)
 
     @property
     def axes(self) -> tuple[Real, Real]:
@@ -244,7 +273,7 @@ class GainMap:
         return self.x, self.y
 
     @property
-    def counts(self) -> NDArray[np.int64]:
+    def counts(self) -> Annotated[NDArray[np.int64], Quantity(key="unstable_poles")]:
         """Unstable poles (len(y), len(x))."""
         return self.unstable.T
 
@@ -259,7 +288,7 @@ class GainMap:
         return self.y
 
     @property
-    def modes_used(self) -> int:
+    def modes_used(self) -> Annotated[int, Quantity("flexible modes")]:
         """How many flexible modes the loop has."""
         return self.loop.plant.count
 
@@ -321,22 +350,6 @@ def _map_of_gains(loop: Sampled, x: Real, y: Real, vary: tuple[str, str]) -> Gai
             message = f"at {where} the crossings count {plane.unstable[i, j]} growing poles, not {count}"
             raise ConvergenceError(message, plane, abs(count - int(plane.unstable[i, j])))
     return plane
-
-
-def map_answer(plane: GainMap) -> dict[str, Any]:
-    """The plane as plain lists: poles outside the unit circle, rows of the second number."""
-    arm, sampling = plane.loop.plant.arm, plane.loop.chain.sampling
-    return {
-        "arm": arm.name,
-        **described_law(plane.loop.given, arm),
-        "period_s": sampling.period,
-        "delay_samples": sampling.delay_samples,
-        "modes_used": plane.modes_used,
-        "vary": list(plane.vary),
-        "x": plane.x.tolist(),
-        "y": plane.y.tolist(),
-        "unstable_poles": plane.unstable.T.tolist(),
-    }
 
 
 def rounded_map(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainMap:

@@ -22,20 +22,18 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import AT_HUB, GAINS, MOMENT_GAIN, AnyLaw, Arm, HubFeedback, must_not_be_algebraic
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace
-from tfarm.arm.feedback import input_words
 from tfarm.arm.law import Law, Part, is_measured
 from tfarm.arrays import Complex, Real
 from tfarm.dsp.chain import MOST_DELAY, Chain
 from tfarm.errors import ParameterError
 from tfarm.records import record
-from tfarm.response.signals import Signals
 from tfarm.spectrum.table import check_gains
 
 SAME_PERIOD = 1e-9  # relative: 1/100 s in two files may differ in its last digits
@@ -70,23 +68,6 @@ def rule_in_words(law: Law) -> str:
     return f"made discrete by {words[law.rule]}"
 
 
-def described_law(law: Law, arm: Arm) -> dict[str, Any]:
-    """The law as it was given, how it is sampled, and what it reads and drives."""
-    units = Signals(arm, law.signals).units
-    sign, late = "-" if law.sign < 0 else "+", f", {law.delay:g} s late" if law.delay else ""
-    words = f"v = {sign}sum of C_i(z) y_i{late}; v is {input_words(arm)}, y = ({', '.join(law.signals)})"
-    return {
-        "law": law.name,
-        "signals": dict(zip(law.signals, units, strict=True)),
-        "law_order": law.order,
-        "delay_s": law.delay,
-        "rule": "none" if law.is_discrete else law.rule,
-        "rule_in_words": rule_in_words(law),
-        "sign_convention": words,
-        "input": arm.input,
-    }
-
-
 def _in_z(part: Part, law: Law, period: float) -> LawBlock:
     """A block of the law in z."""
     block, key = part.block, f"law.{part.signals[0]}.num"
@@ -101,7 +82,7 @@ def _in_z(part: Part, law: Law, period: float) -> LawBlock:
             raise ParameterError(key="rule", value=law.rule, remedy=remedy)
         return matched(block, period)
     if law.rule == "zoh":
-        return zero_order_hold(block, period)
+        return by_scipy(block, period, "zoh")
     return tustin(block, period, law.prewarp)
 
 
@@ -110,14 +91,11 @@ def tustin(block: LawBlock, period: float, prewarp: float = 0.0) -> LawBlock:
     c = prewarped(period, prewarp)
     if isinstance(block, Rational) and block.excess > 0:
         return substituted(block, c)
-    A, B, C, D = block.matrices()
-    unit = np.eye(len(A))
-    whole = unit - A / c
-    if np.linalg.cond(whole) > 1 / np.finfo(float).eps:
+    A = block.matrices()[0]
+    if np.linalg.cond(np.eye(len(A)) - A / c) > 1 / np.finfo(float).eps:
         remedy = f"the law has a pole at {c:g} 1/s, which this rule sends to infinity; take another rule or period"
         raise ParameterError(key="rule", value="tustin", remedy=remedy)
-    within = np.linalg.inv(whole).astype(np.float64)
-    return StateSpace(within @ (unit + A / c), within @ B * (2 / c), C @ within, D + C @ within @ B / c)
+    return by_scipy(block, 2 / c, "bilinear")
 
 
 def prewarped(period: float, prewarp: float) -> float:
@@ -125,14 +103,11 @@ def prewarped(period: float, prewarp: float) -> float:
     return prewarp / math.tan(prewarp * period / 2) if prewarp else 2 / period
 
 
-def zero_order_hold(block: LawBlock, period: float) -> StateSpace:
-    """What the block makes at the samples of signals that are held between them."""
-    from scipy.linalg import expm
+def by_scipy(block: LawBlock, period: float, rule: Literal["zoh", "bilinear"]) -> StateSpace:
+    """The block in z by a rule of `scipy.signal.cont2discrete`: "zoh" of signals that are held, or "bilinear"."""
+    from scipy.signal import cont2discrete  # here, because it takes a while to load
 
-    A, B, C, D = block.matrices()
-    n, m = B.shape
-    both = expm(period * np.vstack([np.hstack([A, B]), np.zeros((m, n + m))]))
-    return StateSpace(both[:n, :n], both[:n, n:], C, D)
+    return StateSpace(*cont2discrete(block.matrices(), period, rule)[:4])
 
 
 def matched(block: Rational, period: float) -> Rational:

@@ -12,6 +12,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import brentq
@@ -25,6 +26,7 @@ from tfarm.dsp.sampled import Sampled, resized, sampled_loop
 from tfarm.dsp.sampling import FORGOTTEN, held_amplitude
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
+from tfarm.schema import Quantity
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.table import first_frequency
 
@@ -179,13 +181,13 @@ class Figure:
     One of `band` and `modes` is None.
     """
 
-    value: float
-    digits: int
-    band: float | None
-    modes: int | None
+    value: Annotated[float, Quantity("value")]
+    digits: Annotated[int, Quantity("digits")]
+    band: Annotated[float | None, Quantity("certified up to", "rad/s", key="up_to_rad_s")]
+    modes: Annotated[int | None, Quantity("holds for the first modes")]
 
     @property
-    def is_settled(self) -> bool:
+    def is_settled(self) -> Annotated[bool, Quantity("certified", key="certified")]:
         """Whether it is proven in a band."""
         return self.band is not None
 
@@ -194,11 +196,15 @@ class Figure:
         return self.is_settled and (self.digits >= digits or self.value == 0.0)
 
     @property
-    def text(self) -> str:
+    def text(self) -> Annotated[str, Quantity("in these digits")]:
         """The number in these digits; "?" where not one holds."""
         if self.value == 0.0 or math.isinf(self.value):
             return f"{self.value:g}"
         return f"{self.value:.{self.digits}g}" if self.digits else "?"
+
+    def as_text(self, _: int) -> str:
+        """The same, for tables."""
+        return self.text if self.modes is None else f"{self.text} (first {self.modes} modes)"
 
 
 Interval = tuple[Figure, Figure]  # both edges of a stable interval

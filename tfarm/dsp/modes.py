@@ -15,7 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +24,10 @@ from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import PLANE, RATE_GAIN
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.columns import ANSWER, JSON, REPORT, Column
 from tfarm.crossing.turning import loose
-from tfarm.digits import general, lined, scientific, singly
 from tfarm.dsp.sampled import Sampled
 from tfarm.records import record
+from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
 FOLLOWING_STEPS = 24  # of the continuation from zero gain
@@ -40,33 +40,7 @@ RIM = 1.12  # radius up to which the z-plane is shown
 DRAWN_RADIUS = 1.2 * RIM  # and up to which a branch is drawn, so that its line runs out of the picture
 RATE_DECADES, STRONGER = 3, 10.0  # of the rate gain: below the end of its locus, and above its own value
 LISTED_DECAY = -20.0  # modes that lose more than this in ln|a| between two samples are not listed
-
-
-_LOG = "ln|z| per sample"
-_log = partial(Column, printed=singly("{:.3e}".format), on=ANSWER)
-_page_log = partial(Column, digits=singly(scientific, 3), group=_LOG, on=REPORT)
-SAMPLED_MODE_COLUMNS = (  # of a `ModeTable`; what of it is small is the change of ln|z| per sample
-    Column("index", "mode", on=ANSWER),
-    Column("mode", "mode", of="index", on=REPORT),
-    Column("natural_frequency_rad_s", of="natural_frequency", head="rad/s", printed=singly(general, 6), on=ANSWER),
-    Column("natural_frequency_hz", "natural frequency", "Hz", of=lambda table: table.natural_frequency / (2 * np.pi),
-           digits=lined(7, 5), on=REPORT),
-    Column("band", "band"),
-    Column("aliased_rad_s", of="aliased", on=(JSON,)),
-    Column("seen_at_hz", "seen at", "Hz", of=lambda table: table.aliased / (2 * np.pi), digits=lined(5, 3), on=REPORT),
-    _log("log_radius_per_sample", "ln|z| closed loop", of="log_radius"),
-    _log("open_loop_log_radius", "open loop", of="by_damping"),
-    _log("first_order_log_radius", "first order", of="first_order"),
-    _log("first_order_by_K1", "by K1", of="by_rate"),
-    _log("first_order_by_K2", "by K2", of="by_moment"),
-    _page_log("by_damping", "own damping", of=lambda table: table.by_damping + 0.0),  # 0.0 where it is -0.0
-    _page_log("by_K1", "K1, first order", of=lambda table: table.by_rate + 0.0),
-    _page_log("by_K2", "K2, first order", of=lambda table: table.by_moment + 0.0),
-    _page_log("log_radius", "closed loop, exact", of=lambda table: table.log_radius + 0.0,
-              tint=lambda table: ["#f9e1d0" if x > 0 else "" for x in table.log_radius]),
-    Column("verdict", "closed loop", on=REPORT,
-           of=lambda table: ["grows" if x > 0 else "decays" if x < 0 else "neither" for x in table.log_radius]),
-)  # fmt: skip
+LOG_RADIUS = "ln|z| per sample, or its change to first order in the gains"
 
 
 @dataclass(frozen=True)
@@ -80,30 +54,22 @@ class ModeTable:
     hub damping).  `band`: 0 from 0 to 1/(2T) [Hz], and so on; `aliased`: where the samples see the mode [rad/s].
     """
 
-    index: NDArray[np.int64]
-    natural_frequency: Real
-    band: NDArray[np.int64]
-    aliased: Real
-    by_rate: Real
-    by_moment: Real
+    is_table = True
+
+    index: Annotated[NDArray[np.int64], Quantity("mode")]
+    natural_frequency: Annotated[Real, Quantity("natural frequency", "rad/s")]
+    band: Annotated[NDArray[np.int64], Quantity("band", help="0 from 0 to half the sampling rate, and so on")]
+    aliased: Annotated[Real, Quantity("aliased to", "rad/s")]
+    by_rate: Annotated[Real, Quantity("by K1", digits=3, key="first_order_by_K1", help=LOG_RADIUS)]
+    by_moment: Annotated[Real, Quantity("by K2", digits=3, key="first_order_by_K2", help=LOG_RADIUS)]
     by_others: Real
-    by_damping: Real
-    log_radius: Real
+    by_damping: Annotated[Real, Quantity("open loop", digits=4, key="open_loop_log_radius", help=LOG_RADIUS)]
+    log_radius: Annotated[Real, Quantity("closed loop", digits=4, key="log_radius_per_sample", help=LOG_RADIUS)]
 
     @property
-    def first_order(self) -> Real:
+    def first_order(self) -> Annotated[Real, Quantity("first order", digits=3, key="first_order_log_radius")]:
         """Change of ln|z| per sample by all gains."""
         return self.by_rate + self.by_moment + self.by_others
-
-    @property
-    def rate_alternates(self) -> bool:
-        """Whether to first order the rate gain drives the modes of every other band, from the second on; no other."""
-        return bool(((self.by_rate > 0) == (self.band % 2 == 1))[self.by_rate != 0].all())
-
-    @property
-    def driven_by_moment(self) -> list[int]:
-        """The modes that the moment gain drives, to first order."""
-        return [int(each) for each in self.index[self.by_moment > 0]]
 
 
 def first_order(loop: Sampled, poles: Whole) -> Real:

@@ -15,17 +15,19 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import AT_HUB, LISTED, TAKEN_OFF, AnyLaw, Arm, driven, tracked, unit_of
+from tfarm.arm import AnyLaw, Arm, tracked
 from tfarm.arrays import Real
 from tfarm.columns import Column
 from tfarm.dsp.chain import Chain, chain_or_usual
-from tfarm.dsp.discretise import described_law, with_all_gains
+from tfarm.dsp.discretise import rule_in_words, with_all_gains
 from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario
 from tfarm.dsp.simulate import Simulation, Simulator, Trace
 from tfarm.dsp.traces import resolved
 from tfarm.errors import ConvergenceError
 from tfarm.exact.outputs import OUTPUTS
+from tfarm.response.controller import controller
+from tfarm.schema import to_dict
 
 MODE_COUNTS = (10, 20, 40)  # flexible modes; 80 would take a heavily damped arm 8 s of CPU time
 ENOUGH_CHANGE = 1e-4  # of each signal's largest value: as many as a table of a simulation shows
@@ -222,17 +224,9 @@ def simulation_answer(
 
 
 def _led_by(arm: Arm, law: AnyLaw) -> dict[str, Any]:
-    """The law, and what it drives."""
+    """The law, what it drives, and its references."""
     given = with_all_gains(arm, law)
-    if given.gains is None or given.references != AT_HUB:
-        return described_law(given, arm) | {"references": list(given.references)}
-    words = f"u = r - {TAKEN_OFF}, with references; a positive root moment M accelerates the hub"
-    return {
-        "law": words + driven(arm),
-        "input": arm.input,
-        "gain_units": {gain.name: unit_of(gain.name, arm) for gain in LISTED},
-        **given.gains.by_name,
-    }
+    return to_dict(controller(given, arm)) | {"references": list(given.references), "rule": rule_in_words(given)}
 
 
 def _cycle_answer(cycle: LimitCycle) -> dict[str, Any]:

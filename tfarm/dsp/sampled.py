@@ -80,12 +80,6 @@ class SampledPoles:
         return self.log_spectral_radius < 0.0
 
 
-def without_drift(A: Real, first: int, shift: Real) -> Real:
-    """A without its pole z = 1 at the direction `shift`, whose entry `first` is 1: the quotient by that direction."""
-    others = np.arange(len(A)) != first
-    return np.asarray(A[others][:, others] - np.outer(shift[others], A[first, others]))
-
-
 @dataclass(frozen=True)
 @record
 class Sampled:
@@ -283,7 +277,8 @@ class Sampled:
         shift = np.zeros(len(A))
         shift[first] = 1.0  # and the states of the law where the hub stands still an angle off
         shift[len(A) - len(own) :] = np.linalg.lstsq(np.eye(len(own)) - own, B @ angle, rcond=None)[0]
-        return without_drift(A, first, shift)
+        others = np.arange(len(A)) != first  # the quotient by that direction
+        return np.asarray(A[others][:, others] - np.outer(shift[others], A[first, others]))
 
     @cached_property
     def eigenvalues(self) -> Complex:

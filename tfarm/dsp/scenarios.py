@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,14 +130,14 @@ def step(arm: Arm, chain: Chain, duration: float, torque: float | None = None) -
     torque = STEP_TORQUE * torque_unit(arm, chain) if torque is None else torque
     resting = _rest("step", chain, duration)
     size = number("torque", torque, "a torque is a finite number of N m")
-    return _with(resting, feedforward=np.full(resting.feedforward.size, size))
+    return replace(resting, feedforward=np.full(resting.feedforward.size, size))
 
 
 def decay(arm: Arm, chain: Chain, duration: float, tip_offset: float | None = None) -> Scenario:
     """Free decay: the first mode released from rest with the tip displaced by `tip_offset` [m], 0.01 L unless told."""
     tip_offset = TIP_OFFSET * arm.length if tip_offset is None else tip_offset
     size = number("tip_offset", tip_offset, "a tip offset is a finite number of metres")
-    return _with(_rest("decay", chain, duration), tip_offset=size)
+    return replace(_rest("decay", chain, duration), tip_offset=size)
 
 
 def impulse(arm: Arm, chain: Chain, duration: float, impulse: float | None = None) -> Scenario:
@@ -149,7 +148,7 @@ def impulse(arm: Arm, chain: Chain, duration: float, impulse: float | None = Non
     """
     impulse = IMPULSE * torque_unit(arm, chain) if impulse is None else impulse
     size = number("impulse", impulse, "an impulse is a finite number of N m s")
-    return _with(_rest("impulse", chain, duration), impulse=size)
+    return replace(_rest("impulse", chain, duration), impulse=size)
 
 
 SCENARIOS: dict[str, Callable[[Arm, Chain, float], Scenario]] = {
@@ -181,11 +180,6 @@ def _rest(name: str, chain: Chain, duration: float) -> Scenario:
     T = chain.sampling.period
     zero = np.zeros(_samples(duration, T))
     return Scenario(name, T, zero, zero, zero, zero, zero)
-
-
-def _with(resting: Scenario, **changes: Any) -> Scenario:
-
-    return replace(resting, **changes)
 
 
 def _samples(duration: float, period: float) -> int:

@@ -3,34 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Annotated, NamedTuple
 
-from tfarm.arm import (
-    ANGLE_GAIN,
-    LISTED,
-    MOMENT_GAIN,
-    NAMES,
-    PLANE,
-    TAKEN_OFF,
-    AnyLaw,
-    Arm,
-    HubFeedback,
-    arm_and_law,
-    cancelled,
-    driven,
-    unit_of,
-)
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, cancelled
 from tfarm.arm.checks import whole
-from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
 from tfarm.crossing import Window
-from tfarm.digits import general, plain, singly
 from tfarm.dsp.chain import Chain, Sampling, chain_or_usual
 from tfarm.dsp.circle import Band, complete_band
 from tfarm.dsp.crossings import around, stable_factors, stable_windows
-from tfarm.dsp.discretise import described_law, rule_in_words
+from tfarm.dsp.discretise import rule_in_words
 from tfarm.dsp.edges import (
     DelayMargin,
     Figure,
@@ -41,12 +25,14 @@ from tfarm.dsp.edges import (
     shown_windows,
     whole_loop,
 )
-from tfarm.dsp.modes import SAMPLED_MODE_COLUMNS, ModeTable, dominant, mode_table
+from tfarm.dsp.modes import ModeTable, dominant, mode_table
 from tfarm.dsp.sampled import Sampled, resized, sampled_loop
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
+from tfarm.response.controller import Controller, controller
+from tfarm.schema import Quantity
 
-WINDOW_DIGITS = 6  # of the ends of a window, where a person reads
+LAW_DELAY_DIGITS = 4  # of the delay margin of a law that is more than gains at the hub
 UNDAMPED_MODES = 20  # of an undamped arm, whose verdict is of the first modes alone
 FEWEST_COMPARED = 8  # modes of the first loop with fewer, twice as many in each next
 LARGEST_LOG = 700.0  # whose exponential is a double
@@ -69,27 +55,42 @@ class Verdict:
     band: Band | None = None
 
     @property
-    def is_settled(self) -> bool:
+    def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
+        """Arm and law in words, as results name them."""
+        return controller(self.loop.given, self.loop.plant.arm)
+
+    @property
+    def rule(self) -> Annotated[str, Quantity("discretisation")]:
+        """How the law came to be one in z."""
+        return rule_in_words(self.loop.given)
+
+    @property
+    def sampling(self) -> Annotated[Sampling, Quantity(flat=True)]:
+        """Period and delay."""
+        return self.loop.chain.sampling
+
+    @property
+    def is_settled(self) -> Annotated[bool, Quantity(key="certified")]:
         """Whether no mode of the band, in the loop or not, and no slow real pole can change the verdict."""
         return self.band is not None
 
     @property
-    def band_rad_s(self) -> float | None:
+    def band_rad_s(self) -> Annotated[float | None, Quantity("certified up to", "rad/s", key="up_to_rad_s")]:
         """Up to where the verdict is proven [rad/s]; None where it is not."""
         return None if self.band is None else self.band.top
 
     @property
-    def modes_used(self) -> int:
+    def modes_used(self) -> Annotated[int, Quantity("flexible modes")]:
         """How many flexible modes the loop has."""
         return self.loop.plant.count
 
     @property
-    def is_stable(self) -> bool:
+    def is_stable(self) -> Annotated[bool, Quantity(key="stable")]:
         """Whether every pole lies inside the unit circle."""
         return self.loop.poles.is_stable
 
     @property
-    def log_radius(self) -> float:
+    def log_radius(self) -> Annotated[float, Quantity(key="log_spectral_radius")]:
         """ln of the spectral radius, of every mode of the band, or of the first `modes_used` where nothing is proven.
 
         Few modes settle a verdict, but not the later digits of this number.
@@ -97,46 +98,47 @@ class Verdict:
         return self.full.poles.log_spectral_radius
 
     @property
+    def spectral_radius(self) -> Annotated[float, Quantity("spectral radius", digits=12)]:
+        """Largest |z|."""
+        return math.exp(self.log_radius)
+
+    @property
+    def unstable_poles(self) -> Annotated[int, Quantity("unstable poles")]:
+        """Outside the unit circle."""
+        return self.loop.poles.unstable
+
+    @property
     def full(self) -> Sampled:
         """The loop with every mode of the band, for other gains than these; that of the verdict where there is none."""
         return self.loop if self.band is None else self.band.full
 
     @property
-    def word(self) -> str:
+    def word(self) -> Annotated[str, Quantity("stability", key="verdict")]:
         """stable, marginal or unstable."""
-        return self.sentence.split(":")[0]
+        growth = self.log_radius
+        return "unstable" if growth > 0 else "stable" if growth < 0 else "marginal"
 
     @property
-    def sentence(self) -> str:
-        """The verdict in words, beginning with stable, unstable or marginal."""
-        growth, what = self.log_radius, self.slowest
-        held = f" ({self.holds_for})"
-        if growth > 0:
-            return f"unstable: {what} grows by {_change(growth)} a sample{held}"
-        if growth == 0:
-            return f"marginal: {what} neither grows nor decays{held}"
-        return f"stable: {what} decays most slowly, by {_change(growth)} a sample{held}"
+    def sentence(self) -> Annotated[str, Quantity(key="verdict_in_words")]:
+        """Stability, and of which modes it is known."""
+        return f"{self.word} ({self.holds_for}); dominant pole: {self.slowest}"
 
     @property
-    def slowest(self) -> str:
+    def slowest(self) -> Annotated[str, Quantity("dominant pole", key="dominant")]:
         """What has the largest radius: a mode, the hub, or a pole of the law."""
         return dominant(self.loop)
 
     @property
-    def holds_for(self) -> str:
-        """What the verdict holds for, in words."""
+    def holds_for(self) -> Annotated[str, Quantity("certainty", key="certainty")]:
+        """The modes for which the verdict is certified."""
         if self.band is None:
-            return f"holds for the first {self.modes_used} modes"
-        return f"proven for every mode below {self.band.top:.3g} rad/s, not known beyond"
+            return f"converged for the first {self.modes_used} modes, not determined beyond"
+        return f"certified up to {self.band.top:.3g} rad/s, not determined beyond"
 
-
-def _change(log_radius: float) -> str:
-    """|z| - 1 in size, which for a small ln|z| is ln|z| itself; a factor where it is no small change."""
-    return (
-        f"{abs(math.expm1(log_radius)):.3g}"
-        if log_radius < 1
-        else f"a factor of {math.exp(min(log_radius, LARGEST_LOG)):.3g}"
-    )
+    @property
+    def time_constant(self) -> Annotated[float | None, Quantity("dominant time constant", "s")]:
+        """That of the dominant pole, below 0 where it grows."""
+        return -self.loop.chain.sampling.period / self.log_radius if self.log_radius else None
 
 
 def sampled_verdict(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | None = None) -> Verdict:
@@ -181,36 +183,21 @@ def _growing(full: Sampled) -> Iterator[Sampled]:
 class SampledNumber(NamedTuple):
     """One number of a law, the gain of a part or a factor on it, and how far it may go alone at the samples."""
 
-    number: str
-    value: float
-    windows: list[Window]
-
-    @property
-    def interval(self) -> Window | None:
-        """The window that its value lies in."""
-        return around(self.windows, self.value)
-
-    def spans(self, how: Callable[[float, int], str]) -> str:
-        """Its windows, each end in six digits."""
-        return " ".join(f"({how(low, WINDOW_DIGITS)}, {how(high, WINDOW_DIGITS)})" for low, high in self.windows)
-
-
-SAMPLED_NUMBER_COLUMNS = (  # of `SampledNumber`
-    Column("number", "number of the law"),
-    Column("value", "value", printed=singly(general, 6), digits=singly(plain, 5)),
-    Column("interval", of=lambda row: row.interval and list(row.interval), on=(JSON,)),
-    Column("windows", of=lambda row: [list(window) for window in row.windows], on=(JSON,)),
-    Column("", "stable, the others held", of=lambda row: row.spans(general) or "none", on=(TERMINAL,)),
-    Column("stable_windows", "stable, the others held", on=REPORT,
-           of=lambda row: " ".join(repr(end) for window in row.windows for end in window) or "none",
-           shown=lambda row: row.spans(plain) or "none"),
-)  # fmt: skip
+    number: Annotated[str, Quantity("gain or coefficient")]
+    value: Annotated[float, Quantity("value")]
+    windows: Annotated[Sequence[Window | Interval], Quantity("stability intervals", key="intervals")]
+    interval: Annotated[Window | None, Quantity()]
 
 
 def sampled_numbers(loop: Sampled) -> list[SampledNumber]:
     """How far the gain of each part of the law may go, the others held."""
     names = [name for name in loop.law.part_gains if loop.number(name)]
-    return [SampledNumber(name, loop.number(name), stable_windows(loop, name)) for name in names]
+    return [number_of(name, loop.number(name), stable_windows(loop, name)) for name in names]
+
+
+def number_of(name: str, value: float, windows: list[Window]) -> SampledNumber:
+    """A number with the interval that its value lies in."""
+    return SampledNumber(name, value, windows, around(windows, value))
 
 
 @dataclass(frozen=True)
@@ -222,8 +209,40 @@ class Analysis:
     the damping is looked for with `damping_modes`.
     """
 
-    verdict: Verdict
+    verdict: Annotated[Verdict, Quantity(flat=True)]
     damping_modes: int = UNDAMPED_MODES
+
+    @property
+    def stability_intervals(self) -> Annotated[list[SampledNumber], Quantity("stability intervals")]:
+        """A row a gain at the hub, or a number of another law, the others held."""
+        if not self.loop.is_of_gains:
+            return self.numbers
+        return [SampledNumber(n, self.loop.number(n), each, self.interval(n)) for n, each in self.shown.items()]
+
+    @property
+    def delay_margin_samples(self) -> Annotated[float, Quantity(unit="samples", key="delay_margin_samples")]:
+        """The further delay in samples, to the last digit."""
+        return self.delay_margin.samples
+
+    @property
+    def delay_margin_seconds(self) -> Annotated[float, Quantity("delay margin", "s", 4, key="delay_margin_s")]:
+        """The further delay in seconds."""
+        return self.delay_margin.samples * self.loop.chain.sampling.period
+
+    @property
+    def is_lower_bound(self) -> Annotated[bool, Quantity("delay margin or more", key="delay_margin_is_lower_bound")]:
+        """Whether no further delay up to there makes the loop unstable."""
+        return self.delay_margin.is_bound
+
+    @property
+    def free_hub_angle(self) -> Annotated[str | None, Quantity("free hub angle")]:
+        """The pole at z = 1 from which the verdict is apart."""
+        return "its pole at z = 1 is left out" if self.loop.has_free_angle else None
+
+    @property
+    def unfiltered_signals(self) -> Annotated[list[str], Quantity()]:
+        """Signals without an anti-alias filter."""
+        return [name for name, analog in zip(self.loop.in_z.signals, self.loop.analog, strict=True) if not analog]
 
     @property
     def loop(self) -> Sampled:
@@ -250,13 +269,17 @@ class Analysis:
         """The same intervals without the digits of their edges."""
         return {name: [(low.value, high.value) for low, high in each] for name, each in self.shown.items()}
 
-    @cached_property
-    def modes(self) -> ModeTable:
+    @property
+    def modes(self) -> Annotated[ModeTable, Quantity("modes", help="ln|z| per sample")]:
         """The modes one by one."""
+        return self._modes
+
+    @cached_property
+    def _modes(self) -> ModeTable:
         return mode_table(self.loop)
 
     @property
-    def first_unstable_mode(self) -> int | None:
+    def first_unstable_mode(self) -> Annotated[int | None, Quantity("first unstable mode")]:
         """The lowest mode that grows."""
         grows = self.modes.index[self.modes.log_radius > 0]
         return int(grows[0]) if grows.size else None
@@ -266,9 +289,11 @@ class Analysis:
         return shown_delay(self.loop, self.verdict.band)
 
     @property
-    def delay(self) -> Figure:
-        """The further delay that the loop bears [samples]."""
-        return self._delay[1]
+    def delay(self) -> Annotated[Figure, Quantity("delay margin in samples", key="delay_margin")]:
+        """The further delay that the loop can take [samples]; of a law with the modes of the verdict."""
+        if self.loop.is_of_gains:
+            return self._delay[1]
+        return Figure(self.delay_margin.samples, LAW_DELAY_DIGITS, None, self.verdict.modes_used)
 
     @cached_property
     def delay_margin(self) -> DelayMargin:
@@ -285,25 +310,30 @@ class Analysis:
         """The damping C [s] from which on the loop is stable."""
         return self.damping.value
 
+    @property
+    def minimum_damping(self) -> Annotated[Figure | None, Quantity("minimum structural damping for stability", "s")]:
+        """The same with its digits, for gains at the hub."""
+        return self.damping if self.loop.is_of_gains else None
+
     @cached_property
     def factors(self) -> list[Window]:
         """Every interval of a factor on the whole law in which the loop is stable, with the modes of the verdict."""
         return stable_factors(self.loop)
 
     @property
-    def gain_factors(self) -> Window | None:
+    def stable_gain_factors(self) -> Annotated[list[Window] | None, Quantity("stable factors on the controller")]:
+        """All intervals, of a controller that is more than gains at the hub."""
+        return None if self.loop.is_of_gains else self.factors
+
+    @property
+    def gain_factors(self) -> Annotated[Window | None, Quantity("gain margin, factors down and up")]:
         """The interval around 1 in which a factor on the law may lie; None where the loop is not stable."""
         return around(self.factors, 1.0)
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> Annotated[tuple[str, ...], Quantity("warnings")]:
         """Unstable poles of the law that its own zeros cancel."""
         return cancelled(self.loop.given)
-
-    @property
-    def rule(self) -> str:
-        """How the law came to be one in z."""
-        return rule_in_words(self.loop.given)
 
     @cached_property
     def numbers(self) -> list[SampledNumber]:
@@ -322,84 +352,6 @@ def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | N
     return Analysis(sampled_verdict(arm, law, chain, count=count), count or UNDAMPED_MODES)
 
 
-def verdict_answer(verdict: Verdict, sampling: Sampling) -> dict[str, Any]:
-    """What is said of any sampled loop: the clock, the verdict, and how far it holds."""
-    return {
-        "period_s": sampling.period,
-        "delay_samples": sampling.delay_samples,
-        "verdict": verdict.word,
-        "verdict_in_words": verdict.sentence,
-        "stable": verdict.is_stable,
-        "spectral_radius": math.exp(verdict.log_radius),
-        "log_spectral_radius": verdict.log_radius,
-        "unstable_poles": verdict.loop.poles.unstable,
-        "modes_used": verdict.modes_used,
-        "settled": verdict.is_settled,
-        "band_rad_s": verdict.band_rad_s,
-    }
-
-
-def sampled_answer(analysis: Analysis) -> dict[str, Any]:
-    """The analysis as a dictionary of plain numbers, texts, lists and the table of its modes."""
-    verdict, gains = analysis.verdict, analysis.loop.gains
-    arm, sampling, windows = verdict.loop.plant.arm, verdict.loop.chain.sampling, analysis.windows.items()
-    return {
-        "arm": arm.name,
-        "law": f"u = -{TAKEN_OFF}; a positive root moment M accelerates the hub{driven(arm)}",
-        "input": arm.input,
-        "gain_units": {gain.name: unit_of(gain.name, arm) for gain in LISTED},
-        **gains.by_name,
-        **verdict_answer(verdict, sampling),
-        **{f"{name}_interval": (it := analysis.interval(name)) and list(it) for name, _ in windows},
-        **{f"{name}_intervals": [list(window) for window in each] for name, each in windows},
-        "first_unstable_mode": analysis.first_unstable_mode,
-        "delay_margin_samples": analysis.delay_margin.samples,
-        "delay_margin_is_lower_bound": analysis.delay_margin.is_bound,
-        "required_damping_s": analysis.required_damping,
-        "shown": {
-            **{
-                f"{name}_intervals": [list(map(_figure, pair)) for pair in each]
-                for name, each in analysis.shown.items()
-            },
-            "delay_margin_samples": _figure(analysis.delay),
-            "required_damping_s": _figure(analysis.damping),
-        },
-        "modes": Table(columns=SAMPLED_MODE_COLUMNS, record=analysis.modes),
-    }
-
-
-def _figure(figure: Figure) -> dict[str, Any]:
-    """What is shown of a number: in how many digits, and for which modes these hold."""
-    return {
-        "text": figure.text,
-        "digits": figure.digits,
-        "settled": figure.is_settled,
-        "band_rad_s": figure.band,
-        "modes": figure.modes,
-    }
-
-
-def sampled_law_answer(analysis: Analysis) -> dict[str, Any]:
-    """The analysis as a dictionary of plain numbers, texts and lists."""
-    verdict, loop = analysis.verdict, analysis.loop
-    sampling, bound = loop.chain.sampling, analysis.delay_margin
-    return {
-        "arm": loop.plant.arm.name,
-        **described_law(loop.given, loop.plant.arm),
-        **verdict_answer(verdict, sampling),
-        "nearest": verdict.slowest,
-        "warnings": list(analysis.warnings),
-        "free_hub_angle": loop.has_free_angle,
-        "stable_gain_factors": [list(window) for window in analysis.factors],
-        "gain_factors": None if analysis.gain_factors is None else list(analysis.gain_factors),
-        "windows": Table(columns=SAMPLED_NUMBER_COLUMNS, record=analysis.numbers),
-        "delay_margin_samples": bound.samples,
-        "delay_margin_s": bound.samples * sampling.period,
-        "delay_margin_is_lower_bound": bound.is_bound,
-        "unfiltered_signals": [name for name, analog in zip(loop.in_z.signals, loop.analog, strict=True) if not analog],
-    }
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampledBrief:
     """Whether a loop holds at a chain's sampling, apart from z = 1 of a free hub angle.
@@ -409,9 +361,30 @@ class SampledBrief:
     """
 
     sampling: Sampling
-    is_stable: bool | None
+    is_stable: Annotated[bool | None, Quantity(key="stable")]
     log_radius: float | None
     sentence: str
+
+    @property
+    def period(self) -> Annotated[float, Quantity(unit="s")]:
+        """The sampling period."""
+        return self.sampling.period
+
+    @property
+    def period_is_default(self) -> Annotated[bool, Quantity()]:
+        """Whether it is tfarm's, not the rig's own."""
+        return self.sampling.period == Sampling().period
+
+    @property
+    def delay_samples(self) -> Annotated[float, Quantity()]:
+        """The delay of the chain."""
+        return self.sampling.delay_samples
+
+    @property
+    def spectral_radius(self) -> Annotated[float | None, Quantity("spectral radius")]:
+        """Largest |z|, infinity where it is no double."""
+        size = self.log_radius
+        return None if size is None else math.exp(size) if size < LARGEST_LOG else math.inf
 
     @property
     def at(self) -> str:
@@ -428,24 +401,10 @@ class SampledBrief:
         return f"{verdict} when sampled every {1e3 * self.sampling.period:g} ms"
 
     @property
-    def words(self) -> str:
-        """The clock and the verdict, loud where the gains do not hold."""
-        verdict, _, rest = self.sentence.partition(":")
-        return f"{self.at} these gains are {verdict if self.is_stable else verdict.upper()}:{rest}"
-
-    @property
-    def answer(self) -> dict[str, Any]:
-        """The brief as a dictionary of plain numbers and texts."""
-        size = self.log_radius
-        radius = None if size is None else math.exp(size) if size < LARGEST_LOG else math.inf
-        return {
-            "period_s": self.sampling.period,
-            "period_is_default": self.sampling.period == Sampling().period,
-            "delay_samples": self.sampling.delay_samples,
-            "stable": self.is_stable,
-            "spectral_radius": radius,
-            "in_words": self.words,
-        }
+    def words(self) -> Annotated[str, Quantity("sampled loop", key="in_words")]:
+        """Sampling period and verdict, in capitals where the loop is not stable."""
+        word, _, rest = self.sentence.partition(" ")
+        return f"{word if self.is_stable else word.upper()} {rest}, {self.at}"
 
 
 def sampled_brief(arm: Arm, law: AnyLaw, chain: Chain) -> SampledBrief:

@@ -92,7 +92,7 @@ def nearest_float(ball: Ball) -> complex:
 
 
 def summed(z_sum: Any, z_product: Any, count: int) -> list[Any]:
-    """F0..F3 at a segment's end by so many terms of their series in z1 + z2 and z1 z2: `Jet`s, or series of flint."""
+    """F0..F3 at a segment's end by so many terms of their series in z1 + z2 and z1 z2, series of flint."""
     h, before, sums = 0 * z_sum + 1, 0 * z_sum, [0 * z_sum] * 4
     factorial = Fraction(1)
     for n in range(count):

@@ -20,7 +20,7 @@ Three things keep the last digits, each measured against balls:
   derivatives F1, F2, F3 along x, at x = l, are summed as series in z_1 + z_2 and z_1 z_2.
 
 Where z_1 = z_2 (never on the imaginary axis at C = 0) both forms lose digits: such points are flagged (`PARALLEL`).
-Floats, complex arrays, power series (`Jet`) and balls run through the same lines; numba melts them into its loops.
+Floats, complex arrays, power series and balls run through the same lines; numba melts them into its loops.
 
 A chain of segments without cancelling waves: the plane of states that the outer end allows, carried inwards.
 
@@ -53,7 +53,7 @@ import numpy as np
 
 from .compiled import compiled, fma, inlined
 
-Number = Any  # float, complex, ndarray, Jet or ball
+Number = Any  # float, complex, ndarray, series or ball
 
 # Where a segment's row of the kernel has a, b, g as two doubles each, sigma and C (`layout.kernel_row`).
 A, A_LOW, B, B_LOW, G, G_LOW, SIGMA, DAMPING = range(8)

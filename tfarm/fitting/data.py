@@ -177,6 +177,7 @@ VALUE_PAIRS = (("re", "im"), ("abs", "deg"), ("db", "deg"))
 KNOWN_COLUMNS = (*FREQUENCIES, "re", "im", "abs", "db", "deg", "coherence", "sigma", "averages")
 DATA_FORM = "OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv"
 UFF = (".uff", ".unv", ".uf")
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.ASCII | re.IGNORECASE)
 UFF_RESPONSE = 4  # in UFF 58 the type of a function that is a frequency response
 UFF_FREQUENCY = 18  # and the kind of an abscissa that is a frequency
 
@@ -269,11 +270,8 @@ def _numbers(names: Sequence[str], rows: Sequence[tuple[int, str]], separator: s
 
 def _number(text: str) -> float:
     """The finite number that a cell holds; nan for anything else."""
-    try:
-        value = float(text)
-    except ValueError:
-        return math.nan
-    return value if math.isfinite(value) and text.isascii() and "_" not in text else math.nan
+    value = float(text) if NUMBER.fullmatch(text) else math.nan
+    return value if math.isfinite(value) else math.nan
 
 
 def data_of(text: str, key: str = "--data") -> Measured:

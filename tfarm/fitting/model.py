@@ -1,16 +1,13 @@
-"""What of an arm may be free: any number of its TOML file, by its key, with a start, bounds and perhaps a prior.
+"""Measured less computed: the residuals of an arm whose numbers are free, over their deviations, with derivatives.
 
-A number that cannot be negative is searched for by its logarithm, any other by itself over its size; so a step of the
-search is a share of the number.
-
-An arm and its neighbours, a step away along each number that is free: for derivatives of whatever is read of it.
-
-Frequencies and damping ratios of decays beside measured responses: eigenvalues of the arm, with derivatives.
-
-Measured less computed: the residuals of an arm whose numbers run, over their deviations, with exact derivatives.
+Any number of an arm's TOML file may be free, by its key, with a start, bounds and perhaps a prior.  One that cannot be
+negative is searched for by its logarithm, any other by itself over its size; so a step of the search is a share of the
+number.
 
 The response of one signal to another is the ratio of two of the arm's transfer functions, so of their numerators, times
-a sensor's gain and delay:  H = gain e^{-i w tau} N_out/N_in,  with the drive for N_in where the input is the arm's own.
+a sensor's gain and delay:  H = gain e^{-i w tau} N/D,  with the drive for D where the input is the arm's own.  N and D
+have no poles, however sharp a resonance of H is: their derivatives are central differences, right to about 1e-10.
+Decays of single modes are eigenvalues of the arm.
 """
 
 from __future__ import annotations
@@ -18,26 +15,24 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, cast
+from typing import NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import INPUTS, Arm, Input
 from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError, did_you_mean
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.exact.series import Direction, Jet, response_gradients
-from tfarm.exact.system import System, system_of
 from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import first_frequency
 
-from .data import Measured, Noise, check_signal, in_parts
+from .data import Measured, Noise, in_parts
 
 SIGNED = ("offset",)  # numbers of an arm that may be negative
 UPPER_ENDS = {"gear_efficiency": 1.0, "poissons_ratio": 0.5}  # and those that end somewhere
@@ -84,16 +79,11 @@ class Parameter:
         high = self.coordinate(self.high) if self.high < math.inf else math.inf
         return max(low, -math.log(FARTHEST_FROM_START)), min(high, math.log(FARTHEST_FROM_START))
 
-    def known_ends(
-        self, coordinates: Sequence[float], values: tuple[float, float]
-    ) -> tuple[float | None, float | None]:
-        """Ends of an interval, None where only the reach of the search ended it and no bound of the number."""
-        reach, (first, last) = math.log(FARTHEST_FROM_START), coordinates
-        if not self.by_logarithm or self.start < 0:
-            return values
-        is_low = first > -reach + AT_REACH or self.low > 0
-        is_high = last < reach - AT_REACH or self.high < math.inf
-        return values[0] if is_low else None, values[1] if is_high else None
+    def ends(self, coordinates: Sequence[float]) -> list[float | None]:
+        """The numbers at the ends of an interval, the lower first; None where only the reach of the search ended it."""
+        farthest = math.log(FARTHEST_FROM_START) - AT_REACH if self.by_logarithm else math.inf
+        found = [self.value(each) if abs(each) < farthest else None for each in coordinates]
+        return found if self.start > 0 or not self.by_logarithm else found[::-1]
 
     def slope(self, coordinate: float) -> float:
         """d value/d coordinate."""
@@ -171,36 +161,6 @@ def _typical(arm: Arm, key: str, own: float) -> float:
     return 0.01 * of_the_arm[name] if own == 0 else 100 * of_the_arm[name]
 
 
-class Around:
-    """An arm and its neighbours a step below and above along each free number, as chains, made once for each drive.
-
-    Where there is no arm on one side, at the tip for what is attached, the arm itself stands in its place.
-    """
-
-    def __init__(self, arm: Arm, pairs: Sequence[tuple[Arm, ...]]) -> None:
-        self.arm, self._pairs = arm, pairs
-        self._chains: dict[str, tuple[System, list[tuple[System, System]]]] = {}
-
-    def gradients(self, driven: str, names: tuple[str, ...], s: Complex) -> tuple[Jet, list[Jet]]:
-        """Drive and signals at s, up to one factor, with their derivatives along the free numbers."""
-        if driven not in self._chains:
-            pairs = [(system_of(under_drive(a, driven)), system_of(under_drive(b, driven))) for a, b in self._pairs]
-            self._chains[driven] = system_of(under_drive(self.arm, driven)), pairs
-        chain, pairs = self._chains[driven]
-        signals, own = Signals(self.arm, names), self.arm
-        along = [
-            Direction(
-                below,
-                above,
-                Signals(a, names).places,
-                Signals(b, names).places,
-                COORDINATE_STEP * ((a != own) + (b != own)),
-            )
-            for (below, above), (a, b) in zip(pairs, self._pairs, strict=True)
-        ]
-        return response_gradients(chain, signals.outputs, signals.places, along, s)
-
-
 def drive_behind(arm: Arm, name: str) -> str:
     """What drives an arm where that is the input of a response: the arm's own drive, where it is over a signal."""
     return name if name in INPUTS and name not in OUTPUTS else arm.input
@@ -262,41 +222,33 @@ def mode_of(text: str) -> RingMode:
     )
 
 
-def ring_residuals(here: Around, rings: tuple[RingMode, ...], size: int) -> tuple[Real, Real]:
-    """Computed less measured over its deviation (n,), of logarithms of frequencies and of ratios; slopes (n, size)."""
+def ring_residuals(arm: Arm, rings: Sequence[RingMode]) -> Real:
+    """Computed less measured over its deviation (n,), of logarithms of frequencies and of ratios."""
     rows: list[float] = []
-    slopes: list[Any] = []
     for each in rings:
-        s, ds = eigenvalue(here, each.number)
-        pad = np.zeros(size - ds.size)
-        share = each.frequency_deviation / each.frequency
-        rows.append(math.log(s.imag / each.frequency) / share)
-        slopes.append(np.r_[ds.imag / s.imag / share, pad])
+        s = eigenvalue(arm, each.number)
+        rows.append(math.log(s.imag / each.frequency) * each.frequency / each.frequency_deviation)
         if each.ratio is not None:
-            size_of, d_size = abs(s), (s.conjugate() * ds).real / abs(s)
-            rows.append((-s.real / size_of - each.ratio) / each.ratio_deviation)
-            d_ratio = -ds.real / size_of + s.real * d_size / size_of**2
-            slopes.append(np.r_[d_ratio / each.ratio_deviation, pad])
-    return np.array(rows), np.array(slopes).reshape(-1, size)
+            rows.append((-s.real / abs(s) - each.ratio) / each.ratio_deviation)
+    return np.array(rows)
 
 
-def eigenvalue(here: Around, number: int) -> tuple[complex, NDArray[Any]]:
-    """The eigenvalue s [1/s] of a flexible mode and its derivatives (numbers of the arm,), by Newton's method.
+def eigenvalue(arm: Arm, number: int) -> complex:
+    """The eigenvalue s [1/s] of a flexible mode, by Newton's method on the drive.
 
     It starts from the undamped natural frequency; ConvergenceError where a damped mode does not ring near that.
     """
-    arm = here.arm
-    s = 1j * float(modes(arm, number).natural_frequency[-1])
+    s, read = 1j * float(modes(arm, number).natural_frequency[-1]), Signals(arm, ("hub_angle",))
     for _ in range(EIGENVALUE_STEPS):
-        drive, _ = here.gradients(arm.input, ("hub_angle",), np.array([s, s * (1 + NUDGE)]))
-        f, by_s = drive.c[0][0], (drive.c[0][1] - drive.c[0][0]) / (s * NUDGE)
-        step = complex(f / by_s)
+        drive, _, scale = read.parts(np.array([s, s * (1 + NUDGE)]))
+        value, nearby = drive * np.exp(scale - scale[0])
+        step = complex(value / (nearby - value) * s * NUDGE)
         s -= step
         if abs(step) < EIGENVALUE_FIRM * abs(s) or not abs(step) < abs(s):
             break
     if not (abs(step) < 1e-8 * abs(s) and s.imag > 0):
         raise ConvergenceError(f"mode {number} of {arm.name} does not ring near its undamped frequency", s, abs(step))
-    return s, np.asarray(-drive.c[1][:, 0] / by_s)
+    return s
 
 
 WALL = 10.0  # times the largest residual of the first point: so high that no search goes on there
@@ -316,6 +268,19 @@ class Response:
     def size(self) -> int:
         """How many real residuals it has: two a frequency at which something was measured."""
         return 2 * int(np.isfinite(self.noise.sigma).sum())
+
+    def over_deviation(self, values: Complex) -> Real:
+        """Values at its frequencies over their deviations: real parts, then imaginary ones, of what was measured."""
+        kept = np.isfinite(self.noise.sigma)
+        return in_parts(values[kept] / self.noise.sigma[kept])
+
+
+class Fraction(NamedTuple):
+    """A response N/D at its frequencies (n,), and `scale`, ln of a factor that both lack."""
+
+    N: Complex
+    D: Complex
+    scale: Real
 
 
 @dataclass(frozen=True)
@@ -352,96 +317,39 @@ class Problem:
         low, high = self.bounds
         return np.clip(point, low + INSIDE_BOUNDS, high - INSIDE_BOUNDS)
 
-    @property
-    def size(self) -> int:
-        """How many real residuals there are: two a frequency, one or two a decay, one a prior."""
-        priors = sum(each.prior is not None for each in self.parameters)
-        rings = sum(1 + (each.ratio is not None) for each in self.rings)
-        return sum(each.size for each in self.responses) + rings + priors
-
-    def numbers(self, point: Real) -> dict[str, float]:
-        """The arm's numbers at a point of the search, by key."""
-        return {each.key: each.value(float(x)) for each, x in zip(self.of_the_arm, point, strict=False)}
-
     def arm(self, point: Real) -> Arm:
         """The arm at a point."""
-        return self.family.at(self.numbers(point))
+        return self.family.at(
+            {each.key: each.value(x) for each, x in zip(self.of_the_arm, point.tolist(), strict=False)}
+        )
 
     # ------------------------------------------------------------ responses
 
     def computed(self, point: Real) -> list[Complex]:
         """Each response at its own frequencies."""
-        return [np.asarray(over / under) for over, under, _ in self.fractions(point)]
+        return [np.asarray(each.N / each.D) for each in self.fractions(point)]
 
-    def fractions(self, point: Real, share: float = 0.0) -> list[tuple[Complex, Complex, Real]]:
-        """Numerator, denominator, and ln of the factor that both lack, of each response at s = (i + share) w."""
-        arm = self.arm(point)
-        found: list[Any] = [None] * len(self.responses)
+    def fractions(self, point: Real, share: float = 0.0) -> list[Fraction]:
+        """Each response at s = (i + share) w."""
+        arm, found = self.arm(point), {}
         for (_, driven), numbers in self._grids.items():
-            names = self._signals(numbers, driven)
+            pairs = [(self.responses[n].data.output, self.responses[n].data.input) for n in numbers]
+            names = tuple(dict.fromkeys(name for pair in pairs for name in pair if name != driven))
             s = (1j + share) * self.responses[numbers[0]].data.omega
-            parts = Signals(under_drive(arm, driven), names).parts(s)
-            for n in numbers:
-                over, under = self._over_and_under(n, names, parts.drive, parts.numerators)
-                found[n] = over * self._sensor(n, point), under, parts.scale.real
-        return found
+            drive, numerators, scale = Signals(under_drive(arm, driven), names).parts(s)
+            known = dict(zip(names, numerators, strict=True)) | {driven: drive}
+            for n, (output, input) in zip(numbers, pairs, strict=True):
+                found[n] = Fraction(known[output] * self._sensor(n, point), known[input], np.asarray(scale.real))
+        return [found[n] for n in range(len(self.responses))]
 
-    def slopes(self, point: Real, here: Around | None = None) -> list[tuple[Complex, Complex]]:
-        """Each response, and its derivative (parameters, n) along each coordinate."""
-        here, found = here or self.around(point), list[Any]([None] * len(self.responses))
-        for (_, driven), numbers in self._grids.items():
-            names, s = self._signals(numbers, driven), 1j * self.responses[numbers[0]].data.omega
-            drive, outputs = here.gradients(driven, names, s)
-            for n in numbers:
-                over, under = self._over_and_under(n, names, drive, outputs)
-                found[n] = self._with_slopes(n, over, under, point, s)
-        return found
-
-    def around(self, point: Real) -> Around:
-        """The arm at a point, and those a step away along each of its own numbers."""
-        base, pairs = self.numbers(point), []
-        own = self.family.at(base)
-        for each, x in zip(self.of_the_arm, point, strict=False):
-            sides = []
-            for step in (-COORDINATE_STEP, COORDINATE_STEP):
-                try:
-                    sides.append(self.family.at(base | {each.key: each.value(float(x) + step)}))
-                except ParameterError:
-                    sides.append(own)
-            pairs.append(tuple(sides))
-        return Around(own, tuple(pairs))
-
-    def _with_slopes(self, n: int, over: Jet, under: Jet, point: Real, s: Complex) -> tuple[Complex, Complex]:
+    def _sensor(self, n: int, point: Real) -> Complex:
+        """Gain and delay of the sensor of a response, at its frequencies."""
         one = self.responses[n]
-        H = over.c[0] / under.c[0] * self._sensor(n, point)
-        slopes = np.zeros((len(self.parameters), s.size), complex)
-        slopes[: len(self.of_the_arm)] = H * (over.c[1] / over.c[0] - under.c[1] / under.c[0])
-        if one.gain is not None:
-            slopes[one.gain] = H  # by its logarithm
-        if one.delay is not None:
-            slopes[one.delay] = -s * H * self.parameters[one.delay].size
-        return H, slopes
-
-    def _signals(self, numbers: Sequence[int], driven: str) -> tuple[str, ...]:
-        """What is read of the arm for those responses."""
-        pairs = [(self.responses[n].data.output, self.responses[n].data.input) for n in numbers]
-        return tuple(dict.fromkeys(name for output, input in pairs for name in (output, input) if name != driven))
-
-    def _over_and_under(self, n: int, names: tuple[str, ...], drive: Any, numerators: Any) -> tuple[Any, Any]:
-        """Numerator and denominator of a response: jets or arrays."""
-        one = self.responses[n].data
-        if one.output == drive_behind(self.family.arm, one.input):  # the input over a signal
-            return drive, numerators[names.index(one.input)]
-        return numerators[names.index(one.output)], numerators[names.index(one.input)] if one.input in names else drive
-
-    def _sensor(self, n: int, point: Real) -> Any:
-        one, factor = self.responses[n], 1.0
-        if one.gain is not None:
-            factor = self.parameters[one.gain].value(float(point[one.gain]))
-        if one.delay is not None:
-            delay = self.parameters[one.delay].value(float(point[one.delay]))
-            return factor * np.exp(-1j * one.data.omega * delay)
-        return factor
+        gain, delay = (
+            usual if place is None else self.parameters[place].value(float(point[place]))
+            for place, usual in ((one.gain, 1.0), (one.delay, 0.0))
+        )
+        return np.asarray(gain * np.exp(-1j * delay * one.data.omega))
 
     def at(self, number: int, omega: Real) -> Problem:
         """The problem of one of its responses alone, at other frequencies: for curves."""
@@ -452,59 +360,47 @@ class Problem:
     # ------------------------------------------------------------ residuals
 
     def residuals(self, point: Real) -> Real:
-        """(size,): real and imaginary parts of computed less measured over their deviations, then the priors."""
-        pairs = zip(self.computed(point), self.responses, strict=True)
-        away = [_parts((H - one.data.values) / one.noise.sigma, one) for H, one in pairs]
-        rings = ring_residuals(Around(self.arm(point), ()), self.rings, point.size)[0] if self.rings else np.empty(0)
-        coordinates = zip(self.parameters, point.tolist(), strict=True)
-        priors = [(each.value(x) - each.prior[0]) / each.prior[1] for each, x in coordinates if each.prior is not None]
-        return np.concatenate([*away, rings, priors])
+        """(size,): real and imaginary parts of computed less measured over their deviations, then decays and priors."""
+        fractions, others = self._terms(point)
+        pairs = zip(fractions, self.responses, strict=True)
+        return np.concatenate([*(one.over_deviation(N / D - one.data.values) for (N, D, _), one in pairs), others])
 
     def jacobian(self, point: Real) -> Real:
         """(size, parameters): the derivatives of the residuals."""
-        here = self.around(point)
-        pairs = zip(self.slopes(point, here), self.responses, strict=True)
-        rows = [_parts(dH / one.noise.sigma, one) for (_, dH), one in pairs]
-        rings = ring_residuals(here, self.rings, point.size)[1]
-        priors = [
-            row * each.slope(x) / each.prior[1]
-            for row, each, x in zip(np.eye(point.size), self.parameters, point.tolist(), strict=True)
-            if each.prior is not None
-        ]
-        return np.concatenate([*(row.T for row in rows), rings, np.reshape(priors, (-1, point.size))])
+        here = self._terms(point)
+        return np.stack([self._slope(here, point, step) for step in COORDINATE_STEP * np.eye(point.size)], axis=1)
+
+    def _slope(self, here: tuple[list[Fraction], Real], point: Real, step: Real) -> Real:
+        """The derivatives along one coordinate; from the arm itself where there is none on one side."""
+        sides, width = [here, here], 0.0
+        for side, to in enumerate((point - step, point + step)):
+            with suppress(ParameterError):
+                sides[side] = self._terms(to)
+                width += COORDINATE_STEP
+        (below, low), (above, high) = sides
+        slopes = []
+        for (N, D, scale), down, up, one in zip(here[0], below, above, self.responses, strict=True):
+            lower, upper = np.exp(down.scale - scale), np.exp(up.scale - scale)
+            dN, dD = up.N * upper - down.N * lower, up.D * upper - down.D * lower
+            slopes.append(one.over_deviation((dN - N / D * dD) / D))
+        return np.concatenate([*slopes, high - low]) / max(width, COORDINATE_STEP)
+
+    def _terms(self, point: Real) -> tuple[list[Fraction], Real]:
+        """The responses, and what decays and priors leave."""
+        coordinates = zip(self.parameters, point.tolist(), strict=True)
+        priors = [(each.value(x) - each.prior[0]) / each.prior[1] for each, x in coordinates if each.prior is not None]
+        return self.fractions(point), np.r_[ring_residuals(self.arm(point), self.rings), priors]
 
 
-def walled(residuals: Callable[[Real], Real]) -> Callable[[Real], Real]:
-    """The residuals, and a wall where there is no arm (a mass beyond the tip): `WALL` times the first one's largest."""
-    walls: list[Real] = []
+def walled(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real], Real]:
+    """The residuals, and where there is no arm (a mass beyond the tip) a wall: `WALL` times the first's largest."""
+    near = residuals(first)
+    wall = np.full(near.size, WALL * max(float(abs(near).max(initial=0.0)), 1.0))
 
     def found(x: Real) -> Real:
         try:
-            values = residuals(x)
+            return residuals(x)
         except ParameterError:
-            if not walls:
-                raise
-            return walls[0]
-        if not walls:
-            walls.append(np.full(values.size, WALL * max(float(abs(values).max(initial=0.0)), 1.0)))
-        return values
+            return wall
 
     return found
-
-
-def _parts(values: Complex, one: Response) -> Real:
-    """Real and imaginary parts, one behind the other, of what was measured."""
-    return in_parts(values[..., np.isfinite(one.noise.sigma)])
-
-
-def check_signals(arm: Arm, data: Sequence[Measured]) -> None:
-    """Raise ParameterError where a response names what is no signal of the arm."""
-    for each in data:
-        for name, role in ((each.output, "output"), (each.input, "input")):
-            check_signal(name, f"{role} of {each.name}")
-            if name in INPUTS and name not in OUTPUTS:
-                under_drive(arm, name)  # which needs a motor, or refuses
-            else:
-                Signals(arm, (name,))
-        if each.output == each.input:
-            raise ParameterError(key=each.name, value="1", remedy="a signal over itself says nothing of the arm")

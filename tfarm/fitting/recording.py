@@ -36,7 +36,6 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm, tracked
@@ -313,14 +312,17 @@ def frequency_response(
     """
     check_signal(output, "--output")
     check_signal(input, "--input")
+    from scipy.signal import csd, get_window, welch
+
     names = columns or (output, input)
     y, x = recording.signal(names[0], "--output"), recording.signal(names[1], "--input")
     kind, taper = _one_of("--estimator", estimator, Estimator), _one_of("--window", window, Taper)
     size, step = _cut(recording, segment, (0.5 if taper == "hann" else 0.0) if overlap is None else overlap)
-    w = np.hanning(size + 1)[:-1] if taper == "hann" else np.ones(size)
-    kept, values, coherence = _estimated(kind, cross_spectra(x, y, w, step), names, recording)
+    how = {"window": taper, "nperseg": size, "noverlap": size - step}
+    spectra = welch(x, **how)[1], csd(x, y, **how)[1], welch(y, **how)[1]
+    kept, values, coherence = _estimated(kind, spectra, names, recording)
     count = 1 + (recording.count - size) // step
-    averages = independent_averages(w, step, count)
+    averages = independent_averages(get_window(taper, size), step, count)
     measured = Measured(
         output=output,
         input=input,
@@ -341,13 +343,6 @@ def frequency_response(
         independent=averages,
         clock=recording.said,
     )
-
-
-def cross_spectra(x: Real, y: Real, w: Real, step: int) -> tuple[Real, Complex, Real]:
-    """S_xx, S_xy and S_yy (lines,) of segments as long as w, begun `step` samples apart; up to a common factor."""
-    cuts = (sliding_window_view(each, w.size)[::step] for each in (x, y))
-    X, Y = (np.fft.rfft((cut - cut.mean(axis=1, keepdims=True)) * w, axis=1) for cut in cuts)
-    return (abs(X) ** 2).mean(0), (X.conj() * Y).mean(0), (abs(Y) ** 2).mean(0)
 
 
 def _estimated(

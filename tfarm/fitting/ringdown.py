@@ -12,9 +12,8 @@ what is left is noise with a spectrum or something that the model lacks; the cov
 and the answer says so: of noise that rings with the decay the fit has taken part away, so that nominal 95 % hold some
 85, and intervals of a wrong model are too narrow by any formula.
 
-A sum of damped sinusoids: its formula with derivatives, where a fit of it begins, and what its residuals leave.
-
-Parameters are sigma, w, a and b of each mode, and the constant c last (see `ringdown`).
+The amplitudes a, b and the constant c are linear: for each trial of the poles s = -sigma + i w they are those of the
+least squares (Golub and Pereyra 1973), so that only the poles are searched for.
 """
 
 from __future__ import annotations
@@ -44,8 +43,7 @@ FASTEST = 3.0  # the logarithm by which a pole of the start may grow during the 
 THINNER = 4  # from one such mean to the next
 SPARE_POLES = 4  # further poles of the start, which take up drift and noise
 CLEAR_LAG = 2.5  # deviations of an autocorrelation of white noise, 1/sqrt(n), above which one stands out
-LINEAR = 1  # the constant c, the last of the parameters
-EACH = 4  # parameters of a mode: sigma, w, a, b
+EACH = 4  # parameters of a mode: sigma, w, a, b; the constant c is the last
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,19 +144,17 @@ def ring(
     many oscillations are not found.
     """
     t, y = _part(recording, name, start, stop, modes)
-    found = least_squares(t - t[0], y, start_of(t - t[0], y, modes))
+    poles = starting_poles(t - t[0], y, modes)
+    found = None if poles is None else nearest_sum(t - t[0], y, poles)
     if found is None:
         word = "oscillation" if modes == 1 else f"{modes} oscillations"
         raise ConvergenceError(f"no {word} found in the decay: choose other times, or fewer modes", None, None)
-    x, J, e = found
-    cosine, sine = J[:, 2:-LINEAR:EACH], J[:, 3:-LINEAR:EACH]
-    energy = ((cosine * x[2:-LINEAR:EACH] + sine * x[3:-LINEAR:EACH]) ** 2).sum(axis=0)
-    order = np.argsort(-energy, kind="stable")
-    freedom = y.size - x.size
-    white = whiteness(e) if e @ e > y.size * (RING_ROUNDING * abs(y).max()) ** 2 else 1.0
-    spread = covariance(J, e, freedom, is_white=white >= NOT_WHITE)
-    places = EACH * order
-    early, late, std = _halves(t - t[0], y, x, order)
+    order = np.argsort(-found.energy, kind="stable")
+    residual = float(np.sqrt(found.e @ found.e / found.freedom))
+    is_rounding = found.e @ found.e <= y.size * (RING_ROUNDING * abs(y).max()) ** 2
+    white = 1.0 if is_rounding else whiteness(found.e)
+    spread = found.covariance(is_white=white >= NOT_WHITE)
+    early, late, std = _halves(t - t[0], y, found.poles)
     return Ring(
         signal=name,
         source=recording.source,
@@ -166,15 +162,15 @@ def ring(
         start=float(t[0]),
         stop=float(t[-1]),
         samples=y.size,
-        poles=-x[places] + 1j * x[places + 1],
-        amplitude=np.hypot(x[places + 2], x[places + 3]),
-        covariance=np.array([spread[p : p + 2, p : p + 2] for p in places]),
-        freedom=freedom,
-        residual=float(np.sqrt(e @ e / freedom)),
+        poles=found.poles[order],
+        amplitude=found.amplitude[order],
+        covariance=np.array([spread[np.ix_([n, n + modes], [n, n + modes])] for n in order]),
+        freedom=found.freedom,
+        residual=residual,
         white=white,
-        early=early,
-        late=late,
-        halves_std=std,
+        early=early[order],
+        late=late[order],
+        halves_std=std[order],
     )
 
 
@@ -186,7 +182,7 @@ def _part(recording: Recording, name: str, start: float | None, stop: float | No
     kept = (t >= low - half * 1e-6) & (t <= high + half * 1e-6)
     if not 1 <= modes <= MOST_RINGING:
         raise ParameterError(key="--modes", value=modes, remedy=f"a whole number from 1 to {MOST_RINGING}")
-    least = 4 * (EACH * modes + LINEAR)
+    least = 4 * (EACH * modes + 1)
     if kept.sum() < least:
         span = f"the record goes from {t[0]:g} to {t[-1]:g} s"
         remedy = f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least} ({span})"
@@ -196,71 +192,100 @@ def _part(recording: Recording, name: str, start: float | None, stop: float | No
     return t[kept], y[kept]
 
 
-def _halves(t: Real, y: Real, x: Real, order: NDArray[np.intp]) -> tuple[Real, Real, Real]:
-    """w by each half of the record, from the whole's parameters on, and the deviation of their difference.
+def _halves(t: Real, y: Real, poles: Complex) -> tuple[Real, Real, Real]:
+    """w by each half of the record, from the whole's poles on, and the deviation of their difference.
 
     Where a half does not tell, w of the whole and an infinite deviation.
     """
-    middle = t.size // 2
+    middle, count = t.size // 2, poles.size
     pairs = []
     for part in (slice(None, middle), slice(middle, None)):
-        own_t = t[part] - t[part][0]
-        s = -x[:-LINEAR:EACH] + 1j * x[1:-LINEAR:EACH]
-        found = least_squares(own_t, y[part], _linear(s, own_t, y[part])[1]) if y[part].size > 2 * x.size else None
+        is_long = y[part].size > 2 * (EACH * count + 1)
+        found = nearest_sum(t[part] - t[part][0], y[part], poles) if is_long else None
         if found is None:
-            pairs.append((x[1:-LINEAR:EACH], np.full(order.size, np.inf)))
+            pairs.append((poles.imag, np.full(count, np.inf)))
             continue
-        own, J, e = found
-        C = covariance(J, e, e.size - x.size, is_white=whiteness(e) >= NOT_WHITE)
-        w, variance = own[1:-LINEAR:EACH], np.diag(C)[1:-LINEAR:EACH]
-        a, b, of_a, of_b = (each[k:-LINEAR:EACH] for each in (own, np.diag(C)) for k in (2, 3))
-        pairs.append((w, np.where(a**2 + b**2 > AMPLITUDE_TOLD**2 * (of_a + of_b) / 2, variance, np.inf)))
+        variance = np.diag(found.covariance(is_white=whiteness(found.e) >= NOT_WHITE))
+        _, of_w, of_a, of_b = variance[:-1].reshape(EACH, count)
+        is_clear = found.amplitude**2 > AMPLITUDE_TOLD**2 * (of_a + of_b) / 2
+        pairs.append((found.poles.imag, np.where(is_clear, of_w, np.inf)))
     (early, one), (late, other) = pairs
-    return early[order], late[order], np.sqrt(one + other)[order]
+    return np.asarray(early), np.asarray(late), np.sqrt(one + other)
 
 
-def least_squares(t: Real, y: Real, start: Real | None) -> tuple[Real, Real, Real] | None:
-    """The parameters with the least sum of squares from a start on, their Jacobian (samples, parameters), residuals.
+def basis(poles: Complex, t: Real) -> Real:
+    """The decaying cosines and sines of the poles (n,) at times (samples,), and 1: (samples, 2 n + 1)."""
+    waves = np.exp(np.clip(np.outer(t, poles.real), -700, 700) + 1j * np.outer(t, poles.imag))
+    return np.c_[waves.real, waves.imag, np.ones(t.size)]
 
-    None where that is no oscillation in the record.
-    """
-    from scipy.optimize import least_squares as minimised
 
-    if start is None:
+def _linear(poles: Complex, t: Real, y: Real) -> tuple[Real, Real]:
+    """Their amplitudes a, then b, and c by least squares, and what is left of y."""
+    columns = basis(poles, t)
+    linear = np.asarray(np.linalg.lstsq(columns, y, rcond=None)[0], dtype=float)
+    return linear, np.asarray(y - columns @ linear)
+
+
+@dataclass(frozen=True)
+@record
+class DampedSum:
+    """A sum with `poles` (n,), `linear` (2 n + 1,), a, b and c, at times t, and what it leaves of y: e (samples,)."""
+
+    poles: Complex
+    linear: Real
+    t: Real
+    e: Real
+
+    @cached_property
+    def jacobian(self) -> Real:
+        """Derivatives of the formula (samples, 4 n + 1) by the sigma, then by the w, the a, the b, and c."""
+        n, columns, by_time = self.poles.size, basis(self.poles, self.t), self.t[:, None]
+        cosines, sines, (a, b) = columns[:, :n], columns[:, n:-1], self.linear[:-1].reshape(2, n)
+        return np.c_[-by_time * (a * cosines + b * sines), by_time * (b * cosines - a * sines), columns]
+
+    @property
+    def amplitude(self) -> Real:
+        """(n,): (a^2 + b^2)^(1/2)."""
+        return np.asarray(np.hypot(*self.linear[:-1].reshape(2, -1)))
+
+    @property
+    def energy(self) -> Real:
+        """(n,): the sum of squares of each mode alone."""
+        n, parts = self.poles.size, (basis(self.poles, self.t) * self.linear)[:, :-1]
+        return np.asarray(((parts[:, :n] + parts[:, n:]) ** 2).sum(axis=0))
+
+    @property
+    def freedom(self) -> int:
+        """Samples less parameters."""
+        return self.e.size - EACH * self.poles.size - 1
+
+    def covariance(self, *, is_white: bool) -> Real:
+        """Of the parameters (4 n + 1, 4 n + 1); the Jacobian's columns are scaled for the inverse's sake."""
+        scale = np.sqrt((self.jacobian**2).sum(axis=0))
+        J, e = self.jacobian / scale, self.e
+        bread = np.linalg.pinv(J.T @ J)
+        meat = J.T @ J * (e @ e) / self.freedom if is_white else _meat(J, e) * e.size / self.freedom
+        return np.asarray(bread @ meat @ bread / np.outer(scale, scale))
+
+
+def nearest_sum(t: Real, y: Real, start: Complex) -> DampedSum | None:
+    """The sum with the least squares next to the poles of a start; None where that is no oscillation in the record."""
+    from scipy.optimize import least_squares
+
+    def left(x: Real) -> Real:
+        return _linear(x[: start.size] + 1j * x[start.size :], t, y)[1]
+
+    found = least_squares(left, np.r_[start.real, start.imag], method="lm", x_scale="jac", xtol=1e-12)
+    poles, period = found.x[: start.size] + 1j * found.x[start.size :], t[1] - t[0]
+    is_inside = (poles.imag > 0) & (poles.imag < np.pi / period) & (abs(poles.real) < 2 / period)
+    if not (found.success and is_inside.all()):
         return None
-
-    def residuals(x: Real) -> Real:
-        return np.asarray(model(x, t)[0] - y)
-
-    def slopes(x: Real) -> Real:
-        return model(x, t)[1]
-
-    found = minimised(residuals, start, jac=slopes, method="lm", x_scale="jac", xtol=1e-12)
-    w, sigma = found.x[1:-LINEAR:EACH], found.x[:-LINEAR:EACH]
-    period = t[1] - t[0]
-    inside = (w > 0) & (w < np.pi / period) & (abs(sigma) < 2 / period)
-    if not (found.success and inside.all()):
-        return None
-    values, J = model(found.x, t)
-    return found.x, J, y - values
+    linear, e = _linear(poles, t, y)
+    return DampedSum(poles, linear, t, e)
 
 
-def model(x: Real, t: Real) -> tuple[Real, Real]:
-    """The formula at times t (n,), and its derivatives by (sigma, w, a, b) of each mode and c: (n, 4 modes + 1)."""
-    values, J = np.full(t.size, x[-1]), np.empty((t.size, x.size))
-    J[:, -1] = 1.0
-    for at in range(0, x.size - LINEAR, EACH):
-        sigma, w, a, b = x[at : at + EACH]
-        decay = np.exp(np.clip(-sigma * t, -700, 700))
-        C, S = decay * np.cos(w * t), decay * np.sin(w * t)
-        part = a * C + b * S
-        values += part
-        J[:, at], J[:, at + 1], J[:, at + 2], J[:, at + 3] = -t * part, t * (b * C - a * S), C, S
-    return values, J
-
-
-def start_of(t: Real, y: Real, modes: int) -> Real | None:
-    """Parameters to start from: of ESPRIT's poles at several rates of sampling those that leave least, one by one.
+def starting_poles(t: Real, y: Real, modes: int) -> Complex | None:
+    """Poles to start from: of ESPRIT's at several rates of sampling those that leave least, one by one.
 
     None if there are not so many poles that turn half a turn in the record, and neither die in a sample nor explode.
     """
@@ -271,24 +296,13 @@ def start_of(t: Real, y: Real, modes: int) -> Real | None:
         thin *= THINNER
     s = np.concatenate(found)
     s = s[(s.imag > math.pi / duration) & (s.real * period > -1) & (s.real * duration < FASTEST)]
-    chosen, x = s[:0], None
+    chosen = s[:0]
     for _ in range(modes):
-        tried = [_linear(np.r_[chosen, each], t, y) for each in s if each not in chosen]
+        tried = [np.r_[chosen, each] for each in s if each not in chosen]
         if not tried:
             return None
-        _, x = min(tried, key=lambda pair: pair[0])
-        chosen = -x[:-LINEAR:EACH] + 1j * x[1:-LINEAR:EACH]
-    return x
-
-
-def _linear(s: Complex, t: Real, y: Real) -> tuple[float, Real]:
-    """What those with these poles leave of y, squared, and their parameters: the linear ones by least squares."""
-    x = np.zeros(EACH * s.size + LINEAR)
-    x[:-LINEAR:EACH], x[1:-LINEAR:EACH] = -s.real, s.imag
-    linear = np.r_[[EACH * m + k for m in range(s.size) for k in (2, 3)], x.size - 1]
-    basis = model(x, t)[1][:, linear]
-    x[linear], *_ = np.linalg.lstsq(basis, y, rcond=None)
-    return float(((basis @ x[linear] - y) ** 2).sum()), x
+        chosen = min(tried, key=lambda poles: float((_linear(poles, t, y)[1] ** 2).sum()))
+    return chosen
 
 
 def _poles(y: Real, count: int) -> Complex:
@@ -300,15 +314,6 @@ def _poles(y: Real, count: int) -> Complex:
     turn, *_ = np.linalg.lstsq(V[:-1], V[1:], rcond=None)
     z = np.linalg.eigvals(turn)
     return np.asarray(np.log(z[z != 0]))
-
-
-def covariance(J: Real, e: Real, freedom: int, *, is_white: bool) -> Real:
-    """Of the parameters (parameters, parameters); the columns of J are scaled for the inverse's sake."""
-    scale = np.sqrt((J**2).sum(axis=0))
-    scaled = J / scale
-    bread = np.linalg.pinv(scaled.T @ scaled)
-    meat = scaled.T @ scaled * (e @ e) / freedom if is_white else _meat(scaled, e) * e.size / freedom
-    return np.asarray(bread @ meat @ bread / np.outer(scale, scale))
 
 
 def _meat(J: Real, e: Real) -> Real:
@@ -336,6 +341,6 @@ def whiteness(e: Real) -> float:
 
 
 def _autocovariance(e: Real) -> Real:
-    size = 2 ** math.ceil(math.log2(2 * e.size))
-    power = abs(np.fft.rfft(e, size)) ** 2
-    return np.asarray(np.fft.irfft(power, size)[: e.size] / e.size)
+    from scipy.signal import correlate
+
+    return np.asarray(correlate(e, e)[e.size - 1 :] / e.size)

@@ -35,7 +35,7 @@ from tfarm.errors import ParameterError
 from tfarm.records import record
 
 from .data import CONFIDENCE, in_parts
-from .model import Around, Problem, ring_residuals, walled
+from .model import Problem, ring_residuals, walled
 
 LADDERS = ((0.1,), (1.0, 0.3, 0.1))  # shares of w, one after another, of the first starts
 DRAWS = 300  # points about one that the equation errors lead to
@@ -85,7 +85,14 @@ def least_errors(problem: Problem, first: Real, share: float) -> OptimizeResult:
         return np.concatenate([equation_errors(problem, x, share), (x - first) / START_DEVIATION])
 
     return least_squares(
-        walled(errors), first, bounds=problem.bounds, loss="soft_l1", f_scale=LOSS, max_nfev=STEPS, xtol=1e-4, ftol=1e-4
+        walled(errors, first),
+        first,
+        bounds=problem.bounds,
+        loss="soft_l1",
+        f_scale=LOSS,
+        max_nfev=STEPS,
+        xtol=1e-4,
+        ftol=1e-4,
     )
 
 
@@ -107,10 +114,10 @@ def equation_errors(problem: Problem, point: Real, share: float) -> Real:
         W = (abs(smooth_N) + (abs(D) + each.noise.sigma) * abs(smooth_P)) * np.exp(there - here)
         errors.append(in_parts((N - D * P) / W))
     if problem.rings:
-        decays = ring_residuals(Around(problem.arm(point), ()), problem.rings, point.size)[0]
-        shares = [(each.frequency_deviation / each.frequency, each.ratio is None) for each in problem.rings]
-        weights = np.concatenate([[size] if is_alone else [size, 0.0] for size, is_alone in shares])
-        errors.append(decays * weights)
+        weights = [
+            [each.frequency_deviation / each.frequency, 0.0][: 1 + (each.ratio is not None)] for each in problem.rings
+        ]
+        errors.append(ring_residuals(problem.arm(point), problem.rings) * np.concatenate(weights))
     return np.concatenate(errors)
 
 
@@ -256,7 +263,8 @@ def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None
     point = start.copy()
     point[list(held)] = list(held.values())
     if not free:
-        return Solution(problem, point, problem.residuals(point), np.zeros((problem.size, start.size)), True, 1)
+        residuals = problem.residuals(point)
+        return Solution(problem, point, residuals, np.zeros((residuals.size, start.size)), True, 1)
     low, high = (each[free] for each in problem.bounds)
 
     def whole(x: Real) -> Real:
@@ -267,8 +275,9 @@ def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None
     def jacobian(x: Real) -> Real:
         return np.asarray(problem.jacobian(whole(x))[:, free])
 
+    first = problem.inside(point)[free]
     found = least_squares(
-        walled(lambda x: problem.residuals(whole(x))), problem.inside(point)[free], jac=jacobian,
+        walled(lambda x: problem.residuals(whole(x)), first), first, jac=jacobian,
         bounds=(low, high), x_scale="jac", xtol=FIRM_POINT, ftol=FIRM_SUM, gtol=None, max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
     full, slopes = whole(found.x), np.zeros((found.fun.size, start.size))
@@ -358,8 +367,7 @@ def sureness(
             ends = [found.point[n] - quantile * deviation, found.point[n] + quantile * deviation]
             if profile:
                 ends = [_end(found, n, way, deviation, quantile, held) for way in (-1, 1)]
-            low, high = sorted(each.value(float(end)) for end in ends)
-            low, high = each.known_ends(ends, (low, high))
+            low, high = each.ends(ends)
         elif n in alone and (side := _one_sided(found, n, quantile)) is not None:
             low, high = side
             words[alone[n]] = ""

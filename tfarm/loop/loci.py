@@ -9,25 +9,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from tfarm.arm import FED_BACK, NAMES, Arm, HubFeedback, as_law, unit_of
+from tfarm.arm import FED_BACK, NAMES, Arm, HubFeedback
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.arrays import LEAST_SIZE, Complex, Real
-from tfarm.columns import Column
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.reduced import modal_model
+from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.following import between
 
-from .answers import law_answer, signals_answer
-from .locus import Locus, crossing_answers, locus
-from .varied import ARM_PARAMETERS, OF_THE_LAW
+from .locus import Locus, locus
+from .varied import OF_THE_LAW
 
 if TYPE_CHECKING:
     import control
@@ -61,13 +60,13 @@ class ReducedLocus:
     flexible frequency.
     """
 
-    order: int
+    order: Annotated[int, Quantity("order of the reduced model", key="reduced_order")]
     gain: Real
     branches: Complex
     gap: Real
 
     @property
-    def worst(self) -> float:
+    def worst(self) -> Annotated[float, Quantity("largest gap to it", digits=2, help=GAP_NOTE, key="gap_to_reduced")]:
         """The largest gap of all branches."""
         return float(self.gap.max())
 
@@ -144,8 +143,8 @@ class MostDamped:
     """The `gain` at which mode 1 has its largest `damping_ratio`, and whether it still swings on all of the way there
     from it (`swings_on`) and is damped less beyond (`falls`)."""
 
-    gain: float
-    damping_ratio: float
+    gain: Annotated[float, Quantity("value")]
+    damping_ratio: Annotated[float, Quantity("damping ratio")]
     swings_on: bool
     falls: bool
 
@@ -181,13 +180,37 @@ def damping_ratios(s: Complex) -> Real:
     return np.where(s.imag > 0, -s.real / np.maximum(abs(s), LEAST_SIZE), -np.inf)
 
 
+class Branch(NamedTuple):
+    """A branch of a locus: its poles at both ends of the range, and how far the reduced model's is from it."""
+
+    branch: Annotated[int, Quantity("branch")]
+    mode: Annotated[int, Quantity("mode")]
+    first: Annotated[complex, Quantity("first pole", "1/s", 10)]
+    last: Annotated[complex, Quantity("last pole", "1/s", 10)]
+    gap: Annotated[float | None, Quantity("gap to reduced", digits=2, help=GAP_NOTE)]
+    ends_at: Annotated[float | None, Quantity("followed up to", digits=10)]
+
+
 @dataclass(frozen=True)
 @record
 class Loci:
     """The exact locus and the reduced one."""
 
-    exact: Locus
-    reduced: ReducedLocus
+    exact: Annotated[Locus, Quantity(flat=True)]
+    reduced: Annotated[ReducedLocus | Any, Quantity(flat=True)]  # None of a law that is more than gains at the hub
+
+    @property
+    def rows(self) -> Annotated[list[Branch], Quantity("branches", key="branch_list", help=BRANCHES_NOTE)]:
+        """A row a branch."""
+        branches, ends = self.exact.branches.tolist(), dict(self.exact.ends)
+        gaps = [None] * len(branches) if self.reduced is None else self.reduced.gap.tolist()
+        rows = enumerate(zip(self.exact.mode.tolist(), branches, gaps, strict=True))
+        return [Branch(n, mode, row[0], row[-1], gap, ends.get(n)) for n, (mode, row, gap) in rows]
+
+    @property
+    def best(self) -> Annotated[MostDamped | None, Quantity("first mode most damped", key="first_mode_most_damped")]:
+        """Where the first mode has its largest damping ratio."""
+        return most_damped(self.exact)
 
     @property
     def name(self) -> str:
@@ -197,13 +220,7 @@ class Loci:
     @property
     def unit(self) -> str:
         """Of what varies; nothing of a pure number."""
-        return unit_in(self.exact).replace("1", "")
-
-
-def unit_in(found: Locus) -> str:
-    """The SI unit of what varies, "1" of a pure number."""
-    of_other = ARM_PARAMETERS | {"delay": "s"}
-    return unit_of(found.vary, found.arm) if found.vary in NAMES else of_other.get(found.vary, "1")
+        return self.exact.unit.replace("1", "")
 
 
 def held_branches(branches: Complex) -> Complex:
@@ -213,44 +230,7 @@ def held_branches(branches: Complex) -> Complex:
     return np.round(branches.real / unit) * unit + 1j * (np.round(branches.imag / unit) * unit)
 
 
-def branch_columns(branches: Complex, key: str, title: str = "") -> list[Column]:
-    """Two columns a branch, Re s and Im s, empty where it is not followed; key and title name branch `n` and `part`."""
-    return [
-        Column(key.format(n=n, part=part[:2].lower()), title.format(n=n, part=part), "1/s",
-               of=["" if np.isnan(s) else x for s, x in zip(row, values.tolist(), strict=True)])
-        for n, row in enumerate(branches) for part, values in (("Re s", row.real), ("Im s", row.imag))
-    ]  # fmt: skip
-
-
 def loci(arm: Arm, law: HubFeedback, vary: str, start: float, stop: float) -> Loci:
     """Return both loci of one gain.  Raises what `locus` and `reduced_locus` raise."""
     exact = locus(arm, law, vary, start, stop, LOCUS_POINTS, LOCUS_BRANCHES)
     return Loci(exact, reduced_locus(exact))
-
-
-def locus_answer(exact: Locus, reduced: ReducedLocus | None) -> dict[str, Any]:
-    """The branches at each value, where they cross the imaginary axis, and the gap to the reduced model's locus."""
-    best = most_damped(exact)
-    answer = {
-        "arm": exact.arm.name,
-        **(signals_answer(as_law(exact.law), exact.arm) if exact.in_box else law_answer(exact.law, exact.arm)),
-        "vary": exact.vary,
-        "unit": unit_in(exact),
-        "gain": exact.gain.tolist(),
-        "mode": exact.mode.tolist(),
-        "branches": [[None if np.isnan(s) else [s.real, s.imag] for s in row] for row in exact.branches.tolist()],
-        "branches_note": BRANCHES_NOTE,
-        "box": list(exact.box),
-        "crossings": crossing_answers(exact.crossings),
-        "ends": [{"branch": branch, "gain": gain} for branch, gain in exact.ends],
-        "first_mode_most_damped": best and {"gain": best.gain, "damping_ratio": best.damping_ratio},
-    }
-    if reduced is None:
-        return answer
-    return answer | {
-        "gap_to_reduced": reduced.worst,
-        "gap_by_branch": reduced.gap.tolist(),
-        "gap_note": GAP_NOTE,
-        "reduced_order": reduced.order,
-        "reduced_points": int(reduced.gain.size),
-    }

@@ -12,22 +12,24 @@ none.  Along another number the branch is followed to it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any, cast
+from typing import Annotated, cast
 
 import numpy as np
 from scipy.optimize import brentq
 
-from tfarm.arm import FED_BACK, NAMES, PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law
+from tfarm.arm import FED_BACK, NAMES, PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law, unit_of
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing import Crossing, crossed
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, ParameterError, must_be_known
 from tfarm.records import record
+from tfarm.response.controller import Controller, controller
 from tfarm.response.frequency import AXIS_SHARE
+from tfarm.schema import Quantity
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.following import assigned, between, follow
@@ -71,12 +73,12 @@ class Locus:
 
     arm: Arm
     law: AnyLaw
-    vary: str
-    gain: Real
-    branches: Complex
+    vary: Annotated[str, Quantity("varied")]
+    gain: Annotated[Real, Quantity("value", curve=True)]
+    branches: Annotated[Complex, Quantity("branch", "1/s", curve=True)]
     mode: Whole
-    box: Box
-    crossings: tuple[BranchCrossing, ...]
+    box: Annotated[Box, Quantity("box: Re s from, to, Im s from, to", help="poles are complete in it at a few values")]
+    crossings: Annotated[tuple[BranchCrossing, ...], Quantity("crossings of the imaginary axis")]
     followed: Complex = field(repr=False, compare=False)
     listed: Whole = field(repr=False, compare=False)
     in_box: bool = False
@@ -85,6 +87,17 @@ class Locus:
     def finding(self) -> str:
         """Where the imaginary axis is crossed, in words."""
         return in_words(self.vary, self.crossings)
+
+    @property
+    def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
+        """Arm and law in words, as results name them."""
+        return controller(as_law(self.law), self.arm)
+
+    @property
+    def unit(self) -> Annotated[str, Quantity("unit")]:
+        """The SI unit of what varies, "1" of a pure number."""
+        of_other = ARM_PARAMETERS | {"delay": "s"}
+        return unit_of(self.vary, self.arm) if self.vary in NAMES else of_other.get(self.vary, "1")
 
     @property
     def varied(self) -> Varied:
@@ -104,7 +117,7 @@ class Locus:
 
     @property
     def ends(self) -> tuple[tuple[int, float], ...]:
-        """The number of each branch that ends on the way, and the last of the values at which it lives."""
+        """The number of each branch that ends on the way, and the last of the values at which it is followed."""
         lives = ~np.isnan(self.branches)
         rows = np.nonzero(~lives[:, -1])[0]
         return tuple((int(row), float(self.gain[np.nonzero(lives[row])[0][-1]])) for row in rows if lives[row].any())
@@ -285,13 +298,13 @@ class BranchCrossing:
     becomes positive as the locus runs, and "stable" where it becomes negative.
     """
 
-    gain: float
-    omega: float
-    branch: int | None
-    direction: str
+    gain: Annotated[float, Quantity("value", digits=10)]
+    omega: Annotated[float, Quantity("frequency", "rad/s", 10)]
+    branch: Annotated[int | None, Quantity("branch", help="- : a pole on no branch")]
+    direction: Annotated[str, Quantity("becomes")]
 
     @property
-    def frequency_hz(self) -> float:
+    def frequency(self) -> Annotated[float, Quantity("frequency", "Hz")]:
         """omega in Hz."""
         return self.omega / (2 * math.pi)
 
@@ -303,20 +316,6 @@ def in_words(vary: str, crossings: Sequence[BranchCrossing]) -> str:
     first = ", ".join(f"{each.direction} at {vary} = {each.gain:.6g}" for each in crossings[:CROSSINGS_SHOWN])
     more = len(crossings) - CROSSINGS_SHOWN
     return f"a pole becomes {first}{f' and {more} more' if more > 0 else ''}"
-
-
-def crossing_answers(found: Iterable[BranchCrossing]) -> list[dict[str, Any]]:
-    """The crossings as plain dictionaries."""
-    return [
-        {
-            "gain": each.gain,
-            "omega_rad_s": each.omega,
-            "frequency_hz": each.frequency_hz,
-            "branch": each.branch,
-            "direction": each.direction,
-        }
-        for each in found
-    ]
 
 
 def branch_crossings(family: Varied, gain: Real, branches: Complex, top: float) -> tuple[BranchCrossing, ...]:

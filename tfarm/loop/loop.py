@@ -18,7 +18,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,9 @@ from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, Feedback, LoopParts, deflated, difference_steps, feedback
 from tfarm.exact.system import System
 from tfarm.records import record
+from tfarm.response.controller import Controller, controller
 from tfarm.response.signals import Signals
+from tfarm.schema import Quantity
 from tfarm.spectrum import flexible_frequencies, modes, modes_below
 from tfarm.spectrum.frequencies import ARMS_KEPT
 from tfarm.spectrum.table import check_gains, first_frequency
@@ -86,6 +88,16 @@ class Loop:
         if self.gains is not None:
             _must_be_possible(self.arm, self.gains)
         self._must_fall()
+
+    @property
+    def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
+        """Arm and law in words, as results name them."""
+        return controller(self.law if self.gains is None else as_law(self.gains), self.arm)
+
+    @cached_property
+    def warnings(self) -> Annotated[tuple[str, ...], Quantity("warnings")]:
+        """Poles of the law right of the axis that its own zeros cancel."""
+        return cancelled(self.law)
 
     def under(self, law: Law) -> Loop:
         """The same rig under another law: what its signals are at rest is not worked out again."""
@@ -231,11 +243,6 @@ class Loop:
                 "its numerator has too high a degree for this signal, so that the loop is algebraic; add a pole to den"
             )
             raise ParameterError(key=f"law.{worst.signals[0]}.num", value=worst.block.excess, remedy=remedy)
-
-    @cached_property
-    def warnings(self) -> tuple[str, ...]:
-        """What a person should know of the law: poles right of the axis that its own zeros cancel."""
-        return cancelled(self.law)
 
 
 def by_differences(

@@ -16,21 +16,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import AnyLaw, Arm
+from tfarm.arm import AnyLaw, Arm, shown_unit
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.crossing import brackets, crossed, zeros_between
 from tfarm.records import record
+from tfarm.schema import At, Quantity
 from tfarm.spectrum.table import first_frequency
 
 from .loop import Loop, grid
 from .stability import Stability, is_quiet, stability
-from .theorem import theorem_of
-from .windows import Windows, windows_of
+from .theorem import Lyapunov, Signs, lyapunov, signs_of_loop, theorem_of
+from .windows import NumberInterval, Windows, reach_words, windows_of
 
 MARGIN_DIGITS, PLACE_DIGITS = 9, 7  # of a margin, at most, and of the frequency of a dip, which its depth hardly feels
 CROSSOVER_DIGITS = 12  # of what each crossover is listed with, at most: more than any table rounds to
@@ -45,6 +47,25 @@ REST = 1e-3  # of the size of -1/L: what its imaginary part and its way from hal
 BELOW_SLOWEST_POLE = 0.05  # of its size: so far down |L| may cross 1
 SLOW_POINTS = 400  # from there to the grid of the arm
 NEAR_POLES = np.geomspace(0.05, 20.0, 12)  # points about a pole, in its distances from the axis
+UNLIMITED = {"disk": 2.0, "peak_sensitivity": 1.0}  # sizes of a passive loop, at no frequency of its own; else inf
+SAME_SIZE = 1e-7  # of such a size: so much rounding leaves next to a narrow resonance
+NO_WINDOWS = "no intervals of the law's numbers: of a rig with a link without damping all modes meet on the axis"
+
+GAIN_MARGIN = Quantity("gain margin, factors down and up", help="factors on L between which the loop stays stable")
+PHASE_MARGIN = Quantity("phase margin", "deg", help="of least size where |L| = 1; above 0 for lag, below for lead")
+PHASE_LAG = Quantity("phase margin for lag", "deg", key="phase_lag_deg")
+PHASE_LEAD = Quantity("phase margin for lead", "deg", key="phase_lead_deg")
+DELAY_MARGIN = Quantity("delay margin", "s", help="smallest further loop delay that destabilises the loop")
+DISK_MARGIN = Quantity("disk margin", help="gain and phase together: factors (2 + d)/(2 - d), |d| < margin")
+PEAK_SENSITIVITY = Quantity("peak sensitivity Ms", key="peak_sensitivity", help="largest |1/(1 + L)|")
+COMPLEMENTARY = "peak_complementary_sensitivity"
+PEAK_COMPLEMENTARY = Quantity("peak complementary sensitivity Mt", key=COMPLEMENTARY, help="largest |L/(1 + L)|")
+EXACT_DELAY, EXACT_DISK, EXACT_PEAK, EXACT_COMPLEMENTARY = (  # of the infinite-dimensional loop
+    replace(each, label=f"{each.label}, exact") for each in (
+        replace(DELAY_MARGIN, key="delay_margin_s"), replace(DISK_MARGIN, key="disk_margin"), PEAK_SENSITIVITY,
+        PEAK_COMPLEMENTARY,
+    )
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -59,7 +80,7 @@ class LoopMargins:
     `phase_crossovers` all with L < 0 and the factor -1/L on it that puts a pole there, both ascending.
     """
 
-    band: float
+    band: Annotated[float, Quantity("up to", "rad/s", key="up_to_rad_s")]
     gain: tuple[float, float]
     phase: float
     phase_lag: float
@@ -72,6 +93,61 @@ class LoopMargins:
     gain_crossovers: tuple[tuple[float, float], ...]
     phase_crossovers: tuple[tuple[float, float], ...]
 
+    def at_frequency(self, name: str) -> At:
+        """The margin of that name, and its frequency; a size that no frequency limits has none."""
+        value = float(getattr(self, name))
+        is_anywhere = math.isclose(abs(value), UNLIMITED.get(name, math.inf), rel_tol=SAME_SIZE)
+        return At(value, None if is_anywhere else self.at[name])
+
+    @property
+    def phase_margin(self) -> Annotated[At, PHASE_MARGIN]:
+        """Of least size."""
+        return self.at_frequency("phase")
+
+    @property
+    def lag(self) -> Annotated[At, PHASE_LAG]:
+        """The least for lag."""
+        return self.at_frequency("phase_lag")
+
+    @property
+    def lead(self) -> Annotated[At, PHASE_LEAD]:
+        """The least for lead."""
+        return self.at_frequency("phase_lead")
+
+    @property
+    def delay_margin(self) -> Annotated[At, DELAY_MARGIN]:
+        """The least further delay."""
+        return self.at_frequency("delay")
+
+    @property
+    def disk_margin(self) -> Annotated[At, DISK_MARGIN]:
+        """For gain and phase at once."""
+        return self.at_frequency("disk")
+
+    @property
+    def sensitivity_peak(self) -> Annotated[At, PEAK_SENSITIVITY]:
+        """Of 1/(1 + L)."""
+        return self.at_frequency("peak_sensitivity")
+
+    @property
+    def complementary_peak(self) -> Annotated[At, PEAK_COMPLEMENTARY]:
+        """Of L/(1 + L)."""
+        return self.at_frequency("peak_complementary")
+
+
+class GainCrossover(NamedTuple):
+    """A frequency with |L| = 1."""
+
+    omega: Annotated[float, Quantity("frequency", "rad/s", 7)]
+    phase_margin: Annotated[float, Quantity("phase margin", "deg")]
+
+
+class PhaseCrossover(NamedTuple):
+    """A frequency with L < 0."""
+
+    omega: Annotated[float, Quantity("frequency", "rad/s", 7)]
+    factor: Annotated[float, Quantity("gain margin (factor)", help="-1/L: this factor on L puts a pole there")]
+
 
 @dataclass(frozen=True)
 @record
@@ -83,12 +159,71 @@ class Margins:
     bounds |L| beyond the band (the hub's inertia does, where it has some): not known then.
     """
 
-    stability: Stability
+    stability: Annotated[Stability, Quantity(flat=True)]
     windows: dict[str, Windows]
     in_band: LoopMargins | None
-    exact_delay: float | None
-    exact_disk: float | None
-    exact_peak: float | None
+    exact_delay: Annotated[float | None, EXACT_DELAY]
+    exact_disk: Annotated[float | None, EXACT_DISK]
+    exact_peak: Annotated[float | None, EXACT_PEAK]
+
+    @property
+    def exact_complementary(self) -> Annotated[float | None, EXACT_COMPLEMENTARY]:
+        """Peak of T = 1 - S of the whole infinite-dimensional loop: as little known as that of S, or as large."""
+        is_open = self.exact_peak is None or math.isinf(self.exact_peak)
+        return self.exact_peak if is_open or self.in_band is None else self.in_band.peak_complementary
+
+    @property
+    def gain_margin(self) -> Annotated[tuple[float, float] | None, GAIN_MARGIN]:
+        """Factors on the whole law."""
+        return None if self.in_band is None else self.in_band.gain
+
+    @property
+    def in_range(self) -> Annotated[LoopMargins | None, Quantity("margins in the frequency range")]:
+        """The margins of L(i w) in the range of the verdict."""
+        return self.in_band
+
+    @property
+    def lyapunov(self) -> Annotated[Lyapunov | None, Quantity("Lyapunov function of the paper")]:
+        """Its proof of gains at the hub."""
+        loop = self.stability.loop
+        return None if loop.gains is None else lyapunov(loop.arm, loop.gains)
+
+    @property
+    def passivity(self) -> Annotated[Signs | None, Quantity("passivity of the controller")]:
+        """The sign of a law that is more than gains at the hub."""
+        loop = self.stability.loop
+        return signs_of_loop(loop) if loop.gains is None else None
+
+    @property
+    def stability_intervals(self) -> Annotated[list[NumberInterval], Quantity("stability intervals")]:
+        """A row a number of the law, the others held; of gains the moment on a free pin, where it has no loop, not."""
+        loop = self.stability.loop
+        units = {} if loop.gains is None else {name: shown_unit(name, loop.arm) for name in loop.numbers}
+        return [each.about(loop.numbers[name], units.get(name, "")) for name, each in self.windows.items()]
+
+    @property
+    def intervals_note(self) -> Annotated[str | None, Quantity("limits of the intervals")]:
+        """The limits where nothing is known beyond the frequency range, in words.
+
+        A theorem on the sign of a law, or small gain, tells nothing of the law with another number in it.
+        """
+        loop, words = self.stability.loop, reach_words(self.windows.values())
+        if loop.gains is not None:
+            return None if self.stability.is_known_beyond else words or None
+        if not self.windows and loop.arm.has_elastic_link:
+            return NO_WINDOWS
+        uncounted = [name for name in loop.law.numbers if self.windows and name not in self.windows]
+        return words + (f"; of {', '.join(uncounted)} poles could not be counted" if uncounted else "") or None
+
+    @property
+    def gain_crossovers(self) -> Annotated[list[GainCrossover], Quantity("gain crossovers, abs(L) = 1")]:
+        """All in the range, ascending; none of a loop that is not stable."""
+        return [] if self.in_band is None else [GainCrossover(*pair) for pair in self.in_band.gain_crossovers]
+
+    @property
+    def phase_crossovers(self) -> Annotated[list[PhaseCrossover], Quantity("phase crossovers, L < 0")]:
+        """All in the range, ascending; none of a loop that is not stable."""
+        return [] if self.in_band is None else [PhaseCrossover(*pair) for pair in self.in_band.phase_crossovers]
 
 
 def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins:
@@ -127,6 +262,11 @@ def loop_margins(verdict: Stability) -> LoopMargins:
     """The margins of a stable loop up to the verdict's band."""
     loop, band = verdict.loop, verdict.band
     omega = dense(verdict)
+
+    def disk(w: Real) -> Real:
+        drive, fed_back = loop.parts(1j * w)
+        return np.asarray(2 * abs(drive + fed_back) / np.maximum(abs(drive - fed_back), LEAST_SIZE))
+
     crossed = unit_crossings(loop, omega)
     apart = _spread(lambda w: loop.loop_function(1j * w), crossed)  # of size 1: what its angle moves by [rad]
     minus = -loop.loop_function(1j * crossed)
@@ -140,7 +280,7 @@ def loop_margins(verdict: Stability) -> LoopMargins:
         "phase_lag": _least(angle[lag], crossed[lag]),
         "phase_lead": _least(-angle[lead], crossed[lead]),
         "delay": _least(delay, crossed),
-        "disk": lowest(lambda w: disk_at(loop, w), omega),
+        "disk": lowest(disk, omega),
         "peak_sensitivity": highest(lambda w: inverse_peak(loop, w, of=0), omega),
         "peak_complementary": highest(lambda w: inverse_peak(loop, w, of=1), omega),
     }
@@ -148,7 +288,8 @@ def loop_margins(verdict: Stability) -> LoopMargins:
     values["peak_sensitivity"] = max(1.0, values["peak_sensitivity"])
     places = {name: float(f"{where:.{PLACE_DIGITS}g}") for name, (_, where) in least.items()}
     by_phase = phase_crossovers(loop, omega)
-    gain = _nearest_to_one(gain_edges(loop, by_phase))
+    factors = gain_edges(loop, by_phase)
+    gain = max((t for t in factors if 0 <= t < 1), default=0.0), min((t for t in factors if t > 1), default=math.inf)
     by_gain = tuple(sorted(zip(crossed.tolist(), angle.tolist(), strict=True)))
     return LoopMargins(band=band, gain=gain, **values, at=places, gain_crossovers=by_gain, phase_crossovers=by_phase)
 
@@ -216,17 +357,6 @@ def _factor(loop: Loop, omega: Real) -> Complex:
     """-1/L at i omega, 0 where L is infinite or vanishes."""
     drive, fed_back = loop.parts(1j * omega)
     return np.asarray(-drive / np.where(fed_back == 0, np.inf, fed_back))
-
-
-def _nearest_to_one(factors: list[float]) -> tuple[float, float]:
-    """The largest factor from 0 up to 1, or 0, and the least above 1, or infinity."""
-    return max((t for t in factors if 0 <= t < 1), default=0.0), min((t for t in factors if t > 1), default=math.inf)
-
-
-def disk_at(loop: Loop, omega: Real) -> Real:
-    """2 |(1 + L)/(1 - L)| at i omega."""
-    drive, fed_back = loop.parts(1j * omega)
-    return np.asarray(2 * abs(drive + fed_back) / np.maximum(abs(drive - fed_back), LEAST_SIZE))
 
 
 def dense(verdict: Stability) -> Real:

@@ -8,19 +8,21 @@ are counted, not read off: clockwise ones are closed-loop poles inside the conto
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arrays import Complex, Real
-from tfarm.columns import Column, Table
 from tfarm.errors import ConvergenceError
+from tfarm.exact.characteristic import Analytic
 from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
+from tfarm.schema import Quantity
 from tfarm.spectrum import flexible_frequencies
+from tfarm.spectrum.box import turned
 
 from .loop import Loop, band_of, grid
 from .poles import count_with_mirrors
@@ -35,9 +37,8 @@ ARC = np.linspace(-math.pi / 2, math.pi / 2, 41)  # rad, along a semicircle arou
 APPROACH = np.geomspace(1.05, 1e3, 40)  # radii of such an arc: points of the axis on either side, a dozen a decade
 RESIDUE_AT = 1e-6  # of a pole's frequency: so near to it L is the pole's share alone
 WIDEST_INDENT = 1e-3  # of the same: the radius of an arc at most, so that it reaches no neighbour
-FAST = 0.7  # radians: where the argument of 1 + L turns by more between neighbours of the contour it is halved
 LONGEST_PIECE = 0.02  # of the rim's radius: the longest straight piece of a drawn curve
-TURN_ROUNDS = 24  # of halving where it turns more
+TURN_ROUNDS = 24  # of halving where they are longer
 
 
 @dataclass(frozen=True)
@@ -50,16 +51,16 @@ class Nyquist:
     contour: those of a law that is not stable by itself.
     """
 
-    s: Complex
-    L: Complex
+    s: Annotated[Complex, Quantity("s", "1/s", curve=True)]
+    L: Annotated[Complex, Quantity("L", curve=True)]
     is_arc: NDArray[np.bool_]
     poles: Real
-    encirclements: int
-    verdict: Stability
-    unstable_open: int = 0
+    encirclements: Annotated[int, Quantity("encirclements of -1", help="counter-clockwise positive")]
+    verdict: Annotated[Stability, Quantity(flat=True)]
+    unstable_open: Annotated[int, Quantity("unstable poles of L")] = 0
 
     @property
-    def on_axis(self) -> int:
+    def on_axis(self) -> Annotated[int, Quantity("poles on the axis to working precision")]:
         """Poles of the box that lie on the axis to working precision, apart from that at 0."""
         moving = self.verdict.poles.moving
         near = abs(moving.real) <= AXIS_SHARE * abs(moving)
@@ -72,7 +73,7 @@ class Nyquist:
         return count_with_mirrors(moving[moving.real > AXIS_SHARE * abs(moving)])
 
     @property
-    def expected(self) -> int:
+    def unstable_by_nyquist(self) -> Annotated[int, Quantity("unstable poles by Nyquist's criterion")]:
         """Unstable closed-loop poles by Nyquist's criterion."""
         return self.unstable_open - self.encirclements
 
@@ -97,17 +98,21 @@ def nyquist_of(verdict: Stability) -> Nyquist:
     s, is_arc = smooth(loop, *upper_contour(loop, poles, band, verdict.poles.moving))
     corner = complex(verdict.poles.box.re_max, band)
     across, down = np.linspace(1j * band, corner, EDGE_POINTS), np.linspace(corner, corner.real, EDGE_POINTS)
-    turned = turning(loop, np.r_[s, across[1:], down[1:]])
+    angle = turned(lambda at: _difference(loop, at), np.r_[s, across[1:], down[1:]], abs(corner))
     own = loop.law.poles
     inside = int(((own.real > AXIS_SHARE * abs(own)) & (abs(own.imag) < band)).sum())
-    plot = Nyquist(s, loop.loop_function(s), is_arc, poles, round(turned / math.pi), verdict, inside)
+    plot = Nyquist(s, loop.loop_function(s), is_arc, poles, round(angle / math.pi), verdict, inside)
     found = min(plot.clear, verdict.unstable_roots)
-    if not found <= plot.expected <= found + plot.on_axis:
-        text = (
-            f"{plot.expected} unstable poles by the turns around -1, {verdict.unstable_roots} by finding all in a box"
-        )
-        raise ConvergenceError(text, plot, plot.expected - verdict.unstable_roots)
+    if not found <= plot.unstable_by_nyquist <= found + plot.on_axis:
+        counted, found_in_box = plot.unstable_by_nyquist, verdict.unstable_roots
+        text = f"{counted} unstable poles by the encirclements of -1, {found_in_box} by finding all in a box"
+        raise ConvergenceError(text, plot, plot.unstable_by_nyquist - verdict.unstable_roots)
     return plot
+
+
+def _difference(loop: Loop, s: Complex) -> Analytic:
+    """1 + L; its slope is left out, as the contour is dense where it is steep."""
+    return Analytic(1 + loop.loop_function(s), np.zeros_like(s), np.zeros_like(s))
 
 
 def poles_on_axis(loop: Loop, band: float) -> Real:
@@ -171,42 +176,8 @@ def indentation(loop: Loop, pole: float) -> float:
     return min(INDENT_RADIUS * float(abs(loop.loop_function(near)[0])) * step, WIDEST_INDENT * scale)
 
 
-def turning(loop: Loop, path: Complex) -> float:
-    """By how much [rad] the argument of 1 + L grows along a path, halved where it turns fast."""
-    value = 1 + loop.loop_function(path)
-    for _ in range(TURN_ROUNDS):
-        with np.errstate(invalid="ignore"):  # what is no number is refused below
-            step = np.angle(value[1:] / value[:-1])
-        (fast,) = np.nonzero(~(abs(step) <= FAST))
-        if not fast.size:
-            return float(step.sum())
-        if not (np.isfinite(value) & (value != 0)).all():
-            break  # a point without an argument is there after any halving, and each doubles the points around it
-        middle = (path[fast] + path[fast + 1]) / 2
-        path, value = np.insert(path, fast + 1, middle), np.insert(value, fast + 1, 1 + loop.loop_function(middle))
-    raise ConvergenceError("the curve passes -1 too close for its encirclements to be counted", path[fast], step[fast])
-
-
 def compressed(L: Complex) -> Complex:
     """L with its size r drawn as r/(1 + r): 0 stays, 1 is half-way, infinity is the rim, at a pole its point 1."""
     size = abs(L)
     inside = np.where(np.isinf(size), 1.0, L)
     return np.asarray(np.where(np.isinf(size), 1.0, inside / (1 + abs(inside))))
-
-
-CONTOUR_COLUMNS = (  # of pairs s, L on the contour of a `Nyquist`
-    Column("re_s", "Re s", "1/s", of=lambda pair: pair[0].real),
-    Column("im_s", "Im s", "rad/s", of=lambda pair: pair[0].imag),
-    Column("re_L", "Re L", of=lambda pair: pair[1].real),
-    Column("im_L", "Im L", of=lambda pair: pair[1].imag),
-)
-
-
-def nyquist_table(*found: Nyquist, stem: str = "", laws: Sequence[str] = ()) -> Table:
-    """L on the contour, a row a point; of several loops, the law of each before it."""
-    pairs = [list(zip(each.s.tolist(), each.L.tolist(), strict=True)) for each in found]
-    named = [name for name, points in zip(laws, pairs, strict=False) for _ in points]
-    first = (Column("law", "law", of=named),) if laws else ()
-    points = [pair for each in pairs for pair in each]
-    title = "The loop function on the contour"
-    return Table(stem=stem, title=title, columns=(*first, *CONTOUR_COLUMNS), record=points)

@@ -19,7 +19,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +27,13 @@ from numpy.typing import NDArray
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, HubFeedback, Law, as_law
 from tfarm.arm.feedback import ON
 from tfarm.arrays import Real
+from tfarm.columns import Table
 from tfarm.crossing import Crossings, Window, counts_over, intervals
+from tfarm.crossing.shown import coarse, grid_table
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
+from tfarm.response.controller import Controller, controller
+from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import PAPER_GAINS, default_gains, hub_locked, rate_unit
 
@@ -38,7 +42,6 @@ from .stability import band_of_family, verdict_on
 from .windows import (
     ROUNDED,
     columns,
-    corner_laws,
     critical,
     crossed,
     held_windows,
@@ -83,16 +86,43 @@ class Plane:
 
     arm: Arm
     law: Law
-    vary: tuple[str, str]
-    x: Real
-    y: Real
+    vary: Annotated[tuple[str, str], Quantity("plane of")]
+    x: Annotated[Real, Quantity(curve=True)]
+    y: Annotated[Real, Quantity(curve=True)]
     unstable: NDArray[np.int64]
     boundary: Real
-    band: float
+    band: Annotated[float, Quantity("frequency range, up to", "rad/s", key="up_to_rad_s")]
     crossings: list[Crossings]
 
     @property
-    def finding(self) -> str:
+    def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
+        """Arm and law in words, as results name them."""
+        return controller(self.law, self.arm)
+
+    @property
+    def counts(self) -> Annotated[list[list[int | float]], Quantity(key="unstable_roots")]:
+        """Unstable poles over the grid, rows upwards, infinity where they are infinitely many."""
+        return [[math.inf if count == INFINITE else count for count in row] for row in self.unstable.tolist()]
+
+    @property
+    def boundary_inside(self) -> Annotated[list[list[float]], Quantity(key="boundary")]:
+        """The points of `boundary` inside the plane."""
+        return [point for point in self.boundary.tolist() if all(
+            values[0] <= value <= values[-1] for value, values in zip(point, self.axes, strict=False)
+        )]  # fmt: skip
+
+    @property
+    def csv_table(self) -> Table:
+        """A row a point of the grid."""
+        return grid_table(self.vary, self.x, self.y, self.counts)
+
+    @property
+    def drawing(self) -> str:
+        """A coarse picture for a terminal."""
+        return coarse(self.vary, self.x, self.y, self.unstable)
+
+    @property
+    def finding(self) -> Annotated[str, Quantity("stability region", key="finding")]:
         """At how many points of the grid the loop is stable, in words."""
         return f"stable at {int(self.stable.sum())} of {self.stable.size} points"
 
@@ -200,7 +230,9 @@ def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real, band: float | Non
     x, y = ascending(vary[0], x, most), ascending(vary[1], y, most)
     across, up = (float(x[0]), float(x[-1])), (float(y[0]), float(y[-1]))
     ends = [critical(name, pair) for name, pair in zip(vary, (across, up), strict=True)]
-    corners = [loop.under(law) for law in corner_laws(loop.law, vary, ends)]
+    corners = [
+        loop.under(with_numbers(loop.law, dict(zip(vary, each, strict=True)))) for each in itertools.product(*ends)
+    ]
     if (
         tuple(ON.get(name, name) for name in vary) == PLANE
         and loop.gains is not None

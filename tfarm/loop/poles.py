@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.reduced.conversions import closed, in_series, pade, sensed_model
 from tfarm.response.frequency import AXIS_SHARE
+from tfarm.schema import Quantity
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR, TRIED_HEIGHTS, Box, complete
 from tfarm.spectrum.proofs import Disc, disjoint, enclosed, proven_count
@@ -71,13 +73,24 @@ class Poles:
     above are of shear, and undamped but for the little that bending takes.
     """
 
-    loop: Loop
-    values: Complex
-    box: Box
-    ends_at_shear_cutoff: bool = False
+    loop: Annotated[Loop, Quantity(flat=True)]
+    values: Annotated[Complex, Quantity("s", "1/s", 12, "closed-loop poles with Im s >= 0", key="poles")]
+    box: Annotated[Box, Quantity("box: Re s from, to, Im s from, to", help="searched, and complete")]
+    ends_at_shear_cutoff: Annotated[bool, Quantity("ends at the shear cut-off, sqrt(kGA/rhoI)")] = False
+    discs: Annotated[tuple[Disc, ...] | None, Quantity(help="enclosures of the poles apart from 0, certified")] = None
 
     @property
-    def unstable(self) -> int:
+    def completeness(self) -> Annotated[str, Quantity("completeness")]:
+        """The word of certainty for the list of poles in the box."""
+        return "converged (winding number)" if self.discs is None else "certified"
+
+    @property
+    def shear_cutoff(self) -> Annotated[float, Quantity(unit="rad/s")]:
+        """sqrt(kGA/rhoI) [rad/s], above which lightly damped shear modes lie."""
+        return self.loop.arm.shear_cutoff
+
+    @property
+    def unstable(self) -> Annotated[int, Quantity("unstable poles")]:
         """How many poles of the box, conjugates counted, lie to the right of the axis.
 
         A real part below working precision decides nothing, but without damping a theorem does (`theorem_of`).
@@ -102,6 +115,10 @@ class Poles:
     def spectral_abscissa(self) -> float:
         """The largest real part [1/s] in the box, apart from poles at 0."""
         return float(self.moving.real.max(initial=-np.inf))
+
+    def certified(self) -> Poles:
+        """The same with the discs of `certify`."""
+        return replace(self, discs=self.certify())
 
     def certify(self, digits: int = DOUBLE_DIGITS) -> tuple[Disc, ...]:
         """A disc around each pole with Im >= 0 apart from 0, and a proof that the box has no other.

@@ -7,6 +7,7 @@ of them (Balas 1978).  The exact loop has them all.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +15,10 @@ from numpy.typing import NDArray
 from tfarm.arm import AnyLaw, Arm, arm_and_law, as_law
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex
-from tfarm.columns import Column
-from tfarm.digits import general, plain, singly
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.reduced.conversions import sensed_model
+from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
 from .poles import poles_of_model
@@ -28,6 +28,14 @@ MOST_SPILL_MODES = 60  # modes of a model
 USUAL_SPILL_MODES = 20  # up to which models are looked at where nothing else is asked for
 REST_SHARE = 1e-7  # of w1: poles at 0 come out as small
 UNDAMPED_SHARE = 1e-9  # of its size: what a real part may be of a pole that no model damps
+
+
+class SpillModel(NamedTuple):
+    """A design model of so many flexible modes under the law."""
+
+    modes: Annotated[int, Quantity("modes")]
+    unstable: Annotated[int, Quantity("unstable poles")]
+    rightmost: Annotated[complex, Quantity("rightmost pole", "1/s")]
 
 
 @dataclass(frozen=True)
@@ -41,19 +49,19 @@ class Spill:
     unstable too, None where the last is not.
     """
 
-    verdict: Stability
+    verdict: Annotated[Stability, Quantity(flat=True)]
     modes: NDArray[np.int64]
     unstable: NDArray[np.int64]
     rightmost: Complex
 
     @property
-    def driven(self) -> Complex:
+    def driven(self) -> Annotated[Complex, Quantity("s", "1/s", help="unstable poles of the exact loop")]:
         """The exact loop's unstable poles, ascending in Im s."""
         moving = self.verdict.poles.moving
         return moving[moving.real > UNDAMPED_SHARE * abs(moving)]
 
     @property
-    def first_mode(self) -> int | None:
+    def first_mode(self) -> Annotated[int | None, Quantity("first mode that is destabilised")]:
         """The mode that spills over first, None where the exact loop is stable in its band."""
         if not self.driven.size:
             return None
@@ -65,7 +73,7 @@ class Spill:
         return int(np.argmin(abs(flexible - lowest))) + 1
 
     @property
-    def shown_from(self) -> int | None:
+    def shown_from(self) -> Annotated[int | None, Quantity("modes of a model that shows it", key="shown_from_modes")]:
         """From how many modes on the models are unstable too."""
         content = np.flatnonzero(self.unstable == 0)
         if content.size == 0:
@@ -73,13 +81,19 @@ class Spill:
         return None if content[-1] == self.modes.size - 1 else int(self.modes[content[-1] + 1])
 
     @property
+    def models(self) -> Annotated[list[SpillModel], Quantity("design models")]:
+        """A row a model."""
+        poles = (complex(s.real, abs(s.imag)) for s in self.rightmost)
+        return list(map(SpillModel, self.modes.tolist(), self.unstable.tolist(), poles))
+
+    @property
     def content(self) -> NDArray[np.int64]:
         """The models that find nothing unstable."""
         return self.modes[self.unstable == 0]
 
     @property
-    def in_words(self) -> str:
-        """What a person should know, in a sentence or two."""
+    def in_words(self) -> Annotated[str, Quantity("spillover")]:
+        """The finding in a sentence or two."""
         exact = f"the exact rig is {self.verdict.verdict}"
         if not self.driven.size:
             return exact + (" up to the band" if not self.verdict.is_known_beyond else "")
@@ -117,13 +131,3 @@ def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
         unstable.append(int((moving.real > UNDAMPED_SHARE * abs(moving)).sum()))
         rightmost.append(moving[np.argmax(moving.real)])
     return Spill(verdict, numbers, np.array(unstable), np.array(rightmost))
-
-
-SPILL = (
-    Column("modes", "modes", of=lambda it: it.modes.tolist()),
-    Column("unstable", "unstable poles of the model", of=lambda it: it.unstable.tolist()),
-    Column("re", "rightmost, Re", "1/s", of=lambda it: it.rightmost.real.tolist(), digits=singly(plain, 6),
-           printed=singly(general, 6)),
-    Column("im", "Im", "rad/s", of=lambda it: abs(it.rightmost.imag).tolist(), digits=singly(plain, 6),
-           printed=singly(general, 6)),
-)  # fmt: skip

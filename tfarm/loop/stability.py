@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
+from tfarm.schema import Quantity
 from tfarm.spectrum import modes, modes_below
 
 from .loop import MOST_BAND_MODES, QUIET_REACH, Loop, band_of, quiet_places
@@ -57,17 +58,27 @@ class Stability:
     Where `is_known_beyond` is false the verdict is that of the band alone.
     """
 
-    loop: Loop
-    verdict: str
-    unstable_roots: int
-    unstable_roots_infinite: bool
-    band: float
-    tail: str
+    loop: Annotated[Loop, Quantity(flat=True)]
+    verdict: Annotated[str, Quantity("stability")]
+    unstable_roots: Annotated[int, Quantity("unstable poles", help="in the frequency range")]
+    unstable_roots_infinite: Annotated[bool, Quantity(help="infinitely many poles beyond the range are unstable")]
+    band: Annotated[float, Quantity("frequency range, up to", "rad/s", key="up_to_rad_s")]
+    tail: Annotated[str, Quantity("beyond that", key="beyond")]
     poles: Poles
-    is_known_beyond: bool = True
+    is_known_beyond: Annotated[bool, Quantity("stability known beyond that", key="known_beyond")] = True
 
     @property
-    def is_stable(self) -> bool:
+    def spectral_abscissa(self) -> Annotated[float, Quantity("spectral abscissa", "1/s", 6, "largest Re s in range")]:
+        """The largest real part [1/s] of the poles in range, apart from those at 0."""
+        return self.poles.spectral_abscissa
+
+    @property
+    def free_pole(self) -> Annotated[str | None, Quantity("free hub angle")]:
+        """The pole at 0 from which the verdict is apart."""
+        return "its pole at s = 0 is left out" if self.poles.moving.size < self.poles.values.size else None
+
+    @property
+    def is_stable(self) -> Annotated[bool, Quantity(key="stable")]:
         """Whether every pole but that of the free hub angle lies left of the axis."""
         return self.verdict == "stable"
 

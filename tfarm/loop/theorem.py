@@ -39,7 +39,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -47,6 +47,7 @@ from tfarm.arm import Arm, HubFeedback, Law, as_law
 from tfarm.arm.blocks import Rational
 from tfarm.records import record
 from tfarm.response import transfer
+from tfarm.schema import Quantity
 
 from .loop import Loop
 
@@ -67,8 +68,8 @@ class Signs:
     `energy` is what it does to each mode: TAKES, CONSERVES, GIVES; None where that is not shown.
     """
 
-    kind: Literal["strictly passive", "passive", "negative imaginary", ""]
-    reason: str
+    kind: Annotated[Literal["strictly passive", "passive", "negative imaginary", ""], Quantity("kind")]
+    reason: Annotated[str, Quantity("reason")]
     at_rest: float = 0.0
     energy: int | None = None
 
@@ -144,8 +145,9 @@ def signs_of(law: Law, friction: float = 0.0) -> Signs:
         return Signs("", "the sign of a law tells something where it reads the hub's own angle or rate")
     if not all(isinstance(part.block, Rational) for part in law.parts):
         return Signs("", "matrices are not looked at: give transfer functions")
-    if law.is_static:
-        return _static_signs(law, friction)
+    if law.is_static:  # gains on hub angle and hub rate, by their signs alone
+        values = dict(zip(law.signals, law.values(np.ones(1, complex))[:, 0].real.tolist(), strict=True))
+        return _of_signs(values.get("hub_rate", 0.0) + friction, values.get("hub_angle", 0.0))
     if law.order > MOST_EXACT_DEGREE:
         return Signs("", f"of a law of more than {MOST_EXACT_DEGREE} states the sign is not looked for")
     num, den = polynomial([0.0]), polynomial([1.0])  # of the whole law as one fraction on the angle
@@ -159,12 +161,6 @@ def signs_of(law: Law, friction: float = 0.0) -> Signs:
     if passive is not None and passive.kind:
         return passive
     return _negative_imaginary(num, den) or passive or Signs("", "neither passive nor negative imaginary")
-
-
-def _static_signs(law: Law, friction: float) -> Signs:
-    """`signs_of` for gains on hub angle and hub rate, by their signs alone."""
-    values = dict(zip(law.signals, law.values(np.ones(1, complex))[:, 0].real.tolist(), strict=True))
-    return _of_signs(values.get("hub_rate", 0.0) + friction, values.get("hub_angle", 0.0))
 
 
 def _of_signs(rate: float, at_rest: float) -> Signs:
@@ -220,10 +216,10 @@ class Lyapunov:
     """
 
     loop: Loop
-    proven: bool
-    a1_over_a2: float | None
+    proven: Annotated[bool, Quantity("stability proven")]
+    a1_over_a2: Annotated[float | None, Quantity("weights a1/a2")]
     kind: Literal["dissipated", "conserved", "unproven"]
-    reason: str
+    reason: Annotated[str, Quantity("reason")]
 
 
 def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:

@@ -67,8 +67,9 @@ class Varied:
         if self.start == self.stop:
             raise ParameterError(key="to", value=self.stop, remedy="the range is empty: a locus runs to another value")
         for key, value in (("from", self.start), ("to", self.stop)):
-            arm = self.at(value).arm
-            if arm.rate_loss and arm.lossless_hub.has_massless_hub and self._rate_gain_at(value) <= -arm.rate_loss:
+            loop = self.at(value)
+            arm, K1 = loop.arm, loop.gains[RATE_GAIN] if loop.gains else 0.0
+            if arm.rate_loss and arm.lossless_hub.has_massless_hub and -arm.rate_loss >= K1:
                 remedy = f"with hub.inertia = 0 a pole passes through infinity at {RATE_GAIN} = {-arm.rate_loss:.6g}"
                 raise ParameterError(
                     key=key, value=value, remedy=f"{remedy}: stay above it, or give the hub an inertia"
@@ -94,11 +95,6 @@ class Varied:
     def law_at(self, value: float) -> Law:
         """The law where the number has that value."""
         return self.full if self.is_of_arm else self.full.having("gain" if self.vary == "all" else self.vary, value)
-
-    def _rate_gain_at(self, value: float) -> float:
-        """The gain on the hub's rate of a law that is gains at the hub; else none."""
-        gains = self.law_at(value).gains
-        return gains[RATE_GAIN] if gains else 0.0
 
     def at(self, value: float) -> Loop:
         """The loop where the number has that value."""

@@ -22,7 +22,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossing, Crossings, Family, Window, counts_over, crossings, family_of, joined
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
+from tfarm.schema import Quantity
 from tfarm.spectrum.box import FIRST_POINTS, NEAREST_TO_ZERO, TRIED_HEIGHTS, turned
 from tfarm.spectrum.table import first_frequency, gain_unit, most_gain
 
@@ -41,6 +42,7 @@ from .stability import MARGIN_OF_ZERO, Stability, band_of_family, is_known_witho
 from .theorem import TAKES, absorbed, theorem_of
 
 End = Literal["edge", "search bound", "no limit"]
+ENDS = "an end with < or > is that of the search range: no limit was found up to there"
 
 WINDOW_REACH, FARTHER_REACH = 20.0, {MOMENT_GAIN: 50.0}  # how far windows are looked for, times `gain_unit`
 BEYOND_STATIC = 2.0  # times J/(J - I_h), where K2 cancels the inertia: windows are looked for at least so far
@@ -56,6 +58,33 @@ FINITE_LIMIT = 1.5  # times the gain at the farther of two small s: more at the 
 STILL_GROWS = 0.75  # of the step before: by more, of places ever farther right, a gain without a limit grows
 ROUNDED = 4 * float(np.finfo(float).eps)  # of a range: a gain so small is 0
 LAST_APPLIED = (".0", ".gain", "gain")  # ends of names: a leading 0 moves the others, a factor is on what there is
+
+
+class Interval(NamedTuple):
+    """Where a loop is stable along one number, and what its ends are."""
+
+    low: Annotated[float, Quantity("from")]
+    high: Annotated[float, Quantity("to")]
+    low_is: Annotated[End, Quantity()] = "edge"
+    high_is: Annotated[End, Quantity()] = "edge"
+
+    def as_text(self, digits: int) -> str:
+        """The interval; an end that is only that of the search has < or > before it."""
+        low = "< " * (self.low_is == "search bound") + f"{self.low:.{digits}g}"
+        high = "> " * (self.high_is == "search bound") + f"{self.high:.{digits}g}"
+        return f"({low}, {high})"
+
+
+class NumberInterval(NamedTuple):
+    """A number of a law and how far it may go alone."""
+
+    name: Annotated[str, Quantity("gain or coefficient", key="number")]
+    value: Annotated[float, Quantity("value")]
+    unit: Annotated[str, Quantity("unit")]
+    interval: Annotated[Interval | None, Quantity("stable around it", digits=8, help=ENDS)]
+    intervals: Annotated[list[Interval], Quantity("all stability intervals", digits=8, help=ENDS)]
+    search_range: Annotated[Window, Quantity("search range", digits=5)]
+    band: Annotated[float, Quantity(key="up_to_rad_s", help="frequency up to which crossings were looked for")]
 
 
 @dataclass(frozen=True)
@@ -79,6 +108,12 @@ class Windows:
         """What an end of one of the windows is."""
         return "no limit" if math.isinf(value) else "search bound" if value in self.looked_at else "edge"
 
+    def about(self, value: float, unit: str = "") -> NumberInterval:
+        """The windows as a row of results, around the value that the number has."""
+        pairs = [Interval(low, high, self.end(low), self.end(high)) for low, high in self.all]
+        here = None if self.around is None else Interval(*self.around, *map(self.end, self.around))
+        return NumberInterval(self.name, value, unit, here, pairs, self.looked_at, self.band)
+
 
 def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[str, Windows]:
     """The windows of each number of a law, or of those named, through the loop whose verdict is given.
@@ -100,7 +135,7 @@ def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[s
             done[name] = Windows(name, None, (), limits, Crossings.of([]))  # an algebraic loop but for 0
             continue
         if name not in found and name in solved:
-            continue  # `answers.unsettled` names it
+            continue  # `Margins.intervals_note` names it
         try:
             if name in found:
                 stable, crossings = _stable(verdict, name, limits, found[name], band), found[name].within(*limits)
@@ -471,8 +506,3 @@ def critical(name: str, limits: tuple[float, float]) -> tuple[float, ...]:
 def turns_over(loop: Loop, name: str, limits: tuple[float, float]) -> bool:
     """Whether a leading coefficient passes through 0 between these values, where without it high modes are driven."""
     return name.endswith(LEADING) and limits[0] < 0 < limits[1] and not is_known_without(loop, name)
-
-
-def corner_laws(law: Law, names: Sequence[str], values: Sequence[Sequence[float]]) -> list[Law]:
-    """The laws with each combination of some values of these numbers."""
-    return [with_numbers(law, dict(zip(names, each, strict=True))) for each in itertools.product(*values)]

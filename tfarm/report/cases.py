@@ -16,12 +16,12 @@ from tfarm.errors import ConvergenceError, one_line
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.recording import MeasuredRun
-from tfarm.loop.answers import sign_of
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import Margins, margins
 from tfarm.plots.words import gains_words
 from tfarm.records import record
 from tfarm.report.sections import typeset
+from tfarm.response.controller import sign_of
 from tfarm.response.signals import Signals
 from tfarm.spectrum.table import default_gains
 from tfarm.synthesis.design import Design, design

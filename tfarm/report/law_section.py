@@ -13,9 +13,9 @@ from tfarm.columns import FILES, REPORT, Column, Table
 from tfarm.digits import plain, singly
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import rule_in_words
-from tfarm.loop.answers import law_answer
 from tfarm.report.cases import GivenLaw, LawOnArm, on_arm
 from tfarm.report.sections import PageSection, typeset, upper
+from tfarm.response.controller import sign_convention
 from tfarm.response.signals import Signals
 
 NOT_LED, FILES_ALONE = "open", (FILES,)  # a column that nothing is led to
@@ -40,8 +40,7 @@ def law_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageSection
     named, ms, words = on_arm(arm, laws), plain(1e3 * chain.sampling.period), []
     for each in named:
         law, file = each.law, f" ({each.given.file})" * bool(each.given.file)
-        told = typeset(str(law_answer(law, each.arm)["sign_convention"]))
-        told = told.replace("C_i(s)", "C_i(z)") if law.is_discrete else told
+        told = typeset(sign_convention(law, each.arm))
         enter = f" {', '.join(law.references)} enter{'s' * (len(law.references) == 1)} less what it should be."
         led = enter * bool(law.references)
         warned = "".join(f" Warning: {typeset(text)}." for text in cancelled(law))

@@ -14,7 +14,7 @@ from tfarm.columns import Column, Table
 from tfarm.digits import how_many, kept_digits, plain, scientific, significant, singly
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
-from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, branch_columns, held_branches, loci, most_damped
+from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, held_branches, loci, most_damped
 from tfarm.loop.stability import MARGIN_OF_ZERO, Stability, stability
 from tfarm.plots.roots import draw_loci
 from tfarm.report.cases import continuous_cases, edge_of_K2, has_loop
@@ -97,15 +97,15 @@ def gap_table(data: Loci, stem: str) -> Table:
 
 
 def loci_data(data: Loci, stem: str) -> Table:
-    """The exact and the reduced branches."""
-    first = Column(data.name, data.name, data.unit, of=data.exact.gain)
-    exact, reduced = held_branches(data.exact.branches), held_branches(data.reduced.branches)
-    columns = (
-        first,
-        *branch_columns(exact, "exact_{n}_{part}", "exact branch {n}, {part}"),
-        *branch_columns(reduced, "reduced_{n}_{part}", "reduced branch {n}, {part}"),
-    )
-    return Table(stem=stem, title=f"Loci along {data.name}", columns=columns)
+    """The exact and the reduced branches, to the digits that hold on every processor."""
+    pairs = (("exact", data.exact.branches), ("reduced", data.reduced.branches))
+    columns = [Column(data.name, data.name, data.unit, of=data.exact.gain)]
+    for name, branches in pairs:
+        for n, row in enumerate(held_branches(branches)):
+            for part, values in (("re", row.real), ("im", row.imag)):
+                cells = ["" if np.isnan(value) else value for value in values.tolist()]
+                columns.append(Column(f"{name}_{n}_{part}", f"{name} branch {n}, {part}", "1/s", of=cells))
+    return Table(stem=stem, title=f"Loci along {data.name}", columns=tuple(columns))
 
 
 def locus_section(arm: Arm, chain: Chain) -> PageSection:

@@ -2,38 +2,26 @@
 
 from __future__ import annotations
 
-import itertools
-import math
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, Arm
+from tfarm.arm import Arm
 from tfarm.columns import Column, Table
-from tfarm.digits import how_many, plain, significant, singly
+from tfarm.digits import how_many, plain, significant
 from tfarm.dsp import Chain
 from tfarm.errors import TfarmError
-from tfarm.loop.answers import (
-    CROSSOVERS,
-    MARGIN_COLUMNS,
-    NOT_STABLE,
-    POLE_COLUMNS,
-    WINDOW_COLUMNS,
-    crossovers,
-    gain_rows,
-    margin_rows,
-    unsettled,
-)
 from tfarm.loop.margins import Margins, loop_curve
-from tfarm.loop.nyquist import Nyquist, nyquist_of, nyquist_table
+from tfarm.loop.nyquist import Nyquist, nyquist_of
 from tfarm.loop.poles import Poles, closed_loop_poles
-from tfarm.loop.spill import SPILL, Spill, spill
+from tfarm.loop.spill import Spill, spill
 from tfarm.loop.theorem import lyapunov, signs_of_loop
 from tfarm.plots.disc import draw_nyquist
 from tfarm.plots.frequency import draw_loop
 from tfarm.report.cases import GivenLaw, LawOnArm, brief_on, continuous_cases, margins_of, why_no_loop
 from tfarm.report.sections import Fact, PageSection, Picture, typeset, upper
+from tfarm.schema import across, curve_table, quantities, roots_table, table
 
 MARGINS_CAPTION = (
     "Exact: of the infinite-dimensional loop; not known where nothing bounds L beyond the band. "
@@ -48,17 +36,9 @@ DELAY_UNDAMPED = (
     "disk margins are 0, and only a band gives them a size"
 )
 CAPTION_OF_WINDOWS = (
-    "The others held, each gain, or number of a law, may move within its window before the first pole reaches the "
-    "axis. Ends ±∞ are proven; an end with a star is no edge: up to there none was found, and beyond none was looked "
-    "for."
+    "Each gain or coefficient alone, the others fixed. Ends ±∞ are exact; an end with < or > is that of the search "
+    "range: no limit was found up to there."
 )
-MARGIN_TITLES = {"disk": "disk margin α"}
-QUANTITIES = (
-    "gain margin, down",
-    "gain margin, up",
-    *(MARGIN_TITLES.get(each.of, each.title) for each in MARGIN_COLUMNS),
-)
-MarginRow = tuple[str, str, float | str, float | str, float | str]  # quantity, unit, exact, in the band, at
 COUNT_CAPTION = (
     "{open}, so each clockwise turn around −1 (counted negative) is one unstable "
     "closed-loop pole. The count in a box was made without Nyquist, by finding every pole; poles whose real part is "
@@ -119,91 +99,34 @@ def verdict_words(name: str, found: Margins) -> str:
 
 
 def margin_table(laws: Sequence[LawOnArm], found: Sequence[Margins], is_undamped: bool) -> Table:
-    """A row a quantity, the verdict first; for each law the exact value, that in the band, and where.
-
-    The caption says what a phase margin below 0 means, for each law that has one.
-    """
-    rows, leads = [list(_rows(each)) for each in found], ""
-    columns = [
-        Column("quantity", "quantity", of=[row[0] for row in rows[0]]),
-        Column("unit", "unit", of=[row[1] for row in rows[0]]),
-    ]
-    number = singly(lambda value: plain(value, 6) if value.is_integer() else significant(value, 5))
-    for named, each, part in zip(laws, found, rows, strict=True):
-        group, band = f"{named.name}: {named.gains}", each.in_band
-        for i, (key, title) in enumerate((("exact", "exact"), ("band", "in the band"), ("at_rad_s", "at rad/s")), 2):
-            columns.append(Column(f"{named.key}_{key}", title, of=[row[i] for row in part], digits=number, group=group))
-        if band is not None and band.phase < 0:
-            lead = f"{significant(band.phase, 5)} deg at {significant(band.at['phase'], 5)} rad/s"
-            leads += f" {upper(named.name)}: {lead} is lead; not an instability."
-    return Table(
-        stem="margins",
-        title="Verdict and margins",
-        caption=MARGINS_CAPTION.format(undamped=DELAY_UNDAMPED if is_undamped else "") + leads,
-        columns=tuple(columns),
-    )
+    """A row a quantity, a column a law."""
+    leads = ""
+    for named, each in zip(laws, found, strict=True):
+        if each.in_band is not None and each.in_band.phase < 0:
+            leads += f" {upper(named.name)}: a phase margin below 0 is lead; not an instability."
+    caption = MARGINS_CAPTION.format(undamped=DELAY_UNDAMPED if is_undamped else "") + leads
+    names = [f"{named.name}: {named.gains}" for named in laws]
+    of = dict(zip(names, found, strict=True))
+    return across(of, keys=[each.key for each in laws], stem="margins", title="Verdict and margins", caption=caption)
 
 
-def _rows(found: Margins) -> Iterator[MarginRow]:
-    """The verdict before any margin."""
-    it, band = found.stability, found.in_band
-    count = math.inf if it.unstable_roots_infinite else float(it.unstable_roots)
-    yield "verdict", "", it.verdict, "", ""
-    yield "unstable poles", "", count, float(it.unstable_roots), ""
-    yield "band", "rad/s", "", it.band, ""
-    if band is None:
-        for name in QUANTITIES:
-            yield name, "", NOT_STABLE, "", ""
-        return
-    yield "gain margin, down", "factor", band.gain[0], "", ""
-    yield "gain margin, up", "factor", band.gain[1], "", ""
-    for name, row in zip(QUANTITIES[2:], margin_rows(found, band), strict=True):
-        yield name, row.column.unit, row.exact, row.in_band, row.at
-
-
-def window_table(laws: Sequence[LawOnArm], found: Sequence[Margins]) -> Table:
-    """A row a law and gain; none for the moment on a free pin, where it has no loop."""
-    rows = [
-        (law.name, each.stability.verdict, row)
-        for law, each in zip(laws, found, strict=True)
-        for row in gain_rows(each)
-        if row.gain != MOMENT_GAIN or not each.stability.loop.arm.has_massless_hub
-    ]
-    names, verdicts, gains = zip(*rows, strict=True)
-    open_ends = ((law.name, unsettled(each)) for law, each in zip(laws, found, strict=True))  # windows of a band
-    more = "".join(f" {upper(name)}: {typeset(text)}." for name, text in open_ends if text)
-    return Table(
-        stem="windows",
-        title="How far each gain may go alone",
-        caption=CAPTION_OF_WINDOWS + more,
-        columns=(Column("law", "law", of=names), Column("verdict", "verdict", of=verdicts), *WINDOW_COLUMNS),
-        record=gains,
-    )
+def window_tables(laws: Sequence[LawOnArm], found: Sequence[Margins]) -> list[Table]:
+    """Of each law a row a gain or number."""
+    return [
+        table(
+            each.stability_intervals, stem=f"{law.key.replace('_', '-')}-windows",
+            title=f"Stability intervals of {law.name}",
+            caption=f"{CAPTION_OF_WINDOWS} {upper(typeset(each.intervals_note or ''))}".strip(),
+        )
+        for law, each in zip(laws, found, strict=True) if each.windows
+    ]  # fmt: skip
 
 
 def count_table(names: Sequence[str], plots: Sequence[Nyquist]) -> Table:
-    """Verdict, encirclements and unstable poles of each law."""
-    whole = partial(Column, digits=singly(lambda n: str(n).replace("-", "−")))
-    unstable = partial(whole, group="unstable poles")
-    words = [
-        f"{it.verdict}{', infinitely many in all' * it.unstable_roots_infinite}"
-        for it in (plot.verdict for plot in plots)
-    ]
-    return Table(
-        stem="nyquist-count",
-        title="Encirclements and unstable poles",
-        caption=COUNT_CAPTION.format(open=NO_OPEN if not any(plot.unstable_open for plot in plots) else OWN_OPEN),
-        columns=(
-            Column("law", "law", of=names),
-            Column("verdict", "verdict", of=words),
-            whole("encirclements", "turns around −1", of="encirclements"),
-            unstable("unstable_by_nyquist", "by Nyquist", of="expected"),
-            unstable("unstable_in_box", "in a box", of="verdict.unstable_roots"),
-            unstable("on_axis_in_box", "undecided", of="on_axis"),
-            Column("band_rad_s", "up to", "rad/s", of="verdict.band", digits=singly(significant, 6)),
-        ),
-        record=list(plots),
-    )
+    """Encirclements and unstable poles of each law."""
+    caption = COUNT_CAPTION.format(open=NO_OPEN if not any(plot.unstable_open for plot in plots) else OWN_OPEN)
+    of = dict(zip(names, plots, strict=True))
+    return across(of, stem="nyquist-count", title="Encirclements and unstable poles", caption=caption)
 
 
 def no_loop_section(arm: Arm) -> PageSection:
@@ -226,9 +149,8 @@ def margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> Pa
     blocks: list[Picture | Table] = [_bode_picture(*each) for each in both]
     if any(it.in_band is not None for it in found):
         blocks.append(margin_table(cases, found, undamped))
-    blocks += [crossings_table(each, it) for each, it in both if it.in_band is not None]
-    if windowed := [(each, it) for each, it in both if it.windows]:
-        blocks.append(window_table([each for each, _ in windowed], [it for _, it in windowed]))
+    blocks += [each_table for each, it in both for each_table in crossings_tables(each, it)]
+    blocks += window_tables(cases, found)
     facts, words = [], []
     for each, it in both:
         far = "" if it.stability.is_known_beyond or it.stability.verdict == "unstable" else ", not known beyond"
@@ -264,27 +186,23 @@ def _bode_picture(each: LawOnArm, found: Margins) -> Picture:
     )
 
 
-def crossings_table(each: LawOnArm, found: Margins) -> Table:
-    """Every crossing of |L| = 1 and of L < 0 in the band, ascending."""
-    assert found.in_band is not None
-    rows = sorted(itertools.chain(*crossovers(found.in_band)), key=lambda row: row.omega_rad_s)
-    return Table(
-        stem=f"{each.key.replace('_', '-')}-crossings",
-        title=f"Every crossing of {each.name}",
-        caption=CROSSINGS_CAPTION if rows else "Nowhere in the band is |L| = 1, or L real and below 0.",
-        columns=CROSSOVERS,
-        record=rows,
-    )
+def crossings_tables(each: LawOnArm, found: Margins) -> list[Table]:
+    """Every crossing of |L| = 1 and of L < 0 in the range, ascending."""
+    stem, kinds = each.key.replace("_", "-"), {"gain": found.gain_crossovers, "phase": found.phase_crossovers}
+    return [
+        table(rows, stem=f"{stem}-{kind}-crossovers", title=f"{upper(kind)} crossovers of {each.name}",
+              caption=CROSSINGS_CAPTION)
+        for kind, rows in kinds.items() if rows
+    ]  # fmt: skip
 
 
 def spill_table(each: LawOnArm, found: Spill) -> Table:
-    """A row a model, what the exact loop says in the caption."""
-    return Table(
+    """A row a model, the finding in the caption."""
+    return table(
+        found.models,
         stem=f"{each.key.replace('_', '-')}-spill",
         title=f"Models of few modes under {each.name}",
         caption=f"{SPILL_CAPTION} {upper(typeset(found.in_words))}.",
-        columns=SPILL,
-        record=found,
     )
 
 
@@ -309,13 +227,25 @@ def nyquist_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> Pa
             stem=stem, title="Nyquist plots of the exact loop function", caption=RINGS_CAPTION,
             alt="; ".join(counts[named.name] for named, _ in pair),
             figure=draw_nyquist(arm.name, {named.name: data for named, data in pair}),
-            data=nyquist_table(*(data for _, data in pair), stem=f"{stem}-data", laws=[named.key for named, _ in pair]),
+            data=contour_table([data for _, data in pair], [named.key for named, _ in pair], stem=f"{stem}-data"),
         ))  # fmt: skip
     own = "" if any(data.unstable_open for _, data in plots) else ", which here is never"
     table = count_table([f"{named.name}: {named.gains}" for named, _ in plots], [data for _, data in plots])
     words = [*map(upper, counts.values()), NYQUIST_WORDS.format(own=own)]
     title = "Nyquist plot: encirclements of −1"
     return PageSection(anchor="margins-nyquist", title=title, words=words, blocks=[*blocks, table])
+
+
+def contour_table(found: Sequence[Nyquist], laws: Sequence[str], *, stem: str) -> Table:
+    """L on the contour of each loop, a row a point."""
+    each = [curve_table(one).columns for one in found]
+    names = [name for name, columns in zip(laws, each, strict=True) for _ in columns[0].values]
+    joined = [
+        replace(columns[0], of=[value for column in columns for value in column.values])
+        for columns in zip(*each, strict=True)
+    ]
+    title = "The loop function on the contour"
+    return Table(stem=stem, title=title, columns=(Column("law", "law", of=names), *joined))
 
 
 # ------------------------------------------------------------ poles
@@ -351,10 +281,8 @@ def _poles_table(each: LawOnArm, poles: Poles) -> Table:
     """Poles with Im s >= 0, with their damping ratio."""
     left, right, _, top = poles.box
     box = f"{plain(left, 5)} < Re s < {plain(right, 5)} and |Im s| < {plain(top, 6)}"
-    return Table(
-        stem=f"{each.key.replace('_', '-')}-poles",
-        title=f"Closed-loop poles under {each.name}",
+    return roots_table(
+        poles.values, quantities(Poles)["values"],
+        stem=f"{each.key.replace('_', '-')}-poles", title=f"Closed-loop poles under {each.name}",
         caption=POLES_CAPTION.format(box=box),
-        columns=POLE_COLUMNS,
-        record=poles.values.tolist(),
-    )
+    )  # fmt: skip

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, PLANE, RATE_GAIN, Arm, shown_unit, unit_of, written_unit
+from tfarm.arm import GAINS, PLANE, RATE_GAIN, Arm, shown_unit, unit_of
 from tfarm.arrays import Real
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp.verdict import SampledBrief
-from tfarm.loop.answers import gain_rows
 from tfarm.loop.loop import band_of
 from tfarm.loop.plane import DEEPEST_MOMENT_GAIN, Axis, Plane, edge, gain_map, moment_axis, rate_axis
 from tfarm.plots import plane
@@ -26,6 +25,7 @@ from tfarm.plots.style import blank, headline, legend_below, style
 from tfarm.records import record
 from tfarm.report.cases import DESIGNED_MODES, LawOnArm, best, brief_on, continuous_cases, margins_of
 from tfarm.report.sections import PageSection, Picture, in_ms, typeset
+from tfarm.schema import text
 from tfarm.spectrum.table import default_gains, default_words, first_frequency, rate_unit
 from tfarm.synthesis.design import Design
 from tfarm.synthesis.judge import least_damping
@@ -204,12 +204,11 @@ def map_section(arm: Arm, chain: Chain | None = None) -> PageSection:
 def _intervals(arm: Arm) -> str:
     """The verdict on the default gains, and the stability interval of each."""
     found = margins_of(arm, default_gains(arm))
-    rows = [row for row in gain_rows(found) if row.gain in PLANE]
-    spans = (f"{row.gain} in {' '.join(row.spans(plain, 5, *row.windows.all)) or 'none'}{written_unit(row.gain, arm)}"
-             for row in rows)  # fmt: skip
+    rows = [row for row in found.stability_intervals if row.name in PLANE]
+    spans = (f"{row.name} in {text(row.intervals, 5)} {row.unit}".rstrip() for row in rows)
     return (
         f"With the default gains {typeset(default_words(arm))} the loop is {found.stability.verdict}. Stability "
-        f"intervals, the other gain fixed: {'; '.join(spans)}. A star: no limit found up to there."
+        f"intervals, the other gain fixed: {'; '.join(spans)}. With < or >: no limit found up to there."
     )
 
 

@@ -6,21 +6,21 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit
 from tfarm.columns import Column, Table
-from tfarm.crossing import Window
 from tfarm.digits import how_many, plain, scientific, significant, singly
 from tfarm.dsp import Analysis, Chain, Verdict, sampled_verdict
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.dsp.crossings import around
-from tfarm.dsp.modes import SAMPLED_MODE_COLUMNS, STRONGER, SampledLoci, sampled_loci
-from tfarm.dsp.verdict import SampledNumber, at_periods, sampled
+from tfarm.dsp.modes import STRONGER, SampledLoci, sampled_loci
+from tfarm.dsp.verdict import at_periods, sampled
 from tfarm.plots.regions import StableRegions, draw_overlay, regions_table, stable_regions
 from tfarm.plots.roots import draw_sampled_loci
 from tfarm.records import record
 from tfarm.report.cases import GivenLaw, LawOnArm, cases_of, has_loop, margins_of, on_hub, what_holds, why_no_loop
 from tfarm.report.motion import measured_blocks, slew
 from tfarm.report.sections import Fact, PageSection, Picture, in_ms, span, spans, typeset, upper
+from tfarm.schema import table
 
 MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict is given
 PAST_HUB = 1.25  # times the rate gain at which sampling alone makes the hub unstable: the end of its locus
@@ -28,6 +28,7 @@ LOCUS_K2 = (-0.5, 1.5)  # of its locus: the stability interval of most arms, and
 DELAYS_CAPTION = (
     "The exact loop with further delay between reading and acting. Stable: every |z| below 1{apart}. {held}"
 )
+VERDICT_COLUMNS = ("word", "spectral_radius", "time_constant", "slowest", "holds_for")
 APART_FROM_FREE = ", that at z = 1 of a hub without angle feedback apart"
 NUMBERS_CAPTION = (
     "Each number alone, the others fixed; a name that ends in “gain” is a factor on that part of the controller. At an "
@@ -63,14 +64,6 @@ class SampledCase:
         """The verdict on the loop."""
         return self.analysis.verdict
 
-    @property
-    def numbers(self) -> Sequence[SampledNumber]:
-        """Each gain at the hub, or each number of another controller, with its stability intervals."""
-        found = self.analysis
-        if not found.loop.is_of_gains:
-            return [SampledNumber("whole controller", 1.0, found.factors), *found.numbers]
-        return [SampledNumber(name, found.loop.number(name), list(each)) for name, each in found.windows.items()]
-
 
 def sampled_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> PageSection:
     """The sampled loop under the laws given, or the default gains; one sentence for an arm without a loop.
@@ -83,7 +76,7 @@ def sampled_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> Pa
     cases = cases_of(arm, laws)
     found = [SampledCase(each, sampled(each.arm, each.law, chain)) for each in cases]
     words = [*map(answer, found), chain_words(arm, chain)]
-    blocks: list[Picture | Table] = [numbers_table(found), delays_table(found, chain)]
+    blocks: list[Picture | Table] = [*map(numbers_table, found), delays_table(found, chain)]
     if not laws:
         gains = found[0].analysis.loop.gains
         blocks = [overlay_picture(stable_regions(arm, gains, chain), found[0]), *blocks]
@@ -171,31 +164,12 @@ def chain_words(arm: Arm, chain: Chain) -> str:
     return f"The chain: {', '.join(text for has, text in parts if has)}.{steps}{paper}"
 
 
-def numbers_table(found: Sequence[SampledCase]) -> Table:
-    """Stability intervals of each number of each case, the others fixed."""
-    rows = [(it, number) for it in found for number in it.numbers]
-    modes = ", ".join(dict.fromkeys(f"{it.each.name} with {it.verdict.modes_used} flexible modes" for it in found))
-    return Table(
-        stem="sampled-numbers",
-        title="Stability intervals, the other numbers fixed",
-        caption=NUMBERS_CAPTION.format(modes=modes),
-        columns=(
-            Column("law", "controller", of=[it.each.name for it, _ in rows]),
-            Column("number", "number", of=[number.number for _, number in rows]),
-            Column("value", "value", of=[number.value for _, number in rows], digits=singly(plain, 5)),
-            Column(
-                "stable_windows", "stable, sampled",
-                of=[" ".join(repr(end) for window in number.windows for end in window) or "none" for _, number in rows],
-                shown=[spans(number.windows, number.value, interval_of(it, number)) for it, number in rows],
-            ),
-        ),
-        keys=2,
-    )  # fmt: skip
-
-
-def interval_of(found: SampledCase, number: SampledNumber) -> Window | None:
-    """The stability interval around a number; a gain on the angle that is 0 is the lower end of its own."""
-    return found.analysis.interval(number.number) if number.number == ANGLE_GAIN else number.interval
+def numbers_table(found: SampledCase) -> Table:
+    """Stability intervals of each number of a case, the others fixed."""
+    stem = "sampled-numbers" if found.each.key in ("default", "law") else f"sampled-numbers-{found.each.key[4:]}"
+    caption = NUMBERS_CAPTION.format(modes=f"{found.verdict.modes_used} flexible modes")
+    title = f"Stability intervals, {found.each.name}"
+    return table(found.analysis.stability_intervals, stem=stem, title=title, caption=caption)
 
 
 def delays_table(found: Sequence[SampledCase], chain: Chain) -> Table:
@@ -213,22 +187,17 @@ def delays_table(found: Sequence[SampledCase], chain: Chain) -> Table:
     verdicts = [verdict for *_, verdict in rows]
     held = dict.fromkeys(f"{upper(verdict.holds_for)}." for verdict in verdicts)
     free = any(verdict.loop.has_free_angle for verdict in verdicts)
+    first = (
+        Column("law", "controller", of=[name for name, *_ in rows]),
+        Column("further_delay_ms", "further delay", "ms", of=[1e3 * T * more for _, more, _ in rows],
+               digits=singly(plain)),
+    )  # fmt: skip
     return Table(
         stem="sampled-delays",
         title="Stability with further delay",
         caption=DELAYS_CAPTION.format(apart=APART_FROM_FREE * free, held=typeset(" ".join(held))),
-        record=verdicts,
-        columns=(
-            Column("law", "controller", of=[name for name, *_ in rows]),
-            Column("further_delay_ms", "further delay", "ms", of=[1e3 * T * more for _, more, _ in rows],
-                   digits=singly(plain)),
-            Column("verdict", "verdict", of="word"),
-            Column("spectral_radius", "largest |z|", of=lambda it: math.exp(it.log_radius), digits=singly(plain, 10)),
-            Column("log_spectral_radius", "ln|z| a sample", of="log_radius", digits=singly(scientific, 4)),
-            Column("slowest", "dominant pole"),
-            Column("modes_used", "modes"),
-        ),
-    )  # fmt: skip
+        columns=(*first, *table(verdicts, VERDICT_COLUMNS).columns),
+    )
 
 
 def periods_table(arm: Arm, gains: HubFeedback, chain: Chain) -> Table:
@@ -245,11 +214,7 @@ def periods_table(arm: Arm, gains: HubFeedback, chain: Chain) -> Table:
         columns=(
             Column("period_ms", "period", "ms", of=lambda row: 1e3 * row.period, digits=singly(plain)),
             Column("half_rate_hz", "aliased above", "Hz", of=lambda row: 0.5 / row.period, digits=singly(plain)),
-            Column("verdict", "verdict", of=lambda row: row.verdict.word),
-            Column("growth_1_s", "growth", "1/s", of=lambda row: row.verdict.log_radius / row.period,
-                   digits=singly(scientific, 3)),
-            Column("modes", "modes", of=lambda row: row.verdict.modes_used,
-                   shown=[f"{'' if row.verdict.is_settled else 'first '}{row.verdict.modes_used}" for row in rows]),
+            *table([row.verdict for row in rows], VERDICT_COLUMNS).columns,
             *(
                 Column(
                     f"stable_{name}", f"stable {name}", shown_unit(name, arm),
@@ -271,12 +236,11 @@ def modes_table(found: SampledCase) -> Table:
     T = found.verdict.loop.chain.sampling.period
     gains = " and ".join(PLANE)
     suffix = "" if found.each.key in ("default", "law") else f"-{found.each.key.replace('_', '-')}"
-    return Table(
+    return table(
+        found.analysis.modes,
         stem=f"sampled-modes{suffix}",
         title=f"Modes of the sampled loop, {found.each.name}",
         caption=MODES_CAPTION.format(ms=plain(1e3 * T), half=plain(0.5 / T), gains=gains),
-        columns=SAMPLED_MODE_COLUMNS,
-        record=found.analysis.modes,
     )
 
 

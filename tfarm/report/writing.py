@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
-import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from tfarm.arm import PLANE, Arm
-from tfarm.columns import Table
 from tfarm.comparing import Comparison
-from tfarm.comparing.answers import compared_margins, compared_modes, compared_poles, side_words, unpaired_poles
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError, TfarmError, must_be_known
 from tfarm.files import temporary_folder
@@ -39,6 +35,7 @@ from tfarm.report.page import (
 from tfarm.report.sections import PageSection, Picture, SavedSection, save_section, typeset, upper
 from tfarm.report.trust import TRUST_FOLDER, Evidence, gather, write_trust
 from tfarm.report.trust_proofs import save_proof, written_proofs
+from tfarm.schema import table
 from tfarm.stopping import undone_if_stopped
 
 ReportProgress = Callable[[int, int, str], object]
@@ -56,17 +53,10 @@ RESERVED_NAMES = (  # which no arm's folder may have
 )  # fmt: skip
 TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
 LEFT_OUT_OF = "{name}: the page leaves out “{title}” and says why: {why}"
-LEADING_MINUS = re.compile(r"^-(?=\d)")  # a minus sign before a number
-LEADING_OMEGA = re.compile(r"^w(?= of )")
-NUMBER_WORDS = {"inf": "∞", "-inf": "−∞", "-": "–"}
-DIFFERENCE_NOTE = "Differences are those of the second from the first, in per cent of the first, of angles in degrees."
+DIFFERENCE_NOTE = "Differences are the second less the first, in the unit of the quantity."
 PAIRED_NOTE = "By the mode whose open-loop pole each is nearest to."
 UNPAIRED_NOTE = "Of a mode that has no oscillating pole on the other side, or of none."
 IN_Z_NOTE = "One of the laws is a law in z: both loops are compared at their samples, each pole z as s = ln(z)/T."
-AT_SAMPLES_NOTE = "Of the exact loop at its samples, with as many modes as its verdict takes."
-KNOWN_NOTE = (
-    "Exact: of the loop at every frequency. In the band: read up to the verdict's band, no exact value being known."
-)
 
 
 def make_all(
@@ -344,8 +334,9 @@ def write_comparison(found: Comparison, out: Path) -> Path:
 
 
 def _sections(found: Comparison) -> Iterator[PageSection]:
-    words = [*(f"{typeset(side_words(side))}." for side in found.sides), *[IN_Z_NOTE] * found.is_sampled]
-    yield PageSection(anchor="verdicts", title="Verdicts", words=words)
+    sides = table(found.rows, stem="compare-sides", title="Compared", caption="")
+    words = [IN_Z_NOTE] * found.is_sampled
+    yield PageSection(anchor="verdicts", title="Verdicts", words=words, blocks=(sides,))
     curves = "exact response" if found.is_of_arms else "loop function"
     plane = f"{' and '.join(PLANE)}, with exact edges"
     if found.is_sampled or found.regions is None:
@@ -357,22 +348,13 @@ def _sections(found: Comparison) -> Iterator[PageSection]:
         figure=comparison.figure(found),
     )  # fmt: skip
     yield PageSection(anchor="both", title="Both in one picture", blocks=(picture,))
-    if found.is_of_arms:
-        modes = _set(compared_modes(found), "modes", "Natural frequencies and damping", DIFFERENCE_NOTE)
-        yield PageSection(anchor="modes", title="Modes", blocks=(modes,))
-    poles = [_set(compared_poles(found), "poles", "Those that oscillate", f"{PAIRED_NOTE} {DIFFERENCE_NOTE}")]
-    if len(apart := unpaired_poles(found)):
-        poles.append(_set(apart, "unpaired-poles", "Poles of one side alone", UNPAIRED_NOTE))
-    yield PageSection(anchor="poles", title="Closed-loop poles", blocks=tuple(poles))
-    known = AT_SAMPLES_NOTE if found.is_sampled else KNOWN_NOTE
-    margins = _set(compared_margins(found), "margins", "How far from unstable", f"{known} {DIFFERENCE_NOTE}")
-    yield PageSection(anchor="margins", title="Margins", blocks=(margins,))
-
-
-def _set(table: Table, of: str, title: str, caption: str) -> Table:
-    """The table as pages show such: powers of ten, minus signs, infinity, and w in Greek."""
-    columns = []
-    for each in table.columns:
-        cells = [NUMBER_WORDS.get(cell) or LEADING_MINUS.sub("−", typeset(cell)) for cell in each.cells]
-        columns.append(replace(each, title=LEADING_OMEGA.sub("ω", each.title), shown=cells))
-    return replace(table, stem=f"compare-{of}", title=title, caption=caption, columns=tuple(columns), record=None)
+    tables = (
+        ("modes", "Natural frequencies and damping", found.mode_differences, DIFFERENCE_NOTE),
+        ("poles", "Closed-loop poles that oscillate", found.pole_differences, PAIRED_NOTE),
+        ("unpaired-poles", "Poles of one side alone", found.unpaired_poles, UNPAIRED_NOTE),
+        ("margins", "Stability and margins", found.margin_differences, DIFFERENCE_NOTE),
+    )
+    for stem, title, rows, caption in tables:
+        if rows:
+            blocks = (table(rows, stem=f"compare-{stem}", title=title, caption=caption),)
+            yield PageSection(anchor=stem, title=title, blocks=blocks)

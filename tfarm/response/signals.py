@@ -19,7 +19,7 @@ from tfarm.errors import MISSING, ParameterError
 from tfarm.exact.characteristic import LoopParts
 from tfarm.exact.outputs import Output
 from tfarm.exact.outputs import output as known_output
-from tfarm.exact.series import expansions_at_zero
+from tfarm.exact.series import order_at_zero
 from tfarm.exact.system import System, system_of
 from tfarm.exact.values import free_outputs
 from tfarm.records import read_only, record
@@ -103,12 +103,9 @@ class Signals:
     @cached_property
     def orders(self) -> tuple[int, ...]:
         """How often each numerator vanishes at s = 0; the drive does `system.at_rest` times."""
-        found = []
-        for wanted, share in zip(self.outputs, self.places, strict=True):
-            (series,) = expansions_at_zero(self.system, [wanted], share)
-            first = next((n for n, coefficient in enumerate(series) if coefficient != 0), len(series))
-            found.append(max(0, self.system.at_rest + first - 2))
-        return tuple(found)
+        return tuple(
+            order_at_zero(self.system, wanted, share) for wanted, share in zip(self.outputs, self.places, strict=True)
+        )
 
     def _placed(self, name: str) -> tuple[Output, float]:
         """The output of a name and its place [m]."""

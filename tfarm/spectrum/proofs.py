@@ -29,6 +29,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
+from typing import Annotated
 
 import flint
 import numpy as np
@@ -39,6 +40,7 @@ from tfarm.exact.balls import Ball, point, precision, rational
 from tfarm.exact.characteristic import Feedback, characteristic_over, tangent
 from tfarm.exact.system import System
 from tfarm.records import record
+from tfarm.schema import Quantity
 
 from .box import Box
 from .frequencies import RealAxis, axis_precisions, secant
@@ -137,9 +139,9 @@ DIGITS_BEYOND = 3  # digits to which it goes on beyond those of the disc: its mi
 class Disc:
     """A closed disc of the complex plane with exactly one zero, simple: middle as decimal strings, radius one."""
 
-    re: str
-    im: str
-    radius: str
+    re: Annotated[str, Quantity("Re s", "1/s", key="re")]
+    im: Annotated[str, Quantity("Im s", "rad/s", key="im")]
+    radius: Annotated[str, Quantity("radius", "1/s")]
 
     @property
     def is_real(self) -> bool:

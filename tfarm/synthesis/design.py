@@ -8,10 +8,10 @@ off, is part of the record.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from operator import itemgetter
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -20,13 +20,13 @@ from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.verdict import SampledBrief, sampled_brief, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError, must_be_known
-from tfarm.loop.answers import law_answer
 from tfarm.loop.loop import Loop
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import record
+from tfarm.schema import Quantity
 from tfarm.synthesis.judge import LOST, OBJECTIVES, Judge, judges_of
 from tfarm.synthesis.models import slew_and_after, trial_slew
-from tfarm.synthesis.search import Search, Worst, flat_part, search
+from tfarm.synthesis.search import CANDIDATES, Search, Worst, flat_part, search
 from tfarm.synthesis.structures import Bounds, Structure, check_bounds, structure_of
 from tfarm.synthesis.worst_case import ArmBox, NamedArm, Tell, WorstCase, arms_of, for_the_worst, same_input
 
@@ -42,11 +42,41 @@ class OnArm:
     `numbers` are those that a box gave the arm.
     """
 
-    name: str
-    numbers: dict[str, float]
-    value: float
+    name: Annotated[str, Quantity("arm", key="name")]
+    numbers: Annotated[dict[str, float], Quantity("numbers of the arm")]
+    value: Annotated[float, Quantity("objective", key="value")]
     verdict: Stability
     sampled: SampledBrief
+
+    @property
+    def stability(self) -> Annotated[str, Quantity("continuous-time loop", key="verdict")]:
+        """The word of the continuous loop's verdict."""
+        return self.verdict.verdict
+
+    @property
+    def known_beyond(self) -> Annotated[bool, Quantity()]:
+        """Whether that is known beyond its frequency range."""
+        return self.verdict.is_known_beyond
+
+    @property
+    def band(self) -> Annotated[float, Quantity(key="up_to_rad_s")]:
+        """That range [rad/s]."""
+        return self.verdict.band
+
+    @property
+    def sampled_loop(self) -> Annotated[str, Quantity("sampled loop", key="sampled")]:
+        """The same of the sampled loop."""
+        return self.sampled.short
+
+
+class Coefficient(NamedTuple):
+    """A coefficient of a design, how flat the optimum is along it, and where it was searched."""
+
+    name: Annotated[str, Quantity("coefficient", key="name")]
+    value: Annotated[float, Quantity("value", digits=7)]
+    flat: Annotated[Bounds | None, Quantity("within one per cent", key="within_one_per_cent")]
+    bounds: Annotated[Bounds | None, Quantity("searched")]
+    optimum: Annotated[str, Quantity("optimum")]
 
 
 @dataclass(frozen=True)
@@ -64,25 +94,67 @@ class Design:
     the K2 = 1 that stops the hub, or 2/T of a pole.  Of `starts` strategies `agreed` came to the best score.
     """
 
-    objective: str
-    structure: str
+    objective: Annotated[str, Quantity("objective")]
+    structure: Annotated[str, Quantity("structure")]
     law: Any
     coefficients: dict[str, float]
-    value: float
-    verdict: Stability
+    value: Annotated[float, Quantity("value of the objective", key="value")]
+    verdict: Annotated[Stability, Quantity(flat=True)]
     bounds: dict[str, Bounds]
     flat: dict[str, Bounds]
-    modes: int
+    modes: Annotated[int, Quantity("flexible modes in the objective")]
     at_bound: tuple[str, ...]
     at_limit: tuple[str, ...]
     widened: tuple[str, ...]
-    loop: LoopKind
+    loop: Annotated[LoopKind, Quantity("designed for the loop", key="designed_for")]
     chain: Chain
-    sampled: SampledBrief
-    arms: tuple[OnArm, ...]
-    starts: int
-    agreed: int
+    sampled: Annotated[SampledBrief, Quantity("sampled loop")]
+    arms: Annotated[tuple[OnArm, ...], Quantity("arms")]
+    starts: Annotated[int, Quantity("searches")]
+    agreed: Annotated[int, Quantity("searches within half a per cent of the best", key="starts_agreed")]
     worst_case: WorstCase
+
+    @property
+    def rows(self) -> Annotated[list[Coefficient], Quantity("coefficients", key="coefficients")]:
+        """A row a coefficient."""
+        return [
+            Coefficient(name, value, self.flat.get(name), self.bounds.get(name), self._optimum(name))
+            for name, value in self.coefficients.items()
+        ]
+
+    def _optimum(self, name: str) -> str:
+        """The place of the best value within the bounds."""
+        if name in self.at_limit:
+            return "at the physical limit"
+        if name in self.at_bound:
+            return "none: search cut off at the bound"
+        return (
+            "inside bounds that were widened" if name in self.widened else "inside" if name in self.bounds else "given"
+        )
+
+    @property
+    def slew_duration(self) -> Annotated[float | None, Quantity("record of the slew", "s", 6)]:
+        """Length of the record that a residual or a cost is of, for `tfarm simulate --duration`; None of others."""
+        arm, chain = self.verdict.loop.arm, self.chain
+        if self.loop == "continuous":
+            return None
+        tasks = {"residual": lambda: slew_and_after(arm, arm, chain), "cost": lambda: trial_slew(arm, chain)}
+        return float(tasks[self.objective]().t[-1]) if self.objective in tasks else None
+
+    @property
+    def worst_arm(self) -> Annotated[str, Quantity("worst arm")]:
+        """The arm that the value is of."""
+        return next(each.name for each in self.arms if each.value == self.value)
+
+    @property
+    def tried(self) -> Annotated[int, Quantity(key="arms_tried_inside")]:
+        """Arms inside the box that were looked at."""
+        return self.worst_case.tried
+
+    @property
+    def worst_case_words(self) -> Annotated[str, Quantity("worst case", key="worst_case_in_words")]:
+        """How the arms were chosen."""
+        return self.worst_case.sentence(len(self.arms))
 
 
 class _Choice(NamedTuple):
@@ -155,17 +227,23 @@ class _Task:
         """The best law that holds on all arms.  Raises ConvergenceError where none is found."""
         nearest: tuple[float, Any] | None = None
         for several in in_step([self.judges(each.arm) for each in named]):
-            worst = Worst(several)
-            found = search(worst, self.form, self.tell)
-            nearest = min([*([nearest] if nearest else []), found.found[0]], key=itemgetter(0))
-            for score, x in found.found:
-                law = found.form.record_at(x)
-                if score < LOST and all(judge.holds(law) for judge in several):
-                    return _Choice(worst, found, score, x, law)
+            for judges, most in self._steps(several):
+                found = search(Worst(judges), self.form, self.tell)
+                nearest = min([*([nearest] if nearest else []), found.found[0]], key=itemgetter(0))
+                for score, x in found.found[:most]:
+                    law = found.form.record_at(x)
+                    if score < LOST and all(judge.holds(law) for judge in several):
+                        return _Choice(Worst(several), found, score, x, law)
         assert nearest is not None  # there is at least one judge
         law = self.form.record_at(nearest[1])
         chain = self.chain if self.loop == "sampled" else None
         raise ConvergenceError(_why_none(named, self.form, law, chain), law, nearest[0])
+
+    def _steps(self, several: tuple[Judge, ...]) -> list[tuple[tuple[Judge, ...], int]]:
+        """Judges to search with, and how many of the laws found are tried: the best under fewer conditions, if it
+        holds, is the best under all."""
+        relaxed = tuple(replace(each, is_relaxed=True) for each in several)
+        return [*([(relaxed, 1)] if self.loop == "sampled" else []), (several, CANDIDATES)]
 
     def score_on(self, choice: _Choice, on: Arm) -> float:
         """What a law minimised, on another arm; inf where the loop does not hold."""
@@ -219,55 +297,3 @@ def in_step(each: Sequence[Iterable[_One]]) -> Iterator[tuple[_One, ...]]:
     for row in zip_longest(*each):
         last = [old if new is None else new for old, new in zip(last, row, strict=True)]
         yield tuple(one for one in last if one is not None)
-
-
-def design_answer(found: Design) -> dict[str, Any]:
-    """What `tfarm design` prints with --json: the law and what it reaches, both verdicts, the optimum."""
-    arm = found.verdict.loop.arm
-    return {
-        "arm": arm.name,
-        "objective": found.objective,
-        **law_answer(found.law, arm),
-        "value": found.value,
-        "slew_duration_s": slew_duration(found),
-        "verdict": found.verdict.verdict,
-        "known_beyond_the_band": found.verdict.is_known_beyond,
-        "band_rad_s": found.verdict.band,
-        "modes": found.modes,
-        "structure": found.structure,
-        "designed_for": found.loop,
-        "coefficients": found.coefficients,
-        "bounds": {name: list(pair) for name, pair in found.bounds.items()},
-        "at_bound": list(found.at_bound),
-        "at_limit": list(found.at_limit),
-        "widened": list(found.widened),
-        **{f"flat_{name}": list(pair) for name, pair in found.flat.items()},
-        "starts": found.starts,
-        "starts_agreed": found.agreed,
-        "sampled": found.sampled.answer,
-        "arms": [_arm_answer(each) for each in found.arms],
-        "worst_arm": next(each.name for each in found.arms if each.value == found.value),
-        "arms_tried_inside": found.worst_case.tried,
-        "worst_case_in_words": found.worst_case.sentence(len(found.arms)),
-    }
-
-
-def _arm_answer(found: OnArm) -> dict[str, Any]:
-    return {
-        "name": found.name,
-        "numbers": found.numbers,
-        "value": found.value,
-        "verdict": found.verdict.verdict,
-        "known_beyond_the_band": found.verdict.is_known_beyond,
-        "band_rad_s": found.verdict.band,
-        "sampled": found.sampled.answer,
-    }
-
-
-def slew_duration(found: Design) -> float | None:
-    """How long the record [s] is that a residual or a cost is of, for `tfarm simulate --duration`; None of others."""
-    arm, chain = found.verdict.loop.arm, found.chain
-    if found.loop == "continuous":
-        return None
-    tasks = {"residual": lambda: slew_and_after(arm, arm, chain), "cost": lambda: trial_slew(arm, chain)}
-    return float(tasks[found.objective]().t[-1]) if found.objective in tasks else None

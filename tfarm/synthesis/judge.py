@@ -25,7 +25,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from tfarm.arm import AnyLaw, Arm, as_law, tracked
 from tfarm.arm.blocks import Rational
@@ -35,6 +34,7 @@ from tfarm.dsp.edges import most_modes
 from tfarm.dsp.results import residual_moment_rms, simulated
 from tfarm.dsp.verdict import UNDAMPED_MODES
 from tfarm.errors import ConvergenceError
+from tfarm.loop.margins import lowest
 from tfarm.loop.stability import stability
 from tfarm.records import record
 from tfarm.synthesis.models import Model, Slews, continuous_model, sampled_model, slew_and_after
@@ -43,7 +43,6 @@ from tfarm.synthesis.structures import Entry, Structure
 REAL_ANGLE = 1e-9  # rad, of ln z or s: a pole at a smaller angle is real
 AS_NEAR = 4.0  # of the least distance to an open-loop pole: as far off a pole may be its own too
 LONGEST_MARGIN = 100.0  # samples, or s: the delay margin where |L| is nowhere 1
-DIPS_REFINED = 5  # lowest points of the grid that are refined
 TIE = 1e-3  # weight of the damping ratio in a disk margin: without sampling rate feedback alone has margin 2
 
 
@@ -126,23 +125,6 @@ def delay(now: Reading) -> Real:
     return -unit * np.where(passes, late, LONGEST_MARGIN).min(axis=1, initial=LONGEST_MARGIN)
 
 
-# ------------------------------------------------------------ values of one law
-
-
-def lowest(model: Model, law: Sequence[Entry], of: Callable[[Complex], Real]) -> float:
-    """The least of a function of L on the grid, its lowest dips refined between the points."""
-    q, found = model.angles, of(model.loop(law)[0])
-    best = [float(found.min())]
-    for i in np.argsort(found)[:DIPS_REFINED]:
-        ends = (q[max(i - 1, 0)], q[min(i + 1, q.size - 1)])
-        done = minimize_scalar(
-            lambda at: float(of(model.loop(law, np.array([at]))[0])[0]),
-            bounds=ends, method="bounded", options={"xatol": 1e-9 * (ends[1] - ends[0])},
-        )  # fmt: skip
-        best.append(float(done.fun))
-    return min(best)
-
-
 OBJECTIVES = {
     "damping": Objective(
         lambda now: -damping_of(now.model, now.poles), lambda judge, law: judge.exact_damping(law), is_negated=True
@@ -174,7 +156,8 @@ LOST = 1e3  # score where a condition of stability is not met, and as much for e
 class Judge:
     """What laws are worth on an arm, by a `model` of few modes; the models `also` have to be stable, too.
 
-    Slews are made for the arm `known`, and damping is that of the first `modes` modes.
+    Slews are made for the arm `known`, and damping is that of the first `modes` modes.  `is_relaxed`: the sampled loop
+    need hold with larger gains alone, which nearly always decides, and is half the work.
     """
 
     arm: Arm
@@ -184,6 +167,7 @@ class Judge:
     modes: int
     model: Model
     also: tuple[Model, ...]
+    is_relaxed: bool = False
 
     @property
     def is_sampled(self) -> bool:
@@ -203,8 +187,11 @@ class Judge:
     @property
     def _conditions(self) -> list[tuple[Model, float]]:
         """What has to be stable, and a factor on the law: most of what is not fails the first, the last is the loop."""
-        shares = (SEARCH_RESERVE, 1 / SEARCH_RESERVE) if self.is_sampled else ()
-        return [*((self.model, share) for share in shares), *((each, 1.0) for each in self.also), (self.model, 1.0)]
+        own = [(self.model, 1.0)]
+        if not self.is_sampled:
+            return own
+        others = [] if self.is_relaxed else [(self.model, 1 / SEARCH_RESERVE), *((each, 1.0) for each in self.also)]
+        return [(self.model, SEARCH_RESERVE), *others, *own]
 
     # ------------------------------------------------------------ in the model
 
@@ -239,7 +226,8 @@ class Judge:
 
     def lowest(self, law: AnyLaw, of: Callable[[Complex], Real]) -> float:
         """The least of a function of the loop function, between the points of the grid too."""
-        return lowest(self.model, entries_of(law), of)
+        entries = entries_of(law)
+        return lowest(lambda angles: of(self.model.loop(entries, angles)[0]), self.model.angles)[0]
 
     def peak(self, law: AnyLaw) -> float:
         """The largest |S|; in continuous time at least 1."""

@@ -304,12 +304,15 @@ class Slews:
 
     def residual(self, entries: Sequence[Entry]) -> Real:
         """Root mean square [N m] of the arm's own moment less the rigid arm's (laws,)."""
-        left = self._left_in_time(entries) if self.model.period is None else self._left_at_samples(entries)
+        if self.model.period is None:
+            left = self._left_in_time(entries)
+        else:
+            left = self._slew.residual(self._run(self._slew, entries, self.model.own_moment)[0])
         return np.sqrt((left**2).mean(axis=0))
 
     def cost(self, entries: Sequence[Entry]) -> Real:
         """T sum of (a x^2 + b e^2)/2 (laws,)."""
-        task, (a, b) = self._trial, trial_weights(self.known, self.chain)
+        task, (a, b) = trial_slew(self.known, self.chain), trial_weights(self.known, self.chain)
         sense = self.model.plant[2][self.model.signals.index("root_moment")]
         moment, u = self._run(task, entries, sense)
         off = moment - task.moment_reference[:, None]
@@ -320,15 +323,7 @@ class Slews:
     def _slew(self) -> Scenario:
         return slew_and_after(self.arm, self.known, self.chain)
 
-    @cached_property
-    def _trial(self) -> Scenario:
-        return trial_slew(self.known, self.chain)
-
     # ------------------------------------------------------------ at samples
-
-    def _left_at_samples(self, entries: Sequence[Entry]) -> Real:
-        moment, _ = self._run(self._slew, entries, self.model.own_moment)
-        return np.asarray((moment.T - self._slew.rigid_moment).T[self._slew.is_after])
 
     def _run(self, task: Scenario, entries: Sequence[Entry], sense: Real) -> tuple[Real, Real]:
         """A root moment, as a row `sense` reads it of the states, and the input at the samples, (samples, laws)."""

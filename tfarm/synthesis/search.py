@@ -67,7 +67,9 @@ class Worst:
 
 def search(judge: Worst, form: Structure, tell: Tell) -> Search:
     """The best laws of a structure near its bounds, which are widened where the best lies beyond."""
-    places = [(place, end) for place in range(form.size) for end in (0, 1) if not is_final(form, place, end)]
+    given = [each.name in form.given for each in form.free]
+    ends = [(place, end) for place in range(form.size) for end in (0, 1)]
+    places = [each for each in ends if not (given[each[0]] or form.is_physical(*each))]
     region = form.wider(places, BEYOND)
     points = np.c_[form.origin, sobol(*form.box, POINTS_LOG2)]
 
@@ -102,11 +104,6 @@ def _at_limits(judge: Worst, form: Structure, x: Real, score: float) -> Real:
         if judge.scores(form, moved[:, None])[0] <= score + AS_GOOD * abs(score):
             x = moved
     return x
-
-
-def is_final(form: Structure, place: int, end: int) -> bool:
-    """Whether no wider bounds are tried there: the bound was given, or is a physical end."""
-    return form.free[place].name in form.given or form.is_physical(place, end)
 
 
 def sobol(low: Real, high: Real, log2: int) -> Real:

@@ -26,18 +26,28 @@ def show(table: Table) -> None:
     print("\n".join(table_lines(table, width)))
 
 
+def show_pairs(pairs: Sequence[tuple[str, str]]) -> None:
+    """Labels and values one below the other; on a terminal a long value goes on below itself."""
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
+    indent = max((len(label) for label, _ in pairs), default=0) + COLUMN_GAP
+    for label, value in pairs:
+        lines = textwrap.wrap(value, max(width - indent, LEAST_FOLDED), break_long_words=False) or [""]
+        print("\n".join([f"{label:{indent}}{lines[0]}", *(" " * indent + line for line in lines[1:])]))
+
+
 def table_lines(table: Table, width: int) -> list[str]:
     """The lines of the table, each in so many characters as far as its widest column allows."""
     columns = table.on(TERMINAL)
     cells = [column.printed(column.values) if column.printed else column.cells for column in columns]
     titles, rows = [heading(column) for column in columns], list(zip(*cells, strict=True))
     fold = [i for i, column in enumerate(columns) if column.folds]
+    words = [i for i, column in enumerate(columns) if column.is_text]
     widths = _widths(titles, rows, fold, width)
     printed: list[str] = []
     for block in _blocks(widths, width, table.keys):
         printed += [""] * bool(printed)
         for row in (titles, *rows):
-            printed += _row(row, widths, fold, block)
+            printed += _row(row, widths, words, block)
     return printed
 
 
@@ -57,10 +67,10 @@ def _widths(titles: Sequence[str], rows: Sequence[Sequence[str]], fold: Sequence
     return widths
 
 
-def _row(row: Sequence[str], widths: Sequence[int], fold: Sequence[int], block: Sequence[int]) -> list[str]:
-    """A row's lines: numbers to the right, what is folded to the left."""
+def _row(row: Sequence[str], widths: Sequence[int], words: Sequence[int], block: Sequence[int]) -> list[str]:
+    """A row's lines: numbers to the right, texts to the left."""
     parts = [textwrap.wrap(row[i], widths[i]) if cell_len(row[i]) > widths[i] else [row[i]] for i in block]
-    to_left = [i in fold and len(part) > 1 for i, part in zip(block, parts, strict=True)]
+    to_left = [i in words for i in block]
     lines = []
     for texts in zip_longest(*parts, fillvalue=""):
         cells = (

@@ -43,7 +43,6 @@ from tfarm.dsp.chain import TIME_ROUNDING
 from tfarm.dsp.scenarios import torque_unit
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum.table import first_frequency
-from tfarm.tuner import kernel
 from tfarm.tuner.guard import Guard, MovingGain, constant_windows
 from tfarm.tuner.trial import Record, Trial, TunedGain, judged, residual_rms, tip_off
 
@@ -96,12 +95,26 @@ def best_constant(trial: Trial) -> BestConstant:
 
 def lq_bound(trial: Trial) -> Record:
     """The optimal trial; its K is zero, for it is no moment feedback, and its u is e."""
-    rest, rigid = trial.reference.rest, trial.reference.rigid
-    gains, (offsets, x, e, moment) = np.zeros((trial.n, trial.model.B.size)), np.zeros((4, trial.n))
-    kernel.optimal(trial.model, rest, rigid, trial.numbers, gains, offsets)
-    kernel.controlled(trial.model, rest, rigid, gains, offsets, x, e, moment)
-    cost = float(trial.numbers.T * np.sum(trial.cost.a * x**2 + trial.cost.b * e**2) / 2)
-    return Record(trial.task.t, x, e, e, np.zeros(trial.n), moment, cost, None)
+    A, B, c = trial.model.A, trial.model.B, trial.model.moment
+    r, m = trial.reference.rest, trial.reference.rigid
+    a, b = trial.numbers.T * trial.cost.a, trial.numbers.T * trial.cost.b
+    P, q = np.zeros_like(A), np.zeros_like(B)
+    gains, offsets = np.zeros((trial.n, B.size)), np.zeros(trial.n)
+    for k in reversed(range(trial.n)):  # e_k = -gains_k s - offsets_k, the last sample first
+        PB = P @ B
+        if (weight := b + B @ PB) > 0:
+            gains[k], offsets[k] = A.T @ PB / weight, (B @ q + B @ PB * r[k]) / weight
+        closed = A - np.outer(B, gains[k])
+        q = closed.T @ (q + PB * (r[k] - offsets[k])) + b * offsets[k] * gains[k] - a * m[k] * c
+        P = closed.T @ P @ closed + b * np.outer(gains[k], gains[k]) + a * np.outer(c, c)
+        P = (P + P.T) / 2
+    states, e = np.zeros_like(gains), np.zeros(trial.n)
+    for k in range(trial.n):
+        e[k] = -gains[k] @ states[k] - offsets[k]
+        states[k + 1 : k + 2] = A @ states[k] + B * (e[k] + r[k])
+    x = states @ c - m
+    cost = float((a * x @ x + b * e @ e) / 2)
+    return Record(trial.task.t, x, e, e, np.zeros(trial.n), states @ trial.model.own, cost, None)
 
 
 def zero_vibration(z: complex) -> Real:

@@ -39,6 +39,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, get_args
@@ -47,7 +48,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
 from tfarm.arrays import Real
 from tfarm.dsp import Sampled, sampled_loop, stable_windows
 from tfarm.dsp.crossings import around
@@ -166,10 +167,7 @@ class MovingGain:
 
     def at(self, K: float) -> Real:
         """The closed-loop matrix at a gain."""
-        return self._under(K).reduced_matrix()
-
-    def _under(self, K: float) -> Sampled:
-        return self.loop.having(**{MOMENT_GAIN: K})
+        return self.loop.having(**{MOMENT_GAIN: K}).reduced_matrix()
 
     def radius(self, m: float) -> float:
         """Half the width of the widest sector around m; 0 where m itself is unstable."""
@@ -186,13 +184,6 @@ class MovingGain:
             self.at((lo + hi) / 2), np.sqrt(half) * self.drive, np.sqrt(half) * self.sense, self.at(lo), self.at(hi)
         )
         return found if found is not None and found.is_proven() else None
-
-    def criterion(self, lo: float, hi: float, theta: Real) -> Real:
-        """1 + (lo + hi) Re H + lo hi |H|^2 at z = e^{i theta}, by transfer functions."""
-        z = np.exp(1j * theta)
-        moment = self.loop.terms(z, None, np.ones(theta.size))[1 + self.loop.part(MOMENT_GAIN)]
-        H = moment / self._under(0.0)(z)
-        return np.asarray(1 + (lo + hi) * H.real + lo * hi * abs(H) ** 2)
 
 
 def _peak(residues: NDArray[np.complexfloating], poles: NDArray[np.complexfloating]) -> float:
@@ -279,11 +270,15 @@ def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
     must_be_known("guard", kind, GUARD_KINDS)
     if kind == "none":
         return Guard("none", 0.0, math.inf, loop.plant.count, False)
-    loops = list(_larger(loop))
-    guard = _frozen(loops, best_constant) if kind == "frozen" else _moving(loops, best_constant)
+    guard = _guard(list(_larger(loop)), kind, best_constant)
     if guard is None:
         raise CertificationError(_remedy(loop, kind))
     return guard
+
+
+def _guard(loops: list[Sampled], kind: GuardKind, best_constant: float) -> Guard | None:
+    """The guard that holds in every model; None where there is none."""
+    return _frozen(loops, best_constant) if kind == "frozen" else _moving(loops, best_constant)
 
 
 def constant_windows(loop: Sampled) -> list[tuple[float, float]]:
@@ -391,7 +386,7 @@ def _larger(loop: Sampled) -> Iterator[Sampled]:
         return
 
 
-def _remedy(loop: Sampled, kind: str) -> str:
+def _remedy(loop: Sampled, kind: GuardKind) -> str:
     """Why there is no guard, and the smallest damping tried that has one."""
     arm = loop.plant.arm
     what = "no sector of moving gains" if kind == "time-varying" else "no constant gain"
@@ -399,27 +394,10 @@ def _remedy(loop: Sampled, kind: str) -> str:
     at = ", ".join(loop.gains.told(name, "{:g}".format) for name in served)
     start = f"{arm.name}: {what} is proven stable at {at}, C = {arm.damping:g} s"
     for C in REMEDY_DAMPINGS[arm.damping < REMEDY_DAMPINGS]:
-        if _has_guard(arm.having(damping=float(C)), loop, kind):
-            return f"{start}; with a damping of C = {C:.1e} s there is one"
+        with suppress(ConvergenceError):
+            damped = sampled_loop(arm.having(damping=float(C)), loop.gains, loop.chain, count=loop.plant.count)
+            guard = _guard(list(_larger(damped)), kind, 0.0)
+            if guard is not None and guard.is_settled:
+                return f"{start}; with a damping of C = {C:.1e} s there is one"
     remedy = f"take another {RATE_GAIN}, or a shorter period or delay"
     return f"{start}, nor with any damping up to {REMEDY_DAMPINGS[-1]:g} s; {remedy}"
-
-
-def _has_guard(arm: Arm, loop: Sampled, kind: str) -> bool:
-    try:
-        first = sampled_loop(arm, loop.gains, loop.chain, count=loop.plant.count)
-        if not constant_windows(first):
-            return False
-        loops = list(_larger(first))
-    except ConvergenceError:
-        return False
-    if kind == "frozen":
-        guard = _frozen(loops, 0.0)
-        return guard is not None and guard.is_settled
-    models = [MovingGain(each) for each in loops]
-    m = _middle(models[0], 0.0)
-    if m is None:
-        return False
-    radii = [model.radius(m) for model in models]
-    sectors = [(m - radius, m + radius) for radius in radii]
-    return RADIUS_SHARE * min(radii) > NARROWEST_SECTOR and _settled(loops, sectors)

@@ -269,53 +269,6 @@ def sample_gradient(k: int, numbers: Numbers, reply: float, x_next: float, run: 
     gain_gradient(weights, run.inputs[k], run.hidden[k], by_gain * run.slope[k], out)
 
 
-@compiled
-def optimal(model: Model, rest: Real, rigid: Real, numbers: Numbers, gains: Real, offsets: Real) -> None:
-    """Fills the gains (N, n) and offsets (N,) of the linear-quadratic optimum e_k = -gains_k.s - offsets_k, the last
-    sample first (see `baselines`)."""
-    A, B, c, T, n = model.A, model.B, model.moment, numbers.T, model.B.size
-    P, closed, turned, product = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
-    q, pull, PB = np.zeros(n), np.zeros(n), np.zeros(n)
-    for k in range(rest.size - 1, -1, -1):
-        g = gains[k]
-        turn(P, B, PB)
-        weight = T * numbers.b + dot(B, PB)
-        if weight > 0:
-            turn(A, PB, g)
-            for i in range(n):
-                g[i] /= weight
-            offsets[k] = (dot(B, q) + dot(B, PB) * rest[k]) / weight
-        for i in range(n):
-            pull[i] = q[i] + PB[i] * (rest[k] - offsets[k])
-            for j in range(n):
-                closed[i, j] = turned[j, i] = A[i, j] - B[i] * g[j]
-        turn(closed, pull, q)
-        for i in range(n):
-            q[i] += T * (numbers.b * offsets[k] * g[i] - numbers.a * rigid[k] * c[i])
-            turn(closed, P[i], product[i])
-        for i in range(n):
-            turn(product, turned[i], P[i])
-            for j in range(n):
-                P[i, j] += T * (numbers.b * g[i] * g[j] + numbers.a * c[i] * c[j])
-        for i in range(n):
-            for j in range(i):
-                P[i, j] = P[j, i] = (P[i, j] + P[j, i]) / 2
-
-
-@compiled
-def controlled(
-    model: Model, rest: Real, rigid: Real, gains: Real, offsets: Real, x: Real, e: Real, moment: Real
-) -> None:
-    """Fills x, e and the arm's own root moment [N m] of the slew under these gains and offsets."""
-    s, now = np.zeros(model.B.size), np.zeros(model.B.size)
-    for k in range(rest.size):
-        x[k], e[k] = dot(model.moment, s) - rigid[k], -dot(gains[k], s) - offsets[k]
-        moment[k] = dot(model.own, s)
-        turn(model.turned, s, now)
-        for i in range(s.size):
-            s[i] = now[i] + model.B[i] * (e[k] + rest[k])
-
-
 MOST_HIDDEN = 1000  # neurons; the paper has 6
 PAPER_INPUTS, PAPER_HIDDEN = 6, 6  # of the paper's network; one input more, the gain before, where it is asked for
 HALF_WIDTH = 0.5  # of the uniform distribution of the initial weights
@@ -363,15 +316,7 @@ class Network:
 
     def gain(self, signals: Real, guard: Limits) -> float:
         """K for one row of inputs [N m], before they are scaled; `guard` as in `guarded`."""
-        return self.gain_and_gradient(signals, guard)[0]
-
-    def gain_and_gradient(self, signals: Real, guard: Limits) -> tuple[float, Real]:
-        """K, and dK/dw by every weight as `weights` lists them."""
-        weights, hidden, inputs = self.weights, np.zeros(self.w2.size), np.asarray(signals, dtype=float) / self.scales
-        K, slope = network_gain(weights, inputs, hidden, guard)
-        gradient = np.zeros(weights.size)
-        gain_gradient(weights, inputs, hidden, slope, gradient)
-        return float(K), gradient
+        return float(network_gain(self.weights, signals / self.scales, np.zeros(self.w2.size), guard)[0])
 
 
 def initial_network(seed: int, *, hidden: int = PAPER_HIDDEN, scales: Real | None = None) -> Network:

@@ -47,8 +47,7 @@ from .kernel import (
 )
 
 NEVER, ENOUGH = -1, -2  # in place of the sample where a trial was stopped: none was, or x had become small enough
-PLAIN_RULE, CLIPPED_RULE, BACKTRACKING_RULE = range(3)  # as compiled code tells them
-X, U, E, K = range(4)  # rows of the derivatives that `_derive` carries, of the signals now
+X, U, E, K = range(4)  # rows of the derivatives that `derive` carries, of the signals now
 BEFORE = 4  # rows further are those of the sample before, and as many further again those of the one before that
 INPUT_ROWS = (U, U + BEFORE, E + BEFORE, E + 2 * BEFORE, X, X + BEFORE, K + BEFORE)  # of each input of the network
 SHARE_FALLS, SHARE_GROWS = 0.5, 1.2  # times: a step of learning halves at once, and is whole after four good trials
@@ -88,14 +87,14 @@ def _step(weights: Real, change: Real, gradient: Real, steps: Steps, share: floa
 
 @compiled
 def learn_by_trials(
-    setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, rule: int
+    setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, takes_back: bool
 ) -> tuple[int, int]:
     """Learning after each trial; fills `costs`, changes `weights`.
 
     Returns how many trials were made and the sample at which the last one passed the bound, NEVER or ENOUGH; where it
-    passed it, `weights` are those of the last trial that did not.  Under BACKTRACKING_RULE a trial that costs more than
-    the last accepted one is taken back, its step shortened and the momentum set to zero; an accepted one lets the step
-    grow again, up to its full size.
+    passed it, `weights` are those of the last trial that did not.  Where the rule `takes_back`, a trial that costs more
+    than the last accepted one is taken back, its step shortened and the momentum set to zero; an accepted one lets the
+    step grow again, up to its full size.
     """
     n, size = run.x.size, weights.size
     gradient, change, kept, slope = np.zeros(size), np.zeros(size), weights.copy(), np.zeros(size)
@@ -104,7 +103,7 @@ def learn_by_trials(
         done = forward(setting, weights, run, work)
         cost = trial_cost(done, setting.numbers, run) if done == n else np.inf
         costs[trial] = cost
-        if rule == BACKTRACKING_RULE and not cost <= best and best < np.inf:
+        if takes_back and not cost <= best and best < np.inf:
             share *= SHARE_FALLS
             copied(kept, weights)
             change.fill(0.0)
@@ -117,49 +116,18 @@ def learn_by_trials(
             return trial + 1, ENOUGH
         backward(setting, weights, run, work, gradient)
         copied(weights, kept)
-        if rule == BACKTRACKING_RULE:
+        if takes_back:
             copied(gradient, slope)
             share = min(1.0, SHARE_GROWS * share)
             best = cost
         _step(weights, change, gradient, steps, share)
-    if rule == BACKTRACKING_RULE:
+    if takes_back:
         copied(kept, weights)
     return costs.size, NEVER
 
 
-@compiled
-def learn_by_samples(
-    setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, reply: float
-) -> tuple[int, int]:
-    """Learning at every sample (the paper's delta rule): as x arrives, the weights that it answers to are corrected.
-
-    A torque is answered `lag` samples later.  `reply` is the derivative of that x by the torque.
-    """
-    n, size, numbers = run.x.size, weights.size, setting.numbers
-    gradient, change, past = np.zeros(size), np.zeros(size), np.zeros((numbers.lag, size))
-    kept = weights.copy()
-    for trial in range(costs.size):
-        work.state.fill(0.0)
-        copied(weights, kept)
-        for k in range(n):
-            if not sense(k, setting, run, work):
-                costs[trial] = np.inf
-                copied(kept, weights)
-                return trial + 1, k
-            made = past[k % numbers.lag]  # the weights that made the torque which x answers now
-            if k >= numbers.lag:
-                sample_gradient(k - numbers.lag, numbers, reply, run.x[k], run, made, gradient)
-                _step(weights, change, gradient, steps, 1.0)
-            copied(weights, made)
-            act(k, setting, weights, run, work)
-        costs[trial] = trial_cost(n, numbers, run)
-        if _rms(run.x) < steps.enough:
-            return trial + 1, ENOUGH
-    return costs.size, NEVER
-
-
 @inlined
-def _derive(k: int, setting: Setting, weights: Real, run: Run, S: Real, spare: Real, D: Real) -> None:
+def derive(k: int, setting: Setting, weights: Real, run: Run, S: Real, spare: Real, D: Real) -> None:
     """Derivatives at sample k by every weight, forward: rows of D are those of x, u, e, K now and one, two samples ago.
 
     S (n, weights) is the state's; it is taken one sample on.
@@ -196,21 +164,21 @@ def _derive(k: int, setting: Setting, weights: Real, run: Run, S: Real, spare: R
 
 
 @compiled
-def learn_by_sensitivities(
-    setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, total: Real
+def learn_by_samples(
+    setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, reply: float, is_whole: bool
 ) -> tuple[int, int]:
-    """Learning at every sample with the whole sensitivity of the plant, carried forward since the trial began.
+    """Learning at every sample: as x arrives, the weights that it answers to are corrected; returns as above.
 
-    The gradient of a x^2/2 + b e^2/2 now, by weights taken for constant all the trial (Williams and Zipser, 1989).
-    `total` collects T times the gradients of a trial: with rates of zero that is the gradient of its cost.
+    By the paper's delta rule a torque is answered `lag` samples later, by `reply`, the derivative of that x by the
+    torque.  `is_whole` carries the plant's whole sensitivity forward since the trial began: the gradient of
+    a x^2/2 + b e^2/2 now, by weights taken for constant all the trial (Williams and Zipser, 1989).
     """
-    n, size, states, (a, b, T, _, _) = run.x.size, weights.size, work.state.size, setting.numbers
-    gradient, change, kept = np.zeros(size), np.zeros(size), weights.copy()
+    n, size, states, numbers = run.x.size, weights.size, work.state.size, setting.numbers
+    gradient, change, past, kept = np.zeros(size), np.zeros(size), np.zeros((numbers.lag, size)), weights.copy()
     S, room, D = np.zeros((states, size)), np.zeros((states, size)), np.zeros((3 * BEFORE, size))
     for trial in range(costs.size):
         copied(weights, kept)
         work.state.fill(0.0)
-        total.fill(0.0)
         S.fill(0.0)
         D.fill(0.0)
         for k in range(n):
@@ -218,14 +186,20 @@ def learn_by_sensitivities(
                 costs[trial] = np.inf
                 copied(kept, weights)
                 return trial + 1, k
+            if is_whole:
+                act(k, setting, weights, run, work)
+                derive(k, setting, weights, run, S, room, D)
+                for p in range(size):
+                    gradient[p] = numbers.a * run.x[k] * D[X, p] + numbers.b * run.e[k] * D[E, p]
+                _step(weights, change, gradient, steps, 1.0)
+                continue
+            made = past[k % numbers.lag]  # the weights that made the torque which x answers now
+            if k >= numbers.lag:
+                sample_gradient(k - numbers.lag, numbers, reply, run.x[k], run, made, gradient)
+                _step(weights, change, gradient, steps, 1.0)
+            copied(weights, made)
             act(k, setting, weights, run, work)
-            _derive(k, setting, weights, run, S, room, D)
-            x, e = run.x[k], run.e[k]
-            for p in range(size):
-                gradient[p] = a * x * D[X, p] + b * e * D[E, p]
-                total[p] += T * gradient[p]
-            _step(weights, change, gradient, steps, 1.0)
-        costs[trial] = trial_cost(n, setting.numbers, run)
+        costs[trial] = trial_cost(n, numbers, run)
         if _rms(run.x) < steps.enough:
             return trial + 1, ENOUGH
     return costs.size, NEVER
@@ -235,7 +209,6 @@ Mode = Literal["trial", "online"]
 Rule = Literal["dynamic", "clipped", "plain"]
 Sensitivity = Literal["one-step", "whole"]
 
-RULE_NUMBERS = {"dynamic": BACKTRACKING_RULE, "clipped": CLIPPED_RULE, "plain": PLAIN_RULE}
 MOST_TRIALS = 1_000_000  # of a tuning: a bound on what a slip of the hand may ask for
 QUARTILES = (0.25, 0.5, 0.75)  # of learning curves over the seeds
 NO_GAIN = 1e-3  # of K: a network that gives less all along a trial has driven its gain to nothing
@@ -360,11 +333,9 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
     steps = Steps(learning.rates(weights.size), float(learning.alpha), longest, float(learning.enough))
     common = (trial.setting(network, guard.limits), steps, weights, costs, *trial.room(network))
     if learning.mode == "trial":
-        made, sample = learn_by_trials(*common, RULE_NUMBERS[learning.rule])
-    elif learning.sensitivity == "whole":
-        made, sample = learn_by_sensitivities(*common, np.zeros(weights.size))
+        made, sample = learn_by_trials(*common, learning.rule == "dynamic")
     else:
-        made, sample = learn_by_samples(*common, trial.reply)
+        made, sample = learn_by_samples(*common, trial.reply, learning.sensitivity == "whole")
     learnt = network.with_weights(weights)
     result = trial.with_network(learnt, guard.limits)
     stopped = Stopped(made - 1, int(sample), trial.numbers.bound) if sample >= 0 else None

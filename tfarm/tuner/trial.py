@@ -44,7 +44,7 @@ from tfarm.records import record
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner import kernel
 from tfarm.tuner.guard import GuardKind
-from tfarm.tuner.kernel import MOST_HIDDEN, PAPER_INPUTS, Limits, Network
+from tfarm.tuner.kernel import PAPER_INPUTS, Limits, Network
 
 SILENT = Network(np.zeros((1, PAPER_INPUTS)), np.zeros(1), np.ones(PAPER_INPUTS))  # for a guard that leaves no choice
 TRIAL_MODES = 6  # flexible modes of a trial, unless told
@@ -171,43 +171,17 @@ class Trial:
 
     def with_network(self, network: Network, guard: kernel.Limits) -> Record:
         """The trial with a network as it is; where it was stopped it costs inf."""
-        run, _, done = self._forward(network, guard)
+        run, work = self.room(network)
+        done = kernel.forward(self.setting(network, guard), network.weights, run, work)
         x, u, e, K, moment = (signal[:done].copy() for signal in (run.x, run.u, run.e, run.K, run.moment))
         cost, stopped = float(kernel.trial_cost(done, self.numbers, run)), None
         if done < self.n:
             cost, stopped = np.inf, int(done)
         return Record(self.task.t[:done], x, u, e, K, moment, cost, stopped)
 
-    def _forward(self, network: Network, guard: kernel.Limits) -> tuple[kernel.Run, kernel.Work, int]:
-        """What the trial fills, the room that it takes, and how many samples it makes."""
-        run, work = self.room(network)
-        return run, work, kernel.forward(self.setting(network, guard), network.weights, run, work)
-
     def with_constant(self, K: float) -> Record:
         """The trial with a constant gain: a guard that leaves no choice."""
         return self.with_network(SILENT, kernel.Limits(K, K))
-
-    def gradient(self, network: Network, guard: kernel.Limits) -> tuple[float, Real]:
-        """The cost of the trial and its derivative by every weight, exact: back through network, plant and time.
-
-        Raises ParameterError where the trial runs away: there is no cost then.
-        """
-        (run, work, done), weights = self._forward(network, guard), network.weights
-        gradient = np.zeros(weights.size)
-        if done < self.n:
-            raise ParameterError(key="weights", value=done, remedy="the loop runs away at that sample; guard the gain")
-        kernel.backward(self.setting(network, guard), weights, run, work, gradient)
-        return float(kernel.trial_cost(done, self.numbers, run)), gradient
-
-    def sample_gradient(self, network: Network, guard: kernel.Limits, k: int) -> Real:
-        """The delta rule's gradient: of a x^2/2 at the first sample that feels the torque of sample k, plus b e^2/2.
-
-        x depends on K(k) by the plant's one-step sensitivity, e directly; all earlier signals are data.
-        """
-        (run, _, _), weights, numbers = self._forward(network, guard), network.weights, self.numbers
-        gradient = np.zeros(weights.size)
-        kernel.sample_gradient(k, numbers, self.reply, float(run.x[k + numbers.lag]), run, weights, gradient)
-        return gradient
 
 
 def slew_trial(
@@ -316,11 +290,6 @@ def judged(simulation: Simulation, cost: Cost, signals: Reading) -> Record:
     return Record(simulation.t, x, e + K * x, e, K, simulation.at_samples.root_moment, total, stopped)
 
 
-def simulated(simulator: Simulator, gain: TunedGain, cost: Cost) -> Record:
-    """The trained network in a simulator whose chain has the same reading of the signals."""
-    return judged(gain.run(simulator), cost, gain.signals)
-
-
 def tip_off(simulation: Simulation, trial: Trial) -> float | None:
     """How far the tip is off its target [m] when a simulation of a slew ends; None where the loop ran away."""
     if simulation.stopped is not None:
@@ -363,23 +332,21 @@ class TunerFile(StrictTable):
     K1: Finite
     Kp: Annotated[Finite, Field(ge=0)] = 0.0  # absent in files of tuners without a servo
     signals: Reading
-    a: Annotated[Finite, Field(ge=0)]
-    b: Annotated[Finite, Field(ge=0)]
+    a: Finite
+    b: Finite
     guard_kind: GuardKind
-    guard: Annotated[list[Annotated[Finite, Field(ge=0)]], Field(min_length=2, max_length=2)] | None
-    scales: Annotated[list[Finite], Field(min_length=6, max_length=7)]
-    W1: Annotated[
-        list[Annotated[list[Finite], Field(min_length=6, max_length=7)]], Field(min_length=1, max_length=MOST_HIDDEN)
-    ]
-    w2: Annotated[list[Finite], Field(min_length=1, max_length=MOST_HIDDEN)]
+    guard: tuple[Finite, Finite] | None
+    scales: list[Finite]
+    W1: list[list[Finite]]
+    w2: list[Finite]
 
     def build(self) -> SavedTuner:
         """The tuner; ParameterError where its parts do not fit together."""
         if (self.guard is None) != (self.guard_kind == "none"):
             raise ParameterError(key="guard", value=self.guard, remedy="two ends, or null with guard_kind none")
         lo, hi = (0.0, math.inf) if self.guard is None else self.guard
-        if not lo < hi:
-            raise ParameterError(key="guard", value=self.guard, remedy="its lower end comes first")
+        if not 0 <= lo < hi:
+            raise ParameterError(key="guard", value=self.guard, remedy="its lower end, from 0 on, comes first")
         widths = {len(row) for row in self.W1}
         if widths != {len(self.scales)}:
             raise ParameterError(
