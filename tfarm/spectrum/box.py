@@ -27,7 +27,7 @@ NEAREST_TO_ZERO = 1e-13  # a contour cannot be resolved closer to a zero than th
 NARROW_BOX = 1e-8  # of a box: in a wide one the part near s = 0 is resolved as finely as in one of this size
 MOST_CONTOUR_POINTS = 200_000  # of a contour
 FIRST_POINTS = 40  # of each edge of a contour, to begin with: those between are put in where they are needed
-MOST_CALLS = 10_000  # of the function in one search; the most that 300 random loops took is 4,100
+MOST_CALLS = 30_000  # of the function in one search; the most that 300 random loops took is 4,100
 DEAD_ZONE = 1e-8  # nearer to s = 0 than this share of a box Newton's method is not believed: a zero there forces cuts
 SAME_BOX_ZERO = 0.1  # of its size: a zero found so near a known one is that one
 MOST_CUTS = 60  # cuts: then a box is a share of 2^-30 of the first, less than float64 can search

@@ -15,7 +15,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.errors import ConvergenceError
@@ -141,6 +140,8 @@ def is_over(family: Family, value: float, row: Complex) -> NDArray[np.bool_]:
 
 def assigned(family: Family, value: float, guess: Complex) -> Complex:
     """The complete set at a value in the order of the guesses (b,); NaN where there are fewer."""
+    from scipy.optimize import linear_sum_assignment  # takes half a second to load, and few branches come here
+
     every = family.complete(value, guess)
     alive = np.flatnonzero(~np.isnan(guess))
     rows, columns = linear_sum_assignment(abs(guess[alive, None] - every))
