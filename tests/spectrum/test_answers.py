@@ -40,7 +40,7 @@ def test_each_disc_is_in_the_row_of_its_eigenvalue(arm, count):
 
 def test_modes_that_are_not_followed_have_their_rows(monkeypatch):
     """They keep their frequency; nothing is said of their damping."""
-    monkeypatch.setattr("tfarm.spectrum.damped.FEWER_MODES", (2, 1))  # as if of more branches were lost
+    monkeypatch.setattr("tfarm.spectrum.damped.MOST_MODES", 2)
     modes = tfarm.modes(RIG, 4)
     followed = len(tfarm.damped_modes(modes).index)
     assert followed < len(modes)
