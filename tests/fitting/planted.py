@@ -168,22 +168,18 @@ def judged(seed, *, profile=True):
     rng = np.random.default_rng([852780, seed])
     arm, data, keys, truth, start = planted(rng)
     found = fit(arm, data, free=keys, start=start, profile=profile)
-    covered = {}
-    verdict = "right"
-    if not found.converged:
-        verdict = "not converged"
-    at_truth = chi_squared_at(found, truth)
-    if found.chi_squared > at_truth * (1 + 1e-9):
-        verdict = "a worse minimum"
+    covered, at_truth = {}, chi_squared_at(found, truth)
+    problems = ["not converged"] * (not found.converged)
+    problems += ["a worse minimum"] * (found.chi_squared > at_truth * (1 + 1e-9))
     for each in found.parameters:
         if not each.identified:
-            verdict = f"{each.key} not identified" if verdict == "right" else verdict
+            problems.append(f"{each.key} not identified")
             continue
         if each.deviation and abs(each.value - truth[each.key]) > 5 * each.deviation:
-            verdict = f"{each.key} too far" if verdict == "right" else verdict
+            problems.append(f"{each.key} too far")
         if profile:
             covered.setdefault(each.key.partition(":")[0], []).append(each.low <= truth[each.key] <= each.high)
-    return verdict, covered, found
+    return next(iter(problems), "right"), covered, found
 
 
 def planted_pair(rng):
@@ -258,17 +254,13 @@ def arm_fit(seed):
     return verdict, {f"{key} inside 95 %": float(np.mean(inside)) for key, inside in covered.items()}
 
 
-def pair_fit(seed):
-    return judged_pair(seed), {}
-
-
 def rig_fit(seed):
     verdict, seconds = judged_rig(seed)
     return verdict, {"process time a fit [s]": seconds}
 
 
 ARMS = share_right("arms", arm_fit, MOSTLY)
-PAIRS_KNOWN = share_right("pairs", pair_fit, MOSTLY)
+PAIRS_KNOWN = share_right("pairs", lambda seed: (judged_pair(seed), {}), MOSTLY)
 RIGS = share_right("rigs", rig_fit, 1.0)
 
 if __name__ == "__main__":
