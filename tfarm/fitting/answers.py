@@ -19,7 +19,7 @@ from tfarm.columns import ANSWER, FILES, JSON, Column, Table
 from tfarm.digits import general, listed, singly
 from tfarm.errors import MISSING, ConvergenceError
 from tfarm.files import write_file
-from tfarm.response.answers import HERTZ
+from tfarm.response.frequency import HERTZ
 
 from .data import CONFIDENCE, Measured
 from .fit import WIDER, Fit, repeats

@@ -28,8 +28,7 @@ from tfarm.digits import general, singly
 from tfarm.errors import MISSING, ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.response import TransferFunction, transfer
-from tfarm.response.answers import HERTZ
-from tfarm.response.frequency import refined_grid, without_cancelled
+from tfarm.response.frequency import HERTZ, refined_grid, without_cancelled
 from tfarm.response.signals import Signals
 from tfarm.response.transfer import Roots
 from tfarm.spectrum import modes as modes_of

@@ -25,8 +25,8 @@ from tfarm.plots.frequency import bode as bode_plot
 from tfarm.plots.words import gains_words
 from tfarm.report.cases import has_loop
 from tfarm.report.sections import PageSection, Picture, typeset, upper
-from tfarm.response.answers import bode_table, roots_table
 from tfarm.response.frequency import AXIS_SHARE, Bode, Extremum, bode
+from tfarm.schema import curve_table, table
 from tfarm.spectrum.table import default_gains
 
 MAGNITUDE = attrgetter("magnitude")
@@ -74,14 +74,15 @@ def bode_section(arm: Arm, output: str) -> PageSection:
         caption=f"{what_is_seen(data)} {what_it_means(data)}",
         alt=alt_text(data),
         figure=bode_plot.figure(data),
-        data=bode_table(data, f"{anchor}-data"),
+        data=curve_table(data, stem=f"{anchor}-data", title=f"{data.input_label} to {data.label}"),
     )
     if not data.poles.size and not data.zeros.size:
         return PageSection(
             anchor=anchor, title=title, words=(f"{completeness(data)} There are none.",), blocks=(picture,)
         )
     caption = f"{completeness(data)} {ROOTS_CAPTION}"
-    roots = roots_table(data, "pole", "zero", stem=f"{anchor}-roots", caption=caption)
+    title_of = f"Poles and zeros, {data.input_label} to {data.label}"
+    roots = table([*data.pole_list, *data.zero_list], stem=f"{anchor}-roots", title=title_of, caption=caption)
     return PageSection(anchor=anchor, title=title, blocks=(picture, roots))
 
 
