@@ -75,6 +75,8 @@ RENAMED = (
     (".*", r"(.*\.)?band_rad_s", r"\1up_to_rad_s"),
     ("simulate", "rule", None),
     ("simulate", "rule_in_words", "rule"),
+    ("tune", r"guard_(\w+)", r"guard.\1"),
+    ("tune", r"guard\[\d\]", None),
     ("bode|reduce", r"band_rad_s(.*)", r"range_rad_s\1"),
     ("bode", r"((poles|zeros)\[\d+\])\.re", r"\1.s[0]"),
     ("bode", r"((poles|zeros)\[\d+\])\.im", r"\1.s[1]"),

@@ -25,7 +25,7 @@ from tfarm.tuner.trial import (
     simulated,
     slew_trial,
 )
-from tfarm.tuner.tuning import Plan, Tuning, curves_answer, learning_curves, tune, tune_answer
+from tfarm.tuner.tuning import Plan, Tuning, TuningResult, learning_curves, tune
 
 __all__ = [
     "BestConstant",
@@ -42,9 +42,9 @@ __all__ = [
     "Trial",
     "TunedGain",
     "Tuning",
+    "TuningResult",
     "best_constant",
     "compare_controllers",
-    "curves_answer",
     "extra_insensitive",
     "find_guard",
     "initial_network",
@@ -59,6 +59,5 @@ __all__ = [
     "train",
     "tried_loops",
     "tune",
-    "tune_answer",
     "zero_vibration",
 ]
