@@ -1,161 +1,42 @@
-"""Eight legal arms unlike the paper's, as TOML text: what is said of every arm is tried on these.
+"""Eight legal arms unlike the paper's: what is said of every arm is tried on these.
 
 Materials and sizes are plausible; C gives 0.1 to 3 % of critical damping in the first mode.
 """
 
-from __future__ import annotations
+import math
 
-import tomllib
+from tfarm import Arm, Hub, Link, Payload, Section
 
-from tfarm.arm import Arm
-from tfarm.arm.schema import arm_of_table
+STEEL = {"density": 7850.0, "youngs_modulus": 2.1e11, "poissons_ratio": 0.3}
+ALUMINIUM = {"density": 2700.0, "youngs_modulus": 7.0e10, "poissons_ratio": 0.33}
+RUBBER = {"density": 1100.0, "youngs_modulus": 1.0e7, "poissons_ratio": 0.49}
+BOOM = Link(
+    length=8.0, density=1600.0, youngs_modulus=1.2e11, shear_modulus=5.0e9, damping=4.0e-4,
+    section=Section.tube(outer_diameter=0.12, inner_diameter=0.112, shear_factor=0.53),
+)  # fmt: skip
 
-LOCKED = """
-name = "locked"
-[link]
-length = 0.5
-density = 7850.0
-youngs_modulus = 2.1e11
-poissons_ratio = 0.3
-damping = 5.0e-5
-[link.section]
-shape = "rectangle"
-width = 0.04
-depth = 0.005
-[hub]
-inertia = inf
-"""
 
-PINNED = """
-name = "pinned"
-[link]
-length = 0.8
-density = 2700.0
-youngs_modulus = 7.0e10
-poissons_ratio = 0.33
-damping = 5.0e-5
-[link.section]
-shape = "rectangle"
-width = 0.05
-depth = 0.004
-[hub]
-inertia = 0.02
-[payload]
-mass = inf
-"""
+def bar(material, length, width, depth, damping):
+    """A rectangular link."""
+    section = Section.rectangle(width=width, depth=depth)
+    return Link.isotropic(length=length, section=section, damping=damping, **material)
 
-FREE_PIN = """
-name = "free-pin"
-[link]
-length = 1.0
-density = 2700.0
-youngs_modulus = 7.0e10
-poissons_ratio = 0.33
-damping = 1.0e-4
-[link.section]
-shape = "rectangle"
-width = 0.06
-depth = 0.006
-[hub]
-inertia = 0.0
-"""
 
-RUBBER = """
-name = "rubber"
-[link]
-length = 0.4
-density = 1100.0
-youngs_modulus = 1.0e7
-poissons_ratio = 0.49
-damping = 1.0e-3
-[link.section]
-shape = "rectangle"
-width = 0.04
-depth = 0.02
-[hub]
-inertia = 0.005
-"""
-
-BOOM = """
-name = "boom"
-[link]
-length = 8.0
-density = 1600.0
-youngs_modulus = 1.2e11
-shear_modulus = 5.0e9
-damping = 4.0e-4
-[link.section]
-shape = "tube"
-outer_diameter = 0.12
-inner_diameter = 0.112
-shear_factor = 0.53
-[hub]
-inertia = 40.0
-[payload]
-mass = 10.0
-inertia = 0.2
-"""
-
-MICRO = """
-name = "micro"
-[link]
-length = 0.05
-density = 7850.0
-youngs_modulus = 2.1e11
-poissons_ratio = 0.3
-damping = 1.0e-6
-[link.section]
-shape = "rectangle"
-width = 0.005
-depth = 0.0005
-[hub]
-inertia = 1.0e-7
-"""
-
-HEAVY_HUB = """
-name = "heavy-hub"
-[link]
-length = 1.0
-density = 2700.0
-youngs_modulus = 7.0e10
-poissons_ratio = 0.33
-damping = 1.0e-4
-[link.section]
-shape = "rectangle"
-width = 0.05
-depth = 0.005
-[hub]
-inertia = 22.5
-"""
-
-STUBBY = """
-name = "stubby"
-[link]
-length = 0.4
-density = 7850.0
-youngs_modulus = 2.1e11
-poissons_ratio = 0.3
-damping = 1.0e-6
-[link.section]
-shape = "rectangle"
-width = 0.05
-depth = 0.1
-[hub]
-inertia = 0.5
-"""
-
-TEXTS = {
-    "locked": LOCKED,
-    "pinned": PINNED,
-    "free-pin": FREE_PIN,
-    "rubber": RUBBER,
-    "boom": BOOM,
-    "micro": MICRO,
-    "heavy-hub": HEAVY_HUB,
-    "stubby": STUBBY,
+PARTS = {  # link, hub inertia, payload
+    "locked": (bar(STEEL, 0.5, 0.04, 0.005, 5.0e-5), math.inf, Payload()),
+    "pinned": (bar(ALUMINIUM, 0.8, 0.05, 0.004, 5.0e-5), 0.02, Payload(mass=math.inf)),
+    "free-pin": (bar(ALUMINIUM, 1.0, 0.06, 0.006, 1.0e-4), 0.0, Payload()),
+    "rubber": (bar(RUBBER, 0.4, 0.04, 0.02, 1.0e-3), 0.005, Payload()),
+    "boom": (BOOM, 40.0, Payload(mass=10.0, inertia=0.2)),
+    "micro": (bar(STEEL, 0.05, 0.005, 0.0005, 1.0e-6), 1.0e-7, Payload()),
+    "heavy-hub": (bar(ALUMINIUM, 1.0, 0.05, 0.005, 1.0e-4), 22.5, Payload()),
+    "stubby": (bar(STEEL, 0.4, 0.05, 0.1, 1.0e-6), 0.5, Payload()),
 }
 
 
-def odd_arms() -> dict[str, Arm]:
+def odd_arms():
     """The eight arms by name."""
-    return {name: arm_of_table(tomllib.loads(text)) for name, text in TEXTS.items()}
+    return {
+        name: Arm(link=link, hub=Hub(inertia=inertia), payload=payload, name=name)
+        for name, (link, inertia, payload) in PARTS.items()
+    }

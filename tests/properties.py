@@ -2,23 +2,26 @@
 
     python -m tests.properties SIZE SEED
 
-SIZE examples of each property, chosen by SEED; the tests have 25.  The exit code is pytest's.
-Budget: two minutes of CPU for each thousand examples.
+SIZE examples of each property, chosen by SEED; the tests have 25.  Budget: two minutes of CPU for each thousand.
 """
 
 import os
-import sys
 
 import pytest
+
+from tests import survey
+from tests.survey import Finding
 
 FILES = ("tests/exact/test_physics.py", "tests/arm/test_reading.py")
 
 
-def survey(size: int, seed: int) -> int:
-    """0 where no counterexample was found."""
+def properties(size, seed):
     os.environ["EXAMPLES"] = str(size)  # for tests/conftest.py
-    return pytest.main(["-q", "-n", "0", "--hypothesis-profile=search", f"--hypothesis-seed={seed}", *FILES])
+    options = ["--hypothesis-profile=search", f"--hypothesis-seed={seed}"]
+    for file in FILES:
+        code = pytest.main(["-q", "-n", "0", *options, file])
+        yield Finding("counterexample" if code else "holds", file, is_wrong=bool(code))
 
 
 if __name__ == "__main__":
-    sys.exit(survey(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1))
+    survey.main(properties)

@@ -2,12 +2,11 @@
 
 from dataclasses import replace
 
-import mpmath
 import numpy as np
 import pytest
 
 import tfarm
-from tests.chain_elements import eigenvalues, frequency_response, natural_frequencies
+from tests.chain_elements import frequency_response, natural_frequencies
 from tests.shared import thinned
 from tests.strategies import some_arm
 from tests.test_transition import NAMES, rig
@@ -31,34 +30,6 @@ def test_the_frequencies_of_the_papers_arm():
         arm = some_arm(rng)
         exact = tfarm.modes(arm, 15).natural_frequency[arm.has_rigid_mode :][:14]
         assert natural_frequencies(arm, exact.size) == pytest.approx(exact, rel=1e-9)
-
-
-@pytest.mark.parametrize("locked", [False, True])
-def test_the_frequencies_of_a_rig_are_where_the_determinant_changes_sign(locked):
-    arm = lossless(rig())
-    found = natural_frequencies(arm, 8, locked=locked)
-    if locked:
-        arm = replace(arm, input="hub_angle")
-    for omega in found:
-        low, high = (determinant(arm, 1j * omega * (1 + shift), 30).real for shift in (-1e-10, 1e-10))
-        assert low * high < 0
-    assert (np.diff(found) > 1e-3 * found[:-1]).all()
-
-
-@pytest.mark.parametrize(
-    ("drive", "inductance"),
-    thinned([("hub_torque", 0.0), ("motor_voltage", 0.0), ("motor_voltage", 0.01), ("hub_angle", 0.0)], 2),
-)
-def test_the_eigenvalues_of_a_damped_rig_are_zeros_of_the_determinant(drive, inductance):
-    """Newton's step from each (its derivative by a difference) is shorter than the elements' error."""
-    arm = rig(input=drive, motor=replace(rig().motor, inductance=inductance))
-    found = eigenvalues(arm, 600.0)
-    assert 4 <= found.size <= 12
-    for s in found:
-        with mpmath.workdps(60):
-            h = mpmath.mpf("1e-20") * abs(s)
-            at, beside = determinant(arm, s), determinant(arm, s + h)
-            assert abs(at * h / (beside - at)) < 1e-9 * abs(s)
 
 
 WANTED = [*NAMES, "link_angle", "payload_displacement"]

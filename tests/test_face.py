@@ -53,25 +53,6 @@ def test_an_unknown_name_is_an_attribute_error():
         _ = tfarm.mode
 
 
-def test_no_name_of_the_face_is_a_room_but_plots():
-    rooms = {
-        "arm",
-        "exact",
-        "spectrum",
-        "response",
-        "reduced",
-        "loop",
-        "dsp",
-        "tuner",
-        "fitting",
-        "synthesis",
-        "audit",
-        "report",
-        "cli",
-    }
-    assert not rooms & set(tfarm.__all__)
-
-
 @pytest.mark.parametrize("arm", ["sasaki2012", Path("arm.toml"), None])
 def test_a_name_in_the_place_of_an_arm_is_refused_with_what_to_write(arm):
     law = tfarm.HubFeedback(K1=0.3, K2=0.3)

@@ -1,12 +1,11 @@
-"""Judges of what a command says of an arm: modes, responses, poles, margins and maps against the independent model."""
+"""Judges of what a command says of an arm: modes, responses, poles and windows against the independent model."""
 
 import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
-from tests.plausible.arms import PLACES, Law, log
+from tests.plausible.arms import PLACES
 from tests.plausible.model import EPS, Model
 
 BLIND = 1e-2  # relative: a model whose own error is larger says nothing
@@ -234,7 +233,7 @@ class Poles:
 
 @dataclass(frozen=True)
 class Margins:
-    """`tfarm margins`: verdict, edges, gains inside and outside the windows, and each margin at its frequency."""
+    """`tfarm margins`: verdict, edges, gains inside and outside the windows."""
 
     def arguments(self, case):
         return case.law.options
@@ -245,9 +244,6 @@ class Margins:
             self._verdict(judged, models, law, answer["stable"], "the law")
         for name in ("K1", "K2", "Kp"):
             self._windows(judged, case, models, name, answer)
-        if answer["stable"]:
-            self._gain_margin(judged, case, models, answer)
-            self._margins(judged, case, models, answer["in_band"])
         return judged
 
     def _verdict(self, judged, models, law, stable, what):
@@ -282,131 +278,3 @@ class Margins:
             self._verdict(judged, models, replace(law, **{name: value}), inside, f"{name} = {value!r}, by an edge")
             if not inside and growing(models, replace(law, **{name: value})) == 0:
                 judged.blind += 1
-
-    def _gain_margin(self, judged, case, models, answer):
-        low, high = (float(end) for end in answer["gain_margin"])
-        for t in (low + BESIDE, 1.0, min(high, 3.0) * (1 - BESIDE)):
-            if low < t < high:
-                self._verdict(judged, models, scaled(case.law, t), True, f"the law times {t!r}")
-        for t in (low * (1 - BESIDE), high * (1 + BESIDE)):
-            if 0 < t < np.inf and growing(models, scaled(case.law, t)) == 0:
-                judged.blind += 1
-
-    def _margins(self, judged, case, models, band):
-        """At the frequency printed L has the margin printed; on a grid it has no smaller one."""
-        at, top = band["at_rad_s"], min(band["band_rad_s"], trusted(models))
-        if np.isfinite(float(band["phase_margin_deg"])):
-            self._phase(judged, models, case.law, at["phase"], abs(band["phase_margin_deg"]), band["band_rad_s"])
-        w = dense(models, case.law, top)
-        L = np.array([loop_function(models.rough, case.law, each) for each in w])
-        for key, f in (("disk_margin", disk), ("peak_sensitivity", peak)):
-            where, printed = at[{"disk_margin": "disk"}.get(key, key)], float(band[key])
-            if where <= top and (key == "disk_margin" or printed > 1):  # S = 1 at infinite frequency
-                fine, rough = (extreme(f, m, case.law, where, band["band_rad_s"]) for m in (models.fine, models.rough))
-                size = max(abs(fine), 1e-300)
-                judged.error(f"{key} at {where}", abs(printed - fine) / size, 1e-5 + SAFETY * abs(fine - rough) / size)
-            least = f(L).min() if key == "disk_margin" else 1 / f(L).max()
-            least = least if key == "disk_margin" else min(1.0, least)
-            bound = printed if key == "disk_margin" else 1 / printed
-            judged.error(f"{key}: worse on a grid", max(0.0, bound / least - 1), 1e-4)
-
-    def _phase(self, judged, models, law, where, printed, top):
-        """Next to the frequency printed |L| = 1 with that phase."""
-        if where > trusted(models):
-            judged.blind += 1
-            return
-        found = []
-        for model in (models.fine, models.rough):
-            at = around(model, law, where, top)
-            sign = np.array([np.sign(abs(loop_function(model, law, w)) - 1) for w in at])
-            ends = [(at[i], at[i + 1]) for i in np.nonzero(sign[1:] * sign[:-1] < 0)[0]]
-            places = [brentq(lambda w: abs(loop_function(model, law, w)) - 1, *pair, xtol=1e-300) for pair in ends]  # noqa: B023
-            phases = [abs(np.angle(-loop_function(model, law, w))) * 180 / np.pi for w in places]
-            found.append(min(phases, key=lambda phase: abs(phase - printed), default=np.inf))
-        judged.error("phase margin", abs(found[0] - printed), 1e-4 + SAFETY * abs(found[0] - found[1]), 5.0)
-
-
-def scaled(law, t):
-    """All gains times t."""
-    return Law(law.K1 * t, law.K2 * t, law.Kp * t)
-
-
-def loop_function(model, law, w):
-    """L(i w) = -u_fed_back/u of the model."""
-    s = 1j * w
-    theta = model.coordinates(s)[0] @ model.b
-    moment = (model.hub * s * s * theta - 1) / (1 + model.C * s)
-    return (law.Kp + law.K1 * s) * theta + law.K2 * moment
-
-
-def disk(L):
-    """2 |(1 + L)/(1 - L)|."""
-    return 2 * abs((1 + L) / (1 - L))
-
-
-def peak(L):
-    """|1/(1 + L)|."""
-    return 1 / abs(1 + L)
-
-
-def around(model, law, where, top):
-    """Frequencies about one that is printed to seven digits, and about the pole there: features are as narrow as it is
-    close to the axis.
-    """
-    pole = model.polished(1j * where, law)[0]
-    width = max(abs(pole.real), 1e-13 * where)
-    at = abs(pole.imag) + width * np.r_[-np.geomspace(1e3, 1e-2, 60), 0.0, np.geomspace(1e-2, 1e3, 60)]
-    at = np.unique(np.r_[at, where * (1 + 1e-6 * np.linspace(-1, 1, 41))])
-    return at[(at > 0) & (at <= top * (1 + 1e-14)) & (abs(at / where - 1) < 1e-4)]
-
-
-def extreme(f, model, law, where, top):
-    """The extreme of f(L) there: the least of `disk`, the largest of `peak`."""
-    sign, at = 1 if f is disk else -1, around(model, law, where, top)
-    values = [sign * f(loop_function(model, law, w)) for w in at]
-    i = int(np.clip(np.argmin(values), 1, at.size - 2))
-    low, reach = at[i - 1], at[i + 1] - at[i - 1]
-    found = minimize_scalar(
-        lambda share: sign * f(loop_function(model, law, low + share * reach)),
-        bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-7},
-    )  # fmt: skip
-    return sign * min(found.fun, *values)
-
-
-def dense(models, law, top):
-    """A grid up to `top` [rad/s], with points about each pole, closed or open loop, as near as it is to the axis."""
-    poles = np.r_[oscillating(models.rough, law, top), models.rough.modes[0]]
-    poles = poles[(poles.imag > 0) & (poles.imag < top)][:40]
-    near = (poles.imag[:, None] + abs(poles.real[:, None]) * np.array([-3.0, -1.0, -0.3, 0.0, 0.3, 1.0, 3.0])).ravel()
-    w = np.r_[near, np.geomspace(1e-3 * models.rough.modes[0][0], top, 120)]
-    return np.unique(w[(w > 0) & (w < top)])
-
-
-@dataclass(frozen=True)
-class Map:
-    """`tfarm map`: the counts at a dozen points of the grid, and boundary points that are poles on the axis."""
-
-    def arguments(self, case):
-        unit = case.beam.total_inertia * case.first * log(case.rng, 0.05, 3.0)
-        return [f"--K1={-0.3 * unit!r},{unit!r}", "--K2=-2,2", f"--Kp={case.law.Kp!r}", "--points", "21"]
-
-    def judge(self, case, models, ran):
-        judged, answer, rng = Judged(), ran.answer, case.rng
-        for _ in range(12):
-            i, j = rng.integers(len(answer["K1"])), rng.integers(len(answer["K2"]))
-            law = Law(answer["K1"][i], answer["K2"][j], case.law.Kp)
-            printed, count = answer["unstable_roots"][j][i], growing(models, law)
-            if count is None or abs(law.K2 - 1) < 1e-9:
-                judged.blind += 1
-            elif printed == "inf":
-                judged.truth(f"infinitely many for {count} at {law}", count > UNDAMPED)
-            elif answer["band_rad_s"] > trusted(models) and case.beam.link.damping:
-                judged.truth(f"{printed} for at least {count} unstable at {law}", printed >= count)
-            else:
-                judged.truth(f"{printed} for {count} unstable at {law}", printed == count)
-        points = [point for point in answer["boundary"] if point[2] < trusted(models)]
-        for at in rng.permutation(len(points))[:5]:
-            K1, K2, w = points[at]
-            digits = 8 * EPS * (case.first / w) ** 2  # of K2, where hub and arm nearly balance each other
-            pole_check(judged, "boundary", 1j * w, models, Law(K1, K2, case.law.Kp), digits)
-        return judged

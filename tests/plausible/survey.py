@@ -28,7 +28,6 @@ VERBS = {
     "response": judges.Response(),
     "poles": judges.Poles(),
     "margins": judges.Margins(),
-    "map": judges.Map(),
 }
 
 

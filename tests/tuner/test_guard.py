@@ -19,7 +19,7 @@ from tests.tuner import bounded
 from tests.tuner.bounded import adversary
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
-from tfarm.errors import CertificationError, ParameterError
+from tfarm.errors import CertificationError
 from tfarm.exact.rationals import as_integers, is_positive_definite
 from tfarm.tuner import find_guard, guard, slew_trial
 from tfarm.tuner.guard import RADIUS_SHARE, MovingGain, _peak, common_lyapunov, upper_modes_are_quiet
@@ -32,9 +32,9 @@ def lab():
     return tfarm.load("sasaki2012-lab")
 
 
-def moving(arm, count=6, delay=0.0):
+def moving(arm, count=6, delay=0.0, **servo):
     chain = Chain(sampling=Sampling(delay_samples=delay))
-    return MovingGain(sampled_loop(arm, HubFeedback(K1=0.3, K2=1.0), chain, count=count))
+    return MovingGain(sampled_loop(arm, HubFeedback(**{"K1": 0.3, "K2": 1.0} | servo), chain, count=count))
 
 
 @pytest.fixture(scope="module")
@@ -71,13 +71,20 @@ def test_the_peak_of_one_pole_is_at_its_own_angle(angle):
         assert peak == pytest.approx(0.5 / (1 - size), rel=1e-9)
 
 
-@pytest.mark.parametrize("m", [0.2, 0.47])
-def test_what_the_criterion_allows_is_proven_and_nothing_beyond(loop, m):
-    radius = loop.radius(m)
-    proof = loop.proof(m - RADIUS_SHARE * radius, m + RADIUS_SHARE * radius)
-    assert proof is not None
+@pytest.mark.parametrize(("m", "servo"), [(0.2, {}), (0.47, {}), (0.3, {"K1": 3.6, "Kp": 10.0})])
+def test_what_the_criterion_allows_is_proven_and_nothing_beyond(lab, m, servo):
+    """And any sequence of its gains contracts as it says, the held angle among the states."""
+    loop = moving(lab, **servo)
+    assert (len(loop.open) == len(loop.loop.matrix())) == bool(servo)
+    ends = [m + share * loop.radius(m) for share in (-RADIUS_SHARE, RADIUS_SHARE)]
+    proof, state = loop.proof(*ends), np.random.default_rng(2).normal(size=loop.drive.size)
+    size = [np.linalg.norm(proof.root.T @ state)]
+    for K in np.random.default_rng(1).choice([*ends, m], size=400):
+        state = loop.at(K) @ state
+        size.append(np.linalg.norm(proof.root.T @ state))
+    assert np.all(np.diff(np.log(size)) <= np.log(proof.contraction) + 1e-12)
     assert proof.contraction < 1
-    assert loop.proof(m - 1.01 * radius, m + 1.01 * radius) is None
+    assert loop.proof(m - 1.01 * loop.radius(m), m + 1.01 * loop.radius(m)) is None
 
 
 def growth(loop, *gains):
@@ -95,13 +102,6 @@ def test_switching_between_stable_gains_can_destabilise(loop):
     assert growth(loop, 0.1, 0.1, 0.1, 0.6, 0.6) == pytest.approx(1.0023, abs=1e-4)
     patterns = [p for n in range(2, 8) for p in product((0.0, 1.1), repeat=n)]
     assert max(growth(loop, *p) for p in patterns) > 1.06
-
-
-def test_the_sector_no_longer_changes_with_the_modes(lab):
-    radii = [moving(lab, count).radius(0.471) for count in (2, 4, 6, 12, 24)]
-    changes = abs(np.diff(radii)) / radii[-1]
-    assert changes[0] > 1e-4
-    assert changes[-1] < 1e-6
 
 
 # ---------------------------------------------------------------- exact proofs
@@ -239,12 +239,6 @@ def test_without_damping_a_proof_is_of_the_first_modes_and_no_proof_of_the_loop(
     assert "proven for the first 20 modes" in guard.sentence
 
 
-def test_no_guard(lab):
-    guard = find_guard(slew_trial(lab).loop, "none", 0.3)
-    assert not guard.is_proven
-    assert guard.limits == (0.0, np.inf)
-
-
 def test_an_empty_guard_names_the_damping_that_would_have_one():
     with pytest.raises(CertificationError, match=r"with a damping of C = .* s there is one"):
         find_guard(slew_trial(tfarm.load("sasaki2012")).loop, "time-varying", 0.3)
@@ -253,11 +247,6 @@ def test_an_empty_guard_names_the_damping_that_would_have_one():
 def test_a_loop_that_no_damping_saves(lab):
     with pytest.raises(CertificationError, match="nor with any damping"):
         find_guard(slew_trial(lab, K1=500.0).loop, "frozen", 0.3)
-
-
-def test_guards_have_names(lab):
-    with pytest.raises(ParameterError, match="time-varying, frozen, none"):
-        find_guard(slew_trial(lab).loop, "moving", 0.3)
 
 
 def test_a_frozen_guard_leaves_a_hundredth_off_each_end_but_0(lab, monkeypatch):

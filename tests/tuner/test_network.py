@@ -28,15 +28,6 @@ def test_the_first_weights_are_uniform_and_repeatable():
     assert np.unique(initial_network(7).weights).size == 42
 
 
-def test_sizes_are_free():
-    network = initial_network(0, hidden=11, scales=np.ones(7))
-    assert network.W1.shape == (11, 7)
-    assert network.weights.size == 88
-    again = network.with_weights(network.weights)
-    np.testing.assert_array_equal(again.W1, network.W1)
-    np.testing.assert_array_equal(again.w2, network.w2)
-
-
 def test_the_guard_is_one_minus_e_to_the_minus_softplus():
     """lo + (hi - lo)(1 - e^-kappa), kappa = ln(1 + e^z), is the sigmoid; and its slope is right."""
     z = np.linspace(-30, 30, 601)
@@ -82,16 +73,22 @@ def tuning():
 
 
 def test_there_and_back(tuning, tmp_path):
-    saved = tuning.saved()
+    saved = replace(tuning.saved(), Kp=10.0)
     save_tuner(saved, tmp_path / "tuner.json")
     again = load_tuner(tmp_path / "tuner.json")
     np.testing.assert_array_equal(again.network.weights, saved.network.weights)
     np.testing.assert_array_equal(again.network.scales, saved.network.scales)
-    for name in ("guard_kind", "lo", "hi", "K1", "signals", "cost", "arm", "period"):
+    for name in ("guard_kind", "lo", "hi", "K1", "Kp", "signals", "cost", "arm", "period"):
         assert getattr(again, name) == getattr(saved, name)
     assert to_text(again) == to_text(saved)
     result = tuning.trial.with_network(again.network, again.gain().guard)
     np.testing.assert_array_equal(result.K, tuning.training.result.K)
+
+
+def test_a_file_of_a_tuner_without_a_servo_has_none(tuning, tmp_path):
+    (tmp_path / "old.json").write_text(to_text(tuning.saved()))
+    assert '"Kp"' not in to_text(tuning.saved())
+    assert load_tuner(tmp_path / "old.json").gain().servo.Kp == 0.0
 
 
 def test_without_a_guard_any_gain_from_0_on_comes_back(tuning, tmp_path):

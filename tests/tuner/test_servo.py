@@ -1,6 +1,5 @@
 """The tuner with a servo: trials, gradients and the guard by second roads, and where the slew ends."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,24 +8,18 @@ import pytest
 import tfarm
 from tests.dsp.roads import aliased, aliased_loop
 from tests.shell import answer, run
-from tests.tuner.plain import PlainTrial, complex_step, gradient_of, plain_gain
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import ParameterError
 from tfarm.report import tuner_section
 from tfarm.tuner import (
     Plan,
-    compare_controllers,
     find_guard,
-    initial_network,
-    load_tuner,
-    save_tuner,
-    slew_trial,
     tune,
 )
-from tfarm.tuner.guard import RADIUS_SHARE, MovingGain
+from tfarm.tuner.guard import MovingGain
 from tfarm.tuner.kernel import Limits
-from tfarm.tuner.trial import to_text, usual_rate_gain
+from tfarm.tuner.trial import usual_rate_gain
 
 LAB = tfarm.load("sasaki2012-lab")
 KP, K1 = 10.0, 3.6
@@ -35,19 +28,6 @@ SECTOR = Limits(0.05, 0.6)
 
 def moving(count=6):
     return MovingGain(sampled_loop(LAB, HubFeedback(K1=K1, K2=1.0, Kp=KP), Chain(), count=count))
-
-
-@pytest.mark.parametrize("signals", ["vibration", "total"])
-def test_trial_and_gradient_are_those_of_plain_numpy(signals):
-    network, plain = initial_network(5), PlainTrial(LAB, K1=K1, Kp=KP, signals=signals)
-    trial = slew_trial(LAB, K1=K1, Kp=KP, signals=signals)
-    record = trial.with_network(network, SECTOR)
-    expected, cost = plain.run(lambda row: plain_gain(row, network.weights, 6, network.scales, SECTOR))
-    for i, name in enumerate(("x", "u", "e", "K")):
-        np.testing.assert_allclose(getattr(record, name), expected[:, i].real, atol=1e-10 * abs(expected[:, i]).max())
-    assert record.cost == pytest.approx(cost.real, rel=1e-10)
-    right = complex_step(lambda w: plain.cost(w, 6, network.scales, SECTOR), network.weights)
-    np.testing.assert_allclose(gradient_of(trial, network, SECTOR)[1], right, atol=1e-9 * abs(right).max())
 
 
 def test_the_exact_arm_obeys_the_criterion_with_its_angle_held():
@@ -66,21 +46,6 @@ def test_the_exact_arm_obeys_the_criterion_with_its_angle_held():
     assert max(sizes) <= 1 / radius * (1 + 3e-4)
 
 
-def test_what_the_criterion_allows_is_proven_the_angle_among_the_states():
-    loop, m = moving(), 0.3
-    radius = loop.radius(m)
-    assert loop.open.shape == loop.loop.matrix().shape
-    proof = loop.proof(m - RADIUS_SHARE * radius, m + RADIUS_SHARE * radius)
-    assert proof is not None
-    assert loop.proof(m - 1.01 * radius, m + 1.01 * radius) is None
-    rng, state = np.random.default_rng(1), np.random.default_rng(2).normal(size=loop.drive.size)
-    size = [np.linalg.norm(proof.root.T @ state)]
-    for K in rng.choice([m - RADIUS_SHARE * radius, m + RADIUS_SHARE * radius, m], size=400):
-        state = loop.at(K) @ state
-        size.append(np.linalg.norm(proof.root.T @ state))
-    assert np.all(np.diff(np.log(size)) <= np.log(proof.contraction) + 1e-12)
-
-
 @pytest.fixture(scope="module")
 def tuning():
     return tune(LAB, Plan(Kp=KP, K1=usual_rate_gain(LAB, KP), trials=30))
@@ -96,20 +61,6 @@ def test_the_tuned_slew_ends_on_its_target(tuning):
     assert guard.is_proven
     assert guard.lo <= tuning.training.result.K.min() <= tuning.training.result.K.max() <= guard.hi
     assert find_guard(tuning.trial.loop, "time-varying", tuning.best_constant.gain).sentence == guard.sentence
-
-
-def test_it_is_held_against_the_same_yardsticks(tuning):
-    """By the simulator, and the bound below every unshaped slew."""
-    (row,) = compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard, [as_trained(tuning)])
-    assert row.tuner.cost == pytest.approx(tuning.training.result.cost, rel=1e-9)
-    assert row.best_constant.cost == pytest.approx(tuning.best_constant.cost, rel=1e-9)
-    assert row.bound.cost < min(row.without.cost, row.own_constant.cost, row.tuner.cost)
-    assert abs(row.tuner.tip_error) < 1e-3
-    assert row.proven
-
-
-def as_trained(tuning):
-    return tfarm.tuner.baselines.NamedLoop("as trained", LAB, tuning.trial.loop.chain)
 
 
 def test_the_usual_rate_gain_damps_the_rigid_arm():
@@ -132,16 +83,6 @@ def test_the_servo_of_a_page_is_slow_for_the_first_mode_and_the_period(monkeypat
         plan = tuner_section._servo_tuning(LAB, Plan(), Chain(sampling=Sampling(period=period)))
         assert np.sqrt(plan.Kp / LAB.total_inertia) == pytest.approx(speed, rel=0.03)
         assert usual_rate_gain(LAB, plan.Kp) == plan.K1
-
-
-def test_files_say_the_servo_and_old_ones_have_none(tuning, tmp_path):
-    save_tuner(tuning.saved(), tmp_path / "servo.json")
-    again = load_tuner(tmp_path / "servo.json")
-    assert (again.Kp, to_text(again)) == (KP, to_text(tuning.saved()))
-    content = json.loads((tmp_path / "servo.json").read_text())
-    del content["Kp"]
-    (tmp_path / "old.json").write_text(json.dumps(content))
-    assert load_tuner(tmp_path / "old.json").gain().servo.Kp == 0.0
 
 
 def test_the_command_says_where_the_tip_ends(capsys):

@@ -5,7 +5,8 @@ Near a resonance a response is, for any linear system,
     H(s) = r/(s - p) + r*/(s - p*) + c0 + c1 (s/|p|) + ... + c4 (s/|p|)^4,
 
 with the rest of the system in the c.  Pole and residue are fitted by Gaussian least squares to the lines around a
-peak, up to the neighbouring dips, so that they need no model of the arm.  In an arm's order peaks are matched with its
+peak, up to the neighbouring dips, so that they need no model of the arm; for each trial of the pole the others, which
+are linear, are those of the least squares.  In an arm's order peaks are matched with its
 poles; where they would match far better 2 pi times lower or higher, the file's frequencies are in another unit.
 """
 
@@ -122,39 +123,30 @@ def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
     if background < 1:
         return None
     s, w = 1j * omega, float(data.omega[place])
+    powers, y = [(s / w) ** n for n in range(background)], in_parts(values * weight)
 
-    def residuals(x: Real) -> Real:
-        return in_parts((_model(x, s, w, background)[0] - values) * weight)
-
-    def slopes(x: Real) -> Real:
-        return in_parts(np.array(_model(x, s, w, background)[1]) * weight).T
+    def linear(x: Real) -> tuple[Real, Real]:
+        """Re r, Im r and the c that leave least, and what they leave."""
+        up, down = 1 / (s + x[0] - 1j * x[1]), 1 / (s + x[0] + 1j * x[1])
+        terms: Complex = np.array([up + down, 1j * (up - down), *powers], dtype=np.complex128)
+        columns = in_parts(terms * weight).T
+        found = np.linalg.lstsq(columns, y, rcond=None)[0]
+        return np.asarray(found), np.asarray(columns @ found - y)
 
     half = max(_half_width(data, place), (omega[-1] - omega[0]) / (4 * omega.size))
-    x = np.zeros(4 + background)
-    x[:2] = half, w
-    linear, *_ = np.linalg.lstsq(slopes(x)[:, 2:], in_parts(values * weight), rcond=None)
-    x[2:] = linear
-    found = least_squares(residuals, x, jac=slopes, method="lm", x_scale="jac")
-    sigma_p, w_p = found.x[:2]
+
+    def left(x: Real) -> Real:
+        return linear(x)[1]
+
+    found = least_squares(left, np.array([half, w]), method="lm", x_scale="jac")
+    sigma_p, w_p = found.x.tolist()
     if not found.success or not omega[0] < w_p < omega[-1] or abs(sigma_p) > w_p:
         return None
-    freedom = 2 * omega.size - x.size
-    J, e = slopes(found.x), residuals(found.x)
-    scale = np.sqrt((J**2).sum(axis=0))
-    spread = np.linalg.pinv((J / scale).T @ (J / scale)) / np.outer(scale, scale) * max(1.0, float(e @ e) / freedom)
-    std = np.sqrt(np.diag(spread)[:2])
-    return Resonance(pole=complex(-sigma_p, w_p), residue=complex(found.x[2], found.x[3]), std=std)
-
-
-def _model(x: Real, s: Complex, w: float, background: int) -> tuple[Complex, list[Complex]]:
-    """The formula, and its derivatives by -Re p, Im p, Re r, Im r and the c."""
-    p, r = complex(-x[0], x[1]), complex(x[2], x[3])
-    up, down = 1 / (s - p), 1 / (s - p.conjugate())
-    powers = [(s / w) ** n for n in range(background)]
-    value = r * up + r.conjugate() * down + sum(c * each for c, each in zip(x[4:], powers, strict=True))
-    by_sigma = -(r * up**2 + r.conjugate() * down**2)
-    by_w = 1j * (r * up**2 - r.conjugate() * down**2)
-    return value, [by_sigma, by_w, up + down, 1j * (up - down), *powers]
+    r, e = linear(found.x)
+    freedom = 2 * omega.size - 4 - background
+    J = np.asarray(found.jac, dtype=float)
+    spread = np.linalg.pinv(J.T @ J) * max(1.0, float(e @ e) / freedom)
+    return Resonance(pole=complex(-sigma_p, w_p), residue=complex(r[0], r[1]), std=np.sqrt(np.diag(spread)))
 
 
 def _half_width(data: Measured, place: int) -> float:

@@ -44,7 +44,7 @@ from tfarm.records import record
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner import kernel
 from tfarm.tuner.guard import GuardKind
-from tfarm.tuner.kernel import MOST_HIDDEN, PAPER_INPUTS, Limits, Network
+from tfarm.tuner.kernel import PAPER_INPUTS, Limits, Network
 
 SILENT = Network(np.zeros((1, PAPER_INPUTS)), np.zeros(1), np.ones(PAPER_INPUTS))  # for a guard that leaves no choice
 TRIAL_MODES = 6  # flexible modes of a trial, unless told
@@ -337,23 +337,21 @@ class TunerFile(StrictTable):
     K1: Finite
     Kp: Annotated[Finite, Field(ge=0)] = 0.0  # absent in files of tuners without a servo
     signals: Reading
-    a: Annotated[Finite, Field(ge=0)]
-    b: Annotated[Finite, Field(ge=0)]
+    a: Finite
+    b: Finite
     guard_kind: GuardKind
-    guard: Annotated[list[Annotated[Finite, Field(ge=0)]], Field(min_length=2, max_length=2)] | None
-    scales: Annotated[list[Finite], Field(min_length=6, max_length=7)]
-    W1: Annotated[
-        list[Annotated[list[Finite], Field(min_length=6, max_length=7)]], Field(min_length=1, max_length=MOST_HIDDEN)
-    ]
-    w2: Annotated[list[Finite], Field(min_length=1, max_length=MOST_HIDDEN)]
+    guard: tuple[Finite, Finite] | None
+    scales: list[Finite]
+    W1: list[list[Finite]]
+    w2: list[Finite]
 
     def build(self) -> SavedTuner:
         """The tuner; ParameterError where its parts do not fit together."""
         if (self.guard is None) != (self.guard_kind == "none"):
             raise ParameterError(key="guard", value=self.guard, remedy="two ends, or null with guard_kind none")
         lo, hi = (0.0, math.inf) if self.guard is None else self.guard
-        if not lo < hi:
-            raise ParameterError(key="guard", value=self.guard, remedy="its lower end comes first")
+        if not 0 <= lo < hi:
+            raise ParameterError(key="guard", value=self.guard, remedy="its lower end, from 0 on, comes first")
         widths = {len(row) for row in self.W1}
         if widths != {len(self.scales)}:
             raise ParameterError(
