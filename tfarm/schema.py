@@ -25,6 +25,7 @@ SLUGS = {"s": "s", "m": "m", "rad/s": "rad_s", "Hz": "hz", "deg": "deg", "sample
 COMPLEX_ERROR = 2e-14  # of the size of a pole or zero: what rounding leaves in its parts (tests: 1e-14 to 50 digits)
 RATIO_DIGITS = 6  # of the damping ratio of a listed pole
 NO_VALUE = "-"
+LONGEST_LINE = 40  # characters of a cell from which on it may be folded on a narrow terminal
 LONGEST_COMPARED = 20  # characters of a text that is compared: a word, and no sentence
 SAME = 4e-14  # of a value: what two computations of it may differ by
 
@@ -163,7 +164,8 @@ def _values(rows: Any, name: str) -> list[Any]:
 
 def _column(of: Quantity, values: Sequence[Any]) -> Column:
     cells = [text(value, of.digits) for value in values]
-    return Column(of.key, of.label, of.unit, of=[to_json_value(value) for value in values], shown=cells)
+    folds = max(map(len, cells), default=0) > LONGEST_LINE
+    return Column(of.key, of.label, of.unit, of=list(map(to_json_value, values)), shown=cells, folds=folds)
 
 
 def across(

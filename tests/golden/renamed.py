@@ -80,6 +80,7 @@ RENAMED = (
     ("fit", r"frequencies_hz.*", "resonances"),
     ("response .*--measured.*", r"band_hz(.*)", r"range_hz\1"),
     ("response .*--measured.*", "(required_percent.*|notes?)", None),
+    ("assumptions", r"(.*\.)?(shape|sensitivity_to)", None),
     ("tune", r"guard_(\w+)", r"guard.\1"),
     ("tune", r"guard\[\d\]", None),
     ("bode|reduce", r"band_rad_s(.*)", r"range_rad_s\1"),

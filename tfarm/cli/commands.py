@@ -5,11 +5,13 @@ Rooms are imported inside them, so that `tfarm --help` answers at once.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from tfarm.arm import Arm
 from tfarm.cli.app import (
     ArmName,
     Compare,
@@ -22,7 +24,6 @@ from tfarm.cli.app import (
     TheoryName,
     app,
     emit,
-    give,
     load_arm,
     read_on,
     right_digits,
@@ -30,12 +31,11 @@ from tfarm.cli.app import (
     whole_number,
 )
 from tfarm.cli.inputs import Png, asked_input, bounds, must_be_band, points_on
-from tfarm.columns import Column, Table
 from tfarm.errors import MISSING, ParameterError
+from tfarm.schema import Quantity
 from tfarm.tables.terminal import show
 
 if TYPE_CHECKING:
-    from tfarm.arm import Arm
     from tfarm.exact.values import Method
 
 Csv = Annotated[Path | None, typer.Option("--csv", help="write the curve to this file")]
@@ -53,21 +53,31 @@ def presets(json: Json = False) -> None:
     """List the arms that come with tfarm."""
     import tfarm
 
-    names = ("name", "length", "damping", "hub_inertia", "payload_mass", "payload_inertia", "assumptions")
-    columns = tuple(Column(key, of=key.replace("hub_", "hub.").replace("payload_", "payload.")) for key in names)
-    arms = Table(columns=columns, record=[tfarm.load(name) for name in tfarm.presets()])
-    give({"presets": arms}, json, _print_presets)
+    emit(Presets([_preset(tfarm.load(name)) for name in tfarm.presets()]), json)
 
 
-def _print_presets(answer: dict[str, Any]) -> None:
-    """A line an arm, with its assumptions."""
-    from rich.console import Console
+class Preset(NamedTuple):
+    """An arm that comes with tfarm."""
 
-    console = Console()
-    for arm in answer["presets"]:
-        console.print(f"[bold]{arm['name']}[/bold]", highlight=False)
-        for text in arm["assumptions"]:
-            console.print(f"  - {text}", highlight=False, markup=False)
+    name: Annotated[str, Quantity("name")]
+    length: Annotated[float, Quantity("length [m]")]
+    damping: Annotated[float, Quantity("damping C [s]")]
+    hub_inertia: Annotated[float, Quantity("hub inertia", "kg m^2")]
+    payload_mass: Annotated[float, Quantity("payload mass", "kg")]
+    payload_inertia: Annotated[float, Quantity("payload inertia", "kg m^2")]
+    assumptions: Annotated[tuple[str, ...], Quantity("assumptions")]
+
+
+def _preset(arm: Arm) -> Preset:
+    payload = arm.payload
+    return Preset(arm.name, arm.length, arm.damping, arm.hub.inertia, payload.mass, payload.inertia, arm.assumptions)
+
+
+@dataclass(frozen=True)
+class Presets:
+    """All of them."""
+
+    presets: Annotated[list[Preset], Quantity("arms")]
 
 
 @app.command()
