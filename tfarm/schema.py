@@ -26,7 +26,8 @@ COMPLEX_ERROR = 2e-14  # of the size of a pole or zero: what rounding leaves in 
 RATIO_DIGITS = 6  # of the damping ratio of a listed pole
 NO_VALUE = "-"
 LONGEST_LINE = 40  # characters of a cell from which on it may be folded on a narrow terminal
-LONGEST_COMPARED = 20  # characters of a text that is compared: a word, and no sentence
+LONGEST_COMPARED = 28  # characters of a text that is compared: a word or an interval, and no sentence
+EMPTY = {"None", "", "[]", "()"}  # what is compared where neither has a value
 SAME = 4e-14  # of a value: what two computations of it may differ by
 
 
@@ -189,8 +190,9 @@ def entries(record: Any, under: str = "") -> Iterator[tuple[str, Quantity, Any]]
     for name, of in quantities(type(record)).items():
         value, label = getattr(record, name), f"{under}{of.label}"
         if hasattr(value, "as_text"):
-            continue
-        if is_declared(value) and not isinstance(value, At) and (of.flat or of.label):
+            if of.label:
+                yield label, of, value.as_text(of.digits)
+        elif is_declared(value) and not isinstance(value, At) and (of.flat or of.label):
             yield from entries(value, under if of.flat else f"{label}: ")
         elif of.label and not (of.curve or isinstance(value, np.ndarray | Mapping) or _is_list_of_records(value)):
             yield label, of, value
@@ -249,7 +251,9 @@ def _with_flat(record: Any) -> Iterator[tuple[Any, Quantity]]:
 
 
 def _is_list_of_records(value: Any) -> bool:
-    return isinstance(value, list | tuple) and bool(value) and all(map(is_declared, value))
+    """Whether a value is the rows of a table; intervals are a text in one cell."""
+    is_some = isinstance(value, list | tuple) and bool(value) and not hasattr(value[0], "as_text")
+    return is_some and all(map(is_declared, value))
 
 
 # --------------------------------------------------------------------------------------------------------- terminal
@@ -361,7 +365,7 @@ class Difference(NamedTuple):
         if one == other:
             return 0.0
         gap = float(other - one)
-        return 0.0 if abs(gap) <= SAME * abs(one) else gap if math.isfinite(gap) else None
+        return None if not math.isfinite(gap) else 0.0 if abs(gap) <= SAME * abs(one) else gap
 
 
 def compare(one: Any, other: Any, under: str = "") -> list[Difference]:
@@ -370,7 +374,9 @@ def compare(one: Any, other: Any, under: str = "") -> list[Difference]:
     found = [
         Difference(label, of.unit, *(each.value if isinstance(each, At) else each for each in (a, others[label])))
         for label, of, a in entries(one, under)
-        if label in others and (of.is_number or len(str(a)) < LONGEST_COMPARED)
+        if label in others
+        and (of.is_number or len(str(a)) < LONGEST_COMPARED)
+        and not {str(a), str(others[label])} <= EMPTY
     ]
     for (a, of), (b, _) in zip(_with_flat(one), _with_flat(other), strict=False):
         if of.label and _is_list_of_records(a) and _is_list_of_records(b):

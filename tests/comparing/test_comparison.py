@@ -9,20 +9,18 @@ from matplotlib import image
 import tfarm
 from tests.shell import answer, run
 from tfarm.comparing import comparison
-from tfarm.comparing.answers import (
-    ComparedQuantity,
-    compared_answer,
-    compared_margins,
-    compared_modes,
-    compared_poles,
-    unpaired_poles,
-)
 from tfarm.dsp import Analysis, sampled_verdict
-from tfarm.loop.answers import margins_answer
+from tfarm.schema import Difference, to_dict
 
 BARE, LAB = tfarm.load("sasaki2012"), tfarm.load("sasaki2012-lab")
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
+PHASE = "margins in the frequency range: phase margin"
 GAINS = "[law]\n[law.hub_rate]\ngain = {}\n[law.root_moment]\ngain = {}\n"
+
+
+def by_quantity(rows):
+    """Values of both sides and the difference by the name of the quantity."""
+    return {row.quantity: (row.one, row.other, row.difference) for row in rows}
 
 
 @pytest.fixture
@@ -35,47 +33,43 @@ def files(tmp_path):
 
 
 def test_four_times_as_stiff_is_twice_as_fast():
-    """w goes with the root of E where G goes with it: every natural frequency by 100 %, to rounding."""
+    """w goes with the root of E where G goes with it, to rounding."""
     link = replace(BARE.link, youngs_modulus=4 * BARE.link.youngs_modulus, shear_modulus=4 * BARE.link.shear_modulus)
     found = tfarm.compare([BARE, replace(BARE, link=link, name="stiff")], modes=5)
-    apart = [row["natural_frequency_rad_s_difference_percent"] for row in compared_modes(found)]
-    assert apart == pytest.approx([100.0] * 5, rel=1e-13)
+    rows = by_quantity(found.mode_differences)
+    for one, _, apart in (rows[f"frequency of mode {mode}"] for mode in range(1, 6)):
+        assert apart == pytest.approx(one, rel=1e-13)
     assert found.is_of_arms
 
 
 def test_twice_the_damping_is_twice_the_ratio():
     """To first order in C; the shear that C does not damp makes it less by a share of C w."""
     found = tfarm.compare([LAB, LAB.having(damping=2 * LAB.damping)], names=("C", "2 C"), modes=2)
-    first, second = (row["damping_ratio_difference_percent"] for row in compared_modes(found))
-    assert first == pytest.approx(100.0, abs=0.1)
-    assert second == pytest.approx(100.0, abs=0.5)
+    for mode, tolerance in ((1, 1e-3), (2, 5e-3)):
+        one, _, apart = by_quantity(found.mode_differences)[f"damping ratio of mode {mode}"]
+        assert apart == pytest.approx(one, rel=tolerance)
 
 
 def test_an_arm_beside_itself_differs_in_nothing():
     found = tfarm.compare([LAB, LAB], LAW, modes=3)
     assert not found.is_of_arms
-    for table in (compared_modes(found), compared_poles(found), compared_margins(found)):
-        apart = [[value for key, value in row.items() if "_difference_" in key] for row in table]
-        assert apart
-        assert all(set(row) - {None} == {0.0} for row in apart)
+    for rows in (found.pole_differences, found.margin_differences):
+        assert {row.difference for row in rows} - {None} == {0.0}
     assert found.regions[0] == found.regions[1]
 
 
 def test_each_side_is_what_it_is_alone():
     other = tfarm.HubFeedback(K1=2.0, K2=-0.2)
     found = tfarm.compare(LAB, [LAW, other], modes=3)
-    for side, law, loop in zip(found.sides, (LAW, other), compared_answer(found)["loops"], strict=True):
+    for side, law, loop in zip(found.sides, (LAW, other), to_dict(found)["loops"], strict=True):
         assert side.margins == tfarm.margins(LAB, law)
-        assert {key: loop[key] for key in ("delay_margin_s", "disk_margin")} == {
-            key: margins_answer(side.margins)[key] for key in ("delay_margin_s", "disk_margin")
-        }
+        assert loop == to_dict(side.margins)
         assert side.sampled.is_stable == sampled_verdict(LAB, law).is_stable
         alone = tfarm.closed_loop_poles(LAB, law, 6).values
         assert side.oscillating[:3] == pytest.approx(alone[alone.imag > 0][:3], rel=1e-12)
-    rows = {row["margin"]: row for row in compared_margins(found)}
     delays = [tfarm.margins(LAB, law).exact_delay for law in (LAW, other)]
-    expected = 100 * (delays[1] / delays[0] - 1)
-    assert rows["delay_margin_s"]["value_difference_percent"] == pytest.approx(expected, rel=1e-12)
+    apart = by_quantity(found.margin_differences)["delay margin, exact"]
+    assert apart == (*delays, pytest.approx(delays[1] - delays[0], rel=1e-12))
 
 
 def test_poles_are_compared_mode_by_mode_and_what_has_no_partner_apart():
@@ -84,27 +78,26 @@ def test_poles_are_compared_mode_by_mode_and_what_has_no_partner_apart():
     Followed from the open loop in small steps of the gains, each pole comes from the mode that it is listed under.
     """
     found = tfarm.compare([BARE, LAB])
-    rows, apart = list(compared_poles(found)), list(unpaired_poles(found))
-    assert [row["mode"] for row in rows] == list(range(1, 13))
-    assert [(row["of"], row["mode"]) for row in apart] == [
-        ("sasaki2012", 13), ("sasaki2012", 14), ("sasaki2012-lab", None), ("sasaki2012-lab", None)
+    rows, apart = by_quantity(found.pole_differences), found.unpaired_poles
+    assert list(rows)[:12] == [f"abs(s) of mode {mode}" for mode in range(1, 13)]
+    assert [(row.side, row.mode) for row in apart] == [
+        ("first", "mode 13"), ("first", "mode 14"), ("second", "none"), ("second", "none")
     ]  # fmt: skip
-    assert min(row["size_rad_s"] for row in apart[2:]) > 7e5
-    shown = {name: sum(row["of"] == name for row in apart) for name in ("sasaki2012", "sasaki2012-lab")}
-    assert all(len(side.oscillating) == len(rows) + shown[side.name] for side in found.sides)
+    assert min(abs(row.pole) for row in apart[2:]) > 7e5
+    assert [len(side.oscillating) for side in found.sides] == [14, 14]
     paths = tfarm.locus(LAB, LAW, "all", 0.0, 1.0, 60, 8)
-    for row in rows[:6]:
-        ends = paths.branches[paths.mode == row["mode"], -1]
-        assert abs(ends) == pytest.approx([row["size_rad_s_other"]], rel=1e-6)
+    for mode in range(1, 7):
+        ends = paths.branches[paths.mode == mode, -1]
+        assert abs(ends) == pytest.approx([rows[f"abs(s) of mode {mode}"][1]], rel=1e-6)
 
 
 def test_a_loop_of_the_hub_is_paired_with_the_other_hub():
-    """K_p and J make a slow pole on both sides: sqrt(Kp/J), by 41 % faster with twice the gain."""
+    """K_p and J make a slow pole on both sides: sqrt(Kp/J)."""
     laws = [tfarm.HubFeedback(K1=0.02, Kp=0.02), tfarm.HubFeedback(K1=0.02, Kp=0.04)]
-    hub, *others = compared_poles(tfarm.compare(LAB, laws, modes=3))
-    assert hub["mode"] == 0
-    assert hub["size_rad_s_difference_percent"] == pytest.approx(100 * (np.sqrt(2) - 1), rel=1e-3)
-    assert [row["mode"] for row in others][:3] == [1, 2, 3]
+    hub, *others = tfarm.compare(LAB, laws, modes=3).pole_differences
+    assert hub.quantity == "abs(s) of the hub"
+    assert hub.difference == pytest.approx((np.sqrt(2) - 1) * hub.one, rel=1e-3)
+    assert [row.quantity for row in others][:3] == [f"abs(s) of mode {mode}" for mode in (1, 2, 3)]
 
 
 def test_a_pole_of_the_law_is_no_mode():
@@ -112,9 +105,9 @@ def test_a_pole_of_the_law_is_no_mode():
     w = 1.15 * float(tfarm.modes(LAB, 1).natural_frequency[-1])
     tuned = tfarm.Law({"hub_rate": ([0.3 * w**2], [1.0, 0.02 * w, w**2]), "hub_angle": 1e-3})
     found = tfarm.compare(LAB, [tfarm.HubFeedback(K1=0.3, Kp=1e-3), tuned], modes=2)
-    apart = [row for row in unpaired_poles(found) if row["of"] == found.other.name and row["mode"] is None]
-    assert [row["size_rad_s"] for row in apart][:1] == pytest.approx([w], rel=0.25)
-    assert {row["mode"] for row in compared_poles(found)} >= {1, 2}
+    apart = [abs(row.pole) for row in found.unpaired_poles if (row.side, row.mode) == ("second", "none")]
+    assert apart[:1] == pytest.approx([w], rel=0.25)
+    assert by_quantity(found.pole_differences).keys() >= {"abs(s) of mode 1", "abs(s) of mode 2"}
 
 
 def test_the_assignment_of_poles_to_modes():
@@ -126,19 +119,18 @@ def test_the_assignment_of_poles_to_modes():
     assert comparison.poles_by_mode(np.array([], complex), own) == {}
 
 
-def test_a_phase_margins_difference_is_in_degrees(capsys):
-    """Of margins known apart; in per cent of a phase of -0.036 deg it was +2.19e+04 %."""
+def test_margins_are_those_known_apart_with_their_unit(capsys):
+    """Without damping any delay is too long: what is exact and what holds in the frequency range are two rows."""
     found = tfarm.compare([BARE, LAB], modes=1)
     alone = [tfarm.margins(arm, side.law).in_band.phase for arm, side in zip((BARE, LAB), found.sides, strict=True)]
-    rows = {row["margin"]: row for row in compared_margins(found)}
-    phase, disk = rows["phase_margin_deg"], rows["disk_margin"]
-    assert phase["value_difference_deg"] == pytest.approx(alone[1] - alone[0], rel=1e-9)
-    assert phase["value_difference_percent"] is None
-    assert disk["value_difference_deg"] is None
-    _, out, _ = run(capsys, "compare", "sasaki2012", "sasaki2012-lab", "--modes", "1")
-    (line,) = [line for line in out.splitlines() if "phase margin [deg]" in line]
-    assert f"{alone[1] - alone[0]:+.3g} deg" in line
-    assert "%" not in line
+    rows = by_quantity(found.margin_differences)
+    assert rows[PHASE] == (*alone, pytest.approx(alone[1] - alone[0], rel=1e-9))
+    assert (rows["delay margin, exact"][0], rows["peak sensitivity Ms, exact"][2]) == (0.0, None)
+    assert rows["stability intervals K2: stable around it"][1] == "(< -50, 1.0305376)"
+    code, out, err = run(capsys, "compare", "sasaki2012", "sasaki2012-lab", "--modes", "1")
+    assert (code, err) == (0, "")
+    (line,) = [line for line in out.splitlines() if line.startswith(f"{PHASE}  ")]
+    assert line.split()[-4:] == ["deg", f"{alone[0]:.8g}", f"{alone[1]:.8g}", f"{alone[1] - alone[0]:.4g}"]
 
 
 def test_two_laws_are_called_by_their_files_and_an_unstable_loop_has_no_margins(capsys, files, tmp_path):
@@ -146,20 +138,12 @@ def test_two_laws_are_called_by_their_files_and_an_unstable_loop_has_no_margins(
     picture = tmp_path / "both.png"
     found = answer(capsys, "compare", "sasaki2012-lab", *laws, "--modes", "1", "--png", str(picture))
     assert min(image.imread(picture).shape[:2]) > 800
-    assert (found["of"], found["names"], found["verdicts"]) == ("laws", ["mild", "wild"], ["stable", "unstable"])
-    assert {row["value_other"] for row in found["margins"]} == {None}
-    assert {row["value_difference_percent"] for row in found["margins"]} == {None}
-    assert {row["value_difference_deg"] for row in found["margins"]} == {None}
+    sides = [(side["name"], side["verdict"]) for side in found["sides"]]
+    assert (found["of"], sides) == ("laws", [("mild", "stable"), ("wild", "unstable")])
+    margins = {row["quantity"]: row for row in found["margins"]}
+    assert (margins["disk margin, exact"]["other"], margins["disk margin, exact"]["difference"]) == (None, None)
+    assert PHASE not in margins
     assert [loop["K2"] for loop in found["loops"]] == [0.3, 1.5]
-    assert [row["size_rad_s_one"] > 0 for row in found["poles"]] == [True] * len(found["poles"])
-
-
-def test_without_damping_phases_are_of_the_band_alone():
-    """A delay of nothing ends an undamped loop: no phase is exact there, as `tfarm margins` has it."""
-    rows = {row["margin"]: row for row in compared_margins(tfarm.compare([BARE, LAB], LAW, modes=1))}
-    assert rows["phase_lag_deg"]["known_one"] == "in the band"
-    assert (rows["delay_margin_s"]["known_one"], rows["delay_margin_s"]["value_one"]) == ("exact", 0.0)
-    assert rows["phase_lag_deg"]["known_other"] == "exact"
 
 
 def test_a_law_of_other_signals_is_mapped_over_factor_and_delay():
@@ -187,10 +171,10 @@ def test_gains_as_a_law_in_z_are_the_same_loop_at_the_samples():
     found = tfarm.compare(LAB, [LAW, tfarm.Law({"hub_rate": 0.3, "root_moment": 0.3}, period=0.01)], modes=2)
     assert found.is_sampled
     assert [side.verdict for side in found.sides] == ["stable", "stable"]
-    for table in (compared_poles(found), compared_margins(found)):
-        apart = [value for row in table for key, value in row.items() if key.endswith("difference_percent")]
-        assert apart
-        assert apart == pytest.approx([0.0] * len(apart), abs=1e-6)
+    rows = [*found.pole_differences, *found.margin_differences]
+    assert rows
+    for row in rows:
+        assert row.difference == pytest.approx(0.0, abs=1e-8 * abs(row.one or 1.0))
     assert [side.margins for side in found.sides] == [None, None]
 
 
@@ -211,7 +195,7 @@ def test_a_law_in_z_beside_gains_is_judged_at_the_clock_of_both():
     upper, _, right = tfarm.plots.comparison.figure(found).axes
     assert upper.get_xlim()[1] == pytest.approx(np.pi / 0.01, rel=1e-3)  # the last point of its grid
     assert right.get_xlabel() == "further delay [ms]"
-    answered = compared_answer(found)
+    answered = to_dict(found)
     assert answered["at_samples"]
     assert [loop["stable"] for loop in answered["loops"]] == [True, True]
 
@@ -223,20 +207,12 @@ def test_a_law_in_z_of_another_clock_is_one_line(capsys, files, tmp_path):
     assert "period = 0.005" in err
 
 
-def test_two_arms_are_printed_with_their_modes(capsys):
-    code, out, err = run(capsys, "compare", "sasaki2012", "sasaki2012-lab", "--modes", "1")
-    assert (code, err) == (0, "")
-    assert "sasaki2012-lab: STABLE; sampled every 10 ms" in out
-    assert "natural frequencies and damping of the arms" in out
-    assert "0 %" in out
-
-
 @pytest.mark.parametrize(
     ("one", "other", "shown"),
-    [(1.0, 1.0 + 1e-15, 0.0), (2.0, 1.0, -50.0), (0.0, 1.0, None), (None, 1.0, None), (1.0, np.inf, None)],
+    [(1.0, 1.0 + 1e-15, 0.0), (2.0, 1.0, -1.0), (None, 1.0, None), (1.0, np.inf, None)],
 )
 def test_a_difference_is_a_number_or_none(one, other, shown):
-    assert ComparedQuantity("a", "", relative=1e-14).percent(one, other) == shown
+    assert Difference("a", "", one, other).difference == shown
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Any linear law on the sampled loop: against python-control, models stepped otherwise, edges, Jury's conditions."""
 
+import re
 from dataclasses import replace
 
 import control
@@ -102,7 +103,7 @@ def test_integrators_of_what_is_0_at_rest_stay_at_one(entries, marginal):
 def test_what_stays_at_one_is_left_out_of_what_is_proven():
     verdict = sampled_verdict(LAB, Law({"hub_rate": 0.3, "root_moment": ([0.001, 0.0], [1.0, -1.0])}, period=T))
     assert (verdict.word, verdict.log_radius, verdict.is_settled) == ("marginal", 0.0, True)
-    assert "a pole of the law neither grows nor decays" in verdict.sentence
+    assert verdict.slowest == "a pole of the law"
 
 
 def test_an_unstable_cancellation_in_the_law_is_said_and_grows(capsys, tmp_path):
@@ -114,9 +115,7 @@ def test_an_unstable_cancellation_in_the_law_is_said_and_grows(capsys, tmp_path)
     assert found.verdict.log_radius == pytest.approx(np.log(1.2), rel=1e-9)
     text = "[law]\nperiod = 0.01\n[law.hub_angle]\nzeros = [1.2]\npoles = [1.2, 0.5]\ngain = 0.1\n"
     (tmp_path / "law.toml").write_text(text)
-    assert (
-        "warning: the law cancels" in run(capsys, "sampled", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"))[1]
-    )
+    assert "the law cancels" in run(capsys, "sampled", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"))[1]
 
 
 def test_filtered_signals_are_what_the_analog_filter_makes_of_them():
@@ -257,13 +256,13 @@ def test_the_command_says_which_rule_it_took(capsys, tmp_path):
     text = "[law]\nname = 'PD'\ndelay = 0.002\nprewarp = 20.0\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
     (tmp_path / "law.toml").write_text(text)
     found = answer(capsys, "sampled", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"))
-    assert (found["rule"], found["delay_samples"], found["settled"]) == ("tustin", 0.2, True)
+    assert (found["delay_samples"], found["certified"]) == (0.2, True)
     (tmp_path / "arm.toml").write_text(tfarm.arm.to_toml(LAB) + "\n" + text)
     assert answer(capsys, "sampled", str(tmp_path / "arm.toml"))["gain_factors"] == found["gain_factors"]
     code, out, _ = run(capsys, "sampled", str(tmp_path / "arm.toml"))
     assert code == 0
-    assert "Tustin's rule, exact at 20 rad/s" in out
-    assert f"spectral radius {found['spectral_radius']:.12g}" in out
+    assert "Tustin's rule, exact at 20 rad/s" in found["rule"]
+    assert re.search(f"^spectral radius +{found['spectral_radius']:.12g}$", out, re.MULTILINE)
 
 
 @pytest.mark.parametrize("arm", ["free", "damped", "held"])
@@ -364,7 +363,7 @@ def test_a_number_is_in_a_window_where_all_eigenvalues_are_inside_the_circle(law
     """At random factors of either sign on one part; near an edge eigenvalues tell nothing."""
     rng, told = np.random.default_rng(5), set()
     loop = sampled_loop(LAB, law, Chain(), count=6)
-    for name, value, windows in sampled_numbers(loop):
+    for name, value, windows, _ in sampled_numbers(loop):
         for factor in (*-(10 ** rng.uniform(-3, 2, 4)), *10 ** rng.uniform(-3, 2, 8)):
             radius = abs(np.linalg.eigvals(loop.having(**{name: factor * value}).reduced_matrix())).max()
             inside = any(low < factor * value < high for low, high in windows)

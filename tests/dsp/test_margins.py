@@ -23,8 +23,9 @@ from tfarm.dsp import (
     sampled_map,
 )
 from tfarm.dsp.crossings import ENDS_AT, around, circle_grid, ends_of_K1, number_crossings, stable_windows
-from tfarm.dsp.verdict import sampled_answer, sampled_verdict
+from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.schema import to_dict
 from tfarm.spectrum.table import default_gains
 
 GAINS = HubFeedback(K1=0.3, K2=0.3)
@@ -180,24 +181,27 @@ def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossl
     assert verdict.sentence.startswith("stable")
     undamped = sampled_verdict(lossless, GAINS)
     assert (undamped.is_settled, undamped.band_rad_s) == (False, None)
-    assert "mode 13 grows by 8.62e-09 a sample (holds for the first 20 modes)" in undamped.sentence
+    assert (undamped.slowest, undamped.modes_used) == ("mode 13", 20)
+    assert undamped.log_radius == pytest.approx(8.62e-9, rel=1e-3)
+    assert undamped.holds_for == "converged for the first 20 modes, not determined beyond"
     assert sampled_verdict(lossless, GAINS, count=12).sentence.startswith("stable")
     assert sampled_verdict(lossless, HubFeedback(K1=0, K2=0)).sentence.startswith("marginal")
 
 
 def test_the_answer_is_plain_and_consistent(lab):
-    answer = sampled_answer(tfarm.sampled(lab, GAINS))
-    low, high = answer["K2_interval"]
-    edges = answer["shown"]["K2_intervals"][0]
-    assert [float(edge["text"]) for edge in edges] == pytest.approx([low, high], rel=5e-6)
-    assert all(edge["settled"] and edge["band_rad_s"] == answer["band_rad_s"] > 1e5 for edge in edges)
-    for key in ("delay_margin_samples", "required_damping_s"):
-        figure = answer["shown"][key]
-        assert (figure["settled"], figure["digits"]) == (True, 4)
-        assert float(figure["text"]) == pytest.approx(answer[key], rel=5e-4)
-    unstable = sampled_answer(tfarm.sampled(lab, HubFeedback(K1=0.3, K2=1.3)))
-    assert (unstable["K2_interval"], unstable["delay_margin_samples"]) == (None, 0.0)
-    assert unstable["K2_intervals"] == answer["K2_intervals"]
+    answer = to_dict(tfarm.sampled(lab, GAINS))
+    (of_K2,) = (row for row in answer["stability_intervals"] if row["number"] == "K2")
+    (edges,) = of_K2["intervals"]
+    assert [float(edge["text"]) for edge in edges] == pytest.approx(of_K2["interval"], rel=5e-6)
+    assert all(edge["certified"] and edge["up_to_rad_s"] == answer["up_to_rad_s"] > 1e5 for edge in edges)
+    for key in ("delay_margin", "minimum_damping_s"):
+        figure = answer[key]
+        assert (figure["certified"], figure["digits"]) == (True, 4)
+        assert float(figure["text"]) == pytest.approx(figure["value"], rel=5e-4)
+    unstable = to_dict(tfarm.sampled(lab, HubFeedback(K1=0.3, K2=1.3)))
+    (of_unstable,) = (row for row in unstable["stability_intervals"] if row["number"] == "K2")
+    assert (of_unstable["interval"], unstable["delay_margin_samples"]) == (None, 0.0)
+    assert of_unstable["intervals"] == of_K2["intervals"]
     outside = abs(np.linalg.eigvals(sampled_loop(lab, HubFeedback(K1=0.3, K2=1.3)).reduced_matrix())) > 1
     assert unstable["unstable_poles"] == outside.sum() == 2
     assert answer["unstable_poles"] == 0

@@ -59,8 +59,8 @@ def test_modes_beyond_the_sixteenth_can_be_the_unstable_ones(name):
     verdict = sampled_verdict(arm, gains, chain)
     assert verdict.is_settled
     assert not verdict.is_stable
-    assert verdict.sentence.startswith("unstable: mode ")
-    assert f"below {verdict.band_rad_s:.3g} rad/s, not known beyond" in verdict.sentence
+    assert verdict.sentence.startswith("unstable (certified ")
+    assert f"up to {verdict.band_rad_s:.3g} rad/s, not determined beyond" in verdict.sentence
     coarse, fine = (HoldModel(arm, terms).log_radius(gains, chain) for terms in (80, 100))
     assert min(coarse, fine) > 1e-3
     assert verdict.loop.poles.log_spectral_radius == pytest.approx(fine, abs=4 * abs(fine - coarse))

@@ -18,11 +18,14 @@ PLACES = (
 ENDS = (("0", "low"), ("1", "high"))
 RENAMED = (
     # stability intervals, of gains at the hub and of the numbers of a law
-    *(("margins|compare", rf"{LOOP}{GAIN}_interval\[{n}\]", rf"\1stability_intervals[\2].interval.{end}") for n, end in ENDS),
-    *(("margins|compare", rf"{LOOP}{GAIN}_interval_ends\[{n}\]", rf"\1stability_intervals[\2].interval.{end}_is") for n, end in ENDS),
+    *(("margins|compare", rf"{LOOP}{GAIN}_interval\[{n}\]", rf"\1stability_intervals[\2].interval.{end}")
+      for n, end in ENDS),
+    *(("margins|compare", rf"{LOOP}{GAIN}_interval_ends\[{n}\]", rf"\1stability_intervals[\2].interval.{end}_is")
+      for n, end in ENDS),
     *(("margins|compare", rf"{LOOP}{GAIN}_windows\[(\d+)\]\[{n}\]", rf"\1stability_intervals[\2].intervals[\3].{end}")
       for n, end in ENDS),
-    *(("margins|compare", rf"{LOOP}{GAIN}_windows_ends\[(\d+)\]\[{n}\]", rf"\1stability_intervals[\2].intervals[\3].{end}_is")
+    *(("margins|compare", rf"{LOOP}{GAIN}_windows_ends\[(\d+)\]\[{n}\]",
+       rf"\1stability_intervals[\2].intervals[\3].{end}_is")
       for n, end in ENDS),
     ("margins|compare", rf"{LOOP}{GAIN}_looked_at(.*)", r"\1stability_intervals[\2].search_range\3"),
     ("margins|compare", rf"{LOOP}{GAIN}_band_rad_s", r"\1stability_intervals[\2].up_to_rad_s"),
@@ -68,7 +71,6 @@ RENAMED = (
     ("sampled", "rule_in_words", "rule"),
     ("sampled", "settled", "certified"),
     ("sampled", "nearest", "dominant"),
-    ("sampled", r"stable_gain_factors.*", None),
     ("sampled", "(law|rule|free_hub_angle)", None),  # prose, where it was something else
     (".*", r"(.*\.)?beyond_the_band", r"\1beyond"),
     (".*", r"(.*\.)?known_beyond_the_band", r"\1known_beyond"),
@@ -121,7 +123,7 @@ RENAMED = (
     ("compare", r"poles\[0\]\.damping_ratio_(one|other)", r"poles[damping ratio of the hub].\1"),
     ("compare", r"poles\[(\d+)\]\.size_rad_s_(one|other)", r"poles[abs(s) of mode \1].\2"),
     ("compare", r"poles\[(\d+)\]\.damping_ratio_(one|other)", r"poles[damping ratio of mode \1].\2"),
-    ("compare", r"(modes|poles|unpaired_poles|margins)\b.*", None),  # two arms or laws are compared quantity by quantity
+    ("compare", r"(modes|poles|unpaired_poles|margins)\b.*", None),  # now quantity by quantity
 )  # fmt: skip
 
 

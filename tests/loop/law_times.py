@@ -19,12 +19,12 @@ from tests.survey import Finding
 from tfarm.arm import Law
 from tfarm.arm.schema import arm_of_table
 from tfarm.dsp import Chain, Sampling
-from tfarm.dsp.verdict import sampled, sampled_law_answer
+from tfarm.dsp.verdict import sampled
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.loop.answers import margins_answer
 from tfarm.loop.margins import margins
 from tfarm.reduced.conversions import closed, sensed_model
 from tfarm.response.signals import Signals
+from tfarm.schema import to_dict
 from tfarm.tables.files import to_json
 
 SIGNALS = ("hub_angle", "hub_rate", "hub_angle", "hub_rate", "root_moment", "tip_displacement", "tip_acceleration",
@@ -146,12 +146,12 @@ def log(rng, low, high):
 
 def of_margins(arm, law, chain):
     """The work of `tfarm margins --law`."""
-    return margins_answer(margins(arm, law))
+    return to_dict(margins(arm, law))
 
 
 def of_sampled(arm, law, chain):
     """The work of `tfarm sampled --law`."""
-    return sampled_law_answer(sampled(arm, law, chain))
+    return to_dict(sampled(arm, law, chain))
 
 
 WORK = {"margins": of_margins, "sampled": of_sampled}

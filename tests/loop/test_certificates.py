@@ -113,7 +113,7 @@ def test_the_command_proves_a_law_of_a_file(capsys, tmp_path):
     path.write_text("[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n")
     code, out, _ = run(capsys, "poles", "sasaki2012-lab", "--law", str(path), "--count", "4", "--certify", "--json")
     assert code == 0
-    assert '"proven_complete": true' in out
+    assert '"completeness": "certified"' in out
 
 
 # ------------------------------------------------------------ what friction at the hub alone does

@@ -16,7 +16,6 @@ from tfarm import ConvergenceError, Hub, HubFeedback, Law, Link, Payload, Rotary
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
 from tfarm.loop import windows as windows_module
-from tfarm.loop.answers import unsettled
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 
@@ -86,7 +85,7 @@ def test_a_number_whose_poles_cannot_be_counted_is_named(monkeypatch):
     monkeypatch.setattr(windows_module, "crossed", lost)
     found = tfarm.margins(LAB, LAW)
     assert LAW.numbers.keys() - found.windows.keys() == {"hub_angle.num.1"}
-    assert unsettled(found).endswith("of hub_angle.num.1 poles could not be counted")
+    assert found.intervals_note.endswith("of hub_angle.num.1 poles could not be counted")
 
 
 def test_the_command_has_them(capsys, tmp_path, monkeypatch):
@@ -99,14 +98,15 @@ def test_the_command_has_them(capsys, tmp_path, monkeypatch):
     code, out, err = run(capsys, *words, "--json")
     assert (code, err) == (0, "")
     answer = json.loads(out)
-    assert {row["number"]: row["interval"] for row in answer["windows"]} == {
-        name: list(each.around) for name, each in found.items()
+    rows = answer["stability_intervals"]
+    assert {row["number"]: (row["interval"]["low"], row["interval"]["high"]) for row in rows} == {
+        name: each.around for name, each in found.items()
     }
-    assert {row["number"]: row["value"] for row in answer["windows"]} == law.numbers
-    assert answer["windows_note"].startswith("window ends are those of poles up to")
+    assert {row["number"]: row["value"] for row in rows} == law.numbers
+    assert answer["intervals_note"].startswith("window ends are those of poles up to")
     out = run(capsys, *words)[1]
-    assert f"(0, {found['hub_angle.den.0'].around[1]:.8g}*)" in out
-    assert out.count(answer["windows_note"]) == 1
+    assert f"(0, > {found['hub_angle.den.0'].around[1]:.8g})" in out
+    assert out.count(answer["intervals_note"]) == 1
     assert np.isfinite(found["gain"].band)
 
 
@@ -142,7 +142,7 @@ def test_no_number_of_a_signal_in_two_parts_has_a_window():
 
 
 def test_of_a_link_without_damping_it_is_said_why_there_are_none():
-    assert "without damping" in unsettled(tfarm.margins(BARE, Law({"hub_rate": ([0.3], [0.01, 1.0])})))
+    assert "without damping" in tfarm.margins(BARE, Law({"hub_rate": ([0.3], [0.01, 1.0])})).intervals_note
 
 
 @pytest.mark.parametrize("damping", [3e-8, 1e-7])

@@ -244,7 +244,7 @@ def test_a_branch_that_comes_to_the_accumulation_point_ends_there_and_the_others
     given = "locus sasaki2012-lab --K2 0 --vary K1 --from 0 --to 2000 --points 41 --branches 5 --json"
     answer = json.loads(run(capsys, *given.split())[1])
     assert answer["branches"][branch][-1] is None
-    assert [each["branch"] for each in answer["ends"]] == [branch]
+    assert [each["branch"] for each in answer["branch_list"] if each["ends_at"] is not None] == [branch]
     assert answer["gap_to_reduced"] < 1e-3
     (back,) = [each for each in locus(LAB, HubFeedback(), "K1", 2000.0, -3.0, 60, 5).crossings if each.branch is None]
     assert (back.gain, back.omega, back.direction) == (0.0, 0.0, "unstable")  # of the pole that comes out of -1/C
@@ -522,7 +522,7 @@ def test_the_command_prints_one_json_object(capsys, tmp_path):
     assert (code, answer["gain"]) == (0, found.gain.tolist())
     assert np.array_equal(np.array(answer["branches"]) @ [1, 1j], found.branches)
     assert [tuple(row.values()) for row in answer["crossings"]] == [
-        (each.gain, each.omega, each.omega / (2 * math.pi), each.branch, each.direction) for each in found.crossings
+        (each.gain, each.omega, each.branch, each.direction, each.omega / (2 * math.pi)) for each in found.crossings
     ]
     assert 0 < answer["gap_to_reduced"] < 1e-4
     assert answer["reduced_order"] == 20

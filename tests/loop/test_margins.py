@@ -18,11 +18,11 @@ from tests.odd_arms import odd_arms
 from tests.shared import thinned
 from tests.transition import response as transition
 from tfarm import Hub, HubFeedback
-from tfarm.loop.answers import margins_answer
 from tfarm.loop.loop import Loop, grid
 from tfarm.loop.margins import lowest
 from tfarm.loop.stability import stability
 from tfarm.reduced import relaxed_model
+from tfarm.schema import to_dict
 
 margins = cache(tfarm.margins)  # several tests ask for those of the same loops
 
@@ -66,13 +66,12 @@ def test_margins_are_those_of_python_control_on_a_fine_grid(arm, law) -> None:
 
 def test_the_lab_arm_bears_75_degrees_of_lag_and_8_of_lead() -> None:
     """Four crossings of |L| = 1, their phases signed as in python-control of a model of 25 modes."""
-    answer = margins_answer(margins(LAB, LAW))
-    for level in (answer, answer["in_band"]):
-        assert level["phase_margin_deg"] == pytest.approx(-7.901, abs=6e-4)
-        assert level["phase_lag_deg"] == pytest.approx(75.280, abs=6e-4)
-        assert level["phase_lead_deg"] == -level["phase_margin_deg"]
-        places = [level["at_rad_s"][name] for name in ("phase", "phase_lag", "phase_lead")]
-        assert places == pytest.approx([63.2834, 0.47466, 63.2834], rel=1e-5)
+    answer = to_dict(margins(LAB, LAW))["in_range"]
+    assert answer["phase_margin_deg"] == pytest.approx(-7.901, abs=6e-4)
+    assert answer["phase_lag_deg"] == pytest.approx(75.280, abs=6e-4)
+    assert answer["phase_lead_deg"] == -answer["phase_margin_deg"]
+    places = [answer[f"{name}_at_rad_s"] for name in ("phase_margin", "phase_lag", "phase_lead")]
+    assert places == pytest.approx([63.2834, 0.47466, 63.2834], rel=1e-5)
     places = np.array([0.47466, 63.2834, 200.58, 208.15])
     omega = np.outer(places, 1 + np.linspace(-1e-3, 1e-3, 400)).ravel()
     rate, moment = relaxed_model(LAB, ["hub_rate", "root_moment"], 25)(1j * omega)
@@ -242,11 +241,12 @@ def test_at_no_damping_the_exact_margins_are_none_and_those_of_the_band_are_besi
     ],
 )
 def test_no_margin_without_stability(arm, law) -> None:
-    answer = margins_answer(margins(arm, law))
+    answer = to_dict(margins(arm, law))
     assert answer["verdict"] != "stable"
-    keys = ("delay_margin_s", "disk_margin", "gain_margin", "phase_margin_deg", "peak_sensitivity", "in_band")
-    intervals = (f"{name}_interval" for name in ("K1", "K2", "Kp"))
-    assert all(answer[key] is None for key in (*keys, *intervals))
+    keys = ("delay_margin_s", "disk_margin", "gain_margin", "peak_sensitivity", "in_range")
+    assert all(answer[key] is None for key in keys)
+    assert answer["gain_crossovers"] == answer["phase_crossovers"] == []
+    assert [row["interval"] for row in answer["stability_intervals"]] == [None] * 3
 
 
 def test_a_comfortable_gain_margin_says_nothing_about_stability() -> None:

@@ -14,12 +14,12 @@ from tests.loop.test_lossless import RIGS
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.errors import ParameterError
-from tfarm.loop.answers import map_answer
 from tfarm.loop.loop import Loop
 from tfarm.loop.plane import INFINITE, between, gain_map, ranges_of
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
+from tfarm.schema import to_dict
 from tfarm.spectrum.table import default_gains
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -133,7 +133,7 @@ def test_the_middle_of_a_range_around_0_is_0_and_not_next_to_it() -> None:
 def test_the_answer_holds_the_boundary_inside_the_map_to_its_very_corner() -> None:
     """Every point of it that lies in the rectangle of the two ranges, and no other."""
     found = gain_map(LAB, np.linspace(0.0, 20.0, 3), np.linspace(-0.5, 1.5, 3))
-    answer = map_answer(found)
+    answer = to_dict(found)
     K1, K2 = found.boundary[:, 0], found.boundary[:, 1]
     inside = (K1 >= 0.0) & (K1 <= 20.0) & (K2 >= -0.5) & (K2 <= 1.5)
     np.testing.assert_array_equal(answer["boundary"], found.boundary[inside])

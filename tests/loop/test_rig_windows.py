@@ -6,7 +6,6 @@ import pytest
 
 import tfarm
 from tests.shell import run
-from tfarm.loop.answers import margins_answer
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import margins
 from tfarm.loop.windows import line_crossings
@@ -18,9 +17,8 @@ def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():
     arm = tfarm.load("quanser-flexlink")
     law = default_gains(arm)
     found = margins(arm, law)
-    answer = margins_answer(found)
-    assert "some may cross inside them" in answer["windows_note"]
-    band = answer["K2_band_rad_s"]
+    assert "some may cross inside them" in found.intervals_note
+    band = found.windows["K2"].band
     assert math.isfinite(band)
     low = found.windows["K2"].around[0]
     higher = line_crossings(Loop(arm, law), "K2", 2 * low, 0.0, 4 * band).gain
@@ -35,6 +33,6 @@ def test_the_table_says_so_too(capsys):
 @pytest.mark.parametrize(("name", "reach"), [("sasaki2012", math.inf), ("sasaki2012-lab", None)])
 def test_where_all_is_known_nothing_is_said(name, reach):
     arm = tfarm.load(name)
-    answer = margins_answer(margins(arm, default_gains(arm)))
-    assert answer["windows_note"] is None
-    assert reach in (None, answer["K2_band_rad_s"])
+    found = margins(arm, default_gains(arm))
+    assert found.intervals_note is None
+    assert reach in (None, found.windows["K2"].band)

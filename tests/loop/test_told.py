@@ -13,14 +13,14 @@ from tests.similar import EITHER
 from tfarm import HubFeedback, Law
 from tfarm.errors import ConvergenceError
 from tfarm.loop import panels
-from tfarm.loop.answers import nyquist_answer, poles_answer
 from tfarm.loop.locus import BranchCrossing, in_words, open_poles
 from tfarm.loop.loop import Loop
-from tfarm.loop.nyquist import nyquist_table, poles_on_axis
+from tfarm.loop.nyquist import poles_on_axis
 from tfarm.loop.panels import CHEBYSHEV, loop_panels
 from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.stability import stability
 from tfarm.loop.theorem import lyapunov
+from tfarm.schema import curve_table, to_dict
 from tfarm.spectrum.table import rate_unit
 
 LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
@@ -31,7 +31,7 @@ LAWS = {"stable": HubFeedback(K1=0.3, K2=0.3), "unstable": HubFeedback(K1=0.3, K
 def test_an_answer_of_nyquist_s_criterion_is_its_record(name):
     """Turns, poles by both roads and every point of the contour, as numbers without a sign of j."""
     found = tfarm.nyquist(LAB, LAWS[name])
-    answer, table = nyquist_answer(found), nyquist_table(found)
+    answer, table = to_dict(found), curve_table(found)
     assert answer["unstable_by_nyquist"] == answer["unstable_roots"] == -answer["encirclements"]
     assert (answer["unstable_roots"] == 0) == (name != "unstable") == (answer["verdict"] == "stable")
     np.testing.assert_array_equal(np.array(answer["s"]) @ [1, 1j], found.s)
@@ -44,7 +44,7 @@ def test_an_answer_of_nyquist_s_criterion_is_its_record(name):
 
 def test_an_answer_of_poles_is_its_record():
     found = tfarm.closed_loop_poles(STOCKY, tfarm.default_gains(STOCKY), 2)
-    answer = poles_answer(found, certify=True)
+    answer = to_dict(found.certified())
     np.testing.assert_array_equal(np.array(answer["poles"]) @ [1, 1j], found.values)
     assert answer["box"] == list(found.box)
     assert answer["unstable"] == found.unstable
@@ -62,7 +62,7 @@ def test_words_tell_three_crossings_and_count_the_others():
     assert in_words("K2", each[:1]) == "a pole becomes stable at K2 = 0"
     assert in_words("K2", each[:3]) == "a pole becomes stable at K2 = 0, unstable at K2 = 0.5, stable at K2 = 1"
     assert in_words("K2", each) == in_words("K2", each[:3]) + " and 3 more"
-    assert each[3].frequency_hz == pytest.approx(3.0, rel=1e-15)
+    assert each[3].frequency == pytest.approx(3.0, rel=1e-15)
 
 
 # ------------------------------------------------------------ the map
@@ -204,4 +204,4 @@ def test_resonators_in_one_fraction_are_passed_as_they_are_in_several():
     assert law.poles.real.any()
     found = tfarm.nyquist(LAB, law)
     np.testing.assert_allclose(found.poles, [0.0, 30.0, 200.0], rtol=1e-9)
-    assert (found.unstable_open, found.expected) == (0, found.verdict.unstable_roots)
+    assert (found.unstable_open, found.unstable_by_nyquist) == (0, found.verdict.unstable_roots)

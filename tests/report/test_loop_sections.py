@@ -300,7 +300,7 @@ def test_a_small_unstable_pole_is_not_indented_away(arm, Kp):
     """Kp < 0 leaves one real unstable pole near -Kp/K1, however near to the double pole of L at 0."""
     law = HubFeedback(K1=0.3, K2=0.3, Kp=Kp)
     plot = nyquist(arm, law)
-    assert (plot.expected, plot.verdict.unstable_roots) == (1, 1)
+    assert (plot.unstable_by_nyquist, plot.verdict.unstable_roots) == (1, 1)
     radius = abs(plot.s[plot.is_arc][plot.s[plot.is_arc].imag < 1e-2]).min()
     assert radius < plot.verdict.poles.values.real.max() == pytest.approx(-Kp / 0.3, rel=1e-2)
 
@@ -309,7 +309,7 @@ def test_both_counts_of_a_nyquist_plot_are_compared():
     """With a verdict that has lost its unstable poles there is no plot."""
     law = HubFeedback(K1=0.3, K2=1.5)
     verdict = replace(stability(LAB, law), unstable_roots=0)
-    with pytest.raises(ConvergenceError, match="by the turns around -1, 0 by finding all"):
+    with pytest.raises(ConvergenceError, match="by the encirclements of -1, 0 by finding all"):
         nyquist_of(verdict)
 
 
@@ -327,7 +327,7 @@ def test_poles_that_only_a_theorem_tells_from_the_axis_may_be_on_either_side_of_
     assert plot.verdict.unstable_roots_infinite
     assert plot.on_axis > 0
     assert plot.clear + plot.on_axis == plot.verdict.unstable_roots
-    assert plot.clear <= plot.expected <= plot.verdict.unstable_roots
+    assert plot.clear <= plot.unstable_by_nyquist <= plot.verdict.unstable_roots
 
 
 def test_a_rate_gain_that_only_takes_damping_is_not_said_to_add_it():

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from tfarm.loop.answers import plane_table
 
 import tfarm
 from tfarm.columns import Table
-from tfarm.loop.answers import plane_table
 from tfarm.loop.loci import branch_columns
 from tfarm.loop.nyquist import nyquist_table
 from tfarm.loop.plane import INFINITE

@@ -21,7 +21,7 @@ from tfarm.dsp.chain import Sampling
 from tfarm.dsp.results import simulated_answer
 from tfarm.reduced import modal_model
 from tfarm.synthesis import search
-from tfarm.synthesis.design import design, slew_duration
+from tfarm.synthesis.design import design
 from tfarm.tuner.tuning import controlled_answer
 
 DATA = Path(__file__).parents[1] / "data" / "reproductions"
@@ -80,14 +80,14 @@ def test_a_design_promises_what_a_simulation_finds(chain, monkeypatch):
     """To the last bit; what was minimised, of eight modes, is the same but for the modes left out."""
     monkeypatch.setattr(search, "STARTS_EACH", 2)
     found = design(LAB, "residual", chain=chain, K1=(0.1, 3.0), K2=(-0.5, 0.5))
-    assert found.value == simulated_answer(LAB, found.law, chain, "slew", slew_duration(found))["residual_moment_rms"]
+    assert found.value == simulated_answer(LAB, found.law, chain, "slew", found.slew_duration)["residual_moment_rms"]
     assert judge_of(LAB, found.law, "residual", chain).score(found.law) == pytest.approx(found.value, rel=1e-4)
 
 
 @pytest.mark.parametrize("chain", CHAINS[-1:], ids=NAMED[-1:])
 def test_so_does_a_design_of_a_law(chain):
     found = tfarm.design(LAB, "residual", structure="PD", chain=chain)
-    assert found.value == simulated_answer(LAB, found.law, chain, "slew", slew_duration(found))["residual_moment_rms"]
+    assert found.value == simulated_answer(LAB, found.law, chain, "slew", found.slew_duration)["residual_moment_rms"]
     assert judge_of(LAB, found.law, "residual", chain).score(found.law) == pytest.approx(found.value, rel=1e-4)
 
 

@@ -108,7 +108,8 @@ def test_a_design_is_saved_and_read_back(capsys, monkeypatch, tmp_path):
     found = answer(capsys, "design", "sasaki2012-lab", "--structure", "lead", "--save", str(file))
     law = load_law(file)
     assert answer(capsys, "sampled", "sasaki2012-lab", "--law", str(file))["stable"] is True
-    zero, pole, Kp = (found["coefficients"][name] for name in ("zero_rad_s", "pole_rad_s", "Kp"))
+    values = {row["name"]: row["value"] for row in found["coefficients"]}
+    zero, pole, Kp = (values[name] for name in ("zero_rad_s", "pole_rad_s", "Kp"))
     assert law == Law({"hub_angle": ((Kp / zero, Kp), (1 / pole, 1.0))}, name="lead", references=("hub_angle",))
     assert pole <= 2 / T
     assert found["sampled"]["stable"] is True

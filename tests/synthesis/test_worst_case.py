@@ -108,11 +108,12 @@ def test_of_one_arm_the_answer_says_as_much_and_keeps_the_bounds_given(capsys):
     found = answer(capsys, "design", *NARROW)
     (own,) = found["arms"]
     assert (own["name"], own["value"]) == ("sasaki2012-lab", found["value"])
-    assert own["sampled"] == found["sampled"]
+    assert own["sampled"] == "stable when sampled every 10 ms"
     assert (found["worst_arm"], found["arms_tried_inside"], found["worst_case_in_words"]) == ("sasaki2012-lab", 0, "")
-    assert (found["designed_for"], found["widened"], found["at_limit"]) == ("sampled", [], [])
-    assert "K1" in found["at_bound"]
-    assert found["bounds"] == {"K1": [0.1, 2.0], "K2": [-0.1, 0.1]}
+    assert found["designed_for"] == "sampled"
+    rows = {row["name"]: row for row in found["coefficients"]}
+    assert rows["K1"]["optimum"] == "none: search cut off at the bound"
+    assert {name: row["bounds"] for name, row in rows.items()} == {"K1": [0.1, 2.0], "K2": [-0.1, 0.1], "Kp": None}
 
 
 @pytest.mark.parametrize(

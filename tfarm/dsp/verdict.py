@@ -321,6 +321,11 @@ class Analysis:
         return stable_factors(self.loop)
 
     @property
+    def stable_gain_factors(self) -> Annotated[list[Window] | None, Quantity("stable factors on the controller")]:
+        """All intervals, of a controller that is more than gains at the hub."""
+        return None if self.loop.is_of_gains else self.factors
+
+    @property
     def gain_factors(self) -> Annotated[Window | None, Quantity("gain margin, factors down and up")]:
         """The interval around 1 in which a factor on the law may lie; None where the loop is not stable."""
         return around(self.factors, 1.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -54,17 +53,10 @@ RESERVED_NAMES = (  # which no arm's folder may have
 )  # fmt: skip
 TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
 LEFT_OUT_OF = "{name}: the page leaves out “{title}” and says why: {why}"
-LEADING_MINUS = re.compile(r"^-(?=\d)")  # a minus sign before a number
-LEADING_OMEGA = re.compile(r"^w(?= of )")
-NUMBER_WORDS = {"inf": "∞", "-inf": "−∞", "-": "–"}
 DIFFERENCE_NOTE = "Differences are the second less the first, in the unit of the quantity."
 PAIRED_NOTE = "By the mode whose open-loop pole each is nearest to."
 UNPAIRED_NOTE = "Of a mode that has no oscillating pole on the other side, or of none."
 IN_Z_NOTE = "One of the laws is a law in z: both loops are compared at their samples, each pole z as s = ln(z)/T."
-AT_SAMPLES_NOTE = "Of the exact loop at its samples, with as many modes as its verdict takes."
-KNOWN_NOTE = (
-    "Exact: of the loop at every frequency. In the band: read up to the verdict's band, no exact value being known."
-)
 
 
 def make_all(

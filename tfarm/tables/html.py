@@ -10,6 +10,7 @@ from markupsafe import Markup, escape
 from tfarm.columns import PAGE, Column, Table
 from tfarm.digits import powers, unit
 
+SIGN, INFINITE = re.compile(r"(?<![\w.)])-(?=[\d.]|inf\b)"), re.compile(r"\binf\b")  # of a number in a cell
 WIDE_CELL = 44  # characters of a text from which its cell is a wide one
 
 
@@ -56,5 +57,6 @@ def _column(column: Column) -> list[Markup]:
 
 def with_symbols(text: str) -> Markup:
     """A text with true subscripts and exponents: I_h becomes I<sub>h</sub>, m^2 becomes m², 1e-4 becomes 1 × 10⁻⁴."""
-    plain = powers(unit(str(escape(text))))
+    plain = SIGN.sub("−", powers(unit(str(escape(text)))))
+    plain = INFINITE.sub("∞", plain)
     return Markup(re.sub(r"\b([A-Za-zθ])_([a-z0-9])\b", r"\1<sub>\2</sub>", plain))
