@@ -5,13 +5,13 @@ from dataclasses import replace
 from decimal import Decimal
 
 import pytest
+from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
 import tfarm
 from tests.shell import run
 from tfarm.arm.writing import to_toml
 from tfarm.digits import within
 from tfarm.loop.poles import closed_loop_poles
-from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
 
 @pytest.mark.parametrize(

@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 from tfarm.loop.answers import plane_table
+from tfarm.response.answers import bode_answer, roots_table
 
 import tfarm
 from tfarm.columns import Table
 from tfarm.loop.loci import branch_columns
 from tfarm.loop.nyquist import nyquist_table
 from tfarm.loop.plane import INFINITE
-from tfarm.response.answers import bode_answer, roots_table
 from tfarm.tables.files import as_csv, to_json
 
 LAB, PURE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")

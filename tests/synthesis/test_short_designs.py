@@ -12,7 +12,8 @@ import tfarm
 from tests.synthesis.judged import judge_of
 from tfarm import HubFeedback
 from tfarm.dsp import Chain
-from tfarm.dsp.results import simulated_answer
+from tfarm.dsp.results import simulated_run
+from tfarm.schema import to_dict
 from tfarm.synthesis.structures import structure_of
 
 DATA = Path(__file__).parents[1] / "data" / "reproductions"
@@ -41,7 +42,7 @@ def test_a_better_residual_holds_and_is_what_a_simulation_finds(name, structure)
     assert judge.holds(law)
     assert judge.score(law) == pytest.approx(residual, rel=1e-5)
     period = 2 * np.pi / tfarm.modes(arm, 1).natural_frequency[-1]
-    found = simulated_answer(arm, law, Chain(), "slew", 1.0 + max(period, 0.16))
+    found = to_dict(simulated_run(arm, law, Chain(), "slew", 1.0 + max(period, 0.16)))
     assert found["residual_moment_rms"] == pytest.approx(residual, rel=1e-5)
 
 

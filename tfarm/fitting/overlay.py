@@ -230,6 +230,12 @@ class Counterpart:
         return self.measured.residue / self.residue if self.measured is not None and self.residue else None
 
 
+def _upper(roots: Complex) -> Complex:
+    """Those with Im s >= 0, ascending in size: the others are their mirror images."""
+    upper = roots[roots.imag >= 0]
+    return np.asarray(upper[np.argsort(abs(upper), kind="stable")])
+
+
 class RequiredChange(NamedTuple):
     """A change of one number of the arm that alone would explain one measured mode."""
 
@@ -312,17 +318,17 @@ class Overlay:
     @property
     def poles(self) -> Annotated[Complex, Quantity("s", "1/s", help="poles of the ratio")]:
         """Those of the ratio."""
-        return self.roots.poles
+        return _upper(self.roots.poles)
 
     @property
     def zeros(self) -> Annotated[Complex, Quantity("s", "1/s", help="zeros of the ratio")]:
         """Those of the ratio."""
-        return self.roots.zeros
+        return _upper(self.roots.zeros)
 
     @property
     def common(self) -> Annotated[Complex, Quantity("s", "1/s", help="common to both signals: they cancel")]:
         """Those that cancel."""
-        return self.roots.common
+        return _upper(self.roots.common)
 
     @property
     def power_at_zero(self) -> Annotated[int, Quantity()]:

@@ -11,6 +11,7 @@ import numpy as np
 from tfarm.arrays import Complex
 from tfarm.columns import Column, Table
 from tfarm.exact.values import MethodRow, Roads
+from tfarm.records import record
 from tfarm.schema import Quantity, roots_table
 
 from .transfer import TransferFunction
@@ -19,6 +20,7 @@ DOUBLE_DIGITS = 15  # more are asked for as texts
 
 
 @dataclass(frozen=True)
+@record
 class Points:
     """G(s) of one output at `s`; `value` are pairs of texts where more than 15 digits were asked for."""
 
