@@ -37,7 +37,6 @@ SURVEYS := \
 	loop.nyquist_counts \
 	reduced.test_accuracy \
 	dsp.settled \
-	dsp.law_verdicts \
 	dsp.law_orders \
 	fitting.planted \
 	tuner.bounded \

@@ -179,7 +179,8 @@ def across(
     columns = [Column("quantity", "quantity", of=labels), Column("unit", "unit", of=units)]
     for key, name, each in zip(keys or records, records, found, strict=True):
         pairs = [each.get(label, (Quantity(), None)) for label in labels]
-        values = [to_json_value(value.value if isinstance(value, At) else value) for _, value in pairs]
+        values = [to_json_value(value.value if isinstance(value, At) and value.omega is None else value)
+                  for _, value in pairs]  # fmt: skip
         cells = [with_unit(value, replace(of, unit="")) for of, value in pairs]
         columns.append(Column(key, name, of=values, shown=cells))
     return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
@@ -312,7 +313,7 @@ def with_unit(value: Any, of: Quantity) -> str:
         at = "" if value.omega is None else f" at {value.omega:.6g} rad/s"
         return with_unit(value.value, of) + at
     shown = text(value, of.digits)
-    return f"{shown} {of.unit}" if of.unit and shown != NO_VALUE else shown
+    return f"{shown} {of.unit}" if of.unit and shown not in ("", NO_VALUE) else shown
 
 
 def text(value: Any, digits: int = 6) -> str:

@@ -5,6 +5,7 @@ import json
 import pytest
 from matplotlib.mathtext import MathTextParser
 
+import tfarm
 from tests.shared import thinned
 from tfarm import audit
 from tfarm.schema import to_dict
@@ -83,6 +84,14 @@ def test_matplotlib_can_draw_them_but_for_the_determinants(rows, name):
 def test_typesetting_by_example(rows, name, formula):
     assert rows[name].corrected_tex == formula
     assert r"\left(\frac{\partial \theta}{\partial t}\right)^{2}" in rows["(20)"].printed_tex
+
+
+def test_numbers_of_the_evidence_are_those_of_other_roads(rows):
+    """By Legendre polynomials along the arm, 8 a field: 1.23186; a root of the closed loop by `tfarm poles`."""
+    assert "grows by 1.232 a period" in rows["(18)-(20): constant gains, varied by the tuner"].evidence
+    poles = tfarm.closed_loop_poles(tfarm.load("sasaki2012"), tfarm.HubFeedback(K1=0.3, K2=0.5), 3).values
+    root = next(pole for pole in poles if 56 < pole.imag < 57)
+    assert f"s = {root.real:.4f} + {root.imag:.4f}j 1/s for K2 = 0.5" in rows["(19)"].evidence
 
 
 @pytest.mark.usefixtures("audited")

@@ -1,6 +1,7 @@
 """The verbs of the continuous loop as a shell sees them."""
 
 import csv
+import re
 from pathlib import Path
 
 import pytest
@@ -14,31 +15,35 @@ LAW = HubFeedback(K1=0.3, K2=0.3)
 
 def test_infinities_are_strings_and_what_has_no_margin_is_null(capsys) -> None:
     found = answer(capsys, "margins", "sasaki2012")
-    assert found["K2_interval"] == ["-inf", pytest.approx(1.0, abs=1e-9)]
-    assert found["K1_interval"] == [0.0, "inf"]
+    K1, K2, _ = (row["interval"] for row in found["stability_intervals"])
+    assert (K2["low"], K2["high"], K2["low_is"]) == ("-inf", pytest.approx(1.0, abs=1e-9), "no limit")
+    assert (K1["low"], K1["high"]) == (0.0, "inf")
     assert (found["delay_margin_s"], found["disk_margin"], found["peak_sensitivity"]) == (0.0, 0.0, "inf")
-    assert found["in_band"]["delay_margin_s"] > 0
+    assert found["in_range"]["delay_margin_s"] > 0
     assert found["lyapunov"]["proven"] is True
     assert found["lyapunov"]["a1_over_a2"] == pytest.approx(0.7)
     driven = answer(capsys, "margins", "sasaki2012", "--K2", "1.2")
     assert driven["unstable_roots_infinite"] is True
-    assert [driven[key] for key in ("K1_interval", "K2_interval", "delay_margin_s", "disk_margin")] == [None] * 4
+    assert [row["interval"] for row in driven["stability_intervals"]] == [None] * 3
+    assert [driven[key] for key in ("delay_margin_s", "disk_margin")] == [None] * 2
 
 
 def test_what_a_passive_loop_has_at_every_frequency_is_at_none(capsys):
     """With K2 = 0 the undamped hub is passive: no law of its kind has a smaller peak, and no frequency is named."""
+    found = answer(capsys, "margins", "sasaki2012", "--K2", "0")
+    margins = found["in_range"]
+    for key, value in (("disk_margin", 2), ("peak_sensitivity", 1)):
+        assert found[key] == margins[key] == pytest.approx(value, rel=1e-7)
+        assert margins[f"{key}_at_rad_s"] is None
+    assert margins["phase_margin_at_rad_s"] > 0
     _, out, _ = run(capsys, "margins", "sasaki2012", "--K2", "0")
-    rows = {
-        line.strip()[:16].strip(): line.split()[-3:] for line in out.splitlines() if "margin" in line or "peak" in line
-    }
-    assert rows["disk margin"] == ["2", "2", "-"]
-    assert rows["peak sensitivity"] == ["1", "1", "-"]
-    assert rows["phase margin [de"][-1] != "-"
+    assert re.search(r"^disk margin +2$", out, re.MULTILINE)
+    assert re.search(r"^phase margin +90 deg at [\d.]+ rad/s$", out, re.MULTILINE)
 
 
 def test_the_map_counts_unstable_poles_over_its_grid(capsys, tmp_path) -> None:
     found = answer(capsys, "map", "sasaki2012", "--points", "4", "--K1", "-1,1", "--K2", "0,2")
-    assert found["K1"] == [-0.75, -0.25, 0.25, 0.75]
+    assert found["x"] == [-0.75, -0.25, 0.25, 0.75]
     assert found["unstable_roots"] == [["inf", "inf", 0, 0]] * 2 + [[1, 1, "inf", "inf"]] * 2
     file = tmp_path / "map.csv"
     code, _, err = run(capsys, "map", "sasaki2012-lab", "--points", "3", "--csv", str(file))
@@ -68,7 +73,7 @@ def test_people_get_a_page_with_the_sign_convention(capsys, verb) -> None:
     code, out, err = run(capsys, verb, "sasaki2012-lab", *more)
     assert (code, err) == (0, "")
     assert "K2 E I phi'(0)" in out
-    assert "nan" not in out
+    assert not re.search(r"\bnan\b", out)
 
 
 @pytest.mark.parametrize("Kp", ["0", "0.5"])
@@ -77,7 +82,7 @@ def test_the_verdict_sets_a_pole_at_0_apart_where_there_is_one(capsys, Kp) -> No
     listed = answer(capsys, "poles", "sasaki2012-lab", "--Kp", Kp, "--count", "2")["poles"]
     at_rest = [0.0, 0.0] in listed
     _, out, _ = run(capsys, "margins", "sasaki2012-lab", "--Kp", Kp)
-    assert ("apart from the pole at 0" in out.splitlines()[0]) is at_rest is (Kp == "0")
+    assert ("its pole at s = 0 is left out" in out) is at_rest is (Kp == "0")
 
 
 @pytest.mark.parametrize(
@@ -120,14 +125,6 @@ def test_what_cannot_be_decided_is_exit_3_with_its_reason(capsys) -> None:
     assert "widen the bounds" in err
 
 
-def test_phases_are_printed_with_their_unit_and_a_lead_is_called_one(capsys) -> None:
-    _, out, _ = run(capsys, "margins", "sasaki2012-lab")
-    assert "phase margin [deg]" in out
-    assert "phase margin -7.90147 deg: lead; not an instability" in out
-    _, out, _ = run(capsys, "margins", "sasaki2012-lab", "--K2", "0")
-    assert "not an instability" not in out
-
-
 def test_a_list_of_poles_that_ends_at_the_shear_cut_off_says_so(capsys, tmp_path) -> None:
     file = tmp_path / "arm.toml"
     stocky = Path(tfarm.__file__).parent / "arm" / "presets" / "stocky-steel.toml"
@@ -135,5 +132,6 @@ def test_a_list_of_poles_that_ends_at_the_shear_cut_off_says_so(capsys, tmp_path
     found = answer(capsys, "poles", str(file), "--K1", "300")
     assert found["ends_at_shear_cutoff"] is True
     assert found["box"][3] <= found["shear_cutoff_rad_s"]
-    assert "no more lie below sqrt(kGA/rhoI)" in run(capsys, "poles", str(file), "--K1", "300")[1]
+    printed = run(capsys, "poles", str(file), "--K1", "300")[1]
+    assert re.search(r"^ends at the shear cut-off, sqrt\(kGA/rhoI\) +yes$", printed, re.MULTILINE)
     assert answer(capsys, "poles", str(file), "--K1", "300", "--count", "10")["ends_at_shear_cutoff"] is False

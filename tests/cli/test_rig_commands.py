@@ -80,7 +80,7 @@ def test_a_voltage_has_its_units_wherever_gains_stand(capsys):
     assert "N m s/rad" not in out
     found = answer(capsys, "map", RIGS["quanser-flexlink"], "--points", "3")
     arm = tfarm.load(RIGS["quanser-flexlink"])
-    assert found["K2"][-1] == pytest.approx(2 * arm.input_per_torque * 2 / 3)
+    assert found["y"][-1] == pytest.approx(2 * arm.input_per_torque * 2 / 3)
 
 
 def test_a_response_is_of_the_input_that_is_asked_for(capsys):

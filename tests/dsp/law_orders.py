@@ -15,15 +15,15 @@ import flint
 import numpy as np
 
 from tests import survey
-from tests.dsp.law_verdicts import sampled
 from tests.loop.arms import some_loop
 from tests.loop.law_counts import SIGNALS
 from tests.rigs import some_rig
 from tests.survey import Finding, each_of
 from tfarm.arm import Arm, Law
-from tfarm.dsp import Chain, Sampling
+from tfarm.dsp import Chain, Sampling, pulse_transfer
 from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.response.signals import Signals
 from tfarm.spectrum.table import first_frequency
 
 BITS = 560
@@ -104,6 +104,15 @@ def some_law(rng, arm, chain, w1):
     return (
         Law(entries, period=T) if in_z else Law(entries, rule=rule, delay=float(rng.choice([0.0, rng.uniform(0, T)])))
     )
+
+
+def sampled(arm, name, chain, z):
+    """The pulse transfer function to a signal, at one z, from ten modes."""
+    plain, _, x = name.partition("@")
+    if not x:
+        return pulse_transfer(arm, [plain], chain.sampling, count=10)(z)[0]
+    s = np.log(z) / chain.sampling.period
+    return Signals(arm, (name,)).values(np.array([s]))[0, 0]
 
 
 def some_roots(rng, order, w1):

@@ -8,24 +8,17 @@ import pytest
 from scipy.io import loadmat
 
 import tfarm
-from tests.dsp.law_verdicts import radius_of, stepped
+from tests.dsp.roads import radius_of, stepped
 from tests.shared import thinned
 from tfarm import Law, ParameterError
 from tfarm.arm.law_tables import load_law
-from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, load_chain, scenario
+from tfarm.dsp import Chain, Converters, Sampling, Simulator, load_chain, scenario
 from tfarm.dsp.sampled import sampled_loop
 from tfarm.dsp.verdict import sampled_verdict
 
 T = 0.01
 LAB, RIG = tfarm.load("sasaki2012-lab"), tfarm.load("quanser-2dsfl")
 DATA = Path(__file__).parent.parent / "data" / "quanser-2dsfl"
-REAL = Chain(
-    sampling=Sampling(delay_samples=1.3, antialias_corner=300.0),
-    converters=Converters(
-        encoder_counts=4096, hub_rate="difference", rate_filter=100.0, moment_bits=10, moment_range=5.0
-    ),
-    actuator=Actuator(torque_limit=3.0),
-)
 ROUNDED = 1e-11  # of the largest: 200 samples of a loop that is stable
 
 

@@ -11,17 +11,9 @@ from tests.odd_arms import odd_arms
 from tests.rigs import some_rig
 from tests.shared import thinned
 from tests.similar import EITHER
-from tfarm import modes
-from tfarm.arm import HubFeedback
-from tfarm.dsp import (
-    Chain,
-    Converters,
-    Sampling,
-    delay_margin,
-    required_damping,
-    sampled_loop,
-    sampled_map,
-)
+from tfarm import HubFeedback, Law, modes
+from tfarm.arm import as_law
+from tfarm.dsp import Chain, Converters, Sampling, delay_margin, required_damping, sampled_loop, sampled_map
 from tfarm.dsp.crossings import ENDS_AT, around, circle_grid, ends_of_K1, number_crossings, stable_windows
 from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError
@@ -298,3 +290,38 @@ def test_an_arm_that_something_holds_has_its_whole_window():
     assert all(loop.having(K1=float(K1)).poles.is_stable for K1 in inside)
     for K1 in (low - 1e-6 * (high - low), high + 1e-6 * (high - low)):
         assert not loop.having(K1=float(K1)).poles.is_stable
+
+
+# ------------------------------------------------------------ planes of any two numbers of the law of a sampled
+
+
+LAB = tfarm.load("sasaki2012-lab")
+FOUR = Law({"hub_angle": ((4.0, 2.0), (0.05, 1.0)), "hub_rate": 1.0, "root_moment": (0.2, (0.01, 1.0))}, delay=0.004)
+WITH_ANGLE = HubFeedback(K1=0.3, K2=0.3, Kp=2.0)
+PLANES = [
+    (WITH_ANGLE, ("Kp", "K2"), (0.2, 8.0), (-1.0, 1.2)),
+    (FOUR, ("delay", "hub_angle"), (0.0, 0.04), (0.1, 6.0)),
+    (FOUR, ("hub_rate", "hub_angle.den.0"), (-3.0, 8.0), (0.01, 0.3)),
+    (FOUR, ("hub_angle.num.0", "root_moment.den.0"), (-9.0, 60.0), (0.002, 0.3)),
+]
+
+
+@pytest.mark.parametrize(("law", "vary", "across", "up"), PLANES)
+def test_the_count_at_a_point_is_that_of_the_poles_of_its_own_loop(law, vary, across, up):
+    """Of a loop made anew for the law at that point; stable and unstable ones are among them."""
+    rng = np.random.default_rng(3)
+    x, y = (np.sort(rng.uniform(*ends, 4)) for ends in (across, up))
+    plane = sampled_map(sampled_loop(LAB, law, count=6), x, y, vary)
+    counts = []
+    for i, j in [(i, j) for i in range(4) for j in range(4) if (i + j) % 2]:
+        there = as_law(law).having(vary[0], x[i]).having(vary[1], y[j])
+        poles = sampled_loop(LAB, there, Chain(), count=6).poles
+        counts.append(int((abs(poles.z) > 1).sum()))
+        assert (plane.unstable[i, j], plane.counts[j, i]) == (counts[-1], counts[-1])
+    assert min(counts) == 0 < max(counts)
+
+
+@pytest.mark.parametrize("name", ["hub_angel", "hub_angle.num.7"])
+def test_what_is_no_number_of_the_law_is_refused(name):
+    with pytest.raises(tfarm.ParameterError, match="law"):
+        sampled_map(sampled_loop(LAB, FOUR, count=4), [0.0, 1.0], [0.0, 1.0], (name, "hub_rate"))

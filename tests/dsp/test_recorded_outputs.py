@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import expm
 
 import tfarm
-from tests.dsp.law_verdicts import stepped
+from tests.dsp.roads import stepped
 from tests.rigs import some_rig
 from tests.shared import thinned
 from tests.shell import answer

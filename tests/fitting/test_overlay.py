@@ -11,7 +11,7 @@ from tests.shell import answer, run
 from tfarm.errors import ParameterError
 from tfarm.fitting.data import Measured, noise_of
 from tfarm.fitting.overlay import Ratio, overlay
-from tfarm.fitting.resonances import matched_peaks, must_be_in_unit
+from tfarm.fitting.resonances import matched_peaks, must_be_in_unit, peaks_of, resonance_at
 
 LAB = tfarm.load("sasaki2012-lab")
 TRUE = replace(LAB, link=replace(LAB.link, youngs_modulus=1.2 * LAB.link.youngs_modulus, damping=2e-4))
@@ -50,6 +50,13 @@ def test_each_resonance_is_the_true_arms_pole_and_residue(pair, found):
         assert near.residue == pytest.approx(GAIN * ratio.residue(complex(pole), np.r_[poles, 0.0]), rel=0.1)
         assert row.level.real < 0  # the sensor is the other way round
     assert one.unmatched.size == 0
+
+
+def test_a_noise_said_too_small_is_taken_from_the_residuals():
+    data = measured(*PAIRS[1])
+    (place, *_) = peaks_of(data, data.sigma)
+    given, small = (resonance_at(data, data.sigma / by, place).std for by in (1, 10))
+    assert small == pytest.approx(given, rel=0.2)
 
 
 def test_the_one_number_that_explains_a_mode_does(found):

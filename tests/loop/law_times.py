@@ -1,9 +1,8 @@
 """CPU seconds of margins and of the sampled verdict under random laws:  python -m tests.loop.law_times SIZE SEED
 
 Random rigs of every kind (`tests.rigs`) and plausible arms (`tests.plausible.arms`), in turn; laws of order 1 to 12 on
-one to three signals: clusters of slow poles, integrators, double integrators, notches on a mode, lags, rarely an
-unstable pole, some with a delay; periods of 0.1 to 20 ms.  Both commands' work is timed, to the JSON, in process, on
-empty caches of the package.
+one to three signals, with zeros and poles as in `tests.dsp.law_orders`, some with a delay; periods of 0.1 to 20 ms.
+Both commands' work is timed, to the JSON, in process, on empty caches of the package.
 """
 
 import time
@@ -11,8 +10,8 @@ import tomllib
 
 import numpy as np
 
-import tfarm
 from tests import caches, survey
+from tests.dsp.law_orders import some_roots
 from tests.plausible.arms import draw
 from tests.rigs import some_rig
 from tests.survey import Finding
@@ -25,12 +24,11 @@ from tfarm.loop.margins import margins
 from tfarm.reduced.conversions import closed, sensed_model
 from tfarm.response.signals import Signals
 from tfarm.schema import to_dict
+from tfarm.spectrum.table import first_frequency
 from tfarm.tables.files import to_json
 
 SIGNALS = ("hub_angle", "hub_rate", "hub_angle", "hub_rate", "root_moment", "tip_displacement", "tip_acceleration",
            "moment@")  # fmt: skip
-PARTS = {"notch": 0.3, "lag": 0.25, "slow": 0.2, "integrator": 0.1, "pair": 0.13, "unstable": 0.02}  # how often
-MODES = 4  # of the rig, on which notches are put
 MODES_OF_MODEL = 8  # of the model by which some laws are made weaker until they work
 WEAKER = (1.0, 0.1, 0.01, 1e-3)  # times a law
 MEDIAN, MOST = 1.0, 5.0  # CPU s: what a median and a maximum may be
@@ -44,8 +42,7 @@ def some_case(seed, number):
         if arm.is_locked or arm.input == "hub_angle":
             continue
         try:
-            omega = tfarm.modes(arm, MODES).natural_frequency[-MODES:]
-            law = some_law(rng, arm, omega)
+            law = some_law(rng, arm, first_frequency(arm))
         except (ConvergenceError, ParameterError):
             continue
         if law is not None:
@@ -61,7 +58,7 @@ def plausible(seed, rng):
     return arm_of_table(table)
 
 
-def some_law(rng, arm, omega):
+def some_law(rng, arm, w1):
     """One to three entries of order 1 to 12 in all, each loop function of the order of 1 somewhere; None of a gain.
 
     Half of them are made to work: a proportional and derivative action on the hub's angle first, and all of it weaker
@@ -75,10 +72,10 @@ def some_law(rng, arm, omega):
         name = f"{name}{round(float(rng.uniform(0.1, 0.9)) * arm.length, 6)}" if name.endswith("@") else name
         order = left if len(entries) == 2 else int(rng.integers(1 if works and not entries else 0, left + 1))
         left -= order
-        zeros, poles = roots(rng, order - 1, omega) if works and not entries else roots(rng, order, omega)
+        zeros, poles = some_roots(rng, order - 1 if works and not entries else order, w1)
         if works and not entries:
-            zeros, poles = [*zeros, -omega[0] * log(rng, 0.05, 1)], [*poles, -omega[0] * log(rng, 3, 100)]
-        at = 1j * omega[0] * log(rng, 0.1, 10)
+            zeros, poles = [*zeros, -w1 * log(rng, 0.05, 1)], [*poles, -w1 * log(rng, 3, 100)]
+        at = 1j * w1 * log(rng, 0.1, 10)
         G = Signals(arm, (name,)).values(np.array([at]))[0, 0]
         size = abs(G * np.prod(at - np.array(zeros)) / np.prod(at - np.array(poles)))
         if 1e-100 < size < 1e100:
@@ -88,7 +85,7 @@ def some_law(rng, arm, omega):
             entries[name] = (tuple(unit * num), tuple(unit * den))
     if not entries:
         return None
-    delay = log(rng, 1e-3, 0.3 if not works else 0.03) / omega[0] if rng.random() < 0.3 else 0.0
+    delay = log(rng, 1e-3, 0.3 if not works else 0.03) / w1 if rng.random() < 0.3 else 0.0
     law = Law(entries, delay=float(delay))
     if works:
         plant = sensed_model(arm, law.signals, MODES_OF_MODEL)
@@ -100,44 +97,6 @@ def is_stable(plant, law):
     """Whether the loop of a modal model is, but for a pole or two at s = 0."""
     s = np.linalg.eigvals(closed(plant, law.matrices()))
     return (s.real < 1e-9 * abs(s).max()).all()
-
-
-def roots(rng, order, omega):
-    """Zeros and poles of an entry of that order, part by part."""
-    zeros, poles, w1 = [], [], omega[0]
-    while len(poles) < order:
-        part = str(rng.choice(list(PARTS), p=list(PARTS.values())))
-        room = order - len(poles)
-        if part == "notch" and room > 1:
-            w = float(rng.choice(omega)) * rng.uniform(0.8, 1.2)
-            zeros += pair(w, log(rng, 1e-3, 0.1))
-            poles += pair(w, rng.uniform(0.2, 1.0))
-        elif part == "pair" and room > 1:
-            poles += pair(w1 * log(rng, 0.1, 30), rng.uniform(0.05, 0.95))
-        elif part == "slow":
-            cluster = w1 * log(rng, 1e-3, 1e-1)
-            poles += [-cluster * rng.uniform(0.8, 1.25) for _ in range(min(room, int(rng.integers(1, 4))))]
-            zeros += [-cluster * rng.uniform(0.5, 5.0) for _ in range(len(poles) - len(zeros) - 1)]
-        elif part == "integrator":
-            poles += [0.0] * min(room, int(rng.choice([1, 1, 2])))
-            zeros += [-w1 * log(rng, 1e-2, 1)] * (len(poles) - len(zeros))
-        elif part == "unstable":
-            poles.append(w1 * log(rng, 1e-2, 1))
-        else:
-            poles.append(-w1 * log(rng, 0.1, 30))
-            zeros += [-w1 * log(rng, 0.1, 30)] * int(rng.random() < 0.5)
-    return zeros[: len(poles)] if len(zeros[: len(poles)]) == len(zeros) else whole(zeros, len(poles)), poles
-
-
-def whole(zeros, most):
-    """The first zeros, of which no pair is torn."""
-    kept = zeros[:most]
-    return kept[:-1] if sum(each.imag for each in map(complex, kept)) else kept
-
-
-def pair(w, ratio):
-    root = complex(-ratio * w, w * np.sqrt(1 - ratio**2))
-    return [root, root.conjugate()]
 
 
 def log(rng, low, high):

@@ -5,35 +5,11 @@ import pytest
 
 import tfarm
 from tfarm import HubFeedback, Law, ParameterError
-from tfarm.loop.plane import Plane
 
-LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
+LAB = tfarm.load("sasaki2012-lab")
 GAINS = HubFeedback(K1=0.3, K2=0.3, Kp=2.0)
-PLAIN = Law({"hub_rate": 0.3, "root_moment": 0.3, "hub_angle": 2.0})  # the same, as a law of signals
 LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)
 ACROSS, UP = np.array([0.5, 2.0, 6.0]), np.array([0.001, 0.01, 0.03])
-
-
-def test_a_map_of_gains_holds_the_angle_as_their_law_does():
-    assert tfarm.map(LAB, ACROSS, UP, law=PLAIN) == tfarm.map(LAB, ACROSS, UP, 2.0)
-    plane = tfarm.map(LAB, ACROSS, UP, law=GAINS, vary=("K1", "K2"))
-    assert isinstance(plane, Plane)
-    assert plane.Kp == 2.0
-    turned = tfarm.map(LAB, np.array([0.2, 1.6]), np.array([0.2, 0.4]), law=GAINS, vary=("root_moment", "hub_rate"))
-    assert turned.unstable[0].tolist() == [
-        tfarm.closed_loop_poles(LAB, HubFeedback(K1=0.2, K2=K2, Kp=2.0), 9).unstable for K2 in (0.2, 1.6)
-    ]
-
-
-def test_spillover_of_gains_at_the_hub():
-    """The exact loop's unstable poles are those of the gains, and the models those of a law that is written out."""
-    gains = HubFeedback(K1=0.3, K2=1.4)
-    found = tfarm.spill(LAB, gains, 4)
-    poles = tfarm.closed_loop_poles(LAB, gains, 12).values
-    assert found.driven == pytest.approx(poles[poles.real > 0], rel=1e-9)
-    same = tfarm.spill(LAB, Law({"root_moment": 1.4, "hub_rate": 0.3}), 4)
-    assert found.unstable.tolist() == same.unstable.tolist()
-    assert found.rightmost == pytest.approx(same.rightmost, rel=1e-9)
 
 
 PATHS = {

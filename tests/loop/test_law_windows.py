@@ -1,27 +1,29 @@
 """How far each number of a law may go alone: against windows of gains, verdicts beside each end, and closed forms."""
 
-import json
 from dataclasses import replace
-from importlib import import_module
 
 import numpy as np
 import pytest
 
 import tfarm
+from tests import caches
 from tests.loop import number_windows
-from tests.loop.arms import with_damping
-from tests.shared import remember, thinned
-from tests.shell import run
-from tfarm import ConvergenceError, Hub, HubFeedback, Law, Link, Payload, RotarySpring, Section
+from tests.loop.arms import some_loop, with_damping
+from tests.loop.law_counts import some_delay, some_law
+from tests.loop.law_times import of_margins, some_case
+from tests.shared import sized, thinned
+from tfarm import ConvergenceError, Hub, Law, Link, Payload, RotarySpring, Section
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
 from tfarm.loop import windows as windows_module
+from tfarm.loop.loop import Loop
+from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import windows_of
+from tfarm.loop.windows import unstable_below, windows_of
+from tfarm.response.signals import Signals
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)
-GAINS = HubFeedback(K1=0.3, K2=0.3, Kp=2.0)
 BESIDE, BESIDE_ZERO = 1e-7, 1e-3  # of a window: so far from its end a verdict is asked for; there a pole may be far out
 
 
@@ -86,28 +88,6 @@ def test_a_number_whose_poles_cannot_be_counted_is_named(monkeypatch):
     found = tfarm.margins(LAB, LAW)
     assert LAW.numbers.keys() - found.windows.keys() == {"hub_angle.num.1"}
     assert found.intervals_note.endswith("of hub_angle.num.1 poles could not be counted")
-
-
-def test_the_command_has_them(capsys, tmp_path, monkeypatch):
-    remember(monkeypatch, import_module("tfarm.loop.margins"), "margins")  # two commands ask for the same
-    text = "[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
-    (tmp_path / "law.toml").write_text(text)
-    law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
-    found = tfarm.margins(LAB, law).windows
-    words = ("margins", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"))
-    code, out, err = run(capsys, *words, "--json")
-    assert (code, err) == (0, "")
-    answer = json.loads(out)
-    rows = answer["stability_intervals"]
-    assert {row["number"]: (row["interval"]["low"], row["interval"]["high"]) for row in rows} == {
-        name: each.around for name, each in found.items()
-    }
-    assert {row["number"]: row["value"] for row in rows} == law.numbers
-    assert answer["intervals_note"].startswith("window ends are those of poles up to")
-    out = run(capsys, *words)[1]
-    assert f"(0, > {found['hub_angle.den.0'].around[1]:.8g})" in out
-    assert out.count(answer["intervals_note"]) == 1
-    assert np.isfinite(found["gain"].band)
 
 
 @pytest.mark.survey
@@ -214,3 +194,67 @@ def test_where_nothing_is_known_beyond_the_band_a_window_is_not_made_of_poles_th
         is_inside = any(low < value < high for low, high in found.all)
         there = stability(arm, law.having("hub_rate.num.0", value), band=found.band)
         assert is_inside == (there.unstable_roots == 0)
+
+
+# ------------------------------------------------------------ how much is worked out for windows, poles and the
+
+
+@pytest.mark.parametrize("number", thinned([128, 72, 120, 133], 2))
+def test_margins_of_a_law_ask_little_of_the_exact_rig(monkeypatch, number):
+    """Poles that meet at rest, and strong damping: with poles found one by one to be counted it was ten times more."""
+    case, asked, parts = some_case(1, number), [], Signals.parts
+
+    def counted(self, s):
+        asked.append(np.size(s))
+        return parts(self, s)
+
+    def never(*_):
+        raise AssertionError("no start of a search is worth the damped modes")
+
+    monkeypatch.setattr(Signals, "parts", counted)
+    monkeypatch.setattr("tfarm.spectrum.damped.follow", never)
+    caches.empty()
+    of_margins(*case)
+    assert len(asked) < 3000
+    assert sum(asked) < 1_200_000
+
+
+@pytest.mark.parametrize("number", sized(3, 12))
+def test_a_count_without_a_list_is_that_of_the_list(number):
+    rng, counts = np.random.default_rng(34), []
+    while len(counts) < number:
+        arm = some_loop(rng)[0]
+        if not arm.least_damping:
+            continue
+        loop = Loop(arm, some_law(rng, arm, delay=some_delay(rng, arm)))
+        band = float(tfarm.modes(arm, 9).natural_frequency[-2:].mean())
+        try:
+            poles = poles_below(loop, band)
+        except ConvergenceError:
+            continue
+        assert unstable_below(loop, poles.box.im_max) == poles.unstable
+        counts.append(poles.unstable)
+    assert any(counts)
+
+
+def test_a_count_next_to_a_law_s_slow_poles_is_right():
+    """Three within a millionth of the lowest frequency, and a hub that turns freely: all in one step of a grid."""
+    slow = 1e-6 * tfarm.modes(LAB, 1).natural_frequency[-1]
+    law = Law({"hub_rate": {"zeros": [0.0] * 3, "poles": [slow, slow * (1 + 1j), slow * (1 - 1j)], "gain": 0.3}})
+    loop = Loop(LAB, law)
+    near = loop.law.times(1e-9)  # as good as no feedback: its own poles, three of them right of the axis
+    assert unstable_below(loop.under(near), 300.0) == 3
+
+
+def test_integrators_of_two_signals_leave_the_third_its_zeros_at_rest():
+    """q = s (s^2 + 7 s), and p of the angle is q: D = a s^2 + ..., so that D/s^2 stays finite next to s = 0."""
+    law = Law({
+        "hub_angle": 40.0,
+        "root_moment": ([0.3, 5.0], [1.0, 0.0]),
+        "tip_acceleration": ([0.3, 5.0], [1.0, 7.0, 0.0]),
+    })  # fmt: skip
+    loop = Loop(LAB, law)
+    assert loop.zeros_at_origin == 2
+    at = loop.function(1e-5 * np.array([1j, 0.5j]))
+    farther, nearer = at.value * np.exp(at.scale)
+    assert farther / nearer == pytest.approx(1.0, abs=1e-3)

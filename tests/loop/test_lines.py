@@ -8,10 +8,11 @@ import pytest
 
 import tfarm
 from tests.loop.agreement import some_free_arm, some_gains
-from tests.loop.arms import window_arm, with_damping
+from tests.loop.arms import some_loop, window_arm, with_damping
 from tests.loop.ritz_loop import RitzLoop
-from tfarm import Arm, HubFeedback, Payload
+from tfarm import Arm, Hub, HubFeedback, ParameterError, Payload
 from tfarm.loop.loop import Loop, grid, steep_places
+from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import band_of_loop
 from tfarm.loop.windows import line_crossings
 
@@ -85,23 +86,6 @@ def test_the_real_pole_of_a_free_arm_passes_zero_at_kp_zero_exactly(K1) -> None:
     assert (each.t, math.copysign(1.0, each.t), each.change) == (0.0, 1.0, -1 if K1 > 0 else 1)
 
 
-@pytest.mark.parametrize(("K2", "change"), [(0.3, -1), (5.0, 1)])
-def test_damping_the_hub_passes_zero_at_k1_zero_by_the_sign_of_the_effective_inertia(K2, change) -> None:
-    each = at_rest(LAB, HubFeedback(K2=K2), "K1", 5.0)
-    assert (each.t, each.change) == (0.0, change)
-    assert at_rest(LAB, HubFeedback(K2=K2, Kp=1.0), "K1", 5.0) is None
-    assert at_rest(LAB, HubFeedback(K1=1.0), "K2", 50.0) is None
-
-
-@pytest.mark.parametrize(("K2", "expected"), [(0.5, 1), (-0.5, -1), (0.0, -1)])
-def test_stiffness_without_k1_leaves_an_oscillation_that_k2_drives_or_damps(K2, expected) -> None:
-    """From one real unstable pole to two or to none: with C > 0 the gauge lags by C behind the inertia it feels."""
-    assert at_rest(LAB, HubFeedback(K2=K2), "Kp", 5.0).change == expected
-    model = RitzLoop(LAB, 14)
-    below, above = (int((model.eigenvalues(HubFeedback(K2=K2, Kp=Kp)).real > 0).sum()) for Kp in (-0.5, 0.5))
-    assert (below, above - below) == (1, expected)
-
-
 def test_a_held_tip_gives_way_where_stiffness_vanishes() -> None:
     """k = 3 E I/L and a little shear: a pinned arm's static stiffness at the root; K2 takes its share of it."""
     arm, K2 = held(), -0.7
@@ -124,3 +108,52 @@ def test_the_grid_has_points_closer_to_every_steep_place_than_its_width() -> Non
     for place in locked:
         assert np.isin(np.round(place, 9), np.round(np.asarray(steep_places(LAB, 5250.0)), 9))
         assert abs(omega - place).min() < LAB.link.damping * place**2
+
+
+# ------------------------------------------------------------ the loop
+
+
+ARM = tfarm.load("sasaki2012")
+
+
+@pytest.mark.parametrize(
+    ("inertia", "law", "words"),
+    [
+        (math.inf, HubFeedback(K1=0.3), "there is no loop"),
+        (0.0, HubFeedback(K1=0.3, K2=0.1), "an algebraic loop"),
+    ],
+)
+def test_where_there_is_no_loop(inertia: float, law, words: str) -> None:
+    with pytest.raises(ParameterError, match=words) as refused:
+        Loop(replace(ARM, hub=Hub(inertia=inertia)), law)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_pin_without_inertia_may_be_damped() -> None:
+    poles = closed_loop_poles(replace(ARM, hub=Hub(inertia=0.0)), HubFeedback(K1=0.3), 5)
+    assert poles.unstable == 0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_loop_function_is_made_of_transfer_functions(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    arm, law = some_loop(rng)
+    omega = tfarm.modes(arm, 3).natural_frequency[-1]
+    s = omega * rng.uniform(0.05, 1, 12) * np.exp(1j * rng.uniform(-1.4, 1.4, 12))
+    theta, moment = tfarm.transfer(arm, ["hub_angle", "root_moment"])(s)
+    terms = np.array([law.Kp * theta, law.K1 * s * theta, law.K2 * moment])
+    miss = abs(Loop(arm, law).loop_function(s) - terms.sum(axis=0))
+    assert (miss < 1e-12 * abs(terms).sum(axis=0)).all()
+
+
+@pytest.mark.parametrize("K2", [-4.0, 0.0, 0.5, 1.2])
+@pytest.mark.parametrize("radius", [0.0, 0.2])
+def test_slow_torque_turns_the_effective_inertia(K2: float, radius: float) -> None:
+    """The slow real pole tends to -K1/J_eff as K1 -> 0; a gauge on a hub's rim does not read all that the hub turns."""
+    arm, misses = replace(ARM, hub=replace(ARM.hub, radius=radius)), []
+    for K1 in (1e-2, 1e-3):
+        slow = closed_loop_poles(arm, HubFeedback(K1=K1, K2=K2), 6).moving
+        slow = slow[abs(slow).argmin()].real
+        misses.append(abs(slow * Loop(arm, HubFeedback(K2=K2)).at_rest[2] / -K1 - 1))
+    assert misses[1] < 1e-3
+    assert misses[1] < misses[0] / 30 or misses[1] < 1e-12

@@ -16,7 +16,6 @@ from tests.shared import thinned
 from tests.shell import run
 from tfarm import Arm, Hub, HubFeedback, Law, Link, ParameterError, Payload, Section
 from tfarm.arm import Attachment, Motor
-from tfarm.loop import loci as room
 from tfarm.loop.loci import damping_ratios, held_branches, loci, most_damped, reduced_locus
 from tfarm.loop.locus import frame, locus, rounded
 from tfarm.loop.loop import Loop
@@ -141,12 +140,6 @@ def test_a_branch_does_not_depend_on_how_many_points_or_branches_there_are():
     assert np.all(abs(fine.branches[:5, ::20] - rough.branches) <= 50 * EPS * abs(rough.branches))
 
 
-def test_branches_are_continuous():
-    """Twice the points halve the largest step of each branch, but for square roots where two meet."""
-    steps = [abs(np.diff(locus(PAPER, HUB, "K2", -3.0, 3.0, n, 10).branches)).max(axis=1) for n in (401, 801)]
-    assert np.all(steps[1] <= 0.75 * steps[0] + EPS)
-
-
 def test_zeros_at_the_origin_stay_exactly_there():
     assert np.all(locus(PAPER, HubFeedback(), "K1", 0.0, 5.0, 50, 3).branches[0] == 0)
     assert np.all(locus(PAPER, HubFeedback(), "K2", 0.0, 0.9, 50, 3).branches[:2] == 0)
@@ -181,26 +174,6 @@ def test_without_a_law_both_ends_are_the_arms_own_modes(arm, vary):
         table = tfarm.modes(changed(arm, value), 6)
         expected = damped_modes(table).eigenvalues[:, 0] if table.arm.link.damping else 1j * table.natural_frequency
         assert np.all(abs(found.branches[1:, end] - expected) <= 50 * EPS * abs(expected))
-
-
-def test_feeding_the_moment_back_is_another_hub():
-    """At C = 0 the arm sees a hub of inertia I_h/(1 - K2) with a damper K1/(1 - K2)."""
-    found = locus(PAPER, K1, "K2", -2.0, 0.9, 30, 8)
-    for n in (0, 13, 29):
-        share = 1 - found.gain[n]
-        equal = replace(PAPER, hub=Hub(inertia=PAPER.hub.inertia / share))
-        other = locus(equal, HubFeedback(), "K1", 0.0, 0.3 / share, 3, 8).branches[:, -1]
-        assert np.all(abs(other - found.branches[:, n]) <= 200 * EPS * abs(other))
-
-
-def test_high_rate_gain_locks_the_hub():
-    """As K1 grows the oscillating branches tend to the modes of the locked hub, as 1/K1."""
-    locked = 1j * tfarm.modes(replace(STOCKY, hub=Hub(inertia=math.inf)), 3).natural_frequency
-    away = []
-    for strong in (1e6, 1e7):
-        last = locus(STOCKY, HubFeedback(), "K1", 0.0, strong, 5, 8).branches[:, -1]
-        away.append(np.array([abs(last - mode).min() for mode in locked]))
-    assert np.all(abs(away[0] / away[1] - 10) < 0.05)
 
 
 def test_the_circuits_pole_and_the_turning_hubs_are_one_pair_at_a_high_gain():
@@ -480,15 +453,6 @@ def test_ten_digits_of_its_size_are_shown_and_a_gain_has_its_unit():
     assert [loci(arm, HUB, vary, 0.0, 0.5).unit for arm, vary in ((LAB, "K1"), (held, "K2"))] == ["N m s/rad", ""]
 
 
-def test_what_cannot_be_followed_at_all_is_said(monkeypatch):
-    def refused(*_):
-        raise tfarm.ConvergenceError("cannot be told apart", 1.0, 1.0)
-
-    monkeypatch.setattr(room, "locus", refused)
-    with pytest.raises(tfarm.ConvergenceError, match="told apart"):
-        loci(LAB, HUB, "K1", 0.2, 1.2)
-
-
 REFUSED = [
     ({"stop": 0.0}, "empty"),
     ({"stop": math.nan}, "finite"),
@@ -511,32 +475,3 @@ def test_bad_input_is_refused_in_one_line(change, words):
     with pytest.raises(ParameterError, match=words) as error:
         locus(**(given | change))
     assert "\n" not in str(error.value)
-
-
-def test_the_command_prints_one_json_object(capsys, tmp_path):
-    table = tmp_path / "locus.csv"
-    given = f"locus sasaki2012-lab --vary K2 --from 0.5 --to 1.1 --points 7 --branches 6 --csv {table}".split()
-    code, out, _ = run(capsys, *given, "--json")
-    answer = json.loads(out)
-    found = locus(LAB, HUB, "K2", 0.5, 1.1, 7, 6)
-    assert (code, answer["gain"]) == (0, found.gain.tolist())
-    assert np.array_equal(np.array(answer["branches"]) @ [1, 1j], found.branches)
-    assert [tuple(row.values()) for row in answer["crossings"]] == [
-        (each.gain, each.omega, each.branch, each.direction, each.omega / (2 * math.pi)) for each in found.crossings
-    ]
-    assert 0 < answer["gap_to_reduced"] < 1e-4
-    assert answer["reduced_order"] == 20
-    assert len(table.read_text().splitlines()) == 8
-    code, _, err = run(capsys, *["locus", "sasaki2012", "--vary", "K1", "--from", "1", "--to", "1"])
-    assert (code, err.count("\n")) == (2, 1)
-
-
-def test_the_command_follows_a_law(capsys, tmp_path):
-    path = tmp_path / "law.toml"
-    path.write_text("[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n")
-    words = f"locus sasaki2012-lab --law {path} --vary gain --from 1 --to 9 --points 3 --branches 1".split()
-    code, out, err = run(capsys, *words, "--json")
-    assert (code, err) == (0, "")
-    found = locus(LAB, Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002), "gain", 1.0, 9.0, 3, 1)
-    assert json.loads(out)["box"] == list(found.box)
-    assert run(capsys, *[each.replace("gain", "K1") for each in words])[0] == 2

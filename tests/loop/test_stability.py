@@ -11,8 +11,7 @@ import tfarm
 from tests.loop.agreement import some_cases, some_free_arm
 from tests.loop.arms import hub_units, window_arm
 from tests.loop.ritz_loop import RitzLoop
-from tests.loop.test_lines import held
-from tfarm import Arm, Hub, HubFeedback, Link, Payload, Section
+from tfarm import Arm, Hub, HubFeedback, Law, Link, Payload, Section
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.loop.loop import Loop
@@ -68,26 +67,6 @@ def test_both_signs_wrong_leave_one_real_pole_to_a_negative_hub_inertia() -> Non
     unstable = found.poles.values[found.poles.values.real > 1e-9 * abs(found.poles.values)]
     model = RitzLoop(BARE, 20).eigenvalues(HubFeedback(K1=-0.3, K2=1.5))
     assert unstable[0].real == pytest.approx(model[model.real > 1e-6 * abs(model)].real[0], rel=1e-6)
-
-
-def test_beyond_k2_where_inertia_cancels_a_real_pole_runs_away_even_without_k1() -> None:
-    J, hub = BARE.total_inertia, BARE.hub.inertia
-    edge = J / (J - hub)
-    below, above = (stability(BARE, HubFeedback(K2=edge * share)) for share in (0.999, 1.001))
-    assert (below.verdict, below.unstable_roots) == ("marginal", 0)
-    assert (above.verdict, above.unstable_roots) == ("unstable", 1)
-    (real,) = above.poles.values[above.poles.values.real > 1e-6]
-    assert real.imag == 0
-
-
-@pytest.mark.parametrize("C", [0.0, 1e-4])
-def test_a_negative_spring_fells_a_free_arm_but_not_a_held_one(C) -> None:
-    arm = replace(LAB, link=replace(LAB.link, damping=C))
-    assert stability(arm, HubFeedback(K1=0.3, Kp=-0.01)).unstable_roots == 1
-    link = arm.link
-    stiffness = 1 / (link.length / (3 * link.EI) + 1 / (link.kGA * link.length))
-    near, far = (stability(held(C), HubFeedback(K1=0.3, Kp=-share * stiffness)) for share in (0.999, 1.001))
-    assert (near.verdict, far.verdict, far.unstable_roots) == ("stable", "unstable", 1)
 
 
 HELD_TIPS = (Payload(mass=math.inf), Payload(inertia=math.inf), Payload(mass=math.inf, inertia=math.inf))
@@ -189,3 +168,46 @@ def test_a_turn_that_is_no_number_is_refused() -> None:
     with pytest.raises(ConvergenceError, match="a zero lies on the contour"):
         turned(unknown, path, 4.0)
     assert abs(turned(unknown, path[path.imag < 1.4], 4.0)) < 1.0
+
+
+# ------------------------------------------------------------ laws that take off exactly what holds a rig at res
+
+
+SPRING = 3.0  # N m/rad
+HELD = replace(LAB, hub=Hub(inertia=0.1, stiffness=SPRING, friction=0.1))
+PUSHES = Law({"hub_angle": ([-SPRING], [1e-2, 1.0])})
+
+
+@pytest.mark.parametrize("law", [HubFeedback(Kp=-SPRING), PUSHES])
+def test_the_verdict_is_marginal_and_its_pole_listed_at_0(law):
+    assert tfarm.margins(HELD, law).stability.verdict == "marginal"
+    poles = tfarm.closed_loop_poles(HELD, law, 3)
+    assert (poles.values == 0).sum() == 1
+    assert poles.unstable == 0
+
+
+@pytest.mark.parametrize(("more", "verdict"), [(1e-6, "unstable"), (-1e-6, "stable")])
+def test_beside_it_they_are_told_apart(more, verdict):
+    for law in (HubFeedback(Kp=-SPRING * (1 + more)), PUSHES.having("gain", 1 + more)):
+        assert tfarm.margins(HELD, law).stability.verdict == verdict
+
+
+def test_without_losses_two_poles_meet_there():
+    arm = replace(LAB.elastic, hub=Hub(inertia=0.1, stiffness=SPRING))
+    poles = tfarm.closed_loop_poles(arm, HubFeedback(Kp=-SPRING), 4)
+    assert (poles.values == 0).sum() == 2
+    assert tfarm.margins(arm, HubFeedback(Kp=-SPRING)).stability.verdict == "marginal"
+
+
+def test_a_map_may_have_it_among_its_points():
+    x, y = np.linspace(0, 2, 5), np.array([0.5, 0.8, 1.0])
+    found = tfarm.map(HELD, x, y, law=PUSHES, vary=("gain", "hub_angle"))
+    product = np.outer(y, x)
+    clear = abs(product - 1) > 1e-9
+    np.testing.assert_array_equal(found.unstable[clear], (product > 1)[clear])
+
+
+def test_a_sampled_loop_beside_it_bears_a_delay_that_changes_nothing_at_rest():
+    assert tfarm.sampled(HELD, PUSHES.having("gain", 1 - 1e-11)).delay_margin.is_bound
+    for less in (1e-13, 1e-14, 0.0):  # rounding decides on which side of the circle it is, and is no error
+        assert tfarm.sampled(HELD, PUSHES.having("gain", 1 - less)).delay_margin.samples >= 0

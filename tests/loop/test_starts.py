@@ -26,7 +26,7 @@ from tfarm.loop.windows import looked_at, windows_of
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.table import angle_unit, rate_unit
 
-LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
+LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
 
 
 # ------------------------------------------------------------ starts

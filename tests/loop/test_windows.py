@@ -14,10 +14,11 @@ from tests.loop.ritz_loop import RitzLoop
 from tests.loop.test_lines import held
 from tfarm import Hub, HubFeedback, Payload
 from tfarm.loop.loop import Loop
+from tfarm.loop.margins import margins
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import windows_of
-from tfarm.spectrum.table import most_gain
+from tfarm.loop.windows import line_crossings, windows_of
+from tfarm.spectrum.table import default_gains, most_gain
 
 LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 
@@ -150,3 +151,27 @@ def test_of_a_heavy_hub_k2_is_looked_at_beyond_where_it_cancels_the_inertia(C) -
     assert found.end(found.around[1]) == "edge"
     assert found.around[1] <= 101
     assert stability(arm, HubFeedback(K1=1e-3, K2=101.5)).unstable_roots > 0
+
+
+# ------------------------------------------------------------ window ends that are those of a band alone say so,
+
+
+def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():
+    """Elastic links: each higher mode is driven by less; the answer names the band, which a higher one undercuts."""
+    arm = tfarm.load("quanser-flexlink")
+    law = default_gains(arm)
+    found = margins(arm, law)
+    assert "some may cross inside them" in found.intervals_note
+    band = found.windows["K2"].band
+    assert math.isfinite(band)
+    low = found.windows["K2"].around[0]
+    higher = line_crossings(Loop(arm, law), "K2", 2 * low, 0.0, 4 * band).gain
+    assert 0.5 * low < higher[higher < 0].max() < 0
+
+
+@pytest.mark.parametrize(("name", "reach"), [("sasaki2012", math.inf), ("sasaki2012-lab", None)])
+def test_where_all_is_known_nothing_is_said(name, reach):
+    arm = tfarm.load(name)
+    found = margins(arm, default_gains(arm))
+    assert found.intervals_note is None
+    assert reach in (None, found.windows["K2"].band)

@@ -22,7 +22,6 @@ MATERIALS = {
 }
 CFRP_SHEAR = 5.0e9
 CFRP_FACTOR = {"rectangle": 5 / 6, "round": 0.9, "tube": 0.53}
-PLACES = (0.15, 0.4, 0.5, 0.75, 0.9)  # shares of the length at which outputs along the arm are asked for
 
 
 @dataclass(frozen=True)
@@ -52,6 +51,7 @@ class Beam:
     link: Link
     hub: Body
     payload: Body
+    has_rigid_mode = True
 
     @property
     def total_inertia(self):

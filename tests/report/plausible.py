@@ -17,6 +17,7 @@ import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,7 @@ WRITE = (
     "from tfarm.report.pieces import QUESTIONS; "
     "write([tfarm.load(sys.argv[1])], Path(sys.argv[2]), only=tuple(QUESTIONS), notice=print)"
 )
+BY_NYQUIST = "unstable poles by Nyquist's criterion"
 LONGEST = 1800.0  # s that one arm may take, on a machine that others use too
 
 
@@ -48,14 +50,14 @@ def contradictions(folder: Path) -> list[str]:
 
 def _of_the_loop(folder: Path) -> list[str]:
     found = [
-        f"{row['law']}: {row['unstable_by_nyquist']} by Nyquist, {row['unstable_in_box']} in a box"
-        for row in _rows(folder, "nyquist-count")
-        if not row["on_axis_in_box"] and row["unstable_by_nyquist"] != row["unstable_in_box"]
+        f"{law}: {of[BY_NYQUIST]} by Nyquist, {of['unstable poles']} in a box"
+        for law, of in _across(folder, "nyquist-count").items()
+        if not of["poles on the axis to working precision"] and of[BY_NYQUIST] != of["unstable poles"]
     ]
     edges = [
-        float(str(row["stable_around_it"]).split()[1])
-        for row in _rows(folder, "windows")
-        if (row["law"], row["gain"]) == ("default gains", "K2") and not str(row["stable_around_it"]).startswith("none")
+        float(row["interval"]["high"])
+        for row in _rows(folder, "default-windows")
+        if row["number"] == "K2" and row["interval"] is not None
     ]
     found += [
         f"K2 = {row['K2']} is {row['verdict']}, below the edge at {edge}"
@@ -66,7 +68,14 @@ def _of_the_loop(folder: Path) -> list[str]:
     return found
 
 
-def _rows(folder: Path, stem: str) -> list[dict[str, float | str]]:
+def _across(folder: Path, stem: str) -> dict[str, dict[str, Any]]:
+    """The quantities of each law in a table with a column a law."""
+    rows = _rows(folder, stem)
+    laws = [key for key in rows[0] if key not in ("quantity", "unit")] if rows else []
+    return {law: {row["quantity"]: row[law] for row in rows} for law in laws}
+
+
+def _rows(folder: Path, stem: str) -> list[dict[str, Any]]:
     """The rows of a table's file; none where there is no such table."""
     file = folder / "data" / f"{stem}.json"
     return json.loads(file.read_text(encoding="utf-8"))["rows"] if file.is_file() else []

@@ -118,9 +118,10 @@ def test_a_slip_of_units_is_named_on_the_page():
 def test_a_contradiction_on_a_page_is_found(tmp_path):
     """The survey of plausible arms sees a count that differs from another, NaN, and a picture that is missing."""
     (tmp_path / "index.html").write_text("<p>K2 up to nan, at 1e-05</p><img src='gone.svg'>")
-    rows = {"law": "x", "unstable_by_nyquist": 5, "unstable_in_box": 7, "on_axis_in_box": 0}
+    counts = {plausible.BY_NYQUIST: 5, "unstable poles": 7, "poles on the axis to working precision": 0}
+    rows = [{"quantity": name, "unit": "", "x": count} for name, count in counts.items()]
     (tmp_path / "data").mkdir()
-    (tmp_path / "data" / "nyquist-count.json").write_text(json.dumps({"rows": [rows]}))
+    (tmp_path / "data" / "nyquist-count.json").write_text(json.dumps({"rows": rows}))
     found = " ".join(plausible.contradictions(tmp_path))
     assert all(word in found for word in ("gone.svg", "'nan'", "'1e-05'", "5 by Nyquist, 7 in a box"))
 
@@ -141,10 +142,10 @@ def test_how_far_K2_may_go_is_what_the_poles_say(name):
     """On either side of an edge; at the end of a search nothing happens, and no edge is claimed."""
     arm, law = ARMS[name], default_gains(ARMS[name])
     words = map_section._intervals(arm).partition("; K2")[2]
-    down, up = (number(end.strip("*()")) for end in re.search(r"\(.+?\)", words)[0].split(", "))
+    down, up = (number(end.strip("<> ()")) for end in re.search(r"\(.+?\)", words)[0].split(", "))
     band = 3 * tfarm.modes(arm, 3).natural_frequency[-1]
     assert is_stable(arm, replace(law, K2=0.999 * up), band)
-    assert words.count("*") == 2 or not is_stable(arm, replace(law, K2=1.001 * up), band)
+    assert words.count(">") == 2 or not is_stable(arm, replace(law, K2=1.001 * up), band)
     assert is_stable(arm, replace(law, K2=down), band)
 
 
@@ -152,15 +153,14 @@ def test_how_far_K2_may_go_is_what_the_poles_say(name):
 def test_sentences_about_the_pole_at_0_and_J_are_for_arms_that_turn_freely(name, monkeypatch):
     monkeypatch.setattr(cases, "best", lambda arm, chain: None)
     section = margins_section(ARMS[name], Chain())
-    (windows,) = (block for block in section.blocks if block.stem == "windows")
+    (windows,) = (block for block in section.blocks if block.stem == "default-windows")
     words = " ".join([*section.words, windows.caption, signs(ARMS[name])])
     turns = ARMS[name].has_rigid_mode
     assert ("of the free hub angle" in words) == ("(J − I_h)/J" in words) == turns
     assert not re.search(r"\de-\d", words)
-    pairs = zip(*(column(windows, key).cells for key in ("stable_around_it", "looked_at")), strict=True)
-    for around, looked_at in pairs:
-        ends = [set(text.strip("()").split(", ")) for text in (around, looked_at)]
-        assert {end.rstrip("*") for end in ends[0] if "*" in end} == {end.rstrip("*") for end in ends[0]} & ends[1]
+    for interval, searched in zip(*(column(windows, key).values for key in ("interval", "search_range")), strict=True):
+        for side, end in zip(("low", "high"), searched, strict=True):
+            assert interval is None or (interval[f"{side}_is"] == "search bound") == (interval[side] == end)
 
 
 @pytest.mark.parametrize("name", thinned(LOOPS, 2))
@@ -219,8 +219,9 @@ def test_a_free_pin_has_its_rate_loop(monkeypatch):
     assert "at every instant" in cases.why_no_loop(replace(arm, link=replace(arm.link, damping=0.0)))
     section = margins_section(arm, Chain())
     assert section.facts[0].value == "STABLE"
-    (windows,) = (block for block in section.blocks if block.stem == "windows")
-    assert set(column(windows, "gain").values) == {"K1", "Kp"}
+    (windows,) = (block for block in section.blocks if block.stem == "default-windows")
+    stable = dict(zip(column(windows, "number").values, column(windows, "intervals").values, strict=True))
+    assert (stable["K2"], [len(stable[name]) for name in ("K1", "Kp")]) == ([], [1, 1])
     loop = [piece for piece in writing.ARM_PIECES if any(map(piece.is_on, ("margins", "locus", "sampled", "tune")))]
     names = [piece.name for piece in loop if piece.is_for(Subject(arm, Chain()))]
     assert names == ["the arm", "no loop", "margins", "root loci", "Nyquist"]
@@ -232,12 +233,14 @@ def test_a_free_pin_has_its_nyquist_plot():
     law = default_gains(arm)
     laws = (GivenLaw(law), GivenLaw(replace(law, K1=-law.K1 / 10)))
     table = nyquist_section(arm, Chain(), laws).blocks[-1]
-    turns, by_nyquist, in_box = (
-        list(column(table, key).values) for key in ("encirclements", "unstable_by_nyquist", "unstable_in_box")
-    )
-    assert by_nyquist == in_box == [-turn for turn in turns]
-    assert by_nyquist[0] == 0 < by_nyquist[1]
-    assert all("K2 = 0" in name for name in column(table, "law").values)
+    quantity, _, *laws = table.columns
+    counts = []
+    for each in laws:
+        found = dict(zip(quantity.values, each.values, strict=True))
+        counts.append(found["unstable poles"])
+        assert found["unstable poles by Nyquist's criterion"] == counts[-1] == -found["encirclements of -1"]
+        assert "K2 = 0" in each.title
+    assert counts[0] == 0 < counts[1]
 
 
 def test_a_margin_without_end_has_no_frequency(monkeypatch):
@@ -245,14 +248,13 @@ def test_a_margin_without_end_has_no_frequency(monkeypatch):
     named = on_hub(ARMS["pinned"], HubFeedback(K1=5.0338, K2=-3.0), "default gains", "default")
     found = cases.margins_of(ARMS["pinned"], named.law)
     table = margin_table([named], [found], False)
-    rows = dict(
-        zip(column(table, "quantity").values, zip(*(c.values for c in table.columns[3:5]), strict=True), strict=True)
-    )
-    assert rows["phase lead"] == (math.inf, "")
-    assert rows["phase lag"][1] == pytest.approx(488.89, rel=1e-4)
+    rows = dict(zip(column(table, "quantity").values, table.columns[2].values, strict=True))
+    assert rows["margins in the frequency range: phase margin for lead"] == math.inf
+    assert rows["margins in the frequency range: phase margin for lag"][1] == pytest.approx(488.89, rel=1e-4)
     passive = cases.margins_of(ARMS["free-pin"], HubFeedback(K1=0.283))
     table = margin_table([named], [passive], False)
-    assert dict(zip(column(table, "quantity").values, table.columns[4].values, strict=True))["disk margin α"] == ""
+    rows = dict(zip(column(table, "quantity").values, table.columns[2].values, strict=True))
+    assert rows["margins in the frequency range: disk margin"] == pytest.approx(2.0)
 
 
 # ------------------------------------------------------------ what the assumptions do

@@ -107,7 +107,7 @@ def test_no_file_is_left_unlinked_or_half_written(pages):
     linked = {unquote(target) for target in links_of(pages / NAME / "index.html").targets}
     for file in files_of(pages / NAME):
         assert file in linked or file in {"index.html", "card.json", "pictures/card.svg"}
-        assert (pages / NAME / file).stat().st_size > 100
+        assert (pages / NAME / file).stat().st_size > 50
     linked = {unquote(target) for target in links_of(pages / "trust" / "index.html").targets}
     assert set(files_of(pages / "trust")) <= linked | {"index.html"}
     assert sorted(p.name for p in pages.iterdir()) == ["assets", "index.html", "trust", NAME]

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import math
 import re
-import tomllib
 from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
@@ -121,19 +119,6 @@ class Walk(HTMLParser):
             self.text[2].append(data)
 
 
-def columns_of(file):
-    """The columns of a file of a curve that hold numbers alone, one or several a cell."""
-    rows = csv.reader(file.read_text(encoding="utf-8").splitlines())
-    next(rows)
-    columns = [" ".join(column).split() for column in zip(*rows, strict=True)]
-    return [list(map(float, column)) for column in columns if not any(map(is_word, column))]
-
-
-def is_word(cell):
-    """Whether a cell of a file is no number."""
-    return any(letter.isalpha() for letter in re.sub(r"inf|e(?=[-+\d])", "", cell))
-
-
 LONG = 64  # entries of a list from which it is a curve: of that only length, ends, and extremes are taken
 
 
@@ -155,16 +140,6 @@ def numbers_of(answer):
     return [*(number for part in ends for number in part), float(len(answer))]
 
 
-def untraced(texts, values, prose):
-    """The numbers of these texts that no value rounds to, without the phrases that are explained."""
-    left = []
-    for text in texts:
-        for phrase in prose:
-            text = re.sub(phrase, " ", text)
-        left += [each for each in shown_in(text) if not each.is_rounding_of(values)]
-    return left
-
-
 def untraced_cells(sheet, rows, law):
     """The numbers in a table's cells that are no rounding of the value under their column's key in their row.
 
@@ -182,11 +157,6 @@ def untraced_cells(sheet, rows, law):
 def read(file):
     """A JSON file."""
     return json.loads(file.read_text(encoding="utf-8"))
-
-
-def read_arm(folder):
-    """The arm's file, as its page has it."""
-    return tomllib.loads((folder / "arm.toml").read_text(encoding="utf-8"))
 
 
 def told(*words):

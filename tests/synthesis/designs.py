@@ -19,7 +19,7 @@ from tests.survey import Finding, main, numbered
 from tests.synthesis.arms import log, some_arm
 from tests.synthesis.held_loop import HeldLoop
 from tfarm import ConvergenceError, ParameterError
-from tfarm.arm import TWO_GAINS, as_law
+from tfarm.arm import as_law
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
 from tfarm.synthesis import design as room
@@ -111,10 +111,8 @@ def excess(rng, structures=tuple(STRUCTURES)):
         arm = replace(arm, link=replace(arm.link, damping=2 * log(rng, 1e-3, 2e-2) / first))
     structure = str(rng.choice(structures))
     law = as_law(room.design(arm, structure=structure, chain=chain, modes=1).law)
-    other, radii = HeldLoop(arm, chain.sampling.period, 20), []
-    for share in (1 / RESERVE, 1.0, RESERVE):
-        z = other.closed_loop_poles(law.times(share))
-        radii.append(abs(z[abs(z - 1) > 1e-7] if structure == TWO_GAINS else z).max())
+    other = HeldLoop(arm, chain.sampling.period, 20)
+    radii = [other.radius(law.times(share)) for share in (1 / RESERVE, 1.0, RESERVE)]
     return max(radii[0], radii[2]) - 1 - EDGE, radii[1] - 1, f"{arm.name}, {structure}"
 
 

@@ -8,44 +8,30 @@ import pytest
 import tfarm
 from tests.shared import thinned
 from tests.shell import answer, run
-from tests.synthesis.held_loop import HeldLoop, blocks
+from tests.synthesis.held_loop import HeldLoop
 from tests.synthesis.judged import judge_of
 from tfarm import Law, ParameterError
 from tfarm.arm import as_law
 from tfarm.arm.law_tables import load_law
+from tfarm.dsp import Chain
+from tfarm.dsp.chain import Converters
 from tfarm.synthesis import search
 from tfarm.synthesis.design import design
-from tfarm.synthesis.judge import RESERVE
+from tfarm.synthesis.evolution import evolved
+from tfarm.synthesis.judge import LOST, RESERVE, entries_of
 from tfarm.synthesis.structures import STRUCTURES, structure_of
+from tfarm.tuner.trial import slew_trial
 
-LAB, T = tfarm.load("sasaki2012-lab"), 0.01
+LAB = tfarm.load("sasaki2012-lab")
+T = 0.01
 HELD = HeldLoop(LAB, T)
-
-
-def poles(law):
-    """Closed-loop poles by the Galerkin model."""
-    return HELD.closed_loop_poles(law)
-
-
-def radius(law):
-    """The largest, the free angle of a law that does not read it left out."""
-    z = poles(law)
-    return abs(z if "hub_angle" in law.signals else z[abs(z - 1) > 1e-7]).max()
-
-
-def loop(law, q):
-    """L at e^{iq}."""
-    A, B, sense = HELD.parts
-    z, eye = np.exp(1j * q), np.eye(len(A))
-    H = np.array([sense @ np.linalg.solve(each * eye - A, B) for each in z]).T
-    return sum(np.polyval(num, z) / np.polyval(den, z) * H[row] for row, num, den in blocks(law, T))
 
 
 def least(of, law):
     """The least of a function of L on the half circle, on a grid and on a finer one about its lowest point."""
     q = np.linspace(1e-3, np.pi, 3000)
-    low = q[of(loop(law, q)).argmin()]
-    return of(loop(law, np.linspace(low - 2e-3, min(low + 2e-3, np.pi), 400))).min()
+    low = q[of(HELD.loop(law, q)).argmin()]
+    return of(HELD.loop(law, np.linspace(low - 2e-3, min(low + 2e-3, np.pi), 400))).min()
 
 
 def form_of(name, Kp=0.0):
@@ -61,10 +47,10 @@ def start_of(name):
 def test_a_law_of_each_structure_is_judged_as_by_another_model(name):
     """Margin, peak of S and, without the higher modes, the radius."""
     law = start_of(name)
-    if radius(law) >= 1:
+    if HELD.radius(law) >= 1:
         assert judge_of(LAB, law, "margin").score(law) >= 1e3
         law = law.times(0.3)
-    assert radius(law) < 1
+    assert HELD.radius(law) < 1
     judges = {each: judge_of(LAB, law, each) for each in ("margin", "sensitivity")}
     assert judges["margin"].value(law) == pytest.approx(least(lambda L: 2 * abs(1 + L) / abs(1 - L), law), rel=1e-5)
     assert judges["sensitivity"].value(law) == pytest.approx(1 / least(lambda L: abs(1 + L), law), rel=1e-5)
@@ -89,9 +75,9 @@ def found():
 def test_what_is_found_holds_and_has_the_radius_of_another_model(found):
     assert found.verdict.is_stable
     assert found.sampled.is_stable
-    assert np.log(radius(found.law)) == pytest.approx(found.sampled.log_radius, rel=1e-4)
+    assert np.log(HELD.radius(found.law)) == pytest.approx(found.sampled.log_radius, rel=1e-4)
     # on the edge of the reserve a radius is 1, and the Ritz model's is right to 1e-6
-    assert max(abs(poles(found.law.times(share))).max() for share in (1 / RESERVE, RESERVE)) < 1 + 1e-6
+    assert max(abs(HELD.poles(found.law.times(share))).max() for share in (1 / RESERVE, RESERVE)) < 1 + 1e-6
 
 
 def test_it_damps_better_than_where_the_search_began(found):
@@ -148,3 +134,71 @@ def test_an_undamped_link_has_a_mode_that_no_lead_law_damps(capsys, monkeypatch)
     rng = np.random.default_rng(2)
     for zero, pole in zip(10 ** rng.uniform(-2, 4, 200), 2 / T * 10 ** rng.uniform(-4, 0, 200), strict=True):
         assert ((1 + s / zero) / (1 + s / pole) * np.exp(-0.5j * seen)).imag < 0
+
+
+# ------------------------------------------------------------ evolution strategies on functions whose least is k
+
+
+def three_circles(x):
+    """The largest of (x - a)^2 + (y - b)^2: least, 1, at the centre of the circle through (1, 0), (-1, 0), (0, 1)."""
+    return max((x[0] - a) ** 2 + (x[1] - b) ** 2 for a, b in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0)))
+
+
+def curved_edge(x):
+    """8 |x^2 - y| + (1 - x)^2, of Lewis and Overton: least, 0, at (1, 1) in a curved edge; wanted: x + y > 0.5."""
+    value = 8 * abs(x[0] ** 2 - x[1]) + (1 - x[0]) ** 2
+    return value if x.sum() > 0.5 else LOST + 0.5 - x.sum()
+
+
+@pytest.mark.parametrize(
+    ("function", "top", "least", "at"),
+    [
+        (three_circles, 9.0, 1.0, [0.0, 0.0]),
+        (curved_edge, 9.0, 0.0, [1.0, 1.0]),
+        (curved_edge, [0.5, 9.0], 0.25, [0.5, 0.25]),  # with a limit on x
+    ],
+)
+def test_the_least_of_a_function_with_edges_is_found(function, top, least, at):
+    """From starts of which one is lost: the lowest score comes first, and points are in the box."""
+    starts, box = np.array([[-0.5, 0.3, -3.0], [0.0, -2.0, 4.0]]), (np.full(2, -9.0), np.broadcast_to(top, 2))
+    rounds = []
+    x, scores = evolved(
+        lambda points: np.array([function(each) for each in points.T]), starts, box, lambda *each: rounds.append(each)
+    )
+    assert scores[0] == pytest.approx(least, abs=1e-3)
+    assert x[:, 0] == pytest.approx(at, abs=0.02)
+    assert (x.shape, list(scores)) == ((2, 3), sorted(scores))
+    assert (box[0] <= x.T).all()
+    assert (box[1] >= x.T).all()
+    assert [best for _, best in rounds] == sorted((best for _, best in rounds), reverse=True)
+
+
+def test_coordinates_that_hang_together_are_learnt():
+    """An ellipsoid whose axes are 1 : 100 and turned: strategies of one step for all coordinates do not get there."""
+    turn, _ = np.linalg.qr(np.random.default_rng(1).standard_normal((5, 5)))
+    sizes = 10 ** np.linspace(0, 4, 5)
+    box = np.full(5, -5.0), np.full(5, 5.0)
+    x, scores = evolved(
+        lambda points: sizes @ (turn @ (points - 0.7)) ** 2, np.array([[-2.0, 3.0, 1.0, 0.0, 4.0]]).T, box, lambda *_: 0
+    )
+    assert x[:, 0] == pytest.approx(0.7, abs=1e-3)
+    assert scores[0] < 1e-5
+
+
+def test_poles_of_a_rate_that_is_a_difference_are_those_of_the_sampled_loop():
+    chain = Chain(converters=Converters(hub_rate="difference", rate_filter=80.0))
+    for law in (tfarm.HubFeedback(K1=2.0, K2=0.2), tfarm.HubFeedback(K1=2.0, K2=0.2, Kp=4.0)):
+        judge = judge_of(LAB, law, "damping", chain)
+        z = abs(judge.model.poles(entries_of(law))).max()
+        assert np.log(z) == pytest.approx(tfarm.sampled(LAB, law, chain).verdict.log_radius, rel=1e-6)
+
+
+@pytest.mark.parametrize("gain", [0.0, 0.2])
+def test_the_cost_is_that_of_the_tuners_trial_with_a_constant_gain(gain):
+    """Its trial has six modes and ideal converters, as the judge here."""
+    law = Law(
+        {"hub_angle": 4.0, "hub_rate": 2.0, "root_moment": gain}, references=("hub_angle", "hub_rate", "root_moment")
+    )
+    trial = slew_trial(LAB, K1=2.0, Kp=4.0)
+    score = judge_of(LAB, law, "cost", count=6).score(law)
+    assert score == pytest.approx(trial.with_constant(gain).cost, rel=1e-9)

@@ -11,8 +11,9 @@ from tfarm import Hub
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Converters, Sampling, Simulator, pulse_transfer
 from tfarm.errors import ParameterError
-from tfarm.tuner import Cost, TunedGain, best_constant, initial_network, lq_bound, residual_rms, simulated, slew_trial
+from tfarm.tuner import Cost, TunedGain, best_constant, initial_network, lq_bound, residual_rms, slew_trial
 from tfarm.tuner.kernel import Limits
+from tfarm.tuner.trial import judged
 
 NONE, SECTOR = Limits(0.0, np.inf), Limits(0.3, 0.64)
 
@@ -39,7 +40,7 @@ def test_a_trial_is_that_of_the_simulator(lab, inputs, signals, chain, K1, Kp):
     network = initial_network(3, scales=np.full(inputs, 1.3))
     record = trial.with_network(network, SECTOR)
     gain = TunedGain(network, SECTOR, HubFeedback(K1=K1, Kp=Kp), signals)
-    other = simulated(Simulator(lab, trial.loop.chain, trial.task, count=6), gain, trial.cost)
+    other = judged(gain.run(Simulator(lab, trial.loop.chain, trial.task, count=6)), trial.cost, signals)
     np.testing.assert_allclose(other.K, record.K, atol=1e-11)
     np.testing.assert_allclose(other.e, record.e, atol=1e-10)
     np.testing.assert_allclose(other.x, record.x, atol=1e-10)  # behind the filter, where there is one

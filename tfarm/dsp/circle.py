@@ -311,9 +311,8 @@ class Band:
 
     @property
     def modes(self) -> int:
-        """How many flexible modes lie in it, the first ones."""
-        outside = self.loop.plant.mode[~self.kept & (abs(self.loop.plant.poles.imag) >= self.top)]
-        return int(outside.min(initial=self.loop.plant.count + 1)) - 1
+        """The last flexible mode in it, which need not be the fastest: damping slows some down more than others."""
+        return int(self.loop.plant.mode[abs(self.loop.plant.poles.imag) < self.top].max(initial=0))
 
     @cached_property
     def full(self) -> Sampled:

@@ -30,7 +30,8 @@ from tfarm.records import record
 from tfarm.response import transfer
 
 from .data import Measured, must_be_measured, noise_of
-from .model import Parameter, Problem, Response, RingMode, check_signals, parameters
+from .model import Parameter, Problem, Response, RingMode, parameters
+from .overlay import ratio_of
 from .solve import (
     FIT_SEED,
     OPEN_DEVIATION,
@@ -155,7 +156,8 @@ def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: An
         raise ParameterError(key="data", value=0, remedy="give at least one measured response, or a decay (--mode)")
     keys = [str(key) for key in free if key not in (SENSOR_GAIN, SENSOR_DELAY)]
     family, numbers = parameters(arm, keys, start=start or {}, bounds=bounds or {}, priors=priors or {})
-    check_signals(arm, data)
+    for each in data:
+        ratio_of(arm, each)
     own, responses = [*numbers], []
     for n, each in enumerate(data, start=1):
         places = {}
@@ -166,9 +168,10 @@ def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: An
     subject = Problem(family, tuple(own), tuple(responses), tuple(rings))
     if not subject.parameters:
         raise ParameterError(key="free", value="nothing", remedy="name what is free, such as link.youngs_modulus")
-    if subject.size < len(subject.parameters):
-        remedy = f"{subject.size} numbers were measured; leave some out"
-        raise ParameterError(key="free", value=len(subject.parameters), remedy=remedy)
+    size = subject.residuals(np.zeros(len(own))).size
+    if size < len(own):
+        remedy = f"{size} numbers were measured; leave some out"
+        raise ParameterError(key="free", value=len(own), remedy=remedy)
     return subject
 
 

@@ -32,7 +32,7 @@ from tfarm.response.signals import Signals
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import first_frequency
 
-from .data import Measured, Noise, check_signal, in_parts
+from .data import Measured, Noise, in_parts
 
 SIGNED = ("offset",)  # numbers of an arm that may be negative
 UPPER_ENDS = {"gear_efficiency": 1.0, "poissons_ratio": 0.5}  # and those that end somewhere
@@ -317,13 +317,6 @@ class Problem:
         low, high = self.bounds
         return np.clip(point, low + INSIDE_BOUNDS, high - INSIDE_BOUNDS)
 
-    @property
-    def size(self) -> int:
-        """How many real residuals there are: two a frequency, one or two a decay, one a prior."""
-        priors = sum(each.prior is not None for each in self.parameters)
-        rings = sum(1 + (each.ratio is not None) for each in self.rings)
-        return sum(each.size for each in self.responses) + rings + priors
-
     def arm(self, point: Real) -> Arm:
         """The arm at a point."""
         return self.family.at(
@@ -411,16 +404,3 @@ def walled(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real], R
             return wall
 
     return found
-
-
-def check_signals(arm: Arm, data: Sequence[Measured]) -> None:
-    """Raise ParameterError where a response names what is no signal of the arm."""
-    for each in data:
-        for name, role in ((each.output, "output"), (each.input, "input")):
-            check_signal(name, f"{role} of {each.name}")
-            if name in INPUTS and name not in OUTPUTS:
-                under_drive(arm, name)  # which needs a motor, or refuses
-            else:
-                Signals(arm, (name,))
-        if each.output == each.input:
-            raise ParameterError(key=each.name, value="1", remedy="a signal over itself says nothing of the arm")

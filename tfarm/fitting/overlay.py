@@ -402,7 +402,7 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
     """
     must_be_arm(arm)
     must_be_measured(measured)
-    ratio, noise = _ratio(arm, measured), noise_of(measured)
+    ratio, noise = ratio_of(arm, measured), noise_of(measured)
     low, high = float(measured.omega[0]), float(measured.omega[-1])
     roots = ratio.roots(PARTNERS_BEYOND * high)
     places = peaks_of(measured, noise.sigma)
@@ -465,13 +465,14 @@ def check_unit(arm: Arm, measured: Measured) -> None:
 
     Where the arm's poles so far up are not found nothing is said.
     """
-    ratio = _ratio(arm, measured)
+    ratio = ratio_of(arm, measured)
     with suppress(ConvergenceError):
         poles = ratio.poles(PARTNERS_BEYOND * HERTZ * float(measured.omega[-1])).values
         must_be_in_unit(measured, noise_of(measured).sigma, poles)
 
 
-def _ratio(arm: Arm, measured: Measured) -> Ratio:
+def ratio_of(arm: Arm, measured: Measured) -> Ratio:
+    """The exact response of what was measured; ParameterError, naming it, where the arm has no such response."""
     try:
         return Ratio(arm, measured.output, measured.input)
     except ParameterError as error:

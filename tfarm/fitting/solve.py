@@ -263,7 +263,8 @@ def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None
     point = start.copy()
     point[list(held)] = list(held.values())
     if not free:
-        return Solution(problem, point, problem.residuals(point), np.zeros((problem.size, start.size)), True, 1)
+        residuals = problem.residuals(point)
+        return Solution(problem, point, residuals, np.zeros((residuals.size, start.size)), True, 1)
     low, high = (each[free] for each in problem.bounds)
 
     def whole(x: Real) -> Real:

@@ -135,7 +135,7 @@ def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[s
             done[name] = Windows(name, None, (), limits, Crossings.of([]))  # an algebraic loop but for 0
             continue
         if name not in found and name in solved:
-            continue  # `answers.unsettled` names it
+            continue  # `Margins.intervals_note` names it
         try:
             if name in found:
                 stable, crossings = _stable(verdict, name, limits, found[name], band), found[name].within(*limits)

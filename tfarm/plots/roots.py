@@ -21,7 +21,7 @@ from tfarm.loop.locus import Locus, frame, rounded
 from tfarm.spectrum import modes
 
 from .labels import OFFSETS_BESIDE, Label
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Keys, legend_below, page, picture
+from .style import BLUE, FIGURES, GREEN, GREY, INK, ORANGE, PURPLE, Keys, legend_below, page, picture
 from .words import gains_words
 
 ZOOMED = 4  # modes drawn on their own
@@ -187,6 +187,9 @@ def locus(exact: Locus, reduced: ReducedLocus | None = None, *, ax: Axes) -> Key
     _panel(fine, exact, reduced, every, ax, named=[*every, None])
     ax.set(xlabel="Re s [1/s]", ylabel="Im s [rad/s]")
     return _legend(fine, reduced)
+
+
+FIGURES[Loci] = lambda data: locus.figure(data.exact, data.reduced)
 
 
 def draw_sampled_loci(data: SampledLoci) -> Figure:

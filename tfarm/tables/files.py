@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tfarm.columns import FILES, Table
+from tfarm.columns import FILES, Column, Table
 from tfarm.errors import MISSING
 from tfarm.files import write_file
 
@@ -58,8 +58,17 @@ def as_csv(table: Table, *, units: bool = False) -> str:
     stream, columns = io.StringIO(), table.on(FILES)
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([f"{column.key} [{column.unit}]" if units and column.unit else column.key for column in columns])
-    writer.writerows(zip(*(map(_csv_cell, column.values) for column in columns), strict=True))
+    writer.writerows(zip(*map(_csv_cells, columns), strict=True))
     return stream.getvalue()
+
+
+def _csv_cells(column: Column) -> Sequence[str]:
+    """The cells of a column; those of records, such as intervals, are texts, and JSON has their numbers."""
+    return column.cells if any(map(_holds_records, column.values)) else list(map(_csv_cell, column.values))
+
+
+def _holds_records(value: Any) -> bool:
+    return isinstance(value, dict) or (isinstance(value, list) and any(map(_holds_records, value)))
 
 
 def _csv_cell(value: Any) -> str:

@@ -22,7 +22,6 @@ from tfarm.tuner.trial import (
     load_tuner,
     residual_rms,
     save_tuner,
-    simulated,
     slew_trial,
 )
 from tfarm.tuner.tuning import Plan, Tuning, TuningResult, learning_curves, tune
@@ -54,7 +53,6 @@ __all__ = [
     "residual_rms",
     "save_tuner",
     "shaped_trial",
-    "simulated",
     "slew_trial",
     "train",
     "tried_loops",

@@ -290,11 +290,6 @@ def judged(simulation: Simulation, cost: Cost, signals: Reading) -> Record:
     return Record(simulation.t, x, e + K * x, e, K, simulation.at_samples.root_moment, total, stopped)
 
 
-def simulated(simulator: Simulator, gain: TunedGain, cost: Cost) -> Record:
-    """The trained network in a simulator whose chain has the same reading of the signals."""
-    return judged(gain.run(simulator), cost, gain.signals)
-
-
 def tip_off(simulation: Simulation, trial: Trial) -> float | None:
     """How far the tip is off its target [m] when a simulation of a slew ends; None where the loop ran away."""
     if simulation.stopped is not None:
