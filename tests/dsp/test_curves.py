@@ -123,23 +123,6 @@ def test_a_mode_rings_as_far_as_in_the_sample_where_it_rings_most(delay):
     assert ringing(simulator, run).size[2, 0] == pytest.approx(np.ptp(samples, axis=1).max() / 2, rel=2e-3)
 
 
-def test_the_slew_of_a_stiff_arm_gets_twenty_points_a_period():
-    """416 Hz, which 400 points a second cannot show."""
-    chain = Chain()
-    simulator = Simulator(STEEL, chain, scenario("slew", STEEL, chain, 3.0), count=8)
-    run = simulator.linear(HubFeedback(K1=1.0, K2=0.0))
-    first = tfarm.modes(STEEL, 1).natural_frequency[-1] / (2 * np.pi)
-    assert first == pytest.approx(416, abs=1)
-    height = float(np.ptp(run.at_samples.root_moment))
-    records = records_between(simulator, run, {"root_moment": height})
-    fastest = ringing(simulator, run).fastest("root_moment", height) / (2 * np.pi)
-    assert records / chain.sampling.period < POINTS_A_PERIOD * fastest <= (records + 1) / chain.sampling.period
-    assert fastest >= first * (1 - 1e-9)
-    fine = simulator.finer(records).linear(HubFeedback(K1=1.0, K2=0.0))
-    np.testing.assert_allclose(fine.at_samples.root_moment, run.at_samples.root_moment, rtol=0, atol=1e-9)
-    assert fine.between.t.size == records * run.t.size
-
-
 def test_a_mode_takes_twenty_points_a_period_the_samples_among_them():
     """Of the lab arm 2.5 Hz in 100 samples a second, and none where nothing is seen."""
     lab, chain = tfarm.load("sasaki2012-lab"), Chain()

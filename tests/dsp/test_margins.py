@@ -108,7 +108,7 @@ def test_the_map_wants_ascending_gains(lab):
     loop = sampled_loop(lab, GAINS, count=6)
     with pytest.raises(ParameterError, match="ascend"):
         sampled_map(loop, [0.3, 0.1], [0.0, 1.0])
-    with pytest.raises(ParameterError, match="finite gains"):
+    with pytest.raises(ParameterError, match="finite values"):
         sampled_map(loop, [0.3, np.inf], [0.0, 1.0])
 
 

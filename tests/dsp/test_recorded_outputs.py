@@ -16,7 +16,7 @@ from tests.shell import answer
 from tfarm.arm import HubFeedback, Law, RotarySpring
 from tfarm.dsp import Actuator, Chain, Sampling, Simulator, sampled_verdict, scenario
 from tfarm.dsp.chain import Slew
-from tfarm.dsp.plant import RECORDED, sensed_plant
+from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.sampled import sampled_loop
 from tfarm.dsp.scenarios import slew
 from tfarm.dsp.traces import away
@@ -165,15 +165,6 @@ def test_the_feedforward_of_a_slew_turns_the_rig_against_its_friction(name):
     gauge = (tfarm.transfer(arm, "root_moment")(1j * SLOW) / tfarm.transfer(arm, "hub_angle")(1j * SLOW)).real
     np.testing.assert_allclose(task.rigid_moment[1:], gauge / -(SLOW**2) * np.diff(task.hub_rate) / task.period,
                                rtol=1e-4, atol=1e-9)  # fmt: skip
-
-
-def test_analog_damping_is_friction_whatever_the_input():
-    """A torque -d theta_t on the hub of a rig driven by current is the same rig with so much more friction."""
-    arm, d = tfarm.load("quanser-2dsfl"), 0.7
-    plant = sensed_plant(arm, Chain(actuator=Actuator(hub_damping=d)), ("hub_rate", "root_moment"), 8).unfiltered
-    stiffer = replace(arm, hub=replace(arm.hub, friction=arm.hub.friction + d))
-    s = 4 + 9j
-    np.testing.assert_allclose(plant(s), tfarm.transfer(stiffer, ["hub_rate", "root_moment"])(s), rtol=1e-4)
 
 
 @pytest.mark.parametrize("name", thinned(["tests/rigs/bench-rig.toml", "quanser-2dsfl", "quanser-flexlink"], 2))

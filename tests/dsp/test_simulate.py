@@ -63,21 +63,6 @@ def test_energy_is_not_known_where_something_takes_it(lab, lossless):
         assert simulator(arm, "step", 0.1, chain, count=2).linear(GAINS).energy_error is None
 
 
-def test_the_trial_cost_of_two_prototypes(lab):
-    """T sum of x^2/2 + 2.6 e^2/2, e = u - K x, 3 s with 6 modes: 2.69 at K = 0, and 0.953 at K = 0.34, the best."""
-    loop, task = simulator(lab, count=6), scenario("slew", lab, Chain(), 3.0)
-
-    def cost(K):
-        run = loop.linear(HubFeedback(K1=0.3, K2=K))
-        x = run.at_samples.root_moment - task.rigid_moment
-        e = 0.3 * (task.hub_rate - run.at_samples.hub_rate) - K * x
-        return T * np.sum(x**2 / 2 + 2.6 * e**2 / 2)
-
-    assert cost(0.0) == pytest.approx(2.69, abs=0.005)
-    assert cost(0.34) == pytest.approx(0.953, abs=0.0005)
-    assert min((0.30, 0.32, 0.34, 0.36, 0.38), key=cost) == 0.34
-
-
 @pytest.mark.parametrize("hub_rate", ["ideal", "difference"])
 @pytest.mark.parametrize("delay", [0.0, 1.3])
 def test_a_python_controller_does_what_the_compiled_law_does(lab, hub_rate, delay):

@@ -1,28 +1,31 @@
 """Where searches for poles start, how far they reach, and what lists are cut to: against closed forms."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import BarycentricInterpolator
 
 import tfarm
+from tests.loop.arms import window_arm
 from tests.loop.test_lossless import RIGS as REACTIVE
 from tests.loop.test_lossless import edges_of
 from tests.shared import thinned
+from tests.similar import EITHER
 from tfarm import HubFeedback, Law
-from tfarm.errors import ParameterError
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop import panels
+from tfarm.loop.locus import BranchCrossing, in_words, open_poles
 from tfarm.loop.loop import Loop
-from tfarm.loop.poles import (
-    Poles,
-    count_with_mirrors,
-    first_poles,
-    near_modes,
-    poles_below,
-    quiet_edge,
-    real_starts,
-)
+from tfarm.loop.nyquist import poles_on_axis
+from tfarm.loop.panels import CHEBYSHEV, loop_panels
+from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
+from tfarm.loop.poles import Poles, count_with_mirrors, first_poles, poles_below, quiet_edge
 from tfarm.loop.stability import stability
+from tfarm.loop.theorem import lyapunov
 from tfarm.loop.windows import looked_at, windows_of
+from tfarm.schema import curve_table, to_dict
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.table import angle_unit, rate_unit
 
@@ -30,29 +33,6 @@ LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
 
 
 # ------------------------------------------------------------ starts
-
-
-def test_starts_beside_a_mode_are_where_bending_alone_takes_it_and_left_of_that():
-    """s^2 + C w^2 s + w^2 = 0 first; a mode that no longer swings starts at its mean on the real axis."""
-    omega, C = np.array([1.0, 7.0, 30.0]), 0.1
-    starts = near_modes(omega, C).reshape(-1, 3)
-    for n, w in enumerate(omega):
-        roots = np.roots([1.0, C * w**2, w**2])
-        assert starts[0, n] == pytest.approx(roots[np.argmax(roots.imag)] if C * w < 2 else roots.mean(), rel=1e-12)
-    assert len(starts) > 1
-    np.testing.assert_array_equal(starts.imag, np.broadcast_to(starts[0].imag, starts.shape))
-    shares = (starts[0] - starts).real / omega
-    assert (np.diff(shares[:, 0]) > 0).all()
-    np.testing.assert_allclose(shares, np.broadcast_to(shares[:, :1], shares.shape), rtol=1e-12)
-    np.testing.assert_array_equal(near_modes(omega, 0.0).reshape(-1, 3)[0], 1j * omega)
-
-
-def test_real_starts_are_even_in_decades_and_reach_beyond_the_box():
-    starts = real_starts(60.0)
-    assert starts[0] < 60.0 / 100
-    assert starts[-1] > 60.0
-    np.testing.assert_allclose(starts[1:] / starts[:-1], starts[1] / starts[0], rtol=1e-12)
-    assert starts[1] / starts[0] < 1.5
 
 
 @pytest.mark.parametrize("K1", [0.3, -30.0])
@@ -180,3 +160,190 @@ def test_two_laws_have_one_factor_of_the_rig(name):
     ratio = one.characteristic(s, of_rig) / other.characteristic(s, of_rig)
     expected = (1 + one.loop_function(s)) / (1 + other.loop_function(s))
     np.testing.assert_allclose(ratio, expected, rtol=1e-10)
+
+
+# ------------------------------------------------------------ what answers and words say of a loop is what its r
+
+
+BARE = tfarm.load("sasaki2012")
+BOTH = {"stable": HubFeedback(K1=0.3, K2=0.3), "unstable": HubFeedback(K1=0.3, K2=1.5)}
+
+
+@pytest.mark.parametrize("name", BOTH)
+def test_an_answer_of_nyquist_s_criterion_is_its_record(name):
+    """Turns, poles by both roads and every point of the contour, as numbers without a sign of j."""
+    found = tfarm.nyquist(LAB, BOTH[name])
+    answer, table = to_dict(found), curve_table(found)
+    assert answer["unstable_by_nyquist"] == answer["unstable_roots"] == -answer["encirclements"]
+    assert (answer["unstable_roots"] == 0) == (name != "unstable") == (answer["verdict"] == "stable")
+    np.testing.assert_array_equal(np.array(answer["s"]) @ [1, 1j], found.s)
+    np.testing.assert_array_equal(np.array(answer["L"]) @ [1, 1j], found.L)
+    rows = np.array([[row[key] for key in ("re_s", "im_s", "re_L", "im_L")] for row in table])
+    np.testing.assert_array_equal(rows @ [1, 1j, 0, 0], found.s)
+    np.testing.assert_array_equal(rows @ [0, 0, 1, 1j], found.L)
+    np.testing.assert_allclose(found.L[5::100], Loop(LAB, BOTH[name]).loop_function(found.s[5::100]), rtol=1e-12)
+
+
+def test_an_answer_of_poles_is_its_record():
+    found = tfarm.closed_loop_poles(STOCKY, tfarm.default_gains(STOCKY), 2)
+    answer = to_dict(found.certified())
+    np.testing.assert_array_equal(np.array(answer["poles"]) @ [1, 1j], found.values)
+    assert answer["box"] == list(found.box)
+    assert answer["unstable"] == found.unstable
+    assert len(answer["discs"]) == np.count_nonzero(found.values)
+    for disc, pole in zip(answer["discs"], found.moving, strict=True):
+        assert abs(complex(float(disc["re"]), float(disc["im"])) - pole) <= 1e-12 * abs(pole)
+
+
+def test_words_tell_three_crossings_and_count_the_others():
+    each = [
+        BranchCrossing(gain=0.5 * n, omega=2 * math.pi * n, branch=n, direction=d)
+        for n, d in enumerate(("stable", "unstable") * 3)
+    ]
+    assert in_words("K2", []) == "no branch crosses the imaginary axis"
+    assert in_words("K2", each[:1]) == "a pole becomes stable at K2 = 0"
+    assert in_words("K2", each[:3]) == "a pole becomes stable at K2 = 0, unstable at K2 = 0.5, stable at K2 = 1"
+    assert in_words("K2", each) == in_words("K2", each[:3]) + " and 3 more"
+    assert each[3].frequency == pytest.approx(3.0, rel=1e-15)
+
+
+# ------------------------------------------------------------ the map
+
+
+@pytest.mark.parametrize("arm", [LAB, STOCKY], ids=lambda arm: arm.name)
+def test_the_rate_axis_is_linear_up_to_the_power_of_ten_below_the_default_gain(arm):
+    axis, K1 = rate_axis(arm), tfarm.default_gains(arm).K1
+    assert axis.linear <= K1 < 10 * axis.linear
+    assert math.log10(axis.linear) == pytest.approx(round(math.log10(axis.linear)), abs=1e-12)
+    assert (axis.low, axis.high) == (-axis.linear, pytest.approx(10 * rate_unit(arm), rel=1e-12))
+
+
+def test_the_moment_axis_holds_the_default_range_and_all_that_is_unstable_below():
+    """-4 to 2 where nothing below is unstable; else the picture shows the end of what is, in between logarithmic."""
+    for arm in (BARE, LAB):
+        assert moment_axis(arm, rate_axis(arm)) == Axis(-4.0, 2.0)
+    arm, x = window_arm(), Axis(0.99, 1.01)  # unstable down to about -41 at K1 = 1
+    assert moment_axis(arm, x) == Axis(-50.0, 2.0, 2.0)
+    assert not tfarm.map(arm, x.grid(3), np.linspace(-42.0, -4.0, 40)).stable.all()
+
+
+@pytest.mark.parametrize("units", EITHER.values(), ids=EITHER)
+def test_the_moment_axis_is_of_no_unit(units):
+    """With the rate axis in the same units."""
+    arm, x = window_arm(), Axis(0.5, 1.5)
+    low, high = (units.law(arm, HubFeedback(K1=each)).K1 for each in (x.low, x.high))
+    here, there = moment_axis(arm, x), moment_axis(units.arm(arm), Axis(low, high))
+    assert (there.low, there.high) == (pytest.approx(here.low, rel=1e-9), here.high)
+
+
+def test_the_stable_edge_is_the_boundary_with_stable_points_on_one_side():
+    """Of points of the D-decomposition those where the count of the map is 0 above or below, but not both."""
+    x, y = Axis(0.02, 3.0, 0.02), Axis(-4.0, 2.0)
+    plane = tfarm.map(LAB, x.grid(60), y.grid(90))
+    points = stable_edge(plane, plane.boundary, x, y)
+    assert 3 < len(points) < len(plane.boundary)
+    assert ((points[:, 0] > 0) & (points[:, 0] <= 3.0) & (points[:, 1] >= -4.0) & (points[:, 1] <= 2.0)).all()
+    half = 3 * 6.0 / 90  # rows on either side
+    told = 0
+    for K1, K2, _ in points[:: max(1, len(points) // 6)]:
+        sides = [stability(LAB, HubFeedback(K1=K1, K2=K2 + way * half)).is_stable for way in (-1, 1)]
+        told += sides[0] != sides[1]
+    assert told >= 5
+    blank = np.full((2, 3), np.nan)
+    assert stable_edge(plane, blank, x, y).size == 0
+
+
+def test_what_a_locus_of_a_damped_rig_begins_with():
+    """About -b/J of the hub's friction, then the modes in their order, each of them a pole of the open rig."""
+    arm = tfarm.load("quanser-2dsfl")
+    poles, mode = open_poles(arm, 4)
+    damped = tfarm.damped_modes(tfarm.modes(arm, 4)).eigenvalues
+    np.testing.assert_array_equal(poles, damped.ravel()[1:])
+    assert damped[0, 0] == 0
+    assert poles[0].imag == 0 > poles[0].real
+    assert mode.tolist() == [0, 1, 1, 2, 2, 3, 3, 4, 4]
+    bare, _ = open_poles(BARE, 4)
+    assert bare[::2].tolist() == (1j * tfarm.modes(BARE, 4).natural_frequency[1:]).tolist()
+
+
+# ------------------------------------------------------------ panels
+
+
+def test_a_panel_that_its_polynomials_miss_is_halved(monkeypatch):
+    """Until they do not; the panels still meet, the first on both sides of 0, and each is a half, a quarter, ..."""
+    band, wide = 1024.0, np.r_[0.0, loop_panels(LAB, 1024.0).high]
+    panel = panels._panel
+
+    def missing(arm, low, high):
+        values, error = panel(arm, low, high)
+        return values, error if high - low < 70.0 else 1.0
+
+    monkeypatch.setattr(panels, "_panel", missing)
+    halved = loop_panels(LAB, band)
+    assert halved.error <= 1e-11
+    assert (halved.low[0], halved.high[-1]) == (-halved.high[0], band)
+    np.testing.assert_array_equal(halved.low[1:], halved.high[:-1])
+    edges = np.r_[0.0, halved.high]
+    powers = np.log2(np.diff(wide)[np.searchsorted(wide, edges[1:] - 1e-9) - 1] / np.diff(edges))
+    np.testing.assert_allclose(powers, np.round(powers), atol=1e-9)
+    assert (np.diff(edges) < 70.0).all()
+    assert (np.histogram(halved.high - 1e-9, wide)[0] > 1).sum() > 2
+    monkeypatch.setattr(panels, "MOST_PANELS", 3)
+    with pytest.raises(ConvergenceError, match="do not follow"):
+        loop_panels(LAB, band)
+
+
+@pytest.mark.parametrize("arm", [LAB, BARE], ids=lambda arm: arm.name)
+def test_between_its_samples_a_panel_is_the_loop_function_too(arm):
+    """By SciPy's interpolation through them; from 0 to the band without a gap, the first panel on both sides of 0."""
+    found, law, band = loop_panels(arm, 400.0), HubFeedback(K1=0.3, K2=-0.7, Kp=2.0), 400.0
+    assert (found.low[0], found.high[-1]) == (-found.high[0], band)
+    np.testing.assert_array_equal(found.low[1:], found.high[:-1])
+    assert found.error <= 1e-11
+    inside = np.array([-0.93, -0.31, 0.07, 0.55, 0.99])
+    for low, high, values in zip(found.low, found.high, np.moveaxis(found.values, 1, 0), strict=True):
+        assert abs(values).max() == pytest.approx(1.0, rel=1e-15)
+        order = np.argsort(CHEBYSHEV)
+        d, theta, m = (BarycentricInterpolator(CHEBYSHEV[order], part[order])(inside) for part in values)
+        s = 1j * ((low + high) / 2 + (high - low) / 2 * inside)
+        fed_back = (law.Kp + law.K1 * s) * theta + law.K2 * m * s**2
+        whole = Loop(arm, law).loop_function(s)
+        np.testing.assert_allclose(fed_back / (d * s**found.order), whole, rtol=1e-6 * (1 + abs(whole).max()))
+
+
+# ------------------------------------------------------------ what theorems and lists take for granted
+
+
+def test_a_contour_passes_the_poles_of_a_law_on_the_axis_below_its_band():
+    """Where it rings without damping, and its integrator if the rig has no zero there."""
+    slow, fast = ([1.0, 0.0, w**2] for w in (30.0, 900.0))
+    loop = Loop(LAB, Law({"hub_rate": ([1.0], slow), "root_moment": ([1.0], fast)}))
+    np.testing.assert_allclose(poles_on_axis(loop, 400.0), [0.0, 30.0], rtol=1e-9)
+    np.testing.assert_allclose(poles_on_axis(loop, 1000.0), [0.0, 30.0, 900.0], rtol=1e-9)
+    np.testing.assert_allclose(poles_on_axis(loop, 10.0), [0.0])
+    bare = Loop(BARE, Law({"root_moment": ([1.0], slow)}))  # finite at rest, where the arm turns
+    omega = tfarm.modes(BARE, 3).natural_frequency[1:]
+    expected = np.sort([30.0, *omega[omega < 400.0]])
+    np.testing.assert_allclose(poles_on_axis(bare, 400.0), expected, rtol=1e-9)
+
+
+def test_lyapunov_counts_what_the_hub_loses_to_the_rate_gain():
+    """K1 may be below 0 by less than the friction: not by more, and at just as much nothing is lost."""
+    arm = replace(BARE, hub=replace(BARE.hub, friction=0.25))
+    for K1, proven in ((-0.2, True), (-0.3, False), (0.1, True)):
+        found = lyapunov(arm, HubFeedback(K1=K1, K2=0.3))
+        assert found.proven == proven
+        assert proven or "feeds energy in" in found.reason
+        assert found.a1_over_a2 == (pytest.approx(0.7, rel=1e-15) if proven else None)
+
+
+def test_resonators_in_one_fraction_are_passed_as_they_are_in_several():
+    """The roots of their product are off the axis by rounding; turns and poles found still agree."""
+    slow, fast = ([1.0, 0.0, w**2] for w in (30.0, 200.0))
+    den = np.polymul(slow, fast)
+    num = np.polyadd(0.3 * den, [0.5, 0.0, 0.0, 0.0])
+    law = Law({"hub_rate": (num.tolist(), den.tolist())})
+    assert law.poles.real.any()
+    found = tfarm.nyquist(LAB, law)
+    np.testing.assert_allclose(found.poles, [0.0, 30.0, 200.0], rtol=1e-9)
+    assert (found.unstable_open, found.unstable_by_nyquist) == (0, found.verdict.unstable_roots)

@@ -210,8 +210,19 @@ class Law:
 
         With the sign of u = -sum: positive is what feeds back against a signal.
         """
+        if self._constants is not None:
+            entries, den = self._constants
+            return np.multiply.outer(entries, np.ones(np.shape(s))), np.full(np.shape(s), den)
         numerators, whole = self.shares(s)
         return numerators.sum(axis=0), whole
+
+    @cached_property
+    def _constants(self) -> tuple[Complex, complex] | None:
+        """`polynomials` at any s, (signals,) and one number, of a law without states; None of any other."""
+        if self.order or self.is_improper:
+            return None
+        numerators, whole = self.shares(np.ones(1, complex))
+        return numerators.sum(axis=0)[:, 0], complex(whole[0])
 
     def shares(self, s: Complex) -> tuple[Complex, Complex]:
         """Of each part what it multiplies the signals by, (parts, signals, n), and the denominator: `polynomials`."""

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
+from tfarm.errors import ParameterError
 from tfarm.records import record
 
 Places = NDArray[Any]  # of a curve, as whoever gives the functions has them
@@ -128,12 +129,9 @@ def _parabolic(x: tuple[Real, Real, Real], f: tuple[Real, Real, Real]) -> Real:
     return np.where((phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi) & np.isfinite(at), at, 0.5)
 
 
-def crossed(places: Real, parts: Parts, known: tuple[Complex, Complex] | None = None) -> tuple[Real, Real, Whole]:
-    """Gain, place and change of the count (n,) of every crossing between neighbours of a grid of places, ascending.
-
-    `known` are A and B on the grid, where they need not be worked out.
-    """
-    A, B = parts(places) if known is None else known
+def crossed(places: Real, parts: Parts) -> tuple[Real, Real, Whole]:
+    """Gain, place and change of the count (n,) of every crossing between neighbours of a grid of places, ascending."""
+    A, B = parts(places)
     (before,), change = brackets((A * B.conj()).imag)
     at, gain = solved(parts, places[before], places[before + 1])
     return gain, at, change
@@ -230,6 +228,18 @@ def solved(parts: Parts, low: Real, high: Real) -> tuple[Real, Real]:
     A, B = parts(place)
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # no B to speak of: beyond any number
         return place, np.asarray(-(A * B.conj()).real / abs(B) ** 2)
+
+
+def ascending(name: str, values: Any, least: int, most: int) -> Real:
+    """The values (n,) of one number of a plane.  Raises ParameterError for what is no ascending range of so many."""
+    try:
+        values = np.atleast_1d(np.asarray(values, dtype=float))
+    except (TypeError, ValueError):  # no numbers
+        values = np.empty(0)
+    if not (least <= values.size <= most and np.isfinite(values).all() and (np.diff(values) > 0).all()):
+        remedy = f"an ascending range of {least} to {most} finite values (give the law as law=, its numbers as vary=)"
+        raise ParameterError(key=name, value=f"{values.size} values", remedy=remedy)
+    return np.asarray(values)
 
 
 def counts_over(gains: Real, columns: Sequence[Crossings], reference: float, there: NDArray[Any]) -> Whole:

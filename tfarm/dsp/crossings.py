@@ -23,12 +23,23 @@ from tfarm.arm import NAMES, PLANE
 from tfarm.arm.feedback import ON
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.columns import Table
-from tfarm.crossing import Crossing, Crossings, Window, brackets, confirmed, counts_over, intervals, pieces, solved
+from tfarm.crossing import (
+    Crossing,
+    Crossings,
+    Window,
+    ascending,
+    brackets,
+    confirmed,
+    counts_over,
+    intervals,
+    pieces,
+    solved,
+)
 from tfarm.crossing.shown import coarse, grid_table
 from tfarm.crossing.turning import loose_columns
 from tfarm.dsp.chain import Sampling
 from tfarm.dsp.sampled import Sampled
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.response.controller import Controller, controller
 from tfarm.schema import Quantity
@@ -311,7 +322,7 @@ def sampled_map(
     edges are exact (D-decomposition), and along one of them for each value of any other number; of two others poles are
     counted at every point.  Raises ConvergenceError where the crossings and a count by eigenvalues differ.
     """
-    x, y = _ascending(vary[0], x), _ascending(vary[1], y)
+    x, y = ascending(vary[0], x, 1, MOST_GAINS), ascending(vary[1], y, 1, MOST_GAINS)
     across, up = (loop.place(name) for name in vary)
     if across is not None and up is not None:
         return _map_of_gains(loop, x, y, vary)
@@ -393,12 +404,3 @@ def with_both_sides(K1: Real, ends: Real) -> Real:
 def _off_the_edge(values: Real) -> float:
     """A gain inside the range that no rounded edge falls on."""
     return float(values[0] + GOLDEN * (values[-1] - values[0])) if values.size > 1 else float(values[0])
-
-
-def _ascending(name: str, values: Sequence[float] | Real) -> Real:
-    gains = np.array(values, dtype=float)
-    if gains.ndim != 1 or not 1 <= gains.size <= MOST_GAINS or not np.isfinite(gains).all():
-        raise ParameterError(key=name, value=gains.shape, remedy=f"a list of 1 to {MOST_GAINS} finite gains")
-    if (np.diff(gains) <= 0).any():
-        raise ParameterError(key=name, value=float(gains[0]), remedy="the gains of a map ascend, each once")
-    return gains

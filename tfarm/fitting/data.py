@@ -177,7 +177,7 @@ VALUE_PAIRS = (("re", "im"), ("abs", "deg"), ("db", "deg"))
 KNOWN_COLUMNS = (*FREQUENCIES, "re", "im", "abs", "db", "deg", "coherence", "sigma", "averages")
 DATA_FORM = "OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv"
 UFF = (".uff", ".unv", ".uf")
-NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.ASCII | re.IGNORECASE)
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"  # as it is written in a cell or an option
 UFF_RESPONSE = 4  # in UFF 58 the type of a function that is a frequency response
 UFF_FREQUENCY = 18  # and the kind of an abscissa that is a frequency
 
@@ -270,7 +270,7 @@ def _numbers(names: Sequence[str], rows: Sequence[tuple[int, str]], separator: s
 
 def _number(text: str) -> float:
     """The finite number that a cell holds; nan for anything else."""
-    value = float(text) if NUMBER.fullmatch(text) else math.nan
+    value = float(text) if re.fullmatch(NUMBER, text, re.ASCII) else math.nan
     return value if math.isfinite(value) else math.nan
 
 

@@ -32,7 +32,7 @@ from tfarm.response.signals import Signals
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import first_frequency
 
-from .data import Measured, Noise, in_parts
+from .data import NUMBER, Measured, Noise, in_parts
 
 SIGNED = ("offset",)  # numbers of an arm that may be negative
 UPPER_ENDS = {"gear_efficiency": 1.0, "poissons_ratio": 0.5}  # and those that end somewhere
@@ -177,7 +177,9 @@ EIGENVALUE_FIRM = 1e-12  # of an eigenvalue: a step that is less ends it
 MOST_NUMBER = 100  # number of a mode
 MODE_FORM = "N=FREQUENCY,RATIO such as 1=2.52hz,0.006 (hz or rad_s; a deviation after ~: 2.52hz~0.01)"
 MODE_PATTERN = re.compile(
-    r"\s*(\d+)\s*=\s*([\d.eE+-]+)\s*(hz|rad_s)\s*(?:~\s*([\d.eE+-]+))?\s*(?:,(.*))?", re.IGNORECASE
+    rf"\s*(\d{{1,3}})\s*=\s*({NUMBER})\s*(hz|rad_s)\s*(?:~\s*({NUMBER}))?\s*"
+    rf"(?:,\s*({NUMBER})\s*(?:~\s*({NUMBER}))?)?\s*",
+    re.IGNORECASE | re.ASCII,
 )
 
 
@@ -199,27 +201,16 @@ class RingMode:
 def mode_of(text: str) -> RingMode:
     """The decay that the command line means by "1=2.52hz,0.006".  Raises ParameterError for another form."""
     found = MODE_PATTERN.fullmatch(text)
-    try:
-        if found is None:
-            raise ValueError
-        number, unit = int(found[1]), 2 * math.pi if found[3].lower() == "hz" else 1.0
-        frequency = float(found[2]) * unit
-        deviation = float(found[4]) * unit if found[4] else FREQUENCY_KNOWN * frequency
-        ratio, spread = None, math.inf
-        if found[5] is not None:
-            value, _, said = found[5].partition("~")
-            ratio = float(value)
-            spread = float(said) if said else RATIO_KNOWN * ratio
-            if not (0 < ratio < 1 and spread > 0):
-                raise ValueError
-        sizes_fit = frequency > 0 and deviation > 0 and math.isfinite(frequency * deviation)
-        if not (1 <= number <= MOST_NUMBER and sizes_fit):
-            raise ValueError
-    except ValueError:
-        raise ParameterError(key="--mode", value=text, remedy=f"write {MODE_FORM}") from None
-    return RingMode(
-        number=number, frequency=frequency, frequency_deviation=deviation, ratio=ratio, ratio_deviation=spread
-    )
+    if found is not None:
+        unit = 2 * math.pi if found[3].lower() == "hz" else 1.0
+        w, ratio = float(found[2]) * unit, float(found[5]) if found[5] else None
+        dw = float(found[4]) * unit if found[4] else FREQUENCY_KNOWN * w
+        spread = float(found[6]) if found[6] else RATIO_KNOWN * (ratio or math.inf)
+        is_ratio = ratio is None or (0 < ratio < 1 and spread > 0)
+        if 1 <= int(found[1]) <= MOST_NUMBER and w > 0 < dw and math.isfinite(w * dw) and is_ratio:
+            number = int(found[1])
+            return RingMode(number=number, frequency=w, frequency_deviation=dw, ratio=ratio, ratio_deviation=spread)
+    raise ParameterError(key="--mode", value=text, remedy=f"write {MODE_FORM}")
 
 
 def ring_residuals(arm: Arm, rings: Sequence[RingMode]) -> Real:

@@ -127,13 +127,12 @@ class Loop:
         """Whether D is real on the imaginary axis, and its zeros come in pairs +-s: nothing takes or gives energy."""
         if not self.feeds_back:
             return self.arm.is_undamped
-        odd = [each.power % 2 for each in self.signals.outputs]
-        return self.arm.is_reactive and self.law.is_static and not (np.array(odd) @ abs(self._static)).any()
-
-    @property
-    def _static(self) -> Complex:
-        """What a static law multiplies each signal by (signals, 1)."""
-        return self.law.polynomials(np.ones(1, complex))[0]
+        odd = np.array([each.power % 2 for each in self.signals.outputs])
+        return (
+            self.arm.is_reactive
+            and self.law.is_static
+            and not (odd @ abs(self.law.polynomials(np.ones(1, complex))[0])).any()
+        )
 
     @cached_property
     def at_rest(self) -> tuple[float, float, float] | None:

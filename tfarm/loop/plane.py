@@ -19,7 +19,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, Hu
 from tfarm.arm.feedback import ON
 from tfarm.arrays import Real
 from tfarm.columns import Table
-from tfarm.crossing import Crossings, Window, counts_over, intervals
+from tfarm.crossing import Crossings, Window, ascending, counts_over, intervals
 from tfarm.crossing.shown import coarse, grid_table
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
@@ -227,7 +227,7 @@ def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real, band: float | Non
     if vary == PLANE and loop.gains is not None:
         loop = loop.under(with_numbers(loop.law, dict.fromkeys(PLANE, 0.0)))
     most = MOST_LAW_VALUES if loop.gains is None else MOST_GRID_VALUES
-    x, y = ascending(vary[0], x, most), ascending(vary[1], y, most)
+    x, y = ascending(vary[0], x, 2, most), ascending(vary[1], y, 2, most)
     across, up = (float(x[0]), float(x[-1])), (float(y[0]), float(y[-1]))
     ends = [critical(name, pair) for name, pair in zip(vary, (across, up), strict=True)]
     corners = [
@@ -347,18 +347,6 @@ def between(low: float, high: float, number: int) -> Real:
     """So many gains from low to high, the middles of equal parts: none of them on a line K1 = 0 unless by chance."""
     values = low + (high - low) * (np.arange(number) + 0.5) / number
     return np.where(abs(values) <= ROUNDED * (high - low), 0.0, values)
-
-
-def ascending(name: str, values: Any, most: int) -> Real:
-    """The values (n,) of one number of a map.  Raises ParameterError for what is no ascending range of 2 to `most`."""
-    try:
-        values = np.atleast_1d(np.asarray(values, dtype=float))
-    except (TypeError, ValueError):  # no numbers
-        values = np.empty(0)
-    if not (2 <= values.size <= most and np.isfinite(values).all() and (np.diff(values) > 0).all()):
-        remedy = f"an ascending range of 2 to {most} values (give the law as law=, its numbers as vary=)"
-        raise ParameterError(key=name, value=f"{values.size} values", remedy=remedy)
-    return np.asarray(values)
 
 
 @dataclass(frozen=True)

@@ -241,7 +241,8 @@ def slow_poles(loop: Loop, below: float) -> Complex:
 def starting_points(loop: Loop, up_to: float) -> Complex:
     """Where Newton's method starts: the arm's own frequencies, the law's poles, and the loop of a modal model."""
     omega, C = np.asarray(steep_places(loop.arm, up_to)), loop.arm.damping
-    near, real, own = near_modes(omega, C), real_starts(up_to), loop.law.poles
+    near, own = near_modes(omega, C), loop.law.poles
+    real = np.geomspace(up_to / REAL_SPAN, REAL_REACH * up_to, REAL_STARTS)  # for poles whose place nothing tells
     slow, of_model = np.empty(0, complex), np.empty(0, complex)
     if loop.at_rest is not None:
         c, b, _ = loop.at_rest
@@ -274,11 +275,6 @@ def poles_of_model(loop: Loop, plant: Matrices) -> Complex:
     if loop.law.delay:
         law = in_series(law, pade(loop.law.delay, PADE).matrices())
     return np.linalg.eigvals(closed(plant, law)).astype(complex)
-
-
-def real_starts(up_to: float) -> Real:
-    """Starts [1/s] on the real axis right of 0, for poles whose place nothing tells; mirrored, those left of it."""
-    return np.geomspace(up_to / REAL_SPAN, REAL_REACH * up_to, REAL_STARTS)
 
 
 def near_modes(omega: Real, C: float) -> Complex:

@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 
@@ -83,14 +83,6 @@ class Stability:
         return self.verdict == "stable"
 
 
-class Beyond(NamedTuple):
-    """What is known beyond the band, in words: whether infinitely many poles there are unstable."""
-
-    words: str
-    is_infinite: bool = False
-    is_known: bool = True
-
-
 def stability(arm: Arm, law: AnyLaw, band: float | None = None) -> Stability:
     """The verdict on the loop of an arm and a law.  `band` [rad/s] is chosen if it is not given.
 
@@ -105,20 +97,20 @@ def verdict_on(loop: Loop, band: float | None = None) -> Stability:
     theorem = theorem_of(loop)
     height, quiet = (band, False) if band is not None else band_of_loop(loop, theorem)
     poles = poles_below(loop, height, LISTED_LEFT)
-    beyond = _beyond(loop, theorem, quiet, height)
-    verdict = _verdict(poles, theorem, beyond.is_infinite)
-    top = poles.box.im_max
-    return Stability(loop, verdict, poles.unstable, beyond.is_infinite, top, beyond.words, poles, beyond.is_known)
+    words, is_infinite, is_known = _beyond(loop, theorem, quiet, height)
+    verdict = _verdict(poles, theorem, is_infinite)
+    return Stability(loop, verdict, poles.unstable, is_infinite, poles.box.im_max, words, poles, is_known)
 
 
-def _beyond(loop: Loop, theorem: Theorem, quiet: bool, band: float) -> Beyond:
+def _beyond(loop: Loop, theorem: Theorem, quiet: bool, band: float) -> tuple[str, bool, bool]:
+    """Words on what lies beyond the band; whether infinitely many poles there are unstable; whether it is known."""
     if theorem.energy is not None:
-        return Beyond(theorem.reason, is_infinite=theorem.energy == GIVES)
+        return theorem.reason, theorem.energy == GIVES, True
     if quiet:
-        return Beyond(SMALL_GAIN)
+        return SMALL_GAIN, False, True
     if loop.arm.is_undamped and loop.law.delay and loop.feeds_back:
-        return Beyond(DELAYED, is_infinite=True)
-    return Beyond(UNKNOWN_ABOVE.format(band=band), is_known=False)
+        return DELAYED, True, True
+    return UNKNOWN_ABOVE.format(band=band), False, False
 
 
 def _verdict(poles: Poles, theorem: Theorem, is_infinite: bool) -> str:

@@ -145,19 +145,13 @@ class Varied:
         delay = values if self.vary == "delay" else np.full(values.shape, self.full.delay)
         if self.is_of_arm or self.vary == "delay":
             return *self.full.polynomials(s), delay
-        (p0, q0), (p1, q1) = self._constants or (law.polynomials(s) for law in self._corners)
+        (p0, q0), (p1, q1) = (law.polynomials(s) for law in self._corners)
         return p0 + values * (p1 - p0), q0 + values * (q1 - q0), delay
 
     @cached_property
     def _corners(self) -> tuple[Law, Law]:
         """The law with 0 and with 1 in the place of the number."""
         return self.law_at(0.0), self.law_at(1.0)
-
-    @cached_property
-    def _constants(self) -> list[tuple[Complex, Complex]]:
-        """p_i and q of these, where they are no functions of s; else none."""
-        is_plain = not (self.full.order or self.full.is_improper)
-        return [law.polynomials(np.ones((1, 1), complex)) for law in self._corners] if is_plain else []
 
     def function(self, s: Complex, values: Real) -> Analytic:
         """D/s^n at s (n,), each at a value of its own (n,), n = `pinned`, with slopes from differences."""
@@ -204,7 +198,7 @@ class Varied:
         turn = np.exp(1j * scale.imag)
         drive, numerators = (drive * turn).real, numerators * turn
         numerators = np.where(odd, 1j * numerators.imag, numerators.real)
-        (p0, q0), (p1, q1) = self._constants or (law.polynomials(s) for law in self._corners)
+        (p0, q0), (p1, q1) = (law.polynomials(s) for law in self._corners)
         A, B = (drive * q + (p * numerators).sum(axis=0) for p, q in ((p0, q0), (p1 - p0, q1 - q0)))
         return A[0], B[0]
 

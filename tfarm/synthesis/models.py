@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import expm
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
@@ -261,7 +262,6 @@ def circle_angles(pulse: PulseTransfer) -> Real:
 
 
 SAMPLES_LEFT = 16  # of the record after the slew, where a period of the first mode has fewer
-TAYLOR_REACH, TAYLOR_TERMS = 0.25, 10  # size of a matrix, and terms of its series: 0.25^11/11! is 6e-15
 PERIOD_POINTS = 64  # of the period after the slew, in continuous time
 
 
@@ -274,22 +274,6 @@ def slew_and_after(arm: Arm, known: Arm, chain: Chain) -> Scenario:
 def trial_slew(known: Arm, chain: Chain) -> Scenario:
     """The slew of the tuner's trials, made for the arm `known`."""
     return scenario("slew", known, chain, TRIAL_SLEWS * chain.slew.rise_time)
-
-
-def exponential(matrices: Real) -> Real:
-    """e^M of matrices (laws, n, n): a Taylor series of M/2^k, squared k times.
-
-    As SciPy's to some 1e-10, but for all at once.
-    """
-    size = float(abs(matrices).sum(axis=2).max(initial=0.0))
-    halvings = max(0, int(np.ceil(np.log2(max(size, LEAST_SIZE) / TAYLOR_REACH))))
-    small, unit = matrices / 2.0**halvings, np.eye(matrices.shape[1])
-    found = np.broadcast_to(unit, matrices.shape)
-    for n in range(TAYLOR_TERMS, 0, -1):
-        found = unit + small @ found / n
-    for _ in range(halvings):
-        found = found @ found
-    return np.asarray(found)
 
 
 @dataclass(frozen=True)
@@ -366,14 +350,14 @@ class Slews:
         whole[:, :size, :size] = A
         whole[:, :n, size:], whole[:, n:size, size:] = B @ push, Bk @ (D @ push) - Bk @ states
         whole[:, size, size + 1] = whole[:, size + 1, size + 2] = 1.0
-        half = exponential(whole * slew.rise_time / 2)
+        half = expm(whole * slew.rise_time / 2)
         x = np.zeros((number, size + 3, 1))
         peak = slew.acceleration(self.known.reach)
         for acceleration in (peak, -peak):
             x[:, -1] = acceleration
             x = half @ x
         x[:, -2:] = 0.0
-        step = exponential(whole * (2 * np.pi / first_frequency(self.arm) / PERIOD_POINTS))
+        step = expm(whole * (2 * np.pi / first_frequency(self.arm) / PERIOD_POINTS))
         row, at = model.own_moment, model.signals.index("root_moment")
         passed = D[at, 0] * np.concatenate([-(Dk @ C) / through, -Ck / through, push], axis=2)
         sense = passed + np.r_[row, np.zeros(size + 3 - n)]
