@@ -164,7 +164,7 @@ def _values(rows: Any, name: str) -> list[Any]:
 
 
 def _column(of: Quantity, values: Sequence[Any]) -> Column:
-    cells = [text(value, of.digits) for value in values]
+    cells = [NO_VALUE if isinstance(value, list | tuple) and not value else text(value, of.digits) for value in values]
     folds = max(map(len, cells), default=0) > LONGEST_LINE
     return Column(of.key, of.label, of.unit, of=list(map(to_json_value, values)), shown=cells, folds=folds)
 

@@ -91,7 +91,7 @@ RENAMED = (
     ("reduce", r"errors\.(\w+)", r"channels[\1].error"),
     ("reduce", r"worst_at_rad_s\.(\w+)", r"channels[\1].worst_at_rad_s"),
     ("reduce", r"(first_mode_lacking_hz|input_unit|inputs|outputs|units)\b.*", None),
-    ("poles|modes", "(proven_)?complete|hub_locked_note", None),
+    ("poles|modes", "(proven_)?complete", None),
     ("modes .*--compare", "theory", None),
     ("modes .*--compare", r"index(\[\d\])", r"at\1"),
     ("response .*--compare", r"s(\[.*)", r"at\1"),

@@ -163,6 +163,21 @@ class Run:
         return settled if math.isfinite(settled) else None
 
     @property
+    def note(self) -> Annotated[str | None, Quantity("not determined", key="note")]:
+        """Why there is no residual or no settling time."""
+        run, reasons = self.simulation, []
+        if self.residual_moment is None:
+            ends = (
+                "the record ends before the slew"
+                if run.stopped is None
+                else f"the run stops at {self.stopped_at:.6g} s"
+            )
+            reasons.append(f"residual root moment, as {ends}")
+        if self.settling_time is None:
+            reasons.append(f"settling time: not settled within {run.t[-1]:.4g} s")
+        return "; ".join(reasons) or None
+
+    @property
     def saturated(self) -> Annotated[dict[str, int], Quantity("saturated samples", key="saturated_samples")]:
         """At how many samples encoder, strain amplifier and torque were clipped."""
         return self.simulation.saturated

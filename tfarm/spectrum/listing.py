@@ -77,7 +77,7 @@ class ModeList:
 
     found: Modes
     damped: DampedModes | None
-    modes: Annotated[list[ListedMode], Quantity("modes", help=LOCKED_NOTE)]
+    modes: Annotated[list[ListedMode], Quantity("modes")]
     unassigned: Annotated[list[Unlisted], Quantity("eigenvalues of no mode", key="unassigned_eigenvalues")]
     method: Annotated[Method, Quantity("method")]
     digits: Annotated[int | None, Quantity()]
@@ -124,6 +124,18 @@ class ModeList:
     def box_note(self) -> Annotated[str | None, Quantity("beyond the box")]:
         """The eigenvalues beyond it."""
         return None if self.damped is None else beyond_the_box(self.found.arm)
+
+    @property
+    def hub_locked_note(self) -> Annotated[str | None, Quantity("hub locked")]:
+        """The meaning of the column; None of an arm whose hub is locked itself."""
+        return None if self.found.arm.is_locked else LOCKED_NOTE
+
+    @property
+    def damped_note(self) -> Annotated[str | None, Quantity("damped modes")]:
+        """Up to where eigenvalues are listed, where that is not all."""
+        if self.damped is None or not self.damped.left_out:
+            return None
+        return f"eigenvalues up to mode {self.damped.index[-1]} only: branches above cannot be told apart"
 
     @property
     def circuit(self) -> Annotated[list[float], Quantity("of the motor's circuit [1/s]", key="circuit_eigenvalues")]:
