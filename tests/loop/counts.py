@@ -23,7 +23,7 @@ from tfarm.exact.system import system_of
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import winding_number
-from tfarm.spectrum.damped import member
+from tfarm.spectrum.naming import function_of
 from tfarm.spectrum.proofs import proven_count
 
 PROVEN = 20
@@ -97,7 +97,7 @@ def edge(a, b):
 def own_poles(arm, box) -> int:
     """How many poles the arm itself has in a box."""
     if arm.link.damping:
-        return winding_number(member(system_of(arm)).function, box, points=2000) + 2 * arm.has_rigid_mode
+        return winding_number(function_of(system_of(arm)), box, points=2000) + 2 * arm.has_rigid_mode
     return 2 * modes_below(arm, box.im_max) + 2 * arm.has_rigid_mode
 
 

@@ -212,7 +212,7 @@ def test_margins_of_a_law_ask_little_of_the_exact_rig(monkeypatch, number):
         raise AssertionError("no start of a search is worth the damped modes")
 
     monkeypatch.setattr(Signals, "parts", counted)
-    monkeypatch.setattr("tfarm.spectrum.damped.follow", never)
+    monkeypatch.setattr("tfarm.spectrum.naming.follow", never)
     caches.empty()
     of_margins(*case)
     assert len(asked) < 3000

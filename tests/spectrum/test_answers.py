@@ -9,7 +9,7 @@ from tests.shared import thinned
 from tfarm.schema import to_dict
 from tfarm.spectrum.listing import listed_modes
 
-LAB = tfarm.load("sasaki2012-lab")
+LAB, RIG = tfarm.load("sasaki2012-lab"), tfarm.load("quanser-2dsfl")
 RUBBED = replace(LAB, name="rubbed", hub=replace(LAB.hub, friction=0.4))
 
 
@@ -37,3 +37,15 @@ def test_a_disc_is_written_with_every_digit():
     assert found["proven_complete_in_box"]
     assert disc.keys() == {"re", "im", "radius"}
     assert complex(float(disc["re"]), float(disc["im"])) == pytest.approx(complex(*found["modes"][1]["eigenvalue"]))
+
+
+def test_modes_that_are_not_followed_have_their_rows(monkeypatch):
+    """They keep their frequency; their damping is not determined."""
+    monkeypatch.setattr("tfarm.spectrum.damped.MOST_MODES", 2)
+    modes = tfarm.modes(RIG, 4)
+    followed = len(tfarm.damped_modes(modes).index)
+    assert followed < len(modes)
+    rows = listed_modes(modes).modes
+    assert len(rows) == len(modes)
+    assert [row.eigenvalue is None for row in rows] == [n >= followed for n in range(len(modes))]
+    assert all(row.damping_ratio is None for row in rows[followed:])

@@ -1,14 +1,19 @@
 """Zeros in a box: what is no zero must not be found, whatever the function looks like."""
 
+import math
 import re
 
 import numpy as np
 import pytest
 
+import tfarm
+from tests.spectrum.damped import some_damped_arm
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.spectrum import box as room
-from tfarm.spectrum.box import Box, complete, distinct, newton, winding_number, zeros_in_box
+from tfarm.spectrum.box import Box, complete, complete_box, distinct, filled_box, newton, winding_number, zeros_in_box
+from tfarm.spectrum.damped import damped_modes
+from tfarm.spectrum.naming import function_of
 
 UNITS = (2.0**-30, 1.0, 2.0**30)  # of time, which matter nowhere: every tolerance is a share of a size
 
@@ -30,6 +35,24 @@ def polynomial(*zeros, flat=0.0):
     def function(s):
         slope = np.where(abs(s) < flat, 0.0, p.deriv()(s))
         return Analytic(p(s), slope.astype(complex), np.zeros(s.size, complex))
+
+    return function
+
+
+def with_zeros(zeros, turning=0.0):
+    """prod (s - z) exp(turning s^2), its exponential apart as scale."""
+    zeros = np.ravel(zeros)
+
+    def function(s):
+        away = s[:, None] - zeros
+        value = away.prod(1)
+        with np.errstate(all="ignore"):
+            rate = (1 / away).sum(1)
+        slope = np.where(value == 0, 0.0, value * np.where(value == 0, 0.0, rate))
+        for n in np.nonzero(value == 0)[0]:
+            others = np.delete(zeros, abs(s[n] - zeros).argmin())
+            slope[n] = (s[n] - others).prod()
+        return Analytic(value, slope + 2 * turning * s * value, turning * s**2)
 
     return function
 
@@ -177,3 +200,70 @@ def test_what_lies_inside_is_inside_of_all_four_edges():
     assert not box.holds(box.corners).any()
     np.testing.assert_array_equal(box.corners[[0, 2]], [-1 - 3j, 2 + 4j])
     np.testing.assert_array_equal(np.diff(box.corners), [3, 7j, -3, -7j])  # counter-clockwise
+
+
+def test_a_fast_turning_function_is_not_aliased(monkeypatch: pytest.MonkeyPatch) -> None:
+    """exp(a s^2) turns once between the points of one side and not at all on the opposite one."""
+    zeros = np.array([0.3 + 0.2j, 0.7 - 0.4j, 0.5 + 0.45j])
+    box = Box(0.0, 1.0, -0.5, 0.5)
+    turn = 40 * math.pi * 1.0  # 2 a x = 2 pi a step of 1/40 at x = 1
+    function = with_zeros(zeros, turn)
+    assert winding_number(function, box, points=40) == 3
+    monkeypatch.setattr(room, "FORESEEN", np.inf)
+    assert winding_number(function, box, points=40) != 3
+
+
+def test_the_arm_that_was_miscounted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """18 of 20 zeros: a piece across the real axis may turn by 4 pi while the ends show no phase, nor a rate of it."""
+    rng = np.random.default_rng(1)
+    for _ in range(70):
+        arm, count = some_damped_arm(rng)
+    damped = damped_modes(tfarm.modes(arm, count))
+    function = function_of(damped.undamped.system)
+    inside = damped.box.holds(damped.eigenvalues[damped.index > 0]).sum()
+    points = (5, 10, 20, 25, 40, 83)
+    assert [winding_number(function, damped.box, number) for number in points] == [inside] * len(points)
+    monkeypatch.setattr(room, "FORESEEN", np.inf)
+    assert winding_number(function, damped.box, 40) == inside - 2
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_zeros_are_counted_and_found(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    zeros = rng.uniform(-2, 2, 12) + 1j * rng.uniform(-2, 2, 12)
+    zeros[3] = zeros[4]  # a double one
+    box = Box(-1.3, 0.9, -1.1, 1.6)
+    inside = box.holds(zeros)
+    for turning in (0.0, 30.0, -200j):
+        function = with_zeros(zeros, turning)
+        assert winding_number(function, box) == inside.sum()
+    found = zeros_in_box(with_zeros(zeros, 3.0), box, np.empty(0, complex))
+    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(zeros[inside]), atol=1e-5)
+
+
+def conjugates(*upper):
+    return np.array([[z, np.conj(z)] for z in upper])
+
+
+def test_a_box_ends_below_the_first_zero_that_is_not_listed() -> None:
+    """Among known zeros by their heights, among unknown ones by the winding number; one below all of them is found."""
+    all_there = with_zeros(conjugates(-0.01 + 1j, -0.01 + 2j, -0.02 + 3j, -0.1 + 5j))
+    none = np.empty((0, 2), complex)
+    box = complete_box(all_there, conjugates(-0.01 + 1j, -0.01 + 2j, -0.1 + 5j), none, 0.0)
+    assert box is not None
+    assert 1 < box.im_max < 3
+    known = complete_box(all_there, conjugates(-0.01 + 1j, -0.01 + 2j), conjugates(-0.02 + 3j, -0.1 + 5j), 0.0)
+    assert known is not None
+    assert 2 < known.im_max < 3
+    below, listed, beyond = (conjugates(each) for each in (-0.01 + 0.3j, -0.01 + 2j, -0.02 + 3j))
+    function = with_zeros(np.concatenate([below, listed, beyond]))
+    assert complete_box(function, listed, beyond, 0.0) is None
+    box, found = filled_box(function, listed, beyond, 2.8, listed.ravel(), 0.0)
+    assert 2 < box.im_max < 3
+    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(np.r_[below, listed].ravel()), rtol=1e-12)
+
+
+def test_no_box_is_complete_with_a_listed_zero_that_is_none() -> None:
+    function = with_zeros(conjugates(-0.01 + 1j, -0.01 + 3j))
+    listed = conjugates(-0.01 + 1j, -0.01 + 2j, -0.01 + 3j)
+    assert complete_box(function, listed, np.empty((0, 2), complex), 0.0) is None

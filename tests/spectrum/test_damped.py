@@ -13,7 +13,7 @@ from tests.spectrum.damped import judge, pairs, some_damped_arm
 from tests.spectrum.damped_roads import newton_step, pinned, ritz_eigenvalues, sine_waves
 from tests.strategies import arm_of, some_arm
 from tfarm import Arm
-from tfarm.spectrum.damped import Branches, DampedModes, all_damped_modes, damped_modes
+from tfarm.spectrum.damped import DampedModes, damped_modes
 
 EPS = np.finfo(float).eps
 EXTREMES = ((0.0, 0.0, 0.0), (math.inf, math.inf, math.inf), (0.0, math.inf, 0.0), (1.0, 0.0, math.inf))
@@ -307,47 +307,11 @@ def test_shapes_are_conjugate_and_of_the_shape_of_x() -> None:
         damped.shape(1.01)
 
 
-def test_modes_that_cannot_be_followed_are_counted_in_the_record(monkeypatch) -> None:
+def test_modes_beyond_the_most_are_counted_in_the_record(monkeypatch) -> None:
     """As the command line answers: the first two of four, each as if two had been asked for, and proven."""
-    monkeypatch.setattr("tfarm.spectrum.damped.FEWER_MODES", (2, 1))
+    monkeypatch.setattr("tfarm.spectrum.damped.MOST_MODES", 2)
     undamped = tfarm.modes(tfarm.load("sasaki2012-lab"), 4)
     few, two = damped_modes(undamped), damped_modes(tfarm.modes(undamped.arm, 2))
     assert (few.left_out, two.left_out) == (2, 0)
     np.testing.assert_array_equal(few.eigenvalues, two.eigenvalues)
     assert len(few.certify()) == 2
-
-
-# ------------------------------------------------------------ many dampings of one arm
-
-
-def test_branches_go_on_from_where_they_were(monkeypatch) -> None:
-    """The same eigenvalues as from C = 0, in whatever order the dampings come; past the first nothing is begun anew."""
-    from tfarm.spectrum import damped as module
-
-    arm, begun, follow = tfarm.load("sasaki2012-lab"), [], module.follow
-    table = [tfarm.modes(with_damping(arm, C), 4) for C in (4e-4, 1e-5, 3e-4, 3.00001e-4, 1e-3, 4e-4)]
-    fresh = [all_damped_modes(each).eigenvalues for each in table]
-    monkeypatch.setattr(module, "follow", lambda *args: begun.append(args[1].at) or follow(*args))
-    branches = Branches()
-    for each, theirs in zip(table, fresh, strict=True):
-        np.testing.assert_allclose(branches(each).eigenvalues, theirs, rtol=64 * EPS)
-    assert begun[0] == 0.0
-    assert 0.0 not in begun[1:]
-
-
-def test_a_lost_branch_is_not_sought_again_beyond(monkeypatch) -> None:
-    from tfarm.errors import ConvergenceError
-    from tfarm.spectrum import damped as module
-
-    sought = []
-
-    def lose(*args):
-        sought.append(args[2])
-        raise ConvergenceError("lost", args[1], 0.0)
-
-    monkeypatch.setattr(module, "follow", lose)
-    arm, branches = tfarm.load("sasaki2012-lab"), Branches((6,))
-    for C in (1e-3, 2e-3, 5e-4):
-        with pytest.raises(ConvergenceError, match="lost"):
-            branches(tfarm.modes(with_damping(arm, C), 4))
-    assert sought == [1e-3, 5e-4]

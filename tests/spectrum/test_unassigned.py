@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import tfarm
 from tests.chain_elements import eigenvalues
@@ -20,8 +21,8 @@ from tfarm.cli.running import run
 from tfarm.errors import ConvergenceError
 from tfarm.loop.locus import open_poles
 from tfarm.report.modes_section import damped_tables, locked_table
-from tfarm.spectrum import damped as module
-from tfarm.spectrum.damped import NOT_ASSIGNED, origin_of, searched
+from tfarm.spectrum import damped as damped_module
+from tfarm.spectrum.damped import NOT_ASSIGNED, origin_of
 
 STIFF_FRICTION = Path("tests/data/reproductions/stiff-friction.toml")
 REFUSED_ONCE = {28: 2, 83: 2, 227: 8}  # rigs of `some_rig` at seed 1, and how many modes were asked for
@@ -87,22 +88,20 @@ def test_origins_are_those_of_closed_forms() -> None:
     assert origin_of(tfarm.modes(slow, 1).system, 1j * tfarm.modes(slow, 1).natural_frequency[-1]) == NOT_ASSIGNED
 
 
-def test_without_any_branch_the_box_is_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_any_name_the_box_is_searched(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is followed otherwise: the same eigenvalues, those of lightly damped modes under their numbers."""
-    arm = tfarm.load("sasaki2012-lab").having(damping=1e-5)
-    undamped = tfarm.modes(arm, 4)
-    expected = tfarm.damped_modes(undamped)
-    found = searched(undamped, None)
-    np.testing.assert_allclose(found.eigenvalues, expected.eigenvalues, rtol=1e-10)
+    arm = tfarm.load("sasaki2012-lab").having(damping=1.23e-5)
+    heavy = tfarm.modes(arm.having(damping=1.23e-3), 8)
+    light, pairs = tfarm.damped_modes(tfarm.modes(arm, 4)), tfarm.damped_modes(heavy)
+
+    def lose(_: object, values: NDArray[np.float64], start: NDArray[np.complex128]) -> None:
+        raise ConvergenceError("lost", (values[0], start), False)
+
+    monkeypatch.setattr("tfarm.spectrum.naming.follow", lose)
+    found = damped_module._searched(light.undamped)
+    np.testing.assert_allclose(found.eigenvalues, light.eigenvalues, rtol=1e-10)
     assert (found.unassigned, found.left_out) == ((), 0)
-
-    def lose(*_: object) -> None:
-        raise ConvergenceError("lost", None, 0)
-
-    heavy = tfarm.modes(arm.having(damping=1e-3), 8)
-    pairs = tfarm.damped_modes(heavy)
-    monkeypatch.setattr(module, "_listed", lose)
-    alone = tfarm.damped_modes(heavy)
+    alone = damped_module._searched(heavy)
     assert 0 < alone.is_assigned.sum() < len(alone.index)
     every = np.r_[alone.eigenvalues[alone.is_assigned, 0], alone.unassigned_pairs[:, 0]]
     inside = pairs.eigenvalues[1:].ravel()[alone.box.holds(pairs.eigenvalues[1:].ravel())]

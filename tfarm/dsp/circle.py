@@ -51,7 +51,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import modes
 from tfarm.spectrum.box import TOWARD_SINGULAR, Box, winding_number
-from tfarm.spectrum.damped import member
+from tfarm.spectrum.naming import function_of
 
 MACHINE_EPS = float(np.finfo(float).eps)  # of a float64, times the counts of operations beside it
 ARCS = 64  # of half the circle to begin with
@@ -344,8 +344,8 @@ def complete_band(loop: Sampled) -> Band | None:
 
 def _highest(loop: Sampled, line: float) -> float | None:
     """The top of the highest box right of the line in which the exact arm has the plant's poles and no other."""
-    plant, function = loop.plant, member(modes(loop.plant.model.arm, 1).system).function
-    poles = np.r_[plant.poles[plant.mode > 0], plant.model.single]
+    plant, function = loop.plant, function_of(modes(loop.plant.model.arm, 1).system)
+    poles = np.r_[plant.poles[(plant.mode > 0) | (plant.poles.imag != 0)], plant.model.single]
     poles = poles[poles.real > -line]
 
     def is_complete(top: float) -> bool:

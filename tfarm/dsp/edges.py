@@ -22,14 +22,12 @@ from tfarm.dsp.chain import Chain
 from tfarm.dsp.circle import Band, Circle, complete_band
 from tfarm.dsp.crossings import stable_windows
 from tfarm.dsp.discretise import acting_law, with_all_gains
-from tfarm.dsp.plant import Branching
 from tfarm.dsp.sampled import Sampled, resized, sampled_loop
 from tfarm.dsp.sampling import FORGOTTEN, held_amplitude
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes_below
-from tfarm.spectrum.damped import COMPANY, LITTLE, Branches, all_damped_modes
 from tfarm.spectrum.table import first_frequency
 
 LONGEST_DELAY_SAMPLES = 20.0  # samples: the delay margin is looked for up to here
@@ -41,7 +39,6 @@ CLEARLY = 1e-6  # within the circle: an eigenvalue there is not polished, as eve
 KEPT_BEYOND = 2  # modes kept beyond the last one that outlives a sample
 MODES_BEYOND = 4  # those of a whole loop that do not outlive a sample
 MOST_LOOP_MODES = 128  # of a whole loop: half a second of work
-FEWER_SHARES = (0.85, 0.72, 0.61, 0.54)  # of these, tried in turn where two damped modes cannot be told apart
 SURELY_OVERDAMPED = 2.5  # C w from which on a mode surely is: following it further costs a hundred times as much
 FAR_BEYOND = 5.0  # of critical in the first mode: all poles of bending lie left of any line, one mode shows it as well
 STRONGEST = 0.15  # of critical in the first mode: no stronger damping is looked at
@@ -103,10 +100,10 @@ def required_damping(arm: Arm, law: AnyLaw, chain: Chain, *, count: int = DAMPIN
 
     0 where it is stable without damping, inf where none up to 15 % of critical in the first mode helps.
     """
-    return damping_edge(sampled_loop(arm.elastic, law, chain, count=count), Branches(LITTLE))
+    return damping_edge(sampled_loop(arm.elastic, law, chain, count=count))
 
 
-def damping_edge(loop: Sampled, branches: Branching) -> float:
+def damping_edge(loop: Sampled) -> float:
     """`required_damping` of an undamped loop, with its number of modes.
 
     Every decade is looked at from the strongest C down, so that larger ones on that grid are stable too; the edge is
@@ -115,7 +112,7 @@ def damping_edge(loop: Sampled, branches: Branching) -> float:
 
     @cache
     def log_radius(C: float) -> float:
-        return log_radius_with(loop, C, loop.plant.count, branches)
+        return log_radius_with(loop, C, loop.plant.count)
 
     if loop.poles.is_stable:
         return 0.0
@@ -131,7 +128,7 @@ def damping_edge(loop: Sampled, branches: Branching) -> float:
     return high
 
 
-def log_radius_with(loop: Sampled, C: float, count: int, branches: Branching) -> float:
+def log_radius_with(loop: Sampled, C: float, count: int) -> float:
     """The log spectral radius at C; where two damped modes are one there, at a C that differs by 1e-6.
 
     Modes that a strong C has settled before the next sample, or overdamped, are left to the remainder, but for a few.
@@ -140,7 +137,7 @@ def log_radius_with(loop: Sampled, C: float, count: int, branches: Branching) ->
     outliving = min(alive(arm.having(damping=C), loop.chain), modes_below(arm, SURELY_OVERDAMPED / C))
     for nudge in NUDGES:
         try:
-            damped = loop.on(arm.having(damping=C * (1 + nudge)), min(count, KEPT_BEYOND + outliving), branches)
+            damped = loop.on(arm.having(damping=C * (1 + nudge)), min(count, KEPT_BEYOND + outliving))
         except ConvergenceError:
             if nudge < 0:
                 raise
@@ -166,24 +163,14 @@ def most_modes(arm: Arm, chain: Chain) -> int:
     return min(MOST_LOOP_MODES, MODES_BEYOND + outliving)
 
 
-def whole_loop(arm: Arm, law: AnyLaw, chain: Chain, branches: Branching = all_damped_modes) -> Sampled:
+def whole_loop(arm: Arm, law: AnyLaw, chain: Chain) -> Sampled:
     """The loop of a damped arm with every mode that outlives a sample and a few, or the first 128.
 
-    With somewhat fewer where two damped modes cannot be told apart; with one where the first is far overdamped.
-    Raises ConvergenceError where not even that one can be followed.
+    With one where the first is far overdamped.
     """
     criticals = arm.damping * first_frequency(arm) / 2
     most = most_modes(arm, acting_law(arm, with_all_gains(arm, law), chain)[1])
-    numbers = [most, *(int(share * most) for share in FEWER_SHARES)]
-    if criticals > FAR_BEYOND:
-        numbers, branches = [1], Branches(COMPANY[:1])
-    for number in numbers:
-        try:
-            return sampled_loop(arm, law, chain, count=max(1, number), branches=branches)
-        except ConvergenceError as error:
-            lost = error
-    where = f"C = {arm.damping:g} s, {criticals:.3g} times critical in the first mode"
-    raise ConvergenceError(f"modes cannot be followed to {where}: {lost}", lost.best, lost.residual)
+    return sampled_loop(arm, law, chain, count=1 if criticals > FAR_BEYOND else max(1, most))
 
 
 @dataclass(frozen=True)
@@ -353,16 +340,16 @@ def _delay(loop: Sampled, band: Band | None) -> tuple[DelayMargin, Figure]:
 
 def shown_damping(loop: Sampled, count: int) -> Figure:
     """The damping from which on a loop is stable, looked for with so many modes, as a figure [s]."""
-    count, branches = min(count, MOST_EDGE_MODES), Branches(LITTLE)
+    count = min(count, MOST_EDGE_MODES)
     bare, law = loop.on(loop.plant.arm.elastic, count), replace(loop.given, delay=0.0)  # which is in the chain's
-    C = damping_edge(bare, branches)
+    C = damping_edge(bare)
     if C == 0.0:
         return Figure(C, OTHER_DIGITS, None, count)
 
     def proof(value: float) -> Proof:
-        return _proof_of(whole_loop(bare.plant.arm.having(damping=value), law, loop.chain, branches))
+        return _proof_of(whole_loop(bare.plant.arm.having(damping=value), law, loop.chain))
 
     def holds(value: float) -> Proof:
-        return log_radius_with(bare, value, another(count, MOST_EDGE_MODES), branches) < 0, math.inf
+        return log_radius_with(bare, value, another(count, MOST_EDGE_MODES)) < 0, math.inf
 
     return figure(C, OTHER_DIGITS, count, proof, holds, below=False, spare=0.0)

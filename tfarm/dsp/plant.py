@@ -9,7 +9,7 @@ discretisation knows nothing of it.  Analog damping of the hub is friction of th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -26,11 +26,7 @@ from tfarm.reduced import ModalModel, modal_model
 from tfarm.reduced.modal import SLOW_POLES_FROM, slow_remainder
 from tfarm.response import transfer
 from tfarm.response.signals import Signals
-from tfarm.spectrum import DampedModes, Modes
-from tfarm.spectrum.damped import all_damped_modes
 from tfarm.spectrum.frequencies import LISTS_KEPT
-
-Branching = Callable[[Modes], DampedModes]
 
 AMPLIFIED = ("M", "Q", "strain", "current")  # what a strain gauge, a load cell or a shunt reads
 RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")  # of a simulation, not filtered
@@ -43,8 +39,8 @@ class Plant:
     """Poles (m,) [1/s] other than s = 0, conjugates listed too; residues (outputs, m), rigid (outputs, 2), static
     (outputs,).
 
-    `mode` (m,) is the flexible mode that a pole belongs to; 0 for those of a filter or the hub.  `model` is what
-    it was made from; it may have more modes.
+    `mode` (m,) is the flexible mode that a pole belongs to; 0 for those of a filter, the hub, or no mode for certain.
+    `model` is what it was made from; it may have more modes.
     """
 
     arm: Arm
@@ -108,16 +104,12 @@ def damped_at_hub(arm: Arm, chain: Chain) -> Arm:
     return arm if damping == 0 else replace(arm, hub=replace(arm.hub, friction=arm.hub.friction + damping))
 
 
-def undelayed_plant(
-    arm: Arm, outputs: Sequence[str], count: int, branches: Branching = all_damped_modes, x: float | None = None
-) -> Plant:
+def undelayed_plant(arm: Arm, outputs: Sequence[str], count: int, x: float | None = None) -> Plant:
     """The arm with `count` flexible modes, its outputs not filtered; `x` [m] is the place of outputs along the arm."""
     if arm.is_locked:
         remedy = "a locked hub has no loop: no torque turns it; give a finite inertia"
         raise ParameterError(key="hub.inertia", value=math.inf, remedy=remedy)
-    if branches is all_damped_modes:
-        return with_modes(_modelled_once(arm, tuple(outputs), count, x), count)
-    return with_modes(modal_model(arm, tuple(outputs), count, x, branches=branches), count)
+    return with_modes(_modelled_once(arm, tuple(outputs), count, x), count)
 
 
 @lru_cache(maxsize=LISTS_KEPT)  # the simulations of one page ask for the same model some twenty times
@@ -127,7 +119,7 @@ def _modelled_once(arm: Arm, names: tuple[str, ...], count: int, x: float | None
 
 def with_modes(model: ModalModel, count: int) -> Plant:
     """The plant with the first `count` modes of a model."""
-    some = model if count == model.index.size else model.first(count)
+    some = model.first(count)
     plant, C = replace(_of_model(some), model=model), model.arm.damping
     if C * some.natural_frequency.max(initial=0.0) < SLOW_POLES_FROM:
         return plant
@@ -229,21 +221,19 @@ class SensedPlant:
             static=np.array([plant.static[n] for plant, n in rows]),
         )
 
-    def with_modes(self, count: int, branches: Branching = all_damped_modes) -> SensedPlant:
+    def with_modes(self, count: int) -> SensedPlant:
         """The same with another number of modes; no work where the models have as many."""
-        if count > self.plants[0].model.index.size:
-            return sensed_plant(self.arm, self.chain, self.read.names, count, branches)
+        if count > self.plants[0].model.index.max(initial=0):
+            return sensed_plant(self.arm, self.chain, self.read.names, count)
         return replace(self, plants=tuple(with_modes(each.model, count) for each in self.plants))
 
 
-def sensed_plant(
-    arm: Arm, chain: Chain, names: Sequence[str], count: int, branches: Branching = all_damped_modes
-) -> SensedPlant:
+def sensed_plant(arm: Arm, chain: Chain, names: Sequence[str], count: int) -> SensedPlant:
     """The signals of that name with `count` flexible modes, of an arm whose hub a chain may damp."""
     read, plants = Signals(damped_at_hub(arm, chain), tuple(names)), []
     for share in dict.fromkeys(read.places):
         here = zip(read.outputs, read.places, strict=True)
         wanted = list(dict.fromkeys(each.name for each, place in here if place == share))
         along = any(each.place == "x" for each in read.outputs if each.name in wanted)
-        plants.append(undelayed_plant(read.arm, wanted, count, branches, share * arm.length if along else None))
+        plants.append(undelayed_plant(read.arm, wanted, count, share * arm.length if along else None))
     return SensedPlant(arm, read, chain, tuple(plants))

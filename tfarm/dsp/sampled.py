@@ -33,12 +33,11 @@ from tfarm.arm.law import Law
 from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.dsp.chain import Chain, chain_or_usual
 from tfarm.dsp.discretise import LawInZ, acting_law, law_in_z, lowest_power, with_all_gains
-from tfarm.dsp.plant import USUAL_MODES, Branching, Plant, SensedPlant, is_analog, sensed_plant
+from tfarm.dsp.plant import USUAL_MODES, Plant, SensedPlant, is_analog, sensed_plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ConvergenceError, ParameterError, did_you_mean
 from tfarm.records import record
 from tfarm.reduced.conversions import closed
-from tfarm.spectrum.damped import all_damped_modes
 
 STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes
 SMALLEST_LOG = -745.0  # of the smallest double: stands for the logarithm of 0
@@ -180,9 +179,9 @@ class Sampled:
         chain = replace(self.chain, sampling=replace(sampling, delay_samples=own))
         return sampled_loop(self.plant.arm, law, chain, count=self.plant.count)
 
-    def on(self, arm: Arm, count: int, branches: Branching = all_damped_modes) -> Sampled:
+    def on(self, arm: Arm, count: int) -> Sampled:
         """The same law on another arm, with so many flexible modes."""
-        return replace(self, sensed=sensed_plant(arm, self.chain, self.in_z.signals, count, branches))
+        return replace(self, sensed=sensed_plant(arm, self.chain, self.in_z.signals, count))
 
     # ------------------------------------------------------------ what it feeds back
 
@@ -408,13 +407,11 @@ def sampled_loop(
     chain: Chain | None = None,
     *,
     count: int = USUAL_MODES,
-    branches: Branching = all_damped_modes,
 ) -> Sampled:
     """The loop with `count` flexible modes.
 
-    For one arm with many C: `branches` of its damped modes, that remember where they were.  Raises ParameterError for a
-    locked hub, an unknown signal, a law in z of another period, and what `discretised` refuses, and for a massless hub
-    whose moment is fed back (an algebraic loop).
+    Raises ParameterError for a locked hub, an unknown signal, a law in z of another period, what `discretised` refuses,
+    and a massless hub whose moment is fed back (an algebraic loop).
     """
     law = with_all_gains(arm, law)
     acting, chain = acting_law(arm, law, chain_or_usual(chain))
@@ -423,7 +420,7 @@ def sampled_loop(
         weights[place] = value
         law, acting = (each.having(name, 1.0) for each in (law, acting))
     in_z = law_in_z(law, acting, chain)
-    return Sampled(sensed_plant(arm, chain, in_z.signals, count, branches), chain, law, in_z, tuple(weights))
+    return Sampled(sensed_plant(arm, chain, in_z.signals, count), chain, law, in_z, tuple(weights))
 
 
 def resized(loop: Sampled, count: int) -> Sampled:

@@ -18,12 +18,12 @@ from tfarm.arm import FED_BACK, NAMES, Arm, HubFeedback
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.arrays import LEAST_SIZE, Complex, Real
-from tfarm.crossing.following import between
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.reduced import modal_model
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
+from tfarm.spectrum.following import between
 
 from .locus import Locus, locus
 from .varied import OF_THE_LAW

@@ -1,7 +1,7 @@
 """Root loci of the exact rig: branches that keep their identity, and where they cross the imaginary axis.
 
 At a few values the winding number says how many poles a box holds: there the list is complete.  In between each pole
-is followed (`tfarm.crossing.following`), vectorised over values and poles.  Branches are named after the modes of the
+is followed (`tfarm.spectrum.following`), vectorised over values and poles.  Branches are named after the modes of the
 rig without feedback: the whole law grows from 0 to what it is at the first value, and each pole is followed there.
 
 Crossings are solved for gain and frequency together, not interpolated.  Along a number of the law in which D is linear
@@ -24,7 +24,6 @@ from tfarm.arm import FED_BACK, NAMES, PLANE, AnyLaw, Arm, HubFeedback, arm_and_
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing import Crossing, crossed
-from tfarm.crossing.following import assigned, between, follow
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, ParameterError, must_be_known
 from tfarm.records import record
@@ -33,7 +32,8 @@ from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import Quantity
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.box import Box
-from tfarm.spectrum.damped import single_zeros
+from tfarm.spectrum.following import assigned, between, follow
+from tfarm.spectrum.naming import single_zeros
 
 from .loop import grid
 from .varied import ARM_PARAMETERS, OF_THE_LAW, Varied

@@ -56,6 +56,8 @@ class Varied:
     box: Box = EMPTY
 
     least_step = 1e-10
+    most_halvings = 600
+    alone = 0.0
     blur = 0.0
 
     def __post_init__(self) -> None:
@@ -202,7 +204,7 @@ class Varied:
         A, B = (drive * q + (p * numerators).sum(axis=0) for p, q in ((p0, q0), (p1 - p0, q1 - q0)))
         return A[0], B[0]
 
-    # ------------------------------------------------------------ as `crossing.following` asks
+    # ------------------------------------------------------------ as `spectrum.following` asks
 
     def near(self, values: Real, guess: Complex) -> Complex:
         """The poles (m, b) next to the guesses at m values, by Newton's method; NaN where it does not settle."""

@@ -31,7 +31,8 @@ from tfarm.exact.system import System
 from tfarm.exact.values import evaluate_outputs, free_slopes
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import Modes, modes
-from tfarm.spectrum.damped import DampedModes, all_damped_modes, entered, single_zeros
+from tfarm.spectrum.damped import damped_modes, entered
+from tfarm.spectrum.naming import single_zeros
 
 from .partial_fractions import PartialFractions
 
@@ -167,35 +168,32 @@ NEXT_TO_REST = 1e-3  # of the first frequency: a pole nearer to 0 leaves 1e-15 o
 
 
 class ModalModel(PartialFractions):
-    """The first flexible modes of the arm with their exact eigenvalues and residues (see `PartialFractions`)."""
+    """The first flexible modes of the arm with their exact eigenvalues and residues (see `PartialFractions`).
+
+    Pairs that are assigned to no mode come last, with the index 0 and |s| for a frequency.
+    """
 
     def first(self, count: int) -> ModalModel:
         """The model with the first `count` of these modes: those left out leave their static share."""
-        gone = (self.residues[:, count:] / self.eigenvalues[count:]).real.sum(axis=(1, 2))
+        beyond = self.index > count
+        beyond |= (self.index == 0) & (self.natural_frequency > self.natural_frequency[beyond].min(initial=math.inf))
+        kept = ~beyond
         return replace(
             self,
-            index=self.index[:count],
-            natural_frequency=self.natural_frequency[:count],
-            eigenvalues=self.eigenvalues[:count],
-            residues=self.residues[:, :count],
-            static=self.static - gone,
-            participation=self.participation[:count],
+            index=self.index[kept],
+            natural_frequency=self.natural_frequency[kept],
+            eigenvalues=self.eigenvalues[kept],
+            residues=self.residues[:, kept],
+            static=self.static - (self.residues[:, beyond] / self.eigenvalues[beyond]).real.sum(axis=(1, 2)),
+            participation=self.participation[kept],
         )
 
 
-def modal_model(
-    arm: Arm,
-    outputs: Wanted,
-    count: int,
-    x: float | None = None,
-    *,
-    branches: Callable[[Modes], DampedModes] = all_damped_modes,
-) -> ModalModel:
+def modal_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -> ModalModel:
     """The modal model of an arm with its first `count` flexible modes (0 to 1000), for one output or several.
 
     `x` [m] is the place of outputs along the arm.  Where the hub is locked, hub angle is the input and no rigid body is
     left.  At C > 0 the eigenvalues and residues are those of the damped arm, overdamped modes by their two real poles.
-    For one arm with many C: `branches`, that remembers where they were.
     Raises ParameterError for an unknown output, a count out of range, and an output that grows with s without bound.
     """
     G = transfer(arm, outputs, x=x)
@@ -203,17 +201,19 @@ def modal_model(
     k, share = G.system, G.share
     wanted = [proper(k, each, share) for each in G.rows]
     table = modes(arm, max(1, int(count)))
-    flexible = slice(int(arm.has_rigid_mode), int(arm.has_rigid_mode) + int(count))
     collocated = OUTPUTS["root_moment" if arm.is_locked else "hub_angle"]
-    p, r, single, alone = _poles_and_residues(arm, table, k, [*wanted, collocated], share, branches)
-    p, r = p[:count], r[:, :count]
+    index, p, single = _eigenvalues(arm, table)
+    r, alone = _residues(table, k, [*wanted, collocated], share, p, single)
+    if count == 0:
+        index, p, r = index[:0], p[:0], r[:, :0]
     expansion, kept = _beside_slow(G, single, table)
+    omega = table.natural_frequency[table.index > 0]
     return ModalModel(
         arm=arm,
         rows=G.rows,
         x=G.x,
-        index=table.index[flexible],
-        natural_frequency=table.natural_frequency[flexible],
+        index=index,
+        natural_frequency=np.where(index > 0, omega[index - 1], abs(p[:, 0])),
         eigenvalues=p,
         residues=r[:-1],
         rigid=expansion[:, :2],
@@ -289,27 +289,33 @@ def proper(k: System, wanted: Output, share: float) -> Output:
     return wanted
 
 
-def _poles_and_residues(
-    arm: Arm,
-    table: Modes,
-    k: System,
-    wanted: list[Output],
-    share: float,
-    branches: Callable[[Modes], DampedModes],
-) -> tuple[Complex, Complex, Real, Real]:
-    """Eigenvalues (n, 2) and residues (outputs, n, 2) at them; single real ones (m,) and theirs (outputs, m)."""
-    none = np.empty(0), np.empty((len(wanted), 0))
+def _eigenvalues(arm: Arm, table: Modes) -> tuple[NDArray[np.int64], Complex, Real]:
+    """The mode of each pair (n,), 0 of one that is assigned to none, the pairs (n, 2), and single real ones (m,)."""
+    flexible = table.index > 0
     if arm.is_undamped:
-        s = 1j * table.natural_frequency[table.index > 0]
-        p = np.stack([s, s.conj()], axis=1)
-        if not arm.input_lags:
-            powers = np.array([[each.power] for each in wanted])
-            upper = undamped_residues(table, wanted, k, share) * s**powers / (2 * s)
-            return p, np.stack([upper, upper.conj()], axis=2), *none
-        single = np.array(single_zeros(table))  # of the motor's circuit
-    else:
-        damped = branches(table)
-        p, single = damped.eigenvalues[table.index > 0], np.r_[damped.single, entered(damped)]
+        return (
+            table.index[flexible],
+            1j * np.outer(table.natural_frequency[flexible], [1, -1]),
+            np.array(single_zeros(table)),
+        )
+    damped = damped_modes(table)
+    pairs, more = damped.eigenvalues[flexible], damped.unassigned_pairs
+    whole, rings = np.isfinite(pairs).all(axis=1), more[:, 0].imag > 0
+    halves = pairs[~whole & np.isfinite(pairs[:, 0]), 0].real
+    index = np.r_[table.index[flexible][whole], np.zeros(rings.sum(), np.int64)]
+    single = np.concatenate([damped.single, halves, more[~rings, 0].real, entered(damped)])
+    return index, np.concatenate([pairs[whole], more[rings]]), single
+
+
+def _residues(
+    table: Modes, k: System, wanted: list[Output], share: float, p: Complex, single: Real
+) -> tuple[Complex, Real]:
+    """Residues (outputs, n, 2) at pairs of eigenvalues (n, 2), and at single real ones (outputs, m)."""
+    none = np.empty((len(wanted), 0))
+    if table.arm.is_undamped and not single.size:
+        powers, s = np.array([[each.power] for each in wanted]), p[:, 0]
+        upper = undamped_residues(table, wanted, k, share)[:, : s.size] * s**powers / (2 * s)
+        return np.stack([upper, upper.conj()], axis=2), none
     residues, doubtful = end_residues(k, wanted, p.ravel(), share)
     if doubtful.any():
         residues[:, doubtful] = contour_residues(k, wanted, p.ravel()[doubtful], share)
@@ -318,8 +324,8 @@ def _poles_and_residues(
     residues[:, pair, 1] = residues[:, pair, 0].conj()
     residues[:, ~pair] = residues[:, ~pair].real
     if not single.size:
-        return p, residues, *none
-    apart = arm.is_undamped  # the circuit's pole alone, where the current is 0 over 0
+        return residues, none
     at = single.astype(complex)
-    alone = contour_residues(k, wanted, at, share) if apart else end_residues(k, wanted, at, share)[0]
-    return p, residues, single, alone.real.astype(float)
+    if table.arm.is_undamped:  # the circuit's pole alone, where the current is 0 over 0
+        return residues, contour_residues(k, wanted, at, share).real.astype(float)
+    return residues, end_residues(k, wanted, at, share)[0].real.astype(float)

@@ -234,66 +234,73 @@ HEIGHTS_LEFT = 1.5  # heights that a box reaches left: zeros further left die ou
 RIGHT_OF_AXIS = 0.1  # heights that a box reaches right at least: its edge is clear of zeros on the axis
 ABOVE_LAST = 1.05  # times the last zero known: up to there a box may reach half-way
 SAME_ZERO = 1e-7  # of its size: a zero that two searches found, one of them next to another zero
-NONE_LEFT: Complex = np.empty(0, complex)
 POINTS_A_ZERO = 8  # of a contour, to begin with, for each zero that it should hold: time alone
 
 
-def complete_box(f: Function, listed: Complex, others: Complex, C: float) -> tuple[Box, int, Complex]:
-    """The highest box in which the listed pairs are all the zeros of f, how many there are, and no more zeros.
+def is_among(zeros: Complex, others: Complex) -> NDArray[np.bool_]:
+    """Which of the zeros are one of the others, which another search found."""
+    away = abs(zeros[..., None] - others)
+    return np.asarray((away < SAME_ZERO * abs(zeros)[..., None]).any(axis=-1))
 
-    By winding number.  `others` are zeros known but not listed.  Where every box has zeros that are not listed it is
-    the highest, and those with Im s >= 0 are found in it.  Raises ConvergenceError if a box holds fewer zeros than are
-    listed.
+
+def complete_box(f: Function, listed: Complex, others: Complex, C: float) -> Box | None:
+    """The highest box in which the listed pairs are all the zeros of f, by winding number; None where there is none.
+
+    `others` are zeros known but not listed.
     """
-    known, mine = np.concatenate([listed, others])[:, 0], np.arange(len(listed) + len(others)) < len(listed)
-    known, mine = known[np.isfinite(known)], mine[np.isfinite(known)]
-    heights = _heights(known, mine, C)
+    known, heights = np.concatenate([listed, others])[:, 0], _heights(listed, others, C)
     low, high = 0, len(heights) - 1
-    best: tuple[Box, int] | None = None
+    best: Box | None = None
     while low <= high:
         middle = high if best is None and high == len(heights) - 1 else (low + high) // 2
         box = _box(float(heights[middle]), known, C)
         inside = int(box.holds(listed.ravel()).sum())
-        there = winding_number(f, box, points=FIRST_POINTS + POINTS_A_ZERO * inside)
+        try:
+            there = winding_number(f, box, points=FIRST_POINTS + POINTS_A_ZERO * inside)
+        except ConvergenceError:
+            return None
         if there < inside:
-            raise ConvergenceError(
-                f"{inside} eigenvalues listed in {tuple(box)}, but only {there} there", listed, there
-            )
+            return None
         if there == inside:
-            best, low = (box, inside), middle + 1
+            best, low = box, middle + 1
         else:
             high = middle - 1
-    if best is None:
-        all_listed = listed[np.isfinite(listed)]
-        box, found, more = filled_box(f, float(heights[-1]), all_listed, np.r_[all_listed, others.ravel()], C)
-        return box, found.size, more
-    return *best, NONE_LEFT
+    return best
 
 
-def filled_box(f: Function, height: float, listed: Complex, starts: Complex, C: float) -> tuple[Box, Complex, Complex]:
-    """A box of about that height, all zeros of f in it, and those of them with Im s >= 0 that are not `listed`.
+def filled_box(
+    f: Function, listed: Complex, others: Complex, height: float, starts: Complex, C: float
+) -> tuple[Box, Complex]:
+    """A box that goes above the listed pairs below that height, or so high where there are none, and all zeros in it.
 
     Raises ConvergenceError if they cannot all be found.
     """
     starts = starts[np.isfinite(starts)]
+    first = listed[:, 0]
+    top = first.imag[is_right(first, C) & (first.imag < height)].max(initial=0.0)
+    if top > 0:
+        height = float(top + min(others[:, 0].imag[others[:, 0].imag > top], default=ABOVE_LAST * top)) / 2
     found, box = complete(f, lambda tried: _box(tried, starts, C), height, starts)
-    inside = listed[box.holds(listed)]
-    is_listed = (abs(found[:, None] - inside) < SAME_ZERO * abs(found)[:, None]).any(axis=1)
-    if is_listed.sum() != inside.size:
-        raise ConvergenceError(f"{inside.size} eigenvalues listed in {tuple(box)}, {is_listed.sum()} found", found, 0)
-    return box, found, found[~is_listed & (found.imag >= 0)]
+    return box, found
 
 
-def _heights(known: Complex, is_listed: NDArray[np.bool_], C: float) -> Real:
+def is_right(zeros: Complex, C: float) -> NDArray[np.bool_]:
+    """Which zeros are right of where a box may reach; not those that are NaN."""
+    return np.asarray(zeros.real > (-TOWARD_SINGULAR / C if C else -np.inf))
+
+
+def _heights(listed: Complex, others: Complex, C: float) -> Real:
     """Heights between the zeros to the right of -1/C, ascending, below the first one that is not listed."""
-    right = known.real > -TOWARD_SINGULAR / C if C else np.ones(known.size, bool)
-    imag, mine = known.imag[right], is_listed[right]
+    known, mine = np.concatenate([listed, others])[:, 0], np.arange(len(listed) + len(others)) < len(listed)
+    right = is_right(known, C)
+    imag, mine = known.imag[right], mine[right]
     order = np.argsort(imag)
     imag, mine = imag[order], mine[order]
     stop = int(np.argmin(mine)) if not mine.all() else mine.size
     tops = np.r_[imag, imag[-1] * ABOVE_LAST if imag.size else 1.0 / C]
     bottoms = np.r_[0.0, imag]
-    return (0.5 * (bottoms + tops))[: stop + 1]
+    heights = (0.5 * (bottoms + tops))[: stop + 1]
+    return heights[heights > 0]
 
 
 def _box(height: float, known: Complex, C: float) -> Box:

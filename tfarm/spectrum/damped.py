@@ -1,4 +1,4 @@
-"""Damped modes: each undamped mode followed to the arm's own C, in a list complete in a printed box.
+"""Damped modes: every eigenvalue in a printed box, and which undamped mode it continues from.
 
 With C > 0 there are two families.  Bending modes become overdamped, and their slow real eigenvalues accumulate at -1/C,
 from the left only.  Shear is undamped in this model, so at any C infinitely many lightly damped modes remain, near
@@ -20,34 +20,26 @@ from tfarm.arm import Arm, Theory
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
-from tfarm.exact.characteristic import (
-    loop_parts,
-    quick_characteristics,
-)
+from tfarm.exact.characteristic import loop_parts
 from tfarm.exact.system import System
 from tfarm.records import record
 
-from .box import TOWARD_SINGULAR, Box, complete_box, filled_box
-from .continuation import BELIEVED_SHARE, Member, Node, follow, improved
+from .box import TOWARD_SINGULAR, Box, complete_box, filled_box, is_among
 from .frequencies import LISTS_KEPT
+from .naming import LOST, function_of, named
 from .proofs import Disc, disjoint, enclosed, proven_count
 from .shapes import mode_field
 from .table import Modes, first_frequency, modes
 
-COMPANY = (6, 11, 17, 29)  # modes followed beyond those wanted, lest the last be led astray: the next if that fails
-FEWER_MODES = (300, 150, 60, 20, 5, 1)  # that are tried where more are asked for, or not all can be followed
-LITTLE = (2, *COMPANY)  # where many C are met and more modes than matter are followed anyway
-MANY_MODES = 30  # of more one number in company is tried, as each step takes long
+COMPANY = 6  # modes named beyond those wanted: below them a box may end
+MOST_MODES = 300  # of a damped table
 BESIDE_DISC = 1e-12  # how far a listed eigenvalue may be from its disc, of its size (more beside its own partner)
-FIRST_STEP_IN_C = 0.01  # the first step in C, over 1/w of the highest mode
-FIRST_SHARE = 1e-3  # of all damping; of the lowest frequency, what a zero that friction makes may be: it is known there
 SLOWEST, REAL_POINTS = 1e-6, 300  # of the lowest frequency, and how many: signs read on the negative real axis
 DRIVE_PARTS = {"friction": "hub friction", "back_emf": "back-EMF", "lag": "electrical pole"}  # what may set a zero
 NOT_ASSIGNED = "not assigned"
 LEAST_INFLUENCE = 0.3  # |d ln s/d ln p| of a part p that an eigenvalue is named after: it is 1/2 where two share it
 PART_STEP = Fraction(1, 10_000)  # of a part, for differences: float64 has D to 1e-15 of its terms
-MOST_NAMED = 3  # eigenvalues in the text of an error
-LAST_STEPS = 3  # of Newton's method from zeros right to SETTLED_CORRECTION: all digits, and once more
+PLAIN_SHARE = 0.2  # how far an eigenvalue may be from the frequency it is named after, in distances to the next one
 
 
 class Unassigned(NamedTuple):
@@ -186,33 +178,29 @@ class DampedModes:
 
 
 def damped_modes(undamped: Modes) -> DampedModes:
-    """The modes of the arm with its own C, continued from the undamped ones as far as that can be followed.
+    """The modes of the arm with its own C, and every eigenvalue of a box that goes up to half-way to the next mode.
 
-    Eigenvalues in the box that continue from no mode for certain are listed as `unassigned`.  Of more than 300 modes,
-    or where a box cannot be searched, the record holds fewer than are asked for, and `left_out` is how many are
-    missing.  Raises ConvergenceError where neither the first mode can be followed nor its box searched.
+    Eigenvalues in the box that continue from no mode for certain are listed as `unassigned`.  Of more than 300 modes of
+    a damped arm, or where a box cannot be searched, the record holds fewer than are asked for, and `left_out` is how
+    many are missing.  Raises ConvergenceError where not even the box of the first mode can be searched.
     """
     if not isinstance(undamped, Modes):
         raise ParameterError(key="modes", value=undamped, remedy="give what tfarm.modes returns")
-    asked, lost, found = int(undamped.index.max()), None, None
-    for count in sorted({asked, *FEWER_MODES}, reverse=True):
-        if count > asked or (count > FEWER_MODES[0] and not undamped.arm.is_undamped):
-            continue
-        some = undamped if count == asked else modes(undamped.arm, count, theory=undamped.theory)
-        try:
-            found = _listed(some, COMPANY if count == asked <= MANY_MODES else COMPANY[:1])
-        except ConvergenceError as error:
-            lost = error
-            continue
-        break
-    if found is not None and (found.undamped == undamped or asked > FEWER_MODES[0]):
-        return replace(found, left_out=asked - int(found.index.max()))
+    asked = int(undamped.index.max())
+    count = asked if undamped.arm.is_undamped else min(asked, MOST_MODES)
+    found = _searched_once(undamped.arm, undamped.theory, count)
+    return replace(found, left_out=asked - int(found.index.max()))
+
+
+@lru_cache(maxsize=LISTS_KEPT)  # loops, plants and simulations of one page ask for the same modes some ninety times
+def _searched_once(arm: Arm, theory: Theory, count: int) -> DampedModes:
+    """So many modes of an arm, or half as many where their box cannot be searched."""
     try:
-        return searched(undamped, found)
+        return _searched(modes(arm, count, theory=theory))
     except ConvergenceError:
-        if found is None:
-            raise lost or AssertionError from None
-        return replace(found, left_out=asked - int(found.index.max()))
+        if count == 1:
+            raise
+        return _searched_once(arm, theory, count // 2)
 
 
 def damped_at_hub(arm: Arm, count: int) -> DampedModes | None:
@@ -230,126 +218,36 @@ def damped_at_hub(arm: Arm, count: int) -> DampedModes | None:
         return None
 
 
-def all_damped_modes(undamped: Modes, companies: tuple[int, ...] = COMPANY) -> DampedModes:
-    """All of the modes with the arm's own C, followed with so many more beside them: the next number if one fails.
-
-    Raises ConvergenceError if a branch is lost, or an eigenvalue belongs to no mode.
-    """
-    return _all_assigned(_listed(undamped, companies))
-
-
-def _listed(undamped: Modes, companies: tuple[int, ...]) -> DampedModes:
-    """`Branches.listed`, once for each arm."""
-    found = _followed_once(undamped.arm, undamped.theory, int(undamped.index.max()), companies)
-    if isinstance(found, ConvergenceError):
-        raise found.with_traceback(None)  # else the frames of every search for it stay
-    return found if found.undamped == undamped else Branches(companies).listed(undamped)
-
-
-def _all_assigned(damped: DampedModes) -> DampedModes:
-    if damped.unassigned:
-        names = ", ".join(f"{each.eigenvalue:.6g} 1/s ({each.origin})" for each in damped.unassigned[:MOST_NAMED])
-        raise ConvergenceError(f"eigenvalues of no mode: {names}", damped, len(damped.unassigned))
-    return damped
-
-
-@lru_cache(maxsize=LISTS_KEPT)  # loops, plants and simulations of one page ask for the same modes some ninety times
-def _followed_once(arm: Arm, theory: Theory, count: int, companies: tuple[int, ...]) -> DampedModes | ConvergenceError:
-    """All damped modes of an arm's own table of `count`, or why they cannot be followed: that takes longest."""
-    try:
-        return Branches(companies).listed(modes(arm, count, theory=theory))
-    except ConvergenceError as error:
-        return error.with_traceback(None)
-
-
-class Branches:
-    """`all_damped_modes` of one arm with this C and that: each is followed on from the nearest smaller C that was met.
-
-    A branch that was lost at one C is not sought again beyond it.  `companies`: how many modes are followed beside
-    those wanted, the next number where one fails.
-    """
-
-    def __init__(self, companies: tuple[int, ...] = COMPANY) -> None:
-        self.companies = companies
-        self._met: dict[tuple[int, int], list[Node]] = {}
-        self._lost: dict[tuple[int, int], tuple[float, ConvergenceError]] = {}
-
-    def __call__(self, undamped: Modes) -> DampedModes:
-        """The modes with the C of this table's arm.  Raises ConvergenceError as `all_damped_modes` does."""
-        return _all_assigned(self.listed(undamped))
-
-    def listed(self, undamped: Modes) -> DampedModes:
-        """The modes with the C of this table's arm, and what of their box is of no mode."""
-        k = undamped.system
-        flexible, alone = int((undamped.index > 0).sum()), len(single_zeros(undamped))
-        zeros = self._followed(undamped, flexible + alone)
-        listed, company = zeros[: flexible + alone], zeros[flexible + alone :]
-        box, count, more = complete_box(member(k).function, listed, company, k.damping)
-        single = listed[:alone]
-        kept = np.isnan(single[:, 1]) & (single[:, 0].imag == 0)  # not what rings or has met another real one
-        free, pairs = np.r_[single[~kept].ravel(), more], listed[alone:].copy()
-        if free.size:  # then the drive's own zeros may have taken the places of modes
-            led = np.array([any(origin_of(k, each) != NOT_ASSIGNED for each in pair) for pair in pairs.tolist()])
-            free, pairs[led] = np.r_[free, pairs[led].ravel()], complex(np.nan, np.nan)
-        resisted = int(bool(alone) and k.at_rest == 1)
-        rigid = np.zeros((undamped.index.size - flexible, 2), complex)
-        rigid[:, 1] = np.where(kept[:resisted], single[:resisted, 0], np.nan) if resisted else 0.0
-        others = tuple(float(each) for each in single[resisted:][kept[resisted:], 0].real)
-        eigenvalues, unassigned = np.concatenate([rigid, pairs]), _with_origins(k, free)
-        return DampedModes(undamped, eigenvalues, box, count + k.at_rest, others=others, unassigned=unassigned)
-
-    def _followed(self, undamped: Modes, wanted: int) -> Complex:
-        """The zeros that the first modes, and those in their company, arrive at."""
-        k = undamped.system
-        C = level_of(k)
-        lost: ConvergenceError | None = None
-        for company in self.companies:
-            key = wanted, company
-            if key in self._lost and self._lost[key][0] <= C:
-                lost = self._lost[key][1]
-                continue
-            met = self._met.get(key) or [_first_node(undamped, wanted + company, C)]
-            start = sorted((node for node in met if node.at <= C), key=lambda node: node.at)[-1]
-            first = C - start.at if len(met) > 1 else min(C, FIRST_STEP_IN_C / abs(start.zeros[-1, 0]))
-            try:
-                nodes = follow(lambda level: member(k.with_damping(level / C if C else 0.0)), start, C, first, wanted)
-            except ConvergenceError as error:
-                lost = error
-                self._lost[key] = C, error
-                continue
-            self._met[key] = [*met, *nodes[1:]] if undamped.arm.is_uniform else []  # one C is not all there is
-            return nodes[-1].zeros if C == 0 else polished(member(k), nodes[-1].zeros)
-        assert lost is not None
-        raise lost
-
-
-def searched(undamped: Modes, followed: DampedModes | None) -> DampedModes:
-    """All eigenvalues in a box up to half-way to the next mode, by search: no branch needs to be followed.
-
-    Modes of `followed` keep theirs; another has the one that is much nearer to its own i w than any other is to either.
-    Raises ConvergenceError where the search does not end.
-    """
-    k, asked = undamped.system, int(undamped.index.max())
-    omega = modes(undamped.arm, asked + 1, theory=undamped.theory).natural_frequency[-asked - 1 :]
-    eigenvalues = np.full((undamped.index.size, 2), complex(np.nan, np.nan))
-    eigenvalues[undamped.index == 0] = [0.0, np.nan if k.at_rest == 1 else 0.0]
-    single = np.array(single_zeros(undamped))
-    if followed is not None:
-        eigenvalues[: len(followed.index)], single = followed.eigenvalues, followed.single
-    listed = np.r_[eigenvalues[undamped.index > 0].ravel(), [] if followed is None else single]
-    listed = listed[np.isfinite(listed)]
-    starts = np.r_[listed, 1j * omega, -1j * omega, single]
-    box, found, more = filled_box(member(k).function, float(omega[-2:].mean()), listed, starts, k.damping)
-    for row in np.flatnonzero(np.isnan(eigenvalues[:, 0])):
-        mode = int(undamped.index[row]) - 1
-        if (near := _plainly(omega, mode, found, more)) is not None:
-            eigenvalues[row], more = [near, near.conjugate()], more[more != near]
-    others: tuple[float, ...] = ()
-    if followed is not None:
-        others, beyond = followed.others, followed.unassigned_pairs[:, 0]
-        more = np.r_[more, beyond[~box.holds(beyond)]]
-    count = found.size + k.at_rest
-    return DampedModes(undamped, eigenvalues, box, count, others=others, unassigned=_with_origins(k, more))
+def _searched(undamped: Modes) -> DampedModes:
+    """All eigenvalues in a box, under the names that they have for certain."""
+    k, count, function = undamped.system, int(undamped.index.max()), function_of(undamped.system)
+    single, every = named(undamped, count + COMPANY)
+    pairs, company = every[:count], every[count:]
+    listed = np.concatenate([np.stack([single, np.full(single.size, LOST)], axis=1), pairs])
+    box = complete_box(function, listed, company, k.damping) if np.isfinite(listed[:, 0]).all() else None
+    inside, free = int(box.holds(listed).sum()) if box else 0, single[single.imag != 0]
+    lost = np.flatnonzero(np.isnan(pairs[:, 0]))
+    if box is None:
+        omega = modes(undamped.arm, count + 1, theory=undamped.theory).natural_frequency[-count - 1 :]
+        starts = np.r_[listed.ravel(), company.ravel(), 1j * omega, -1j * omega]
+        box, found = filled_box(function, listed, company, float(omega[-2:].mean()), starts, k.damping)
+        for zeros in (single, pairs):
+            zeros[box.holds(zeros) & ~is_among(zeros, found)] = LOST
+        more = found[(found.imag >= 0) & ~is_among(found, np.r_[single, pairs.ravel()])]
+        inside, free = found.size, np.r_[free, more]
+    if free.size:  # then the drive's own zeros may have taken the places of modes
+        led = np.array([any(origin_of(k, s) != NOT_ASSIGNED for s in pair[np.isfinite(pair)]) for pair in pairs])
+        free, pairs[led] = np.r_[free, pairs[led].ravel()], LOST
+    for row in lost.tolist():
+        if (near := _plainly(omega, row, found, free)) is not None:
+            pairs[row], free = [near, near.conjugate()], free[free != near]
+    single = np.where(single.imag == 0, single.real, np.nan)
+    resisted = int(bool(single.size) and k.at_rest == 1)
+    rigid = np.zeros((undamped.index.size - count, 2), complex)
+    rigid[:, 1] = single[0] if resisted else 0.0
+    others = tuple(each for each in single[resisted:].tolist() if np.isfinite(each))
+    eigenvalues, unassigned = np.concatenate([rigid, pairs]), _with_origins(k, free)
+    return DampedModes(undamped, eigenvalues, box, inside + k.at_rest, others=others, unassigned=unassigned)
 
 
 def _plainly(omega: Real, mode: int, found: Complex, free: Complex) -> complex | None:
@@ -360,7 +258,7 @@ def _plainly(omega: Real, mode: int, found: Complex, free: Complex) -> complex |
     start, near = 1j * omega[mode], complex(ringing[np.argmin(abs(ringing - 1j * omega[mode]))])
     rest = found[found != near]
     apart = [*abs(np.delete(omega, mode) - omega[mode]), *abs(rest - near), *abs(rest - start)]
-    return near if abs(near - start) < BELIEVED_SHARE * min(apart) else None
+    return near if abs(near - start) < PLAIN_SHARE * min(apart) else None
 
 
 def _with_origins(k: System, zeros: Complex) -> tuple[Unassigned, ...]:
@@ -376,10 +274,10 @@ def origin_of(k: System, s: complex) -> str:
     s^2 = -K^2/(J L_a) that of either 1/2; of a mode it is no more than the loss there does to its frequency.
     """
     at, found = np.array([s]), []
-    here = member(k).function(at)
+    here = function_of(k)(at)
     for part, name in DRIVE_PARTS.items():
         larger = k.drive._replace(**{part: getattr(k.drive, part) * (1 + PART_STEP)})
-        there = member(replace(k, drive=larger)).function(at)
+        there = function_of(replace(k, drive=larger))(at)
         change = there.value * np.exp(there.scale - here.scale) - here.value
         if abs(change[0] / (here.slope[0] * s)) > LEAST_INFLUENCE * PART_STEP:
             found.append(name)
@@ -403,47 +301,9 @@ def entered(damped: DampedModes) -> Real:
         drive, _, scale = loop_parts(k, s + 0j)
         return np.asarray((drive * np.exp(1j * scale.imag)).real)
 
-    known = np.sort(-np.r_[damped.eigenvalues[damped.is_overdamped].real.ravel(), damped.single])
+    alone = damped.unassigned_pairs[:, 0]
+    overdamped = damped.eigenvalues[damped.is_overdamped].real.ravel()
+    known = np.sort(-np.r_[overdamped, damped.single, alone[alone.imag == 0].real])
     sides, passed = np.sign(signed(at)), np.searchsorted(known, -at)
     new = np.flatnonzero((sides[1:] * sides[:-1] < 0) & (np.diff(passed) == 0))
     return np.array([brentq(lambda s: float(signed(np.array([s]))[0]), at[n + 1], at[n], xtol=1e-300) for n in new])
-
-
-def level_of(k: System) -> float:
-    """How far a system's damping is from none: its C [s], 1 s where it is damped otherwise, 0 where it is not."""
-    return 0.0 if k.is_undamped else k.damping or 1.0
-
-
-def single_zeros(undamped: Modes, share: float = 1.0) -> list[float]:
-    """Real eigenvalues [1/s] that no flexible mode goes over into, under a share of the damping: -b/J, and -R/L_a."""
-    k = undamped.system
-    friction = float((k.drive.friction + k.drive.back_emf) * k.EI / k.length)
-    turning = [-share * friction / undamped.arm.total_inertia] if k.at_rest == 1 else []
-    return turning + ([-1.0 / float(k.drive.lag)] if k.drive.lag else [])
-
-
-def _first_node(undamped: Modes, count: int, level: float) -> Node:
-    """Where the way begins: at no damping, or at so little that what friction makes of the zeros at 0 is apart."""
-    alone = single_zeros(undamped)
-    more = modes(undamped.arm, count - len(alone), theory=undamped.theory)
-    omega = more.natural_frequency[more.index > 0]
-    node = Node(0.0, np.stack([1j * omega, -1j * omega], 1))
-    if not alone:
-        return node
-    share = min(FIRST_SHARE, FIRST_SHARE * abs(node.zeros[0, 0] / alone[0]))
-    single = np.array([[zero, np.nan] for zero in single_zeros(undamped, share)], dtype=complex)
-    start = member(undamped.system.with_damping(share))
-    return Node(share * level, polished(start, np.concatenate([single, node.zeros])))
-
-
-def member(k: System) -> Member:
-    """The characteristic function without its zeros at the origin, to be followed."""
-    singular = -1.0 / k.damping if k.damping else -np.inf
-    return Member(lambda s: quick_characteristics(k, s, k.at_rest), singular)
-
-
-def polished(last: Member, zeros: Complex) -> Complex:
-    """Every zero to the last digits that float64 has of it."""
-    for _ in range(LAST_STEPS):
-        zeros, _ = improved(last, zeros)
-    return zeros

@@ -15,25 +15,32 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.errors import ConvergenceError
 
 PAST = 4  # values through which predictions go
 MOST_AHEAD = 64  # values predicted at once, at most: memory and time alone
+MOST_DISTANCES = 4_000_000  # between roots at these values: memory alone
 FIRST_STEP = 1e-4  # of the first step: how far the first value is that tells the slopes
 PLAIN_MOVE = 0.1  # of the distance to the next root: one that is off its prediction by less is itself
 PLAIN_IN_COUPLE = 0.2  # the same, of the distance to the other one of two that meet or part
-MOST_HALVINGS = 600  # of steps on the way: a branch that meets the axis takes some 40
 ENDS_BEFORE = 0.05  # of its size: a real root so near to a singular point, right of it, ends there
+JUMP = 0.5  # of its size: a root that is not found nearer, however short the step, is lost
+SAME_ROOT = 1e-9  # of its size: two so near each other are one
 TURNED = 0.5  # of a right angle's cosine: below it the two of a couple have met between two values
 
 
 class Family(Protocol):
-    """What is followed: `least_step` is the shortest step, as a share of the way; `blur` a distance that is none."""
+    """What is followed: `least_step` is the shortest step, as a share of the way, `blur` a distance that is none.
+
+    `most_halvings` of steps are made; a branch that meets the axis takes some 40.  Where no more than the share `alone`
+    of the roots is stray these are followed alone in shorter steps.
+    """
 
     least_step: float
+    most_halvings: int
+    alone: float
     blur: float
 
     def near(self, values: Real, guess: Complex) -> Complex:
@@ -55,36 +62,56 @@ class Family(Protocol):
 def follow(family: Family, values: Real, start: Complex) -> Complex:
     """Return the roots (n, b) at each of the values (n,), from those at the first; NaN from where one is lost.
 
-    A root is lost where it comes to a singular point, and where it is none of the family's complete set.  Raises
-    ConvergenceError where too many steps would have to be halved.
+    A root is lost where it comes to a singular point, and where it is next to none of the family's complete set.
+    Raises ConvergenceError where too many steps would have to be halved, with the last value and the roots there, and
+    which of them are stray.
     """
     rows = np.full((values.size, start.size), np.nan, complex)
     rows[0], past, span = start, [(float(values[0]), start)], abs(values[-1] - values[0])
     ahead = [(float(value), n) for n, value in enumerate(values)][:0:-1]
     ahead.append((past[0][0] + FIRST_STEP * (ahead[-1][0] - past[0][0]), 0))
-    many, halvings = 1, 0
+    many, halvings, most = 1, 0, max(1, min(MOST_AHEAD, MOST_DISTANCES // start.size**2))
     while ahead:
         block = ahead[-many:][::-1]
         at, last = np.array([value for value, _ in block]), past[-1][1]
         guess = predicted(np.array([value for value, _ in past]), np.array([row for _, row in past]), at, last)
         found = corrected(family, at, guess, last)
-        plain = is_plain(family, at, guess, found)
+        are_plain = which_plain(family, at, guess, found, last)
+        plain = are_plain.all(axis=1)
         good = len(block) if plain.all() else int(np.argmin(plain))
+        if not good and len(block) == 1 and np.mean(~are_plain[0]) <= family.alone:
+            stray = beside(~are_plain[0], last)
+            try:
+                found[0, stray] = follow(family, np.array([past[-1][0], at[0]]), last[stray])[1]
+            except ConvergenceError as lost:
+                raise ConvergenceError(str(lost), past[-1], stray) from None
+            good = int(not (distances(found[0]).min(axis=1) <= SAME_ROOT * abs(found[0])).any())
         if not good and len(block) == 1:
             if abs(at[0] - past[-1][0]) > family.least_step * span:
                 ahead.append(((past[-1][0] + float(at[0])) / 2, 0))
                 halvings += 1
-                if halvings > MOST_HALVINGS:
-                    raise ConvergenceError(f"branches cannot be told apart beyond {past[-1][0]:.10g}", past[-1], at[0])
+                if halvings > family.most_halvings:
+                    text = f"branches cannot be told apart beyond {past[-1][0]:.10g}"
+                    raise ConvergenceError(text, past[-1], ~are_plain[0])
             else:
-                found, good = assigned(family, float(at[0]), guess[0])[None], 1
-        many = min(2 * many, MOST_AHEAD) if good == len(block) else max(1, good)
+                near, good = assigned(family, float(at[0]), guess[0]), 1
+                found = np.where((abs(near - last) > JUMP * abs(last)) & (last != 0), np.nan, near)[None]
+        many = min(2 * many, most) if good == len(block) else max(1, good)
         del ahead[len(ahead) - good :]
         for (value, n), row in zip(block[:good], found[:good], strict=True):
             if n:
                 rows[n] = row
             past = [*past, (value, np.where(is_over(family, value, row), np.nan, row))][-PAST:]
     return rows
+
+
+def beside(stray: NDArray[np.bool_], last: Complex) -> NDArray[np.bool_]:
+    """These roots, and of each couple and conjugate pair the other one."""
+    both, (first, second) = stray.copy(), couples(last)
+    both[first] |= stray[second]
+    both[second] |= stray[first]
+    mirrored = (last[:, None] == last[stray].conj()).any(axis=1)
+    return both | mirrored
 
 
 def between(family: Family, values: Real, rows: Complex, wanted: Real) -> Complex:
@@ -99,7 +126,7 @@ def between(family: Family, values: Real, rows: Complex, wanted: Real) -> Comple
         here, near = np.flatnonzero(right == n), slice(low, low + PAST)
         guess = predicted(values[near], rows[near], wanted[here], rows[n - 1])
         found[here] = corrected(family, wanted[here], guess, rows[n - 1])
-        for each in here[~is_plain(family, wanted[here], guess, found[here])]:
+        for each in here[~which_plain(family, wanted[here], guess, found[here], rows[n - 1]).all(axis=1)]:
             found[each] = follow(family, np.array([values[n - 1], wanted[each]]), rows[n - 1])[1]
     return found
 
@@ -113,6 +140,8 @@ def is_over(family: Family, value: float, row: Complex) -> NDArray[np.bool_]:
 
 def assigned(family: Family, value: float, guess: Complex) -> Complex:
     """The complete set at a value in the order of the guesses (b,); NaN where there are fewer."""
+    from scipy.optimize import linear_sum_assignment  # takes half a second to load, and few branches come here
+
     every = family.complete(value, guess)
     alive = np.flatnonzero(~np.isnan(guess))
     rows, columns = linear_sum_assignment(abs(guess[alive, None] - every))
@@ -126,9 +155,10 @@ def predicted(at: Real, rows: Complex, wanted: Real, base: Complex) -> Complex:
     own = np.eye(at.size, dtype=bool)
     ratios = (wanted[:, None, None] - at) / np.where(own, 1.0, at[:, None] - at)
     weights = np.where(own, 1.0, ratios).prod(axis=2)
-    guess = weights @ rows
+    guess = weights @ np.where((rows.imag == 0) == (base.imag == 0), rows, np.nan)  # what it was before it met another
     first, second = couples(base)
     mean, half = (rows[:, first] + rows[:, second]) / 2, (rows[:, first] - rows[:, second]) / 2
+    mean = np.where((mean.imag == 0) == ((base[first] + base[second]).imag == 0), mean, np.nan)
     apart = (base[first] - base[second]) / 2
     root = np.sqrt(weights @ (half * half))
     way = (root * apart.conj()).real
@@ -156,10 +186,10 @@ def corrected(family: Family, values: Real, guess: Complex, base: Complex) -> Co
     partner = np.arange(base.size)
     first, second = couples(np.where(base.imag == 0, base, np.nan))
     partner[first], partner[second] = second, first
-    lower, upper = np.flatnonzero(base.imag < 0), np.flatnonzero(base.imag > 0)
-    if lower.size:
-        partner[lower] = upper[abs(base[lower].conj()[:, None] - base[upper]).argmin(axis=1)]
-    is_lower = guess.imag < 0
+    mirrors = (base[:, None] == base.conj()) & (base.imag < 0)[:, None]
+    lower, upper = np.nonzero(mirrors)
+    partner[lower] = upper
+    is_lower = (guess.imag < 0) & (partner != np.arange(base.size))
     found = family.near(values, np.where(is_lower, np.nan, guess))
     return np.where(is_lower, found[:, partner].conj(), found)
 
@@ -172,8 +202,11 @@ def distances(row: Complex) -> Real:
     return np.asarray(away)
 
 
-def is_plain(family: Family, values: Real, guess: Complex, found: Complex) -> NDArray[np.bool_]:
-    """At which of the values every root is next to its prediction, compared with the distance to any other."""
+def which_plain(family: Family, values: Real, guess: Complex, found: Complex, base: Complex) -> NDArray[np.bool_]:
+    """Which of the roots (m, b) are next to their prediction, compared with the distance to any other.
+
+    To its mirror image too, of one that has none in the base (b,).
+    """
     away, moved = distances(found), abs(found - guess)
     nearest = away.argmin(axis=2)[..., None]
     own = np.take_along_axis(away, nearest, 2)[..., 0]
@@ -182,8 +215,10 @@ def is_plain(family: Family, values: Real, guess: Complex, found: Complex) -> ND
     room = away.min(axis=2, initial=np.inf)
     for point in family.singular(values).T:
         room = np.minimum(room, abs(found - point[:, None]))
+    has_mirror = (base[:, None] == base.conj()).any(axis=1) | (base.imag == 0)
+    room = np.where(has_mirror, room, np.minimum(room, 2 * np.minimum(abs(found.imag), abs(base.imag))))
     near = (moved <= np.where(is_couple, PLAIN_IN_COUPLE, PLAIN_MOVE) * own) & (
         np.sign(found.imag) == np.sign(guess.imag)
     )
     same = (near | (guess == 0) | (found == 0)) & (moved <= PLAIN_MOVE * room)
-    return np.asarray((np.isnan(guess) | same | (moved <= family.blur)).all(axis=1))
+    return np.asarray(np.isnan(guess) | same | (moved <= family.blur))

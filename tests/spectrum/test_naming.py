@@ -1,0 +1,94 @@
+"""Roots followed on functions whose roots are known, and whole pairs made of what they arrive at."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from tfarm.errors import ConvergenceError
+from tfarm.spectrum.following import follow
+from tfarm.spectrum.naming import LOST, in_pairs
+
+
+@dataclass
+class Known:
+    """A family whose roots at each value are known; what is next to a guess is the nearest of them."""
+
+    roots: object
+    most_halvings: int = 200
+
+    least_step = 1e-9
+    blur = alone = 0.0
+
+    def near(self, values, guess):
+        found = guess.copy()
+        for row, value in zip(found, values, strict=True):
+            known = np.asarray(self.roots(value), complex)
+            alive = np.flatnonzero(~np.isnan(row))
+            real = known[known.imag == 0]
+            for n in alive:
+                of = real if row[n].imag == 0 else known
+                row[n] = of[abs(of - row[n]).argmin()] if of.size else np.nan
+        return found
+
+    def complete(self, value, guess):
+        return np.asarray(self.roots(value), complex)
+
+    def singular(self, values):
+        return np.empty((values.size, 0))
+
+
+def oscillators(omega):
+    """Roots of s^2 + t w^2 s + w^2 = 0 for each w."""
+
+    def roots(t):
+        half = t * omega**2 / 2
+        root = np.sqrt((half**2 - omega**2).astype(complex))
+        return np.stack([-half + root, -half - root], axis=1).ravel()
+
+    return roots
+
+
+@pytest.mark.parametrize("stop", [0.03, 0.21, 1.1, 5.0])
+def test_oscillators_are_followed_into_overdamping(stop):
+    """In the order in which they began, whatever lies between."""
+    roots = oscillators(np.array([1.0, 1.7, 4.0, 9.0]))
+    found = follow(Known(roots), np.array([0.0, stop]), roots(0.0))[1].reshape(-1, 2)
+    expected = roots(stop).reshape(-1, 2)
+    np.testing.assert_allclose(found.sum(axis=1), expected.sum(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(found.prod(axis=1), expected.prod(axis=1), rtol=1e-12)
+
+
+def test_what_jumps_is_lost_and_the_others_are_kept():
+    """Past too many halvings with the last roots in hand, and which of them are stray; else NaN."""
+
+    def roots(t):
+        return np.array([-1 + 2j, -1 - 2j, -3.0, (-50.0 if t > 0.37 else -9.0)])
+
+    found = follow(Known(roots), np.array([0.0, 1.0]), roots(0.0))[1]
+    np.testing.assert_array_equal(found[:3], roots(1.0)[:3])
+    assert np.isnan(found[3])
+    with pytest.raises(ConvergenceError, match=r"beyond 0\.3") as told:
+        follow(Known(roots, most_halvings=5), np.array([0.0, 1.0]), roots(0.0))
+    np.testing.assert_array_equal(told.value.best[1], roots(0.0))
+    assert told.value.residual[3]
+
+
+RINGS, OTHER = -2 + 5j, -2 - 5j
+
+
+@pytest.mark.parametrize(
+    ("single", "pairs", "expected_single", "expected"),
+    [
+        ([], [[-1, RINGS]], [], [[RINGS, OTHER]]),  # the fast zero has met one that nobody follows
+        ([OTHER], [[-7, RINGS]], [-7], [[RINGS, OTHER]]),
+        ([], [[-1, RINGS], [OTHER, -30]], [], [[-1, -30], [RINGS, OTHER]]),
+        ([], [[-1, RINGS], [OTHER, -9 + 4j]], [], [[-9 + 4j, -9 - 4j], [RINGS, OTHER]]),
+        ([], [[-30, -1]], [], [[-1, -30]]),
+        ([], [[LOST, -1], [OTHER, RINGS]], [], [[-1, LOST], [RINGS, OTHER]]),
+    ],
+)
+def test_zeros_that_ring_are_a_pair(single, pairs, expected_single, expected):
+    found = in_pairs(np.array(single, complex), np.array(pairs, complex))
+    np.testing.assert_array_equal(found[0], np.array(expected_single, complex))
+    np.testing.assert_array_equal(found[1], np.array(expected, complex))

@@ -1,0 +1,151 @@
+"""Which mode an eigenvalue is of: each undamped one is followed as all damping grows from none to what it is.
+
+A search finds the eigenvalues, and this only their names (`damped`): where a step is not plain, one may be lost or
+come to a neighbour's place.  A damped Timoshenko beam has a third, real zero for each bending wave, coming from
+s = -inf as C grows from 0.  It meets the fast zero of the overdamped mode; together they ring again, in shear.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tfarm.arrays import Complex, Real
+from tfarm.errors import ConvergenceError
+from tfarm.exact.characteristic import quick_characteristics
+from tfarm.exact.system import System
+
+from .box import REAL_SHARE, Function, newton
+from .following import follow
+from .table import Modes, modes
+
+FIRST_SHARE = 1e-3  # of all damping, or less: there an undamped mode has hardly moved
+NEWTON_STEPS = 8  # from a guess right to some digits: what has not settled then is followed in shorter steps
+SETTLED = 1e-10  # of its size: one step more is taken where Newton's method still moves a zero by this
+DECADES = 3  # of the share at a time: the shortest step is a share of these
+HALVINGS = (250, *[80] * 8)  # of steps until those that are stray are lost, and the others followed alone
+AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])  # starts next to a guess, of it
+NEAR_REAL = 1e-7  # of its size: the imaginary part of a double zero is rounding
+LOST = complex(np.nan, np.nan)
+
+
+def function_of(k: System) -> Function:
+    """The characteristic function without its zeros at the origin."""
+    return lambda s: quick_characteristics(k, s, k.at_rest)
+
+
+def settled(function: Function, guess: Complex) -> Complex:
+    """The zero next to each of the guesses (n,) by Newton's method, a real one of a real guess; NaN where none is."""
+    s, still = guess.copy(), ~np.isnan(guess)
+    with np.errstate(all="ignore"):
+        for _ in range(NEWTON_STEPS):
+            if not still.any():
+                break
+            there = function(s[still])
+            move = there.value / there.slope
+            s[still] -= np.where(s[still].imag == 0, move.real, move)
+            still[still] = ~(abs(move) <= SETTLED * abs(s[still]))
+    return np.where(still | ~np.isfinite(s), LOST, s)
+
+
+@dataclass
+class Damping:
+    """The eigenvalues of a system with a share of all its damping, s times that share of `level` [s].
+
+    In these units one next to -1/C hardly moves as the share grows, and all are 0 where it is.
+    """
+
+    k: System
+    level: float
+    most_halvings: int
+
+    least_step = 1e-7
+    blur = 0.0
+    alone = 0.15
+
+    def near(self, values: Real, guess: Complex) -> Complex:
+        """As `following` wants it."""
+        units = values * self.level
+        systems = [self.k.with_damping(float(share)) for share in values]
+        found = [settled(function_of(k), row / unit) for k, row, unit in zip(systems, guess, units, strict=True)]
+        return np.array(found) * units[:, None]
+
+    def complete(self, value: float, guess: Complex) -> Complex:
+        """Those next to the guesses; the mirror image only of one that a guess below the real axis is next to."""
+        unit, wanted = value * self.level, guess[~np.isnan(guess)]
+        starts = np.outer(wanted[wanted.imag >= 0] / unit, AROUND).ravel()
+        with np.errstate(all="ignore"):
+            found = newton(function_of(self.k.with_damping(value)), starts) * unit
+        found = np.where(abs(found.imag) < NEAR_REAL * abs(found), found.real, found)
+        upper, lower = found[found.imag > 0], wanted[wanted.imag < 0].conj()
+        away = abs(upper[:, None] - lower).min(axis=1, initial=np.inf)
+        return np.r_[found[found.imag >= 0], upper[away < abs(AROUND[-1] - 1) * abs(upper)].conj()]
+
+    def singular(self, values: Real) -> Real:
+        """-1/C of the damped segments in these units."""
+        return np.tile(np.array(self.k.singular) * self.level, (values.size, 1))
+
+
+def single_zeros(undamped: Modes, share: float = 1.0) -> list[float]:
+    """Real eigenvalues [1/s] that no flexible mode goes over into, under a share of the damping: -b/J, and -R/L_a."""
+    k = undamped.system
+    friction = float((k.drive.friction + k.drive.back_emf) * k.EI / k.length)
+    turning = [-share * friction / undamped.arm.total_inertia] if k.at_rest == 1 else []
+    return turning + ([-1.0 / float(k.drive.lag)] if k.drive.lag else [])
+
+
+def named(undamped: Modes, count: int) -> tuple[Complex, Complex]:
+    """What `single_zeros` (m,) and the first `count` flexible modes (count, 2) go over into; NaN where that is lost.
+
+    Of a mode a conjugate pair, Im > 0 first, or two real ones, the slower first.
+    """
+    k = undamped.system
+    omega = modes(undamped.arm, count, theory=undamped.theory).natural_frequency[-count:]
+    alone = single_zeros(undamped)
+    if k.is_undamped:
+        return np.array(alone, complex), 1j * np.outer(omega, [1, -1])
+    family = Damping(k, k.damping or 1.0, HALVINGS[0])
+    slowest = [omega[0] / abs(each) for each in alone]
+    share = FIRST_SHARE * min(1.0, 1 / (family.level * omega[-1]) if k.damping else 1.0, *slowest)
+    upper = settled(function_of(k.with_damping(share)), np.r_[single_zeros(undamped, share), 1j * omega])
+    pairs = np.stack([upper[len(alone) :], upper[len(alone) :].conj()], axis=1)
+    start = np.r_[upper[: len(alone)], pairs.ravel()] * (share * family.level)
+    ends = np.geomspace(share, 1.0, 1 + math.ceil(-math.log10(share) / DECADES))[1:].tolist()
+    for family.most_halvings in HALVINGS:
+        try:
+            while ends:
+                start = follow(family, np.array([share, ends[0]]), start)[1]
+                share = ends.pop(0)
+            break
+        except ConvergenceError as lost:
+            (share, start), stray = lost.best, lost.residual
+            start = np.where(stray, LOST, start)
+    found = np.full(start.size, LOST) if ends else settled(function_of(k), start / family.level)
+    again = np.triu(abs(found[:, None] - found) <= REAL_SHARE * abs(found), 1).any(axis=0)
+    found[again] = LOST
+    return in_pairs(found[: len(alone)], found[len(alone) :].reshape(-1, 2))
+
+
+def in_pairs(single: Complex, pairs: Complex) -> tuple[Complex, Complex]:
+    """The same with whole pairs: where real zeros of two modes, or of one and none, have met those that ring are one.
+
+    Of two modes the higher has them, and the lower the two left; of a mode and a single zero the mode.
+    """
+    single, pairs = single.copy(), pairs.copy()
+    for n in (*range(len(pairs)), *range(len(pairs))):  # twice, as one of two may be left with half of another pair
+        rings = np.flatnonzero(np.isfinite(pairs[n]) & (pairs[n].imag != 0))
+        if rings.size == 1:
+            one, rest = pairs[n, rings[0]], pairs[n, 1 - rings[0]]
+            alone, other = (abs(each - one.conj()) <= REAL_SHARE * abs(one) for each in (single, pairs))
+            pairs[n] = one, one.conj()
+            if other.any():
+                m, place = np.argwhere(other)[0]
+                pairs[m] = rest, pairs[m, 1 - place]
+                pairs[[min(n, m), max(n, m)]] = pairs[[m, n]]
+            elif alone.any():
+                single[alone] = rest
+    upper, slower = pairs.imag > 0, abs(pairs[:, 0]) <= abs(pairs[:, 1])
+    first = np.where(upper.any(axis=1), upper[:, 0], slower | np.isnan(pairs[:, 1]))
+    return single, np.where(first[:, None], pairs, pairs[:, ::-1])
