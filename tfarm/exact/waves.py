@@ -103,18 +103,6 @@ def _square_root(z: complex) -> complex:
 
 
 @inlined
-def quotient(a: complex, b: complex) -> complex:
-    """a/b for numbers of any size (Smith 1962); where b = 0 it is no number, which numba's own would raise for."""
-    if abs(b.real) >= abs(b.imag):
-        ratio = b.imag / b.real
-        size = b.real + ratio * b.imag
-        return complex((a.real + ratio * a.imag) / size, (a.imag - ratio * a.real) / size)
-    ratio = b.real / b.imag
-    size = b.imag + ratio * b.real
-    return complex((ratio * a.real + a.imag) / size, (ratio * a.imag - a.real) / size)
-
-
-@inlined
 def reciprocal(z: complex) -> complex:
     """1/z; the numbers here stay within 1e+-140, so the plain formula neither over- nor underflows."""
     scale = 1.0 / (z.real * z.real + z.imag * z.imag)
