@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from tfarm.columns import Column, Table
 from tfarm.errors import ParameterError, did_you_mean
+from tfarm.schema import Quantity
 
 
 @dataclass(frozen=True, slots=True)
 class Term:
     """A word or two, and what they promise or mean."""
 
-    name: str
-    meaning: str
+    name: Annotated[str, Quantity("term", key="term")]
+    meaning: Annotated[str, Quantity("meaning")]
 
 
 GLOSSARY_TERMS = (
@@ -134,18 +135,19 @@ GLOSSARY_TERMS = (
         "no limit was found, and beyond which none was looked for.",
     ),
 )
-TERM = (
-    Column("term", "term", of="name"),
-    Column("meaning", "meaning", folds=True),
-)
 
 
-def glossary(words: str | None = None) -> Table:
+@dataclass(frozen=True)
+class Glossary:
+    """Terms with their meanings."""
+
+    terms: Annotated[tuple[Term, ...], Quantity("terms")]
+
+
+def glossary(words: str | None = None) -> Glossary:
     """Every term with its meaning, or those whose name holds the words.  Raises ParameterError where there is none."""
-    if words is None:
-        return Table(columns=TERM, record=GLOSSARY_TERMS)
-    found = tuple(each for each in GLOSSARY_TERMS if words.casefold() in each.name.casefold())
+    found = tuple(each for each in GLOSSARY_TERMS if words is None or words.casefold() in each.name.casefold())
     if not found:
-        remedy = did_you_mean(words, [each.name for each in GLOSSARY_TERMS])
+        remedy = did_you_mean(str(words), [each.name for each in GLOSSARY_TERMS])
         raise ParameterError(key="term", value=words, remedy=remedy)
-    return Table(columns=TERM, record=found)
+    return Glossary(found)

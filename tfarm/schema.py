@@ -25,6 +25,7 @@ SLUGS = {"s": "s", "m": "m", "rad/s": "rad_s", "Hz": "hz", "deg": "deg", "sample
 COMPLEX_ERROR = 2e-14  # of the size of a pole or zero: what rounding leaves in its parts (tests: 1e-14 to 50 digits)
 RATIO_DIGITS = 6  # of the damping ratio of a listed pole
 NO_VALUE = "-"
+LONGEST_LINE = 40  # characters of a cell from which on it may be folded on a narrow terminal
 LONGEST_COMPARED = 28  # characters of a text that is compared: a word or an interval, and no sentence
 EMPTY = {"None", "", "[]", "()"}  # what is compared where neither has a value
 SAME = 4e-14  # of a value: what two computations of it may differ by
@@ -144,19 +145,28 @@ def _is_table(value: Any) -> bool:
 
 
 def table(rows: Any, names: Sequence[str] = (), *, stem: str = "", title: str = "", caption: str = "") -> Table:
-    """A row a record (or an entry of a record of columns), a column a quantity: those with a label, or these."""
+    """A row a record (or an entry of a record of columns), a column a quantity: those with a label, or these.
+
+    A column without any value is left out unless it is named.
+    """
     if not (_is_table(rows) or rows):
         return Table(columns=(), stem=stem, title=title, caption=caption)
     declared = quantities(type(rows if _is_table(rows) else rows[0]))
     wanted = names or [name for name, of in declared.items() if of.label]
-    values = [getattr(rows, name) if _is_table(rows) else [getattr(row, name) for row in rows] for name in wanted]
-    columns = (_column(declared[name], list(each)) for name, each in zip(wanted, values, strict=True))
+    found = ((declared[name], _values(rows, name)) for name in wanted)
+    columns = (_column(of, values) for of, values in found if names or any(value is not None for value in values))
     return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
 
 
+def _values(rows: Any, name: str) -> list[Any]:
+    """One attribute of each row."""
+    return list(getattr(rows, name)) if _is_table(rows) else [getattr(row, name) for row in rows]
+
+
 def _column(of: Quantity, values: Sequence[Any]) -> Column:
-    cells = [text(value, of.digits) for value in values]
-    return Column(of.key, of.label, of.unit, of=[to_json_value(value) for value in values], shown=cells)
+    cells = [NO_VALUE if isinstance(value, list | tuple) and not value else text(value, of.digits) for value in values]
+    folds = max(map(len, cells), default=0) > LONGEST_LINE
+    return Column(of.key, of.label, of.unit, of=list(map(to_json_value, values)), shown=cells, folds=folds)
 
 
 def across(
@@ -206,7 +216,12 @@ def roots_table(values: Any, of: Quantity, *, stem: str = "", title: str = "", c
     return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
 
 
-def curve_table(record: Any) -> Table:
+def _ratio(value: complex) -> str:
+    """The damping ratio of a pole that oscillates."""
+    return within(-value.real / abs(value), COMPLEX_ERROR, RATIO_DIGITS) if value.imag else NO_VALUE
+
+
+def curve_table(record: Any, *, stem: str = "", title: str = "") -> Table:
     """The curves of a record, a row a point; complex ones in two columns.  Without any, the first list of records."""
     if hasattr(record, "csv_table"):
         own: Table = record.csv_table
@@ -223,7 +238,7 @@ def curve_table(record: Any) -> Table:
             columns.append(Column(of.key, of.label, of.unit, of=name))
         elif not columns and _is_list_of_records(name):
             return table(name)
-    return Table(columns=tuple(columns))
+    return Table(columns=tuple(columns), stem=stem, title=title)
 
 
 def _with_flat(record: Any) -> Iterator[tuple[Any, Quantity]]:
@@ -286,7 +301,7 @@ def _parts_of(value: Any, of: Quantity, pairs: list[tuple[str, str]]) -> Iterato
     elif _is_list_of_records(value):
         yield Section(of.label, table=table(value))
     elif isinstance(value, np.ndarray) and np.iscomplexobj(value) and value.size:
-        yield Section(of.label, table=roots_table(value, of))
+        yield Section(of.help or of.label, table=roots_table(value, of))
     else:
         if shown := with_unit(value, of):
             pairs.append((of.label, shown))

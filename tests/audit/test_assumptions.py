@@ -10,7 +10,7 @@ import pytest
 import tfarm
 from tests.shared import thinned
 from tfarm.audit.assumptions import (
-    assumptions_answer,
+    assumptions,
     candidates,
     has_hub_inertia,
     hub_study,
@@ -18,6 +18,7 @@ from tfarm.audit.assumptions import (
     own_depth,
     section_study,
 )
+from tfarm.schema import to_dict
 from tfarm.spectrum.table import PAPER_GAINS
 from tfarm.tables.files import to_json
 
@@ -63,7 +64,7 @@ def test_an_inertia_outside_moves_the_candidates_by_decades(own):
 
 def test_a_hub_without_an_inertia_has_no_candidates():
     assert [has_hub_inertia(arm) for arm in ARMS] == [True, True, False, False]
-    assert [assumptions_answer(arm, 1)["hub"] for arm in (LOCKED, PINNED)] == [None, None]
+    assert [to_dict(assumptions(arm, 1))["hub"] for arm in (LOCKED, PINNED)] == [None, None]
     assert hub_study(LOCKED, [0.1]).natural_frequency[0] == pytest.approx(own_frequencies(PAPER), rel=1e-14)
 
 
@@ -75,9 +76,9 @@ def test_the_own_section_gives_the_arms_own_table(arm):
     study = section_study(arm, count=6)
     assert study.is_own.sum() == 1
     assert study.natural_frequency[study.is_own][0] == pytest.approx(own_frequencies(arm, 6), rel=1e-13)
-    (row,) = (row for row in candidates(study) if row["is_own"])
-    assert row["width_m"] * row["depth_m"] == pytest.approx(arm.link.section.area, rel=1e-14)
-    assert row["second_moment_m4"] == pytest.approx(arm.link.section.second_moment, rel=1e-14)
+    (row,) = (row for row in candidates(study) if row.is_own)
+    assert row.width * row.depth == pytest.approx(arm.link.section.area, rel=1e-14)
+    assert row.second_moment == pytest.approx(arm.link.section.second_moment, rel=1e-14)
 
 
 def test_a_round_bar_is_the_rectangle_with_its_area_and_second_moment():
@@ -165,7 +166,7 @@ def test_hub_frequencies_fall_and_interlace_with_those_of_pin_and_lock(arm):
 
 
 def test_the_answer_is_plain_json_with_the_numbers_of_the_studies():
-    answer = json.loads(to_json(assumptions_answer(PAPER, 2)))
+    answer = json.loads(to_json(to_dict(assumptions(PAPER, 2))))
     assert (answer["arm"], answer["count"]) == ("sasaki2012", 2)
     study, rows = section_study(PAPER, count=2), answer["section"]["candidates"]
     assert [row["natural_frequency_rad_s"] for row in rows] == study.natural_frequency.tolist()
@@ -193,5 +194,5 @@ def test_verdicts_are_those_of_the_loop_itself():
 def test_a_locked_hub_has_no_loop():
     arm = replace(tfarm.load("sasaki2012-lab"), hub=tfarm.Hub(inertia=math.inf))
     assert loop_verdicts(section_study(arm, (0.006,))) is None
-    rows = assumptions_answer(arm, 1)["section"]["candidates"]
+    rows = to_dict(assumptions(arm, 1))["section"]["candidates"]
     assert {(row["verdict"], row["K2_below"]) for row in rows} == {("no loop", None)}

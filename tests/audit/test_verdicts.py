@@ -8,6 +8,7 @@ from matplotlib.mathtext import MathTextParser
 import tfarm
 from tests.shared import thinned
 from tfarm import audit
+from tfarm.schema import to_dict
 from tfarm.tables.files import to_json
 
 VERDICTS = {
@@ -96,7 +97,7 @@ def test_numbers_of_the_evidence_are_those_of_other_roads(rows):
 @pytest.mark.usefixtures("audited")
 def test_json_has_the_keys_of_the_issue(audit_file):
     """The answer is what the command has printed, in a process of its own."""
-    answer = json.loads(to_json(audit.audit_answer()))
+    answer = json.loads(to_json(to_dict(audit.Audit(audit.PAPER, audit.audit()))))
     assert json.loads(audit_file.with_suffix(".json").read_text(encoding="utf-8")) == answer
     assert "852780" in answer["paper"]
     keys = ["equation", "verdict", "printed", "corrected", "evidence", "residual_printed", "residual_corrected"]

@@ -20,12 +20,13 @@ from playwright.sync_api import Browser, Page, sync_playwright
 import tfarm
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain, load_chain, sampled_verdict
-from tfarm.dsp.results import simulated_answer
+from tfarm.dsp.results import simulated_run
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import gain_map
 from tfarm.loop.stability import stability
 from tfarm.report.cases import Subject
 from tfarm.report.live import ASSETS, save_live, write_assets
+from tfarm.schema import to_dict
 
 Real = NDArray[np.float64]
 
@@ -102,7 +103,7 @@ def set_gains(page: Page, law: HubFeedback) -> None:
 
 def slew_words(arm: Arm, law: HubFeedback, chain: Chain, modes: int) -> dict[str, str]:
     """What the page shows of a slew, from the answer of `tfarm simulate`."""
-    answer = simulated_answer(arm, law, chain, "slew", 3 * chain.slew.rise_time, count=modes)
+    answer = to_dict(simulated_run(arm, law, chain, "slew", 3 * chain.slew.rise_time, count=modes))
     settled = answer["settling_time_s"]
     largest = {name: max(map(abs, answer[key])) for name, key in (("torque", "torque"), ("moment", "root_moment"))}
     figures = largest | {"residual": answer["residual_moment_rms"]}

@@ -53,9 +53,7 @@ def test_csv_is_the_same_table(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert err == f"written: {file}\n"
     largest = abs(tfarm.transfer(tfarm.load("sasaki2012"), "root_moment")(2j))
     assert code == 0
-    assert out.splitlines() == [
-        f"sasaki2012: 2 points, largest |root_moment / hub_torque| {largest:.6g} N m / N m at s = 0+2i 1/s",
-    ]
+    assert re.search(rf"^largest magnitude +{largest:.6g}\nat s +0\+2i 1/s$", out, re.MULTILINE)
     header, *rows = csv.reader(file.read_text().splitlines())
     assert header == ["re_s [1/s]", "im_s [1/s]", "re_root_moment [N m / N m]", "im_root_moment [N m / N m]"]
     value = tfarm.transfer(tfarm.load("sasaki2012"), "root_moment")(2j)
@@ -200,12 +198,11 @@ def test_damped_modes_stand_beside_the_undamped_ones(capsys: pytest.CaptureFixtu
     """Each eigenvalue near its own frequency, overdamped ones in pairs, and as many in the box as are said to be."""
     result = answer(capsys, "modes", "sasaki2012-lab", "--count", "17", "--certify")
     flexible = result["modes"][1:]
-    assert ["eigenvalue" in mode for mode in flexible] == [True] * 15 + [False] * 2
-    assert ["eigenvalues" in mode for mode in flexible] == [False] * 15 + [True] * 2
+    assert [mode["second_eigenvalue"] is None for mode in flexible] == [True] * 15 + [False] * 2
     first = flexible[0]
     assert abs(complex(*first["eigenvalue"])) == pytest.approx(first["natural_frequency_rad_s"], rel=1e-6)
     assert float(first["discs"][0]["im"]) == pytest.approx(first["eigenvalue"][1], rel=1e-14)
-    listed = [mode["eigenvalue"] for mode in result["modes"] if "eigenvalue" in mode]
+    listed = [mode["eigenvalue"] for mode in result["modes"] if mode["second_eigenvalue"] is None]
     inside = sum(re > result["box"][0] and im < result["box"][3] for re, im in listed)
     assert 2 * inside == result["eigenvalues_in_box"]
 
@@ -215,7 +212,7 @@ def test_modes_that_cannot_be_followed_are_said_not_left_out(
 ) -> None:
     monkeypatch.setattr("tfarm.spectrum.damped.MOST_MODES", 4)
     result = answer(capsys, "modes", "sasaki2012-lab", "--count", "6")
-    assert [mode["index"] for mode in result["modes"] if "damping_ratio" in mode] == [0, 1, 2, 3, 4]
+    assert [mode["index"] for mode in result["modes"] if mode["damping_ratio"] is not None] == [0, 1, 2, 3, 4]
     assert len(result["modes"]) == 7
     assert "up to mode 4 only" in result["damped_note"]
 

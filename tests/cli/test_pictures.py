@@ -72,33 +72,33 @@ def test_bode_looks_along_the_arm_at_either_side_of_a_joint_and_from_another_inp
     assert ratio == pytest.approx(np.full(ratio.size, ratio[0]), rel=1e-6)
     assert abs(ratio[0] - 1) > 0.1
     code, out, _ = run(capsys, "bode", LAB, "--output", "moment", "--x", "0.4", "--to", "300")
-    assert (code, out.splitlines()[0]) == (
-        0, "sasaki2012-lab: moment at x = 0.4 m / hub_torque [N m/(N m)], 2 to 300 rad/s"
-    )  # fmt: skip
+    assert code == 0
+    assert re.search(r"^frequency range +\(2, 300\) rad/s$", out, re.MULTILINE)
 
 
 def test_bode_prints_what_the_record_holds(capsys, tmp_path):
     """On the undamped arm: |G| is infinite at each mode, and the zeros are the clamped arm's frequencies."""
     found = answer(capsys, "bode", "sasaki2012", "--output", "hub_angle", "--to", "300")
     arm = tfarm.load("sasaki2012")
-    data = tfarm.bode(arm, "hub_angle", (found["band_rad_s"][0], 300.0))
+    data = tfarm.bode(arm, "hub_angle", (found["range_rad_s"][0], 300.0))
     modes, locked = tfarm.modes(arm, 2), tfarm.modes(arm.having(hub_inertia=np.inf), 3).natural_frequency
     assert found["omega_rad_s"] == data.omega.tolist()
     assert [complex(*pair) for pair in found["value"]] == data.value.tolist()
-    assert [pole["im"] for pole in found["poles"]] == pytest.approx(modes.natural_frequency[1:], rel=1e-13)
+    assert [pole["s"][1] for pole in found["poles"]] == pytest.approx(modes.natural_frequency[1:], rel=1e-13)
     assert {pole["magnitude"] for pole in found["poles"]} == {"inf"}
-    assert [zero["im"] for zero in found["zeros"]] == pytest.approx(locked[locked < 300.0], rel=1e-13)
+    assert [zero["s"][1] for zero in found["zeros"]] == pytest.approx(locked[locked < 300.0], rel=1e-13)
     code, _, _ = run(capsys, "bode", "sasaki2012", "--to", "300", "--csv", str(tmp_path / "bode.csv"))
     header, *rows = csv.reader((tmp_path / "bode.csv").read_text().splitlines())
     assert (code, header[0], float(rows[-1][0])) == (0, "omega_rad_s [rad/s]", 300.0)
-    assert header[2:5] == [f"{key} [N m/(N m)]" for key in ("real", "imaginary", "magnitude")]
+    assert header[1:5] == ["re_value", "im_value", "phase_deg [deg]", "magnitude"]
 
 
 def test_bode_says_that_an_output_is_zero_and_draws_that(capsys, tmp_path):
     """Nothing is beyond the free tip to shear it: G is 0, which has no logarithm."""
     there = ("bode", LAB, "--output", "shear", "--x", "1", "--to", "300")
     code, out, err = run(capsys, *there, "--png", str(tmp_path / "zero.png"))
-    assert (code, out.splitlines()[1:], err) == (0, ["zero at every frequency"], f"written: {tmp_path / 'zero.png'}\n")
+    assert (code, err) == (0, f"written: {tmp_path / 'zero.png'}\n")
+    assert "0 poles and 0 zeros up to 300 rad/s" in out
     found = tfarm.bode(tfarm.load(LAB), "shear", (1.0, 300.0), x=1.0)
     assert found.is_zero
     figure = tfarm.plots.bode.figure(found)

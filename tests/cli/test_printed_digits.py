@@ -11,7 +11,7 @@ from tests.shell import run
 from tfarm.arm.writing import to_toml
 from tfarm.digits import within
 from tfarm.loop.poles import closed_loop_poles
-from tfarm.spectrum.answers import EIGENVALUE_ERROR
+from tfarm.schema import COMPLEX_ERROR
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_poles_of_a_hardly_damped_arm_are_printed_as_far_as_they_are_proven(caps
     for row, disc in zip(pole_rows(out)[-len(discs) :], discs, strict=True):
         unit = Decimal(row[0]).as_tuple().exponent
         assert abs(Decimal(row[0]) - Decimal(disc.re)) <= Decimal(10) ** unit
-        assert abs(Decimal(disc.re)) > EIGENVALUE_ERROR * math.hypot(float(disc.re), float(disc.im))
+        assert abs(Decimal(disc.re)) > COMPLEX_ERROR * math.hypot(float(disc.re), float(disc.im))
 
 
 def test_a_lossless_loop_has_zeros_and_no_noise(capsys) -> None:

@@ -96,9 +96,9 @@ def test_a_reduced_model_reads_the_side_asked_for(stepped, capsys):
         side: answer(capsys, "reduce", file, "--outputs", "moment", "--x", "0.4", "--side", side, "--order", "8")
         for side in ("outer", "inner")
     }
-    assert list(found["inner"]["errors"]) == ["moment_inner"]
-    assert list(found["outer"]["errors"]) == ["moment"]
-    assert found["inner"]["errors"]["moment_inner"] != found["outer"]["errors"]["moment"]
+    (inner,), (outer,) = (found[side]["channels"] for side in ("inner", "outer"))
+    assert (inner["output"], outer["output"]) == ("moment_inner", "moment")
+    assert inner["error"] != outer["error"]
 
 
 @pytest.mark.parametrize(

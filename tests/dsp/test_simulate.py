@@ -31,11 +31,12 @@ from tfarm.dsp.results import (
     residual_moment_rms,
     residual_raw_moment_rms,
     settling_time,
-    simulated_answer,
+    simulated_run,
 )
 from tfarm.dsp.scenarios import SCENARIOS
 from tfarm.errors import ParameterError
 from tfarm.reduced import modal_model
+from tfarm.schema import to_dict
 
 T = 0.01
 GAINS = HubFeedback(K1=0.3, K2=0.3)
@@ -235,13 +236,13 @@ def test_an_unstable_loop_that_its_motor_limits_rings_for_ever(lab):
     assert (one.kept_up_by, one.torque) == ("saturation", 3.0)
     assert two.root_moment == pytest.approx(2 * one.root_moment, rel=1e-6)  # what rounding makes of 20 s of ringing
     assert two.frequency == one.frequency
-    answer = simulated_answer(lab, gains, chain, "impulse", 20.0, count=8)
+    answer = to_dict(simulated_run(lab, gains, chain, "impulse", 20.0, count=8))
     assert answer["limit_cycle"]["kept_up_by"] == "saturation"
 
 
 def test_saturation_that_is_over_is_no_limit_cycle(lab):
     chain = Chain(actuator=Actuator(torque_limit=3.0))
-    answer = simulated_answer(lab, GAINS, chain, "slew", 20.0, count=8)
+    answer = to_dict(simulated_run(lab, GAINS, chain, "slew", 20.0, count=8))
     assert answer["saturated_samples"]["torque"] > 10
     assert answer["limit_cycle"] is None
 
@@ -249,17 +250,17 @@ def test_saturation_that_is_over_is_no_limit_cycle(lab):
 def test_a_simulation_takes_the_modes_that_its_digits_need_or_says_what_it_is_off(lab, lossless):
     """After a slew, and with damping after an impulse, 20 modes do; without it 40 do not, and what is said is right."""
     for task, duration in (("slew", 1.5), ("impulse", 0.5)):
-        enough = simulated_answer(lab, GAINS, Chain(), task, duration)
+        enough = to_dict(simulated_run(lab, GAINS, Chain(), task, duration))
         assert (enough["modes_used"], enough["modes_change"] < 1e-4) == (20, True)
         fine = simulator(lab, task, duration, count=30).linear(GAINS).at_samples
         off = abs(enough["root_moment"] - fine.root_moment).max() / abs(fine.root_moment).max()
         assert 0 < off < max(enough["modes_change"], ROUNDED)
-    sudden = simulated_answer(lossless, GAINS, Chain(), "impulse", 0.5)
+    sudden = to_dict(simulated_run(lossless, GAINS, Chain(), "impulse", 0.5))
     assert (sudden["modes_used"], sudden["modes_change"] > 1e-4) == (40, True)
     more = simulator(lossless, "impulse", 0.5, count=160).linear(GAINS).at_samples
     off = abs(sudden["root_moment"] - more.root_moment).max() / abs(more.root_moment).max()
     assert 1e-4 < off < 2 * sudden["modes_change"]
-    asked = simulated_answer(lab, GAINS, Chain(), "slew", 0.1, count=3)
+    asked = to_dict(simulated_run(lab, GAINS, Chain(), "slew", 0.1, count=3))
     assert (asked["modes_used"], asked["modes_change"]) == (3, None)
 
 
@@ -290,7 +291,7 @@ def test_running_away_is_said_with_its_time_and_mode(lab):
     assert f"mode {run.stopped.mode}" == dominant(sampled_loop(lab, HubFeedback(K1=0.3, K2=1.5), count=8))
     for signal in (run.torque, run.at_samples.root_moment, run.at_samples.tip_displacement):
         assert np.isfinite(signal).all()
-    answer = simulated_answer(lab, HubFeedback(K1=0.3, K2=1.5), Chain(), "slew", 5.0, count=8)
+    answer = to_dict(simulated_run(lab, HubFeedback(K1=0.3, K2=1.5), Chain(), "slew", 5.0, count=8))
     assert answer["settling_time_s"] is None
     assert answer["stopped_at_s"] == run.stopped.time
 

@@ -15,10 +15,10 @@ from tests.shared import thinned
 from tests.shell import answer, run
 from tfarm.arm.writing import KeyedArms
 from tfarm.errors import ParameterError
-from tfarm.fitting.answers import resonances
 from tfarm.fitting.data import noise_of
 from tfarm.fitting.fit import fit
 from tfarm.fitting.model import RingMode, mode_of
+from tfarm.fitting.results import resonances
 from tfarm.fitting.solve import equation_errors
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -227,18 +227,19 @@ def test_the_command_and_its_file(tmp_path, capsys):
         "--save", str(save), "--png", str(png), "--covariance",
     )  # fmt: skip
     assert (code, err) == (0, f"written: {save}\nwritten: {png}\n")
-    assert "2 of 2 numbers are known from these data" in out
+    assert "2 of 2 numbers identified" in out
     assert png.read_bytes().startswith(b"\x89PNG")
     fitted = tfarm.load(save)
     assert one.digest == ""
     assert "SHA-256" in fitted.assumptions[-1]
     assert tomllib.loads(save.read_text())["link"]["youngs_modulus"] == fitted.link.youngs_modulus
     found = answer(capsys, *given, "--free", "link.youngs_modulus", "--covariance")
-    assert set(found["parameters"]["link.youngs_modulus"]) >= {"value", "low", "high", "std", "identified"}
-    assert set(found["frequencies_hz"]) == {"before", "after", "measured"}
+    (number,) = found["parameters"]
+    assert number.keys() >= {"key", "value", "low", "high", "std", "identified"}
+    assert all(set(row) == {"before_hz", "after_hz", "measured_hz"} for row in found["resonances"])
     assert found["converged"]
     assert found["rms_log_error"] < 0.1
-    assert found["arm"]["link"]["youngs_modulus"] == found["parameters"]["link.youngs_modulus"]["value"]
+    assert found["arm"]["link"]["youngs_modulus"] == number["value"]
 
 
 def test_from_a_file_to_margins_in_three_commands(tmp_path, capsys):
@@ -249,8 +250,8 @@ def test_from_a_file_to_margins_in_three_commands(tmp_path, capsys):
     given = ("fit", "sasaki2012-lab", "--data", data, "--free", free, "--save", str(save))
     found = answer(capsys, *given, "--covariance")
     truth = {"youngs_modulus": 6.3e10, "damping": 1.6e-4, "inertia": 0.085, "mass": 0.12}
-    for key, each in found["parameters"].items():
-        assert abs(each["value"] - truth[key.split(".")[1]]) < 4 * each["std"]
+    for each in found["parameters"]:
+        assert abs(each["value"] - truth[each["key"].split(".")[1]]) < 4 * each["std"]
     assert found["explained"]
     assert found["unexplained_peaks_hz"] == []
     assert answer(capsys, "margins", str(save))["verdict"] == "stable"

@@ -1,5 +1,7 @@
 """`tfarm frf` and `tfarm ring` from a file to a file, and what they refuse in one line."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy import signal
@@ -27,7 +29,7 @@ def test_a_record_becomes_a_file_that_the_other_commands_read(record, tmp_path, 
     save = tmp_path / "sweep.csv"
     code, out, err = run(capsys, "frf", str(record), *NAMED, "--save", str(save))
     assert (code, err) == (0, f"written: {save}\n")
-    assert "H1 of 15 segments of 2 s (hann, 50 % overlapped), worth 14.2" in out
+    assert re.search(r"^independent averages +14.2", out, re.MULTILINE)
     data = data_of(f"tip_acceleration/hub_torque={save}")
     found = answer(capsys, "frf", str(record), *NAMED)
     assert [row["hz"] for row in found["response"]] == pytest.approx(list(data.omega / 2 / np.pi), rel=1e-15)
@@ -42,8 +44,9 @@ def test_a_record_becomes_a_file_that_the_other_commands_read(record, tmp_path, 
 def test_the_table_is_printed_where_no_file_is_asked_for(record, capsys):
     code, out, _ = run(capsys, "frf", str(record), *NAMED, "--segment", "0.2", "--estimator", "Hv")
     assert code == 0
-    assert len(out.splitlines()) == 1 + 9 + 3
-    assert "Hv of 159 segments" in out
+    table = out[out.index("frequency [Hz]") :].splitlines()
+    assert len(table) == 1 + 9
+    assert re.search(r"^segments +159$", out, re.MULTILINE)
 
 
 @pytest.mark.parametrize(

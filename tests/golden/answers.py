@@ -18,7 +18,7 @@ from tfarm.cli import main
 HERE = Path(__file__).parent
 TOLERANCE = 1e-8  # relative, of what is well conditioned: a frequency, a pole, a margin, an edge
 MOST_ITEMS = 40  # of a list that is kept whole
-ROW_NAMES = ("quantity", "branch", "mode", "number")  # keys that name a row
+ROW_NAMES = ("quantity", "branch", "mode", "number", "output")  # keys that name a row
 KEPT_ITEMS = 8  # of a longer one, evenly spread
 PHRASES = re.compile(r"(^|[._])(verdict|method|objective|structure|units?(\.\w+)?(\[\])?|theory|name)$")  # no prose
 SEARCHES = {"design": "value", "tune": "cost_tuned", "fit": "chi_squared"}  # what a search is judged by

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,8 @@ import pytest
 import tfarm
 from tests.shell import run
 from tfarm import ConvergenceError, Hub, ParameterError
-from tfarm.reduced import reduce, reduced_answer, transfer_function
+from tfarm.reduced import reduce, transfer_function
+from tfarm.schema import to_dict
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +71,7 @@ def test_odd_orders_are_for_damped_arms():
     odd, even = (reduce(lab, ["root_moment", "hub_rate"], order=order) for order in (21, 20))
     assert (odd.order, odd.model.states[-1]) == (21, "relaxation")
     assert odd.worst_error < 0.2 * even.worst_error
-    assert [-1 / lab.link.damping, 0.0] == reduced_answer(odd)["poles"][-1]
+    assert [-1 / lab.link.damping, 0.0] == to_dict(odd)["poles"][-1]
     small = reduce(lab, ["root_moment", "hub_rate"], error=1e-5)
     assert small.worst_error <= 1e-5
     s = np.array([2.0j, 150j])
@@ -134,9 +136,8 @@ def test_by_error_with_a_band_and_a_file(capsys, tmp_path):
 def test_for_a_person(capsys):
     code, out, _ = run(capsys, "reduce", "sasaki2012", "--order", "14")
     assert code == 0
-    assert "order 14" in out
-    assert "first mode it lacks: 5" in out
-    assert out.count("pole") == 6
+    assert re.search(r"^order +14$", out, re.MULTILINE)
+    assert re.search(r"^first mode missing +5$", out, re.MULTILINE)
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,6 @@ from tests.report import plausible
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import implausible
-from tfarm.audit import assumptions
-from tfarm.audit.assumptions import LoopVerdict, hub_study
 from tfarm.columns import PAGE
 from tfarm.dsp import Chain
 from tfarm.loop import loci as loci_room
@@ -27,7 +25,7 @@ from tfarm.report.arm_section import arm_section, derived_table
 from tfarm.report.cases import GivenLaw, Subject, edge_of_K2, has_loop, on_hub
 from tfarm.report.locus_section import beyond_table, locus_section
 from tfarm.report.loop_section import margin_table, margins_section, nyquist_section
-from tfarm.report.modes_section import damped_table, modal_table, places
+from tfarm.report.modes_section import damped_tables, modal_table
 from tfarm.report.page import signs
 from tfarm.report.response_sections import bode_section
 from tfarm.spectrum import DampedModes
@@ -68,14 +66,9 @@ def test_cells_of_the_modal_table_are_its_numbers_with_a_few_digits(name):
         assert [number(cell) for cell in each.cells] == pytest.approx(list(each.values), rel=5e-4, abs=0)
         assert max(len(cell) for cell in each.cells) <= 17
     for cell, nodes in zip(table.on(PAGE)[5].cells, modes.nodes, strict=True):
-        shown = [] if cell == "none" else [number(part) for part in cell.split(", ")]
+        shown = [] if cell == "-" else [number(part) for part in cell.split(", ")]
         assert shown == pytest.approx(list(nodes), rel=0.05, abs=0)
     assert not np.any(modes.modal_moment) or name != "free-pin"
-
-
-def test_a_node_next_to_the_hub_keeps_its_place():
-    assert places(np.array([3.1e-6, 0.02468, 0.049]), 0.05) == ("3.1 × 10⁻⁶", "0.024680", "0.049000")
-    assert places(np.array([1.5e-5, 0.4321]), 1.0) == ("1.5 × 10⁻⁵", "0.4321")
 
 
 @pytest.mark.parametrize("name", DAMPED)
@@ -83,12 +76,12 @@ def test_rows_outside_the_certified_box_are_marked(name, monkeypatch):
     """The box and the count that the caption prints hold just the rows that are said to be in it."""
     monkeypatch.setattr(DampedModes, "certify", lambda self, digits: ())  # seconds, and its own tests
     arm = ARMS[name]
-    table = damped_table(tfarm.modes(arm, count=6))
+    table, *_ = damped_tables(tfarm.modes(arm, count=6))
     count = int(re.search(r"All (\d+) eigenvalues", table.caption)[1])
     edges = re.search(r"with (\S+) < Re s < (.+?) 1/s and .Im s. < (.+?) rad", table.caption)
     left, right, top = (number(edge) for edge in edges.groups())
     marks = column(table, "complete").values
-    re_s, im_s = (np.array(column(table, key).values) for key in ("eigenvalue_re", "eigenvalue_im"))
+    re_s, im_s = np.array(column(table, "eigenvalue").values).T
     assert [mark == "in the box" for mark in marks] == list((left < re_s) & (re_s < right) & (im_s < top))
     assert count == 2 * sum(mark == "in the box" for mark in marks)
     assert ("outside" in table.caption) == ("outside" in marks)
@@ -263,18 +256,6 @@ def test_a_margin_without_end_has_no_frequency(monkeypatch):
 
 
 # ------------------------------------------------------------ what the assumptions do
-
-
-def test_a_K2_where_the_search_ended_has_a_star():
-    verdicts = (LoopVerdict("stable", 1.08, True), LoopVerdict("stable", 50.0, False), LoopVerdict("unstable", None))
-    study = hub_study(ARMS["heavy-hub"], [1.0, 22.5, 30.0], count=1)
-    *_, edges = assumptions.loop_columns(study, verdicts)
-    assert list(edges.cells) == ["1.08000", "50*", "-"]
-    small = hub_study(ARMS["micro"], [1e-7, 2e-7, 5e-7], count=1)
-    assert "K1 = 1.66 × 10⁻⁵, K2 = 0.3" in next(assumptions.loop_columns(small, verdicts)).group
-    assert "*" in assumptions_section.searched_words(edges)
-    certain = replace(edges, of=edges.of[::2], shown=edges.shown[::2])
-    assert not assumptions_section.searched_words(certain)
 
 
 @pytest.mark.parametrize(("hub", "words"), [(math.inf, "a hub that is locked"), (0.1, "the two values assumed")])

@@ -83,8 +83,8 @@ def test_the_responses_are_the_api_too(pages):
         records = list(csv.DictReader(file.read_text(encoding="utf-8").splitlines()))
         s = [1j * float(r["omega_rad_s"]) for r in records]
         values = tfarm.transfer(ARM, output)(s)
-        assert [float(r["real"]) for r in records] == values.real.tolist()
-        assert [float(r["imaginary"]) for r in records] == values.imag.tolist()
+        assert [float(r["re_value"]) for r in records] == values.real.tolist()
+        assert [float(r["im_value"]) for r in records] == values.imag.tolist()
     _, roots = tables(pages, "bode-root-moment-roots")
     assert {r["magnitude"] for r in roots if r["kind"] == "pole"} == {"inf"}
 

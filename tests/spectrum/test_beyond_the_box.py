@@ -7,7 +7,7 @@ import pytest
 
 import tfarm
 from tfarm.arm import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR
-from tfarm.spectrum.answers import beyond_the_box
+from tfarm.spectrum.listing import beyond_the_box
 
 LAB = tfarm.load("sasaki2012-lab")
 STIFF = replace(LAB.link, damping=0.0)

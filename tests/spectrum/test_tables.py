@@ -7,90 +7,49 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.columns import JSON, TERMINAL
-from tfarm.errors import MISSING, ParameterError
-from tfarm.spectrum.answers import DAMPED_MODE_COLUMNS, modes_answer, modes_by_methods_answer
+from tfarm.errors import ParameterError
+from tfarm.schema import table
+from tfarm.spectrum.listing import listed_modes
 from tfarm.spectrum.table import compare_theories, hub_locked, modes_below
 
 EPS = 2.0**-52
 LAB, STEEL = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
 PINNED = replace(STEEL, hub=tfarm.Hub(inertia=0.0), payload=tfarm.Payload(mass=math.inf))
-ORDER = [  # of a command's columns; a damped arm has what stands between brackets
-    "index", "natural_frequency_rad_s", "natural_frequency_hz", "eigenvalue", "damping_ratio",
-    "hub_locked_rad_s", "hub_participation", "modal_moment",
-]  # fmt: skip
-
-
-def keys(answer, output):
-    return [each.key for each in answer["modes"].columns if output in each.on]
-
-
-@pytest.mark.parametrize("arm", [LAB, STEEL])
-def test_columns_stand_in_one_order_and_each_once(arm):
-    """Frequencies, then what damping makes of them, then the locked hub's, then shapes."""
-    answer = modes_answer(tfarm.modes(arm, 3), None)
-    damped = not arm.is_undamped
-    expected = [key for key in ORDER if damped or key not in ("eigenvalue", "damping_ratio")]
-    assert keys(answer, TERMINAL) == expected + ["nodes_m"] * (not damped)
-    found = keys(answer, JSON)
-    assert len(found) == len(set(found))
-    assert [key for key in found if key in expected] == expected
-    assert set(found) - set(expected) == {"nodes_m", "theories_rad_s", "sensitivity"} | (
-        {"eigenvalues"} if damped else set()
-    )
 
 
 @pytest.mark.parametrize("arm", [LAB, STEEL, PINNED, LAB.having(hub_inertia=math.inf)])
 def test_every_row_is_of_its_mode(arm):
-    """The column of the locked hub too: beside a rigid body stands nothing, beside flexible mode n number n."""
-    table = tfarm.modes(arm, 3)
-    answer = modes_answer(table, None)
-    columns = {each.key: each.of for each in answer["modes"].columns if JSON in each.on}
-    still = hub_locked(table).natural_frequency[-3:].tolist()
-    assert columns["hub_locked_rad_s"] == [MISSING] * arm.has_rigid_mode + still
-    np.testing.assert_array_equal(columns["natural_frequency_hz"], table.natural_frequency_hz)
-    np.testing.assert_allclose(2 * math.pi * table.natural_frequency_hz, table.natural_frequency, rtol=4 * EPS)
-    (locked,) = (each for each in answer["modes"].columns if each.key == "hub_locked_rad_s")
-    assert (TERMINAL in locked.on) == (not arm.is_locked)
-    assert (answer["hub_locked_note"] is None) == arm.is_locked
-    assert answer["count"] == 3
+    """The column of the locked hub too: of a rigid body there is none, of flexible mode n it is number n."""
+    found = tfarm.modes(arm, 3)
+    listed = listed_modes(found)
+    still = hub_locked(found).natural_frequency[-3:].tolist()
+    assert [row.hub_locked for row in listed.modes] == [None] * arm.has_rigid_mode + still
+    np.testing.assert_array_equal([row.natural_frequency_hz for row in listed.modes], found.natural_frequency_hz)
+    np.testing.assert_allclose(2 * math.pi * found.natural_frequency_hz, found.natural_frequency, rtol=4 * EPS)
+    assert listed.count == 3
+    keys = [column.key for column in table(listed.modes).columns]
+    assert ("eigenvalue" in keys) == (not arm.is_undamped)
+    assert "hub_locked_rad_s" in keys
 
 
 @pytest.mark.parametrize("digits", [14, 15, 16, 30])
 def test_digits_beyond_a_double_are_strings_of_them(digits):
     """Of both columns, the hub's free and locked, and each within a last unit of the float64."""
     table = tfarm.modes(STEEL, 3)
-    answer = modes_answer(table, digits, certify=True)
-    columns = {each.key: each.of for each in answer["modes"].columns if JSON in each.on}
-    assert answer["digits"] == digits
+    answer = listed_modes(table, digits, certify=True)
+    assert answer.digits == digits
     for key, values in (
-        ("natural_frequency_rad_s", table.natural_frequency),
-        ("hub_locked_rad_s", hub_locked(table).natural_frequency),
+        ("natural_frequency", table.natural_frequency),
+        ("hub_locked", hub_locked(table).natural_frequency),
     ):
-        own = list(columns[key])[-3:]
+        own = [getattr(row, key) for row in answer.modes][-3:]
         assert all(isinstance(each, str) == (digits > 15) for each in own)
         np.testing.assert_allclose([float(each) for each in own], values[-3:], rtol=4 * EPS)
         assert digits <= 15 or all(len(each.replace(".", "")) == digits for each in own)
-    for lower, upper, omega in zip(
-        columns["lower_rad_s"], columns["upper_rad_s"], table.natural_frequency, strict=True
-    ):
-        assert lower is MISSING if omega == 0 else float(lower) * (1 - 2 * EPS) <= omega <= float(upper) * (1 + 2 * EPS)
-    assert answer["proof"]["count"] == len(table)
-
-
-def test_a_page_says_im_s_or_the_second_real_eigenvalue():
-    """And of a damping ratio three digits at least, however small."""
-    damped = tfarm.damped_modes(tfarm.modes(LAB.having(damping=1e-3), 8))
-    assert 0 < damped.is_overdamped.sum() < 8
-    shown = {each.key: each for each in DAMPED_MODE_COLUMNS}
-    for text, pair, over in zip(
-        shown["eigenvalue_im"].shown(damped), damped.eigenvalues, damped.is_overdamped, strict=True
-    ):
-        number = text.rpartition(" ")[2].replace("−", "-")
-        assert text.startswith("overdamped, and ") == bool(over)
-        assert float(number) == pytest.approx(pair[1].real if over else pair[0].imag, rel=1e-6)
-    texts = shown["damping_ratio"].digits([0.0, 1.23456e-4, 0.9999e-3, 1e-3, 0.0123456, 1.5])
-    assert list(texts) == ["0", "1.235 × 10⁻⁴", "9.999 × 10⁻⁴", "0.00100", "0.01235", "1.50000"]
+    for row, omega in zip(answer.modes, table.natural_frequency, strict=True):
+        low, high = row.lower, row.upper
+        assert low is None if omega == 0 else float(low) * (1 - 2 * EPS) <= omega <= float(high) * (1 + 2 * EPS)
+    assert answer.proof.count == len(table)
 
 
 def test_a_table_says_how_many_and_from_where_to_where():
@@ -113,8 +72,6 @@ def test_every_road_to_the_frequencies_ends_at_them():
     assert texts[0] == "0.0"
     np.testing.assert_allclose([float(text) for text in texts], table.frequencies("balls"), rtol=EPS)
     assert all(len(text.replace(".", "")) == 20 for text in texts[1:])
-    answer = modes_by_methods_answer(table)
-    assert answer["index"] == [0, 1, 2, 3, 4]
     assert list(table.by_methods().values) == ["closed-form", "balls", "appendix"]
 
 

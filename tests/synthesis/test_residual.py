@@ -18,11 +18,12 @@ from tests.synthesis.judged import judge_of
 from tfarm import HubFeedback, tuner
 from tfarm.dsp import Chain, Slew
 from tfarm.dsp.chain import Sampling
-from tfarm.dsp.results import simulated_answer
+from tfarm.dsp.results import simulated_run
 from tfarm.reduced import modal_model
+from tfarm.schema import to_dict
 from tfarm.synthesis import search
 from tfarm.synthesis.design import design
-from tfarm.tuner.tuning import controlled_answer
+from tfarm.tuner.tuning import controlled_run
 
 DATA = Path(__file__).parents[1] / "data" / "reproductions"
 LAB = tfarm.load("sasaki2012-lab")
@@ -71,7 +72,7 @@ def by_exponentials(arm, law, chain, duration, count):
 @pytest.mark.parametrize("chain", CHAINS, ids=NAMED)
 def test_a_simulation_finds_the_arms_own_moment_less_the_rigid_arms(chain):
     law = HubFeedback(K1=0.5, K2=0.15, Kp=2.0)
-    found = simulated_answer(LAB, law, chain, "slew", 1.4, count=6)["residual_moment_rms"]
+    found = to_dict(simulated_run(LAB, law, chain, "slew", 1.4, count=6))["residual_moment_rms"]
     assert found == pytest.approx(by_exponentials(LAB, law, chain, 1.4, 6), rel=1e-8)
 
 
@@ -80,14 +81,18 @@ def test_a_design_promises_what_a_simulation_finds(chain, monkeypatch):
     """To the last bit; what was minimised, of eight modes, is the same but for the modes left out."""
     monkeypatch.setattr(search, "STARTS_EACH", 2)
     found = design(LAB, "residual", chain=chain, K1=(0.1, 3.0), K2=(-0.5, 0.5))
-    assert found.value == simulated_answer(LAB, found.law, chain, "slew", found.slew_duration)["residual_moment_rms"]
+    assert (
+        found.value == to_dict(simulated_run(LAB, found.law, chain, "slew", found.slew_duration))["residual_moment_rms"]
+    )
     assert judge_of(LAB, found.law, "residual", chain).score(found.law) == pytest.approx(found.value, rel=1e-4)
 
 
 @pytest.mark.parametrize("chain", CHAINS[-1:], ids=NAMED[-1:])
 def test_so_does_a_design_of_a_law(chain):
     found = tfarm.design(LAB, "residual", structure="PD", chain=chain)
-    assert found.value == simulated_answer(LAB, found.law, chain, "slew", found.slew_duration)["residual_moment_rms"]
+    assert (
+        found.value == to_dict(simulated_run(LAB, found.law, chain, "slew", found.slew_duration))["residual_moment_rms"]
+    )
     assert judge_of(LAB, found.law, "residual", chain).score(found.law) == pytest.approx(found.value, rel=1e-4)
 
 
@@ -96,14 +101,14 @@ def test_the_tuner_reports_what_a_simulation_finds(chain):
     """Tuned, with a constant gain and without moment feedback, of as many modes."""
     plan = tuner.Plan(K1=0.5, Kp=2.0, signals=chain.slew.reading, trials=3, duration=1.5)
     tuning = tuner.tune(LAB, plan, chain)
-    found = tuner.tune_answer(tuning)
-    again = controlled_answer(LAB, tuning.saved(), chain, "slew", 1.5, count=6, between=0)
+    found = to_dict(tuner.TuningResult(tuning))
+    again = to_dict(controlled_run(LAB, tuning.saved(), chain, "slew", 1.5, count=6, between=0))
     for key in ("residual_moment_rms", "residual_raw_moment_rms"):
         assert again[key] == pytest.approx(found[key], rel=1e-9)
     for gain, residual in ((0.0, found["residual_without"]), (0.2, None)):
         record = tuning.trial.with_constant(gain)
         law = HubFeedback(K1=0.5, K2=gain, Kp=2.0)
-        simulated = simulated_answer(LAB, law, chain, "slew", 1.5, count=6)["residual_moment_rms"]
+        simulated = to_dict(simulated_run(LAB, law, chain, "slew", 1.5, count=6))["residual_moment_rms"]
         assert tuner.residual_rms(record, tuning.trial.task) == pytest.approx(simulated, rel=1e-9)
         assert residual is None or residual == pytest.approx(simulated, rel=1e-9)
 
@@ -138,17 +143,17 @@ def test_what_was_not_computed_is_null_and_is_no_number_in_words(capsys):
     stopped = ("simulate", str(DATA / "r2.toml"), "--dsp", str(DATA / "q1.toml"), "--K1", "13.81572", "--K2", ".1",
                "--Kp", "27.1322", "--duration", "2")  # fmt: skip
     _, out, err = run(capsys, *stopped)
-    assert "residual root moment, less the rigid arm's: not computed, as the run stops at 0.528 s" in out
+    assert "residual root moment, as the run stops at 0.528 s" in out
     assert "unstable: stopped at 0.528 s" in err
     answer = json.loads(run(capsys, *stopped, "--json")[1])
     assert answer["residual_moment_rms"] is answer["residual_raw_moment_rms"] is None
     short = run(capsys, "simulate", "sasaki2012-lab", "--duration", "0.9")[1]
-    assert "not computed, as the record ends before the slew" in short
+    assert "residual root moment, as the record ends before the slew" in short
 
 
 def test_a_loop_that_runs_away_later_leaves_no_number_either():
     """Stopped after the slew: the record that the residual is of does not exist."""
     law = HubFeedback(K1=0.3, K2=1.2)
-    answer = simulated_answer(LAB, law, Chain(), "slew", 60.0, count=6)
+    answer = to_dict(simulated_run(LAB, law, Chain(), "slew", 60.0, count=6))
     assert answer["stopped_at_s"] > 1.0
     assert answer["residual_moment_rms"] is None

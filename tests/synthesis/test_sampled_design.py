@@ -16,7 +16,7 @@ from tfarm import ConvergenceError, HubFeedback, ParameterError
 from tfarm.arm import TWO_GAINS
 from tfarm.dsp import Chain, Slew, sampled_verdict
 from tfarm.dsp.chain import Sampling
-from tfarm.dsp.results import simulated_answer
+from tfarm.dsp.results import simulated_run
 from tfarm.synthesis import search
 from tfarm.synthesis.design import design
 from tfarm.synthesis.judge import RESERVE
@@ -158,8 +158,8 @@ def test_a_better_residual_holds_and_is_what_a_simulation_finds(name, structure)
     assert judge.holds(law)
     assert judge.score(law) == pytest.approx(residual, rel=1e-5)
     period = 2 * np.pi / tfarm.modes(arm, 1).natural_frequency[-1]
-    found = simulated_answer(arm, law, Chain(), "slew", 1.0 + max(period, 0.16))
-    assert found["residual_moment_rms"] == pytest.approx(residual, rel=1e-5)
+    found = simulated_run(arm, law, Chain(), "slew", 1.0 + max(period, 0.16))
+    assert found.residual_moment == pytest.approx(residual, rel=1e-5)
 
 
 @pytest.mark.parametrize(("name", "structure"), BETTER)

@@ -10,9 +10,10 @@ import tfarm
 from tests.shell import answer, run
 from tests.synthesis.judged import judge_of
 from tfarm.dsp import Chain
-from tfarm.dsp.results import simulated_answer
+from tfarm.dsp.results import simulated_run
 from tfarm.report import tuner_section
 from tfarm.report.tuner_section import comparison_table
+from tfarm.schema import to_dict
 from tfarm.tuner.tuning import trial_of, usual_plan
 
 SMALL = Path(__file__).parents[1] / "data" / "reproductions" / "r3.toml"
@@ -36,7 +37,7 @@ def page():
 
 def by_hand(law, duration=3.0):
     """T sum of (x^2 + 2.6 e^2)/2 of a simulated slew, in units of 0.3 N m; e is what the law adds to r."""
-    found = simulated_answer(ARM, law, Chain(), "slew", duration, count=6)
+    found = to_dict(simulated_run(ARM, law, Chain(), "slew", duration, count=6))
     t, acceleration = np.array(found["t"]), 4 * 1.15  # rad/s^2: 1.15 rad in 1 s
     sign = np.where(t < 0.5 - 1e-9, 1.0, np.where(t < 1.0 - 1e-9, -1.0, 0.0))
     before = np.r_[0.0, sign[:-1]]
@@ -51,7 +52,7 @@ def by_hand(law, duration=3.0):
 def test_text_json_page_and_file_have_one_cost(capsys, saved, page):
     _, out, _ = run(capsys, "tune", str(SMALL))
     found = answer(capsys, "tune", str(SMALL), "--save", str(saved))
-    assert f"units of {UNIT:g} N m" in out
+    assert f"cost_unit_N_m {UNIT:g}" in out
     assert (found["a"], found["b"], found["cost_unit_N_m"]) == (1.0, 2.6, UNIT)
     costs = {"without": "cost_without", "best_constant": "cost_best_constant", "tuner": "cost_tuned"}
     row = comparison_table(page)[0]

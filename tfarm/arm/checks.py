@@ -15,6 +15,9 @@ from collections.abc import Callable, Mapping
 from numbers import Integral, Real
 from typing import Literal, get_args
 
+import numpy as np
+
+from tfarm.arrays import Real as Reals
 from tfarm.errors import ParameterError
 
 SMALLEST_NUMBER = 1e-40  # far outside any arm, yet no product of a few such numbers underflows
@@ -83,6 +86,14 @@ def extended(key: str, value: object, meaning: str) -> float:
     """Zero, a positive number, or inf."""
     x = number(key, value, meaning)
     return x if x == math.inf else not_negative(key, x, meaning)
+
+
+def on_the_arm(key: str, x: Reals | float, length: float) -> Reals:
+    """Points [m] of an arm of this length, as an array; nan is none."""
+    points = np.asarray(x, dtype=float)
+    if not np.all((points >= 0) & (points <= length)):
+        raise ParameterError(key=key, value=x, remedy=f"a point of the arm lies between 0 and {length:g} m")
+    return points
 
 
 def check_fields(

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 from .rows import AuditRow, Claim, is_zero
 
 if TYPE_CHECKING:
-    from .paper import PAPER, audit, audit_answer, claims
+    from .paper import PAPER, Audit, audit, claims
 
-__all__ = ["PAPER", "AuditRow", "Claim", "audit", "audit_answer", "claims", "is_zero"]
+__all__ = ["PAPER", "Audit", "AuditRow", "Claim", "audit", "claims", "is_zero"]
 
 
 def __getattr__(name: str) -> object:

@@ -3,29 +3,25 @@
 The paper gives an area, 6e-4 m^2, but neither the second moment I nor the hub inertia I_h.  Two studies walk through
 the candidates, one parameter at a time, everything else being the arm's own.  Both rest on the exact solution, and
 the sensitivities are exact too (`Modes.sensitivity`); frequencies are those of the undamped arm.
-
-The candidates of `assumptions` as commands and pages have them, and the answer of `tfarm assumptions`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import MOMENT_GAIN, PLANE, Arm, Section
 from tfarm.arrays import Real
-from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
-from tfarm.digits import fixed, general, plain, significant, singly
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.records import record
+from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import default_gains
 
@@ -163,113 +159,118 @@ def _with_own(candidates: Sequence[float], own: float) -> list[float]:
 
 HELD_SECTION = "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice"
 HELD_HUB = "all else held"
-OWN = "#eaf1f8"  # on a page behind the row of the arm itself
-NO_EDGE = "-"  # where no gain on the moment is stable
 
 
-def _tints(study: Study) -> list[str]:
-    return [OWN if own else "" for own in study.is_own]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """One candidate section or hub inertia, and the loop under the default gains of the arm itself."""
+
+    is_own: Annotated[bool, Quantity("this arm")]
+    depth: Annotated[float | None, Quantity("depth", "m", 4)] = None
+    width: Annotated[float | None, Quantity("width", "m", 4)] = None
+    second_moment: Annotated[float | None, Quantity("I", "m^4", 4, key="second_moment_m4")] = None
+    hub_inertia: Annotated[float | None, Quantity("I_h", "kg m^2", 4, key="hub_inertia_kg_m2")] = None
+    natural_frequency: Annotated[list[float], Quantity("natural frequencies", "rad/s")]
+    sensitivity: Annotated[list[float], Quantity("sensitivities", "%/%", 4, "of frequency to I or I_h, exact")]
+    verdict: Annotated[str, Quantity("loop")]
+    K2_below: Annotated[float | None, Quantity(f"stable below {MOMENT_GAIN}", help="of the default loop")]
+    K2_below_is_edge: Annotated[bool, Quantity("stability limit there")]
 
 
-_size = partial(Column, digits=singly(plain, 4), printed=singly(general, 4), tint=_tints)
-SECTION_COLUMNS = (
-    _size("depth_m", "depth", "m", of="values"),
-    _size("width_m", "width", "m", of=lambda study: study.arm.link.section.area / study.values),
-    _size(
-        "second_moment_m4",
-        "I",
-        "m⁴",
-        head="I [m^4]",
-        of=lambda study: study.arm.link.section.area * study.values**2 / 12,
-    ),
-)
-HUB_COLUMNS = (_size("hub_inertia_kg_m2", "I_h", "kg m²", of="values", head="I_h [kg m^2]"),)
+def candidates(study: Study) -> list[Candidate]:
+    """A row a candidate."""
+    verdicts = loop_verdicts(study) or (LoopVerdict("no loop", None),) * len(study.arms)
+    rows = zip(study.is_own.tolist(), study.values.tolist(), study.natural_frequency.tolist(),
+               study.sensitivity.tolist(), verdicts, strict=True)  # fmt: skip
+    return [
+        Candidate(is_own=own, natural_frequency=omega, sensitivity=slopes, verdict=loop.verdict, K2_below=loop.K2_below,
+                  K2_below_is_edge=loop.is_edge, **_size(study, value))
+        for own, value, omega, slopes, loop in rows
+    ]  # fmt: skip
 
 
-def candidates(study: Study) -> Table:
-    """A row a candidate: its size, frequencies [rad/s], sensitivities, and what becomes of the default loop."""
-    size, parameter = (HUB_COLUMNS, "I_h") if study.pinned.size else (SECTION_COLUMNS, "I")
-    columns = (
-        Column("is_own", head="", printed=lambda values: ["*" * own for own in values], on=ANSWER),
-        Column("is", of=["this arm" if own else "" for own in study.is_own], tint=_tints, on=REPORT),
-        *size,
-        Column("natural_frequency_rad_s", of="natural_frequency", on=(JSON,)),
-        Column("sensitivity", on=(JSON,)),
-        *_modes(study, parameter),
-        *loop_columns(study, loop_verdicts(study)),
-    )
-    return Table(columns=columns, record=study, keys=2)
+def _size(study: Study, value: float) -> dict[str, float]:
+    """The varied parameter and those that go with it."""
+    area = study.arm.link.section.area
+    if study.pinned.size:
+        return {"hub_inertia": value}
+    return {"depth": value, "width": area / value, "second_moment": area * value**2 / 12}
 
 
-def _modes(study: Study, parameter: str) -> Iterator[Column]:
-    """Frequencies, then sensitivities on a page; on a terminal in pairs."""
-    pairs = list(enumerate(zip(study.natural_frequency.T, study.sensitivity.T, strict=True), 1))
-    frequency, sensitivity = (partial(Column, group=name, tint=_tints, on=REPORT)
-                              for name in ("natural frequency", "sensitivity"))  # fmt: skip
-    for i, (omega, _) in pairs:
-        yield frequency(f"mode_{i}_rad_s", f"mode {i}", "rad/s", of=omega, digits=singly(significant, 6))
-    for i, (_, slope) in pairs:
-        yield sensitivity(f"mode_{i}_sensitivity", f"mode {i}", "%/%", of=slope, digits=partial(fixed, decimals=4))
-    for i, (omega, slope) in pairs:
-        yield Column("", f"w{i}", "rad/s", of=omega, digits=singly(general, 8), on=(TERMINAL,))
-        yield Column("", f"%/% {parameter}", of=slope, digits=singly("{:.4f}".format), on=(TERMINAL,))
+@dataclass(frozen=True)
+class SectionStudy:
+    """Rectangles of the arm's area."""
+
+    study: Study
+
+    @property
+    def area(self) -> Annotated[float, Quantity("area", "m^2", key="area_m2")]:
+        """The area of the section."""
+        return self.study.arm.link.section.area
+
+    @property
+    def shear_factor(self) -> Annotated[float, Quantity("shear factor")]:
+        """The shear factor of the section."""
+        return self.study.arm.link.shear_factor
+
+    @property
+    def held(self) -> Annotated[str, Quantity("sensitivity to I")]:
+        """What is held."""
+        return HELD_SECTION
+
+    @property
+    def candidates(self) -> Annotated[list[Candidate], Quantity("candidate sections")]:
+        """A row a candidate."""
+        return candidates(self.study)
 
 
-def loop_columns(study: Study, found: tuple[LoopVerdict, ...] | None) -> Iterator[Column]:
-    """The verdict on the default loop, and the upper edge of its moment gain; not on a page where there is no loop."""
-    verdicts = found or (LoopVerdict("no loop", None),) * len(study.arms)
-    law, edges = default_gains(study.arm), [each.K2_below for each in verdicts]
-    group = f"loop at {', '.join(law.told(name, lambda gain: plain(gain, 4)) for name in PLANE)}"
-    everywhere = (*ANSWER, *REPORT) if found else ANSWER
-    words = [each.verdict for each in verdicts]
-    yield Column("verdict", "verdict", of=words, head="loop", group=group, tint=_tints, on=everywhere)
-    shown = [NO_EDGE if edge is None else general(edge, 6) for edge in edges]
-    yield Column("K2_below", of=edges, head=f"{MOMENT_GAIN} below", shown=shown, on=ANSWER)
-    yield Column("K2_below_is_edge", of=[each.is_edge for each in verdicts], on=(JSON,))
-    if found:
-        texts = [NO_EDGE if each.K2_below is None else _edge(each.K2_below, each.is_edge) for each in found]
-        values = ["" if edge is None else edge for edge in edges]
-        yield Column(
-            "K2_below", f"stable below {MOMENT_GAIN}", of=values, shown=texts, group=group, tint=_tints, on=REPORT
-        )
+@dataclass(frozen=True)
+class HubStudy:
+    """Hub inertias."""
+
+    study: Study
+
+    @property
+    def held(self) -> Annotated[str, Quantity("sensitivity to I_h")]:
+        """What is held."""
+        return HELD_HUB
+
+    @property
+    def locked(self) -> Annotated[list[float], Quantity("locked hub (I_h = inf) [rad/s]", key="locked_rad_s")]:
+        """The limits of a heavy hub."""
+        return list(self.study.locked.tolist())
+
+    @property
+    def pinned(self) -> Annotated[list[float], Quantity("free pin (I_h = 0) [rad/s]", key="pinned_rad_s")]:
+        """The limits of a light one."""
+        return list(self.study.pinned.tolist())
+
+    @property
+    def candidates(self) -> Annotated[list[Candidate], Quantity("candidate hub inertias")]:
+        """A row a candidate."""
+        return candidates(self.study)
 
 
-def _edge(gain: float, is_edge: bool) -> str:
-    """An edge, or with a star the end of a search that found none."""
-    return significant(gain, 6) if is_edge else f"{plain(gain, 6)}*"
+@dataclass(frozen=True)
+class Assumptions:
+    """The effect of the assumed section and hub; no hub where that has no inertia to choose."""
+
+    arm: Annotated[str, Quantity("arm")]
+    count: Annotated[int, Quantity("flexible modes")]
+    gains: Annotated[dict[str, float], Quantity("gains of the loop")]
+    section: Annotated[SectionStudy, Quantity("section")]
+    hub: Annotated[HubStudy | None, Quantity("hub")]
 
 
-def assumptions_answer(arm: Arm, count: int) -> dict[str, Any]:
-    """The answer of `tfarm assumptions --json`; "hub" is null where the hub has no inertia to choose.
+def assumptions(arm: Arm, count: int) -> Assumptions:
+    """Frequencies over the candidates of section and hub inertia.
 
     Raises ParameterError for a rig: what the paper leaves open are section and hub of one beam.
     """
     if not arm.is_uniform:
         remedy = "the assumptions looked at are the paper's, of one Timoshenko beam on a hub; this is a rig"
         raise ParameterError(key="arm", value=arm.name, remedy=remedy)
-    section = {
-        "shape": "rectangle",
-        "area_m2": arm.link.section.area,
-        "shear_factor": arm.link.shear_factor,
-        "sensitivity_to": "second_moment",
-        "held": HELD_SECTION,
-        "candidates": candidates(section_study(arm, count=count)),
-    }
-    hub = None
-    if has_hub_inertia(arm):
-        study = hub_study(arm, count=count)
-        hub = {
-            "sensitivity_to": "hub_inertia",
-            "held": HELD_HUB,
-            "candidates": candidates(study),
-            "locked_rad_s": study.locked.tolist(),
-            "pinned_rad_s": study.pinned.tolist(),
-        }
+    hub = HubStudy(hub_study(arm, count=count)) if has_hub_inertia(arm) else None
     law = default_gains(arm)
-    return {
-        "arm": arm.name,
-        "count": count,
-        "gains": {name: law[name] for name in PLANE},
-        "section": section,
-        "hub": hub,
-    }
+    section = SectionStudy(section_study(arm, count=count))
+    return Assumptions(arm.name, count, {name: law[name] for name in PLANE}, section, hub)

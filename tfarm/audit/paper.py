@@ -6,16 +6,17 @@ The audit of the paper: a row for each of its equations, its table and its appen
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cache, partial
-from typing import Any
+from typing import Annotated
 
-from tfarm.columns import Table
+from tfarm.schema import Quantity
 
 from .appendix import APPENDIX_CLAIMS, DAMPING_CLAIM, LAMBDA
 from .energy import ENERGY_CLAIMS
 from .formulas import NEEDED, PAPER_UNITS, Dimension, clauses, mismatch, parsed, spelled, unit_dimension, unlike
 from .motion import MOTION_CLAIMS, TIME
-from .rows import AUDIT_COLUMNS, AuditRow, Claim, in_words
+from .rows import AuditRow, Claim, in_words
 from .tuner import TUNER_CLAIMS
 
 ALUMINIUM_DENSITIES = (2550.0, 2900.0)  # kg/m^3: alloys from aluminium-lithium to those rich in copper and zinc
@@ -156,6 +157,9 @@ def audit() -> tuple[AuditRow, ...]:
     return tuple(claim.row() for claim in claims())
 
 
-def audit_answer() -> dict[str, Any]:
-    """The answer of `tfarm audit --json`."""
-    return {"paper": PAPER, "rows": Table(columns=AUDIT_COLUMNS, record=audit())}
+@dataclass(frozen=True)
+class Audit:
+    """The paper, equation by equation."""
+
+    paper: Annotated[str, Quantity("paper")]
+    rows: Annotated[tuple[AuditRow, ...], Quantity("equations")]

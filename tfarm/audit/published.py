@@ -13,16 +13,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from importlib.resources import files
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, Theory
 from tfarm.arm.schema import arm_of_table
-from tfarm.columns import JSON, REPORT, Column, Table
-from tfarm.digits import TEXTS, general, powers, significant, singly, worded
 from tfarm.errors import CertificationError
+from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
 SLENDERNESS = 100.0  # L/r of the beam of a case that has no other
@@ -48,9 +47,9 @@ class Case:
 class Source:
     """A publication: `citation` says where its table stands, `reached` by what way its numbers came here."""
 
-    key: str
-    citation: str
-    reached: str
+    key: Annotated[str, Quantity("source", key="key")]
+    citation: Annotated[str, Quantity("citation")]
+    reached: Annotated[str, Quantity("read from")]
     cases: tuple[Case, ...]
 
 
@@ -83,35 +82,25 @@ ALL = tuple(map(_source, tomllib.loads((files("tfarm.audit") / "literature.toml"
 class PublishedRow:
     """One printed number and ours; `difference` is ours/printed - 1, `why` empty where ours agrees."""
 
-    source: str
-    case: str
-    quantity: str
-    mode: int
-    printed: str
-    ours: float
-    difference: float
-    agrees: bool
-    why: str
+    source: Annotated[str, Quantity("source")]
+    case: Annotated[str, Quantity("case")]
+    quantity: Annotated[str, Quantity("quantity")]
+    mode: Annotated[int, Quantity("mode")]
+    agrees: Annotated[bool, Quantity("agrees to the last printed digit")]
+    printed: Annotated[str, Quantity("printed")]
+    ours: Annotated[float, Quantity("exact", digits=10)]
+    difference: Annotated[float, Quantity("relative difference", digits=2)]
+    why: Annotated[str, Quantity()]
 
 
-def lettered(text: str) -> str:
-    """Words with formulas in plain letters, with Greek ones."""
-    return powers(text.replace("rhoA", "ρA").replace("w^2", "ω^2").replace("w L", "ω L"))
+class Difference(NamedTuple):
+    """Printed numbers of a case that ours do not round to, and why."""
 
-
-PUBLISHED_COLUMNS = (
-    Column("source", "source", on=(JSON, *REPORT)),
-    Column("case", "case", digits=worded(lettered), printed=TEXTS, folds=True),
-    Column("quantity", "quantity", digits=worded(lettered), printed=TEXTS, folds=True),
-    Column("mode", "mode"),
-    Column("agrees", on=(JSON,)),
-    Column("agrees", of=lambda row: "yes" if row.agrees else "no", digits=worded({"yes": "✓", "no": "≠"}.__getitem__),
-           on=REPORT),
-    Column("printed", "printed"),
-    Column("ours", "ours", digits=singly(significant, 11), head="exact", printed=singly(general, 10)),
-    Column("difference", "difference", digits=singly(significant, 2), printed=singly(lambda x: f"{x:+.1e}")),
-    Column("why", on=(JSON,)),
-)  # fmt: skip
+    source: Annotated[str, Quantity("source")]
+    case: Annotated[str, Quantity("case")]
+    modes: Annotated[str, Quantity("modes")]
+    largest: Annotated[float, Quantity("largest difference", digits=2)]
+    why: Annotated[str, Quantity("reason")]
 
 
 def validate(sources: tuple[Source, ...] = ALL) -> tuple[PublishedRow, ...]:
@@ -171,15 +160,37 @@ def agrees(ours: float, printed: str) -> bool:
     return abs(Decimal(ours) - number) <= unit / 2
 
 
-def validate_answer() -> dict[str, Any]:
-    """The sources and the table of rows, with how many agree and how many are explained.
+@dataclass(frozen=True)
+class Validation:
+    """Published tables, number by number."""
 
-    Raises CertificationError as `validate` does.
-    """
-    found = validate()
-    return {
-        "sources": [{"key": s.key, "citation": s.citation, "reached": s.reached} for s in ALL],
-        "rows": Table(columns=PUBLISHED_COLUMNS, record=found),
-        "agree": sum(row.agrees for row in found),
-        "explained": sum(bool(row.why) for row in found),
-    }
+    rows: Annotated[tuple[PublishedRow, ...], Quantity("published numbers")]
+
+    @property
+    def sources(self) -> Annotated[list[Source], Quantity("sources")]:
+        """The publications."""
+        return [each for each in ALL if any(row.source == each.key for row in self.rows)]
+
+    @property
+    def differences(self) -> Annotated[list[Difference], Quantity("differences")]:
+        """A row a reason."""
+        groups: dict[tuple[str, str, str], list[PublishedRow]] = {}
+        for row in self.rows:
+            if not row.agrees:
+                groups.setdefault((row.source, row.case, row.why), []).append(row)
+        return [
+            Difference(
+                source, case, ", ".join(str(row.mode) for row in of), max((r.difference for r in of), key=abs), why
+            )
+            for (source, case, why), of in groups.items()
+        ]
+
+    @property
+    def agree(self) -> Annotated[int, Quantity("agree to the last printed digit")]:
+        """How many numbers agree."""
+        return sum(row.agrees for row in self.rows)
+
+    @property
+    def explained(self) -> Annotated[int, Quantity("differ for the reason given")]:
+        """How many do not."""
+        return sum(bool(row.why) for row in self.rows)

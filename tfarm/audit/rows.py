@@ -14,9 +14,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
-from tfarm.columns import FILES, JSON, Column
 from tfarm.errors import CertificationError
+from tfarm.schema import Quantity
 
 
 def tex(text: str) -> str:
@@ -49,27 +50,15 @@ RESIDUAL_NOISE = 1e-25  # relative: numbers are compared at 50 digits
 class AuditRow:
     """One equation as printed and as corrected, with what each leaves in the check that tells them apart."""
 
-    equation: str
-    verdict: str
-    printed: str
-    corrected: str
-    evidence: str
-    residual_printed: str
-    residual_corrected: str
+    equation: Annotated[str, Quantity("equation")]
+    verdict: Annotated[str, Quantity("verdict")]
+    printed: Annotated[str, Quantity()]
+    corrected: Annotated[str, Quantity()]
+    evidence: Annotated[str, Quantity()]
+    residual_printed: Annotated[str, Quantity("residual as printed")]
+    residual_corrected: Annotated[str, Quantity("as corrected")]
     printed_tex: str
     corrected_tex: str
-
-
-AUDIT_COLUMNS = (
-    Column("equation", "equation", folds=True),
-    Column("verdict", "verdict"),
-    Column("printed", on=(JSON, FILES)),
-    Column("corrected", on=(JSON, FILES)),
-    Column("evidence", on=(JSON,)),
-    Column("residual_printed", "residual as printed", folds=True),
-    Column("residual_corrected", "as corrected", folds=True),
-    Column("evidence", on=(FILES,)),  # the last of a line
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,7 +19,6 @@ from tfarm.tables.files import to_json, write_csv
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
-    from tfarm.columns import Table
     from tfarm.exact.outputs import Output
 
 
@@ -99,44 +98,6 @@ def read_on(names: list[str], side: str | None) -> list[str | Output]:
     from tfarm.exact.outputs import on_side
 
     return [name if side is None else on_side(name, cast("Any", side)) for name in names]
-
-
-def give(answer: dict[str, Any], json: bool, printed: Callable[[dict[str, Any]], None]) -> None:
-    """The answer as one JSON object, or as it is `printed`, then which gains are defaults."""
-    if json:
-        print(to_json(answer))
-        return
-    printed(answer)
-    if answer.get("default_gains"):
-        print(f"by default {answer['default_gains_in_words']}")
-
-
-def hand_out(
-    answer: Callable[[], dict[str, Any]],
-    printed: Callable[[dict[str, Any]], None],
-    json: bool,
-    *,
-    csv: Path | None = None,
-    table: Callable[[], Table] | None = None,
-    png: Path | None = None,
-    picture: Sequence[object] = (),
-    also: Sequence[Path | None] = (),
-) -> None:
-    """What was found: its table and its picture to the files asked for, then the answer, as JSON or `printed`.
-
-    `picture` is the record that is drawn, with what stands beside it; `also` are files that are written already.
-    Nothing is printed where standard output holds one of them.
-    """
-    if csv is not None and table is not None:
-        write_csv(table(), csv)
-    if png is not None:
-        import tfarm.plots  # noqa: F401  every picture is known once they are loaded
-        from tfarm.plots.files import save_png
-        from tfarm.plots.style import FIGURES
-
-        save_png(FIGURES[type(picture[0])](*picture), png)
-    if say_written(*also, csv, png) or json:
-        give(answer(), json, printed)
 
 
 def emit(

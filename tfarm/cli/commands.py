@@ -5,12 +5,13 @@ Rooms are imported inside them, so that `tfarm --help` answers at once.
 
 from __future__ import annotations
 
-import math
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from tfarm.arm import Arm
 from tfarm.cli.app import (
     ArmName,
     Compare,
@@ -22,23 +23,19 @@ from tfarm.cli.app import (
     SideName,
     TheoryName,
     app,
-    give,
-    hand_out,
+    emit,
     load_arm,
     read_on,
     right_digits,
-    say_written,
     tell,
     whole_number,
 )
 from tfarm.cli.inputs import Png, asked_input, bounds, must_be_band, points_on
-from tfarm.columns import Column, Table
-from tfarm.digits import general, singly
 from tfarm.errors import MISSING, ParameterError
+from tfarm.schema import Quantity
 from tfarm.tables.terminal import show
 
 if TYPE_CHECKING:
-    from tfarm.arm import Arm
     from tfarm.exact.values import Method
 
 Csv = Annotated[Path | None, typer.Option("--csv", help="write the curve to this file")]
@@ -56,21 +53,31 @@ def presets(json: Json = False) -> None:
     """List the arms that come with tfarm."""
     import tfarm
 
-    names = ("name", "length", "damping", "hub_inertia", "payload_mass", "payload_inertia", "assumptions")
-    columns = tuple(Column(key, of=key.replace("hub_", "hub.").replace("payload_", "payload.")) for key in names)
-    arms = Table(columns=columns, record=[tfarm.load(name) for name in tfarm.presets()])
-    give({"presets": arms}, json, _print_presets)
+    emit(Presets([_preset(tfarm.load(name)) for name in tfarm.presets()]), json)
 
 
-def _print_presets(answer: dict[str, Any]) -> None:
-    """A line an arm, with its assumptions."""
-    from rich.console import Console
+class Preset(NamedTuple):
+    """An arm that comes with tfarm."""
 
-    console = Console()
-    for arm in answer["presets"]:
-        console.print(f"[bold]{arm['name']}[/bold]", highlight=False)
-        for text in arm["assumptions"]:
-            console.print(f"  - {text}", highlight=False, markup=False)
+    name: Annotated[str, Quantity("name")]
+    length: Annotated[float, Quantity("length [m]")]
+    damping: Annotated[float, Quantity("damping C [s]")]
+    hub_inertia: Annotated[float, Quantity("hub inertia", "kg m^2")]
+    payload_mass: Annotated[float, Quantity("payload mass", "kg")]
+    payload_inertia: Annotated[float, Quantity("payload inertia", "kg m^2")]
+    assumptions: Annotated[tuple[str, ...], Quantity("assumptions")]
+
+
+def _preset(arm: Arm) -> Preset:
+    payload = arm.payload
+    return Preset(arm.name, arm.length, arm.damping, arm.hub.inertia, payload.mass, payload.inertia, arm.assumptions)
+
+
+@dataclass(frozen=True)
+class Presets:
+    """All of them."""
+
+    presets: Annotated[list[Preset], Quantity("arms")]
 
 
 @app.command()
@@ -87,44 +94,21 @@ def modes(
     """Natural frequencies and modes, complete by construction."""
     wanted, right = whole_number("--count", count, 1, MOST_LISTED), right_digits(digits)
     subject = load_arm(arm, theory)
+    from tfarm.response.points import ByMethods
     from tfarm.spectrum import modes as find_modes
-    from tfarm.spectrum.answers import modes_answer, modes_by_methods_answer
+    from tfarm.spectrum.listing import listed_modes
 
-    table = find_modes(subject, wanted)
-    road = _slow_method(method, len(table), right, compare)
+    found = find_modes(subject, wanted)
+    chosen = _slow_method(method, len(found), right, compare)
     if compare:
         _refuse_beside({"--certify": certify or None}, BESIDE_COMPARE)
-        give(modes_by_methods_answer(table), json, _print_compared)
+        emit(ByMethods(subject.name, "natural_frequency", "rad/s", found.index.tolist(), found.by_methods()), json)
         return
-    answer = modes_answer(table, right, certify, road)
-    give(answer, json, _print_modes)
-    if "damped_failure" in answer:
-        tell(answer["damped_failure"])
+    answer = listed_modes(found, right, certify, chosen)
+    emit(answer, json)
+    if answer.damped_failure:
+        tell(answer.damped_failure)
         raise typer.Exit(3)  # as where nothing could be solved
-
-
-def _print_modes(answer: dict[str, Any]) -> None:
-    """The modal table; with damping, each eigenvalue beside its undamped frequency."""
-    show(answer["modes"])
-    if "proof" in answer:
-        proof = answer["proof"]
-        print(f"proven: each frequency enclosed, and {proof['count']} in all below {proof['below_rad_s']} rad/s")
-    if "box" in answer:
-        left, right, low, high = answer["box"]
-        proven = "proven" if "proven_complete_in_box" in answer else "by winding number"
-        print(f"{answer['eigenvalues_in_box']} eigenvalues with Re s from {left:.6g} to {right:.6g} 1/s and")
-        print(f"Im s from {low:.6g} to {high:.6g} rad/s, all listed ({proven}). Beyond the box there are more:")
-        print(f"{answer['box_note'].partition(': ')[2]}.")
-        for each in answer.get("circuit_eigenvalues", ()):
-            print(f"One more, {each:.8g} 1/s, belongs to no mode: it is the motor's circuit.")
-        for each in answer.get("unassigned_eigenvalues", ()):
-            re, im = each["eigenvalue"]
-            print(f"One more, {re:.8g}{f' +- {im:.8g}i' if im else ''} 1/s, is assigned to no mode: {each['origin']}.")
-        if "damped_note" in answer:
-            print(answer["damped_note"])
-    if answer["hub_locked_note"]:
-        print(answer["hub_locked_note"])
-    print(f"{answer['arm']}: the first {answer['count']} flexible modes, none missing ({answer['theory']} theory)")
 
 
 @app.command()
@@ -161,18 +145,22 @@ def response(
         raise ParameterError(key=option, value=MISSING, remedy="say which response: --output root_moment, for one")
     (wanted,) = read_on([output], side)
     from tfarm.response import transfer
-    from tfarm.response.answers import by_methods_answer, points_table, response_answer
+    from tfarm.response.points import ByMethods
+    from tfarm.response.points import points as values_at
+    from tfarm.schema import curve_table
 
     right, at = right_digits(digits), points_on(s, omega, start, stop, points)
     subject, driven = asked_input(load_arm(arm, theory, driven), driven)
-    road = _slow_method(method, at.size, right, compare)
+    chosen = _slow_method(method, at.size, right, compare)
     if compare:
         _refuse_beside({"--csv": csv, "--input": driven}, BESIDE_COMPARE)
-        give(by_methods_answer(transfer(subject, wanted, x=x), at), json, _print_compared)
+        G = transfer(subject, wanted, x=x)
+        emit(ByMethods(subject.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)), json)
         return
-    answer = response_answer(transfer(subject, wanted, x=x, method=road, input=driven), at, right)
-    printed = _print_found if csv is not None else lambda found: show(points_table(found))
-    hand_out(lambda: answer, printed, json, csv=csv, table=lambda: points_table(answer))
+    found = values_at(transfer(subject, wanted, x=x, method=chosen, input=driven), at, right)
+    emit(found, json, csv=csv)
+    if csv is None and not json:
+        show(curve_table(found))
 
 
 def _slow_method(method: str, number: int, digits: int | None, compare: bool) -> Method:
@@ -198,88 +186,16 @@ def _refuse_beside(others: dict[str, Any], remedy: str) -> None:
             raise ParameterError(key=key, value=value, remedy=remedy)
 
 
-def _print_found(answer: dict[str, Any]) -> None:
-    """How many points, and where the response is largest, for those who have the table in a file."""
-    sizes = [abs(complex(*map(float, value))) for value in answer["value"]]
-    largest = max(range(len(sizes)), key=sizes.__getitem__)
-    re, im = answer["s"][largest]
-    what = f"largest |{answer['output']} / {answer['input']}| {sizes[largest]:.6g}"
-    unit = f"{answer['unit']} / {answer['input_unit']}"
-    print(f"{answer['arm']}: {len(sizes)} points, {what} {unit} at s = {re:.10g}{im:+.10g}i 1/s")
-
-
-def _print_compared(answer: dict[str, Any]) -> None:
-    """A row a point or a mode: the closed form's number, and how far the others are from it, relatively."""
-    from tfarm.exact.values import METHODS_AGREE
-
-    numbers = answer["methods"]["closed-form"]
-    if "index" in answer:
-        first = Column("index", "mode", of=answer["index"]), Column("", "rad/s", of=numbers, digits=singly(general, 15))
-    else:
-        points = [f"{complex(*at):.10g}" for at in answer["s"]]
-        pairs = ([part if abs(part) > METHODS_AGREE * math.hypot(*pair) else 0.0 for part in pair] for pair in numbers)
-        values = [f"{complex(*pair):.15g}" for pair in pairs]  # no part that is less than the rounding of the other
-        first = Column("s", "s", "1/s", of=points), Column("", answer["output"], answer["unit"], of=values)
-    apart = [
-        Column(name, f"{name} differ{end} by", of=answer["differences"][name], digits=singly("{:.1e}".format))
-        for name, end in (("balls", ""), ("appendix", "s"))
-        if name in answer["differences"]
-    ]
-    show(Table(columns=(*first, *apart)))
-    largest = answer["largest_difference"]
-    if largest <= METHODS_AGREE:
-        others = " and proven balls" if answer["left_out"] else ", proven balls and the paper's own determinant"
-        print(f"Float64{others} agree to {largest:.1e}, their rounding.")
-    else:
-        print(f"They part by up to {largest:.1e}: more than rounding ({METHODS_AGREE:.0e}); the balls are proven.")
-    for method, why in answer["left_out"].items():
-        print(f"No {method} here: {why}.")
-
-
 def _lay_over(subject: Arm, text: str, others: dict[str, Any], csv: Path | None, png: Path | None, json: bool) -> None:
     """Both curves: mode by mode on the terminal or as JSON, point by point as a table, and as a picture.
 
     Raises ParameterError for one of the `others`, options that would go unheard.
     """
     from tfarm.fitting.data import data_of
-    from tfarm.fitting.overlay import curves_table, overlay, overlay_answer
+    from tfarm.fitting.overlay import overlay
 
     _refuse_beside(others, "a measured response has its own outputs and frequencies; leave this out")
-    found = overlay(subject, data_of(text, "--measured"))
-    hand_out(
-        lambda: overlay_answer(found), _print_overlay, json,
-        csv=csv, table=lambda: curves_table(found), png=png, picture=(found,),
-    )  # fmt: skip
-
-
-def _print_overlay(answer: dict[str, Any]) -> None:
-    """Mode by mode what differs, then poles and zeros."""
-    from tfarm.fitting.overlay import required_table
-
-    low, high = answer["band_hz"]
-    span = f"{answer['points']} points from {low:.6g} to {high:.6g} Hz"
-    print(f"{answer['arm']}: {answer['output']} over {answer['input']} [{answer['unit']}], {span}")
-    if len(answer["modes"]):
-        show(answer["modes"])
-    else:
-        print("no resonance of the arm lies in the band")
-    for peak in answer["unmatched_peaks_hz"]:
-        print(f"measured peak at {peak:.6g} Hz: none of the arm's is near")
-    if (table := required_table(answer)) is not None:
-        print("what the arm's numbers would have to be, each alone and for each mode (to first order in logarithms):")
-        show(table)
-    for what in ("poles", "zeros"):
-        print(f"{what} up to {answer['roots_up_to_rad_s']:.6g} rad/s [1/s]: {_listed(answer[what])}")
-    if answer["common"]:
-        print(f"common to both signals, and in neither: {_listed(answer['common'])}")
-    print(f"noise by {answer['noise']}; rms of ln |measured/exact| {answer['rms_log_error']:.4g}")
-
-
-def _listed(roots: list[list[float]]) -> str:
-    """Those in the upper half-plane, the first of them."""
-    texts = [f"{re:.6g}{im:+.6g}i" if im else f"{re:.6g}" for re, im in roots[:MOST_LISTED_ROOTS]]
-    rest = f" and {len(roots) - MOST_LISTED_ROOTS} more" if len(roots) > MOST_LISTED_ROOTS else ""
-    return ", ".join(texts) + rest if texts else "none"
+    emit(overlay(subject, data_of(text, "--measured")), json, csv=csv, png=png)
 
 
 @app.command()
@@ -302,13 +218,8 @@ def bode(
     subject, driven = asked_input(load_arm(arm, theory, driven), driven)
     band, (wanted,) = _band(subject, start, stop), read_on([output], side)
     from tfarm.response import bode as find
-    from tfarm.response.answers import bode_answer, bode_table
 
-    found = find(subject, wanted, band, x=x, input=driven)
-    hand_out(
-        lambda: bode_answer(found), _print_bode, json,
-        csv=csv, table=lambda: bode_table(found), png=png, picture=(found,),
-    )  # fmt: skip
+    emit(find(subject, wanted, band, x=x, input=driven), json, csv=csv, png=png)
 
 
 def _band(arm: Arm, start: float | None, stop: float | None) -> tuple[float, float] | None:
@@ -321,25 +232,6 @@ def _band(arm: Arm, start: float | None, stop: float | None) -> tuple[float, flo
     low, high = low if start is None else start, high if stop is None else stop
     must_be_band(low, high)
     return low, high
-
-
-def _print_bode(answer: dict[str, Any]) -> None:
-    """Poles and zeros, then peaks and dips."""
-    from tfarm.tables.terminal import show
-
-    low, high = answer["band_rad_s"]
-    at = f" at x = {answer['x']:g} m" if "x" in answer else ""
-    print(f"{answer['arm']}: {answer['output']}{at} / {answer['input']} [{answer['unit']}], {low:g} to {high:g} rad/s")
-    if not any(map(any, answer["value"])):
-        print("zero at every frequency")
-        return
-    none = {"peaks": ": |G| has no local maximum here", "dips": ": |G| has no local minimum here"}
-    for kind in ("poles", "zeros", "peaks", "dips"):
-        if len(answer[kind]):
-            print(f"{kind}:")
-            show(answer[kind])
-        else:
-            print(f"no {kind}{none.get(kind, '')}")
 
 
 @app.command()
@@ -363,27 +255,11 @@ def reduce(
     states = None if order is None else whole_number("--order", order, 0, 10**9)
     subject = load_arm(arm, theory)
     from tfarm.reduced import reduce as find
-    from tfarm.reduced import reduced_answer, save_mat
+    from tfarm.reduced import save_mat
 
     wanted = read_on([name.strip() for name in outputs.split(",")], side)
     how: Any = {"order": states, "error": error, "method": method, "band": (low, high), "x": x}
     reduced = find(subject, wanted, **how)
     written = () if mat is None else save_mat(reduced, mat, key="--mat")
 
-    say_written(*written)
-    give(reduced_answer(reduced), json, _print_reduced)
-
-
-def _print_reduced(answer: dict[str, Any]) -> None:
-    low, high = answer["band_rad_s"]
-    print(f"{answer['arm']}: {answer['method']}, order {answer['order']}, from {answer['input']}")
-    print(f"worst {answer['error_norm']} over {low:g} to {high:g} rad/s: {answer['worst_error']:.3g}")
-    for name, error in answer["errors"].items():
-        print(f"  {name}: {error:.3g}, at {answer['worst_at_rad_s'][name]:.6g} rad/s")
-    frequency, hertz = answer["first_mode_lacking_rad_s"], answer["first_mode_lacking_hz"]
-    print(f"first mode it lacks: {answer['first_mode_lacking']}, {frequency:.10g} rad/s ({hertz:.6g} Hz)")
-    for name, (re, im) in zip(answer["states"][-len(answer["poles"]) :], answer["poles"], strict=True):
-        if im >= 0:
-            print(f"  {name.rsplit('_', 1)[0]}: pole {re:.10g}{im:+.10g}i 1/s")
-    if answer["note"]:
-        print(answer["note"])
+    emit(reduced, json, also=written)

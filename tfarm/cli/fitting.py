@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,16 +17,13 @@ from tfarm.cli.app import (
     Json,
     TheoryName,
     app,
-    give,
-    hand_out,
+    emit,
     load_arm,
     progress,
-    say_written,
     tell,
     whole_number,
 )
 from tfarm.errors import ParameterError
-from tfarm.tables.files import write_csv
 from tfarm.tables.terminal import show
 
 if TYPE_CHECKING:
@@ -66,7 +62,7 @@ def fit(
     json: Json = False,
 ) -> None:
     """The numbers of an arm that explain what was measured of it, with intervals, and what is left open."""
-    from tfarm.fitting.answers import fit_answer, save_fit
+    from tfarm.fitting.results import FitResult, save_fit
 
     found = _fitted(
         load_arm(arm, theory), data or [], free, mode or [], profile=not covariance,
@@ -81,7 +77,7 @@ def fit(
 
         with progress() as advance:
             page = write([found.arm], out, fits=[found], progress=advance, notice=tell)
-    hand_out(lambda: fit_answer(found), partial(_print, found), json, png=png, picture=(found,), also=(save, page))
+    emit(FitResult(found), json, png=png, also=(save, page))
     if not found.converged:
         raise typer.Exit(3)
 
@@ -115,30 +111,6 @@ def _numbers(option: str, texts: Iterable[str], count: int) -> Iterable[tuple[st
         yield key.strip(), values
 
 
-def _print(found: Fit, answer: dict[str, Any]) -> None:
-    from tfarm.fitting.answers import PEAK_REACH, parameters_table
-
-    print(f"{answer['arm_name']}: {answer['in_words']}")
-    show(parameters_table(found))
-    print(
-        f"from and to: the 95 % interval {'of the covariance' if not found.profiled else 'of the profile likelihood'}"
-    )
-    for words in answer["not_determined"]:
-        print(words)
-    if answer["records"] is not None:
-        print(answer["records"]["in_words"])
-        for key, (low, high) in answer["records"]["intervals"].items():
-            print(f"{key} by records: {low:.6g} to {high:.6g}")
-    rows = zip(*answer["frequencies_hz"].values(), strict=True)
-    shown = [" -> ".join("-" if each is None else f"{each:.5g}" for each in row) for row in rows]
-    if shown:
-        print(f"resonances [Hz], before -> after -> measured: {'; '.join(shown)}")
-    for peak in answer["unexplained_peaks_hz"]:
-        print(f"the peak measured at {peak:.5g} Hz is {100 * PEAK_REACH:.0f} % and more from every pole of the arm")
-    if answer["rms_log_error"] is not None:
-        print(f"rms of ln(computed/measured): {answer['rms_log_error']:.4g}")
-
-
 @app.command()
 def frf(
     record: RecordName,
@@ -163,18 +135,16 @@ def frf(
 ) -> None:
     """The frequency response of a record over time, by averaged cross-spectra, with coherence."""
     named, columns = zip(*(_named(each) for each in (output, input)), strict=True)
-    from tfarm.fitting.answers import estimate_answer, measured_table
     from tfarm.fitting.recording import frequency_response, read_recording
+    from tfarm.fitting.results import EstimateResult, measured_table
 
     how = {"estimator": estimator, "window": window}
     found = frequency_response(read_recording(record), *named, columns=columns, segment=segment, overlap=overlap, **how)
-    if csv is not None:
-        write_csv(measured_table(found.measured), csv)
-    if say_written(csv) or json:
-        answer = estimate_answer(found)
-        if not json and csv is None:
-            show(answer["response"])
-        give(answer, json, _estimated)
+    emit(EstimateResult(found), json, csv=csv)
+    if csv is None and not json:
+        show(measured_table(found.measured))
+    if found.clock:
+        tell(found.clock)
 
 
 @app.command()
@@ -187,14 +157,14 @@ def ring(
     json: Json = False,
 ) -> None:
     """Frequency and damping of a decay, with intervals."""
-    from tfarm.fitting.answers import ring_answer
     from tfarm.fitting.recording import read_recording
+    from tfarm.fitting.results import RingResult
     from tfarm.fitting.ringdown import MOST_RINGING
     from tfarm.fitting.ringdown import ring as find
 
     count = whole_number("--modes", modes, 1, MOST_RINGING)
     found = find(read_recording(record), signal, start=start, stop=stop, modes=count)
-    give(ring_answer(found), json, _rung)
+    emit(RingResult(found), json)
 
 
 def _named(text: str) -> tuple[str, str]:
@@ -203,29 +173,3 @@ def _named(text: str) -> tuple[str, str]:
     if given and not column.strip():
         raise ParameterError(key="signal", value=text, remedy="write NAME=COLUMN, such as tip_acceleration=acc1")
     return name.strip(), column.strip() or name.strip()
-
-
-def _estimated(answer: dict[str, Any]) -> None:
-    rows = answer["response"]
-    first, last = rows[0]["hz"], rows[len(rows) - 1]["hz"]
-    overlapped = f", {100 * answer['overlap']:.3g} % overlapped" if answer["overlap"] else ""
-    segments = f"{answer['segments']} segments of {answer['segment_s']:.6g} s ({answer['window']}{overlapped})"
-    print(f"{answer['output']} / {answer['input']}: {len(rows)} lines from {first:.6g} to {last:.6g} Hz")
-    print(f"{answer['estimator']} of {segments}, worth {answer['independent_averages']:.4g} independent averages")
-    apart = f"{answer['resolution_hz']:.4g} Hz"
-    flat = f"a resonance narrower than {apart} is flattened" if answer["window"] == "hann" else f"lines {apart} apart"
-    print(f"median coherence {answer['median_coherence']:.4g}; {flat}")
-    if answer["note"]:
-        tell(answer["note"])
-
-
-def _rung(answer: dict[str, Any]) -> None:
-
-    show(answer["modes"])
-    span = f"{answer['from_s']:g} to {answer['to_s']:g} s, {answer['samples']} samples"
-    print(f"{answer['signal']} from {span}; residual {answer['residual_rms']:.4g} rms")
-    print(f"from and to: the interval that holds the true value in {100 * answer['level']:.0f} of 100 such records")
-    for mode in answer["modes"]:
-        print(f"for tfarm fit: --mode N={mode['mode_option']}, where it is the arm's flexible mode N")
-    for note in answer["notes"]:
-        print(f"note: {note}")

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from itertools import groupby
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from tfarm.arm import MOMENT_GAIN, presets
+from tfarm.arm import presets
 from tfarm.cli.app import (
     ArmName,
     Json,
     TheoryName,
     app,
-    give,
+    emit,
     load_arm,
     progress,
     say_when_compiling,
@@ -24,9 +23,7 @@ from tfarm.cli.app import (
 )
 from tfarm.cli.inputs import GAIN_OPTIONS, LawFiles, Typed, asked_laws, with_options
 from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
-from tfarm.columns import Column, Table
 from tfarm.errors import must_be_known
-from tfarm.tables.terminal import show
 
 SHELLS = ("bash", "zsh", "fish")
 BASH = """\
@@ -94,15 +91,10 @@ def report(
 def audit(json: Json = False) -> None:
     """Every equation of the paper, as printed and as corrected, with the check that tells them apart."""
     say_when_compiling()
-    from tfarm.audit import audit_answer
+    from tfarm.audit import PAPER, Audit
+    from tfarm.audit import audit as find
 
-    give(audit_answer(), json, _print_audit)
-
-
-def _print_audit(answer: dict[str, Any]) -> None:
-    """A row an equation: the verdict, and what it was and should be where the paper is corrected."""
-    print(answer["paper"])
-    show(answer["rows"])
+    emit(Audit(PAPER, find()), json)
 
 
 @app.command()
@@ -115,55 +107,19 @@ def assumptions(
     """What the assumed section and hub do: frequencies over the candidates, with exact sensitivities."""
     wanted = whole_number("--count", count, 1, 100)
     subject = load_arm(arm, theory)
-    from tfarm.audit.assumptions import assumptions_answer
+    from tfarm.audit.assumptions import assumptions as find
 
-    give(assumptions_answer(subject, wanted), json, _print_assumptions)
-
-
-def _print_assumptions(answer: dict[str, Any]) -> None:
-    """A table over the candidate sections and one over the hub inertias; a star marks the arm's own."""
-    section, hub = answer["section"], answer["hub"]
-    print(f"Rectangles of the arm's area, {section['area_m2']:g} m^2, shear factor {section['shear_factor']:.6g}:")
-    show(section["candidates"])
-    if hub is None:
-        print("\nHub inertia: none to choose, the hub is locked or a free pin.")
-    else:
-        print("\nHub inertias:")
-        show(hub["candidates"])
-        print("limits: I_h = 0 gives " + ", ".join(f"{x:.8g}" for x in hub["pinned_rad_s"]), end=" rad/s; ")
-        print("I_h = inf gives " + ", ".join(f"{x:.8g}" for x in hub["locked_rad_s"]) + " rad/s")
-    print(
-        f"\n* is {answer['arm']} itself. Frequencies of the undamped arm, exact; behind each, per cent of frequency for"
-    )
-    print(f"one per cent more of I (with {section['held']})")
-    print("or of I_h (with all else held).")
-    gains = ", ".join(f"{name} = {value:g}" for name, value in answer["gains"].items())
-    print(f"loop: the verdict at {gains}, and up to which {MOMENT_GAIN} it stays stable.")
+    emit(find(subject, wanted), json)
 
 
 @app.command()
 def validate(json: Json = False) -> None:
     """Natural frequencies of published tables beside the exact ones, and why where they differ."""
     say_when_compiling()
-    from tfarm.audit.published import validate_answer
+    from tfarm.audit.published import Validation
+    from tfarm.audit.published import validate as find
 
-    give(validate_answer(), json, _print_validation)
-
-
-def _print_validation(answer: dict[str, Any]) -> None:
-    """A table a source: their number, ours, the relative difference; below it why a row differs beyond its digits."""
-    citations, table = {source["key"]: source for source in answer["sources"]}, answer["rows"]
-    rows = list(table)
-    for key, places in groupby(range(len(rows)), key=lambda i: rows[i]["source"]):
-        print(f"{citations[key]['citation']}\n({citations[key]['reached']})")
-        part = table.rows(list(places))
-        reasons = list(dict.fromkeys(row["why"] for row in part if row["why"]))
-        marks = ["" if row["agrees"] else f"[{reasons.index(row['why']) + 1}]" for row in part]
-        show(Table(columns=(*part.columns, Column("", of=marks))))
-        for number, reason in enumerate(reasons, start=1):
-            print(f"[{number}] {reason}")
-        print()
-    print(f"{answer['agree']} agree to the last printed digit, {answer['explained']} differ for the reason given")
+    emit(Validation(find()), json)
 
 
 @app.command()
@@ -174,7 +130,7 @@ def glossary(
     """What the words mean that answers use in a sense of their own: proven, certified, band, window ..."""
     from tfarm.glossary import glossary as find
 
-    give({"terms": find(words)}, json, lambda answer: show(answer["terms"]))
+    emit(find(words), json)
 
 
 @app.command()

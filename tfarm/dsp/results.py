@@ -1,4 +1,4 @@
-"""A simulation in a few numbers: residual vibration, settling, limit cycles; and its answer as a dictionary.
+"""A simulation in a few numbers: residual vibration, settling, limit cycles.
 
 How many flexible modes it takes for the digits that are asked for, the signals with twice the modes tell: their largest
 change, relative to the largest value of each signal, is what half the modes were off by, and mostly more than what is
@@ -9,26 +9,26 @@ twice the change left); a loop whose high modes grow is for `dsp.verdict` to fin
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
 from tfarm.arm import AnyLaw, Arm, tracked
 from tfarm.arrays import Real
-from tfarm.columns import Column
+from tfarm.columns import Column, Table
 from tfarm.dsp.chain import Chain, chain_or_usual
 from tfarm.dsp.discretise import rule_in_words, with_all_gains
-from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario
 from tfarm.dsp.simulate import Simulation, Simulator, Trace
 from tfarm.dsp.traces import resolved
 from tfarm.errors import ConvergenceError
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.response.controller import controller
-from tfarm.schema import to_dict
+from tfarm.response.controller import Controller, controller
+from tfarm.schema import Quantity
 
+RESIDUAL = "residual root moment after the slew"
 MODE_COUNTS = (10, 20, 40)  # flexible modes; 80 would take a heavily damped arm 8 s of CPU time
 ENOUGH_CHANGE = 1e-4  # of each signal's largest value: as many as a table of a simulation shows
 SETTLED_SHARE = 0.05  # of the largest root moment, within which a slew has settled
@@ -78,22 +78,6 @@ def change(before: Trace, after: Trace) -> float:
     return max(changes)
 
 
-def traced_columns(others: Iterable[str]) -> tuple[Column, ...]:
-    """The columns of a `Trace`: its times, what is always recorded, and what else was asked for."""
-    known = [(name, OUTPUTS[name.partition("@")[0]], name.partition("@")[2]) for name in (*RECORDED, *others)]
-    return (
-        Column("t", "time", "s"),
-        *(Column(name, f"{each.label}{at and f' = {at} m'}", each.unit) for name, each, at in known),
-    )
-
-
-AT_SAMPLES_COLUMNS = (  # of what an answer has at the samples only
-    Column("torque", "torque", "N m"),  # or in the unit of another input, `torque_unit` of the answer
-    Column("gain", "gain", "-"),
-    Column("volts", "volts", "V"),
-)
-
-
 @dataclass(frozen=True)
 class LimitCycle:
     """A vibration that does not end: half peak to peak of root moment [N m], hub rate [rad/s] and torque [N m].
@@ -102,11 +86,171 @@ class LimitCycle:
     "saturation" where a signal is still clipped (an unstable loop that its limits hold), else "quantisation".
     """
 
-    root_moment: float
-    hub_rate: float
-    torque: float
-    frequency: float
-    kept_up_by: Literal["quantisation", "saturation"]
+    root_moment: Annotated[float, Quantity("root moment amplitude", "N m", 4, key="root_moment_amplitude")]
+    hub_rate: Annotated[float, Quantity("hub rate amplitude", "rad/s", 4, key="hub_rate_amplitude")]
+    torque: Annotated[float, Quantity("torque amplitude", "N m", 4, key="torque_amplitude")]
+    frequency: Annotated[float, Quantity("frequency", "rad/s", 4)]
+    kept_up_by: Annotated[Literal["quantisation", "saturation"], Quantity("sustained by", key="kept_up_by")]
+
+
+@dataclass(frozen=True)
+class Run:
+    """A simulated scenario: its signals, and the numbers that they come to."""
+
+    arm: Arm
+    law: AnyLaw
+    simulation: Simulation
+    used: Enough
+    scenario_in_words: Annotated[str, Quantity("scenario", key="scenario_in_words")]
+    cycle: LimitCycle | None = None
+    tuner: Annotated[dict[str, Any] | None, Quantity("tuner", key="controller", help="that set the moment gain")] = None
+
+    @property
+    def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
+        """Arm and law in words, as results name them."""
+        return controller(with_all_gains(self.arm, self.law), self.arm)
+
+    @property
+    def references(self) -> Annotated[list[str], Quantity()]:
+        """Signals that follow a reference."""
+        return list(with_all_gains(self.arm, self.law).references)
+
+    @property
+    def rule(self) -> Annotated[str, Quantity("discretisation")]:
+        """How the law came to be one in z."""
+        return rule_in_words(with_all_gains(self.arm, self.law))
+
+    @property
+    def scenario(self) -> Annotated[str, Quantity()]:
+        """The name of the scenario."""
+        return self.simulation.scenario.name
+
+    @property
+    def reading(self) -> Annotated[str, Quantity()]:
+        """The moment that is fed back during a slew."""
+        return self.simulation.chain.slew.reading
+
+    @property
+    def period(self) -> Annotated[float, Quantity("sampling period", "s")]:
+        """The sampling period."""
+        return self.simulation.scenario.period
+
+    @property
+    def modes_used(self) -> Annotated[int, Quantity("flexible modes")]:
+        """How many flexible modes there are."""
+        return self.used.modes
+
+    @property
+    def modes_change(self) -> Annotated[float | None, Quantity("change of signals from half of them", digits=2)]:
+        """Relative to the largest value of each; None where the number of modes was asked for."""
+        return None if math.isnan(self.used.change) else self.used.change
+
+    @property
+    def residual_moment(self) -> Annotated[float | None, Quantity(f"{RESIDUAL} less the rigid arm's", "N m rms",
+                                                                  key="residual_moment_rms")]:  # fmt: skip
+        """None where the run stopped, or its record ends before the slew."""
+        return residual_moment_rms(self.simulation)
+
+    @property
+    def residual_raw(self) -> Annotated[float | None, Quantity(RESIDUAL, "N m rms", key="residual_raw_moment_rms")]:
+        """The same of the root moment itself."""
+        return residual_raw_moment_rms(self.simulation)
+
+    @property
+    def settling_time(self) -> Annotated[float | None, Quantity("settling time (5 %)", "s", 4)]:
+        """None where the moment does not settle within the record."""
+        settled = settling_time(self.simulation)
+        return settled if math.isfinite(settled) else None
+
+    @property
+    def note(self) -> Annotated[str | None, Quantity("not determined", key="note")]:
+        """Why there is no residual or no settling time."""
+        run, reasons = self.simulation, []
+        if self.residual_moment is None:
+            ends = (
+                "the record ends before the slew"
+                if run.stopped is None
+                else f"the run stops at {self.stopped_at:.6g} s"
+            )
+            reasons.append(f"residual root moment, as {ends}")
+        if self.settling_time is None:
+            reasons.append(f"settling time: not settled within {run.t[-1]:.4g} s")
+        return "; ".join(reasons) or None
+
+    @property
+    def saturated(self) -> Annotated[dict[str, int], Quantity("saturated samples", key="saturated_samples")]:
+        """At how many samples encoder, strain amplifier and torque were clipped."""
+        return self.simulation.saturated
+
+    @property
+    def energy_error(self) -> Annotated[float | None, Quantity()]:
+        """Of an arm without damping."""
+        return self.simulation.energy_error
+
+    @property
+    def stopped_at(self) -> Annotated[float | None, Quantity(key="stopped_at_s")]:
+        """When an unstable loop was stopped [s]."""
+        stopped = self.simulation.stopped
+        return None if stopped is None else stopped.time
+
+    @property
+    def growing_mode(self) -> Annotated[int | None, Quantity()]:
+        """The mode that grew, 0 the hub."""
+        stopped = self.simulation.stopped
+        return None if stopped is None else stopped.mode
+
+    @property
+    def limit_cycle(self) -> Annotated[LimitCycle | None, Quantity("limit cycle")]:
+        """A vibration that does not end."""
+        return self.cycle
+
+    @property
+    def units(self) -> Annotated[dict[str, str], Quantity(key="outputs")]:
+        """The SI unit of each further output."""
+        return dict(self.simulation.at_samples.units)
+
+    @property
+    def torque_unit(self) -> Annotated[str, Quantity()]:
+        """The unit of the input of the arm."""
+        return self.arm.input_unit
+
+    @property
+    def signals(self) -> Annotated[dict[str, Real], Quantity(flat=True)]:
+        """Time and signals at the samples, by name."""
+        run = self.simulation
+        gain = np.empty(0) if run.gain is None else run.gain
+        volts = {} if run.volts is None else {"volts": run.volts}
+        return _signals(run.at_samples) | {"torque": run.torque, "gain": gain} | volts
+
+    @property
+    def between(self) -> Annotated[dict[str, Real] | None, Quantity()]:
+        """The same between the samples, of those that change there."""
+        return None if self.simulation.between is None else _signals(self.simulation.between)
+
+    @property
+    def csv_table(self) -> Table:
+        """The signals in the order of time; between the samples what changes at these only is empty."""
+        finer, coarse = self.between or {"t": np.empty(0)}, self.signals
+        order = np.argsort(np.r_[coarse["t"], finer["t"]], kind="stable").tolist()
+        empty, columns = [""] * len(finer["t"]), []
+        for name, values in coarse.items():
+            if len(values):
+                joined = [*values.tolist(), *(finer[name].tolist() if name in finer else empty)]
+                columns.append(Column(name, *self._titled(name), of=[joined[row] for row in order]))
+        return Table(columns=tuple(columns))
+
+    def _titled(self, name: str) -> tuple[str, str]:
+        """Title and unit of a signal."""
+        own = {
+            "t": ("time", "s"),
+            "torque": ("torque", self.torque_unit),
+            "gain": ("gain", "-"),
+            "volts": ("volts", "V"),
+        }
+        if name in own:
+            return own[name]
+        of, _, at = name.partition("@")
+        return f"{OUTPUTS[of].label}{at and f' = {at} m'}", OUTPUTS[of].unit
 
 
 def residual_moment_rms(simulation: Simulation) -> float | None:
@@ -185,62 +329,8 @@ def _half_range(signal: Real) -> float:
     return float(np.ptp(signal)) / 2 if signal.size else 0.0
 
 
-def simulation_answer(
-    arm: Arm, law: AnyLaw, simulation: Simulation, cycle: LimitCycle | None, used: Enough
-) -> dict[str, Any]:
-    """The simulation as a dictionary of plain numbers, texts and lists.
-
-    `modes_change`: by how much the signals changed when the modes were doubled to `modes_used`, relative to the
-    largest value of each; null where the number of modes was asked for.
-    """
-    stopped, settled = simulation.stopped, settling_time(simulation)
-    answer: dict[str, Any] = {
-        "arm": arm.name,
-        **_led_by(arm, law),
-        "scenario": simulation.scenario.name,
-        "reading": simulation.chain.slew.reading,
-        "period_s": simulation.scenario.period,
-        "modes_used": used.modes,
-        "modes_change": None if math.isnan(used.change) else used.change,
-        **_columns(simulation.at_samples),
-        "torque": simulation.torque.tolist(),
-        "torque_unit": arm.input_unit,
-        "outputs": dict(simulation.at_samples.units),
-        "gain": [] if simulation.gain is None else simulation.gain.tolist(),
-        "residual_moment_rms": residual_moment_rms(simulation),
-        "residual_raw_moment_rms": residual_raw_moment_rms(simulation),
-        "settling_time_s": settled if math.isfinite(settled) else None,
-        "saturated_samples": simulation.saturated,
-        "energy_error": simulation.energy_error,
-        "stopped_at_s": None if stopped is None else stopped.time,
-        "growing_mode": None if stopped is None else stopped.mode,
-        "limit_cycle": None if cycle is None else _cycle_answer(cycle),
-    }
-    if simulation.volts is not None:
-        answer["volts"] = simulation.volts.tolist()
-    if simulation.between is not None:
-        answer["between"] = _columns(simulation.between)
-    return answer
-
-
-def _led_by(arm: Arm, law: AnyLaw) -> dict[str, Any]:
-    """The law, what it drives, and its references."""
-    given = with_all_gains(arm, law)
-    return to_dict(controller(given, arm)) | {"references": list(given.references), "rule": rule_in_words(given)}
-
-
-def _cycle_answer(cycle: LimitCycle) -> dict[str, Any]:
-    return {
-        "root_moment_amplitude": cycle.root_moment,
-        "hub_rate_amplitude": cycle.hub_rate,
-        "torque_amplitude": cycle.torque,
-        "frequency_rad_s": cycle.frequency,
-        "kept_up_by": cycle.kept_up_by,
-    }
-
-
-def _columns(trace: Trace) -> dict[str, Sequence[float]]:
-    return {"t": trace.t.tolist()} | {name: trace.signal(name).tolist() for name in trace.names}
+def _signals(trace: Trace) -> dict[str, Real]:
+    return {"t": trace.t} | {name: trace.signal(name) for name in trace.names}
 
 
 def ideal_chain(chain: Chain) -> Chain:
@@ -307,7 +397,7 @@ def simulated(
     return Simulator(arm, chain, task, law, count=used.modes, between=between, outputs=outputs).run(), used
 
 
-def simulated_answer(
+def simulated_run(
     arm: Arm,
     law: AnyLaw,
     chain: Chain,
@@ -317,8 +407,8 @@ def simulated_answer(
     count: int | None = None,
     between: int = 0,
     outputs: Sequence[str] = (),
-) -> dict[str, Any]:
-    """Simulate a scenario by its name and say what came of it: with `count` modes, or as many as its digits take.
+) -> Run:
+    """Simulate a scenario by its name: with `count` modes, or as many as its digits take.
 
     Raises ParameterError as `simulate` does.
     """
@@ -327,4 +417,4 @@ def simulated_answer(
     simulation, used = simulated(arm, law, chain, task, count, between, outputs)
     if not chain.is_linear:
         cycle = limit_cycle(simulation, Simulator(arm, ideal_chain(chain), task, law, count=used.modes).run())
-    return simulation_answer(arm, law, simulation, cycle, used) | {"scenario_in_words": described(task, arm, chain)}
+    return Run(arm, law, simulation, used, described(task, arm, chain), cycle)

@@ -335,6 +335,11 @@ class Analysis:
         """Unstable poles of the law that its own zeros cancel."""
         return cancelled(self.loop.given)
 
+    @property
+    def rule(self) -> str:
+        """How the law came to be one in z."""
+        return self.verdict.rule
+
     @cached_property
     def numbers(self) -> list[SampledNumber]:
         """How far the gain of each part of the law may go, the others held, with the modes of the verdict."""

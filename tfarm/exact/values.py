@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from tfarm.arm import Arm, Theory
 from tfarm.arrays import Complex, Real
 from tfarm.errors import CertificationError, ParameterError, did_you_mean
 from tfarm.records import record
+from tfarm.schema import Quantity
 
 from . import appendix
 from .balls import Ball, State, nearest_float, point, precision, rational
@@ -277,30 +278,46 @@ APPENDIX_DIGITS = 17  # of the appendix: more than a float64 holds
 METHODS_AGREE = 1e-14  # relative: some tens of roundings of a float64, by which each of two roads may be off
 
 
+class MethodRow(NamedTuple):
+    """One number by several methods."""
+
+    at: Annotated[Any, Quantity("mode or s", digits=10)]
+    value: Annotated[Any, Quantity("closed form", digits=15)]
+    balls: Annotated[float | None, Quantity("difference of balls", digits=2)]
+    appendix: Annotated[float | None, Quantity("difference of the appendix", digits=2)]
+
+
 @dataclass(frozen=True)
 @record
 class Roads:
     """The same numbers by each method that has them (`values`), and in words why another is left out (`left_out`)."""
 
-    values: dict[Method, NDArray[Any]]
-    left_out: dict[Method, str]
+    values: Annotated[dict[Method, NDArray[Any]], Quantity(key="methods")]
+    left_out: Annotated[dict[Method, str], Quantity("left out")]
 
     @property
-    def differences(self) -> dict[Method, Real]:
+    def differences(self) -> Annotated[dict[Method, Real], Quantity(help="relative, from the closed form")]:
         """How far each is from the closed form, as a share of that; of 1 where that is 0."""
         fast = self.values["closed-form"]
         size = np.where(fast == 0, 1.0, abs(fast))
         return {name: np.asarray(abs(each - fast) / size) for name, each in self.values.items() if each is not fast}
 
     @property
-    def largest_difference(self) -> float:
+    def largest_difference(self) -> Annotated[float, Quantity("maximum relative difference", digits=2)]:
         """The largest of these."""
         return max(float(each.max(initial=0.0)) for each in self.differences.values())
 
     @property
-    def finding(self) -> str:
-        """How far the roads part, in words."""
-        return f"{', '.join(self.values)} {'agree' if self.agree else 'part'} to {self.largest_difference:.1e}"
+    def finding(self) -> Annotated[str, Quantity("methods")]:
+        """How well the methods agree, in words."""
+        word = "agree to rounding" if self.agree else "differ by more than rounding"
+        return f"{', '.join(self.values)}: {word}"
+
+    def rows(self, at: Sequence[Any]) -> list[MethodRow]:
+        """A row a place: the closed form's value, and the relative difference of the others."""
+        values, apart = self.values["closed-form"].tolist(), {k: v.tolist() for k, v in self.differences.items()}
+        balls, appendix = (apart.get(name, [None] * len(values)) for name in ("balls", "appendix"))
+        return list(map(MethodRow, at, values, balls, appendix))
 
     @property
     def agree(self) -> bool:
@@ -312,20 +329,6 @@ def by_roads(value: Callable[[Method], NDArray[Any]], no_appendix: str) -> Roads
     """The values of each method, without the appendix where words say why it has none."""
     left_out: dict[Method, str] = {"appendix": no_appendix} if no_appendix else {}
     return Roads({method: np.asarray(value(method)) for method in METHODS if method not in left_out}, left_out)
-
-
-def roads_answer(found: Roads) -> dict[str, Any]:
-    """The values by method, complex ones as pairs, how far they part, and what is left out."""
-
-    def listed(values: NDArray[Any]) -> list[Any]:
-        return np.stack([values.real, values.imag], axis=-1).tolist() if np.iscomplexobj(values) else values.tolist()
-
-    return {
-        "methods": {name: listed(each) for name, each in found.values.items()},
-        "left_out": dict(found.left_out),
-        "differences": {name: each.tolist() for name, each in found.differences.items()},
-        "largest_difference": found.largest_difference,
-    }
 
 
 def known_method(method: str) -> Method:

@@ -7,8 +7,6 @@ own poles are in neither.  Over an input of the hub (a torque, a voltage, the an
 the angle as input and the angle as a signal that was measured give the same one.
 
 A measured response beside the exact one: mode by mode what differs, and which number alone would explain it.
-
-The answer of `tfarm response --measured`, and its tables.
 """
 
 from __future__ import annotations
@@ -17,21 +15,20 @@ import math
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, cast
+from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 
 from tfarm.arm import INPUTS, Arm, Input, must_be_arm
 from tfarm.arrays import Complex, Real
-from tfarm.columns import JSON, Column, Table
-from tfarm.digits import general, singly
-from tfarm.errors import MISSING, ConvergenceError, ParameterError
+from tfarm.columns import Column, Table
+from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.response import TransferFunction, transfer
-from tfarm.response.answers import HERTZ
-from tfarm.response.frequency import refined_grid, without_cancelled
+from tfarm.response.frequency import HERTZ, refined_grid, without_cancelled
 from tfarm.response.signals import Signals
 from tfarm.response.transfer import Roots
+from tfarm.schema import Quantity
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum import modes_below
 
@@ -151,7 +148,6 @@ def _transfer(arm: Arm, name: str) -> TransferFunction:
 SAME_MODE = 0.1  # of its frequency: how near a pole of a damped arm is to that mode of the arm without damping
 LARGEST_FACTOR = 3.0  # the factor on a number beyond which it is no explanation
 LEAST_SENSITIVITY = 1e-3  # d ln w/d ln p below which a number does not move a mode
-DASH = "-"  # what was not measured, on a terminal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,9 +161,56 @@ class Counterpart:
 
     pole: complex
     residue: complex
-    mode: int | None
+    mode: Annotated[int | None, Quantity("mode")]
     peak: float | None
     measured: Resonance | None
+
+    @property
+    def exact(self) -> Annotated[float, Quantity("exact", "Hz", 7)]:
+        """The exact natural frequency."""
+        return abs(self.pole) / HERTZ
+
+    @property
+    def frequency(self) -> Annotated[float | None, Quantity("measured", "Hz", 7, key="measured_hz")]:
+        """The measured one."""
+        return None if self.frequency_ratio is None else self.frequency_ratio * self.exact
+
+    @property
+    def frequency_std(self) -> Annotated[float | None, Quantity("deviation", "Hz", 2, key="measured_std_hz")]:
+        """The standard deviation of that."""
+        return None if self.measured is None else float(self.measured.std[1]) / HERTZ
+
+    @property
+    def off(self) -> Annotated[float | None, Quantity("difference", "%", 3, key="frequency_residual_percent")]:
+        """Measured less exact."""
+        return None if self.frequency_ratio is None else 100 * (self.frequency_ratio - 1)
+
+    @property
+    def measured_damping(self) -> Annotated[float | None, Quantity("measured damping ratio", digits=4,
+                                                                   key="measured_damping_ratio")]:  # fmt: skip
+        """That of the fitted pole."""
+        return None if self.measured is None else self.measured.damping_ratio
+
+    @property
+    def damping_std(self) -> Annotated[float | None, Quantity("deviation", digits=2,
+                                                              key="measured_damping_ratio_std")]:  # fmt: skip
+        """The standard deviation of that."""
+        return None if self.measured is None else float(self.measured.std[0]) / abs(self.measured.pole)
+
+    @property
+    def level_db(self) -> Annotated[float | None, Quantity("residue, measured over exact", "dB", 3)]:
+        """Its size."""
+        return 20 * math.log10(abs(self.level)) if self.level else None
+
+    @property
+    def level_degrees(self) -> Annotated[float | None, Quantity("turned", "deg", 3, key="level_degrees")]:
+        """Its angle."""
+        return math.degrees(np.angle(self.level)) if self.level else None
+
+    @property
+    def is_peak_only(self) -> Annotated[bool, Quantity()]:
+        """Whether a peak was measured and no pole could be fitted."""
+        return self.peak is not None and self.measured is None
 
     @property
     def frequency_ratio(self) -> float | None:
@@ -177,7 +220,7 @@ class Counterpart:
         return None if self.peak is None else self.peak / abs(self.pole)
 
     @property
-    def damping_ratio(self) -> float:
+    def damping_ratio(self) -> Annotated[float, Quantity("exact damping ratio", digits=4, key="exact_damping_ratio")]:
         """Of the exact pole."""
         return -self.pole.real / abs(self.pole) + 0.0
 
@@ -185,6 +228,20 @@ class Counterpart:
     def level(self) -> complex | None:
         """The measured residue over the exact one: the sensor's gain and sign, and what shifts the mode besides."""
         return self.measured.residue / self.residue if self.measured is not None and self.residue else None
+
+
+def _upper(roots: Complex) -> Complex:
+    """Those with Im s >= 0, ascending in size: the others are their mirror images."""
+    upper = roots[roots.imag >= 0]
+    return np.asarray(upper[np.argsort(abs(upper), kind="stable")])
+
+
+class RequiredChange(NamedTuple):
+    """A change of one number of the arm that alone would explain one measured mode."""
+
+    parameter: Annotated[str, Quantity("parameter")]
+    mode: Annotated[int, Quantity("mode")]
+    change: Annotated[float, Quantity("change", "%", 4, key="change_percent")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -204,8 +261,99 @@ class Overlay:
     exact: Complex
     omega: Real
     curve: Complex
-    beside: tuple[Counterpart, ...]
+    beside: Annotated[tuple[Counterpart, ...], Quantity("mode by mode", key="modes")]
     unmatched: Real
+
+    @property
+    def arm_name(self) -> Annotated[str, Quantity("arm", key="arm")]:
+        """The name of the arm."""
+        return self.arm.name
+
+    @property
+    def output(self) -> Annotated[str, Quantity("output")]:
+        """The output."""
+        return self.measured.output
+
+    @property
+    def input(self) -> Annotated[str, Quantity("input")]:
+        """The input."""
+        return self.measured.input
+
+    @property
+    def unit(self) -> Annotated[str, Quantity("unit")]:
+        """The unit of the response."""
+        return self.ratio.unit
+
+    @property
+    def source(self) -> Annotated[str, Quantity(key="measured")]:
+        """The file."""
+        return self.measured.source
+
+    @property
+    def sha256(self) -> Annotated[str, Quantity()]:
+        """Of the file."""
+        return self.measured.digest
+
+    @property
+    def points(self) -> Annotated[int, Quantity("measured frequencies", key="points")]:
+        """How many there are."""
+        return int(self.measured.omega.size)
+
+    @property
+    def band_hz(self) -> Annotated[tuple[float, float], Quantity("frequency range", "Hz", key="range_hz")]:
+        """The first and the last of them."""
+        return float(self.measured.omega[0]) / HERTZ, float(self.measured.omega[-1]) / HERTZ
+
+    @property
+    def noise_by(self) -> Annotated[str, Quantity("noise by", key="noise")]:
+        """The source of the size of the noise."""
+        return self.noise.road
+
+    @property
+    def unmatched_hz(self) -> Annotated[list[float], Quantity("measured peaks far from every pole of the arm [Hz]",
+                                                              key="unmatched_peaks_hz")]:  # fmt: skip
+        """Measured peaks that the arm does not have."""
+        return (self.unmatched / HERTZ).tolist()
+
+    @property
+    def poles(self) -> Annotated[Complex, Quantity("s", "1/s", help="poles of the ratio")]:
+        """Those of the ratio."""
+        return _upper(self.roots.poles)
+
+    @property
+    def zeros(self) -> Annotated[Complex, Quantity("s", "1/s", help="zeros of the ratio")]:
+        """Those of the ratio."""
+        return _upper(self.roots.zeros)
+
+    @property
+    def common(self) -> Annotated[Complex, Quantity("s", "1/s", help="common to both signals: they cancel")]:
+        """Those that cancel."""
+        return _upper(self.roots.common)
+
+    @property
+    def power_at_zero(self) -> Annotated[int, Quantity()]:
+        """n where the ratio goes as s^n at 0."""
+        return self.roots.at_zero
+
+    @property
+    def roots_up_to(self) -> Annotated[float, Quantity("poles and zeros up to", "rad/s")]:
+        """Up to where poles and zeros are complete."""
+        return self.roots.up_to
+
+    @property
+    def required_changes(self) -> Annotated[list[RequiredChange], Quantity("single changes that explain a mode",
+                                                                           key="required_percent")]:  # fmt: skip
+        """A row a parameter and mode, to first order in logarithms."""
+        pairs = ((name, factors) for name, factors in self.required.items())
+        return [RequiredChange(name, mode, 100 * (factor - 1)) for name, of in pairs for mode, factor in of.items()]
+
+    @property
+    def csv_table(self) -> Table:
+        """A row a frequency: measured and exact."""
+        values, exact = self.measured.values, self.exact
+        columns = {"re": values.real, "im": values.imag, "exact_re": exact.real, "exact_im": exact.imag}
+        first = Column("hz", "", "Hz", of=self.measured.omega / HERTZ)
+        return Table(columns=(first, *(Column(name, name, of=column) for name, column in columns.items())))
 
     @property
     def finding(self) -> str:
@@ -214,7 +362,7 @@ class Overlay:
         return f"{seen} of {len(self.beside)} poles measured, ln |measured/exact| {self.rms_log_error:.2g} rms"
 
     @property
-    def rms_log_error(self) -> float:
+    def rms_log_error(self) -> Annotated[float, Quantity("rms of ln(measured/exact)", digits=4)]:
         """The root mean square of ln |measured/exact|, over frequencies that stand out of the noise."""
         kept = (abs(self.measured.values) > self.noise.sigma) & np.isfinite(self.exact) & (self.exact != 0)
         if not kept.any():
@@ -331,117 +479,3 @@ def ratio_of(arm: Arm, measured: Measured) -> Ratio:
         raise ParameterError(
             key=f"{measured.name} {error.key}", value=error.value, remedy=error.remedy, file=error.file
         ) from None
-
-
-def _or_dash(digits: int) -> Any:
-    return lambda values: [DASH if value is MISSING else general(value, digits) for value in values]
-
-
-def _known(value: Any) -> Any:
-    return MISSING if value is None else value
-
-
-def _fitted(of: Any) -> Any:
-    """A number of the resonance that was measured, if one was fitted."""
-    return lambda row: MISSING if row.measured is None else of(row)
-
-
-def _level(of: Any) -> Any:
-    """A number of the residue's level, if it has one."""
-    return lambda row: of(row.level) if row.level else MISSING
-
-
-COUNTERPARTS = (
-    Column("mode", "mode", of=lambda row: _known(row.mode), digits=_or_dash(3)),
-    Column("exact_hz", "exact", "Hz", of=lambda row: abs(row.pole) / HERTZ, digits=singly(general, 7)),
-    Column(
-        "measured_hz",
-        "measured",
-        "Hz",
-        of=lambda row: _known(None if row.frequency_ratio is None else row.frequency_ratio * abs(row.pole) / HERTZ),
-        digits=_or_dash(7),
-    ),
-    Column("measured_std_hz", "+-", "Hz", of=_fitted(lambda row: row.measured.std[1] / HERTZ), digits=_or_dash(2)),
-    Column(
-        "frequency_residual_percent",
-        "off",
-        "%",
-        of=lambda row: _known(None if row.frequency_ratio is None else 100 * (row.frequency_ratio - 1)),
-        digits=_or_dash(3),
-    ),
-    Column("exact_damping_ratio", "damping exact", of="damping_ratio", digits=singly(general, 4)),
-    Column(
-        "measured_damping_ratio", "measured", of=_fitted(lambda row: row.measured.damping_ratio), digits=_or_dash(4)
-    ),
-    Column(
-        "measured_damping_ratio_std",
-        "+-",
-        of=_fitted(lambda row: row.measured.std[0] / abs(row.measured.pole)),
-        digits=_or_dash(2),
-    ),
-    Column("level_db", "residue", "dB", of=_level(lambda level: 20 * math.log10(abs(level))), digits=_or_dash(3)),
-    Column(
-        "level_degrees", "turned", "deg", of=_level(lambda level: math.degrees(np.angle(level))), digits=_or_dash(3)
-    ),
-    Column("is_peak_only", of=lambda row: row.peak is not None and row.measured is None, on=(JSON,)),
-)
-
-
-def overlay_answer(found: Overlay) -> dict[str, Any]:
-    """Mode by mode what differs, poles and zeros of the ratio, and what would explain it."""
-    data, roots = found.measured, found.roots
-    return {
-        "arm": found.arm.name,
-        "output": data.output,
-        "input": data.input,
-        "unit": found.ratio.unit,
-        "measured": data.source,
-        "sha256": data.digest,
-        "points": data.omega.size,
-        "band_hz": [float(data.omega[0]) / HERTZ, float(data.omega[-1]) / HERTZ],
-        "noise": found.noise.road,
-        "rms_log_error": found.rms_log_error,
-        "modes": Table(columns=COUNTERPARTS, record=list(found.beside)),
-        "unmatched_peaks_hz": (found.unmatched / HERTZ).tolist(),
-        "poles": _pairs(roots.poles),
-        "zeros": _pairs(roots.zeros),
-        "common": _pairs(roots.common),
-        "power_at_zero": roots.at_zero,
-        "roots_up_to_rad_s": roots.up_to,
-        "required_percent": {
-            name: {str(mode): 100 * (factor - 1) for mode, factor in factors.items()}
-            for name, factors in found.required.items()
-        },
-    }
-
-
-def required_table(answer: dict[str, Any]) -> Table | None:
-    """A row a number of the arm, a column a mode; None where the poles are no modes, or none was measured."""
-    required = answer["required_percent"]
-    numbers = sorted({int(mode) for entries in required.values() for mode in entries})
-    if not numbers:
-        return None
-    columns = [Column("parameter", "alone, to be changed by", of=list(required))]
-    for mode in numbers:
-        cells = [entries.get(str(mode), MISSING) for entries in required.values()]
-        columns.append(Column(f"mode_{mode}", f"mode {mode}", "%", of=cells, digits=_or_dash(4)))
-    return Table(columns=tuple(columns))
-
-
-def curves_table(found: Overlay) -> Table:
-    """A row a frequency: measured and exact, for a file."""
-    data = found.measured
-    columns = [
-        Column("hz", "", "Hz", of=data.omega / HERTZ),
-        Column("re", of=data.values.real),
-        Column("im", of=data.values.imag),
-        Column("exact_re", of=found.exact.real),
-        Column("exact_im", of=found.exact.imag),
-    ]
-    return Table(columns=tuple(columns))
-
-
-def _pairs(roots: Any) -> list[list[float]]:
-    """[Re, Im] of each with Im >= 0, ascending."""
-    upper = sorted((each for each in roots if each.imag >= 0), key=abs)
-    return [[float(each.real), float(each.imag)] for each in upper]

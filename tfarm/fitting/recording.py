@@ -33,7 +33,7 @@ import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,7 @@ from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.errors import MISSING, ParameterError, did_you_mean, must_be_known, naming
 from tfarm.files import read_mat
 from tfarm.records import record
+from tfarm.schema import Quantity
 
 from .data import MOST_RECORD_BYTES, Measured, check_signal, digest_of, read_sheet
 
@@ -279,16 +280,16 @@ class Estimate:
     """
 
     measured: Measured
-    estimator: Estimator
-    window: Taper
-    segment: float
-    segments: int
-    overlap: float
-    independent: float
-    clock: str
+    estimator: Annotated[Estimator, Quantity("estimator")]
+    window: Annotated[Taper, Quantity("window")]
+    segment: Annotated[float, Quantity("segment", "s")]
+    segments: Annotated[int, Quantity("segments")]
+    overlap: Annotated[float, Quantity("overlap", digits=3)]
+    independent: Annotated[float, Quantity("independent averages", digits=4, key="independent_averages")]
+    clock: Annotated[str, Quantity("sampling of the record", key="note")]
 
     @property
-    def resolution(self) -> float:
+    def resolution(self) -> Annotated[float, Quantity("frequency resolution", "Hz", 4)]:
         """The distance of the lines [Hz]."""
         return 1.0 / self.segment
 

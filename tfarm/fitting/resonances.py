@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
-from tfarm.response.answers import HERTZ
+from tfarm.response.frequency import HERTZ
 
 from .data import Measured, in_parts
 

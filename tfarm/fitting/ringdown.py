@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,7 @@ from numpy.typing import NDArray
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
+from tfarm.schema import Quantity
 
 from .data import CONFIDENCE
 from .recording import Recording
@@ -57,18 +59,18 @@ class Ring:
     the two halves of the record alone.
     """
 
-    signal: str
-    source: str
+    signal: Annotated[str, Quantity("signal")]
+    source: Annotated[str, Quantity("record", key="record")]
     clock: str
-    start: float
-    stop: float
-    samples: int
+    start: Annotated[float, Quantity("from", "s", key="from_s")]
+    stop: Annotated[float, Quantity("to", "s", key="to_s")]
+    samples: Annotated[int, Quantity("samples")]
     poles: Complex
     amplitude: Real
     covariance: Real
     freedom: int
-    residual: float
-    white: float
+    residual: Annotated[float, Quantity("residual rms", digits=4, key="residual_rms")]
+    white: Annotated[float, Quantity("probability of white residuals", digits=3, key="whiteness_probability")]
     early: Real
     late: Real
     halves_std: Real
@@ -108,7 +110,7 @@ class Ring:
         return float(stdtrit(self.freedom, 0.5 + CONFIDENCE / 2))
 
     @property
-    def is_white(self) -> bool:
+    def is_white(self) -> Annotated[bool, Quantity("residuals white", key="residuals_white")]:
         """Whether what is left looks like white noise."""
         return self.white >= NOT_WHITE
 
@@ -118,7 +120,7 @@ class Ring:
         return np.asarray(abs(self.early - self.late) > HALVES_APART * self.halves_std + RING_ROUNDING * self.frequency)
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> Annotated[tuple[str, ...], Quantity("notes")]:
         """What is to be said beside the intervals."""
         found = [self.clock] if self.clock else []
         if not self.is_white:

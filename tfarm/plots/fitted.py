@@ -17,9 +17,10 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from tfarm.digits import plain
 from tfarm.fitting.fit import Fit, Possible, response_band, share_stable
 from tfarm.fitting.overlay import Overlay
+from tfarm.fitting.results import FitResult
 
 from .frequency import RAD_PER_CYCLE, draw_wrapped
-from .style import BLUE, FAINT, GREY, INK, ORANGE, page, picture
+from .style import BLUE, FAINT, FIGURES, GREY, INK, ORANGE, page, picture
 from .words import name_axes
 
 FITTED_POINTS = 1200  # of a computed curve, beside the measured frequencies: more than a column has pixels
@@ -88,6 +89,9 @@ def draw_share(those: Possible, ranges: Sequence[tuple[float, float]]) -> Figure
         name_axes(those.fit.arm, ax)
         ax.grid(False)
     return figure
+
+
+FIGURES[FitResult] = lambda data: fitted.figure(data.fit)
 
 
 @picture(

@@ -4,7 +4,7 @@ from tfarm.reduced.conversions import discrete, save_mat, to_pymor, transfer_fun
 from tfarm.reduced.modal import ModalModel, modal_model, relaxed_model, slow_model
 from tfarm.reduced.partial_fractions import PartialFractions
 from tfarm.reduced.rational import rational_model
-from tfarm.reduced.reduction import BAND, ReducedModel, reduce, reduced_answer
+from tfarm.reduced.reduction import BAND, ReducedModel, reduce
 
 __all__ = [
     "BAND",
@@ -15,7 +15,6 @@ __all__ = [
     "modal_model",
     "rational_model",
     "reduce",
-    "reduced_answer",
     "relaxed_model",
     "save_mat",
     "slow_model",

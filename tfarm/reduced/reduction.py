@@ -6,10 +6,9 @@ This is the one door out of exactness.  What comes through carries its band, its
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +22,7 @@ from tfarm.exact.outputs import Output
 from tfarm.records import record
 from tfarm.response import Wanted, transfer
 from tfarm.response.frequency import known_band
+from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
 from .modal import SLOW_PAIRS, SLOW_POLES_FROM, modal_model, relaxed_model, slow_model
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 Reduction = Literal["modal", "aaa"]
 
 BAND = (0.1, 1000.0)  # rad/s, unless told
+NORM = "|dG| / (|G| + |w dG/dw|)"  # of the printed errors
 MOST_STATES = 400  # states: where the search for a model within an error ends
 MOST_TAILS = 12  # pairs of poles above the band: more fit rounding
 LEAST_FALL = 0.5  # of the error, or more, goes with 2.25 times the modes, even where it falls as 1/n; less is its floor
@@ -42,6 +43,15 @@ COUNTS_TRIED = 3  # numbers of modes from the one that a rough measure finds on,
 REDUCTION_BAND = "two frequencies in rad/s, 0 < low < high, such as 0.1,1000"  # what is asked for
 WIDEST_BAND = 1e12  # its ends' ratio: what is wider was mistyped
 POLE_IS_MODE = 1e-6  # relative gap within which a pole of the model is a mode of the arm
+
+
+class Channel(NamedTuple):
+    """An output of a reduced model: its largest error over the range, and the frequency of that."""
+
+    output: Annotated[str, Quantity("output")]
+    unit: Annotated[str, Quantity("unit")]
+    error: Annotated[float, Quantity("worst error", digits=3)]
+    worst_at: Annotated[float, Quantity("at", "rad/s")]
 
 
 @dataclass(frozen=True)
@@ -56,16 +66,60 @@ class ReducedModel:
     """
 
     model: PartialFractions
-    method: Reduction
-    band: tuple[float, float]
+    method: Annotated[Reduction, Quantity("method")]
+    band: Annotated[tuple[float, float], Quantity("frequency range", "rad/s", key="range_rad_s")]
     errors: Real
     worst_at: Real
-    first_mode_lacking: int
-    lacking_frequency: float
-    note: str = ""
+    first_mode_lacking: Annotated[int, Quantity("first mode missing")]
+    lacking_frequency: Annotated[float, Quantity("its frequency", "rad/s", 10, key="first_mode_lacking_rad_s")]
+    note: Annotated[str, Quantity("note")] = ""
 
     @property
-    def worst_error(self) -> float:
+    def arm_name(self) -> Annotated[str, Quantity("arm", key="arm")]:
+        """The name of the arm."""
+        return self.arm.name
+
+    @property
+    def error_norm(self) -> Annotated[str, Quantity("error norm")]:
+        """The norm of `errors`."""
+        return NORM
+
+    @property
+    def channels(self) -> Annotated[list[Channel], Quantity("outputs", key="channels")]:
+        """A row an output."""
+        G = transfer(self.arm, self.model.rows, x=self.model.x)
+        rows = zip(self.model.outputs, G.units, self.errors.tolist(), self.worst_at.tolist(), strict=True)
+        return [Channel(*row) for row in rows]
+
+    @property
+    def poles(self) -> Annotated[Complex, Quantity("s", "1/s", 10, key="poles")]:
+        """The poles of the model with Im s >= 0 and their mirror images."""
+        model = self.model
+        slow = [-1 / model.arm.damping] if model.relaxation is not None else []
+        return np.r_[model.eigenvalues.ravel(), model.single, slow].astype(complex)
+
+    @property
+    def x(self) -> Annotated[float | None, Quantity(help="place of outputs along the arm [m]")]:
+        """The place of outputs along the arm."""
+        return self.model.x
+
+    @property
+    def input(self) -> Annotated[str, Quantity("input")]:
+        """The input."""
+        return self.model.input
+
+    @property
+    def states(self) -> Annotated[tuple[str, ...], Quantity()]:
+        """Names of the states."""
+        return tuple(self.model.states)
+
+    @property
+    def named_matrices(self) -> Annotated[dict[str, Real], Quantity(flat=True)]:
+        """A, B, C and D by their names."""
+        return dict(zip("ABCD", self.matrices(), strict=True))
+
+    @property
+    def worst_error(self) -> Annotated[float, Quantity("worst error", digits=3)]:
         """The largest of `errors`."""
         return float(self.errors.max())
 
@@ -75,7 +129,7 @@ class ReducedModel:
         return self.model.arm
 
     @property
-    def order(self) -> int:
+    def order(self) -> Annotated[int, Quantity("order")]:
         """The number of states."""
         return self.model.order
 
@@ -264,42 +318,3 @@ def first_mode_lacking(model: PartialFractions) -> tuple[int, float]:
     has = (abs(model.natural_frequency[:, None] - omega) <= POLE_IS_MODE * omega).any(axis=0)
     first = int(np.argmin(has))
     return first + 1, float(omega[first])
-
-
-NORM = "|dG| / (|G| + |w dG/dw|)"
-
-
-def reduced_answer(reduced: ReducedModel) -> dict[str, Any]:
-    """The model, its matrices and its error."""
-    model = reduced.model
-    G = transfer(model.arm, model.rows, x=model.x)
-    A, B, C, D = reduced.matrices()
-    poles = [[float(p.real), float(p.imag)] for p in model.eigenvalues.ravel()]
-    poles += [[float(pole), 0.0] for pole in model.single]
-    poles += [[-1 / model.arm.damping, 0.0]] if model.relaxation is not None else []
-    return {
-        "arm": model.arm.name,
-        "method": reduced.method,
-        "order": reduced.order,
-        "band_rad_s": list(reduced.band),
-        "worst_error": reduced.worst_error,
-        "error_norm": NORM,
-        "errors": dict(zip(model.outputs, map(float, reduced.errors), strict=True)),
-        "worst_at_rad_s": dict(zip(model.outputs, map(float, reduced.worst_at), strict=True)),
-        "first_mode_lacking": reduced.first_mode_lacking,
-        "first_mode_lacking_rad_s": reduced.lacking_frequency,
-        "first_mode_lacking_hz": reduced.lacking_frequency / (2 * math.pi),
-        "note": reduced.note,
-        **({} if model.x is None else {"x": model.x}),
-        "input": model.input,
-        "input_unit": G.input_unit,
-        "inputs": [model.input],
-        "outputs": list(model.outputs),
-        "units": list(G.units),
-        "states": list(model.states),
-        "poles": poles,
-        "A": A.tolist(),
-        "B": B.tolist(),
-        "C": C.tolist(),
-        "D": D.tolist(),
-    }

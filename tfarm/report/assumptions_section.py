@@ -18,6 +18,7 @@ from tfarm.digits import fixed, plain, significant
 from tfarm.plots.shapes import CURVE_COLOURS, draw_over
 from tfarm.report.arm_section import is_from_paper
 from tfarm.report.sections import PageSection, Picture
+from tfarm.schema import table
 
 PAPER_LEAVES_OPEN = (
     "The paper prints the area of the section, but neither its second moment I nor the hub inertia I_h. Every "
@@ -41,15 +42,14 @@ OF_ONE_BEAM = (
 )
 NO_HUB = "The hub of this arm is {what}, so there is no inertia to choose."
 SECTION_TABLE = (
-    "The shaded row is this arm. Sensitivity: per cent of natural frequency for one per cent more of I, with the area, "
+    "Sensitivity: per cent of natural frequency for one per cent more of I, with the area, "
     "the shear factor and all else held, exact. As I = A depth²/12, one per cent of depth counts twice. A slender arm "
-    "has 0.5 throughout.{searched}"
+    "has 0.5 throughout."
 )
 HUB_TABLE = (
-    "The shaded row is this arm. Sensitivity: per cent of natural frequency for one per cent more of I_h, all else "
-    "held, exact. The closer to zero, the less that frequency depends on the hub.{searched}"
+    "Sensitivity: per cent of natural frequency for one per cent more of I_h, all else "
+    "held, exact. The closer to zero, the less that frequency depends on the hub."
 )
-SEARCH_ENDS = " *: no limit was found up to there; the search ends."
 CURVE_POINTS = 49  # of each curve, which bends slowly on two logarithmic axes
 
 SECTION_PICTURE = (
@@ -73,13 +73,16 @@ def assumptions_section(arm: Arm) -> PageSection:
     area, slope = plain(arm.link.section.area, 4), fixed(2 * section.sensitivity[section.is_own][0, :1], 3)[0]
     words = [opening(arm), SECTION_WORDS.format(area=area, slope=slope, **_ends(section.values, section))]
     blocks: list[Picture | Table] = [section_picture(section)]
-    blocks.append(_table("assumptions-section", "Candidate sections: rectangles of this area", SECTION_TABLE, section))
+    title_of = "Candidate sections: rectangles of this area"
+    blocks.append(table(candidates(section), stem="assumptions-section", title=title_of, caption=SECTION_TABLE))
     if has_hub_inertia(arm):
         hub = hub_study(arm)
         limits = {"locked": significant(float(hub.locked[0]), 5), "pinned": significant(float(hub.pinned[0]), 5)}
         slope = fixed(hub.sensitivity[hub.is_own][0, :1], 3)[0]
         words.append(HUB_WORDS.format(slope=slope, **limits, **_ends(hub.values, hub)))
-        blocks += [hub_picture(hub), _table("assumptions-hub", "Candidate hub inertias", HUB_TABLE, hub)]
+        blocks.append(hub_picture(hub))
+        of_hub = {"stem": "assumptions-hub", "title": "Candidate hub inertias", "caption": HUB_TABLE}
+        blocks.append(table(candidates(hub), **of_hub))
     else:
         words.append(NO_HUB.format(what="locked" if arm.is_locked else "a free pin"))
     return PageSection(anchor="assumptions", title=title, words=words, blocks=blocks)
@@ -106,20 +109,6 @@ def _ends(values: Real, study: Study) -> dict[str, str]:
     return {name: plain(float(x), 4) for name, x in texts.items()} | {
         name: significant(float(x), 5) for name, x in frequencies.items()
     }
-
-
-# ------------------------------------------------------------ tables
-
-
-def _table(stem: str, title: str, caption: str, study: Study) -> Table:
-    """The candidates on a page."""
-    columns = candidates(study).columns
-    return Table(stem=stem, title=title, caption=caption.format(searched=searched_words(columns[-1])), columns=columns)
-
-
-def searched_words(edges: Column) -> str:
-    """What a star means, where there is one."""
-    return SEARCH_ENDS if any("*" in cell for cell in edges.cells) else ""
 
 
 # ------------------------------------------------------------ pictures

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from decimal import Decimal, localcontext
 from functools import lru_cache, partial
 
@@ -12,15 +13,16 @@ import numpy as np
 import tfarm
 from tfarm.arm import Arm, Theory
 from tfarm.arrays import Real
-from tfarm.columns import FILES, REPORT, Column, Table
-from tfarm.digits import fixed, lined, listed, plain, significant, singly
-from tfarm.errors import MISSING, CertificationError, ConvergenceError
+from tfarm.columns import Column, Table
+from tfarm.digits import fixed, kept_digits, lined, listed, plain, significant, singly
+from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.plots.shapes import SHAPE_POINTS, draw_differences, scaled, theory_name
 from tfarm.plots.shapes import modes as shapes_plot
 from tfarm.report.sections import PageSection, Picture, typeset
-from tfarm.spectrum import DampedModes, Modes, answers, damped_modes, modes
-from tfarm.spectrum.answers import DAMPED_MODE_COLUMNS, beyond_the_box
+from tfarm.schema import table
+from tfarm.spectrum import DampedModes, Modes, damped_modes, modes
 from tfarm.spectrum.damped import damped_at_hub
+from tfarm.spectrum.listing import SHAPE_DIGITS, ListedMode, beyond_the_box, listed_modes
 from tfarm.spectrum.table import hub_locked
 
 PROVEN_MODES, BRACKET_DIGITS = (
@@ -37,15 +39,17 @@ DAMPED_CAPTION = (
     "this box. {outside}Beyond any such box there are more: {beyond}."
 )
 OWN_DAMPING, LOSSES = "the arm with its own damping", "the rig with what its hub, clamp and joint lose"
-UNASSIGNED_NOTE = (
-    "Rows without a number are eigenvalues that continue from no mode for certain, named after the part of the drive "
-    "that sets them, where one does; a mode that is “not assigned” has one of them, or none in the box. "
-)
+DAMPED_COLUMNS = ("index", "eigenvalue", "second_eigenvalue", "damping_ratio")
+UNASSIGNED_NOTE = "They continue from no mode for certain; the origin is the part of the drive that sets them, if any."
+NOT_ASSIGNED_NOTE = "A mode without an eigenvalue has one of those of no mode, or none in the box. "
 NOT_LISTED = "Modes above {last} are not listed: their branches cannot be told apart. "
 OUTSIDE_NOTE = (
     "Rows that are “outside” lie, with one eigenvalue or both, beyond the box: beside them others may exist that are "
     "not listed. "
 )
+MODAL_COLUMNS = (
+    "index", "natural_frequency", "natural_frequency_hz", "hub_participation", "modal_moment", "nodes",
+)  # fmt: skip
 PROVEN_DIGITS = 12  # of an eigenvalue: more than a page prints of any
 BOX_WORDS = "in the box", "outside"
 TABLED_MODES, DRAWN_MODES = 10, 6  # as `tfarm modes` lists them; shapes in three rows of two
@@ -115,8 +119,8 @@ def proven_damped_modes(arm: Arm, count: int) -> DampedModes:
     return found
 
 
-def damped_table(undamped: Modes) -> Table:
-    """The table of the arm's damped modes, each number proven to 12 digits and printed to fewer."""
+def damped_tables(undamped: Modes) -> list[Table]:
+    """The arm's damped modes, each number certified to 12 digits and printed to fewer; then those of no mode."""
     arm = undamped.arm
     damped = proven_damped_modes(arm, int(undamped.index[-1]))
     C, box = arm.damping, damped.box
@@ -132,31 +136,27 @@ def damped_table(undamped: Modes) -> Table:
     words = {name: plain(round(x)) if abs(x) >= 100 else plain(x, 3) for name, x in edges.items()}
     every = np.concatenate([damped.eigenvalues, damped.unassigned_pairs])
     inside = np.all(box.holds(every) | np.isnan(every), axis=1)
-    words_of = np.where(np.isnan(every[:, 0]), "-", np.where(inside, *BOX_WORDS))
+    words_of = np.where(inside, *BOX_WORDS)
     notes = NOT_LISTED.format(last=damped.index[-1]) if damped.left_out else ""
     if damped.unassigned or not damped.is_assigned.all():
-        notes += UNASSIGNED_NOTE
-    names = [*[MISSING] * len(damped.index), *(each.origin for each in damped.unassigned)]
-    origins = [Column("origin", of=names, on=(FILES,))] if damped.unassigned else []
-    return Table(
-        stem="damped-modes",
-        title="Damped modes",
-        caption=DAMPED_CAPTION.format(
-            whose=OWN_DAMPING if C else LOSSES,
-            C=plain(C),
-            count=damped.count,
-            rigid=rigid,
-            outside=("" if inside.all() else OUTSIDE_NOTE) + notes,
-            beyond=typeset(beyond_the_box(arm)),
-            **words,
-        ),
-        columns=(
-            *DAMPED_MODE_COLUMNS,
-            Column("complete", "list complete", of=words_of),
-            *origins,
-        ),
-        record=damped,
+        notes += NOT_ASSIGNED_NOTE
+    listed = listed_modes(undamped)
+    caption = DAMPED_CAPTION.format(
+        whose=OWN_DAMPING if C else LOSSES,
+        C=plain(C),
+        count=damped.count,
+        rigid=rigid,
+        outside=("" if inside.all() else OUTSIDE_NOTE) + notes,
+        beyond=typeset(beyond_the_box(arm)),
+        **words,
     )
+    columns = table(listed.modes[: len(damped.index)], DAMPED_COLUMNS).columns
+    complete = Column("complete", "list complete", of=words_of[: len(damped.index)])
+    tables = [Table(stem="damped-modes", title="Damped modes", caption=caption, columns=(*columns, complete))]
+    if listed.unassigned:
+        more = {"stem": "unassigned-eigenvalues", "title": "Eigenvalues of no mode", "caption": UNASSIGNED_NOTE}
+        tables.append(table(listed.unassigned, **more))
+    return tables
 
 
 def modes_section(arm: Arm) -> PageSection:
@@ -171,7 +171,7 @@ def modes_section(arm: Arm) -> PageSection:
     words = [COMPLETE]
     if not arm.is_undamped:
         try:
-            damped = [damped_table(modes)]
+            damped = damped_tables(modes)
         except (ConvergenceError, CertificationError) as error:
             words.append(NO_DAMPED_TABLE.format(why=error))
     return PageSection(
@@ -196,35 +196,28 @@ def _flexible(modes: Modes) -> Real:
 
 def modal_table(modes: Modes) -> Table:
     """Frequencies, hub participation, modal moment and nodes."""
-    nodes = [", ".join(places(node, modes.arm.length)) or "none" for node in modes.nodes]
-    # a node is known as a share of the length
-    decimals = answers.SHAPE_DIGITS - 1 - math.floor(math.log10(modes.arm.length))
-    at = [tuple(np.round(node, decimals).tolist()) for node in modes.nodes]
     rigid = "Row 0 is the arm turning as a rigid body. " if modes.arm.has_rigid_mode else ""
     tip = "tip rotation" if math.isfinite(modes.arm.payload.inertia) else "hub angle"
     tip = (
         "tip displacement" if math.isfinite(modes.arm.payload.mass) else tip
     )  # the first of its motions that it can make
-    omega, hertz = (column.read(modes).cells for column in answers.MODE_COLUMNS[1:3])
-    return Table(
-        stem="modal-table",
-        title="Modal table",
-        caption=MODAL_TABLE.format(
-            rigid=rigid,
-            tip=tip,
-            hub=LOCKED_TAKES_NO_PART if modes.arm.is_locked else FREE_PIN if modes.arm.has_massless_hub else "",
-            proof=how_proven(modes, omega, hertz),
-        ),
-        columns=(*answers.MODE_COLUMNS, Column("nodes_m", "nodes", "m", of=at, shown=nodes, on=REPORT)),
-        record=modes,
+    rows = listed_modes(modes).modes
+    columns = table([_rounded(row, modes.arm.length) for row in rows], MODAL_COLUMNS).columns
+    caption = MODAL_TABLE.format(
+        rigid=rigid,
+        tip=tip,
+        hub=LOCKED_TAKES_NO_PART if modes.arm.is_locked else FREE_PIN if modes.arm.has_massless_hub else "",
+        proof=how_proven(modes, columns[1].cells, columns[2].cells),
     )
+    return Table(stem="modal-table", title="Modal table", caption=caption, columns=columns)
 
 
-def places(nodes: Real, length: float) -> tuple[str, ...]:
-    """Points along the arm [m] to a ten-thousandth of its length; one nearer to the root has two digits of its own."""
-    decimals = max(0, 4 - math.floor(math.log10(length)))
-    near = 10.0 ** (1 - decimals)
-    return tuple(significant(float(x), 2) if x < near else fixed([float(x)], decimals)[0] for x in nodes)
+def _rounded(row: ListedMode, length: float) -> ListedMode:
+    """The row with what depends on a mode's shape to the digits that hold on every processor."""
+    decimals = SHAPE_DIGITS - 1 - math.floor(math.log10(length))
+    participation, moment = kept_digits((row.hub_participation, row.modal_moment + 0.0), SHAPE_DIGITS)
+    nodes = np.round(row.nodes, decimals).tolist()
+    return replace(row, hub_participation=participation, modal_moment=moment, nodes=nodes)
 
 
 def _shapes(modes: Modes) -> Picture:
@@ -232,7 +225,7 @@ def _shapes(modes: Modes) -> Picture:
     counts = ", ".join(str(len(modes.nodes[modes.index.tolist().index(number)])) for number in shapes)
     columns = [Column("x_m", "x", "m", of=np.linspace(0.0, modes.arm.length, SHAPE_POINTS))]
     columns += [
-        Column(f"mode_{number}", f"mode {number}", of=np.round(w, answers.SHAPE_DIGITS - 1) + 0.0)
+        Column(f"mode_{number}", f"mode {number}", of=np.round(w, SHAPE_DIGITS - 1) + 0.0)
         for number, w in shapes.items()
     ]
     return Picture(
@@ -288,7 +281,7 @@ def sensitivity_table(modes: Modes) -> Table:
     """Per cent of frequency per per cent of each parameter: a row a parameter, a column a mode."""
     flexible = modes.index > 0
     rows = {
-        name.replace("youngs", "Young's").replace("_", " "): np.round(values[flexible], answers.SHAPE_DIGITS - 1) + 0.0
+        name.replace("youngs", "Young's").replace("_", " "): np.round(values[flexible], SHAPE_DIGITS - 1) + 0.0
         for name, values in modes.sensitivity.items()
     }
     shown = {name: values for name, values in rows.items() if abs(values).max() > NEGLECTED}
@@ -315,10 +308,10 @@ def tint(x: float) -> str:
     return "#" + "".join(f"{part:02x}" for part in parts)
 
 
-def locked_table(table: Modes) -> Table:
+def locked_table(found: Modes) -> Table:
     """A row a mode: hub free, with its losses where it has any, and locked."""
-    arm = table.arm
-    free = tfarm.modes(arm, LOCKED_MODES, theory=table.theory)
+    arm = found.arm
+    free = tfarm.modes(arm, LOCKED_MODES, theory=found.theory)
     omega, locked = free.natural_frequency[free.index > 0], hub_locked(free)
     held = locked.natural_frequency[locked.index > 0]
     columns = [Column("mode", "mode", of=range(1, LOCKED_MODES + 1)), *_pair("hub_free", "hub free", omega)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
@@ -13,10 +12,10 @@ from tfarm.arm import MOMENT_GAIN, Arm
 from tfarm.columns import Column, Table
 from tfarm.digits import general, how_many, listed, plain, significant, singly
 from tfarm.errors import ConvergenceError
-from tfarm.fitting.answers import fit_in_words, known, parameters_table, resonances
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import ARMS, Fit, Possible, possible
-from tfarm.fitting.overlay import curves_table, overlay, overlay_answer, required_table
+from tfarm.fitting.overlay import overlay
+from tfarm.fitting.results import FitResult, fit_in_words
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import ranges_of
 from tfarm.plots.fitted import draw_band, draw_share, fitted
@@ -25,8 +24,8 @@ from tfarm.plots.frequency import bode as bode_plot
 from tfarm.plots.words import gains_words
 from tfarm.report.cases import has_loop
 from tfarm.report.sections import PageSection, Picture, typeset, upper
-from tfarm.response.answers import bode_table, roots_table
 from tfarm.response.frequency import AXIS_SHARE, Bode, Extremum, bode
+from tfarm.schema import curve_table, table
 from tfarm.spectrum.table import default_gains
 
 MAGNITUDE = attrgetter("magnitude")
@@ -47,11 +46,6 @@ SPANS_ON_ALL = (  # title, unit and name of a margin in the band
     ("phase margin", "deg", "phase"),
     ("delay margin", "s", "delay"),
     ("disk margin", "", "disk"),
-)
-FIT_RESONANCES = (
-    Column("before_hz", "start", "Hz", of=lambda row: row[0], digits=singly(known, 6)),
-    Column("after_hz", "fitted", "Hz", of=lambda row: row[1], digits=singly(known, 6)),
-    Column("measured_hz", "measured", "Hz", of=lambda row: row[2], digits=singly(general, 6)),
 )
 MODES_CAPTION = (
     "A pole and its residue are fitted to the lines around each measured peak; off: measured against exact frequency; "
@@ -74,14 +68,15 @@ def bode_section(arm: Arm, output: str) -> PageSection:
         caption=f"{what_is_seen(data)} {what_it_means(data)}",
         alt=alt_text(data),
         figure=bode_plot.figure(data),
-        data=bode_table(data, f"{anchor}-data"),
+        data=curve_table(data, stem=f"{anchor}-data", title=f"{data.input_label} to {data.label}"),
     )
     if not data.poles.size and not data.zeros.size:
         return PageSection(
             anchor=anchor, title=title, words=(f"{completeness(data)} There are none.",), blocks=(picture,)
         )
     caption = f"{completeness(data)} {ROOTS_CAPTION}"
-    roots = roots_table(data, "pole", "zero", stem=f"{anchor}-roots", caption=caption)
+    title_of = f"Poles and zeros, {data.input_label} to {data.label}"
+    roots = table([*data.pole_list, *data.zero_list], stem=f"{anchor}-roots", title=title_of, caption=caption)
     return PageSection(anchor=anchor, title=title, blocks=(picture, roots))
 
 
@@ -167,14 +162,13 @@ def fit_section(fit: Fit, count: int = ARMS) -> PageSection:
             stem="fit-overlay", title="Measured over fitted", caption=caption,
             alt=f"Measured and computed responses: {names}.", figure=fitted.figure(fit),
         ))  # fmt: skip
-    blocks.append(parameters_table(fit))
-    if rows := resonances(fit):
+    result = FitResult(fit)
+    blocks.append(table(result.parameters, stem="fit", title="Fitted numbers"))
+    if result.resonances:
         caption = (
             "Peaks of the measured responses, and poles of the arm's: with a held hub where they are over its angle."
         )
-        blocks.append(
-            Table(columns=FIT_RESONANCES, record=rows, stem="fit-resonances", title="Resonances", caption=caption)
-        )
+        blocks.append(table(result.resonances, stem="fit-resonances", title="Resonances", caption=caption))
     try:
         those = possible(fit, count)
     except ConvergenceError as error:
@@ -227,19 +221,19 @@ def measured_section(arm: Arm, measured: Sequence[Measured]) -> PageSection:
     words: list[str] = []
     for number, one in enumerate(measured, start=1):
         found = overlay(arm, one)
-        answer, name = overlay_answer(found), found.measured.name
+        name = found.measured.name
         label = f"-{number}" if len(measured) > 1 else ""
-        curves = replace(curves_table(found), stem=f"measured{label}-data", title=name)
         blocks.append(Picture(
             stem=f"measured{label}", title=name, caption=CURVES_CAPTION,
-            alt=f"Measured and exact response {name}.", figure=measured_plot.figure(found), data=curves,
+            alt=f"Measured and exact response {name}.", figure=measured_plot.figure(found),
+            data=Table(stem=f"measured{label}-data", title=name, columns=found.csv_table.columns),
         ))  # fmt: skip
-        if len(answer["modes"]):
-            table = replace(answer["modes"], stem=f"measured-modes{label}", title="Mode by mode", caption=MODES_CAPTION)
-            blocks.append(table)
-        if (required := required_table(answer)) is not None:
-            stem = f"measured-required{label}"
-            blocks.append(replace(required, stem=stem, title="What would explain it", caption=REQUIRED_CAPTION))
+        if found.beside:
+            stem = f"measured-modes{label}"
+            blocks.append(table(found.beside, stem=stem, title="Mode by mode", caption=MODES_CAPTION))
+        if found.required_changes:
+            stem, title = f"measured-required{label}", "Single changes that explain a mode"
+            blocks.append(table(found.required_changes, stem=stem, title=title, caption=REQUIRED_CAPTION))
         words.append(typeset(f"{name}: the rms of ln(measured/exact) is {general(found.rms_log_error, 3)}."))
         if peaks := [plain(float(peak) / (2 * math.pi), 5) for peak in found.unmatched]:
             words[-1] += typeset(f" Peaks at {', '.join(peaks)} Hz are none of the arm's.")

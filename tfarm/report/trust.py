@@ -20,16 +20,20 @@ import tfarm
 from tfarm import audit
 from tfarm.arm import load, presets
 from tfarm.audit import AuditRow, published
-from tfarm.audit.rows import AUDIT_COLUMNS, is_zero
+from tfarm.audit.rows import is_zero
 from tfarm.columns import Column, Table
-from tfarm.digits import powers, scientific, significant, singly, unit, worded
+from tfarm.digits import powers, scientific, unit
 from tfarm.report.modes_section import BRACKET_DIGITS
 from tfarm.report.page import command_for_all, render
 from tfarm.report.sections import DATA, Fact, PageSection, save_section
 from tfarm.report.trust_proofs import ArmProof, accuracy_table, boxes_tables, counts_table, digits_table, hash_of
 from tfarm.response.frequency import BAND_POINTS
+from tfarm.schema import table
 from tfarm.tables.files import save_table
 
+AUDIT_COLUMNS = (
+    "equation", "verdict", "printed", "corrected", "residual_printed", "residual_corrected", "evidence",
+)  # fmt: skip
 VERDICT_MARKS = {"ok": ("✓", "right as printed"), "corrected": ("≠", "corrected"), "undecided": ("?", "undecided")}
 GREEK_LETTERS = dict(
     zip(
@@ -195,9 +199,7 @@ def write_trust(evidence: Evidence, proofs: Sequence[ArmProof], folder: Path) ->
     """index.html and its tables, into a folder of their own."""
     folder.mkdir()
     sections = {s.anchor: save_section(s, folder) for s in _sections(evidence, proofs)}
-    plain = Table(
-        stem="audit", title="The paper, equation by equation", columns=AUDIT_COLUMNS, record=list(evidence.audit)
-    )
+    plain = table(evidence.audit, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation")
     files = save_table(plain, folder / DATA)
     page = render(
         "trust.html",
@@ -216,7 +218,7 @@ def write_trust(evidence: Evidence, proofs: Sequence[ArmProof], folder: Path) ->
 
 
 def _sections(evidence: Evidence, proofs: Sequence[ArmProof]) -> list[PageSection]:
-    rows = evidence.published
+    rows, found = evidence.published, published.Validation(evidence.published)
     agree, of = sum(row.agrees for row in rows), len({row.source for row in rows})
     facts = (
         Fact(label="numbers compared", value=str(len(rows)), beside=f"from {of} sources"),
@@ -238,7 +240,7 @@ def _sections(evidence: Evidence, proofs: Sequence[ArmProof]) -> list[PageSectio
             title="Published numbers",
             words=(PUBLISHED_WORDS,),
             facts=facts,
-            blocks=(sources_table(rows), differences_table(rows), published_table(rows)),
+            blocks=(sources_table(rows), differences_table(found), published_table(found)),
         ),
         PageSection(anchor="again", title="Make it again", blocks=(inputs_table(proofs), versions_table())),
     ]
@@ -286,37 +288,16 @@ def sources_table(rows: Sequence[published.PublishedRow]) -> Table:
     )
 
 
-def differences_table(rows: Sequence[published.PublishedRow]) -> Table:
+def differences_table(found: published.Validation) -> Table:
     """The printed numbers that ours does not round to, a row a reason."""
-    groups: dict[tuple[str, str, str], list[published.PublishedRow]] = {}
-    for row in rows:
-        if not row.agrees:
-            groups.setdefault((row.source, row.case, row.why), []).append(row)
-    worst = [max((row.difference for row in each), key=abs) for each in groups.values()]
-    return Table(
-        stem="differences",
-        title="Where ours differs, and why",
-        caption="Largest difference: ours over printed, less one, of the modes named. All other numbers agree.",
-        columns=(
-            Column("source", "source", of=[source for source, _, _ in groups]),
-            Column("case", "case", of=[case for _, case, _ in groups], digits=worded(published.lettered)),
-            Column("modes", "modes", of=[", ".join(str(row.mode) for row in each) for each in groups.values()]),
-            Column("largest_difference", "largest difference", of=worst, digits=singly(significant, 2)),
-            Column("why", "why", of=[why for _, _, why in groups]),
-        ),
-    )
+    caption = "Largest difference: ours over printed, less one, of the modes named. All other numbers agree."
+    return table(found.differences, stem="differences", title="Where ours differs, and why", caption=caption)
 
 
-def published_table(rows: Sequence[published.PublishedRow]) -> Table:
-    """Every printed number beside ours."""
-    return Table(
-        stem="published",
-        title="All printed numbers, and ours",
-        caption="✓ agrees to the last printed digit, ≠ differs, for the reason given above. Difference: ours over "
-        "printed, less one.",
-        record=list(rows),
-        columns=published.PUBLISHED_COLUMNS,
-    )
+def published_table(found: published.Validation) -> Table:
+    """Every printed number and ours."""
+    caption = "Relative difference: ours over printed, less one; the reasons are given above."
+    return table(found.rows, stem="published", title="All printed numbers, and ours", caption=caption)
 
 
 # ------------------------------------------------------------ making it again

@@ -17,11 +17,12 @@ frequency.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.outputs import Output
 from tfarm.exact.rigid import rigid_response
 from tfarm.records import record
+from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
 from .transfer import TransferFunction, transfer
@@ -62,6 +64,8 @@ def worst_error(arm: Arm, output: str, band: tuple[float, float]) -> float | Non
     return float(max(errors)) if errors else None
 
 
+HERTZ = 2 * math.pi  # rad/s
+ZERO_ON_AXIS = 1e-13  # of |s|: what rounding leaves of Re s where a zero of an elastic link lies on the axis
 LEAST = 1e-9  # of |G|: a smaller rise or fall makes no peak; rounding makes smaller ones of a constant
 ROUNDING = 1e-14  # relative error of a value, over |s/(s - p)| of the nearest pole or zero p
 HALVINGS = 40  # of an interval of the grid, at most: to the spacing of float64 numbers
@@ -76,8 +80,23 @@ class Extremum(NamedTuple):
     `magnitude` is inf at a pole on the imaginary axis and 0 at a zero on it.
     """
 
-    omega: float
-    magnitude: float
+    omega: Annotated[float, Quantity("angular frequency", "rad/s", 7)]
+    magnitude: Annotated[float, Quantity("magnitude")]
+
+    @property
+    def frequency(self) -> Annotated[float, Quantity("frequency", "Hz", 7)]:
+        """In Hz."""
+        return self.omega / HERTZ
+
+
+class Root(NamedTuple):
+    """A pole or zero of a Bode plot, and |G| at i Im s, of a real one at i |s|."""
+
+    kind: Annotated[str, Quantity("kind")]
+    s: Annotated[complex, Quantity("s", "1/s", 10, key="s")]
+    frequency: Annotated[float, Quantity("Im s/2 pi", "Hz", 8)]
+    damping: Annotated[float | None, Quantity("damping ratio", digits=6, key="damping_ratio")]
+    magnitude: Annotated[float, Quantity("magnitude there")]
 
 
 def extrema(
@@ -181,29 +200,60 @@ class Bode:
     """
 
     arm: Arm
-    output: str
+    output: Annotated[str, Quantity("output")]
     row: Output = field(repr=False)
-    x: float | None = None
-    omega: Real
-    value: Complex
-    phase: Real
+    x: Annotated[float | None, Quantity(help="place of the output [m]")] = None
+    omega: Annotated[Real, Quantity("angular frequency", "rad/s", curve=True)]
+    value: Annotated[Complex, Quantity("value", curve=True)]
+    phase: Annotated[Real, Quantity("phase", "deg", curve=True)]
     poles: Complex
     zeros: Complex
     rigid: Complex
     at_poles: Real  # |G| at the frequency of each pole; inf on the axis
     at_zeros: Real  # and of each zero; 0 on the axis
-    peaks: tuple[Extremum, ...]  # local maxima of |G| inside the band, ascending
-    dips: tuple[Extremum, ...]  # and minima
-    pole_width: tuple[float, float]
-    zero_width: tuple[float, float]
+    peaks: Annotated[tuple[Extremum, ...], Quantity("peaks, local maxima of the magnitude")]  # ascending
+    dips: Annotated[tuple[Extremum, ...], Quantity("dips, local minima of the magnitude")]
+    pole_width: Annotated[tuple[float, float], Quantity("poles complete in Re s [1/s]", key="poles_between_re_1_s")]
+    zero_width: Annotated[tuple[float, float], Quantity("zeros complete in Re s [1/s]", key="zeros_between_re_1_s")]
 
     @property
-    def finding(self) -> str:
+    def arm_name(self) -> Annotated[str, Quantity("arm", key="arm")]:
+        """The name of the arm."""
+        return self.arm.name
+
+    @property
+    def input(self) -> Annotated[str, Quantity("input")]:
+        """The input that the response is to."""
+        return "hub_angle" if self.arm.is_locked else self.arm.input
+
+    @property
+    def magnitude(self) -> Annotated[Real, Quantity("magnitude", curve=True)]:
+        """|G|."""
+        return np.abs(self.value)
+
+    @property
+    def pole_list(self) -> Annotated[list[Root], Quantity("poles", key="poles")]:
+        """Those of the upper half-plane."""
+        return list(map(self._root, itertools.repeat("pole"), self.poles.tolist(), self.at_poles.tolist()))
+
+    @property
+    def zero_list(self) -> Annotated[list[Root], Quantity("zeros", key="zeros")]:
+        """Those of the upper half-plane; what rounding leaves of Re s of a zero on the axis is left out."""
+        zeros = self.zeros
+        if self.arm.has_elastic_link:
+            zeros = np.where(abs(zeros.real) < ZERO_ON_AXIS * abs(zeros), 1j * zeros.imag, zeros)
+        return list(map(self._root, itertools.repeat("zero"), zeros.tolist(), self.at_zeros.tolist()))
+
+    def _root(self, kind: str, s: complex, size: float) -> Root:
+        return Root(kind, s, s.imag / HERTZ, -s.real / abs(s) + 0.0 if s else None, size)
+
+    @property
+    def finding(self) -> Annotated[str, Quantity("poles and zeros")]:
         """How many poles and zeros the output shows, and up to where, in words."""
         return f"{self.poles.size} poles and {self.zeros.size} zeros up to {self.band[1]:.6g} rad/s"
 
     @property
-    def band(self) -> tuple[float, float]:
+    def band(self) -> Annotated[tuple[float, float], Quantity("frequency range", "rad/s", key="range_rad_s")]:
         """First and last frequency [rad/s]."""
         return float(self.omega[0]), float(self.omega[-1])
 
@@ -233,7 +283,7 @@ class Bode:
         return self.row.label if self.x is None else self.row.label.replace("at x", f"at x = {self.x:g} m")
 
     @property
-    def gain_unit(self) -> str:
+    def gain_unit(self) -> Annotated[str, Quantity("unit", key="unit")]:
         """SI unit of the response, e.g. N m/(N m)."""
         given = self.arm.input_unit
         return f"{self.row.unit}/{f'({given})' if ' ' in given else given}"

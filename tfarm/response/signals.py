@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.arm.checks import on_the_arm
 from tfarm.arrays import Complex
 from tfarm.errors import MISSING, ParameterError
 from tfarm.exact.characteristic import LoopParts
@@ -39,20 +40,18 @@ class Signals:
     names: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        if not self.names:
+        if not self._placed:
             raise ParameterError(key="signals", value=[], remedy="name at least one output")
-        for name in self.names:
-            self._placed(name)
 
-    @cached_property
+    @property
     def outputs(self) -> tuple[Output, ...]:
         """The output that each reads."""
-        return tuple(self._placed(name)[0] for name in self.names)
+        return tuple(wanted for wanted, _ in self._placed)
 
     @cached_property
     def places(self) -> tuple[float, ...]:
         """Where each is, as a share of the length; 0 for those that have their own place."""
-        return tuple(self._placed(name)[1] / self.arm.length for name in self.names)
+        return tuple(place / self.arm.length for _, place in self._placed)
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -107,22 +106,25 @@ class Signals:
             order_at_zero(self.system, wanted, share) for wanted, share in zip(self.outputs, self.places, strict=True)
         )
 
-    def _placed(self, name: str) -> tuple[Output, float]:
-        """The output of a name and its place [m]."""
-        plain, at, text = name.partition("@")
-        wanted, length = known_output(plain), self.arm.length
-        if wanted.place != "x":
-            if at:
-                raise ParameterError(key=name, value=text, remedy=f"{plain} has its own place; leave out {at}{text}")
-            return wanted, 0.0
-        if not at:
-            remedy = f"say where: {plain}@x with x between 0 and {length:g} m"
-            raise ParameterError(key=f"{name}.x", value=MISSING, remedy=remedy)
-        try:
-            x = float(text)
-        except ValueError:
-            x = float("nan")
-        if not 0 <= x <= length:
-            remedy = f"a point of the arm lies between 0 and {length:g} m"
-            raise ParameterError(key=name, value=text, remedy=remedy)
-        return wanted, x
+    @cached_property
+    def _placed(self) -> tuple[tuple[Output, float], ...]:
+        """The output of each name and its place [m]."""
+        return tuple(placed(name, self.arm.length) for name in self.names)
+
+
+def placed(name: str, length: float) -> tuple[Output, float]:
+    """The output of a name and its place [m] on an arm of this length."""
+    plain, at, text = name.partition("@")
+    wanted = known_output(plain)
+    if wanted.place != "x":
+        if at:
+            raise ParameterError(key=name, value=text, remedy=f"{plain} has its own place; leave out {at}{text}")
+        return wanted, 0.0
+    if not at:
+        remedy = f"say where: {plain}@x with x between 0 and {length:g} m"
+        raise ParameterError(key=f"{name}.x", value=MISSING, remedy=remedy)
+    try:
+        x = float(text)
+    except ValueError:
+        raise ParameterError(key=name, value=text, remedy=f"a number of metres, 0 to {length:g}") from None
+    return wanted, float(on_the_arm(name, x, length))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import INPUT_UNITS, Arm, Input, must_be_arm
-from tfarm.arm.checks import number, positive, whole
+from tfarm.arm.checks import number, on_the_arm, positive, whole
 from tfarm.arrays import Complex
 from tfarm.errors import MISSING, ParameterError
 from tfarm.exact.balls import nearest_float
@@ -355,11 +355,7 @@ class TransferFunction:
             return None
         if x is None:
             raise ParameterError(key="x", value=MISSING, remedy=f"say where {along[0]} is meant, 0 to {length:g} m")
-        remedy = f"a point of the arm lies between 0 and {length:g} m"
-        place = number("x", x, remedy)
-        if not 0 <= place <= length:
-            raise ParameterError(key="x", value=x, remedy=remedy)
-        return place
+        return float(on_the_arm("x", number("x", x, f"a point between 0 and {length:g} m"), length))
 
 
 def _finite(s: ArrayLike) -> Complex:

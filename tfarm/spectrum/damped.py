@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, Theory
+from tfarm.arm.checks import on_the_arm
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
@@ -165,9 +166,7 @@ class DampedModes:
 
     def _field(self, quantity: str, x: NDArray[np.float64] | float) -> Complex:
         k = self.undamped.system
-        share = np.asarray(x, dtype=float) / float(k.length)
-        if not np.all((share >= 0) & (share <= 1)):
-            raise ParameterError(key="x", value=x, remedy=f"a point of the arm lies between 0 and {float(k.length)} m")
+        share = on_the_arm("x", x, float(k.length)) / float(k.length)
         zeros = self.eigenvalues[self.index > 0]
         unknown = np.full(share.size, complex(np.nan, np.nan))
         values = [

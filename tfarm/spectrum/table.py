@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import GAINS, THEORIES, Arm, HubFeedback, Theory, input_words, load, must_be_arm, written_unit
-from tfarm.arm.checks import whole
+from tfarm.arm.checks import on_the_arm, whole
 from tfarm.arrays import Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import ConvergenceError, ParameterError
@@ -204,9 +204,7 @@ class Modes:
         return Shapes(self._k, self.natural_frequency[self._rigid :])
 
     def _field(self, which: int, x: NDArray[np.float64] | float) -> Real:
-        share = np.asarray(x, dtype=float) / float(self._k.length)
-        if not np.all((share >= 0) & (share <= 1)):
-            raise ParameterError(key="x", value=x, remedy=f"a point of the arm lies between 0 and {self._k.length} m")
+        share = on_the_arm("x", x, float(self._k.length)) / float(self._k.length)
         values = self._shapes(share.ravel())[which] * self._unit
         if self._rigid:
             turn = 1.0 / math.sqrt(self.arm.total_inertia)

@@ -64,7 +64,9 @@ def as_csv(table: Table, *, units: bool = False) -> str:
 
 def _csv_cells(column: Column) -> Sequence[str]:
     """The cells of a column; those of records, such as intervals, are texts, and JSON has their numbers."""
-    return column.cells if any(map(_holds_records, column.values)) else list(map(_csv_cell, column.values))
+    if not any(map(_holds_records, column.values)):
+        return list(map(_csv_cell, column.values))
+    return [cell if value else "" for cell, value in zip(column.cells, column.values, strict=True)]
 
 
 def _holds_records(value: Any) -> bool:

@@ -24,7 +24,7 @@ from tfarm.tuner.trial import (
     save_tuner,
     slew_trial,
 )
-from tfarm.tuner.tuning import Plan, Tuning, curves_answer, learning_curves, tune, tune_answer
+from tfarm.tuner.tuning import Plan, Tuning, TuningResult, learning_curves, tune
 
 __all__ = [
     "BestConstant",
@@ -41,9 +41,9 @@ __all__ = [
     "Trial",
     "TunedGain",
     "Tuning",
+    "TuningResult",
     "best_constant",
     "compare_controllers",
-    "curves_answer",
     "extra_insensitive",
     "find_guard",
     "initial_network",
@@ -57,6 +57,5 @@ __all__ = [
     "train",
     "tried_loops",
     "tune",
-    "tune_answer",
     "zero_vibration",
 ]

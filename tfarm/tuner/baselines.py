@@ -31,7 +31,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -42,6 +42,7 @@ from tfarm.dsp import Chain, Converters, Sampled, Scenario, Simulation
 from tfarm.dsp.chain import TIME_ROUNDING
 from tfarm.dsp.scenarios import torque_unit
 from tfarm.errors import ConvergenceError
+from tfarm.schema import Quantity
 from tfarm.spectrum.table import first_frequency
 from tfarm.tuner.guard import Guard, MovingGain, constant_windows
 from tfarm.tuner.trial import Record, Trial, TunedGain, judged, residual_rms, tip_off
@@ -191,9 +192,13 @@ class Outcome(NamedTuple):
     `tip_error` [m] is how far the tip is off its target when the trial ends; None where it ran away, and of the bound.
     """
 
-    cost: float
-    residual: float | None
-    tip_error: float | None
+    cost: Annotated[float, Quantity("cost")]
+    residual: Annotated[float | None, Quantity("residual root moment", "N m rms")]
+    tip_error: Annotated[float | None, Quantity(help="tip error [m]")]
+
+    def as_text(self, digits: int) -> str:
+        """The cost."""
+        return f"{self.cost:.{digits}g}"
 
 
 @dataclass(frozen=True)
@@ -205,16 +210,16 @@ class Outcomes:
     of the unshaped one.  `proven`: whether the tuner's guard is proven for this loop too.
     """
 
-    condition: str
-    without: Outcome
-    best_constant: Outcome
-    own_constant: Outcome
-    own_gain: float
-    ZV: Outcome
-    EI: Outcome
-    tuner: Outcome
-    bound: Outcome
-    proven: bool
+    condition: Annotated[str, Quantity("condition")]
+    without: Annotated[Outcome, Quantity("no moment feedback", digits=4)]
+    best_constant: Annotated[Outcome, Quantity("constant", digits=4)]
+    own_constant: Annotated[Outcome, Quantity("own constant", digits=4)]
+    own_gain: Annotated[float, Quantity()]
+    ZV: Annotated[Outcome, Quantity("ZV", digits=4)]
+    EI: Annotated[Outcome, Quantity("EI", digits=4)]
+    tuner: Annotated[Outcome, Quantity("tuner", digits=4)]
+    bound: Annotated[Outcome, Quantity("LQ bound", digits=4)]
+    proven: Annotated[bool, Quantity("guard certified")]
 
 
 @dataclass(frozen=True)

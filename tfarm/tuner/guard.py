@@ -42,7 +42,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,7 @@ from tfarm.dsp.sampling import held_amplitude
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.exact.rationals import as_integers, falls, is_positive_definite
 from tfarm.records import record
+from tfarm.schema import Quantity
 from tfarm.tuner.kernel import Limits
 
 SLACKS = (1e-3, 1e-5, 1e-7, 1e-9)  # how strictly the inequality is asked for, in balanced states
@@ -229,15 +230,15 @@ class Guard:
     time-varying kind only: a Lyapunov function of every model that was looked at.
     """
 
-    kind: GuardKind
-    lo: float
-    hi: float
-    modes_used: int
-    is_settled: bool
+    kind: Annotated[GuardKind, Quantity("kind")]
+    lo: Annotated[float, Quantity("least moment gain", digits=4)]
+    hi: Annotated[float, Quantity("largest moment gain", digits=4)]
+    modes_used: Annotated[int, Quantity("flexible modes", key="modes")]
+    is_settled: Annotated[bool, Quantity("more modes change nothing", key="settled")]
     proofs: tuple[CommonLyapunov, ...] = ()
 
     @property
-    def is_proven(self) -> bool:
+    def is_proven(self) -> Annotated[bool, Quantity("certified for any K(t)", key="proven")]:
         """Whether the loop is proven stable for every K(t) in it, and not that of its first modes alone."""
         return bool(self.proofs) and self.is_settled
 
@@ -247,7 +248,7 @@ class Guard:
         return Limits(self.lo, self.hi)
 
     @property
-    def sentence(self) -> str:
+    def sentence(self) -> Annotated[str, Quantity("certainty", key="says")]:
         """What is proven, in words."""
         if self.kind == "none":
             return "no guard: K >= 0, nothing is proven"

@@ -19,7 +19,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite, sqrt
-from typing import Literal, NamedTuple, get_args
+from typing import Annotated, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from tfarm.arrays import Real
 from tfarm.errors import ParameterError, must_be_known
 from tfarm.exact.compiled import compiled, inlined
 from tfarm.records import record
+from tfarm.schema import Quantity
 from tfarm.tuner.guard import Guard
 from tfarm.tuner.kernel import Network
 from tfarm.tuner.trial import Record, Trial
@@ -299,9 +300,25 @@ class LearningCurves:
     """
 
     costs: Real
-    final: Real
-    diverged: int
-    died: int
+    final: Annotated[Real, Quantity(key="final_cost")]
+    diverged: Annotated[int, Quantity("seeds diverged", key="diverged")]
+    died: Annotated[int, Quantity("seeds died at K = 0", key="died")]
+
+    @property
+    def seeds(self) -> Annotated[int, Quantity("seeds")]:
+        """How many there are."""
+        return int(self.final.size)
+
+    @property
+    def final_quartiles(self) -> Annotated[list[float], Quantity("final cost, quartiles and median", digits=4)]:
+        """Lower quartile, median and upper quartile of the final costs."""
+        return [self.final_quantile(share) for share in QUARTILES]
+
+    @property
+    def quartile_curves(self) -> Annotated[dict[str, Real], Quantity(flat=True)]:
+        """The same of the cost after each trial."""
+        names = ("lower_quartile", "median", "upper_quartile")
+        return {name: self.quantile(share) for name, share in zip(names, QUARTILES, strict=True)}
 
     @classmethod
     def of(cls, trainings: Sequence[Training], trials: int) -> LearningCurves:

@@ -370,12 +370,12 @@ def to_text(tuner: SavedTuner) -> str:
         "b": tuner.cost.b,
         "guard_kind": tuner.guard_kind,
         "guard": None if tuner.guard_kind == "none" else [tuner.lo, tuner.hi],
-        **weights_answer(tuner.network),
+        **weights_of(tuner.network),
     }
     return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def weights_answer(network: Network) -> dict[str, list[float] | list[list[float]]]:
+def weights_of(network: Network) -> dict[str, list[float] | list[list[float]]]:
     """scales, W1 and w2 as lists."""
     return {name: getattr(network, name).tolist() for name in ("scales", "W1", "w2")}
 

@@ -1,27 +1,30 @@
-"""One call: the guard, the training, and what the tuner has to be held against, as a record and as a dictionary."""
+"""One call: the guard, the training, and what the tuner has to be held against, as records."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
 from tfarm.arm.checks import whole
+from tfarm.arrays import Real
 from tfarm.dsp import Chain, Simulation, Simulator, scenario
 from tfarm.dsp.chain import Reading, chain_or_usual
-from tfarm.dsp.results import enough_modes, ideal_chain, residual_moment_rms, residual_raw_moment_rms, simulation_answer
+from tfarm.dsp.results import RESIDUAL, Run, enough_modes, ideal_chain, residual_moment_rms, residual_raw_moment_rms
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
 from tfarm.errors import ParameterError
 from tfarm.records import record
+from tfarm.schema import Quantity
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner.baselines import SHAPERS, BestConstant, Outcomes, best_constant, lq_bound, shaped_trial
-from tfarm.tuner.guard import GuardKind, find_guard
+from tfarm.tuner.guard import Guard, GuardKind, find_guard
 from tfarm.tuner.kernel import PAPER_HIDDEN, PAPER_INPUTS, initial_network
-from tfarm.tuner.training import QUARTILES, Learning, LearningCurves, Training, train
+from tfarm.tuner.training import Learning, LearningCurves, Training, train
 from tfarm.tuner.trial import (
     TRIAL_MODES,
     Cost,
@@ -32,7 +35,7 @@ from tfarm.tuner.trial import (
     slew_trial,
     tip_off,
     usual_rate_gain,
-    weights_answer,
+    weights_of,
     with_signals,
 )
 
@@ -40,6 +43,9 @@ Advance = Callable[[int, int, str], None]
 
 MOST_SEEDS = 10_000  # of learning curves
 TRAINING_THREADS = 2  # a report uses no more cores
+SHAPED_NOTE = (
+    "no moment feedback; judged by the shaped slew, which arrives later, so that cost_lq_bound does not bound it"
+)
 BOUND_NOTES = {
     "vibration": "the least cost of any control signal e on this slew, with full state and preview",
     "total": "the least cost of any torque: under this reading the cost does not ask the arm to move, so none is best",
@@ -207,73 +213,150 @@ def learning_curves(tuning: Tuning, seeds: int, advance: Advance | None = None) 
     return LearningCurves.of(done, plan.trials)
 
 
-def curves_answer(curves: LearningCurves) -> dict[str, Any]:
-    """Learning curves as a dictionary of plain numbers and lists."""
-    lower, median, upper = (curves.quantile(share).tolist() for share in QUARTILES)
-    return {
-        "seeds": curves.final.size,
-        "median": median,
-        "lower_quartile": lower,
-        "upper_quartile": upper,
-        "final_cost": curves.final.tolist(),
-        "final_quartiles": [curves.final_quantile(share) for share in QUARTILES],
-        "diverged": curves.diverged,
-        "died": curves.died,
-    }
+class Baseline(NamedTuple):
+    """The cost of a slew with a controller that the tuner is compared with."""
+
+    name: Annotated[str, Quantity("controller")]
+    cost: Annotated[float, Quantity("cost of a slew", digits=4)]
+    later: Annotated[float | None, Quantity("arrives later", "s", 3)] = None
 
 
-def tune_answer(tuning: Tuning) -> dict[str, Any]:
-    """The tuning as a dictionary of plain numbers, texts and lists."""
-    training, plan, guard = tuning.training, tuning.plan, tuning.training.guard
-    result, trial, runs = training.result, tuning.trial, _runs(tuning)
-    tuned, _, without = runs
-    stopped = training.stopped
-    return {
-        "arm": tuning.trial.arm.name,
-        "mode": plan.learning.mode,
-        "rule": plan.learning.rule,
-        "sensitivity": plan.learning.sensitivity,
-        "signals": plan.signals,
-        "seed": plan.seed,
-        "K1": plan.K1,
-        "Kp": plan.Kp,
-        "trials": int(training.costs.size),
-        "a": plan.cost.a,
-        "b": plan.cost.b,
-        "cost_unit_N_m": plan.scale,
-        "cost": training.costs.tolist(),
-        "cost_tuned": result.cost,
-        "cost_without": tuning.without.cost,
-        "cost_best_constant": tuning.best_constant.cost,
-        "best_constant_gain": tuning.best_constant.gain,
-        "cost_lq_bound": tuning.bound.cost,
-        "lq_bound_note": BOUND_NOTES[plan.signals],
-        **_shaped(tuning),
-        "gain": {"t": result.t.tolist(), "K": result.K.tolist()},
-        "residual_moment_rms": residual_moment_rms(tuned),
-        "residual_raw_moment_rms": residual_raw_moment_rms(tuned),
-        "residual_without": residual_moment_rms(without),
-        **_tip_errors(trial, runs),
-        "guard": [guard.lo, guard.hi],
-        "guard_kind": guard.kind,
-        "guard_proven": guard.is_proven,
-        "guard_modes": guard.modes_used,
-        "guard_settled": guard.is_settled,
-        "guard_says": guard.sentence,
-        "reached_preset_error": training.reached,
-        "stopped": None if stopped is None else str(stopped),
-        "weights": weights_answer(training.network),
-    }
+@dataclass(frozen=True)
+class TuningResult:
+    """A tuning with the numbers that it comes to, and as far as asked for its learning curves and a comparison."""
+
+    tuning: Tuning
+    curves: Annotated[LearningCurves | None, Quantity("learning curves")] = None
+    comparison: Annotated[list[Outcomes] | None, Quantity("compared in other conditions")] = None
+
+    @property
+    def arm(self) -> Annotated[str, Quantity("arm")]:
+        """The name of the arm."""
+        return self.tuning.trial.arm.name
+
+    @property
+    def plan(self) -> Annotated[dict[str, Any], Quantity("plan", flat=True)]:
+        """Mode, rule, constants and seed of the learning, gains of the servo, and weights of the cost."""
+        plan = self.tuning.plan
+        return {
+            "mode": plan.learning.mode, "rule": plan.learning.rule, "sensitivity": plan.learning.sensitivity,
+            "signals": plan.signals, "seed": plan.seed, "K1": plan.K1, "Kp": plan.Kp, "a": plan.cost.a,
+            "b": plan.cost.b, "cost_unit_N_m": plan.scale,
+        }  # fmt: skip
+
+    @property
+    def trials(self) -> Annotated[int, Quantity("trials")]:
+        """How many trials there were."""
+        return int(self.tuning.training.costs.size)
+
+    @property
+    def costs(self) -> Annotated[Real, Quantity("cost", curve=True, key="cost")]:
+        """The cost of each trial."""
+        return self.tuning.training.costs
+
+    @property
+    def baselines(self) -> Annotated[list[Baseline], Quantity("compared with baselines")]:
+        """The cost with the tuner and with what it is compared with."""
+        tuning, shaped = self.tuning, self.tuning.shaped_costs
+        constant = f"best constant gain, K = {tuning.best_constant.gain:.4g}"
+        late = tuning.shaped_delays
+        return [
+            Baseline("no moment feedback", tuning.without.cost),
+            Baseline(constant, tuning.best_constant.cost),
+            Baseline(f"tuner, after {self.trials} trials", tuning.training.result.cost),
+            *(Baseline(f"input shaping, {kind}", cost, late[kind]) for kind, cost in shaped.items()),
+            Baseline("linear-quadratic bound of the unshaped slew", tuning.bound.cost),
+        ]
+
+    @property
+    def numbers(self) -> Annotated[dict[str, Any], Quantity(flat=True)]:
+        """The same numbers by name."""
+        tuning = self.tuning
+        costs, late = tuning.shaped_costs, tuning.shaped_delays
+        return {
+            "cost_tuned": tuning.training.result.cost,
+            "cost_without": tuning.without.cost,
+            "cost_best_constant": tuning.best_constant.cost,
+            "best_constant_gain": tuning.best_constant.gain,
+            "cost_lq_bound": tuning.bound.cost,
+            "lq_bound_note": BOUND_NOTES[tuning.plan.signals],
+            "cost_shaped": min(costs.values()),
+            "shaped": {kind: {"cost": costs[kind], "arrives_later_by_s": late[kind]} for kind in costs},
+            "shaped_note": SHAPED_NOTE,
+        }
+
+    @property
+    def gain(self) -> Annotated[dict[str, Real], Quantity()]:
+        """The moment gain over time, tuned."""
+        return {"t": self.tuning.training.result.t, "K": self.tuning.training.result.K}
+
+    @property
+    def gain_range(self) -> Annotated[tuple[float, float], Quantity("moment gain", digits=4)]:
+        """Its least and its largest value."""
+        K = self.tuning.training.result.K
+        return float(K.min()), float(K.max())
+
+    @cached_property
+    def _runs(self) -> tuple[Simulation, Simulation, Simulation]:
+        return _runs(self.tuning)
+
+    @property
+    def residual_moment(self) -> Annotated[float | None, Quantity(RESIDUAL, "N m rms", key="residual_moment_rms")]:
+        """With the tuner, less the rigid arm's."""
+        return residual_moment_rms(self._runs[0])
+
+    @property
+    def residual_raw(self) -> Annotated[float | None, Quantity(key="residual_raw_moment_rms")]:
+        """The same of the root moment itself."""
+        return residual_raw_moment_rms(self._runs[0])
+
+    @property
+    def residual_without(self) -> Annotated[float | None, Quantity("without moment feedback", "N m rms")]:
+        """The residual without moment feedback."""
+        return residual_moment_rms(self._runs[2])
+
+    @property
+    def tip_error(self) -> Annotated[float | None, Quantity("tip error at the end", "m", 3)]:
+        """How far off the tip is when the trial ends, tuned."""
+        return tip_off(self._runs[0], self.tuning.trial)
+
+    @property
+    def tip_error_constant(self) -> Annotated[float | None, Quantity("with the best constant gain", "m", 3,
+                                                                     key="tip_error_best_constant_m")]:  # fmt: skip
+        """The same with the best constant gain."""
+        return tip_off(self._runs[1], self.tuning.trial)
+
+    @property
+    def tip_error_without(self) -> Annotated[float | None, Quantity("and without moment feedback", "m", 3)]:
+        """The same without moment feedback."""
+        return tip_off(self._runs[2], self.tuning.trial)
+
+    @property
+    def guard(self) -> Annotated[Guard, Quantity("guard of the gain")]:
+        """The gains that the tuner may take, and what is certified of them."""
+        return self.tuning.training.guard
+
+    @property
+    def reached(self) -> Annotated[bool, Quantity(key="reached_preset_error")]:
+        """Whether the preset error was reached."""
+        return self.tuning.training.reached
+
+    @property
+    def stopped(self) -> Annotated[str | None, Quantity("stopped")]:
+        """Why the training stopped early."""
+        stopped = self.tuning.training.stopped
+        return None if stopped is None else str(stopped)
+
+    @property
+    def weights(self) -> Annotated[dict[str, Any], Quantity()]:
+        """Every weight of the network."""
+        return weights_of(self.tuning.training.network)
 
 
 def tip_errors(tuning: Tuning) -> dict[str, float | None]:
     """How far off the tip is [m] when the trial ends: tuned, with the best constant gain, without moment feedback."""
-    return _tip_errors(tuning.trial, _runs(tuning))
-
-
-def _tip_errors(trial: Trial, runs: Sequence[Simulation]) -> dict[str, float | None]:
     keys = ("tip_error_m", "tip_error_best_constant_m", "tip_error_without_m")
-    return {key: tip_off(run, trial) for key, run in zip(keys, runs, strict=True)}
+    return {key: tip_off(run, tuning.trial) for key, run in zip(keys, _runs(tuning), strict=True)}
 
 
 def _runs(tuning: Tuning) -> tuple[Simulation, Simulation, Simulation]:
@@ -282,24 +365,7 @@ def _runs(tuning: Tuning) -> tuple[Simulation, Simulation, Simulation]:
     return gain.run(simulator), simulator.linear(tuning.constant), simulator.linear(gain.servo)
 
 
-def _shaped(tuning: Tuning) -> dict[str, Any]:
-    """The better shaper's cost, and both; how much later they arrive."""
-    costs, late = tuning.shaped_costs, tuning.shaped_delays
-    note = "no moment feedback; judged by the shaped slew, which arrives later, so that cost_lq_bound does not bound it"
-    return {
-        "cost_shaped": min(costs.values()),
-        "shaped": {kind: {"cost": costs[kind], "arrives_later_by_s": late[kind]} for kind in costs},
-        "shaped_note": note,
-    }
-
-
-def outcomes_answer(rows: list[Outcomes]) -> list[dict[str, Any]]:
-    """The rows of a comparison as dictionaries."""
-    items = ([(each.name, getattr(row, each.name)) for each in fields(row)] for row in rows)
-    return [{key: value._asdict() if hasattr(value, "_asdict") else value for key, value in row} for row in items]
-
-
-def controlled_answer(
+def controlled_run(
     arm: Arm,
     saved: SavedTuner,
     chain: Chain,
@@ -309,8 +375,8 @@ def controlled_answer(
     count: int | None,
     between: int,
     outputs: Sequence[str] = (),
-) -> dict[str, Any]:
-    """A scenario simulated with a saved tuner as the gain, as `tfarm.dsp.results.simulated_answer` says it.
+) -> Run:
+    """A scenario simulated with a saved tuner as the gain.
 
     Its guard is proven for the loop that it was trained on, not for every arm and chain that it may be tried with.
     """
@@ -319,8 +385,7 @@ def controlled_answer(
     ideal = ideal_chain(chain)
     used = enough_modes(lambda n: saved.gain().run(Simulator(arm, ideal, task, count=n, outputs=outputs)), count)
     run = saved.gain().run(Simulator(arm, chain, task, count=used.modes, between=between, outputs=outputs))
-    answer = simulation_answer(arm, saved.gain().servo, run, None, used)
-    controller = {
+    trained = {
         "trained_on": saved.arm,
         "guard_kind": saved.guard_kind,
         "guard": [saved.lo, saved.hi],
@@ -331,5 +396,4 @@ def controlled_answer(
         **asdict(saved.cost),
         "cost_unit_N_m": float(saved.network.scales[0]),
     }
-    what = described(task, arm, chain)
-    return answer | {MOMENT_GAIN: None, "controller": controller, "scenario_in_words": what}
+    return Run(arm, saved.gain().servo, run, used, described(task, arm, chain), tuner=trained)

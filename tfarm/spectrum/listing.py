@@ -1,0 +1,244 @@
+"""The list of modes as commands and pages have it: undamped, damped and hub-locked frequencies, mode by mode."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from tfarm.arm import WITH_SHEAR, Arm
+from tfarm.digits import DOUBLE_DIGITS
+from tfarm.errors import CertificationError, ConvergenceError
+from tfarm.exact.values import Method
+from tfarm.schema import Quantity
+
+from .damped import DampedModes, damped_modes
+from .proofs import Certificate, Disc
+from .table import Modes, compare_theories, hub_locked
+
+LESS_DAMPED = "they are ever less damped, as no segment is (C = 0)"
+OF_SHEAR = "shear is undamped in this model, so lightly damped modes exist at ever higher frequency"
+OF_ELASTIC = "segments without damping have lightly damped modes at ever higher frequency"
+OF_BENDING = "in this theory, which leaves out shear, all of them are overdamped from some frequency on"
+ACCUMULATE = "the slow real eigenvalues of overdamped bending modes accumulate at -1/C"
+LOCKED_NOTE = (
+    "frequencies with the hub held still, as dry friction mostly holds it once a slew is over; a measured frequency "
+    "near this column indicates a hub at rest"
+)
+SHAPE_DIGITS = 10  # in a report's files, of what shapes are needed for: these differ by 1e-14 between processors
+
+
+@dataclass(frozen=True, slots=True)
+class ListedMode:
+    """One mode.  Frequencies are texts where more than 15 digits are asked for."""
+
+    index: Annotated[int, Quantity("mode")]
+    natural_frequency: Annotated[float | str, Quantity("natural frequency", "rad/s", 12)]
+    natural_frequency_hz: Annotated[float, Quantity("frequency", "Hz", 9, key="natural_frequency_hz")]
+    eigenvalue: Annotated[complex | None, Quantity("eigenvalue", "1/s", 10)]
+    second_eigenvalue: Annotated[float | None, Quantity("second eigenvalue", "1/s", 8, "of an overdamped mode")]
+    damping_ratio: Annotated[float | None, Quantity("damping ratio")]
+    hub_locked: Annotated[float | str | None, Quantity("hub locked", "rad/s", 12, LOCKED_NOTE)]
+    hub_participation: Annotated[float, Quantity("hub participation b", help="hub angle of the mode of unit mass")]
+    modal_moment: Annotated[float, Quantity("modal moment", "N m", help="root moment of the mode of unit mass")]
+    nodes: Annotated[list[float], Quantity("nodes", "m", 4)]
+    theories: Annotated[dict[str, float], Quantity(key="theories_rad_s")]
+    sensitivity: Annotated[dict[str, float], Quantity(help="relative change of frequency over that of a parameter")]
+    lower: Annotated[str | None, Quantity(key="lower_rad_s", help="certified bracket")] = None
+    upper: Annotated[str | None, Quantity(key="upper_rad_s")] = None
+    discs: Annotated[tuple[Disc, ...] | None, Quantity(help="certified enclosures of the eigenvalues")] = None
+
+
+class Unlisted(NamedTuple):
+    """An eigenvalue of the box that is assigned to no mode, and the part of the drive that sets it, if one does."""
+
+    origin: Annotated[str, Quantity("origin")]
+    eigenvalue: Annotated[complex, Quantity("eigenvalue", "1/s", 10)]
+    discs: Annotated[tuple[Disc, ...] | None, Quantity()] = None
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """How many frequencies lie below a frequency, certified."""
+
+    count: Annotated[int, Quantity("frequencies in all")]
+    below: Annotated[str, Quantity("below", "rad/s")]
+
+
+@dataclass(frozen=True)
+class ModeList:
+    """The first flexible modes, none missing.
+
+    `damped` are None where there is no damping, or where they cannot be found or certified: `damped_failure` says why.
+    """
+
+    found: Modes
+    damped: DampedModes | None
+    modes: Annotated[list[ListedMode], Quantity("modes")]
+    unassigned: Annotated[list[Unlisted], Quantity("eigenvalues of no mode", key="unassigned_eigenvalues")]
+    method: Annotated[Method, Quantity("method")]
+    digits: Annotated[int | None, Quantity()]
+    proof: Annotated[Proof | None, Quantity("certified")]
+    damped_failure: Annotated[str | None, Quantity("damped modes not determined")]
+    is_proven_in_box: Annotated[bool, Quantity(key="proven_complete_in_box")]
+
+    @property
+    def arm(self) -> Annotated[str, Quantity("arm")]:
+        """The name of the arm."""
+        return self.found.arm.name
+
+    @property
+    def theory(self) -> Annotated[str, Quantity("beam theory")]:
+        """The theory of the beam."""
+        return self.found.theory
+
+    @property
+    def input(self) -> Annotated[str, Quantity()]:
+        """The input of the arm."""
+        return self.found.arm.input
+
+    @property
+    def count(self) -> Annotated[int, Quantity("flexible modes, none missing")]:
+        """The number of the last mode."""
+        return int(self.found.index.max())
+
+    @property
+    def certainty(self) -> Annotated[str, Quantity("completeness")]:
+        """The word of certainty for the list of modes."""
+        return "converged (counted)" if self.proof is None else "certified"
+
+    @property
+    def box(self) -> Annotated[tuple[float, ...] | None, Quantity("box: Re s from, to, Im s from, to")]:
+        """The box of the eigenvalues."""
+        return None if self.damped is None else tuple(self.damped.box)
+
+    @property
+    def eigenvalues_in_box(self) -> Annotated[int | None, Quantity("eigenvalues in the box, all listed")]:
+        """How many there are, conjugates counted."""
+        return None if self.damped is None else self.damped.count
+
+    @property
+    def box_note(self) -> Annotated[str | None, Quantity("beyond the box")]:
+        """The eigenvalues beyond it."""
+        return None if self.damped is None else beyond_the_box(self.found.arm)
+
+    @property
+    def hub_locked_note(self) -> Annotated[str | None, Quantity("hub locked")]:
+        """The meaning of the column; None of an arm whose hub is locked itself."""
+        return None if self.found.arm.is_locked else LOCKED_NOTE
+
+    @property
+    def damped_note(self) -> Annotated[str | None, Quantity("damped modes")]:
+        """Up to where eigenvalues are listed, where that is not all."""
+        if self.damped is None or not self.damped.left_out:
+            return None
+        return f"eigenvalues up to mode {self.damped.index[-1]} only: branches above cannot be told apart"
+
+    @property
+    def circuit(self) -> Annotated[list[float], Quantity("of the motor's circuit [1/s]", key="circuit_eigenvalues")]:
+        """Real eigenvalues of the motor's circuit."""
+        return [] if self.damped is None else list(self.damped.others)
+
+
+def listed_modes(
+    found: Modes, digits: int | None = None, certify: bool = False, method: Method = "closed-form"
+) -> ModeList:
+    """The modal table, frequencies as strings of so many digits where more than 15 are asked for.
+
+    With `certify` each flexible mode has its bracket and its discs, and the list the count that proves it complete;
+    `method` is that of the frequencies.
+    """
+    wanted = None if not certify else DOUBLE_DIGITS if digits is None else digits
+    proof = None if wanted is None else found.certify(wanted)
+    damped, discs, failure = None, None, None
+    if not found.arm.is_undamped:
+        try:
+            damped = damped_modes(found)
+            discs = None if wanted is None else damped.certify(wanted)
+        except (ConvergenceError, CertificationError) as error:
+            damped, failure = None, f"damped modes: {error}"
+    rows = list(_rows(found, digits, method, damped, proof, discs))
+    return ModeList(
+        found=found, damped=damped, modes=rows, unassigned=list(_unassigned(damped, discs)), method=method,
+        digits=digits, proof=None if proof is None else Proof(proof.count, proof.below), damped_failure=failure,
+        is_proven_in_box=discs is not None,
+    )  # fmt: skip
+
+
+def _rows(
+    found: Modes,
+    digits: int | None,
+    method: Method,
+    damped: DampedModes | None,
+    proof: Certificate | None,
+    discs: Sequence[Sequence[Disc]] | None,
+) -> Iterator[ListedMode]:
+    """A row a mode."""
+    locked, rigid = hub_locked(found), int(np.sum(found.index == 0))
+    flexible = int((locked.index > 0).sum())
+    omega: list[Any] = found.frequencies(method).tolist()
+    hertz = (found.frequencies(method) / (2 * math.pi)).tolist()
+    still: list[Any] = locked.natural_frequency[locked.index > 0].tolist()
+    if digits is not None and digits > DOUBLE_DIGITS:
+        omega, still = found.digits(digits), locked.digits(digits)[-flexible:]
+    brackets = [(None, None)] * len(found) if proof is None else [*[(None, None)] * rigid, *proof.brackets]
+    theories, sensitivity = compare_theories(found), found.sensitivity
+    enclosures = _discs_by_row(found, damped, discs)
+    for row in range(len(found)):
+        first, second, ratio = (None, None, None) if damped is None else _damped(damped, row)
+        yield ListedMode(
+            index=int(found.index[row]), natural_frequency=omega[row], natural_frequency_hz=hertz[row],
+            eigenvalue=first, second_eigenvalue=second, damping_ratio=ratio,
+            hub_locked=None if row < rigid else still[row - rigid],
+            hub_participation=float(found.hub_participation[row]), modal_moment=float(found.modal_moment[row]),
+            nodes=found.nodes[row].tolist(),
+            theories={str(name): float(values[row]) for name, values in theories.items()},
+            sensitivity={name: float(values[row]) for name, values in sensitivity.items()},
+            lower=brackets[row][0], upper=brackets[row][1], discs=enclosures[row],
+        )  # fmt: skip
+
+
+def _damped(damped: DampedModes, row: int) -> tuple[complex | None, float | None, float | None]:
+    """Eigenvalue, second real eigenvalue and damping ratio of a mode, as far as it has them."""
+    if row >= len(damped.index) or not damped.is_assigned[row]:
+        return None, None, None
+    p, q = damped.eigenvalues[row].tolist()
+    turning = damped.index[row] == 0 and q != 0  # friction resists the rigid body
+    both = (damped.is_overdamped[row] or turning) and not math.isnan(q.real)
+    return p, q.real if both else None, float(damped.damping_ratio[row])
+
+
+def _discs_by_row(
+    found: Modes, damped: DampedModes | None, discs: Sequence[Sequence[Disc]] | None
+) -> list[tuple[Disc, ...] | None]:
+    """The discs of each mode: those of flexible modes first, then what friction makes of the rigid body's second 0."""
+    rigid = int(np.sum(found.index == 0))
+    if damped is None or discs is None:
+        return [None] * len(found)
+    flexible = int(np.sum(damped.index > 0))
+    alone = [tuple(each) for each in discs[flexible : flexible + damped.single.size - len(damped.others)]]
+    rows: list[tuple[Disc, ...] | None] = [*alone] if alone else [None] * rigid
+    rows += [tuple(each) for each in discs[:flexible]]
+    return rows + [None] * (len(found) - len(rows))
+
+
+def _unassigned(damped: DampedModes | None, discs: Sequence[Sequence[Disc]] | None) -> Iterator[Unlisted]:
+    """The eigenvalues of the box that are assigned to no mode."""
+    if damped is None:
+        return
+    proven = [None] * len(damped.unassigned) if discs is None else discs[len(discs) - len(damped.unassigned) :]
+    for each, enclosed in zip(damped.unassigned, proven, strict=True):
+        yield Unlisted(each.origin, each.eigenvalue, None if enclosed is None else tuple(enclosed))
+
+
+def beyond_the_box(arm: Arm) -> str:
+    """The eigenvalues of a damped arm beyond any box, in words."""
+    if arm.has_elastic_link:
+        return LESS_DAMPED
+    dampings = {link.damping for link in arm.links}
+    light = OF_SHEAR if arm.theory in WITH_SHEAR else OF_BENDING if all(dampings) else OF_ELASTIC
+    most = " of the most damped segment" * (len(dampings) > 1)
+    return f"{light}, and {ACCUMULATE}{most}, {-1 / arm.damping:.6g} 1/s"
