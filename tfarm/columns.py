@@ -5,7 +5,7 @@
         Column("becomes", of="direction"),
     )
 
-A line more is a column more in JSON, on terminals, in files and on pages, which `tfarm.tables` makes of a `Table`.
+`tfarm.tables` makes terminals' tables, files and pages of a `Table`; `tfarm.schema` makes one of declared quantities.
 """
 
 from __future__ import annotations
@@ -16,10 +16,6 @@ from operator import attrgetter
 from typing import Any
 
 from tfarm.digits import TEXTS, CellsOf
-from tfarm.errors import MISSING
-
-JSON, TERMINAL, FILES, PAGE = "json", "terminal", "files", "page"
-ANSWER, REPORT = (JSON, TERMINAL), (FILES, PAGE)  # of a command; of a report
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,9 +24,8 @@ class Column:
 
     `of` says where its values are: the name of an attribute (that of the key if left out), a function of the record,
     or the values themselves.  Of a list of records it is asked one by one.  `digits` makes cells of values; where
-    these do not say it all, `shown` is, like `of`, the cells.  On a terminal `printed` makes them, under `head`, where
-    these are given.  `on`: the outputs that have it.  Neighbours of one `group` share a heading on a page; `tint` is,
-    like `of`, a background colour a cell; on a narrow terminal texts of a column with `folds` are folded.
+    these do not say it all, `shown` is, like `of`, the cells.  Neighbours of one `group` share a heading on a page;
+    `tint` is, like `of`, a background colour a cell; on a narrow terminal a column that `folds` is folded.
     """
 
     key: str
@@ -39,9 +34,6 @@ class Column:
     of: Any = None
     digits: CellsOf = TEXTS
     shown: Any = None
-    head: str | None = None
-    printed: CellsOf | None = None
-    on: tuple[str, ...] = (*ANSWER, *REPORT)
     group: str = ""
     tint: Any = ()
     folds: bool = False
@@ -51,11 +43,6 @@ class Column:
         values = _read(self.key if self.of is None else self.of, record)
         shown = None if self.shown is None else _read(self.shown, record)
         return replace(self, of=values, shown=shown, tint=_read(self.tint, record))
-
-    def at(self, places: Sequence[int]) -> Column:
-        """Some rows of a column that was read."""
-        of, shown, tint = ([part[i] for i in places] if part else part for part in (self.of, self.shown, self.tint))
-        return replace(self, of=of, shown=shown, tint=tint)
 
     @property
     def values(self) -> Sequence[Any]:
@@ -77,8 +64,7 @@ class Column:
 class Table:
     """The columns of a record, read; a sequence of its rows as JSON has them.
 
-    `stem` names its files, `title` stands above, `caption` says what is to be seen and what it means.  The first
-    `keys` columns say which row it is.
+    `stem` names its files, `title` stands above, `caption` says what is to be seen and what it means.
     """
 
     columns: tuple[Column, ...]
@@ -86,22 +72,12 @@ class Table:
     stem: str = ""
     title: str = ""
     caption: str = ""
-    keys: int = 1
 
     def __post_init__(self, record: Any) -> None:
         object.__setattr__(self, "columns", tuple(column.read(record) for column in self.columns))
-        for output in (JSON, FILES):
-            keys = [column.key for column in self.on(output)]
-            assert len(set(keys)) == len(keys), f"{self.stem}: two columns of one key in {keys}"
+        keys = [column.key for column in self.columns]
+        assert len(set(keys)) == len(keys), f"{self.stem}: two columns of one key in {keys}"
         assert len({len(column.values) for column in self.columns}) <= 1, f"{self.stem}: columns of different lengths"
-
-    def on(self, output: str) -> list[Column]:
-        """The columns that an output has."""
-        return [column for column in self.columns if output in column.on]
-
-    def rows(self, places: Sequence[int]) -> Table:
-        """The same columns with some of the rows only."""
-        return replace(self, columns=tuple(column.at(places) for column in self.columns), record=None)
 
     def __len__(self) -> int:
         return len(self.columns[0].values)
@@ -110,9 +86,8 @@ class Table:
         return map(self.__getitem__, range(len(self)))
 
     def __getitem__(self, row: int) -> dict[str, Any]:
-        """A row by its keys, without those that it has no value for."""
-        entries = {column.key: column.values[row] for column in self.on(JSON)}
-        return {key: value for key, value in entries.items() if value is not MISSING}
+        """A row by its keys."""
+        return {column.key: column.values[row] for column in self.columns}
 
 
 def _read(how: Any, record: Any) -> list[Any]:

@@ -14,7 +14,6 @@ from tests.report import plausible
 from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import implausible
-from tfarm.columns import PAGE
 from tfarm.dsp import Chain
 from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus
@@ -36,7 +35,7 @@ DAMPED = [name for name, arm in ARMS.items() if arm.link.damping]
 
 
 def column(table, key):
-    return next(each for each in table.on(PAGE) if each.key == key)
+    return next(each for each in table.columns if each.key == key)
 
 
 def number(text):
@@ -62,10 +61,10 @@ def test_cells_of_the_modal_table_are_its_numbers_with_a_few_digits(name):
     """None rounded away, none with more decimals than it has a use for; nodes lie within the arm, and not at 0."""
     modes = tfarm.modes(ARMS[name], count=6)
     table = modal_table(modes)
-    for each in table.on(PAGE)[1:5]:
+    for each in table.columns[1:5]:
         assert [number(cell) for cell in each.cells] == pytest.approx(list(each.values), rel=5e-4, abs=0)
         assert max(len(cell) for cell in each.cells) <= 17
-    for cell, nodes in zip(table.on(PAGE)[5].cells, modes.nodes, strict=True):
+    for cell, nodes in zip(table.columns[5].cells, modes.nodes, strict=True):
         shown = [] if cell == "-" else [number(part) for part in cell.split(", ")]
         assert shown == pytest.approx(list(nodes), rel=0.05, abs=0)
     assert not np.any(modes.modal_moment) or name != "free-pin"

@@ -10,9 +10,8 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from tfarm.columns import ANSWER, FILES, PAGE, REPORT, Column, Table
+from tfarm.columns import Column, Table
 from tfarm.digits import lined, significant, singly, worded
-from tfarm.errors import MISSING
 from tfarm.tables.files import as_csv, as_json, save_table, to_json
 from tfarm.tables.html import as_html, with_symbols
 
@@ -103,25 +102,12 @@ def test_the_page_has_the_cells_of_the_files_rounded(table):
     assert "text" not in page.attributes[2][1]["class"]
 
 
-def test_a_column_may_be_for_some_outputs_only():
-    columns = (Column("a", of=[1]), Column("b", of=[2], on=ANSWER), Column("c", of=[3], on=REPORT))
-    table = Table(columns=columns)
-    assert list(table) == [{"a": 1, "b": 2}]
-    assert json.loads(as_json(table))["rows"] == [{"a": 1, "c": 3}]
-    assert [column.key for column in table.on(FILES)] == [column.key for column in table.on(PAGE)] == ["a", "c"]
-
-
 def test_a_list_of_records_is_asked_one_by_one():
     rows = [{"x": 1.5, "y": "a"}, {"x": 2.5, "y": "b"}]
     columns = (Column("x", of=lambda row: row["x"]), Column("y", of=lambda row: row["y"], digits=worded(str.upper)))
     table = Table(columns=columns, record=rows)
     assert list(table) == rows
     assert list(table.columns[1].cells) == ["A", "B"]
-
-
-def test_what_a_row_has_no_value_for_is_left_out_of_it():
-    table = Table(columns=(Column("a", of=[1, 2]), Column("b", of=[MISSING, None])))
-    assert list(table) == [{"a": 1}, {"a": 2, "b": None}]
 
 
 def test_no_nan_is_written(table):
@@ -131,17 +117,9 @@ def test_no_nan_is_written(table):
             render(Table(columns=columns))
 
 
-def test_some_rows_of_a_table_have_its_cells_and_tints(table):
-    part = table.rows([2, 1])
-    whole, rows = Parsed(as_html(table)), Parsed(as_html(part))
-    assert rows.rows == [*whole.rows[:2], whole.rows[4], whole.rows[3]]
-    assert rows.attributes[3] == whole.attributes[3]
-    assert list(part) == [table[2], table[1]]
-
-
 def test_two_columns_of_one_key_are_a_slip():
     with pytest.raises(AssertionError, match="two columns of one key"):
-        Table(columns=(Column("a", of=[1]), Column("a", of=[2], on=("files",))))
+        Table(columns=(Column("a", of=[1]), Column("a", of=[2])))
 
 
 def test_a_report_s_table_has_two_files(table, tmp_path):

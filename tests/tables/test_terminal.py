@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from tfarm.columns import REPORT, Column, Table
+from tfarm.columns import Column, Table
 from tfarm.digits import general, singly
 from tfarm.tables.terminal import table_lines
 
@@ -20,8 +20,8 @@ COLUMNS = (
 )
 
 
-def printed(width, columns=COLUMNS, keys=1):
-    return table_lines(Table(columns=columns, keys=keys), width)
+def printed(width, columns=COLUMNS):
+    return table_lines(Table(columns=columns), width)
 
 
 def words(lines):
@@ -50,25 +50,13 @@ def test_what_does_not_fit_stands_below_beside_the_first_column():
     assert [line.split()[0] for line in lines[-2:]] == ["1", "2"]
 
 
-def test_a_row_is_known_by_as_many_columns_as_it_takes():
-    texts = {"": "*", "depth": "0.006", "first frequency": "71.505682466890", "second frequency": "204.33313936381"}
-    columns = tuple(Column(title, title, of=[text]) for title, text in texts.items())
-    assert [line.split() for line in printed(30, columns, keys=2) if "*" in line] == [
-        ["*", "0.006", "71.505682466890"],
-        ["*", "0.006", "204.33313936381"],
-    ]
-
-
 def test_a_table_without_rows_has_its_titles():
     assert printed(80, (Column("a", "a", of=[]), Column("b", "b", of=[]))) == ["a  b"]
 
 
-def test_a_heading_has_the_unit_and_cells_the_digits_of_a_terminal():
-    one = Column("omega_rad_s", "frequency", "rad/s", of=[71.50568246689], printed=singly(general, 5))
-    assert printed(80, (one, replace(one, key="w", head="w"), replace(one, key="page", on=REPORT))) == [
-        "frequency [rad/s]       w",
-        "           71.506  71.506",
-    ]
+def test_a_heading_has_the_unit():
+    one = Column("omega_rad_s", "frequency", "rad/s", of=[71.50568246689], digits=singly(general, 5))
+    assert printed(80, (one,)) == ["frequency [rad/s]", "           71.506"]
 
 
 BOTH = """

@@ -45,7 +45,6 @@ LaidOver = Annotated[
 MOST_LISTED = 1000  # modes with nodes and sensitivities: their work grows with the square, to some 20 s
 MOST_SLOW = 2000  # points by balls or by the appendix, at some milliseconds each
 BESIDE_COMPARE = "--compare prints a table of its own: ask for one of them"
-MOST_LISTED_ROOTS = 12  # poles, or zeros, in one line of a terminal; --json has them all
 
 
 @app.command()

@@ -12,7 +12,6 @@ from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
 from tfarm.cli.app import ArmName, Json, TheoryName, app, emit, load_arm, progress, tell, whole_number
 from tfarm.cli.inputs import HELP_ON_GAINS, Given, asked_gains, with_options
 from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
-from tfarm.digits import general, singly
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
@@ -62,7 +61,6 @@ OF_LEARNING, AS_TYPED = (
     ("mode", "rule", "sensitivity", "eta", "alpha", "enough"),
     ("signals", "guard", "duration", "seventh_input"),
 )
-FOUR = singly(general, 4)  # digits of a cost
 
 
 @app.command()

@@ -9,7 +9,7 @@ import numpy as np
 from tfarm.arm import PLANE, Arm, cancelled
 from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.arm.law import REFERENCE, is_measured
-from tfarm.columns import FILES, REPORT, Column, Table
+from tfarm.columns import Column, Table
 from tfarm.digits import plain, singly
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import rule_in_words
@@ -18,7 +18,7 @@ from tfarm.report.sections import PageSection, typeset, upper
 from tfarm.response.controller import sign_convention
 from tfarm.response.signals import Signals
 
-NOT_LED, FILES_ALONE = "open", (FILES,)  # a column that nothing is led to
+NOT_LED = "open"  # a column that nothing is led to
 RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 NOT_ON_PAGE = (
     f"This page is about what stands here, not about the default gains. The map of {' and '.join(PLANE)}, the loci "
@@ -127,14 +127,11 @@ def matrices_tables(each: LawOnArm) -> list[Table]:
         columns = (
             Column("row", "", of=[*(f"{step}x{i}" for i in range(1, n + 1)), "input"]),
             *(
-                Column(
-                    key, title, of=whole[:, i], digits=singly(plain, 5), on=FILES_ALONE if title == NOT_LED else REPORT
-                )
+                Column(key, title, of=whole[:, i], digits=singly(plain, 5))
                 for i, (key, title) in enumerate(zip(keys, titles, strict=True))
             ),
         )
-        left = ", and the columns that nothing is led to" * ("" in part.signals)
-        caption = f"{each.name}: A and C under the states, B and D under the signals; the files have every digit{left}."
+        caption = f"{each.name}: A and C under the states, B and D under the signals; the files have every digit."
         stem = f"{each.key.replace('_', '-')}-matrices" + f"-{number}" * (number > 1)
         found.append(Table(stem=stem, title=f"Matrices of {each.name}", caption=caption, columns=columns))
     return found

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tfarm.columns import FILES, Column, Table
-from tfarm.errors import MISSING
+from tfarm.columns import Column, Table
 from tfarm.files import write_file
 
 
@@ -35,12 +34,9 @@ def json_value(value: Any) -> Any:
 
 def as_json(table: Table) -> str:
     """{"table", "units", "rows": [{key: value}, ...]}, a line a row."""
-    columns = table.on(FILES)
+    columns = table.columns
     rows = zip(*(json_value(column.values) for column in columns), strict=True)
-    texts = (
-        _dumped({column.key: value for column, value in zip(columns, row, strict=True) if value is not MISSING})
-        for row in rows
-    )
+    texts = (_dumped({column.key: value for column, value in zip(columns, row, strict=True)}) for row in rows)
     lines = ",\n  ".join(texts)
     head = _dumped({"table": table.title, "units": {column.key: column.unit for column in columns if column.unit}})
     return f'{head[:-1]}, "rows": [\n  {lines}\n]}}\n'
@@ -55,7 +51,7 @@ def as_csv(table: Table, *, units: bool = False) -> str:
 
     With `units` these stand in brackets behind the keys.
     """
-    stream, columns = io.StringIO(), table.on(FILES)
+    stream, columns = io.StringIO(), table.columns
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([f"{column.key} [{column.unit}]" if units and column.unit else column.key for column in columns])
     writer.writerows(zip(*map(_csv_cells, columns), strict=True))
@@ -74,7 +70,7 @@ def _holds_records(value: Any) -> bool:
 
 
 def _csv_cell(value: Any) -> str:
-    if value is MISSING or value is None:
+    if value is None:
         return ""
     found = json_value(value)
     return " ".join(map(str, found)) if isinstance(found, list) else str(found)

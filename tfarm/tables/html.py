@@ -7,7 +7,7 @@ import re
 
 from markupsafe import Markup, escape
 
-from tfarm.columns import PAGE, Column, Table
+from tfarm.columns import Column, Table
 from tfarm.digits import powers, unit
 
 SIGN, INFINITE = re.compile(r"(?<![\w.)])-(?=[\d.]|inf\b)"), re.compile(r"\binf\b")  # of a number in a cell
@@ -16,7 +16,7 @@ WIDE_CELL = 44  # characters of a text from which its cell is a wide one
 
 def as_html(table: Table) -> Markup:
     """The table element, named by the table's title; shared headings, where there are any, over their columns."""
-    columns = table.on(PAGE)
+    columns = table.columns
     runs = [(name, len(list(run))) for name, run in itertools.groupby(column.group for column in columns)]
     groups = Markup("")
     if any(name for name, _ in runs):

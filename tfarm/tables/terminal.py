@@ -14,7 +14,7 @@ from itertools import zip_longest
 
 from rich.cells import cell_len
 
-from tfarm.columns import TERMINAL, Column, Table
+from tfarm.columns import Column, Table
 
 COLUMN_GAP = 2  # spaces between two columns
 LEAST_FOLDED = 20  # characters to which a text may be folded
@@ -37,14 +37,14 @@ def show_pairs(pairs: Sequence[tuple[str, str]]) -> None:
 
 def table_lines(table: Table, width: int) -> list[str]:
     """The lines of the table, each in so many characters as far as its widest column allows."""
-    columns = table.on(TERMINAL)
-    cells = [column.printed(column.values) if column.printed else column.cells for column in columns]
+    columns = table.columns
+    cells = [column.cells for column in columns]
     titles, rows = [heading(column) for column in columns], list(zip(*cells, strict=True))
     fold = [i for i, column in enumerate(columns) if column.folds]
     words = [i for i, column in enumerate(columns) if column.is_text]
     widths = _widths(titles, rows, fold, width)
     printed: list[str] = []
-    for block in _blocks(widths, width, table.keys):
+    for block in _blocks(widths, width):
         printed += [""] * bool(printed)
         for row in (titles, *rows):
             printed += _row(row, widths, words, block)
@@ -83,18 +83,16 @@ def _row(row: Sequence[str], widths: Sequence[int], words: Sequence[int], block:
 
 
 def heading(column: Column) -> str:
-    """The title with its unit, or what is said on terminals in their place."""
-    if column.head is not None:
-        return column.head
+    """The title with its unit."""
     return f"{column.title} [{column.unit}]" if column.unit else column.title
 
 
-def _blocks(widths: Sequence[int], width: int, keys: int) -> list[list[int]]:
-    """The columns of each block, the first so many in all of them."""
-    blocks = [list(range(min(keys, len(widths))))]
-    for i in range(keys, len(widths)):
-        if len(blocks[-1]) > keys and _total([widths[j] for j in (*blocks[-1], i)]) > width:
-            blocks.append(list(range(keys)))
+def _blocks(widths: Sequence[int], width: int) -> list[list[int]]:
+    """The columns of each block, the first in all of them."""
+    blocks = [[0] if widths else []]
+    for i in range(1, len(widths)):
+        if len(blocks[-1]) > 1 and _total([widths[j] for j in (*blocks[-1], i)]) > width:
+            blocks.append([0])
         blocks[-1].append(i)
     return blocks
 
