@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm.writing import to_toml
+from tfarm.arm.writing import number_unit, to_toml
 from tfarm.columns import Column, Table
 from tfarm.digits import general, listed, singly
 from tfarm.errors import ConvergenceError
@@ -29,14 +29,6 @@ from .ringdown import Ring
 PEAK_REACH = 0.1  # of ln w, and the damping ratio: a peak farther from all of the arm's is not one of them
 BROADER = 2.0  # times the damping ratio: what a broad peak may lie off its pole
 SAME_PEAK = 0.02  # of ln w: peaks of two responses nearer than that are one
-NUMBER_UNITS = {  # of a number by the last word of its key, in SI
-    "length": "m", "radius": "m", "offset": "m", "x": "m", "width": "m", "depth": "m", "diameter": "m",
-    "outer_diameter": "m", "inner_diameter": "m", "area": "m^2", "second_moment": "m^4", "density": "kg/m^3",
-    "youngs_modulus": "Pa", "shear_modulus": "Pa", "damping": "s", "inertia": "kg m^2", "rotor_inertia": "kg m^2",
-    "mass": "kg", "friction": "N m s/rad", "rotor_friction": "N m s/rad", "rotational_stiffness": "N m/rad",
-    "stiffness": "N m/rad", "resistance": "ohm", "inductance": "H", "torque_constant": "N m/A",
-    "back_emf_constant": "V s/rad", "delay": "s",
-}  # fmt: skip
 SIX, NINE = singly(general, 6), singly(general, 9)  # digits of what was measured, and of the frequencies of its lines
 
 
@@ -207,14 +199,6 @@ def _records(fit: Fit) -> RecordScatter | None:
     each = [dict(zip(found.keys, row, strict=True)) for row in found.each.tolist()]
     intervals = dict(zip(found.keys, found.intervals.tolist(), strict=True))
     return RecordScatter(found.response, len(found.each), each, intervals, wider, finding)
-
-
-def number_unit(key: str) -> str:
-    """The SI unit of a free number; "1" where it has none, or that of its response."""
-    words = key.partition(":")[0].split(".")
-    if words[-1] == "stiffness" and words[0] == "attachment":
-        return "N/m"
-    return NUMBER_UNITS.get(words[-1], "1")
 
 
 def resonances(fit: Fit) -> list[FittedResonance]:

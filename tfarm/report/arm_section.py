@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import tomllib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from typing import Annotated, Any, NamedTuple
 
 import tfarm
-from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, Link, RotarySpring, implausible, input_words, unit_of
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, implausible, input_words, unit_of
+from tfarm.arm.writing import number_unit, to_toml
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant, singly, unit
 from tfarm.plots.sketch import sketch
 from tfarm.report.sections import Fact, PageSection, Picture
+from tfarm.schema import Quantity, table
 
 HEADLINE_MODES = 3  # natural frequencies among the headline numbers, the rigid body's 0 not shown
 MOST_POISSON = 0.5  # of an isotropic material; a larger E/2G - 1 is none's ratio
@@ -36,16 +40,7 @@ THEORY_WORDS = {
     "rayleigh": "Rayleigh's, without shear",
     "euler-bernoulli": "Euler and Bernoulli's, without shear and rotary inertia",
 }
-MOTOR_ROWS = (
-    ("resistance", "R", "resistance", "ohm"),
-    ("inductance", "L_a", "inductance", "H"),
-    ("torque constant", "Kt", "torque_constant", "N m/A"),
-    ("back-EMF constant", "Ke", "back_emf_constant", "V s/rad"),
-    ("gear ratio", "N", "gear_ratio", ""),
-    ("gear efficiency, motor to hub", "η", "gear_efficiency", ""),
-    ("rotor inertia, before the gear", "J_m", "rotor_inertia", "kg m^2"),
-    ("rotor friction, before the gear", "b_m", "rotor_friction", "N m s/rad"),
-)
+TEXTS = ("name", "assumptions")  # of the file, which stand elsewhere on the page
 QuantityRow = tuple[str, str, float, str]
 
 
@@ -58,7 +53,8 @@ def arm_section(arm: Arm) -> PageSection:
         theory = THEORY_WORDS[arm.theory]
         words.append(f"The theory of its link is {theory}. {driven}; all loops on this page close through that.")
     caption = GIVEN_CAPTION if arm.is_uniform else RIG_GIVEN_CAPTION
-    given = _table("parameters", "Parameters", caption, given_rows(arm))
+    rows = list(parameters(tomllib.loads(to_toml(arm))))
+    given = table(rows, stem="parameters", title="Parameters", caption=caption)
     return PageSection(
         anchor="arm",
         title="The arm",
@@ -136,66 +132,25 @@ def _table(stem: str, title: str, caption: str, rows: list[QuantityRow], digits:
     )
 
 
-def given_rows(arm: Arm) -> list[QuantityRow]:
-    """Every part that the rig has."""
-    alone = not arm.outer
-    rows = [row for i, link in enumerate(arm.links, 1) for row in _segment(link, "" if alone else f"segment {i}: ")]
-    hub = arm.hub
-    rows.append(("hub inertia", "I_h", hub.inertia, "kg m^2"))
-    others: list[QuantityRow] = [
-        ("hub friction", "b", hub.friction, "N m s/rad"),
-        ("hub radius, from the axis to the clamp", "r", hub.radius, "m"),
-        ("spring from hub to ground", "", hub.stiffness, "N m/rad"),
-    ]
-    rows += [row for row in others if row[2]]
-    rows += [*_spring(arm.clamp, "clamp"), *_spring(arm.joint, "joint at the axis"), *_motor(arm)]
-    for i, each in enumerate(arm.attachments, 1):
-        parts: list[QuantityRow] = [
-            ("place from the clamp", "x", each.x, "m"),
-            ("mass", "", each.mass, "kg"),
-            ("inertia", "", each.inertia, "kg m^2"),
-            ("spring to ground", "", each.stiffness, "N/m"),
-            ("rotary spring to ground", "", each.rotational_stiffness, "N m/rad"),
-        ]
-        rows += [
-            (f"attachment {i}: {name}", symbol, value, unit)
-            for place, (name, symbol, value, unit) in enumerate(parts)
-            if value or not place
-        ]
-    rows += [("strain gauge: place from the clamp", "x", arm.gauge.x, "m")] * bool(arm.gauge.x)
-    payload = arm.payload
-    rows += [("payload mass", "m", payload.mass, "kg"), ("payload inertia", "I_c", payload.inertia, "kg m^2")]
-    return rows + [("payload's centre beyond the tip", "e", payload.offset, "m")] * bool(payload.offset)
+class Parameter(NamedTuple):
+    """A number of the arm's file."""
+
+    key: Annotated[str, Quantity("key")]
+    value: Annotated[float | str, Quantity("value", digits=10)]
+    unit: Annotated[str, Quantity("unit")]
 
 
-def _segment(link: Link, prefix: str) -> Iterator[QuantityRow]:
-    """The numbers of one segment."""
-    section = link.section
-    kappa = "shear factor, given" if section.shear_factor is not None else "shear factor, Cowper (1966)"
-    rows: list[QuantityRow] = [
-        ("length", "L", link.length, "m"),
-        ("density", "ρ", link.density, "kg/m^3"),
-        ("Young's modulus", "E", link.youngs_modulus, "Pa"),
-        ("shear modulus", "G", link.shear_modulus, "Pa"),
-        ("Kelvin-Voigt damping, on bending", "C", link.damping, "s"),
-        *((f"section ({section.shape}): {n.replace('_', ' ')}", "", value, "m") for n, value in section.dimensions),
-        ("area of the section", "A", section.area, "m^2"),
-        ("second moment of area", "I", section.second_moment, "m^4"),
-        (kappa, "κ", link.shear_factor, ""),
-    ]
-    for name, symbol, value, its_unit in rows:
-        yield f"{prefix}{name}", symbol, value, its_unit
-
-
-def _spring(spring: RotarySpring, name: str) -> Iterator[QuantityRow]:
-    if not spring.is_rigid:
-        yield f"{name}: stiffness", "k", spring.stiffness, "N m/rad"
-        yield f"{name}: damping, k (1 + c s)", "c", spring.damping, "s"
-
-
-def _motor(arm: Arm) -> Iterator[QuantityRow]:
-    for name, symbol, key, its_unit in MOTOR_ROWS if arm.motor is not None else ():
-        yield f"motor: {name}", symbol, getattr(arm.motor, key), its_unit
+def parameters(table: Mapping[str, Any], under: str = "") -> Iterator[Parameter]:
+    """The numbers of a table of an arm's file by their keys, those of tables in it too."""
+    for key, value in table.items():
+        name = f"{under}{key}"
+        if isinstance(value, dict):
+            yield from parameters(value, f"{name}.")
+        elif isinstance(value, list) and all(isinstance(each, dict) for each in value):
+            for number, each in enumerate(value, 1):
+                yield from parameters(each, f"{name}.{number}.")
+        elif key not in TEXTS:
+            yield Parameter(name, value, "" if isinstance(value, str) else unit(number_unit(name)).removeprefix("1"))
 
 
 def derived_rows(arm: Arm) -> list[QuantityRow]:
@@ -204,7 +159,11 @@ def derived_rows(arm: Arm) -> list[QuantityRow]:
     rows: list[QuantityRow] = []
     for i, link in enumerate(arm.links, 1):
         prefix = "" if alone else f"segment {i}: "
+        kappa = "given" if link.section.shear_factor is not None else "Cowper (1966)"
         rows += [
+            (f"{prefix}area of the section", "A", link.section.area, "m^2"),
+            (f"{prefix}second moment of area", "I", link.section.second_moment, "m^4"),
+            (f"{prefix}shear factor, {kappa}", "κ", link.shear_factor, ""),
             (f"{prefix}mass", "ρAL", link.rhoA * link.length, "kg"),
             (f"{prefix}bending stiffness", "EI", link.EI, "N m^2"),
             (f"{prefix}shear stiffness", "κGA", link.kGA, "N"),
@@ -300,7 +259,7 @@ def paper_section(arm: Arm) -> PageSection:
     used = values_of(arm)
     marked = partial(Column, tint=["#fff1de" if remark(key, used[key]) else "" for key in TABLE_1])
     printed = [_with_unit(row.value, row.unit) if row.value is not None else "not given" for row in TABLE_1.values()]
-    table = Table(
+    values = Table(
         stem="paper-values",
         title="Table 1 of the paper, and what is used here",
         caption="Rows in colour differ from the paper in value or unit, or are missing there: every number on this "
@@ -318,7 +277,7 @@ def paper_section(arm: Arm) -> PageSection:
         "The arm is that of “Self-Tuning Vibration Control of a Rotational Flexible Timoshenko Arm Using Neural "
         "Networks”, Advances in Acoustics and Vibration, 2012, article 852780.",
     )
-    return PageSection(anchor="paper", title="The paper's values, corrected", words=words, blocks=(table,))
+    return PageSection(anchor="paper", title="The paper's values, corrected", words=words, blocks=(values,))
 
 
 def remark(key: str, used: float) -> str:
