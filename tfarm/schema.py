@@ -174,7 +174,8 @@ def across(
 ) -> Table:
     """A row a quantity that has one value, a column a record; the records are named, `keys` are those of columns."""
     found = [{label: (of, value) for label, of, value in entries(each)} for each in records.values()]
-    labels = list(dict.fromkeys(label for each in found for label in each))
+    every = dict.fromkeys(label for each in found for label in each)
+    labels = [label for label in every if any(_is_short(each[label][1]) for each in found if label in each)]
     units = [next(each[label][0].unit for each in found if label in each) for label in labels]
     columns = [Column("quantity", "quantity", of=labels), Column("unit", "unit", of=units)]
     for key, name, each in zip(keys or records, records, found, strict=True):
@@ -184,6 +185,13 @@ def across(
         cells = [with_unit(value, replace(of, unit="")) for of, value in pairs]
         columns.append(Column(key, name, of=values, shown=cells))
     return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
+
+
+def _is_short(value: Any) -> bool:
+    """Whether a value is there, and no sentence."""
+    return (
+        value is not None and str(value) not in EMPTY and not (isinstance(value, str) and len(value) > LONGEST_COMPARED)
+    )
 
 
 def entries(record: Any, under: str = "") -> Iterator[tuple[str, Quantity, Any]]:
@@ -313,7 +321,9 @@ def with_unit(value: Any, of: Quantity) -> str:
         at = "" if value.omega is None else f" at {value.omega:.6g} rad/s"
         return with_unit(value.value, of) + at
     shown = text(value, of.digits)
-    return f"{shown} {of.unit}" if of.unit and shown not in ("", NO_VALUE) else shown
+    number, _, note = shown.partition(" (")  # of a figure, such as the modes for which it holds
+    after = f" ({note}" if note else ""
+    return f"{number} {of.unit}{after}" if of.unit and shown not in ("", NO_VALUE) else shown
 
 
 def text(value: Any, digits: int = 6) -> str:

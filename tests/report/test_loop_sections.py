@@ -182,7 +182,7 @@ def test_the_verdict_comes_before_any_margin():
     table = margin_table([wrong], [margins_of(PURE, wrong.law)], True)
     values = dict(zip(table.columns[0].values, table.columns[2].values, strict=True))
     assert values["stability"] == "unstable"
-    assert {value for name, value in values.items() if "margin" in name or "peak" in name} == {None}
+    assert not [name for name in values if "margin" in name or "peak" in name]
 
 
 # ------------------------------------------------------------ loci

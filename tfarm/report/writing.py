@@ -311,7 +311,10 @@ def write_comparison(found: Comparison, out: Path) -> Path:
     It leads to the index and to the arms' own pages, as far as they are in the folder.  An index of reports that is
     there leads to it from then on, and pages of its arms that are made later.
     """
-    title, arms = f"{found.one.name} beside {found.other.name}", list(dict.fromkeys(s.arm.name for s in found.sides))
+    title, arms = (
+        f"{found.one.name} and {found.other.name} compared",
+        list(dict.fromkeys(s.arm.name for s in found.sides)),
+    )
     lead = "Two arms, exact." if found.is_of_arms else f"Two laws on {found.one.arm.name}, exact."
     try:
         out.mkdir(parents=True, exist_ok=True)
