@@ -26,6 +26,7 @@ from tfarm.schema import (
     to_dict,
 )
 from tfarm.tables.files import as_csv, to_json
+from tfarm.tables.html import as_html
 from tfarm.tables.terminal import table_lines
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -152,6 +153,18 @@ def test_poles_have_their_damping_ratio():
 def test_a_quantity_without_a_label_is_in_no_table():
     assert [column.key for column in table(RECORD.rows).columns] == ["mode", "omega_rad_s"]
     assert [column.key for column in table(RECORD.rows, ("omega",)).columns] == ["omega_rad_s"]
+
+
+def test_a_table_without_rows_is_a_page_s_too():
+    @dataclass(frozen=True)
+    class Columns:
+        is_table = True
+
+        omega: Annotated[np.ndarray, Quantity("frequency", "rad/s")]
+
+    assert "frequency" in as_html(table(Columns(np.empty(0))))
+    assert "none" in as_html(table([]))
+    assert as_csv(table([])) == "\n"
 
 
 def test_every_quantity_of_a_real_loop_is_read():

@@ -154,7 +154,9 @@ def table(rows: Any, names: Sequence[str] = (), *, stem: str = "", title: str = 
     declared = quantities(type(rows if _is_table(rows) else rows[0]))
     wanted = names or [name for name, of in declared.items() if of.label]
     found = ((declared[name], _values(rows, name)) for name in wanted)
-    columns = (_column(of, values) for of, values in found if names or any(value is not None for value in values))
+    columns = (
+        _column(of, values) for of, values in found if names or not values or any(value is not None for value in values)
+    )
     return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
 
 

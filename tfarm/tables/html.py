@@ -17,6 +17,8 @@ WIDE_CELL = 44  # characters of a text from which its cell is a wide one
 def as_html(table: Table) -> Markup:
     """The table element, named by the table's title; shared headings, where there are any, over their columns."""
     columns = table.columns
+    if not columns:
+        return Markup('<p class="caption">none</p>')
     runs = [(name, len(list(run))) for name, run in itertools.groupby(column.group for column in columns)]
     groups = Markup("")
     if any(name for name, _ in runs):
