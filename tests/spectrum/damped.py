@@ -69,7 +69,9 @@ def judge(arm, count, *, certify=True, model=True):
         wrong.append(f"{inside.size} flexible eigenvalues listed in the box of {damped.count}")
     if model:
         wrong += compared(arm, damped, inside)
-    if proof is not None and [len(discs) for discs in proof] != [2 - (pair[0].imag > 0) for pair in pairs(damped)]:
+    if proof is not None and [len(discs) for discs in proof] != [
+        1 if pair[0].imag > 0 else int(np.isfinite(pair).sum()) for pair in pairs(damped)
+    ]:
         wrong.append("not a disc for each eigenvalue")
     outcome, text = ("wrong", ", ".join(wrong)) if wrong else ("right", "")
     return Verdict(outcome, text, listing, proving, inside.size, int(damped.is_overdamped.sum()))
