@@ -42,7 +42,7 @@ OWN_DAMPING, LOSSES = "the arm with its own damping", "the rig with what its hub
 DAMPED_COLUMNS = ("index", "eigenvalue", "second_eigenvalue", "damping_ratio")
 UNASSIGNED_NOTE = "They continue from no mode for certain; the origin is the part of the drive that sets them, if any."
 NOT_ASSIGNED_NOTE = "A mode without an eigenvalue has one of those of no mode, or none in the box. "
-NOT_LISTED = "Modes above {last} are not listed: their branches cannot be told apart. "
+NOT_LISTED = "Modes above {last} are not listed: the box of their eigenvalues could not be searched. "
 OUTSIDE_NOTE = (
     "Rows that are “outside” lie, with one eigenvalue or both, beyond the box: beside them others may exist that are "
     "not listed. "

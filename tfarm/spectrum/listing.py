@@ -135,7 +135,7 @@ class ModeList:
         """Up to where eigenvalues are listed, where that is not all."""
         if self.damped is None or not self.damped.left_out:
             return None
-        return f"eigenvalues up to mode {self.damped.index[-1]} only: branches above cannot be told apart"
+        return f"eigenvalues up to mode {self.damped.index[-1]} only: the box of more could not be searched"
 
     @property
     def circuit(self) -> Annotated[list[float], Quantity("of the motor's circuit [1/s]", key="circuit_eigenvalues")]:
