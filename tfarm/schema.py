@@ -50,11 +50,6 @@ class Quantity:
     curve: bool = False
     is_number: bool = False
 
-    @property
-    def heading(self) -> str:
-        """Label and unit, as of an axis or a column."""
-        return f"{self.label} [{self.unit}]" if self.unit else self.label
-
 
 class At(NamedTuple):
     """A value and the frequency [rad/s] at which it occurs: two keys in JSON, two cells of a table."""
@@ -101,10 +96,11 @@ def to_dict(record: Any) -> dict[str, Any]:
     """The quantities of a record by their keys, as JSON has them: a complex number is [real, imaginary]."""
     found: dict[str, Any] = {}
     for name, of in quantities(type(record)).items():
-        value = to_json_value(getattr(record, name))
-        if isinstance(getattr(record, name), At):
+        own = getattr(record, name)
+        value = to_json_value(own)
+        if isinstance(own, At):
             plain = of.key.removesuffix(f"_{SLUGS.get(of.unit, '')}")
-            found |= {of.key: value[0], f"{plain}_at_rad_s": value[1]}
+            found |= {of.key: own.value, f"{plain}_at_rad_s": own.omega}
         elif of.flat:
             found |= value or {}
         else:
@@ -115,7 +111,10 @@ def to_dict(record: Any) -> dict[str, Any]:
 def to_json_value(value: Any) -> Any:
     """One entry of `to_dict`.  Infinities stay; they are texts in `tfarm.tables.files.to_json`."""
     if _is_table(value):
-        return [dict(zip(row, cells, strict=True)) for row, cells in _json_rows(value)]
+        declared = quantities(type(value))
+        columns = [to_json_value(getattr(value, name)) for name in declared]
+        keys = [of.key for of in declared.values()]
+        return [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)]
     if is_declared(value):
         return to_dict(value)
     if isinstance(value, np.ndarray | np.generic):
@@ -127,13 +126,6 @@ def to_json_value(value: Any) -> Any:
     if isinstance(value, list | tuple | range):
         return [to_json_value(entry) for entry in value]
     return value
-
-
-def _json_rows(value: Any) -> Iterator[tuple[list[str], tuple[Any, ...]]]:
-    """Keys and values of each row of a record of columns."""
-    declared = quantities(type(value))
-    columns = [to_json_value(getattr(value, name)) for name in declared]
-    return (([of.key for of in declared.values()], row) for row in zip(*columns, strict=True))
 
 
 def _is_table(value: Any) -> bool:
@@ -218,11 +210,7 @@ def roots_table(values: Any, of: Quantity, *, stem: str = "", title: str = "", c
                shown=[im for _, im in parts]),
     ]  # fmt: skip
     if of.unit == "1/s":
-        ratios = [
-            within(-value.real / abs(value), COMPLEX_ERROR, RATIO_DIGITS) if value.imag else NO_VALUE
-            for value in values
-        ]
-        columns.append(Column("damping_ratio", "damping ratio", of=ratios))
+        columns.append(Column("damping_ratio", "damping ratio", of=[_ratio(value) for value in values]))
     return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
 
 
@@ -237,17 +225,17 @@ def curve_table(record: Any, *, stem: str = "", title: str = "") -> Table:
         own: Table = record.csv_table
         return own
     columns: list[Column] = []
-    for name, of in _with_flat(record):
-        if of.curve and np.iscomplexobj(name):
-            for number, values in enumerate(np.atleast_2d(name)):
-                after = f"_{number}" if np.ndim(name) > 1 else ""
+    for value, of in _with_flat(record):
+        if of.curve and np.iscomplexobj(value):
+            for number, values in enumerate(np.atleast_2d(value)):
+                after = f"_{number}" if np.ndim(value) > 1 else ""
                 for part, numbers in (("re", values.real), ("im", values.imag)):
                     cells = ["" if math.isnan(each) else each for each in numbers.tolist()]
                     columns.append(Column(f"{part}_{of.key}{after}", f"{part} {of.label}{after}", of.unit, of=cells))
         elif of.curve:
-            columns.append(Column(of.key, of.label, of.unit, of=name))
-        elif not columns and _is_list_of_records(name):
-            return table(name)
+            columns.append(Column(of.key, of.label, of.unit, of=value))
+        elif not columns and _is_list_of_records(value):
+            return table(value)
     return Table(columns=tuple(columns), stem=stem, title=title)
 
 
@@ -312,9 +300,8 @@ def _parts_of(value: Any, of: Quantity, pairs: list[tuple[str, str]]) -> Iterato
         yield Section(of.label, table=table(value))
     elif isinstance(value, np.ndarray) and np.iscomplexobj(value) and value.size:
         yield Section(of.help or of.label, table=roots_table(value, of))
-    else:
-        if shown := with_unit(value, of):
-            pairs.append((of.label, shown))
+    elif shown := with_unit(value, of):
+        pairs.append((of.label, shown))
 
 
 def with_unit(value: Any, of: Quantity) -> str:
