@@ -11,10 +11,10 @@ from tests.loop.agreement import some_free_arm, some_gains
 from tests.loop.arms import some_loop, window_arm, with_damping
 from tests.loop.ritz_loop import RitzLoop
 from tfarm import Arm, Hub, HubFeedback, ParameterError, Payload
+from tfarm.loop.lines import line_crossings
 from tfarm.loop.loop import Loop, grid, steep_places
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import band_of_loop
-from tfarm.loop.windows import line_crossings
 
 LAB = tfarm.load("sasaki2012-lab")
 

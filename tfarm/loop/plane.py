@@ -37,22 +37,20 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import PAPER_GAINS, default_gains, hub_locked, rate_unit
 
-from .loop import Loop, grid
-from .stability import band_of_family, verdict_on
-from .windows import (
+from .lines import (
     ROUNDED,
     columns,
     critical,
     crossed,
-    held_windows,
     line_crossings,
     rows,
-    static_edge,
-    told_edges,
     turns_over,
     unstable_below,
     with_numbers,
 )
+from .loop import Loop, grid
+from .stability import band_of_family, verdict_on
+from .windows import held_windows, static_edge, told_edges
 
 INFINITE = -1  # stands for infinitely many unstable poles
 MOST_GRID_VALUES, MOST_LAW_VALUES = 2000, 400  # of a map, along one gain, and along one number of another law
