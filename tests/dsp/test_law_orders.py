@@ -62,6 +62,15 @@ def test_a_rig_that_eleven_states_drive_grows_slowly():
     assert verdict.log_radius == pytest.approx(1.0224e-4, rel=1e-4)
 
 
+def test_roots_of_a_cluster_are_not_put_back_to_eigenvalues_that_are_far_off():
+    """Seven poles of the law next to z = 1, where eigenvalues are 3 % off: a growing one came out 14 times too fast."""
+    arm = tfarm.load(str(FILES / "45_316.toml"))
+    case = Case(arm, load_law(FILES / "45_316_law.toml"), chain_of(0.005169508987710493))
+    loop = sampled_verdict(arm, case.law, case.chain).loop
+    _, logs = truth(loop, case)
+    assert loop.poles.log_spectral_radius == pytest.approx(logs[0], rel=1e-6)
+
+
 @pytest.mark.parametrize("period", [1e-4, 0.01])
 @pytest.mark.parametrize("rule", ["tustin", "zoh", "matched"])
 def test_a_cluster_of_eight_poles_has_the_radius_of_its_state_transition(rule, period):

@@ -247,6 +247,16 @@ def test_a_count_next_to_a_law_s_slow_poles_is_right():
     assert unstable_below(loop.under(near), 300.0) == 3
 
 
+@pytest.mark.parametrize("size", [1e-4, 1e-16])
+def test_a_pole_next_to_zero_is_found_where_nothing_turns_freely(size):
+    """A spring of the hub against g/(s + e) of its rate: J s^2 + k + s g/(s + e) = 0 next to s = -k e/(k + g)."""
+    stiffness, gain, e = 5.0, 2.0, size * tfarm.modes(LAB, 1).natural_frequency[-1]
+    arm = replace(LAB, hub=replace(LAB.hub, stiffness=stiffness))
+    poles = tfarm.closed_loop_poles(arm, Law({"hub_rate": ([gain], [1.0, e])}), 4)
+    slowest = poles.values[np.argmin(abs(poles.values))]
+    assert slowest == pytest.approx(-stiffness * e / (stiffness + gain), rel=1e-9 + 10 * size, abs=0)
+
+
 def test_integrators_of_two_signals_leave_the_third_its_zeros_at_rest():
     """q = s (s^2 + 7 s), and p of the angle is q: D = a s^2 + ..., so that D/s^2 stays finite next to s = 0."""
     law = Law({

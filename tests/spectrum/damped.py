@@ -28,7 +28,8 @@ MOST_MODES = 24
 MOST_RIG_MODES = 8
 TERMS = 56
 OF_ELEMENTS = 1e-5  # of an eigenvalue: how far the one of finite elements may be: it is a matter of which
-NEXT_TO_REST = {0: 0.0, 1: 1e-12, 2: 1e-7}  # of the largest: what one zero at 0, or two, are to finite elements
+NEXT_TO_REST = {0: 0.0, 1: 1e-12, 2: 1e-7}  # of the box: what one zero at 0, or two, are to finite elements
+LEAST_OF_MODEL = 1e-7  # of the largest: one nearer to 0 is rounding of the model's stiffness
 AGREED = 1e-6  # of the model with the listed eigenvalues: it is a matter of which, not of digits
 ROUNDING = 64 * np.finfo(float).eps  # of the model's flexibilities 1/w^2, in units of the largest
 
@@ -103,8 +104,9 @@ def judge_rig(arm, count, *, certify=True):
     inside = every[damped.box.holds(every)]
     at_rest = damped.undamped.system.at_rest
     wrong = [] if inside.size + at_rest == damped.count else ["not so many are listed"]
-    mine, theirs = inside[inside.imag >= 0], eigenvalues(arm, abs(damped.box.corners).max())
-    theirs = theirs[damped.box.holds(theirs) & (abs(theirs) > NEXT_TO_REST[at_rest] * abs(mine).max(initial=0.0))]
+    largest = abs(damped.box.corners).max()
+    mine, theirs = inside[inside.imag >= 0], eigenvalues(arm, largest)
+    theirs = theirs[damped.box.holds(theirs) & (abs(theirs) > NEXT_TO_REST[at_rest] * largest)]
     if mine.size != theirs.size:
         wrong.append(f"{theirs.size} eigenvalues of finite elements in the box, {mine.size} listed")
     wrong += [f"{s:.6g} is no eigenvalue of finite elements" for s in mine if _away(s, theirs) > OF_ELEMENTS]
@@ -122,7 +124,8 @@ def _away(zero, others):
 def compared(arm, damped, inside):
     """What the Galerkin model has against the list."""
     theirs = ritz_eigenvalues(arm, TERMS)
-    theirs = theirs[damped.box.holds(theirs)]
+    largest = abs(inside).max(initial=0.0)
+    theirs, inside = (each[abs(each) > LEAST_OF_MODEL * largest] for each in (theirs[damped.box.holds(theirs)], inside))
     if theirs.size != inside.size:
         return [f"{theirs.size} eigenvalues of the model in the box, {inside.size} listed"]
     lowest = abs(theirs).min(initial=np.inf)

@@ -5,7 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+import tfarm
+from tests import caches
+from tests.loop.law_times import some_case
 from tfarm.errors import ConvergenceError
+from tfarm.spectrum import naming
+from tfarm.spectrum.damped import damped_modes
 from tfarm.spectrum.following import follow
 from tfarm.spectrum.naming import LOST, in_pairs
 
@@ -92,3 +97,20 @@ def test_zeros_that_ring_are_a_pair(single, pairs, expected_single, expected):
     found = in_pairs(np.array(single, complex), np.array(pairs, complex))
     np.testing.assert_array_equal(found[0], np.array(expected_single, complex))
     np.testing.assert_array_equal(found[1], np.array(expected, complex))
+
+
+def test_names_are_given_up_and_the_box_is_complete_all_the_same(monkeypatch):
+    """128 modes of a rig that took 24,000 steps to name, 32 s: those that are lost are listed without a name."""
+    arm, steps, near = some_case(1, 24)[0], [], naming.Damping.near
+
+    def counted(self, values, guess):
+        steps.append(values.size)
+        return near(self, values, guess)
+
+    monkeypatch.setattr(naming.Damping, "near", counted)
+    caches.empty()
+    damped = damped_modes(tfarm.modes(arm, 128))
+    inside = np.r_[damped.eigenvalues.ravel(), damped.single, damped.unassigned_pairs.ravel()]
+    assert len(steps) < 2 * naming.MOST_OF_LONG
+    assert damped.box.holds(inside).sum() == damped.count
+    assert damped.box.im_max > damped.natural_frequency[:100].max()

@@ -43,9 +43,9 @@ STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 mo
 SMALLEST_LOG = -745.0  # of the smallest double: stands for the logarithm of 0
 OFF_POLE = 1e-17  # stands for an offset of 0: next to 1 that is none
 DIFFERENCE = 1e-7  # of an offset: between two points that give a slope
-MOST_STEPS = 60  # of all roots together: from four digits on two are enough, of a cluster a dozen spread first
+MOST_STEPS = 200  # of all roots together: from four digits on two are enough, of a cluster of twelve a hundred
 LAST_STEP = 1e-12  # of the offset: below its rounding
-SETTLED, EIGENVALUE_ROUNDING = 1e-6, 1e-9  # of the offset, and beyond: a root that still steps by more is put back
+SETTLED, EIGENVALUE_ROUNDING = 1e-6, 1e-9  # of the offset, and beyond: one that still steps by more is put back
 UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
 LEAST_SQUARE = -1.0 + 1e-15  # stands for |z|^2 - 1 of a pole at z = 0, which no root is laid out from
 FADED_RADIUS = 0.2  # a pole nearer to z = 0 decides nothing and is not polished
@@ -370,11 +370,11 @@ def _polished(loop: Sampled, z: Complex, which: Any = None) -> SampledPoles:
 
 
 def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> None:
-    """Bring some roots to rest, in place: those that never come there stay as they are."""
-    start, shifts, pulse = offset.copy(), loop.open_loop, loop.pulse
+    """Bring some roots to rest, in place: those that never come there stay where their step was shortest."""
+    kept, shifts, pulse = offset.copy(), loop.open_loop, loop.pulse
     known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0)]  # of F; what is left is at z = 1
     poles = np.r_[known, np.zeros(max(0, offset.size - known.size - loop.in_z.poles.size))]
-    last = np.full(offset.size, np.inf)
+    last, shortest = np.full((2, offset.size), np.inf)
     offset[rows] = np.where(offset[rows] == 0, OFF_POLE, offset[rows])
     with np.errstate(all="ignore"):  # a root on an open-loop pole, and one that strays beyond any number
         for _ in range(MOST_STEPS):
@@ -388,11 +388,13 @@ def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> None:
             step = np.where((f == 0) | ~np.isfinite(step), 0.0, step)
             offset[rows] = np.where(abs(o - step) < UNMOVED, UNMOVED, o - step)
             last[rows] = abs(step)
+            better = rows[abs(step) < shortest[rows]]
+            kept[better], shortest[better] = offset[better], last[better]
             rows = rows[abs(step) > LAST_STEP * abs(offset[rows])]
             if not rows.size:
                 break
     lost = np.isfinite(last) & (last > EIGENVALUE_ROUNDING + SETTLED * abs(offset))
-    offset[lost] = start[lost]
+    offset[lost] = kept[lost]
     offset[abs(offset) <= UNMOVED] = 0.0
 
 

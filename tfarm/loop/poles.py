@@ -37,6 +37,7 @@ USUAL_POLES = 10  # poles listed where no count is asked for
 MOST_BOX_MODES = 4000  # flexible, below the highest box that is searched for as many poles as are asked for
 SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are the rigid arm's, and known beforehand
 SLOW_STEPS = 4  # of Newton's method from there
+AT_REST = 1e-12  # of these: so near 0 the slope there is read
 NEAR_RIGID = 0.01  # of its size: how far it may be from the rigid arm's
 LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
 RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is looked at again
@@ -220,17 +221,19 @@ def quiet_edge(loop: Loop, right: float, height: float) -> float:
 
 
 def slow_poles(loop: Loop, below: float) -> Complex:
-    """Poles [1/s] but 0 of the turning arm under small gains, of size up to `below`: zeros of J s^2 + b s + c.
+    """Poles [1/s] but 0 of size up to `below`: of the turning arm under small gains zeros of J s^2 + b s + c.
 
-    These are `Loop.at_rest`, corrected on the characteristic function.
+    These are `Loop.at_rest`, corrected on the characteristic function; or the one zero next to 0 that its slope tells.
     """
-    if loop.at_rest is None:
-        return np.empty(0, complex)
-    c, b, J = loop.at_rest
+    at = loop.function(np.array([below * AT_REST + 0j]))
+    with np.errstate(all="ignore"):  # an even function has no slope there, and no zero
+        alone = below * AT_REST - (at.value / at.slope).real
+    c, b, J = loop.at_rest or (0.0, 0.0, 1.0)
     unit = max(abs(b), math.sqrt(abs(c * J)), LEAST_SIZE)  # b and sqrt(c J) alike
     with np.errstate(over="ignore"):
         roots = unit * np.roots([J, b / unit, c / unit / unit]).astype(complex)
-    slow = roots[(roots != 0) & (abs(roots) <= below)]
+    slow = np.r_[roots, alone[[(abs(roots - alone) > NEAR_RIGID * abs(alone)).all()]]]
+    slow = slow[(slow != 0) & (abs(slow) <= below)]
     exact = slow.copy()
     for _ in range(SLOW_STEPS if slow.size else 0):
         at = loop.function(exact)

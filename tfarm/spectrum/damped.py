@@ -229,7 +229,8 @@ def _searched(undamped: Modes) -> DampedModes:
     if box is None:
         omega = modes(undamped.arm, count + 1, theory=undamped.theory).natural_frequency[-count - 1 :]
         starts = np.r_[listed.ravel(), company.ravel(), 1j * omega, -1j * omega]
-        box, found = filled_box(function, listed, company, float(omega[-2:].mean()), starts, k.damping)
+        below = listed if not lost.size else listed[:0]  # what is not known may be above any that is
+        box, found = filled_box(function, below, company, float(omega[-2:].mean()), starts, k.damping)
         for zeros in (single, pairs):
             zeros[box.holds(zeros) & ~is_among(zeros, found)] = LOST
         more = found[(found.imag >= 0) & ~is_among(found, np.r_[single, pairs.ravel()])]

@@ -26,6 +26,8 @@ NEWTON_STEPS = 8  # from a guess right to some digits: what has not settled then
 SETTLED = 1e-10  # of its size: one step more is taken where Newton's method still moves a zero by this
 DECADES = 3  # of the share at a time: the shortest step is a share of these
 HALVINGS = (250, *[80] * 8)  # of steps until those that are stray are lost, and the others followed alone
+LONG_LIST = 40  # modes: more are asked for by models, which need no names
+MOST_STEPS, MOST_OF_LONG, LATE_HALVINGS = 4_000, 1_000, 8  # after so many, time alone: what is stray is soon lost
 AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])  # starts next to a guess, of it
 NEAR_REAL = 1e-7  # of its size: the imaginary part of a double zero is rounding
 LOST = complex(np.nan, np.nan)
@@ -60,6 +62,7 @@ class Damping:
     k: System
     level: float
     most_halvings: int
+    steps_left: int
 
     least_step = 1e-7
     blur = 0.0
@@ -67,6 +70,9 @@ class Damping:
 
     def near(self, values: Real, guess: Complex) -> Complex:
         """As `following` wants it."""
+        self.steps_left -= 1
+        if self.steps_left < 0:
+            self.most_halvings = min(self.most_halvings, LATE_HALVINGS)
         units = values * self.level
         systems = [self.k.with_damping(float(share)) for share in values]
         found = [settled(function_of(k), row / unit) for k, row, unit in zip(systems, guess, units, strict=True)]
@@ -106,7 +112,8 @@ def named(undamped: Modes, count: int) -> tuple[Complex, Complex]:
     alone = single_zeros(undamped)
     if k.is_undamped:
         return np.array(alone, complex), 1j * np.outer(omega, [1, -1])
-    family = Damping(k, k.damping or 1.0, HALVINGS[0])
+    steps = MOST_STEPS if count <= LONG_LIST else MOST_OF_LONG
+    family = Damping(k, k.damping or 1.0, HALVINGS[0], steps)
     slowest = [omega[0] / abs(each) for each in alone]
     share = FIRST_SHARE * min(1.0, 1 / (family.level * omega[-1]) if k.damping else 1.0, *slowest)
     upper = settled(function_of(k.with_damping(share)), np.r_[single_zeros(undamped, share), 1j * omega])
