@@ -53,7 +53,7 @@ def test_types_are_strict_and_other_keys_are_refused(table, kind):
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ({}, "spring.stiffness is missing: [spring] is nothing without it"),
+        ({}, "spring.stiffness is missing: [spring] needs it"),
         (3, "spring = 3: give a table, headed [spring]"),
         ({"stiffness": "2"}, "spring.stiffness = '2': wrong value; input should be a valid number"),
         ({"stifness": 2.0}, 'spring.stifness = 2.0: unknown key; did you mean "stiffness"?'),

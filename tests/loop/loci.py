@@ -38,7 +38,7 @@ def some_locus(number, seed):
         "K1": (0.0, 2 * abs(law.K1)), "K2": (0.0, 2.0) if rng.random() < 0.5 else (-1.0, 3.0),
         "Kp": (0.0, 2 * law.Kp or abs(law.K1)), "all": (0.0, 2.0),
         "damping": (arm.damping, 4 * arm.damping or 1e-5 / case.first), "length": (arm.length, 1.5 * arm.length),
-        "hub_inertia": (arm.hub_inertia, 3 * arm.hub_inertia),
+        "hub_inertia": (arm.hub.inertia, 3 * arm.hub.inertia),
         "payload_mass": (arm.payload.mass, 2 * arm.payload.mass + 0.1 * beam),
     }  # fmt: skip
     return arm, law, vary, *ranges[vary]

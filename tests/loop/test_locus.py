@@ -35,7 +35,7 @@ RIGS = {
     "back-EMF": replace(PAPER, motor=MOTOR, input="motor_voltage"),
     "rotor's friction": replace(LAB, motor=replace(MOTOR, rotor_friction=1e-6), input="motor_voltage"),
     "flexlink": tfarm.load("quanser-flexlink"),
-    "friction": replace(LAB, hub=Hub(inertia=LAB.hub_inertia, friction=0.2)),
+    "friction": replace(LAB, hub=Hub(inertia=LAB.hub.inertia, friction=0.2)),
 }
 RUBBING = replace(LAB, hub=Hub(inertia=0.0, friction=2.0))
 PLASTIC = Arm(  # a hub of next to no inertia and a heavy tip: K1 makes mode 1 two real poles at once

@@ -1,17 +1,15 @@
-"""Each conversion is the same function of s (or z): checked by evaluating it."""
+"""The MATLAB file and its script, and the state space."""
 
 import os
 import re
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
 import scipy.io
-from scipy.linalg import expm
 
 import tfarm
 from tfarm import ParameterError
-from tfarm.reduced import discrete, reduce, save_mat, to_pymor, transfer_function
+from tfarm.reduced import reduce, save_mat
 
 POINTS = np.array([3j, 60j, 0.5 + 200j])
 
@@ -26,26 +24,6 @@ def test_state_space(reduced):
     np.testing.assert_allclose(system(POINTS)[:, 0], reduced(POINTS), rtol=1e-9)
     assert system.output_labels == ["root_moment", "hub_rate"]
     assert system.name == "sasaki2012, aaa, order 10"
-
-
-def test_transfer_function(reduced):
-    system = transfer_function(reduced)
-    np.testing.assert_allclose(system(POINTS)[:, 0], reduced(POINTS), rtol=1e-8)
-    assert (system.input_labels, system.output_labels) == (["hub_torque"], ["root_moment", "hub_rate"])
-
-
-def test_discrete_is_the_zero_order_hold(reduced):
-    """By the matrix exponential of the system with its held input."""
-    system = discrete(reduced, 0.01)
-    A, B, *_ = reduced.matrices()
-    n = reduced.order
-    whole = expm(np.block([[A, B], [np.zeros((1, n + 1))]]) * 0.01)
-    np.testing.assert_allclose(system.A, whole[:n, :n], atol=1e-12)
-    np.testing.assert_allclose(system.B, whole[:n, n:], atol=1e-12)
-    assert system.dt == 0.01
-    assert system.output_labels == ["root_moment", "hub_rate"]
-    with pytest.raises(ParameterError, match="period"):
-        discrete(reduced, 0.0)
 
 
 def test_mat_file_and_its_script(reduced, tmp_path):
@@ -75,14 +53,6 @@ def test_same_inputs_same_bytes(reduced, tmp_path):
 def test_a_folder_that_is_not_there(reduced, tmp_path):
     with pytest.raises(ParameterError, match="cannot be written"):
         save_mat(reduced, tmp_path / "none" / "a.mat")
-
-
-def test_pymor(reduced):
-    if find_spec("pymor") is None:
-        with pytest.raises(ParameterError, match="pip install pymor"):
-            to_pymor(reduced)
-    else:
-        np.testing.assert_allclose(to_pymor(reduced).transfer_function.eval_tf(60j)[:, 0], reduced(60j), rtol=1e-9)
 
 
 def test_a_script_that_is_another_files_is_left_alone(reduced, tmp_path):

@@ -54,7 +54,7 @@ def by_exponentials(arm, law, chain, duration, count):
     rate = peak * np.clip(np.minimum(t, chain.slew.rise_time - t), 0, None)
     acceleration = np.append(np.diff(rate), 0.0) / T
     angle = np.r_[0.0, np.cumsum((rate[1:] + rate[:-1]) / 2) * T]
-    rigid = -(arm.total_inertia - arm.hub_inertia) * np.r_[0.0, acceleration[:-1]]
+    rigid = -(arm.total_inertia - arm.hub.inertia) * np.r_[0.0, acceleration[:-1]]
     z, moments = np.zeros(n + more + 1), []
     for k in range(t.size):
         theta, speed, moment = C @ z[:n] + D[:, 0] * z[-1]
@@ -134,7 +134,7 @@ def test_the_total_reading_changes_the_feedback_and_not_the_residual(capsys):
     assert answer["residual_raw_moment_rms"] == pytest.approx(np.sqrt(np.mean(moment[after] ** 2)), rel=1e-12)
     assert answer["residual_raw_moment_rms"] == pytest.approx(1.15797, abs=5e-6)
     rigid = np.zeros(t.size)
-    rigid[np.flatnonzero(after)[0]] = (LAB.total_inertia - LAB.hub_inertia) * 4 * 1.15 / 0.7**2  # still braking
+    rigid[np.flatnonzero(after)[0]] = (LAB.total_inertia - LAB.hub.inertia) * 4 * 1.15 / 0.7**2  # still braking
     assert answer["residual_moment_rms"] == pytest.approx(np.sqrt(np.mean((moment - rigid)[after] ** 2)), rel=1e-9)
     assert answer["residual_moment_rms"] == pytest.approx(1.1923, abs=5e-5)
 

@@ -93,7 +93,7 @@ def slewed(arm, law, chain):
     left = run.at_samples.root_moment[after]
     n, peak = int(np.argmax(after)), 4 * chain.slew.travel_of(arm.reach) / (arm.reach * chain.slew.rise_time**2)
     share = min(max((chain.slew.rise_time - (n - 1) * T) / T, 0.0), 1.0)  # of the interval before, still braking
-    left[0] -= (arm.total_inertia - arm.hub_inertia) * peak * share
+    left[0] -= (arm.total_inertia - arm.hub.inertia) * peak * share
     return float(np.sqrt((left**2).mean()))
 
 

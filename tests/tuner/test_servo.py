@@ -68,7 +68,7 @@ def test_the_usual_rate_gain_damps_the_rigid_arm():
     for Kp in (KP, 0.05):
         s = np.roots([J, usual_rate_gain(LAB, Kp), Kp])
         assert (-s.real / abs(s)).min() == pytest.approx(np.sqrt(0.5), rel=1e-12)
-    rubbed = replace(LAB, hub=Hub(inertia=LAB.hub_inertia, friction=5.0))
+    rubbed = replace(LAB, hub=Hub(inertia=LAB.hub.inertia, friction=5.0))
     assert usual_rate_gain(rubbed, KP) == 0.0  # what the hub loses is more than enough
     assert usual_rate_gain(LAB, 0.0) == tfarm.default_gains(LAB).K1
     with pytest.raises(ParameterError, match="Kp"):

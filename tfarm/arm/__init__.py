@@ -1,4 +1,4 @@
-"""What is analysed: the arm as frozen records, its TOML file and the presets."""
+"""The arm and its controller as frozen records, their TOML tables and the presets."""
 
 from tfarm.arm.checks import INPUT_UNITS, INPUTS, THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Input, Theory
 from tfarm.arm.feedback import (
@@ -16,7 +16,6 @@ from tfarm.arm.feedback import (
     TWO_GAINS,
     Gain,
     HubFeedback,
-    driven,
     input_words,
     law_of,
     shown_unit,
@@ -67,7 +66,6 @@ __all__ = [
     "arm_and_law",
     "as_law",
     "cancelled",
-    "driven",
     "full_law",
     "implausible",
     "input_words",

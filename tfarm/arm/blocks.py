@@ -1,7 +1,7 @@
-"""The parts of a law: from one signal to the input as a ratio of polynomials, or from several as matrices.
+"""The blocks of a law: from one signal to the input as a ratio of polynomials, or from several as a state space.
 
-Both give numerators and one denominator, polynomials in s [1/s], or in z where the law is discrete, so that what is
-computed of a loop has no pole where a controller has one.
+Both have numerators and one denominator, polynomials in s [1/s], or in z for a discrete-time law.  So the
+characteristic function of a loop has no pole at a pole of its controller.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from tfarm.records import record
 Matrices = tuple[Real, Real, Real, Real]
 
 LARGEST_COEFFICIENT = 1e150  # the square of one is still a double
-MOST_DEGREE = 60  # of one part: beyond it a polynomial of doubles says little
-GROWTH_READ_AT = (1e-6, 1e-9)  # 1/s: the numerator of a state space grows there with the power of its lowest term
+MOST_DEGREE = 60  # of one part: beyond it rounding of the coefficients moves the roots
+GROWTH_READ_AT = (1e-6, 1e-9)  # 1/s: the numerator of a state space grows there as its lowest power of s
 REAL_PAIR = 1e-9  # of its size: how far a root may be from the conjugate of another
 
 
 @dataclass(frozen=True, slots=True)
 class Rational:
-    """num(s)/den(s), coefficients in descending powers, den[0] not 0.  Raises ParameterError for what is no such."""
+    """num(s)/den(s), coefficients in descending powers.  Raises ParameterError for other values, or den = 0."""
 
     num: tuple[float, ...]
     den: tuple[float, ...] = (1.0,)
@@ -44,23 +44,23 @@ class Rational:
 
     @classmethod
     def of_roots(cls, zeros: ArrayLike, poles: ArrayLike, gain: float) -> Rational:
-        """gain prod(s - zeros)/prod(s - poles); complex roots in conjugate pairs."""
+        """Build gain prod(s - zeros)/prod(s - poles), complex roots in conjugate pairs."""
         gain = number("gain", gain, "a finite number")
         return cls(tuple(gain * _of_roots("zeros", zeros)), tuple(_of_roots("poles", poles)))
 
     @property
     def signals(self) -> int:
-        """How many signals it takes."""
+        """The number of its signals."""
         return 1
 
     @property
     def order(self) -> int:
-        """How many states it has, where it is proper."""
+        """The number of its states, where it is proper."""
         return len(self.den) - 1
 
     @property
     def excess(self) -> int:
-        """Degree of the numerator over that of the denominator: above 0 it differentiates."""
+        """Degree of the numerator minus that of the denominator: above 0 it differentiates."""
         return len(self.num) - len(self.den)
 
     @property
@@ -74,26 +74,26 @@ class Rational:
         return np.roots(self.num).astype(complex)
 
     def denominator(self, s: Complex) -> Complex:
-        """den(s)."""
+        """Return den(s)."""
         return np.asarray(np.polyval(np.array(self.den), s))
 
     def numerators(self, s: Complex) -> Complex:
-        """num(s) (1, n)."""
+        """Return num(s) (1, n)."""
         return np.asarray(np.polyval(np.array(self.num), s))[None]
 
     def zeros_at_origin(self, signal: int) -> int | None:
-        """How often the numerator of its one signal vanishes at 0; None where it is 0 everywhere."""
+        """Return the order of the numerator's zero at 0; None where it is 0 everywhere."""
         assert signal == 0
         return next((n for n, each in enumerate(reversed(self.num)) if each), None)
 
     def times(self, factor: float) -> Rational:
-        """Itself times a number."""
+        """Return the block times a number."""
         return Rational(tuple(factor * each for each in self.num), self.den)
 
     def matrices(self) -> Matrices:
-        """A state space (controllable form, balanced); raises ParameterError where it is not proper."""
+        """Return a state space (controllable form, balanced).  Raises ParameterError where it is not proper."""
         if self.excess > 0:
-            remedy = "of a higher degree than its denominator: no states give that; add a pole"
+            remedy = "of a higher degree than its denominator: it has no state space; add a pole"
             raise ParameterError(key="num", value=list(self.num), remedy=remedy)
         den = np.array(self.den) / self.den[0]
         num = np.r_[np.zeros(-self.excess), np.array(self.num) / self.den[0]]
@@ -108,9 +108,9 @@ class Rational:
 @dataclass(frozen=True)
 @record
 class StateSpace:
-    """x' = A x + B y, v = C x + D y from m signals to the input (or x of the next sample, of a discrete law).
+    """x' = A x + B y, v = C x + D y from m signals y to the input v; for a discrete-time law x' is the next x.
 
-    A (n, n), B (n, m), C (1, n), D (1, m).  Raises ParameterError for shapes that do not fit and what is not finite.
+    A (n, n), B (n, m), C (1, n), D (1, m).  Raises ParameterError for other shapes and numbers that are not finite.
     """
 
     A: Real
@@ -120,30 +120,36 @@ class StateSpace:
 
     def __post_init__(self) -> None:
         for name in "ABCD":
-            object.__setattr__(self, name, _matrix(name, getattr(self, name)))
+            try:
+                found = np.array(getattr(self, name), dtype=float, ndmin=2)
+            except (TypeError, ValueError):
+                raise ParameterError(key=name, value="matrix", remedy="rows of numbers") from None
+            if found.ndim != 2 or not np.isfinite(found).all():
+                raise ParameterError(key=name, value="matrix", remedy="rows of finite numbers")
+            if name in "AB" and not found.size:  # without states
+                found = np.empty((0, 0 if name == "A" else found.shape[1] or 1))
+            object.__setattr__(self, name, found)
         n, m = len(self.A), self.D.shape[1]
         for name, shape in {"A": (n, n), "B": (n, m), "C": (1, n), "D": (1, m)}.items():
             if getattr(self, name).shape != shape:
-                remedy = (
-                    f"is {getattr(self, name).shape}, and should be {shape}: A (n, n), B (n, m), C (1, n), D (1, m)"
-                )
+                remedy = f"{getattr(self, name).shape}, expected {shape}: A (n, n), B (n, m), C (1, n), D (1, m)"
                 raise ParameterError(key=name, value="matrix", remedy=remedy)
         if n > MOST_DEGREE:
             raise ParameterError(key="A", value=n, remedy=f"at most {MOST_DEGREE} states are read")
 
     @property
     def signals(self) -> int:
-        """How many signals it takes."""
+        """The number of its signals."""
         return int(self.D.shape[1])
 
     @property
     def order(self) -> int:
-        """How many states it has."""
+        """The number of its states."""
         return len(self.A)
 
     @property
     def excess(self) -> int:
-        """0 where a signal passes at once, -1 where none does."""
+        """0 with a direct feedthrough, -1 without."""
         return 0 if self.D.any() else -1
 
     @cached_property
@@ -152,23 +158,23 @@ class StateSpace:
         return np.linalg.eigvals(self.A).astype(complex)
 
     def denominator(self, s: Complex) -> Complex:
-        """det(s - A)."""
+        """Return det(s - A)."""
         return np.asarray(np.prod(s[..., None] - self.poles, axis=-1))
 
     def numerators(self, s: Complex) -> Complex:
-        """det[[s - A, B_j], [-C, D_j]] (m, n): the transfer function of each signal j times det(s - A)."""
+        """Return det[[s - A, B_j], [-C, D_j]] (m, n): the transfer function from each signal j times det(s - A)."""
         n, flat = self.order, np.ravel(s)
         bordered = np.zeros((flat.size, n + 1, n + 1), complex)
         bordered[:, :n, :n] = flat[:, None, None] * np.eye(n) - self.A
         bordered[:, n, :n] = -self.C
         found = np.zeros((self.signals, *np.shape(s)), complex)
-        for j in np.flatnonzero(self.B.any(axis=0) | self.D.any(axis=0)):  # of an empty column it is 0
+        for j in np.flatnonzero(self.B.any(axis=0) | self.D.any(axis=0)):  # an empty column has 0
             bordered[:, :n, n], bordered[:, n, n] = self.B[:, j], self.D[0, j]
             found[j] = np.linalg.det(bordered).reshape(np.shape(s))
         return found
 
     def zeros_at_origin(self, signal: int) -> int | None:
-        """How often the numerator of a signal vanishes at 0, told from its growth between two tiny arguments.
+        """Return the order of a numerator's zero at 0, from its growth between two tiny arguments.
 
         None where it is 0 at one of them.
         """
@@ -178,11 +184,11 @@ class StateSpace:
         return max(0, round(math.log(first / second) / math.log(GROWTH_READ_AT[0] / GROWTH_READ_AT[1])))
 
     def times(self, factor: float) -> StateSpace:
-        """Itself times a number."""
+        """Return the block times a number."""
         return StateSpace(self.A, self.B, factor * self.C, factor * self.D)
 
     def matrices(self) -> Matrices:
-        """A, B, C, D."""
+        """Return A, B, C, D."""
         return self.A, self.B, self.C, self.D
 
 
@@ -190,18 +196,18 @@ LawBlock = Rational | StateSpace
 
 
 def block_of(key: str, entry: Any) -> tuple[LawBlock, float | None]:
-    """A part of a law from what a person has, and its sample period [s], None where it does not say or is continuous.
+    """Return the block of an entry of a law, and its sampling period [s], None where it has none.
 
-    A number; a pair (num, den); a mapping with zeros, poles and gain; python-control's TransferFunction or StateSpace
-    with one output.  Raises ParameterError for anything else.
+    An entry is a number; a pair (num, den); a mapping with zeros, poles and gain; python-control's TransferFunction or
+    StateSpace with one output.  Raises ParameterError for anything else.
     """
     if isinstance(entry, Rational | StateSpace):
         return entry, None
-    dt = getattr(entry, "dt", None)  # python-control's: 0 of a continuous system, True of a period that is not said
+    dt = getattr(entry, "dt", None)  # python-control's: 0 of a continuous-time system, True of an unspecified period
     period = None if dt is None or dt is True or dt == 0 else float(dt)
     if all(hasattr(entry, name) for name in "ABCD"):
         system = [getattr(entry, name) for name in "ABCD"]
-        if hasattr(entry, "poles"):  # a control system, whose states may be of any size
+        if hasattr(entry, "poles"):  # python-control's, with states of any size
             system = list(balanced(*(np.asarray(part, dtype=float) for part in system)))
         return StateSpace(*system), period
     if hasattr(entry, "num") and hasattr(entry, "den"):
@@ -223,18 +229,18 @@ def block_of(key: str, entry: Any) -> tuple[LawBlock, float | None]:
 
 
 def balanced(A: Real, B: Real, C: Real, D: Real) -> Matrices:
-    """The same system with states of like size: a diagonal change of coordinates by powers of 2."""
+    """Return the same system with states of similar size: diagonal scaling by powers of 2."""
     if not len(A):
         return A, B, C, D
     from scipy.linalg import matrix_balance
 
-    with np.errstate(invalid="ignore"):  # SciPy casts the scales to a permutation's whole numbers too, unused here
+    with np.errstate(invalid="ignore"):  # SciPy also casts the scales to an unused permutation
         balanced_A, (scale, _) = matrix_balance(A, permute=False, separate=True)
     return np.asarray(balanced_A), B / scale[:, None], C * scale, D
 
 
 def _polynomial(name: str, values: Iterable[Any]) -> tuple[float, ...]:
-    """Coefficients without leading zeros, each finite."""
+    """Return coefficients without leading zeros.  Raises ParameterError where one is not finite."""
     remedy = "numbers in descending powers, such as [1, 0.5]"
     if isinstance(values, str) or not isinstance(values, Sequence | np.ndarray) or not len(values):
         raise ParameterError(key=name, value=values, remedy=remedy)
@@ -249,7 +255,7 @@ def _polynomial(name: str, values: Iterable[Any]) -> tuple[float, ...]:
 
 
 def _of_roots(name: str, roots: ArrayLike) -> Real:
-    """The monic real polynomial with these roots, (re, im) pairs or complex numbers, conjugates among them."""
+    """Return the monic real polynomial with these roots, (re, im) pairs or complex numbers, with their conjugates."""
     try:
         found = np.array([complex(*each) if isinstance(each, tuple | list) else complex(each) for each in list(roots)])  # type: ignore[arg-type]
     except (TypeError, ValueError):
@@ -260,22 +266,8 @@ def _of_roots(name: str, roots: ArrayLike) -> Real:
     upper = np.sort_complex(found[found.imag > 0])
     lower = np.sort_complex(found[found.imag < 0].conj())
     if upper.size != lower.size or (abs(upper - lower) > REAL_PAIR * abs(upper)).any():
-        remedy = "a complex root without its conjugate: a law with real coefficients has both"
+        remedy = "a complex root without its conjugate: real coefficients need both"
         raise ParameterError(key=name, value=[f"{each:g}" for each in found], remedy=remedy)
     pairs = [np.array([1.0, -2 * each.real, abs(each) ** 2]) for each in upper]
     alone = [np.array([1.0, -each.real]) for each in found[found.imag == 0]]
     return reduce(np.convolve, [*pairs, *alone], np.ones(1))
-
-
-def _matrix(name: str, values: ArrayLike) -> Real:
-    try:
-        found = np.array(values, dtype=float, ndmin=2)
-    except (TypeError, ValueError):
-        raise ParameterError(key=name, value="matrix", remedy="rows of numbers") from None
-    if found.ndim != 2 or not np.isfinite(found).all():
-        raise ParameterError(key=name, value="matrix", remedy="rows of finite numbers")
-    if name == "A" and not found.size:
-        return np.empty((0, 0))
-    if name == "B" and not found.size:
-        return np.empty((0, found.shape[1] or 1))
-    return found

@@ -1,11 +1,6 @@
-"""The checks of a single number, each made once, where a record is built.
+"""Checks of single numbers and texts, and the inputs and beam theories that an arm's file names.
 
-Everywhere `key` is the name as in the TOML file and `meaning` says, in the language of physics, what
-would be right.
-
-What an arm's file chooses by name, declared once for every room: what drives the hub, and the theory of its beam.
-
-The texts of an arm: its name, which is also a folder's, and its assumptions.
+Each check runs once, where a record is built.  `key` is the name in the TOML file, `meaning` the legal values in words.
 """
 
 from __future__ import annotations
@@ -34,7 +29,7 @@ DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt")
 
 
 def number(key: str, value: object, meaning: str) -> float:
-    """`value` as a float; a bool, a text or nan is refused."""
+    """Return `value` as a float.  Raises ParameterError for a bool, a text or nan."""
     if isinstance(value, bool) or not isinstance(value, Real):
         raise ParameterError(key=key, value=value, remedy=f"{meaning}; write a plain number, no text or true")
     try:
@@ -47,9 +42,9 @@ def number(key: str, value: object, meaning: str) -> float:
 
 
 def whole(key: str, value: object, least: int, most: float, remedy: str) -> int:
-    """A whole number from `least` to `most`; NumPy's are welcome, a bool or a text is none.
+    """Return a whole number from `least` to `most`, of Python or NumPy.
 
-    `remedy` says all of what would be right.
+    Raises ParameterError with the `remedy` for any other value, also for a bool or a text.
     """
     if isinstance(value, bool) or not isinstance(value, Integral) or not least <= int(value) <= most:
         raise ParameterError(key=key, value=value, remedy=remedy)
@@ -57,7 +52,7 @@ def whole(key: str, value: object, least: int, most: float, remedy: str) -> int:
 
 
 def positive(key: str, value: object, meaning: str) -> float:
-    """A number above zero, finite and of a sane magnitude."""
+    """Return a finite number above zero, from 1e-40 to 1e40."""
     x = number(key, value, meaning)
     if x <= 0.0 or math.isinf(x):
         raise ParameterError(key=key, value=x, remedy=meaning)
@@ -67,13 +62,13 @@ def positive(key: str, value: object, meaning: str) -> float:
 
 
 def not_negative(key: str, value: object, meaning: str) -> float:
-    """Zero, or a positive number."""
+    """Return zero or a positive number."""
     x = number(key, value, meaning)
     return 0.0 if x == 0.0 else positive(key, x, meaning)
 
 
 def signed(key: str, value: object, meaning: str) -> float:
-    """Zero, or a finite number of either sign."""
+    """Return zero or a finite number of either sign."""
     x = number(key, value, meaning)
     if math.isinf(x):
         raise ParameterError(key=key, value=x, remedy=meaning)
@@ -83,13 +78,13 @@ def signed(key: str, value: object, meaning: str) -> float:
 
 
 def extended(key: str, value: object, meaning: str) -> float:
-    """Zero, a positive number, or inf."""
+    """Return zero, a positive number or inf."""
     x = number(key, value, meaning)
     return x if x == math.inf else not_negative(key, x, meaning)
 
 
 def on_the_arm(key: str, x: Reals | float, length: float) -> Reals:
-    """Points [m] of an arm of this length, as an array; nan is none."""
+    """Return points x [m] of an arm of this length as an array.  Raises ParameterError for points off it and nan."""
     points = np.asarray(x, dtype=float)
     if not np.all((points >= 0) & (points <= length)):
         raise ParameterError(key=key, value=x, remedy=f"a point of the arm lies between 0 and {length:g} m")
@@ -99,7 +94,7 @@ def on_the_arm(key: str, x: Reals | float, length: float) -> Reals:
 def check_fields(
     record: object, kind: str, check: Callable[[str, object, str], float], meanings: Mapping[str, str]
 ) -> None:
-    """Each of these fields of a frozen record as one of the checks above leaves it, under the key `kind.field`."""
+    """Replace fields of a frozen record by their checked values, each under the key `kind.field`."""
     for name, meaning in meanings.items():
         key = f"{kind}.{name}" if kind else name
         object.__setattr__(record, name, check(key, getattr(record, name), meaning))
@@ -111,7 +106,7 @@ def _too_far(key: str, value: object) -> ParameterError:
 
 
 def plain_name(name: object) -> str:
-    """The name, which is also the name of the arm's folder of reports, on every file system."""
+    """Return a name that is also a legal folder name on every file system."""
     remedy = 'a name has 1 to 80 characters, begins with a letter or digit and has no / \\ : * ? " < > |'
     if not isinstance(name, str) or not 1 <= len(name) <= 80 or not name.isprintable():
         raise ParameterError(key="name", value=name, remedy=remedy)
@@ -125,7 +120,7 @@ def plain_name(name: object) -> str:
 
 
 def plain_texts(assumptions: object) -> tuple[str, ...]:
-    """The assumptions, each with its white space made plain."""
+    """Return the assumptions, each with single spaces between its words."""
     remedy = "assumptions are a list of plain texts"
     if not isinstance(assumptions, list | tuple):
         raise ParameterError(key="assumptions", value=assumptions, remedy=remedy)

@@ -1,9 +1,9 @@
-"""The control law, as a record: one gain an output, and the table of what each of them multiplies.
+"""The paper's control law as a record: one gain for each output, and the table of gains and outputs.
 
     u = -Kp theta - K1 theta_t - K2 E I phi'(0) + r                                                            (19)
 
-Sign convention, everywhere in tfarm: E I phi'(0) is the elastic moment at the root as a strain gauge reads it, positive
-where it accelerates the hub; a static torque u gives it the value -(J - I_h)/J u.  Reversing the gauge mirrors K2.
+Sign convention: E I phi'(0) is the elastic moment that a strain gauge reads at the root, positive where it accelerates
+the hub.  Under a static torque u it is -(J - I_h)/J u.  With a reversed gauge K2 has the opposite sign.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ GAINS = (
 FED_BACK = tuple(gain.output for gain in GAINS)
 LISTED = tuple(sorted(GAINS, key=lambda gain: gain.name))  # in the order in which a person lists them
 NAMES = tuple(gain.name for gain in LISTED)
-AT_HUB = ("hub_angle", "hub_rate", "root_moment")  # what theorems on the loop are about: gains on these, the first
+AT_HUB = ("hub_angle", "hub_rate", "root_moment")  # theorems on the loop are about gains on these, the first
 assert FED_BACK[: len(AT_HUB)] == AT_HUB
 ON = {gain.output: gain.name for gain in GAINS}  # the name of the gain on each output
 OUTPUT_OF = {name: output for output, name in ON.items()}
 ANGLE_GAIN, RATE_GAIN, MOMENT_GAIN = (ON[output] for output in AT_HUB)
-PLANE = (RATE_GAIN, MOMENT_GAIN)  # the gains of the paper's own law: across and up the map of a loop
-TWO_GAINS = "-".join(PLANE)  # the structure of a law that is these, beside PD, lead, ...
-TAKEN_OFF = " - ".join(f"{gain.name} {gain.letter}" for gain in GAINS)  # off the input of the arm, by the law
+PLANE = (RATE_GAIN, MOMENT_GAIN)  # the gains of the paper's law: axes of the stability region
+TWO_GAINS = "-".join(PLANE)  # the name of that structure, as PD or lead
+TAKEN_OFF = " - ".join(f"{gain.name} {gain.letter}" for gain in GAINS)  # the law, subtracted from the input
 SPELT_OUT = re.sub(r"\bM(?= |$)", "E I phi'(0)", TAKEN_OFF)
 
 
@@ -53,9 +53,8 @@ SPELT_OUT = re.sub(r"\bM(?= |$)", "E I phi'(0)", TAKEN_OFF)
 class HubFeedback:
     """Feedback at the hub: `K1` [N m s/rad] on the hub rate, `K2` [-] on the root moment, `Kp` [N m/rad] on the angle.
 
-    Kp is an extension of the paper's law (19), which leaves the angle itself alone.  Raises ParameterError for what is
-    no finite number or would overflow; whether a gain is too large for an arm is judged in that arm's own units, where
-    the loop is closed.
+    Kp extends the paper's law (19), which has no feedback of the angle.  Raises ParameterError for a gain that is not
+    finite or above 1e40; `check_gains` checks its size against the units of an arm.
     """
 
     K1: float = 0.0
@@ -72,26 +71,26 @@ class HubFeedback:
 
     @property
     def row(self) -> tuple[float, ...]:
-        """The gains in the order of `GAINS`: what the outputs in `FED_BACK` are multiplied by."""
+        """The gains in the order of `GAINS`, on the outputs in `FED_BACK`."""
         return tuple(self[gain.name] for gain in GAINS)
 
     def __getitem__(self, name: str) -> float:
-        """The gain of that name."""
+        """Return the gain of that name."""
         return getattr(self, name)
 
     @property
     def by_name(self) -> dict[str, float]:
-        """The gains, as a person lists them."""
+        """The gains by name, in the order of a list."""
         return {name: self[name] for name in NAMES}
 
     @property
     def point(self) -> tuple[float, float]:
-        """Where the law lies in the plane of its two gains: across, up."""
+        """The coordinates of the law in the plane of `PLANE`: across, up."""
         across, up = (self[name] for name in PLANE)
         return across, up
 
     def at(self, across: float, up: float) -> HubFeedback:
-        """The law with its gains of the plane at this point of it."""
+        """Return the law with its gains of the plane at this point of it."""
         return replace(self, **dict(zip(PLANE, (across, up), strict=True)))
 
     def told(self, name: str, how: Callable[[float], str], arm: Arm | None = None) -> str:
@@ -99,18 +98,18 @@ class HubFeedback:
         return f"{name} = {how(self[name])}{'' if arm is None else written_unit(name, arm)}"
 
     def having(self, name: str, value: float) -> HubFeedback:
-        """The law with another value of one gain."""
+        """Return the law with another value of one gain."""
         return replace(self, **{name: value})
 
     def times(self, factor: float) -> HubFeedback:
-        """Every gain times a number."""
+        """Return the law with every gain times a number."""
         return HubFeedback(**{gain.name: factor * self[gain.name] for gain in GAINS})
 
 
 def unit_of(name: str, arm: Arm) -> str:
-    """The SI unit of the gain of that name on an arm whose loop closes through its own input: N m, A or V.
+    """Return the SI unit of the gain of that name on an arm, by the arm's input [N m, A or V].
 
-    K2, a pure number where a torque answers the moment, is A/(N m) or V/(N m) through a motor.
+    K2 is a pure number for a torque, and in A/(N m) or V/(N m) for a motor.
     """
     (unit,) = (gain.unit for gain in GAINS if gain.name == name)
     given = INPUT_UNITS["hub_torque" if arm.is_locked else arm.input]
@@ -120,28 +119,23 @@ def unit_of(name: str, arm: Arm) -> str:
 
 
 def shown_unit(name: str, arm: Arm) -> str:
-    """The unit of that gain as a table heads it: nothing of a pure number."""
+    """Return the unit of that gain for the heading of a table, "" for a pure number."""
     unit = unit_of(name, arm)
     return "" if unit == "1" else unit
 
 
 def written_unit(name: str, arm: Arm) -> str:
-    """What follows a value of that gain in a sentence: a space and its unit, nothing of a pure number."""
+    """Return a space and the unit of that gain, "" for a pure number."""
     unit = shown_unit(name, arm)
     return f" {unit}" if unit else ""
 
 
 def input_words(arm: Arm) -> str:
-    """What the loop of an arm closes through, in words."""
+    """Return the input of an arm in words."""
     words = {"motor_voltage": "the motor's voltage [V]", "motor_current": "the motor's current [A]"}
     return words.get(arm.input, "the torque at the hub [N m]")
 
 
-def driven(arm: Arm) -> str:
-    """A clause that says what u is, where it is no torque."""
-    return f"; u is {input_words(arm)}" if shown_unit(MOMENT_GAIN, arm) else ""
-
-
 def law_of(row: ArrayLike) -> HubFeedback:
-    """The law with these gains, in the order of `GAINS`."""
+    """Return the law with these gains, in the order of `GAINS`."""
     return HubFeedback(**{gain.name: float(value) for gain, value in zip(GAINS, np.asarray(row), strict=True)})

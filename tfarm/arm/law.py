@@ -1,9 +1,9 @@
-"""Any linear law, as a record: what of each signal is fed back to the input of the rig.
+"""A linear law as a record: from the signals of a rig to its input,
 
-    v = -sum over signals of C_i(s) e^{-s tau} (y_i - r_i)
+    v = -sum over signals of C_i(s) e^{-s tau} (y_i - r_i),
 
-with a minus, as the paper's (19) has it (`sign` = 1 for laws that are written the other way).  `HubFeedback` is the
-simplest of them: a number on hub angle, hub rate and root moment.
+with the minus of the paper's (19) (`sign` = 1 for +).  `HubFeedback` is the simplest law: constant gains on hub angle,
+hub rate and root moment.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from tfarm.arrays import Complex
 from tfarm.errors import ParameterError, did_you_mean, must_be_known
 from tfarm.records import record
 
-MOST_SIGNALS = 12  # of a law: more than any rig measures
-CANCELLED = 1e-6  # of its size: a zero of the law so near to an unstable pole of it cancels that
-REFERENCE = "reference:"  # before the name of a signal: what that should be
-SAMPLING_RULES = ("tustin", "zoh", "matched")  # by which a continuous law is made discrete
+MOST_SIGNALS = 12  # of a law, for time and memory
+CANCELLED = 1e-6  # of its size: distance within which a zero cancels an unstable pole
+REFERENCE = "reference:"  # before the name of a signal: its reference
+SAMPLING_RULES = ("tustin", "zoh", "matched")  # by which a continuous-time law is discretised
 
 
 @dataclass(frozen=True)
 @record
 class Part:
-    """One block of a law and the signals that it takes: names of outputs, with "@x" [m] for those along the link.
+    """One block of a law and its signals: names of outputs, with "@x" [m] for those along the link.
 
-    "reference:hub_angle" is what hub_angle should be: no part of the loop.  "" is a column that nothing is led to.
+    "reference:hub_angle" is the reference of hub_angle, outside the loop.  "" is an unconnected column.
     """
 
     signals: tuple[str, ...]
@@ -48,12 +48,12 @@ class Part:
 class Law:
     """A linear law from named signals to the rig's input.
 
-    `entries` maps a signal ("hub_angle", "tip_acceleration", "strain@0.05") to what it is multiplied by: a number, a
-    pair (num, den), a mapping of zeros, poles and gain, or a python-control system; `parts` are those, as blocks.
-    `delay` [s] lies in the loop; `input` is what the law drives, the arm's own where None; `period` [s] makes it a law
-    in z, None in s; signals among `references` enter as (signal - reference); `sign` is -1, or 1 for laws written
-    v = +C y; `rule` and `prewarp` [rad/s] say how a continuous law is sampled.
-    Raises ParameterError for what is no law, naming the key.
+    `entries` maps a signal ("hub_angle", "tip_acceleration", "strain@0.05") to its factor: a number, a pair (num, den),
+    a mapping of zeros, poles and gain, or a python-control system.  `parts` are the entries as blocks.
+    `delay` [s] is that of the controller.  `input` is the driven input, by default that of the arm.  With a `period`
+    [s] the law is in z, without one in s.  Signals among `references` enter as (signal - reference).  `sign` is -1, or
+    1 for v = +C y.  `rule` and `prewarp` [rad/s] are those of the discretisation of a continuous-time law.
+    Raises ParameterError, naming the key, for illegal values.
     """
 
     entries: Mapping[str, Any] = field(repr=False, compare=False)
@@ -75,9 +75,9 @@ class Law:
         check_fields(self, "", not_negative, meanings)
         known = {float(each) for each in periods}
         if self.period is not None:
-            known.add(positive("period", self.period, "a sample period in s; leave it out for a continuous law"))
+            known.add(positive("period", self.period, "a sampling period in s; leave it out for a continuous-time law"))
         if len(known) > 1:
-            remedy = "the parts of a law have one period in common"
+            remedy = "the parts of a law have one sampling period in common"
             raise ParameterError(key="period", value=sorted(known), remedy=remedy)
         object.__setattr__(self, "period", known.pop() if known else None)
         object.__setattr__(self, "references", tuple(self.references))
@@ -91,12 +91,12 @@ class Law:
         for each in self.references:
             must_be_known("references", each, self.signals)
         if self.period is not None and self.is_improper:
-            remedy = "a discrete law needs no sample of the future: give num at most the degree of den"
+            remedy = "a discrete-time law is causal: give num at most the degree of den"
             raise ParameterError(key="num", value=self.name, remedy=remedy)
 
     @classmethod
     def of_matrices(cls, A: Any, B: Any, C: Any, D: Any, signals: Sequence[str], **others: Any) -> Law:
-        """One state space from several signals, in the order of the columns of B and D."""
+        """Build a law of one state space from several signals, in the order of the columns of B and D."""
         block = StateSpace(A, B, C, D)
         if block.signals != len(signals):
             remedy = f"B has {block.signals} columns: name one signal for each"
@@ -109,12 +109,12 @@ class Law:
 
     @classmethod
     def of_gains(cls, law: HubFeedback) -> Law:
-        """The hub's gains as a law, on what their signals are off their references."""
+        """Build the law of gains at the hub, on the errors of their signals."""
         used = {gain.output: law[gain.name] for gain in GAINS if law[gain.name]} or {"hub_rate": 0.0}
         return cls(used, name="gains at the hub", references=tuple(name for name in used if name in AT_HUB))
 
     def as_typed(self) -> Iterator[tuple[str, str]]:
-        """Each signal with what it is multiplied by, as a person types it; of matrices how many states they have."""
+        """Yield each signal and the text of its block; of a state space the number of states."""
         for part in self.parts:
             block = part.block
             if not isinstance(block, Rational):
@@ -125,12 +125,12 @@ class Law:
 
     @cached_property
     def signals(self) -> tuple[str, ...]:
-        """The signals that are fed back, each once."""
+        """The signals in the loop, each once."""
         return tuple(dict.fromkeys(name for part in self.parts for name in part.signals if is_measured(name)))
 
     @property
     def wanted(self) -> tuple[str, ...]:
-        """The columns that are led to references, "reference:hub_angle", each once."""
+        """The columns of references, such as "reference:hub_angle", each once."""
         every = (name for part in self.parts for name in part.signals)
         return tuple(dict.fromkeys(name for name in every if name.startswith(REFERENCE)))
 
@@ -141,7 +141,7 @@ class Law:
 
     @property
     def order(self) -> int:
-        """How many states it has."""
+        """The number of its states."""
         return sum(part.block.order for part in self.parts)
 
     @property
@@ -151,7 +151,7 @@ class Law:
 
     @property
     def is_static(self) -> bool:
-        """Whether it multiplies each signal by a number, at once, and does no more."""
+        """Whether it is a constant gain on each signal, without delay."""
         plain = all(isinstance(part.block, Rational) and not part.block.order for part in self.parts)
         return plain and not (self.delay or self.is_discrete or self.is_improper)
 
@@ -162,7 +162,7 @@ class Law:
 
     @property
     def gains(self) -> HubFeedback | None:
-        """The law as gains at the hub, where it is no more than that; None where it is."""
+        """The law as gains at the hub; None where it has more than those."""
         if not self.is_static or not set(self.signals) <= set(ON):
             return None
         numbers = self.values(np.zeros(1, complex))[:, 0].real
@@ -170,11 +170,11 @@ class Law:
 
     @property
     def numbers(self) -> dict[str, float]:
-        """Each number in which the loop is linear, by the name that `having` knows it by; those that are 0 left out.
+        """Each number other than 0 in which the loop is linear, by its name in `having`.
 
-        That is "gain", a factor on everything, and of each signal with a block of its own what it is multiplied by:
-        the gain itself, or the coefficients of its polynomials and, of more than one, a factor, "hub_angle.gain".  Of a
-        signal in several parts no number has a name of its own.
+        That is "gain", a factor on the law, and for each signal with a block of its own the constant gain, or the
+        coefficients of its polynomials and, for more than one, a factor, "hub_angle.gain".  A signal in several parts
+        has no number with a name.
         """
         found = {"gain": 1.0}
         for key, (place, value) in self.part_gains.items():
@@ -188,9 +188,9 @@ class Law:
 
     @property
     def part_gains(self) -> dict[str, tuple[int, float]]:
-        """Each part that one signal has to itself: its place among `parts`, and its gain, by the name `having` knows.
+        """Each part of a single signal: its index among `parts`, and its gain, by its name in `having`.
 
-        That is of a plain gain the signal's, "hub_angle"; else 1, a factor, "hub_angle.gain".
+        A constant gain has the name of its signal, "hub_angle"; other blocks have a factor of 1, "hub_angle.gain".
         """
         found, read = {}, [name for part in self.parts for name in part.signals]
         for place, part in enumerate(self.parts):
@@ -206,9 +206,9 @@ class Law:
     # ------------------------------------------------------------ values
 
     def polynomials(self, s: Complex) -> tuple[Complex, Complex]:
-        """What the signals are multiplied by, (signals, n), and the denominator (n,) of all, without the delay.
+        """Return the numerators of the signals (signals, n) and their common denominator (n,), without the delay.
 
-        With the sign of u = -sum: positive is what feeds back against a signal.
+        With the sign of u = -sum: positive numbers are negative feedback.
         """
         if self._constants is not None:
             entries, den = self._constants
@@ -225,7 +225,7 @@ class Law:
         return numerators.sum(axis=0)[:, 0], complex(whole[0])
 
     def shares(self, s: Complex) -> tuple[Complex, Complex]:
-        """Of each part what it multiplies the signals by, (parts, signals, n), and the denominator: `polynomials`."""
+        """Return the numerators of each part (parts, signals, n) and the common denominator (n,), as `polynomials`."""
         s = np.asarray(s, dtype=complex)
         dens = [part.block.denominator(s) for part in self.parts]
         row = {name: n for n, name in enumerate(self.signals)}
@@ -238,22 +238,21 @@ class Law:
         return numerators, np.asarray(np.prod(dens, axis=0))
 
     def values(self, s: Complex) -> Complex:
-        """C_i (signals, n) at s, or z, without the delay; infinite or nan at its poles."""
+        """Return C_i (signals, n) at s, or z, without the delay; infinite or nan at its poles."""
         numerators, whole = self.polynomials(s)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(numerators / whole)
 
     def matrices(self, columns: Sequence[str] | None = None) -> Matrices:
-        """One state space from all signals, or these columns, to what is taken off the input (v = -out).
+        """Return one state space from all signals, or these columns, to -v.
 
         Raises ParameterError where a part differentiates.
         """
         columns = self.signals if columns is None else tuple(columns)
-        blocks = [part.block.matrices() for part in self.parts]
-        n, m = self.order, len(columns)
+        n, m, start = self.order, len(columns), 0
         A, B, C, D = np.zeros((n, n)), np.zeros((n, m)), np.zeros((1, n)), np.zeros((1, m))
-        start = 0
-        for part, (a, b, c, d) in zip(self.parts, blocks, strict=True):
+        for part in self.parts:
+            a, b, c, d = part.block.matrices()
             states = slice(start, start + len(a))
             A[states, states], C[:, states] = a, c
             for j, name in enumerate(part.signals):
@@ -266,20 +265,20 @@ class Law:
     # ------------------------------------------------------------ other laws
 
     def times(self, factor: float) -> Law:
-        """Every part times a number."""
+        """Return the law times a number."""
         return self.weighted([factor] * len(self.parts))
 
     def weighted(self, factors: Sequence[float]) -> Law:
-        """Each part times a number of its own."""
+        """Return the law with each part times its own factor."""
         pairs = zip(self.parts, factors, strict=True)
         return replace(self, parts=tuple(Part(part.signals, part.block.times(factor)) for part, factor in pairs))
 
     def having(self, key: str, value: float) -> Law:
-        """The law with another value of one number.
+        """Return the law with another value of one number.
 
-        "delay"; "gain", a factor on everything; "hub_angle" or "hub_angle.gain", a factor on what a signal takes;
-        "hub_angle.num.1", a coefficient, counted from 0; "K1", "K2" and "Kp" are the gains on the hub's own signals.
-        Raises ParameterError for a key that there is not.
+        Its key is "delay"; "gain", a factor on the law; "hub_angle" or "hub_angle.gain", a factor on one signal;
+        "hub_angle.num.1", a coefficient, counted from 0; or "K1", "K2", "Kp", the gains on the signals of the hub.
+        Raises ParameterError for an unknown key.
         """
         value = number(key, value, "a finite number")
         key = OUTPUT_OF.get(key, key)
@@ -300,7 +299,7 @@ class Law:
 
 
 def _parts_of(entries: Mapping[str, Any]) -> tuple[tuple[Part, ...], tuple[float, ...]]:
-    """The blocks of the entries of a law, and the sample periods that they bring."""
+    """Return the blocks of the entries of a law, and their sampling periods [s]."""
     if not isinstance(entries, Mapping) or not entries:
         raise ParameterError(key="law", value=entries, remedy='name at least one signal, such as {"hub_rate": 0.3}')
     found: list[Part] = []
@@ -308,7 +307,7 @@ def _parts_of(entries: Mapping[str, Any]) -> tuple[tuple[Part, ...], tuple[float
     for name, entry in entries.items():
         block, period = block_of(_signal(name), entry)
         if block.signals != 1:
-            remedy = "takes several signals: use Law.of_matrices and name them"
+            remedy = "has several signals: use Law.of_matrices and name them"
             raise ParameterError(key=name, value=type(entry).__name__, remedy=remedy)
         found.append(Part((name,), block))
         periods += [] if period is None else [period]
@@ -316,7 +315,7 @@ def _parts_of(entries: Mapping[str, Any]) -> tuple[tuple[Part, ...], tuple[float
 
 
 def _signal(name: Any, *, of_reference: bool = False) -> str:
-    """The name of an output, with a place along the link after an @ where it needs one; that of its reference too."""
+    """Return the name of an output, or of its reference.  Raises ParameterError for other texts."""
     plain = name.removeprefix(REFERENCE) if of_reference and isinstance(name, str) else name
     if not isinstance(plain, str) or not re.fullmatch(r"[A-Za-z_]\w*(@[0-9.eE+-]+)?", plain):
         remedy = 'an output such as hub_rate, or one along the link with its place, "strain@0.05"'
@@ -325,15 +324,15 @@ def _signal(name: Any, *, of_reference: bool = False) -> str:
 
 
 def is_measured(name: str) -> bool:
-    """Whether a column of a law is fed from the rig: no reference, and not left open."""
+    """Whether a column of a law is measured: neither a reference nor unconnected."""
     return bool(name) and not name.startswith(REFERENCE)
 
 
 def _varied(block: LawBlock, rest: str, value: float, key: str) -> LawBlock:
-    """A block with another factor, or coefficient."""
+    """Return a block with another factor, or coefficient."""
     if rest in ("", "gain"):
         if isinstance(block, Rational) and not block.order and len(block.num) == 1:
-            return Rational((value,))  # of a plain gain, the gain itself
+            return Rational((value,))  # a constant gain
         return block.times(value)
     polynomial, _, place = rest.partition(".")
     if isinstance(block, Rational) and polynomial in ("num", "den") and place.isdecimal():
@@ -347,11 +346,11 @@ def _varied(block: LawBlock, rest: str, value: float, key: str) -> LawBlock:
 
 AnyLaw = HubFeedback | Law
 
-# ------------------------------------------------------------ what a law drives, and whether it is gains at the hub
+# ------------------------------------------------------------ laws of an arm
 
 
 def as_law(law: AnyLaw) -> Law:
-    """The law as one of signals, gains at the hub too.  Raises ParameterError for what is no law."""
+    """Return a Law, also for gains at the hub.  Raises ParameterError for anything else."""
     if isinstance(law, HubFeedback):
         return Law.of_gains(law)
     if not isinstance(law, Law):
@@ -360,7 +359,7 @@ def as_law(law: AnyLaw) -> Law:
 
 
 def full_law(law: AnyLaw) -> Law:
-    """The law as one of signals; gains at the hub as a law on all of their signals, also those with a gain of 0."""
+    """Return a Law; for gains at the hub with all of their signals, also those with a gain of 0."""
     gains = as_law(law).gains
     if gains is None:
         return as_law(law)
@@ -368,9 +367,9 @@ def full_law(law: AnyLaw) -> Law:
 
 
 def arm_and_law(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
-    """The arm with the input that the law drives, and the law as gains at the hub where it is no more than those.
+    """Return the arm with the input of the law, and the law, as gains at the hub where it has no more than those.
 
-    Raises ParameterError for what is no law.
+    Raises ParameterError for anything but a law.
     """
     law = as_law(law)
     if law.input is not None and law.input != arm.input:
@@ -379,26 +378,26 @@ def arm_and_law(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
 
 
 def tracked(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
-    """The same for a loop that is led: gains at the hub follow references in all that they feed back.
+    """Return arm and law of a loop with a reference: gains at the hub have references on all of their signals.
 
-    So a law that is no more than gains is taken for them where each of its signals is among its references.
+    So a law of gains alone is returned as gains only where each of its signals is among its references.
     """
     (driven, plain), led = arm_and_law(arm, law), as_law(law)
     return driven, plain if set(led.signals) <= set(led.references) else law
 
 
 def must_not_be_algebraic(arm: Arm, key: str, value: object) -> None:
-    """Raise ParameterError where the hub has no inertia: its root moment, fed back, is the torque itself."""
+    """Raise ParameterError where the hub has no inertia: its root moment is the torque itself."""
     if arm.has_massless_hub:
         remedy = (
             "with hub.inertia = 0 the root moment is -u itself, so that moment feedback is an algebraic loop; "
-            "give the hub an inertia, or feed no moment back"
+            "give the hub an inertia, or a moment gain of 0"
         )
         raise ParameterError(key=key, value=value, remedy=remedy)
 
 
 def cancelled(law: Law) -> tuple[str, ...]:
-    """Warnings: the law's own poles right of the axis, or outside the unit circle, that its own zeros cancel."""
+    """Return warnings of the law's unstable poles that its own zeros cancel."""
     found = []
     for part in law.parts:
         zeros = getattr(part.block, "zeros", np.empty(0, complex))

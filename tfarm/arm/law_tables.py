@@ -1,10 +1,10 @@
-"""The table [law] of a TOML file: the arm's own, or one of its own beside it.
+"""The table [law] of a TOML file: of an arm's file, or of a file of its own.
 
     [law]
-    input = "hub_torque"        # else what the arm's file says
+    input = "hub_torque"        # else that of the arm's file
     delay = 0.004               # s
     [law.hub_angle]
-    num = [2.0, 1.0]            # descending powers of s; of z where the law has a period
+    num = [2.0, 1.0]            # descending powers of s; of z with a period
     den = [0.01, 1.0]
     [law.strain]
     x = 0.02                    # m from the clamp, for an output along the link
@@ -59,24 +59,23 @@ class SignalTable(StrictTable):
     x: float | None = None
 
     def build(self, key: str) -> Any:
-        """What `Law` takes for it."""
+        """Return the entry of `Law`.  Raises ParameterError for keys that exclude each other."""
         if self.num is not None:
             if self.gain is not None or self.zeros is not None or self.poles is not None:
-                raise ParameterError(
-                    key=f"{key}.num", value=self.num, remedy="either num and den, or zeros, poles, gain"
-                )
+                remedy = "either num and den, or zeros, poles, gain"
+                raise ParameterError(key=f"{key}.num", value=self.num, remedy=remedy)
             return tuple(self.num), tuple(self.den or [1.0])
         if self.den is not None:
-            raise ParameterError(key=f"{key}.num", value=MISSING, remedy="den stands with num")
+            raise ParameterError(key=f"{key}.num", value=MISSING, remedy="den needs num")
         if self.gain is None:
             raise ParameterError(key=f"{key}.gain", value=MISSING, remedy="give gain, or num and den")
         return {"zeros": self.zeros or (), "poles": self.poles or (), "gain": self.gain}
 
 
 def load_law(name_or_path: str | os.PathLike[str]) -> Law | None:
-    """The law of a file's [law] table, None where it has none.
+    """Return the law of a file's [law] table, None where it has none.
 
-    Raises ParameterError for an unknown key, a wrong type or a value that cannot be, naming the file.
+    Raises ParameterError, naming the file, for an unknown key, a wrong type or an illegal value.
     """
     tables, file = load_tables(name_or_path)
     with naming(file):
@@ -84,14 +83,17 @@ def load_law(name_or_path: str | os.PathLike[str]) -> Law | None:
 
 
 def law_of_table(table: Any, folder: Path) -> Law:
-    """The law of a parsed [law] table; a .mat file is looked for beside the file, in `folder`."""
+    """Return the law of a parsed [law] table; the path of a .mat file is relative to `folder`."""
     if not isinstance(table, dict):
         raise ParameterError(key=LAW_TABLE, value=table, remedy="give a table, headed [law]")
     signals = {key: value for key, value in table.items() if isinstance(value, dict)}
-    _no_bare_gain({key: value for key, value in table.items() if key not in LawTable.model_fields})
-    head = validated(LawTable, {key: value for key, value in table.items() if key not in signals}, LAW_TABLE)
-    common = {key: getattr(head, key) for key in ("name", "input", "delay", "period", "sign", "rule", "prewarp")}
-    common["references"] = tuple(head.references)
+    others = {key: value for key, value in table.items() if key not in signals}
+    for key, value in others.items():  # hub_angle = 2.0, and no misspelt delay
+        if type(value) in (int, float) and not close_to(key, LawTable.model_fields):
+            remedy = f"a signal has a table of its own: [{LAW_TABLE}.{key}] with gain = {value:g}"
+            raise ParameterError(key=f"{LAW_TABLE}.{key}", value=value, remedy=remedy)
+    head = validated(LawTable, others, LAW_TABLE)
+    common = head.model_dump(include={"name", "input", "delay", "period", "sign", "references", "rule", "prewarp"})
     try:
         if head.matrices is not None:
             if signals:
@@ -99,9 +101,8 @@ def law_of_table(table: Any, folder: Path) -> Law:
                 raise ParameterError(key=next(iter(signals)), value=MISSING, remedy=remedy)
             return _of_file(head, folder, common)
         if head.signals is not None or head.system is not None or head.scales is not None:
-            raise ParameterError(
-                key="matrices", value=MISSING, remedy="signals, system and scales are those of a .mat file"
-            )
+            remedy = "signals, system and scales need a .mat file"
+            raise ParameterError(key="matrices", value=MISSING, remedy=remedy)
         entries = {}
         for name, values in signals.items():
             given = validated(SignalTable, values, f"{LAW_TABLE}.{name}")
@@ -112,16 +113,8 @@ def law_of_table(table: Any, folder: Path) -> Law:
         raise ParameterError(key=key, value=error.value, remedy=error.remedy) from None
 
 
-def _no_bare_gain(others: dict[str, Any]) -> None:
-    """Raise ParameterError for a number where a signal's table is meant: hub_angle = 2.0, and no misspelt delay."""
-    for key, value in others.items():
-        if type(value) in (int, float) and not close_to(key, LawTable.model_fields):
-            remedy = f"a signal has a table of its own: [{LAW_TABLE}.{key}] with gain = {value:g}"
-            raise ParameterError(key=f"{LAW_TABLE}.{key}", value=value, remedy=remedy)
-
-
 def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
-    """The law of a .mat file with A, B, C and D, or of the structure in it that `system` names."""
+    """Return the law of a .mat file with A, B, C and D, or of its structure named `system`."""
     import numpy as np
 
     assert head.matrices is not None

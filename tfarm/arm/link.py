@@ -1,11 +1,7 @@
-"""Cross-sections: area, second moment of area, and Cowper's shear factor.
+"""Cross-sections and uniform segments of a Timoshenko beam, as frozen records in SI units.
 
-Source of the shear factors: G. R. Cowper, "The shear coefficient in Timoshenko's beam theory",
-Journal of Applied Mechanics 33 (1966) 335-340, table 1.
-
-The link: a uniform segment of a Timoshenko beam.  Frozen, checked once, SI units.
-
-Letters as in the paper: E, G, rho, A, I, kappa, C.
+Letters as in the paper: E, G, rho, A, I, kappa, C.  Source of the shear factors: G. R. Cowper, "The shear coefficient
+in Timoshenko's beam theory", Journal of Applied Mechanics 33 (1966) 335-340, table 1.
 """
 
 from __future__ import annotations
@@ -18,7 +14,7 @@ from tfarm.arm.checks import check_fields, not_negative, number, positive
 from tfarm.errors import MISSING, ParameterError, did_you_mean
 
 KEY = "link.section"  # before the names of its numbers in messages
-SLENDEREST = 1e9  # length over radius of gyration: above it the units are mixed up
+SLENDEREST = 1e9  # length over radius of gyration: above it the units are wrong
 MEANINGS = {
     "length": "a length is a positive, finite number of metres",
     "density": "a density is a positive, finite number in kg/m^3",
@@ -78,8 +74,8 @@ SHAPES: Mapping[str, NamedShape] = {
 class Section:
     """A cross-section: `area` [m^2], `second_moment` [m^4] about the bending axis, `shear_factor` [-].
 
-    Build it by its shape: `Section.rectangle(width=, depth=)` and so on; `dimensions` [m] are what that was
-    given.  A named shape without a shear factor has Cowper's.
+    Build it by its shape, such as `Section.rectangle(width=, depth=)`; `dimensions` [m] are the arguments of that.
+    A named shape without a shear factor has Cowper's.
     """
 
     shape: str
@@ -150,7 +146,7 @@ class Section:
 
     @property
     def half_depth(self) -> float | None:
-        """From the middle to the surface in the plane of bending [m]; None for a general section."""
+        """Distance [m] from the neutral axis to the surface in the plane of bending; None for a general section."""
         sizes = dict(self.dimensions)
         depth = sizes.get("depth", sizes.get("diameter", sizes.get("outer_diameter")))
         return None if depth is None else depth / 2
@@ -161,7 +157,7 @@ class Section:
 
 
 def _properties(shape: str, dimensions: Mapping[str, float]) -> tuple[float, float]:
-    """Area [m^2] and second moment [m^4] of a named shape."""
+    """Return the area [m^2] and second moment [m^4] of a named shape.  Raises ParameterError for wrong dimensions."""
     if shape not in SHAPES:
         raise ParameterError(key=f"{KEY}.shape", value=shape, remedy=did_you_mean(str(shape), [*SHAPES, "general"]))
     names = SHAPES[shape].dimensions
@@ -194,11 +190,11 @@ class Link:
         if self.slenderness > SLENDEREST:
             remedy = f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units"
             raise ParameterError(key="link.length", value=self.length, remedy=remedy)
-        nu = self.poissons_ratio  # which Cowper's factor is a function of; the margins allow for a rounded G
+        nu = self.poissons_ratio  # the argument of Cowper's factor; the margins allow for a rounded G
         if self.section.shear_factor is None and not -1 + 1e-9 <= nu <= 0.5 + 1e-12:
             remedy = (
                 f"with this Young's modulus it means a Poisson's ratio of {nu:.4g}, outside (-1, 0.5]; "
-                "mend it, or give link.section.shear_factor for a material that is not isotropic"
+                "correct it, or give link.section.shear_factor for a material that is not isotropic"
             )
             raise ParameterError(key="link.shear_modulus", value=self.shear_modulus, remedy=remedy)
 
@@ -213,7 +209,7 @@ class Link:
         section: Section,
         damping: float = 0.0,
     ) -> Link:
-        """The link of an isotropic material: G = E / (2 (1 + nu)) from Poisson's ratio nu."""
+        """Build the link of an isotropic material: G = E/(2 (1 + nu)), nu Poisson's ratio."""
         E = positive("link.youngs_modulus", youngs_modulus, MEANINGS["youngs_modulus"])
         meaning = "Poisson's ratio lies above -1, up to 0.5 (incompressible); about 0.3 for metals"
         nu = number("link.poissons_ratio", poissons_ratio, meaning)
@@ -235,7 +231,7 @@ class Link:
 
     @property
     def shear_factor(self) -> float:
-        """kappa [-]: the section's own, or else Cowper's (1966) from Poisson's ratio."""
+        """kappa [-] of the section, or else Cowper's (1966) from Poisson's ratio."""
         given = self.section.shear_factor
         return self.section.cowper_factor(self.poissons_ratio) if given is None else given
 

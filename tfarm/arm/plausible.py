@@ -1,7 +1,7 @@
-"""Values that are legal and yet look like a slip of units: texts for a warning, never an error.
+"""Warnings of legal values that may have a wrong unit.
 
-Each bound lies outside what any material or mechanism has by a margin; a unit mistaken for another (GPa for Pa,
-mm for m, g/cm^3 for kg/m^3, a damping ratio for seconds) moves a value by a factor of 50 or more, well past it.
+Each bound is far outside the range of materials and mechanisms.  A wrong unit (GPa for Pa, mm for m, g/cm^3 for kg/m^3,
+a damping ratio for seconds) changes a value by a factor of 50 or more.
 """
 
 from __future__ import annotations
@@ -19,36 +19,37 @@ LIGHTEST = 25.0  # kg/m^3; light foam has 30, and in g/cm^3 everything is below 
 DENSEST = 25_000.0  # kg/m^3; osmium has 22,600
 LONGEST_ARM = 100.0  # m; the arm of the space station has 17
 MOST_DAMPED = 0.1  # damping ratio of the clamped link; rubber has about 0.05
-MODULUS = (SOFTEST, "softer than any rubber; it is taken in Pa, not in GPa",
-           STIFFEST, "stiffer than diamond; it is taken in Pa")  # fmt: skip
-USUAL = {  # of a segment: between what, and what is said below and above that
+MODULUS = (SOFTEST, "softer than any rubber; its unit is Pa, not in GPa",
+           STIFFEST, "stiffer than diamond; its unit is Pa")  # fmt: skip
+USUAL = {  # of a segment: least and largest value, and the warning below and above
     "youngs_modulus": MODULUS,
     "shear_modulus": MODULUS,
-    "density": (LIGHTEST, "lighter than foam; it is taken in kg/m^3, not in g/cm^3",
-                DENSEST, "denser than osmium; it is taken in kg/m^3"),
-    "length": (0.0, "", LONGEST_ARM, "longer than any arm; it is taken in m, not in mm"),
+    "density": (LIGHTEST, "lighter than foam; its unit is kg/m^3, not in g/cm^3",
+                DENSEST, "denser than osmium; its unit is kg/m^3"),
+    "length": (0.0, "", LONGEST_ARM, "longer than any arm; its unit is m, not in mm"),
 }  # fmt: skip
 HEAVIEST = 1e5  # times the link's own mass or inertia
 FARTHEST_OFFSET = 10.0  # times the link's length; a hub's radius and a payload's offset are a fraction of it
-YIELDING = 10.0  # times the link's own flexibility L/(3 EI); a clamp that is meant to hold has a tenth of it
-RUBBING = 50.0  # times 2 sqrt(3 EI/L J), beyond which the link cannot turn the hub; a harmonic drive reaches 1
+YIELDING = 10.0  # times the link's own flexibility L/(3 EI); a usual clamp has a tenth of it
+MOST_FRICTION = 50.0  # times 2 sqrt(3 EI/L J), beyond which the link cannot turn the hub; a harmonic drive reaches 1
 FIRST_CLAMPED = 1.8751040687119611  # first root of 1 + cos(b) cosh(b) = 0, for the clamped Euler-Bernoulli beam
 
 
 def implausible(arm: Arm) -> tuple[str, ...]:
-    """One text for each value that looks like a slip of units: the key as in the TOML file, the value, and why.
+    """Return a warning for each value that may have a wrong unit: its key in the TOML file, the value, and the reason.
 
     Empty for a plausible arm.
     """
     keys = [f"link.{i}" for i in range(1, len(arm.links) + 1)] if arm.outer else ["link"]
     segments = [text for key, link in zip(keys, arm.links, strict=True) for text in _segment(key, link, arm.length)]
-    return (*segments, *_inertias(arm), *_rig(arm))
+    return (*segments, *_parts(arm))
 
 
 def _segment(key: str, link: Link, length: float) -> Iterator[str]:
-    """What looks odd in a segment of an arm of that length [m]; its texts begin with its key in the file.
+    """Yield the warnings of a segment of an arm of that length [m], each beginning with its key in the file.
 
-    Material, size, and the damping ratio C w/2 of the clamped arm in its first mode, w = (b/L)^2 sqrt(EI / rhoA).
+    They are of material, size, and the damping ratio C w/2 of the clamped arm in its first mode,
+    w = (b/L)^2 sqrt(EI/rhoA).
     """
     for name, (least, below, most, above) in USUAL.items():
         value = getattr(link, name)
@@ -63,53 +64,34 @@ def _segment(key: str, link: Link, length: float) -> Iterator[str]:
     if ratio > MOST_DAMPED:
         yield (
             f"{key}.damping = {shown(link.damping)}: a damping ratio of {ratio:.2g} in the first mode "
-            "of the clamped link; it is taken in s (E (1 + C s)), it is no ratio"
+            "of the clamped link; its unit is s, as in E (1 + C s)"
         )
 
 
-def _inertias(arm: Arm) -> Iterator[str]:
-    payload, mass, inertia = arm.payload, arm.own_mass, _beam_inertia(arm)
-    if HEAVIEST * inertia < arm.hub.inertia < math.inf:
-        yield f"hub.inertia = {shown(arm.hub.inertia)}: {arm.hub.inertia / inertia:.1g} times the link's; in kg m^2?"
-    if HEAVIEST * mass < payload.mass < math.inf:
-        yield f"payload.mass = {shown(payload.mass)}: {payload.mass / mass:.1g} times the link's; in kg?"
-    if 0.0 < payload.mass < math.inf and payload.mass * arm.length**2 < payload.inertia < math.inf:
-        radius = math.sqrt(payload.inertia / payload.mass)
-        yield (
-            f"payload.inertia = {shown(payload.inertia)}: a radius of gyration of {radius:.3g} m, "
-            "above the link's length; in kg m^2?"
-        )
-
-
-def _beam_inertia(arm: Arm) -> float:
-    """Inertia [kg m^2] of the arm's own mass, taken as spread evenly from the axis."""
-    return arm.own_mass * arm.length**2 / 3
-
-
-def _rig(arm: Arm) -> Iterator[str]:
-    """The parts that the paper's arm has not: bounds on what a slip of units by 50 or more does to them."""
-    hub, bending = arm.hub, 3 * arm.bending_scale
-    for key, value in (("hub.radius", hub.radius), ("payload.offset", abs(arm.payload.offset))):
-        if value > FARTHEST_OFFSET * arm.length:
-            times = value / arm.length
-            yield f"{key} = {shown(value)}: {times:.3g} times the link's length; it is taken in m, not in mm"
-    if arm.clamp.stiffness < bending / YIELDING:
-        yield (
-            f"clamp.stiffness = {shown(arm.clamp.stiffness)}: a clamp that yields {bending / arm.clamp.stiffness:.2g} "
-            "times as much as its link bends; it is taken in N m/rad"
-        )
+def _parts(arm: Arm) -> Iterator[str]:
+    """Yield the warnings of hub, payload, clamp, motor and attachments: values by a ratio to those of the link."""
+    hub, payload, motor, length, mass = arm.hub, arm.payload, arm.motor, arm.length, arm.own_mass
+    beam, bending = mass * length**2 / 3, 3 * arm.bending_scale  # kg m^2, spread evenly from the axis; N m
+    radius = math.sqrt(payload.inertia / payload.mass) if 0.0 < payload.mass < math.inf else 0.0
     critical = 2 * math.sqrt(bending * arm.total_inertia)
-    if hub.friction > RUBBING * critical:
-        yield (
-            f"hub.friction = {shown(hub.friction)}: {hub.friction / critical:.2g} times what keeps the link's first "
-            "swing from ringing; it is taken in N m s/rad, at the hub's side of a gear"
-        )
-    if arm.motor and arm.motor.reflected_inertia > HEAVIEST * _beam_inertia(arm):
-        times = arm.motor.reflected_inertia / _beam_inertia(arm)
-        yield (
-            f"motor.rotor_inertia = {shown(arm.motor.rotor_inertia)}: through the gear {times:.1g} times the link's; "
-            "it is taken in kg m^2, before the gear"
-        )
-    for i, each in enumerate(arm.attachments, 1):
-        if each.mass > HEAVIEST * arm.own_mass:
-            yield f"attachment.{i}.mass = {shown(each.mass)}: {each.mass / arm.own_mass:.1g} times the link's; in kg?"
+    rotor = (motor.rotor_inertia, motor.reflected_inertia / beam) if motor else (0.0, 0.0)
+    heavy, far = "{:.1g} times the link's; in kg?", "{:.3g} times the link's length; its unit is m, not mm"
+    limits = (  # key, value, its ratio, the largest ratio, and the warning
+        ("hub.inertia", hub.inertia, hub.inertia / beam, HEAVIEST, "{:.1g} times the link's; in kg m^2?"),
+        ("payload.mass", payload.mass, payload.mass / mass, HEAVIEST, heavy),
+        ("payload.inertia", payload.inertia, radius / length, 1.0,
+         f"a radius of gyration of {radius:.3g} m, above the link's length; in kg m^2?"),
+        ("hub.radius", hub.radius, hub.radius / length, FARTHEST_OFFSET, far),
+        ("payload.offset", abs(payload.offset), abs(payload.offset) / length, FARTHEST_OFFSET, far),
+        ("clamp.stiffness", arm.clamp.stiffness, bending / arm.clamp.stiffness, YIELDING,
+         "a clamp {:.2g} times as flexible as its link; its unit is N m/rad"),
+        ("hub.friction", hub.friction, hub.friction / critical, MOST_FRICTION,
+         "{:.2g} times the critical damping of the first mode; its unit is N m s/rad, on the hub's side of a gear"),
+        ("motor.rotor_inertia", *rotor, HEAVIEST,
+         "through the gear {:.1g} times the link's; its unit is kg m^2, before the gear"),
+        *((f"attachment.{i}.mass", each.mass, each.mass / mass, HEAVIEST, heavy)
+          for i, each in enumerate(arm.attachments, 1)),
+    )  # fmt: skip
+    for key, value, ratio, most, text in limits:
+        if most < ratio < math.inf:
+            yield f"{key} = {shown(value)}: {text.format(ratio)}"

@@ -1,7 +1,4 @@
-"""From a preset's name or a file's path to an Arm.
-
-A file is data: it is measured before it is parsed, and never run.
-"""
+"""Arms of presets and TOML files.  The size and nesting of a file are checked before it is parsed."""
 
 from __future__ import annotations
 
@@ -18,8 +15,8 @@ from tfarm.files import read_file
 
 PRESETS = files("tfarm.arm") / "presets"
 MOST_ARM_BYTES = 64 * 1024  # of an arm's file; that of 64 segments has 15 KB
-# tomllib takes seconds on one dotted key of 40 KB and recurses on every bracket; an arm's file needs
-# a line of text and a depth of two.
+# tomllib needs seconds for one dotted key of 40 KB and recurses on every bracket; an arm's file has short lines and a
+# depth of two.
 LONGEST_LINE = 8192  # characters
 MOST_DOTS = 64  # in a line
 MOST_BRACKETS = 16  # brackets open at once
@@ -27,25 +24,25 @@ MOST_BRACKETS = 16  # brackets open at once
 
 @cache
 def presets() -> tuple[str, ...]:
-    """The names of the arms that come with tfarm."""
+    """Return the names of the arms that come with tfarm."""
     return tuple(sorted(p.name.removesuffix(".toml") for p in PRESETS.iterdir() if p.name.endswith(".toml")))
 
 
 def load(name_or_path: str | os.PathLike[str]) -> Arm:
-    """The arm of a preset's name or of a TOML file's path."""
+    """Return the arm of a preset's name or of a TOML file's path.  Raises ParameterError, naming the file."""
     return arm_in(*load_tables(name_or_path))
 
 
 def arm_in(table: dict[str, Any], file: str) -> Arm:
-    """The arm of the parsed TOML of a file of that name."""
-    from tfarm.arm.schema import arm_of_table  # here, because pydantic takes a while to import
+    """Return the arm of the parsed TOML of a file of that name."""
+    from tfarm.arm.schema import arm_of_table  # here, as the import of pydantic is slow
 
     with naming(file):
         return arm_of_table(table)
 
 
 def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
-    """The parsed TOML behind a preset's name or a path, and the file's name: for rooms with tables of their own."""
+    """Return the parsed TOML of a preset's name or a path, and the file's name."""
     is_named = not isinstance(name_or_path, os.PathLike)
     name: object = name_or_path if is_named else os.fspath(name_or_path)
     if not isinstance(name, str) or not name.strip() or "\0" in name:
@@ -63,7 +60,7 @@ def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], s
 
 
 def decoded(data: bytes, remedy: str) -> str:
-    """The text of a file in UTF-8.  Raises ParameterError, naming the first byte that is none, with the remedy."""
+    """Return the text of a file in UTF-8.  Raises ParameterError, naming the first other byte, with the remedy."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -72,36 +69,31 @@ def decoded(data: bytes, remedy: str) -> str:
 
 
 def _table_of(data: bytes) -> dict[str, Any]:
-    """The TOML table, after a look at what would choke the parser.
+    """Return the TOML table of a file.
 
-    Its complaint stands with the line it is about, the last one where it names none.
+    Raises ParameterError for lines and brackets that would slow the parser down, and for its errors, each with its
+    line, the last one where the error has none.
     """
     text = decoded(data, "is not UTF-8; save the file as UTF-8")
-    _check(text)
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        what, _, where = str(error).rstrip(")").partition(" (at ")
-        number = re.match(r"line (\d+)", where)
-        line = text.split("\n")[int(number[1]) - 1 if number else -1]
-        raise ParameterError(key=where or "TOML", value=line, remedy=f"is not TOML: {what}") from None
-    except (ValueError, RecursionError):
-        remedy = "an integer of thousands of digits, or brackets nested too deep"
-        raise ParameterError(key="TOML", value=text, remedy=remedy) from None
-
-
-def _check(text: str) -> None:
-    """Refuse what tomllib takes seconds for: a long line, one of many dots, and brackets in brackets in brackets."""
-    lines = text.split("\n")
+    lines, depth = text.split("\n"), 0
     for i, line in enumerate(lines, 1):
         for number, what, most in ((len(line), "characters", LONGEST_LINE), (line.count("."), "dots", MOST_DOTS)):
             if number > most:
                 remedy = f"{number} {what} in a line; at most {most}"
                 raise ParameterError(key=f"line {i}", value=line, remedy=remedy)
-    depth = 0
     for bracket in re.finditer(r"[\[\]{}]", text):
         depth = depth + 1 if bracket[0] in "[{" else max(depth - 1, 0)
         if depth > MOST_BRACKETS:
             i = text.count("\n", 0, bracket.start()) + 1
             remedy = f"more than {MOST_BRACKETS} brackets open; an arm's file needs no nesting"
             raise ParameterError(key=f"line {i}", value=lines[i - 1], remedy=remedy)
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        what, _, where = str(error).rstrip(")").partition(" (at ")
+        at = re.match(r"line (\d+)", where)
+        line = lines[int(at[1]) - 1 if at else -1]
+        raise ParameterError(key=where or "TOML", value=line, remedy=f"is not TOML: {what}") from None
+    except (ValueError, RecursionError):
+        remedy = "an integer of thousands of digits, or brackets nested too deep"
+        raise ParameterError(key="TOML", value=text, remedy=remedy) from None

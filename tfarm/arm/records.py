@@ -1,7 +1,4 @@
-"""What is analysed: a hub, a flexible link of one or more segments and a payload, with whatever else a rig has.
-
-Frozen, checked once, SI units.
-"""
+"""The arm or rig as a frozen record in SI units: hub, flexible link of one or more segments, payload, other parts."""
 
 from __future__ import annotations
 
@@ -24,11 +21,11 @@ from tfarm.arm.checks import (
 )
 from tfarm.arm.link import Link
 from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring, brief_repr
-from tfarm.errors import ParameterError, did_you_mean, shown
+from tfarm.errors import ParameterError, must_be_known, shown
 
-MOST_PARTS = 64  # segments, and attachments: more than any rig has, and 64 equal pieces are a check of the chain
-FLATTEST = 1e-3  # arm's length over a segment's radius of gyration: below it the units are mixed up
-LENGTH_ROUNDING = 1e-12  # of the length: what a person's sum of up to 64 decimal lengths may differ from ours
+MOST_PARTS = 64  # segments, and attachments: a check of the chain has 64 equal pieces
+FLATTEST = 1e-3  # arm's length over a segment's radius of gyration: below it the units are wrong
+LENGTH_ROUNDING = 1e-12  # of the length: rounding of a sum of up to 64 decimal lengths
 
 _Part = TypeVar("_Part")
 
@@ -37,10 +34,11 @@ _Part = TypeVar("_Part")
 class Arm:
     """A hub, a flexible link and a payload, with the assumptions that every report repeats.
 
-    `link` is the segment at the hub, the only one of the paper's arm, and `outer` are those that follow it outwards.
-    The `clamp` yields between hub and link, `hub.radius` from the axis, the `joint` (gear, shaft) at the axis.
-    The `gauge` reads what the law feeds back as the root moment.  `theory` is one of `THEORIES`; `input` one of
-    `INPUTS`, what drives the hub.
+    `link` is the segment at the hub, the only one of the paper's arm; `outer` are the other segments, outwards.  The
+    `clamp` is the spring between hub and link, at `hub.radius` from the axis, the `joint` (gear, shaft) that at the
+    axis.  The `gauge` measures the root moment of the law.  `theory` is one of `THEORIES`, `input` one of `INPUTS`.
+    Raises ParameterError for an attachment or gauge off the link, a pinned payload on the axis, a motor's input
+    without a motor, and a motor on a locked hub.
     """
 
     link: Link
@@ -62,24 +60,25 @@ class Arm:
         object.__setattr__(self, "assumptions", plain_texts(self.assumptions))
         object.__setattr__(self, "outer", _parts("outer", self.outer, Link, MOST_PARTS - 1))
         object.__setattr__(self, "attachments", _parts("attachments", self.attachments, Attachment, MOST_PARTS))
-        _one_of("theory", self.theory, THEORIES)
-        _one_of("input", self.input, INPUTS)
-        self._check_slenderness()
+        must_be_known("theory", self.theory, THEORIES)
+        must_be_known("input", self.input, INPUTS)
+        slenderness = min(self.length / link.section.radius_of_gyration for link in self.links)  # of the whole length
+        if slenderness < FLATTEST:
+            remedy = f"{slenderness:.3g} times the section's radius of gyration is no beam; check the units"
+            raise ParameterError(key="length" if self.outer else "link.length", value=self.length, remedy=remedy)
         self._check_places()
-        self._check_motor()
+        if self.motor is None and self.input in ("motor_voltage", "motor_current"):
+            remedy = "there is no motor; describe it under [motor], or take hub_torque or hub_angle"
+            raise ParameterError(key="input", value=self.input, remedy=remedy)
+        if self.motor is not None and math.isinf(self.hub.inertia):
+            remedy = "locks the hub, so the motor has no effect; leave out the motor, or give the hub's own inertia"
+            raise ParameterError(key="hub.inertia", value=self.hub.inertia, remedy=remedy)
 
     def __repr__(self) -> str:
         return brief_repr(self, always=4)
 
-    def _check_slenderness(self) -> None:
-        """A segment may be as short as one likes, the whole arm may not."""
-        slenderness = min(self.length / link.section.radius_of_gyration for link in self.links)
-        if slenderness < FLATTEST:
-            remedy = f"{slenderness:.3g} times the section's radius of gyration is no beam; check the units"
-            raise ParameterError(key="length" if self.outer else "link.length", value=self.length, remedy=remedy)
-
     def _check_places(self) -> None:
-        """Attachments on the link, those at the tip exactly there; no pin on the axis, which stands anyway."""
+        """Check the places of attachments, gauge and pin; move an attachment that rounding has put beyond the tip."""
         end = self.length * (1 + LENGTH_ROUNDING)
         places = [(f"attachment.{i}", each.x, end) for i, each in enumerate(self.attachments, 1)]
         for part, x, most in [*places, ("gauge", self.gauge.x, self.length)]:
@@ -89,16 +88,8 @@ class Arm:
         on_it = tuple(each if each.x <= self.length else replace(each, x=self.length) for each in self.attachments)
         object.__setattr__(self, "attachments", on_it)
         if math.isinf(self.payload.mass) and abs(self.centre_distance) < 1e-9 * (self.hub.radius + self.length):
-            remedy = "puts the pinned centre of mass on the axis, which stands anyway; give a finite payload.mass"
+            remedy = "puts the pinned centre of mass on the axis, which is fixed anyway; give a finite payload.mass"
             raise ParameterError(key="payload.offset", value=self.payload.offset, remedy=remedy)
-
-    def _check_motor(self) -> None:
-        if self.motor is None and self.input in ("motor_voltage", "motor_current"):
-            remedy = "there is no motor; describe it under [motor], or take hub_torque or hub_angle"
-            raise ParameterError(key="input", value=self.input, remedy=remedy)
-        if self.motor is not None and math.isinf(self.hub.inertia):
-            remedy = "cannot turn, so the motor does nothing; leave out the motor, or give the hub's own inertia"
-            raise ParameterError(key="hub.inertia", value=self.hub.inertia, remedy=remedy)
 
     @property
     def links(self) -> tuple[Link, ...]:
@@ -112,7 +103,7 @@ class Arm:
 
     @property
     def reach(self) -> float:
-        """r + L [m], from the axis to the tip: a rigid arm turned by theta has moved its tip by (r + L) theta."""
+        """r + L [m], from the axis to the tip."""
         return self.hub.radius + self.length
 
     @property
@@ -126,23 +117,13 @@ class Arm:
         return math.fsum(link.rhoA * link.length for link in self.links)
 
     @property
-    def payload_mass(self) -> float:
-        """m [kg], at the tip; inf where that is pinned."""
-        return self.payload.mass
-
-    @property
-    def payload_inertia(self) -> float:
-        """I_c [kg m^2], about the payload's own centre of mass."""
-        return self.payload.inertia
-
-    @property
     def damping(self) -> float:
         """C [s] of the bending moment E I (1 + C s); of several segments the largest."""
         return max(link.damping for link in self.links)
 
     @property
     def is_undamped(self) -> bool:
-        """Whether nothing dissipates: then every frequency is real, and theorems hold that do not otherwise."""
+        """Whether nothing dissipates: then every natural frequency is real."""
         springs, motor = (self.clamp.damping, self.joint.damping), self.motor
         losses = [self.damping, *springs, self.hub.friction]
         if motor is not None:
@@ -151,17 +132,17 @@ class Arm:
 
     @property
     def is_reactive(self) -> bool:
-        """Whether nothing dissipates and the input acts at once: at s = i w all but odd powers of s is real."""
+        """Whether nothing dissipates and no input lags: at s = i w all but odd powers of s is real."""
         return self.is_undamped and not self.input_lags
 
     @property
-    def is_told_by_lyapunov(self) -> bool:
-        """Whether, besides, the gauge reads the hub's moment: then a theorem tells every mode under any law."""
+    def has_lyapunov_theorem(self) -> bool:
+        """Whether it is reactive with the gauge at the hub: then a theorem decides on each mode under any law."""
         return self.is_reactive and self.reads_hub_moment
 
     @property
     def is_uniform(self) -> bool:
-        """Whether it is an arm as the paper has it: one segment on a hub, a payload centred on the tip, no more."""
+        """Whether it is an arm as in the paper: one segment on a hub, a payload centred on the tip, no other part."""
         hub, spare = self.hub, (self.outer, self.motor, self.attachments, self.payload.offset, self.gauge.x)
         plain = not any((hub.friction, hub.radius, hub.stiffness, *spare))
         return plain and self.clamp.is_rigid and self.joint.is_rigid
@@ -173,30 +154,30 @@ class Arm:
 
     @property
     def has_elastic_link(self) -> bool:
-        """Whether no segment is damped: C = 0 throughout, whatever hub, clamp and joint lose."""
+        """Whether C = 0 in every segment; hub, clamp and joint may dissipate."""
         return self.damping == 0.0
 
     @property
     def has_massless_hub(self) -> bool:
-        """Whether nothing at the hub resists its turning and r = 0: then the root moment is -u at every instant."""
+        """Whether the hub has no inertia, friction or stiffness, and r = 0: then the root moment is -u."""
         friction = self.hub.friction + (self.motor.rotor_friction if self.motor else 0.0)
         back_emf = self.motor is not None and self.input == "motor_voltage" and self.motor.back_emf_constant > 0.0
-        elsewhere = self.hub.radius or self.gauge.x  # the gauge reads another moment
+        elsewhere = self.hub.radius or self.gauge.x  # the gauge measures another moment
         return not (self.hub_side_inertia or friction or self.hub.stiffness or elsewhere or back_emf)
 
     @property
     def bending_scale(self) -> float:
-        """E I/L [N m] of the hub's segment and the whole length: the moment that bends the arm by an angle of 1."""
+        """E I/L [N m] of the hub's segment and the whole length."""
         return self.link.EI / self.length
 
     @property
     def is_locked(self) -> bool:
-        """Whether the hub's angle drives, not a torque: I_h = inf, or the angle is the input."""
+        """Whether the hub angle is the input instead of a torque: I_h = inf, or `input` says so."""
         return math.isinf(self.hub.inertia) or self.input == "hub_angle"
 
     @property
     def input_unit(self) -> str:
-        """The SI unit of the input, "rad" where the hub is locked: N m, V or A of one that turns."""
+        """The SI unit of the input: "rad" where the hub is locked, else N m, V or A."""
         return INPUT_UNITS["hub_angle" if self.is_locked else self.input]
 
     @property
@@ -209,7 +190,7 @@ class Arm:
         return math.isfinite(self.total_inertia) and not is_held
 
     def _springs_to_ground(self) -> Iterator[tuple[str, float]]:
-        """The key and the stiffness of each spring that could hold the rig."""
+        """Yield the key and the stiffness of each spring to ground."""
         yield "hub.stiffness", self.hub.stiffness
         for i, each in enumerate(self.attachments, 1):
             on_axis = not (each.x or self.hub.radius)  # where nothing moves
@@ -220,23 +201,23 @@ class Arm:
     def shear_cutoff(self) -> float:
         """sqrt(kGA/rhoI) [rad/s], above which both pairs of waves travel; of several segments the lowest.
 
-        A theory without shear or without rotary inertia has but one that ever travels (`has_cutoff`).
+        In a theory without shear or rotary inertia only one pair travels at any frequency (`has_cutoff`).
         """
         return min(math.sqrt(link.kGA / link.rhoI) for link in self.links)
 
     @property
     def has_cutoff(self) -> bool:
-        """Whether its waves change at `shear_cutoff`: they do in Timoshenko's theory alone."""
+        """Whether `shear_cutoff` applies: in Timoshenko's theory alone."""
         return self.theory in WITH_SHEAR and self.theory in WITH_ROTARY_INERTIA
 
-    # ------------------------------------------------------------ as a rigid body on a motor, seen from the hub
+    # ------------------------------------------------------------ rigid body and motor, at the hub
 
     @property
     def total_inertia(self) -> float:
         """J = I_h + N^2 J_m + sum of the segments and attachments + m (r + L + e)^2 + I_c [kg m^2], about the axis.
 
         A segment from a to a + L has rhoA (L^3/3 + a L (a + L)) + rhoI L, without rhoI where the theory has no rotary
-        inertia.  inf where the hub or the payload says so.
+        inertia.  inf where that of the hub or the payload is.
         """
         beam = math.fsum(self._segment_inertias())
         payload = self.payload.mass * self.centre_distance**2
@@ -252,29 +233,24 @@ class Arm:
             a += L
 
     @property
-    def hub_inertia(self) -> float:
-        """I_h [kg m^2]."""
-        return self.hub.inertia
-
-    @property
     def hub_side_inertia(self) -> float:
         """I_h + N^2 J_m [kg m^2], of hub and rotor."""
         return self.hub.inertia + (self.motor.reflected_inertia if self.motor else 0.0)
 
     @property
     def carried_inertia(self) -> float:
-        """J - I_h - N^2 J_m [kg m^2], of what the hub carries."""
+        """J - I_h - N^2 J_m [kg m^2], of link, payload and attachments."""
         return self.total_inertia - self.hub_side_inertia
 
     @property
     def reads_hub_moment(self) -> bool:
-        """Whether the gauge reads the moment that turns the hub: it is at the root, r = 0, no inertia at the clamp."""
+        """Whether the gauge measures the moment on the hub: it is at the root, r = 0, no inertia at the clamp."""
         at_clamp = any(each.x == 0 and (each.inertia or each.rotational_stiffness) for each in self.attachments)
         return self.hub.radius == 0 and self.gauge.x == 0 and not at_clamp
 
     @property
     def input_per_torque(self) -> float:
-        """What one N m of torque at the hub takes of the input: 1, or of a motor's current [A] or voltage [V]."""
+        """The input for a torque of 1 N m at the hub: 1, or a motor's current [A] or voltage [V]."""
         if self.motor is None or self.input not in ("motor_current", "motor_voltage"):
             return 1.0
         per_ampere = self.motor.gear_efficiency * self.motor.gear_ratio * self.motor.torque_constant
@@ -282,22 +258,22 @@ class Arm:
 
     @property
     def input_lags(self) -> bool:
-        """Whether the input is a voltage behind an inductance, whose torque comes late."""
+        """Whether the input is the voltage of a motor with an inductance."""
         return self.input == "motor_voltage" and self.motor is not None and self.motor.inductance > 0
 
     @property
     def loses_at_hub_alone(self) -> bool:
-        """Whether nothing but the hub's own friction, the rotor's and back-EMF dissipates."""
+        """Whether only friction of hub and rotor and the back-EMF dissipate."""
         return not any((*(link.damping for link in self.links), self.clamp.damping, self.joint.damping))
 
     @property
     def _turning_friction(self) -> float:
-        """b + N^2 b_m [N m s/rad], of hub and rotor as the hub feels it."""
+        """b + N^2 b_m [N m s/rad], of hub and rotor at the hub."""
         return self.hub.friction + (self.motor.gear_ratio**2 * self.motor.rotor_friction if self.motor else 0.0)
 
     @property
     def rate_loss(self) -> float:
-        """What the input must give for 1 rad/s: of N m for b + N^2 b_m, and of a voltage N Ke for the back-EMF too."""
+        """The input for a rate of 1 rad/s: that for b + N^2 b_m and, of a voltage, N Ke for the back-EMF."""
         if self.motor is None:
             return self.hub.friction
         back_emf = self.motor.gear_ratio * self.motor.back_emf_constant if self.input == "motor_voltage" else 0.0
@@ -305,7 +281,7 @@ class Arm:
 
     @property
     def turned_inertia(self) -> float:
-        """J in units of the input [N m s^2, A s^2 or V s^2]; with an inductance what friction adds through L_a/R."""
+        """J in units of the input [N m s^2, A s^2 or V s^2]; with an inductance plus L_a/R times the friction."""
         lag = 0.0
         if self.motor is not None and self.input == "motor_voltage":
             lag = self.motor.inductance / self.motor.resistance * self._turning_friction
@@ -313,7 +289,7 @@ class Arm:
 
     @property
     def gauged_inertia(self) -> float:
-        """-M(0)/theta_tt [kg m^2] of the slowly turning rig: J without hub and rotor where the clamp is on the axis."""
+        """-M(0)/theta_tt [kg m^2] of the rigid rig: J without hub and rotor where the clamp is on the axis."""
         if self.reads_hub_moment:
             return self.carried_inertia
         r, at = self.hub.radius, self.gauge.x
@@ -332,10 +308,10 @@ class Arm:
     # ------------------------------------------------------------ other arms
 
     def having(self, **numbers: float) -> Arm:
-        """The arm with other numbers: of `ADJUSTABLE`, by name, in SI units.  Raises ParameterError as its parts do.
+        """Return the arm with other values of numbers in `ADJUSTABLE`, in SI units.
 
-        The damping is that of every segment.  A hub that an infinite inertia locks is left without its friction, spring
-        and motor, which then do nothing.
+        The damping is that of every segment.  A hub locked by an infinite inertia loses its friction, spring and motor.
+        Raises ParameterError for an illegal value, and for a length of several segments.
         """
         arm = self
         for name, value in numbers.items():
@@ -345,7 +321,7 @@ class Arm:
                 arm = replace(arm, link=replace(arm.link, damping=value), outer=others)
                 continue
             if room == "link" and arm.outer:
-                remedy = f"which of the {len(arm.links)} segments is meant? write their [[link]] tables anew"
+                remedy = f"ambiguous, as there are {len(arm.links)} segments: change their [[link]] tables"
                 raise ParameterError(key=name, value=value, remedy=remedy)
             if name == "hub_inertia" and value == math.inf:
                 idle = replace(arm.hub, friction=0.0, stiffness=0.0)
@@ -355,23 +331,23 @@ class Arm:
         return arm
 
     def under(self, theory: Theory) -> Arm:
-        """The same under another of `THEORIES`.  Raises ParameterError for what is none."""
+        """Return the arm under another of `THEORIES`.  Raises ParameterError for an unknown one."""
         return replace(self, theory=theory)
 
     @property
     def elastic(self) -> Arm:
-        """The same with C = 0 in every segment."""
+        """The arm with C = 0 in every segment."""
         return self if self.has_elastic_link else self.having(damping=0.0)
 
     @property
     def lossless(self) -> Arm:
-        """The same without anything that dissipates."""
+        """The arm without dissipation."""
         clamp, joint = replace(self.clamp, damping=0.0), replace(self.joint, damping=0.0)
         return replace(self.elastic.lossless_hub, clamp=clamp, joint=joint)
 
     @property
     def lossless_hub(self) -> Arm:
-        """The same without what `rate_loss` counts: friction of hub and rotor, and back-EMF."""
+        """The arm without friction of hub and rotor and without back-EMF, the parts of `rate_loss`."""
         motor = self.motor and replace(self.motor, rotor_friction=0.0, back_emf_constant=0.0)
         return replace(self, hub=replace(self.hub, friction=0.0), motor=motor)
 
@@ -386,14 +362,14 @@ ADJUSTABLE = {  # numbers of an arm by name: the part and the field that hold th
 
 
 def must_be_arm(arm: object) -> None:
-    """Raise ParameterError where a name, a path or anything else stands in the place of an Arm."""
+    """Raise ParameterError for anything but an Arm."""
     if not isinstance(arm, Arm):
         name = str(arm) if isinstance(arm, str | os.PathLike) else "sasaki2012"
         raise ParameterError(key="arm", value=arm, remedy=f"is no Arm; give tfarm.load({shown(name)})")
 
 
 def must_turn(arm: Arm) -> None:
-    """Raise ParameterError, naming the infinite part or the spring, for an arm that cannot slew: something holds it."""
+    """Raise ParameterError, naming the infinite part or the spring, for an arm that cannot slew."""
     parts = {
         "hub.inertia": arm.hub.inertia,
         "payload.mass": arm.payload.mass,
@@ -404,19 +380,14 @@ def must_turn(arm: Arm) -> None:
         raise ParameterError(key=key, value=value, remedy="an arm that cannot turn has no slew; give finite inertias")
     for key, value in arm._springs_to_ground():
         if value > 0.0:
-            remedy = "an arm that a spring ties to the ground has no slew; leave the spring out"
+            remedy = "an arm with a spring to ground has no slew; leave the spring out"
             raise ParameterError(key=key, value=value, remedy=remedy)
 
 
 def _parts(key: str, parts: object, kind: type[_Part], most: int) -> tuple[_Part, ...]:
-    """A tuple of at most so many records of one kind."""
+    """Return a tuple of at most `most` records of one kind.  Raises ParameterError for anything else."""
     if not isinstance(parts, list | tuple) or not all(isinstance(part, kind) for part in parts):
         raise ParameterError(key=key, value=parts, remedy=f"give a tuple of {kind.__name__} records")
     if len(parts) > most:
-        raise ParameterError(key=key, value=len(parts), remedy=f"at most {most} are taken")
+        raise ParameterError(key=key, value=len(parts), remedy=f"at most {most}")
     return tuple(parts)
-
-
-def _one_of(key: str, value: object, known: tuple[str, ...]) -> None:
-    if value not in known:
-        raise ParameterError(key=key, value=value, remedy=f"unknown; {did_you_mean(str(value), known)}")

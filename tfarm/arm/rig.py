@@ -1,4 +1,4 @@
-"""The parts of a rig besides its link: hub, springs, motor, attachments, payload.  Frozen, checked once, SI units.
+"""The parts of a rig other than its link, as frozen records in SI units: hub, springs, motor, attachments, payload.
 
 Letters: I_h, b, r of the hub; k, c of a rotary spring; R, L_a, Kt, Ke, N, J_m, b_m, eta of the motor; m, I_c, e of the
 payload.
@@ -15,7 +15,7 @@ from tfarm.errors import ParameterError
 
 
 def differing(record: Any, always: int) -> dict[str, Any]:
-    """The first `always` fields of a record's repr, and of the others those that differ from their defaults."""
+    """Return the first `always` fields of a record's repr, and those of the others that differ from their defaults."""
     found = {}
     for i, each in enumerate(known for known in fields(record) if known.repr):
         value = getattr(record, each.name)
@@ -26,16 +26,16 @@ def differing(record: Any, always: int) -> dict[str, Any]:
 
 
 def brief_repr(record: Any, always: int) -> str:
-    """The repr of a record with no more in it than `differing` has."""
+    """Return the repr of a record with the fields of `differing` alone."""
     shown = ", ".join(f"{name}={value!r}" for name, value in differing(record, always).items())
     return f"{type(record).__name__}({shown})"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hub:
-    """The hub: `inertia` I_h [kg m^2] (inf locks it, 0 leaves a free pin), viscous `friction` b [N m s/rad].
+    """The hub: `inertia` I_h [kg m^2] (inf: locked, 0: free pin), viscous `friction` b [N m s/rad].
 
-    `radius` r [m] lies between the axis and the clamp; `stiffness` [N m/rad] is a spring to ground.
+    `radius` r [m] is the distance from the axis to the clamp; `stiffness` [N m/rad] is a spring to ground.
     """
 
     inertia: float
@@ -54,7 +54,7 @@ class Hub:
         check_fields(self, "hub", not_negative, meanings)
         for name in ("friction", "stiffness"):
             if math.isinf(self.inertia) and getattr(self, name) > 0.0:
-                remedy = f"does nothing: with inertia = inf the hub cannot turn; leave out the {name}, or the inf"
+                remedy = f"no effect, as inertia = inf locks the hub; leave out the {name}, or give a finite inertia"
                 raise ParameterError(key=f"hub.{name}", value=getattr(self, name), remedy=remedy)
 
     def __repr__(self) -> str:
@@ -63,7 +63,7 @@ class Hub:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RotarySpring:
-    """A rotary spring with a dashpot beside it: `stiffness` k [N m/rad] (inf: rigid), `damping` c [s], k (1 + c s)."""
+    """A rotary spring and dashpot in parallel: `stiffness` k [N m/rad] (inf: rigid), `damping` c [s], k (1 + c s)."""
 
     stiffness: float = math.inf
     damping: float = 0.0
@@ -76,12 +76,12 @@ class RotarySpring:
         damping = "damping c is zero or a positive time in seconds, as in k (1 + c s)"
         check_fields(self, "spring", not_negative, {"damping": damping})
         if self.damping > 0.0 and self.is_rigid:
-            remedy = "nothing yields that could be damped: give a finite stiffness in N m/rad, or leave the damping out"
+            remedy = "a rigid spring has no damping: give a finite stiffness in N m/rad, or leave the damping out"
             raise ParameterError(key="spring.damping", value=self.damping, remedy=remedy)
 
     @property
     def is_rigid(self) -> bool:
-        """Whether it does not yield at all: k = inf."""
+        """Whether k = inf."""
         return math.isinf(self.stiffness)
 
 
@@ -89,9 +89,9 @@ class RotarySpring:
 class Motor:
     """A geared DC motor: `resistance` R [ohm], `inductance` L_a [H], `torque_constant` Kt [N m/A].
 
-    `back_emf_constant` Ke [V s/rad] is Kt unless given; `gear_ratio` N is motor turns per hub turn.  On the motor's
+    `back_emf_constant` Ke [V s/rad] is Kt by default; `gear_ratio` N is motor turns per hub turn.  On the motor's
     side of the gear: `rotor_inertia` J_m [kg m^2] and `rotor_friction` b_m [N m s/rad].  `gear_efficiency` eta [-]
-    holds in the direction from motor to hub: u = eta N Kt i.
+    is that from motor to hub: u = eta N Kt i.
     """
 
     resistance: float
@@ -127,15 +127,15 @@ class Motor:
 
     @property
     def reflected_inertia(self) -> float:
-        """N^2 J_m [kg m^2], the rotor's inertia as the hub feels it."""
+        """N^2 J_m [kg m^2], the rotor's inertia at the hub."""
         return self.gear_ratio**2 * self.rotor_inertia
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attachment:
-    """What sits on the link at `x` [m] from the clamp: a `mass` [kg], an `inertia` [kg m^2], springs to ground.
+    """A body on the link at `x` [m] from the clamp: `mass` [kg], `inertia` [kg m^2], springs to ground.
 
-    `stiffness` [N/m] resists the displacement there, `rotational_stiffness` [N m/rad] the rotation.
+    `stiffness` [N/m] is that of its displacement, `rotational_stiffness` [N m/rad] that of its rotation.
     """
 
     x: float
@@ -154,20 +154,20 @@ class Attachment:
         }
         check_fields(self, "attachment", not_negative, meanings)
         if not (self.mass or self.inertia or self.is_held):
-            remedy = "there is nothing in it: give a mass, an inertia, a stiffness or a rotational_stiffness"
+            remedy = "an empty attachment: give a mass, an inertia, a stiffness or a rotational_stiffness"
             raise ParameterError(key="attachment.x", value=self.x, remedy=remedy)
 
     @property
     def is_held(self) -> bool:
-        """Whether a spring ties it to the ground."""
+        """Whether it has a spring to ground."""
         return self.stiffness > 0.0 or self.rotational_stiffness > 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gauge:
-    """The strain gauge whose moment is fed back, at `x` [m] from the clamp: 0 at the root, as the paper has it.
+    """The strain gauge whose moment is fed back, at `x` [m] from the clamp: 0, the root, in the paper.
 
-    At a joint of two segments, or where something is attached, it sits on the outer side unless `side` is "inner".
+    At a joint of two segments, or at an attachment, it is on the outer side unless `side` is "inner".
     """
 
     x: float = 0.0
@@ -184,7 +184,7 @@ class Gauge:
 class Payload:
     """The payload: `mass` m [kg] (inf pins its centre), `inertia` I_c [kg m^2] about its own centre of mass.
 
-    An infinite inertia forbids tip rotation; `offset` e [m] is how far the centre lies beyond the tip, of any sign.
+    An infinite inertia locks the tip's rotation; `offset` e [m], of any sign, is that of the centre beyond the tip.
     """
 
     mass: float = 0.0

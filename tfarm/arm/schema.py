@@ -1,16 +1,11 @@
-"""A TOML table is declared by what it builds: a strict pydantic model with the parameters of a record's constructor.
+"""The tables of an arm's TOML file as strict pydantic models, each with the parameters of its record's constructor.
 
-What an arm's TOML file may hold: strict pydantic models at the file's edge, which build the records.
-
-Types and names are checked here, physics in the records.
-
-From a parsed TOML table to the arm; the first problem becomes one ParameterError.
+Types and names are checked here, physics in the records.  The first problem of a file becomes one ParameterError.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache
 from inspect import Parameter, signature
 from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_type_hints
 
@@ -26,42 +21,35 @@ from tfarm.errors import MISSING, ParameterError, did_you_mean
 _Strict = TypeVar("_Strict", bound="StrictTable")
 _Table = TypeVar("_Table", bound="TomlTable")
 _Part = TypeVar("_Part")
-LOOP_TABLES = ("sampling", "converters", "actuator", "slew", "law")  # of the loop: others read them
-AT_THE_TOP = ("name", "assumptions", "theory", "input")  # no tables: they stand before the first
+LOOP_TABLES = ("sampling", "converters", "actuator", "slew", "law")  # of the loop: read by other rooms
+AT_THE_TOP = ("name", "assumptions", "theory", "input")  # keys before the first table
 
 
 class StrictTable(BaseModel):
-    """What a file says: no unknown keys, no conversions."""
+    """A table without unknown keys and conversions."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
 class TomlTable(StrictTable):
-    """A TOML table of a record's numbers."""
+    """A TOML table of the numbers of a record."""
 
     makes: ClassVar[Callable[..., Any]]
+    parameters: ClassVar[frozenset[str]]  # their names, read once: a fit builds a thousand arms
 
     def given(self) -> dict[str, Any]:
-        """What the file says, and nothing that it leaves out."""
+        """Return the keys of the file alone, without defaults."""
         return {name: getattr(self, name) for name in self.model_fields_set}
 
     def build(self) -> Any:
-        """What the table declares.  Raises ParameterError where its numbers make none."""
-        known = _parameters(type(self).makes)
-        return type(self).makes(**{name: value for name, value in self.given().items() if name in known})
-
-
-@cache  # a fit builds a thousand arms
-def _parameters(makes: Callable[..., Any]) -> frozenset[str]:
-    """The names of a constructor's parameters."""
-    return frozenset(signature(makes).parameters)
+        """Return the record of the table.  Raises ParameterError for illegal numbers."""
+        return type(self).makes(**{name: value for name, value in self.given().items() if name in self.parameters})
 
 
 def validated(model: type[_Strict], table: object, place: str) -> _Strict:
-    """The table headed [place] of a file.
+    """Return the table headed [place] of a file.
 
-    Raises ParameterError for what is no table, or one wrong key: a misspelt one comes before those that are then
-    missing.
+    Raises ParameterError for anything but a table and for one wrong key, an unknown one before a missing one.
     """
     if not isinstance(table, dict):
         raise ParameterError(key=place, value=table, remedy=f"give a table, headed [{place}]")
@@ -73,16 +61,16 @@ def validated(model: type[_Strict], table: object, place: str) -> _Strict:
     if problem["type"] == "extra_forbidden":
         remedy = f"unknown key; {did_you_mean(word, model.model_fields)}"
     elif problem["type"] == "missing":
-        value, remedy = MISSING, f"[{place}] is nothing without it"
+        value, remedy = MISSING, f"[{place}] needs it"
     else:
         remedy = f"wrong value; {problem['msg'][:1].lower()}{problem['msg'][1:]}"
     raise ParameterError(key=f"{place}.{word}", value=value, remedy=remedy)
 
 
 def of(makes: Callable[..., Any]) -> Callable[[type[_Table]], type[_Table]]:
-    """A decorator: the table has the parameters of a dataclass, or of another constructor, as its keys.
+    """Decorate a table whose keys are the parameters of a constructor, with their names, types and defaults.
 
-    Names, types and defaults are theirs, but for keys that the class itself declares.
+    Keys of the class itself are kept.
     """
 
     def with_keys(table: type[_Table]) -> type[_Table]:
@@ -93,7 +81,7 @@ def of(makes: Callable[..., Any]) -> Callable[[type[_Table]], type[_Table]]:
             if each.name not in table.model_fields
         }
         made: type[_Table] = create_model(table.__name__, __base__=table, __doc__=table.__doc__, **own)
-        made.makes = makes
+        made.makes, made.parameters = makes, frozenset(hints) & frozenset(signature(makes).parameters)
         return made
 
     return with_keys
@@ -129,7 +117,7 @@ class General(TomlTable):
 
 @of(Link)
 class LinkTable(TomlTable):
-    """[link], or one [[link]] of several: exactly one of shear_modulus and poissons_ratio."""
+    """[link], or one [[link]] of several, with either shear_modulus or poissons_ratio."""
 
     shear_modulus: float | None = None
     poissons_ratio: float | None = None
@@ -196,9 +184,7 @@ class ArmTable(TomlTable):
         alone = len(self.link) == 1
         link, *outer = (_within("link" if alone else f"link.{i}", table.build) for i, table in enumerate(self.link, 1))
         attachments = (_within(f"attachment.{i}", table.build) for i, table in enumerate(self.attachment, 1))
-        texts: dict[str, Any] = {
-            key: getattr(self, key) for key in ("name", "theory", "input")
-        }  # the record checks them
+        texts: dict[str, Any] = self.model_dump(include={"name", "theory", "input"})  # checked by the record
         return Arm(
             **texts,
             assumptions=tuple(self.assumptions),
@@ -215,7 +201,7 @@ class ArmTable(TomlTable):
 
 
 def _within(place: str, build: Callable[[], _Part]) -> _Part:
-    """What `build` gives; a ParameterError names the table's place in the file in its key's first word."""
+    """Return `build()`; the key of a ParameterError begins with the table's place in the file."""
     try:
         return build()
     except ParameterError as error:
@@ -238,7 +224,7 @@ ARM_TABLES: dict[str, type[TomlTable]] = {
 
 
 def arm_of_table(table: dict[str, Any]) -> Arm:
-    """The arm that a parsed TOML table describes."""
+    """Return the arm of a parsed TOML table.  Raises ParameterError for the first problem."""
     own = {key: value for key, value in table.items() if key not in LOOP_TABLES}
     if isinstance(own.get("link"), dict):
         own["link"] = [own["link"]]
@@ -251,13 +237,15 @@ def arm_of_table(table: dict[str, Any]) -> Arm:
 
 
 def _in_one_line(problems: Sequence[ErrorDetails], alone: bool) -> ParameterError:
-    """The first problem; a key that is misspelt comes before the one that is then missing.
+    """Return the error of the first problem, an unknown key before a missing one.
 
-    `alone` is whether there is but one link, which then has no number.
+    `alone` is whether there is one link, which has no number.
     """
     problem = min(problems, key=lambda problem: problem["type"] != "extra_forbidden")
     place, kind = problem["loc"], problem["type"]
-    key, value = _key(place, alone), problem["input"]
+    numbered = len(place) > 1 and (place[0] == "attachment" or (place[0] == "link" and not alone))
+    words = (place[0], *([int(place[1]) + 1] if numbered else []), *_without_shape(place)[1:])  # counted from 1
+    key, value = ".".join(map(str, words if place[0] in ("link", "attachment") else place)), problem["input"]
     if kind in ("missing", "too_short"):
         return ParameterError(key=key, value=MISSING, remedy=f"give {_expected(place)}")
     if kind == "union_tag_not_found":
@@ -274,26 +262,18 @@ def _in_one_line(problems: Sequence[ErrorDetails], alone: bool) -> ParameterErro
         remedy = f"unknown shape; {did_you_mean(shape, SHAPE_TABLES)}"
         return ParameterError(key=f"{key}.shape", value=shape, remedy=remedy)
     if kind == "too_long":
-        return ParameterError(key=key, value=problem["ctx"]["actual_length"], remedy=f"at most {MOST_PARTS} are read")
+        return ParameterError(key=key, value=problem["ctx"]["actual_length"], remedy=f"at most {MOST_PARTS}")
     return ParameterError(key=key, value=value, remedy=f"wrong type; give {_expected(place)}")
 
 
-def _key(place: Sequence[str | int], alone: bool) -> str:
-    """The TOML key of a pydantic location, with the number of a [[table]] counted from 1."""
-    if place[0] not in ("link", "attachment") or len(place) == 1:
-        return ".".join(map(str, place))
-    number = () if alone and place[0] == "link" else (int(place[1]) + 1,)
-    return ".".join(map(str, (place[0], *number, *_without_shape(place)[1:])))
-
-
 def _without_shape(place: Sequence[str | int]) -> tuple[str, ...]:
-    """The names of a pydantic location: no numbers of a list, and no shape, which it has between section and key."""
+    """Return the names of a pydantic location, without list numbers and without the shape between section and key."""
     names = tuple(name for name in place if isinstance(name, str))
     return names[:2] + names[3:] if names[:2] == ("link", "section") else names
 
 
 def _expected(place: Sequence[str | int]) -> str:
-    """What a key should hold."""
+    """Return the expected value of a key in words."""
     key = ".".join(_without_shape(place))
     known = {
         "name": 'a text such as name = "my-arm"',

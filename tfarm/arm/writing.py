@@ -1,8 +1,6 @@
-"""From an Arm back to TOML: what `load` reads, to the last bit.
+"""Arms and laws as TOML that `load` and `load_law` read back to the last bit.
 
-From a Law back to TOML: what `load_law` reads, to the last bit.
-
-The numbers of an arm by their keys in its TOML file, "link.2.section.width": which there are, and other values.
+The numbers of an arm have keys, those of its TOML file, such as "link.2.section.width".
 """
 
 from __future__ import annotations
@@ -18,12 +16,12 @@ from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Law, Part
 from tfarm.arm.link import Link
 from tfarm.arm.records import Arm
-from tfarm.arm.rig import Motor, differing
+from tfarm.arm.rig import differing
 from tfarm.arm.schema import ARM_TABLES, arm_of_table
 from tfarm.errors import ParameterError, must_be_known
 from tfarm.files import write_file
 
-LAW_DEFAULTS: dict[str, Any] = {  # what a [law] is where it does not say otherwise
+LAW_DEFAULTS: dict[str, Any] = {  # of the keys of [law]
     "input": None, "delay": 0.0, "period": None, "sign": -1, "references": (), "rule": "tustin", "prewarp": 0.0,
 }  # fmt: skip
 
@@ -38,7 +36,7 @@ NUMBER_UNITS = {  # of a number by the last word of its key, in SI
 
 
 def number_unit(key: str) -> str:
-    """The SI unit of a free number; "1" where it has none, or that of its response."""
+    """Return the SI unit of a free number; "1" where it has none, or that of its response."""
     words = key.partition(":")[0].split(".")
     if words[-1] == "stiffness" and words[0] == "attachment":
         return "N/m"
@@ -46,13 +44,16 @@ def number_unit(key: str) -> str:
 
 
 def to_toml(arm: Arm) -> str:
-    """The arm as a TOML file; equal arms give equal text, so its hash names the inputs.
+    """Return the arm as a TOML file; equal arms have equal texts.
 
-    The numbers of the paper's arm are always there, all else only where it differs from its default.
+    The numbers of the paper's arm are always there, others only where they differ from their defaults.
     """
     named = {"theory": arm.theory, "input": arm.input}
-    defaults = {"theory": "timoshenko", "input": None if arm.motor else "hub_torque"}  # with a motor it is a choice
+    defaults = {"theory": "timoshenko", "input": None if arm.motor else "hub_torque"}  # required with a motor
     springs = {"clamp": arm.clamp, "joint": arm.joint}
+    motor = {} if arm.motor is None else differing(arm.motor, always=2)
+    if arm.motor is not None and arm.motor.back_emf_constant == arm.motor.torque_constant:  # its default
+        del motor["back_emf_constant"]
     tables = [
         [
             f"name = {_text(arm.name)}",
@@ -64,7 +65,7 @@ def to_toml(arm: Arm) -> str:
         *(table for link in arm.links for table in _link(link, "[[link]]" if arm.outer else "[link]")),
         ["[hub]", *_lines(differing(arm.hub, always=1))],
         *([f"[{key}]", *_lines(differing(spring, always=0))] for key, spring in springs.items() if not spring.is_rigid),
-        *([] if arm.motor is None else [["[motor]", *_motor(arm.motor)]]),
+        *([["[motor]", *_lines(motor)]] if motor else []),
         *(["[[attachment]]", *_lines(differing(each, always=1))] for each in arm.attachments),
         *([["[gauge]", f"x = {arm.gauge.x!r}", f"side = {_text(arm.gauge.side)}"]] if arm.gauge.x else []),
         ["[payload]", *_lines(differing(arm.payload, always=2))],
@@ -73,12 +74,12 @@ def to_toml(arm: Arm) -> str:
 
 
 def _lines(numbers: Mapping[str, float]) -> Iterable[str]:
-    """Python's shortest exact digits are TOML's too, and so is inf."""
+    """Return lines of a table; the repr of a float, inf too, is valid TOML."""
     return (f"{name} = {value!r}" for name, value in numbers.items())
 
 
 def _link(link: Link, heading: str) -> Iterable[list[str]]:
-    """The tables of a link and of its section: the dimensions of that, or else its area and second moment."""
+    """Yield the tables of a link and of its section, that with its dimensions or else its area and second moment."""
     names = ("length", "density", "youngs_modulus", "shear_modulus", "damping")
     yield [heading, *_lines({name: getattr(link, name) for name in names})]
     section = link.section
@@ -88,45 +89,36 @@ def _link(link: Link, heading: str) -> Iterable[list[str]]:
     yield ["[link.section]", f"shape = {_text(section.shape)}", *_lines(numbers)]
 
 
-def _motor(motor: Motor) -> Iterable[str]:
-    """The back-EMF constant stands there only where it is not the torque constant."""
-    numbers = differing(motor, always=2)
-    if motor.back_emf_constant == motor.torque_constant:
-        del numbers["back_emf_constant"]
-    return _lines(numbers)
-
-
 def _text(text: str) -> str:
-    """A TOML basic string: JSON's escapes are TOML's, and a record's texts hold only what prints."""
+    """Return a TOML basic string, with the escapes of JSON."""
     return json.dumps(text, ensure_ascii=False)
 
 
 def law_toml(law: Law) -> str:
-    """The table [law] of a law; equal laws give equal text.
+    """Return the table [law] of a law; equal laws have equal texts.
 
-    Raises ParameterError for a law with a state space, which stands in a .mat file, and for one with two blocks on a
-    signal.
+    Raises ParameterError for a law with a state space, whose form is a .mat file, and for two blocks on one signal.
     """
-    head = [f"name = {json.dumps(law.name, ensure_ascii=False)}"]
+    head = [f"name = {_text(law.name)}"]
     given = ((key, getattr(law, key), usual) for key, usual in LAW_DEFAULTS.items())
     head += [f"{key} = {_value(value)}" for key, value, usual in given if value != usual]
     names = [name for part in law.parts for name in part.signals]
     if len(set(names)) < len(names):
-        raise ParameterError(key="law", value=law.name, remedy="two blocks on one signal: add them up to be saved")
+        raise ParameterError(key="law", value=law.name, remedy="two blocks on one signal: add them up first")
     tables = [["[law]", *head], *(list(_signal(part)) for part in law.parts)]
     return "\n\n".join("\n".join(table) for table in tables) + "\n"
 
 
 def save_law(law: Law, path: Path) -> None:
-    """Write it beside, then rename."""
+    """Write a law as a TOML file.  Raises ParameterError where it cannot be written."""
     write_file(path, law_toml(law).encode(), key="--save")
 
 
 def _signal(part: Part) -> Iterable[str]:
-    """The table of one signal; a name with its place along the link is quoted."""
+    """Yield the lines of the table of one signal; a name with a place is quoted."""
     block, name = part.block, part.signals[0]
     if not isinstance(block, Rational) or len(part.signals) > 1:
-        remedy = "a state space is kept in a .mat file: scipy.io.savemat(file, {'A': ..}), matrices = file in [law]"
+        remedy = "save a state space as a .mat file: scipy.io.savemat(file, {'A': ..}), matrices = file in [law]"
         raise ParameterError(key="law", value=name, remedy=remedy)
     yield f"[law.{json.dumps(name) if '@' in name else name}]"
     if len(block.num) == len(block.den) == 1 and block.den[0] == 1.0:
@@ -137,17 +129,17 @@ def _signal(part: Part) -> Iterable[str]:
 
 
 def _value(value: Any) -> str:
-    """Python's shortest exact digits are TOML's too."""
+    """Return a TOML value; the repr of a float is valid TOML."""
     if isinstance(value, tuple):
         return f"[{', '.join(map(_value, value))}]"
     return json.dumps(value) if isinstance(value, str) else repr(value)
 
 
 class KeyedArms:
-    """The arms that an arm becomes as some of its numbers run, by their TOML keys.
+    """Arms with other values of some numbers of one arm, by their TOML keys.
 
-    Poisson's ratio stays where Young's modulus runs alone: the shear modulus goes along.  Raises ParameterError, naming
-    `what`, for a key that the arm does not have, with the nearest.
+    With Young's modulus alone the shear modulus changes too, at a constant Poisson's ratio.  Raises ParameterError,
+    naming `what`, for an unknown key, with the nearest.
     """
 
     def __init__(self, arm: Arm, keys: Sequence[str], what: str = "free") -> None:
@@ -160,7 +152,7 @@ class KeyedArms:
             raise ParameterError(key=what, value=min(repeated), remedy="is named twice; once is enough")
 
     def at(self, values: Mapping[str, float]) -> Arm:
-        """The arm with those numbers in their places.  Raises ParameterError where it is none."""
+        """Return the arm with other values of numbers.  Raises ParameterError for an illegal value."""
         table = deepcopy(self._table)
         for key, value in values.items():
             here, name = _table_of(table, key)
@@ -173,7 +165,7 @@ class KeyedArms:
         return arm_of_table(table)
 
     def value(self, key: str) -> float:
-        """The arm's own number: what its file says, or its default."""
+        """Return a number of the arm, from its file or its default."""
         place, name = _table_of(self._table, key)
         if name == "poissons_ratio":
             return float(place["youngs_modulus"] / (2 * place["shear_modulus"]) - 1)
@@ -186,7 +178,7 @@ class KeyedArms:
 
 
 def _known(table: Mapping[str, Any]) -> Iterator[str]:
-    """The keys of all numbers that the arm's file holds or could hold."""
+    """Yield the keys of all numbers of an arm's file, also of those at their defaults."""
     alone = isinstance(table["link"], dict)
     links = [table["link"]] if alone else table["link"]
     for number, link in enumerate(links, start=1):
@@ -200,7 +192,7 @@ def _known(table: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _table_of(table: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:
-    """The innermost table of a key, made where it is not there, and the name in it."""
+    """Return the innermost table of a key, a new one where there is none, and the name in it."""
     *places, name = key.split(".")
     here: Any = table
     for place in places:

@@ -1,14 +1,14 @@
-"""The modal model: exact residues, the rigid body, and a static remainder for the modes left out.
+"""The modal model: exact residues, the rigid body, and a static remainder for the omitted modes.
 
     G(s) ~ R2/s^2 + R1/s + static + sum over modes of r1/(s - p1) + r2/(s - p2)
 
 A truncated Mittag-Leffler series, exact at s -> 0.  At C = 0 the poles are exactly imaginary and the model is lossless.
 At C > 0 the undamped modes do not diagonalise the damping, so the residues are those of the damped eigenvalues.
 
-An output is G = N/D with N and the drive D analytic, so its residue at a simple zero p of D is N(p)/D'(p): one
-evaluation with its derivative, all eigenvalues at once.  Where hub angle or moment is a small difference there, the
-hub's own balance gives it.  For double frequencies mode shapes do it at C = 0 (residue c b, Meirovitch, Fundamentals
-of Vibrations, 2001, ch. 7) and Cauchy's integral around p at C > 0.
+An output is G = N/D with N and the drive D analytic, so its residue at a simple zero p of D is N(p)/D'(p).  Where hub
+angle or moment is a small difference there, it is computed from the balance of the hub.  At double frequencies the
+residue is c b of the mode shapes for C = 0 (Meirovitch, Fundamentals of Vibrations, 2001, ch. 7) and Cauchy's integral
+around p for C > 0.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.layout import constant_of
 from tfarm.exact.outputs import OUTPUTS, Output, unit_scale
-from tfarm.exact.series import beside_slow_pole
+from tfarm.exact.series import without_slow_pole
 from tfarm.exact.system import System
 from tfarm.exact.values import evaluate_outputs, free_slopes
 from tfarm.response import TransferFunction, Wanted, transfer
@@ -39,36 +39,38 @@ from .partial_fractions import PartialFractions
 CORNER_RATIOS = 1 + np.geomspace(0.02, 30.0, 14)  # c_j C, and below s C of the fit: tuned by hand on the lab arm
 SLOW_PAIRS = CORNER_RATIOS.size // 2  # the corners, two a pair
 FITTED_AT = np.geomspace(0.02, 5.0, 60)  # s C at which they are fitted: tuned with CORNER_RATIOS
-ALIKE = 1e-12  # of the largest singular value: corners that differ by less share their weight
-SLOW_POLES_FROM = 1.2  # C w of the last mode from which on it serves; below, the modes left out still ring
+RANK_CUTOFF = 1e-12  # of the largest singular value
+SLOW_POLES_FROM = 1.2  # C w of the last mode, at least: below, the omitted modes are not overdamped
 
 
 def slow_remainder(C: float, missing: Callable[[Complex], Complex]) -> tuple[Real, Real]:
-    """The corners c_j (m,) [1/s] and the shares D_j (outputs, m), C being the damping [s].
+    """Return the corners c_j (m,) [1/s] and the shares D_j (outputs, m) of a remainder, C being the damping [s].
 
-    `missing` gives what the modes leave out of each output (outputs, n) at s (n,).
+    `missing` is the remainder of the modal sum of each output (outputs, n) at s (n,).
     """
     basis = 1 / (1 + FITTED_AT[:, None] / CORNER_RATIOS) - 1
     left = missing((FITTED_AT / C).astype(complex)).real
-    shares: Real = np.linalg.lstsq(basis, left.T, rcond=ALIKE)[0].T.astype(float)
+    shares: Real = np.linalg.lstsq(basis, left.T, rcond=RANK_CUTOFF)[0].T.astype(float)
     return CORNER_RATIOS / C, shares
 
 
-CLOSE_FREQUENCIES = 1e-6  # relative gap under which two frequencies are told apart by their shapes alone
-UNIT_CIRCLE = np.exp(2j * np.pi * np.arange(32) / 32)  # of Cauchy's integral: a pole 4 radii off adds 4^-32 of its own
-POLES_AWAY = 4  # radii of its circle: how far off another pole is at least
+CLOSE_FREQUENCIES = 1e-6  # relative gap under which only shapes separate two modes
+UNIT_CIRCLE = np.exp(
+    2j * np.pi * np.arange(32) / 32
+)  # of Cauchy's integral: a pole 4 radii away adds 4^-32 of its residue
+POLES_AWAY = 4  # radii of its circle: the least distance of another pole
 RADII_TRIED, RADIUS_FALLS = 9, 3  # circles after the first, each a third of the one before
-OF_SHAPES = ("theta", "W", "Y", "Phi", "M", "Q")  # quantities that a table of modes has
+OF_SHAPES = ("theta", "W", "Y", "Phi", "M", "Q")  # quantities of a table of modes
 AT_HUB = (  # moment and shear force of the link at the hub, and the hub's angle
     Output(quantity="M", place="root", unit="N m", label="moment at the root"),
     Output(quantity="Q", place="root", unit="N", label="shear at the root"),
     Output(quantity="theta", place="root", unit="rad", label="angle of the hub"),
 )
-RADII_AGREE = 1e-11  # of the largest value on the circle: what two radii may differ by
+RADII_AGREE = 1e-11  # of the largest value on the circle: the largest difference of two radii
 
 
 def undamped_residues(table: Modes, wanted: Sequence[Output], k: System, x: float) -> Real:
-    """Residues in the variable s^2 of each output over s^power at the flexible modes (C = 0): (outputs, modes).
+    """Return residues in s^2 of each output over s^power at the flexible modes (C = 0): (outputs, modes).
 
     c b, with c the output of the mode and b its hub participation (its root moment where the hub is locked).
     `x` is a share of the length.
@@ -84,9 +86,9 @@ def undamped_residues(table: Modes, wanted: Sequence[Output], k: System, x: floa
 
 
 def end_residues(k: System, wanted: Sequence[Output], p: Complex, x: float = 0.0) -> tuple[Complex, NDArray[np.bool_]]:
-    """Residues N(p)/D'(p) (outputs, p) at eigenvalues p, and where they are in doubt.
+    """Return residues N(p)/D'(p) (outputs, p) at eigenvalues p, and where they are doubtful.
 
-    There A theta = B M on the hub (see `tfarm.exact.system`); of the two the one on the larger side has lost digits.
+    There A theta = B M on the hub (see `tfarm.exact.system`); the one with the larger factor has lost digits.
     """
     with np.errstate(all="ignore"):
         here, slopes = free_slopes(k, [*wanted, *AT_HUB], p, x)
@@ -110,10 +112,10 @@ def end_residues(k: System, wanted: Sequence[Output], p: Complex, x: float = 0.0
 
 
 def contour_residues(k: System, wanted: Sequence[Output], p: Complex, x: float) -> Complex:
-    """Residues (outputs, p) by the trapezoid rule on circles around p, which converges geometrically.
+    """Return residues (outputs, p) by the trapezoid rule on circles around p, which converges geometrically.
 
-    A circle is right where one of a third of its radius agrees with it; until then it shrinks.
-    Raises ConvergenceError where that never happens: two eigenvalues are one to the last digits.
+    A circle shrinks until one of a third of its radius agrees with it.
+    Raises ConvergenceError where none does: two eigenvalues are one to the last digits.
     """
     apart = abs(p[:, None] - p) + np.where(np.eye(p.size, dtype=bool), np.inf, 0.0)
     radius = np.minimum(apart.min(axis=1, initial=np.inf), abs(p)) / POLES_AWAY
@@ -136,7 +138,7 @@ def contour_residues(k: System, wanted: Sequence[Output], p: Complex, x: float) 
 def _around(
     k: System, wanted: Sequence[Output], p: Complex, radius: Real, x: float
 ) -> tuple[Complex, NDArray[np.float64]]:
-    """Cauchy's integral on the circles, and the largest |G| radius on each."""
+    """Return Cauchy's integral on the circles, and the largest |G| radius on each."""
     arrow = radius[:, None] * UNIT_CIRCLE
     values = evaluate_outputs(k, wanted, (p[:, None] + arrow).ravel(), x)
     values = values.reshape(len(wanted), *arrow.shape) * arrow
@@ -144,12 +146,12 @@ def _around(
 
 
 def _from_shapes(table: Modes, wanted: Sequence[Output], k: System, x: float) -> Real:
-    """c b of every flexible mode by the mode shapes."""
+    """Return c b (outputs, modes) of the flexible modes by the mode shapes."""
     length = float(k.length)
     drive = table.modal_moment if k.is_locked else table.hub_participation
     theta = table.hub_participation
 
-    def seen(each: Output) -> Real:
+    def value(each: Output) -> Real:
         at = each.share(x) * length
         if each.quantity == "theta":
             return theta
@@ -159,22 +161,22 @@ def _from_shapes(table: Modes, wanted: Sequence[Output], k: System, x: float) ->
             return table.rotation(at) - theta
         return table.moment(at) if each.quantity == "M" else table.shear(at)
 
-    return np.array([seen(each) * drive for each in wanted])[:, table.index > 0]
+    return np.array([value(each) * drive for each in wanted])[:, table.index > 0]
 
 
 MOST_MODELLED = 1000  # of a model: its matrices of 2000 states take 32 MB
-MOST_PROPER = 2  # power of s: a mode's share r s^2/(s^2 + w^2) is bounded, and one of s^3 is not
+MOST_PROPER = 2  # power of s: r s^2/(s^2 + w^2) of a mode is bounded, and with s^3 it is not
 NEXT_TO_REST = 1e-3  # of the first frequency: a pole nearer to 0 leaves 1e-15 of itself five terms on
 
 
 class ModalModel(PartialFractions):
     """The first flexible modes of the arm with their exact eigenvalues and residues (see `PartialFractions`).
 
-    Pairs that are assigned to no mode come last, with the index 0 and |s| for a frequency.
+    Pairs assigned to no mode come last, with the index 0 and |s| for a frequency.
     """
 
     def first(self, count: int) -> ModalModel:
-        """The model with the first `count` of these modes: those left out leave their static share."""
+        """Return the model with the first `count` of these modes, the static gains of the others in `static`."""
         beyond = self.index > count
         beyond |= (self.index == 0) & (self.natural_frequency > self.natural_frequency[beyond].min(initial=math.inf))
         kept = ~beyond
@@ -190,11 +192,11 @@ class ModalModel(PartialFractions):
 
 
 def modal_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -> ModalModel:
-    """The modal model of an arm with its first `count` flexible modes (0 to 1000), for one output or several.
+    """Return the modal model of an arm with its first `count` flexible modes (0 to 1000), for one output or several.
 
-    `x` [m] is the place of outputs along the arm.  Where the hub is locked, hub angle is the input and no rigid body is
-    left.  At C > 0 the eigenvalues and residues are those of the damped arm, overdamped modes by their two real poles.
-    Raises ParameterError for an unknown output, a count out of range, and an output that grows with s without bound.
+    `x` [m] is the place of outputs along the arm.  With a locked hub the hub angle is the input, and there is no rigid
+    body.  At C > 0 eigenvalues and residues are those of the damped arm, two real poles of an overdamped mode.
+    Raises ParameterError for an unknown or improper output and a count out of range.
     """
     G = transfer(arm, outputs, x=x)
     count = whole("count", count, 0, MOST_MODELLED, f"a whole number of flexible modes, 0 to {MOST_MODELLED}")
@@ -206,7 +208,7 @@ def modal_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -
     r, alone = _residues(table, k, [*wanted, collocated], share, p, single)
     if count == 0:
         index, p, r = index[:0], p[:0], r[:, :0]
-    expansion, kept = _beside_slow(G, single, table)
+    expansion, kept = _at_rest(G, single, table)
     omega = table.natural_frequency[table.index > 0]
     return ModalModel(
         arm=arm,
@@ -225,16 +227,15 @@ def modal_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -
 
 
 def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -> ModalModel:
-    """The modal model of a damped arm with one state more, exact to first order at s -> 0.
+    """Return the modal model of a damped arm with one more state, exact to first order at s -> 0.
 
-    At C > 0 the bending modes left out are overdamped and follow as c b/w^2/(1 + C s), not at once as a static
-    remainder does: their slow poles gather at -1/C.  So the remainder is D + E/(1 + C s), from G and G' at 0.
-    Raises ParameterError at C = 0.
+    At C > 0 the omitted bending modes are overdamped with slow poles near -1/C: c b/w^2/(1 + C s), no static gain.  So
+    the remainder is D + E/(1 + C s), from G and G' at 0.  Raises ParameterError at C = 0.
     """
     model, C = modal_model(arm, outputs, count, x), arm.damping
     if C == 0:
         raise ParameterError(key="link.damping", value=C, remedy="without damping nothing relaxes; take modal_model")
-    exact, kept = _beside_slow(transfer(arm, model.rows, x=x), model.single, modes(arm, 1))
+    exact, kept = _at_rest(transfer(arm, model.rows, x=x), model.single, modes(arm, 1))
     slope = exact[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
     if model.single_residues is not None:
         slope = slope + (model.single_residues / model.single**2)[:, kept].sum(axis=1)
@@ -242,9 +243,9 @@ def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None)
 
 
 def slow_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -> ModalModel:
-    """The modal model of a damped arm with slow real poles in the place of all modes left out (`modal`).
+    """Return the modal model of a damped arm with slow real poles in the place of all omitted modes.
 
-    They go in pairs, with the index 0.  Raises ParameterError at C = 0.
+    They are in pairs, with the index 0.  Raises ParameterError at C = 0.
     """
     model, C = modal_model(arm, outputs, count, x), arm.damping
     if C == 0:
@@ -264,33 +265,33 @@ def slow_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) ->
     )
 
 
-def _beside_slow(G: TransferFunction, single: Real, table: Modes) -> tuple[Real, NDArray[np.bool_]]:
-    """The expansion of an arm (outputs, 4), and which of its single poles (m,) have their share in it yet.
+def _at_rest(G: TransferFunction, single: Real, table: Modes) -> tuple[Real, NDArray[np.bool_]]:
+    """Return the expansion at s = 0 (outputs, 4), and which single poles (m,) still have to be subtracted from it.
 
-    The pole of a hub that hardly any friction brings to rest has not: there 1 and s have what is left without it.
+    The slow pole of a hub with hardly any friction is left out of the coefficients of 1 and s.
     """
     expansion, kept = G.expansion, np.ones(single.size, np.bool_)
     slowest = abs(single).min(initial=math.inf)
     first = table.natural_frequency[table.index > 0][0]
     if G.arm.has_rigid_mode and slowest < NEXT_TO_REST * first:
-        expansion = np.c_[expansion[:, :2], beside_slow_pole(G.system, G.rows, G.share)]
+        expansion = np.c_[expansion[:, :2], without_slow_pole(G.system, G.rows, G.share)]
         kept = abs(single) > slowest
     return expansion, kept
 
 
 def proper(k: System, wanted: Output, share: float) -> Output:
-    """The output, if a state space of finite order can have it.  Raises ParameterError if not."""
+    """Return the output.  Raises ParameterError where no state space of finite order has it."""
     if wanted.power and constant_of(k, wanted, share):
-        remedy = "a power of s times the input itself, which no state space has; ask for another output"
+        remedy = "a power of s times the input, which no state space has; choose another output"
         raise ParameterError(key="outputs", value=wanted.name, remedy=remedy)
     if wanted.power > MOST_PROPER:
-        remedy = f"s^{wanted.power} makes it grow with s, as no state space does; ask for a lower derivative"
+        remedy = f"s^{wanted.power} makes it improper, which no state space is; choose a lower derivative"
         raise ParameterError(key="outputs", value=wanted.name, remedy=remedy)
     return wanted
 
 
 def _eigenvalues(arm: Arm, table: Modes) -> tuple[NDArray[np.int64], Complex, Real]:
-    """The mode of each pair (n,), 0 of one that is assigned to none, the pairs (n, 2), and single real ones (m,)."""
+    """Return the mode of each pair (n,), 0 of one assigned to none, the pairs (n, 2), and single real ones (m,)."""
     flexible = table.index > 0
     if arm.is_undamped:
         return (
@@ -310,7 +311,7 @@ def _eigenvalues(arm: Arm, table: Modes) -> tuple[NDArray[np.int64], Complex, Re
 def _residues(
     table: Modes, k: System, wanted: list[Output], share: float, p: Complex, single: Real
 ) -> tuple[Complex, Real]:
-    """Residues (outputs, n, 2) at pairs of eigenvalues (n, 2), and at single real ones (outputs, m)."""
+    """Return residues (outputs, n, 2) at pairs of eigenvalues (n, 2), and at single real ones (outputs, m)."""
     none = np.empty((len(wanted), 0))
     if table.arm.is_undamped and not single.size:
         powers, s = np.array([[each.power] for each in wanted]), p[:, 0]
@@ -326,6 +327,6 @@ def _residues(
     if not single.size:
         return residues, none
     at = single.astype(complex)
-    if table.arm.is_undamped:  # the circuit's pole alone, where the current is 0 over 0
+    if table.arm.is_undamped:  # only the pole of the circuit, where the current is 0 over 0
         return residues, contour_residues(k, wanted, at, share).real.astype(float)
     return residues, end_residues(k, wanted, at, share)[0].real.astype(float)

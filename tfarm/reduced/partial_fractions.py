@@ -1,15 +1,16 @@
 """A reduced model as partial fractions: poles, residues, rigid body, static remainder; its values and its worst error.
 
-The error is the worst |dG| / (|G| + |w G'|) over a band.  The norm is finite at zeros and at poles of G.  Between
-samples the error moves on the scale of the exact poles, of the zeros of G and of G', and of the model's own poles; so
-the samples crowd there, and every high local maximum is then closed in on.  What is printed is the largest value
-found, and a little more (`FOUND_TO_WORST`, tuned on random arms).
+The error is the largest |dG| / (|G| + |w G'|) over a frequency range.  The norm is finite at zeros and poles of G.  The
+error varies on the scale of the exact poles, of the zeros of G and G', and of the poles of the model.  The samples are
+dense there, and each high local maximum is refined.  The printed error has a margin of 2 % (`FOUND_TO_WORST`, tuned on
+random arms).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     import control
 
 
-TERMS_AT_ONCE = 1 << 18  # entries of (poles, s) held at a time
+TERMS_AT_ONCE = 1 << 18  # entries of (poles, s) in memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,14 +36,14 @@ TERMS_AT_ONCE = 1 << 18  # entries of (poles, s) held at a time
 class PartialFractions:
     """G_o(s) ~ rigid[o,0]/s^2 + rigid[o,1]/s + static[o] + sum of residues[o,k,i]/(s - eigenvalues[k,i]).
 
-    `eigenvalues` (n, 2) [1/s] are conjugate pairs (Im > 0 first), or two reals where a mode is overdamped; `modal`
-    (outputs, n, 2) belong to them.  `index` (n,) numbers the arm's own flexible modes from 1, and is 0 for a pole that
-    stands for all modes left out; `natural_frequency` (n,) is undamped [rad/s].  `rigid` (outputs, 2) and `static`
-    (outputs,) make the model exact at s -> 0.  `participation` (n,) is how strongly the input drives each pair:
-    |b| at C = 0, the root moment of the mode where the hub is locked.  `relaxation` (outputs,), where there is one, is
-    the share E of E/(1 + C s), which stands for what the bending modes left out do at C > 0 (see `relaxed_model`).
-    `single` (m,) [1/s] are real poles of a rig that belong to no flexible mode, about -b/J where friction resists the
-    turning hub (then rigid[:,0] is 0) and -R/L_a of a motor's circuit, with `single_residues` (outputs, m).
+    `eigenvalues` (n, 2) [1/s] are conjugate pairs (Im > 0 first), or two reals of an overdamped mode; `residues`
+    (outputs, n, 2) belong to them.  `index` (n,) numbers the arm's own flexible modes from 1, and is 0 for a pole in
+    place of omitted modes; `natural_frequency` (n,) is undamped [rad/s].  `rigid` (outputs, 2) and `static` (outputs,)
+    make the model exact at s -> 0.  `participation` (n,) is that of the input in each pair: |b| at C = 0, for a locked
+    hub the root moment of the mode.  `relaxation` (outputs,) is E of E/(1 + C s), in place of the omitted bending modes
+    at C > 0 (see `relaxed_model`); None without.  `single` (m,) [1/s] are real poles of a rig that belong to no
+    flexible mode, with `single_residues` (outputs, m): about -b/J of a hub with friction (then rigid[:,0] is 0) and
+    -R/L_a of a motor's circuit.
     """
 
     arm: Arm
@@ -66,12 +67,12 @@ class PartialFractions:
 
     @property
     def has_rigid_states(self) -> bool:
-        """Whether an output feels the arm turn as a rigid body; then angle and rate are two of the states."""
+        """Whether an output depends on the rigid body; then angle and rate are two of the states."""
         return bool(self.rigid.any())
 
     @property
     def rigid_states(self) -> int:
-        """Two where an output feels the angle of the rigid body, one where friction leaves it a single integral."""
+        """The number of states of the rigid body: two, one with friction at the hub, or none."""
         return self.has_rigid_states * (1 if self.arm.rate_loss else 2)
 
     @property
@@ -91,7 +92,7 @@ class PartialFractions:
 
     @property
     def input(self) -> str:
-        """The input: the arm's own, "hub_torque" [N m] of the paper's; "hub_angle" [rad] where the hub is locked."""
+        """The input of the arm, "hub_angle" [rad] where the hub is locked."""
         return "hub_angle" if self.arm.is_locked else self.arm.input
 
     @property
@@ -107,46 +108,37 @@ class PartialFractions:
         return (r1 + r2).real, -(r1 * p2 + r2 * p1).real
 
     def __call__(self, s: ArrayLike) -> Complex:
-        """Values (outputs, *s.shape) at complex s [1/s].  Raises ParameterError at a pole of the model."""
+        """Return values (outputs, *s.shape) at complex s [1/s].  Raises ParameterError at a pole of the model."""
         points = np.asarray(s, dtype=complex)
         flat, values = points.ravel(), np.empty((len(self.outputs), points.size), complex)
         step = max(1, TERMS_AT_ONCE // max(1, self.index.size))
         for start in range(0, flat.size, step):
-            values[:, start : start + step] = self._values(flat[start : start + step])
+            values[:, start : start + step] = self._sum(flat[start : start + step], np.asarray)
         return values.reshape(len(self.outputs), *points.shape)
 
-    def _values(self, s: Complex) -> Complex:
+    def magnitude(self, s: Complex) -> Real:
+        """Return the sum of the magnitudes of all terms (outputs, s) at s (1-D), the scale of rounding."""
+        return self._sum(s, abs)
+
+    def _sum(self, s: Complex, part: Callable[[Any], Any]) -> Any:
+        """Return the sum of all terms (outputs, s) at s (1-D), or with `part` abs that of their magnitudes."""
         p1, p2 = self.eigenvalues.T[:, :, None]
         product = (s - p1) * (s - p2)
         if not product.all() or (self.has_rigid_states and not s.all()):
             pole = s[(product == 0).any(axis=0)] if not product.all() else s[s == 0]
             raise ParameterError(key="s", value=complex(pole[0]), remedy="a pole of the reduced model; move s")
-        n1, n0 = self.numerators
-        values = s * (n1 @ (1 / product)) + n0 @ (1 / product) + self.static[:, None]
+        (n1, n0), share = map(part, self.numerators), part(1 / product)
+        total = part(s) * (n1 @ share) + n0 @ share + part(self.static)[:, None]
         if self.has_rigid_states:
-            values = values + self.rigid[:, :1] / (s * s) + self.rigid[:, 1:] / s
+            total = total + part(self.rigid[:, :1] / (s * s)) + part(self.rigid[:, 1:] / s)
         if self.single_residues is not None:
-            values = values + self.single_residues @ (1 / (s - self.single[:, None]))
+            total = total + part(self.single_residues) @ part(1 / (s - self.single[:, None]))
         if self.relaxation is not None:
-            values = values + self.relaxation[:, None] / (1 + self.arm.damping * s)
-        return values
-
-    def magnitude(self, s: Complex) -> Real:
-        """The sum of the sizes of all terms (outputs, s) at s (1-D): times epsilon, what their sum rounds."""
-        p1, p2 = self.eigenvalues.T[:, :, None]
-        n1, n0 = self.numerators
-        share = 1 / abs((s - p1) * (s - p2))
-        size = abs(n1) @ (abs(s) * share) + abs(n0) @ share + abs(self.static)[:, None]
-        if self.has_rigid_states:
-            size = size + abs(self.rigid[:, :1]) / abs(s) ** 2 + abs(self.rigid[:, 1:]) / abs(s)
-        if self.single_residues is not None:
-            size = size + abs(self.single_residues) @ (1 / abs(s - self.single[:, None]))
-        if self.relaxation is not None:
-            size = size + abs(self.relaxation[:, None] / (1 + self.arm.damping * s))
-        return size
+            total = total + part(self.relaxation[:, None] / (1 + self.arm.damping * s))
+        return total
 
     def matrices(self) -> Matrices:
-        """A, B, C, D of x' = A x + B u, y = C x + D u: NumPy arrays (n, n), (n, 1), (outputs, n), (outputs, 1).
+        """Return A, B, C, D of x' = A x + B u, y = C x + D u: arrays (n, n), (n, 1), (outputs, n), (outputs, 1).
 
         Rigid body: angle and rate of an inertia J.  Each mode: (w q, q') with q'' + a q' + w^2 q = b u, that is the
         block [[0, w], [-w, -a]]; at C = 0 half the sum of their squares is the mode's energy [J].
@@ -175,9 +167,9 @@ class PartialFractions:
         return A, B, C, self.static[:, None].copy()
 
     def closed(self, gains: ArrayLike) -> Matrices:
-        """A, B, C, D under the law  u = r - gains . y, r the new input: gains (outputs,), or (n, outputs) of n laws.
+        """Return A, B, C, D under the law  u = r - gains . y, r the new input; gains are (outputs,) or (n, outputs).
 
-        Of n laws every matrix has a leading axis.  What D feeds straight back is solved for.
+        For n laws every matrix has a leading axis.
         """
         A, B, C, D = self.matrices()
         law = np.asarray(gains, dtype=float)
@@ -186,7 +178,7 @@ class PartialFractions:
         return A - B * row, B * share, C - D * row, D * share
 
     def state_space(self, name: str | None = None) -> control.StateSpace:
-        """The model as a `control.StateSpace` with named inputs, outputs and states."""
+        """Return the model as a `control.StateSpace` with named inputs, outputs and states."""
         import control
 
         return control.StateSpace(
@@ -198,66 +190,68 @@ class PartialFractions:
         )
 
 
-FOUND_TO_WORST = 1.02  # times the worst that was found: tuned on random arms
-EXACT_ROUNDING = 1e-14  # what the exact values themselves may be off, in the same norm
+FOUND_TO_WORST = 1.02  # times the largest error found: tuned on random arms
+EXACT_ROUNDING = 1e-14  # error of the exact values in the same norm
 TERM_ROUNDING = 4 * float(np.finfo(float).eps)  # of a model's terms, which cancel where G is small, in their sum
-CLEAR_OF_POLES = 1e-12  # nearer to a pole nothing new happens, and nothing can be evaluated on it
+CLEAR_OF_POLES = 1e-12  # of a frequency: the least distance of a sample from a pole
 POLE_DISTANCES = 10.0 ** -np.arange(1, 8)  # of samples from a pole, as shares of its frequency
-SAMPLES_PER_DECADE = 60  # of the even grid; peaks between are closed in on
-LEAST_SAMPLES, EVEN_SAMPLES, BETWEEN_POLES = 200, 400, 24  # beside these, along the band, and between two poles
+SAMPLES_PER_DECADE = 60  # of the even grid; peaks between are refined
+LEAST_SAMPLES, EVEN_SAMPLES, BETWEEN_POLES = 200, 400, 24  # more of these, in even steps, and between two poles
 DIP_POINTS = 8  # around each dip of |G| or |G'|
-POLES_BEYOND = 1.5  # times the end of a band: samples keep clear of poles up to there
-MOST_PEAKS = 12  # local maxima of the error that are closed in on, the highest first
-HIGH_PEAK = 0.2  # of the highest: lower ones between samples do not reach it
-PEAK_CLOSINGS, CLOSING_POINTS = 3, 17  # times that such a peak is closed in on, each to an eighth of its width
+POLES_BEYOND = 1.5  # times the end of the range: samples keep clear of poles up to there
+MOST_PEAKS = 12  # local maxima of the error that are refined, the highest first
+HIGH_PEAK = 0.2  # of the highest: lower ones are not refined
+REFINEMENTS, REFINED_POINTS = 3, 17  # of such a peak, each to an eighth of its width
 
 
 class Ruler:
-    """The exact outputs over a band [rad/s], sampled once, against which any number of models is held."""
+    """The exact outputs over a frequency range [rad/s], sampled once, and the errors of models."""
 
     def __init__(self, arm: Arm, outputs: Wanted, band: tuple[float, float], x: float | None = None) -> None:
         self.G = transfer(arm, transfer(arm, outputs, x=x).rows, x=x)
         self.band = band
         self._poles = frequencies_around(arm, band[1])
-        w = self._clear(_samples(*band, self._poles))
+        w = _samples(*band, self._poles)
+        w = w[self._is_clear(w)]
         for _ in range(2):
-            w = self._clear(np.union1d(w, self._dips(w)))
+            w = np.union1d(w, self._dips(w))
+            w = w[self._is_clear(w)]
         self.w, (self._values, self._size) = w, self._exact(w)
 
     def norm(self, w: Real) -> Real:
-        """|G| + |w dG/dw| (outputs, w) of the exact arm at w [rad/s], 1-D, off its natural frequencies."""
+        """Return |G| + |w dG/dw| (outputs, w) of the exact arm at w [rad/s], 1-D, off its natural frequencies."""
         return norm(self.G, w, self.G(1j * w))
 
     def rough(self, model: PartialFractions) -> float:
-        """The largest error at the samples: a little less than the worst."""
+        """Return the largest error at the samples, a little below the worst one."""
         return float(_errors(model, self.w, self._values, self._size).max())
 
     def measure(self, model: PartialFractions) -> tuple[Real, Real]:
-        """An upper figure of the error of each output, every high peak between the samples closed in on; and where."""
+        """Return the largest error of each output, with a margin, and its frequency [rad/s]; high peaks are refined."""
         errors = _errors(model, self.w, self._values, self._size)
         worst, at = errors.max(axis=1), self.w[errors.argmax(axis=1)]
         for row, error in enumerate(errors):
             low, high = self._brackets(error)
-            for _ in range(PEAK_CLOSINGS):
-                inner = np.linspace(low, high, CLOSING_POINTS)
+            for _ in range(REFINEMENTS):
+                inner = np.linspace(low, high, REFINED_POINTS)
                 found = self._error_at(model, inner, row)
                 top = found.argmax(axis=0)
                 columns = np.arange(low.size)
                 best = int(found.max(axis=0).argmax())
                 if found[top[best], best] > worst[row]:
                     worst[row], at[row] = found[top[best], best], inner[top[best], best]
-                low, high = (inner[np.clip(top + way, 0, CLOSING_POINTS - 1), columns] for way in (-1, 1))
+                low, high = (inner[np.clip(top + way, 0, REFINED_POINTS - 1), columns] for way in (-1, 1))
         return worst * FOUND_TO_WORST + EXACT_ROUNDING, at
 
     def _brackets(self, error: Real) -> tuple[Real, Real]:
-        """The samples on either side of each high local maximum."""
+        """Return the samples on either side of each high local maximum."""
         padded = np.r_[-1.0, error, -1.0]
         (peaks,) = np.nonzero((error >= padded[:-2]) & (error >= padded[2:]) & (error >= HIGH_PEAK * error.max()))
         peaks = peaks[np.argsort(-error[peaks])][:MOST_PEAKS]
         return self.w[np.maximum(peaks - 1, 0)], self.w[np.minimum(peaks + 1, self.w.size - 1)]
 
     def _error_at(self, model: PartialFractions, w: Real, row: int) -> Real:
-        """Error of one output at w of any shape; zero next to a pole."""
+        """Return the error of one output at w of any shape, zero next to a pole."""
         flat = w.ravel()
         clear = self._is_clear(flat)
         errors = np.zeros(flat.size)
@@ -270,7 +264,7 @@ class Ruler:
         return values, norm(self.G, w, values)
 
     def _dips(self, w: Real) -> Real:
-        """Points around the dips of |G| and |G'|, where the norm is small on one side."""
+        """Return points around the dips of |G| and |G'|, where the norm is small."""
         dips = [
             np.flatnonzero((size[1:-1] < size[:-2]) & (size[1:-1] < size[2:])) + 1
             for size in abs(np.concatenate([self.G(1j * w), self.G.derivative(1j * w)]))
@@ -278,33 +272,30 @@ class Ruler:
         where = np.unique(np.concatenate(dips))
         return np.linspace(w[where - 1], w[where + 1], DIP_POINTS).ravel()
 
-    def _clear(self, w: Real) -> Real:
-        return w[self._is_clear(w)]
-
     def _is_clear(self, w: Real) -> NDArray[np.bool_]:
         return distance(w, self._poles) > CLEAR_OF_POLES * w
 
 
 def norm(G: TransferFunction, w: Real, values: Complex) -> Real:
-    """|G| + |w dG/dw| (outputs, w) on the imaginary axis, given G(i w)."""
+    """Return |G| + |w dG/dw| (outputs, w) on the imaginary axis, from G(i w)."""
     return abs(values) + abs(w * np.atleast_2d(G.derivative(1j * w)))
 
 
 def distance(w: Real, poles: Real) -> Real:
-    """From each w to the nearest of the poles (ascending)."""
+    """Return the distance of each w from the nearest of the poles (ascending)."""
     edged = np.r_[-np.inf, poles, np.inf]
     above = np.searchsorted(poles, w)
     return np.minimum(w - edged[above], edged[above + 1] - w)
 
 
 def frequencies_around(arm: Arm, high: float) -> Real:
-    """The flexible natural frequencies below `POLES_BEYOND` times `high`, and the next one."""
+    """Return the flexible natural frequencies [rad/s] below `POLES_BEYOND` times `high`, and the next one."""
     table = modes(arm, modes_below(arm, POLES_BEYOND * high) + 1)
     return table.natural_frequency[table.index > 0]
 
 
 def _samples(low: float, high: float, poles: Real) -> Real:
-    """Frequencies even by themselves and in their logarithm, between neighbouring poles, and crowded around each."""
+    """Return frequencies in even and in geometric steps, more between neighbouring poles and around each."""
     count = LEAST_SAMPLES + int(SAMPLES_PER_DECADE * np.log10(high / low))
     crowd = np.concatenate([poles[:, None] * (1 - POLE_DISTANCES), poles[:, None] * (1 + POLE_DISTANCES)]).ravel()
     knots = np.r_[low, poles[(poles > low) & (poles < high)], high]
@@ -315,6 +306,6 @@ def _samples(low: float, high: float, poles: Real) -> Real:
 
 
 def _errors(model: PartialFractions, w: Real, exact: Complex, size: Real) -> Real:
-    """|dG|, and what rounding a state space adds to it, over the norm; none for an output that is zero throughout."""
+    """Return |dG| and the rounding of a state space, over the norm; 0 for an output that is zero throughout."""
     gap = abs(model(1j * w) - exact) + TERM_ROUNDING * model.magnitude(1j * w)
     return np.divide(gap, size, out=np.where(gap > 0, np.inf, 0.0), where=size > 0)

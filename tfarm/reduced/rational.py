@@ -1,19 +1,18 @@
-"""The smallest lossless model: the band's own modes exactly, all modes above it by a few poles from AAA in s^2.
+"""The smallest lossless model: the modes of a frequency range exactly, those above it by a few poles from AAA in s^2.
 
-At C = 0 every output over a power of s is a real function of S = s^2.  What is left of it after the modes of the band
-is the share of the modes above, smooth over the band, and for the hub angle a Stieltjes function: a sum of
-b^2 S/(S + w^2) with b^2 > 0, so that its rational interpolants have poles on the negative axis and residues of one sign
-(Baker and Graves-Morris, Pade Approximants, 1996, ch. 5).  AAA (Nakatsukasa, Sete and Trefethen 2018), here for several
-functions with common poles (Lietaert et al. 2022), finds such poles to near the smallest error; S = 0 is always a
-support point, so rigid body and statics stay exact.  Rounding can add poles that mean nothing (Froissart doublets):
-every pole is checked to be real and above the band, every residue of the hub angle to be positive, or it is left out.
+At C = 0 every output over a power of s is a real function of S = s^2.  Without the modes of the range it is the sum of
+the modes above, smooth over the range.  For the hub angle that is a Stieltjes function, a sum of b^2 S/(S + w^2) with
+b^2 > 0: its rational interpolants have poles on the negative axis and residues of one sign (Baker and Graves-Morris,
+Pade Approximants, 1996, ch. 5).  AAA (Nakatsukasa, Sete and Trefethen 2018), here for several functions with common
+poles (Lietaert et al. 2022), finds such poles near the smallest error.  S = 0 is always a support point, so rigid body
+and statics stay exact.  Rounding can add spurious poles (Froissart doublets): only poles that are real, above the range
+and with a positive residue of the hub angle are used.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -29,24 +28,24 @@ from tfarm.spectrum import modes_below
 from .modal import MOST_MODELLED, modal_model
 from .partial_fractions import PartialFractions, distance, frequencies_around, norm
 
-BEYOND_BAND = 1.02  # modes up to so much above the band's end are taken exactly: a pole nearer to the band would show
-REMAINDER_POINTS = 300  # of the band, denser towards its end, where poles above it show most
-REMAINDER_FROM = 0.01  # of the band's end: below, the point S = 0 says all there is to say
-BESIDE_POLE = 1e-9  # of its frequency: no sample is nearer to a pole of the arm
-INFINITE_BELOW = 1e-13  # of the numerator: an eigenvalue with a smaller denominator is infinite but for rounding
-SHARING_ROUNDS = 4  # in which pairs that AAA did not need are given to modes
+BEYOND_BAND = 1.02  # times the end of the range: up to there modes are exact
+REMAINDER_POINTS = 300  # of the range, denser towards its end, where poles above have most effect
+REMAINDER_FROM = 0.01  # of the end of the range: below, the point S = 0 is enough
+OFF_POLE = 1e-9  # of its frequency: the least distance of a sample from a pole of the arm
+INFINITE_BELOW = 1e-13  # of the numerator: an eigenvalue with a smaller denominator is infinite
+SHARING_ROUNDS = 4  # in which unused pairs of AAA become modes
 REAL_SQUARE = 1e-10  # relative; a pole whose imaginary part is below it is real
-PATIENCE = 3  # degrees without progress, after which rounding rules
-ERRORS_ALIKE = 5e-14  # errors below this are all alike
+PATIENCE = 3  # degrees without progress before the search ends
+ERRORS_ALIKE = 5e-14  # errors below this are equal
 ERROR_FLOOR = 1e-14  # a weighted error below this is rounding; more poles would fit noise
 
 
 @dataclass(frozen=True)
 class _Remainders:
-    """What the exact modes leave, F (outputs, S), zero at S = 0; weights that make it |dG|/(|G| + |w G'|).
+    """The remainders F (outputs, S) of the exact modes, zero at S = 0; with the weights it is |dG|/(|G| + |w G'|).
 
-    `by_S` (outputs,) tells which outputs are multiplied by S; the hub's own, rate or (locked) moment, comes first.
-    Poles lie above `beyond` [rad/s].
+    `by_S` (outputs,) is whether an output is multiplied by S; that of the hub, rate or (locked) moment, comes first.
+    Poles are above `beyond` [rad/s].
     """
 
     S: Real
@@ -57,7 +56,7 @@ class _Remainders:
 
 
 def modes_in(arm: Arm, high: float) -> int:
-    """How many modes a model for frequencies up to `high` [rad/s] takes exactly.  Raises ParameterError over 1000."""
+    """Return the number of exact modes of a model up to `high` [rad/s].  Raises ParameterError over 1000."""
     count = modes_below(arm, BEYOND_BAND * high)
     if count > MOST_MODELLED:
         remedy = f"{count} modes lie below it, over {MOST_MODELLED}; lower it"
@@ -66,24 +65,23 @@ def modes_in(arm: Arm, high: float) -> int:
 
 
 def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float | None = None) -> PartialFractions:
-    """The lossless model of so many pairs of poles: every mode below `high` [rad/s] exactly, the rest by AAA.
+    """Return the lossless model of `pairs` pairs of poles: modes below `high` [rad/s] exactly, the rest by AAA.
 
-    Where more poles bring nothing but rounding, further modes are taken exactly instead; fewer pairs come out where too
-    few poles pass the checks.  Raises ParameterError at C > 0, where poles do not lie on one line in s^2, and where
-    `pairs` does not exceed the modes below `high`.
+    Pairs that would fit rounding become more exact modes.  There are fewer pairs where too few poles pass the checks.
+    Raises ParameterError at C > 0, where poles are not on one line in s^2, and for too few pairs.
     """
     if not arm.is_undamped or arm.input_lags:
-        raise ParameterError(key="method", value="aaa", remedy="AAA in s^2 is for C = 0; take modal, which has C")
+        raise ParameterError(key="method", value="aaa", remedy="AAA in s^2 is for C = 0; use modal")
     exact = modes_in(arm, high)
     if pairs <= exact:
-        remedy = f"{exact} modes lie in the band: AAA wants more pairs of poles than that; take modal"
+        remedy = f"{exact} modes lie in the range, and AAA needs more pairs of poles; use modal"
         raise ParameterError(key="pairs", value=pairs, remedy=remedy)
     rows = transfer(arm, outputs, x=x).rows
     hub = "root_moment" if arm.is_locked else "hub_rate"
     G = transfer(arm, (hub, *rows), x=x)
     frequencies = frequencies_around(arm, high)
     found: list[tuple[tuple[float, int], PartialFractions]] = []
-    for _ in range(SHARING_ROUNDS):  # first with all the poles asked for, then with those that helped
+    for _ in range(SHARING_ROUNDS):  # first with all poles, then with the used ones
         inside = modal_model(arm, G.rows, exact, x)
         rest = _remainders(G, inside, high, frequencies)
         poles, shares, error = _best_poles(rest, pairs - exact)
@@ -95,9 +93,9 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
 
 
 def _remainders(G: TransferFunction, inside: PartialFractions, high: float, frequencies: Real) -> _Remainders:
-    """Samples over the band.  Below high/100 the point S = 0 says all there is to say."""
+    """Return the remainders at samples of the range."""
     w = high * np.sin(np.linspace(REMAINDER_FROM, np.pi / 2, REMAINDER_POINTS))
-    w = w[distance(w, frequencies) > BESIDE_POLE * w]
+    w = w[distance(w, frequencies) > OFF_POLE * w]
     S, power = -(w**2), np.array([[each.power] for each in G.rows])
     bases = [each.base for each in G.rows]
     at_zero = np.array(expansions_at_zero(G.system, bases, G.share))
@@ -112,7 +110,7 @@ def _remainders(G: TransferFunction, inside: PartialFractions, high: float, freq
     size = norm(G, w, values)
     weight = np.divide(w**power, size, out=np.zeros_like(size), where=size > 0) / np.where(by_S, abs(S), 1.0)
     kinds = [(each.quantity, each.place, kind) for each, kind in zip(bases, by_S[:, 0], strict=True)]
-    for kind in set(kinds):  # a power of s apart: one fit for both, or the rate would not be that of the angle
+    for kind in set(kinds):  # one fit for powers of s of one quantity: the rate stays that of the angle
         same = [row for row, other in enumerate(kinds) if other == kind]
         F[same], weight[same] = F[same[0]], weight[same].max(axis=0)
     beyond = max(high, inside.natural_frequency.max(initial=0.0))
@@ -120,9 +118,9 @@ def _remainders(G: TransferFunction, inside: PartialFractions, high: float, freq
 
 
 def _best_poles(rest: _Remainders, most: int) -> tuple[Real, Real, float]:
-    """Frequencies of up to so many poles that pass the checks, their shares a of F ~ sum of a S/(S + w^2), the error.
+    """Return frequencies w of up to `most` poles, their shares a of F ~ sum of a S/(S + w^2), and the error.
 
-    Of the degrees tried the one with the smallest error, or the first at which only rounding is left.
+    Their degree is that with the smallest error, or the first with an error of rounding alone.
     """
     best = np.empty(0), np.empty((len(rest.F), 0))
     least, idle = float((abs(rest.F) * rest.weight).max()), 0
@@ -138,9 +136,9 @@ def _best_poles(rest: _Remainders, most: int) -> tuple[Real, Real, float]:
 
 
 def _checked(rest: _Remainders, square: Real) -> tuple[Real, Real]:
-    """The poles without those whose residue in the hub's own output has the wrong sign, and the shares of the rest.
+    """Return the poles with the right sign of their residue in the hub's output, and their shares (outputs, poles).
 
-    Shares (outputs, poles) by weighted least squares for each output.
+    Shares are those of weighted least squares for each output.
     """
     sign = 1.0 if rest.by_S[0] else -1.0
     while True:
@@ -160,7 +158,7 @@ def _basis(rest: _Remainders, square: Real) -> Real:
 
 
 def aaa_poles(S: Real, F: Real, weight: Real, degree: int) -> Iterator[Real]:
-    """-S at the real negative poles, ascending, of the AAA approximants of degree 1, 2, ... to all rows of F.
+    """Yield -S at the real negative poles, ascending, of the AAA approximants of degree 1, 2, ... to all rows of F.
 
     F (functions, S) vanishes at S = 0, which is the first support point; the others are taken where the weighted error
     is largest, and their weights minimise the linearised one (smallest singular vector of the Loewner matrix).
@@ -179,25 +177,16 @@ def aaa_poles(S: Real, F: Real, weight: Real, degree: int) -> Iterator[Real]:
         fit = ((w * F[:, support]) @ cauchy.T) / (cauchy @ w)
         error = np.zeros_like(F)
         error[:, others] = abs(fit - F[:, others]) * weight[:, others]
-        poles = -_zeros_of_denominator(S[support], w) * unit
+        arrow, mass = np.diag(np.r_[0.0, S[support]]), np.diag(np.r_[0.0, np.ones(len(support))])
+        arrow[0, 1:], arrow[1:, 0] = w, 1.0  # its finite eigenvalues are the zeros of sum w_j/(S - S_j)
+        numerator, denominator = scipy.linalg.eigvals(arrow, mass, homogeneous_eigvals=True)
+        finite = abs(denominator) > INFINITE_BELOW * abs(numerator)
+        poles = -numerator[finite] / denominator[finite] * unit
         yield np.sort(poles.real[(abs(poles.imag) <= REAL_SQUARE * abs(poles)) & (poles.real > 0)])
 
 
-def _zeros_of_denominator(nodes: Real, weights: Real) -> NDArray[Any]:
-    """Zeros of sum w_j/(S - S_j): the finite eigenvalues of an arrowhead pencil."""
-    n = nodes.size
-    arrow = np.zeros((n + 1, n + 1))
-    arrow[0, 1:], arrow[1:, 0] = weights, 1.0
-    arrow[1:, 1:] = np.diag(nodes)
-    mass = np.eye(n + 1)
-    mass[0, 0] = 0.0
-    numerator, denominator = scipy.linalg.eigvals(arrow, mass, homogeneous_eigvals=True)
-    finite = abs(denominator) > INFINITE_BELOW * abs(numerator)
-    return numerator[finite] / denominator[finite]
-
-
 def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares: Real) -> PartialFractions:
-    """The exact modes and the poles above them as one model, without the hub's own output."""
+    """Return the exact modes and the poles above them as one model, without the hub's own output."""
     power = np.array([[each.power] for each in inside.rows])
     s = 1j * poles
     in_S = np.where(rest.by_S[:, None], shares, -shares * poles**2)
@@ -205,7 +194,7 @@ def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares:
     added = np.stack([upper, upper.conj()], axis=2)
     ends = np.stack([s, s.conj()], axis=1)
     static = inside.static + (added / ends).real.sum(axis=(1, 2))
-    strict = rest.by_S & (power[:, 0] < 2)  # no static remainder: the poles above the band stand for it
+    strict = rest.by_S & (power[:, 0] < 2)  # the poles above replace the static remainder
     return PartialFractions(
         arm=inside.arm,
         rows=inside.rows[1:],

@@ -1,7 +1,6 @@
-"""From the exact arm to the smallest model that serves: by order or by error, with its error measured.
+"""Reduced models of an order or within an error, each with its frequency range, worst error and first missing mode.
 
-This is the one door out of exactness.  What comes through carries its band, its worst error over it in the norm
-|dG| / (|G| + |w G'|), and the first mode it lacks.
+The norm of an error is |dG| / (|G| + |w G'|).
 """
 
 from __future__ import annotations
@@ -34,14 +33,14 @@ if TYPE_CHECKING:
 
 Reduction = Literal["modal", "aaa"]
 
-BAND = (0.1, 1000.0)  # rad/s, unless told
+BAND = (0.1, 1000.0)  # rad/s, by default
 NORM = "|dG| / (|G| + |w dG/dw|)"  # of the printed errors
-MOST_STATES = 400  # states: where the search for a model within an error ends
-MOST_TAILS = 12  # pairs of poles above the band: more fit rounding
-LEAST_FALL = 0.5  # of the error, or more, goes with 2.25 times the modes, even where it falls as 1/n; less is its floor
-COUNTS_TRIED = 3  # numbers of modes from the one that a rough measure finds on, measured in full
-REDUCTION_BAND = "two frequencies in rad/s, 0 < low < high, such as 0.1,1000"  # what is asked for
-WIDEST_BAND = 1e12  # its ends' ratio: what is wider was mistyped
+MOST_STATES = 400  # of a model within an error
+MOST_TAILS = 12  # pairs of poles above the range: more would fit rounding
+LEAST_FALL = 0.5  # decrease of the error with 2.25 times the modes, at least, even for 1/n; less is its floor
+COUNTS_TRIED = 3  # numbers of modes, from that of the rough error on, whose error is computed in full
+REDUCTION_BAND = "two frequencies in rad/s, 0 < low < high, such as 0.1,1000"  # the expected form
+WIDEST_BAND = 1e12  # the largest ratio of its ends
 POLE_IS_MODE = 1e-6  # relative gap within which a pole of the model is a mode of the arm
 
 
@@ -57,12 +56,12 @@ class Channel(NamedTuple):
 @dataclass(frozen=True)
 @record
 class ReducedModel:
-    """A reduced model and how far to trust it.
+    """A reduced model and its error.
 
-    `worst_error` is an upper figure of |dG| / (|G| + |w dG/dw|) over `band` [rad/s], the largest of `errors`
-    (outputs,), which are worst at `worst_at` [rad/s].  `first_mode_lacking` is the first flexible mode of the arm that
-    no pole of the model meets to within 1e-6, `lacking_frequency` [rad/s] its undamped frequency.  `note` says what
-    was not done as asked, or is empty.
+    `worst_error` is the largest |dG| / (|G| + |w dG/dw|) over `band` [rad/s], with a margin of 2 %: the maximum of
+    `errors` (outputs,), which are at `worst_at` [rad/s].  `first_mode_lacking` is the first flexible mode of the arm
+    without a pole of the model within 1e-6, `lacking_frequency` [rad/s] its undamped frequency.  `note` has the
+    deviation from the requested order or method, or is empty.
     """
 
     model: PartialFractions
@@ -125,7 +124,7 @@ class ReducedModel:
 
     @property
     def arm(self) -> Arm:
-        """The arm it stands for."""
+        """The exact arm."""
         return self.model.arm
 
     @property
@@ -140,30 +139,30 @@ class ReducedModel:
 
     @property
     def name(self) -> str:
-        """What it is, in a few words."""
+        """Arm, method and order in words."""
         return f"{self.arm.name}, {self.method}, order {self.order}"
 
     def __call__(self, s: ArrayLike) -> Complex:
-        """Values (outputs, *s.shape) at complex s [1/s]."""
+        """Return values (outputs, *s.shape) at complex s [1/s]."""
         return self.model(s)
 
     def deviation(self, omega: ArrayLike) -> Real:
-        """How far from the exact |G(i omega)| the printed error lets the model be: (outputs, omega), for an error band.
+        """Return the bound on |dG| (outputs, omega) of each output's error, errors times (|G| + |w G'|).
 
-        worst error times |G| + |w G'|; omega [rad/s] in the band, 1-D.
+        omega [rad/s] is 1-D.  Raises ParameterError for frequencies out of the range.
         """
         w = np.atleast_1d(np.asarray(omega, dtype=float))
         if not ((w >= self.band[0]) & (w <= self.band[1])).all():
-            remedy = f"the error is known from {self.band[0]:g} to {self.band[1]:g} rad/s; stay in this band"
+            remedy = f"the error is known from {self.band[0]:g} to {self.band[1]:g} rad/s; stay in this range"
             raise ParameterError(key="omega", value=omega, remedy=remedy)
         return self.errors[:, None] * Ruler(self.arm, self.model.rows, self.band, self.model.x).norm(w)
 
     def matrices(self) -> Matrices:
-        """A, B, C, D as NumPy arrays (see `PartialFractions.matrices`)."""
+        """Return A, B, C, D as NumPy arrays (see `PartialFractions.matrices`)."""
         return self.model.matrices()
 
     def state_space(self) -> control.StateSpace:
-        """The model as a `control.StateSpace` with named inputs, outputs and states."""
+        """Return the model as a `control.StateSpace` with named inputs, outputs and states."""
         return self.model.state_space(self.name)
 
 
@@ -177,13 +176,14 @@ def reduce(
     band: tuple[float, float] = BAND,
     x: float | None = None,
 ) -> ReducedModel:
-    """The reduced model of so many states, or the smallest one whose worst error over the band is within `error`.
+    """Return the reduced model of an `order`, or the smallest one whose worst error over the range is within `error`.
 
-    Orders are even; at C > 0 an odd one has the relaxation of the modes left out as a state (see `relaxed_model`), and
-    where these are overdamped 14 of an even one may be slow poles beside -1/C in their place (`slow_model`).
-    `band` in rad/s; `method` "modal" or "aaa" (C = 0 only), by default whichever has the smaller error; `x` [m] is the
-    place of outputs along the arm.  Raises ParameterError for what no model can be, ConvergenceError where no model of
-    up to 400 states is within the error.
+    Orders are even.  At C > 0 an odd order has a state for the relaxation of the omitted modes (see `relaxed_model`).
+    Where these are overdamped, 14 states of an even order may be slow poles next to -1/C (`slow_model`).
+    `band` [rad/s] is the frequency range; `method` is "modal" or "aaa" (C = 0 only), by default that with the smaller
+    error; `x` [m] is the place of outputs along the arm.
+    Raises ParameterError for illegal arguments, ConvergenceError where no model of up to 400 states is within the
+    error.
     """
     rows = transfer(arm, outputs, x=x).rows
     names = tuple(each.name for each in rows)
@@ -201,14 +201,14 @@ def reduce(
     if order is None:
         error = positive("error", error, "a positive number, such as 1e-6")
         if error < EXACT_ROUNDING:
-            remedy = f"the exact values it is measured against are float64 numbers; ask for {EXACT_ROUNDING:g} or more"
+            remedy = f"below the rounding of the exact values; give {EXACT_ROUNDING:g} or more"
             raise ParameterError(key="error", value=error, remedy=remedy)
         return _Bench(arm, rows, band, x, method).within(error)
     return _Bench(arm, rows, band, x, method).of_order(order)
 
 
 class _Bench:
-    """Models of one arm over one band, tried and measured."""
+    """Models of one arm over one frequency range, with their errors."""
 
     def __init__(
         self, arm: Arm, rows: tuple[Output, ...], band: tuple[float, float], x: float | None, method: Reduction | None
@@ -222,25 +222,25 @@ class _Bench:
         self.ruler = Ruler(arm, rows, band, x)
 
     def of_order(self, order: int) -> ReducedModel:
-        """The better model of that many states."""
+        """Return the better model of that many states."""
         pairs = self._pairs(order)
         if (order - self.fixed) % 2 and self.arm.damping:
             return self._measured(relaxed_model(self.arm, self.rows, pairs, self.x), "modal", "")
         found: list[ReducedModel] = []
         if self.by_aaa and pairs > self.inside:
             model = rational_model(self.arm, self.rows, pairs, self.band[1], self.x)
-            few = "" if model.order == order else f"order {order} asked: no more poles passed the checks of AAA"
+            few = "" if model.order == order else f"order below {order}: no more poles passed the checks of AAA"
             found.append(self._measured(model, "aaa", few))
         if self.by_modes or not found:
-            note = "" if self.by_modes else f"modal taken: AAA wants more than the {self.inside} modes in the band"
+            note = "" if self.by_modes else f"method modal: AAA needs more than the {self.inside} modes in the range"
             found.append(self._measured(modal_model(self.arm, self.rows, pairs, self.x), "modal", note))
-            less = pairs - SLOW_PAIRS  # modes: slow poles stand for those left out where these are overdamped
+            less = pairs - SLOW_PAIRS  # modes: slow poles replace omitted ones that are overdamped
             if less >= 1 and self.arm.damping * modes(self.arm, less).natural_frequency[-1] >= SLOW_POLES_FROM:
                 found.append(self._measured(slow_model(self.arm, self.rows, less, self.x), "modal", ""))
         return min(found, key=lambda each: each.worst_error)
 
     def within(self, error: float) -> ReducedModel:
-        """The smallest model whose measured error is within that one."""
+        """Return the smallest model whose error is within that one."""
         tried, most = [self._few_poles(error)], self.most
         if self.arm.damping:
             tried.append(self._few_modes(error, relaxed_model, most))
@@ -253,14 +253,14 @@ class _Bench:
         if not found:
             best = self.of_order(2 * min(self.inside + MOST_TAILS, self.most) + self.fixed)
             message = (
-                f"found no model of up to {MOST_STATES} states within {error:g} from {self.band[0]:g} to "
-                f"{self.band[1]:g} rad/s; order {best.order} has {best.worst_error:.2g}: allow more, or narrow the band"
+                f"no model of up to {MOST_STATES} states is within {error:g} from {self.band[0]:g} to {self.band[1]:g} "
+                f"rad/s; order {best.order} has {best.worst_error:.2g}: allow more, or narrow the range"
             )
             raise ConvergenceError(message, best, best.worst_error)
         return min(found, key=lambda each: (each.order, each.worst_error))
 
     def _few_poles(self, error: float) -> ReducedModel | None:
-        """The smallest model by AAA, if one will do."""
+        """Return the smallest model by AAA within an error, or None."""
         if not self.by_aaa:
             return None
         for pairs in range(self.inside + 1, min(self.inside + MOST_TAILS, self.most) + 1):
@@ -272,20 +272,20 @@ class _Bench:
         return None
 
     def _few_modes(self, error: float, make: Callable[..., PartialFractions], most: int) -> ReducedModel | None:
-        """The smallest model of up to so many modes, if one will do; its error falls with each, so by bisection."""
+        """Return the smallest model of up to `most` modes within an error, or None.  By bisection, as errors fall."""
 
         def rough(count: int) -> float:
             return self.ruler.rough(make(self.arm, self.rows, count, self.x))
 
         good, bad = 0, -1
-        sizes: list[float] = []  # of the errors with more and more modes, once all those of the band are there
+        sizes: list[float] = []  # of the errors with more and more modes beyond those of the range
         try:
             while (size := rough(good)) > error:
                 sizes += [size] * (good > self.inside)
                 if good == most or (len(sizes) > 2 and sizes[-1] > LEAST_FALL * sizes[-3]):
                     return None
                 good, bad = min(good + max(good // 2, 2), most), good
-        except ConvergenceError:  # at C > 0 no more damped modes can be told apart
+        except ConvergenceError:  # at C > 0 no more damped modes can be separated
             return None
         while good - bad > 1:
             middle = (good + bad) // 2
@@ -300,8 +300,8 @@ class _Bench:
         return ReducedModel(model, method, self.band, *self.ruler.measure(model), *first_mode_lacking(model), note)
 
     def _pairs(self, order: object) -> int:
-        """Flexible pairs of poles in a model of so many states."""
-        rigid = {0: "", 2: "two for the rigid body, "}.get(self.fixed, f"{self.fixed} besides the modes, ")
+        """Return the number of flexible pairs of poles in a model of that order."""
+        rigid = {0: "", 2: "two for the rigid body, "}.get(self.fixed, f"{self.fixed} other than the modes, ")
         remedy = f"states come in pairs, {rigid}two a mode: an even number from 2 to {MOST_STATES}"
         if not self.arm.is_undamped:
             remedy = f"two states a mode, {rigid}and one for relaxation where it is odd: from 2 to {MOST_STATES}"
@@ -312,7 +312,7 @@ class _Bench:
 
 
 def first_mode_lacking(model: PartialFractions) -> tuple[int, float]:
-    """Number and undamped frequency [rad/s] of the arm's first flexible mode that is not one of the model's."""
+    """Return the number and undamped frequency [rad/s] of the arm's first flexible mode that the model lacks."""
     table = modes(model.arm, model.index.size + 1)
     omega = table.natural_frequency[table.index > 0]
     has = (abs(model.natural_frequency[:, None] - omega) <= POLE_IS_MODE * omega).any(axis=0)

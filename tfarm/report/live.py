@@ -202,7 +202,7 @@ def _known(arm: Arm, is_quiet: bool) -> dict[str, Any]:
     kind = "reactive" if arm.is_reactive else "quiet" if is_quiet else "band"
     by_energy = "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"
     beyond = "beyond the band |L| stays below one half at all gains of this page: no unstable pole there (small gain)"
-    if arm.is_reactive and not arm.is_told_by_lyapunov:
+    if arm.is_reactive and not arm.has_lyapunov_theorem:
         by_energy = "C = 0: none of the modes looked at is driven; no theorem tells the others"
     moments = _stable_moments(arm) if arm.is_reactive else (-math.inf, math.inf)
     return {

@@ -145,7 +145,7 @@ def margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> Pa
     cases = continuous_cases(arm, chain, laws)
     found = [margins_of(each.arm, each.law) for each in cases]
     both = list(zip(cases, found, strict=True))
-    undamped = arm.is_told_by_lyapunov and all(it.stability.loop.gains is not None for it in found)
+    undamped = arm.has_lyapunov_theorem and all(it.stability.loop.gains is not None for it in found)
     blocks: list[Picture | Table] = [_bode_picture(*each) for each in both]
     if any(it.in_band is not None for it in found):
         blocks.append(margin_table(cases, found, undamped))
