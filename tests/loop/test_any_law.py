@@ -49,7 +49,7 @@ def test_what_is_no_law_is_refused_everywhere(name, law):
         (lambda: tfarm.map(LAB, ACROSS, UP, law=LAW), "two numbers of the law"),
         (lambda: tfarm.map(LAB, ACROSS, UP, law=LAW, vary="gain"), "two numbers of the law"),
         (lambda: tfarm.map(LAB, ACROSS, UP, vary=("gain", "delay")), "whose numbers vary names"),
-        (lambda: tfarm.map(LAB, ACROSS, UP, 1.0, law=LAW, vary=("gain", "delay")), "give Kp in it"),
+        (lambda: tfarm.map(LAB, ACROSS, UP, 1.0, law=LAW, vary=("gain", "delay")), "give Kp in the law"),
         (lambda: tfarm.locus(LAB, GAINS, "K3", 0.0, 1.0), "known are: K1, K2"),
         (lambda: tfarm.locus(LAB, GAINS, 2, 0.0, 1.0), "the name of what varies, such as K2"),
         (lambda: tfarm.locus(LAB, LAW, "K2", 0.0, 1.0), "known are: gain, delay, hub_angle"),

@@ -88,7 +88,7 @@ def test_a_number_whose_poles_cannot_be_counted_is_named(monkeypatch):
     monkeypatch.setattr(windows_module, "crossed", lost)
     found = tfarm.margins(LAB, LAW)
     assert LAW.numbers.keys() - found.windows.keys() == {"hub_angle.num.1"}
-    assert found.intervals_note.endswith("of hub_angle.num.1 poles could not be counted")
+    assert found.intervals_note.endswith("poles not counted along hub_angle.num.1")
 
 
 @pytest.mark.survey
@@ -122,8 +122,8 @@ def test_no_number_of_a_signal_in_two_parts_has_a_window():
     assert list(law.numbers) == ["gain", "hub_rate.num.0", "hub_rate.den.0", "hub_rate.den.1"]
 
 
-def test_of_a_link_without_damping_it_is_said_why_there_are_none():
-    assert "without damping" in tfarm.margins(BARE, Law({"hub_rate": ([0.3], [0.01, 1.0])})).intervals_note
+def test_the_note_gives_the_reason_why_an_undamped_link_has_none():
+    assert "undamped link" in tfarm.margins(BARE, Law({"hub_rate": ([0.3], [0.01, 1.0])})).intervals_note
 
 
 @pytest.mark.parametrize("damping", [3e-8, 1e-7])

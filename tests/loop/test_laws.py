@@ -105,12 +105,12 @@ def test_a_law_with_a_sign_is_known_beyond_the_band():
     assert (washout.poles.values == 0).sum() == 2
 
 
-def test_what_is_known_beyond_the_band_is_said_with_its_theorem():
+def test_the_tail_names_the_theorem_beyond_the_band():
     """A passive law drives nothing whatever holds the hub; positive position feedback must be held against too."""
     passive, ppf = ({"hub_angle": each} for each in (([2.0, 1.0], [0.01, 1.0]), ([-3.0], [1.0, 2.0, 5.0])))
     for arm in (LAB, BARE):
         held = replace(arm, hub=replace(arm.hub, stiffness=0.7))
-        assert "takes energy" in (tail := stability(held, Law(passive)).tail)
+        assert "dissipates energy" in (tail := stability(held, Law(passive)).tail)
         assert "imaginary" not in tail
         assert "strictly negative imaginary" in stability(held, Law(ppf)).tail
 
@@ -228,7 +228,7 @@ def test_a_law_that_two_modes_bear_drives_the_third():
     assert (found.verdict.is_stable, found.first_mode, found.shown_from) == (False, 3, 3)
     third = tfarm.modes(BARE, 3).natural_frequency[-1]
     assert abs(found.driven[0].imag - third) < 0.01 * third
-    assert "models of 1 to 2 modes find nothing unstable" in found.in_words
+    assert "models of 1 to 2 modes are stable" in found.in_words
 
 
 UNSTABLE = {"hub_angle": {"zeros": [-3.0], "poles": [4.0, -60.0], "gain": 900.0}, "hub_rate": 0.5}

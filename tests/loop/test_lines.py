@@ -119,7 +119,7 @@ ARM = tfarm.load("sasaki2012")
 @pytest.mark.parametrize(
     ("inertia", "law", "words"),
     [
-        (math.inf, HubFeedback(K1=0.3), "there is no loop"),
+        (math.inf, HubFeedback(K1=0.3), "has no loop"),
         (0.0, HubFeedback(K1=0.3, K2=0.1), "an algebraic loop"),
     ],
 )

@@ -50,12 +50,12 @@ def test_without_K1_V_is_constant() -> None:
 @pytest.mark.parametrize(
     ("arm", "feedback", "words"),
     [
-        (ARM, law(K1=-0.1), "K1 = -0.1 feeds energy in"),
+        (ARM, law(K1=-0.1), "K1 = -0.1 supplies energy"),
         (ARM, law(K2=1.0), "hub alone"),
         (ARM, law(K2=1.5), "1 - K2 = -0.5 is negative"),
         (ARM, law(Kp=-2.0), "Kp = -2 is below"),
-        (LAB, law(K2=0.1), "gauge does not feel the damping"),
-        (LAB, law(K2=-0.1), "gauge does not feel the damping"),
+        (LAB, law(K2=0.1), "gauge signal has no term in the damping"),
+        (LAB, law(K2=-0.1), "gauge signal has no term in the damping"),
     ],
 )
 def test_where_no_weights_exist(arm, feedback, words: str) -> None:
@@ -148,5 +148,5 @@ def test_without_K2_damping_does_no_harm(seed: int) -> None:
 
 
 def test_a_locked_hub_has_no_loop_to_prove() -> None:
-    with pytest.raises(ParameterError, match="there is no loop"):
+    with pytest.raises(ParameterError, match="has no loop"):
         lyapunov(replace(ARM, hub=Hub(inertia=math.inf)), law())

@@ -172,7 +172,7 @@ def test_the_miss_of_a_panel_is_a_share_of_each_parts_own_size(monkeypatch):
             return found.drive * drive, found.numerators * np.array(shares)[:, None], found.scale
 
         monkeypatch.setattr(panels, "loop_parts", read)
-        errors.append(panels._panel(LAB, -2e4, 2e4)[1])
+        errors.append(panels._panel(LAB, 2, -2e4, 2e4)[1])
     assert errors[0] > 1e-9
     np.testing.assert_allclose(errors, errors[0], rtol=1e-6)
 

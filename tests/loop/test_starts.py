@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from tests.similar import EITHER
 from tfarm import HubFeedback, Law
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop import panels
-from tfarm.loop.locus import BranchCrossing, in_words, open_poles
+from tfarm.loop.locus import BranchCrossing, Locus, open_poles
 from tfarm.loop.loop import Loop
 from tfarm.loop.nyquist import poles_on_axis
 from tfarm.loop.panels import CHEBYSHEV, loop_panels
@@ -195,15 +196,19 @@ def test_an_answer_of_poles_is_its_record():
         assert abs(complex(float(disc["re"]), float(disc["im"])) - pole) <= 1e-12 * abs(pole)
 
 
-def test_words_tell_three_crossings_and_count_the_others():
+def test_a_finding_has_three_crossings_and_counts_the_others():
     each = [
         BranchCrossing(gain=0.5 * n, omega=2 * math.pi * n, branch=n, direction=d)
         for n, d in enumerate(("stable", "unstable") * 3)
     ]
-    assert in_words("K2", []) == "no branch crosses the imaginary axis"
-    assert in_words("K2", each[:1]) == "a pole becomes stable at K2 = 0"
-    assert in_words("K2", each[:3]) == "a pole becomes stable at K2 = 0, unstable at K2 = 0.5, stable at K2 = 1"
-    assert in_words("K2", each) == in_words("K2", each[:3]) + " and 3 more"
+
+    def finding(crossings):
+        return Locus.finding.fget(SimpleNamespace(vary="K2", crossings=crossings))
+
+    assert finding([]) == "no branch crosses the imaginary axis"
+    assert finding(each[:1]) == "a pole becomes stable at K2 = 0"
+    assert finding(each[:3]) == "a pole becomes stable at K2 = 0, unstable at K2 = 0.5, stable at K2 = 1"
+    assert finding(each) == finding(each[:3]) + " and 3 more"
     assert each[3].frequency == pytest.approx(3.0, rel=1e-15)
 
 
@@ -274,8 +279,8 @@ def test_a_panel_that_its_polynomials_miss_is_halved(monkeypatch):
     band, wide = 1024.0, np.r_[0.0, loop_panels(LAB, 1024.0).high]
     panel = panels._panel
 
-    def missing(arm, low, high):
-        values, error = panel(arm, low, high)
+    def missing(arm, order, low, high):
+        values, error = panel(arm, order, low, high)
         return values, error if high - low < 70.0 else 1.0
 
     monkeypatch.setattr(panels, "_panel", missing)
@@ -333,7 +338,7 @@ def test_lyapunov_counts_what_the_hub_loses_to_the_rate_gain():
     for K1, proven in ((-0.2, True), (-0.3, False), (0.1, True)):
         found = lyapunov(arm, HubFeedback(K1=K1, K2=0.3))
         assert found.proven == proven
-        assert proven or "feeds energy in" in found.reason
+        assert proven or "supplies energy" in found.reason
         assert found.a1_over_a2 == (pytest.approx(0.7, rel=1e-15) if proven else None)
 
 

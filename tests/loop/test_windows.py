@@ -162,7 +162,7 @@ def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():
     arm = tfarm.load("quanser-flexlink")
     law = default_gains(arm)
     found = margins(arm, law)
-    assert "some may cross inside them" in found.intervals_note
+    assert "poles may cross inside them" in found.intervals_note
     band = found.windows["K2"].band
     assert math.isfinite(band)
     low = found.windows["K2"].around[0]

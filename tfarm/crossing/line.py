@@ -24,21 +24,20 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.errors import ParameterError
 from tfarm.records import record
 
-Places = NDArray[Any]  # of a curve, as whoever gives the functions has them
+Places = NDArray[Any]  # of a curve, in any coordinate
 Parts = Callable[[Real], tuple[Complex, Complex]]  # A and B at places of a curve
 
 LAST_BIT = 2.0**-53  # of a place, and of its bracket, which is narrower
 DIP_STEPS = 14  # of a golden section: a thousandth of two steps of the grid is left
 GOLDEN = (5.0**0.5 - 1.0) / 2.0
-ROUNDED = 1e-11  # of |A| |B|: a part beside the real one that may be rounding
-MOST_HALVINGS = 200  # a zero takes ten evaluations; three times 53 where no step but halving is believed
+ROUNDED = 1e-11  # of |A| |B|: an imaginary part that may be rounding
+MOST_HALVINGS = 200  # a zero takes ten evaluations; three times 53 where every step is a halving
 Window = tuple[float, float]  # two values of a gain, the lower first
 SAME_EDGE = 1e-9  # relative: next to z = 1 one static crossing is read several times, each with an error near 1e-12
 
 
 class Crossing(NamedTuple):
-    """At the gain `t` zeros are on the curve at the place `at` and its mirror image: `change` more of them are beyond
-    it for greater gains."""
+    """Zeros on the curve at the gain `t`, at the place `at` and its mirror image; `change` more are beyond it after."""
 
     t: float
     at: float
@@ -48,7 +47,7 @@ class Crossing(NamedTuple):
 @dataclass(frozen=True)
 @record
 class Crossings:
-    """Every `Crossing` along one gain: `gain` (n,), ascending, where each is `at` (n,) and its `change` (n,)."""
+    """Every `Crossing` along one gain: `gain` (n,), ascending, the place `at` (n,) and the `change` (n,) of each."""
 
     gain: Real
     at: Real
@@ -56,7 +55,7 @@ class Crossings:
 
     @classmethod
     def of(cls, found: Iterable[tuple[float, float, int]]) -> Crossings:
-        """Those crossings, the ones at no finite gain left out."""
+        """Collect crossings, without those at no finite gain."""
         rows = sorted((float(t), float(at), int(change)) for t, at, change in found if np.isfinite(t))
         gain, at, change = zip(*rows, strict=True) if rows else ((), (), ())
         return cls(np.array(gain, dtype=float), np.array(at, dtype=float), np.array(change, dtype=np.int64))
@@ -74,15 +73,15 @@ class Crossings:
         return Crossings(self.gain[inside], self.at[inside], self.change[inside])
 
     def passed(self, gains: Real) -> Whole:
-        """How many zeros have gone beyond the curve between -infinity and each of the gains, those at it too."""
+        """Number of zeros that pass beyond the curve between -infinity and each of the gains, inclusive."""
         return np.r_[0, np.cumsum(self.change)][np.searchsorted(self.gain, gains, side="right")]
 
 
 def brackets(h: Real) -> tuple[tuple[Whole, ...], Whole]:
-    """Where h (..., points) changes sign between neighbours, as indices of the first, and what that changes.
+    """Changes of sign of h (..., points) between neighbours: indices of the first, and the change of the count.
 
     2 more zeros beyond the curve where h falls, 2 fewer where it rises, the mirror image counted.  A point at which h
-    is 0 to the last bit counts for the sign that follows.
+    is exactly 0 has the sign of the next.
     """
     sign = np.sign(h)
     if (sign == 0).any():
@@ -95,9 +94,10 @@ def brackets(h: Real) -> tuple[tuple[Whole, ...], Whole]:
 
 
 def zeros_between(f: Callable[[Real], Real], low: Real, high: Real) -> Real:
-    """Where each of the functions f (n,) changes sign between `low` and `high` (n,), to the last bit.
+    """Return the zeros of functions f (n,) that change sign between `low` and `high` (n,), to the last bit.
 
-    By Chandrupatla (1997): the parabola of x through the last three points where these vouch for it, else the middle.
+    By Chandrupatla (1997): inverse quadratic interpolation through the last three points where it is safe, else the
+    middle.
     """
     if not low.size:
         return low
@@ -113,20 +113,15 @@ def zeros_between(f: Callable[[Real], Real], low: Real, high: Real) -> Real:
         x1, f1 = x, y
         best = np.where(abs(f1) < abs(f2), x1, x2)
         width, wanted = abs(x2 - x1), narrow + LAST_BIT * abs(best)
-        with np.errstate(all="ignore"):  # of points that coincide, or have one value, nothing is used
+        with np.errstate(all="ignore"):  # points that coincide, or have one value, give NaN, which is not used
             least = np.where(width > 2 * wanted, wanted / width, 0.5)
-            share = np.clip(_parabolic((x1, x2, x3), (f1, f2, f3)), least, 1 - least)
+            xi, phi = (x1 - x2) / (x3 - x2), (f1 - f2) / (f3 - f2)
+            at = f1 / (f2 - f1) * f3 / (f2 - f3) + (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (f3 - f2)
+            is_safe = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi) & np.isfinite(at)
+            share = np.clip(np.where(is_safe, at, 0.5), least, 1 - least)
         if ((least == 0.5) | (f1 == 0)).all():
             break
     return np.asarray(best)
-
-
-def _parabolic(x: tuple[Real, Real, Real], f: tuple[Real, Real, Real]) -> Real:
-    """Where from x1 (0) to x2 (1) the parabola x(f) through three points has its zero; a half where it bends back."""
-    (x1, x2, x3), (f1, f2, f3) = x, f
-    xi, phi = (x1 - x2) / (x3 - x2), (f1 - f2) / (f3 - f2)
-    at = f1 / (f2 - f1) * f3 / (f2 - f3) + (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (f3 - f2)
-    return np.where((phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi) & np.isfinite(at), at, 0.5)
 
 
 def crossed(places: Real, parts: Parts) -> tuple[Real, Real, Whole]:
@@ -149,9 +144,9 @@ class Family(NamedTuple):
 
 
 def family_of(corners: Callable[[Places], Complex], across: Callable[[Places], Complex], count: int) -> Family:
-    """The lines along y of  F = a + f b + y (c + f d),  one for each of so many values of f.
+    """The lines along y of  F = a + f b + y (c + f d),  one for each of `count` values of f.
 
-    `corners` gives a, b, c and d at places (4, n); `across` gives f (lines, n), or (lines, 1) where no place matters.
+    `corners` gives a, b, c and d at places (4, n); `across` gives f (lines, n), or (lines, 1) if it is constant.
     """
 
     def on(places: Places) -> tuple[Complex, Complex]:
@@ -189,8 +184,8 @@ def crossings(family: Family, places: Real, *, with_dips: bool) -> list[list[Cro
 def _dips(family: Family, places: Real, share: Real) -> tuple[Whole, Real, Real, Real, Whole]:
     """Dips of |h| through 0 between three neighbours: the line, the first place, one beyond 0, the last, and the sign.
 
-    Two crossings lie there, as close together as a resonance makes them, and h has one sign at all points around.
-    Each dip is searched by golden section, all at once.
+    Two crossings lie there, as near to each other as a resonance is narrow, and h has one sign at the points of the
+    grid.  Each dip is searched by golden section, all at once.
     """
     inner, sign = share[:, 1:-1], np.sign(share[:, 1:-1])
     lower = np.minimum(sign * share[:, :-2], sign * share[:, 2:])  # of the neighbours: below 0 where one is across
@@ -210,12 +205,12 @@ def _dips(family: Family, places: Real, share: Real) -> tuple[Whole, Real, Real,
 
 
 def _share(A: Complex, B: Complex) -> Real:
-    """h over the size that it can have, -1 to 1."""
+    """h over its largest possible size, -1 to 1."""
     return np.asarray((A * B.conj()).imag / np.maximum(abs(A) * abs(B), LEAST_SIZE))
 
 
 def solved(parts: Parts, low: Real, high: Real) -> tuple[Real, Real]:
-    """The place (n,) between `low` and `high` (n,) at which each bracket's gain is real, and that gain.
+    """Return the place (n,) between `low` and `high` (n,) at which each bracket's gain is real, and that gain.
 
     `parts` gives A and B of every bracket at a place of each.
     """
@@ -226,12 +221,12 @@ def solved(parts: Parts, low: Real, high: Real) -> tuple[Real, Real]:
 
     place = zeros_between(h, low, high)
     A, B = parts(place)
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # no B to speak of: beyond any number
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # B vanishes: the gain is infinite
         return place, np.asarray(-(A * B.conj()).real / abs(B) ** 2)
 
 
 def ascending(name: str, values: Any, least: int, most: int) -> Real:
-    """The values (n,) of one number of a plane.  Raises ParameterError for what is no ascending range of so many."""
+    """Check the values (n,) of one number of a plane.  Raises ParameterError unless they ascend, `least` to `most`."""
     try:
         values = np.atleast_1d(np.asarray(values, dtype=float))
     except (TypeError, ValueError):  # no numbers
@@ -243,31 +238,31 @@ def ascending(name: str, values: Any, least: int, most: int) -> Real:
 
 
 def counts_over(gains: Real, columns: Sequence[Crossings], reference: float, there: NDArray[Any]) -> Whole:
-    """Zeros beyond the curve at each of the gains (n,) in each column: (columns, n).
+    """Return the number of zeros beyond the curve at each of the gains (n,) in each column: (columns, n).
 
-    `columns` holds the crossings of each along the gain, `there` (columns,) the count at the gain `reference`.
+    `columns` are the crossings of each along the gain, `there` (columns,) the count at the gain `reference`.
     """
     passed = np.array([each.passed(np.r_[gains, reference]) for each in columns]).reshape(len(columns), gains.size + 1)
     return np.asarray(np.asarray(there)[:, None] + passed[:, :-1] - passed[:, -1:], dtype=np.int64)
 
 
 def intervals(found: Crossings, low: float, high: float, reference: float, there: int) -> list[Window]:
-    """The intervals between `low` and `high` in which nothing is beyond the curve, `there` the count at `reference`."""
+    """Return the intervals between `low` and `high` without zeros beyond the curve; `there`: at `reference`."""
     ends = np.r_[low, np.unique(found.within(low, high).gain), high]
     (counts,) = counts_over((ends[1:] + ends[:-1]) / 2, [found], reference, np.array([there]))
     return joined([(float(a), float(b)) for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True) if n == 0 < b - a])
 
 
 def confirmed(found: Crossings, low: float, high: float, is_stable: Callable[[float], bool]) -> list[Window]:
-    """The intervals between `low` and `high`, which may be infinite, in which nothing is beyond the curve.
+    """Return the intervals between `low` and `high`, which may be infinite, without zeros beyond the curve.
 
-    Between two crossings the count is constant, and only where it is least it may be 0: there `is_stable` is asked at
-    one gain.  Gaps that rounding tears between crossings of one gain are none.  Where it is stable in none of these
-    `is_stable` is asked between all: next to z = 1 rounding may have made a crossing, and the counts are wrong.
+    Between two crossings the count is constant, and may be 0 only where it is least: there `is_stable` is evaluated at
+    one gain.  Crossings that differ by rounding are one.  If all of these are unstable, `is_stable` is evaluated
+    between all crossings: next to z = 1 rounding may have made a crossing, and the counts are wrong.
     """
     gains = found.within(low, high).gain
     edges = np.r_[low, gains[np.r_[True, np.diff(gains) > SAME_EDGE * abs(gains[1:])][: gains.size]], high]
-    beyond = 2 * (abs(edges[np.isfinite(edges)]).max(initial=0.0) or 1.0)  # where nothing crosses: any would do
+    beyond = 2 * (abs(edges[np.isfinite(edges)]).max(initial=0.0) or 1.0)  # where nothing crosses: any value
     inner = np.clip(edges, -beyond, beyond)
     middles = (inner[1:] + inner[:-1]) / 2
     counts = found.passed(middles)  # the same up to a constant
@@ -278,7 +273,7 @@ def confirmed(found: Crossings, low: float, high: float, is_stable: Callable[[fl
 
 
 def joined(windows: list[Window]) -> list[Window]:
-    """Neighbours with a common edge are one (two crossings that cancel)."""
+    """Join neighbours with a common edge (two crossings that cancel)."""
     merged: list[Window] = []
     for low, high in windows:
         if merged and merged[-1][1] == low:

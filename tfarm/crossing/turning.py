@@ -1,7 +1,7 @@
-"""Curves of zeros as a gain runs: between which of its values they must be known more closely to be drawn round.
+"""Curves of zeros along a gain: values to be added between its values, so that the curves are drawn smooth.
 
-A curve through few points has corners where the zeros have none.  Where two of them meet on the real axis and part
-there, at a right angle, the corner is true: it is approached until nobody sees what is cut off.
+A curve through few points has corners where the zeros have none.  Where two of them meet on the real axis and separate
+at a right angle, the corner is true: it is approached to less than a pixel.
 
 A region, given as intervals column by column, is cut into parts that can be filled.
 """
@@ -22,16 +22,16 @@ from .line import Window
 
 STRETCH = 2.0  # how much wider than high, or higher than wide, a picture is at most: so much more a curve turns in it
 MOST_TURN = math.radians(5.0) / STRETCH  # from one piece of a curve to the next, where the picture is as high as wide
-PIXEL = 2e-3  # of the picture, a pixel: the corners of what is no longer nobody sees
+PIXEL = 2e-3  # of the picture, a pixel: corners of shorter pieces are invisible
 ASIDE = 0.45  # of the way from one column to the next: half way may be the very edge that both were laid around
-TOLD_APART = 1e-11  # of a gain: columns nearer to each other are in the rounding of where a region ends
+DISTINCT = 1e-11  # of a gain: columns nearer to each other are in the rounding of the end of a region
 Slice = tuple[float, float, float]  # a value of the gain across, and an interval of the other there
 
 
 def loose(curves: Complex, width: Real | float, height: Real | float) -> NDArray[np.bool_]:
     """Whether a value is needed between each and the next (n - 1,), for curves (b, n) in pictures of that size.
 
-    `width` and `height` are numbers, or columns (b, 1).  Where a curve is NaN, or stays on the real axis, it is not.
+    `width` and `height` are numbers, or columns (b, 1).  None is needed where a curve is NaN or real.
     """
     piece = np.diff(curves.real / width + 1j * (curves.imag / height), axis=1)
     size, is_real = abs(piece), curves.imag == 0
@@ -49,7 +49,7 @@ def loose(curves: Complex, width: Real | float, height: Real | float) -> NDArray
 def loose_columns(across: Real, parts: Sequence[RegionPiece], drawn: Callable[[Real, Real], Complex]) -> Real:
     """Values of a gain between columns (n,) of a region, next to corners of the outlines of its parts.
 
-    `drawn` says where a point of the plane is in the picture, 1 high and about as wide; corners outside are not seen.
+    `drawn` maps a point of the plane to the picture, 1 high and about as wide; corners outside are left out.
     """
     wanted: set[float] = set()
     for part in parts:
@@ -63,7 +63,7 @@ def loose_columns(across: Real, parts: Sequence[RegionPiece], drawn: Callable[[R
 
 
 def _corners(outline: Complex) -> list[tuple[int, int, int]]:
-    """The numbers of points of a closed line at which it turns by more than 5 degrees, with their neighbours."""
+    """The indices of points of a closed line at which it turns by more than 5 degrees, with their neighbours."""
     kept = np.flatnonzero(abs(outline - np.roll(outline, 1)) > 0)
     before, after = np.roll(kept, 1), np.roll(kept, -1)
     with np.errstate(all="ignore"):
@@ -74,10 +74,10 @@ def _corners(outline: Complex) -> list[tuple[int, int, int]]:
 
 
 def _halves(across: Real, here: float, other: float) -> list[float]:
-    """Nearly half way between two columns; of a side that is upright, to the columns beside it."""
+    """Nearly half way between two columns; of an upright side, to its neighbours."""
     n = int(np.searchsorted(across, here))
-    beside = [float(across[k]) for k in (n - 1, n + 1) if 0 <= k < across.size]
-    ends = [each for each in beside if abs(each - here) > TOLD_APART * abs(here)] if here == other else [other]
+    neighbours = [float(across[k]) for k in (n - 1, n + 1) if 0 <= k < across.size]
+    ends = [each for each in neighbours if abs(each - here) > DISTINCT * abs(here)] if here == other else [other]
     return [min(here, each) + ASIDE * abs(each - here) for each in ends]
 
 
@@ -85,7 +85,7 @@ def _halves(across: Real, here: float, other: float) -> list[float]:
 class RegionPiece:
     """A part of a region to fill: (across, low, high) from column to column.
 
-    `begins`, `ends`: whether the region itself does at that side, and not only the piece.
+    `begins`, `ends`: whether the region itself has an end at that side, and not only the piece.
     """
 
     points: list[Slice]
@@ -94,7 +94,7 @@ class RegionPiece:
 
 
 def pieces(across: Real, intervals: Sequence[Sequence[Window]]) -> list[RegionPiece]:
-    """The region cut into parts with one interval a column; where intervals part or join, parts meet without a gap."""
+    """Cut the region into parts with one interval a column; where intervals split or join, parts meet without a gap."""
     done: list[RegionPiece] = []
     going: list[RegionPiece] = []
     for gain, column in zip(across, intervals, strict=True):
@@ -126,7 +126,7 @@ def pieces(across: Real, intervals: Sequence[Sequence[Window]]) -> list[RegionPi
 
 
 def _shares(whole: Slice, parts: Sequence[Slice]) -> list[Slice]:
-    """The interval divided among the parts that it falls into, in the middles of the gaps between them."""
+    """The interval divided among its parts, in the middles of the gaps between them."""
     gaps = [(a[2] + b[1]) / 2 for a, b in itertools.pairwise(parts)]
     return [(whole[0], low, high) for low, high in itertools.pairwise([whole[1], *gaps, whole[2]])]
 

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from tfarm.arm import NAMES, PLANE
 from tfarm.arm.feedback import ON
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.columns import Table
 from tfarm.crossing import (
     Crossing,
     Crossings,
@@ -35,7 +34,7 @@ from tfarm.crossing import (
     pieces,
     solved,
 )
-from tfarm.crossing.shown import coarse, grid_table
+from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.crossing.turning import loose_columns
 from tfarm.dsp.chain import Sampling
 from tfarm.dsp.sampled import Sampled
@@ -239,11 +238,11 @@ def around(windows: list[Window], gain: float) -> Window | None:
 
 @dataclass(frozen=True)
 @record
-class GainMap:
-    """`unstable` (len(x), len(y)): how many poles grow, apart from z = 1 of a free hub angle; stable where it is zero.
+class GainMap(PlaneOfCounts):
+    """`unstable` (len(x), len(y)): number of unstable poles, without z = 1 of a free hub angle; stable where it is 0.
 
-    `vary` names both numbers of the law, `x` and `y` are their values: K1 and K2, by default.  `crossings[i]`: at which
-    y the count changes at x[i], exact and not tied to the grid.
+    `vary` names both numbers of the law, `x` and `y` are their values: K1 and K2, by default.  `crossings[i]` are the y
+    at which the count changes at x[i], exact and independent of the grid.
     """
 
     loop: Sampled
@@ -260,28 +259,13 @@ class GainMap:
 
     @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
-        """Arm and law in words, as results name them."""
+        """Names of the arm and the controller."""
         return controller(self.loop.given, self.loop.plant.arm)
 
     @property
     def finding(self) -> Annotated[str, Quantity("stability region")]:
-        """At how many points of the grid the loop is stable, in words."""
+        """Number of points of the grid at which the loop is stable."""
         return f"stable at {int((self.unstable == 0).sum())} of {self.unstable.size} points"
-
-    @property
-    def csv_table(self) -> Table:
-        """A row a point of the grid."""
-        return grid_table(self.vary, self.x, self.y, self.counts.tolist())
-
-    @property
-    def drawing(self) -> str:
-        """A coarse picture for a terminal."""
-        return coarse(self.vary, self.x, self.y, self.counts)
-
-    @property
-    def axes(self) -> tuple[Real, Real]:
-        """The values of both numbers: across the plane, and up it."""
-        return self.x, self.y
 
     @property
     def counts(self) -> Annotated[NDArray[np.int64], Quantity(key="unstable_poles")]:
@@ -289,28 +273,15 @@ class GainMap:
         return self.unstable.T
 
     @property
-    def K1(self) -> Real:
-        """The values across, of the plane of K1 and K2."""
-        return self.x
-
-    @property
-    def K2(self) -> Real:
-        """The values up, of the plane of K1 and K2."""
-        return self.y
-
-    @property
     def modes_used(self) -> Annotated[int, Quantity("flexible modes")]:
-        """How many flexible modes the loop has."""
+        """Number of flexible modes in the loop."""
         return self.loop.plant.count
 
     @property
     def stable_intervals(self) -> list[list[Window]]:
-        """For each x the intervals of y, cut to the map, in which nothing grows: the region with exact edges."""
-        low, high = float(self.y[0]), float(self.y[-1])
-        return [
-            intervals(found, low, high, low, int(unstable))
-            for found, unstable in zip(self.crossings, self.unstable[:, 0], strict=True)
-        ]
+        """For each x the stability intervals of y, cut to the map: the region with exact edges."""
+        low, high, first = float(self.y[0]), float(self.y[-1]), self.unstable[:, 0].tolist()
+        return [intervals(found, low, high, low, count) for found, count in zip(self.crossings, first, strict=True)]
 
 
 def sampled_map(

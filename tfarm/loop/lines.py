@@ -5,7 +5,7 @@ and four, the corners of a plane, all over two:
 
     D = D00 + x D10 + y D01 + x y D11
 
-In a delay it is not: there x stands for e^{-s tau}, which what is fed back is multiplied by.  On the axis poles cross
+It is not affine in a delay: there x is e^{-s tau}, the factor on the terms that are fed back.  On the axis poles cross
 in pairs, at s = 0 and at infinity one by one.
 """
 
@@ -24,24 +24,23 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.spectrum.box import FIRST_POINTS, NEAREST_TO_ZERO, TRIED_HEIGHTS, turned
 from tfarm.spectrum.table import first_frequency
 
-from .loop import Loop, grid
+from .loop import FAR_RIGHT, Loop, grid
 from .poles import box_of
 from .stability import MARGIN_OF_ZERO, is_known_without
 
 LEADING = ".den.0"  # how the name of a leading coefficient ends
-FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: where one is looked for on its way through infinity
 ORDER_READ_AT = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off
 SIMPLE = 3.0  # ratio of values at the first and the second: 2 of a simple zero, 4 of a double one
 NEXT_TO_MEETING = 1e-3  # of the range: how far from such a place its counts are taken
 FINITE_LIMIT = 1.5  # times the gain at the farther of two small s: more at the nearer one is a gain without a limit
 STILL_GROWS = 0.75  # of the step before: by more, of places ever farther right, a gain without a limit grows
 LAST_APPLIED = (".0", ".gain", "gain")  # ends of names: a leading 0 moves the others, a factor is on what there is
-NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is looked for on its way through 0
+NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is searched on its way through 0
 ROUNDED = 4 * float(np.finfo(float).eps)  # of a range: a gain so small is 0
 
 
 def with_numbers(law: Law, values: Mapping[str, float]) -> Law:
-    """The law with other values of some of its numbers, factors on the others' new values."""
+    """Return the law with other values of some of its numbers; factors act on the new values of the others."""
 
     def rank(name: str) -> int:
         return next((n for n, end in enumerate(LAST_APPLIED, 1) if name.endswith(end)), 0) + (name == "gain")
@@ -64,7 +63,7 @@ def rows(loop: Loop, s: Complex) -> Complex:
 
 
 def _ends(law: Law, name: str, reach: float) -> tuple[float, float]:
-    """Two values of a number, 0 the first where there is such a law."""
+    """Two values of a number; the first is 0 where the law exists there."""
     try:
         law.having(name, 0.0)
     except ParameterError:  # a denominator that is 0 everywhere
@@ -73,7 +72,7 @@ def _ends(law: Law, name: str, reach: float) -> tuple[float, float]:
 
 
 def along(loop: Loop, ranges: Mapping[str, tuple[float, float]]) -> Family:
-    """The lines of loops along each of some numbers, all others held, at places s."""
+    """The lines of loops along each of some numbers, all others constant, at places s."""
     ends = {name: _ends(loop.law, name, max(map(abs, pair))) for name, pair in ranges.items()}
     laws = [([loop.law.having(name, end) for end in pair], pair) for name, pair in ends.items()]
 
@@ -101,12 +100,12 @@ def along(loop: Loop, ranges: Mapping[str, tuple[float, float]]) -> Family:
 def columns(loop: Loop, names: tuple[str, str], x: Real, reach: tuple[float, float]) -> Family:
     """The lines of loops along the second of two numbers, one for each value x of the first, at places s."""
     first, second = names
-    is_delay = first == "delay"  # x stands for e^{-s tau} then, 0 where nothing is fed back
+    is_delay = first == "delay"  # then x is e^{-s tau}, 0 where nothing is fed back
     law = loop.law.having("delay", 0.0) if is_delay else loop.law
     low, high = (0.0, 1.0) if is_delay else _ends(law, first, reach[0])
     bottom, top = _ends(law, second, reach[1])
     across = [{} if is_delay else {first: each} for each in (low, high)]
-    laws = [[with_numbers(law, held | {second: each}) for each in (bottom, top)] for held in across]
+    laws = [[with_numbers(law, fixed | {second: each}) for each in (bottom, top)] for fixed in across]
 
     def corners(s: Complex) -> Complex:
         terms = rows(loop, s)
@@ -132,10 +131,10 @@ def crossed(
     omega: Real,
     members: Sequence[Callable[[], Loop]],
 ) -> list[Crossings]:
-    """The crossings of the axis along each of some lines of loops, of whose numbers names and ranges are given.
+    """Return the crossings of the axis along each of some lines of loops, given the names and ranges of their numbers.
 
-    Where the leading coefficient of a denominator changes its sign a real pole passes through infinity.  `members` make
-    a loop of each line, for the counts on either side of a value at which two poles meet at s = 0.
+    Where the leading coefficient of a denominator changes its sign, a real pole passes through infinity.  `members`
+    make a loop of each line: poles are counted on either side of a value at which two of them meet at s = 0.
     """
     axis = Family(lambda w: lines.on(1j * w), lambda line, w: lines.at(line, 1j * w))
     found = crossings(axis, omega, with_dips=bool(loop.arm.least_damping))  # else h is rounding where modes rest
@@ -157,15 +156,15 @@ def crossed(
 
 
 def line_crossings(loop: Loop, name: str, low: float, high: float, band: float) -> Crossings:
-    """The crossings of the axis up to a band [rad/s] along one number of a loop's law between two values."""
+    """Return the crossings of the axis up to a band [rad/s] along one number of a loop's law between two values."""
     lines = along(loop, {name: (low, high)})
     return crossed(loop, lines, [(name, (low, high))], np.asarray(grid(loop.arm, band)), [lambda: loop])[0]
 
 
 def _change_at(loop: Loop, name: str, at: float, span: float, others: list[Crossing], band: float) -> int:
-    """By how much the count grows at a value where two poles meet at s = 0, from counts on either side.
+    """Return the change of the count at a value where two poles meet at s = 0, from counts on either side.
 
-    Without losses modes may cross at that value, but for rounding: it is no place to count at, and is refused.
+    Raises ConvergenceError where nothing is damped and modes cross at that value too, but for rounding.
     """
     at = 0.0 if abs(at) <= ROUNDED * span else at
     away = [abs(each.t - at) for each in others if each.t != at and math.isfinite(each.t)]
@@ -174,8 +173,8 @@ def _change_at(loop: Loop, name: str, at: float, span: float, others: list[Cross
         below, above = (unstable_below(loop.having(name, at + side * step), band) for side in (-1, 1))
     except ConvergenceError as error:
         why = (
-            f"at {name} = {at:.6g} two poles meet at s = 0, and next to it others are on the axis, where nothing is "
-            "damped: they cannot be counted; give the link a little damping, or a range without that value"
+            f"{name}: at {at:.6g} two poles meet at s = 0 and undamped modes are on the axis, so poles cannot be "
+            "counted; give the link a little damping, or a range without that value"
         )
         raise ConvergenceError(why, error.best, error.residual) from error
     return above - below
@@ -192,10 +191,7 @@ def through_origin(N: Complex, P: Complex) -> Crossing | None:
 
 
 def through_infinity(N: Complex, P: Complex) -> Crossing | None:
-    """A real pole through infinity, from N and P at three real s far right, each so many times the one before.
-
-    None where t has no limit there.
-    """
+    """A real pole through infinity, from N and P at three real s far right, as `FAR_RIGHT`; None without a limit."""
     with np.errstate(over="ignore", invalid="ignore"):  # a law of high order is beyond any number there
         if not P.all() or not np.isfinite(N / P).all():
             return None
@@ -207,13 +203,13 @@ def through_infinity(N: Complex, P: Complex) -> Crossing | None:
 
 
 def unstable_below(loop: Loop, band: float) -> int:
-    """Poles right of the axis with |Im s| < band: by how often D turns around the upper half of that region.
+    """Return the number of poles right of the axis with |Im s| < band, from the turns of D around that region.
 
-    Where one is on its upper edge the next of `TRIED_HEIGHTS` is taken.  Raises ConvergenceError where one is on the
+    The next of `TRIED_HEIGHTS` is taken where a pole is on its upper edge.  Raises ConvergenceError where one is on the
     axis, to working precision.
     """
     if loop.resting_zeros:
-        raise ConvergenceError("a pole is at s = 0, neither stable nor not: take other values", loop, 0.0)
+        raise ConvergenceError("a pole is at s = 0, neither stable nor unstable: take other values", loop, 0.0)
     right, nearest = box_of(loop, band).re_max, MARGIN_OF_ZERO if loop.arm.least_damping else NEAREST_TO_ZERO
     for factor in TRIED_HEIGHTS:
         top = factor * band
@@ -228,7 +224,7 @@ def unstable_below(loop: Loop, band: float) -> int:
 
 
 def critical(name: str, limits: tuple[float, float]) -> tuple[float, ...]:
-    """At which values of a number a band has to tell all: its ends, and of a leading coefficient 0 between them."""
+    """Values of a number at which the band must be sufficient: its limits, and 0 of a leading coefficient."""
     low, high = limits
     return (low, 0.0, high) if name.endswith(LEADING) and low < 0 < high else limits
 

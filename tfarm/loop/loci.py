@@ -1,7 +1,7 @@
-"""A locus beside that of a reduced model, where it damps the first mode most, and as plain data.
+"""A locus compared with that of a reduced model, and the gain that damps the first mode most.
 
-Where a gain varies the reduced locus is `control.root_locus_map` on the loop of a modal model opened at that gain, the
-other gains closed before; for a parameter of the arm, which python-control cannot vary, the poles of a reduced closed
+Along a gain the reduced locus is `control.root_locus_map` on the loop of a modal model, opened at that gain and closed
+at the others.  A parameter of the arm is nothing that python-control varies: there it is the poles of a reduced closed
 loop at a few values.
 """
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 LOCUS_POINTS, LOCUS_BRANCHES = 300, 7  # values of the gain, and branches
 POLE_DIGITS = 10  # digits of |s| that are drawn and written: poles differ from processor to processor by 1e-14 at most
-GAPS_HELD = 3  # digits of a gap, 1e-5 of |s| or less: a reduced pole is right to 1e-12 of that
+GAPS_HELD = 3  # digits of a gap, 1e-5 of |s| or less: a reduced pole has an error of 1e-12 of that
 GAP_NOTE = (
     "largest distance of a branch from the reduced one, over |s| or the arm's first flexible frequency, the larger"
 )
@@ -44,7 +44,7 @@ BRANCHES_NOTE = (
     "listed too (branch null)."
 )
 LEAST_ORDER = 20  # of the model, ten modes, where no order is asked for
-MODES_BEYOND_BRANCHES = 2  # modes of the reduced model above the last branch, if the order is not said
+MODES_BEYOND_BRANCHES = 2  # modes of the reduced model above the last branch, if no order is asked for
 REDUCED_VALUES = 9  # values at which an arm is reduced anew, where a parameter of it varies
 ROUND_POINTS = 17  # of each round between two neighbours, so that it is an eighth as wide as the one before
 NARROWEST_ROUND = 1e-7  # of the gain: where rounds end; a damping ratio, flat there, is known to 1e-14 of its curvature
@@ -53,7 +53,7 @@ NARROWEST_ROUND = 1e-7  # of the gain: where rounds end; a damping ratio, flat t
 @dataclass(frozen=True)
 @record
 class ReducedLocus:
-    """Poles of a reduced closed loop of that `order`, next to the exact branches, at the values `gain` (m,).
+    """Poles of a reduced closed loop of that `order`, paired with the exact branches, at the values `gain` (m,).
 
     `branches` (b, m) [1/s] are the reduced poles paired one to one with the exact ones so that the sum of distances is
     least; `gap` (b,) is the largest distance of each branch, as a share of |s| or, if that is more, of the arm's first
@@ -72,9 +72,10 @@ class ReducedLocus:
 
 
 def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
-    """The locus by python-control on a modal model of that order, or of one two modes beyond the last branch.
+    """Return the locus by python-control on a modal model of that order, or of one two modes beyond the last branch.
 
-    Raises ParameterError if the order is odd or has no room for as many poles as there are branches.
+    Raises ParameterError if the order is odd or has no room for as many poles as there are branches, ConvergenceError
+    if the model is beyond python-control.
     """
     arm, rigid = exact.arm, exact.arm.has_rigid_mode
     least = int(exact.mode.max()) + rigid
@@ -86,8 +87,15 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
         raise ParameterError(key="order", value=order, remedy=remedy)
     count = order // 2 - rigid
     if exact.vary in OF_THE_LAW:
+        import control
+
         which = np.arange(exact.gain.size)
-        poles = root_locus(arm, exact.gains, exact.vary, exact.gain, count)
+        system = open_loop(arm, exact.gains, exact.vary, count)
+        try:
+            poles = np.asarray(control.root_locus_map(system, exact.gain).loci)
+        except np.linalg.LinAlgError as error:  # it works with coefficients of s^n, which overflow at high frequencies
+            text = f"python-control cannot follow a model of this arm: {error}"
+            raise ConvergenceError(text, arm.name, count) from None
     else:
         which = np.unique(np.linspace(0, exact.gain.size - 1, REDUCED_VALUES).round().astype(int))
         arms = [exact.varied.at(float(value)).arm for value in exact.gain[which]]
@@ -104,22 +112,12 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
 
 
 def reduced_of(exact: Locus) -> ReducedLocus | None:
-    """The same of gains at the hub, of which there is a reduced locus; None of another law or number."""
+    """The reduced locus of gains at the hub; None of another law or number."""
     return None if exact.in_box else reduced_locus(exact)
 
 
-def root_locus(arm: Arm, law: HubFeedback, vary: str, gain: Real, count: int) -> Complex:
-    """`control.root_locus_map` of the loop opened at what varies, a modal model of `count` modes: (gains, order)."""
-    import control
-
-    try:
-        return np.asarray(control.root_locus_map(open_loop(arm, law, vary, count), gain).loci)
-    except np.linalg.LinAlgError as error:  # it works with coefficients of s^n, which overflow at high frequencies
-        raise ConvergenceError(f"python-control cannot follow a model of this arm: {error}", arm.name, count) from None
-
-
 def open_loop(arm: Arm, law: HubFeedback, vary: str, count: int) -> control.StateSpace:
-    """The loop function to be multiplied by the varied gain, all other gains closed; state space of a modal model."""
+    """The loop function that the varied gain multiplies, all other gains closed: state space of a modal model."""
     import control
 
     moving = np.array(law.row) if vary == "all" else np.array(HubFeedback().having(vary, 1.0).row)
@@ -129,7 +127,7 @@ def open_loop(arm: Arm, law: HubFeedback, vary: str, count: int) -> control.Stat
 
 
 def _closed(arm: Arm, fixed: Real, count: int, moving: Real) -> tuple[Matrices, Real]:
-    """The model of the outputs that either row of gains uses, closed by the fixed one, and the other on its outputs."""
+    """The model of the outputs of either row of gains, closed by the fixed one; the other row on its outputs."""
     used = (fixed != 0) | (moving != 0)
     used[FED_BACK.index("hub_rate")] |= not used.any()
     used[FED_BACK.index("hub_angle")] |= bool(arm.rate_loss) and arm.has_rigid_mode  # or its pole at 0 is not a state
@@ -140,8 +138,10 @@ def _closed(arm: Arm, fixed: Real, count: int, moving: Real) -> tuple[Matrices, 
 @dataclass(frozen=True)
 @record
 class MostDamped:
-    """The `gain` at which mode 1 has its largest `damping_ratio`, and whether it still swings on all of the way there
-    from it (`swings_on`) and is damped less beyond (`falls`)."""
+    """The `gain` at which mode 1 has its largest `damping_ratio`.
+
+    `swings_on`: it oscillates from there to the end of the range.  `falls`: it is damped less beyond.
+    """
 
     gain: Annotated[float, Quantity("value")]
     damping_ratio: Annotated[float, Quantity("damping ratio")]
@@ -150,10 +150,10 @@ class MostDamped:
 
 
 def most_damped(found: Locus) -> MostDamped | None:
-    """The first mode's largest damping ratio along a gain; None where its branch is not followed all the way.
+    """Return the first mode's largest damping ratio along a gain; None where its branch is not followed all the way.
 
-    Where it is the largest of the locus's values with a neighbour on either side that swings too, it is looked for
-    between these, on ever narrower grids; at an end of the range it is that of the locus's own value.
+    Between neighbours that oscillate too it is refined on ever narrower grids.  At an end of the range it is that of
+    the locus's own value.
     """
     rows = found.branches[(found.mode == 1) & (found.branches.imag > 0).any(axis=1)]
     rows = rows[~np.isnan(rows).any(axis=1)]
@@ -176,12 +176,12 @@ def most_damped(found: Locus) -> MostDamped | None:
 
 
 def damping_ratios(s: Complex) -> Real:
-    """-Re s/|s| of poles that swing; -inf of real ones."""
+    """-Re s/|s| of oscillating poles; -inf of real ones."""
     return np.where(s.imag > 0, -s.real / np.maximum(abs(s), LEAST_SIZE), -np.inf)
 
 
 class Branch(NamedTuple):
-    """A branch of a locus: its poles at both ends of the range, and how far the reduced model's is from it."""
+    """A branch of a locus: its poles at both ends of the range, and its distance from the reduced model's."""
 
     branch: Annotated[int, Quantity("branch")]
     mode: Annotated[int, Quantity("mode")]
@@ -201,7 +201,7 @@ class Loci:
 
     @property
     def rows(self) -> Annotated[list[Branch], Quantity("branches", key="branch_list", help=BRANCHES_NOTE)]:
-        """A row a branch."""
+        """One row for each branch."""
         branches, ends = self.exact.branches.tolist(), dict(self.exact.ends)
         gaps = [None] * len(branches) if self.reduced is None else self.reduced.gap.tolist()
         rows = enumerate(zip(self.exact.mode.tolist(), branches, gaps, strict=True))
@@ -209,22 +209,22 @@ class Loci:
 
     @property
     def best(self) -> Annotated[MostDamped | None, Quantity("first mode most damped", key="first_mode_most_damped")]:
-        """Where the first mode has its largest damping ratio."""
+        """The gain at which the first mode has its largest damping ratio."""
         return most_damped(self.exact)
 
     @property
     def name(self) -> str:
-        """What varies."""
+        """The number that varies."""
         return self.exact.vary
 
     @property
     def unit(self) -> str:
-        """Of what varies; nothing of a pure number."""
+        """The unit of that number; empty of a pure one."""
         return self.exact.unit.replace("1", "")
 
 
 def held_branches(branches: Complex) -> Complex:
-    """Branches to the digits that hold on every processor: as shares of |s|, so that a small Re s keeps its place."""
+    """Branches rounded to the digits that are the same on every processor, relative to |s|: a small Re s is kept."""
     size = np.maximum(abs(branches), np.finfo(float).tiny)
     unit = 10.0 ** (np.floor(np.log10(size)) + 1 - POLE_DIGITS)
     return np.round(branches.real / unit) * unit + 1j * (np.round(branches.imag / unit) * unit)

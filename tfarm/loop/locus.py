@@ -1,12 +1,12 @@
 """Root loci of the exact rig: branches that keep their identity, and where they cross the imaginary axis.
 
-At a few values the winding number says how many poles a box holds: there the list is complete.  In between each pole
-is followed (`tfarm.spectrum.following`), vectorised over values and poles.  Branches are named after the modes of the
-rig without feedback: the whole law grows from 0 to what it is at the first value, and each pole is followed there.
+At a few values the winding number counts the poles of a box: there the list is complete.  In between each pole is
+followed (`tfarm.spectrum.following`), vectorised over values and poles.  Branches are named after the modes of the rig
+without feedback: a factor on the law grows from 0 to 1 at the first value, and each pole is followed on that way.
 
 Crossings are solved for gain and frequency together, not interpolated.  Along a number of the law in which D is linear
-D-decomposition has every one (`tfarm.crossing`); each is that of the branch that changes sides there, or of a pole on
-none.  Along another number the branch is followed to it.
+D-decomposition has every one (`tfarm.crossing`).  Each belongs to the branch that changes sides there, or to a pole on
+no branch.  Along another number the branch is followed to its crossing.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ COMPANY = 2  # flexible modes followed beyond the box, whose poles may come into
 NODES = 3  # values after the first at which the poles of the box are counted
 SAME_POLE = 1e-6  # of its size: a pole found by two searches
 HALVING_ROUNDS = 24  # of halving at most: where two branches meet their distance goes with the root of that of the gain
-LEAST_WIDTH, LEAST_HEIGHT = 1e-12, 1e-9  # of a picture, of the size of its poles: less is rounding of one that stands
+LEAST_WIDTH, LEAST_HEIGHT = 1e-12, 1e-9  # of a picture, of the size of its poles: less is rounding of a constant pole
 AT_ORIGIN = 1e-9  # of the largest of its branch: a pole so near to 0 is there but for the last step of its correction
-SAME_CROSSING = 1e-3  # of the highest frequency: so near is a crossing of a branch to where its points say that it is
+SAME_CROSSING = 1e-3  # of the highest frequency: largest distance of a crossing from where the points of its branch are
 AT_END = 1e-9  # of the range: a crossing so near to an end is at the end, and not between
 GAIN_KNOWN = 1e-15  # of the larger end of a step: the value at which a branch crosses
 JUST_ABOVE = 1.01  # times the highest frequency of a branch: between two values it may be higher
 STEP = 1e-6  # of a frequency, for a difference
-CROSSINGS_SHOWN = 3  # of a locus in words
+CROSSINGS_SHOWN = 3  # of a locus, in its finding
 
 
 @dataclass(frozen=True)
@@ -85,17 +85,21 @@ class Locus:
 
     @property
     def finding(self) -> str:
-        """Where the imaginary axis is crossed, in words."""
-        return in_words(self.vary, self.crossings)
+        """The first `CROSSINGS_SHOWN` crossings of the imaginary axis."""
+        if not self.crossings:
+            return "no branch crosses the imaginary axis"
+        shown, more = self.crossings[:CROSSINGS_SHOWN], len(self.crossings) - CROSSINGS_SHOWN
+        first = ", ".join(f"{each.direction} at {self.vary} = {each.gain:.6g}" for each in shown)
+        return f"a pole becomes {first}{f' and {more} more' if more > 0 else ''}"
 
     @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
-        """Arm and law in words, as results name them."""
+        """Names of the arm and the controller."""
         return controller(as_law(self.law), self.arm)
 
     @property
     def unit(self) -> Annotated[str, Quantity("unit")]:
-        """The SI unit of what varies, "1" of a pure number."""
+        """The SI unit of the varied number, "1" of a pure one."""
         of_other = ARM_PARAMETERS | {"delay": "s"}
         return unit_of(self.vary, self.arm) if self.vary in NAMES else of_other.get(self.vary, "1")
 
@@ -117,7 +121,7 @@ class Locus:
 
     @property
     def ends(self) -> tuple[tuple[int, float], ...]:
-        """The number of each branch that ends on the way, and the last of the values at which it is followed."""
+        """The number of each branch that ends within the range, and the last value at which it is followed."""
         lives = ~np.isnan(self.branches)
         rows = np.nonzero(~lives[:, -1])[0]
         return tuple((int(row), float(self.gain[np.nonzero(lives[row])[0][-1]])) for row in rows if lives[row].any())
@@ -126,13 +130,13 @@ class Locus:
 def locus(
     arm: Arm, law: AnyLaw, vary: str, start: float, stop: float, points: int | None = None, branches: int = 10
 ) -> Locus:
-    """The closed-loop poles of the exact arm as one number goes from `start` to `stop`, at equally spaced values.
+    """Return the closed-loop poles of the exact arm at equally spaced values of one number, `start` to `stop`.
 
     `vary` is a gain, "all" (a scale on the gains), payload_mass, payload_inertia, hub_inertia, length or damping; of a
-    law of signals "gain" (a factor on it), "delay", a signal, "SIGNAL.num.N" or "SIGNAL.den.N", too.  Along these, and
-    of any other `Law` than gains at the hub, the record has all poles of a box as high as the first `branches` flexible
-    modes, with 100 values unless `points` says otherwise; else that many branches, with 500.
-    Raises ParameterError for what is no law, no loop or no range, ConvergenceError where branches cannot be told apart.
+    law of signals also "gain" (a factor on it), "delay", a signal, "SIGNAL.num.N" or "SIGNAL.den.N".  Along the latter,
+    and of any `Law` but gains at the hub, the record has all poles of a box as high as the first `branches` flexible
+    modes, by default at 100 values.  Else it has that many branches, by default at 500 values.
+    Raises ParameterError for an invalid law, loop or range, ConvergenceError where branches cannot be distinguished.
     """
     (arm, plain), gains = arm_and_law(arm, law), as_law(law).gains
     if not isinstance(vary, str):
@@ -168,7 +172,7 @@ def locus(
 
 
 def followed(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
-    """All poles (b, n) but those at 0 all the way, mirror images among them, and the mode of each."""
+    """All poles (b, n) but those at 0 at every value, mirror images included, and the mode of each."""
     row, mode = named(family, modes + COMPANY)
     row = np.r_[row, missing(family, family.start, row)]
     rows, low = row[:, None], 0
@@ -192,14 +196,15 @@ def followed(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
 
 
 def missing(family: Varied, value: float, row: Complex) -> Complex:
-    """The poles of the box at a value that are none of these (b,): none where their number is that of the box."""
+    """The poles of the box at a value that are not among these (b,): none where their number is that of the box."""
     inside = row[family.box.holds(row) & (row != 0)]
     try:
         count = family.count(value)
     except ConvergenceError:  # a pole on the edge of the box: there it comes or goes
         return row[:0]
     if count < inside.size:
-        raise ConvergenceError(f"branches cannot be told apart at {family.vary} = {value:.10g}", value, inside.size)
+        text = f"two branches cannot be distinguished at {family.vary} = {value:.10g}"
+        raise ConvergenceError(text, value, inside.size)
     if count == inside.size:
         return row[:0]
     every = family.complete(value, row)
@@ -208,9 +213,9 @@ def missing(family: Varied, value: float, row: Complex) -> Complex:
 
 
 def named(family: Varied, number: int) -> tuple[Complex, Whole]:
-    """The poles but those at 0 all the way at the first value (b,) that continue from the open rig's, and their modes.
+    """Poles at the first value (b,) that continue from the open rig's, and their modes; without those pinned at 0.
 
-    In the order of the modes, of which there are so many flexible ones; those of a law come last.
+    In the order of the modes, `number` flexible ones; poles of a law come last.
     """
     loop = family.first
     law = family.law_at(family.start)
@@ -230,7 +235,7 @@ def named(family: Varied, number: int) -> tuple[Complex, Whole]:
 
 
 def open_poles(arm: Arm, number: int) -> tuple[Complex, Whole]:
-    """The poles of the rig without feedback, both of each pair, and their modes: of so many flexible ones at least."""
+    """Poles of the rig without feedback, both of each pair, and their modes: of at least `number` flexible ones."""
     table = modes(arm, number)
     if arm.is_undamped:
         omega = table.natural_frequency[table.index > 0]
@@ -253,12 +258,15 @@ def open_poles(arm: Arm, number: int) -> tuple[Complex, Whole]:
 def rounded(found: Locus) -> Locus:
     """Return the same locus with more values, until no branch turns by more than 5 degrees as it is drawn.
 
-    Each is seen in a picture of its own and in one of all, down to pieces of a pixel.
+    Each is drawn in a picture of its own and in one of all, down to pieces of a pixel.
     """
     family, gain, rows, shown = found.varied, found.gain, found.followed, found.branches
     way, pinned = int(np.sign(gain[-1] - gain[0])), len(shown) - found.listed.size
     for _ in range(HALVING_ROUNDS):
-        more = _bent(gain, shown)
+        frames = np.array([[*map(frame, shown)], [frame(shown)] * len(shown)])  # (2, b, 4)
+        width, height = frames[..., 1] - frames[..., 0], frames[..., 3] - frames[..., 2]
+        own, every = (loose(shown, width[n, :, None], height[n, :, None]) for n in (0, 1))
+        more = (gain[:-1] + gain[1:])[own | every] / 2
         if not more.size or more.size + gain.size > MOST_LOCUS_POINTS:
             break
         order = np.argsort(way * np.r_[gain, more], kind="stable")
@@ -269,29 +277,21 @@ def rounded(found: Locus) -> Locus:
     return replace(found, gain=gain, branches=shown, followed=rows)
 
 
-def _bent(gain: Real, rows: Complex) -> Real:
-    """Half way between values where a branch is to be known more closely, in a frame of its own or of all."""
-    frames = np.array([[*map(frame, rows)], [frame(rows)] * len(rows)])  # (2, b, 4)
-    width, height = frames[..., 1] - frames[..., 0], frames[..., 3] - frames[..., 2]
-    own, every = (loose(rows, width[n, :, None], height[n, :, None]) for n in (0, 1))
-    return np.asarray((gain[:-1] + gain[1:])[own | every] / 2)
-
-
 def frame(branches: Complex) -> tuple[float, float, float, float]:
-    """Left, right, low and high of the picture of these branches [1/s]: all of them, with the imaginary axis."""
+    """Left, right, low and high [1/s] of the picture of all these branches, with the imaginary axis."""
     points = branches[~np.isnan(branches)]
     if not points.size:
         return 0.0, 1.0, 0.0, 1.0
     left, right = min(float(points.real.min()), 0.0), max(float(points.real.max()), 0.0)
     low, high = float(points.imag.min()), float(points.imag.max())
     wide = max(right - left, LEAST_WIDTH * float(abs(points).max())) or 1.0  # where no pole moves from 0
-    tall = max(high - low, LEAST_HEIGHT * high) or wide  # where none of them swings
+    tall = max(high - low, LEAST_HEIGHT * high) or wide  # where none of them oscillates
     return left, left + wide, low, low + tall
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BranchCrossing:
-    """One branch of a locus crosses the imaginary axis at s = i `omega` [rad/s], where what varies is `gain`.
+    """Crossing of the imaginary axis by a branch of a locus, at s = i `omega` [rad/s] and the value `gain`.
 
     `omega` is 0 or infinite where a real pole goes through the origin or through infinity.  `branch` is its number in
     the locus, None for a pole on none of them, or between two points; `direction` is "unstable" where the real part
@@ -309,17 +309,8 @@ class BranchCrossing:
         return self.omega / (2 * math.pi)
 
 
-def in_words(vary: str, crossings: Sequence[BranchCrossing]) -> str:
-    """Where poles cross the imaginary axis as one number varies, the first `CROSSINGS_SHOWN` of them."""
-    if not crossings:
-        return "no branch crosses the imaginary axis"
-    first = ", ".join(f"{each.direction} at {vary} = {each.gain:.6g}" for each in crossings[:CROSSINGS_SHOWN])
-    more = len(crossings) - CROSSINGS_SHOWN
-    return f"a pole becomes {first}{f' and {more} more' if more > 0 else ''}"
-
-
 def branch_crossings(family: Varied, gain: Real, branches: Complex, top: float) -> tuple[BranchCrossing, ...]:
-    """Return the crossings of the imaginary axis in the order in which they come.
+    """Return the crossings of the imaginary axis in the order of the way.
 
     Of a damped rig along a number of its law those of poles on no branch too, up to `top` [rad/s].
     """
@@ -343,7 +334,7 @@ def branch_crossings(family: Varied, gain: Real, branches: Complex, top: float) 
 
 
 def _on_line(family: Varied, gain: Real, top: float) -> list[Crossing]:
-    """The crossings by D-decomposition where D is linear in the number; else none."""
+    """Crossings by D-decomposition where D is linear in the number; else none."""
     if family.is_of_arm or family.vary == "delay":
         return []
     loop = family.first.under(family.full)
@@ -355,9 +346,9 @@ def _on_line(family: Varied, gain: Real, top: float) -> list[Crossing]:
 
 
 def _corrected(family: Varied, t: Real, at: Real) -> Real:
-    """The gains for what a frequency is off in its last bit, by a step of Newton's method for both.
+    """Gains corrected for the rounding of the frequency, by a step of Newton's method for both.
 
-    Of D + B dt + D' dw = 0 the part across D' is one for dt alone.
+    Of D + B dt + D' dw = 0 the part across D' is an equation for dt alone.
     """
     (A, B), (after, by_after), (before, by_before) = (family.on_axis(at * (1 + d)) for d in (0.0, STEP, -STEP))
     slope = (after + t * by_after) - (before + t * by_before)
@@ -366,10 +357,10 @@ def _corrected(family: Varied, t: Real, at: Real) -> Real:
 
 
 def _changes(branches: Complex) -> list[tuple[int, int, int]]:
-    """Each branch that changes sides with the numbers of its last value before and the first after.
+    """Each branch that changes sides, with the numbers of its last value before and the first after.
 
-    Points on the axis are left out; one of them that is at i w becomes a real one off it, too.  A mirror image is not
-    listed.
+    Points on the axis are left out.  A change too is where a point at i w becomes a real one off the axis.  Mirror
+    images are not listed.
     """
     size = abs(branches)
     largest = np.nanmax(np.where(np.isnan(size), 0.0, size), axis=1)[:, None]
@@ -403,7 +394,7 @@ def _crossed(family: Varied, ends: Real, points: Complex, known: Sequence[Crossi
         share = (value - ends[0]) / (ends[1] - ends[0])
         found = family.near(np.array([value]), np.array([[points[0] + share * (points[1] - points[0])]]))[0, 0]
         if np.isnan(found):
-            text = f"a crossing of the imaginary axis near {family.vary} = {value:.6g} could not be solved for"
+            text = f"a crossing of the imaginary axis near {family.vary} = {value:.6g} was not found"
             raise ConvergenceError(text, value, found)
         return complex(found)
 

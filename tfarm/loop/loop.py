@@ -2,13 +2,13 @@
 
     L(s) = e^{-s tau} sum of C_i(s) G_i(s),    D(s) = drive q(s) + e^{-s tau} sum of p_i(s) numerator_i(s)
 
-q being the common denominator of the law and p_i/q its entries: D has no poles but those of a damped link's -1/C, so
-its zeros can be counted.  Where the law and the rig share a zero and a pole D keeps both: what is cancelled is seen.
-Gains at the hub are a law of order 0 on hub angle, hub rate and root moment.
+q is the common denominator of the law and p_i/q its entries: D has no poles but a damped link's -1/C, so its zeros can
+be counted.  Where the law and the rig share a zero and a pole, D keeps both: no cancellation is hidden.  Gains at the
+hub are a law of order 0 on hub angle, hub rate and root moment.
 
 Along s = i w the loop function is steep at the arm's natural frequencies, at those with the hub locked (zeros of the
-hub angle) and with the hub free of inertia (zeros of the root moment); at small C these features are as narrow as C
-w^2. So a grid has points at geometric distances around each.
+hub angle) and with the hub free of inertia (zeros of the root moment).  At small C these features are as narrow as
+C w^2, so a grid has points at geometric distances from each.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback, Law, as_law, cancelled, full_law, must_be_arm, must_not_be_algebraic
-from tfarm.arm.law import Part
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, Feedback, LoopParts, deflated, difference_steps, feedback
@@ -37,33 +36,32 @@ from tfarm.spectrum import flexible_frequencies, modes, modes_below
 from tfarm.spectrum.frequencies import ARMS_KEPT
 from tfarm.spectrum.table import check_gains, first_frequency
 
-FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: how far right an improper law is looked at
+FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: far right, where L of an improper law must fall, and poles come from infinity
 UNDISPERSED = 1e11  # of w1: where waves are no longer dispersed
 FALL_FACTOR = 0.5  # L must fall by this there, from one to the next
-SOMEWHERE = 0.31 + 0.71j  # of w1: where it is seen whether a signal is fed back at all; no law has its zero there
-NO_ORDER = 99  # of a zero at s = 0, of what is not fed back: above that of any part
-LEAST_GAIN = 1e-100  # N m s/rad, N m/rad or pure: the squares of what is slower than such a gain makes are no doubles
+SOMEWHERE = 0.31 + 0.71j  # of w1: where a signal is tested for being fed back at all; no law has its zero there
+LEAST_GAIN = 1e-100  # N m s/rad, N m/rad or pure: poles of a smaller gain have squares below the smallest double
 NEAREST_TO_ORIGIN = 1e-12  # of w1: where a function, its zeros at 0 divided out, is taken for its value at 0
 ROUNDING_AT_REST = 1e-13  # of the terms of D: less is left by their rounding where they cancel at s = 0
 ORDER_READ_AT = (2e-5, 1e-5)  # of w1: where the order of a zero at s = 0 is read off
 NEAREST_TO_STEEP, FARTHEST_FROM_STEEP = 1e-10, 0.06  # distances from a steep place, as shares of its frequency
-POINTS_BESIDE_STEEP = 14  # of a grid on either side of a steep place, one and a half a decade
+POINTS_NEAR_STEEP = 14  # of a grid on either side of a steep place, one and a half a decade
 POINTS_BETWEEN_STEEP = 24  # and between two of them
 STEEP_BEYOND = 1.05  # of the end of a grid: the points of steep places up to there reach below it
 SLOWEST = 1e-6  # of the first steep place: where a grid begins, as nothing bends there
 POINTS_BELOW_STEEP = 60  # from there to that place, ten a decade
-QUIET_REACH = 100.0  # bands up to which |L| is looked at beyond a band: two decades of its fall
-MOST_RESONANCES = 2000  # looked at in them: 20 ms
-MOST_BAND_MODES = 150  # flexible: what is not settled within so many is left open
+QUIET_REACH = 100.0  # times a band: the end of the range beyond it in which |L| is evaluated, two decades of its fall
+MOST_RESONANCES = 2000  # evaluated in it: 20 ms
+MOST_BAND_MODES = 150  # flexible: in a band; beyond, poles are not determined without a theorem or small gain
 
 
 @dataclass(frozen=True)
 @record
 class Loop:
-    """A rig under a law in s, gains at the hub among them.
+    """A rig under a law in s, gains at the hub among them; `signals` are those fed back, made unless given.
 
     Raises ParameterError for a locked hub, a law in z, an algebraic loop, and gains that are denormal numbers or far
-    too large for the arm.  `signals` are what is fed back: made unless given, as `under` gives those of another law.
+    too large for the arm.
     """
 
     arm: Arm
@@ -76,10 +74,10 @@ class Loop:
         if law.input is not None and law.input != self.arm.input:
             object.__setattr__(self, "arm", replace(self.arm, input=law.input))  # type: ignore[arg-type]
         if self.arm.is_locked:
-            remedy = "a locked hub (inertia = inf) takes no torque: there is no loop; give the hub a finite inertia"
+            remedy = "a locked hub (inertia = inf) has no loop: give the hub a finite inertia"
             raise ParameterError(key="hub.inertia", value=self.arm.hub.inertia, remedy=remedy)
         if law.is_discrete:
-            remedy = "a law in z acts at samples: ask for the sampled loop, or leave the period out of a law in s"
+            remedy = "a law in z has a sampled loop: ask for that, or leave the period out of a law in s"
             raise ParameterError(key="period", value=law.period, remedy=remedy)
         object.__setattr__(self, "law", full_law(law))
         given: Signals | None = self.signals
@@ -87,11 +85,11 @@ class Loop:
             object.__setattr__(self, "signals", Signals(self.arm, self.law.signals))
         if self.gains is not None:
             _must_be_possible(self.arm, self.gains)
-        self._must_fall()
+        _must_not_be_algebraic(self)
 
     @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
-        """Arm and law in words, as results name them."""
+        """Names of the arm and the controller."""
         return controller(self.law if self.gains is None else as_law(self.gains), self.arm)
 
     @cached_property
@@ -100,7 +98,7 @@ class Loop:
         return cancelled(self.law)
 
     def under(self, law: Law) -> Loop:
-        """The same rig under another law: what its signals are at rest is not worked out again."""
+        """The same rig under another law; its signals at rest are kept."""
         return Loop(self.arm, law, self.signals)
 
     def having(self, name: str, value: float) -> Loop:
@@ -109,7 +107,7 @@ class Loop:
 
     @cached_property
     def gains(self) -> HubFeedback | None:
-        """The gains at the hub of a law that is no more than those."""
+        """The law as gains at the hub; None of any other law."""
         return self.law.gains
 
     @property
@@ -124,7 +122,7 @@ class Loop:
 
     @cached_property
     def is_lossless(self) -> bool:
-        """Whether D is real on the imaginary axis, and its zeros come in pairs +-s: nothing takes or gives energy."""
+        """Whether D is real on the imaginary axis, and its zeros come in pairs +-s: energy is conserved."""
         if not self.feeds_back:
             return self.arm.is_undamped
         odd = np.array([each.power % 2 for each in self.signals.outputs])
@@ -136,7 +134,7 @@ class Loop:
 
     @cached_property
     def at_rest(self) -> tuple[float, float, float] | None:
-        """c, b and J of  D/theta = c + b s + J s^2 + ...  of gains at the hub of an arm that turns; None of others."""
+        """c, b and J of  D/theta = c + b s + J s^2 + ...  for gains at the hub of an arm that turns; else None."""
         if self.gains is None or not self.arm.has_rigid_mode:
             return None
         arm, gains = self.arm, self.gains
@@ -152,7 +150,7 @@ class Loop:
 
     @cached_property
     def exact(self) -> Feedback:
-        """What the law feeds back, exactly, for proofs in ball arithmetic."""
+        """The fed-back terms, exact, for proofs in ball arithmetic."""
         return feedback(self.k, self.law, self.signals.outputs, self.signals.places)
 
     def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
@@ -169,37 +167,29 @@ class Loop:
 
     @cached_property
     def zeros_at_origin(self) -> int:
-        """How often D vanishes at s = 0: as the least of its terms does, and more often where these cancel."""
+        """Order of the zero of D at s = 0: the least order of its terms, and more where these cancel."""
         integrators = int((self.law.poles == 0).sum())
         terms = [self.k.at_rest + integrators]
-        numerators, _ = self.law.polynomials(np.array([SOMEWHERE * first_frequency(self.arm)]))
-        for row, order in enumerate(self.signals.orders):
-            if abs(numerators[row, 0]) > 0:
-                terms.append(order + self._order_of(row))
+        (numerators,) = self.law.polynomials(np.array([SOMEWHERE * first_frequency(self.arm)]))[0].T
+        for name, order, numerator in zip(self.law.signals, self.signals.orders, numerators, strict=True):
+            for part in self.law.parts if numerator else ():
+                own = part.block.zeros_at_origin(part.signals.index(name)) if name in part.signals else None
+                if own is not None:  # and the integrators of the other parts
+                    terms.append(order + own + integrators - int((part.block.poles == 0).sum()))
         return min(terms) + self.resting_zeros
 
     @cached_property
     def resting_zeros(self) -> int:
-        """How many poles are at s = 0 because the law takes off exactly what holds the rig at rest: L(0) = -1.
+        """Number of poles at s = 0 because the law cancels the stiffness of the rig exactly: L(0) = -1.
 
-        Which terms of D vanish at s = 0 is known from their orders; that they cancel there is seen in their values
-        alone.  What is odd in s next to 0 is taken off by the mean on both sides.
+        The orders of the terms of D do not show that they cancel there, but their values do.  The mean on both sides
+        of 0 has no terms odd in s.
         """
         s = first_frequency(self.arm) * np.array([NEAREST_TO_ORIGIN, -NEAREST_TO_ORIGIN, *ORDER_READ_AT]) + 0j
         with np.errstate(all="ignore"):  # L is infinite at a pole of the rig or of the law: then nothing cancels
             right, left, farther, nearer = 1 + self.loop_function(s)
-            cancels = abs(right + left) <= 2 * ROUNDING_AT_REST and abs(right) < 1  # else what is odd hides the rest
+            cancels = abs(right + left) <= 2 * ROUNDING_AT_REST and abs(right) < 1  # else odd terms dominate
         return round(float(np.log2(abs(farther / nearer)))) if cancels else 0
-
-    def _order_of(self, row: int) -> int:
-        """How often p_i vanishes at s = 0: those zeros of its parts, and integrators of the others."""
-        name, orders = self.law.signals[row], []
-        for n, part in enumerate(self.law.parts):
-            if name in part.signals:
-                others = sum(int((each.block.poles == 0).sum()) for m, each in enumerate(self.law.parts) if m != n)
-                own = part.block.zeros_at_origin(part.signals.index(name))
-                orders.append(NO_ORDER if own is None else others + own)
-        return min(orders)
 
     def function(self, s: Complex) -> Analytic:
         """D/s^n, n = `zeros_at_origin`, with slopes from differences."""
@@ -219,29 +209,10 @@ class Loop:
         return float(max(0.0, scale[1] - scale[0]) / far)
 
     def characteristic(self, s: Complex, of_rig: LoopParts) -> Complex:
-        """D(s) up to a factor that no law changes, so that two laws may be added; `of_rig` are the signals' parts."""
+        """D(s) up to a factor independent of the law, so that laws may be added; `of_rig` are the signals' parts."""
         entries, whole = self.law.polynomials(s)
         late = np.exp(-s * self.law.delay)
         return np.asarray(of_rig.drive * whole + late * (entries * of_rig.numerators).sum(axis=0))
-
-    def _must_fall(self) -> None:
-        """Refuse a law that asks for more than the rig gives at once: then its loop is algebraic."""
-        if self.arm.has_massless_hub and any(map(_passes_moment_on, self.law.parts)):
-            key, value = ("law.root_moment", self.law.name) if self.gains is None else ("K2", self.gains.K2)
-            must_not_be_algebraic(self.arm, key, value)
-        if not self.law.is_improper:
-            return
-        far = first_frequency(self.arm) * np.array(FAR_RIGHT) + 0j
-        drive, numerators, _ = self.signals.parts(far)
-        entries, whole = self.law.polynomials(far)
-        with np.errstate(all="ignore"):
-            size = abs((entries * numerators).sum(axis=0) / (drive * whole))  # L without its delay
-        if not (np.isfinite(size).all() and (size[1:] < FALL_FACTOR * size[:-1]).all()):
-            worst = next(p for p in self.law.parts if p.block.excess > 0)
-            remedy = (
-                "its numerator has too high a degree for this signal, so that the loop is algebraic; add a pole to den"
-            )
-            raise ParameterError(key=f"law.{worst.signals[0]}.num", value=worst.block.excess, remedy=remedy)
 
 
 def by_differences(
@@ -255,22 +226,35 @@ def by_differences(
         return deflated(D[0], (up - down) / (2 * h), scale[0], s, at_zero)
 
 
-def _passes_moment_on(part: Part) -> bool:
-    """Whether a part of a law takes the root moment and gives some of it at once."""
-    if "root_moment" not in part.signals or part.block.excess != 0:
-        return False
-    return bool(part.block.matrices()[3][0, part.signals.index("root_moment")])
+def _must_not_be_algebraic(loop: Loop) -> None:
+    """Raise ParameterError for a law whose loop function does not fall far right: the loop would be algebraic."""
+    arm, law = loop.arm, loop.law
+    moment = [part for part in law.parts if "root_moment" in part.signals and part.block.excess == 0]
+    if arm.has_massless_hub and any(p.block.matrices()[3][0, p.signals.index("root_moment")] for p in moment):
+        key, value = ("law.root_moment", law.name) if loop.gains is None else ("K2", loop.gains.K2)
+        must_not_be_algebraic(arm, key, value)
+    if not law.is_improper:
+        return
+    far = first_frequency(arm) * np.array(FAR_RIGHT) + 0j
+    drive, numerators, _ = loop.signals.parts(far)
+    entries, whole = law.polynomials(far)
+    with np.errstate(all="ignore"):
+        size = abs((entries * numerators).sum(axis=0) / (drive * whole))  # L without its delay
+    if not (np.isfinite(size).all() and (size[1:] < FALL_FACTOR * size[:-1]).all()):
+        worst = next(p for p in law.parts if p.block.excess > 0)
+        remedy = "the degree of its numerator is too high for this signal, so the loop is algebraic; add a pole to den"
+        raise ParameterError(key=f"law.{worst.signals[0]}.num", value=worst.block.excess, remedy=remedy)
 
 
 def _must_be_possible(arm: Arm, gains: HubFeedback) -> None:
-    """Raise ParameterError for gains with which there is no loop, or which no double or machine can tell."""
+    """Raise ParameterError for gains without a loop, and for gains beyond the range of doubles."""
     if gains.K2 and arm.is_undamped and not (arm.hub_side_inertia or arm.reads_hub_moment):
         remedy = "with hub.inertia = 0 and no damping K2 moves poles through infinity; use K2 = 0 or some inertia"
         raise ParameterError(key="K2", value=gains.K2, remedy=remedy)
     least = LEAST_GAIN * max(1.0, arm.total_inertia if arm.has_rigid_mode else 1.0)
     for name, value in gains.by_name.items():
         if 0 < abs(value) < least:
-            remedy = f"0, or at least {least:.1e} in size: no double has the square of what is as slow"
+            remedy = f"0, or at least {least:.1e} in size: the square of a slower pole is below the smallest double"
             raise ParameterError(key=name, value=value, remedy=remedy)
     check_gains(arm, gains)
 
@@ -290,7 +274,7 @@ def grid(arm: Arm, up_to: float) -> Any:
     """Frequencies [rad/s] from a millionth of the first natural one to `up_to`, dense at steep places; read-only."""
     places = np.asarray(steep_places(arm, STEEP_BEYOND * up_to))
     lowest = SLOWEST * min(up_to, places[0] if places.size else up_to)
-    away = np.geomspace(NEAREST_TO_STEEP, FARTHEST_FROM_STEEP, POINTS_BESIDE_STEEP)
+    away = np.geomspace(NEAREST_TO_STEEP, FARTHEST_FROM_STEEP, POINTS_NEAR_STEEP)
     close = (places[:, None] * (1 + np.r_[-away[::-1], away])).ravel()
     corners = np.r_[lowest, places[places < up_to], up_to]
     between = np.concatenate(
@@ -305,17 +289,17 @@ def grid(arm: Arm, up_to: float) -> Any:
 
 @lru_cache(maxsize=ARMS_KEPT)
 def band_of(arm: Arm, number: int) -> float:
-    """A frequency [rad/s] half-way between two natural ones, with so many flexible modes below."""
+    """A frequency [rad/s] half-way between two natural ones, with `number` flexible modes below."""
     omega = modes(arm, number + 1).natural_frequency
     return float((omega[-1] + omega[-2]) / 2)
 
 
 @lru_cache(maxsize=ARMS_KEPT)
 def quiet_places(arm: Arm, band: float, points: int) -> Any:
-    """Frequencies [rad/s] in two decades from a band on, where a damped loop is seen to be quiet or not; read-only.
+    """Frequencies [rad/s] in two decades above a band, for the test of small gain of a damped loop; read-only.
 
-    So many at equal ratios, and the natural ones, the first `MOST_RESONANCES`, up to where bending is overdamped, 2/C
-    of the segment with the least C: a resonance narrower than their spacing would stand between them.
+    `points` of them have equal ratios.  The natural ones are added, as a resonance may be narrower than that spacing:
+    the first `MOST_RESONANCES`, up to where bending is overdamped, 2/C of the segment with the least C.
     """
     places = band * np.geomspace(1.0, QUIET_REACH, points)
     if arm.least_damping:

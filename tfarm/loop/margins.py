@@ -1,15 +1,15 @@
 """Gain, phase, delay and disk margin of the exact loop function L(i w), and never without the verdict.
 
-A gain margin of an unstable loop is a number that means nothing.  At C = 0 the loop function has poles on the axis at
-ever higher frequency, so that any delay, however short, destabilises some mode: the exact delay margin is 0.  With
-K2 != 0 the disk margin is 0 too and the peak sensitivity infinite; with K2 = 0 the hub is passive, and they are not.
-What the loop has up to a band is given beside them, with the band.
+Margins of an unstable loop have no meaning.  At C = 0 the loop function has poles on the axis at ever higher frequency,
+so that any delay, however short, destabilises some mode: the exact delay margin is 0.  With K2 != 0 the exact disk
+margin is 0 too and the peak sensitivity infinite; with K2 = 0 the hub is passive, and both are finite.  The margins up
+to a band are listed in addition, with the band.
 
-Phase margins bear the sign that python-control gives them: where |L| = 1 the angle from -1 to L, in (-180, 180] deg.
-One above 0 is lag that the loop bears, one below 0 lead; of a stable loop neither sign is an instability.
+Phase margins have the sign of python-control: where |L| = 1 the angle from -1 to L, in (-180, 180] deg.  A positive one
+is a margin for lag, a negative one for lead; of a stable loop neither sign is an instability.
 
-Disk margin: the largest alpha for which the loop bears every factor (2 + alpha d)/(2 - alpha d), |d| < 1 (Seiler,
-Packard and Gahinet 2020, symmetric disks), which is 2 min |(1 + L)/(1 - L)|.
+Disk margin: the largest alpha for which the loop is stable with every factor (2 + alpha d)/(2 - alpha d), |d| < 1
+(Seiler, Packard and Gahinet 2020, symmetric disks), which is 2 min |(1 + L)/(1 - L)|.
 """
 
 from __future__ import annotations
@@ -34,22 +34,22 @@ from .stability import Stability, is_quiet, stability
 from .theorem import Lyapunov, Signs, lyapunov, signs_of_loop, theorem_of
 from .windows import NumberInterval, Windows, reach_words, windows_of
 
-MARGIN_DIGITS, PLACE_DIGITS = 9, 7  # of a margin, at most, and of the frequency of a dip, which its depth hardly feels
-CROSSOVER_DIGITS = 12  # of what each crossover is listed with, at most: more than any table rounds to
+MARGIN_DIGITS, PLACE_DIGITS = 9, 7  # of a margin, at most, and of the frequency of a dip, where its depth is flat
+CROSSOVER_DIGITS = 12  # of the value at each crossover, at most: more than any table rounds to
 NEXT_DOUBLES = 2.0**-52 * np.arange(-16, 17, 4)  # on either side of a frequency, in shares of it: as L is rounded
-FARTHER = 8.0 ** np.arange(-16, -5)  # the same, until rounding does not decide any more on which side of the axis L is
-BELOW_SLOWEST = 20.0  # of the slowest thing that is to be seen: where the curve of L begins
+FARTHER = 8.0 ** np.arange(-16, -5)  # the same, until rounding no longer decides the side of the axis that L is on
+BELOW_SLOWEST = 20.0  # of the lowest frequency of interest: where the curve of L begins
 ABOVE_NOISE = 4.0  # times what neighbours differ by
 ROUND_POINTS, ROUNDS = 17, 7  # of ever narrower grids around a dip, an eighth each time: 1e-6 of the first is left
 LOWEST = 6  # local minima on the grid that are refined
 AT_POLE = 1e-9  # a factor on L so small belongs to a pole of L on the axis, where L changes its sign through infinity
-REST = 1e-3  # of the size of -1/L: what its imaginary part and its way from half the lowest frequency on may be at rest
+REST = 1e-3  # of the size of -1/L: largest imaginary part, and change from half the lowest frequency on, at rest
 BELOW_SLOWEST_POLE = 0.05  # of its size: so far down |L| may cross 1
 SLOW_POINTS = 400  # from there to the grid of the arm
 NEAR_POLES = np.geomspace(0.05, 20.0, 12)  # points about a pole, in its distances from the axis
 UNLIMITED = {"disk": 2.0, "peak_sensitivity": 1.0}  # sizes of a passive loop, at no frequency of its own; else inf
 SAME_SIZE = 1e-7  # of such a size: so much rounding leaves next to a narrow resonance
-NO_WINDOWS = "no intervals of the law's numbers: of a rig with a link without damping all modes meet on the axis"
+NO_WINDOWS = "no stability intervals: with an undamped link all modes meet on the axis"
 
 GAIN_MARGIN = Quantity("gain margin, factors down and up", help="factors on L between which the loop stays stable")
 PHASE_MARGIN = Quantity("phase margin", "deg", help="of least size where |L| = 1; above 0 for lag, below for lead")
@@ -71,13 +71,13 @@ EXACT_DELAY, EXACT_DISK, EXACT_PEAK, EXACT_COMPLEMENTARY = (  # of the infinite-
 @dataclass(frozen=True)
 @record
 class LoopMargins:
-    """Margins of L(i w) for 0 < w <= `band` [rad/s]; inf where nothing limits.
+    """Margins of L(i w) for 0 < w <= `band` [rad/s]; inf where there is no limit.
 
     `gain` (lowest, highest factor), `phase` [deg] of least size, above 0 for lag and below for lead, `phase_lag` and
     `phase_lead` [deg] the sizes of the least of either, `delay` [s], `disk` [-], `peak_sensitivity` and
-    `peak_complementary` [-], of 1/(1 + L) and L/(1 + L); `at` are the frequencies [rad/s] where these occur, 0 where
-    there is none.  `gain_crossovers` are all frequencies with |L| = 1 and the phase margin [deg] at each,
-    `phase_crossovers` all with L < 0 and the factor -1/L on it that puts a pole there, both ascending.
+    `peak_complementary` [-], of 1/(1 + L) and L/(1 + L); `at` are the frequencies [rad/s] where these occur, or 0.
+    `gain_crossovers` are all frequencies with |L| = 1 and the phase margin [deg] at each, `phase_crossovers` all with
+    L < 0 and the factor -1/L on it that puts a pole there, both ascending.
     """
 
     band: Annotated[float, Quantity("up to", "rad/s", key="up_to_rad_s")]
@@ -94,44 +94,44 @@ class LoopMargins:
     phase_crossovers: tuple[tuple[float, float], ...]
 
     def at_frequency(self, name: str) -> At:
-        """The margin of that name, and its frequency; a size that no frequency limits has none."""
+        """The margin of that name, and its frequency; None where no frequency limits it."""
         value = float(getattr(self, name))
         is_anywhere = math.isclose(abs(value), UNLIMITED.get(name, math.inf), rel_tol=SAME_SIZE)
         return At(value, None if is_anywhere else self.at[name])
 
     @property
     def phase_margin(self) -> Annotated[At, PHASE_MARGIN]:
-        """Of least size."""
+        """The phase margin of least size."""
         return self.at_frequency("phase")
 
     @property
     def lag(self) -> Annotated[At, PHASE_LAG]:
-        """The least for lag."""
+        """The least phase margin for lag."""
         return self.at_frequency("phase_lag")
 
     @property
     def lead(self) -> Annotated[At, PHASE_LEAD]:
-        """The least for lead."""
+        """The least phase margin for lead."""
         return self.at_frequency("phase_lead")
 
     @property
     def delay_margin(self) -> Annotated[At, DELAY_MARGIN]:
-        """The least further delay."""
+        """The smallest destabilising delay."""
         return self.at_frequency("delay")
 
     @property
     def disk_margin(self) -> Annotated[At, DISK_MARGIN]:
-        """For gain and phase at once."""
+        """The margin for gain and phase together."""
         return self.at_frequency("disk")
 
     @property
     def sensitivity_peak(self) -> Annotated[At, PEAK_SENSITIVITY]:
-        """Of 1/(1 + L)."""
+        """The peak of 1/(1 + L)."""
         return self.at_frequency("peak_sensitivity")
 
     @property
     def complementary_peak(self) -> Annotated[At, PEAK_COMPLEMENTARY]:
-        """Of L/(1 + L)."""
+        """The peak of L/(1 + L)."""
         return self.at_frequency("peak_complementary")
 
 
@@ -152,11 +152,11 @@ class PhaseCrossover(NamedTuple):
 @dataclass(frozen=True)
 @record
 class Margins:
-    """The verdict first.  `windows` are those of each gain, or number of a law, by its name.
+    """Verdict and margins of a loop; `windows` are the stability intervals of each number of the law, by its name.
 
     `in_band` are the margins up to the verdict's band; `exact_delay`, `exact_disk` and `exact_peak` those of the whole
-    infinite-dimensional loop.  All four are None unless the loop is stable, and each exact one where at C > 0 nothing
-    bounds |L| beyond the band (the hub's inertia does, where it has some): not known then.
+    infinite-dimensional loop.  All four are None unless the loop is stable.  The exact ones are None, not determined,
+    where at C > 0 nothing bounds |L| beyond the band (the hub's inertia does, where there is some).
     """
 
     stability: Annotated[Stability, Quantity(flat=True)]
@@ -168,13 +168,13 @@ class Margins:
 
     @property
     def exact_complementary(self) -> Annotated[float | None, EXACT_COMPLEMENTARY]:
-        """Peak of T = 1 - S of the whole infinite-dimensional loop: as little known as that of S, or as large."""
+        """Peak of T = 1 - S of the whole infinite-dimensional loop: not determined, or infinite, where that of S is."""
         is_open = self.exact_peak is None or math.isinf(self.exact_peak)
         return self.exact_peak if is_open or self.in_band is None else self.in_band.peak_complementary
 
     @property
     def gain_margin(self) -> Annotated[tuple[float, float] | None, GAIN_MARGIN]:
-        """Factors on the whole law."""
+        """Factors on the whole law between which the loop is stable."""
         return None if self.in_band is None else self.in_band.gain
 
     @property
@@ -184,7 +184,7 @@ class Margins:
 
     @property
     def lyapunov(self) -> Annotated[Lyapunov | None, Quantity("Lyapunov function of the paper")]:
-        """Its proof of gains at the hub."""
+        """The proof by energy, for gains at the hub."""
         loop = self.stability.loop
         return None if loop.gains is None else lyapunov(loop.arm, loop.gains)
 
@@ -196,16 +196,16 @@ class Margins:
 
     @property
     def stability_intervals(self) -> Annotated[list[NumberInterval], Quantity("stability intervals")]:
-        """A row a number of the law, the others held; of gains the moment on a free pin, where it has no loop, not."""
+        """One row for each number of the law, the others constant; without K2 on a free pin, where it has no loop."""
         loop = self.stability.loop
         units = {} if loop.gains is None else {name: shown_unit(name, loop.arm) for name in loop.numbers}
         return [each.about(loop.numbers[name], units.get(name, "")) for name, each in self.windows.items()]
 
     @property
     def intervals_note(self) -> Annotated[str | None, Quantity("limits of the intervals")]:
-        """The limits where nothing is known beyond the frequency range, in words.
+        """Frequency range of the intervals where nothing is known beyond it.
 
-        A theorem on the sign of a law, or small gain, tells nothing of the law with another number in it.
+        A theorem on the sign of a law, and small gain, hold for that law, not for one with another number.
         """
         loop, words = self.stability.loop, reach_words(self.windows.values())
         if loop.gains is not None:
@@ -213,21 +213,21 @@ class Margins:
         if not self.windows and loop.arm.has_elastic_link:
             return NO_WINDOWS
         uncounted = [name for name in loop.law.numbers if self.windows and name not in self.windows]
-        return words + (f"; of {', '.join(uncounted)} poles could not be counted" if uncounted else "") or None
+        return words + (f"; poles not counted along {', '.join(uncounted)}" if uncounted else "") or None
 
     @property
     def gain_crossovers(self) -> Annotated[list[GainCrossover], Quantity("gain crossovers, abs(L) = 1")]:
-        """All in the range, ascending; none of a loop that is not stable."""
+        """All in the frequency range, ascending; empty unless the loop is stable."""
         return [] if self.in_band is None else [GainCrossover(*pair) for pair in self.in_band.gain_crossovers]
 
     @property
     def phase_crossovers(self) -> Annotated[list[PhaseCrossover], Quantity("phase crossovers, L < 0")]:
-        """All in the range, ascending; none of a loop that is not stable."""
+        """All in the frequency range, ascending; empty unless the loop is stable."""
         return [] if self.in_band is None else [PhaseCrossover(*pair) for pair in self.in_band.phase_crossovers]
 
 
 def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins:
-    """Verdict first, then the stable windows of each gain, or of each number of a law, and the margins of the loop.
+    """Return the verdict, the stability intervals of each number of the law, and the margins of the loop.
 
     Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, or where with damping
     one is on the axis to working precision.
@@ -241,7 +241,7 @@ def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins:
 
 
 def _exact(verdict: Stability, found: LoopMargins) -> tuple[float | None, float | None, float | None]:
-    """Delay margin, disk margin and peak sensitivity of the whole infinite-dimensional loop, None where not known."""
+    """Delay margin, disk margin and peak sensitivity of the whole infinite-dimensional loop; None: not determined."""
     loop = verdict.loop
     arm, gains = loop.arm, loop.gains
     if arm.is_undamped:
@@ -295,9 +295,9 @@ def loop_margins(verdict: Stability) -> LoopMargins:
 
 
 def held(values: Real, spread: Real, most: int = MARGIN_DIGITS) -> Real:
-    """The values (n,) to the digits that hold: those after them are the rounding of L next to its poles.
+    """Round values (n,) to the digits that are significant next to poles of L, where L is rounded.
 
-    That is `most` of them, or fewer where a value moves by more among the next doubles, by its `spread` (n,).
+    These are `most` digits, or fewer where a value changes by its `spread` (n,) among the next doubles.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         known = np.log10(abs(values) / spread)
@@ -306,7 +306,7 @@ def held(values: Real, spread: Real, most: int = MARGIN_DIGITS) -> Real:
 
 
 def _spread(f: Callable[[Real], Real | Complex], omega: Real) -> Real:
-    """How far f of frequencies (n,) moves among the doubles next to each: nearer than that it is not known."""
+    """Largest change of f at frequencies (n,) among the doubles next to each: its rounding error."""
     if not omega.size:
         return np.empty(0)
     near = np.multiply.outer(1 + NEXT_DOUBLES, omega)
@@ -314,15 +314,33 @@ def _spread(f: Callable[[Real], Real | Complex], omega: Real) -> Real:
 
 
 def inverse_peak(loop: Loop, omega: Real, of: int) -> Real:
-    """|1 + L| at i omega, or |1 + 1/L| for `of` 1: the inverse of what S = 1/(1 + L) and T = L/(1 + L) peak at."""
+    """|1 + L| at i omega, or |1 + 1/L| for `of` 1: 1/|S| and 1/|T|, S = 1/(1 + L) and T = L/(1 + L)."""
     parts = loop.parts(1j * omega)
     return np.asarray(abs(parts[0] + parts[1]) / np.maximum(abs(parts[of]), LEAST_SIZE))
 
 
 def phase_crossovers(loop: Loop, omega: Real) -> tuple[tuple[float, float], ...]:
-    """Frequencies [rad/s] with L real and below 0, and the factor -1/L; at rest too where L is finite there."""
+    """Frequencies [rad/s] with L real and below 0, and the factor -1/L; at rest too where L is finite there.
+
+    Where L changes the side of the real axis at a pole or zero of its own, its denominator or numerator turns and not
+    L.  Both sides are compared as near as rounding allows: next to a narrow resonance L is so close to the axis that
+    the place itself is not known.
+    """
+
+    def h(parts: tuple[Complex, Complex]) -> Real:
+        return np.asarray((parts[0] * parts[1].conj()).imag)
+
     factor, place, _ = crossed(omega, lambda w: loop.parts(1j * w))
-    crosses = (factor > AT_POLE) & (factor < 1 / AT_POLE) & ~_through_pole_or_zero(loop, place)
+    noise = _spread(lambda w: h(loop.parts(1j * w)), place)
+    turns, is_open = np.ones((2, place.size), bool)
+    for share in FARTHER:
+        before, after = (loop.parts(1j * place * (1 + side * share)) for side in (-1, 1))
+        is_clear = np.minimum(abs(h(before)), abs(h(after))) > ABOVE_NOISE * noise
+        decided = is_open & (h(before) * h(after) < 0) & is_clear
+        ways = [(each * other.conj()).real for each, other in zip(before, after, strict=True)]
+        turns = np.where(decided, np.less(ways, 0.0).any(axis=0), turns)
+        is_open &= ~decided
+    crosses = (factor > AT_POLE) & (factor < 1 / AT_POLE) & ~turns
     place, factor = place[crosses], factor[crosses]
     factor = held(factor, _spread(lambda w: _factor(loop, w), place), CROSSOVER_DIGITS)
     found = list(zip(place.tolist(), factor.tolist(), strict=True))
@@ -332,37 +350,16 @@ def phase_crossovers(loop: Loop, omega: Real) -> tuple[tuple[float, float], ...]
     return tuple(sorted(found))
 
 
-def _through_pole_or_zero(loop: Loop, place: Real) -> NDArray[np.bool_]:
-    """Of frequencies (n,) at which L turns from one side of the real axis to the other, which do so at a pole or zero.
-
-    There its denominator or numerator turns round and not L.  They are looked at as near as rounding lets the sides be
-    told: next to a narrow resonance L keeps so close to the axis that the place itself is not known.
-    """
-
-    def h(parts: tuple[Complex, Complex]) -> Real:
-        return np.asarray((parts[0] * parts[1].conj()).imag)
-
-    noise = _spread(lambda w: h(loop.parts(1j * w)), place)
-    turned, unsure = np.ones((2, place.size), bool)
-    for share in FARTHER:
-        before, after = (loop.parts(1j * place * (1 + side * share)) for side in (-1, 1))
-        told = unsure & (h(before) * h(after) < 0) & (np.minimum(abs(h(before)), abs(h(after))) > ABOVE_NOISE * noise)
-        ways = [(each * other.conj()).real for each, other in zip(before, after, strict=True)]
-        turned = np.where(told, np.less(ways, 0.0).any(axis=0), turned)
-        unsure &= ~told
-    return turned
-
-
 def _factor(loop: Loop, omega: Real) -> Complex:
-    """-1/L at i omega, 0 where L is infinite or vanishes."""
+    """-1/L at i omega; 0 where L is infinite or vanishes."""
     drive, fed_back = loop.parts(1j * omega)
     return np.asarray(-drive / np.where(fed_back == 0, np.inf, fed_back))
 
 
 def dense(verdict: Stability) -> Real:
-    """The grid of the arm and points about every oscillating pole of the loop, as close as it is to the axis.
+    """The grid of the arm, and points about every oscillating pole of the loop at its distance from the axis.
 
-    There |1 + L| dips, by as little damping as narrowly, and not where the arm's own functions are steep.
+    |1 + L| dips there, and not where the arm's own functions are steep; the less damping, the narrower the dip.
     """
     poles = verdict.poles.values[verdict.poles.values.imag > 0]
     away = np.concatenate([-NEAR_POLES[::-1], [0.0], NEAR_POLES])
@@ -376,24 +373,24 @@ def dense(verdict: Stability) -> Real:
 
 
 def loop_curve(found: Margins) -> tuple[Real, NDArray[np.complex128]]:
-    """Frequencies [rad/s] (n,) around every steep place of the loop, and L there, as far as that is finite.
+    """Frequencies [rad/s] (n,) around every steep place of the loop, and the finite values of L there.
 
-    They begin below the first crossing and the first mode: further down L is all the same.
+    They begin below the first crossing and the first mode: further down L does not change.
     """
     band = found.in_band
     crossed = [] if band is None else [w for w, _ in (*band.gain_crossovers, *band.phase_crossovers) if w > 0]
     lowest = min([first_frequency(found.stability.loop.arm), *crossed]) / BELOW_SLOWEST
     omega = dense(found.stability)
     L = np.asarray(found.stability.loop.loop_function(1j * omega), dtype=np.complex128)
-    told = np.isfinite(L) & (L != 0) & (omega >= lowest)
-    return omega[told], L[told]
+    shown = np.isfinite(L) & (L != 0) & (omega >= lowest)
+    return omega[shown], L[shown]
 
 
 def gain_edges(loop: Loop, by_phase: tuple[tuple[float, float], ...]) -> list[float]:
-    """The factors on all of a law at which a pole reaches the axis, from where L < 0.
+    """Factors on all of a law at which a pole reaches the axis, from where L < 0.
 
-    Without damping all modes may reach it at one factor, where rounding alone decides whether L < 0: there a theorem
-    says at which.
+    Without damping all modes may reach it at one factor, where rounding alone decides whether L < 0.  There the factor
+    follows from a theorem.
     """
     gains, arm = loop.gains, loop.arm
     if gains is None or not arm.loses_at_hub_alone or theorem_of(loop).energy is None:
@@ -417,7 +414,7 @@ def unit_crossings(loop: Loop, omega: Real) -> Real:
 
 
 def lowest(f: Callable[[Real], Real], omega: Real) -> tuple[float, float]:
-    """The least value of f over the grid's range and where, its lowest dips refined between grid points."""
+    """The least value of f over the range of the grid, and its place; the lowest dips are refined."""
     values = f(omega)
     best = int(np.argmin(values))
     dips = np.nonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:]))[0] + 1
@@ -436,7 +433,7 @@ def lowest(f: Callable[[Real], Real], omega: Real) -> tuple[float, float]:
 
 
 def highest(inverse: Callable[[Real], Real], omega: Real) -> tuple[float, float]:
-    """The highest value of a function whose inverse is given, and where; infinity where that vanishes."""
+    """The highest value of a function given by its inverse, and its place; infinity where the inverse vanishes."""
     dip, at = lowest(inverse, omega)
     if not dip:
         return math.inf, at
@@ -445,7 +442,7 @@ def highest(inverse: Callable[[Real], Real], omega: Real) -> tuple[float, float]
 
 
 def _least(values: Real, where: Real) -> tuple[float, float]:
-    """The value of least size and where; infinity and 0 where there is none."""
+    """The value of least size and its place; infinity and 0 where there is none."""
     if not values.size:
         return math.inf, 0.0
     i = int(np.argmin(abs(values)))

@@ -1,8 +1,8 @@
-"""Nyquist's criterion on the exact loop function, the turns around -1 counted and compared with the poles found.
+"""Nyquist's criterion on the exact loop function: encirclements of -1 counted and compared with the poles found.
 
 The contour runs up the imaginary axis, passes each pole of L on it by a small semicircle on the right, and closes along
 the edges of the box in which the verdict's poles were counted.  L is evaluated on all of it, so the encirclements of -1
-are counted, not read off: clockwise ones are closed-loop poles inside the contour, as no pole of L is in there.
+are counted.  Clockwise ones are closed-loop poles inside the contour, as no pole of L is in there.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from .poles import count_with_mirrors
 from .stability import Stability, stability
 
 INDENT_RADIUS = 0.05  # radius of a semicircle around a pole of L, in units of its residue: |L| is about 20 on it
-NEARER = 0.1  # of the way to the nearest closed-loop pole: no step past a pole of L leaves an unstable one out
+NEARER = 0.1  # of the way to the nearest closed-loop pole: no arc around a pole of L leaves an unstable one out
 AROUND_LAW_POLE = np.linspace(-4.0, 4.0, 41)  # points around a pole of the law, in its distances from the axis
 SLOW_POINTS = 200  # points between that and the arm's own grid
 EDGE_POINTS = 750  # points along an edge of the box, to begin with
@@ -47,7 +47,7 @@ class Nyquist:
     """L on the contour for Im s >= 0: `s` (n,), `L` (n,), `is_arc` where the contour passes a pole on the axis.
 
     `poles` [rad/s] are those of L on the axis, `encirclements` of -1 by the whole contour, counter-clockwise positive,
-    `verdict` what the poles say, counted in a box without this contour.  `unstable_open` poles of L lie inside the
+    `verdict` that by the poles, counted in a box without this contour.  `unstable_open` poles of L lie inside the
     contour: those of a law that is not stable by itself.
     """
 
@@ -61,14 +61,14 @@ class Nyquist:
 
     @property
     def on_axis(self) -> Annotated[int, Quantity("poles on the axis to working precision")]:
-        """Poles of the box that lie on the axis to working precision, apart from that at 0."""
+        """Number of poles of the box on the axis to working precision, apart from that at 0."""
         moving = self.verdict.poles.moving
         near = abs(moving.real) <= AXIS_SHARE * abs(moving)
         return count_with_mirrors(moving[near])
 
     @property
     def clear(self) -> int:
-        """Poles of the box that lie right of the axis by more than working precision: at C = 0 a theorem knows more."""
+        """Number of poles of the box right of the axis by more than working precision."""
         moving = self.verdict.poles.moving
         return count_with_mirrors(moving[moving.real > AXIS_SHARE * abs(moving)])
 
@@ -79,20 +79,16 @@ class Nyquist:
 
 
 def nyquist(arm: Arm, law: AnyLaw) -> Nyquist:
-    """The loop function of a law on Nyquist's contour, its turns around -1 counted up to the verdict's band.
+    """Return the loop function of a law on Nyquist's contour, its encirclements of -1 counted up to the verdict's band.
 
-    Raises what the verdict raises, and ConvergenceError where the curve passes -1 so close that its turns cannot be
-    counted, or where the two counts differ.
+    Raises as `stability` does, and ConvergenceError where the curve passes too near to -1 for them to be counted, or
+    where the two counts differ.
     """
     return nyquist_of(stability(arm, law))
 
 
 def nyquist_of(verdict: Stability) -> Nyquist:
-    """The same for a verdict, its encirclements counted up to the verdict's band.
-
-    The contour goes around the right part of the verdict's box, so both counts are of one region.  Raises
-    ConvergenceError where a curve passes -1 so close that its turns cannot be counted, or the two counts differ.
-    """
+    """Return the same for a verdict: the contour encloses the right part of its box, so both counts have one region."""
     loop, band = verdict.loop, verdict.band
     poles = poles_on_axis(loop, band)
     s, is_arc = smooth(loop, *upper_contour(loop, poles, band, verdict.poles.moving))
@@ -111,15 +107,12 @@ def nyquist_of(verdict: Stability) -> Nyquist:
 
 
 def _difference(loop: Loop, s: Complex) -> Analytic:
-    """1 + L; its slope is left out, as the contour is dense where it is steep."""
+    """1 + L without its slope, as the contour is dense where it is steep."""
     return Analytic(1 + loop.loop_function(s), np.zeros_like(s), np.zeros_like(s))
 
 
 def poles_on_axis(loop: Loop, band: float) -> Real:
-    """Poles of L on the imaginary axis [rad/s], from 0 up: the rigid body's, and at C = 0 every natural frequency.
-
-    A law may have some of its own.
-    """
+    """Poles of L on the imaginary axis [rad/s], from 0 up: of the rigid body and the law, and at C = 0 of all modes."""
     arm = loop.arm
     flexible = np.asarray(flexible_frequencies(arm, band)) if arm.is_undamped else np.empty(0)
     own = loop.law.poles
@@ -130,9 +123,10 @@ def poles_on_axis(loop: Loop, band: float) -> Real:
 
 
 def upper_contour(loop: Loop, poles: Real, band: float, closed: Complex) -> tuple[Complex, NDArray[np.bool_]]:
-    """From s = 0 (or right of it, where a pole is) up the axis to the band, past each pole on its right.
+    """The contour from s = 0 (or right of a pole there) up the axis to the band, past each pole on its right.
 
-    `closed` are the closed loop's poles: each step past a pole of L goes nearer to it than the nearest of them.
+    `closed` are the closed-loop poles: each arc around a pole of L is smaller than its distance to the nearest of them.
+    The radius is that where |L| is about 20, and at most a thousandth of the pole's frequency (at 0: of the first).
     """
     omega = np.asarray(grid(loop.arm, band))
     own = loop.law.poles[loop.law.poles.imag > 0]
@@ -140,9 +134,13 @@ def upper_contour(loop: Loop, poles: Real, band: float, closed: Complex) -> tupl
     omega = np.unique(np.r_[omega, near[(near > omega[0]) & (near < band)]])
     s, is_arc = 1j * omega, np.zeros(omega.size, bool)
     for pole in poles:
-        radius = indentation(loop, float(pole))
+        scale = float(pole) or band_of(loop.arm, 1)
+        step = RESIDUE_AT * scale
+        near = np.array([step + 0j if pole == 0 else 1j * (pole + step)])
+        of_residue = INDENT_RADIUS * float(abs(loop.loop_function(near)[0])) * step
         away = abs(closed - 1j * pole)
-        radius = min(radius, NEARER * float(away[away > AXIS_SHARE * pole].min(initial=math.inf)))
+        nearest = float(away[away > AXIS_SHARE * pole].min(initial=math.inf))
+        radius = min(of_residue, WIDEST_INDENT * scale, NEARER * nearest)
         if pole == 0:
             slow = 1j * np.geomspace(radius, omega[0], SLOW_POINTS)[1:-1]
             s, is_arc = np.r_[s, slow], np.r_[is_arc, np.zeros(slow.size, bool)]
@@ -157,7 +155,7 @@ def upper_contour(loop: Loop, poles: Real, band: float, closed: Complex) -> tupl
 
 
 def smooth(loop: Loop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
-    """More points on the axis wherever the drawn curve would have corners."""
+    """The contour with more points on the axis where the drawn curve would have corners."""
     for _ in range(TURN_ROUNDS):
         length = abs(np.diff(compressed(loop.loop_function(s))))
         (coarse,) = np.nonzero((length > LONGEST_PIECE) & ~is_arc[1:] & ~is_arc[:-1])
@@ -168,16 +166,8 @@ def smooth(loop: Loop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, 
     return s, is_arc
 
 
-def indentation(loop: Loop, pole: float) -> float:
-    """The radius at which |L| is about 20, and at most a thousandth of the pole's frequency (at 0: of the first)."""
-    scale = pole or band_of(loop.arm, 1)
-    step = RESIDUE_AT * scale
-    near = np.array([step + 0j if pole == 0 else 1j * (pole + step)])
-    return min(INDENT_RADIUS * float(abs(loop.loop_function(near)[0])) * step, WIDEST_INDENT * scale)
-
-
 def compressed(L: Complex) -> Complex:
-    """L with its size r drawn as r/(1 + r): 0 stays, 1 is half-way, infinity is the rim, at a pole its point 1."""
+    """L with its size r mapped to r/(1 + r): 1 is half-way, infinity is the rim, at a pole its point 1."""
     size = abs(L)
     inside = np.where(np.isinf(size), 1.0, L)
     return np.asarray(np.where(np.isinf(size), 1.0, inside / (1 + abs(inside))))

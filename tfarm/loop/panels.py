@@ -1,18 +1,18 @@
 """The parts of the loop function along the imaginary axis, as polynomials through exact samples.
 
 Drive, hub angle and gauge at s = i w have neither poles nor branches (but for s = -1/C, off the axis): resonances are
-zeros of the drive.  So on a panel of a few resonances polynomials through Chebyshev points hold all digits, between
+zeros of the drive.  So on a panel of a few resonances polynomials through Chebyshev points have all digits, between
 the samples and, for poles, some way off the axis too (Trefethen 2013, theorem 8.2).  L is a quotient of them, linear
-in the gains: whoever has the samples has the loop for any gains, without the arm.
+in the gains: the samples give the loop for any gains, without the arm.
 
     L(s) = gains . (theta, s theta, s^2 m) / (s^n d),   drive = s^n d, gauge = s^2 m,  n = 2, or 1 where the hub loses
 
 The powers of s are taken out so that slow gains lose no digits next to s = 0.
 
-From the hub's input to a sensor at x the numerator N = G drive is a function along s = i w like those:
-without poles or branches (but for s = -1/C), so that its zeros near the axis are those of polynomials through exact
-samples of it, and so are those near the positive real axis, which no law outruns.  A law at the hub leaves them where
-they are: it changes the drive alone.
+From the hub's input to a sensor at x the numerator N = G drive is a function along s = i w like those, without poles or
+branches (but for s = -1/C).  So its zeros near the axis are those of polynomials through exact samples of it, and so
+are those near the positive real axis, which limit the bandwidth of every law.  A law at the hub does not move them: it
+changes the drive alone.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ BARYCENTRIC = (-1.0) ** np.arange(PANEL_SAMPLES) * np.sin(_ANGLES)  # weights of
 Sensor = Literal["displacement", "moment"]
 
 MOST_SENSOR_MISS = 1e-8  # of the numerator on a panel, between samples: zeros are shown to five digits
-NOT_SENSED = 1e-9  # of a mode's largest: what reads no more of any mode is no sensor
+NOT_SENSED = 1e-9  # of a mode's largest: a reading no larger of any mode is none
 SERIES_END = 1e-13  # of the largest coefficient: a series ends where it is that
-BESIDE_LINE = 1.0  # of a panel's half width: how far from the axis zeros are looked for
+OFF_LINE = 1.0  # of a panel's half width: largest distance of a zero from the axis
 PAST_EDGE = 1e-7  # of a panel's half width: panels end at modes, where a sensor at a node has its zero
 BEHIND_ORIGIN = 1e-9  # of a panel's outer end: a zero at s = 0 may come out so far on the wrong side
 SAME_SENSOR_ZERO = 1e-5  # relative: a zero near both lines is found from both
@@ -79,17 +79,20 @@ class Panels:
 
 
 def loop_panels(arm: Arm, band: float) -> Panels:
-    """The samples up to a band [rad/s].  Raises ParameterError for an arm that cannot turn freely, ConvergenceError
-    where halving panels does not help."""
+    """Return the samples up to a band [rad/s].
+
+    Raises ParameterError for an arm that cannot turn freely, ConvergenceError where halving panels does not help.
+    """
     if not arm.has_rigid_mode:
         raise ParameterError(key="arm", value=arm.name, remedy="samples of a loop are of an arm that turns freely")
+    order = 1 if arm.rate_loss else 2
     places = np.asarray(steep_places(arm, band))[STEEP_A_PANEL - 1 :: STEEP_A_PANEL]
     edges = np.r_[0.0, places[places < band], band]
     waiting = [(-edges[1], edges[1]), *itertools.pairwise(edges[1:])]
     done: list[tuple[float, float, Complex, float]] = []
     while waiting:
         low, high = waiting.pop()
-        values, error = _panel(arm, low, high)
+        values, error = _panel(arm, order, low, high)
         if error <= MOST_MISS:
             done.append((float(low), float(high), values, error))
         elif low == -high:
@@ -99,25 +102,19 @@ def loop_panels(arm: Arm, band: float) -> Panels:
         if len(done) + len(waiting) > MOST_PANELS:
             raise ConvergenceError("polynomials do not follow the loop's parts along the axis", high, error)
     lows, highs, parts, errors = zip(*sorted(done, key=lambda each: each[1]), strict=True)
-    return Panels(
-        arm, band, np.array(lows), np.array(highs), np.stack(parts, axis=1), _order(arm), max(errors)
-    )  # fmt: skip
+    return Panels(arm, band, np.array(lows), np.array(highs), np.stack(parts, axis=1), order, max(errors))
 
 
-def _order(arm: Arm) -> int:
-    return 1 if arm.rate_loss else 2
-
-
-def _panel(arm: Arm, low: float, high: float) -> tuple[Complex, float]:
+def _panel(arm: Arm, order: int, low: float, high: float) -> tuple[Complex, float]:
     """Samples of d, theta and m on one panel, the largest 1, and the largest miss between them.
 
-    Without losses they are real but for rounding, which is taken off: next to a resonance it would be a loss.
+    Without losses they are real: the imaginary part is rounding, and would be a loss next to a resonance.
     """
     middle, half, k = (low + high) / 2, (high - low) / 2, system_of(arm)
     s = 1j * (middle + half * np.r_[CHEBYSHEV, BETWEEN_SAMPLES])
     drive, numerators, scale = loop_parts(k, s)
     theta, _, gauge = (float_units(k) * numerators)[[FED_BACK.index(output) for output in AT_HUB]]
-    both = np.stack([drive / s ** _order(arm), theta, gauge / s**2]) * np.exp(scale - scale.real.max())
+    both = np.stack([drive / s**order, theta, gauge / s**2]) * np.exp(scale - scale.real.max())
     both = both.real + 0j if arm.is_reactive else both
     size = abs(both).max()
     values, between = both[:, :PANEL_SAMPLES] / size, both[:, PANEL_SAMPLES:] / size
@@ -129,9 +126,10 @@ def _panel(arm: Arm, low: float, high: float) -> tuple[Complex, float]:
 @dataclass(frozen=True)
 @record
 class Positions:
-    """Of the first flexible modes with `natural_frequency` (modes,) [rad/s] what a sensor at each `x` (n,) [m] from the
-    clamp sees: `participation` (modes, n), a mode's largest 1 in size.  `zeros` [1/s] of each position are those near
-    the imaginary and the positive real axis up to `band` [rad/s], with Im s >= 0.
+    """Sensor positions `x` (n,) [m] from the clamp, and `participation` (modes, n) of the first flexible modes there.
+
+    The largest of a mode is 1 in size; `natural_frequency` (modes,) is in rad/s.  `zeros` [1/s] of each position are
+    those near the imaginary and the positive real axis up to `band` [rad/s], with Im s >= 0.
     """
 
     x: Real
@@ -142,7 +140,7 @@ class Positions:
 
     @property
     def known_zeros(self) -> tuple[Complex, ...]:
-        """The same, a part of a zero 0 where that is all that is known of it."""
+        """The same, with 0 for a real or imaginary part below the error of a zero."""
         parts = ((s, MOST_SENSOR_MISS * abs(s)) for s in self.zeros)
         return tuple(
             np.where(abs(s.real) > least, s.real, 0.0) + 1j * np.where(abs(s.imag) > least, s.imag, 0.0)
@@ -151,18 +149,18 @@ class Positions:
 
 
 def sensed_places(arm: Arm, sensor: Sensor, x: Real, count: int) -> Real:
-    """Those of the places x [m] at which a sensor sees any of the first modes: not an end that none moves, or bends."""
+    """The places x [m] at which a sensor reads any of the first modes: not an end that none moves, or bends."""
     size = _fields(modes(arm, count), sensor, x)
     return np.asarray(x[(abs(size) > NOT_SENSED * abs(size).max(axis=1, keepdims=True)).any(axis=0)])
 
 
 def _fields(found: Modes, sensor: Sensor, x: Real) -> Real:
-    """What a sensor at each x reads of each flexible mode (modes, n)."""
+    """Reading of each flexible mode by a sensor at each x (modes, n)."""
     return np.asarray((found.shape if sensor == "displacement" else found.moment)(x)[found.index > 0])
 
 
 def positions(arm: Arm, sensor: Sensor, x: Real, count: int) -> Positions:
-    """Participation of the first `count` modes, and the zeros below the next, from hub input to a sensor at each x [m].
+    """Return participation of the first `count` modes, and zeros below the next, of a sensor at each x [m].
 
     Raises ParameterError for an arm that cannot turn, ConvergenceError where the numerator is not resolved.
     """
@@ -186,8 +184,10 @@ def positions(arm: Arm, sensor: Sensor, x: Real, count: int) -> Positions:
 
 @dataclass(frozen=True)
 class _Panels:
-    """Panels of a line through s = 0 in the direction of `unit`, from `low` to `high` (n,) [rad/s]; `s` (n, points) are
-    the samples and the places between, `factor` (n, points) is what makes the numerator of a sensor's G there."""
+    """Panels of a line through s = 0 in the direction of `unit`, from `low` to `high` (n,) [rad/s].
+
+    `s` (n, points) are the samples and the places between, `factor` (n, points) is numerator/G of a sensor there.
+    """
 
     unit: complex
     low: Real
@@ -200,7 +200,15 @@ class _Panels:
     def of(cls, arm: Arm, sensor: Sensor, unit: complex, band: float) -> _Panels:
         """Panels of the line up to the band: along the imaginary axis the first begins at -`high`, as all is even."""
         places = np.asarray(steep_places(arm, band))[STEEP_A_SENSOR_PANEL - 1 :: STEEP_A_SENSOR_PANEL]
-        edges = _graded(np.r_[0.0, places[places < band], band], unit, arm.damping)
+        edges, C = np.r_[0.0, places[places < band], band], arm.damping
+        for _ in range(GRADING_HALVINGS if C else 0):  # where a panel is too near to -1/C for a polynomial
+            middle, half = (edges[1:] + edges[:-1]) / 2, np.diff(edges) / 2
+            if unit == 1j:
+                middle[0], half[0] = 0.0, edges[1]
+            near = half > ROOM_TO_SINGULAR * abs(unit * middle + 1 / C)
+            if not near.any():
+                break
+            edges = np.sort(np.r_[edges, ((edges[1:] + edges[:-1]) / 2)[near]])
         low, high = edges[:-1].copy(), edges[1:]
         low[0] = -high[0] if unit == 1j else 0.0
         s = unit * ((low + high)[:, None] / 2 + (high - low)[:, None] / 2 * np.r_[CHEBYSHEV, BETWEEN_SAMPLES])
@@ -221,23 +229,7 @@ class _Panels:
                 raise ConvergenceError(f"polynomials do not follow the numerator of {G.outputs[0]}", high, missed)
             last = int(np.nonzero(abs(series) > SERIES_END * abs(series).max())[0].max())
             roots = np.asarray(chebyshev.chebroots(series[: last + 1]), dtype=complex)
-            roots = roots[(abs(roots.real) <= 1 + PAST_EDGE) & (abs(roots.imag) <= BESIDE_LINE)]
+            roots = roots[(abs(roots.real) <= 1 + PAST_EDGE) & (abs(roots.imag) <= OFF_LINE)]
             roots = (low + high) / 2 + (high - low) / 2 * roots
             found += [self.unit * z for z in roots if z.real > -BEHIND_ORIGIN * high]
         return found
-
-
-def _graded(edges: Real, unit: complex, C: float) -> Real:
-    """Edges of panels of a line, more of them where it is so near to -1/C that a polynomial would not follow.
-
-    The first panel of the imaginary axis is twice as wide as from 0 to its edge.
-    """
-    for _ in range(GRADING_HALVINGS if C else 0):
-        middle, half = (edges[1:] + edges[:-1]) / 2, np.diff(edges) / 2
-        if unit == 1j:
-            middle[0], half[0] = 0.0, edges[1]
-        near = half > ROOM_TO_SINGULAR * abs(unit * middle + 1 / C)
-        if not near.any():
-            break
-        edges = np.sort(np.r_[edges, ((edges[1:] + edges[:-1]) / 2)[near]])
-    return edges

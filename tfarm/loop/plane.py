@@ -1,17 +1,17 @@
 """The plane of two numbers of a law: how many poles are unstable over a grid, and the exact stability boundary.
 
-D-decomposition (Neimark 1948): D is affine in each number (`windows`), so that along the second one, column by column,
-its crossings of the imaginary axis are solved for, all columns at once, and one count of unstable poles gives all the
-others: nothing is interpolated or missed between grid points.  In a delay D is not affine: that runs across the
-columns, each counted by itself.  So does a leading coefficient through 0 where no band tells all there: poles come to
-any band from above.
+D-decomposition (Neimark 1948): D is affine in each number (`windows`).  Its crossings of the imaginary axis are solved
+for along the second number, all columns at once, and one count of unstable poles gives all others.  Nothing is
+interpolated or missed between grid points.  D is not affine in a delay: that is the number across the columns, each of
+which is counted by itself.  So is a leading coefficient that passes through 0 where no band is sufficient: there poles
+come to any band from above.
 
-Of both gains K1 and K2 each frequency has one point with poles at s = i w: the boundary.  Without damping, where the
-gauge reads the hub's moment, that collapses onto the lines where K1 makes up for what the hub loses and where K2 takes
-the whole moment: between them a theorem tells every mode (`theorem`).
+In the plane of K1 and K2 each frequency has one point with poles at s = i w: the boundary.  Without damping, where the
+gauge reads the hub's moment, it collapses onto two lines.  On one K1 cancels the friction of the hub, on the other K2
+cancels the whole moment; between them a theorem decides the stability of every mode (`theorem`).
 
-As it is drawn: axes, and the boundary fine enough for a picture.  Where a segment of it would be seen as one, the
-D-decomposition is evaluated between; where the curve leaves the picture, or runs through infinity, it is cut.
+For pictures: axes, and the boundary in short segments.  The D-decomposition is evaluated inside a long segment; where
+the curve leaves the picture, or passes through infinity, it is cut.
 """
 
 from __future__ import annotations
@@ -27,9 +27,8 @@ from numpy.typing import NDArray
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, HubFeedback, Law, as_law
 from tfarm.arm.feedback import ON
 from tfarm.arrays import Real
-from tfarm.columns import Table
 from tfarm.crossing import Crossings, Window, ascending, counts_over, intervals
-from tfarm.crossing.shown import coarse, grid_table
+from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.response.controller import Controller, controller
@@ -50,36 +49,36 @@ from .lines import (
 )
 from .loop import Loop, grid
 from .stability import band_of_family, verdict_on
-from .windows import held_windows, static_edge, told_edges
+from .windows import static_edge, theorem_edges, theorem_windows
 
-INFINITE = -1  # stands for infinitely many unstable poles
+INFINITE = -1  # count of infinitely many unstable poles
 MOST_GRID_VALUES, MOST_LAW_VALUES = 2000, 400  # of a map, along one gain, and along one number of another law
-SHOWN_K1, SHOWN_K2 = (-1.0, 3.0), (-2.0, 2.0)  # of a map, by default: what the paper's arm is stable in, and around it
+SHOWN_K1, SHOWN_K2 = (-1.0, 3.0), (-2.0, 2.0)  # of a map, by default: the stable region of the paper's arm, and around
 NOT_AFFINE = ("delay", ".den.")  # in the name of a number in which L is not affine: its size is not largest at corners
 LOG_BASE = math.log(10.0)
 LINEAR_SCALE = 0.5  # decades that the linear part of an axis takes on each side of 0, as matplotlib's `linscale` has it
-LINEAR_SHARE = LINEAR_SCALE / (1 - 1 / 10)  # what these are multiplied by there
+LINEAR_SHARE = LINEAR_SCALE / (1 - 1 / 10)  # factor on values there
 EVEN_GRID = 1e-9  # of its range: by less may the steps of an even grid differ
-LOWEST_MOMENT_GAIN, HIGHEST_MOMENT_GAIN = -4.0, 2.0  # of what balances a torque: the range that is shown
-DEEPEST_MOMENT_GAIN = -50.0  # and how deep unstable windows are looked for
-DEEP_ROWS = 400  # values between, at which they are looked for
-BELOW_DEEPEST = 1.4  # times the deepest of them: how deep the picture goes, so that it is seen to end
+LOWEST_MOMENT_GAIN, HIGHEST_MOMENT_GAIN = -4.0, 2.0  # times `input_per_torque`: the range that is shown
+DEEPEST_MOMENT_GAIN = -50.0  # and the lowest value at which unstable gains are searched
+DEEP_ROWS = 400  # values between, at which they are searched
+BELOW_DEEPEST = 1.4  # times the deepest of them: the depth of the picture, so that the region ends in it
 HIGHEST_RATE_GAIN = 10  # J w1: with it the hub of a rigid arm slows down within 0.1/w1
-SHORT_SEGMENT = 0.008  # of the picture: longer pieces of the boundary are seen as straight, and are cut
-LONG_SEGMENT = 0.03  # of the picture: what is longer after all cuts is a jump through infinity, and is not drawn
-EDGE_ROUNDS = 30  # of cutting at most: 2^-30 of a step between frequencies is below what a picture shows
-SCAN = 32  # columns of the picture in which unstable windows are looked for
-ROWS_BESIDE_EDGE = 1.5  # beyond this many rows from the boundary the count must have changed
+SHORT_SEGMENT = 0.008  # of the picture: longer pieces of the boundary look straight, and are cut
+LONG_SEGMENT = 0.03  # of the picture: a piece longer than that after all cuts is a jump through infinity, and not drawn
+EDGE_ROUNDS = 30  # of cutting at most: 2^-30 of a step between frequencies is less than a pixel
+SCAN = 32  # columns of the picture in which unstable gains are searched
+ROWS_FROM_EDGE = 1.5  # beyond this many rows from the boundary the count must have changed
 
 
 @dataclass(frozen=True)
 @record
-class Plane:
+class Plane(PlaneOfCounts):
     """Unstable poles over a grid of two numbers: `unstable` (len(y), len(x)), -1 where they are infinitely many.
 
     `vary` names both numbers of `law`, across and up, as `Law.having` does.  `boundary` (n, 3) holds both gains and
     w [rad/s] of the D-decomposition curve of K1 and K2; empty without losses and of other numbers.  `band` [rad/s] is
-    how far up crossings were looked for, 0 where every mode is known; `crossings` those along y for each x, or none.
+    the frequency range of the crossings, 0 where every mode is known; `crossings` those along y for each x, or none.
     """
 
     arm: Arm
@@ -94,7 +93,7 @@ class Plane:
 
     @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
-        """Arm and law in words, as results name them."""
+        """Names of the arm and the controller."""
         return controller(self.law, self.arm)
 
     @property
@@ -110,24 +109,9 @@ class Plane:
         )]  # fmt: skip
 
     @property
-    def csv_table(self) -> Table:
-        """A row a point of the grid."""
-        return grid_table(self.vary, self.x, self.y, self.counts)
-
-    @property
-    def drawing(self) -> str:
-        """A coarse picture for a terminal."""
-        return coarse(self.vary, self.x, self.y, self.unstable)
-
-    @property
     def finding(self) -> Annotated[str, Quantity("stability region", key="finding")]:
-        """At how many points of the grid the loop is stable, in words."""
+        """Number of points of the grid at which the loop is stable."""
         return f"stable at {int(self.stable.sum())} of {self.stable.size} points"
-
-    @property
-    def axes(self) -> tuple[Real, Real]:
-        """The values of both numbers: across the plane, and up it."""
-        return self.x, self.y
 
     @property
     def is_of_gains(self) -> bool:
@@ -136,50 +120,36 @@ class Plane:
 
     @property
     def is_known(self) -> bool:
-        """Whether a theorem tells every mode at each point: no damping in the links, gains at the hub alone."""
+        """Whether a theorem decides every mode at each point: no damping in the links, gains at the hub alone."""
         return self.is_of_gains and _is_known_everywhere(self.arm)
 
     @property
-    def K1(self) -> Real:
-        """The values across, of the plane of K1 and K2."""
-        return self.x
-
-    @property
-    def K2(self) -> Real:
-        """The values up, of the plane of K1 and K2."""
-        return self.y
-
-    @property
     def Kp(self) -> float:
-        """The gain on the hub angle that it holds."""
+        """The constant gain on the hub angle."""
         return 0.0 if self.law.gains is None else self.law.gains.Kp
 
     @property
     def upright(self) -> float:
-        """The K1 that takes off what the hub loses."""
+        """The K1 that cancels the friction of the hub."""
         return 0.0 - self.arm.rate_loss
-
-    def on(self, across: Real, up: Real, unstable: NDArray[np.int64]) -> Plane:
-        """The same plane, with counts on another grid."""
-        return replace(self, x=across, y=up, unstable=unstable)
 
     @property
     def stable_intervals(self) -> list[list[Window]]:
-        """For each x the intervals of y, cut to the map, in which nothing grows: the region with exact edges.
+        """For each x the stability intervals of y, cut to the map: the region with exact edges.
 
-        Where a theorem tells every mode the same for every K1 > `upright`, and none for others.
+        Where a theorem decides they are the same for every K1 > `upright`, and none for others.
         """
         limits = float(self.y[0]), float(self.y[-1])
         if self.is_known:
             loop = Loop(self.arm, self.law.having(RATE_GAIN, self.upright + default_gains(self.arm).K1))
-            held = held_windows(loop, MOMENT_GAIN, limits, told_edges(loop, MOMENT_GAIN, limits))
-            return [held if self.upright < K1 else [] for K1 in self.x]
+            stable = theorem_windows(loop, MOMENT_GAIN, limits, theorem_edges(loop, MOMENT_GAIN, limits))
+            return [stable if self.upright < K1 else [] for K1 in self.x]
         first = self.unstable[0].tolist()
         return [intervals(found, *limits, limits[0], count) for found, count in zip(self.crossings, first, strict=True)]
 
     @property
     def stable(self) -> NDArray[np.bool_]:
-        """Where no pole is unstable, the free hub angle has not two poles at 0 (K1 = Kp = 0), and something damps."""
+        """Where no pole is unstable, the free hub angle has no double pole at 0 (K1 = Kp = 0), and modes are damped."""
         if not self.is_of_gains:
             return np.asarray(self.unstable == 0)
         arm = self.arm
@@ -193,12 +163,12 @@ class Plane:
 def gain_map(
     arm: Arm, K1: Real, K2: Real, Kp: float = 0.0, *, law: AnyLaw | None = None, vary: tuple[str, str] | None = None
 ) -> Plane:
-    """How many poles are unstable over the plane of K1 and K2 (1-D, ascending), and its exact boundary.
+    """Return the number of unstable poles over the plane of K1 and K2 (1-D, ascending), and its exact boundary.
 
-    Of a `law` `vary` names two of its numbers ("gain", "delay", a signal, "SIGNAL.num.N", "SIGNAL.den.N", "K1"): the
-    values are theirs then, first across and then up.  A grid line exactly on K1 = 0 or K2 = 1 at C = 0 is not stable,
+    Of a `law` `vary` names two of its numbers ("gain", "delay", a signal, "SIGNAL.num.N", "SIGNAL.den.N", "K1"), whose
+    values are then given, first across and then up.  A grid line exactly on K1 = 0 or K2 = 1 at C = 0 is not stable,
     though no pole need be right of the axis there, nor is K1 = 0 where the hub angle is free.
-    Raises ParameterError for what is no law, no loop or no range, ConvergenceError where poles cannot be counted.
+    Raises ParameterError for an invalid law, loop or range, ConvergenceError where poles cannot be counted.
     """
     if law is None:
         if vary is not None:
@@ -206,7 +176,7 @@ def gain_map(
         return plane(Loop(arm, as_law(HubFeedback(Kp=Kp))), PLANE, K1, K2)
     loop = Loop(arm, as_law(law))
     if Kp:
-        raise ParameterError(key=ANGLE_GAIN, value=Kp, remedy="the law holds the angle: give Kp in it, or no law")
+        raise ParameterError(key=ANGLE_GAIN, value=Kp, remedy="give Kp in the law, or no law")
     if vary is None and loop.gains is not None:
         vary = PLANE
     if not isinstance(vary, tuple | list) or len(vary) != 2 or not all(isinstance(each, str) for each in vary):
@@ -215,9 +185,9 @@ def gain_map(
 
 
 def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real, band: float | None = None) -> Plane:
-    """The map over two numbers of the law of a loop, x and y (1-D, ascending), the others held.
+    """Return the map over two numbers of the law of a loop, x and y (1-D, ascending), the others constant.
 
-    Raises ParameterError for what is no number of the law, no loop or no range; ConvergenceError where poles cannot be
+    Raises ParameterError for an unknown number, an invalid loop or range; ConvergenceError where poles cannot be
     counted.
     """
     if vary[0] == vary[1]:
@@ -227,15 +197,8 @@ def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real, band: float | Non
     most = MOST_LAW_VALUES if loop.gains is None else MOST_GRID_VALUES
     x, y = ascending(vary[0], x, 2, most), ascending(vary[1], y, 2, most)
     across, up = (float(x[0]), float(x[-1])), (float(y[0]), float(y[-1]))
-    ends = [critical(name, pair) for name, pair in zip(vary, (across, up), strict=True)]
-    corners = [
-        loop.under(with_numbers(loop.law, dict(zip(vary, each, strict=True)))) for each in itertools.product(*ends)
-    ]
-    if (
-        tuple(ON.get(name, name) for name in vary) == PLANE
-        and loop.gains is not None
-        and _is_known_everywhere(loop.arm)
-    ):
+    corners = [_at(loop, vary, each) for each in itertools.product(critical(vary[0], across), critical(vary[1], up))]
+    if loop.gains is not None and _is_known_everywhere(loop.arm) and tuple(ON.get(n, n) for n in vary) == PLANE:
         counts = _known_counts(loop, x, y)
         return Plane(loop.arm, loop.law, vary, x, y, counts, np.empty((0, 3)), 0.0, [])
     is_counted = vary[0] == "delay" or turns_over(loop, vary[0], across)
@@ -251,11 +214,7 @@ def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real, band: float | Non
     found = crossed(loop, lines, [(vary[1], up)] * x.size, omega, members)
     crossing = np.concatenate([y[:0], *(each.gain for each in found)])
     at = 0.0 if vary == PLANE else float(y[_farthest(y, crossing)])  # at K2 = 0 the hub is passive
-    row = loop.having(vary[1], at)
-    if is_counted:
-        there = np.array([unstable_below(row.having(vary[0], value), band) for value in x.tolist()])
-    else:
-        there = _counts_across(row, vary[0], x, band)
+    there = _counts_across(loop.having(vary[1], at), vary[0], x, band, one_by_one=is_counted)
     unstable = counts_over(y, found, at, there).T.copy()
     edge = boundary(loop, omega) if vary == PLANE and loop.gains is not None else np.empty((0, 3))
     done = Plane(loop.arm, loop.law, vary, x, y, unstable, edge, band, found)
@@ -264,15 +223,20 @@ def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real, band: float | Non
     return done
 
 
+def _at(loop: Loop, vary: tuple[str, str], point: tuple[float, ...]) -> Loop:
+    """The loop at a point of the plane of two numbers of its law."""
+    return loop.under(with_numbers(loop.law, dict(zip(vary, point, strict=True))))
+
+
 def _is_known_everywhere(arm: Arm) -> bool:
-    """Whether a theorem tells every mode whatever K1 and K2."""
+    """Whether a theorem decides every mode for any K1 and K2."""
     return arm.loses_at_hub_alone and arm.reads_hub_moment and not arm.input_lags
 
 
 def _known_counts(loop: Loop, K1: Real, K2: Real) -> NDArray[np.int64]:
     """Unstable poles without damping: one count for each side of each line on which modes meet the axis."""
     limits = float(K2[0]), float(K2[-1])
-    edges = told_edges(loop.having(RATE_GAIN, default_gains(loop.arm).K1), MOMENT_GAIN, limits)
+    edges = theorem_edges(loop.having(RATE_GAIN, default_gains(loop.arm).K1), MOMENT_GAIN, limits)
     static = [each.t for each in edges if each.at == 0]
     side = static[0] < K2 if static else np.zeros(K2.size, bool)
     unstable = np.zeros((K2.size, K1.size), dtype=np.int64)
@@ -280,15 +244,16 @@ def _known_counts(loop: Loop, K1: Real, K2: Real) -> NDArray[np.int64]:
     for of_column, of_row, each in itertools.product((-1, 0, 1), (-1, 0, 1), (True, False)):
         (where,), (here,) = np.nonzero(of_K1 == of_column), np.nonzero((of_K2 == of_row) & (side == each))
         if here.size and where.size:
-            point = float(K1[where[where.size // 2]]), float(K2[here[here.size // 2]])
-            found = verdict_on(loop.under(with_numbers(loop.law, dict(zip(PLANE, point, strict=True)))))
+            found = verdict_on(_at(loop, PLANE, (float(K1[where[where.size // 2]]), float(K2[here[here.size // 2]]))))
             count = INFINITE if found.unstable_roots_infinite else found.unstable_roots
             unstable[np.ix_(here, where)] = count
     return unstable
 
 
-def _counts_across(row: Loop, name: str, x: Real, band: float) -> NDArray[np.int64]:
-    """Unstable poles at each x along a row, from one count at the value farthest from its crossings."""
+def _counts_across(row: Loop, name: str, x: Real, band: float, *, one_by_one: bool) -> NDArray[np.int64]:
+    """Unstable poles at each x along a row, from one count at the value farthest from its crossings, or one by one."""
+    if one_by_one:
+        return np.array([unstable_below(row.having(name, value), band) for value in x.tolist()])
     across = line_crossings(row, name, float(x[0]), float(x[-1]), band)
     start = float(x[-1] if name == RATE_GAIN else x[x.size // 2])
     if row.having(name, start).resting_zeros:
@@ -298,23 +263,22 @@ def _counts_across(row: Loop, name: str, x: Real, band: float) -> NDArray[np.int
 
 
 def _farthest(values: Real, at: Real) -> int:
-    """Which of the values is farthest from all crossings; the middle one where there are none."""
+    """Index of the value that is farthest from all crossings; of the middle one where there are none."""
     return int(np.argmax(abs(values[:, None] - at).min(axis=1))) if at.size else values.size // 2
 
 
 def _must_hold_at_corners(loop: Loop, found: Plane) -> None:
-    """Refuse a map by ConvergenceError where poles came into the band or left it through its top, on the way."""
+    """Raise ConvergenceError for a map where poles entered or left the band through its top, between the corners."""
     for i, j in ((0, 0), (0, -1), (-1, 0), (-1, -1)):
         at = (float(found.x[i]), float(found.y[j]))
-        law = with_numbers(loop.law, dict(zip(found.vary, at, strict=True)))
         try:
-            count = unstable_below(loop.under(law), found.band)
+            count = unstable_below(_at(loop, found.vary, at), found.band)
         except ConvergenceError:  # a pole on the axis to working precision, which is on either side
             continue
         if count != found.unstable[j, i]:
             where = ", ".join(f"{name} = {value:.6g}" for name, value in zip(found.vary, at, strict=True))
             why = f"at {where} {count} poles below {found.band:.4g} rad/s are unstable, not {found.unstable[j, i]}"
-            remedy = "on the way there some passed the band's top: ask for a smaller range"
+            remedy = "some crossed the end of the frequency range: ask for a smaller range of values"
             raise ConvergenceError(f"{why}; {remedy}", found, abs(count - int(found.unstable[j, i])))
 
 
@@ -334,7 +298,7 @@ def boundary(loop: Loop, omega: Real) -> Real:
 
 
 def ranges_of(arm: Arm) -> tuple[tuple[float, float], tuple[float, float]]:
-    """The ranges of K1 and K2 that a map has by default: of a rig, in its own units."""
+    """Default ranges of K1 and K2 of a map, in the units of the rig."""
     K1 = 1.0 if arm.is_uniform else default_gains(arm).K1 / PAPER_GAINS.K1
     K2 = arm.input_per_torque
     (low, high), (lower, upper) = SHOWN_K1, SHOWN_K2
@@ -342,7 +306,7 @@ def ranges_of(arm: Arm) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def between(low: float, high: float, number: int) -> Real:
-    """So many gains from low to high, the middles of equal parts: none of them on a line K1 = 0 unless by chance."""
+    """The middles of `number` equal parts from low to high: none of them on a line K1 = 0 unless by chance."""
     values = low + (high - low) * (np.arange(number) + 0.5) / number
     return np.where(abs(values) <= ROUNDED * (high - low), 0.0, values)
 
@@ -361,12 +325,12 @@ class Axis:
         return math.isinf(self.linear)
 
     def place(self, x: Real) -> Real:
-        """Where values are along the axis, 0 to 1."""
+        """Places of values along the axis, 0 to 1."""
         low, high = self._stretched(np.array([self.low, self.high]))
         return np.asarray((self._stretched(np.asarray(x, float)) - low) / (high - low))
 
     def grid(self, number: int) -> Real:
-        """So many values, evenly spaced as seen."""
+        """Values at `number` places of even distance."""
         low, high = self._stretched(np.array([self.low, self.high]))
         y = between(low, high, number)
         if self.is_linear:
@@ -384,7 +348,7 @@ class Axis:
 
     @classmethod
     def of(cls, values: Real) -> Axis:
-        """That on which a grid (n,), ascending, is nearly even: linear, or logarithmic beyond its smallest size."""
+        """The axis on which a grid (n,), ascending, is nearly even: linear, or logarithmic beyond its smallest size."""
         low, high = float(values[0]), float(values[-1])
         if np.ptp(np.diff(values)) <= EVEN_GRID * (high - low):
             return cls(low, high)
@@ -392,23 +356,23 @@ class Axis:
 
 
 def rate_axis(arm: Arm) -> Axis:
-    """The rate gain from just below 0 to 10 J w1, logarithmic from well below the default gain on."""
+    """The axis of the rate gain, just below 0 to 10 J w1, logarithmic from well below the default gain on."""
     unit = rate_unit(arm)
     linear = 10.0 ** math.floor(math.log10(default_gains(arm)[RATE_GAIN]))
     return Axis(-linear, HIGHEST_RATE_GAIN * unit, linear)
 
 
 def rate_columns(arm: Arm, x: Axis, number: int) -> Real:
-    """Of so many rate gains, evenly spaced as seen, those at which an arm may be stable.
+    """Those of `number` rate gains at even places of an axis at which an arm may be stable.
 
-    A free hub whose gain takes more than it loses runs away: 1 + L is below 0 next to s = 0, and above it far right.
+    A free hub is unstable where its gain exceeds the friction: 1 + L is below 0 next to s = 0, and above it far right.
     """
     across, least = x.grid(number), -arm.rate_loss
     return across[across > least] if arm.has_rigid_mode else across[across != least]
 
 
 def moment_axis(arm: Arm, x: Axis) -> Axis:
-    """The moment gain from -4 to 2, or as deep as unstable windows go, times what one N m takes of a rig's input."""
+    """The axis of the moment gain, -4 to 2 times `input_per_torque`, or down to the lowest unstable gain."""
     low, high, deepest = (
         each * arm.input_per_torque for each in (LOWEST_MOMENT_GAIN, HIGHEST_MOMENT_GAIN, DEEPEST_MOMENT_GAIN)
     )
@@ -423,7 +387,7 @@ def moment_axis(arm: Arm, x: Axis) -> Axis:
 
 
 def edge(found: Plane, x: Axis, y: Axis) -> Real:
-    """The boundary in the picture, finer where it is coarse, with a row of nan after each of its parts."""
+    """The boundary in the picture, refined where it is coarse, with a row of nan after each of its parts."""
     points, loop = found.boundary, Loop(found.arm, found.law)
     if not points.size:
         return points
@@ -447,14 +411,14 @@ def edge(found: Plane, x: Axis, y: Axis) -> Real:
 
 
 def _segments(points: Real, x: Axis, y: Axis) -> tuple[Real, NDArray[np.bool_]]:
-    """How long each segment looks, and whether it may pass through the picture."""
+    """The drawn length of each segment, and whether it may pass through the picture."""
     places = np.stack([axis.place(points[:, i]) for i, axis in enumerate((x, y))])
     low, high = np.minimum(places[:, 1:], places[:, :-1]), np.maximum(places[:, 1:], places[:, :-1])
     return np.hypot(*np.diff(places)), np.asarray(((high >= 0) & (low <= 1)).all(axis=0))
 
 
 def stable_edge(found: Plane, points: Real, x: Axis, y: Axis) -> Real:
-    """Of points (n, 3) of the boundary those in the picture with the stable region on one side, above or below."""
+    """Points (n, 3) of the boundary in the picture with the stable region on one side, above or below."""
     points = points[~np.isnan(points[:, 0])]
     if not points.size:
         return points
@@ -462,7 +426,7 @@ def stable_edge(found: Plane, points: Real, x: Axis, y: Axis) -> Real:
     columns, rows = (axis.place(values) for axis, values in zip((x, y), found.axes, strict=True))
     column, row = np.searchsorted(_middles(columns), across), np.interp(up, rows, np.arange(rows.size))
     below, above = (
-        np.clip(np.round(row + way).astype(int), 0, rows.size - 1) for way in (-ROWS_BESIDE_EDGE, ROWS_BESIDE_EDGE)
+        np.clip(np.round(row + way).astype(int), 0, rows.size - 1) for way in (-ROWS_FROM_EDGE, ROWS_FROM_EDGE)
     )
     differ = (found.unstable[below, column] == 0) != (found.unstable[above, column] == 0)
     return np.asarray(points[differ & (up >= 0) & (up <= 1) & (across <= 1) & (points[:, 0] > 0)])
@@ -473,19 +437,19 @@ def _middles(values: Real) -> Real:
 
 
 def seen(found: Plane, x: Axis, y: Axis) -> Plane:
-    """The counts of a map on a grid that is even as seen: at each of its points those of the nearest one computed."""
+    """The counts of a map on a grid with even places: at each of its points those of the nearest one computed."""
     across, up = (axis.grid(values.size) for axis, values in zip((x, y), found.axes, strict=True))
     columns, rows = (np.searchsorted(_middles(old), new) for old, new in zip(found.axes, (across, up), strict=True))
-    return found.on(across, up, found.unstable[np.ix_(rows, columns)])
+    return replace(found, x=across, y=up, unstable=found.unstable[np.ix_(rows, columns)])
 
 
 def resting_frequencies(found: Plane, count: int) -> Real:
-    """The first frequencies [rad/s] with the hub at rest, which the edge along the gain across is made of."""
+    """The first natural frequencies [rad/s] with the hub at rest, those of the edge along the gain across."""
     return hub_locked(modes(found.arm, count)).natural_frequency
 
 
 def static_edges(found: Plane) -> tuple[float | None, float | None]:
-    """Where a real pole passes through 0: an upright line of the boundary, and a level one."""
+    """The gains at which a real pole passes through 0: an upright line of the boundary, and a level one."""
     loop, (across, up) = Loop(found.arm, found.law), (abs(values).max() for values in found.axes)
     upright = static_edge(loop.having(MOMENT_GAIN, 0.0), RATE_GAIN, (-across, across))
     level = static_edge(loop.having(RATE_GAIN, 1.0), MOMENT_GAIN, (-up, up))

@@ -1,8 +1,8 @@
 """Closed-loop poles of the exact rig under any law: zeros of a transcendental function, complete in a printed box.
 
-No reduced model takes part, but for places to start from.  Newton's method finds zeros from many starts, and the
-winding number of the characteristic function around the box says how many there are (`spectrum.box`); where it
-disagrees the box is cut and searched again.
+A reduced model gives starting points alone.  Newton's method finds zeros from many starts, and the winding number of
+the characteristic function around the box is their number (`spectrum.box`).  Where it disagrees the box is cut and
+searched again.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
-from tfarm.arrays import LEAST_SIZE, Complex, Real
+from tfarm.arrays import LEAST_SIZE, Complex
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.records import record
@@ -38,21 +38,21 @@ MOST_BOX_MODES = 4000  # flexible, below the highest box that is searched for as
 SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are the rigid arm's, and known beforehand
 SLOW_STEPS = 4  # of Newton's method from there
 AT_REST = 1e-12  # of these: so near 0 the slope there is read
-NEAR_RIGID = 0.01  # of its size: how far it may be from the rigid arm's
+NEAR_RIGID = 0.01  # of its size: largest distance of a slow pole from the rigid arm's
 LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
-RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is looked at again
-FAR_RIGHT, BEYOND_CORNER = 1e5, 10.0  # times that edge, and a law's fastest corner: so far a real pole is looked for
+RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is evaluated again
+FAR_RIGHT, BEYOND_CORNER = 1e5, 10.0  # times that edge, and a law's fastest corner: the end of a search of real poles
 FAR_POINTS = 41  # of the real axis up to there, on which 1 + L is smooth
 RIGHT_GROWS = 1.7  # times, from one right edge that is tried to the next: of effect on the time alone
-RIGHT_POINTS = 60  # of half a right edge, where Re L is looked at: far from any pole of L, it is smooth
+RIGHT_POINTS = 60  # of half a right edge, where Re L is evaluated: far from any pole of L, it is smooth
 MOST_HEIGHTS_RIGHT = 1e8  # that a box reaches at most: an improper law may have poles so far right
 LATE = 2.0  # of 1/delay: further left a delayed loop has ever more poles, and all of them are fast
 BEYOND_OWN = 1.1  # times the rightmost pole of a law, where L is infinite: the nearest right edge that is tried
-# Starts of Newton's method: the winding number says what they missed, so that they bear on the time alone.
+# Starts of Newton's method affect the time alone: the winding number counts the zeros that they missed.
 STARTS_REACH = 1.3  # heights of the box: modes of the arm up to there, as a law may draw their poles down into it
-DAMPED_BY_LAW = (0.0, 0.02, 0.3)  # of its frequency: how far left of a mode's own pole a law may have moved it
-REAL_STARTS, REAL_SPAN, REAL_REACH = 25, 300, 1.4  # on the real axis: so many, from height/300 to 1.4 heights
-FARTHER_OWN, NEARER_OWN, ASIDE_OWN = 1.01, 0.9, 0.1j  # of a law's pole: starts beside it, as on it D is infinite
+DAMPED_BY_LAW = (0.0, 0.02, 0.3)  # of its frequency: starts left of a mode's own pole, where a law may have moved it
+REAL_STARTS, REAL_SPAN, REAL_REACH = 25, 300, 1.4  # on the real axis: their number, from height/300 to 1.4 heights
+FARTHER_OWN, NEARER_OWN, ASIDE_OWN = 1.01, 0.9, 0.1j  # of a law's pole: starts near it, as on it D is infinite
 LEAST_START = 1e-100  # 1/s: zeros at 0 are divided out
 PADE = 8  # order of the approximation of a delay in the model that starts are taken from
 MODES_ABOVE_BOX, MOST_MODEL_MODES = 4, 40  # modes of the model above the box, and at most
@@ -60,18 +60,17 @@ SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)  # of a box that 
 
 
 def count_with_mirrors(zeros: Complex) -> int:
-    """How many zeros these with Im s >= 0 stand for, conjugates counted."""
+    """Number of zeros with their conjugates, from those with Im s >= 0."""
     return int(np.where(zeros.imag > 0, 2, 1).sum())
 
 
 @dataclass(frozen=True)
 @record
 class Poles:
-    """Closed-loop poles [1/s] with Im >= 0, ascending in Im, those at 0 as often as they are: all there are in `box`.
+    """Closed-loop poles [1/s] with Im >= 0, ascending in Im, with their multiplicity: all there are in `box`.
 
-    A real pole is listed as often as its order, an oscillating one stands for its conjugate too.
-    `ends_at_shear_cutoff` says that the box ends at sqrt(kappa G A/(rho I)), since no more poles lie below it: those
-    above are of shear, and undamped but for the little that bending takes.
+    The conjugates of oscillating poles are not listed.  Where `ends_at_shear_cutoff` the box ends at
+    sqrt(kappa G A/(rho I)), since no more poles lie below it: those above are shear modes, damped by bending alone.
     """
 
     loop: Annotated[Loop, Quantity(flat=True)]
@@ -92,9 +91,9 @@ class Poles:
 
     @property
     def unstable(self) -> Annotated[int, Quantity("unstable poles")]:
-        """How many poles of the box, conjugates counted, lie to the right of the axis.
+        """Number of poles of the box, conjugates counted, right of the axis.
 
-        A real part below working precision decides nothing, but without damping a theorem does (`theorem_of`).
+        A real part below working precision decides nothing; without damping a theorem decides (`theorem_of`).
         """
         size = abs(self.values)
         right = self.values.real > AXIS_SHARE * size
@@ -104,12 +103,12 @@ class Poles:
 
     @property
     def count(self) -> int:
-        """How many poles the box holds, conjugates counted."""
+        """Number of poles in the box, conjugates counted."""
         return count_with_mirrors(self.values)
 
     @property
     def moving(self) -> Complex:
-        """The poles apart from those at 0, which the hub angle leaves there where nothing holds it."""
+        """The poles apart from those at 0, where that of a free hub angle is."""
         return self.values[self.values != 0]
 
     @property
@@ -122,7 +121,7 @@ class Poles:
         return replace(self, discs=self.certify())
 
     def certify(self, digits: int = DOUBLE_DIGITS) -> tuple[Disc, ...]:
-        """A disc around each pole with Im >= 0 apart from 0, and a proof that the box has no other.
+        """Return a disc around each pole with Im >= 0 apart from 0, proven to contain all poles of the box.
 
         Raises CertificationError where something cannot be proven.
         """
@@ -132,15 +131,15 @@ class Poles:
             raise CertificationError("the discs of two poles touch: ask for more digits")
         proven = proven_count(k, self.box, law)
         if proven != self.count:
-            raise CertificationError(f"{self.count} poles in the box are listed, but {proven} are there")
+            raise CertificationError(f"{self.count} poles in the box are listed, but it contains {proven}")
         return discs
 
 
 def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles:
-    """The first `count` closed-loop poles with Im >= 0, ascending in Im s, complete in the box of the record.
+    """Return the first `count` closed-loop poles with Im >= 0, ascending in Im s, complete in the box of the record.
 
-    Without a count the first ten (more, where more are real), or as many as lie below the shear cut-off where these are
-    fewer: the box then ends there.  A count that is given goes on into shear.
+    Without a count these are the first ten (more, where more are real), or all below the shear cut-off where these are
+    fewer: then the box ends there.  With a count shear modes are included.
     Raises ParameterError where there is no loop, ConvergenceError where the box cannot be completed.
     """
     if count is not None:
@@ -166,7 +165,7 @@ def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles:
 
 
 def poles_below(loop: Loop, height: float, late: float = LATE, factors: tuple[float, ...] = TRIED_HEIGHTS) -> Poles:
-    """All closed-loop poles with |Im s| <= height [rad/s] in a box that reaches right of every unstable one.
+    """Return all closed-loop poles with |Im s| <= height [rad/s] in a box that reaches right of every unstable one.
 
     Left it reaches to about -1.5 heights, -0.8/C or -late/delay.  Where a zero lies on the edge of the box the next of
     the `factors` on the height is tried.
@@ -187,7 +186,7 @@ def box_of(loop: Loop, height: float, late: float = LATE) -> Box:
     own, C = loop.law.poles, loop.arm.damping
     if own.real.max(initial=0.0) > UNDISPERSED * first_frequency(loop.arm):
         fastest = complex(own[own.real.argmax()])
-        why = f"the law has a pole at {fastest:.3g} 1/s, farther right than a box reaches: its den begins next to 0"
+        why = f"law: its pole at {fastest:.3g} 1/s is farther right than any box, as its den begins next to 0"
         raise ConvergenceError(f"{why}; begin it with 0, which is another law, or a larger number", fastest, height)
     right = RIGHT_OF_AXIS * height
     if own.size:
@@ -199,11 +198,11 @@ def box_of(loop: Loop, height: float, late: float = LATE) -> Box:
 
 
 def quiet_edge(loop: Loop, right: float, height: float) -> float:
-    """The right edge [1/s] of a box of that height, from `right` on: where 1 + L has no zero, or after so many heights.
+    """The right edge [1/s] of a box of that height, from `right` on: where 1 + L has no zero, or `MOST_HEIGHTS_RIGHT`.
 
-    That is where Re L > -1/2, on the edge and at a few places beyond; L > 0 may be large, as on a hub without inertia,
-    and 1 + L keeps its sign on the real axis for five decades more, and beyond the fastest corner of a law: a hub of
-    little inertia meets it only there.
+    There Re L > -1/2, on the edge and at a few places beyond; L > 0 may be large, as on a hub without inertia.  On the
+    real axis 1 + L keeps its sign for five decades more, and beyond the fastest corner of a law, where the inertia of a
+    light hub begins to matter.
     """
     edge = 1j * np.linspace(0.0, height, RIGHT_POINTS)
     corner = float(abs(loop.law.poles).max(initial=0.0))
@@ -213,17 +212,17 @@ def quiet_edge(loop: Loop, right: float, height: float) -> float:
             break
         right *= RIGHT_GROWS
     far = np.geomspace(right, max(FAR_RIGHT * right, BEYOND_CORNER * corner), FAR_POINTS)
-    with np.errstate(all="ignore"):  # so far right powers of s may be no doubles: there nothing is told
+    with np.errstate(all="ignore"):  # powers of s may overflow so far right: these points are left out
         real_part = loop.loop_function(far.astype(complex)).real
-    far, held = far[np.isfinite(real_part)], real_part[np.isfinite(real_part)] > -1
-    (turns,) = np.nonzero(held[1:] != held[:-1])
+    far, is_above = far[np.isfinite(real_part)], real_part[np.isfinite(real_part)] > -1
+    (turns,) = np.nonzero(is_above[1:] != is_above[:-1])
     return float(far[turns[-1] + 1] if turns.size else right)
 
 
 def slow_poles(loop: Loop, below: float) -> Complex:
     """Poles [1/s] but 0 of size up to `below`: of the turning arm under small gains zeros of J s^2 + b s + c.
 
-    These are `Loop.at_rest`, corrected on the characteristic function; or the one zero next to 0 that its slope tells.
+    These are from `Loop.at_rest`, corrected on the characteristic function, and one zero next to 0 from its slope.
     """
     at = loop.function(np.array([below * AT_REST + 0j]))
     with np.errstate(all="ignore"):  # an even function has no slope there, and no zero
@@ -242,27 +241,28 @@ def slow_poles(loop: Loop, below: float) -> Complex:
 
 
 def starting_points(loop: Loop, up_to: float) -> Complex:
-    """Where Newton's method starts: the arm's own frequencies, the law's poles, and the loop of a modal model."""
-    omega, C = np.asarray(steep_places(loop.arm, up_to)), loop.arm.damping
-    near, own = near_modes(omega, C), loop.law.poles
-    real = np.geomspace(up_to / REAL_SPAN, REAL_REACH * up_to, REAL_STARTS)  # for poles whose place nothing tells
+    """Starts of Newton's method: at and left of the arm's own poles, near the law's, and poles of a modal model."""
+    omega, C, own = np.asarray(steep_places(loop.arm, up_to)), loop.arm.damping, loop.law.poles
+    shift, damped = np.array(DAMPED_BY_LAW)[:, None], np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))
+    near = (-(C * omega**2 / 2) - shift * omega + 1j * omega * damped).ravel()
+    real = np.geomspace(up_to / REAL_SPAN, REAL_REACH * up_to, REAL_STARTS)  # for poles of unknown place
     slow, of_model = np.empty(0, complex), np.empty(0, complex)
     if loop.at_rest is not None:
         c, b, _ = loop.at_rest
         slow = np.roots([loop.arm.turned_inertia, b, c]).astype(complex)
     if not (loop.law.is_static or loop.law.is_improper):  # which has no states
         count = min(modes_below(loop.arm, up_to) + MODES_ABOVE_BOX, MOST_MODEL_MODES)
-        with suppress(ParameterError, ConvergenceError):  # the winding number says whether something is missing
+        with suppress(ParameterError, ConvergenceError):  # the winding number shows whether a pole is missing
             of_model = poles_of_model(loop, _lightly_damped(loop, count))
-    beside = [own * FARTHER_OWN, own * NEARER_OWN + ASIDE_OWN * abs(own)]
-    starts = np.concatenate([near, near.conj(), slow, real, -real, *beside, of_model])
+    near_own = [own * FARTHER_OWN, own * NEARER_OWN + ASIDE_OWN * abs(own)]
+    starts = np.concatenate([near, near.conj(), slow, real, -real, *near_own, of_model])
     return starts[abs(starts) > LEAST_START]
 
 
 def _lightly_damped(loop: Loop, count: int) -> Matrices:
-    """A model of the rig in its undamped modes, each with the damping of its own C w, and what the hub loses.
+    """A model of the rig in its undamped modes, each with the damping C w, and the friction of the hub.
 
-    Bending of one C has just that; the damped modes themselves take far longer to be followed than starts are worth.
+    Bending of one C has just that; following the damped modes themselves takes far longer than starts are worth.
     """
     arm, signals = loop.arm, loop.law.signals
     A, B, C, D = sensed_model(arm.lossless, (*signals, "hub_rate"), count)
@@ -273,24 +273,17 @@ def _lightly_damped(loop: Loop, count: int) -> Matrices:
 
 
 def poles_of_model(loop: Loop, plant: Matrices) -> Complex:
-    """Poles of a model of the rig, from its input to the law's signals, under the law, a delay by Pade's fraction."""
+    """Poles of a model of the rig, from its input to the law's signals, under the law; a delay is a Pade fraction."""
     law = loop.law.matrices()
     if loop.law.delay:
         law = in_series(law, pade(loop.law.delay, PADE).matrices())
     return np.linalg.eigvals(closed(plant, law)).astype(complex)
 
 
-def near_modes(omega: Real, C: float) -> Complex:
-    """Starts [1/s] at and left of the poles of modes of those frequencies [rad/s] that bending alone damps."""
-    shift = np.array(DAMPED_BY_LAW)[:, None]
-    decay = C * omega**2 / 2
-    return (-decay - shift * omega + 1j * omega * np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))).ravel()
-
-
 def first_poles(poles: Poles, count: int | None) -> Poles:
-    """The first so many poles, the usual ones and all real ones if no number is given, and a lower box of just these.
+    """The first `count` poles, or the usual ones and all real ones, in a lower box of just these.
 
-    Raises ParameterError where a number that is given parts real poles.
+    Raises ParameterError where a count separates real poles.
     """
     values, real = poles.values, int((poles.values.imag == 0).sum())
     count = max(USUAL_POLES, real) if count is None else count

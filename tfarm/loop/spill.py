@@ -1,7 +1,7 @@
-"""Spillover: what reduced models of ever more modes say of a law, beside the exact rig.
+"""Spillover: stability of a law on reduced models of more and more modes, compared with the exact rig.
 
-A law is designed on a model of a few modes; the modes left out are on the rig all the same, and the law may drive one
-of them (Balas 1978).  The exact loop has them all.
+A law is designed on a model of a few modes, and may destabilise a mode of the rig that the model omits (Balas 1978).
+The exact loop has all modes.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from .poles import poles_of_model
 from .stability import Stability, stability
 
 MOST_SPILL_MODES = 60  # modes of a model
-USUAL_SPILL_MODES = 20  # up to which models are looked at where nothing else is asked for
+USUAL_SPILL_MODES = 20  # of the largest model by default
 REST_SHARE = 1e-7  # of w1: poles at 0 come out as small
-UNDAMPED_SHARE = 1e-9  # of its size: what a real part may be of a pole that no model damps
+UNDAMPED_SHARE = 1e-9  # of its size: largest real part of a pole that no model damps
 
 
 class SpillModel(NamedTuple):
-    """A design model of so many flexible modes under the law."""
+    """A design model under the law: flexible modes, unstable poles, rightmost pole."""
 
     modes: Annotated[int, Quantity("modes")]
     unstable: Annotated[int, Quantity("unstable poles")]
@@ -43,10 +43,10 @@ class SpillModel(NamedTuple):
 class Spill:
     """The verdict on the exact loop, and models of `modes` (n,) flexible modes: `unstable` (n,) and `rightmost` (n,).
 
-    `rightmost` [1/s] is the pole of each furthest right, apart from those at 0.  `driven` [1/s] are the exact loop's
-    unstable poles with Im >= 0, `first_mode` the flexible mode whose frequency is next to the lowest of those, 0 where
-    that is real or slower than half the first; `shown_from` the number of modes from which on every model looked at is
-    unstable too, None where the last is not.
+    `rightmost` [1/s] is the rightmost pole of each, apart from those at 0.  `driven` [1/s] are the exact loop's
+    unstable poles with Im >= 0.  `first_mode` is the flexible mode whose frequency is next to the lowest of those, 0
+    where that is real or below half the first.  From `shown_from` modes on every model is unstable too; None where the
+    last is not.
     """
 
     verdict: Annotated[Stability, Quantity(flat=True)]
@@ -62,7 +62,7 @@ class Spill:
 
     @property
     def first_mode(self) -> Annotated[int | None, Quantity("first mode that is destabilised")]:
-        """The mode that spills over first, None where the exact loop is stable in its band."""
+        """The lowest destabilised mode; None where the exact loop is stable in its band."""
         if not self.driven.size:
             return None
         lowest = float(self.driven[0].imag)
@@ -74,7 +74,7 @@ class Spill:
 
     @property
     def shown_from(self) -> Annotated[int | None, Quantity("modes of a model that shows it", key="shown_from_modes")]:
-        """From how many modes on the models are unstable too."""
+        """Number of modes from which on the models are unstable too."""
         content = np.flatnonzero(self.unstable == 0)
         if content.size == 0:
             return int(self.modes[0])
@@ -82,38 +82,38 @@ class Spill:
 
     @property
     def models(self) -> Annotated[list[SpillModel], Quantity("design models")]:
-        """A row a model."""
+        """One row for each model."""
         poles = (complex(s.real, abs(s.imag)) for s in self.rightmost)
         return list(map(SpillModel, self.modes.tolist(), self.unstable.tolist(), poles))
 
     @property
     def content(self) -> NDArray[np.int64]:
-        """The models that find nothing unstable."""
+        """The numbers of modes of the models that are stable."""
         return self.modes[self.unstable == 0]
 
     @property
     def in_words(self) -> Annotated[str, Quantity("spillover")]:
-        """The finding in a sentence or two."""
+        """The finding: the exact loop, and the models that do not show it."""
         exact = f"the exact rig is {self.verdict.verdict}"
         if not self.driven.size:
-            return exact + (" up to the band" if not self.verdict.is_known_beyond else "")
+            return exact + (" in the frequency range" if not self.verdict.is_known_beyond else "")
         which = f"mode {self.first_mode}" if self.first_mode else "a pole below the first mode"
-        words = f"{exact}: {which} is driven, at {abs(self.driven[0]):.6g} rad/s"
+        words = f"{exact}: {which} is unstable, at {abs(self.driven[0]):.6g} rad/s"
         if not self.content.size:
-            return f"{words}; every model says so"
+            return f"{words}; every model shows it"
         first, last = int(self.content[0]), int(self.content[-1])
         models = f"{first} to {last} modes" if first != last else f"{first} mode{'s' * (first > 1)}"
         if last - first + 1 != self.content.size:
             models = f"{self.content.size} orders up to {last}"
-        end = f"from {self.shown_from} modes on they show it" if self.shown_from else "none looked at shows it for good"
-        return f"{words}; models of {models} find nothing unstable, {end}"
+        end = f"from {self.shown_from} modes on they show it" if self.shown_from else "the largest model is stable too"
+        return f"{words}; models of {models} are stable, {end}"
 
 
 def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
-    """The exact loop beside models of 1 to `most` flexible modes, their static remainder left out.
+    """Return the verdict on the exact loop, and models of 1 to `most` flexible modes without their static remainder.
 
-    The models are those that a law is designed on: bare modes.  A delay is in them as a Pade approximation.
-    Raises ParameterError for what is no law, where there is no loop, or none of finite order; ConvergenceError as
+    Such models are used for design: bare modes.  A delay is in them as a Pade approximation.
+    Raises ParameterError for an invalid law, where there is no loop, or none of finite order; ConvergenceError as
     `stability` does.
     """
     (arm, _), law = arm_and_law(arm, law), as_law(law)

@@ -2,17 +2,16 @@
 
 Poles are computed, completely, up to a band; what lies beyond is known by
 
-* a theorem on the sign of the law (`theorem`): on the hub's own angle or rate, through a torque that acts at once, it
-  tells every mode of any rig; with feedback of the hub's moment every mode of a rig without damping, so that a few
-  modes tell the rest;
+* a theorem on the sign of the law (`theorem`): for a law on the hub's own angle or rate, through a torque without lag,
+  it holds for every mode of any rig; with feedback of the hub's moment for every mode of a rig without damping;
 * small gain: with damping in every segment, once |L| stays below one half on the axis, and falls, and on the upper
-  edge of the box, 1 + L has no zero above it.  Where the band of that would hold more modes than `MOST_BAND_MODES` it
-  is cut, and where a segment of a lossy rig has C = 0 there is none;
-* delay without any damping: the phase of what is fed back turns ever on from mode to mode, so that of infinitely many
-  modes infinitely many are driven.
+  edge of the box, 1 + L has no zero above it.  A band of more than `MOST_BAND_MODES` modes is cut, and there is none
+  where a segment of a lossy rig has C = 0;
+* delay without any damping: the phase of the loop turns on from mode to mode, so that infinitely many modes are
+  unstable.
 
-Else it is not known, and the verdict is that of the band.  A pole at 0 remains where nothing holds the hub's angle:
-verdicts are apart from it.
+Else it is not determined, and the verdict is that of the band.  A pole at 0 remains where the hub angle is free:
+verdicts leave it out.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from typing import Annotated
 import numpy as np
 
 from tfarm.arm import AnyLaw, Arm, as_law
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -37,14 +36,14 @@ from .theorem import GIVES, TAKES, Theorem, theorem_of
 
 LEAST_BAND_MODES = 12  # flexible modes in the band at C = 0, and at least
 QUIET = 0.5  # |L| beyond the band, with damping
-QUIET_POINTS = 1200  # in the bands of QUIET_REACH, 600 a decade; a quarter of so many on the upper edge of the box
+QUIET_POINTS = 1200  # up to QUIET_REACH, 600 a decade; a quarter of that number on the upper edge of the box
 WIDENED = 1.6  # times, from one band that is tried to the next
-MARGIN_OF_ZERO = 1e-11  # a real part below this share of |s| is none: the poles are right to a few eps
-LISTED_LEFT = 0.5  # of 1/delay: poles are listed so far left, of ever more as |L| falls, to tell the unstable ones
+MARGIN_OF_ZERO = 1e-11  # a real part below this share of |s| is none: poles have an error of a few eps
+LISTED_LEFT = 0.5  # of 1/delay: poles are listed up to there on the left; further left are more and more, all stable
 BEYOND_LAW_POLES = 1.3  # of the fastest pole of the law that rings: a band reaches so far, if it can
 DULL = 0.7  # damping ratio from which on a pole of the law makes no peak
-NEAREST_TO_AXIS = 1e-4  # of a band: the upper edge of the box is looked at on the axis and from so near to it on
-UNFELT = 1e-9  # a hub participation below this share of an ordinary one is none
+NEAREST_TO_AXIS = 1e-4  # of a band: first distance from the axis at which L is evaluated on the upper edge of the box
+UNCONTROLLABLE = 1e-9  # a hub participation below this share of an ordinary one is none
 DELAYED = "without any damping a delayed law drives infinitely many modes beyond the band"
 SMALL_GAIN = f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)"
 UNKNOWN_ABOVE = "converged up to {band:.4g} rad/s, not determined beyond, neither by small gain nor by a theorem"
@@ -53,7 +52,7 @@ UNKNOWN_ABOVE = "converged up to {band:.4g} rad/s, not determined beyond, neithe
 @dataclass(frozen=True)
 @record
 class Stability:
-    """`verdict` "stable", "marginal" or "unstable"; poles in the band; what is known beyond it, in words.
+    """Verdict on a loop, "stable", "marginal" or "unstable", its poles in the band, and its stability beyond (`tail`).
 
     Where `is_known_beyond` is false the verdict is that of the band alone.
     """
@@ -74,7 +73,7 @@ class Stability:
 
     @property
     def free_pole(self) -> Annotated[str | None, Quantity("free hub angle")]:
-        """The pole at 0 from which the verdict is apart."""
+        """The pole at 0 that the verdict leaves out."""
         return "its pole at s = 0 is left out" if self.poles.moving.size < self.poles.values.size else None
 
     @property
@@ -84,7 +83,7 @@ class Stability:
 
 
 def stability(arm: Arm, law: AnyLaw, band: float | None = None) -> Stability:
-    """The verdict on the loop of an arm and a law.  `band` [rad/s] is chosen if it is not given.
+    """Return the verdict on the loop of an arm and a law.  `band` [rad/s] is chosen if it is not given.
 
     Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, and where with damping
     one is on the axis to working precision.
@@ -93,7 +92,7 @@ def stability(arm: Arm, law: AnyLaw, band: float | None = None) -> Stability:
 
 
 def verdict_on(loop: Loop, band: float | None = None) -> Stability:
-    """`stability` of a loop."""
+    """Return the verdict on a loop, as `stability`."""
     theorem = theorem_of(loop)
     height, quiet = (band, False) if band is not None else band_of_loop(loop, theorem)
     poles = poles_below(loop, height, LISTED_LEFT)
@@ -103,7 +102,7 @@ def verdict_on(loop: Loop, band: float | None = None) -> Stability:
 
 
 def _beyond(loop: Loop, theorem: Theorem, quiet: bool, band: float) -> tuple[str, bool, bool]:
-    """Words on what lies beyond the band; whether infinitely many poles there are unstable; whether it is known."""
+    """Stability beyond the band: the reason; whether infinitely many poles there are unstable; whether it is known."""
     if theorem.energy is not None:
         return theorem.reason, theorem.energy == GIVES, True
     if quiet:
@@ -114,7 +113,10 @@ def _beyond(loop: Loop, theorem: Theorem, quiet: bool, band: float) -> tuple[str
 
 
 def _verdict(poles: Poles, theorem: Theorem, is_infinite: bool) -> str:
-    """The verdict from the poles of the band and the theorem, which may know a side that rounding hides."""
+    """The verdict from the poles of the band, and from the theorem where rounding hides the side of the axis.
+
+    Raises ConvergenceError where one of a damped loop may be on the axis, and none is right of it.
+    """
     moving, arm = poles.moving, poles.loop.arm
     if is_infinite or bool((moving.real > MARGIN_OF_ZERO * abs(moving)).any()):
         return "unstable"
@@ -123,28 +125,23 @@ def _verdict(poles: Poles, theorem: Theorem, is_infinite: bool) -> str:
         return "marginal"
     if arm.loses_at_hub_alone:
         known = theorem.energy == TAKES or not (moving.real > -MARGIN_OF_ZERO * abs(moving)).any()
-        return "stable" if known and is_felt(arm.lossless_hub, poles.box.im_max) else "marginal"
-    must_be_off_axis(moving)
+        return "stable" if known and is_controllable(arm.lossless_hub, poles.box.im_max) else "marginal"
+    on_axis = moving[moving.real > -MARGIN_OF_ZERO * abs(moving)]
+    if on_axis.size:
+        text = f"the pole at {on_axis[0]:.6g} 1/s is on the imaginary axis to working precision: not determined"
+        raise ConvergenceError(text, complex(on_axis[0]), float(on_axis[0].real))
     return "stable"
 
 
-def must_be_off_axis(stable: Complex) -> None:
-    """Refuse poles [1/s], none of which is right of the axis, where one may be on it, by ConvergenceError."""
-    on_axis = stable[stable.real > -MARGIN_OF_ZERO * abs(stable)]
-    if on_axis.size:
-        text = f"the pole at {on_axis[0]:.6g} 1/s is on the imaginary axis to working precision: neither stable nor not"
-        raise ConvergenceError(text, complex(on_axis[0]), float(on_axis[0].real))
-
-
-def is_felt(arm: Arm, up_to: float) -> bool:
+def is_controllable(arm: Arm, up_to: float) -> bool:
     """Whether the hub takes part in every flexible mode below `up_to` [rad/s], by rotation or by root moment.
 
-    At C = 0 a mode that it does not feel stays undamped under any law: so it is for exceptional arms only.
+    At C = 0 a mode without the hub stays undamped under any law: exceptional arms have one.
     """
-    return modes_below(arm, up_to) == 0 or bool((felt(arm, up_to).max(axis=0) > UNFELT).all())
+    return modes_below(arm, up_to) == 0 or bool((hub_shares(arm, up_to).max(axis=0) > UNCONTROLLABLE).all())
 
 
-def felt(arm: Arm, up_to: float) -> Real:
+def hub_shares(arm: Arm, up_to: float) -> Real:
     """Rotation and root moment at the hub (2, modes) of the flexible modes below `up_to` [rad/s], as shares.
 
     Of sqrt(1/m) k and sqrt(1/m) E I k^2, those of a slender beam of mass m with waves of the same frequency: high modes
@@ -158,13 +155,13 @@ def felt(arm: Arm, up_to: float) -> Real:
 
 
 def band_of_loop(loop: Loop, theorem: Theorem | None = None) -> tuple[float, bool]:
-    """The band [rad/s] in which poles are computed, and whether the loop is quiet beyond it (never without damping)."""
+    """The band [rad/s] in which poles are computed, and whether small gain holds beyond it (never without damping)."""
     theorem, arm, own = theorem or theorem_of(loop), loop.arm, loop.law.poles
     ringing = own[own.real > -DULL * abs(own)]
     fastest, highest = BEYOND_LAW_POLES * float(abs(ringing).max(initial=0.0)), band_of(arm, MOST_BAND_MODES)
     least = max(band_of(arm, LEAST_BAND_MODES), min(fastest, highest))
-    is_told = theorem.energy is not None and (arm.has_elastic_link or not loop.law.is_static)
-    if arm.loses_at_hub_alone or is_told or fastest > highest:
+    is_decided = theorem.energy is not None and (arm.has_elastic_link or not loop.law.is_static)
+    if arm.loses_at_hub_alone or is_decided or fastest > highest:
         return least, False
     band = least
     while modes_below(arm, band) <= MOST_BAND_MODES:
@@ -175,16 +172,16 @@ def band_of_loop(loop: Loop, theorem: Theorem | None = None) -> tuple[float, boo
 
 
 def band_of_family(loops: Iterable[Loop]) -> tuple[float, bool]:
-    """A band [rad/s] for all these loops, and whether they are all quiet beyond it."""
+    """A band [rad/s] for all these loops, and whether small gain holds beyond it for all."""
     bands, quiet = zip(*map(band_of_loop, loops), strict=True)
     return max(bands), all(quiet)
 
 
 def is_quiet(loop: Loop, band: float) -> bool:
-    """Whether small gain tells every pole beyond a band.
+    """Whether small gain decides every pole beyond a band.
 
-    Of a rig with an elastic segment it is not known: with what the hub or another segment loses, the resonances of that
-    one become ever narrower, and pass between any points that are looked at.
+    Not determined for a rig with an elastic segment: its resonances become ever narrower, and pass between any points
+    at which L is evaluated.
     """
     return loop.arm.least_damping > 0 and has_fallen(loop, band)
 
@@ -192,8 +189,8 @@ def is_quiet(loop: Loop, band: float) -> bool:
 def has_fallen(loop: Loop, band: float) -> bool:
     """Whether 1 + L has no zero with Im s > band right of the axis, by |L| < 1/2 on the edges of that region.
 
-    On the axis two decades are looked at, where |L| falls, with the natural frequencies between; on the upper edge of
-    the box as far right as that reaches, and beyond |L| is smaller still.
+    L is evaluated on two decades of the axis, where |L| falls, with the natural frequencies between, and on the upper
+    edge of the box; farther right |L| is smaller still.
     """
     omega, half = np.asarray(quiet_places(loop.arm, band, QUIET_POINTS)), math.sqrt(QUIET_REACH) * band
     size = abs(loop.loop_function(1j * omega))
@@ -205,10 +202,10 @@ def has_fallen(loop: Loop, band: float) -> bool:
 
 
 def is_known_without(loop: Loop, name: str) -> bool:
-    """Whether poles beyond some band are known, of this law or any nearer to it, once a leading coefficient is 0.
+    """Whether poles beyond some band are known of this law, and of any nearer to it, once a leading coefficient is 0.
 
-    Else high modes are driven on the way there, and their poles come to a band from above: counts in it cannot be
-    carried from one side of 0 to the other.
+    Else high modes become unstable as it goes to 0, and their poles come to a band from above: the counts on one side
+    of 0 do not follow from those on the other.
     """
     try:
         without = loop.having(name, 0.0)

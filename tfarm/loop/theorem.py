@@ -1,21 +1,21 @@
-"""What the sign of a law does to every mode of a rig: passivity, negative imaginary systems, and moment feedback.
+"""Stability of every mode from the sign of a law: passivity, negative imaginary systems, and moment feedback.
 
 A hub torque does work on its own angle: the transfer function from torque to hub rate is positive real (passive) for
-any rig, with any losses.  So a positive real law on the rate cannot drive a mode, and where no mode hides from the hub
-and the law takes energy at every frequency, it damps each one.  To the angle the same rig is negative imaginary, and a
-law u = -C theta with -C strictly negative imaginary leaves it stable if and only if k_theta + C(0) > 0 (Lanzon and
-Petersen 2008; positive position feedback is of that kind).
+any rig, with any losses.  So a positive real law on the rate destabilises no mode.  It damps each one where the hub
+takes part in all of them and the law dissipates energy at every frequency.  The same rig from torque to angle is
+negative imaginary: under u = -C theta with -C strictly negative imaginary it is stable if and only if
+k_theta + C(0) > 0 (Lanzon and Petersen 2008; positive position feedback is of that kind).
 
 Both need hub torque on the hub's own angle or rate, no delay, no inductance, no sampling.  The signs of real
-polynomials are decided in exact arithmetic, by Sturm's theorem: no frequency is passed over.
+polynomials are decided in exact arithmetic, by Sturm's theorem, at all frequencies.
 
 Feedback of the moment M on the hub, u = -C - k M, is absorbed by the hub of another rig (`absorbed`).  Its equation
 
     I theta_tt + b theta_t + c theta = u + M   divided by 1 - k   is that of inertia I/(1-k), friction b/(1-k),
                                                                   stiffness c/(1-k) and the law C/(1-k)
 
-So for k < 1 the sign of C decides, for k > 1 the opposite sign, and k = 1 leaves the modes of the locked hub as they
-are.  That is the paper's theorem for C = K1 s + Kp.  It holds where the gauge reads M, so without damping in the links.
+So for k < 1 the sign of C decides, for k > 1 the opposite sign, and k = 1 leaves the modes of the locked hub undamped.
+That is the paper's theorem for C = K1 s + Kp.  It needs a gauge that reads M, so no damping in the links.
 
 The same by energy, as the paper has it (`lyapunov`), for constant gains:
 
@@ -26,13 +26,13 @@ is equation (15) with its payload, and a term for the extension Kp.  Under u = -
     V_t = -a2 K1 theta_t^2 - a1 C integral(E I phi_xt^2) + (a2 - a2 K2 - a1) E I phi_x(0) theta_t
           + (a2 - a1) C E I phi_xt(0) theta_t
 
-The last two have no sign, so both factors must vanish: a1/a2 = 1 - K2, and where C > 0 also a1 = a2, that is K2 = 0:
-the gauge does not feel C.  A gauge signal multiplied by 1 + C s is the whole moment M(0): then the two terms have one
-factor, and a1/a2 = 1 - K2 does at any C.
+The last two have no sign, so both factors must vanish: a1/a2 = 1 - K2, and where C > 0 also a1 = a2, that is K2 = 0,
+as the gauge signal has no term in C.  A gauge signal multiplied by 1 + C s is the whole moment M(0): then the two terms
+have one factor, and a1/a2 = 1 - K2 is sufficient at any C.
 
-V_t <= 0 says that no pole lies in the right half-plane, for the arm with all its modes.  It does not say that all
-motion dies out: theta is left alone where Kp = 0, and exceptional arms have a mode that the root does not feel (with a
-free tip just below the cut-off frequency).
+V_t <= 0 proves that no pole lies in the right half-plane, for the arm with all its modes.  It does not prove asymptotic
+stability: theta is free where Kp = 0, and exceptional arms have a mode without moment at the root (with a free tip just
+below the cut-off frequency).
 """
 
 from __future__ import annotations
@@ -55,17 +55,17 @@ if TYPE_CHECKING:
     Poly = Any  # of sympy, over the rationals: it comes without types, and is imported where it is used
 
 MOST_EXACT_DEGREE = 40  # degree: exact arithmetic with such polynomials takes a moment
-TAKES, CONSERVES, GIVES = 1, 0, -1  # what a law does to the energy of every mode that the hub takes part in
+TAKES, CONSERVES, GIVES = 1, 0, -1  # energy that a law takes from every mode with motion of the hub: its sign
 
 
 @dataclass(frozen=True)
 @record
 class Signs:
-    """What a law in s on hub angle and hub rate is: its `kind`, and in words why.
+    """The `kind` of a law in s on hub angle and hub rate, and the `reason`.
 
     "strictly passive": Re of the law on the rate is above 0 at all frequencies; "passive": nowhere below;
     "negative imaginary": -C strictly so on the angle, with C(0) = `at_rest` [N m/rad]; "" where none of these is shown.
-    `energy` is what it does to each mode: TAKES, CONSERVES, GIVES; None where that is not shown.
+    `energy` of each mode: the law TAKES, CONSERVES or GIVES it; None where that is not shown.
     """
 
     kind: Annotated[Literal["strictly passive", "passive", "negative imaginary", ""], Quantity("kind")]
@@ -75,24 +75,24 @@ class Signs:
 
 
 class Theorem(NamedTuple):
-    """What a theorem says of every mode of a loop, in words, and what becomes of its energy; None: nothing."""
+    """Effect of a law on the `energy` of every mode of a loop by a theorem, None without one, and the `reason`."""
 
     energy: int | None
     reason: str
 
 
 NO_THEOREM = Theorem(None, "")
-HELD = "modes with the hub at rest stay undamped, in every band: all of the moment on the hub is fed back"
-CONSERVED = "C = 0 and nothing takes or gives energy: modes beyond the band lie on the axis"
-DAMPED = "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"
-DRIVEN = "C = 0: every flexible mode beyond the band is unstable too, with a growth rate that tends to 0"
+HELD = "modes with the hub at rest stay undamped at all frequencies: the whole moment on the hub is fed back"
+CONSERVED = "C = 0 and energy is conserved: modes beyond lie on the axis"
+DAMPED = "C = 0: every mode beyond is damped (Lyapunov), with a decay rate that tends to 0"
+DRIVEN = "C = 0: every flexible mode beyond is unstable too, with a growth rate that tends to 0"
 
 
 def absorbed(arm: Arm, law: Law) -> tuple[float, Law] | None:
-    """The share k of the moment on the hub that a law takes off it, and the rest of the law.
+    """The share k of the moment on the hub that a law cancels, and the rest of the law.
 
-    None where the law reads more than the hub's angle and rate and statically the moment that acts on the hub: with
-    damping in the links a gauge does not read that.
+    None for laws on other signals than the hub's angle and rate and, statically, the moment that acts on the hub.  With
+    damping in the links that moment is not the gauge's.
     """
     share, rest = 0.0, []
     for part in law.parts:
@@ -110,7 +110,7 @@ def absorbed(arm: Arm, law: Law) -> tuple[float, Law] | None:
 
 
 def theorem_of(loop: Loop) -> Theorem:
-    """What is known of every mode of a loop, however high."""
+    """Return the theorem that decides the stability of every mode of a loop."""
     arm, parts = loop.arm, absorbed(loop.arm, loop.law)
     if parts is None or (arm.input_lags and loop.feeds_back):
         return NO_THEOREM
@@ -121,7 +121,7 @@ def theorem_of(loop: Loop) -> Theorem:
     signs = signs_of(rest.times(way), way * arm.rate_loss)
     if signs.energy is not None:
         is_plain = arm.has_elastic_link and loop.law.is_static
-        words = f"{signs.reason}: no mode, however high, is driven"
+        words = f"{signs.reason}: no mode is unstable at any frequency"
         return Theorem(signs.energy, (DAMPED if signs.energy else CONSERVED) if is_plain else words)
     if arm.has_elastic_link and arm.loses_at_hub_alone:
         opposite = signs_of(rest.times(-way), -way * arm.rate_loss)
@@ -131,25 +131,28 @@ def theorem_of(loop: Loop) -> Theorem:
 
 
 def signs_of_loop(loop: Loop) -> Signs:
-    """The sign of the law of a loop, with the hub's friction counted to it: none behind an inductance."""
+    """The sign of the law of a loop, the hub's friction included; none behind an inductance."""
     if loop.arm.input_lags:
-        return Signs("", "behind an inductance the torque comes late")
+        return Signs("", "the torque lags behind the input, through an inductance")
     return signs_of(loop.law, loop.arm.rate_loss)
 
 
 def signs_of(law: Law, friction: float = 0.0) -> Signs:
-    """The sign of a law, with the hub's friction [input per rad/s] counted to it."""
-    if law.delay:
-        return Signs("", "a delay turns every sign with frequency")
-    if law.is_discrete or not set(law.signals) <= {"hub_angle", "hub_rate"}:
-        return Signs("", "the sign of a law tells something where it reads the hub's own angle or rate")
-    if not all(isinstance(part.block, Rational) for part in law.parts):
-        return Signs("", "matrices are not looked at: give transfer functions")
+    """Return the sign of a law, the hub's friction [input per rad/s] included."""
+    obstacles = {
+        "a delay turns the phase with frequency": law.delay,
+        "it is not a law in s on the hub's own angle or rate alone": law.is_discrete
+        or not set(law.signals) <= {"hub_angle", "hub_rate"},
+        "the sign of matrices is not determined: give transfer functions": not all(
+            isinstance(part.block, Rational) for part in law.parts
+        ),
+        f"the sign of more than {MOST_EXACT_DEGREE} states is not determined": law.order > MOST_EXACT_DEGREE,
+    }
+    if reason := next((text for text, holds in obstacles.items() if holds), ""):
+        return Signs("", reason)
     if law.is_static:  # gains on hub angle and hub rate, by their signs alone
         values = dict(zip(law.signals, law.values(np.ones(1, complex))[:, 0].real.tolist(), strict=True))
         return _of_signs(values.get("hub_rate", 0.0) + friction, values.get("hub_angle", 0.0))
-    if law.order > MOST_EXACT_DEGREE:
-        return Signs("", f"of a law of more than {MOST_EXACT_DEGREE} states the sign is not looked for")
     num, den = polynomial([0.0]), polynomial([1.0])  # of the whole law as one fraction on the angle
     for part in law.parts:
         assert isinstance(part.block, Rational)  # seen above
@@ -160,28 +163,31 @@ def signs_of(law: Law, friction: float = 0.0) -> Signs:
     passive = _positive_real(num + polynomial([friction, 0.0]) * den, den)
     if passive is not None and passive.kind:
         return passive
-    return _negative_imaginary(num, den) or passive or Signs("", "neither passive nor negative imaginary")
+    if is_hurwitz(den) and num.degree() <= den.degree() and definite(on_axis(num, den)[1]) == "above":
+        words = "the law on the hub's angle, with its sign changed, is strictly negative imaginary"
+        return Signs("negative imaginary", words, float(num.eval(0) / den.eval(0)), TAKES)
+    return passive or Signs("", "neither passive nor negative imaginary")
 
 
 def _of_signs(rate: float, at_rest: float) -> Signs:
     """The signs of a law without poles right of the axis, by that of Re on the rate and by its value at rest."""
     if rate > 0 and at_rest >= 0:
-        words = "the law on the hub's rate takes energy at every frequency (strictly positive real)"
+        words = "the law on the hub's rate dissipates energy at every frequency (strictly positive real)"
         return Signs("strictly passive", words, at_rest, TAKES)
     if rate == 0 and at_rest >= 0:
-        words = "the law on the hub's rate gives energy at no frequency (positive real)"
+        words = "the law on the hub's rate supplies energy at no frequency (positive real)"
         return Signs("passive", words, at_rest, CONSERVES)
     if rate < 0:
         return Signs("", "neither passive nor negative imaginary")
-    # Re > 0 on the whole axis but 0: a pole crosses that at s = 0 alone, and only real poles are driven
-    return Signs("", "at rest the law pushes the hub on", at_rest, TAKES if rate else CONSERVES)
+    # Re > 0 on the whole axis but 0: a pole crosses that at s = 0 alone, and only real poles are unstable
+    return Signs("", "the static stiffness of the law is negative", at_rest, TAKES if rate else CONSERVES)
 
 
 def _positive_real(num: Poly, den: Poly) -> Signs | None:
-    """Whether C(s)/s, the law on the rate, is positive real, and with Re > 0 on the whole axis but 0; None if not.
+    """Signs of C(s)/s, the law on the rate, if it is positive real, or has Re > 0 on the whole axis but 0; else None.
 
     It is if Re >= 0 on the axis, no pole lies right of it, and those on it are simple with a residue above 0: of these
-    only one at 0 is granted, the C(0) of an angle that is held.
+    one at 0 alone is allowed, C(0) of a law on the angle.
     """
     at_rest = num.eval(0) / den.eval(0) if den.eval(0) else None
     if at_rest is None or not is_hurwitz(den):
@@ -194,21 +200,13 @@ def _positive_real(num: Poly, den: Poly) -> Signs | None:
     return _of_signs(float(sign == "above"), float(at_rest))
 
 
-def _negative_imaginary(num: Poly, den: Poly) -> Signs | None:
-    """Whether -C is strictly negative imaginary on the angle: C stable and proper, Im C(i w) > 0 for all w > 0."""
-    if not is_hurwitz(den) or num.degree() > den.degree() or definite(on_axis(num, den)[1]) != "above":
-        return None
-    words = "the law on the hub's angle, with its sign changed, is strictly negative imaginary"
-    return Signs("negative imaginary", words, float(num.eval(0) / den.eval(0)), TAKES)
-
-
 # ------------------------------------------------------------ by energy
 
 
 @dataclass(frozen=True)
 @record
 class Lyapunov:
-    """What V proves about an arm and a law with constant gains.
+    """Lyapunov's proof by V about an arm and a law with constant gains.
 
     `proven`: no pole lies in the right half-plane, because V >= 0 never grows; its weights are then `a1_over_a2`, else
     None: no weights exist.  `kind`: V is "dissipated" (V_t <= 0), "conserved" (V_t = 0: every pole on the axis), or
@@ -223,53 +221,43 @@ class Lyapunov:
 
 
 def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:
-    """What V proves of the law with a strain gauge as it is.  Raises ParameterError where there is no loop."""
+    """Return Lyapunov's proof for gains at the hub with a strain gauge.  Raises ParameterError where there is no loop.
+
+    V_t = -a2 K1 theta_t^2 - a1 C integral(E I phi_xt^2) with a1/a2 = 1 - K2, where that has a sign.
+    """
     loop, C = Loop(arm, as_law(law)), arm.damping
-    if law.K2 and not arm.reads_hub_moment:
-        return _unproven(loop, "the gauge does not read the moment on the hub (r > 0, or inertia at the clamp)")
-    if C and law.K2:
-        reason = (
-            f"the gauge does not feel the damping C = {C:g} s, so V_t keeps a term in phi_xt(0) theta_t of no sign, "
-            "and no weights a1, a2 prove a K2 other than 0"
-        )
-        return _unproven(loop, reason)
-    return _with_whole_moment(loop, law)
-
-
-def _with_whole_moment(loop: Loop, law: HubFeedback) -> Lyapunov:
-    """V_t = -a2 K1 theta_t^2 - a1 C integral(E I phi_xt^2) with a1/a2 = 1 - K2."""
-    C = 0.0 if loop.arm.is_undamped else 1.0
-    weight, K1 = 1.0 - law.K2 / loop.arm.input_per_torque, law.K1 + loop.arm.rate_loss
-    if loop.arm.input_lags:
-        return _unproven(loop, "the voltage reaches the hub through an inductance, late: V_t has a term of no sign")
-    if weight == 0:
-        return _unproven(loop, "K2 = 1 leaves a1 = 0: V sees the hub alone, and the arm moves as on a held hub")
-    if weight < 0:
-        return _unproven(loop, f"a1/a2 = 1 - K2 = {weight:g} is negative, so V has no sign")
-    if K1 < 0:
-        return _unproven(loop, f"K1 = {law.K1:g} feeds energy in: V_t = -a2 K1 theta_t^2 has the wrong sign")
-    stiffness = 0.0  # of the hub at rest [N m/rad]: more than 0 where the tip is held
-    if law.Kp < 0 and not loop.arm.has_rigid_mode:
-        stiffness = 1.0 / float(transfer(loop.arm, "hub_angle").static)
-    if law.Kp < 0 and law.Kp < (least := -weight * stiffness):
-        return _unproven(
-            loop, f"Kp = {law.Kp:g} is below {least:g} N m/rad, where the spring at the hub makes V negative"
-        )
-    kind: Literal["dissipated", "conserved"] = "dissipated" if K1 or C else "conserved"
-    loss = "V_t = -a2 K1 theta_t^2" + (" less what the material dissipates" if C else "")
-    what = f"never grows ({loss})" if kind == "dissipated" else "is constant (K1 = 0), and no motion dies out"
-    return Lyapunov(loop, True, weight, kind, f"V with a1/a2 = {weight:g} {what}: no pole lies in the right half-plane")
-
-
-def _unproven(loop: Loop, reason: str) -> Lyapunov:
-    return Lyapunov(loop, False, None, "unproven", reason)
+    weight, K1 = 1.0 - law.K2 / arm.input_per_torque, law.K1 + arm.rate_loss
+    least = 0.0  # of Kp: below 0 where the tip is held, and gives the hub a static stiffness
+    if law.Kp < 0 and not arm.has_rigid_mode:
+        least = -weight / float(transfer(arm, "hub_angle").static)
+    obstacles = {
+        "the gauge does not read the moment on the hub (r > 0, or inertia at the clamp)": (
+            law.K2 and not arm.reads_hub_moment
+        ),
+        f"the gauge signal has no term in the damping C = {C:g} s, so V_t keeps a term in phi_xt(0) theta_t of no "
+        "sign, and no weights a1, a2 prove a K2 other than 0": C and law.K2,
+        "the torque lags behind the voltage, through an inductance: V_t has a term of no sign": arm.input_lags,
+        "K2 = 1 leaves a1 = 0: V is of the hub alone, and the arm moves as on a locked hub": weight == 0,
+        f"a1/a2 = 1 - K2 = {weight:g} is negative, so V has no sign": weight < 0,
+        f"K1 = {law.K1:g} supplies energy: V_t = -a2 K1 theta_t^2 has the wrong sign": K1 < 0,
+        f"Kp = {law.Kp:g} is below {least:g} N m/rad, where the spring at the hub makes V negative": (
+            law.Kp < min(least, 0.0)
+        ),
+    }
+    if reason := next((text for text, holds in obstacles.items() if holds), ""):
+        return Lyapunov(loop, False, None, "unproven", reason)
+    loss = "V_t = -a2 K1 theta_t^2" + ("" if arm.is_undamped else " less the dissipation of the material")
+    is_dissipated = bool(K1) or not arm.is_undamped
+    change = f"never grows ({loss})" if is_dissipated else "is constant (K1 = 0), and no motion decays"
+    reason = f"V with a1/a2 = {weight:g} {change}: no pole lies in the right half-plane"
+    return Lyapunov(loop, True, weight, "dissipated" if is_dissipated else "conserved", reason)
 
 
 # ------------------------------------------------------------ polynomials, exactly
 
 
 def polynomial(coefficients: Sequence[float]) -> Poly:
-    """The polynomial in w with these doubles as coefficients, descending, exactly."""
+    """The polynomial in w with these doubles as coefficients, descending, exact."""
     from sympy import QQ, Poly, Rational, Symbol
 
     return Poly([Rational(*float(each).as_integer_ratio()) for each in coefficients], Symbol("w"), domain=QQ)
@@ -290,7 +278,7 @@ def _split(poly: Poly) -> tuple[Poly, Poly]:
 
 
 def definite(poly: Poly) -> Literal["above", "not below", "zero", ""]:
-    """The sign of a polynomial on v > 0: "above" 0 everywhere, "not below" it, "zero", or "" where it is below."""
+    """Sign of a polynomial on v > 0: "above" 0 everywhere, "not below" it, "zero", or "" where it is below."""
     if poly.is_zero:
         return "zero"
     if poly.LC() < 0:

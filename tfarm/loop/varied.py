@@ -2,7 +2,7 @@
 
     D(s; t) = drive(s) q(s; t) + e^{-s tau(t)} sum of p_i(s; t) numerator_i(s)
 
-In a factor on the law and in any coefficient of it q and p_i are linear in t; a parameter of the arm has systems of its
+q and p_i are linear in a factor on the law and in any coefficient of it.  A parameter of the arm gives a system of its
 own at each value.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 from tfarm.arm import LISTED, RATE_GAIN, AnyLaw, Arm, Law, arm_and_law, full_law
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.exact.characteristic import Analytic, LoopParts
+from tfarm.exact.characteristic import Analytic
 from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum.box import Box, winding_number, zeros_in_box
@@ -31,7 +31,7 @@ ARM_PARAMETERS = {
     "payload_mass": "kg", "payload_inertia": "kg m^2", "hub_inertia": "kg m^2", "length": "m", "damping": "s"
 }  # fmt: skip
 HEIGHTS = (1.0, 1.013, 1.031, 1.057, 0.985, 1.09)  # of the box, until no pole is on its edge at the first value
-NEWTON_STEPS = 6  # from a guess right to some digits: what has not settled then is followed in shorter steps
+NEWTON_STEPS = 6  # from a guess of some digits: a pole that has not settled then is followed in shorter steps
 SETTLED = 1e-10  # of its size: one step more is taken where Newton's method still moves a pole by this
 SERIES_RADIUS, SERIES_POINTS = 0.2, 16  # of the first frequency: where a power series next to 0 is read off
 NO_PART = 1e-9  # of a pole's size: a smaller imaginary part is rounding
@@ -42,10 +42,10 @@ ARMS_KEPT = 200  # at values needed again: memory against time, of no effect on 
 @dataclass(frozen=True)
 @record
 class Varied:
-    """The loops of an arm and a law, of which `vary` takes values from `start` to `stop`.
+    """The loops of an arm and a law, with the number `vary` from `start` to `stop`.
 
     `vary` is a number of the law as `Law.having` names it, "all" (a factor on it), or of the arm.  Raises
-    ParameterError for what is none, and where there is no loop.
+    ParameterError for another name, and where there is no loop.
     """
 
     arm: Arm
@@ -71,9 +71,8 @@ class Varied:
             arm, K1 = loop.arm, loop.gains[RATE_GAIN] if loop.gains else 0.0
             if arm.rate_loss and arm.lossless_hub.has_massless_hub and -arm.rate_loss >= K1:
                 remedy = f"with hub.inertia = 0 a pole passes through infinity at {RATE_GAIN} = {-arm.rate_loss:.6g}"
-                raise ParameterError(
-                    key=key, value=value, remedy=f"{remedy}: stay above it, or give the hub an inertia"
-                )
+                remedy = f"{remedy}: stay above it, or give the hub an inertia"
+                raise ParameterError(key=key, value=value, remedy=remedy)
 
     # ------------------------------------------------------------ loops and functions
 
@@ -84,12 +83,12 @@ class Varied:
 
     @property
     def is_reactive(self) -> bool:
-        """Whether nothing is lost but by the law, which is static: then modes may stay on the axis at all values."""
+        """Whether the law alone dissipates, and is static: then modes may stay on the axis at all values."""
         return self.first.k.is_real_on_axis and self.full.is_static and not self.full.delay
 
     @cached_property
     def full(self) -> Law:
-        """The law with every gain at the hub, where it is no more than these."""
+        """The law; gains at the hub as a law of all of these."""
         return full_law(self.law)
 
     def law_at(self, value: float) -> Law:
@@ -105,7 +104,7 @@ class Varied:
 
     @cached_property
     def first(self) -> Loop:
-        """The loop where the way begins, of whose rig the others are."""
+        """The loop at the first value."""
         return self.at(self.start) if self.is_of_arm else Loop(self.arm, self.law_at(self.start))
 
     def _signals(self, value: float) -> Signals:
@@ -123,36 +122,17 @@ class Varied:
 
     @cached_property
     def pinned(self) -> int:
-        """How many poles are at s = 0 all the way."""
+        """Number of poles at s = 0 for every value."""
         return min(self.at(value).zeros_at_origin for value in self.few)
 
     @property
     def few(self) -> tuple[float, float, float]:
-        """Both ends of the way, and a value between that is none of a grid's."""
+        """Both ends of the range, and a value between that is not on a grid."""
         return self.start, self.start + (self.stop - self.start) / math.e, self.stop
-
-    def _parts(self, s: Complex, values: Real) -> LoopParts:
-        """Drive, numerators and scale at s (3, n), each column at a value of its own (n,)."""
-        if not self.is_of_arm:
-            return self.first.signals.parts(s)
-        found = np.empty((2 + len(self.full.signals), *s.shape), complex)
-        for value in np.unique(values):
-            here = values == value
-            part = self._signals(float(value)).parts(s[:, here])
-            found[0, :, here], found[1, :, here], found[2:, :, here] = part.drive.T, part.scale.T, part.numerators
-        return LoopParts(found[0], found[2:], found[1])
-
-    def _polynomials(self, s: Complex, values: Real) -> tuple[Complex, Complex, Real]:
-        """p_i (signals, ...), q (...) and the delay (n,) of the law at s (k, n), each column at a value of its own."""
-        delay = values if self.vary == "delay" else np.full(values.shape, self.full.delay)
-        if self.is_of_arm or self.vary == "delay":
-            return *self.full.polynomials(s), delay
-        (p0, q0), (p1, q1) = (law.polynomials(s) for law in self._corners)
-        return p0 + values * (p1 - p0), q0 + values * (q1 - q0), delay
 
     @cached_property
     def _corners(self) -> tuple[Law, Law]:
-        """The law with 0 and with 1 in the place of the number."""
+        """The law with the number 0, and with 1."""
         return self.law_at(0.0), self.law_at(1.0)
 
     def function(self, s: Complex, values: Real) -> Analytic:
@@ -162,19 +142,32 @@ class Varied:
 
     def _characteristic(self, s: Complex, values: Real) -> tuple[Complex, Complex]:
         """D e^{-scale} and scale at s (k, n), each column at a value of its own (n,)."""
-        drive, numerators, scale = self._parts(s, values)
-        p, q, delay = self._polynomials(s, values)
+        delay = values if self.vary == "delay" else np.full(values.shape, self.full.delay)
+        if self.is_of_arm or self.vary == "delay":
+            p, q = self.full.polynomials(s)
+        else:
+            (p0, q0), (p1, q1) = (law.polynomials(s) for law in self._corners)
+            p, q = p0 + values * (p1 - p0), q0 + values * (q1 - q0)
+        if not self.is_of_arm:
+            drive, numerators, scale = self.first.signals.parts(s)
+        else:
+            found = np.empty((2 + len(self.full.signals), *s.shape), complex)
+            for value in np.unique(values):
+                here = values == value
+                part = self._signals(float(value)).parts(s[:, here])
+                found[0, :, here], found[1, :, here], found[2:, :, here] = part.drive.T, part.scale.T, part.numerators
+            drive, scale, numerators = found[0], found[1], found[2:]
         return drive * q + np.exp(-s * delay) * (p * numerators).sum(axis=0), scale
 
     @cached_property
     def frequency(self) -> float:
-        """The rig's first flexible frequency [rad/s] where the way begins."""
+        """The rig's first flexible frequency [rad/s] at the first value."""
         return first_frequency(self.first.arm)
 
     def resting(self, values: Real) -> Whole:
-        """How many poles more than `pinned` are at s = 0 at each of the values (n,).
+        """Number of poles beyond `pinned` at s = 0 at each of the values (n,).
 
-        Where D grows with a higher power next to 0; a pole that is slower than that is none, which the loop knows.
+        D has a zero of higher order there, or a pole of the loop is slower than the two frequencies: the loop decides.
         """
         s = self.frequency * np.multiply.outer(ORDER_READ_AT, np.ones(values.size)) + 0j
         farther, nearer = self._characteristic(s, values)[0]
@@ -193,7 +186,7 @@ class Varied:
     def on_axis(self, omega: Real) -> tuple[Complex, Complex]:
         """A and B of D = A + t B at s = i omega (n,), of a rig without losses, where D is linear in the number.
 
-        There drive and numerators are real, or imaginary with an odd power of s: what rounding adds is taken off.
+        There drive and numerators are real, or imaginary with an odd power of s: the other part is rounding, and 0.
         """
         s, odd = 1j * omega[None], np.array([[[each.power % 2]] for each in self.first.signals.outputs])
         drive, numerators, scale = self.first.signals.parts(s)
@@ -204,7 +197,7 @@ class Varied:
         A, B = (drive * q + (p * numerators).sum(axis=0) for p, q in ((p0, q0), (p1 - p0, q1 - q0)))
         return A[0], B[0]
 
-    # ------------------------------------------------------------ as `spectrum.following` asks
+    # ------------------------------------------------------------ interface of `spectrum.following`
 
     def near(self, values: Real, guess: Complex) -> Complex:
         """The poles (m, b) next to the guesses at m values, by Newton's method; NaN where it does not settle."""
@@ -231,7 +224,7 @@ class Varied:
         return found
 
     def slow(self, value: float, count: int) -> Complex:
-        """So many poles next to 0 at a value, from the power series of D there; the upper one, or the larger, first."""
+        """The `count` poles nearest to 0 at a value, from the power series of D there; the upper, or larger, first."""
         circle = SERIES_RADIUS * self.frequency * np.exp(2j * np.pi * np.arange(SERIES_POINTS) / SERIES_POINTS)
         D, scale = (each[0] for each in self._characteristic(circle[None], np.full(circle.size, value)))
         series = np.fft.fft(D * np.exp(scale - scale[0]) / circle**self.pinned).real[: SERIES_POINTS // 2]
@@ -261,7 +254,7 @@ class Varied:
     # ------------------------------------------------------------ complete in a box
 
     def boxed(self, modes: int) -> Varied:
-        """The same with a box for the whole way, as high as so many modes, no pole on its edge at the first value."""
+        """The same with a box for all values, as high as `modes` modes, no pole on its edge at the first value."""
         loops, lost = [self.at(value) for value in self.few], ConvergenceError("no box", self, 0.0)
         for factor in HEIGHTS:
             height = factor * max(band_of(loop.arm, modes) for loop in loops)
@@ -277,5 +270,5 @@ class Varied:
         raise lost
 
     def count(self, value: float) -> int:
-        """How many poles but those at 0 the box holds at one value, by the winding number."""
+        """Number of poles in the box at one value, without those at 0, by the winding number."""
         return winding_number(self.at(value).function, self.box)
