@@ -83,7 +83,8 @@ def test_matplotlib_can_draw_them_but_for_the_determinants(rows, name):
 )
 def test_typesetting_by_example(rows, name, formula):
     assert rows[name].corrected_tex == formula
-    assert r"\left(\frac{\partial \theta}{\partial t}\right)^{2}" in rows["(20)"].printed_tex
+    assert r"\theta_{t}^{2}" in rows["(20)"].printed_tex
+    assert r"\phi_{x}(0,t)" in rows["(19)"].corrected_tex
 
 
 def test_numbers_of_the_evidence_are_those_of_other_roads(rows):

@@ -7,7 +7,6 @@ The rows of the appendix, and of the damping that only the appendix has.
 
 from __future__ import annotations
 
-import re
 from functools import cache, partial
 from typing import Any
 
@@ -19,6 +18,7 @@ from .formulas import (
     PAPER_UNITS,
     Expression,
     clauses,
+    determinant,
     difference,
     jet_parts,
     mismatch,
@@ -27,7 +27,6 @@ from .formulas import (
     sides,
     symbol,
     symbols,
-    tex,
 )
 from .motion import LAPLACE
 from .rows import Claim
@@ -179,12 +178,8 @@ def are_entries(text: str) -> str:
 
 def determinants(text: str) -> dict[str, Expression]:
     """Delta and Delta_k_i of a text, as polynomials in a_ij and U."""
-    found = {}
-    for clause in clauses(text):
-        name, rows = clause.split(" = ")
-        entries = [[parsed(entry) for entry in row.split()] for row in rows.strip("|").split(" / ")]
-        found[name] = sp.Matrix(entries).det(method="berkowitz")
-    return found
+    pairs = (clause.split(" = ") for clause in clauses(text))
+    return {name: determinant(rows).det(method="berkowitz") for name, rows in pairs}
 
 
 def are_determinants(text: str) -> str:
@@ -258,18 +253,6 @@ def by_appendix(text: str, v: BeamNumbers) -> list[Any]:
     return [psi(*given, 0), w(*given, v["L"]), psi(*given, v["L"]), moment]
 
 
-def determinant_tex(text: str) -> str:
-    """|a11 a12 / ...| as a determinant."""
-
-    def between_bars(match: re.Match[str]) -> str:
-        lines = match[1].split(" / ")
-        rows = r" \\ ".join(" & ".join(map(tex, line.split())) for line in lines)
-        return rf"\begin{{vmatrix}}{rows}\end{{vmatrix}}"
-
-    names = [clause.split(" = ", 1) for clause in text.split("; ")]
-    return r",\quad ".join(f"{tex(name)} = {re.sub(r'[|](.*)[|]', between_bars, right)}" for name, right in names)
-
-
 APPENDIX_CLAIMS = (  # the waves, their numbers, the ends' matrix and Cramer's rule; last, all of it in numbers
     Claim(
         equation="(A.1)",
@@ -302,7 +285,6 @@ APPENDIX_CLAIMS = (  # the waves, their numbers, the ends' matrix and Cramer's r
         equation="Delta, Delta k_i",
         printed=DETERMINANTS,
         check=are_determinants,
-        typeset=determinant_tex,
         evidence="Cramer's rule for any a_ij (SymPy, polynomial identity): sum_j a_ij Delta k_j = (0, 0, 0, U) "
         "Delta. The brackets are read as the bars of determinants.",
     ),

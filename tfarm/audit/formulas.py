@@ -3,7 +3,7 @@
     rho*A*(y_tt + x*theta_tt) - kappa*G*A*(y_xx - phi_x) = 0
     V_t = theta_t*(a2*u + (a2 - a1)*E*I*phi_x(0,t)); a3 = a1
 
-Clauses are parted by semicolons.  y_xt is a derivative of y at the running x, y_xt(L,t) the same at the tip, and
+Clauses are separated by semicolons.  y_xt is a derivative of y at the running x, y_xt(L,t) the same at the tip, and
 each is a symbol of its own (a jet coordinate).  theta, V and the gains do not depend on x, so that theta_x is 0.
 Of the two arguments the one that is a place (0, L, x) is taken as the place, in whatever order they come.
 integral(f) is the integral of f over x from 0 to L.
@@ -24,14 +24,13 @@ from functools import cache
 from typing import Any
 
 import sympy as sp
-from sympy.printing.latex import LatexPrinter
 
 Expression = Any  # sympy comes without types
 OF_TIME = ("theta", "Theta", "V", "K2", "a1")
 JET = re.compile(r"\b(y|phi|theta|Y|Phi|Theta|V|K2|a1)(?:_(x*t*))?(?!\w)(?:\(([0Lxts]), ?([0Lxts])\))?")
 NAME = re.compile(r"[A-Za-z]\w*")
 LETTERS = {"pm": r"\pm", "lambda_": r"\lambda", **{f"Delta_k{i}": rf"\Delta k_{{{i}}}" for i in (1, 2, 3, 4)}}
-FUNCTIONS = {"sqrt": sp.sqrt, "exp": sp.exp, "integral": sp.Function("integral"), "oo": sp.oo}
+FUNCTIONS = {"sqrt": sp.sqrt, "exp": sp.exp, "oo": sp.oo}
 
 
 @cache
@@ -41,7 +40,7 @@ def symbol(name: str) -> Expression:
 
 
 def symbols(names: str) -> list[Expression]:
-    """Several, their names parted by blanks."""
+    """Several, their names separated by blanks."""
     return [symbol(name) for name in names.split()]
 
 
@@ -63,6 +62,9 @@ def jet_parts(s: Expression) -> tuple[str, int, int, str] | None:
     return field, orders.count("x"), orders.count("t"), f"({place},{time})" if place else ""
 
 
+x, L = symbol("x"), symbol("L")
+
+
 @cache
 def parsed(text: str) -> Expression:
     """The SymPy expression of a text without = or ;."""
@@ -72,11 +74,11 @@ def parsed(text: str) -> Expression:
         place, time = (first, second) if first in ("", "0", "L", "x") else (second, first)
         return jet(field, orders.count("x"), orders.count("t"), f"({place},{time})" if place else "")
 
-    return _read(text, normal)
+    return _read(text, normal, sp.Function("integral"))
 
 
-def _read(text: str, jet_of: Callable[[re.Match[str]], Expression], **how: Any) -> Expression:
-    names: dict[str, Expression] = dict(FUNCTIONS)
+def _read(text: str, jet_of: Callable[[re.Match[str]], Expression], integral: Any, **how: Any) -> Expression:
+    names: dict[str, Expression] = {**FUNCTIONS, "integral": integral}
 
     def stand_in(match: re.Match[str]) -> str:
         name = f"jet{len(names)}"
@@ -89,38 +91,27 @@ def _read(text: str, jet_of: Callable[[re.Match[str]], Expression], **how: Any) 
     return sp.parse_expr(code, local_dict=names, **how)
 
 
-class _AsWritten(LatexPrinter):  # type: ignore[misc]
-    """TeX in the order of the text: derivatives as fractions, integrals along the arm."""
-
-    def _print_Symbol(self, expr: Expression, style: str = "plain") -> str:
-        found = JET.fullmatch(expr.name)
-        if found is None:
-            return LETTERS.get(expr.name) or str(super()._print_Symbol(expr, style))
-        field, by = sp.latex(sp.Symbol(found[1])), found[2] or ""
-        field += f"({found[3]},{found[4]})" if found[3] else ""
-        below = " ".join(rf"\partial {letter}" + f"^{n}" * (n > 1) for letter in "xt" if (n := by.count(letter)))
-        above = r"\partial" + f"^{len(by)}" * (len(by) > 1)
-        return rf"\frac{{{above} {field}}}{{{below}}}" if by else field
-
-    def _print_Pow(self, expr: Expression) -> str:
-        return re.sub(r"^(\\frac\{[^{}]*\}\{[^{}]*\})\^", r"\\left(\1\\right)^", str(super()._print_Pow(expr)))
-
-    def _print_Function(self, expr: Expression, exp: str | None = None) -> str:
-        if expr.func.__name__ == "integral":
-            return rf"\int_0^L\left[{self._print(expr.args[0])}\right]dx"
-        return str(super()._print_Function(expr, exp))
-
-
 def tex(text: str) -> str:
-    """The TeX of a text, as it is written."""
-    printer = _AsWritten({"order": "none"})
+    """The TeX of a text by SymPy, in the text's own order; derivatives are indices, as in the text."""
 
     def written(part: str) -> str:
-        return printer.doprint(_read(part, lambda match: symbol(match[0]), evaluate=False)) if part else ""
+        if part.startswith("|"):
+            return str(sp.latex(determinant(part), mat_str="vmatrix", mat_delim=""))
+        read = _read(part, lambda match: symbol(match[0]), lambda f: sp.Integral(f, (x, 0, L)), evaluate=False)
+        heads = {s: s.name.partition("(") for s in read.free_symbols}
+        names = {
+            s: LETTERS.get(s.name, sp.latex(symbol(name)) + place + end) for s, (name, place, end) in heads.items()
+        }
+        return str(sp.latex(read, order="none", symbol_names=names))
 
     parts = re.split(r"( = | < |; )", text)
-    found = "".join(part.replace("; ", r",\quad ") if n % 2 else written(part) for n, part in enumerate(parts))
+    found = "".join(part.replace("; ", r",\quad ") if n % 2 else written(part) for n, part in enumerate(parts) if part)
     return re.sub(r"\b1 (\\cdot )?(?=\\frac\{1\})", "", found.replace(r"+ \pm", r"\pm"))
+
+
+def determinant(text: str) -> Expression:
+    """The matrix of a text such as |a11 a12 / a21 a22|."""
+    return sp.Matrix([[parsed(entry) for entry in row.split()] for row in text.strip("|").split(" / ")])
 
 
 def clauses(text: str) -> list[str]:
@@ -151,7 +142,6 @@ def remainder(*expressions: Expression) -> str:
     return text if len(text) <= 160 else f"{text[:150]} ... ({len(text)} characters)"
 
 
-x, L = symbol("x"), symbol("L")
 AT_TIP = "(L,t)"  # places of a jet
 AT_ROOT = "(0,t)"
 

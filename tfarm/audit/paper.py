@@ -16,7 +16,7 @@ from .appendix import APPENDIX_CLAIMS, DAMPING_CLAIM, LAMBDA
 from .energy import ENERGY_CLAIMS
 from .formulas import NEEDED, PAPER_UNITS, Dimension, clauses, mismatch, parsed, spelled, unit_dimension, unlike
 from .motion import MOTION_CLAIMS, TIME
-from .rows import AuditRow, Claim, in_words
+from .rows import AuditRow, Claim
 from .tuner import TUNER_CLAIMS
 
 ALUMINIUM_DENSITIES = (2550.0, 2900.0)  # kg/m^3: alloys from aluminium-lithium to those rich in copper and zinc
@@ -100,7 +100,6 @@ TABLE_CLAIMS = (  # Table 1
         printed="rho = 2.7667 kg/m^3",
         corrected="rho = 2766.7 kg/m^3",
         check=is_aluminium,
-        typeset=in_words,
         evidence="E and G are those of aluminium, whose alloys weigh 2550 to 2900 kg/m^3: the printed number is "
         "right in g/cm^3. Residual: relative distance from that range.",
         measured=density_in_numbers,
@@ -110,14 +109,12 @@ TABLE_CLAIMS = (  # Table 1
         printed="C: kg/s",
         corrected="C: s",
         check=is_unit_of_damping,
-        typeset=in_words,
         evidence="C enters as 1 + C s (A.2), so C s is a pure number (dimension checker).",
     ),
     Claim(
         equation="Table 1 (other units)",
         printed=OTHER_UNITS,
         check=are_units,
-        typeset=in_words,
         evidence="With these units every sum in (1), (2), (4), (5) and the mended (A.2) adds like to like "
         "(dimension checker).",
     ),
@@ -126,7 +123,6 @@ TABLE_CLAIMS = (  # Table 1
         printed="no value",
         corrected="I = 1.8e-9 m^4; rectangle 0.1 m x 0.006 m",
         check=is_section,
-        typeset=in_words,
         evidence="(2), (3), (5), (A.2) and the a_ij need I.",
         doubt="The area does not decide it: rectangles of 6e-4 m^2 and 2 to 60 mm depth have I from 2.0e-10 to "
         "1.8e-7 m^4. The value is our assumption.",
@@ -136,7 +132,6 @@ TABLE_CLAIMS = (  # Table 1
         printed="no value",
         corrected="I_h = 0.1 kg m^2",
         check=partial(is_given, "I_h"),
-        typeset=in_words,
         evidence="(3), (10) and a_41 to a_44 need I_h.",
         doubt="Nothing in the paper decides it. The value is our assumption.",
     ),

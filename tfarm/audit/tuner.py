@@ -19,7 +19,7 @@ from .formulas import (
     symbols,
     unit_dimension,
 )
-from .rows import Claim, in_words
+from .rows import Claim
 
 INCREMENT = "dw = -eta_c*g + alpha_c*dw_before"
 UPDATE_PRINTED = "w_next = w - dw"
@@ -31,17 +31,6 @@ GAIN_LAWS = "V_t = -a2*K1*theta_t^2; e = u - K2*x"
 INPUT_SIGNALS_PRINTED = "u(t), u(t-1), e(t), e(t-1), K, x(t), x(t-1)"
 INPUT_SIGNALS = "u(t), u(t-1), e(t), e(t-1), x(t), x(t-1)"
 INPUT_NEURONS = 6  # neurons, section 5
-
-TEX = {
-    "dw_before": r"\Delta w^r_{pq}(t-1)", "dw": r"\Delta w^r_{pq}(t)", "w_next": r"w^r_{pq}(t+1)",
-    "eta_c": r"\eta_c", "alpha_c": r"\alpha_c", "g": r"\frac{\partial E}{\partial w^r_{pq}(t)}", "w": r"w^r_{pq}(t)",
-}  # fmt: skip
-
-
-def rule_tex(text: str) -> str:
-    """A learning rule with the paper's indices."""
-    words = text.replace("*", " * ").replace("-eta", "- eta").split(" ")
-    return " ".join(TEX.get(word, word) for word in words).replace(" * ", r"\,")
 
 
 def descends(increment: str, update: str) -> str:
@@ -99,7 +88,6 @@ TUNER_CLAIMS = (  # the learning rule, the cost, and what section 5 says of them
         equation="(21)",
         printed=INCREMENT,
         check=lambda text: descends(text, UPDATE),
-        typeset=rule_tex,
         evidence="Gradient descent with momentum, together with the mended (22) (SymPy, quadratic cost). The text "
         "after (21) gives the increment the other sign and no momentum: either (21) or (22) may be mended, here "
         "(22) is. The gradient needs dx/dK, how the arm's moment answers to the gain, which the paper does not "
@@ -110,7 +98,6 @@ TUNER_CLAIMS = (  # the learning rule, the cost, and what section 5 says of them
         printed=UPDATE_PRINTED,
         corrected=UPDATE,
         check=lambda text: descends(INCREMENT, text),
-        typeset=rule_tex,
         evidence="With (21) as printed w - dw climbs: on c w^2/2 the map of (w, dw) has det(I - M) = -eta c, a "
         "multiplier above 1 for every eta and alpha (SymPy). An increment is w(t+1) - w(t).",
     ),
@@ -137,7 +124,6 @@ TUNER_CLAIMS = (  # the learning rule, the cost, and what section 5 says of them
         printed=INPUT_SIGNALS_PRINTED,
         corrected=INPUT_SIGNALS,
         check=surplus,
-        typeset=lambda text: text,
         evidence=f"{INPUT_NEURONS} input neurons, seven signals named (counted).",
         doubt='Which is too many is not said; a network with "no inner feedback loop" speaks against K, its own '
         "output, and six neurons are read as the six without it.",
@@ -147,7 +133,6 @@ TUNER_CLAIMS = (  # the learning rule, the cost, and what section 5 says of them
         printed="alpha_c changed dynamically; alpha_c = 0.6",
         corrected="alpha_c = 0.6",
         check=contradictions,
-        typeset=in_words,
         evidence="Section 4 changes the momentum dynamically, by no rule; section 5 has one best value (counted).",
         doubt="The constant 0.6 is used.",
     ),
@@ -156,7 +141,6 @@ TUNER_CLAIMS = (  # the learning rule, the cost, and what section 5 says of them
         printed="eta_c of each weight its own; eta_c = 0.8",
         corrected="eta_c = 0.8",
         check=contradictions,
-        typeset=in_words,
         evidence="Section 4 gives each weight a learning rate of its own, section 5 has one value (counted).",
         doubt="0.8 for all weights is used.",
     ),
