@@ -52,14 +52,13 @@ def jet(field: str, x: int = 0, t: int = 0, at: str = "") -> Expression:
     return symbol(f"{field}{'_' + orders if orders else ''}{'' if field in OF_TIME else at}")
 
 
-def jet_parts(s: Expression) -> tuple[str, int, int, str] | None:
-    """(field, orders in x and t, place) of a jet symbol, None of any other."""
-    match = JET.fullmatch(s.name)
-    if match is None:
-        return None
-    field, orders, place, time = match.groups()
-    orders = orders or ""
-    return field, orders.count("x"), orders.count("t"), f"({place},{time})" if place else ""
+def jets(f: Expression) -> list[tuple[Expression, str, int, int, str]]:
+    """(symbol, field, order in x, order in t, place) of each jet in an expression."""
+    found = ((s, match.groups(default="")) for s in f.free_symbols if (match := JET.fullmatch(s.name)))
+    return [
+        (s, field, orders.count("x"), orders.count("t"), f"({place},{time})" if place else "")
+        for s, (field, orders, place, time) in found
+    ]
 
 
 x, L = symbol("x"), symbol("L")
@@ -148,8 +147,7 @@ AT_ROOT = "(0,t)"
 
 def d_dx(f: Expression) -> Expression:
     """Total derivative by the running x; values at the ends do not move."""
-    moving = [(s, parts) for s in f.free_symbols if (parts := jet_parts(s)) and not parts[3]]
-    return sp.diff(f, x) + sum(sp.diff(f, s) * jet(field, i + 1, j) for s, (field, i, j, _) in moving)
+    return sp.diff(f, x) + sum(sp.diff(f, s) * jet(field, i + 1, j) for s, field, i, j, at in jets(f) if not at)
 
 
 def d_dt(f: Expression) -> Expression:
@@ -160,8 +158,8 @@ def d_dt(f: Expression) -> Expression:
 
 
 def _d_dt(f: Expression) -> Expression:
-    moving = [(s, parts) for s in f.free_symbols if (parts := jet_parts(s)) and s.name != "a1"]
-    return sum((sp.diff(f, s) * jet(field, i, j + 1, at) for s, (field, i, j, at) in moving), sp.Integer(0))
+    terms = (sp.diff(f, s) * jet(field, i, j + 1, at) for s, field, i, j, at in jets(f) if s.name != "a1")
+    return sum(terms, sp.Integer(0))
 
 
 def integral_parts(f: Expression) -> tuple[Expression, Expression]:
@@ -173,19 +171,14 @@ def integral_parts(f: Expression) -> tuple[Expression, Expression]:
 
 
 def at_running_point(f: Expression) -> Expression:
-    """Values at the tip as values at x: what holds for an arm of any length."""
-    tip = {s: jet(*found[:3]) for s in f.free_symbols if (found := jet_parts(s)) and found[3] == AT_TIP}
-    return f.subs(tip).subs(L, x)
+    """Values at the tip as values at x: for an arm of any length."""
+    return f.subs({s: jet(field, i, j) for s, field, i, j, at in jets(f) if at == AT_TIP}).subs(L, x)
 
 
 def at_root(f: Expression) -> Expression:
     """f at x = 0, where y = phi = 0 at all times (6), (7)."""
-    ends = {}
-    for s in f.free_symbols:
-        found = jet_parts(s)
-        if found and found[3] in ("", AT_ROOT) and found[0] in ("y", "phi"):
-            field, i, j, _ = found
-            ends[s] = jet(field, i, j, AT_ROOT) if i else sp.Integer(0)
+    fields = [each for each in jets(f) if each[4] in ("", AT_ROOT) and each[1] in ("y", "phi")]
+    ends = {s: jet(field, i, j, AT_ROOT) if i else sp.Integer(0) for s, field, i, j, _ in fields}
     return f.subs(ends).subs(x, 0)
 
 
@@ -263,7 +256,7 @@ def _like(found: list[Dimension | None]) -> Dimension | None:
 
 
 def mismatch(f: Expression, units: dict[str, Dimension]) -> str:
-    """What does not add up in an expression: "0" if all does."""
+    """The terms of different dimensions in a sum: "0" if there are none."""
     try:
         dimension(f, units)
     except MismatchError as found:
@@ -271,22 +264,15 @@ def mismatch(f: Expression, units: dict[str, Dimension]) -> str:
     return "0"
 
 
-def units_in(f: Expression, units: dict[str, Dimension]) -> dict[str, Dimension]:
-    """The dimension of every symbol of an expression; a derivative's is its field's by x and t."""
-    found = dict(units)
-    for s in f.free_symbols:
-        parts = jet_parts(s)
-        if parts and s.name not in units:
-            field, i, j, _ = parts
-            found[s.name] = unit_dimension(FIELD_UNITS[field]) / METRE**i / SECOND**j
-    return found
-
-
 def unlike(text: str, units: dict[str, Dimension]) -> str:
-    """What does not add up in a text's equations: "0" if all sides and sums are of one dimension."""
+    """The terms of different dimensions in a text's equations: "0" if all sides and sums are of one dimension.
+
+    The dimension of a derivative is that of its field by x and t.
+    """
     for left, right in sides(text).items():
-        rest = left - right
-        found = mismatch(rest, units_in(rest, units))
+        fields = (each for each in jets(left - right) if each[0].name not in units)
+        own = {s.name: unit_dimension(FIELD_UNITS[field]) / METRE**i / SECOND**j for s, field, i, j, _ in fields}
+        found = mismatch(left - right, units | own)
         if found != "0":
             return found
     return "0"

@@ -63,16 +63,19 @@ def arm_of_case(case: Mapping[str, Any]) -> Arm:
     return arm_of_table({"name": "arm", "link": link | case.get("link", {}), "hub": hub, **parts})
 
 
-def _case(case: Mapping[str, Any]) -> Case:
-    why = dict.fromkeys(case.get("differs", ()), case.get("why", ""))
-    own = {key: case[key] for key in ("name", "theory", "quantity")}
-    return Case(arm=arm_of_case(case), printed=tuple(case["printed"]), why=why, **own)
-
-
 def _source(table: dict[str, Any]) -> Source:
     """The source of a table, whose theory and quantity are those of its cases but where these have others."""
     own = {key: table.pop(key) for key in ("key", "citation", "reached")}
-    return Source(cases=tuple(_case(table | each) for each in table["case"]), **own)
+    cases = tuple(
+        Case(
+            arm=arm_of_case(case),
+            printed=tuple(case["printed"]),
+            why=dict.fromkeys(case.get("differs", ()), case.get("why", "")),
+            **{key: case[key] for key in ("name", "theory", "quantity")},
+        )
+        for case in (table | each for each in table["case"])
+    )
+    return Source(cases=cases, **own)
 
 
 ALL = tuple(map(_source, tomllib.loads((files("tfarm.audit") / "literature.toml").read_text("utf-8"))["source"]))
