@@ -30,9 +30,8 @@ STUDIED_MODES = 4  # flexible modes, by default
 AREA = 6.0e-4  # m^2, the paper's
 DEPTHS = (0.002, 0.003, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.040, 0.060)  # m, for that area
 INERTIAS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # kg m^2, about the value assumed for the paper's hub
+HELD = "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice"
 OWN_VALUE = 1e-9  # relative: a candidate nearer to the arm's own value is that value
-HELD_SECTION = "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice"
-HELD_HUB = "all else held"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,7 +153,15 @@ def section_study(arm: Arm, depths: Sequence[float] = (), *, count: int = STUDIE
     sections = [Section.general(area=area, second_moment=area * depth**2 / 12, shear_factor=arm.link.shear_factor)
                 for depth in values]  # fmt: skip
     arms = [replace(arm, link=replace(arm.link, section=section)) for section in sections]
-    return _study(arm, arms, values, own, count, "second_moment", held=HELD_SECTION)
+    return _study(
+        arm,
+        arms,
+        values,
+        own,
+        count,
+        "second_moment",
+        held=HELD,
+    )
 
 
 def hub_study(arm: Arm, inertias: Sequence[float] = (), *, count: int = STUDIED_MODES) -> Study:
@@ -173,7 +180,7 @@ def hub_study(arm: Arm, inertias: Sequence[float] = (), *, count: int = STUDIED_
     )
     if not arm.having(hub_inertia=1.0).has_rigid_mode:  # the first falls to 0, a heavy hub on the arm's own stiffness
         locked = np.r_[0.0, locked[:-1]]
-    return _study(arm, arms, values, own, count, "hub_inertia", held=HELD_HUB, locked=locked, pinned=pinned)
+    return _study(arm, arms, values, own, count, "hub_inertia", held="all else held", locked=locked, pinned=pinned)
 
 
 def _study(

@@ -143,22 +143,14 @@ def is_power(text: str) -> str:
     return unbalanced((rate(energy_of(V)) - value).subs(conditions))
 
 
-def with_law(value: Expression, text: str) -> Expression:
-    """An expression with u from a law."""
-    return value.subs(u, sides(text)[u])
-
-
 def proven_gains(law: Expression) -> dict[str, Expression]:
     """The intervals of K1 and K2 for which some a1, a2 > 0 make the true dV/dt (a3 = a1) a negative square."""
     M, slope = symbol("M(0)"), parsed("phi_x(0,t)")
     power = sp.expand(claimed(POWER_FLOW)[0].subs(u, law)).subs(slope, M / parsed("E*I"))
     weight = sp.solve(power.coeff(M), a1)[0] / a2  # a1/a2, which must be positive
     damping = -sp.expand(power.subs(M, 0)) / (a2 * theta_t**2)
-    return {"K1": _positive(damping, symbol("K1")), "K2": _positive(weight, symbol("K2"))}
-
-
-def _positive(f: Expression, gain: Expression) -> Expression:
-    return sp.solveset(sp.simplify(f) > 0, gain, sp.S.Reals)
+    positive = {"K1": damping, "K2": weight}
+    return {gain: sp.solveset(sp.simplify(f) > 0, symbol(gain), sp.S.Reals) for gain, f in positive.items()}
 
 
 def are_proven_gains(text: str) -> str:
@@ -178,7 +170,7 @@ def is_decay(text: str) -> str:
     """(20): (19) in the true dV/dt."""
     value, stated = claimed(text)
     weights = stated or claimed(DECAY)[1]
-    change = with_law(rate(energy_of(V)), CONTROL_LAW) - value
+    change = rate(energy_of(V)).subs(u, sides(CONTROL_LAW)[u]) - value
     return unbalanced(change.subs(a3, weights[a3]).subs(a1, weights[a1]))
 
 
@@ -186,7 +178,7 @@ def is_damped_decay(text: str) -> str:
     """Section 3 with C > 0: dV/dt may be -a2 K1 theta_t^2 less what the material dissipates, no more."""
     weights = {a1: a2 * (1 - symbol("K2"))}
     lost = parsed("-a2*K1*theta_t^2 - a1*C*integral(E*I*phi_xt^2)")
-    change = with_law(rate(energy_of(V).subs(a3, a1), symbol("C")), text) - lost
+    change = rate(energy_of(V).subs(a3, a1), symbol("C")).subs(u, sides(text)[u]) - lost
     return unbalanced(change.subs(weights))
 
 
@@ -195,7 +187,7 @@ def is_varied_decay(text: str) -> str:
     value, conditions = claimed(text)
     weight = conditions[a1]
     K2_t = conditions.get(jet("K2", t=1), jet("K2", t=1))
-    law_rate = with_law(rate(energy_of(V)).subs(a3, a1), CONTROL_LAW)
+    law_rate = rate(energy_of(V)).subs(a3, a1).subs(u, sides(CONTROL_LAW)[u])
     moving = sp.diff(energy_of(V).subs(a3, a1), a1) * sp.diff(weight, symbol("K2")) * K2_t
     return unbalanced((law_rate + moving - value).subs(a1, weight))
 

@@ -65,7 +65,6 @@ LAPLACE = LAPLACE_PRINTED | {
     11: "m*s^2*(Y(L,s) + L*Theta) = -kappa*G*A*(Y_x(L,s) - Phi(L,s))",
     14: "Phi(0,s) = 0",
 }
-TRANSFORMED = {"y": "Y", "phi": "Phi", "theta": "Theta"}
 
 
 def euler(field: str) -> Expression:
@@ -107,19 +106,14 @@ def at_clamp(field: str, text: str) -> str:
 
 def transformed(f: Expression) -> Expression:
     """Laplace transform of a linear expression that starts from rest."""
-    images = {s: symbol("s") ** j * jet(TRANSFORMED[field], i, 0, at.replace(",t)", ",s)"))
-              for s, field, i, j, at in jets(f)}  # fmt: skip
+    names = {"y": "Y", "phi": "Phi", "theta": "Theta"}
+    images = {s: symbol("s") ** j * jet(names[field], i, 0, at.replace(",t)", ",s)")) for s, field, i, j, at in jets(f)}
     return f.subs(images | {symbol("u"): symbol("U")}, simultaneous=True)
 
 
 def is_transform(number: int, text: str) -> str:
     """(8)-(14): against the transform of (1)-(7)."""
     return remainder(transformed(difference(TIME[number - 7])) - difference(text))
-
-
-def misplaced(text: str) -> str:
-    """How many arguments stand in another order than (x, t) or (x, s)."""
-    return str(sum(first in "ts" for first in re.findall(r"\(([0Lxts]),", text)))
 
 
 @cache
@@ -152,7 +146,7 @@ MOTION_EVIDENCE = {
     6: "With y(0, t) = 0 the clamp's force does no work (SymPy).",
     7: "With phi(0, t) = 0 the clamp's moment does no work beyond the hub's (SymPy).",
     8: "Laplace transform of (1), from rest (SymPy). Theta does not depend on x, so the print drops the shear of phi. "
-    "Capital Theta for Phi could also be the scan's misreading; the formula is wrong as it stands either way.",
+    "Capital Theta for Phi could also be the scan's misreading; the formula is wrong as printed either way.",
     11: "Laplace transform of (4) (SymPy): y(L, s) is no transform. A small y for Y could also be the scan's.",
     14: "Laplace transform of (7) (SymPy): the argument is s, not t.",
 }
@@ -174,7 +168,7 @@ MOTION_CLAIMS = (  # (1)-(14), and the order of arguments
         equation="(3), (10), (18), (19): order of arguments",
         printed="phi_x(t,0); Phi_x(s,0); phi_x(t,0); phi_x(t,0)",
         corrected="phi_x(0,t); Phi_x(0,s); phi_x(0,t); phi_x(0,t)",
-        check=misplaced,
+        check=lambda text: str(len(re.findall(r"\([ts],", text))),  # places after the time
         evidence="Counted: (4)-(7), (11)-(14) and (17) have the place first, these four the time. Taken literally, the "
         "root moment in (3) would be the moment at x = t and time 0. Notation only.",
     ),
@@ -236,7 +230,6 @@ DETERMINANTS = "; ".join(
     f"{name} = |{_columns_replaced(column)}|"
     for column, name in enumerate(("Delta", "Delta_k1", "Delta_k2", "Delta_k3", "Delta_k4"))
 )
-STIFFNESS_PRINTED = "E*I"
 STIFFNESS = "E*(1 + C*s)*I"
 
 
@@ -437,7 +430,7 @@ APPENDIX_CLAIMS = (  # the waves, their numbers, the ends' matrix and Cramer's r
 
 DAMPING_CLAIM = Claim(  # C, which (1)-(14) lack
     equation="(1)-(14): damping C",
-    printed=STIFFNESS_PRINTED,
+    printed="E*I",
     corrected=STIFFNESS,
     check=partial(solves, WAVES_CORRECTED),
     evidence="The waves of the appendix, corrected, in (8) and (9) with this bending stiffness (SymPy): with C they "

@@ -12,8 +12,8 @@ Calculus on jets: total derivatives, and identities between integrals along the 
 
 A small checker of dimensions: every sum must add like to like, every exponential must be of a pure number.
 
-A dimension is a product of powers of kg, m and s, as SymPy has it; those of what stands in the paper's formulas are as
-its equations need them.
+A dimension is a product of powers of kg, m and s, as SymPy has it; those of the paper's symbols are as its
+equations need them.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ def difference(text: str) -> Expression:
 
 
 def remainder(*expressions: Expression) -> str:
-    """What is left of expressions that should vanish: "0", or the rest, cut where it is long."""
+    """The rest of expressions that should vanish: "0", or the rest, cut where it is long."""
     left = [each for each in map(sp.factor_terms, map(sp.expand, expressions)) if each != 0]
     if not left:
         return "0"
@@ -183,17 +183,16 @@ def at_root(f: Expression) -> Expression:
 
 
 def unbalanced(f: Expression) -> str:
-    """What keeps f = integral(g) + h(tip, root) from vanishing for every motion: "0" if nothing does.
+    """The rest of f = integral(g) + h(tip, root), which should vanish for every motion: "0" if it does.
 
     Let the arm end at a running x.  f vanishes for every length if it does for length 0, and if its slope
     g + dh/dx vanishes: integration by parts, without having to guess what to integrate.
     """
     inside, outside = integral_parts(f)
-    outside = at_running_point(outside)
-    return remainder(inside + d_dx(outside), at_root(outside))
+    at_length = at_running_point(outside)
+    return remainder(inside + d_dx(at_length), at_root(at_length))
 
 
-Dimension = Any  # sympy comes without types
 KG, METRE, SECOND = sp.symbols("kg m s", positive=True)  # so that the root of a square is the unit itself
 UNITS = {"kg": KG, "m": METRE, "s": SECOND, "N": KG * METRE / SECOND**2, "Pa": KG / (METRE * SECOND**2)}
 
@@ -202,7 +201,7 @@ class MismatchError(Exception):
     """Unlike things are added."""
 
 
-def unit_dimension(text: str) -> Dimension:
+def unit_dimension(text: str) -> Expression:
     """The dimension of a unit such as "kg/m^3" or "N m s"; of no unit that of a pure number."""
     return sp.parse_expr(text.replace("^", "**").replace(" ", "*") or "1", local_dict=UNITS)
 
@@ -217,18 +216,18 @@ OTHERS = {
     "k4": "m s",
 }  # fmt: skip
 FIELD_UNITS = {"y": "m", "phi": "1", "theta": "1", "V": "N m", "Y": "m s", "Phi": "s", "Theta": "s"}
-PAPER_UNITS: dict[str, Dimension] = {name: unit_dimension(text) for name, text in (NEEDED | OTHERS).items()}
+PAPER_UNITS: dict[str, Expression] = {name: unit_dimension(text) for name, text in (NEEDED | OTHERS).items()}
 
 
-def spelled(dimension: Dimension) -> str:
+def spelled(dimension: Expression) -> str:
     """A dimension in SI base units."""
     powers = dimension.as_powers_dict()
     each = ((name, powers[UNITS[name]]) for name in ("kg", "m", "s"))
     return " ".join(name if n == 1 else f"{name}^{n}" for name, n in each if n) or "1"
 
 
-def dimension(f: Expression, units: dict[str, Dimension]) -> Dimension | None:
-    """Dimension of an expression, None of a zero.  Raises MismatchError."""
+def dimension(f: Expression, units: dict[str, Expression]) -> Expression | None:
+    """Expression of an expression, None of a zero.  Raises MismatchError."""
     if f.is_Symbol:
         return units[f.name]
     if f.is_number:
@@ -248,14 +247,14 @@ def dimension(f: Expression, units: dict[str, Dimension]) -> Dimension | None:
     raise TypeError(f"no dimension of {f}")
 
 
-def _like(found: list[Dimension | None]) -> Dimension | None:
+def _like(found: list[Expression | None]) -> Expression | None:
     kinds = {each for each in found if each is not None}
     if len(kinds) > 1:
         raise MismatchError(" + ".join(sorted(spelled(each) for each in kinds)))
     return kinds.pop() if kinds else None
 
 
-def mismatch(f: Expression, units: dict[str, Dimension]) -> str:
+def mismatch(f: Expression, units: dict[str, Expression]) -> str:
     """The terms of different dimensions in a sum: "0" if there are none."""
     try:
         dimension(f, units)
@@ -264,7 +263,7 @@ def mismatch(f: Expression, units: dict[str, Dimension]) -> str:
     return "0"
 
 
-def unlike(text: str, units: dict[str, Dimension]) -> str:
+def unlike(text: str, units: dict[str, Expression]) -> str:
     """The terms of different dimensions in a text's equations: "0" if all sides and sums are of one dimension.
 
     The dimension of a derivative is that of its field by x and t.

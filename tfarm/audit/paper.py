@@ -21,7 +21,7 @@ from .equations import APPENDIX_CLAIMS, DAMPING_CLAIM, LAMBDA, MOTION_CLAIMS, TI
 from .formulas import (
     NEEDED,
     PAPER_UNITS,
-    Dimension,
+    Expression,
     clauses,
     difference,
     jet,
@@ -47,7 +47,7 @@ PAPER = (
 )
 
 
-def quantity(clause: str) -> tuple[str, float, Dimension]:
+def quantity(clause: str) -> tuple[str, float, Expression]:
     """Name, value and dimension of a text such as "rho = 2766.7 kg/m^3"."""
     name, _, rest = clause.partition(" = ")
     value, _, of = rest.partition(" ")
@@ -78,10 +78,9 @@ def are_units(text: str) -> str:
 
 def is_given(name: str, text: str) -> str:
     """Whether a parameter that (2), (3) and the a_ij need has a value of the right dimension."""
-    for clause in clauses(text):
-        if clause.startswith(f"{name} = "):
-            _, value, dimension = quantity(clause)
-            return "0" if value > 0 and dimension == unit_dimension(NEEDED[name]) else f"{name} in {spelled(dimension)}"
+    for clause in (clause for clause in clauses(text) if clause.startswith(f"{name} = ")):
+        _, value, dimension = quantity(clause)
+        return "0" if value > 0 and dimension == unit_dimension(NEEDED[name]) else f"{name} in {spelled(dimension)}"
     return f"{name} has no value"
 
 
@@ -90,7 +89,7 @@ def is_section(text: str) -> str:
     given = is_given("I", text)
     if given != "0":
         return given
-    value, sides = quantity(clauses(text)[0])[1], clauses(text)[1].removeprefix("rectangle ").split(" x ")
+    (_, value, _), sides = quantity(clauses(text)[0]), clauses(text)[1].removeprefix("rectangle ").split(" x ")
     width, depth = (quantity(f"side = {side}")[1] for side in sides)
     off = max(abs(width * depth / PRINTED_A - 1), abs(width * depth**3 / 12 / value - 1))
     return f"{off:.2g}" if off > 1e-12 else "0"  # doubles read from decimals
@@ -180,16 +179,15 @@ def is_cost(text: str) -> str:
     moment = {parsed("phi_x(0,t)"): x / parsed("E*I"), symbol("K2"): symbol("K")}
     torque = sides(CONTROL_LAW)[u].subs(moment)
     given = sides(text)
-    signal = given[e].subs(u, given.get(u, torque))  # "control input": the torque, unless the text says otherwise
-    cost = given[symbol("E")]
-    curvature = sp.hessian(cost, (x, e)) - sp.diag(a, b)
+    signal = given[e].subs(u, given.get(u, torque))  # "control input": the torque, unless the text defines it
+    curvature = sp.hessian(given[symbol("E")], (x, e)) - sp.diag(a, b)
     return remainder(signal - torque, *curvature)
 
 
 def are_gain_units(text: str) -> str:
-    """(20), (23): each gain's dimension by the equation it stands in; one name cannot have two."""
+    """(20), (23): each gain's dimension by its equation; one name cannot have two."""
     x, theta_t = symbol("x"), jet("theta", t=1)
-    needs: dict[str, set[Dimension]] = {}
+    needs: dict[str, set[Expression]] = {}
     places = {jet("V", t=1): (theta_t**2, unit_dimension("N m s")), symbol("e"): (x, unit_dimension("1"))}
     for left, right in sides(text).items():
         factor, dimension = places[left]
@@ -199,7 +197,7 @@ def are_gain_units(text: str) -> str:
     return "; ".join(clashes) or "0"
 
 
-TUNER_CLAIMS = (  # the learning rule, the cost, and what section 5 says of them
+TUNER_CLAIMS = (  # the learning rule, the cost, and section 5 on them
     Claim(
         equation="(21)",
         printed=INCREMENT,
@@ -222,7 +220,7 @@ TUNER_CLAIMS = (  # the learning rule, the cost, and what section 5 says of them
         printed=COST,
         corrected=COST + "; u = -K1*theta_t",
         check=is_cost,
-        evidence='Below (23) u is "the control input", in section 5 a "reference signal" beside "control signals '
+        evidence='Below (23) u is "the control input", in section 5 a "reference signal" with "control signals '
         'e". By (19) the torque is -K1 theta_t - K2 x (SymPy).',
         doubt="Two readings: u is the torque, then e = u - K x counts the moment feedback twice (to measure the "
         "distance from the law it would be u + K x); or u is the reference and e the torque, then (23) agrees with "
@@ -241,8 +239,8 @@ TUNER_CLAIMS = (  # the learning rule, the cost, and what section 5 says of them
         corrected="u(t), u(t-1), e(t), e(t-1), x(t), x(t-1)",
         check=lambda text: str(len(text.split(", ")) - INPUT_NEURONS),  # signals beyond the neurons
         evidence=f"{INPUT_NEURONS} input neurons, seven signals named (counted).",
-        doubt='Which is too many is not said; a network with "no inner feedback loop" speaks against K, its own '
-        "output, and six neurons are read as the six without it.",
+        doubt='The paper does not name the surplus one; a network with "no inner feedback loop" speaks against K, its '
+        "own output, and six neurons are read as the six without it.",
     ),
     Claim(
         equation="section 5: alpha_c",
