@@ -41,7 +41,7 @@ from tfarm.response.frequency import HERTZ
 from tfarm.schema import Quantity
 
 CONFIDENCE = 0.95  # of every interval of a fit: the usual one
-LEAST_SHARE = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence says
+LEAST_SHARE = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence
 SCATTER_NEIGHBOURS = 2  # neighbours on each side that a value is compared with
 SIX, NINE = singly(general, 6), singly(general, 9)  # digits of what was measured, and of the frequencies of its lines
 TYPICAL = 1.17741  # the median of |x + i y| of normal x and y of deviation 1: sqrt(2 ln 2)

@@ -47,7 +47,7 @@ NUDGE = 1e-6  # of s: for a slope along it by a difference, which is right to ab
 class Parameter:
     """A free number: its key, where the search starts, its bounds, all in SI units, and a prior (mean, deviation).
 
-    `by_logarithm` says that the search is for ln(value/start), otherwise for (value - start)/size.
+    With `by_logarithm` the search is for ln(value/start), otherwise for (value - start)/size.
     """
 
     key: str
@@ -155,7 +155,7 @@ def _typical(arm: Arm, key: str, own: float) -> float:
     return (0.01 if own == 0 else 100) * of_the_arm[name]
 
 
-FREQUENCY_KNOWN = 2e-3  # of itself: what a decay says of it, where its deviation is not said
+FREQUENCY_KNOWN = 2e-3  # of itself: its deviation in a decay by default
 RATIO_KNOWN = 0.1  # of itself, likewise
 EIGENVALUE_STEPS = 30  # of Newton's method, at most: from an undamped frequency on a few do
 EIGENVALUE_FIRM = 1e-12  # of an eigenvalue: a step that is less ends it
@@ -272,16 +272,6 @@ class Problem:
     rings: tuple[RingMode, ...] = ()
 
     @cached_property
-    def _grids(self) -> dict[tuple[bytes, str], list[int]]:
-        """Responses that are computed together, by their frequencies and by what drives the arm."""
-        found: dict[tuple[bytes, str], list[int]] = {}
-        for number, each in enumerate(self.responses):
-            name, own = each.data.input, self.family.arm.input
-            driven = name if name in INPUTS and name not in OUTPUTS else own  # the arm's own, where it is over a signal
-            found.setdefault((each.data.omega.tobytes(), driven), []).append(number)
-        return found
-
-    @cached_property
     def of_the_arm(self) -> tuple[Parameter, ...]:
         """The parameters that are the arm's."""
         return self.parameters[: len(self.family.keys)]
@@ -310,9 +300,15 @@ class Problem:
         return [np.asarray(each.N / each.D) for each in self.fractions(point)]
 
     def fractions(self, point: Real, share: float = 0.0) -> list[Fraction]:
-        """Each response at s = (i + share) w."""
+        """Each response at s = (i + share) w; those of one grid of frequencies and one drive are computed together."""
         arm, found = self.arm(point), {}
-        for (_, driven), numbers in self._grids.items():
+        grids: dict[tuple[bytes, str], list[int]] = {}
+        for n, each in enumerate(self.responses):
+            driven: str = arm.input  # where the response is over a signal
+            if each.data.input in INPUTS and each.data.input not in OUTPUTS:
+                driven = each.data.input
+            grids.setdefault((each.data.omega.tobytes(), driven), []).append(n)
+        for (_, driven), numbers in grids.items():
             pairs = [(self.responses[n].data.output, self.responses[n].data.input) for n in numbers]
             names = tuple(dict.fromkeys(name for pair in pairs for name in pair if name != driven))
             s = (1j + share) * self.responses[numbers[0]].data.omega

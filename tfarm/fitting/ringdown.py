@@ -24,7 +24,6 @@ from functools import cached_property
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc, stdtrit
 
 from tfarm.arrays import Complex, Real
@@ -72,61 +71,21 @@ class DecayMode(NamedTuple):
 @dataclass(frozen=True, kw_only=True)
 @record
 class Ring:
-    """Modes (n,) of a decay, that of most energy first; intervals hold the true value in 95 of 100 records.
+    """Modes of a decay, that of most energy first; intervals hold the true value in 95 of 100 records.
 
-    `poles` [1/s] are -sigma + i w; `amplitude` (n,) is that at `start` [s], in the signal's unit.  `covariance` is that
-    of sigma and w, mode by mode (n, 2, 2) [1/s^2].  `residual` is the root mean square of the residuals, `white` the
-    probability of residuals as correlated as these if they were white noise.  `early` and `late` are w (n,) [rad/s] by
-    the two halves of the record alone.
+    `residual` is the root mean square of the residuals, `white` the probability of residuals as correlated as these if
+    they were white noise; `notes` are limits of the intervals.
     """
 
     signal: Annotated[str, Quantity("signal")]
     source: Annotated[str, Quantity("record", key="record")]
-    sampling_note: str
     start: Annotated[float, Quantity("from", "s", key="from_s")]
     stop: Annotated[float, Quantity("to", "s", key="to_s")]
     samples: Annotated[int, Quantity("samples")]
-    poles: Complex
-    amplitude: Real
-    covariance: Real
-    freedom: int
     residual: Annotated[float, Quantity("residual rms", digits=4, key="residual_rms")]
     white: Annotated[float, Quantity("probability of white residuals", digits=3, key="whiteness_probability")]
-    early: Real
-    late: Real
-    halves_std: Real
-
-    @property
-    def frequency(self) -> Real:
-        """The damped frequencies w (n,) [rad/s]."""
-        return np.asarray(self.poles.imag)
-
-    @property
-    def natural_frequency(self) -> Real:
-        """|s| (n,) [rad/s]."""
-        return np.asarray(abs(self.poles), dtype=float)
-
-    @property
-    def damping_ratio(self) -> Real:
-        """sigma/|s| (n,)."""
-        return np.asarray(-self.poles.real / abs(self.poles))
-
-    @property
-    def frequency_std(self) -> Real:
-        """Standard deviations (n,) [rad/s]."""
-        return np.sqrt(self.covariance[:, 1, 1])
-
-    @cached_property
-    def damping_ratio_std(self) -> Real:
-        """Standard deviations (n,), by d zeta = (w^2 d sigma - sigma w d w)/|s|^3."""
-        sigma, w = -self.poles.real, self.poles.imag
-        slope = np.c_[w**2, -sigma * w] / abs(self.poles)[:, None] ** 3
-        return np.sqrt(np.einsum("mi,mij,mj->m", slope, self.covariance, slope))
-
-    @property
-    def reach(self) -> float:
-        """Standard deviations of an interval to each side (Student's t)."""
-        return float(stdtrit(self.freedom, 0.5 + CONFIDENCE / 2))
+    notes: Annotated[tuple[str, ...], Quantity("notes")]
+    modes: Annotated[tuple[DecayMode, ...], Quantity("modes")]
 
     @property
     def is_white(self) -> Annotated[bool, Quantity("residuals white", key="residuals_white")]:
@@ -137,46 +96,6 @@ class Ring:
     def level(self) -> Annotated[float, Quantity("probability of the intervals")]:
         """The share of intervals that hold the true value."""
         return CONFIDENCE
-
-    @property
-    def drifts(self) -> NDArray[np.bool_]:
-        """Whether the two halves of the record differ in w (n,) by more than chance."""
-        return np.asarray(abs(self.early - self.late) > HALVES_APART * self.halves_std + RING_ROUNDING * self.frequency)
-
-    @property
-    def notes(self) -> Annotated[tuple[str, ...], Quantity("notes")]:
-        """Limits of the intervals."""
-        found = [self.sampling_note] if self.sampling_note else []
-        if not self.is_white:
-            chance = f"{self.white:.1g}" if self.white > RARE else f"below {RARE:g}"
-            found.append(
-                f"the residuals are correlated (probability {chance} if they were white noise): intervals are "
-                "by their autocovariance, and may be too narrow, above all if the residuals are no noise"
-            )
-        halves = zip(self.early / HERTZ, self.late / HERTZ, self.drifts, strict=True)
-        found += [
-            f"mode {mode} rings at {early:.4g} Hz in its first half, {late:.4g} Hz in its second: "
-            "no linear decay, or friction, or another mode"
-            for mode, (early, late, drifts) in enumerate(halves, start=1)
-            if drifts
-        ]
-        return tuple(found)
-
-    @property
-    def modes(self) -> Annotated[list[DecayMode], Quantity("modes")]:
-        """A row a mode, with the text that `tfarm fit --mode N=` takes; no damping ratio there that is not positive."""
-        found = []
-        columns = np.c_[self.frequency / HERTZ, self.frequency_std / HERTZ, self.natural_frequency / HERTZ,
-                        self.damping_ratio, self.damping_ratio_std, self.amplitude]  # fmt: skip
-        halves = np.c_[self.early, self.late] / HERTZ
-        for n, (f, df, natural, z, dz, amplitude) in enumerate(columns.tolist()):
-            damping = f",{z:.6g}~{dz:.3g}" if 0 < z < 1 and dz > 0 else ""
-            both = halves[n].tolist() if np.isfinite(self.halves_std[n]) else (None, None)
-            found.append(DecayMode(
-                n + 1, f, f - self.reach * df, f + self.reach * df, df, natural, z, z - self.reach * dz,
-                z + self.reach * dz, dz, amplitude, f"{f:.8g}hz~{df:.3g}{damping}", *both,
-            ))  # fmt: skip
-        return found
 
 
 def ring(
@@ -193,28 +112,37 @@ def ring(
     if found is None:
         word = "oscillation" if modes == 1 else f"{modes} oscillations"
         raise ConvergenceError(f"no {word} found in the decay: choose other times, or fewer modes", None, None)
-    order = np.argsort(-found.energy, kind="stable")
     squares = float(found.e @ found.e)
     is_rounding = squares <= y.size * (RING_ROUNDING * abs(y).max()) ** 2
     white = 1.0 if is_rounding else whiteness(found.e)
+    notes = [recording.note] if recording.note else []
+    if white < NOT_WHITE:
+        chance = f"{white:.1g}" if white > RARE else f"below {RARE:g}"
+        notes.append(
+            f"the residuals are correlated (probability {chance} if they were white noise): intervals are "
+            "by their autocovariance, and may be too narrow, above all if the residuals are no noise"
+        )
     spread = found.covariance(is_white=white >= NOT_WHITE)
-    early, late, std = _halves(t - t[0], y, found.poles)
+    early, late, apart = _halves(t - t[0], y, found.poles)
+    rows = []
+    for number, n in enumerate(np.argsort(-found.energy, kind="stable").tolist(), start=1):
+        halves = (float(early[n]) / HERTZ, float(late[n]) / HERTZ) if np.isfinite(apart[n]) else None
+        rows.append(found.mode(n, number, spread, halves))
+        if abs(early[n] - late[n]) > HALVES_APART * apart[n] + RING_ROUNDING * found.poles[n].imag:
+            notes.append(
+                f"mode {number} rings at {early[n] / HERTZ:.4g} Hz in its first half, {late[n] / HERTZ:.4g} Hz in its "
+                "second: no linear decay, or friction, or another mode"
+            )
     return Ring(
         signal=name,
         source=recording.source,
-        sampling_note=recording.note,
         start=float(t[0]),
         stop=float(t[-1]),
         samples=y.size,
-        poles=found.poles[order],
-        amplitude=found.amplitude[order],
-        covariance=np.array([spread[np.ix_([n, n + modes], [n, n + modes])] for n in order]),
-        freedom=found.freedom,
         residual=math.sqrt(squares / found.freedom),
         white=white,
-        early=early[order],
-        late=late[order],
-        halves_std=std[order],
+        notes=tuple(notes),
+        modes=tuple(rows),
     )
 
 
@@ -306,6 +234,18 @@ class DampedSum:
         bread = np.linalg.pinv(J.T @ J)
         meat = J.T @ J * (e @ e) / self.freedom if is_white else _meat(J, e) * e.size / self.freedom
         return np.asarray(bread @ meat @ bread / np.outer(scale, scale))
+
+    def mode(self, n: int, number: int, covariance: Real, halves: tuple[float, float] | None) -> DecayMode:
+        """Mode n by its number, with intervals (Student's t); d zeta = (w^2 d sigma - sigma w d w)/|s|^3."""
+        s, places = complex(self.poles[n]), [n, n + self.poles.size]
+        slope = np.array([s.imag**2, s.real * s.imag]) / abs(s) ** 3
+        own, reach = covariance[np.ix_(places, places)], float(stdtrit(self.freedom, 0.5 + CONFIDENCE / 2))
+        f, df, z, dz = s.imag / HERTZ, math.sqrt(own[1, 1]) / HERTZ, -s.real / abs(s), math.sqrt(slope @ own @ slope)
+        damping = f",{z:.6g}~{dz:.3g}" if 0 < z < 1 and dz > 0 else ""  # `tfarm fit --mode` takes positive ones alone
+        return DecayMode(
+            number, f, f - reach * df, f + reach * df, df, abs(s) / HERTZ, z, z - reach * dz, z + reach * dz, dz,
+            float(self.amplitude[n]), f"{f:.8g}hz~{df:.3g}{damping}", *(halves or (None, None)),
+        )  # fmt: skip
 
 
 def nearest_sum(t: Real, y: Real, start: Complex) -> DampedSum | None:

@@ -242,30 +242,25 @@ def is_explained(one: Solution) -> bool | None:
 def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None = None) -> Solution:
     """The nearest minimum from a start, some coordinates held at a value."""
     held = held or {}
-    free = [n for n in range(start.size) if n not in held]
     point = start.copy()
     point[list(held)] = list(held.values())
-    if not free:
+    free = np.delete(np.eye(start.size), list(held), axis=1)  # a column for each of the others
+    fixed = point - free @ free.T @ point
+    if not free.size:
         residuals = problem.residuals(point)
         return Solution(problem, point, residuals, np.zeros((residuals.size, start.size)), True, 1)
-    low, high = (each[free] for each in problem.bounds)
-
-    def whole(x: Real) -> Real:
-        full = point.copy()
-        full[free] = x
-        return full
+    first, (low, high) = problem.inside(point) @ free, (each[free.any(axis=1)] for each in problem.bounds)
 
     def jacobian(x: Real) -> Real:
-        return np.asarray(problem.jacobian(whole(x))[:, free])
+        return np.asarray(problem.jacobian(fixed + free @ x) @ free)
 
-    first = problem.inside(point)[free]
     found = least_squares(
-        walled(lambda x: problem.residuals(whole(x)), first), first, jac=jacobian,
-        bounds=(low, high), x_scale="jac", xtol=FIRM_POINT, ftol=FIRM_SUM, gtol=None, max_nfev=MOST_EVALUATIONS,
+        walled(lambda x: problem.residuals(fixed + free @ x), first), first, jac=jacobian,
+        bounds=(low, high), x_scale="jac", xtol=FIRM_POINT, ftol=FIRM_SUM,
+        gtol=None, max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
-    full, slopes = whole(found.x), np.zeros((found.fun.size, start.size))
-    slopes[:, free] = np.asarray(found.jac)
-    return Solution(problem, full, found.fun, slopes, bool(found.status > 0), 1)
+    slopes = np.asarray(found.jac) @ free.T
+    return Solution(problem, fixed + free @ found.x, found.fun, slopes, bool(found.status > 0), 1)
 
 
 def _rescaled(found: Solution) -> Solution:
