@@ -8,7 +8,7 @@ import numpy as np
 import tfarm
 from tfarm.arm.law_tables import load_law
 from tfarm.arm.writing import save_law
-from tfarm.fitting.results import save_fit
+from tfarm.fitting.fit import save_fit
 
 sheet = tfarm.load("sasaki2012-lab")
 softer = replace(sheet.link, youngs_modulus=0.93 * sheet.link.youngs_modulus)

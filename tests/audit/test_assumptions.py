@@ -11,10 +11,8 @@ import tfarm
 from tests.shared import thinned
 from tfarm.audit.assumptions import (
     assumptions,
-    candidates,
     has_hub_inertia,
     hub_study,
-    loop_verdicts,
     own_depth,
     section_study,
 )
@@ -76,7 +74,7 @@ def test_the_own_section_gives_the_arms_own_table(arm):
     study = section_study(arm, count=6)
     assert study.is_own.sum() == 1
     assert study.natural_frequency[study.is_own][0] == pytest.approx(own_frequencies(arm, 6), rel=1e-13)
-    (row,) = (row for row in candidates(study) if row.is_own)
+    (row,) = (row for row in study.candidates if row.is_own)
     assert row.width * row.depth == pytest.approx(arm.link.section.area, rel=1e-14)
     assert row.second_moment == pytest.approx(arm.link.section.second_moment, rel=1e-14)
 
@@ -182,7 +180,7 @@ def test_verdicts_are_those_of_the_loop_itself():
     """The arm's own row says what `margins` says of it, and every row what its own closed-loop poles say."""
     arm = tfarm.load("sasaki2012-lab")
     study = hub_study(arm, (0.05, 0.1, 0.5))
-    verdicts = loop_verdicts(study)
+    verdicts = study.candidates
     assert verdicts[1].K2_below == pytest.approx(tfarm.margins(arm, PAPER_GAINS).windows["K2"].around[1], rel=1e-12)
     for each, found in zip(study.arms, verdicts, strict=True):
         below, above = (replace(PAPER_GAINS, K2=found.K2_below * factor) for factor in (0.99, 1.01))
@@ -193,6 +191,4 @@ def test_verdicts_are_those_of_the_loop_itself():
 
 def test_a_locked_hub_has_no_loop():
     arm = replace(tfarm.load("sasaki2012-lab"), hub=tfarm.Hub(inertia=math.inf))
-    assert loop_verdicts(section_study(arm, (0.006,))) is None
-    rows = to_dict(assumptions(arm, 1))["section"]["candidates"]
-    assert {(row["verdict"], row["K2_below"]) for row in rows} == {("no loop", None)}
+    assert {(row.verdict, row.K2_below) for row in section_study(arm, count=1).candidates} == {("no loop", None)}

@@ -20,7 +20,7 @@ from tests import survey
 from tests.shared import thinned
 from tests.survey import Finding
 from tfarm import audit
-from tfarm.audit import appendix, energy, formulas, motion, tuner
+from tfarm.audit import energy, equations, formulas, paper
 from tfarm.errors import CertificationError
 
 CLAIMS = {claim.equation: claim for claim in audit.claims()}
@@ -30,7 +30,7 @@ FORMULAS = {
     for name, claim in CLAIMS.items()
     if not name.startswith("Table") and name not in NOT_FORMULAS and "order of" not in name
 }
-CACHES = (formulas.parsed, motion.solved_motion, energy.energy_of, appendix.wave_determinant, appendix.relation)
+CACHES = (formulas.parsed, equations.solved_motion, energy.energy_of, equations.wave_determinant, equations.relation)
 
 
 def flips(text):
@@ -207,8 +207,8 @@ def test_increment_and_update_are_judged_by_descent_on_numbers():
         ends[name] = abs(w)
     assert ends["mended"] < 1e-9
     assert ends["printed"] > 1e9
-    assert tuner.UPDATE == "w_next = w + dw"
-    assert tuner.UPDATE_PRINTED == "w_next = w - dw"
+    assert paper.UPDATE == "w_next = w + dw"
+    assert paper.UPDATE_PRINTED == "w_next = w - dw"
 
 
 if __name__ == "__main__":

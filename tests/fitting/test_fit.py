@@ -18,7 +18,6 @@ from tfarm.errors import ParameterError
 from tfarm.fitting.data import noise_of
 from tfarm.fitting.fit import fit
 from tfarm.fitting.model import RingMode, mode_of
-from tfarm.fitting.results import resonances
 from tfarm.fitting.solve import equation_errors
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -205,7 +204,7 @@ def test_resonances_before_and_after_are_the_arms_own():
     found = fit(LAB, measured(), free=["link.youngs_modulus"], start=start, profile=False)
     free = tfarm.modes(found.arm, 6).natural_frequency[1:] / 2 / math.pi
     locked = tfarm.modes(found.arm.having(hub_inertia=math.inf), 6).natural_frequency / 2 / math.pi
-    for before, after, peak in resonances(found):
+    for before, after, peak in found.resonances:
         own = min([*free, *locked], key=lambda f: abs(f - after))
         assert after == pytest.approx(own, rel=2e-3)  # w of an eigenvalue, damped
         assert before / after == pytest.approx(

@@ -80,17 +80,17 @@ def test_the_scatter_between_records(scatter):
     shares = np.array([-1.2, 0.7, 0.1, 1.4, -0.6, -1.1, 0.9, -0.2])
     moduli = LAB.link.youngs_modulus * (1 + scatter * shares)
     found = fit(LAB, records(moduli), free=["link.youngs_modulus"], profile=False)
-    told = repeats(found, draws=12)
-    assert told.keys == ("link.youngs_modulus",)
-    assert told.each[:, 0] == pytest.approx(moduli, rel=5e-3 if scatter else 2e-3)
-    (times,) = told.times_wider
+    several = repeats(found, draws=12)
+    each = [row["link.youngs_modulus"] for row in several.each]
+    assert each == pytest.approx(moduli, rel=5e-3 if scatter else 2e-3)
+    times = several.times_wider["link.youngs_modulus"]
     if not scatter:
         assert 0.4 < times < 1.8  # of eight records: a deviation is known to 1/sqrt(14)
         return
-    spread = told.drawn.std(ddof=1) / LAB.link.youngs_modulus
+    spread = times * found.parameters[0].deviation / LAB.link.youngs_modulus
     assert spread == pytest.approx(scatter * shares.std(ddof=0) / np.sqrt(8), rel=0.5)
     assert times > 5
-    ((low, high),) = told.intervals
+    low, high = several.intervals["link.youngs_modulus"]
     assert low < LAB.link.youngs_modulus < high
 
 

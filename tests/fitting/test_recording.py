@@ -27,15 +27,15 @@ def test_csv_and_mat_hold_the_same_record(tmp_path):
     for found, name in ((one, "acc"), (other, "both.2")):
         assert found.signal(name, "--signal").tolist() == Y.tolist()
         assert found.times == pytest.approx(T, rel=4e-16)
-        assert (found.period, found.said) == (pytest.approx(0.002, rel=1e-13), "")
+        assert (found.period, found.note) == (pytest.approx(0.002, rel=1e-13), "")
 
 
 def test_times_in_few_digits_are_even_and_a_wandering_clock_is_said(tmp_path):
     rounded = read_recording(written(tmp_path / "a.csv", ("t", "x"), np.round(T / 3, 6), X))
-    assert rounded.said == ""
+    assert rounded.note == ""
     wandering = T + 5e-5 * np.sin(40 * T)
     found = read_recording(written(tmp_path / "b.csv", ("t", "x"), wandering, X))
-    assert found.said.startswith("sampled unevenly, by up to")
+    assert found.note.startswith("sampled unevenly, by up to")
 
 
 BAD = {

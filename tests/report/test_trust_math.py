@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 import pytest
 
 from tfarm.audit import claims
+from tfarm.audit.rows import tex
 from tfarm.report.trust import GREEK_LETTERS, anchor, compared_formulas, formulas, in_letters
 
 CLAIMS = claims()
@@ -27,18 +28,18 @@ def claim_of(equation):
 
 def pair(equation):
     claim = claim_of(equation)
-    return compared_formulas(claim.typeset(claim.printed), claim.typeset(claim.corrected))
+    return compared_formulas(tex(claim.printed), tex(claim.corrected))
 
 
 @pytest.mark.parametrize(("claim", "text"), TEXTS, ids=lambda it: getattr(it, "equation", ""))
 def test_every_greek_letter_of_the_plain_text_is_set(claim, text):
-    shown = "".join(leaf.text for leaf in leaves(formulas(claim.typeset(text))))
+    shown = "".join(leaf.text for leaf in leaves(formulas(tex(text))))
     for name, letter in GREEK_LETTERS.items():
         if name == "Delta" and claim.equation in WITH_DW:
             continue
         count = len(re.findall(rf"(?<![A-Za-z]){name}(?![A-Za-z])", text))
         assert shown.replace("ϕ", "φ").count(letter) == count, name
-    assert not re.search("xmlns|http|&#", "".join(formulas(claim.typeset(text))))
+    assert not re.search("xmlns|http|&#", "".join(formulas(tex(text))))
 
 
 @pytest.mark.parametrize(
@@ -60,13 +61,13 @@ def test_what_differs_is_marked_and_nothing_else(equation, printed, corrected):
 
 
 def test_the_same_formula_has_no_marks():
-    tex = claim_of("(15)").typeset(claim_of("(15)").printed)
-    assert [changed(side) for side in compared_formulas(tex, tex)] == [[], []]
+    typeset = tex(claim_of("(15)").printed)
+    assert [changed(side) for side in compared_formulas(typeset, typeset)] == [[], []]
 
 
 def test_a_determinant_has_bars_as_high_as_it():
     claim = claim_of("Delta, Delta k_i")
-    bars = [leaf for leaf in leaves(formulas(claim.typeset(claim.printed))) if leaf.text == "|"]
+    bars = [leaf for leaf in leaves(formulas(tex(claim.printed))) if leaf.text == "|"]
     assert [bar.get("form") for bar in bars] == ["prefix", "postfix"] * 5
     assert all(bar.get("stretchy") == "true" for bar in bars)
 

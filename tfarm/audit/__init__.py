@@ -1,4 +1,4 @@
-"""The paper, equation by equation: as printed, as corrected, and the check that tells them apart.
+"""The paper, equation by equation: as printed, as corrected, and the check that separates them.
 
 for row in tfarm.audit.audit():
     print(row.equation, row.verdict, row.residual_printed, row.residual_corrected)

@@ -1,25 +1,22 @@
 """Equations (15)-(20) and the feedback: integration by parts with payload and with a1, a2, a3 free.
 
-`rate` differentiates a V along the motion (1)-(5), which `motion` has checked against Hamilton's principle, and
+`rate` differentiates a V along the motion (1)-(5), which `equations` has checked against Hamilton's principle, and
 `unbalanced` compares two such rates for every motion at once.
 """
 
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
-import mpmath
 import numpy as np
 import sympy as sp
-from mpmath import mpc, mpf
 from scipy.linalg import expm
 
-from tfarm.arm import Arm, load
-from tfarm.arrays import Real
+from tfarm.arm import HubFeedback, load
+from tfarm.loop.poles import closed_loop_poles
 from tfarm.reduced import modal_model
 
-from .appendix import BEAM_NAMES, by_transition
+from .equations import solved_motion
 from .formulas import (
     Expression,
     clauses,
@@ -33,69 +30,42 @@ from .formulas import (
     symbols,
     unbalanced,
 )
-from .motion import solved_motion
 from .rows import Claim
 
 K1 = 0.3  # N m s/rad
-ROOT_DIGITS = 30  # of a root, of which four are shown
 MODES = 8  # of the arm whose gain is switched
 
 
-def growth(K2: float, near: complex) -> Any:
-    """The root of 1 + K1 s theta + K2 M(0) near a point, both per unit torque, to ROOT_DIGITS digits; default arm."""
-    arm = load("sasaki2012")
-    link, section = arm.link, arm.link.section
-    numbers = (
-        link.density, section.area, link.length, link.youngs_modulus, section.second_moment, link.shear_factor,
-        link.shear_modulus, link.damping, arm.payload.mass, arm.payload.inertia, arm.hub.inertia,
-    )  # fmt: skip
-    known = dict(zip(BEAM_NAMES, map(mpf, numbers), strict=False))
-
-    def returned(s: Any) -> Any:
-        theta, _, _, moment = by_transition(known | {"s": s})
-        return 1 + K1 * s * theta + K2 * moment
-
-    with mpmath.workdps(2 * ROOT_DIGITS):
-        return mpmath.findroot(returned, mpc(near), tol=mpf(10) ** (-ROOT_DIGITS))
-
-
-def propagator(arm: Arm, K2: float, duration: float) -> Real:
-    """State transition of the loop (19) over a time of constant gains, by the arm's first modes."""
-    A, B, C, D = modal_model(arm, ["hub_rate", "root_moment"], MODES).matrices()
-    gains = np.array([K1, K2])
-    fed_back = gains @ C / (1 + gains @ D)
-    return np.asarray(expm((A - np.outer(B, fed_back)) * duration))
-
-
-def pumped(low: float, high: float, first: float, second: float) -> float:
-    """Growth per period of the motion when K2 is switched: low for `first` seconds, high for `second`."""
-    arm = load("sasaki2012")
-    period = propagator(arm, high, second) @ propagator(arm, low, first)
+def pumped(*switched: tuple[float, float]) -> float:
+    """Growth per period of the loop (19) on the default arm when K2 is switched: each value with its duration [s]."""
+    A, B, C, D = modal_model(load("sasaki2012"), ["hub_rate", "root_moment"], MODES).matrices()
+    period = np.eye(len(A))
+    for K2, duration in switched:
+        gains = np.array([K1, K2])
+        period = expm((A - np.outer(B, gains @ C / (1 + gains @ D))) * duration) @ period
     return float(abs(np.linalg.eigvals(period)).max())
 
 
 def growth_text() -> str:
     """The sharpness of K2 < 1 in numbers."""
-    within, beyond = (_rounded(growth(K2, near)) for K2, near in ((0.5, -1 + 57j), (1.1, 2 + 21j)))
+    laws = (HubFeedback(K1=K1, K2=K2) for K2 in (0.5, 1.1))
+    roots = (closed_loop_poles(load("sasaki2012"), law, 3).values[-1] for law in laws)
+    within, beyond = (f"{s.real:.4f} + {s.imag:.4f}j" for s in roots)
     return (
-        f"Default arm, K1 = {K1}: a root at s = {within} 1/s for K2 = 0.5, at {beyond} 1/s for K2 = 1.1 (mpmath, "
-        "from the state-transition matrix)."
+        f"Default arm, K1 = {K1}: a root at s = {within} 1/s for K2 = 0.5, at {beyond} 1/s for K2 = 1.1 (closed-loop "
+        "poles)."
     )
 
 
 def pumped_text() -> str:
     """A gain that varies between two stable values and drives the arm unstable."""
-    low, high, first, second = 0.1, 0.6, 0.027, 0.025
-    constant = max(pumped(low, low, first, second), pumped(high, high, first, second))
+    low, high = (0.1, 0.027), (0.6, 0.025)
+    constant = max(pumped(low), pumped(high))
     return (
-        f"Counterexample: default arm, K1 = {K1}, {MODES} modes, continuous time: K2 = {low} for "
-        f"{1e3 * first:.0f} ms and {high} for {1e3 * second:.0f} ms grows by {pumped(low, high, first, second):.3f} a "
+        f"Counterexample: default arm, K1 = {K1}, {MODES} modes, continuous time: K2 = {low[0]} for "
+        f"{1e3 * low[1]:.0f} ms and {high[0]} for {1e3 * high[1]:.0f} ms grows by {pumped(low, high):.3f} a "
         f"period, either gain alone by {constant:.6f}, which is the angle at rest."
     )
-
-
-def _rounded(s: Any) -> str:
-    return f"{float(s.real):.4f} {'-' if s.imag < 0 else '+'} {abs(float(s.imag)):.4f}j"
 
 
 KINETIC = "rho*A*(y_t + x*theta_t)^2 + rho*I*(phi_t + theta_t)^2"
@@ -112,15 +82,9 @@ SUBSTITUTED = (
     " + (phi_t + theta_t)*(E*I*phi_xx - kappa*G*A*(phi - y_x)))"
     f" + a2*theta_t*(E*I*phi_x(0,t) + u) + {STRAIN_RATE}"
 )
-SUBSTITUTED_PRINTED = SUBSTITUTED.replace("(phi_t + theta_t)", "(phi_t + theta_x)")
-POWER_FLOW_PRINTED = "V_t = theta_t*(a2*u + (a3 - a1)*E*I*phi_x(t,0))"
 POWER_FLOW = "V_t = theta_t*(a2*u + (a2 - a1)*E*I*phi_x(0,t)); a3 = a1"
-CONTROL_LAW_PRINTED = "u = -K1*theta_t - K2*E*I*phi_x(t,0); 0 < K1 < oo; 0 < K2 < oo"
 CONTROL_LAW = "u = -K1*theta_t - K2*E*I*phi_x(0,t); 0 < K1 < oo; -oo < K2 < 1"
-DECAY_PRINTED = "V_t = -K*theta_t^2"
 DECAY = "V_t = -a2*K1*theta_t^2; a3 = a1; a1 = a2*(1 - K2)"
-DAMPED_LAW_PRINTED = "u = -K1*theta_t - K2*E*I*phi_x(0,t)"
-DAMPED_LAW = "u = -K1*theta_t - K2*E*I*(phi_x(0,t) + C*phi_xt(0,t))"
 VARIED_DECAY = "V_t = -a2*K1*theta_t^2; a3 = a1; a1 = a2*(1 - K2)"
 a1, a2, a3, u, theta_t = (*symbols("a1 a2 a3 u"), jet("theta", t=1))
 M0 = parsed("E*I*phi_x(0,t)")
@@ -128,21 +92,16 @@ M0 = parsed("E*I*phi_x(0,t)")
 
 def rate(energy_of: Expression, damping: Expression = 0) -> Expression:
     """dV/dt with the accelerations of (1)-(5); with damping, E phi_x becomes E (phi_x + C phi_xt) in them."""
-    arm, tip, hub = (_damped(each, damping) for each in solved_motion())
+    E, places = symbol("E"), [(i, at) for i in (1, 2) for at in ("", "(L,t)", "(0,t)")]
+    rates = {jet("phi", i, 0, at): jet("phi", i, 0, at) + damping * jet("phi", i, 1, at) for i, at in places}
+    arm, tip, hub = (
+        {s: sp.expand(f).coeff(E, 0) + E * sp.expand(f).coeff(E, 1).subs(rates, simultaneous=True)
+         for s, f in solved.items()}
+        for solved in solved_motion()
+    )  # fmt: skip
     inside, outside = integral_parts(d_dt(energy_of))
     outside = sp.expand(sp.expand(outside.subs(tip)).subs(hub))
     return sp.Function("integral")(sp.expand(inside.subs(arm))) + outside
-
-
-def _damped(solved: dict[Expression, Expression], C: Expression) -> dict[Expression, Expression]:
-    """Bending moments E I phi_x with their rates, wherever E stands before phi_x or phi_xx."""
-    places = [(i, at) for i in (1, 2) for at in ("", "(L,t)", "(0,t)")]
-    rates = {jet("phi", i, 0, at): jet("phi", i, 0, at) + C * jet("phi", i, 1, at) for i, at in places}
-    return {
-        s: (terms := sp.expand(value)).coeff(symbol("E"), 0)
-        + symbol("E") * terms.coeff(symbol("E"), 1).subs(rates, simultaneous=True)
-        for s, value in solved.items()
-    }
 
 
 @cache
@@ -184,22 +143,14 @@ def is_power(text: str) -> str:
     return unbalanced((rate(energy_of(V)) - value).subs(conditions))
 
 
-def with_law(value: Expression, text: str) -> Expression:
-    """An expression with u from a law."""
-    return value.subs(u, sides(text)[u])
-
-
 def proven_gains(law: Expression) -> dict[str, Expression]:
     """The intervals of K1 and K2 for which some a1, a2 > 0 make the true dV/dt (a3 = a1) a negative square."""
     M, slope = symbol("M(0)"), parsed("phi_x(0,t)")
     power = sp.expand(claimed(POWER_FLOW)[0].subs(u, law)).subs(slope, M / parsed("E*I"))
     weight = sp.solve(power.coeff(M), a1)[0] / a2  # a1/a2, which must be positive
     damping = -sp.expand(power.subs(M, 0)) / (a2 * theta_t**2)
-    return {"K1": _positive(damping, symbol("K1")), "K2": _positive(weight, symbol("K2"))}
-
-
-def _positive(f: Expression, gain: Expression) -> Expression:
-    return sp.solveset(sp.simplify(f) > 0, gain, sp.S.Reals)
+    positive = {"K1": damping, "K2": weight}
+    return {gain: sp.solveset(sp.simplify(f) > 0, symbol(gain), sp.S.Reals) for gain, f in positive.items()}
 
 
 def are_proven_gains(text: str) -> str:
@@ -219,7 +170,7 @@ def is_decay(text: str) -> str:
     """(20): (19) in the true dV/dt."""
     value, stated = claimed(text)
     weights = stated or claimed(DECAY)[1]
-    change = with_law(rate(energy_of(V)), CONTROL_LAW) - value
+    change = rate(energy_of(V)).subs(u, sides(CONTROL_LAW)[u]) - value
     return unbalanced(change.subs(a3, weights[a3]).subs(a1, weights[a1]))
 
 
@@ -227,7 +178,7 @@ def is_damped_decay(text: str) -> str:
     """Section 3 with C > 0: dV/dt may be -a2 K1 theta_t^2 less what the material dissipates, no more."""
     weights = {a1: a2 * (1 - symbol("K2"))}
     lost = parsed("-a2*K1*theta_t^2 - a1*C*integral(E*I*phi_xt^2)")
-    change = with_law(rate(energy_of(V).subs(a3, a1), symbol("C")), text) - lost
+    change = rate(energy_of(V).subs(a3, a1), symbol("C")).subs(u, sides(text)[u]) - lost
     return unbalanced(change.subs(weights))
 
 
@@ -236,12 +187,12 @@ def is_varied_decay(text: str) -> str:
     value, conditions = claimed(text)
     weight = conditions[a1]
     K2_t = conditions.get(jet("K2", t=1), jet("K2", t=1))
-    law_rate = with_law(rate(energy_of(V)).subs(a3, a1), CONTROL_LAW)
+    law_rate = rate(energy_of(V)).subs(a3, a1).subs(u, sides(CONTROL_LAW)[u])
     moving = sp.diff(energy_of(V).subs(a3, a1), a1) * sp.diff(weight, symbol("K2")) * K2_t
     return unbalanced((law_rate + moving - value).subs(a1, weight))
 
 
-ENERGY_CLAIMS = (  # the energy, its rate, the law and what is said to follow from it
+ENERGY_CLAIMS = (  # the energy, its rate, the law and the consequences stated of it
     Claim(
         equation="(15)",
         printed=V_PRINTED,
@@ -255,12 +206,12 @@ ENERGY_CLAIMS = (  # the energy, its rate, the law and what is said to follow fr
         equation="(16)",
         printed=RATE,
         check=is_derivative,
-        evidence="The time derivative of (15) as printed (SymPy). With (15) mended, (16) and (17) gain "
+        evidence="The time derivative of (15) as printed (SymPy). With (15) corrected, (16) and (17) gain "
         "a1 (m w_t w_tt + I_c psi_t psi_tt) at the tip; (V depends on t only: dV/dt).",
     ),
     Claim(
         equation="(17)",
-        printed=SUBSTITUTED_PRINTED,
+        printed=SUBSTITUTED.replace("(phi_t + theta_t)", "(phi_t + theta_x)"),
         corrected=SUBSTITUTED,
         check=is_substituted,
         evidence="(16) with the accelerations of (1), (2) and (3) (SymPy); theta does not depend on x. The text "
@@ -268,7 +219,7 @@ ENERGY_CLAIMS = (  # the energy, its rate, the law and what is said to follow fr
     ),
     Claim(
         equation="(18)",
-        printed=POWER_FLOW_PRINTED,
+        printed="V_t = theta_t*(a2*u + (a3 - a1)*E*I*phi_x(t,0))",
         corrected=POWER_FLOW,
         check=is_power,
         evidence="Integrated by parts with payload and a1, a2, a3 free (SymPy): dV/dt is theta_t (a2 u + (a2 - a1) "
@@ -277,7 +228,7 @@ ENERGY_CLAIMS = (  # the energy, its rate, the law and what is said to follow fr
     ),
     Claim(
         equation="(19)",
-        printed=CONTROL_LAW_PRINTED,
+        printed="u = -K1*theta_t - K2*E*I*phi_x(t,0); 0 < K1 < oo; 0 < K2 < oo",
         corrected=CONTROL_LAW,
         check=are_proven_gains,
         evidence="dV/dt <= 0 needs a1/a2 = 1 - K2 > 0 (SymPy): K1 > 0 and K2 < 1, negative K2 included; "
@@ -286,7 +237,7 @@ ENERGY_CLAIMS = (  # the energy, its rate, the law and what is said to follow fr
     ),
     Claim(
         equation="(20)",
-        printed=DECAY_PRINTED,
+        printed="V_t = -K*theta_t^2",
         corrected=DECAY,
         check=is_decay,
         evidence="(19) in the true dV/dt (SymPy). K is not defined before (20). Semidefinite: theta itself is "
@@ -295,8 +246,8 @@ ENERGY_CLAIMS = (  # the energy, its rate, the law and what is said to follow fr
     ),
     Claim(
         equation="(18)-(20): damping C > 0",
-        printed=DAMPED_LAW_PRINTED,
-        corrected=DAMPED_LAW,
+        printed="u = -K1*theta_t - K2*E*I*phi_x(0,t)",
+        corrected="u = -K1*theta_t - K2*E*I*(phi_x(0,t) + C*phi_xt(0,t))",
         check=is_damped_decay,
         evidence="With E (1 + C d/dt) in (2), (3), (5), dV/dt = -a2 K1 theta_t^2 - a1 C integral(E I phi_xt^2) "
         "needs the moment with its damping part; what a strain gauge gives, E I phi', leaves a term of no sign "

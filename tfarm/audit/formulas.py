@@ -3,7 +3,7 @@
     rho*A*(y_tt + x*theta_tt) - kappa*G*A*(y_xx - phi_x) = 0
     V_t = theta_t*(a2*u + (a2 - a1)*E*I*phi_x(0,t)); a3 = a1
 
-Clauses are parted by semicolons.  y_xt is a derivative of y at the running x, y_xt(L,t) the same at the tip, and
+Clauses are separated by semicolons.  y_xt is a derivative of y at the running x, y_xt(L,t) the same at the tip, and
 each is a symbol of its own (a jet coordinate).  theta, V and the gains do not depend on x, so that theta_x is 0.
 Of the two arguments the one that is a place (0, L, x) is taken as the place, in whatever order they come.
 integral(f) is the integral of f over x from 0 to L.
@@ -12,8 +12,8 @@ Calculus on jets: total derivatives, and identities between integrals along the 
 
 A small checker of dimensions: every sum must add like to like, every exponential must be of a pure number.
 
-A dimension is a product of powers of kg, m and s, as SymPy has it; those of what stands in the paper's formulas are as
-its equations need them.
+A dimension is a product of powers of kg, m and s, as SymPy has it; those of the paper's symbols are as its
+equations need them.
 """
 
 from __future__ import annotations
@@ -24,14 +24,13 @@ from functools import cache
 from typing import Any
 
 import sympy as sp
-from sympy.printing.latex import LatexPrinter
 
 Expression = Any  # sympy comes without types
 OF_TIME = ("theta", "Theta", "V", "K2", "a1")
 JET = re.compile(r"\b(y|phi|theta|Y|Phi|Theta|V|K2|a1)(?:_(x*t*))?(?!\w)(?:\(([0Lxts]), ?([0Lxts])\))?")
 NAME = re.compile(r"[A-Za-z]\w*")
 LETTERS = {"pm": r"\pm", "lambda_": r"\lambda", **{f"Delta_k{i}": rf"\Delta k_{{{i}}}" for i in (1, 2, 3, 4)}}
-FUNCTIONS = {"sqrt": sp.sqrt, "exp": sp.exp, "integral": sp.Function("integral"), "oo": sp.oo}
+FUNCTIONS = {"sqrt": sp.sqrt, "exp": sp.exp, "oo": sp.oo}
 
 
 @cache
@@ -41,7 +40,7 @@ def symbol(name: str) -> Expression:
 
 
 def symbols(names: str) -> list[Expression]:
-    """Several, their names parted by blanks."""
+    """Several, their names separated by blanks."""
     return [symbol(name) for name in names.split()]
 
 
@@ -53,14 +52,16 @@ def jet(field: str, x: int = 0, t: int = 0, at: str = "") -> Expression:
     return symbol(f"{field}{'_' + orders if orders else ''}{'' if field in OF_TIME else at}")
 
 
-def jet_parts(s: Expression) -> tuple[str, int, int, str] | None:
-    """(field, orders in x and t, place) of a jet symbol, None of any other."""
-    match = JET.fullmatch(s.name)
-    if match is None:
-        return None
-    field, orders, place, time = match.groups()
-    orders = orders or ""
-    return field, orders.count("x"), orders.count("t"), f"({place},{time})" if place else ""
+def jets(f: Expression) -> list[tuple[Expression, str, int, int, str]]:
+    """(symbol, field, order in x, order in t, place) of each jet in an expression."""
+    found = ((s, match.groups(default="")) for s in f.free_symbols if (match := JET.fullmatch(s.name)))
+    return [
+        (s, field, orders.count("x"), orders.count("t"), f"({place},{time})" if place else "")
+        for s, (field, orders, place, time) in found
+    ]
+
+
+x, L = symbol("x"), symbol("L")
 
 
 @cache
@@ -72,11 +73,11 @@ def parsed(text: str) -> Expression:
         place, time = (first, second) if first in ("", "0", "L", "x") else (second, first)
         return jet(field, orders.count("x"), orders.count("t"), f"({place},{time})" if place else "")
 
-    return _read(text, normal)
+    return _read(text, normal, sp.Function("integral"))
 
 
-def _read(text: str, jet_of: Callable[[re.Match[str]], Expression], **how: Any) -> Expression:
-    names: dict[str, Expression] = dict(FUNCTIONS)
+def _read(text: str, jet_of: Callable[[re.Match[str]], Expression], integral: Any, **how: Any) -> Expression:
+    names: dict[str, Expression] = {**FUNCTIONS, "integral": integral}
 
     def stand_in(match: re.Match[str]) -> str:
         name = f"jet{len(names)}"
@@ -89,38 +90,27 @@ def _read(text: str, jet_of: Callable[[re.Match[str]], Expression], **how: Any) 
     return sp.parse_expr(code, local_dict=names, **how)
 
 
-class _AsWritten(LatexPrinter):  # type: ignore[misc]
-    """TeX in the order of the text: derivatives as fractions, integrals along the arm."""
-
-    def _print_Symbol(self, expr: Expression, style: str = "plain") -> str:
-        found = JET.fullmatch(expr.name)
-        if found is None:
-            return LETTERS.get(expr.name) or str(super()._print_Symbol(expr, style))
-        field, by = sp.latex(sp.Symbol(found[1])), found[2] or ""
-        field += f"({found[3]},{found[4]})" if found[3] else ""
-        below = " ".join(rf"\partial {letter}" + f"^{n}" * (n > 1) for letter in "xt" if (n := by.count(letter)))
-        above = r"\partial" + f"^{len(by)}" * (len(by) > 1)
-        return rf"\frac{{{above} {field}}}{{{below}}}" if by else field
-
-    def _print_Pow(self, expr: Expression) -> str:
-        return re.sub(r"^(\\frac\{[^{}]*\}\{[^{}]*\})\^", r"\\left(\1\\right)^", str(super()._print_Pow(expr)))
-
-    def _print_Function(self, expr: Expression, exp: str | None = None) -> str:
-        if expr.func.__name__ == "integral":
-            return rf"\int_0^L\left[{self._print(expr.args[0])}\right]dx"
-        return str(super()._print_Function(expr, exp))
-
-
 def tex(text: str) -> str:
-    """The TeX of a text, as it is written."""
-    printer = _AsWritten({"order": "none"})
+    """The TeX of a text by SymPy, in the text's own order; derivatives are indices, as in the text."""
 
     def written(part: str) -> str:
-        return printer.doprint(_read(part, lambda match: symbol(match[0]), evaluate=False)) if part else ""
+        if part.startswith("|"):
+            return str(sp.latex(determinant(part), mat_str="vmatrix", mat_delim=""))
+        read = _read(part, lambda match: symbol(match[0]), lambda f: sp.Integral(f, (x, 0, L)), evaluate=False)
+        heads = {s: s.name.partition("(") for s in read.free_symbols}
+        names = {
+            s: LETTERS.get(s.name, sp.latex(symbol(name)) + place + end) for s, (name, place, end) in heads.items()
+        }
+        return str(sp.latex(read, order="none", symbol_names=names))
 
     parts = re.split(r"( = | < |; )", text)
-    found = "".join(part.replace("; ", r",\quad ") if n % 2 else written(part) for n, part in enumerate(parts))
+    found = "".join(part.replace("; ", r",\quad ") if n % 2 else written(part) for n, part in enumerate(parts) if part)
     return re.sub(r"\b1 (\\cdot )?(?=\\frac\{1\})", "", found.replace(r"+ \pm", r"\pm"))
+
+
+def determinant(text: str) -> Expression:
+    """The matrix of a text such as |a11 a12 / a21 a22|."""
+    return sp.Matrix([[parsed(entry) for entry in row.split()] for row in text.strip("|").split(" / ")])
 
 
 def clauses(text: str) -> list[str]:
@@ -141,7 +131,7 @@ def difference(text: str) -> Expression:
 
 
 def remainder(*expressions: Expression) -> str:
-    """What is left of expressions that should vanish: "0", or the rest, cut where it is long."""
+    """The rest of expressions that should vanish: "0", or the rest, cut where it is long."""
     left = [each for each in map(sp.factor_terms, map(sp.expand, expressions)) if each != 0]
     if not left:
         return "0"
@@ -151,15 +141,13 @@ def remainder(*expressions: Expression) -> str:
     return text if len(text) <= 160 else f"{text[:150]} ... ({len(text)} characters)"
 
 
-x, L = symbol("x"), symbol("L")
 AT_TIP = "(L,t)"  # places of a jet
 AT_ROOT = "(0,t)"
 
 
 def d_dx(f: Expression) -> Expression:
     """Total derivative by the running x; values at the ends do not move."""
-    moving = [(s, parts) for s in f.free_symbols if (parts := jet_parts(s)) and not parts[3]]
-    return sp.diff(f, x) + sum(sp.diff(f, s) * jet(field, i + 1, j) for s, (field, i, j, _) in moving)
+    return sp.diff(f, x) + sum(sp.diff(f, s) * jet(field, i + 1, j) for s, field, i, j, at in jets(f) if not at)
 
 
 def d_dt(f: Expression) -> Expression:
@@ -170,8 +158,8 @@ def d_dt(f: Expression) -> Expression:
 
 
 def _d_dt(f: Expression) -> Expression:
-    moving = [(s, parts) for s in f.free_symbols if (parts := jet_parts(s)) and s.name != "a1"]
-    return sum((sp.diff(f, s) * jet(field, i, j + 1, at) for s, (field, i, j, at) in moving), sp.Integer(0))
+    terms = (sp.diff(f, s) * jet(field, i, j + 1, at) for s, field, i, j, at in jets(f) if s.name != "a1")
+    return sum(terms, sp.Integer(0))
 
 
 def integral_parts(f: Expression) -> tuple[Expression, Expression]:
@@ -183,34 +171,28 @@ def integral_parts(f: Expression) -> tuple[Expression, Expression]:
 
 
 def at_running_point(f: Expression) -> Expression:
-    """Values at the tip as values at x: what holds for an arm of any length."""
-    tip = {s: jet(*found[:3]) for s in f.free_symbols if (found := jet_parts(s)) and found[3] == AT_TIP}
-    return f.subs(tip).subs(L, x)
+    """Values at the tip as values at x: for an arm of any length."""
+    return f.subs({s: jet(field, i, j) for s, field, i, j, at in jets(f) if at == AT_TIP}).subs(L, x)
 
 
 def at_root(f: Expression) -> Expression:
     """f at x = 0, where y = phi = 0 at all times (6), (7)."""
-    ends = {}
-    for s in f.free_symbols:
-        found = jet_parts(s)
-        if found and found[3] in ("", AT_ROOT) and found[0] in ("y", "phi"):
-            field, i, j, _ = found
-            ends[s] = jet(field, i, j, AT_ROOT) if i else sp.Integer(0)
+    fields = [each for each in jets(f) if each[4] in ("", AT_ROOT) and each[1] in ("y", "phi")]
+    ends = {s: jet(field, i, j, AT_ROOT) if i else sp.Integer(0) for s, field, i, j, _ in fields}
     return f.subs(ends).subs(x, 0)
 
 
 def unbalanced(f: Expression) -> str:
-    """What keeps f = integral(g) + h(tip, root) from vanishing for every motion: "0" if nothing does.
+    """The rest of f = integral(g) + h(tip, root), which should vanish for every motion: "0" if it does.
 
     Let the arm end at a running x.  f vanishes for every length if it does for length 0, and if its slope
     g + dh/dx vanishes: integration by parts, without having to guess what to integrate.
     """
     inside, outside = integral_parts(f)
-    outside = at_running_point(outside)
-    return remainder(inside + d_dx(outside), at_root(outside))
+    at_length = at_running_point(outside)
+    return remainder(inside + d_dx(at_length), at_root(at_length))
 
 
-Dimension = Any  # sympy comes without types
 KG, METRE, SECOND = sp.symbols("kg m s", positive=True)  # so that the root of a square is the unit itself
 UNITS = {"kg": KG, "m": METRE, "s": SECOND, "N": KG * METRE / SECOND**2, "Pa": KG / (METRE * SECOND**2)}
 
@@ -219,7 +201,7 @@ class MismatchError(Exception):
     """Unlike things are added."""
 
 
-def unit_dimension(text: str) -> Dimension:
+def unit_dimension(text: str) -> Expression:
     """The dimension of a unit such as "kg/m^3" or "N m s"; of no unit that of a pure number."""
     return sp.parse_expr(text.replace("^", "**").replace(" ", "*") or "1", local_dict=UNITS)
 
@@ -234,18 +216,18 @@ OTHERS = {
     "k4": "m s",
 }  # fmt: skip
 FIELD_UNITS = {"y": "m", "phi": "1", "theta": "1", "V": "N m", "Y": "m s", "Phi": "s", "Theta": "s"}
-PAPER_UNITS: dict[str, Dimension] = {name: unit_dimension(text) for name, text in (NEEDED | OTHERS).items()}
+PAPER_UNITS: dict[str, Expression] = {name: unit_dimension(text) for name, text in (NEEDED | OTHERS).items()}
 
 
-def spelled(dimension: Dimension) -> str:
+def spelled(dimension: Expression) -> str:
     """A dimension in SI base units."""
     powers = dimension.as_powers_dict()
     each = ((name, powers[UNITS[name]]) for name in ("kg", "m", "s"))
     return " ".join(name if n == 1 else f"{name}^{n}" for name, n in each if n) or "1"
 
 
-def dimension(f: Expression, units: dict[str, Dimension]) -> Dimension | None:
-    """Dimension of an expression, None of a zero.  Raises MismatchError."""
+def dimension(f: Expression, units: dict[str, Expression]) -> Expression | None:
+    """Expression of an expression, None of a zero.  Raises MismatchError."""
     if f.is_Symbol:
         return units[f.name]
     if f.is_number:
@@ -265,15 +247,15 @@ def dimension(f: Expression, units: dict[str, Dimension]) -> Dimension | None:
     raise TypeError(f"no dimension of {f}")
 
 
-def _like(found: list[Dimension | None]) -> Dimension | None:
+def _like(found: list[Expression | None]) -> Expression | None:
     kinds = {each for each in found if each is not None}
     if len(kinds) > 1:
         raise MismatchError(" + ".join(sorted(spelled(each) for each in kinds)))
     return kinds.pop() if kinds else None
 
 
-def mismatch(f: Expression, units: dict[str, Dimension]) -> str:
-    """What does not add up in an expression: "0" if all does."""
+def mismatch(f: Expression, units: dict[str, Expression]) -> str:
+    """The terms of different dimensions in a sum: "0" if there are none."""
     try:
         dimension(f, units)
     except MismatchError as found:
@@ -281,22 +263,15 @@ def mismatch(f: Expression, units: dict[str, Dimension]) -> str:
     return "0"
 
 
-def units_in(f: Expression, units: dict[str, Dimension]) -> dict[str, Dimension]:
-    """The dimension of every symbol of an expression; a derivative's is its field's by x and t."""
-    found = dict(units)
-    for s in f.free_symbols:
-        parts = jet_parts(s)
-        if parts and s.name not in units:
-            field, i, j, _ = parts
-            found[s.name] = unit_dimension(FIELD_UNITS[field]) / METRE**i / SECOND**j
-    return found
+def unlike(text: str, units: dict[str, Expression]) -> str:
+    """The terms of different dimensions in a text's equations: "0" if all sides and sums are of one dimension.
 
-
-def unlike(text: str, units: dict[str, Dimension]) -> str:
-    """What does not add up in a text's equations: "0" if all sides and sums are of one dimension."""
+    The dimension of a derivative is that of its field by x and t.
+    """
     for left, right in sides(text).items():
-        rest = left - right
-        found = mismatch(rest, units_in(rest, units))
+        fields = (each for each in jets(left - right) if each[0].name not in units)
+        own = {s.name: unit_dimension(FIELD_UNITS[field]) / METRE**i / SECOND**j for s, field, i, j, _ in fields}
+        found = mismatch(left - right, units | own)
         if found != "0":
             return found
     return "0"

@@ -1,6 +1,6 @@
-"""Table 1: its values against the material they name, its units against the equations they enter.
+"""Table 1, its values and units; equations (21)-(23) and the network's inputs of section 5; the audit of the paper.
 
-The audit of the paper: a row for each of its equations, its table and its appendix.
+The audit has a row for each equation of the paper, its table and its appendix.
 """
 
 from __future__ import annotations
@@ -10,27 +10,44 @@ from dataclasses import dataclass
 from functools import cache, partial
 from typing import Annotated
 
-from tfarm.schema import Quantity
+import sympy as sp
 
-from .appendix import APPENDIX_CLAIMS, DAMPING_CLAIM, LAMBDA
-from .energy import ENERGY_CLAIMS
-from .formulas import NEEDED, PAPER_UNITS, Dimension, clauses, mismatch, parsed, spelled, unit_dimension, unlike
-from .motion import MOTION_CLAIMS, TIME
-from .rows import AuditRow, Claim, in_words
-from .tuner import TUNER_CLAIMS
+from tfarm.arm import load
+from tfarm.schema import Quantity
+from tfarm.spectrum import modes
+
+from .energy import CONTROL_LAW, ENERGY_CLAIMS
+from .equations import APPENDIX_CLAIMS, DAMPING_CLAIM, LAMBDA, MOTION_CLAIMS, TIME
+from .formulas import (
+    NEEDED,
+    PAPER_UNITS,
+    Expression,
+    clauses,
+    difference,
+    jet,
+    mismatch,
+    parsed,
+    remainder,
+    sides,
+    spelled,
+    symbol,
+    symbols,
+    unit_dimension,
+    unlike,
+)
+from .rows import AuditRow, Claim
 
 ALUMINIUM_DENSITIES = (2550.0, 2900.0)  # kg/m^3: alloys from aluminium-lithium to those rich in copper and zinc
 PRINTED_E = 6.8944e10  # Pa, as printed
 PRINTED_G = 2.6517e10  # Pa
 PRINTED_A = 6.0e-4  # m^2
-OTHER_UNITS = "L: m; A: m^2; rho: kg/m^3; E: Pa; I_c: kg m^2; m: kg; kappa: 1; G: Pa"
 PAPER = (
     "Self-Tuning Vibration Control of a Rotational Flexible Timoshenko Arm Using Neural Networks, "
     "Advances in Acoustics and Vibration, 2012, article 852780"
 )
 
 
-def quantity(clause: str) -> tuple[str, float, Dimension]:
+def quantity(clause: str) -> tuple[str, float, Expression]:
     """Name, value and dimension of a text such as "rho = 2766.7 kg/m^3"."""
     name, _, rest = clause.partition(" = ")
     value, _, of = rest.partition(" ")
@@ -61,10 +78,9 @@ def are_units(text: str) -> str:
 
 def is_given(name: str, text: str) -> str:
     """Whether a parameter that (2), (3) and the a_ij need has a value of the right dimension."""
-    for clause in clauses(text):
-        if clause.startswith(f"{name} = "):
-            _, value, dimension = quantity(clause)
-            return "0" if value > 0 and dimension == unit_dimension(NEEDED[name]) else f"{name} in {spelled(dimension)}"
+    for clause in (clause for clause in clauses(text) if clause.startswith(f"{name} = ")):
+        _, value, dimension = quantity(clause)
+        return "0" if value > 0 and dimension == unit_dimension(NEEDED[name]) else f"{name} in {spelled(dimension)}"
     return f"{name} has no value"
 
 
@@ -73,7 +89,7 @@ def is_section(text: str) -> str:
     given = is_given("I", text)
     if given != "0":
         return given
-    value, sides = quantity(clauses(text)[0])[1], clauses(text)[1].removeprefix("rectangle ").split(" x ")
+    (_, value, _), sides = quantity(clauses(text)[0]), clauses(text)[1].removeprefix("rectangle ").split(" x ")
     width, depth = (quantity(f"side = {side}")[1] for side in sides)
     off = max(abs(width * depth / PRINTED_A - 1), abs(width * depth**3 / 12 / value - 1))
     return f"{off:.2g}" if off > 1e-12 else "0"  # doubles read from decimals
@@ -81,15 +97,12 @@ def is_section(text: str) -> str:
 
 def density_in_numbers() -> str:
     """What the density printed would mean."""
-    from tfarm.arm import load
-    from tfarm.spectrum import modes
-
     printed, used = (modes(load(name), 3).natural_frequency[1:] for name in ("sasaki2012-as-printed", "sasaki2012"))
     ratios = ", ".join(f"{ratio:.1f}" for ratio in printed / used)
     speeds = [math.sqrt(PRINTED_E / rho) / 1e3 for rho in (2.7667, 2766.7)]
     return (
         f"E/(2 G) - 1 = {PRINTED_E / (2 * PRINTED_G) - 1:.4f}, Poisson's ratio of aluminium. As printed, sound would "
-        f"run along the arm at {speeds[0]:.0f} km/s (mended: {speeds[1]:.2f}; diamond: about 18), and the first "
+        f"run along the arm at {speeds[0]:.0f} km/s (corrected: {speeds[1]:.2f}; diamond: about 18), and the first "
         f"natural frequencies would be {ratios} times as high (hub inertia 0.1 kg m^2)."
     )
 
@@ -100,7 +113,6 @@ TABLE_CLAIMS = (  # Table 1
         printed="rho = 2.7667 kg/m^3",
         corrected="rho = 2766.7 kg/m^3",
         check=is_aluminium,
-        typeset=in_words,
         evidence="E and G are those of aluminium, whose alloys weigh 2550 to 2900 kg/m^3: the printed number is "
         "right in g/cm^3. Residual: relative distance from that range.",
         measured=density_in_numbers,
@@ -110,15 +122,13 @@ TABLE_CLAIMS = (  # Table 1
         printed="C: kg/s",
         corrected="C: s",
         check=is_unit_of_damping,
-        typeset=in_words,
         evidence="C enters as 1 + C s (A.2), so C s is a pure number (dimension checker).",
     ),
     Claim(
         equation="Table 1 (other units)",
-        printed=OTHER_UNITS,
+        printed="L: m; A: m^2; rho: kg/m^3; E: Pa; I_c: kg m^2; m: kg; kappa: 1; G: Pa",
         check=are_units,
-        typeset=in_words,
-        evidence="With these units every sum in (1), (2), (4), (5) and the mended (A.2) adds like to like "
+        evidence="With these units every sum in (1), (2), (4), (5) and the corrected (A.2) adds like to like "
         "(dimension checker).",
     ),
     Claim(
@@ -126,7 +136,6 @@ TABLE_CLAIMS = (  # Table 1
         printed="no value",
         corrected="I = 1.8e-9 m^4; rectangle 0.1 m x 0.006 m",
         check=is_section,
-        typeset=in_words,
         evidence="(2), (3), (5), (A.2) and the a_ij need I.",
         doubt="The area does not decide it: rectangles of 6e-4 m^2 and 2 to 60 mm depth have I from 2.0e-10 to "
         "1.8e-7 m^4. The value is our assumption.",
@@ -136,9 +145,118 @@ TABLE_CLAIMS = (  # Table 1
         printed="no value",
         corrected="I_h = 0.1 kg m^2",
         check=partial(is_given, "I_h"),
-        typeset=in_words,
         evidence="(3), (10) and a_41 to a_44 need I_h.",
         doubt="Nothing in the paper decides it. The value is our assumption.",
+    ),
+)
+
+
+INCREMENT = "dw = -eta_c*g + alpha_c*dw_before"
+UPDATE_PRINTED = "w_next = w - dw"
+UPDATE = "w_next = w + dw"
+COST = "E = 1/2*a*x^2 + 1/2*b*e^2; e = u - K*x"
+INPUT_NEURONS = 6  # neurons, section 5
+
+
+def descends(increment: str, update: str) -> str:
+    """What keeps (21) with (22) from being descent with momentum on the cost c w^2/2, whose gradient is c w.
+
+    With M the map (w, dw_before) -> (w_next, dw): det(I - M) = eta c > 0 (were it negative, w would grow without
+    end for every eta), det M = alpha (the memory), and w_next - w is the increment dw by its name.
+    """
+    w, dw, before, c = symbols("w dw dw_before c")
+    step = difference(increment)
+    dw_of = sp.solve(step, dw)[0].subs(symbol("g"), c * w)
+    w_of = sides(update)[symbol("w_next")]
+    M = sp.Matrix([w_of.subs(dw, dw_of), dw_of]).jacobian([w, before])
+    eta, alpha = symbols("eta_c alpha_c")
+    return remainder((sp.eye(2) - M).det() / (eta * c) - 1, M.det() - alpha, w_of - w - dw)
+
+
+def is_cost(text: str) -> str:
+    """(23): e, the control signal of section 5, against the torque of (19) with K for K2, x for the moment; and E."""
+    x, e, a, b, u = symbols("x e a b u")
+    moment = {parsed("phi_x(0,t)"): x / parsed("E*I"), symbol("K2"): symbol("K")}
+    torque = sides(CONTROL_LAW)[u].subs(moment)
+    given = sides(text)
+    signal = given[e].subs(u, given.get(u, torque))  # "control input": the torque, unless the text defines it
+    curvature = sp.hessian(given[symbol("E")], (x, e)) - sp.diag(a, b)
+    return remainder(signal - torque, *curvature)
+
+
+def are_gain_units(text: str) -> str:
+    """(20), (23): each gain's dimension by its equation; one name cannot have two."""
+    x, theta_t = symbol("x"), jet("theta", t=1)
+    needs: dict[str, set[Expression]] = {}
+    places = {jet("V", t=1): (theta_t**2, unit_dimension("N m s")), symbol("e"): (x, unit_dimension("1"))}
+    for left, right in sides(text).items():
+        factor, dimension = places[left]
+        for name in (s.name for s in right.coeff(factor).free_symbols if s.name.startswith("K")):
+            needs.setdefault(name, {PAPER_UNITS[name]} if name in PAPER_UNITS else set()).add(dimension)
+    clashes = [f"{name}: {' and '.join(sorted(map(spelled, two)))}" for name, two in needs.items() if len(two) > 1]
+    return "; ".join(clashes) or "0"
+
+
+TUNER_CLAIMS = (  # the learning rule, the cost, and section 5 on them
+    Claim(
+        equation="(21)",
+        printed=INCREMENT,
+        check=lambda text: descends(text, UPDATE),
+        evidence="Gradient descent with momentum, together with the corrected (22) (SymPy, quadratic cost). The text "
+        "after (21) gives the increment the other sign and no momentum: either (21) or (22) may be corrected, here "
+        "(22) is. The gradient needs dx/dK, how the arm's moment answers to the gain, which the paper does not "
+        "give; its E is not Young's modulus.",
+    ),
+    Claim(
+        equation="(22)",
+        printed=UPDATE_PRINTED,
+        corrected=UPDATE,
+        check=lambda text: descends(INCREMENT, text),
+        evidence="With (21) as printed w - dw climbs: on c w^2/2 the map of (w, dw) has det(I - M) = -eta c, a "
+        "multiplier above 1 for every eta and alpha (SymPy). An increment is w(t+1) - w(t).",
+    ),
+    Claim(
+        equation="(23)",
+        printed=COST,
+        corrected=COST + "; u = -K1*theta_t",
+        check=is_cost,
+        evidence='Below (23) u is "the control input", in section 5 a "reference signal" with "control signals '
+        'e". By (19) the torque is -K1 theta_t - K2 x (SymPy).',
+        doubt="Two readings: u is the torque, then e = u - K x counts the moment feedback twice (to measure the "
+        "distance from the law it would be u + K x); or u is the reference and e the torque, then (23) agrees with "
+        "(19). The second is used.",
+    ),
+    Claim(
+        equation="(20), (23): K",
+        printed="V_t = -K*theta_t^2; e = u - K*x",
+        corrected="V_t = -a2*K1*theta_t^2; e = u - K2*x",
+        check=are_gain_units,
+        evidence="K in (20) is in N m s, K in (23) a pure number (dimension checker): two gains, a2 K1 and K2.",
+    ),
+    Claim(
+        equation="section 5: inputs",
+        printed="u(t), u(t-1), e(t), e(t-1), K, x(t), x(t-1)",
+        corrected="u(t), u(t-1), e(t), e(t-1), x(t), x(t-1)",
+        check=lambda text: str(len(text.split(", ")) - INPUT_NEURONS),  # signals beyond the neurons
+        evidence=f"{INPUT_NEURONS} input neurons, seven signals named (counted).",
+        doubt='The paper does not name the surplus one; a network with "no inner feedback loop" speaks against K, its '
+        "own output, and six neurons are read as the six without it.",
+    ),
+    Claim(
+        equation="section 5: alpha_c",
+        printed="alpha_c changed dynamically; alpha_c = 0.6",
+        corrected="alpha_c = 0.6",
+        check=lambda text: str(len(clauses(text)) - 1),  # statements beyond the first
+        evidence="Section 4 changes the momentum dynamically, by no rule; section 5 has one best value (counted).",
+        doubt="The constant 0.6 is used.",
+    ),
+    Claim(
+        equation="section 5: eta_c",
+        printed="eta_c of each weight its own; eta_c = 0.8",
+        corrected="eta_c = 0.8",
+        check=lambda text: str(len(clauses(text)) - 1),  # statements beyond the first
+        evidence="Section 4 gives each weight a learning rate of its own, section 5 has one value (counted).",
+        doubt="0.8 for all weights is used.",
     ),
 )
 

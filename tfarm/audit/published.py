@@ -1,8 +1,7 @@
 """Published natural frequencies against the exact ones: their number, ours, the difference, and why there is one.
 
 `literature.toml` has the numbers, with all they need to be computed again.  A row agrees if ours, rounded to the last
-printed digit, is what they printed.  One that does not must say why (`Case.why`), and one that does must not: neither a
-difference nor an excuse stands alone.
+printed digit, is what they printed.  One that does not must give a reason (`Case.why`), and one that does must not.
 """
 
 from __future__ import annotations
@@ -13,6 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from importlib.resources import files
+from itertools import groupby
+from operator import attrgetter
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -45,7 +46,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """A publication: `citation` says where its table stands, `reached` by what way its numbers came here."""
+    """A publication: `citation` names its table, `reached` the way of its numbers to here."""
 
     key: Annotated[str, Quantity("source", key="key")]
     citation: Annotated[str, Quantity("citation")]
@@ -63,16 +64,19 @@ def arm_of_case(case: Mapping[str, Any]) -> Arm:
     return arm_of_table({"name": "arm", "link": link | case.get("link", {}), "hub": hub, **parts})
 
 
-def _case(case: Mapping[str, Any]) -> Case:
-    why = dict.fromkeys(case.get("differs", ()), case.get("why", ""))
-    own = {key: case[key] for key in ("name", "theory", "quantity")}
-    return Case(arm=arm_of_case(case), printed=tuple(case["printed"]), why=why, **own)
-
-
 def _source(table: dict[str, Any]) -> Source:
     """The source of a table, whose theory and quantity are those of its cases but where these have others."""
     own = {key: table.pop(key) for key in ("key", "citation", "reached")}
-    return Source(cases=tuple(_case(table | each) for each in table["case"]), **own)
+    cases = tuple(
+        Case(
+            arm=arm_of_case(case),
+            printed=tuple(case["printed"]),
+            why=dict.fromkeys(case.get("differs", ()), case.get("why", "")),
+            **{key: case[key] for key in ("name", "theory", "quantity")},
+        )
+        for case in (table | each for each in table["case"])
+    )
+    return Source(cases=cases, **own)
 
 
 ALL = tuple(map(_source, tomllib.loads((files("tfarm.audit") / "literature.toml").read_text("utf-8"))["source"]))
@@ -174,15 +178,13 @@ class Validation:
     @property
     def differences(self) -> Annotated[list[Difference], Quantity("differences")]:
         """A row a reason."""
-        groups: dict[tuple[str, str, str], list[PublishedRow]] = {}
-        for row in self.rows:
-            if not row.agrees:
-                groups.setdefault((row.source, row.case, row.why), []).append(row)
+        rows = (row for row in self.rows if not row.agrees)
+        groups = ((key, list(of)) for key, of in groupby(rows, attrgetter("source", "case", "why")))
         return [
             Difference(
                 source, case, ", ".join(str(row.mode) for row in of), max((r.difference for r in of), key=abs), why
             )
-            for (source, case, why), of in groups.items()
+            for (source, case, why), of in groups
         ]
 
     @property

@@ -62,7 +62,7 @@ def fit(
     json: Json = False,
 ) -> None:
     """The numbers of an arm that explain what was measured of it, with intervals, and what is left open."""
-    from tfarm.fitting.results import FitResult, save_fit
+    from tfarm.fitting.fit import save_fit
 
     found = _fitted(
         load_arm(arm, theory), data or [], free, mode or [], profile=not covariance,
@@ -77,7 +77,7 @@ def fit(
 
         with progress() as advance:
             page = write([found.arm], out, fits=[found], progress=advance, notice=tell)
-    emit(FitResult(found), json, png=png, also=(save, page))
+    emit(found, json, png=png, also=(save, page))
     if not found.converged:
         raise typer.Exit(3)
 
@@ -136,15 +136,14 @@ def frf(
     """The frequency response of a record over time, by averaged cross-spectra, with coherence."""
     named, columns = zip(*(_named(each) for each in (output, input)), strict=True)
     from tfarm.fitting.recording import frequency_response, read_recording
-    from tfarm.fitting.results import EstimateResult, measured_table
 
     how = {"estimator": estimator, "window": window}
     found = frequency_response(read_recording(record), *named, columns=columns, segment=segment, overlap=overlap, **how)
-    emit(EstimateResult(found), json, csv=csv)
+    emit(found, json, csv=csv)
     if csv is None and not json:
-        show(measured_table(found.measured))
-    if found.clock:
-        tell(found.clock)
+        show(found.csv_table)
+    if found.note:
+        tell(found.note)
 
 
 @app.command()
@@ -158,13 +157,12 @@ def ring(
 ) -> None:
     """Frequency and damping of a decay, with intervals."""
     from tfarm.fitting.recording import read_recording
-    from tfarm.fitting.results import RingResult
     from tfarm.fitting.ringdown import MOST_RINGING
     from tfarm.fitting.ringdown import ring as find
 
     count = whole_number("--modes", modes, 1, MOST_RINGING)
     found = find(read_recording(record), signal, start=start, stop=stop, modes=count)
-    emit(RingResult(found), json)
+    emit(found, json)
 
 
 def _named(text: str) -> tuple[str, str]:

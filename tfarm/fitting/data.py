@@ -1,14 +1,12 @@
 """A measured frequency response: one signal of a rig over another, at frequencies of a swept sine or of an estimate.
 
-How far a measured value may be from the true one: by what the file says, by its coherence, or by its own scatter.
+Its noise is given by the file (sigma), by its coherence, or by its own scatter.
 
-Columns of numbers from a text file, as laboratories write them.
+Columns of numbers are read from a text file as laboratories write them.  Comma, semicolon or tab separate the columns,
+whichever the header has; with the last two a decimal comma is read.  A byte order mark, Windows line ends, empty lines
+and lines that begin with # are passed over.  A unit in brackets after a name, "t [s]", is not part of it.
 
-Comma, semicolon or tab separate the columns, whichever the header has; behind the last two a decimal comma is read.  A
-byte order mark, Windows line ends, empty lines and lines that begin with # are passed over.  A unit in brackets behind
-a name, "t [s]", is not part of it.
-
-Measured responses from files: CSV, UFF 58.
+A response is read from CSV or from UFF 58:
 
     hz, re, im, coherence          hz or rad_s; re, im or abs, deg or db, deg; coherence or sigma and averages as known
     1.00, 0.312, -0.004, 0.998
@@ -25,7 +23,7 @@ import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,15 +31,32 @@ from numpy.typing import NDArray
 from tfarm.arm import INPUTS
 from tfarm.arm.reading import decoded
 from tfarm.arrays import Complex, Real
+from tfarm.columns import Column, Table
+from tfarm.digits import general, singly
 from tfarm.errors import MISSING, ParameterError, did_you_mean, naming
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.files import read_file
 from tfarm.records import record
+from tfarm.response.frequency import HERTZ
+from tfarm.schema import Quantity
 
 CONFIDENCE = 0.95  # of every interval of a fit: the usual one
-LEAST_SHARE = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence says
+LEAST_SHARE = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence
 SCATTER_NEIGHBOURS = 2  # neighbours on each side that a value is compared with
+SIX, NINE = singly(general, 6), singly(general, 9)  # digits of what was measured, and of the frequencies of its lines
 TYPICAL = 1.17741  # the median of |x + i y| of normal x and y of deviation 1: sqrt(2 ln 2)
+
+
+def require(is_met: object, key: str, value: object, remedy: str, file: str | None = None) -> None:
+    """Raise ParameterError unless a condition is met."""
+    if not is_met:
+        raise ParameterError(key=key, value=value, remedy=remedy, file=file)
+
+
+def require_all(key: str, values: Real, is_good: NDArray[np.bool_], remedy: str) -> None:
+    """Raise ParameterError for the first of the values that is not good."""
+    if not is_good.all():
+        raise ParameterError(key=key, value=float(values[~is_good][0]), remedy=remedy)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,58 +66,70 @@ class Measured:
 
     Both signals are named as in `response.signals` ("tip_acceleration", "strain@0.05"), `input` also as an arm's input
     is ("hub_torque").  `sigma` (n,) is the standard deviation of the real and of the imaginary part, each; `coherence`
-    (n,) between 0 and 1 is that of an estimate from so many independent `averages`.  `source` says where they are from,
-    `digest` is the SHA-256 of the file.
+    (n,) between 0 and 1 is that of an estimate from a number of independent `averages`.  `source` names the file,
+    `digest` is its SHA-256.
 
-    Raises ParameterError for what no measurement can be: shapes that differ, frequencies that are not positive or do
-    not ascend, values that are no numbers or 0 everywhere, a coherence out of [0, 1] or 0 everywhere, a sigma that is
-    not positive.
+    Raises ParameterError for shapes that differ, frequencies that are not positive or do not ascend, values that are no
+    numbers or 0 everywhere, a coherence out of [0, 1] or 0 everywhere, a sigma that is not positive.
     """
 
-    output: str
-    input: str
+    output: Annotated[str, Quantity("output")]
+    input: Annotated[str, Quantity("input")]
     omega: Real
     values: Complex
     sigma: Real | None = None
     coherence: Real | None = None
     averages: int | None = None
-    source: str = "array"
-    digest: str = ""
+    source: Annotated[str, Quantity("file")] = "array"
+    digest: Annotated[str, Quantity(key="sha256")] = ""
 
     def __post_init__(self) -> None:
         for name, kind in {"omega": float, "values": complex, "sigma": float, "coherence": float}.items():
-            given = getattr(self, name)
-            if given is not None:
-                object.__setattr__(self, name, np.atleast_1d(np.asarray(given, dtype=kind)))
-        for name in ("values", "sigma", "coherence"):
-            held = getattr(self, name)
-            if held is not None and held.shape != self.omega.shape:
+            if getattr(self, name) is not None:
+                array: NDArray[Any] = np.atleast_1d(np.asarray(getattr(self, name), dtype=kind))
+                object.__setattr__(self, name, array)
                 remedy = f"one for each of the {self.omega.size} frequencies"
-                raise ParameterError(key=f"{self.name} {name}", value=held.shape, remedy=remedy)
-        w, ordered = self.omega, "repeated or not in ascending order; sort the rows, and average those of one frequency"
-        _check("frequency", w, (w > 0) & np.isfinite(w), "positive and finite; leave other rows out")
-        _check("frequency", w[1:], np.diff(w) > 0, ordered)
-        _check("frequency", w, np.isfinite(self.values), "has a value that is no number; leave the row out")
-        nothing = "0 everywhere: nothing was measured"
-        _check(f"{self.name} values", np.zeros(1), np.atleast_1d(self.values.any()), nothing)
-        if self.sigma is not None:
-            positive = (self.sigma > 0) & np.isfinite(self.sigma)
-            _check("sigma", self.sigma, positive, "a standard deviation is positive")
-        if self.coherence is not None:
-            g = self.coherence
-            _check("coherence", g, (g >= 0) & (g <= 1), "between 0 and 1")
-            _check("coherence", np.zeros(1), np.atleast_1d(g.any()), f"{nothing}; leave it out")
+                require(array.shape == self.omega.shape, f"{self.name} {name}", array.shape, remedy)
+        w, one, nothing = self.omega, np.ones(self.omega.size), "0 everywhere: nothing was measured"
+        sigma, coherence = (one if each is None else each for each in (self.sigma, self.coherence))
+        ordered = "repeated or not in ascending order; sort the rows, and average those of one frequency"
+        require_all("frequency", w, (w > 0) & np.isfinite(w), "positive and finite; leave other rows out")
+        require_all("frequency", w[1:], np.diff(w) > 0, ordered)
+        require_all("frequency", w, np.isfinite(self.values), "has a value that is no number; leave the row out")
+        require(self.values.any(), f"{self.name} values", 0.0, nothing)
+        require_all("sigma", sigma, (sigma > 0) & np.isfinite(sigma), "a standard deviation is positive")
+        require_all("coherence", coherence, (coherence >= 0) & (coherence <= 1), "between 0 and 1")
+        require(coherence.any(), "coherence", 0.0, f"{nothing}; leave it out")
 
     @property
     def name(self) -> str:
-        """What is measured, as the command line has it: tip_acceleration/hub_angle."""
+        """Output and input, as the command line has them: tip_acceleration/hub_angle."""
         return f"{self.output}/{self.input}"
 
+    @property
+    def points(self) -> Annotated[int, Quantity("measured frequencies", key="points")]:
+        """The number of frequencies."""
+        return int(self.omega.size)
 
-def _check(key: str, values: Real, good: NDArray[np.bool_], remedy: str) -> None:
-    """Raise ParameterError for the first of the values that is not good."""
-    if not good.all():
-        raise ParameterError(key=key, value=float(values[~good][0]), remedy=remedy)
+    @property
+    def band(self) -> tuple[float, float]:
+        """The first and the last frequency [rad/s]."""
+        return float(self.omega[0]), float(self.omega[-1])
+
+    @property
+    def range_hz(self) -> Annotated[tuple[float, float], Quantity("frequency range", "Hz", key="range_hz")]:
+        """The same [Hz]."""
+        return self.band[0] / HERTZ, self.band[1] / HERTZ
+
+    @property
+    def csv_table(self) -> Table:
+        """A row a frequency, in the columns that `read_measured` reads."""
+        columns = {"re": self.values.real, "im": self.values.imag, "sigma": self.sigma, "coherence": self.coherence}
+        titles = {"re": f"Re {self.name}", "im": f"Im {self.name}"}
+        rows = [Column("hz", "frequency", "Hz", of=self.omega / HERTZ, digits=NINE)]
+        rows += [Column(key, titles.get(key, key), of=x, digits=SIX) for key, x in columns.items() if x is not None]
+        rows += [Column("averages", "averages", of=[self.averages] * self.points)] * (self.averages is not None)
+        return Table(columns=tuple(rows))
 
 
 def in_parts(values: Complex) -> Real:
@@ -111,10 +138,9 @@ def in_parts(values: Complex) -> Real:
 
 
 def must_be_measured(measured: object) -> None:
-    """Raise ParameterError where a path or anything else stands in the place of a measured response."""
-    if not isinstance(measured, Measured):
-        remedy = "is no measured response; give what tfarm.read_measured returns, or a tfarm.Measured"
-        raise ParameterError(key="measured", value=measured, remedy=remedy)
+    """Raise ParameterError for a path or anything else in the place of a measured response."""
+    remedy = "is no measured response; give what tfarm.read_measured returns, or a tfarm.Measured"
+    require(isinstance(measured, Measured), "measured", measured, remedy)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,13 +148,12 @@ def must_be_measured(measured: object) -> None:
 class Noise:
     """The standard deviation `sigma` (n,) of real and imaginary part, each; infinite where nothing was measured.
 
-    `is_known` is whether it is in the units of the values, or only up to a factor that the residuals have to say.
-    `road` says where it is from.
+    `is_known` is whether it is in the units of the values, or only up to a factor that the residuals determine.
     """
 
     sigma: Real
     is_known: bool
-    road: str
+    source: Annotated[str, Quantity("noise by", key="noise")]
 
 
 def noise_of(data: Measured) -> Noise:
@@ -138,19 +163,17 @@ def noise_of(data: Measured) -> Noise:
     (Bendat and Piersol 2010, (9.90)); without n it is known up to a factor.  With nothing given it is the scatter of
     the values about a parabola through their neighbours.
     """
-    size = abs(data.values)
     if data.sigma is not None:
-        return Noise(sigma=data.sigma, is_known=True, road="sigma of the file")
-    if data.coherence is not None:
-        g = data.coherence
-        with np.errstate(divide="ignore"):
-            share = np.sqrt((1.0 - g) / (2.0 * (data.averages or 1) * g))
-        sigma = np.asarray(size * np.maximum(share, LEAST_SHARE), dtype=float)
-        sigma[(g == 0) | (size == 0)] = np.inf  # a share of nothing says nothing
-        known = data.averages is not None
-        road = f"coherence of {data.averages} averages" if known else "coherence, up to a factor"
-        return Noise(sigma=sigma, is_known=known, road=road)
-    return Noise(sigma=_scatter(data.values), is_known=False, road="scatter of the values")
+        return Noise(sigma=data.sigma, is_known=True, source="sigma of the file")
+    if data.coherence is None:
+        return Noise(sigma=_scatter(data.values), is_known=False, source="scatter of the values")
+    g, size = data.coherence, abs(data.values)
+    with np.errstate(divide="ignore"):
+        share = np.maximum(np.sqrt((1.0 - g) / (2.0 * (data.averages or 1) * g)), LEAST_SHARE)
+    sigma = np.where((g == 0) | (size == 0), np.inf, size * share)  # a share of nothing is no deviation
+    known = data.averages is not None
+    source = f"coherence of {data.averages} averages" if known else "coherence, up to a factor"
+    return Noise(sigma=sigma, is_known=known, source=source)
 
 
 def _scatter(values: NDArray[Any]) -> Real:
@@ -158,13 +181,13 @@ def _scatter(values: NDArray[Any]) -> Real:
 
     It is LEAST_SHARE of the value at least.
     """
-    n = values.size
-    if n < 2 * SCATTER_NEIGHBOURS + 1:
-        return np.maximum(abs(values), LEAST_SHARE * abs(values).max())
+    size = abs(values)
+    if size.size < 2 * SCATTER_NEIGHBOURS + 1:
+        return np.maximum(size, LEAST_SHARE * size.max())
     # x_k less the parabola through x_(k-2), x_(k-1), x_(k+1), x_(k+2): weights -1/6, 2/3, 2/3, -1/6 of these
     weights = np.array([1 / 6, -2 / 3, 1.0, -2 / 3, 1 / 6])
     away = np.convolve(values, weights, mode="valid") / np.sqrt((weights**2).sum())
-    size, inside = abs(values), abs(values[SCATTER_NEIGHBOURS:-SCATTER_NEIGHBOURS])
+    inside = size[SCATTER_NEIGHBOURS:-SCATTER_NEIGHBOURS]
     relative = abs(away[inside > 0]) / inside[inside > 0]
     typical = float(np.median(relative)) / TYPICAL if relative.size else 1.0
     least = max(1e-3 * float(np.median(size)), 1e-6 * float(size.max()))  # which a value of 0 is taken for
@@ -194,15 +217,8 @@ class Sheet:
 
     def refuse(self, name: str, wrong: NDArray[np.bool_], remedy: str) -> None:
         """Raise ParameterError for the first row (rows,) in which a column is wrong, naming its line."""
-        if wrong.any():
-            at = int(wrong.argmax())
-            value = float(self.columns[name][at])
-            raise ParameterError(key=f"line {self.lines[at]}, {name}", value=value, remedy=remedy)
-
-
-def digest_of(data: bytes) -> str:
-    """The SHA-256 of a file's bytes."""
-    return hashlib.sha256(data).hexdigest()
+        at = int(wrong.argmax())
+        require(not wrong[at], f"line {self.lines[at]}, {name}", float(self.columns[name][at]), remedy)
 
 
 def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
@@ -213,64 +229,52 @@ def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
     """
     data = read_file(path, MOST_RECORD_BYTES, key=key, what="a .csv file")
     with naming(path):
-        text = decoded(data, "is not UTF-8 text; save the file as CSV in UTF-8")
-        numbered = enumerate(text.splitlines(), start=1)
+        numbered = enumerate(decoded(data, "is not UTF-8 text; save the file as CSV in UTF-8").splitlines(), start=1)
         rows = [(number, line) for number, line in numbered if line.strip() and not line.lstrip().startswith("#")]
-        if not rows:
-            remedy = "the file is empty; begin with the names of columns"
-            raise ParameterError(key="header", value=MISSING, remedy=remedy)
+        require(rows, "header", MISSING, "the file is empty; begin with the names of columns")
         separator = next((each for each in "\t;" if each in rows[0][1]), ",")
-        units = _header(_cells(rows[0][1], separator))
-        if len(rows) == 1:
-            raise ParameterError(key="rows", value=0, remedy="a header and nothing below it")
+        units = _header(list(map(_cell, rows[0][1].split(separator))))
+        require(len(rows) > 1, "rows", 0, "a header and nothing below it")
         values = _numbers(list(units), rows[1:], separator)
-    return Sheet(
-        columns=dict(zip(units, values.T, strict=True)),
-        units=units,
-        lines=tuple(number for number, _ in rows[1:]),
-        digest=digest_of(data),
-    )
+    lines = tuple(number for number, _ in rows[1:])
+    return Sheet(dict(zip(units, values.T, strict=True)), units, lines, hashlib.sha256(data).hexdigest())
 
 
 def _header(cells: Sequence[str]) -> dict[str, str]:
-    """The unit of each column by its name; a first line of numbers is a header left out."""
+    """The unit of each column by its name; a first line of numbers is a missing header."""
     units: dict[str, str] = {}
     for place, cell in enumerate(cells, start=1):
-        found = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", cell)
-        name, unit = found.groups() if found else (cell, None)
-        if math.isfinite(_number(name)):
-            remedy = "the first line holds numbers; begin the file with the names of its columns"
-            raise ParameterError(key="header", value=MISSING, remedy=remedy)
-        if not name or name in units:
-            remedy = "each column has a name of its own"
-            raise ParameterError(key=f"header, column {place}", value=name, remedy=remedy)
-        units[name] = (unit or "").strip()
+        name, unit = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", cell, re.DOTALL).groups("")  # type: ignore[union-attr]
+        remedy = "the first line holds numbers; begin the file with the names of its columns"
+        require(math.isnan(_number(name)), "header", MISSING, remedy)
+        require(name and name not in units, f"header, column {place}", name, "each column has a name of its own")
+        units[name] = unit.strip()
     return units
 
 
-def _cells(line: str, separator: str) -> list[str]:
-    return [cell.strip().strip('"').strip() for cell in line.split(separator)]
+def _cell(text: str) -> str:
+    return text.strip().strip('"').strip()
 
 
 def _numbers(names: Sequence[str], rows: Sequence[tuple[int, str]], separator: str) -> Real:
-    """The cells (rows, columns) of numbered lines as numbers."""
-    values = np.empty((len(rows), len(names)))
-    for at, (line, text) in enumerate(rows):
-        cells = _cells(text, separator)
-        if len(cells) != len(names):
-            remedy = f"{len(cells)} columns where the header names {len(names)}"
+    """The cells (rows, columns) of numbered lines, by NumPy; the line of a row that is none is named."""
+    for line, text in rows:
+        if (count := text.count(separator) + 1) != len(names):
+            remedy = f"{count} columns where the header names {len(names)}"
             raise ParameterError(key=f"line {line}", value=text, remedy=remedy)
-        values[at] = [_number(cell if separator == "," else cell.replace(",", ".")) for cell in cells]
-        if not np.isfinite(values[at]).all():
-            wrong = int(np.isnan(values[at]).argmax())
-            remedy = "no finite number; leave the row out, or write numbers as 50, 0.5 or 5e1"
-            raise ParameterError(key=f"line {line}, {names[wrong]}", value=cells[wrong], remedy=remedy)
+    lines = [text for _, text in rows]
+    values = np.loadtxt(lines, delimiter=separator, converters=_number, comments=None, ndmin=2)
+    for row, column in np.argwhere(np.isnan(values))[:1]:
+        remedy = "no finite number; leave the row out, or write numbers as 50, 0.5 or 5e1"
+        cell = lines[row].split(separator)[column]
+        raise ParameterError(key=f"line {rows[row][0]}, {names[column]}", value=_cell(cell), remedy=remedy)
     return values
 
 
 def _number(text: str) -> float:
-    """The finite number that a cell holds; nan for anything else."""
-    value = float(text) if re.fullmatch(NUMBER, text, re.ASCII) else math.nan
+    """The finite number that a cell holds, with a decimal point or comma; nan for anything else."""
+    plain = _cell(text).replace(",", ".")
+    value = float(plain) if re.fullmatch(NUMBER, plain, re.ASCII) else math.nan
     return value if math.isfinite(value) else math.nan
 
 
@@ -279,15 +283,14 @@ def data_of(text: str, key: str = "--data") -> Measured:
 
     Raises ParameterError for another form, a signal that is none, and for what `read_measured` refuses.
     """
-    names, given, path = text.partition("=")
+    names, _, path = text.partition("=")
     output, slash, input = (part.strip() for part in names.partition("/"))
-    if not (given and slash and path.strip()):
-        raise ParameterError(key=key, value=text, remedy=f"write {DATA_FORM}")
+    require(slash and path.strip(), key, text, f"write {DATA_FORM}")
     return read_measured(path.strip(), output, input)
 
 
 def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Measured:
-    """The response `output`/`input` of a CSV file, or of a UFF file with a data set 58 (its number behind a #).
+    """The response `output`/`input` of a CSV file, or of a UFF file with a data set 58 (its number after a #).
 
     Raises ParameterError, naming file and line, for a header without frequency or value, for frequencies that are
     repeated or not sorted, a coherence that is 0 everywhere, and for what else no measurement can be.
@@ -299,7 +302,10 @@ def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Meas
         return _of_uff(name, output, input)
     sheet = read_sheet(path, key=f"{output}/{input}")
     with naming(name):
-        omega, values = _frequencies(sheet), _values(sheet)
+        omega, values, averages = _frequencies(sheet), _values(sheet), sheet.columns.get("averages")
+        if averages is not None:
+            wrong = (averages != averages[0]) | (averages < 1) | (averages != np.round(averages))
+            sheet.refuse("averages", wrong, "a whole number of averages, the same in every row")
         return Measured(
             output=output,
             input=input,
@@ -307,7 +313,7 @@ def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Meas
             values=values,
             sigma=sheet.columns.get("sigma"),
             coherence=sheet.columns.get("coherence"),
-            averages=_averages(sheet),
+            averages=None if averages is None else int(averages[0]),
             source=name,
             digest=sheet.digest,
         )
@@ -316,28 +322,22 @@ def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Meas
 def check_signal(name: str, key: str) -> None:
     """Raise ParameterError, with the nearest name, for what is neither an output of an arm nor an input of its hub.
 
-    Where along the link it is, and whether the arm has it, is seen when the arm is known.
+    Its place along the link, and whether the arm has it, are checked when the arm is known.
     """
-    plain, known = name.partition("@")[0], (*OUTPUTS, *(each for each in INPUTS if each not in OUTPUTS))
-    if plain not in known:
-        raise ParameterError(key=key, value=name, remedy=did_you_mean(plain, known))
+    plain, known = name.partition("@")[0], tuple(dict.fromkeys((*OUTPUTS, *INPUTS)))
+    require(plain in known, key, name, did_you_mean(plain, known))
 
 
 # ------------------------------------------------------------ CSV
 def _frequencies(sheet: Sheet) -> Real:
     """The frequencies [rad/s], once the header is known to be one and they ascend."""
     for name in sheet.columns:
-        if name not in KNOWN_COLUMNS:
-            raise ParameterError(key="header", value=name, remedy=did_you_mean(name.lower(), KNOWN_COLUMNS))
-    given = [name for name in FREQUENCIES if name in sheet.columns]
-    if len(given) != 1:
-        remedy = "one column of frequencies: hz or rad_s"
-        raise ParameterError(key="header", value=", ".join(sheet.columns), remedy=remedy)
-    (name,) = given
-    unit, scale = FREQUENCIES[name]
-    if sheet.units[name].lower() not in ("", unit.lower()):
-        raise ParameterError(key=f"unit of {name}", value=sheet.units[name], remedy=f"{name} is in {unit}")
-    frequency = sheet.columns[name]
+        require(name in KNOWN_COLUMNS, "header", name, did_you_mean(name.lower(), KNOWN_COLUMNS))
+    found = [name for name in FREQUENCIES if name in sheet.columns]
+    require(len(found) == 1, "header", ", ".join(sheet.columns), "one column of frequencies: hz or rad_s")
+    name, (unit, scale) = found[0], FREQUENCIES[found[0]]
+    own, frequency = sheet.units[name], sheet.columns[name]
+    require(own.lower() in ("", unit.lower()), f"unit of {name}", own, f"{name} is in {unit}")
     sheet.refuse(name, ~(frequency > 0), "a frequency is positive; leave the row out")
     back = np.r_[False, np.diff(frequency) <= 0]
     again = frequency[back.argmax()] in frequency[: back.argmax()]
@@ -347,53 +347,37 @@ def _frequencies(sheet: Sheet) -> Real:
 
 def _values(sheet: Sheet) -> Complex:
     """The complex response, of whichever two columns there are."""
-    given = tuple(name for name in KNOWN_COLUMNS if name in sheet.columns and name in itertools.chain(*VALUE_PAIRS))
-    if given not in VALUE_PAIRS:
-        remedy = "one pair of columns for the value: re, im or abs, deg or db, deg; leave others out"
-        raise ParameterError(key="header", value=", ".join(sheet.columns), remedy=remedy)
-    first, second = (sheet.columns[name] for name in given)
-    if given == ("re", "im"):
+    pair = tuple(name for name in KNOWN_COLUMNS if name in sheet.columns and name in itertools.chain(*VALUE_PAIRS))
+    remedy = "one pair of columns for the value: re, im or abs, deg or db, deg; leave others out"
+    require(pair in VALUE_PAIRS, "header", ", ".join(sheet.columns), remedy)
+    first, second = (sheet.columns[name] for name in pair)
+    if pair == ("re", "im"):
         return np.asarray(first + 1j * second)
-    if given == ("abs", "deg"):
+    if pair == ("abs", "deg"):
         sheet.refuse("abs", first < 0, "a magnitude is not negative; is it db?")
     with np.errstate(over="ignore"):
-        size = first if given == ("abs", "deg") else 10.0 ** (first / 20)
+        size = first if pair == ("abs", "deg") else 10.0 ** (first / 20)
     return np.asarray(size * np.exp(1j * np.radians(second)))
-
-
-def _averages(sheet: Sheet) -> int | None:
-    """The number of independent averages, which is one for all rows."""
-    if "averages" not in sheet.columns:
-        return None
-    found = sheet.columns["averages"]
-    wrong = (found != found[0]) | (found < 1) | (found != np.round(found))
-    sheet.refuse("averages", wrong, "a whole number of averages, the same in every row")
-    return int(found[0])
 
 
 # ------------------------------------------------------------ UFF
 def _of_uff(name: str, output: str, input: str) -> Measured:
-    """The response of a UFF file: the one it has, or that of the number behind a # (from 1, as they stand there)."""
+    """The response of a UFF file: the only one, or that of the number after a #, from 1 in their order there."""
     path, _, number = name.partition("#")
     data = read_file(path, MOST_RECORD_BYTES, key=f"{output}/{input}", what="a .uff file")
     with naming(path):
         found = _responses(path)
-        if not found:
-            remedy = "the file holds no frequency response function (type 58, function 4)"
-            raise ParameterError(key="data set", value=58, remedy=remedy)
-        if not number and len(found) > 1:
-            remedy = f"the file holds {len(found)} responses; choose one by its number, as file.uff#2"
-            raise ParameterError(key="data set", value=MISSING, remedy=remedy)
+        remedy = "the file holds no frequency response function (type 58, function 4)"
+        require(found, "data set", 58, remedy)
+        remedy = f"the file holds {len(found)} responses; choose one by its number, as file.uff#2"
+        require(number or len(found) == 1, "data set", MISSING, remedy)
         place = int(number or 1)
-        if not 1 <= place <= len(found):
-            remedy = f"from 1 to {len(found)}, the responses of the file"
-            raise ParameterError(key="data set", value=place, remedy=remedy)
+        require(1 <= place <= len(found), "data set", place, f"from 1 to {len(found)}, the responses of the file")
         omega = 2 * np.pi * np.asarray(found[place - 1]["x"], dtype=float)
         values: NDArray[Any] = np.asarray(found[place - 1]["data"], dtype=complex)
         kept = slice(int(omega.size > 0 and omega[0] == 0), None)  # the line at 0 Hz that spectra begin with
-        return Measured(
-            output=output, input=input, omega=omega[kept], values=values[kept], source=name, digest=digest_of(data)
-        )
+        digest = hashlib.sha256(data).hexdigest()
+        return Measured(output=output, input=input, omega=omega[kept], values=values[kept], source=name, digest=digest)
 
 
 def _responses(path: str) -> list[dict[str, Any]]:

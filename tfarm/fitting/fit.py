@@ -1,53 +1,70 @@
-"""The fit of an arm to what was measured of it: which numbers explain it, how sure, and which are left open.
+"""The fit of an arm to what was measured of it: its numbers, their intervals, and what the data do not determine.
 
-The arms that the data leave possible: drawn about the best one, and what a loop is on each of them.
+Arms that the data leave possible are drawn from the normal distribution that the residuals have about their least sum,
+and kept where the true sum of squares agrees with it; along what the data do not determine, within a factor of e of the
+start.
 
-Drawn from the normal distribution that the residuals have about their least sum, kept where the true sum of squares
-agrees with it; along what the data do not determine, within a factor of e of the start: no knowledge of theirs.
-
-Several records of one response: what they say one by one, and a bootstrap over them.
-
-The noise within a record is not all that differs from one sweep to the next: amplitudes, temperatures, the hand that
-clamped the link.  What the numbers scatter by from record to record says so, and drawing whole records anew (Efron
-1979) gives intervals that know of it.
+Of several records of one response there are the numbers by each record, and a bootstrap over them.  The noise within a
+record is not all that differs from one sweep to the next: amplitudes, temperatures, the hand that clamped the link.
+Drawing whole records anew (Efron 1979) gives intervals that include it.
 """
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.special import gammaincinv
 
 from tfarm.arm import Arm, must_be_arm
+from tfarm.arm.writing import to_toml
 from tfarm.arrays import LEAST_SIZE, Real
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.digits import listed
+from tfarm.errors import ConvergenceError
+from tfarm.files import write_file
 from tfarm.loop.plane import gain_map
 from tfarm.records import record
 from tfarm.response import transfer
+from tfarm.schema import Quantity
 
-from .data import Measured, must_be_measured, noise_of
+from .data import CONFIDENCE, Measured, must_be_measured, noise_of, require
 from .model import Parameter, Problem, Response, RingMode, parameters
-from .overlay import ratio_of
+from .overlay import ResonanceShift, ratio_of, resonance_shifts
 from .solve import (
     FIT_SEED,
     OPEN_DEVIATION,
     BetterError,
     Fitted,
+    Progress,
     Solution,
-    ToldInterval,
     best_solution,
+    confidence_intervals,
     is_explained,
     nearest_minimum,
     principal_axes,
-    sureness,
 )
 
-SENSOR_GAIN, SENSOR_DELAY = "gain", "delay"  # of a sensor, as `Response` has them: free beside the arm's numbers
-MENDED = 4  # times that a profile may find a lower sum of squares than the search did
+SENSOR_GAIN, SENSOR_DELAY = "gain", "delay"  # of a sensor, as `Response` has them: free like the arm's numbers
+MOST_RESTARTS = 4  # times that a profile may find a lower sum of squares than the search did
+
+
+@dataclass(frozen=True, slots=True)
+class FittedResponse:
+    """A response of the fit."""
+
+    name: Annotated[str, Quantity("response")]
+    source: Annotated[str, Quantity()]
+    sha256: Annotated[str, Quantity()]
+    frequencies: Annotated[int, Quantity("frequencies")]
+    low: Annotated[float, Quantity("from", "Hz", key="from_hz")]
+    high: Annotated[float, Quantity("to", "Hz", key="to_hz")]
+    noise: Annotated[str, Quantity("noise by")]
+    chi_squared: Annotated[float, Quantity("chi-squared", digits=4)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,27 +78,69 @@ class Fit:
 
     arm: Arm
     before: Arm
-    converged: bool
-    parameters: tuple[Fitted, ...]
-    not_determined: tuple[str, ...]
-    chi_squared: float
-    freedom: int
-    solution: Solution
-    profiled: bool
+    converged: Annotated[bool, Quantity("converged")]
+    parameters: Annotated[tuple[Fitted, ...], Quantity("fitted numbers")]
+    not_determined: Annotated[tuple[str, ...], Quantity("not identifiable")]
+    chi_squared: Annotated[float, Quantity("chi-squared", digits=4)]
+    freedom: Annotated[int, Quantity("degrees of freedom")]
+    solution: Annotated[Solution, Quantity(flat=True)]
+    interval_by: Annotated[str, Quantity("intervals by")]
+
+    @property
+    def arm_name(self) -> Annotated[str, Quantity("arm")]:
+        """The arm that the fit began with."""
+        return self.before.name
+
+    @property
+    def arm_table(self) -> Annotated[dict[str, Any], Quantity(key="arm")]:
+        """The fitted arm as its file has it."""
+        return tomllib.loads(to_toml(self.arm))
+
+    @property
+    def level(self) -> Annotated[float, Quantity()]:
+        """The probability of the intervals."""
+        return CONFIDENCE
 
     @property
     def finding(self) -> str:
-        """The numbers, and how well they explain the data, in words."""
+        """The numbers, and chi-squared."""
         numbers = ", ".join(f"{each.key} = {each.value:.6g}" for each in self.parameters)
         return f"{numbers}; chi-squared {self.chi_squared:.4g} of {self.freedom}"
 
     @property
     def responses(self) -> tuple[Measured, ...]:
-        """What was measured."""
+        """The measured responses."""
         return tuple(each.data for each in self.solution.problem.responses)
 
+    @property
+    def response_list(self) -> Annotated[list[FittedResponse], Quantity("responses", key="responses")]:
+        """A row a response."""
+        pairs = zip(self.solution.problem.responses, self.solution.parts, strict=True)
+        return [
+            FittedResponse(one.data.name, one.data.source, one.data.digest, one.data.points, *one.data.range_hz,
+                           one.noise.source, float(residuals @ residuals))
+            for one, residuals in pairs
+        ]  # fmt: skip
+
     @cached_property
-    def rms_log_error(self) -> float | None:
+    def resonances(self) -> Annotated[list[ResonanceShift], Quantity("resonances")]:
+        """A row a measured peak."""
+        responses = [(each.data, each.noise) for each in self.solution.problem.responses]
+        return resonance_shifts(self.before, self.arm, responses)
+
+    @property
+    def unexplained(self) -> Annotated[list[float], Quantity("peaks far from every pole of the arm [Hz]",
+                                                             key="unexplained_peaks_hz")]:  # fmt: skip
+        """Measured peaks that the fitted arm does not have."""
+        return [row.measured for row in self.resonances if row.after is None]
+
+    @cached_property
+    def records(self) -> Annotated[Repeats | None, Quantity("scatter between records")]:
+        """The scatter between the records of one response."""
+        return repeats(self)
+
+    @cached_property
+    def rms_log_error(self) -> Annotated[float | None, Quantity("rms of ln(computed/measured)", digits=4)]:
         """The root mean square of ln(computed/measured), complex, over all values; None where there are none."""
         if not self.responses:
             return None
@@ -91,16 +150,29 @@ class Fit:
         return float(np.sqrt((abs(away) ** 2).mean()))
 
     @property
-    def is_explained(self) -> bool | None:
+    def is_explained(self) -> Annotated[bool | None, Quantity(key="explained")]:
         """Whether noise alone is often so large; None where its size was taken from the residuals."""
         return is_explained(self.solution)
 
     @property
-    def verdict(self) -> str:
-        """In a word or three."""
+    def verdict(self) -> Annotated[str, Quantity()]:
+        """Whether it converged, and whether the model is rejected."""
         if not self.converged:
             return "not converged"
         return "fitted, but the arm does not explain the data" if self.is_explained is False else "fitted"
+
+    @property
+    def in_words(self) -> Annotated[str, Quantity("fit", key="in_words")]:
+        """Convergence, identified numbers, and whether the model is rejected."""
+        known = sum(each.identified for each in self.parameters)
+        share = f"reduced chi-squared = {self.chi_squared / max(self.freedom, 1):.3g}"
+        tests = {
+            None: "noise estimated from the residuals: the model cannot be tested",
+            True: f"model not rejected: {share}",
+            False: f"model rejected: {share}; the intervals, which rest on the noise alone, are too narrow",
+        }
+        start = "" if self.converged else "not converged: these are the best numbers so far; "
+        return f"{start}{known} of {len(self.parameters)} numbers identified; {tests[self.is_explained]}"
 
 
 def fit(
@@ -113,26 +185,26 @@ def fit(
     priors: Mapping[str, tuple[float, float]] | None = None,
     rings: Sequence[RingMode] = (),
     profile: bool = True,
-    progress: ToldInterval | None = None,
+    progress: Progress | None = None,
 ) -> Fit:
     """The arm whose free numbers explain the measured responses best.
 
     `free` are keys of the arm's TOML file, and "gain" and "delay" of each response's sensor; `start`, `bounds` and
     `priors` (mean, deviation) are by key, in SI units; `rings` are decays of single modes.  With `profile` each
-    interval is that of the profile likelihood, otherwise of the covariance; `progress` is told (done, total, what).
+    interval is that of the profile likelihood, otherwise of the covariance; `progress` gets (done, total, what).
     Raises ParameterError for a key that is none, and for more numbers than data.
     """
     subject = _problem(arm, data, free, start, bounds, priors, rings)
     found = best_solution(subject)
-    for _ in range(MENDED):
+    for _ in range(MOST_RESTARTS):
         try:
-            fitted, unknown = sureness(found, profile=profile, progress=progress)
+            fitted, unknown = confidence_intervals(found, profile=profile, progress=progress)
             break
         except BetterError as better:
             found = replace(nearest_minimum(better.found.problem, better.found.point), starts=found.starts)
     else:  # one valley after another: no end of it
         found = replace(found, converged=False)
-        fitted, unknown = sureness(found, profile=False)
+        fitted, unknown = confidence_intervals(found, profile=False)
     return Fit(
         arm=replace(found.problem.arm(found.point), name=f"{arm.name}-fitted"),
         before=replace(subject.arm(np.zeros(len(subject.parameters))), name=arm.name),
@@ -142,41 +214,36 @@ def fit(
         chi_squared=found.chi_squared,
         freedom=found.freedom,
         solution=found,
-        profiled=profile,
+        interval_by="profile likelihood" if profile else "covariance",
     )
 
 
 def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: Any, rings: Any) -> Problem:
-    """What is searched for: the arm's numbers, then the sensors' own, one of a kind for each response."""
+    """The search: the arm's numbers, then the sensors' own, one of a kind for each response."""
     must_be_arm(arm)
     data = tuple(data) if isinstance(data, Iterable) and not isinstance(data, str) else (data,)
     for each in data:
         must_be_measured(each)
-    if not data and not rings:
-        raise ParameterError(key="data", value=0, remedy="give at least one measured response, or a decay (--mode)")
+    require(data or rings, "data", 0, "give at least one measured response, or a decay (--mode)")
     keys = [str(key) for key in free if key not in (SENSOR_GAIN, SENSOR_DELAY)]
     family, numbers = parameters(arm, keys, start=start or {}, bounds=bounds or {}, priors=priors or {})
-    for each in data:
-        ratio_of(arm, each)
     own, responses = [*numbers], []
     for n, each in enumerate(data, start=1):
+        ratio_of(arm, each)
         places = {}
         for kind in (kind for kind in (SENSOR_GAIN, SENSOR_DELAY) if kind in free):
             places[kind] = len(own)
             own.append(_of_sensor(kind, kind if len(data) == 1 else f"{kind}:{n}", each))
         responses.append(Response(each, noise_of(each), **places))
+    require(own, "free", "nothing", "name what is free, such as link.youngs_modulus")
     subject = Problem(family, tuple(own), tuple(responses), tuple(rings))
-    if not subject.parameters:
-        raise ParameterError(key="free", value="nothing", remedy="name what is free, such as link.youngs_modulus")
     size = subject.residuals(np.zeros(len(own))).size
-    if size < len(own):
-        remedy = f"{size} numbers were measured; leave some out"
-        raise ParameterError(key="free", value=len(own), remedy=remedy)
+    require(size >= len(own), "free", len(own), f"{size} numbers were measured; leave some out")
     return subject
 
 
 def _of_sensor(kind: str, key: str, data: Measured) -> Parameter:
-    """The gain of a response's sensor, by its logarithm, or its delay, in the time that the highest frequency takes."""
+    """The gain of a response's sensor, by its logarithm, or its delay, over the inverse of the highest frequency."""
     is_gain = kind == SENSOR_GAIN
     size = 1.0 if is_gain else 1.0 / float(data.omega[-1])
     return Parameter(key=key, start=float(is_gain), low=-np.inf, high=np.inf, by_logarithm=is_gain, size=size)
@@ -184,11 +251,10 @@ def _of_sensor(kind: str, key: str, data: Measured) -> Parameter:
 
 ARMS = 40  # that a report draws
 DRAWS_KEPT = 0.999  # of the draws of a normal distribution: one whose sum of squares is larger is none of them
-DRAWS_EACH = 10  # times so many are drawn before it is given up
+DRAWS_EACH = 10  # draws for each arm wanted, at most
 FEWEST_RECORDS = 3  # records of one response, for a scatter
 DRAWS = 40  # of records
-INTERVAL_PERCENTS = (2.5, 97.5)  # per cent of the draws: a 95 % interval
-WIDER = 1.5  # times what the noise says: a scatter beyond is told
+WIDER = 1.5  # times the deviation by the noise: a wider scatter is named
 
 
 @dataclass(frozen=True)
@@ -202,7 +268,7 @@ class Possible:
 
 
 def possible(fit: Fit, count: int) -> Possible:
-    """So many arms that explain the data as well as the best one does, but for what noise is worth.
+    """A number of arms that explain the data as well as the best one does, but for the noise.
 
     Raises ConvergenceError where the sum of squares is so far from a parabola that draws of one are none of it.
     """
@@ -226,7 +292,7 @@ def possible(fit: Fit, count: int) -> Possible:
 
 
 def share_stable(those: Possible, across: Real, up: Real) -> Real:
-    """The share of the arms on which both gains hold (up, across), without a clock."""
+    """The share of the arms on which both gains are stable (up, across), in continuous time."""
     return np.asarray(np.mean([gain_map(arm, across, up).unstable == 0 for arm in those.arms], axis=0))
 
 
@@ -239,26 +305,26 @@ def response_band(those: Possible, output: str, omega: Real) -> tuple[Real, Real
 @dataclass(frozen=True)
 @record
 class Repeats:
-    """The fitted numbers by each record of `response` alone, `each` (records, numbers), and by draws of records.
+    """The fitted numbers by each record of `response` alone, `each` [SI], and by draws of records.
 
-    `drawn` (draws, numbers); both in SI units, in the order of `keys`: those that all records together determine.
+    `intervals` hold 95 % of the draws, `times_wider` is their standard deviation over that by the noise.
     """
 
-    response: str
-    keys: tuple[str, ...]
-    each: Real
-    drawn: Real
-    by_noise: Real
+    response: Annotated[str, Quantity("response")]
+    each: Annotated[list[dict[str, float]], Quantity()]
+    intervals: Annotated[dict[str, list[float]], Quantity("intervals by records")]
+    times_wider: Annotated[dict[str, float], Quantity("times wider than by noise")]
 
     @property
-    def intervals(self) -> Real:
-        """(numbers, 2): what 95 % of the draws of records lie in."""
-        return np.asarray(np.percentile(self.drawn, INTERVAL_PERCENTS, axis=0).T)
+    def count(self) -> Annotated[int, Quantity("records")]:
+        """The number of records."""
+        return len(self.each)
 
     @property
-    def times_wider(self) -> Real:
-        """(numbers,): the standard deviation of the draws over that which the noise says."""
-        return np.asarray(self.drawn.std(axis=0, ddof=1) / self.by_noise)
+    def in_words(self) -> Annotated[str, Quantity("finding", key="in_words")]:
+        """The numbers whose scatter is larger than the noise explains."""
+        larger = [f"{key} {times:.3g} times" for key, times in self.times_wider.items() if times > WIDER]
+        return f"larger than the noise explains: {listed(larger)}" if larger else "as the noise explains"
 
 
 def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
@@ -267,16 +333,18 @@ def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
     Each least sum over some of the responses begins at that over all; sensors of the others are held, and so is what
     all together do not determine.
     """
+    from scipy.stats import bootstrap
+
     own = fit.solution.problem
     names = [each.data.name for each in own.responses]
-    if not names or names.count(most := max(names, key=names.count)) < FEWEST_RECORDS:
-        return None
+    most = max(names, key=names.count, default="")
     records = [n for n, name in enumerate(names) if name == most]
+    if len(records) < FEWEST_RECORDS:
+        return None
     others = [n for n, name in enumerate(names) if name != most]
     every = list(enumerate(fit.parameters))  # a key with a colon is of one record's sensor, which others do not know
     known = [n for n, each in every if each.identified and each.deviation and ":" not in each.key]
-    keys = tuple(fit.parameters[n].key for n in known)
-    rng, start = np.random.default_rng(FIT_SEED), fit.solution.point
+    keys, start = [fit.parameters[n].key for n in known], fit.solution.point
 
     def numbers(chosen: Sequence[int]) -> Real:
         some = replace(own, responses=tuple(own.responses[n] for n in (*chosen, *others)))
@@ -286,6 +354,31 @@ def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
         point = nearest_minimum(some, start, {n: float(start[n]) for n in held}).point
         return np.array([own.parameters[n].value(float(point[n])) for n in known])
 
-    alone = np.array([numbers([n]) for n in records])
-    drawn = np.array([numbers(rng.choice(records, size=len(records)).tolist()) for _ in range(draws)])
-    return Repeats(most, keys, alone, drawn, np.array([fit.parameters[n].deviation for n in known]))
+    drawn = bootstrap(
+        (records,), numbers, n_resamples=draws, vectorized=False, method="percentile", confidence_level=CONFIDENCE,
+        rng=FIT_SEED,
+    )  # fmt: skip
+    ends = np.array(drawn.confidence_interval).T
+    wider = drawn.standard_error / np.array([fit.parameters[n].deviation for n in known])
+    return Repeats(
+        response=most,
+        each=[dict(zip(keys, numbers([n]).tolist(), strict=True)) for n in records],
+        intervals=dict(zip(keys, ends.tolist(), strict=True)),
+        times_wider=dict(zip(keys, wider.tolist(), strict=True)),
+    )
+
+
+def fitted_toml(fit: Fit) -> str:
+    """The fitted arm as a TOML file, with what was fitted to what among its assumptions."""
+    values = listed([f"{each.key} = {each.value:.6g}" for each in fit.parameters if "." in each.key])
+    lines = [f"Fitted: {values}, from the arm {fit.before.name}; {fit.in_words}."]
+    lines += [
+        f"Fitted to {each.name} of {Path(each.source).name}, SHA-256 {each.digest or 'none'}." for each in fit.responses
+    ]
+    lines += [f"Of the fit: {words}." for words in fit.not_determined]
+    return to_toml(replace(fit.arm, assumptions=(*fit.arm.assumptions, *lines)))
+
+
+def save_fit(fit: Fit, path: Path) -> None:
+    """Write the fitted arm to a temporary file, then rename it."""
+    write_file(path, fitted_toml(fit).encode(), key="--save")

@@ -32,7 +32,7 @@ from tfarm.response.signals import Signals
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import first_frequency
 
-from .data import NUMBER, Measured, Noise, in_parts
+from .data import NUMBER, Measured, Noise, in_parts, require
 
 SIGNED = ("offset",)  # numbers of an arm that may be negative
 UPPER_ENDS = {"gear_efficiency": 1.0, "poissons_ratio": 0.5}  # and those that end somewhere
@@ -47,7 +47,7 @@ NUDGE = 1e-6  # of s: for a slope along it by a difference, which is right to ab
 class Parameter:
     """A free number: its key, where the search starts, its bounds, all in SI units, and a prior (mean, deviation).
 
-    `by_logarithm` says that the search is for ln(value/start), otherwise for (value - start)/size.
+    With `by_logarithm` the search is for ln(value/start), otherwise for (value - start)/size.
     """
 
     key: str
@@ -100,13 +100,12 @@ def parameters(
 ) -> tuple[KeyedArms, tuple[Parameter, ...]]:
     """The family of an arm whose numbers under `keys` are free, and these numbers.
 
-    Each starts where `start` says, else at the arm's own value, or where that is 0 at a hundredth of what would matter.
+    Each starts where `start` has it, else at the arm's own value, or where that is 0 at a hundredth of a typical one.
     Raises ParameterError for a key that is none or is not free, and for bounds or a start that leave no room.
     """
-    for said, what in ((start, "start"), (bounds, "bounds"), (priors, "prior")):
-        for key in said:
-            if key not in keys:
-                raise ParameterError(key=what, value=key, remedy=f"is not free; {did_you_mean(key, keys)}")
+    for known, what in ((start, "start"), (bounds, "bounds"), (priors, "prior")):
+        for key in known:
+            require(key in keys, what, key, f"is not free; {did_you_mean(key, keys)}")
     family = KeyedArms(arm, keys)
     return family, tuple(
         _parameter(family, key, start.get(key), bounds.get(key), priors.get(key)) for key in family.keys
@@ -120,28 +119,25 @@ def _parameter(
     bounds: tuple[float, float] | None,
     prior: tuple[float, float] | None,
 ) -> Parameter:
-    name = key.split(".")[-1]
-    own = family.value(key)
+    name, own = key.split(".")[-1], family.value(key)
     if start is None:
         start = own if own and math.isfinite(own) else _typical(family.arm, key, own)
-    is_signed = name in SIGNED
-    most = family.arm.length if name == "x" else UPPER_ENDS.get(name, math.inf)
+    is_signed, length = name in SIGNED, family.arm.length
+    most = length if name == "x" else UPPER_ENDS.get(name, math.inf)
     low, high = bounds or (-math.inf if is_signed else 0.0, most)
-    if not low <= start <= high or not low < high:
-        remedy = f"starts at {start:g}; give bounds low,high around it, or another start"
-        raise ParameterError(key=f"bounds of {key}", value=(low, high), remedy=remedy)
-    if not is_signed and start <= 0:
-        raise ParameterError(key=f"start of {key}", value=start, remedy="a positive number in SI units")
-    if prior is not None and not (math.isfinite(prior[0]) and prior[1] > 0):
-        raise ParameterError(key=f"prior of {key}", value=prior, remedy="mean,deviation with a deviation above 0")
-    size = max(abs(start), 0.1 * family.arm.length) if is_signed else abs(start)
+    remedy = f"starts at {start:g}; give bounds low,high around it, or another start"
+    require(low <= start <= high and low < high, f"bounds of {key}", (low, high), remedy)
+    require(is_signed or start > 0, f"start of {key}", start, "a positive number in SI units")
+    is_prior = prior is None or (math.isfinite(prior[0]) and prior[1] > 0)
+    require(is_prior, f"prior of {key}", prior, "mean,deviation with a deviation above 0")
+    size = max(abs(start), 0.1 * length) if is_signed else start
     return Parameter(key=key, start=start, low=low, high=high, by_logarithm=not is_signed, size=size, prior=prior)
 
 
 def _typical(arm: Arm, key: str, own: float) -> float:
-    """A hundredth of what would matter, for a number that is 0, or a hundred times that of one that is infinite."""
+    """A hundredth of a typical value, for a number that is 0, or a hundred times it for one that is infinite."""
     w1, inertia = first_frequency(arm), arm.turned_inertia if math.isfinite(arm.turned_inertia) else arm.carried_inertia
-    EI, length = arm.link.EI, arm.length
+    EI, length, name = arm.link.EI, arm.length, key.split(".")[-1]
     of_the_arm = {
         "mass": arm.own_mass,
         "inertia": inertia,
@@ -155,29 +151,18 @@ def _typical(arm: Arm, key: str, own: float) -> float:
         "rotational_stiffness": EI / length,
         "stiffness": EI / length**3 if key.startswith("attachment") else EI / length,
     }
-    name = key.split(".")[-1]
-    if name not in of_the_arm:
-        raise ParameterError(key=f"start of {key}", value=own, remedy="say where to start the search")
-    return 0.01 * of_the_arm[name] if own == 0 else 100 * of_the_arm[name]
+    require(name in of_the_arm, f"start of {key}", own, "give the value where the search starts")
+    return (0.01 if own == 0 else 100) * of_the_arm[name]
 
 
-def drive_behind(arm: Arm, name: str) -> str:
-    """What drives an arm where that is the input of a response: the arm's own drive, where it is over a signal."""
-    return name if name in INPUTS and name not in OUTPUTS else arm.input
-
-
-def under_drive(arm: Arm, driven: str) -> Arm:
-    return arm if arm.input == driven else replace(arm, input=cast("Input", driven))
-
-
-FREQUENCY_KNOWN = 2e-3  # of itself: what a decay says of it, where its deviation is not said
+FREQUENCY_KNOWN = 2e-3  # of itself: its deviation in a decay by default
 RATIO_KNOWN = 0.1  # of itself, likewise
 EIGENVALUE_STEPS = 30  # of Newton's method, at most: from an undamped frequency on a few do
 EIGENVALUE_FIRM = 1e-12  # of an eigenvalue: a step that is less ends it
 MOST_NUMBER = 100  # number of a mode
 MODE_FORM = "N=FREQUENCY,RATIO such as 1=2.52hz,0.006 (hz or rad_s; a deviation after ~: 2.52hz~0.01)"
 MODE_PATTERN = re.compile(
-    rf"\s*(\d{{1,3}})\s*=\s*({NUMBER})\s*(hz|rad_s)\s*(?:~\s*({NUMBER}))?\s*"
+    rf"\s*(\d{{1,3}})\s*=\s*({NUMBER})\s*(?:hz|rad_s)\s*(?:~\s*({NUMBER}))?\s*"
     rf"(?:,\s*({NUMBER})\s*(?:~\s*({NUMBER}))?)?\s*",
     re.IGNORECASE | re.ASCII,
 )
@@ -201,23 +186,26 @@ class RingMode:
 def mode_of(text: str) -> RingMode:
     """The decay that the command line means by "1=2.52hz,0.006".  Raises ParameterError for another form."""
     found = MODE_PATTERN.fullmatch(text)
-    if found is not None:
-        unit = 2 * math.pi if found[3].lower() == "hz" else 1.0
-        w, ratio = float(found[2]) * unit, float(found[5]) if found[5] else None
-        dw = float(found[4]) * unit if found[4] else FREQUENCY_KNOWN * w
-        spread = float(found[6]) if found[6] else RATIO_KNOWN * (ratio or math.inf)
-        is_ratio = ratio is None or (0 < ratio < 1 and spread > 0)
-        if 1 <= int(found[1]) <= MOST_NUMBER and w > 0 < dw and math.isfinite(w * dw) and is_ratio:
-            number = int(found[1])
-            return RingMode(number=number, frequency=w, frequency_deviation=dw, ratio=ratio, ratio_deviation=spread)
-    raise ParameterError(key="--mode", value=text, remedy=f"write {MODE_FORM}")
+    number, w, dw, ratio, spread = found.groups() if found else ("0",) * 5
+    unit = 2 * math.pi if "hz" in text.lower() else 1.0
+    frequency = float(w) * unit
+    mode = RingMode(
+        number=int(number),
+        frequency=frequency,
+        frequency_deviation=float(dw) * unit if dw else FREQUENCY_KNOWN * frequency,
+        ratio=float(ratio) if ratio else None,
+        ratio_deviation=float(spread) if spread else RATIO_KNOWN * float(ratio or math.inf),
+    )
+    is_ratio = mode.ratio is None or (0 < mode.ratio < 1 and mode.ratio_deviation > 0)
+    is_frequency = mode.frequency_deviation > 0 and 0 < mode.frequency * mode.frequency_deviation < math.inf
+    require(1 <= mode.number <= MOST_NUMBER and is_frequency and is_ratio, "--mode", text, f"write {MODE_FORM}")
+    return mode
 
 
 def ring_residuals(arm: Arm, rings: Sequence[RingMode]) -> Real:
     """Computed less measured over its deviation (n,), of logarithms of frequencies and of ratios."""
     rows: list[float] = []
-    for each in rings:
-        s = eigenvalue(arm, each.number)
+    for each, s in ((each, eigenvalue(arm, each.number)) for each in rings):
         rows.append(math.log(s.imag / each.frequency) * each.frequency / each.frequency_deviation)
         if each.ratio is not None:
             rows.append((-s.real / abs(s) - each.ratio) / each.ratio_deviation)
@@ -284,15 +272,6 @@ class Problem:
     rings: tuple[RingMode, ...] = ()
 
     @cached_property
-    def _grids(self) -> dict[tuple[bytes, str], list[int]]:
-        """Responses that are computed together, by their frequencies and by what drives the arm."""
-        found: dict[tuple[bytes, str], list[int]] = {}
-        for number, each in enumerate(self.responses):
-            driven = drive_behind(self.family.arm, each.data.input)
-            found.setdefault((each.data.omega.tobytes(), driven), []).append(number)
-        return found
-
-    @cached_property
     def of_the_arm(self) -> tuple[Parameter, ...]:
         """The parameters that are the arm's."""
         return self.parameters[: len(self.family.keys)]
@@ -321,13 +300,20 @@ class Problem:
         return [np.asarray(each.N / each.D) for each in self.fractions(point)]
 
     def fractions(self, point: Real, share: float = 0.0) -> list[Fraction]:
-        """Each response at s = (i + share) w."""
+        """Each response at s = (i + share) w; those of one grid of frequencies and one drive are computed together."""
         arm, found = self.arm(point), {}
-        for (_, driven), numbers in self._grids.items():
+        grids: dict[tuple[bytes, str], list[int]] = {}
+        for n, each in enumerate(self.responses):
+            driven: str = arm.input  # where the response is over a signal
+            if each.data.input in INPUTS and each.data.input not in OUTPUTS:
+                driven = each.data.input
+            grids.setdefault((each.data.omega.tobytes(), driven), []).append(n)
+        for (_, driven), numbers in grids.items():
             pairs = [(self.responses[n].data.output, self.responses[n].data.input) for n in numbers]
             names = tuple(dict.fromkeys(name for pair in pairs for name in pair if name != driven))
             s = (1j + share) * self.responses[numbers[0]].data.omega
-            drive, numerators, scale = Signals(under_drive(arm, driven), names).parts(s)
+            under_drive = arm if arm.input == driven else replace(arm, input=cast("Input", driven))
+            drive, numerators, scale = Signals(under_drive, names).parts(s)
             known = dict(zip(names, numerators, strict=True)) | {driven: drive}
             for n, (output, input) in zip(numbers, pairs, strict=True):
                 found[n] = Fraction(known[output] * self._sensor(n, point), known[input], np.asarray(scale.real))

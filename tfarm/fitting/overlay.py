@@ -2,16 +2,18 @@
 
     H(s) = T_out(s)/T_in(s)
 
-Its zeros are those of T_out, its poles the zeros of T_in: what rings where the signal T_in is held still.  The arm's
-own poles are in neither.  Over an input of the hub (a torque, a voltage, the angle) H is a transfer function itself:
-the angle as input and the angle as a signal that was measured give the same one.
+Its zeros are those of T_out, its poles the zeros of T_in: the resonances while the signal T_in is held at zero.  The
+arm's own poles are in neither.  Over an input of the hub (a torque, a voltage, the angle) H is a transfer function
+itself: the angle as input and the angle as a signal that was measured give the same one.
 
-A measured response beside the exact one: mode by mode what differs, and which number alone would explain it.
+A measured response is compared with the exact one mode by mode: the differences, and the single changes of the arm's
+numbers that would explain them.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -32,7 +34,7 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum import modes_below
 
-from .data import Measured, Noise, check_signal, must_be_measured, noise_of
+from .data import Measured, Noise, check_signal, must_be_measured, noise_of, require
 from .resonances import (
     PARTNERS_BEYOND,
     Resonance,
@@ -49,7 +51,7 @@ SOMEWHERE = 0.37 + 0.73j  # 1/s: a response that is not 0 throughout is not 0 th
 @dataclass(frozen=True, slots=True, kw_only=True)
 @record
 class RatioRoots:
-    """Poles and zeros [1/s] of a ratio with |Im s| <= `up_to` [rad/s], those at s = 0 apart: complete in these ranges.
+    """Poles and zeros [1/s] of a ratio with |Im s| <= `up_to` [rad/s], none at s = 0: complete in these ranges.
 
     `common` are those that both signals have, which cancel; at s = 0 the ratio goes as s^`at_zero`.
     """
@@ -57,8 +59,30 @@ class RatioRoots:
     poles: Complex
     zeros: Complex
     common: Complex
-    at_zero: int
-    up_to: float
+    at_zero: Annotated[int, Quantity(key="power_at_zero")]
+    up_to: Annotated[float, Quantity("poles and zeros up to", "rad/s", key="roots_up_to_rad_s")]
+
+    @property
+    def upper_poles(self) -> Annotated[Complex, Quantity("s", "1/s", help="poles of the ratio", key="poles")]:
+        """Those with Im s >= 0."""
+        return _upper(self.poles)
+
+    @property
+    def upper_zeros(self) -> Annotated[Complex, Quantity("s", "1/s", help="zeros of the ratio", key="zeros")]:
+        """Those with Im s >= 0."""
+        return _upper(self.zeros)
+
+    @property
+    def upper_common(self) -> Annotated[Complex, Quantity("s", "1/s", help="common to both signals: they cancel",
+                                                          key="common")]:  # fmt: skip
+        """Those with Im s >= 0."""
+        return _upper(self.common)
+
+
+def _upper(roots: Complex) -> Complex:
+    """Those with Im s >= 0, ascending in size: the others are their mirror images."""
+    upper = roots[roots.imag >= 0]
+    return np.asarray(upper[np.argsort(abs(upper), kind="stable")])
 
 
 @dataclass(frozen=True)
@@ -72,11 +96,10 @@ class Ratio:
     def __post_init__(self) -> None:
         check_signal(self.output, "output")
         check_signal(self.input, "input")
-        if self.output == self.input:
-            raise ParameterError(key="input", value=self.input, remedy="a signal over itself is 1")
+        require(self.output != self.input, "input", self.input, "a signal over itself is 1")
         for key, name, each in (("output", self.output, self.above), ("input", self.input, self.below)):
-            if each is not None and each(SOMEWHERE) == 0:
-                raise ParameterError(key=key, value=name, remedy="does not move on this arm: it is held")
+            is_held = each is not None and each(SOMEWHERE) == 0
+            require(not is_held, key, name, "does not move on this arm: it is held")
 
     @property
     def is_driven(self) -> bool:
@@ -85,7 +108,7 @@ class Ratio:
 
     @cached_property
     def driven(self) -> Arm:
-        """The arm under the input that is meant: its own where the ratio is of two signals."""
+        """The arm under the input of the ratio: its own where the ratio is of two signals."""
         return replace(self.arm, input=cast("Input", self.input)) if self.is_driven else self.arm
 
     @cached_property
@@ -111,20 +134,19 @@ class Ratio:
     def roots(self, up_to: float) -> RatioRoots:
         """Poles and zeros with |Im s| <= up_to [rad/s], as each transfer function has them, complete."""
         every = self.poles(up_to).values, self.above.zeros(up_to=up_to).values
-        given_poles, given_zeros = (roots[roots != 0] for roots in every)
-        poles, zeros = without_cancelled(given_poles, given_zeros)
-        orders = Signals(self.driven, (self.output,)).orders[0]
-        under = Signals(self.arm, (self.input,)).orders[0] if self.below is not None else self.above.system.at_rest
+        own_poles, own_zeros = (roots[roots != 0] for roots in every)
+        poles, zeros = without_cancelled(own_poles, own_zeros)
+        below = self.above.system.at_rest if self.below is None else Signals(self.arm, (self.input,)).orders[0]
         return RatioRoots(
             poles=poles,
             zeros=zeros,
-            common=np.array([pole for pole in given_poles if pole not in poles], complex),
-            at_zero=orders - under,
+            common=own_poles[~np.isin(own_poles, poles)],
+            at_zero=Signals(self.driven, (self.output,)).orders[0] - below,
             up_to=up_to,
         )
 
     def poles(self, up_to: float) -> Roots:
-        """What would be its poles if the output showed them all; with those at s = 0."""
+        """Its poles if the output had them all; with those at s = 0."""
         return self.above.poles(up_to=up_to) if self.below is None else self.below.zeros(up_to=up_to)
 
     def residue(self, pole: complex, others: Complex) -> complex:
@@ -139,15 +161,18 @@ class Ratio:
 
 
 def _transfer(arm: Arm, name: str) -> TransferFunction:
-    """To a signal with its place behind an @."""
+    """To a signal with its place after an @."""
     signals = Signals(arm, (name,))
-    wanted = signals.outputs[0]
-    return transfer(arm, wanted, x=signals.places[0] * arm.length if wanted.place == "x" else None)
+    wanted, place = signals.outputs[0], signals.places[0]
+    return transfer(arm, wanted, x=place * arm.length if wanted.place == "x" else None)
 
 
 SAME_MODE = 0.1  # of its frequency: how near a pole of a damped arm is to that mode of the arm without damping
 LARGEST_FACTOR = 3.0  # the factor on a number beyond which it is no explanation
 LEAST_SENSITIVITY = 1e-3  # d ln w/d ln p below which a number does not move a mode
+PEAK_REACH = 0.1  # of ln w, and the damping ratio: a peak farther from all of the arm's is not one of them
+BROADER = 2.0  # times the damping ratio: the largest distance of a broad peak from its pole
+SAME_PEAK = 0.02  # of ln w: peaks of two responses nearer than that are one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,8 +180,8 @@ LEAST_SENSITIVITY = 1e-3  # d ln w/d ln p below which a number does not move a m
 class Counterpart:
     """A pole of the exact response and the resonance that was measured in its place, if one was.
 
-    `peak` [rad/s] is where the measured curve has its peak; `measured` is the pole fitted there, None where its lines
-    do not tell it.  `mode` is the arm's mode that it is, counted from 1; None where the ratio's poles are no modes.
+    `peak` [rad/s] is that of the measured curve; `measured` is the pole fitted there, None where its lines do not
+    determine one.  `mode` is the number of the arm's mode, from 1; None where the ratio's poles are no modes.
     """
 
     pole: complex
@@ -230,12 +255,6 @@ class Counterpart:
         return self.measured.residue / self.residue if self.measured is not None and self.residue else None
 
 
-def _upper(roots: Complex) -> Complex:
-    """Those with Im s >= 0, ascending in size: the others are their mirror images."""
-    upper = roots[roots.imag >= 0]
-    return np.asarray(upper[np.argsort(abs(upper), kind="stable")])
-
-
 class RequiredChange(NamedTuple):
     """A change of one number of the arm that alone would explain one measured mode."""
 
@@ -247,21 +266,21 @@ class RequiredChange(NamedTuple):
 @dataclass(frozen=True, kw_only=True)
 @record
 class Overlay:
-    """A measured response of an arm beside the exact one.
+    """A measured response of an arm and the exact one.
 
-    `exact` is at the measured frequencies, `curve` at those of a grid `omega` [rad/s] that misses no peak.  `beside`
-    has a row a pole in the band; `unmatched` [rad/s] are measured peaks that the arm does not have.
+    `exact` is at the measured frequencies, `curve` at those of a grid `omega` [rad/s] that misses no peak.  `modes`
+    has a row a pole in the range; `unmatched` [rad/s] are measured peaks that the arm does not have.
     """
 
     arm: Arm
-    measured: Measured
-    noise: Noise
+    measured: Annotated[Measured, Quantity(flat=True)]
+    noise: Annotated[Noise, Quantity(flat=True)]
     ratio: Ratio
-    roots: RatioRoots
+    roots: Annotated[RatioRoots, Quantity(flat=True)]
     exact: Complex
     omega: Real
     curve: Complex
-    beside: Annotated[tuple[Counterpart, ...], Quantity("mode by mode", key="modes")]
+    modes: Annotated[tuple[Counterpart, ...], Quantity("mode by mode")]
     unmatched: Real
 
     @property
@@ -270,82 +289,15 @@ class Overlay:
         return self.arm.name
 
     @property
-    def output(self) -> Annotated[str, Quantity("output")]:
-        """The output."""
-        return self.measured.output
-
-    @property
-    def input(self) -> Annotated[str, Quantity("input")]:
-        """The input."""
-        return self.measured.input
-
-    @property
     def unit(self) -> Annotated[str, Quantity("unit")]:
         """The unit of the response."""
         return self.ratio.unit
-
-    @property
-    def source(self) -> Annotated[str, Quantity(key="measured")]:
-        """The file."""
-        return self.measured.source
-
-    @property
-    def sha256(self) -> Annotated[str, Quantity()]:
-        """Of the file."""
-        return self.measured.digest
-
-    @property
-    def points(self) -> Annotated[int, Quantity("measured frequencies", key="points")]:
-        """How many there are."""
-        return int(self.measured.omega.size)
-
-    @property
-    def band_hz(self) -> Annotated[tuple[float, float], Quantity("frequency range", "Hz", key="range_hz")]:
-        """The first and the last of them."""
-        return float(self.measured.omega[0]) / HERTZ, float(self.measured.omega[-1]) / HERTZ
-
-    @property
-    def noise_by(self) -> Annotated[str, Quantity("noise by", key="noise")]:
-        """The source of the size of the noise."""
-        return self.noise.road
 
     @property
     def unmatched_hz(self) -> Annotated[list[float], Quantity("measured peaks far from every pole of the arm [Hz]",
                                                               key="unmatched_peaks_hz")]:  # fmt: skip
         """Measured peaks that the arm does not have."""
         return (self.unmatched / HERTZ).tolist()
-
-    @property
-    def poles(self) -> Annotated[Complex, Quantity("s", "1/s", help="poles of the ratio")]:
-        """Those of the ratio."""
-        return _upper(self.roots.poles)
-
-    @property
-    def zeros(self) -> Annotated[Complex, Quantity("s", "1/s", help="zeros of the ratio")]:
-        """Those of the ratio."""
-        return _upper(self.roots.zeros)
-
-    @property
-    def common(self) -> Annotated[Complex, Quantity("s", "1/s", help="common to both signals: they cancel")]:
-        """Those that cancel."""
-        return _upper(self.roots.common)
-
-    @property
-    def power_at_zero(self) -> Annotated[int, Quantity()]:
-        """n where the ratio goes as s^n at 0."""
-        return self.roots.at_zero
-
-    @property
-    def roots_up_to(self) -> Annotated[float, Quantity("poles and zeros up to", "rad/s")]:
-        """Up to where poles and zeros are complete."""
-        return self.roots.up_to
-
-    @property
-    def required_changes(self) -> Annotated[list[RequiredChange], Quantity("single changes that explain a mode",
-                                                                           key="required_percent")]:  # fmt: skip
-        """A row a parameter and mode, to first order in logarithms."""
-        pairs = ((name, factors) for name, factors in self.required.items())
-        return [RequiredChange(name, mode, 100 * (factor - 1)) for name, of in pairs for mode, factor in of.items()]
 
     @property
     def csv_table(self) -> Table:
@@ -357,64 +309,58 @@ class Overlay:
 
     @property
     def finding(self) -> str:
-        """How many poles of the arm were measured, and how far off it is, in words."""
-        seen = sum(each.peak is not None for each in self.beside)
-        return f"{seen} of {len(self.beside)} poles measured, ln |measured/exact| {self.rms_log_error:.2g} rms"
+        """The number of poles of the arm that were measured, and the difference."""
+        seen = sum(each.peak is not None for each in self.modes)
+        return f"{seen} of {len(self.modes)} poles measured, ln |measured/exact| {self.rms_log_error:.2g} rms"
 
     @property
     def rms_log_error(self) -> Annotated[float, Quantity("rms of ln(measured/exact)", digits=4)]:
-        """The root mean square of ln |measured/exact|, over frequencies that stand out of the noise."""
+        """The root mean square of ln |measured/exact|, over frequencies above the noise."""
         kept = (abs(self.measured.values) > self.noise.sigma) & np.isfinite(self.exact) & (self.exact != 0)
         if not kept.any():
             return math.inf
         return float(np.sqrt((np.log(abs(self.measured.values[kept] / self.exact[kept])) ** 2).mean()))
 
     @cached_property
-    def required(self) -> dict[str, dict[int, float]]:
-        """By parameter of `Modes.sensitivity` and number of the mode: the factor on it that alone would explain it.
+    def required_changes(self) -> Annotated[tuple[RequiredChange, ...], Quantity("single changes that explain a mode",
+                                                                                key="required_percent")]:  # fmt: skip
+        """A row a parameter of `Modes.sensitivity` and mode: the change of it that alone would explain the mode.
 
-        exp(ln(measured/exact)/S) with S = d ln w/d ln p: exact for a power law, as of Young's modulus or the density,
-        else to first order.  Without those beyond LARGEST_FACTOR, or of a number that hardly moves the mode.
+        It is exp(ln(measured/exact)/S) - 1 with S = d ln w/d ln p: exact for a power law, as of Young's modulus or the
+        density, else to first order.  Without factors beyond LARGEST_FACTOR, or of a number that hardly moves the mode.
         """
-        every = ((each.mode, each.frequency_ratio) for each in self.beside)
-        told = [(mode, ratio) for mode, ratio in every if mode is not None and ratio is not None]
-        if not told:
-            return {}
-        table = modes_of(self.ratio.driven, max(mode for mode, _ in told))
-        found: dict[str, dict[int, float]] = {}
+        ratios = {row.mode: row.frequency_ratio for row in self.modes if row.mode and row.frequency_ratio is not None}
+        if not ratios:
+            return ()
+        table, found = modes_of(self.ratio.driven, max(ratios)), []
         for name, slopes in table.sensitivity.items():
-            factors = {}
-            for mode, ratio in told:
-                slope = float(slopes[np.flatnonzero(table.index == mode)[0]])
+            for mode, ratio in ratios.items():
+                slope = float(slopes[table.index == mode][0])
                 exponent = math.log(ratio) / slope if abs(slope) > LEAST_SENSITIVITY else math.inf
                 if abs(exponent) <= math.log(LARGEST_FACTOR):
-                    factors[mode] = math.exp(exponent)
-            if factors:
-                found[name] = factors
-        return found
+                    found.append(RequiredChange(name, mode, 100 * (math.exp(exponent) - 1)))
+        return tuple(found)
 
 
 def overlay(arm: Arm, measured: Measured) -> Overlay:
-    """A measured response beside the exact one of that arm.
+    """A measured response and the exact one of that arm.
 
     Raises ParameterError for signals that the arm does not have, and where the frequencies of the file are in another
-    unit than it says (see `must_be_in_unit`).
+    unit than its header has (see `must_be_in_unit`).
     """
     must_be_arm(arm)
     must_be_measured(measured)
-    ratio, noise = ratio_of(arm, measured), noise_of(measured)
-    low, high = float(measured.omega[0]), float(measured.omega[-1])
+    ratio, noise, (low, high) = ratio_of(arm, measured), noise_of(measured), measured.band
     roots = ratio.roots(PARTNERS_BEYOND * high)
-    places = peaks_of(measured, noise.sigma)
-    own = peaks_among(roots.poles)
+    places, own = peaks_of(measured, noise.sigma), peaks_among(roots.poles)
     own = own[abs(own) >= low / PARTNERS_BEYOND]
-    w = abs(own)
-    pairs, _ = matched_peaks(measured.omega[places], w, (low, high))
-    if len(pairs) < max(places.size, int(((w >= low) & (w <= high)).sum())):
+    is_inside = (abs(own) >= low) & (abs(own) <= high)
+    pairs, _ = matched_peaks(measured.omega[places], abs(own), measured.band)
+    if len(pairs) < max(places.size, int(is_inside.sum())):
         check_unit(arm, measured)
     at = {j: int(places[i]) for i, j in pairs}
-    shown = [(pole, at.get(j)) for j, pole in enumerate(own.tolist()) if j in at or low <= abs(pole) <= high]
-    grid = refined_grid((low, high), np.r_[roots.poles, roots.zeros]) if low < high else measured.omega
+    shown = [(pole, at.get(j)) for j, pole in enumerate(own.tolist()) if j in at or is_inside[j]]
+    grid = refined_grid(measured.band, np.r_[roots.poles, roots.zeros]) if low < high else measured.omega
     omega = np.asarray(grid, dtype=float)
     return Overlay(
         arm=arm,
@@ -425,7 +371,7 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
         exact=np.asarray(ratio(1j * measured.omega)),
         omega=omega,
         curve=np.asarray(ratio(1j * omega)),
-        beside=_counterparts(ratio, roots, measured, noise, shown),
+        modes=_counterparts(ratio, roots, measured, noise, shown),
         unmatched=np.delete(measured.omega[places], [i for i, _ in pairs]),
     )
 
@@ -435,35 +381,59 @@ def _counterparts(
 ) -> tuple[Counterpart, ...]:
     """A row a pole: of each pole [1/s] that is shown, with the place of its measured peak, if it has one.
 
-    The arm's modes are told where they are the poles of the ratio, each by the nearest natural frequency.
+    The arm's modes are named where they are the poles of the ratio, each by the nearest natural frequency.
     """
     up_to = (1 + SAME_MODE) * max((abs(pole) for pole, _ in shown), default=0.0)
     are_modes = ratio.is_driven and up_to > 0 and modes_below(ratio.driven, up_to) > 0
     table = modes_of(ratio.driven, up_to=up_to) if are_modes else None
-    others = np.r_[roots.poles, roots.zeros, 0.0]
-    found = []
+    others, found = np.r_[roots.poles, roots.zeros, 0.0], []
     for pole, place in shown:
         mode = None
         if table is not None:
             away = abs(table.natural_frequency / abs(pole) - 1)
-            at = int(np.argmin(away))
-            mode = int(table.index[at]) if away[at] < SAME_MODE and table.index[at] > 0 else None
-        found.append(
-            Counterpart(
-                pole=pole,
-                residue=ratio.residue(pole, others),
-                mode=mode,
-                peak=None if place is None else float(measured.omega[place]),
-                measured=None if place is None else resonance_at(measured, noise.sigma, place),
-            )
-        )
+            nearest = int(table.index[np.argmin(away)])
+            mode = nearest if away.min() < SAME_MODE and nearest > 0 else None
+        peak = None if place is None else float(measured.omega[place])
+        own = None if place is None else resonance_at(measured, noise.sigma, place)
+        found.append(Counterpart(pole=pole, residue=ratio.residue(pole, others), mode=mode, peak=peak, measured=own))
     return tuple(found)
 
 
-def check_unit(arm: Arm, measured: Measured) -> None:
-    """Raise ParameterError where the file's frequencies are in another unit than it says (see `must_be_in_unit`).
+class ResonanceShift(NamedTuple):
+    """A measured peak [Hz] and that of the arm before and after the fit; None where it has none there."""
 
-    Where the arm's poles so far up are not found nothing is said.
+    before: Annotated[float | None, Quantity("start", "Hz")]
+    after: Annotated[float | None, Quantity("fitted", "Hz")]
+    measured: Annotated[float, Quantity("measured", "Hz")]
+
+
+def resonance_shifts(before: Arm, after: Arm, responses: Sequence[tuple[Measured, Noise]]) -> list[ResonanceShift]:
+    """Each measured peak of all responses, with those of the arm before and after a fit.
+
+    A peak is a pole of its response: a natural frequency, with the hub held where the response is over the hub's angle.
+    Of a response whose poles are not found completely no peak is listed.
+    """
+    found = {}
+    for data, noise in responses:
+        with suppress(ConvergenceError):
+            ratios = [Ratio(arm, data.output, data.input) for arm in (before, after)]
+            old, new = (peaks_among(ratio.poles(PARTNERS_BEYOND * data.band[1]).values) for ratio in ratios)
+            peaks, w, first = data.omega[peaks_of(data, noise.sigma)], abs(new), abs(old)
+            places, earlier = dict(matched_peaks(peaks, w, data.band)[0]), dict(matched_peaks(w, first, data.band)[0])
+            for n, peak in enumerate(peaks.tolist()):
+                row = ResonanceShift(None, None, peak / HERTZ)
+                own = places.get(n, int(np.argmin(abs(np.log(w / peak)))) if w.size else None)
+                if own is not None and abs(math.log(w[own] / peak)) < PEAK_REACH - BROADER * new[own].real / w[own]:
+                    start = float(first[earlier[own]]) / HERTZ if own in earlier else None
+                    row = ResonanceShift(start, float(w[own]) / HERTZ, peak / HERTZ)
+                found[data.input, round(math.log(peak) / SAME_PEAK)] = row
+    return sorted(found.values(), key=lambda row: row.measured)
+
+
+def check_unit(arm: Arm, measured: Measured) -> None:
+    """Raise ParameterError where the file's frequencies are in another unit than its header has (`must_be_in_unit`).
+
+    Nothing is checked where the arm's poles up to there are not found.
     """
     ratio = ratio_of(arm, measured)
     with suppress(ConvergenceError):

@@ -20,23 +20,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real
-from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.response.frequency import HERTZ
 
-from .data import Measured, in_parts
+from .data import Measured, in_parts, require
 
 PROMINENCE = math.log(2)  # a peak is twice what is around it
-CLEAR_OF_NOISE = 5.0  # deviations of the noise that it stands above
+CLEAR_OF_NOISE = 5.0  # deviations of the noise that it exceeds
 UNPAIRED = 0.3  # of ln w: what a peak or a pole in the band costs without a partner; so partners are 1.8 apart at most
 WIDEST_PEAK = 0.5  # damping ratio of a pole that is no peak
-PARTNERS_BEYOND = 1.8  # so far beyond the band partners are looked for
+PARTNERS_BEYOND = 1.8  # times the ends of the range: partners are looked for up to there
 WIDTHS = 3.0  # half-widths of a peak around it that its pole is fitted to: tuned with the next, for the least bias
 BACKGROUND = 5  # coefficients c
-CLOSE_IN_UNIT = 0.3  # of ln w, in the mean of the peaks: how well they fit in the other unit before that is said,
+CLOSE_IN_UNIT = 0.3  # of ln w, in the mean of the peaks: how well they fit in the other unit before it is named,
 ALIKE_IN_UNIT = 0.15  # and how far they may differ in that
 PEAK_ALONE = math.log(2.0)  # of ln w: farther from every pole a peak has nothing to do with one
-PEAKS_THAT_TELL = 3  # peaks, whose spacing tells one match from another
+LEAST_PEAKS = 3  # peaks, whose spacing distinguishes one match from another
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +54,7 @@ class Resonance:
 
 
 def peaks_of(data: Measured, sigma: Real) -> NDArray[np.intp]:
-    """The places (n,) of the peaks that stand out of the noise."""
+    """The places (n,) of the peaks above the noise."""
     from scipy.signal import find_peaks
 
     size = abs(data.values)
@@ -100,21 +99,19 @@ def must_be_in_unit(data: Measured, sigma: Real, poles: Complex) -> None:
     peaks, own = data.omega[peaks_of(data, sigma)], abs(peaks_among(poles))
     if not peaks.size or not own.size:
         return
-    band = float(data.omega[0]), float(data.omega[-1])
-    _, cost = matched_peaks(peaks, own, band)
+    _, cost = matched_peaks(peaks, own, data.band)
     lonely = bool((abs(np.log(peaks[:, None] / own)).min(axis=1) > PEAK_ALONE).all())
     for factor, words in ((1 / HERTZ, "are rad/s given as Hz?"), (HERTZ, "are Hz given as rad/s?")):
-        there, fitting = matched_peaks(peaks * factor, own, (band[0] * factor, band[1] * factor))
-        better = cost - fitting > UNPAIRED if peaks.size >= PEAKS_THAT_TELL else lonely
+        there, fitting = matched_peaks(peaks * factor, own, (data.band[0] * factor, data.band[1] * factor))
+        better = cost - fitting > UNPAIRED if peaks.size >= LEAST_PEAKS else lonely
         away = np.array([math.log(peaks[i] * factor / own[j]) for i, j in there])
-        if better and away.size == peaks.size and abs(away.mean()) < CLOSE_IN_UNIT and np.ptp(away) < ALIKE_IN_UNIT:
-            found = f"{peaks[0] / HERTZ:.4g} Hz"
-            remedy = f"its peaks are {HERTZ if factor < 1 else 1 / HERTZ:.3g} times the arm's frequencies: {words}"
-            raise ParameterError(key=f"{data.name} first peak", value=found, remedy=remedy, file=data.source)
+        fits = away.size == peaks.size and abs(away.mean()) < CLOSE_IN_UNIT and np.ptp(away) < ALIKE_IN_UNIT
+        remedy = f"its peaks are {1 / factor:.3g} times the arm's frequencies: {words}"
+        require(not (better and fits), f"{data.name} first peak", f"{peaks[0] / HERTZ:.4g} Hz", remedy, data.source)
 
 
 def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
-    """The pole and residue of the peak at a place; None where its lines do not tell them."""
+    """The pole and residue of the peak at a place; None where its lines do not determine them."""
     from scipy.optimize import least_squares
 
     kept = _around(data, place)
@@ -126,7 +123,7 @@ def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
     powers, y = [(s / w) ** n for n in range(background)], in_parts(values * weight)
 
     def linear(x: Real) -> tuple[Real, Real]:
-        """Re r, Im r and the c that leave least, and what they leave."""
+        """Re r, Im r and the c of the least squares, and the residuals."""
         up, down = 1 / (s + x[0] - 1j * x[1]), 1 / (s + x[0] + 1j * x[1])
         terms: Complex = np.array([up + down, 1j * (up - down), *powers], dtype=np.complex128)
         columns = in_parts(terms * weight).T
@@ -135,18 +132,17 @@ def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
 
     half = max(_half_width(data, place), (omega[-1] - omega[0]) / (4 * omega.size))
 
-    def left(x: Real) -> Real:
+    def residuals(x: Real) -> Real:
         return linear(x)[1]
 
-    found = least_squares(left, np.array([half, w]), method="lm", x_scale="jac")
+    found = least_squares(residuals, np.array([half, w]), method="lm", x_scale="jac")
     sigma_p, w_p = found.x.tolist()
     if not found.success or not omega[0] < w_p < omega[-1] or abs(sigma_p) > w_p:
         return None
-    r, e = linear(found.x)
-    freedom = 2 * omega.size - 4 - background
+    (re, im, *_), e = linear(found.x)
     J = np.asarray(found.jac, dtype=float)
-    spread = np.linalg.pinv(J.T @ J) * max(1.0, float(e @ e) / freedom)
-    return Resonance(pole=complex(-sigma_p, w_p), residue=complex(r[0], r[1]), std=np.sqrt(np.diag(spread)))
+    spread = np.linalg.pinv(J.T @ J) * max(1.0, float(e @ e) / (2 * omega.size - 4 - background))
+    return Resonance(pole=complex(-sigma_p, w_p), residue=complex(re, im), std=np.sqrt(np.diag(spread)))
 
 
 def _half_width(data: Measured, place: int) -> float:

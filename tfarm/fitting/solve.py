@@ -1,4 +1,4 @@
-"""Where a fit begins: numerator and denominator of a response agree with the data first, then their ratio.
+"""A fit's search and its intervals: numerator and denominator of a response agree with the data, then their ratio.
 
 The squares of H - D, of a response H = N/P and its measured values D, have a minimum for every pole of H that lies
 between two other lines than the true one.  The equation error of Levy (1959)
@@ -10,12 +10,11 @@ neither has zeros.  So its squares have few minima, and a pole comes to where N 
 biased by noise (Sanathanan and Koerner 1963), and only where a search begins.  With a larger `share` W is smoother.
 Tuned on the survey `tests.fitting.planted`: the constants below.
 
-The end of a fit: complex residuals over their deviations, least squares, from one start after another.
+The end of a fit is least squares of complex residuals over their deviations, from one start after another.  A robust
+loss is no likelihood and the logarithm of a noisy value is biased at an antiresonance, so every result and every
+interval rests on Gaussian residuals alone.
 
-A robust loss is no likelihood and the logarithm of a noisy value is biased at an antiresonance, so what is reported,
-and every interval, rests on Gaussian residuals alone.
-
-How sure a fit is: covariance, what the data do not determine, and intervals by the profile of the likelihood.
+Intervals are by the covariance or by the profile of the likelihood; some numbers the data do not determine.
 """
 
 from __future__ import annotations
@@ -25,14 +24,17 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Annotated
 
 import numpy as np
-from scipy.optimize import OptimizeResult, brentq, least_squares
+from scipy.optimize import brentq, least_squares
 from scipy.special import chdtrc, ndtri, stdtrit
 
+from tfarm.arm.writing import number_unit
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
+from tfarm.schema import Quantity
 
 from .data import CONFIDENCE, in_parts
 from .model import Problem, ring_residuals, walled
@@ -62,38 +64,27 @@ def starts(problem: Problem) -> Iterator[tuple[Problem, Real]]:
 
 
 def _start_near(problem: Problem, point: Real, shares: tuple[float, ...], draws: int) -> tuple[Problem, Real]:
-    """The problem, its sensors' gains by the sign that they have, and where the equation errors lead from a point.
+    """The problem, its sensors' gains by the sign that they have, and the least equation errors next to a point.
 
-    Of the `draws` as far from there as these know it, that of the least squares: the true side of a line.
+    Of a number of draws about these, as wide as they are uncertain, that of the least squares: the true side of a line.
     """
     point = problem.inside(point)
     for share in shares:
         whole, first = with_gains(problem, point)
         thin = thinned(whole, LINES)
-        found = least_errors(thin, first, share)
+
+        def errors(x: Real, thin: Problem = thin, first: Real = first, share: float = share) -> Real:
+            return np.concatenate([equation_errors(thin, x, share), (x - first) / START_DEVIATION])
+
+        found = least_squares(
+            walled(errors, first), first, bounds=thin.bounds, loss="soft_l1", f_scale=LOSS, max_nfev=STEPS, xtol=1e-4,
+            ftol=1e-4,
+        )  # fmt: skip
         point = np.asarray(found.x)
-    _, sizes, axes = np.linalg.svd(found.jac, full_matrices=False)
+    _, sizes, axes = np.linalg.svd(np.asarray(found.jac), full_matrices=False)
     deviation = math.sqrt(2 * found.cost / found.fun.size) / sizes
     drawn = np.random.default_rng(FIT_SEED).standard_normal((draws, point.size)) * DRAWN * deviation
     return whole, min((point, *map(thin.inside, point + drawn @ axes)), key=partial(sum_of_squares, thin))
-
-
-def least_errors(problem: Problem, first: Real, share: float) -> OptimizeResult:
-    """Where the equation errors are least, next to a point, under a loss for outliers."""
-
-    def errors(x: Real) -> Real:
-        return np.concatenate([equation_errors(problem, x, share), (x - first) / START_DEVIATION])
-
-    return least_squares(
-        walled(errors, first),
-        first,
-        bounds=problem.bounds,
-        loss="soft_l1",
-        f_scale=LOSS,
-        max_nfev=STEPS,
-        xtol=1e-4,
-        ftol=1e-4,
-    )
 
 
 def sum_of_squares(problem: Problem, point: Real) -> float:
@@ -113,12 +104,8 @@ def equation_errors(problem: Problem, point: Real, share: float) -> Real:
         D = each.data.values
         W = (abs(smooth_N) + (abs(D) + each.noise.sigma) * abs(smooth_P)) * np.exp(there - here)
         errors.append(in_parts((N - D * P) / W))
-    if problem.rings:
-        weights = [
-            [each.frequency_deviation / each.frequency, 0.0][: 1 + (each.ratio is not None)] for each in problem.rings
-        ]
-        errors.append(ring_residuals(problem.arm(point), problem.rings) * np.concatenate(weights))
-    return np.concatenate(errors)
+    frequencies = [replace(each, frequency_deviation=each.frequency, ratio=None) for each in problem.rings]
+    return np.concatenate([*errors, ring_residuals(problem.arm(point), frequencies)])
 
 
 def with_gains(problem: Problem, point: Real) -> tuple[Problem, Real]:
@@ -126,8 +113,7 @@ def with_gains(problem: Problem, point: Real) -> tuple[Problem, Real]:
     parameters, point = list(problem.parameters), point.copy()
     for H, each in zip(problem.computed(point), problem.responses, strict=True):
         if each.gain is not None:
-            ratio = each.data.values / H
-            own = parameters[each.gain]
+            ratio, own = each.data.values / H, parameters[each.gain]
             if np.median(ratio.real / abs(ratio)) < 0:
                 parameters[each.gain] = replace(own, start=-own.start)
             point[each.gain] += float(np.median(np.log(abs(ratio))))
@@ -135,27 +121,25 @@ def with_gains(problem: Problem, point: Real) -> tuple[Problem, Real]:
 
 
 def thinned(problem: Problem, most: int) -> Problem:
-    """The problem at so many of each response's frequencies at most."""
+    """The problem at a number of each response's frequencies at most."""
     responses = []
     for each in problem.responses:
-        size = each.data.omega.size
-        kept = np.unique(np.linspace(0, size - 1, min(size, most)).astype(int))
-        kept = kept[np.isfinite(each.noise.sigma[kept]) & (each.data.values[kept] != 0)]
-        data = replace(
-            each.data, omega=each.data.omega[kept], values=each.data.values[kept], sigma=None, coherence=None
-        )
-        responses.append(replace(each, data=data, noise=replace(each.noise, sigma=each.noise.sigma[kept])))
+        w, values, sigma = each.data.omega, each.data.values, each.noise.sigma
+        kept = np.unique(np.linspace(0, w.size - 1, min(w.size, most)).astype(int))
+        kept = kept[np.isfinite(sigma[kept]) & (values[kept] != 0)]
+        data = replace(each.data, omega=w[kept], values=values[kept], sigma=None, coherence=None)
+        responses.append(replace(each, data=data, noise=replace(each.noise, sigma=sigma[kept])))
     return replace(problem, responses=tuple(responses))
 
 
-NOISE_ALONE = 1e-6  # a sum of squares that noise alone exceeds so rarely is no noise: another start may do better
+NOISE_ALONE = 1e-6  # probability of a sum of squares by noise alone below which another start is tried
 MUCH_MISFIT = 4.0  # times its degrees of freedom: a best sum beyond is tried from strayed starts too
 MOST_EVALUATIONS = 60  # evaluations from one start
 FIRM_POINT = 1e-7  # of the coordinates: a step that changes less ends a search
 FIRM_SUM = 1e-9  # of the sum, likewise
 OPEN_DEVIATION = 1.0  # of ln p: a combination with a larger deviation (a factor of e) is not determined by the data
-WEAK = 0.1  # of ln p: what is known so badly is looked at again
-SAME_SUM = 0.1  # of a sum of squares: less is no difference to speak of
+WEAK = 0.1  # of ln p: a larger deviation is checked again
+SAME_SUM = 0.1  # of a sum of squares: a smaller difference is none
 EXCLUDED = 16.0  # of a sum of squares: noise alone makes up an effect of four deviations once in 15,000 fits
 RESCALED = 3  # times that a noise known up to a factor takes its factor from the residuals
 
@@ -170,7 +154,7 @@ class Solution:
     residuals: Real
     jacobian: Real
     converged: bool
-    starts: int
+    starts: Annotated[int, Quantity()]
 
     @property
     def chi_squared(self) -> float:
@@ -221,8 +205,8 @@ def best_solution(problem: Problem) -> Solution:
 def _nearest(found: Solution) -> Solution:
     """The solution with those directions open that the data do not exclude to be so, at the point nearest to the start.
 
-    A valley may be open where the search began and closed where it ended, by what noise makes of an effect too small
-    to be measured (the rotary inertia of E I).  The point moves only where the sum of squares stays what it is.
+    A valley may be open where the search began and closed where it ended, where noise exceeds an effect too small to be
+    measured (the rotary inertia of E I).  The point moves only where the sum of squares stays what it is.
     """
     sizes, axes = principal_axes(found.jacobian)
     for limit, most in ((OPEN_DEVIATION, SAME_SUM), (WEAK, EXCLUDED)):
@@ -243,10 +227,9 @@ def _nearest(found: Solution) -> Solution:
 
 
 def principal_axes(jacobian: Real) -> tuple[Real, Real]:
-    """What a unit step along each axis changes the residuals by (parameters,), largest first, and the axes (rows)."""
-    count = jacobian.shape[1]
-    _, sizes, axes = np.linalg.svd(np.vstack([jacobian, np.zeros((count, count))]), full_matrices=False)
-    return sizes, axes
+    """The change of the residuals by a unit step along each axis (parameters,), largest first, and the axes (rows)."""
+    padded = np.vstack([jacobian, np.zeros((jacobian.shape[1],) * 2)])
+    return np.linalg.svd(padded, full_matrices=False)[1:]
 
 
 def is_explained(one: Solution) -> bool | None:
@@ -259,30 +242,25 @@ def is_explained(one: Solution) -> bool | None:
 def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None = None) -> Solution:
     """The nearest minimum from a start, some coordinates held at a value."""
     held = held or {}
-    free = [n for n in range(start.size) if n not in held]
     point = start.copy()
     point[list(held)] = list(held.values())
-    if not free:
+    free = np.delete(np.eye(start.size), list(held), axis=1)  # a column for each of the others
+    fixed = point - free @ free.T @ point
+    if not free.size:
         residuals = problem.residuals(point)
         return Solution(problem, point, residuals, np.zeros((residuals.size, start.size)), True, 1)
-    low, high = (each[free] for each in problem.bounds)
-
-    def whole(x: Real) -> Real:
-        full = point.copy()
-        full[free] = x
-        return full
+    first, (low, high) = problem.inside(point) @ free, (each[free.any(axis=1)] for each in problem.bounds)
 
     def jacobian(x: Real) -> Real:
-        return np.asarray(problem.jacobian(whole(x))[:, free])
+        return np.asarray(problem.jacobian(fixed + free @ x) @ free)
 
-    first = problem.inside(point)[free]
     found = least_squares(
-        walled(lambda x: problem.residuals(whole(x)), first), first, jac=jacobian,
-        bounds=(low, high), x_scale="jac", xtol=FIRM_POINT, ftol=FIRM_SUM, gtol=None, max_nfev=MOST_EVALUATIONS,
+        walled(lambda x: problem.residuals(fixed + free @ x), first), first, jac=jacobian,
+        bounds=(low, high), x_scale="jac", xtol=FIRM_POINT, ftol=FIRM_SUM,
+        gtol=None, max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
-    full, slopes = whole(found.x), np.zeros((found.fun.size, start.size))
-    slopes[:, free] = np.asarray(found.jac)
-    return Solution(problem, full, found.fun, slopes, bool(found.status > 0), 1)
+    slopes = np.asarray(found.jac) @ free.T
+    return Solution(problem, fixed + free @ found.x, found.fun, slopes, bool(found.status > 0), 1)
 
 
 def _rescaled(found: Solution) -> Solution:
@@ -298,7 +276,7 @@ def _rescaled(found: Solution) -> Solution:
     return found
 
 
-ToldInterval = Callable[[int, int, str], object]
+Progress = Callable[[int, int, str], object]
 
 TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
 ROUND = 0.02  # a power so near to 1 is written as 1
@@ -313,23 +291,17 @@ REACHES = (0.5, 1.0, 2.0, 4.0, 6.0, 9.0)  # of ln p: where a number that does no
 class Fitted:
     """A fitted number: `value` in SI units, the ends of its 95 % interval, its standard deviation by the covariance.
 
-    What the data do not determine has no interval.
+    A number that the data do not determine has no interval.
     """
 
-    key: str
-    value: float
-    low: float | None
-    high: float | None
-    deviation: float | None
-    identified: bool
-
-    @property
-    def half_known(self) -> str:
-        """What is known of a number whose interval has one end, in words; nothing of others."""
-        if (self.low is None) == (self.high is None):
-            return ""
-        side = f"at least {self.low:.4g}" if self.high is None else f"at most {self.high:.4g}"
-        return f"{self.key} is {side}: these data say no more"
+    key: Annotated[str, Quantity("number")]
+    unit: Annotated[str, Quantity("unit")]
+    value: Annotated[float, Quantity("value")]
+    low: Annotated[float | None, Quantity("95 % interval from")]
+    high: Annotated[float | None, Quantity("to")]
+    deviation: Annotated[float | None, Quantity("standard deviation", digits=3, key="std")]
+    identified: Annotated[bool, Quantity("identified")]
+    start: Annotated[float, Quantity()]
 
 
 class BetterError(Exception):
@@ -340,73 +312,70 @@ class BetterError(Exception):
         self.found = found
 
 
-def sureness(
-    found: Solution, *, profile: bool, progress: ToldInterval | None = None
+def confidence_intervals(
+    found: Solution, *, profile: bool, progress: Progress | None = None
 ) -> tuple[tuple[Fitted, ...], tuple[str, ...]]:
     """A solution's numbers with their intervals, and what is not determined, in words.
 
     The intervals are by profiles, or by the covariance where these are not asked for.
-    Along an open axis nothing changes, so one number of it is held while the others are profiled.  `progress` is told
+    Along an open axis nothing changes, so one number of it is held while the others are profiled.  `progress` gets
     (done, total, key) before each.  Raises BetterError where a profile comes to a lower sum than the solution's.
     """
+    parameters, quantile = found.problem.parameters, found.quantile
     sizes, axes = principal_axes(found.jacobian)
     is_open = sizes < 1.0 / OPEN_DEVIATION
     covariance = (axes[~is_open].T / sizes[~is_open] ** 2) @ axes[~is_open]
     unsure: list[bool] = np.any(abs(axes[is_open]) > TAKES_PART, axis=0).tolist()
-    held = {int(abs(axis).argmax()): float(found.point[abs(axis).argmax()]) for axis in axes[is_open]}
-    quantile = found.quantile
-    fitted, words = [], [_said(axis, [each.key for each in found.problem.parameters]) for axis in axes[is_open]]
-    alone = {int(abs(axis).argmax()): n for n, axis in enumerate(axes[is_open]) if (abs(axis) > TAKES_PART).sum() == 1}
-    for n, each in enumerate(found.problem.parameters):
+    largest = abs(axes[is_open]).argmax(axis=1).tolist()
+    held = {n: float(found.point[n]) for n in largest}
+    words = [_undetermined(axis, [each.key for each in parameters]) for axis in axes[is_open]]
+    alone = {n: k for k, n in enumerate(largest) if (abs(axes[is_open][k]) > TAKES_PART).sum() == 1}
+    fitted = []
+    for n, each in enumerate(parameters):
         if progress is not None:
-            progress(n, len(found.problem.parameters), f"interval of {each.key}")
-        value, slope = each.value(float(found.point[n])), abs(each.slope(float(found.point[n])))
+            progress(n, len(parameters), f"interval of {each.key}")
         low = high = deviation = None
+        point = float(found.point[n])
         if not unsure[n]:
-            deviation = math.sqrt(covariance[n, n])
-            ends = [found.point[n] - quantile * deviation, found.point[n] + quantile * deviation]
-            if profile:
-                ends = [_end(found, n, way, deviation, quantile, held) for way in (-1, 1)]
-            low, high = each.ends(ends)
-        elif n in alone and (side := _one_sided(found, n, quantile)) is not None:
-            low, high = side
-            words[alone[n]] = ""
-        fitted.append(
-            Fitted(
-                key=each.key, value=value, low=low, high=high, identified=low is not None and high is not None,
-                deviation=None if deviation is None else slope * deviation,
-            )
-        )  # fmt: skip
-    words += [each.half_known for each in fitted]
+            own = math.sqrt(covariance[n, n])
+            ends = [_end(found, n, way, own, quantile, held) if profile else point + way * quantile * own
+                    for way in (-1, 1)]  # fmt: skip
+            (low, high), deviation = each.ends(ends), own * abs(each.slope(point))
+        elif n in alone:
+            low, high = _one_sided(found, n, quantile)
+            words[alone[n]] = words[alone[n]] if low is None else ""
+        fitted.append(Fitted(
+            key=each.key, unit=number_unit(each.key), value=each.value(point), low=low, high=high, deviation=deviation,
+            identified=low is not None and high is not None, start=each.start,
+        ))  # fmt: skip
+        if (low is None) != (high is None):
+            end = f"at most {high:.4g}" if low is None else f"at least {low:.4g}"
+            words.append(f"{each.key} is {end}: one-sided bound")
     return tuple(fitted), tuple(word for word in words if word)
 
 
-def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float, float | None] | None:
-    """The interval of a number that does not matter where it is, but would if it were larger, or smaller.
+def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float | None, float | None]:
+    """The interval of a number that has no effect where it is, but would if it were larger, or smaller.
 
-    A payload of next to nothing is at most so heavy, a clamp that is all but rigid at least so stiff.  The others are
-    held: what they could take back is no more than a factor of the end.
+    A payload of next to nothing has an upper bound, a clamp that is all but rigid a lower one; None, None where there
+    is neither.  The others are held: with them free the bound is farther by no more than a factor.
     """
-    each, limits = found.problem.parameters[n], (found.problem.bounds[0][n], found.problem.bounds[1][n])
+    each, low, high = found.problem.parameters[n], found.problem.bounds[0][n], found.problem.bounds[1][n]
     if not each.by_logarithm:
-        return None
+        return None, None
 
     def excess(at: float) -> float:
         point = found.point.copy()
         point[n] = at
-        residuals = found.problem.residuals(point)
-        return float(residuals @ residuals) - found.chi_squared - quantile**2
+        return sum_of_squares(found.problem, point) - found.chi_squared - quantile**2
 
-    ends: list[float | None] = []
-    for way in (-1, 1):
-        steps = (found.point[n] + way * reach for reach in REACHES)
-        inside = [float(at) for at in steps if limits[0] <= at <= limits[1]]
-        beyond = next((at for at in inside if excess(at) > 0), None)
-        ends.append(None if beyond is None else float(brentq(excess, found.point[n], beyond, xtol=1e-4)))
-    if ends == [None, None]:
-        return None
-    low, high = ends
-    return 0.0 if low is None else each.value(low), None if high is None else each.value(high)
+    ends: list[float | None] = [None, None]
+    for side, way in enumerate((-1, 1)):
+        steps = (float(found.point[n]) + way * reach for reach in REACHES)
+        beyond = next((at for at in steps if low <= at <= high and excess(at) > 0), None)
+        if beyond is not None:
+            ends[side] = each.value(float(brentq(excess, found.point[n], beyond, xtol=1e-4)))
+    return (None, None) if ends == [None, None] else (ends[0] or 0.0, ends[1])
 
 
 def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, held: dict[int, float]) -> float:
@@ -436,7 +405,7 @@ def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, h
     return at
 
 
-def _said(axis: Real, keys: Sequence[str]) -> str:
+def _undetermined(axis: Real, keys: Sequence[str]) -> str:
     """A direction along which nothing changes, in words; of two numbers, the combination that is known instead."""
     part = [n for n in np.argsort(-abs(axis)) if abs(axis[n]) > TAKES_PART]
     names = [keys[n] for n in part]

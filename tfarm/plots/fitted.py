@@ -17,10 +17,9 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from tfarm.digits import plain
 from tfarm.fitting.fit import Fit, Possible, response_band, share_stable
 from tfarm.fitting.overlay import Overlay
-from tfarm.fitting.results import FitResult
 
 from .frequency import RAD_PER_CYCLE, draw_wrapped
-from .style import BLUE, FAINT, FIGURES, GREY, INK, ORANGE, page, picture
+from .style import BLUE, FAINT, GREY, INK, ORANGE, page, picture
 from .words import name_axes
 
 FITTED_POINTS = 1200  # of a computed curve, beside the measured frequencies: more than a column has pixels
@@ -91,9 +90,6 @@ def draw_share(those: Possible, ranges: Sequence[tuple[float, float]]) -> Figure
     return figure
 
 
-FIGURES[FitResult] = lambda data: fitted.figure(data.fit)
-
-
 @picture(
     (Overlay, "tfarm.overlay returns"), size=(9.0, 7.2), rows=(2.2, 1.2, 0.8),
     title=lambda data: f"{data.arm.name}: {_words(data.measured.output)} over {_words(data.measured.input)}",
@@ -126,7 +122,7 @@ def _magnitude(data: Overlay, ax: Axes) -> None:
         usual = np.log10(np.median(size[size > 0])) if (size > 0).any() else low
         low, high, margin = min(low, usual), max(high, usual), 0.15 + (SPAN - 1) / 2 * (high - low)
         ax.set_ylim(10 ** (low - margin), 10 ** (high + margin))
-    for row in data.beside:
+    for row in data.modes:
         ax.axvline(abs(row.pole) / RAD_PER_CYCLE, color=FAINT, lw=0.8, zorder=0.5)
         if row.frequency_ratio is not None:
             ax.axvline(

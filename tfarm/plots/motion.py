@@ -19,7 +19,7 @@ from tfarm.digits import how_many, plain, significant
 from tfarm.dsp import GainMap, Simulation, traces
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.traces import POINTS_A_PERIOD, TimeCurve
-from tfarm.fitting.recording import Beside
+from tfarm.fitting.recording import RunComparison
 from tfarm.loop.plane import Plane
 from tfarm.tuner import Tuning
 from tfarm.tuner.training import QUARTILES, LearningCurves
@@ -91,7 +91,7 @@ def _draw_curve(curve: TimeCurve, ax: Axes, colour: str, label: str | None = Non
         ax.plot(curve.t, curve.low, color=colour, lw=1.3, label=label)
 
 
-def draw_beside(title: str, each: Mapping[str, Beside]) -> Figure:
+def draw_beside(title: str, each: Mapping[str, RunComparison]) -> Figure:
     """A column a law: hub angle above, root moment below where it was measured."""
     moment = any(found.measured.root_moment.size for found in each.values())
     grid = {"nrows": 1 + moment, "ncols": len(each), "sharex": "col", "sharey": "row", "squeeze": False}

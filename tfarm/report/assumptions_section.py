@@ -8,7 +8,6 @@ from tfarm.arm import Arm
 from tfarm.arrays import Real
 from tfarm.audit.assumptions import (
     Study,
-    candidates,
     has_hub_inertia,
     hub_study,
     section_study,
@@ -74,7 +73,7 @@ def assumptions_section(arm: Arm) -> PageSection:
     words = [opening(arm), SECTION_WORDS.format(area=area, slope=slope, **_ends(section.values, section))]
     blocks: list[Picture | Table] = [section_picture(section)]
     title_of = "Candidate sections: rectangles of this area"
-    blocks.append(table(candidates(section), stem="assumptions-section", title=title_of, caption=SECTION_TABLE))
+    blocks.append(table(section.candidates, stem="assumptions-section", title=title_of, caption=SECTION_TABLE))
     if has_hub_inertia(arm):
         hub = hub_study(arm)
         limits = {"locked": significant(float(hub.locked[0]), 5), "pinned": significant(float(hub.pinned[0]), 5)}
@@ -82,7 +81,7 @@ def assumptions_section(arm: Arm) -> PageSection:
         words.append(HUB_WORDS.format(slope=slope, **limits, **_ends(hub.values, hub)))
         blocks.append(hub_picture(hub))
         of_hub = {"stem": "assumptions-hub", "title": "Candidate hub inertias", "caption": HUB_TABLE}
-        blocks.append(table(candidates(hub), **of_hub))
+        blocks.append(table(hub.candidates, **of_hub))
     else:
         words.append(NO_HUB.format(what="locked" if arm.is_locked else "a free pin"))
     return PageSection(anchor="assumptions", title=title, words=words, blocks=blocks)

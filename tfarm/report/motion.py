@@ -16,7 +16,7 @@ from tfarm.dsp import Chain, Simulation, traces
 from tfarm.dsp.results import drawn, residual_moment_rms, settling_time
 from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.errors import ParameterError
-from tfarm.fitting.recording import Beside, beside_exact, overshoot
+from tfarm.fitting.recording import RunComparison, compare_run, overshoot
 from tfarm.plots.motion import draw_beside
 from tfarm.plots.motion import slew as slew_plot
 from tfarm.plots.style import safe
@@ -99,7 +99,7 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
 def measured_blocks(named: Sequence[LawOnArm], chain: Chain) -> list[Picture | Table]:
     """Each measured run with the exact loop over it, and both in numbers."""
     runs = [(each, each.given.measured) for each in named if each.given.measured is not None]
-    found = {each.name: beside_exact(each.arm, each.law, chain, run) for each, run in runs}
+    found = {each.name: compare_run(each.arm, each.law, chain, run) for each, run in runs}
     sources = " ".join(f"{name}: {it.measured.source}." for name, it in found.items() if it.measured.source)
     steps = ", ".join(f"{name} by {plain(math.degrees(it.measured.step), 3)} deg" for name, it in found.items())
     picture = Picture(
@@ -125,7 +125,7 @@ SIGNALS = (
 )
 
 
-def overshoot_table(found: Mapping[str, Beside]) -> Table:
+def overshoot_table(found: Mapping[str, RunComparison]) -> Table:
     """A row a law: overshoot, where it ends, and the greatest moment, measured and computed."""
     three = singly(significant, 3)
     columns = [Column("law", "law", of=list(found)),
@@ -145,7 +145,7 @@ def overshoot_table(found: Mapping[str, Beside]) -> Table:
     )
 
 
-def beside_table(found: Mapping[str, Beside]) -> Table:
+def beside_table(found: Mapping[str, RunComparison]) -> Table:
     """What the picture draws: a row a sample, measured values taken between their rows."""
     t = min((it.run.t for it in found.values()), key=len)
     columns = [Column("t_s", "time", "s", of=t)]

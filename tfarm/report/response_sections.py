@@ -15,7 +15,6 @@ from tfarm.errors import ConvergenceError
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import ARMS, Fit, Possible, possible
 from tfarm.fitting.overlay import overlay
-from tfarm.fitting.results import FitResult, fit_in_words
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import ranges_of
 from tfarm.plots.fitted import draw_band, draw_share, fitted
@@ -152,7 +151,7 @@ def completeness(data: Bode) -> str:
 
 def fit_section(fit: Fit, count: int = ARMS) -> PageSection:
     """What was measured, what explains it, how sure, and on how many arms of those that remain a loop holds."""
-    words = [typeset(f"{fit.verdict[0].upper()}{fit.verdict[1:]}: {fit_in_words(fit)}. {LEVEL_WORDS}")]
+    words = [typeset(f"{fit.verdict[0].upper()}{fit.verdict[1:]}: {fit.in_words}. {LEVEL_WORDS}")]
     words += [typeset(f"{each[0].upper()}{each[1:]}.") for each in fit.not_determined]
     blocks: list[Picture | Table] = []
     if fit.responses:
@@ -162,13 +161,12 @@ def fit_section(fit: Fit, count: int = ARMS) -> PageSection:
             stem="fit-overlay", title="Measured over fitted", caption=caption,
             alt=f"Measured and computed responses: {names}.", figure=fitted.figure(fit),
         ))  # fmt: skip
-    result = FitResult(fit)
-    blocks.append(table(result.parameters, stem="fit", title="Fitted numbers"))
-    if result.resonances:
+    blocks.append(table(fit.parameters, stem="fit", title="Fitted numbers"))
+    if fit.resonances:
         caption = (
             "Peaks of the measured responses, and poles of the arm's: with a held hub where they are over its angle."
         )
-        blocks.append(table(result.resonances, stem="fit-resonances", title="Resonances", caption=caption))
+        blocks.append(table(fit.resonances, stem="fit-resonances", title="Resonances", caption=caption))
     try:
         those = possible(fit, count)
     except ConvergenceError as error:
@@ -228,9 +226,9 @@ def measured_section(arm: Arm, measured: Sequence[Measured]) -> PageSection:
             alt=f"Measured and exact response {name}.", figure=measured_plot.figure(found),
             data=Table(stem=f"measured{label}-data", title=name, columns=found.csv_table.columns),
         ))  # fmt: skip
-        if found.beside:
+        if found.modes:
             stem = f"measured-modes{label}"
-            blocks.append(table(found.beside, stem=stem, title="Mode by mode", caption=MODES_CAPTION))
+            blocks.append(table(found.modes, stem=stem, title="Mode by mode", caption=MODES_CAPTION))
         if found.required_changes:
             stem, title = f"measured-required{label}", "Single changes that explain a mode"
             blocks.append(table(found.required_changes, stem=stem, title=title, caption=REQUIRED_CAPTION))
