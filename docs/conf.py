@@ -1,5 +1,8 @@
-"""Sphinx configuration.  Pages are prose in MyST; those of commands and of the arm file are made from the code."""
+"""Sphinx configuration.  Pages are prose in MyST; those of commands, JSON keys and files are made from the code."""
 
+import inspect
+import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +13,12 @@ from typer.cli import get_docs_for_click
 
 import tfarm
 import tfarm.cli.running  # loads every command
-from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, TomlTable
+from tfarm.arm.law_tables import LawTable, SignalTable
+from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, StrictTable
 from tfarm.cli.app import whole_command
+from tfarm.dsp.chain import ActuatorTable, ConvertersTable, SamplingTable, SlewTable
+from tfarm.fitting.recording import RunTable
+from tfarm.glossary import CERTAINTY, declared_records
 
 HERE = Path(__file__).parent
 
@@ -19,7 +26,7 @@ project = "tfarm"
 author = copyright = "The tfarm authors"
 release = version = tfarm.__version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-myst_enable_extensions = ["colon_fence", "dollarmath", "deflist"]
+myst_enable_extensions = ["colon_fence", "dollarmath", "deflist", "substitution"]
 myst_heading_anchors = 3
 html_theme = "furo"
 html_math_renderer = "mathml"
@@ -35,50 +42,95 @@ napoleon_use_rtype = False
 exclude_patterns = ["_build"]
 
 
+FILE_TABLES: dict[str, type[StrictTable]] = {
+    **ARM_TABLES,
+    **{f'link.section] with shape = "{shape}': table for shape, table in SHAPE_TABLES.items()},
+    "law": LawTable,
+    "law.SIGNAL": SignalTable,
+    "sampling": SamplingTable,
+    "converters": ConvertersTable,
+    "actuator": ActuatorTable,
+    "slew": SlewTable,
+    "measured": RunTable,
+}
+
+
+def markdown_table(titles: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
+    """Return the lines of a table."""
+    cells = ([cell.replace("|", r"\|").replace("\n", " ") for cell in row] for row in rows)
+    head = [*titles]
+    return [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *cells)]
+
+
 def commands_page() -> str:
-    """Every command with its arguments and options, as Typer writes them."""
+    """Return every command with its arguments, options and example, as Typer writes them."""
     whole = whole_command()
     context, commands = typer.Context(whole), whole.commands.values()
+    rows = ([each.rich_help_panel, f"[`{each.name}`](#tfarm-{each.name})", each.help.splitlines()[0]]
+            for each in commands)  # fmt: skip
     pages = [get_docs_for_click(obj=each, ctx=context, indent=1, call_prefix="tfarm") for each in commands]
-    rows = [f"| [`{each.name}`](#tfarm-{each.name}) | {each.help.splitlines()[0]} |" for each in commands]
-    return "\n".join(["# Commands", "", "| command | purpose |", "|---|---|", *rows, "", *pages])
+    text = re.sub(r"(?m)^Example: (.*)$", "**Example**:\n\n```console\n$ \\1\n```", "\n".join(pages))
+    return "\n".join(["# Commands", "", *markdown_table(("group", "command", "purpose"), rows), "", text])
 
 
 def arm_file_page() -> str:
-    """Every table of an arm's TOML file: key, type, default, and the meaning with units from the record's docstring."""
+    """Return every table of an arm's file: key, type, default, and the record's docstring with meaning and units."""
     lines = ["# Arm file", "", "Tables of an arm's TOML file, in SI units. A key without a default is required.", ""]
-    for name, table in {**ARM_TABLES, **{f"link.section, {each}": of for each, of in SHAPE_TABLES.items()}}.items():
-        lines += [f"## {f'[{name}]' if name else 'Top of the file'}", "", *table_of(table), ""]
+    for name, table in FILE_TABLES.items():
+        meaning = inspect.getdoc(getattr(table, "makes", table)) or ""
+        lines += [f"## {f'[{name}]' if name else 'Top of the file'}", "", " ".join(meaning.split()), ""]
+        lines += [*markdown_table(("key", "type", "default"), map(row_of, table.model_fields.items())), ""]
     return "\n".join(lines)
 
 
-def table_of(table: type[TomlTable]) -> list[str]:
-    """The lines of one table: the meaning of its record, then its keys."""
-    record: Any = getattr(table, "makes", None)
-    meaning = [" ".join((record.__doc__ or "").split()), ""] if record else []
-    return [*meaning, "| key | type | default |", "|---|---|---|", *map(row_of, table.model_fields.items())]
+def json_page() -> str:
+    """Return every record of the results: JSON keys with label, unit and meaning."""
+    text = """# JSON keys
+
+Records that the commands print with `--json`, one section each. A record inside another one is an object there, a list
+of records a list of objects. A complex number is `[real, imaginary]`, an infinity `"inf"` or `"-inf"`, a missing value
+`null`. Columns of CSV files have the same keys.
+"""
+    lines = [text]
+    for kind, declared in sorted(declared_records(), key=lambda each: (each[0].__name__, each[0].__module__)):
+        title = f"{kind.__name__} ({kind.__module__.split('.')[1]})"
+        meaning = (inspect.getdoc(kind) or "").split("\n\n")[0]
+        rows = ([f"`{of.key}`", of.label, of.unit, of.help] for of in declared.values())
+        lines += [f"## {title}", "", " ".join(meaning.split()), ""]
+        lines += [*markdown_table(("key", "label", "unit", "meaning"), rows), ""]
+    return "\n".join(lines)
 
 
-def row_of(field: tuple[str, Any]) -> str:
-    """One key of a table."""
+def row_of(field: tuple[str, Any]) -> list[str]:
+    """Return the cells of one key of a file's table."""
     key, known = field
     made = known.annotation.__name__ if isinstance(known.annotation, type) else str(known.annotation)
     is_table = "Table" in made or key == "section"
     kind = "table" if is_table else made.replace("typing.", "").replace("|", "or")
     default = "" if known.default is PydanticUndefined or is_table else f"`{known.default!r}`"
-    return f"| `{key}` | {kind} | {default} |"
+    return [f"`{key}`", kind, default]
+
+
+myst_substitutions = {
+    "certainty": "\n".join(
+        markdown_table(
+            ("word", "meaning", "condition"),
+            ([f"**{each.name}**", *each.meaning.split(" Shown: ")] for each in CERTAINTY),
+        )
+    )
+}
 
 
 def write_references(app: Any) -> None:
     """Write the pages that are made from the code, where they have changed."""
-    for name, text in {"commands": commands_page(), "arm-file": arm_file_page()}.items():
+    for name, text in {"commands": commands_page(), "json": json_page(), "arm-file": arm_file_page()}.items():
         path = HERE / "reference" / f"{name}.md"
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
 
 
 def write_formula(translator: Any, node: Any) -> None:
-    """A formula as MathML, which browsers draw without a script or the network."""
+    """Write a formula as MathML, which browsers draw without a script or the network."""
     from docutils import nodes  # comes with Sphinx; the tests read this file without
 
     display = "block" if isinstance(node, nodes.math_block) else "inline"
@@ -87,6 +139,6 @@ def write_formula(translator: Any, node: Any) -> None:
 
 
 def setup(app: Any) -> None:
-    """Sphinx calls this."""
+    """Connect the pages and formulas above to Sphinx."""
     app.connect("builder-inited", write_references)
     app.add_html_math_renderer("mathml", (write_formula, None), (write_formula, None))

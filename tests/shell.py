@@ -16,15 +16,12 @@ def run(capsys, *arguments):
     return int(stop.value.code or 0), out, heard(err)
 
 
-PASSING = re.compile(r"tfarm: (compiling once|\d+ of \d+ done, last: ).*\n")
+PROGRESS = re.compile(r"^tfarm: .*\(\d+ s\)\n", re.MULTILINE)
 
 
 def heard(err):
-    """What a command says on standard error, but for what depends on the time it takes.
-
-    That is the notice with the first use after an installation, and the progress of what takes more than seconds.
-    """
-    return PASSING.sub("", err)
+    """Standard error of a command without its lines of progress, which depend on the time that it takes."""
+    return PROGRESS.sub("", err)
 
 
 def answer(capsys, *arguments):

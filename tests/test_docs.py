@@ -8,6 +8,7 @@ import pytest
 
 from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES
 from tfarm.cli.app import whole_command
+from tfarm.glossary import declared_records
 
 DOCS = Path(__file__).parent.parent / "docs"
 
@@ -32,13 +33,30 @@ def test_every_command_and_option_is_on_the_page_of_commands(conf):
 
 def test_every_key_of_an_arm_file_is_on_its_page(conf):
     page = conf.arm_file_page()
-    for table in (*ARM_TABLES.values(), *SHAPE_TABLES.values()):
+    for table in (*ARM_TABLES.values(), *SHAPE_TABLES.values(), *conf.FILE_TABLES.values()):
         assert all(f"| `{key}` |" in page for key in table.model_fields)
     assert "| `friction` | float | `0.0` |" in page
     assert "| `inertia` | float |  |" in page
 
 
+def test_every_json_key_of_every_record_is_in_its_section(conf):
+    sections = dict(re.findall(r"^## (\S+ \(\w+\))$(.*?)(?=^## |\Z)", conf.json_page(), re.MULTILINE | re.DOTALL))
+    records = list(declared_records())
+    assert len(sections) == len(records)
+    assert {"Margins (loop)", "ModeList (spectrum)", "Verdict (dsp)"} <= sections.keys()
+    for kind, declared in records:
+        section = sections[f"{kind.__name__} ({kind.__module__.split('.')[1]})"]
+        assert all(f"| `{of.key}` | {of.label} |" in section.replace(r"\|", "|") for of in declared.values()), kind
+
+
+def test_the_page_of_words_has_the_five_words_with_their_conditions(conf):
+    assert "{{ certainty }}" in (DOCS / "words.md").read_text(encoding="utf-8")
+    rows = conf.myst_substitutions["certainty"].splitlines()[2:]
+    assert [row.split("**")[1] for row in rows] == ["exact", "certified", "converged", "approximate", "not determined"]
+    assert all(len(row.split(" | ")) == 3 for row in rows)
+
+
 def test_every_page_is_in_a_table_of_contents():
     listed = set(re.findall(r"^[\w/-]+$", (DOCS / "index.md").read_text(encoding="utf-8"), re.MULTILINE))
     pages = {str(path.relative_to(DOCS).with_suffix("")) for path in DOCS.rglob("*.md") if "_build" not in path.parts}
-    assert listed == (pages | {"reference/commands", "reference/arm-file"}) - {"index"}
+    assert listed == (pages | {"reference/commands", "reference/json", "reference/arm-file"}) - {"index"}

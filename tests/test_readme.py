@@ -112,8 +112,7 @@ def test_the_example_of_a_report_runs(
     (line,) = (line for line in COMMANDS if line.startswith("tfarm report "))
     code, out, err = run(capsys, *shlex.split(line)[1:])
     assert (code, out.strip()) == (0, "pages/index.html")
-    progress = r"tfarm: (starting|\d+ of \d+ done(, running: .*)?)"  # every few seconds, so on a busy machine alone
-    assert [line for line in err.splitlines() if not re.fullmatch(progress, line)] == []
+    assert err == ""
     assert {path.name for path in (tmp_path / "pages").iterdir()} == {"assets", "index.html", "sasaki2012-lab", "trust"}
     assert (tmp_path / "pages" / "sasaki2012-lab" / "index.html").exists()
 

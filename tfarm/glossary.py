@@ -1,153 +1,175 @@
-"""The words that tfarm's answers use in a sense of their own, each once, for `tfarm glossary` and for pages."""
+"""The five words of certainty and the terms of the results, for `tfarm glossary`, the pages and the documentation.
+
+The quantities of all results, with label, unit and meaning, are read where each record declares them.
+"""
 
 from __future__ import annotations
 
+import pkgutil
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
 from typing import Annotated
 
 from tfarm.errors import ParameterError, did_you_mean
-from tfarm.schema import Quantity
+from tfarm.schema import Quantity, quantities
 
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A word or two, and what they promise or mean."""
+    """A term and its meaning; of a word of certainty what has to be shown for it."""
 
     name: Annotated[str, Quantity("term", key="term")]
     meaning: Annotated[str, Quantity("meaning")]
 
 
-GLOSSARY_TERMS = (
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """A quantity of the results."""
+
+    label: Annotated[str, Quantity("quantity", key="quantity")]
+    unit: Annotated[str, Quantity("unit")]
+    meaning: Annotated[str, Quantity("meaning")]
+
+
+CERTAINTY = (
     Term(
-        "band",
-        "the range of frequencies from 0 up to a printed one in which poles were counted or a margin was "
-        "read. What is known beyond it stands beside it; where nothing is, the answer says so.",
-    ),
-    Term(
-        "box",
-        "a rectangle of the s-plane. A list that is complete in a box holds every pole or zero inside it, "
-        "counted by the winding number around it.",
+        "exact",
+        "Solution of the beam equations without truncation of modes. Shown: it is evaluated from the "
+        "transcendental solution, and the rounding error is below the last printed digit.",
     ),
     Term(
         "certified",
-        "proven in ball arithmetic: each frequency or eigenvalue is enclosed, and their number is certain. "
-        "Asked for by --certify.",
+        "Proven, rounding included. Shown: an enclosure in ball arithmetic and a proven count of the roots in it, "
+        "or a theorem whose hypotheses were checked.",
     ),
     Term(
+        "converged",
+        "A limit was reached within a stated tolerance. Shown: more modes, points or starts changed the result by "
+        "less than the tolerance.",
+    ),
+    Term(
+        "approximate",
+        "The result of a model that is not exact. Shown: its error was measured against the exact solution, and is "
+        "printed with the result.",
+    ),
+    Term(
+        "not determined",
+        "No statement. Shown: the search or the proof stopped short, and the reason is printed.",
+    ),
+)
+TERMS = (
+    Term("band", "The frequency range from 0 to a printed limit in which poles were counted or a margin was read."),
+    Term("box", "A rectangle of the s-plane. A list that is complete in a box has every pole or zero inside it."),
+    Term(
         "complete",
-        "nothing is missing: a count that does not rest on finding things agrees with the list, in the band "
-        "or box that is printed.",
+        "No entry is missing: a count that is independent of the search agrees with the list, in the printed "
+        "frequency range or box.",
     ),
     Term(
         "crossover",
-        "a frequency where |L| = 1 (gain crossover, with its phase margin) or where L < 0 (phase crossover, "
-        "with the factor on the whole law that puts a pole there).",
+        "A frequency where |L| = 1 (gain crossover, of the phase margin) or where L < 0 (phase crossover, of the "
+        "gain margin).",
     ),
     Term(
         "default gains",
-        "K1 = 0.00642 J w1 (J the arm's inertia, w1 its first flexible frequency) and K2 = 0.3, taken where "
-        "none are given, and said. They are the paper's on its arm and a place to begin on another, no "
-        "recommendation.",
+        "K1 = 0.00642 J w1 (J the arm's inertia, w1 its first flexible frequency) and K2 = 0.3, where none are "
+        "given. They are the paper's on its arm and a first guess on another one, no recommendation.",
     ),
     Term(
         "delay margin",
-        "the least further delay in the loop that puts a pole on the imaginary axis; in seconds, or in "
-        "samples of a sampled loop.",
+        "The smallest additional loop delay that brings a pole to the stability boundary, in s or in samples.",
     ),
     Term(
         "disk margin",
-        "twice the least |(1 + L)/(1 - L)|: under a complex factor (2 + d)/(2 - d) on L, gain and phase at "
-        "once, no pole becomes unstable while |d| is below it (Seiler, Packard and Gahinet 2020).",
+        "Twice the minimum of |(1 + L)/(1 - L)|. With a complex factor (2 + d)/(2 - d) on L the loop stays stable "
+        "while |d| is smaller (Seiler, Packard and Gahinet 2020).",
     ),
-    Term(
-        "enclosed",
-        "known to lie in a printed interval or disc, with rounding accounted for; exactly one root lies in each.",
-    ),
-    Term(
-        "exact",
-        "of the transcendental solution of the beam equations, with no modes cut off; computed to rounding, "
-        "which every printed digit is clear of.",
-    ),
+    Term("enclosed", "In a printed interval or disc, with rounding accounted for; exactly one root is in each."),
+    Term("gain margin", "The factor on L, in dB, at which a pole reaches the stability boundary."),
     Term(
         "hub participation",
-        "how much a mode turns the hub: the angle b of the hub in the mode's shape of unit modal mass. b^2 is "
-        "the residue of hub angle over torque; a mode with b = 0 is neither driven nor seen there.",
+        "The hub angle b of a mode's shape of unit modal mass; b^2 is the residue of hub angle over torque. A mode "
+        "with b = 0 is neither controllable nor observable at the hub.",
     ),
     Term(
         "hub-locked frequency",
-        "a natural frequency with the hub held still. A rig rings there when dry friction has stopped its hub.",
+        "A natural frequency with the hub fixed. A rig vibrates there when dry friction has stopped its hub.",
     ),
     Term(
         "Lyapunov region",
-        "K1 > 0, K2 < 1, where the paper's energy argument proves the undamped arm (C = 0) stable. With C > 0 "
-        "it proves K2 = 0 alone; on other rigs it proves what the answer says, often nothing. Outside it a "
-        "loop need not be unstable.",
+        "K1 > 0, K2 < 1, where the paper's energy argument proves the undamped arm (C = 0) stable. It is sufficient, "
+        "not necessary. With C > 0 it proves K2 = 0 alone.",
     ),
-    Term(
-        "marginal",
-        "with poles on the imaginary axis to working precision: neither stable nor unstable.",
-    ),
+    Term("marginal", "With poles on the stability boundary to working precision: neither stable nor unstable."),
     Term(
         "passive",
-        "of a law from the hub's own angle or rate to its torque that gives the arm no energy at any "
-        "frequency: it drives no mode of any rig. A delay or a clock ends that.",
+        "Of a law from the hub's angle or rate to its torque that supplies no energy to the arm at any frequency. "
+        "It destabilises no mode of any rig; a delay or sampling ends that.",
     ),
-    Term(
-        "proven",
-        "shown by a theorem whose hypotheses hold here, or in arithmetic whose every rounding is bounded. A "
-        "number in float64 is never called so.",
-    ),
-    Term(
-        "settled",
-        "of a sampled verdict: no mode of the printed band, in the computed loop or not, and no slow real "
-        "pole can change it.",
-    ),
+    Term("peak sensitivity Ms", "The maximum of |1/(1 + L)|, one over the smallest distance of L from -1."),
+    Term("phase margin", "The smallest phase lag, in deg, that brings a pole to the stability boundary."),
+    Term("proven", "Certified: shown by a theorem whose hypotheses were checked, or with every rounding bounded."),
+    Term("settled", "Certified, of a sampled verdict: no mode of the printed frequency range can change it."),
     Term(
         "sign convention",
-        "u = -Kp theta - K1 theta_t - K2 E I phi'(0): the root moment counts positive where it accelerates "
-        "the hub. With the gauge the other way round K2 changes its sign.",
+        "u = -Kp theta - K1 theta_t - K2 E I phi'(0): the root moment is positive where it accelerates the hub. With "
+        "the gauge reversed K2 changes its sign.",
     ),
     Term(
         "small gain",
-        "where |L| < 1 no pole can be unstable, whatever the phase: why nothing need be counted beyond a band "
-        "in which |L| has become small and falls.",
+        "Where |L| < 1 no pole can be unstable, whatever the phase. Beyond a frequency range in which |L| has become "
+        "small and falls, no poles need be counted.",
     ),
-    Term(
-        "spectral abscissa",
-        "the largest real part of the poles in the band; negative where they all decay.",
-    ),
-    Term(
-        "spill-over",
-        "a law that drives a mode which its design model leaves out: stable on the model, unstable on the rig.",
-    ),
-    Term(
-        "verdict",
-        "stable, unstable, marginal or undecided. It comes before any margin, as an unstable loop has none.",
-    ),
+    Term("spectral abscissa", "The largest real part of the poles in the frequency range; negative if all decay."),
+    Term("spillover", "A law destabilises a mode that its design model leaves out."),
+    Term("verdict", "Stable, unstable, marginal or not determined. An unstable loop has no margins."),
     Term(
         "winding number",
-        "how often D(s) turns around 0 as s goes around a box: the number of roots inside, found without "
-        "looking for them (the argument principle).",
+        "The number of encirclements of 0 by D(s) along a box: the number of roots inside it (argument principle).",
     ),
     Term(
         "window",
-        "an interval of one gain, the others held, in which the loop is stable. A * marks an end up to which "
-        "no limit was found, and beyond which none was looked for.",
+        "A stability interval of one gain, the others fixed. A * marks an end of the search range, at which no "
+        "limit was found.",
     ),
 )
+GLOSSARY_TERMS = tuple(sorted((*CERTAINTY, *TERMS), key=lambda term: term.name.casefold()))
+
+
+def declared_records() -> Iterator[tuple[type, dict[str, Quantity]]]:
+    """Return every class of records with its quantities by attribute; imports the whole package."""
+    for module in pkgutil.walk_packages([str(Path(__file__).parent)], "tfarm."):
+        if module.name in ("tfarm.__main__", "tfarm.grouped"):  # these act when they are imported
+            continue
+        for kind in vars(import_module(module.name)).values():
+            with suppress(NameError):  # of a class whose annotations are for type checkers alone
+                if isinstance(kind, type) and kind.__module__ == module.name and quantities(kind):
+                    yield kind, quantities(kind)
 
 
 @dataclass(frozen=True)
 class Glossary:
-    """Terms with their meanings."""
+    """The words of certainty and terms, and the quantities that have a meaning of their own."""
 
     terms: Annotated[tuple[Term, ...], Quantity("terms")]
+    quantities: Annotated[tuple[Declared, ...], Quantity("quantities of the results")]
 
 
 def glossary(words: str | None = None) -> Glossary:
-    """Every term with its meaning, or those whose name holds the words.  Raises ParameterError where there is none."""
-    found = tuple(each for each in GLOSSARY_TERMS if words is None or words.casefold() in each.name.casefold())
-    if not found:
-        remedy = did_you_mean(str(words), [each.name for each in GLOSSARY_TERMS])
+    """Return every term and quantity, or those whose name contains the words.
+
+    Raises ParameterError where there is none.
+    """
+    every = {Declared(of.label, of.unit, of.help) for _, all_of in declared_records() for of in all_of.values()
+             if of.label and of.help}  # fmt: skip
+    part = (words or "").casefold()
+    terms = tuple(each for each in GLOSSARY_TERMS if part in each.name.casefold())
+    known = sorted(every, key=lambda each: (each.label.casefold(), each.unit, each.meaning))
+    found = tuple(each for each in known if part in each.label.casefold())
+    if not (terms or found):
+        remedy = did_you_mean(part, [each.name for each in GLOSSARY_TERMS])
         raise ParameterError(key="term", value=words, remedy=remedy)
-    return Glossary(found)
+    return Glossary(terms, found)

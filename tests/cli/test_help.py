@@ -1,6 +1,7 @@
-"""What helps with the other verbs: the glossary, completion, the version, `python -m tfarm`."""
+"""Help: glossary, completion, texts and examples of every command, version, `python -m tfarm`."""
 
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -9,8 +10,9 @@ import pytest
 
 import tfarm
 from tests.shell import answer, run
+from tfarm.cli.app import GROUPS
 from tfarm.cli.running import whole_command
-from tfarm.glossary import GLOSSARY_TERMS
+from tfarm.glossary import CERTAINTY, GLOSSARY_TERMS
 
 VERBS = whole_command().commands
 
@@ -20,49 +22,49 @@ def test_the_glossary_has_each_word_once_in_order(capsys):
     names = [each["term"] for each in terms]
     assert names == [each.name for each in GLOSSARY_TERMS]
     assert names == sorted(set(names), key=str.casefold)
-    needed = {"proven", "enclosed", "winding number", "Lyapunov region", "certified", "band", "spill-over", "settled"}
-    assert needed <= set(names)
+    assert {each.name for each in CERTAINTY} <= set(names)
+    assert {"gain margin", "winding number", "Lyapunov region", "spillover"} <= set(names)
     assert all(each["meaning"].endswith(".") and len(each["meaning"]) < 300 for each in terms)
+
+
+def test_the_glossary_has_the_meanings_that_records_declare(capsys):
+    found = answer(capsys, "glossary", "disk margin")["quantities"]
+    assert {"quantity", "unit", "meaning"} == found[0].keys()
+    assert all("gain and phase together" in each["meaning"] for each in found)
 
 
 def test_a_term_is_found_by_a_part_of_it_and_no_other_is_refused(capsys):
     assert [each["term"] for each in answer(capsys, "glossary", "lyap")["terms"]] == ["Lyapunov region"]
     _, out, _ = run(capsys, "glossary", "proven")
-    assert "theorem whose hypotheses hold" in out
+    assert "theorem whose hypotheses were checked" in out
     code, out, err = run(capsys, "glossary", "provn")
     assert (code, out) == (2, "")
     assert 'did you mean "proven"?' in err
     assert err.count("\n") == 1
 
 
-def completed(script, *words):
-    """What bash offers for the last of these words."""
-    line = f"""{script}
-COMP_WORDS=({" ".join(f"'{word}'" for word in ("tfarm", *words))}); COMP_CWORD={len(words)}
-_tfarm; printf '%s\\n' "${{COMPREPLY[@]}}\""""
-    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=True)
-    assert done.stderr == ""
-    return done.stdout.split()
+def completed(capsys, monkeypatch, *words):
+    """The words that tfarm gives to bash for the last of these."""
+    monkeypatch.setenv("COMP_WORDS", " ".join(("tfarm", *words)))
+    monkeypatch.setenv("COMP_CWORD", str(len(words)))
+    monkeypatch.setenv("_TFARM_COMPLETE", "complete_bash")
+    return run(capsys)[1].split()
 
 
-def test_bash_completes_verbs_options_and_presets(capsys):
-    code, script, err = run(capsys, "completion", "bash")
-    assert (code, err) == (0, "")
-    assert completed(script, "") == [*sorted(VERBS), "--help", "--version"]
-    assert completed(script, "mar") == ["margins"]
-    assert completed(script, "margins", "sasaki2012-") == ["sasaki2012-as-printed", "sasaki2012-lab"]
-    assert completed(script, "modes", "sasaki2012", "--c") == ["--count", "--certify", "--compare"]
-    for verb, command in VERBS.items():
-        known = {option for each in command.params for option in each.opts if option.startswith("--")}
-        assert set(completed(script, verb, "--")) == known | {"--help"}
-    assert {*tfarm.presets()} <= set(completed(script, "report", ""))
+def test_commands_options_presets_and_choices_are_completed(capsys, monkeypatch):
+    assert completed(capsys, monkeypatch, "") == list(VERBS)
+    assert completed(capsys, monkeypatch, "mar") == ["margins"]
+    assert completed(capsys, monkeypatch, "margins", "sasaki2012-") == ["sasaki2012-as-printed", "sasaki2012-lab"]
+    assert completed(capsys, monkeypatch, "modes", "sasaki2012", "--c") == ["--count", "--certify", "--compare"]
+    assert completed(capsys, monkeypatch, "modes", "sasaki2012", "--theory", "eu") == ["euler-bernoulli"]
+    assert {*tfarm.presets()} <= set(completed(capsys, monkeypatch, "report", ""))
 
 
-@pytest.mark.parametrize("shell", ["zsh", "fish"])
-def test_other_shells_have_the_same_words(capsys, shell):
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_script_of_a_shell_is_one_of_its_own(capsys, shell):
     code, script, err = run(capsys, "completion", shell)
     assert (code, err) == (0, "")
-    assert {*VERBS, *tfarm.presets()} <= set(re.findall(r"[\w-]+", script))
+    assert f"_TFARM_COMPLETE=complete_{shell}" in script
     if (there := shutil.which(shell)) is not None:
         subprocess.run([there, "-n"], input=script, text=True, check=True)
 
@@ -70,7 +72,31 @@ def test_other_shells_have_the_same_words(capsys, shell):
 def test_an_unknown_shell_is_one_line(capsys):
     code, out, err = run(capsys, "completion", "fsh")
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert 'did you mean "fish"?' in err
+    assert "'fish'" in err
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_help_is_whole_and_has_an_example_that_is_understood(capsys, monkeypatch, tmp_path, name):
+    """At 80 columns: no text is cut, a unit in brackets is no markup, and the example parses."""
+    monkeypatch.setenv("COLUMNS", "80")
+    code, out, err = run(capsys, name, "--help")
+    assert (code, err, "…" in out) == (0, "", False)
+    words = " ".join(re.sub("[│╭╮╰╯─]", " ", out).split())
+    command = VERBS[name]
+    assert " ".join(command.help.replace("\\[", "[").split()) in words
+    assert command.epilog in words
+    verb, *rest = shlex.split(command.epilog.removeprefix("Example: tfarm "))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "record.csv").touch()
+    assert verb == name
+    command.make_context(verb, rest)
+
+
+def test_commands_stand_in_their_groups(capsys):
+    out = run(capsys, "--help")[1]
+    places = [out.index(f"─ {title} ─") for title in GROUPS]
+    assert places == sorted(places)
+    assert "…" not in out
 
 
 def test_the_version_is_said_by_every_way_in(capsys):

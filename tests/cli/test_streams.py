@@ -13,7 +13,6 @@ import tfarm
 from tests.shared import thinned
 from tests.shell import heard, run
 from tfarm.cli import main
-from tfarm.cli.app import say_when_compiling
 
 TFARM = f"{sys.executable} -m tfarm"
 
@@ -150,17 +149,3 @@ def test_what_befalls_a_command_midway_is_one_line(error, code, line, capsys, mo
     assert (got, out) == (code, "")
     assert err.startswith(f"tfarm: {line}")
     assert err.count("\n") == 1
-
-
-def test_the_first_compilation_is_announced_once(capsys):
-    import numba
-
-    say_when_compiling.__wrapped__()  # whatever this process has said already
-    assert capsys.readouterr() == ("", "")
-    for function in (lambda x: x + 1, lambda x: x + 2):
-        assert numba.njit(function)(1) in (2, 3)
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.startswith("tfarm: compiling once")
-    assert heard(err) == ""
-    assert err.count("\n") <= 2  # this announcement's, and perhaps that of an earlier command of this process

@@ -220,7 +220,7 @@ def test_a_difference_is_a_number_or_none(one, other, shown):
     [
         (["sasaki2012"], "give a second arm, or --law FILE twice"),
         (["sasaki2012", "sasaki2012-lab", "stocky-steel"], "two at most"),
-        (["sasaki2012", "--law", "a.toml"], "give a second arm, or --law FILE twice"),
+        (["sasaki2012", "--law", "a.toml"], "does not exist"),
         (["sasaki2012", "sasaki2021"], 'did you mean "sasaki2012"'),
         (["sasaki2012", "sasaki2012-lab", "--modes", "31"], "1 to 30"),
         (["sasaki2012", "quanser-2dsfl"], "gains of sasaki2012 are in another unit"),

@@ -74,8 +74,8 @@ def test_the_folder_of_an_arm_is_small(pages):
     assert sum(len(content) for content in files_of(pages / NAME).values()) < 4e6
 
 
-def test_progress_is_told_in_a_pipe_too(monkeypatch, capsys):
-    monkeypatch.setattr(cli_app, "PROGRESS_EVERY", 0.02)
+def test_progress_is_a_line_in_a_pipe_too(monkeypatch, capsys):
+    monkeypatch.setattr(cli_app, "PROGRESS_AFTER", 0.02)
     with cli_app.progress() as advance:
         advance(3, 7, "a section")
         deadline = time.monotonic() + 30
@@ -83,4 +83,4 @@ def test_progress_is_told_in_a_pipe_too(monkeypatch, capsys):
         while "a section" not in seen and time.monotonic() < deadline:
             time.sleep(0.02)
             seen += capsys.readouterr().err
-    assert "tfarm: 3 of 7 done, running: a section" in seen.splitlines()
+    assert "tfarm: 3 of 7 done, running: a section (0 s)" in seen.splitlines()

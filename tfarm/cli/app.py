@@ -1,145 +1,308 @@
-"""The application and what its verbs share."""
+"""The application: options that commands share, the arm and the law that they name, and the output of a record."""
 
 from __future__ import annotations
 
 import os
 import sys
+import time
+from cmath import inf, isnan
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from functools import cache
+from dataclasses import replace
+from functools import cache, wraps
+from inspect import Parameter, signature
 from pathlib import Path
 from threading import Event, Thread
 from typing import IO, TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
+import tfarm
+from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, RATE_GAIN, Arm, Theory, implausible
 from tfarm.errors import ParameterError, one_line
 from tfarm.files import is_standard_output
 from tfarm.tables.files import to_json, write_csv
 
 if TYPE_CHECKING:
-    from tfarm.arm import Arm
-    from tfarm.exact.outputs import Output
+    from tfarm.arm import AnyLaw, Input
+    from tfarm.dsp import Chain
+    from tfarm.exact.outputs import Output, Side
 
-
-app = typer.Typer(
-    name="tfarm",
-    add_completion=False,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
+app = typer.Typer(name="tfarm", rich_markup_mode="rich", pretty_exceptions_enable=False)
+GROUPS = ("Arm", "Loop", "Sampled loop", "Design", "Measurement", "Report")  # of commands in the help, in its order
+PROGRESS_AFTER, PROGRESS_EVERY = 2.0, 4.0  # seconds to the first line of progress, and from one to the next
+INPUT_REMEDY = "Set input to hub_torque, motor_voltage or motor_current at the top of the file."
 
 
 @cache  # some 35 ms, which a process with several commands need not spend on each
 def whole_command() -> Any:
-    """The command of all verbs as Click has it; asked for once all rooms of verbs are loaded."""
-    return typer.main.get_command(app)
+    """Return the command with all its subcommands; called once every module of commands is loaded.
+
+    A [unit] in a help text is no markup of rich.
+    """
+    command: Any = typer.main.get_command(app)
+    command.commands = dict(sorted(command.commands.items(), key=lambda each: GROUPS.index(each[1].rich_help_panel)))
+    for each in command.commands.values():
+        for text in (each, *each.params):
+            text.help = (text.help or "").replace("[", r"\[")
+    return command
 
 
-def _say_version(asked: bool) -> None:
-    if asked:
-        from tfarm import __version__
+def group(title: str) -> Callable[..., Callable[[Callable[..., None]], Callable[..., None]]]:
+    """Return the decorator of a command in a group of the help: `command(example, name=None)`."""
 
-        print(f"tfarm {__version__}")
+    def command(example: str, **options: Any) -> Any:
+        return app.command(rich_help_panel=title, epilog=f"Example: tfarm {example}", **options)
+
+    return command
+
+
+def print_version(wanted: bool) -> None:
+    """Print the version and exit, where --version is given."""
+    if wanted:
+        print(f"tfarm {tfarm.__version__}")
         raise typer.Exit
 
 
 @app.callback()
-def options_of_all(
+def tfarm_options(
     version: Annotated[
-        bool, typer.Option("--version", is_eager=True, callback=_say_version, help="print the version, and exit")
+        bool, typer.Option("--version", is_eager=True, callback=print_version, help="print the version, and exit")
     ] = False,
 ) -> None:
     """Exact frequency-domain analysis of a rotating flexible Timoshenko arm."""
 
 
-ArmName = Annotated[str, typer.Argument(metavar="ARM", help="a preset's name or a TOML file", show_default=False)]
-TheoryName = Annotated[
-    str | None,
-    typer.Option("--theory", help="timoshenko, shear, rayleigh or euler-bernoulli; the arm's own if not said"),
+# ---------------------------------------------------------------------------------------------------------- options
+
+
+def preset_names(incomplete: str) -> list[str]:
+    """Return the presets that begin so, for the completion of a shell."""
+    return [name for name in tfarm.presets() if name.startswith(incomplete)]
+
+
+def numbers(count: int = 0, kind: Callable[[str], Any] = float) -> Callable[[str], tuple[Any, ...]]:
+    """Return the parser of an option's numbers, which commas separate: so many, or any number of them."""
+
+    def parse(text: str) -> tuple[Any, ...]:
+        with suppress(ValueError):
+            found = tuple(kind(part.strip()) for part in text.split(","))
+            if len(found) == (count or len(found)) and not any(map(isnan, found)):
+                return found
+        expected = ",".join(["NUMBER"] * count) or "NUMBER,NUMBER,..."
+        raise typer.BadParameter(f"{text!r} is not of the form {expected}")
+
+    return parse
+
+
+def interval(text: str) -> tuple[float, ...]:
+    """Return the two numbers of LOW,HIGH."""
+    low, high = numbers(2)(text)
+    if not -inf < low < high < inf:
+        raise typer.BadParameter(f"{text!r} is no interval. Give two numbers, the lower first, such as -1,3")
+    return low, high
+
+
+def named(parser: Callable[[str], Any]) -> Callable[[str], tuple[str, Any]]:
+    """Return the parser of NAME=VALUE, with one for the value."""
+
+    def parse(text: str) -> tuple[str, Any]:
+        name, _, value = text.partition("=")
+        return name.strip(), parser(value)
+
+    return parse
+
+
+CONTROLLER, SAMPLING = "Controller", "Sampling"  # groups of options
+ArmName = Annotated[
+    str, typer.Argument(metavar="ARM", help="preset or TOML file", autocompletion=preset_names, show_default=False)
 ]
-PROGRESS_EVERY = 4.0  # seconds from one line of progress to the next: few lines in a log, and no long silence
-INPUT_REMEDY = "Set input to hub_torque, motor_voltage or motor_current at the top of the file."
-SideName = Annotated[
-    str | None, typer.Option("--side", help="outer (if not said) or inner side of a joint, for outputs along the arm")
-]
+TheoryName = Annotated[Theory | None, typer.Option("--theory", help="beam theory; by default that of the arm's file")]
+Json = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")]
+Csv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="write the table to this file")]
+Png = Annotated[Path | None, typer.Option("--png", metavar="FILE", help="draw the picture into this file")]
 Place = Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")]
-INPUT_WORDS = "hub_torque, motor_voltage, motor_current, hub_angle, force@X or moment_pair@X1,X2"
-InputName = Annotated[str | None, typer.Option("--input", help=INPUT_WORDS)]
-Json = Annotated[bool, typer.Option("--json", help="one JSON object on standard output")]
-MethodName = Annotated[str, typer.Option("--method", help="closed-form, balls, or appendix: the paper's determinant")]
-Compare = Annotated[bool, typer.Option("--compare", help="all three methods beside each other, and where they part")]
-DigitCount = Annotated[str | None, typer.Option("--digits", metavar="D", help="right digits, proven; strings above 15")]
+SideName = Annotated[
+    str | None, typer.Option("--side", help="outer (default) or inner side of a joint, for outputs along the arm")
+]
+InputName = Annotated[
+    str | None,
+    typer.Option("--input", help="hub_torque, motor_voltage, motor_current, hub_angle, force@X or moment_pair@X1,X2"),
+]
+ModeCount = Annotated[int, typer.Option("--modes", min=1, max=30, help="flexible modes")]
+LawFile = Annotated[
+    Path | None,
+    typer.Option("--law", metavar="FILE", exists=True, help="TOML file with a [law]; by default that of the arm's file",
+                 rich_help_panel=CONTROLLER),
+]  # fmt: skip
+LawFiles = Annotated[
+    list[Path] | None,
+    typer.Option("--law", metavar="FILE", exists=True, help="TOML file with a [law]; may be repeated",
+                 rich_help_panel=CONTROLLER),
+]  # fmt: skip
+Period = Annotated[
+    float | None,
+    typer.Option("--period", help="sampling period [s]; by default the file's, or 0.01", rich_help_panel=SAMPLING),
+]
+Delay = Annotated[
+    float | None,
+    typer.Option("--delay-samples", help="computational delay in samples, any fraction", rich_help_panel=SAMPLING),
+]
+DspFile = Annotated[
+    str | None,
+    typer.Option("--dsp", metavar="FILE", rich_help_panel=SAMPLING,
+                 help="TOML file with [sampling], [converters], [actuator], [slew]; by default that of the arm"),
+]  # fmt: skip
+Gains = dict[str, float | None]  # by name; None where not given
+DEFAULT_GAINS = {
+    RATE_GAIN: "hub rate gain [N m s/rad, V s/rad or A s/rad]; by default 0.00642 J w1 (0.3 on the paper's arm)",
+    MOMENT_GAIN: f"root moment gain, u = ... - {MOMENT_GAIN} E I phi'(0); by default 0.3, 0 without hub inertia",
+}
 
 
-def load_arm(name: str, theory: str | None = None, driven: str | None = None) -> Arm:
-    """The preset or file of that name, under that theory or its own.
+def gain_option(name: str, text: str, kind: Any = float | None) -> Any:
+    """Return the type of the option of a gain."""
+    return Annotated[kind, typer.Option(f"--{name}", help=text, rich_help_panel=CONTROLLER)]
 
-    Values that look like a slip of units, and a motor without an input (`driven` or the file's), are named on standard
-    error.
+
+GAIN_OPTIONS = {
+    gain.name: gain_option(
+        gain.name, DEFAULT_GAINS.get(gain.name, f"{gain.output.replace('_', ' ')} gain [{gain.unit}]; by default 0")
+    )
+    for gain in LISTED
+}
+AngleGain = gain_option(ANGLE_GAIN, "hub angle gain", float)
+
+
+def with_gains(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of the gains to a command, whose last parameter has their values by name."""
+    own = signature(command, eval_str=True)
+    *kept, _ = (each.replace(kind=Parameter.KEYWORD_ONLY) for each in own.parameters.values())
+    added = [
+        Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=kind) for name, kind in GAIN_OPTIONS.items()
+    ]
+
+    @wraps(command)
+    def called(**options: Any) -> None:
+        command(gains={name: options.pop(name) for name in GAIN_OPTIONS}, **options)
+
+    called.__signature__ = own.replace(parameters=[*kept, *added])  # type: ignore[attr-defined]
+    return called
+
+
+# ------------------------------------------------------------------------------------------------------------ inputs
+
+
+def load_arm(name: str, theory: Theory | None = None, driven: str | None = None) -> Arm:
+    """Return the preset or file of that name, under that theory, with `driven` as its input.
+
+    Values that look like a wrong unit, and a motor without an input, are named on standard error.
     """
-    from tfarm.arm import implausible
     from tfarm.arm.reading import arm_in, load_tables
 
-    say_when_compiling()
     table, file = load_tables(name)
     arm = arm_in(table, file)
     if "motor" in table and "input" not in table and driven is None:
-        tell(f"warning: {file}: input: not given with a [motor], {arm.input} is assumed. {INPUT_REMEDY}")
+        print_line(f"warning: {file}: input: not given with a [motor], {arm.input} is assumed. {INPUT_REMEDY}")
     if theory is not None:
-        arm = arm.under(cast("Any", theory))
+        arm = arm.under(theory)
     if texts := implausible(arm):
-        tell(f"warning: {arm.name}: {'; '.join(texts)}")
-    return arm
+        print_line(f"warning: {arm.name}: {'; '.join(texts)}")
+    return arm if driven is None or "@" in driven else replace(arm, input=cast("Input", driven))
 
 
-def read_on(names: list[str], side: str | None) -> list[str | Output]:
-    """The outputs of these names, or those of them on one side of a joint of two segments."""
+def load_law(arm: Arm, name: str, gains: Gains, file: Path | None = None) -> tuple[AnyLaw, dict[str, Any]]:
+    """Return the law of a file, of the gains given, or of the arm's own [law], and what JSON has of default gains.
+
+    `default_gains` names those that are not given and have a default, `default_gains_in_words` is their values.
+    """
+    from tfarm.arm.law_tables import load_law as read
+    from tfarm.spectrum.table import default_words
+
+    typed = {gain: value for gain, value in gains.items() if value is not None}
+    if file is not None and typed:
+        gain, value = next(iter(typed.items()))
+        raise ParameterError(
+            key=f"--{gain}", value=value, remedy=f"the law is that of {file}; leave out --{gain}, or --law"
+        )
+    own = None if typed else read(name if file is None else file)
+    if own is not None:
+        return own, {}
+    if file is not None:
+        raise ParameterError(key="--law", value=str(file), remedy="has no table [law]")
+    missing = [gain for gain in DEFAULT_GAINS if gain not in typed]
+    words = default_words(arm, missing) if missing else None
+    law = replace(tfarm.default_gains(arm), **typed)
+    return law, {"default_gains": missing, "default_gains_in_words": words}
+
+
+def load_loop(name: str, theory: Theory | None, gains: Gains, law: Path | None) -> tuple[Arm, AnyLaw, dict[str, Any]]:
+    """Return arm and law of a command, and what JSON has of default gains."""
+    arm = load_arm(name, theory)
+    return arm, *load_law(arm, name, gains, law)
+
+
+def load_chain(name: str, period: float | None, delay_samples: float | None) -> Chain:
+    """Return the sampled chain of a file, with the period and the delay that are given instead."""
+    from tfarm.dsp.chain import load_chain as read
+
+    chain = read(name)
+    options = {"period": period, "delay_samples": delay_samples}
+    given = {key: value for key, value in options.items() if value is not None}
+    return replace(chain, sampling=replace(chain.sampling, **given))
+
+
+def outputs_on(names: Sequence[str], side: str | None) -> list[str | Output]:
+    """Return the outputs of these names, on one side of a joint where that is given."""
     from tfarm.exact.outputs import on_side
 
-    return [name if side is None else on_side(name, cast("Any", side)) for name in names]
+    return [name if side is None else on_side(name, cast("Side", side)) for name in names]
+
+
+def refuse(others: Mapping[str, Any], remedy: str) -> None:
+    """Raise ParameterError for an option that another one excludes."""
+    for key, value in others.items():
+        if value is not None and value is not False:
+            raise ParameterError(key=key, value=value, remedy=remedy)
+
+
+# ----------------------------------------------------------------------------------------------------------- outputs
 
 
 def emit(
-    found: Any,
+    record: Any,
     json: bool,
-    said: Mapping[str, Any] | None = None,
+    defaults: Mapping[str, Any] | None = None,
     *,
     csv: Path | None = None,
     png: Path | None = None,
     also: Sequence[Path | None] = (),
 ) -> None:
-    """A record to the outputs asked for: its curves or rows as CSV, its picture, then JSON or text.
+    """Write the curves or rows of a record to CSV and its picture to PNG, then print it as JSON or as text.
 
-    `said` is what else is known of the command, such as its default gains; `also` are files that are written already.
-    Nothing is printed where standard output holds one of them.
+    `defaults` is what JSON has of default gains; `also` are files that are written already.  Nothing is printed where
+    standard output is one of the files.
     """
-    from tfarm.schema import curve_table, to_dict
+    from tfarm.schema import curve_table, sections, to_dict
+    from tfarm.tables.terminal import show, show_pairs
 
     if csv is not None:
-        write_csv(curve_table(found), csv)
+        write_csv(curve_table(record), csv)
     if png is not None:
-        import tfarm.plots  # noqa: F401  every picture is known once they are loaded
         from tfarm.plots.files import save_png
         from tfarm.plots.style import FIGURES
 
-        save_png(FIGURES[type(found)](found), png)
-    if not (say_written(*also, csv, png) or json):
+        assert tfarm.plots  # every picture is registered once they are loaded
+        save_png(FIGURES[type(record)](record), png)
+    written = [path for path in (*also, csv, png) if path is not None]
+    if any(map(is_standard_output, written)):
         return
+    for path in written:
+        print(f"written: {path}", file=sys.stderr)
     if json:
-        print(to_json({**to_dict(found), **(said or {})}))
+        print(to_json({**to_dict(record), **(defaults or {})}))
         return
-    print_record(found)
-    if said and said.get("default_gains"):
-        print(f"by default {said['default_gains_in_words']}")
-
-
-def print_record(found: Any) -> None:
-    """The record as text: single values under their labels, then its tables."""
-    from tfarm.schema import sections
-    from tfarm.tables.terminal import show, show_pairs
-
-    for number, each in enumerate(sections(found)):
+    for number, each in enumerate(sections(record)):
         if number and (each.pairs or each.table or each.drawing):
             print(f"\n{each.title}" if each.title else "")
         show_pairs(each.pairs)
@@ -147,37 +310,26 @@ def print_record(found: Any) -> None:
             show(each.table)
         if each.drawing:
             print(each.drawing)
+    if defaults and defaults["default_gains"]:
+        print(f"by default {defaults['default_gains_in_words']}")
 
 
-def say_written(*paths: Path | None) -> bool:
-    """Say on standard error which files were written; False where one is standard output, which holds the table."""
-    given = [path for path in paths if path is not None]
-    if any(map(is_standard_output, given)):
-        return False
-    for path in given:
-        print(f"written: {path}", file=sys.stderr)
-    return True
+_state = ["running"]  # of the command, for the lines of progress
+
+
+def advance(done: int, total: int, text: str) -> None:
+    """Set the next line of progress: the task that runs, and how many of all are done."""
+    _state[0] = f"{done} of {total} done, running: {text}" if total else text
 
 
 @contextmanager
-def progress() -> Iterator[Callable[[int, int, str], None] | None]:
-    """A progress bar on a terminal; in a pipe a line every few seconds, of what runs."""
-    if sys.stderr.isatty():
-        from rich.console import Console
-        from rich.progress import Progress
-
-        with Progress(console=Console(stderr=True), transient=True) as bar:
-            task = bar.add_task("", total=None)
-            yield lambda done, total, text: bar.update(task, completed=done, total=total, description=text)
-        return
-    state, over = ["starting"], Event()
-
-    def advance(done: int, total: int, text: str) -> None:
-        state[0] = f"{done} of {total} done" + f", running: {text}" * bool(text)
+def progress() -> Iterator[Callable[[int, int, str], None]]:
+    """Print a line on standard error every few seconds while a command runs."""
+    _state[0], over, began = "running", Event(), time.monotonic()
 
     def speak() -> None:
-        while not over.wait(PROGRESS_EVERY):
-            tell(state[0])
+        while not over.wait(PROGRESS_EVERY if time.monotonic() - began > PROGRESS_AFTER else PROGRESS_AFTER):
+            print_line(f"{_state[0]} ({time.monotonic() - began:.0f} s)")
 
     speaker = Thread(target=speak, daemon=True)
     speaker.start()
@@ -188,32 +340,8 @@ def progress() -> Iterator[Callable[[int, int, str], None] | None]:
         speaker.join()
 
 
-def right_digits(text: str | None) -> int | None:
-    """The --digits option as a number."""
-    return None if text is None else whole_number("--digits", text, 1, 1000)
-
-
-def whole_number(key: str, text: str, least: int, most: int) -> int:
-    """A whole number in a range; it may be typed as 1e3."""
-    remedy = f"a whole number from {least} to {most}"
-    try:
-        number = plain_number(text)
-    except ValueError:
-        raise ParameterError(key=key, value=text, remedy=remedy) from None
-    if not (least <= number <= most and number == int(number)):
-        raise ParameterError(key=key, value=text, remedy=remedy)
-    return int(number)
-
-
-def plain_number(text: str) -> float:
-    """A number as people write it; ValueError for Python's own 5_0 and for digits that are not ASCII."""
-    if "_" in text or not text.isascii():
-        raise ValueError(text)
-    return float(text)
-
-
-def tell(message: str) -> None:
-    """One line to the person at the terminal, on standard error; nothing where nobody can hear it."""
+def print_line(message: str) -> None:
+    """Print one line on standard error; a closed one swallows it."""
     try:
         print(f"tfarm: {one_line(message, 1000)}", file=sys.stderr)
     except OSError:
@@ -221,30 +349,8 @@ def tell(message: str) -> None:
 
 
 def discard(stream: IO[str]) -> None:
-    """Send what the stream still holds nowhere: Python would complain about it on leaving."""
+    """Send what a stream still holds nowhere: Python would complain about it on leaving."""
     with suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
         os.close(nowhere)
-
-
-@cache
-def say_when_compiling() -> None:
-    """From now on the first compilation of a numerical kernel is announced, once, on standard error.
-
-    numba keeps what it has compiled, so this is the first use after an installation or an update.
-    """
-    from numba.core.event import Listener, register
-
-    class Announcement(Listener):  # type: ignore[misc]  # numba comes without types
-        said = False
-
-        def on_start(self, event: Event) -> None:
-            if not self.said:
-                self.said = True
-                tell("compiling once: the first use after an installation takes some seconds longer")
-
-        def on_end(self, event: Event) -> None:
-            pass
-
-    register("numba:compile", Announcement())

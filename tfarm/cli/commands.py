@@ -1,61 +1,47 @@
-"""The verbs that look at an arm, and the one that leaves exactness.
-
-Rooms are imported inside them, so that `tfarm --help` answers at once.
-"""
+"""The commands on an arm, and the reduced model.  Packages are imported inside them: `tfarm --help` needs none."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, cast
 
+import numpy as np
 import typer
 
-from tfarm.arm import Arm
+import tfarm
 from tfarm.cli.app import (
     ArmName,
-    Compare,
-    DigitCount,
+    Csv,
     InputName,
     Json,
-    MethodName,
     Place,
+    Png,
     SideName,
     TheoryName,
-    app,
     emit,
+    group,
+    interval,
     load_arm,
-    read_on,
-    right_digits,
-    tell,
-    whole_number,
+    numbers,
+    outputs_on,
+    print_line,
+    refuse,
 )
-from tfarm.cli.inputs import Png, asked_input, bounds, must_be_band, points_on
-from tfarm.errors import MISSING, ParameterError
 from tfarm.schema import Quantity
-from tfarm.tables.terminal import show
 
-if TYPE_CHECKING:
-    from tfarm.exact.values import Method
-
-Csv = Annotated[Path | None, typer.Option("--csv", help="write the curve to this file")]
-LaidOver = Annotated[
-    str | None, typer.Option("--measured", metavar="OUTPUT/INPUT=FILE", help="lay a measured response over it")
+command = group("Arm")
+MethodName = Annotated[str, typer.Option("--method", help="closed-form, balls, or appendix (the paper's determinant)")]
+Compare = Annotated[bool, typer.Option("--compare", help="all three methods and their differences")]
+DigitCount = Annotated[
+    int | None, typer.Option("--digits", min=1, max=1000, help="certified digits; texts in JSON above 15")
 ]
-MOST_LISTED = 1000  # modes with nodes and sensitivities: their work grows with the square, to some 20 s
 MOST_SLOW = 2000  # points by balls or by the appendix, at some milliseconds each
-BESIDE_COMPARE = "--compare prints a table of its own: ask for one of them"
 
 
-@app.command()
-def presets(json: Json = False) -> None:
-    """List the arms that come with tfarm."""
-    import tfarm
-
-    emit(Presets([_preset(tfarm.load(name)) for name in tfarm.presets()]), json)
-
-
-class Preset(NamedTuple):
+@dataclass(frozen=True)
+class Preset:
     """An arm that comes with tfarm."""
 
     name: Annotated[str, Quantity("name")]
@@ -67,11 +53,6 @@ class Preset(NamedTuple):
     assumptions: Annotated[tuple[str, ...], Quantity("assumptions")]
 
 
-def _preset(arm: Arm) -> Preset:
-    payload = arm.payload
-    return Preset(arm.name, arm.length, arm.damping, arm.hub.inertia, payload.mass, payload.inertia, arm.assumptions)
-
-
 @dataclass(frozen=True)
 class Presets:
     """All of them."""
@@ -79,10 +60,24 @@ class Presets:
     presets: Annotated[list[Preset], Quantity("arms")]
 
 
-@app.command()
+@command("presets")
+def presets(json: Json = False) -> None:
+    """List the arms that come with tfarm, with their assumptions."""
+    arms = map(tfarm.load, tfarm.presets())
+    rows = [
+        Preset(
+            *(arm.name, arm.length, arm.damping, arm.hub.inertia, arm.payload.mass, arm.payload.inertia),
+            arm.assumptions,
+        )
+        for arm in arms
+    ]
+    emit(Presets(rows), json)
+
+
+@command("modes sasaki2012-lab --count 5")
 def modes(
     arm: ArmName,
-    count: Annotated[str, typer.Option("--count", metavar="N", help="flexible modes, 1 to 1000")] = "10",
+    count: Annotated[int, typer.Option("--count", min=1, max=1000, help="flexible modes")] = 10,
     digits: DigitCount = None,
     certify: Annotated[bool, typer.Option("--certify", help="prove each bracket, and that no mode is missing")] = False,
     method: MethodName = "closed-form",
@@ -90,121 +85,121 @@ def modes(
     theory: TheoryName = None,
     json: Json = False,
 ) -> None:
-    """Natural frequencies and modes, complete by construction."""
-    wanted, right = whole_number("--count", count, 1, MOST_LISTED), right_digits(digits)
-    subject = load_arm(arm, theory)
+    """Natural frequencies, damping ratios and modes, complete by construction."""
     from tfarm.response.points import ByMethods
-    from tfarm.spectrum import modes as find_modes
     from tfarm.spectrum.listing import listed_modes
 
-    found = find_modes(subject, wanted)
-    chosen = _slow_method(method, len(found), right, compare)
+    found = tfarm.modes(load_arm(arm, theory), count)
+    check_method(method, len(found), digits, compare)
     if compare:
-        _refuse_beside({"--certify": certify or None}, BESIDE_COMPARE)
-        emit(ByMethods(subject.name, "natural_frequency", "rad/s", found.index.tolist(), found.by_methods()), json)
+        refuse({"--certify": certify}, "--compare prints a table of its own: ask for one of them")
+        emit(ByMethods(found.arm.name, "natural_frequency", "rad/s", found.index.tolist(), found.by_methods()), json)
         return
-    answer = listed_modes(found, right, certify, chosen)
-    emit(answer, json)
-    if answer.damped_failure:
-        tell(answer.damped_failure)
+    listed = listed_modes(found, digits, certify, cast("Any", method))
+    emit(listed, json)
+    if listed.damped_failure:
+        print_line(listed.damped_failure)
         raise typer.Exit(3)  # as where nothing could be solved
 
 
-@app.command()
+def as_complex(text: str) -> complex:
+    """Return the number of 0.3+57.1j or 0.3+57.1i."""
+    return complex(text.replace("i", "j"))
+
+
+@command("response sasaki2012-lab --from 1 --to 100 --csv root.csv")
 def response(
     arm: ArmName,
-    output: Annotated[str | None, typer.Option("--output", help="what is looked at, such as root_moment")] = None,
-    s: Annotated[str | None, typer.Option("--s", help="points s [1/s]: 0.3+57.1j,10j")] = None,
-    omega: Annotated[str | None, typer.Option("--omega", help="frequencies [rad/s]: 1,10,100")] = None,
+    output: Annotated[
+        str | None, typer.Option("--output", help="output, such as tip_displacement; by default root_moment")
+    ] = None,
+    s: Annotated[
+        Any, typer.Option("--s", parser=numbers(kind=as_complex), metavar="S,S", help="points s [1/s]: 0.3+57.1j,10j")
+    ] = None,
+    omega: Annotated[
+        Any, typer.Option("--omega", parser=numbers(), metavar="W,W", help="frequencies [rad/s]: 1,10,100")
+    ] = None,
     start: Annotated[float, typer.Option("--from", help="lowest frequency [rad/s]")] = 0.1,
     stop: Annotated[float, typer.Option("--to", help="highest frequency [rad/s]")] = 1000.0,
-    points: Annotated[str, typer.Option("--points", help="how many, logarithmically spaced")] = "500",
+    points: Annotated[
+        int, typer.Option("--points", min=2, max=1_000_000, help="number of frequencies, logarithmically spaced")
+    ] = 500,
     x: Place = None,
     side: SideName = None,
     driven: InputName = None,
     digits: DigitCount = None,
     method: MethodName = "closed-form",
     compare: Compare = False,
-    csv: Annotated[Path | None, typer.Option("--csv", help="write a table to this file")] = None,
-    measured: LaidOver = None,
-    png: Annotated[Path | None, typer.Option("--png", help="with --measured: write the picture to this file")] = None,
+    csv: Csv = None,
+    measured: Annotated[
+        str | None, typer.Option("--measured", metavar="OUTPUT/INPUT=FILE", help="compare with a measured response")
+    ] = None,
+    png: Png = None,
     theory: TheoryName = None,
     json: Json = False,
 ) -> None:
-    """The exact response to the arm's input: hub torque unless its file says otherwise, hub angle of a locked hub.
+    """Exact frequency response to the arm's input, or its values at points s.
 
-    With --measured tip_acceleration/hub_angle=sweep.csv: that measured response beside the exact one.
+    The input is the hub torque unless the arm's file names another, and the hub angle of a locked hub.
+    With --measured tip_acceleration/hub_angle=sweep.csv it is compared with that response.
     """
     if measured is not None:
-        others = {"--s": s, "--omega": omega, "--output": output, "--x": x, "--side": side, "--digits": digits}
-        _lay_over(load_arm(arm, theory), measured, others, csv, png, json)
-        return
-    if output is None or png is not None:
-        option = "--output" if output is None else "--measured"
-        raise ParameterError(key=option, value=MISSING, remedy="say which response: --output root_moment, for one")
-    (wanted,) = read_on([output], side)
-    from tfarm.response import transfer
-    from tfarm.response.points import ByMethods
-    from tfarm.response.points import points as values_at
-    from tfarm.schema import curve_table
+        from tfarm.fitting.data import data_of
 
-    right, at = right_digits(digits), points_on(s, omega, start, stop, points)
-    subject, driven = asked_input(load_arm(arm, theory, driven), driven)
-    chosen = _slow_method(method, at.size, right, compare)
-    if compare:
-        _refuse_beside({"--csv": csv, "--input": driven}, BESIDE_COMPARE)
-        G = transfer(subject, wanted, x=x)
-        emit(ByMethods(subject.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)), json)
+        others = {"--s": s, "--omega": omega, "--output": output, "--x": x, "--side": side, "--digits": digits}
+        refuse(others, "a measured response has its own outputs and frequencies; leave this out")
+        emit(tfarm.overlay(load_arm(arm, theory), data_of(measured, "--measured")), json, csv=csv, png=png)
         return
-    found = values_at(transfer(subject, wanted, x=x, method=chosen, input=driven), at, right)
+    refuse({"--png": png}, "a picture needs --measured; tfarm bode draws the exact response")
+    refuse({"--omega": omega if s else None}, "give --s or --omega, not both")
+    from tfarm.response import points as results
+    from tfarm.tables.terminal import show
+
+    (wanted,) = outputs_on([output or "root_moment"], side)
+    subject, load = load_arm(arm, theory, driven), load_on_link(driven)
+    if s is None and omega is None:
+        check_range(start, stop)
+        omega = np.geomspace(start, stop, points)
+    at = np.array(s) if s else 1j * np.array(omega)
+    check_method(method, at.size, digits, compare)
+    if compare:
+        refuse({"--csv": csv, "--input": load}, "--compare prints a table of its own: ask for one of them")
+        G = tfarm.transfer(subject, wanted, x=x)
+        emit(results.ByMethods(subject.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)), json)
+        return
+    found = results.points(tfarm.transfer(subject, wanted, x=x, method=cast("Any", method), input=load), at, digits)
     emit(found, json, csv=csv)
     if csv is None and not json:
-        show(curve_table(found))
+        show(found.csv_table)
 
 
-def _slow_method(method: str, number: int, digits: int | None, compare: bool) -> Method:
-    """The method asked for.  Raises ParameterError for an unknown one, too many points, digits beside a slow one."""
-    from tfarm.exact.values import known_method
-
-    chosen = known_method(method)
-    if chosen == "closed-form" and not compare:
-        return chosen
-    if digits is not None:
-        remedy = "they are proven by balls in any case: leave --method and --compare out"
-        raise ParameterError(key="--digits", value=digits, remedy=remedy)
-    if number > MOST_SLOW:
-        remedy = f"at most {MOST_SLOW} by balls or the appendix, which take milliseconds for each"
-        raise ParameterError(key="points", value=number, remedy=remedy)
-    return chosen
+def load_on_link(driven: str | None) -> str | None:
+    """Return the input where it is a load on the link, force@X or moment_pair@X1,X2."""
+    return driven if driven and "@" in driven else None
 
 
-def _refuse_beside(others: dict[str, Any], remedy: str) -> None:
-    """Raise ParameterError for an option that another one would leave unheard."""
-    for key, value in others.items():
-        if value is not None:
-            raise ParameterError(key=key, value=value, remedy=remedy)
+def check_method(method: str, number: int, digits: int | None, compare: bool) -> None:
+    """Raise ParameterError for digits, or too many points, by one of the slow methods."""
+    if method != "closed-form" or compare:
+        refuse({"--digits": digits}, "they are certified by balls in any case: leave --method and --compare out")
+        most = f"at most {MOST_SLOW} by balls or the appendix, which take milliseconds for each"
+        refuse({"points": number if number > MOST_SLOW else None}, most)
 
 
-def _lay_over(subject: Arm, text: str, others: dict[str, Any], csv: Path | None, png: Path | None, json: bool) -> None:
-    """Both curves: mode by mode on the terminal or as JSON, point by point as a table, and as a picture.
-
-    Raises ParameterError for one of the `others`, options that would go unheard.
-    """
-    from tfarm.fitting.data import data_of
-    from tfarm.fitting.overlay import overlay
-
-    _refuse_beside(others, "a measured response has its own outputs and frequencies; leave this out")
-    emit(overlay(subject, data_of(text, "--measured")), json, csv=csv, png=png)
+def check_range(start: float, stop: float) -> None:
+    """Raise ParameterError for what is no frequency range [rad/s]."""
+    refuse({"--from": None if 0 < start < math.inf else start}, "a positive frequency in rad/s")
+    refuse({"--to": None if start < stop < math.inf else stop}, f"a frequency above --from, {start:g} rad/s")
 
 
-@app.command()
+@command("bode sasaki2012-lab --output tip_displacement --png bode.png")
 def bode(
     arm: ArmName,
-    output: Annotated[
-        str, typer.Option("--output", help="what is looked at, such as tip_displacement")
-    ] = "root_moment",
+    output: Annotated[str, typer.Option("--output", help="output, such as tip_displacement")] = "root_moment",
     start: Annotated[float | None, typer.Option("--from", help="lowest frequency [rad/s]")] = None,
-    stop: Annotated[float | None, typer.Option("--to", help="highest; by default ten flexible modes are seen")] = None,
+    stop: Annotated[
+        float | None, typer.Option("--to", help="highest frequency [rad/s]; by default above ten flexible modes")
+    ] = None,
     x: Place = None,
     side: SideName = None,
     driven: InputName = None,
@@ -213,52 +208,40 @@ def bode(
     theory: TheoryName = None,
     json: Json = False,
 ) -> None:
-    """Bode plot of the exact response to the arm's input, with the poles and zeros that the output shows."""
-    subject, driven = asked_input(load_arm(arm, theory, driven), driven)
-    band, (wanted,) = _band(subject, start, stop), read_on([output], side)
-    from tfarm.response import bode as find
-
-    emit(find(subject, wanted, band, x=x, input=driven), json, csv=csv, png=png)
-
-
-def _band(arm: Arm, start: float | None, stop: float | None) -> tuple[float, float] | None:
-    """The band [rad/s] that is asked for, an end that is not given as a page has it; None for the page's own."""
-    if start is None and stop is None:
-        return None
+    """Bode plot of the exact response to the arm's input, with the poles and zeros of that output."""
     from tfarm.response.frequency import resonant_band
 
-    low, high = resonant_band(arm)
-    low, high = low if start is None else start, high if stop is None else stop
-    must_be_band(low, high)
-    return low, high
+    subject, (wanted,) = load_arm(arm, theory, driven), outputs_on([output], side)
+    low, high = resonant_band(subject)
+    band = low if start is None else start, high if stop is None else stop
+    check_range(*band)
+    emit(tfarm.bode(subject, wanted, band, x=x, input=load_on_link(driven)), json, csv=csv, png=png)
 
 
-@app.command()
+@command("reduce sasaki2012 --outputs root_moment,hub_rate --order 14")
 def reduce(
     arm: ArmName,
     outputs: Annotated[str, typer.Option("--outputs", help="names separated by commas")] = "root_moment,hub_rate",
-    order: Annotated[
-        str | None, typer.Option("--order", metavar="N", help="number of states; even where C = 0")
-    ] = None,
+    order: Annotated[int | None, typer.Option("--order", min=0, help="number of states; even where C = 0")] = None,
     error: Annotated[float | None, typer.Option("--error", help="or the largest error allowed, such as 1e-6")] = None,
-    band: Annotated[str, typer.Option("--band", metavar="LOW,HIGH", help="frequencies [rad/s]")] = "0.1,1000",
-    method: Annotated[str | None, typer.Option("--method", help="modal or aaa; the better one if left out")] = None,
+    band: Annotated[
+        Any, typer.Option("--band", parser=interval, metavar="LOW,HIGH", help="frequency range [rad/s]")
+    ] = "0.1,1000",
+    method: Annotated[
+        str | None, typer.Option("--method", help="modal or aaa; by default that of the smaller error")
+    ] = None,
     x: Place = None,
     side: SideName = None,
-    mat: Annotated[Path | None, typer.Option("--mat", help="write a MATLAB file, and a script beside it")] = None,
+    mat: Annotated[
+        Path | None, typer.Option("--mat", metavar="FILE", help="write a MATLAB file, and a script of that name")
+    ] = None,
     theory: TheoryName = None,
     json: Json = False,
 ) -> None:
-    """A state space of few states, with its worst error against the exact arm over a band."""
-    low, high = bounds("--band", band, "two frequencies in rad/s such as 0.1,1000")
-    states = None if order is None else whole_number("--order", order, 0, 10**9)
-    subject = load_arm(arm, theory)
-    from tfarm.reduced import reduce as find
+    """Reduced state-space model, with its largest error against the exact arm over a frequency range."""
     from tfarm.reduced import save_mat
 
-    wanted = read_on([name.strip() for name in outputs.split(",")], side)
-    how: Any = {"order": states, "error": error, "method": method, "band": (low, high), "x": x}
-    reduced = find(subject, wanted, **how)
-    written = () if mat is None else save_mat(reduced, mat, key="--mat")
-
-    emit(reduced, json, also=written)
+    wanted = outputs_on([name.strip() for name in outputs.split(",")], side)
+    how: Any = {"order": order, "error": error, "method": method, "band": band, "x": x}
+    reduced = tfarm.reduce(load_arm(arm, theory), wanted, **how)
+    emit(reduced, json, also=() if mat is None else save_mat(reduced, mat, key="--mat"))

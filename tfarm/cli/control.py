@@ -1,109 +1,209 @@
-"""The verbs of the continuous loop: poles, margins, Nyquist, spill-over and locus."""
+"""The commands on the continuous-time loop."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from tfarm.arm import NAMES
-from tfarm.cli.app import ArmName, Json, app, emit, whole_number
-from tfarm.cli.inputs import Given, Png, under_a_law
-
-Csv = Annotated[Path | None, typer.Option("--csv", help="write the curve to this file")]
-HELP_ON_COUNT = (
-    "poles with Im s >= 0, 1 to 1000; if not given ten, or those below the shear cut-off where they are fewer"
+import tfarm
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, PLANE, RATE_GAIN
+from tfarm.cli.app import (
+    AngleGain,
+    ArmName,
+    Csv,
+    Delay,
+    DspFile,
+    Gains,
+    Json,
+    LawFile,
+    Period,
+    Png,
+    TheoryName,
+    emit,
+    group,
+    interval,
+    load_arm,
+    load_chain,
+    load_law,
+    load_loop,
+    named,
+    refuse,
+    with_gains,
 )
-Vary = Annotated[
-    str,
-    typer.Option(
-        "--vary",
-        help=f"{', '.join(NAMES)}, all (a scale on all of them), payload_mass, payload_inertia, hub_inertia, length or "
-        "damping; or gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N",
-    ),
-]
-HELP_ON_POINTS = "values, equally spaced; 500, along a gain, delay or signal of a law 100"
-HELP_ON_BRANCHES = "branches, 1 to 200; along those the flexible modes below the top of the box"
+
+command = group("Loop")
+NUMBERS = "gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N"  # of a law
+PARAMETERS = "payload_mass, payload_inertia, hub_inertia, length or damping"
 
 
-@app.command()
-@under_a_law
+@command("poles sasaki2012-lab --K1 0.3 --K2 0.3 --count 8")
+@with_gains
 def poles(
     arm: ArmName,
-    count: Annotated[str | None, typer.Option("--count", metavar="N", help=HELP_ON_COUNT)] = None,
+    count: Annotated[
+        int | None,
+        typer.Option(
+            "--count", min=1, max=1000, help="poles with Im s >= 0; by default ten, or those below the shear cut-off"
+        ),
+    ] = None,
     certify: Annotated[bool, typer.Option("--certify", help="prove each, and that none is missing")] = False,
+    law: LawFile = None,
+    theory: TheoryName = None,
     json: Json = False,
     *,
-    given: Given,
+    gains: Gains,
 ) -> None:
     """Closed-loop poles of the exact arm, complete in a printed box."""
-    number = None if count is None else whole_number("--count", count, 1, 1000)
-    subject, law, said = given.loop()
-    from tfarm.loop.poles import closed_loop_poles
-
-    found = closed_loop_poles(subject, law, number)
-    emit(found.certified() if certify else found, json, said)
+    subject, controller, defaults = load_loop(arm, theory, gains, law)
+    found = tfarm.closed_loop_poles(subject, controller, count)
+    emit(found.certified() if certify else found, json, defaults)
 
 
-@app.command()
-@under_a_law
-def margins(arm: ArmName, json: Json = False, *, given: Given) -> None:
+@command("margins sasaki2012-lab --K1 0.3 --K2 0.3")
+@with_gains
+def margins(arm: ArmName, law: LawFile = None, theory: TheoryName = None, json: Json = False, *, gains: Gains) -> None:
     """Stability, the stability interval of each gain, and the margins of the exact loop function."""
-    subject, law, said = given.loop()
-    from tfarm.loop.margins import margins as find
-
-    emit(find(subject, law), json, said)
+    subject, controller, defaults = load_loop(arm, theory, gains, law)
+    emit(tfarm.margins(subject, controller), json, defaults)
 
 
-@app.command()
-@under_a_law
-def nyquist(arm: ArmName, png: Png = None, csv: Csv = None, json: Json = False, *, given: Given) -> None:
+@command("nyquist sasaki2012-lab --K1 0.3 --K2 0.3 --png nyquist.png")
+@with_gains
+def nyquist(
+    arm: ArmName,
+    png: Png = None,
+    csv: Csv = None,
+    law: LawFile = None,
+    theory: TheoryName = None,
+    json: Json = False,
+    *,
+    gains: Gains,
+) -> None:
     """Nyquist plot of the exact loop: encirclements of -1, and the unstable poles found in a box."""
-    subject, law, said = given.loop()
-    from tfarm.loop.nyquist import nyquist as find
-
-    emit(find(subject, law), json, said, csv=csv, png=png)
+    subject, controller, defaults = load_loop(arm, theory, gains, law)
+    emit(tfarm.nyquist(subject, controller), json, defaults, csv=csv, png=png)
 
 
-@app.command()
-@under_a_law
+@command("spill sasaki2012-lab --K1 0.3 --K2 -2")
+@with_gains
 def spill(
     arm: ArmName,
-    modes: Annotated[str, typer.Option("--modes", metavar="N", help="models of 1 to so many modes")] = "20",
+    modes: Annotated[int, typer.Option("--modes", min=1, max=60, help="modes of the largest model")] = 20,
+    law: LawFile = None,
+    theory: TheoryName = None,
     json: Json = False,
     *,
-    given: Given,
+    gains: Gains,
 ) -> None:
     """Spillover into modes that a design model leaves out: the exact loop and models of 1, 2, 3 ... modes."""
-    number = whole_number("--modes", modes, 1, 60)
-    subject, law, said = given.loop()
-    from tfarm.loop.spill import spill as find
-
-    emit(find(subject, law, number), json, said)
+    subject, controller, defaults = load_loop(arm, theory, gains, law)
+    emit(tfarm.spill(subject, controller, modes), json, defaults)
 
 
-@app.command()
-@under_a_law
+@command("locus sasaki2012-lab --vary K2 --from 0 --to 2 --png locus.png")
+@with_gains
 def locus(
     arm: ArmName,
-    vary: Vary,
-    start: Annotated[float, typer.Option("--from", help="value at which the locus begins")],
-    stop: Annotated[float, typer.Option("--to", help="value at which it ends")],
-    points: Annotated[str | None, typer.Option("--points", metavar="N", help=HELP_ON_POINTS)] = None,
-    branches: Annotated[str, typer.Option("--branches", metavar="N", help=HELP_ON_BRANCHES)] = "10",
+    vary: Annotated[
+        str, typer.Option("--vary", help=f"{', '.join(NAMES)}, all (a factor on these), {PARAMETERS}; or {NUMBERS}")
+    ],
+    start: Annotated[float, typer.Option("--from", help="first value")],
+    stop: Annotated[float, typer.Option("--to", help="last value")],
+    points: Annotated[
+        int | None,
+        typer.Option(
+            "--points", min=2, max=100_000, help="values, equally spaced; by default 500, of a number of a law 100"
+        ),
+    ] = None,
+    branches: Annotated[
+        int, typer.Option("--branches", min=1, max=200, help="branches; all flexible modes below the last are listed")
+    ] = 10,
     png: Png = None,
-    csv: Annotated[Path | None, typer.Option("--csv", help="write the branches to this file")] = None,
+    csv: Csv = None,
+    law: LawFile = None,
+    theory: TheoryName = None,
     json: Json = False,
     *,
-    given: Given,
+    gains: Gains,
 ) -> None:
-    """Root locus of the exact arm along a gain or a parameter; crossings of the imaginary axis are solved for."""
-    count = whole_number("--branches", branches, 1, 200)
-    subject, law, said = given.loop()
+    """Root locus of the exact arm along a gain or a parameter, with its crossings of the imaginary axis."""
     from tfarm.loop.loci import Loci, reduced_of
-    from tfarm.loop.locus import locus as find
 
-    number = None if points is None else whole_number("--points", points, 2, 100_000)
-    found = find(subject, law, vary, start, stop, number, count)
-    emit(Loci(found, reduced_of(found)), json, said, csv=csv, png=png)
+    subject, controller, defaults = load_loop(arm, theory, gains, law)
+    found = tfarm.locus(subject, controller, vary, start, stop, points, branches)
+    emit(Loci(found, reduced_of(found)), json, defaults, csv=csv, png=png)
+
+
+@command("map sasaki2012-lab --K1 -1,3 --K2 -2,2 --png map.png", name="map")
+def gain_map(
+    arm: ArmName,
+    k1: Annotated[
+        Any,
+        typer.Option(
+            f"--{RATE_GAIN}",
+            parser=interval,
+            metavar="LO,HI",
+            help=f"range of {RATE_GAIN}; by default -1,3 on the paper's arm, -3.33 to 10 times the default on a rig",
+        ),
+    ] = None,
+    k2: Annotated[
+        Any,
+        typer.Option(
+            f"--{MOMENT_GAIN}",
+            parser=interval,
+            metavar="LO,HI",
+            help=f"range of {MOMENT_GAIN}; by default -2,2, on a rig times its input of 1 N m",
+        ),
+    ] = None,
+    kp: AngleGain = 0.0,
+    points: Annotated[
+        int | None,
+        typer.Option("--points", min=2, max=2000, help="grid points along each; by default 101, of a law 60"),
+    ] = None,
+    csv: Csv = None,
+    png: Png = None,
+    law: LawFile = None,
+    vary: Annotated[
+        list[Any] | None,
+        typer.Option(
+            "--vary",
+            parser=named(interval),
+            metavar="NAME=LO,HI",
+            help=f"twice: two numbers of a law and their ranges; {NUMBERS}",
+        ),
+    ] = None,
+    period: Period = None,
+    delay_samples: Delay = None,
+    dsp: DspFile = None,
+    theory: TheoryName = None,
+    json: Json = False,
+) -> None:
+    """Number of unstable poles over the plane of two gains, or of two numbers of a law, with the exact boundary.
+
+    With --period, --delay-samples or --dsp of the sampled loop.
+    """
+    from tfarm.dsp import crossings, verdict
+    from tfarm.loop.plane import between, ranges_of
+
+    subject, typed = load_arm(arm, theory), {RATE_GAIN: k1, MOMENT_GAIN: k2}
+    of_law, ranges = bool(vary or law), vary or []
+    if of_law:
+        remedy = "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice"
+        refuse({f"--{name}": value for name, value in (typed | {ANGLE_GAIN: kp or None}).items()}, remedy)
+        remedy = "give two numbers of the law, such as --vary hub_angle=0,10 --vary delay=0,0.02"
+        refuse({"--vary": [name for name, _ in ranges] if len(ranges) != 2 else None}, remedy)
+        controller, _ = load_law(subject, arm, {}, law)
+    else:
+        ranges = [(name, typed[name] or usual) for name, usual in zip(PLANE, ranges_of(subject), strict=True)]
+        controller = tfarm.HubFeedback(Kp=kp)
+    (first, across), (second, up) = ranges
+    number = points or (60 if of_law else 101)
+    x, y = between(across[0], across[1], number), between(up[0], up[1], number)
+    if (period, delay_samples, dsp) == (None, None, None):
+        found: Any = tfarm.map(subject, x, y, law=controller, vary=(first, second))
+    else:
+        full = controller if of_law else tfarm.default_gains(subject).having(ANGLE_GAIN, kp)
+        chain = load_chain(dsp or arm, period, delay_samples)
+        found = crossings.sampled_map(verdict.sampled_verdict(subject, full, chain).full, x, y, (first, second))
+    emit(found, json, csv=csv, png=png)

@@ -1,230 +1,235 @@
-"""The verbs that choose a law: the map over two of its numbers, its design, and two laws or arms compared."""
+"""The commands that choose a law or compare: design, tuner, comparison."""
 
 from __future__ import annotations
 
-import sys
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, TWO_GAINS, HubFeedback, as_law
-from tfarm.cli.app import ArmName, Json, TheoryName, app, emit, load_arm, tell, whole_number
-from tfarm.cli.inputs import (
-    GAIN_OPTIONS,
-    Given,
-    HeldAngle,
-    LawFile,
+import tfarm
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, TWO_GAINS, as_law
+from tfarm.cli.app import (
+    CONTROLLER,
+    AngleGain,
+    ArmName,
+    Delay,
+    DspFile,
+    Gains,
+    Json,
+    LawFiles,
+    ModeCount,
+    Period,
     Png,
-    Typed,
-    asked_law,
-    bounds,
-    range_option,
-    with_options,
+    TheoryName,
+    advance,
+    emit,
+    group,
+    interval,
+    load_arm,
+    load_chain,
+    load_law,
+    named,
+    preset_names,
+    print_line,
+    with_gains,
 )
-from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
 from tfarm.errors import ParameterError
 
-if TYPE_CHECKING:
-    from tfarm.arm import AnyLaw, Arm
-    from tfarm.arrays import Real
-    from tfarm.dsp import Chain, GainMap
-
-HELP_ON_ALSO = "a further arm that the law has to serve: the objective is the worst of all; may be repeated"
-HELP_ON_RANGE = "numbers that the arm may have, such as payload.mass=0.1,0.5; up to four: corners, and a search inside"
-HELP_ON_VARY = "twice: two numbers of a law and their ranges; gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N"
-
-MapPeriod = Annotated[
-    float | None, typer.Option("--period", help="sampling period [s]: the map of the sampled loop, as with --dsp")
-]
-HELP_ON_MAP = (
-    f"How many poles are unstable over the plane of {' and '.join(PLANE)}, and the exact boundary; "
-    "or over two numbers of a law."
-)
-HELP_ON_OBJECTIVE = "damping, margin, sensitivity, delay, residual or cost (of the tuner's trial)"
-HELP_ON_STRUCTURE = f"{TWO_GAINS}, PD, PD+notch, lead, PPF or strain-rate"
-USUAL_RANGES = {  # of a map
-    RATE_GAIN: f"by default -1,3 on the paper's arm, -3.33 to 10 times the default {RATE_GAIN} on a rig",
-    MOMENT_GAIN: "by default -2,2, times what one N m takes of the input of a rig",
-}
-RANGES = {name: range_option(name, f"range of {name}; {usual}") for name, usual in USUAL_RANGES.items()}
-BOUNDS = {name: range_option(name, f"bounds of {name}") for name in PLANE}
-Arms = Annotated[list[str], typer.Argument(metavar="ARM [ARM]", help="presets or TOML files", show_default=False)]
-Laws = Annotated[
-    list[str] | None,
-    typer.Option("--law", metavar="FILE", help="of one arm two laws; of two arms one for both, or one each"),
-]
+command = group("Design")
+RATE_HELP = f"hub rate gain [N m s/rad]; by default 0.00642 J w1, or a damping ratio of 0.71 under {ANGLE_GAIN}"
+LEARNING, COST = "Learning", "Cost"  # groups of the tuner's options
 
 
-@app.command("map", help=HELP_ON_MAP)
-@with_options(RANGES, after="arm")
-def gain_map(
-    arm: ArmName,
-    kp: HeldAngle = 0.0,
-    points: Annotated[str | None, typer.Option("--points", help="grid points along each; 101, of a law 60")] = None,
-    csv: Annotated[Path | None, typer.Option("--csv", help="write both numbers and the count to this file")] = None,
-    png: Png = None,
-    law: LawFile = None,
-    vary: Annotated[list[str] | None, typer.Option("--vary", metavar="NAME=LO,HI", help=HELP_ON_VARY)] = None,
-    period: MapPeriod = None,
-    delay_samples: Delay = None,
-    dsp: DspFile = None,
-    theory: TheoryName = None,
-    json: Json = False,
-    *,
-    typed: dict[str, str | None],
-) -> None:
-    """The map over the plane of both gains, or over two numbers of a law."""
-    subject, of_law = load_arm(arm, theory), bool(vary or law)
-    if of_law:
-        _must_be_two_numbers(vary or [], typed | {ANGLE_GAIN: kp or None})
-    from tfarm.loop.loop import Loop
-    from tfarm.loop.plane import between, plane, ranges_of
-
-    if of_law:
-        number = whole_number("--points", points or "60", 2, 400)
-        ranges = [_range_of("--vary", each) for each in vary or []]
-        controller, _ = asked_law(subject, Given({}, law, arm))
-    else:
-        number, given = whole_number("--points", points or "101", 2, 2000), _bounds_of(typed)
-        ranges = [(name, given[name] or usual) for name, usual in zip(PLANE, ranges_of(subject), strict=True)]
-        controller = HubFeedback(Kp=kp)
-    (first, across), (second, up) = ranges
-    x, y = between(*across, number), between(*up, number)
-    if (period, delay_samples, dsp) != (None,) * 3:
-        chain = asked_chain(dsp or arm, period, delay_samples)
-        emit(
-            _sampled_plane(subject, controller if of_law else None, kp, chain, (first, second), (x, y)),
-            json,
-            csv=csv,
-            png=png,
-        )
-        return
-    emit(plane(Loop(subject, as_law(controller)), (first, second), x, y), json, csv=csv, png=png)
-
-
-def _must_be_two_numbers(vary: list[str], gains: dict[str, Any]) -> None:
-    """Refuse a plane of a law that does not have two numbers of its own, or has ranges of gains at the hub."""
-    for name, value in gains.items():
-        if value is not None:
-            remedy = "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice"
-            raise ParameterError(key=f"--{name}", value=value, remedy=remedy)
-    if len(vary) != 2:
-        remedy = "twice, such as --vary hub_angle=0,10 --vary delay=0,0.02"
-        raise ParameterError(key="--vary", value=vary, remedy=remedy)
-
-
-def _sampled_plane(
-    arm: Arm, law: AnyLaw | None, kp: float, chain: Chain, vary: tuple[str, str], axes: tuple[Real, Real]
-) -> GainMap:
-    """The map of the sampled loop, with as many modes as the verdict on the law takes, or on the default gains."""
-    from tfarm.dsp.crossings import sampled_map
-    from tfarm.dsp.verdict import sampled_verdict
-    from tfarm.spectrum.table import default_gains
-
-    law = default_gains(arm).having(ANGLE_GAIN, kp) if law is None else law
-    return sampled_map(sampled_verdict(arm, law, chain).full, *axes, vary)
-
-
-def _range_of(option: str, text: str) -> tuple[str, tuple[float, float]]:
-    """A name and its range, of NAME=LO,HI."""
-    name, _, limits = text.partition("=")
-    return name, bounds(f"{option} {name}", limits)
-
-
-def _bounds_of(typed: dict[str, str | None]) -> dict[str, tuple[float, float] | None]:
-    """The ranges of gains, None where not typed."""
-    return {name: None if text is None else bounds(f"--{name}", text) for name, text in typed.items()}
-
-
-@app.command()
-@with_options(BOUNDS, after="structure")
+@command("design sasaki2012-lab --structure PD+notch --save notch.toml")
 def design(
     arm: ArmName,
-    objective: Annotated[str, typer.Option("--objective", help=HELP_ON_OBJECTIVE)] = "damping",
-    structure: Annotated[str, typer.Option("--structure", help=HELP_ON_STRUCTURE)] = TWO_GAINS,
-    kp: HeldAngle = 0.0,
-    modes: Annotated[str, typer.Option("--modes", help="flexible modes in the band, 1 to 30")] = "2",
+    objective: Annotated[
+        str, typer.Option("--objective", help="damping, margin, sensitivity, delay, residual or cost (of the tuner)")
+    ] = "damping",
+    structure: Annotated[
+        str, typer.Option("--structure", help=f"{TWO_GAINS}, PD, PD+notch, lead, PPF or strain-rate")
+    ] = TWO_GAINS,
+    k1: Annotated[
+        Any, typer.Option(f"--{RATE_GAIN}", parser=interval, metavar="LO,HI", help=f"bounds of {RATE_GAIN}")
+    ] = None,
+    k2: Annotated[
+        Any, typer.Option(f"--{MOMENT_GAIN}", parser=interval, metavar="LO,HI", help=f"bounds of {MOMENT_GAIN}")
+    ] = None,
+    kp: AngleGain = 0.0,
+    modes: ModeCount = 2,
     continuous: Annotated[bool, typer.Option("--continuous", help="for the continuous-time loop")] = False,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
-    also: Annotated[list[str] | None, typer.Option("--also", metavar="ARM", help=HELP_ON_ALSO)] = None,
-    over: Annotated[list[str] | None, typer.Option("--range", metavar="KEY=LO,HI", help=HELP_ON_RANGE)] = None,
-    save: Annotated[Path | None, typer.Option("--save", help="write the law to this TOML file, for --law")] = None,
+    also: Annotated[
+        list[str] | None,
+        typer.Option("--also", metavar="ARM", help="further arm; the objective is the worst of all; may be repeated"),
+    ] = None,
+    over: Annotated[
+        list[Any] | None,
+        typer.Option(
+            "--range",
+            parser=named(interval),
+            metavar="KEY=LO,HI",
+            help="range of a number of the arm, such as payload.mass=0.1,0.5; up to four: corners, and a search inside",
+        ),
+    ] = None,
+    save: Annotated[
+        Path | None, typer.Option("--save", metavar="FILE", help="write the law to this TOML file, for --law")
+    ] = None,
     theory: TheoryName = None,
     json: Json = False,
-    *,
-    typed: dict[str, str | None],
 ) -> None:
-    """The law that serves an objective best in the sampled loop, at the file's period or else 10 ms."""
-    number, subject = whole_number("--modes", modes, 1, 30), load_arm(arm, theory)
-    chain = asked_chain(dsp or arm, period, delay_samples)
-    within: Any = {**_bounds_of(typed), ANGLE_GAIN: kp}
-    ranges = dict(_range_of("--range", each) for each in over or [])
+    """Law of a structure with the best objective in the sampled loop, at the file's period or else 10 ms."""
     from tfarm.arm.writing import save_law
-    from tfarm.synthesis.design import design as find_law
 
-    found = find_law(
-        subject, objective, structure=structure, **within, modes=number, chain=chain,
-        continuous=continuous, progress=tell if sys.stderr.isatty() else None,
-        also=[load_arm(name, theory) for name in also or []], ranges=ranges,
+    bounds: Any = {RATE_GAIN: k1, MOMENT_GAIN: k2, ANGLE_GAIN: kp}
+    found = tfarm.design(
+        load_arm(arm, theory), objective, structure=structure, **bounds, modes=modes,
+        chain=load_chain(dsp or arm, period, delay_samples), continuous=continuous, progress=partial(advance, 0, 0),
+        also=[load_arm(name, theory) for name in also or []], ranges=dict(over or []),
     )  # fmt: skip
     if save is not None:
         save_law(as_law(found.law), save)
     emit(found, json, also=(save,))
 
 
-@app.command()
-@with_options(GAIN_OPTIONS, after="arms")
+@command("tune sasaki2012-lab --trials 100 --save tuned.json")
+def tune(
+    arm: ArmName,
+    trials: Annotated[int, typer.Option("--trials", min=1, max=1_000_000, help="slews to learn from")] = 100,
+    mode: Annotated[
+        str,
+        typer.Option("--mode", help="trial: after each slew; online: at every sample", rich_help_panel=LEARNING),
+    ] = "trial",
+    signals: Annotated[
+        str | None, typer.Option("--signals", help="vibration or total, in x and u; by default that of [slew]")
+    ] = None,
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, max=2**53, help="of the initial weights", rich_help_panel=LEARNING)
+    ] = 0,
+    curves: Annotated[
+        int, typer.Option("--curves", min=0, max=10_000, help="learning curves over N seeds (the paper's Figure 5)")
+    ] = 0,
+    guard: Annotated[str, typer.Option("--guard", help="time-varying (proven), frozen or none")] = "time-varying",
+    rule: Annotated[
+        str,
+        typer.Option("--rule", help="dynamic, clipped or plain: form of (21)", rich_help_panel=LEARNING),
+    ] = "dynamic",
+    sensitivity: Annotated[
+        str,
+        typer.Option(
+            "--sensitivity", help="of the plant, online: one-step (the paper's) or whole", rich_help_panel=LEARNING
+        ),
+    ] = "one-step",
+    eta: Annotated[float, typer.Option("--eta", help="learning rate", rich_help_panel=LEARNING)] = 0.8,
+    alpha: Annotated[float, typer.Option("--alpha", help="momentum, in [0, 1)", rich_help_panel=LEARNING)] = 0.6,
+    a: Annotated[
+        float,
+        typer.Option("--a", help="weight of the root moment, in the arm's unit", rich_help_panel=COST),
+    ] = 1.0,
+    b: Annotated[float, typer.Option("--b", help="weight of the control signal, likewise", rich_help_panel=COST)] = 2.6,
+    k1: Annotated[float | None, typer.Option(f"--{RATE_GAIN}", help=RATE_HELP, rich_help_panel=CONTROLLER)] = None,
+    kp: AngleGain = 0.0,
+    duration: Annotated[
+        float | None, typer.Option("--duration", help="duration of a trial [s]; by default three slews")
+    ] = None,
+    enough: Annotated[
+        float, typer.Option("--enough", help="stop once the rms of x is below this [N m]", rich_help_panel=LEARNING)
+    ] = 0.0,
+    hidden: Annotated[int, typer.Option("--hidden", min=1, max=1000, help="hidden neurons")] = 6,
+    seventh_input: Annotated[bool, typer.Option("--seventh-input", help="feed K(t-1) to the network too")] = False,
+    modes: Annotated[int, typer.Option("--modes", min=1, max=48, help="flexible modes")] = 6,
+    period: Period = None,
+    delay_samples: Delay = None,
+    dsp: DspFile = None,
+    compare: Annotated[bool, typer.Option("--compare", help="with converters, delay, and on other arms too")] = False,
+    save: Annotated[
+        Path | None, typer.Option("--save", metavar="FILE", help="write the tuner to this JSON file")
+    ] = None,
+    theory: TheoryName = None,
+    json: Json = False,
+) -> None:
+    """Neural tuner of the moment gain during a slew, compared with simpler baselines."""
+    from tfarm import tuner
+    from tfarm.tuner.trial import usual_rate_gain
+    from tfarm.tuner.tuning import usual_plan
+
+    subject, chain = load_arm(arm, theory), load_chain(dsp or arm, period, delay_samples)
+    law, defaults = load_law(subject, arm, {RATE_GAIN: k1, MOMENT_GAIN: 0.0})
+    servo: Any = {RATE_GAIN: cast("tfarm.HubFeedback", law)[RATE_GAIN], ANGLE_GAIN: kp}
+    if k1 is None and kp:
+        servo[RATE_GAIN] = usual_rate_gain(subject, kp)
+        words = f"{RATE_GAIN} = {servo[RATE_GAIN]:.4g}, a damping ratio of 0.71 of the rigid arm under {ANGLE_GAIN}"
+        defaults = {"default_gains": [RATE_GAIN], "default_gains_in_words": words}
+    learning: Any = {"mode": mode, "rule": rule, "sensitivity": sensitivity}
+    given: Any = {"signals": signals, "duration": duration}
+    plan = replace(
+        usual_plan(subject, chain),
+        cost=tuner.Cost(a=a, b=b),
+        learning=tuner.Learning(**learning, eta=eta, alpha=alpha, enough=enough),
+        trials=trials, seed=seed, count=modes, hidden=hidden, guard=cast("Any", guard), seventh_input=seventh_input,
+        **servo,
+        **{name: value for name, value in given.items() if value is not None},
+    )  # fmt: skip
+    tuning = tuner.tune(subject, plan, chain)
+    drawn = tuner.learning_curves(tuning, curves, advance) if curves else None
+    compared = tuner.compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard) if compare else None
+    if save is not None:
+        tuner.save_tuner(tuning.saved(), save)
+    found = tuner.TuningResult(tuning, drawn, compared)
+    if found.stopped is not None:
+        print_line(f"{found.stopped}; the tuner is that of the trial before")
+    emit(found, json, defaults, also=(save,))
+
+
+@command("compare sasaki2012 sasaki2012-lab --png both.png")
+@with_gains
 def compare(
-    arms: Arms,
-    law: Laws = None,
-    modes: Annotated[str, typer.Option("--modes", metavar="N", help="flexible modes, 1 to 30")] = "10",
-    output: Annotated[str, typer.Option("--output", help="what the Bode plot of two arms shows")] = "root_moment",
+    arms: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="ARM [ARM]", help="presets or TOML files", autocompletion=preset_names, show_default=False
+        ),
+    ],
+    law: LawFiles = None,
+    modes: ModeCount = 10,
+    output: Annotated[str, typer.Option("--output", help="output of the Bode plot of two arms")] = "root_moment",
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
     theory: TheoryName = None,
     png: Png = None,
-    out: Annotated[Path | None, typer.Option("--out", help="write a page, compare.html, to this folder")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FOLDER", help="write a page, compare.html, to this folder")
+    ] = None,
     json: Json = False,
     *,
-    gains: Typed,
+    gains: Gains,
 ) -> None:
-    """Two arms, or two laws on one arm, compared: modes, poles, verdicts, margins; differences in per cent or deg."""
-    count, files = whole_number("--modes", modes, 1, 30), law or []
-    _check_number(arms, files)
-    subjects = [load_arm(name, theory) for name in arms]
-    chain = asked_chain(dsp or arms[0], period, delay_samples)
-    pairs = [(subjects[min(n, len(arms) - 1)], arms[min(n, len(arms) - 1)]) for n in (0, 1)]
-    wanted = [None, None] if not files else files * (2 // len(files))
-    laws = [asked_law(arm, Given(gains, file, name))[0] for (arm, name), file in zip(pairs, wanted, strict=True)]
-    from tfarm.comparing import compare as find
+    """Comparison of two arms, or of two laws on one arm: modes, poles, verdicts, margins.
 
-    names = _names_of([arm.name for arm in subjects], files)
-    found = find(subjects, laws, names=names, modes=count, output=output, chain=chain)
-    page = None
+    Of one arm give --law twice; of two arms once for both, or once for each.
+    """
+    files, page = law or [], None
+    for key, given in (("ARM", arms), ("--law", files)):
+        if len(given) > 2:
+            raise ParameterError(key=key, value=str(given[2]), remedy="two at most can be compared")
+    if len(arms) == 1 and len(files) < 2:
+        raise ParameterError(key="ARM", value=arms[0], remedy="give a second arm, or --law FILE twice")
+    subjects = [load_arm(name, theory) for name in arms]
+    chain = load_chain(dsp or arms[0], period, delay_samples)
+    wanted: list[Path | None] = [*files * (2 // len(files))] if files else [None, None]
+    pairs = zip(subjects * (2 // len(arms)), arms * (2 // len(arms)), wanted, strict=True)
+    laws = [load_law(subject, name, gains, file)[0] for subject, name, file in pairs]
+    candidates = ([each.name for each in subjects], [each.stem for each in files], list(map(str, files)))
+    names = next((each for each in candidates if len(set(each)) == 2), ["first", "second"])
+    found = tfarm.compare(subjects, laws, names=names, modes=modes, output=output, chain=chain)
     if out is not None:
         from tfarm.report.writing import write_comparison
 
         page = write_comparison(found, out)
     emit(found, json, png=png, also=(page,))
-
-
-def _check_number(arms: list[str], files: list[str]) -> None:
-    """Raise ParameterError where there are not two of anything."""
-    if len(arms) > 2 or len(files) > 2:
-        key, given = ("ARM", arms) if len(arms) > 2 else ("--law", files)
-        raise ParameterError(key=key, value=given[2], remedy="two at most can be compared")
-    if len(arms) == 1 and len(files) < 2:
-        raise ParameterError(key="ARM", value=arms[0], remedy="give a second arm, or --law FILE twice")
-
-
-def _names_of(arms: list[str], files: list[str]) -> list[str]:
-    """What the two are called: by their arms, else by their laws' files, else by their numbers."""
-    stems, whole_names = [Path(file).stem for file in files], [str(file) for file in files]
-    for names in (arms, stems, whole_names):
-        if len(names) == 2 and names[0] != names[1]:
-            return names
-    return ["first", "second"]

@@ -1,101 +1,108 @@
-"""Tables for a terminal: no number is ever cut.
+"""Tables for a terminal, by rich: in a pipe every row is one line; on a terminal no number is broken or cut.
 
-In a pipe every row is one line.  On a terminal that is too narrow titles and long texts are folded; if that is not
-enough, the columns that do not fit follow in a block below, beside the first column again.  What answers comes first.
+Where the terminal is too narrow, titles and long texts are folded.  If that is not enough, the columns that do not fit
+follow in a block below, after the first column again.
 """
 
 from __future__ import annotations
 
+import io
 import shutil
 import sys
-import textwrap
 from collections.abc import Sequence
-from itertools import zip_longest
+from typing import Any, cast
 
-from rich.cells import cell_len
+from rich.cells import cell_len, set_cell_size
+from rich.console import Console
+from rich.table import Table as RichTable
+from rich.text import Text
 
 from tfarm.columns import Column, Table
 
 COLUMN_GAP = 2  # spaces between two columns
 LEAST_FOLDED = 20  # characters to which a text may be folded
+PIPE_WIDTH = 10**6  # columns of a pipe: more than any row has
+
+
+def terminal_width() -> int:
+    """Return the columns of the terminal, or more than any row has where standard output is none."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else PIPE_WIDTH
 
 
 def show(table: Table) -> None:
-    """Print it, in the width of the terminal or, in a pipe, in as many characters as it takes."""
-    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
-    print("\n".join(table_lines(table, width)))
+    """Print a table in the width of the terminal."""
+    print("\n".join(table_lines(table, terminal_width())))
 
 
 def show_pairs(pairs: Sequence[tuple[str, str]]) -> None:
-    """Labels and values one below the other; on a terminal a long value goes on below itself."""
-    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
-    indent = max((len(label) for label, _ in pairs), default=0) + COLUMN_GAP
+    """Print labels and values one below the other; a long value is folded on a terminal."""
+    grid = RichTable.grid(padding=(0, COLUMN_GAP, 0, 0))
+    grid.add_column(no_wrap=True)
+    grid.add_column(min_width=max((widest_word(value) for _, value in pairs), default=0))
     for label, value in pairs:
-        lines = textwrap.wrap(value, max(width - indent, LEAST_FOLDED), break_long_words=False) or [""]
-        print("\n".join([f"{label:{indent}}{lines[0]}", *(" " * indent + line for line in lines[1:])]))
+        grid.add_row(Text(label), Text(value))
+    if pairs:
+        print("\n".join(rendered(grid, terminal_width())))
 
 
 def table_lines(table: Table, width: int) -> list[str]:
-    """The lines of the table, each in so many characters as far as its widest column allows."""
+    """Return the lines of a table, each within `width` as far as its widest column allows."""
     columns = table.columns
-    cells = [column.cells for column in columns]
-    titles, rows = [heading(column) for column in columns], list(zip(*cells, strict=True))
-    fold = [i for i, column in enumerate(columns) if column.folds]
-    words = [i for i, column in enumerate(columns) if column.is_text]
-    widths = _widths(titles, rows, fold, width)
-    printed: list[str] = []
-    for block in _blocks(widths, width):
-        printed += [""] * bool(printed)
-        for row in (titles, *rows):
-            printed += _row(row, widths, words, block)
-    return printed
-
-
-def _widths(titles: Sequence[str], rows: Sequence[Sequence[str]], fold: Sequence[int], width: int) -> list[int]:
-    """Of each column: as its cells want it, folded where that does not fit."""
-    columns = list(zip(*rows, strict=True)) or [() for _ in titles]
-    cells = [max(map(cell_len, column), default=0) for column in columns]
-    natural = [max(cell_len(title), cell) for title, cell in zip(titles, cells, strict=True)]
-    if _total(natural) <= width:
-        return natural
-    words = [max(map(len, title.split()), default=0) for title in titles]
-    widths = [max(pair) for pair in zip(words, cells, strict=True)]
-    rest = width - _total([w for i, w in enumerate(widths) if i not in fold]) - COLUMN_GAP * len(fold)
-    for left, i in zip(range(len(fold), 0, -1), sorted(fold, key=lambda i: widths[i]), strict=True):
-        widths[i] = min(widths[i], max(rest // left, LEAST_FOLDED, words[i]))
-        rest -= widths[i]
-    return widths
-
-
-def _row(row: Sequence[str], widths: Sequence[int], words: Sequence[int], block: Sequence[int]) -> list[str]:
-    """A row's lines: numbers to the right, texts to the left."""
-    parts = [textwrap.wrap(row[i], widths[i]) if cell_len(row[i]) > widths[i] else [row[i]] for i in block]
-    to_left = [i in words for i in block]
-    lines = []
-    for texts in zip_longest(*parts, fillvalue=""):
-        cells = (
-            text + pad if left else pad + text
-            for i, text, left in zip(block, texts, to_left, strict=True)
-            for pad in [" " * (widths[i] - cell_len(text))]
-        )
-        lines.append((" " * COLUMN_GAP).join(cells).rstrip())
+    widths = [max(cell_len(heading(each)), widest(each)) for each in columns]
+    if sum(widths) + COLUMN_GAP * (len(widths) - 1) <= width:  # rich would take a second for two thousand rows
+        aligned = [
+            [set_cell_size(cell, size) if each.is_text else " " * (size - cell_len(cell)) + cell
+             for cell in (heading(each), *each.cells)]
+            for each, size in zip(columns, widths, strict=True)
+        ]  # fmt: skip
+        return [(" " * COLUMN_GAP).join(row).rstrip() for row in zip(*aligned, strict=True)]
+    blocks: list[list[Column]] = [[columns[0]]]
+    for column in columns[1:]:
+        if len(blocks[-1]) > 1 and least_width([*blocks[-1], column]) > width:
+            blocks.append([columns[0]])
+        blocks[-1].append(column)
+    lines: list[str] = []
+    for block in blocks:
+        grid = RichTable(box=None, pad_edge=False, padding=(0, COLUMN_GAP, 0, 0), header_style="")
+        for column in block:
+            size, side = least(column), "left" if column.is_text else "right"
+            fixed = None if column.folds else size
+            grid.add_column(Text(heading(column)), justify=cast("Any", side), width=fixed, min_width=size)
+        for row in zip(*(column.cells for column in block), strict=True):
+            grid.add_row(*map(Text, row))
+        lines += [""] * bool(lines) + rendered(grid, max(width, least_width(block)))
     return lines
 
 
+def rendered(grid: RichTable, width: int) -> list[str]:
+    """Return the lines of a rich table in that width."""
+    console = Console(file=io.StringIO(), width=width, color_system=None, legacy_windows=False)
+    with console.capture() as captured:
+        console.print(grid, crop=False)
+    return [line.rstrip() for line in captured.get().splitlines()]
+
+
 def heading(column: Column) -> str:
-    """The title with its unit."""
+    """Return the title of a column with its unit."""
     return f"{column.title} [{column.unit}]" if column.unit else column.title
 
 
-def _blocks(widths: Sequence[int], width: int) -> list[list[int]]:
-    """The columns of each block, the first in all of them."""
-    blocks = [[0] if widths else []]
-    for i in range(1, len(widths)):
-        if len(blocks[-1]) > 1 and _total([widths[j] for j in (*blocks[-1], i)]) > width:
-            blocks.append([0])
-        blocks[-1].append(i)
-    return blocks
+def least_width(columns: Sequence[Column]) -> int:
+    """Return the characters that columns take at least."""
+    return sum(map(least, columns)) + COLUMN_GAP * (len(columns) - 1)
 
 
-def _total(widths: Sequence[int]) -> int:
-    return sum(widths) + COLUMN_GAP * (len(widths) - 1)
+def least(column: Column) -> int:
+    """Return the characters below which a word or a number of a column would be broken."""
+    cells = max(LEAST_FOLDED, *map(widest_word, column.cells)) if column.folds else widest(column)
+    return max(cells, widest_word(heading(column)))
+
+
+def widest(column: Column) -> int:
+    """Return the characters of the widest cell of a column."""
+    return max(map(cell_len, column.cells), default=0)
+
+
+def widest_word(text: str) -> int:
+    """Return the characters of the widest word of a text."""
+    return max(map(cell_len, text.split()), default=0)
