@@ -14,7 +14,14 @@ from tfarm.arm import HubFeedback
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, pulse_transfer, sampled_loop, scenario
 from tfarm.dsp.kernel import estimate
 from tfarm.dsp.modes import dominant
-from tfarm.dsp.results import ideal_chain, limit_cycle, settling_time, simulated_run
+from tfarm.dsp.results import (
+    ideal_chain,
+    limit_cycle,
+    residual_moment_rms,
+    residual_raw_moment_rms,
+    settling_time,
+    simulated_run,
+)
 from tfarm.dsp.scenarios import SCENARIOS
 from tfarm.errors import ParameterError
 from tfarm.reduced import modal_model
@@ -259,6 +266,15 @@ def test_running_away_is_said_with_its_time_and_mode(lab):
     answer = to_dict(simulated_run(lab, HubFeedback(K1=0.3, K2=1.5), Chain(), "slew", 5.0, count=8))
     assert answer["settling_time_s"] is None
     assert answer["stopped_at_s"] == run.stopped.time
+
+
+def test_settling_and_residual_by_hand(lab):
+    run = simulator(lab).linear(GAINS)
+    moment, vibration = abs(run.at_samples.root_moment), run.at_samples.root_moment - run.scenario.rigid_moment
+    assert residual_moment_rms(run) == pytest.approx(np.sqrt(np.mean(vibration[100:] ** 2)), rel=1e-12)
+    assert residual_raw_moment_rms(run) == pytest.approx(np.sqrt(np.mean(moment[100:] ** 2)), rel=1e-12)
+    k = round(settling_time(run) / T)
+    assert moment[k:].max() <= 0.05 * moment.max() < moment[k - 1]
 
 
 @pytest.mark.parametrize("more", [0, 1])
