@@ -16,6 +16,7 @@ import mpmath
 import pytest
 from hypothesis import HealthCheck, settings
 
+import tfarm
 from tests.shared import once
 
 SLOW = [HealthCheck.too_slow]
@@ -43,6 +44,18 @@ def precision_stays_local() -> Iterator[None]:
     after = mpmath.mp.prec, flint.ctx.prec
     mpmath.mp.prec, flint.ctx.prec = before
     assert after == before, f"(mpmath, flint) bits were {before}, and now are {after}"
+
+
+@pytest.fixture(scope="session")
+def lab():
+    """The paper's arm with a little damping."""
+    return tfarm.load("sasaki2012-lab")
+
+
+@pytest.fixture(scope="session")
+def lossless():
+    """The paper's arm."""
+    return tfarm.load("sasaki2012")
 
 
 KEPT = """

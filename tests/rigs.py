@@ -1,6 +1,7 @@
 """Rigs and Laplace variables drawn at random by a NumPy generator: whatever a rig can have, alone and together."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,7 +25,7 @@ def some_rig(rng, *, damped=None, segments=None, theory="timoshenko", drive=None
     scale = _Scale(links)
     if damped and rng.random() < 0.8:
         C = [_maybe(rng, 0.7, _log(rng, 1e-5, 0.1)) / scale.rate for _ in links]
-        links = [_with_damping(link, each) for link, each in zip(links, C, strict=True)]
+        links = [replace(link, damping=each) for link, each in zip(links, C, strict=True)]
     locked = bool(rng.random() < 0.1)
     motor = None if locked else _motor(rng, scale, damped)
     return Arm(
@@ -82,17 +83,6 @@ def _links(rng, count):
             )
         )
     return links
-
-
-def _with_damping(link, C):
-    return Link(
-        length=link.length,
-        density=link.density,
-        youngs_modulus=link.youngs_modulus,
-        shear_modulus=link.shear_modulus,
-        section=link.section,
-        damping=C,
-    )
 
 
 def _hub(rng, scale, locked, damped):

@@ -24,6 +24,13 @@ def heard(err):
     return PROGRESS.sub("", err)
 
 
+def refused(capsys, *arguments, code=2):
+    """The one line that a command says where it cannot go on; it prints nothing."""
+    stopped, out, err = run(capsys, *arguments)
+    assert (stopped, out, err.count("\n")) == (code, "", 1)
+    return err
+
+
 def answer(capsys, *arguments):
     """What the command prints with --json, which holds no NaN; nothing on standard error but what was written."""
     code, out, err = run(capsys, *arguments, "--json")

@@ -2,15 +2,7 @@ import pickle
 
 import pytest
 
-from tfarm.errors import (
-    MISSING,
-    CertificationError,
-    ConvergenceError,
-    ParameterError,
-    TfarmError,
-    did_you_mean,
-    naming,
-)
+from tfarm.errors import MISSING, CertificationError, ConvergenceError, ParameterError, TfarmError, did_you_mean, naming
 
 
 def error(key="link.length", value=-1.0, remedy="a length is positive", file=None):

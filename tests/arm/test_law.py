@@ -87,15 +87,7 @@ def test_each_number_of_a_law_is_what_its_name_gives_back():
     }  # fmt: skip
     both = Law.of_matrices([[-1.0]], [[1.0, 2.0]], [[1.0]], [[0.0, 0.0]], ["hub_angle", "hub_rate"])
     assert both.numbers == {"gain": 1.0}
-
-
-def test_one_number_of_a_law_changes_and_nothing_else():
-    law = Law({"hub_angle": ([1.0, 2.0], [1.0, 3.0]), "hub_rate": 0.5})
-    assert law.having("hub_angle.num.1", 7.0).parts[0].block.num == (1.0, 7.0)
-    assert law.having("hub_rate", 4.0).parts[1].block.num == (4.0,)
-    np.testing.assert_allclose(law.having("gain", 3.0).values(S), 3 * law.values(S), rtol=1e-15)
     assert law.having("delay", 0.01).delay == 0.01
-    assert Law({"strain@0.05": ([1.0], [1.0, 2.0])}).having("strain@0.05.den.1", 9.0).parts[0].block.den == (1.0, 9.0)
     with pytest.raises(ParameterError, match="hub_rate"):
         law.having("hub_speed", 1.0)
 

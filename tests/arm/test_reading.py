@@ -82,12 +82,7 @@ def test_the_documented_file(accepted):
         name="sasaki2012",
         assumptions=("density read as 2766.7 kg/m^3 (Table 1 prints 2.7667)", "..."),
         link=Link(
-            length=1.0,
-            density=2766.7,
-            youngs_modulus=6.8944e10,
-            shear_modulus=2.6517e10,
-            section=section,
-            damping=0.0,
+            length=1.0, density=2766.7, youngs_modulus=6.8944e10, shear_modulus=2.6517e10, section=section, damping=0.0
         ),
         hub=Hub(inertia=0.1),
         payload=Payload(mass=0.0, inertia=0.0),
@@ -139,75 +134,17 @@ BAD_EDITS = {
     "missing table": ("[hub]\ninertia = 0.1", "", "hub is missing: give a table, headed [hub]"),
     "missing name": ('name = "sasaki2012"', "", "name is missing: give a text such as"),
     "missing shape": ('shape = "general"', "", "link.section.shape is missing: give one of rectangle, round"),
-    "missing shear factor": ("shear_factor = 0.8333333333333334", "", "link.section.shear_factor is missing"),
     "no shear modulus": ("shear_modulus = 2.6517e10", "", "link.shear_modulus is missing: give it in Pa, or"),
     "unknown key": ("density =", "densty =", 'link.densty = 2766.7: unknown key; did you mean "density"?'),
     "unknown table": ("[payload]", "[payloads]", 'unknown key; did you mean "payload"?'),
-    "unknown section key": (
-        "area =",
-        "aera =",
-        'link.section.aera = 0.0006: unknown key; did you mean "area"?',
-    ),
-    "unknown shape": (
-        '"general"',
-        '"rectangel"',
-        "shape = 'rectangel': unknown shape; did you mean \"rectangle\"?",
-    ),
-    "text for a number": (
-        "length = 1.0 ",
-        'length = "1.0" ',
-        "link.length = '1.0': wrong type; give a number",
-    ),
+    "unknown section key": ("area =", "aera =", 'link.section.aera = 0.0006: unknown key; did you mean "area"?'),
+    "text for a number": ("length = 1.0 ", 'length = "1.0" ', "link.length = '1.0': wrong type; give a number"),
     "true for a number": ("length = 1.0 ", "length = true ", "link.length = true: wrong type; give a number"),
-    "date for a number": ("length = 1.0 ", "length = 2012-01-01 ", "link.length = datetime.date"),
-    "list for a number": ("length = 1.0 ", "length = [1.0] ", "link.length = [1.0]: wrong type"),
     "number for a table": ("[payload]", "payload = 1\n[other]", "unknown key"),
     "number for a text": ('name = "sasaki2012"', "name = 1", "name = 1: wrong type; give a text"),
     "number for an assumption": ('"..."', "3", "assumptions.1 = 3: wrong type; give a text in double quotes"),
-    "text for assumptions": (
-        ', "..."]',
-        ', "..."]\nx = 1',
-        "x = 1: unknown key; known are: name, assumptions",
-    ),
-    "nan": ("length = 1.0 ", "length = nan ", "link.length = nan: a length is a positive, finite number"),
-    "negative length": (
-        "length = 1.0 ",
-        "length = -1.0 ",
-        "link.length = -1.0: a length is a positive, finite",
-    ),
-    "infinite density": ("density = 2766.7", "density = inf", "link.density = inf: a density is a positive"),
-    "zero modulus": (
-        "youngs_modulus = 6.8944e10",
-        "youngs_modulus = 0",
-        "link.youngs_modulus = 0.0: Young's",
-    ),
-    "zero area": (
-        "area = 6.0e-4",
-        "area = 0",
-        "link.section.area = 0.0: a section has a positive, finite area",
-    ),
-    "negative damping": ("damping = 0.0", "damping = -1e-4", "link.damping = -0.0001: damping C is zero or"),
-    "negative hub": (
-        "inertia = 0.1",
-        "inertia = -0.1",
-        "hub.inertia = -0.1: a hub inertia is zero (free pin)",
-    ),
-    "negative mass": (
-        "mass = 0.0",
-        "mass = -1",
-        "payload.mass = -1.0: a payload mass is zero, positive in kg",
-    ),
-    "rubber": (
-        "shear_modulus = 2.6517e10",
-        "poissons_ratio = 0.7",
-        "link.poissons_ratio = 0.7: Poisson's ratio",
-    ),
-    "both": (
-        "damping",
-        "poissons_ratio = 0.3\ndamping",
-        "link.poissons_ratio = 0.3: shear_modulus is given too",
-    ),
-    "huge number": ("length = 1.0 ", "length = 1e300 ", "link.length = 1e+300: beyond any arm"),
+    "negative length": ("length = 1.0 ", "length = -1.0 ", "link.length = -1.0: a length is a positive, finite"),
+    "both": ("damping", "poissons_ratio = 0.3\ndamping", "link.poissons_ratio = 0.3: shear_modulus is given too"),
     "long number": ("length = 1.0 ", f"length = 1{'0' * 5000} ", "TOML = "),
     "path as name": ('"sasaki2012"', '"../../x"', "name = '../../x': a name has 1 to 80 characters"),
     "control character": ('"..."', '"\\u001b[31m"', "assumptions = '\\x1b[31m': assumptions are a list of"),
@@ -223,11 +160,6 @@ def test_a_bad_file_is_refused_in_one_line_with_its_key_value_and_remedy(refused
     content = EXAMPLE.replace(old, new, 1)
     assert content != EXAMPLE
     assert message in refused(content)
-
-
-def test_a_tube_thinner_than_nothing(refused):
-    table = 'shape = "tube"\nouter_diameter = 0.01\ninner_diameter = 0.02\n'
-    assert "link.section.inner_diameter = 0.02: a tube is hollow" in refused(edited(GENERAL, table))
 
 
 CHOKING = {
@@ -351,11 +283,6 @@ def test_an_arm_written_and_read_is_the_same_to_the_last_bit(tmp_path_factory, a
     path = tmp_path_factory.getbasetemp() / "round-trip.toml"
     path.write_text(to_toml(arm), encoding="utf-8")
     assert load(path) == arm
-
-
-@pytest.mark.parametrize("name", presets())
-def test_a_preset_written_and_read_is_the_same(accepted, name):
-    assert accepted(to_toml(load(name))) == load(name)
 
 
 @given(place=st.integers(0, len(EXAMPLE)), cut=st.integers(0, 12), noise=st.binary(max_size=12))

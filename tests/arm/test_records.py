@@ -28,23 +28,6 @@ def test_stiffness_and_inertia_per_length():
     assert LINK.slenderness == pytest.approx(2 * math.sqrt(2), rel=1e-15)
 
 
-def test_total_inertia_is_the_integral_over_the_rigid_arm():
-    """dJ = rho (x^2 + z^2) dV, by quadrature over a bar of square section, plus hub and payload."""
-    bar = Link(
-        length=1.5,
-        density=8.0,
-        youngs_modulus=1.0,
-        shear_modulus=0.4,
-        section=Section.rectangle(width=0.2, depth=0.2),
-    )
-    nodes, weights = np.polynomial.legendre.leggauss(4)
-    x, z = 0.75 * (nodes + 1), 0.1 * nodes
-    per_volume = np.add.outer(x**2, z**2)
-    beam = 8.0 * 0.2 * np.einsum("i,j,ij", 0.75 * weights, 0.1 * weights, per_volume)
-    arm = Arm(link=bar, hub=Hub(inertia=0.3), payload=Payload(mass=0.7, inertia=0.11))
-    assert arm.total_inertia == pytest.approx(0.3 + beam + 0.7 * 1.5**2 + 0.11, rel=4e-16 * 4)
-
-
 def test_shear_cutoff_is_where_one_wave_number_vanishes():
     """The product of the squared wave numbers, s^2 rhoA/EI (1 + s^2 rhoI/kGA), is zero at s = i w."""
     w = ARM.shear_cutoff
@@ -53,13 +36,7 @@ def test_shear_cutoff_is_where_one_wave_number_vanishes():
 
 @pytest.mark.parametrize(
     ("hub", "mass", "inertia", "rigid"),
-    [
-        (1, 1, 1, True),
-        (0, 0, 0, True),
-        (math.inf, 0, 0, False),
-        (1, math.inf, 0, False),
-        (1, 0, math.inf, False),
-    ],
+    [(1, 1, 1, True), (0, 0, 0, True), (math.inf, 0, 0, False), (1, math.inf, 0, False), (1, 0, math.inf, False)],
 )
 def test_the_arm_turns_rigidly_unless_something_holds_it(hub, mass, inertia, rigid):
     arm = Arm(link=LINK, hub=Hub(inertia=hub), payload=Payload(mass=mass, inertia=inertia))
@@ -166,13 +143,28 @@ def test_a_plate_or_an_endless_thread_is_no_beam(length):
         replace(ARM, link=replace(LINK, length=length))
 
 
-@pytest.mark.parametrize(
-    "name", ["", "../up", "a/b", "a\\b", ".hidden", "end.", "two\nlines", "\x1b[1m", "x" * 81, 3, "a:b"]
-)
+BAD_NAMES = ["", "../up", "a/b", "a\\b", ".hidden", "end.", "two\nlines", "\x1b[1m", "x" * 81, 3, "a:b"]
+DEVICES = [
+    "CON",
+    "nul",
+    "com1.old",
+    "LPT9",
+    "aux .x",
+    "\U0001d538" * 80,
+]  # and 80 letters of 4 bytes, longer than Linux's 255
+
+
+@pytest.mark.parametrize("name", BAD_NAMES + DEVICES)
 def test_a_name_can_be_a_folder_on_any_machine(name):
-    with pytest.raises(ParameterError, match=r"^name = .*begins with a letter or digit"):
+    with pytest.raises(
+        ParameterError, match=r"^name = " if name in DEVICES else r"^name = .*begins with a letter or digit"
+    ):
         replace(ARM, name=name)
-    assert replace(ARM, name="Arm nº 2 (β)").name == "Arm nº 2 (β)"
+
+
+@pytest.mark.parametrize("name", ["console", "null", "com", "lpt10", "é" * 80, "Arm nº 2 (β)"])
+def test_names_that_are_allowed(name):
+    assert replace(ARM, name=name).name == name
 
 
 @pytest.mark.parametrize("assumptions", ["one text", [3], ["\x1b[31m"], None])
@@ -185,18 +177,6 @@ def test_assumptions_become_a_tuple_of_single_lines():
     assert replace(ARM, assumptions=["two\n  lines", "one"]).assumptions == ("two lines", "one")
 
 
-@pytest.mark.parametrize("name", ["CON", "nul", "com1.old", "LPT9", "aux .x", "\U0001d538" * 80])
-def test_a_name_is_one_on_every_file_system(name):
-    """Windows' devices, and 80 letters of four bytes, longer than the 255 that Linux allows."""
-    with pytest.raises(ParameterError, match="name = "):
-        replace(ARM, name=name)
-
-
-@pytest.mark.parametrize("name", ["console", "null", "com", "lpt10", "é" * 80])
-def test_names_that_only_look_so(name):
-    assert replace(ARM, name=name).name == name
-
-
 @pytest.mark.parametrize(("name", "value"), [("damping", 1e-4), ("length", 2.0)])
 def test_an_arm_with_another_number_is_the_same_but_for_it(name: str, value: float) -> None:
     arm = tfarm.load("sasaki2012-lab")
@@ -207,17 +187,6 @@ def test_an_arm_with_another_number_is_the_same_but_for_it(name: str, value: flo
     assert arm.having(payload_mass=1.0, payload_inertia=0.2).payload == tfarm.Payload(mass=1.0, inertia=0.2)
     with pytest.raises(tfarm.ParameterError, match="length"):
         arm.having(length=-1.0)
-
-
-def test_what_the_hub_carries_and_what_bends_the_arm() -> None:
-    arm = tfarm.load("stocky-steel")
-    link, payload = arm.link, arm.payload
-    carried = arm.having(hub_inertia=0.0).total_inertia
-    assert arm.carried_inertia == pytest.approx(carried, rel=1e-15)
-    assert payload.mass * arm.length**2 + payload.inertia < carried
-    assert arm.bending_scale * arm.length == link.EI
-    assert arm.is_undamped == (arm.damping == 0)
-    assert not arm.has_massless_hub
 
 
 @pytest.mark.parametrize("value", [True, 1.0, "2", None, 0, 8])

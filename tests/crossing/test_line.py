@@ -165,10 +165,6 @@ def test_every_place_that_is_asked_for_is_that_of_another_chandrupatla(f, low):
     np.testing.assert_array_equal(found, other.x)
 
 
-def test_no_bracket_has_no_zero():
-    assert zeros_between(lambda x: x, np.empty(0), np.empty(0)).size == 0
-
-
 @pytest.mark.parametrize(
     ("h", "before", "change"),
     [
@@ -187,13 +183,6 @@ def test_a_zero_exactly_at_a_point_is_not_lost(h, before, change):
     assert columns.tolist() == 2 * before
     assert rows.tolist() == [0] * len(before) + [1] * len(before)
     assert both.tolist() == 2 * change
-
-
-def test_the_zero_at_the_end_of_its_bracket_is_found():
-    assert zeros_between(lambda x: x - 2.0, np.array([1.0]), np.array([2.0])) == pytest.approx([2.0], rel=1e-15)
-
-
-# ------------------------------------------------------------ windows between crossings some of which rounding h
 
 
 TRUE = [(-2.0, 0.7, -2), (3.0, 1.1, 2)]
@@ -218,9 +207,6 @@ def test_a_window_is_found_where_the_counts_are_wrong():
 
 def test_where_nothing_holds_there_is_none():
     assert confirmed(Crossings.of(TRUE + FALSE), -math.inf, math.inf, lambda gain: False) == []
-
-
-# ------------------------------------------------------------ two crossings between neighbours of a grid
 
 
 def of(h):
@@ -296,8 +282,3 @@ def test_what_is_no_dip_is_not_searched(h):
     without = list(asked)
     found(grid, parts)
     assert asked[len(without) :] == without
-
-
-def test_a_dip_that_stays_off_0_adds_nothing():
-    grid, parts = np.arange(7.0), of(lambda x: (x - 3.2) ** 2 / 10 + 1e-6)
-    assert found(grid, parts).size == 0

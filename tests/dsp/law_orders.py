@@ -40,9 +40,6 @@ class Case:
     chain: Chain
 
 
-# ------------------------------------------------------------ random cases
-
-
 def some_case(rng):
     """A rig, a law and a chain; None where the law reads nothing that moves."""
     try:
@@ -139,9 +136,6 @@ def some_roots(rng, order, w1):
             0.0 if rng.random() < 0.15 else float(-w1 * 10 ** rng.uniform(-2, 1) * rng.choice([1, -1], p=[0.9, 0.1]))
         )
     return zeros, poles
-
-
-# ------------------------------------------------------------ the truth
 
 
 def held(A, B, duration):

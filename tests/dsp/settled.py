@@ -14,6 +14,7 @@ from scipy.linalg import block_diag, expm
 
 from tests import survey
 from tests.models import Ritz
+from tests.plausible.arms import log
 from tests.strategies import arm_of
 from tests.survey import Finding, each_of
 from tfarm.arm import HubFeedback
@@ -33,20 +34,16 @@ class Case:
     chain: Chain
 
 
-def _log(rng, low, high):
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
 def beam_of(rng, longest, stockiest):
     """What a slender beam without hub and damping is drawn from, and its inertia about the hub [kg m^2]."""
     draw = {
-        "length": _log(rng, 0.3, longest),
-        "slenderness": _log(rng, stockiest, 300),
-        "width": _log(rng, 1, 20),
-        "density": _log(rng, 1500, 8000),
-        "E": _log(rng, 1e10, 2e11),
+        "length": log(rng, 0.3, longest),
+        "slenderness": log(rng, stockiest, 300),
+        "width": log(rng, 1, 20),
+        "density": log(rng, 1500, 8000),
+        "E": log(rng, 1e10, 2e11),
         "nu": float(rng.uniform(0.1, 0.4)),
-        "mass": float(rng.choice([0.0, _log(rng, 0.01, 1)])),
+        "mass": float(rng.choice([0.0, log(rng, 0.01, 1)])),
         "inertia": 0.0,
     }
     return draw, arm_of(**draw, damping=0.0, hub=1.0).total_inertia - 1.0
@@ -55,8 +52,8 @@ def beam_of(rng, longest, stockiest):
 def ordinary_case(rng):
     """A slender arm with a hub of its size, damped, and gains on both sides of the edges."""
     draw, beam = beam_of(rng, 2.0, 30)
-    arm = arm_of(**draw, damping=_log(rng, 3e-6, 3e-4), hub=beam * _log(rng, 0.05, 5))
-    gains = HubFeedback(K1=arm.total_inertia / PERIOD * _log(rng, 1e-3, 3), K2=float(rng.uniform(-0.6, 1.8)))
+    arm = arm_of(**draw, damping=log(rng, 3e-6, 3e-4), hub=beam * log(rng, 0.05, 5))
+    gains = HubFeedback(K1=arm.total_inertia / PERIOD * log(rng, 1e-3, 3), K2=float(rng.uniform(-0.6, 1.8)))
     delay = float(rng.choice([0.0, 1.0, 2.0, rng.uniform(0, 2)]))
     return Case(arm, gains, Chain(sampling=Sampling(period=PERIOD, delay_samples=delay)))
 
@@ -64,14 +61,14 @@ def ordinary_case(rng):
 def hurting_case(rng):
     """A light hub, little damping, and a period short enough for the modes 10 to 60 to matter."""
     draw, beam = beam_of(rng, 3.0, 20)
-    share = float(rng.choice([0.0, *(_log(rng, 1e-4, 1e-1) for _ in range(3))]))
+    share = float(rng.choice([0.0, *(log(rng, 1e-4, 1e-1) for _ in range(3))]))
     arm = arm_of(**draw, damping=0.0, hub=beam * share)
     w = modes(arm, 60).natural_frequency
-    arm = replace(arm, link=replace(arm.link, damping=2 * _log(rng, 1e-6, 1e-3) / float(w[1])))
+    arm = replace(arm, link=replace(arm.link, damping=2 * log(rng, 1e-6, 1e-3) / float(w[1])))
     period = float(rng.uniform(1.0, 2.0) * np.pi / w[rng.integers(10, 61)])
     delay = float(rng.choice([0.0, 0.5, 1.0, rng.uniform(0, 2)]))
     felt = float(rng.choice([arm.total_inertia, max(arm.hub.inertia, 1e-4 * beam)]))
-    gains = HubFeedback(K1=felt / period * _log(rng, 1e-3, 1), K2=float(rng.uniform(-0.4, 1.4)) if share else 0.0)
+    gains = HubFeedback(K1=felt / period * log(rng, 1e-3, 1), K2=float(rng.uniform(-0.4, 1.4)) if share else 0.0)
     return Case(arm, gains, Chain(sampling=Sampling(period=period, delay_samples=delay)))
 
 

@@ -10,9 +10,9 @@ import pytest
 import tfarm
 from tfarm.arm import FED_BACK, Hub, HubFeedback, Law
 from tfarm.dsp import Chain, Converters, Sampling, circle, pulse_transfer, sampled_loop, sampled_verdict
-from tfarm.dsp.circle import HIGHER, Circle, Discs, _Arcs, complete_band, product
-from tfarm.dsp.crossings import COARSEST, circle_grid, crossing_factors, stable_windows
-from tfarm.dsp.edges import Figure, shown_delay, whole_loop
+from tfarm.dsp.circle import Circle, Discs, _Arcs, complete_band, product
+from tfarm.dsp.crossings import crossing_factors, stable_windows
+from tfarm.dsp.edges import shown_delay, whole_loop
 from tfarm.dsp.verdict import Verdict
 from tfarm.reduced import modal_model, relaxed_model
 
@@ -34,19 +34,6 @@ def test_the_filters_own_pole_errs_by_what_the_model_is_off_at_its_corner(delay)
     np.testing.assert_allclose(found, [0.0, *abs(model - exact)[1:] * most], rtol=1e-6, atol=1e-15)
     assert found[2] > 1e-12
     assert not circle._of_the_filter(loop, 150.0).any()  # its pole is left of the line, with those that are left out
-
-
-def test_the_top_of_a_band_is_so_many_times_the_last_pole_of_the_model():
-    loop = sampled_loop(LAB.having(damping=1e-3), GAINS, count=4)
-    shares = complete_band(loop).top / loop.plant.poles.imag.max() / circle.ABOVE_MODEL
-    assert min(abs(shares / factor - 1) for factor in HIGHER) < 1e-12
-
-
-def test_no_gap_of_the_grid_on_the_circle_is_twice_as_wide_as_of_the_uniform_one():
-    """However far the poles are from each other, and from z = -1; between the points of two poles the grids meet."""
-    for count in (1, 5):
-        q = circle_grid(sampled_loop(LAB, GAINS, count=count)).q
-        assert np.diff(q).max() < 2 * math.pi / COARSEST
 
 
 def test_without_a_band_a_delay_margin_has_the_digits_that_twice_the_modes_leave():
@@ -110,18 +97,6 @@ def test_a_disc_holds_every_value_on_its_arc_and_is_no_larger_than_its_terms(nam
     sizes = abs(-np.expm1(-1j * angles)[:, None] * (1 + roots) - roots)
     most = (sizes + radius[:, None] * abs(1 + roots)).prod(axis=1)
     assert (found.radius <= most - sizes.prod(axis=1) + 1e-13 * (1 + most)).all()
-
-
-@pytest.mark.parametrize(
-    ("figure", "sharp"),
-    [
-        (Figure(1.2345, 4, 500.0, None), [3, 4]),
-        (Figure(1.2345, 4, None, 12), []),  # of the first modes alone: no digit is proven
-        (Figure(0.0, 0, 500.0, None), [3, 4, 5]),  # nothing is left to be rounded
-    ],
-)
-def test_a_figure_is_sharp_in_the_digits_that_are_proven(figure, sharp):
-    assert [digits for digits in (3, 4, 5) if figure.is_sharp(digits)] == sharp
 
 
 def test_a_disc_about_a_point_is_as_wide_as_rounding_next_to_a_pole_too():
@@ -217,11 +192,3 @@ def test_a_model_has_its_statics_whatever_the_friction(model):
         arm = replace(LAB, hub=replace(LAB.hub, friction=b))
         off.append(abs(model(arm, names, 6)(s) / tfarm.transfer(arm, names)(s) - 1).max())
     assert max(off) < 2 * off[0] + 1e-16 * LAB.total_inertia * 3 / 1e-7  # R/s and r/(s - p) cancel to first order
-
-
-def test_a_pole_left_of_the_line_is_not_bounded_twice():
-    """What is left of it is in `missing` already: then the integral of the rate stands by itself."""
-    loop = whole_loop(BRAKED, HELD, Chain())
-    band = complete_band(loop)
-    left = band.kept & (np.arange(band.kept.size) != band.circle().braked)
-    assert Circle(loop, left, band.missing).braked is None

@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.arm import HubFeedback, to_toml
-from tfarm.arm.checks import LARGEST_NUMBER
+from tfarm.arm import to_toml
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Slew, load_chain
 from tfarm.dsp.chain import chain_of_tables, file_text
-from tfarm.dsp.kernel import AMPLIFIER, DAC, quantise
-from tfarm.dsp.simulate import quantisers
+from tfarm.dsp.kernel import quantise
 from tfarm.errors import ParameterError
 
 ARM = tfarm.load("sasaki2012-lab")
@@ -82,25 +80,18 @@ def test_an_arm_still_refuses_other_tables(tmp_path):
 
 BAD = [
     ("sampling", {"period": 0.0}, "sampling.period = 0.0: a sample period is a positive"),
-    ("sampling", {"period": -0.01}, "sampling.period = -0.01"),
-    ("sampling", {"period": math.nan}, "nan is none"),
-    ("sampling", {"period": math.inf}, "sampling.period = inf"),
-    ("sampling", {"period": "0.01"}, "sampling.period = '0.01'"),
     ("sampling", {"period": True}, "sampling.period = true"),
     ("sampling", {"delay_samples": -1.0}, "sampling.delay_samples = -1.0: a computational delay is zero or positive"),
-    ("sampling", {"delay_samples": 1e6}, "at most 100"),
     ("sampling", {"antialias_corner": 0.0}, "positive in rad/s, or inf"),
     ("sampling", {"perod": 0.01}, 'did you mean "period"'),
     ("converters", {"moment_bits": 0, "moment_range": 1.0}, "moment_bits = 0: a whole number of bits from 2 to 32"),
-    ("converters", {"moment_bits": 70, "moment_range": 1.0}, "converters.moment_bits = 70"),
     ("converters", {"torque_bits": 12}, "converters.torque_range = None: 12 bits of what"),
     ("converters", {"torque_range": -3.0}, "the range +-R of a converter"),
-    ("converters", {"encoder_counts": 0}, "counts a revolution from 2"),
     ("converters", {"encoder_counts": 2**31 + 1}, "counts a revolution from 2"),
-    ("converters", {"encoder_counts": 1.5}, "converters.encoder_counts = 1.5"),
     ("converters", {"hub_rate": "guess"}, "converters.hub_rate = 'guess'"),
     ("converters", {"arithmetic": "float16"}, "'float32'"),
     ("actuator", {"torque_limit": 0.0}, "a torque limit is positive"),
+    ("actuator", {"torque_limit": -1.0}, "in V or A where that is the arm's input"),
     ("actuator", {"hub_damping": -1.0}, "hub damping is zero or positive"),
     ("actuator", {"motor_constant": 0.0}, "a motor constant is a positive number"),
     ("slew", {"travel": 0.0}, "slew.travel"),
@@ -116,22 +107,6 @@ def test_bad_tables_are_named(table, content, message):
         chain_of_tables({table: content})
     assert message in str(refused.value)
     assert "\n" not in str(refused.value)
-
-
-@pytest.mark.parametrize("value", [math.nan, math.inf, 2 * LARGEST_NUMBER, "0.3", True])
-def test_gains_are_finite_numbers(value):
-    with pytest.raises(ParameterError, match="K2"):
-        HubFeedback(K1=0.3, K2=value)
-
-
-def test_steps_and_ranges():
-    chain = Chain(
-        converters=Converters(moment_bits=4, moment_range=8.0, torque_bits=3, torque_range=4.0),
-        actuator=Actuator(torque_limit=2.5),
-    )
-    rows = quantisers(chain)
-    assert rows[AMPLIFIER].tolist() == [1.0, -8.0, 7.0]
-    assert rows[DAC].tolist() == [1.0, -2.5, 2.5]
 
 
 def test_quantise_rounds_clips_and_says_so():

@@ -1,7 +1,6 @@
 """tfarm sampled and tfarm simulate as a shell sees them: words, files, units, the sampled verdict beside a design."""
 
 import csv
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -13,10 +12,10 @@ from scipy.io import loadmat
 
 import tfarm
 from tests.shared import remember, thinned
-from tests.shell import answer, run
+from tests.shell import answer, refused, run
 from tests.synthesis.held_loop import HeldLoop
 from tfarm import HubFeedback
-from tfarm.dsp import Actuator, Chain
+from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
 from tfarm.dsp.verdict import sampled_brief
 from tfarm.plots import slew
@@ -62,25 +61,6 @@ def test_simulate_writes_what_it_prints(capsys, tmp_path, scenario):
     assert mat.read_bytes() == first
 
 
-def test_a_record_that_ends_next_to_its_settling_is_not_settled(capsys):
-    """Within 1.5 s the moment is below 5 % from 1.41 s on, which nine hundredths of a second do not show to last."""
-    given = ("simulate", "sasaki2012-lab", "--duration")
-    assert "not settled within 1.5 s\n" in run(capsys, *given, "1.5")[1]
-    assert answer(capsys, *given, "1.5")["settling_time_s"] is None
-    assert answer(capsys, *given, "3")["settling_time_s"] == pytest.approx(1.41)
-
-
-def test_an_unstable_simulation_says_when_and_which_mode(capsys):
-    code, out, err = run(capsys, "simulate", "sasaki2012-lab", "--K2", "1.5", "--json")
-    result = json.loads(out)
-    assert code == 0
-    assert result["stopped_at_s"] == pytest.approx(0.01 * len(result["t"]))
-    assert f"stopped at {result['stopped_at_s']:g} s" in err
-    assert err.count("\n") == 1
-    assert np.isfinite(result["root_moment"]).all()
-    assert result["settling_time_s"] is None
-
-
 def test_a_dsp_file_beside_the_arm(capsys, tmp_path):
     file = tmp_path / "loop.toml"
     file.write_text(
@@ -111,10 +91,7 @@ BAD = [
 
 @pytest.mark.parametrize(("arguments", "message"), BAD)
 def test_bad_input_is_one_line_and_exit_2(capsys, arguments, message):
-    code, out, err = run(capsys, *arguments)
-    assert (code, out) == (2, "")
-    assert err.count("\n") == 1
-    assert message in err
+    assert message in refused(capsys, *arguments)
 
 
 @pytest.mark.parametrize(
@@ -139,12 +116,6 @@ def test_gains_that_fail_when_sampled_are_not_recommended_without_a_word(capsys,
     _, out, _ = run(capsys, "design", "sasaki2012-lab", "--continuous")
     assert "inside bounds that were widened" in out
     assert re.search(r"^sampled loop +UNSTABLE .*\(tfarm's default period\)$", out, re.MULTILINE)
-
-
-def test_in_short_it_is_the_verdict_and_the_clock_in_milliseconds():
-    chain = Chain(sampling=Sampling(period=0.004))
-    told = [sampled_brief(LAB, HubFeedback(K1=0.3, K2=K2), chain).short for K2 in (0.3, -4.0)]
-    assert told == ["stable when sampled every 4 ms", "UNSTABLE when sampled every 4 ms"]
 
 
 RIG = "quanser-2dsfl"
@@ -177,8 +148,3 @@ def test_the_signals_file_and_the_words_have_it(tmp_path, capsys):
     found = answer(capsys, "simulate", RIG, "--scenario", "step", "--duration", "0.05", "--modes", "3")
     assert found["torque_unit"] == "A"
     assert found["scenario_in_words"].endswith(" A")
-
-
-def test_a_limit_says_in_which_unit_it_is():
-    with pytest.raises(tfarm.ParameterError, match="in V or A where that is the arm's input"):
-        Actuator(torque_limit=-1.0)

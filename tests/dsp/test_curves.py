@@ -19,7 +19,6 @@ from tfarm.dsp.traces import (
     TimeCurve,
     curve,
     points_a_period,
-    records_between,
     reference_angle,
     ringing,
     root_moment,
@@ -110,28 +109,3 @@ def test_what_is_played_again_is_the_simulation(delay):
     found = ringing(simulator, run)
     assert found.frequency == pytest.approx(tfarm.modes(arm, 1).natural_frequency[-1:])
     assert found.size[2, 0] == pytest.approx(np.ptp(moment) / 2, rel=2e-3)  # 400 records a sample: 96 a period
-
-
-@pytest.mark.parametrize("delay", [0.0, 1.0])
-def test_a_mode_rings_as_far_as_in_the_sample_where_it_rings_most(delay):
-    """A slew, whose torque changes at each sample; four periods of the mode fit into one."""
-    arm = replace(STEEL, link=replace(STEEL.link, damping=0.0))
-    chain = Chain(sampling=Sampling(delay_samples=delay))
-    simulator = Simulator(arm, chain, scenario("slew", arm, chain, 1.5), count=1, between=400)
-    run = simulator.linear(HubFeedback(K1=0.0, K2=0.0))
-    samples = run.between.root_moment.reshape(-1, 400)
-    assert ringing(simulator, run).size[2, 0] == pytest.approx(np.ptp(samples, axis=1).max() / 2, rel=2e-3)
-
-
-def test_a_mode_takes_twenty_points_a_period_the_samples_among_them():
-    """Of the lab arm 2.5 Hz in 100 samples a second, and none where nothing is seen."""
-    lab, chain = tfarm.load("sasaki2012-lab"), Chain()
-    simulator = Simulator(lab, chain, scenario("slew", lab, chain, 1.2), count=3)
-    run = simulator.linear(HubFeedback(K1=0.3, K2=0.3))
-    frequency = tfarm.modes(lab, 3).natural_frequency[1:] / (2 * np.pi)
-    points = np.ceil(POINTS_A_PERIOD * frequency / 100)  # a sample's, itself among them
-    height = float(np.ptp(run.at_samples.root_moment))
-    needed = [records_between(simulator, run, {"root_moment": each}) for each in (1e9, height, 0.0)]
-    assert needed[0] == 0
-    assert needed[1] + 1 in points
-    assert needed[2] + 1 == points[-1]

@@ -34,9 +34,6 @@ def is_stable(law, chain):
     return sampled_verdict(LAB, law, chain).is_stable
 
 
-# ------------------------------------------------------------ verdicts
-
-
 def test_five_poles_next_to_one_are_no_integrator():
     """At 0.5 ms the loop's poles are as good as those of continuous time, which the exact arm has."""
     chain = chain_of(0.0005)
@@ -107,9 +104,6 @@ def test_small_run_of_the_survey(number):
     assert wrong == 0
     assert found["right"] == found.total() - found["refused"] - found["not proven"]
     assert found["right"] > 0.7 * found.total()
-
-
-# ------------------------------------------------------------ factors
 
 
 def values_of(in_z, delta):

@@ -72,27 +72,10 @@ def test_a_servo_follows_as_python_control_says():
     np.testing.assert_allclose(mine.at_samples.hub_angle, found, atol=1e-9 * abs(found).max())
 
 
-def test_a_column_of_references_is_a_reference():
-    task, gain = scenario("slew", LAB, Chain(), 1.5), 3.0
-    one = Law({"hub_angle": gain, "hub_rate": 1.0}, references=("hub_angle",))
-    other = Law.of_matrices(
-        np.empty((0, 0)),
-        np.empty((0, 3)),
-        np.empty((1, 0)),
-        [[-gain, gain, -1.0]],
-        ["hub_angle", "reference:hub_angle", "hub_rate"],
-        sign=1,
-    )
-    assert_close(*(Simulator(LAB, Chain(), task, law, count=6).run() for law in (one, other)))
-
-
 def test_no_reference_is_made_up():
     with pytest.raises(ParameterError) as error:
         tfarm.simulate(LAB, Law({"tip_displacement": 1.0}, references=("tip_displacement",)))
     assert error.value.key == "references"
-
-
-# ------------------------------------------------------------ controllers of a real rig
 
 
 def real(name):

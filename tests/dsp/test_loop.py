@@ -9,9 +9,8 @@ import pytest
 import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.arm import Hub, HubFeedback
-from tfarm.dsp import Actuator, Chain, Converters, Sampling, plant, sampled_loop
-from tfarm.dsp.edges import another
-from tfarm.dsp.modes import RIM, STRONGER, followed_branches, mode_table, sampled_loci, sampled_locus
+from tfarm.dsp import Actuator, Chain, Converters, Sampling, sampled_loop
+from tfarm.dsp.modes import RIM, STRONGER, mode_table, sampled_loci, sampled_locus
 from tfarm.errors import ParameterError
 
 pytestmark = pytest.mark.kernels
@@ -89,16 +88,6 @@ def test_a_rate_by_difference_is_in_the_matrix_as_in_F(lab, delay, Kp, hub_dampi
     np.testing.assert_allclose(abs(by_hand), 0, atol=1e-7)
 
 
-def test_the_locus_starts_at_the_open_loop_and_has_no_jumps(lab):
-    loop = sampled_loop(lab, HubFeedback(K1=1e-9, K2=1.3), count=8)
-    gains = np.linspace(0.0, 1.3, 60)
-    locus = followed_branches([loop.having(K2=K2).poles.z for K2 in gains.tolist()], gains)
-    assert np.all(abs(np.diff(locus, axis=0)) < 0.2)
-    flexible = loop.pulse.multipliers[loop.pulse.mode > 0]
-    assert max(abs(locus[0, :, None] - flexible).min(axis=0)) < 1e-9
-    assert max(np.log(abs(locus[-1]))) == pytest.approx(loop.poles.log_spectral_radius, rel=1e-9)
-
-
 SIZE = 1e-4  # of a gain: the difference over both signs is right to its square, and to the rounding of ln|z| over it
 
 
@@ -167,29 +156,6 @@ def test_a_locked_hub_has_no_loop_and_a_free_pin_none_by_moment(lab):
     assert sampled_loop(pin, HubFeedback(K1=0.1, K2=0.0), count=6).poles.z.size > 10
 
 
-@pytest.mark.parametrize("hub_damping", [0.0, 0.4])
-def test_a_loop_with_fewer_modes_is_cut_from_the_same_model(lab, hub_damping, monkeypatch):
-    """As made anew, poles and static remainder and all; a model is made again only where more modes are asked for."""
-    chain = Chain(
-        sampling=Sampling(delay_samples=0.4, antialias_corner=900.0), actuator=Actuator(hub_damping=hub_damping)
-    )
-    gains = HubFeedback(K1=0.3, K2=0.3)
-    large, small, larger = (sampled_loop(lab, gains, chain, count=count) for count in (20, 7, 24))
-    made = []
-    model = plant.modal_model
-    plant._modelled_once.cache_clear()  # what was asked for above is not asked for again
-    monkeypatch.setattr(plant, "modal_model", lambda *args, **named: made.append(args[2]) or model(*args, **named))
-    cut = large.with_modes(7)
-    assert cut.plant.count == small.plant.count == 7
-    z = np.exp(1j * np.linspace(0.01, 3.1, 50))
-    np.testing.assert_allclose(cut(z), small(z), rtol=1e-9)
-    assert cut.poles.log_spectral_radius == pytest.approx(small.poles.log_spectral_radius, rel=1e-9)
-    np.testing.assert_array_equal(cut.with_modes(20)(z), large(z))
-    assert made == []
-    np.testing.assert_allclose(cut.with_modes(24)(z), larger(z), rtol=1e-9)
-    assert set(made) == {24}
-
-
 def test_a_hub_that_cannot_drift_has_the_poles_of_its_modes_alone():
     """Its tip is pinned: the two integrals of the torque are felt by nothing, their poles at z = 1 are left out."""
     loop = sampled_loop(odd_arms()["pinned"], HubFeedback(K1=0.0374, K2=0.3), count=6)
@@ -254,8 +220,3 @@ def test_a_branch_is_named_after_the_mode_whose_pole_it_leaves(found):
     for number, pair in zip(range(1, 7), eigenvalues[-6:], strict=True):
         mine = np.sort_complex(start[mode == number])
         np.testing.assert_allclose(mine, np.sort_complex(np.exp(pair * 0.01)), rtol=0, atol=1e-4)
-
-
-@pytest.mark.parametrize(("count", "most", "other"), [(5, 40, 10), (20, 40, 40), (21, 40, 10), (1, 1, 1), (3, 5, 1)])
-def test_a_figure_is_compared_with_that_of_twice_or_half_the_modes(count, most, other):
-    assert another(count, most) == other

@@ -12,7 +12,6 @@ import tfarm
 from tests.dsp.roads import stepped
 from tests.rigs import some_rig
 from tests.shared import thinned
-from tests.shell import answer
 from tfarm.arm import HubFeedback, Law, RotarySpring
 from tfarm.dsp import Actuator, Chain, Sampling, Simulator, sampled_verdict, scenario
 from tfarm.dsp.chain import Slew
@@ -118,17 +117,6 @@ def test_what_was_not_asked_for_is_named_with_what_there_is():
     trace = tfarm.simulate(LAB, GAINS, duration=0.1, count=2, outputs=["tip_angle"]).at_samples
     with pytest.raises(ParameterError, match=r"known are: hub_angle, .*tip_angle"):
         trace.signal("tip_rotation")
-
-
-def test_the_modes_that_it_takes_are_those_of_every_signal(capsys):
-    """A shear force inside converges with fewer digits than the signals at the ends: more modes are taken, and said."""
-    words = ["simulate", "sasaki2012", "--duration", "0.2"]
-    plain, deep = (answer(capsys, *words, *more) for more in ([], ["--output", "shear@0.5"]))
-    assert plain["outputs"] == {}
-    assert deep["outputs"] == {"shear@0.5": "N"}
-    assert deep["modes_used"] > plain["modes_used"]
-    assert deep["modes_change"] > plain["modes_change"]
-    assert len(deep["shear@0.5"]) == len(deep["t"])
 
 
 @pytest.mark.parametrize(

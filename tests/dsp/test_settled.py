@@ -12,20 +12,10 @@ from tests.dsp.settled import HoldModel, hurting, ordinary
 from tests.shared import thinned
 from tests.survey import each_of, tally
 from tfarm.arm import FED_BACK, Arm, Hub, HubFeedback, Link, Payload, Section
-from tfarm.dsp import (
-    Chain,
-    Converters,
-    Sampling,
-    plant,
-    sampled_loop,
-    sampled_verdict,
-    stable_windows,
-)
-from tfarm.dsp import (
-    circle as circle_module,
-)
+from tfarm.dsp import Chain, Converters, Sampling, sampled_loop, sampled_verdict, stable_windows
+from tfarm.dsp import circle as circle_module
 from tfarm.dsp.circle import Circle, complete_band
-from tfarm.dsp.edges import figure, shown_windows, whole_loop
+from tfarm.dsp.edges import shown_windows, whole_loop
 from tfarm.spectrum import modes
 from tfarm.spectrum.box import TOWARD_SINGULAR
 from tfarm.spectrum.damped import damped_modes
@@ -149,18 +139,6 @@ def test_the_count_is_that_of_the_eigenvalues_outside_odd_ones_too(lab, K1, K2, 
     assert complete_band(loop).circle().count(loop.weights) == outside.sum()
 
 
-@pytest.mark.parametrize("hub_rate", ["ideal", "difference"])
-def test_what_the_anti_alias_filter_leaves_in_the_band_is_wc_over_s_and_wc(lab, hub_rate):
-    """Of the signals that pass it: the gauge, and the rate where that is no difference of the encoder's angle."""
-    corner = 900.0
-    chain = Chain(sampling=Sampling(antialias_corner=corner), converters=Converters(hub_rate=hub_rate))
-    s = np.array([-20 + 300j, 5 + 40j])
-    lag = 1 / (1 + s / corner)
-    rates = [] if hub_rate == "difference" else [lag]
-    found = circle_module._filter_factors(sampled_loop(lab, HubFeedback(K1=0.3, K2=0.3), chain, count=4), s)
-    np.testing.assert_allclose(found, [np.ones(2), *rates, lag], rtol=1e-14)
-
-
 @pytest.mark.parametrize("Kp", [0.0, 0.5])
 @pytest.mark.parametrize("hub_rate", ["ideal", "difference"])
 def test_discs_hold_the_characteristic_function(lab, Kp, hub_rate):
@@ -196,31 +174,6 @@ def test_a_verdict_needs_no_mode_to_be_followed(lab):
     arm, gains = replace(lab, link=replace(lab.link, damping=12.0)), HubFeedback(K1=0.3, K2=0.3)
     verdict = sampled_verdict(arm, gains)
     assert verdict.loop.poles.log_spectral_radius == pytest.approx(HoldModel(arm, 30).log_radius(gains, Chain()), 0.05)
-
-
-def test_an_analysis_makes_each_model_once(lab, monkeypatch):
-    """One plant serves every number of modes up to its own."""
-    models, model = [], plant.modal_model
-    monkeypatch.setattr(plant, "modal_model", lambda *args, **named: models.append(1) or model(*args, **named))
-    found = tfarm.sampled(lab, HubFeedback(K1=0.3, K2=0.3))
-    assert all((found.shown, found.delay, found.damping))
-    assert len(models) < 28
-
-
-def test_digits_are_found_by_bisection():
-    """As many as a look at each number finds, in at most three looks, each at both ends."""
-    for held in range(7):
-        asked = []
-
-        def below(value, asked=asked, held=held):
-            asked.append(value)
-            return (value < np.pi if abs(value - np.pi) > 0.4 * 10.0**-held else None), 1.0
-
-        found = figure(np.pi, 6, 8, below, lambda value: (None, 1.0), below=True, spare=0.0)
-        assert len(asked) <= 8
-        ends = {n: (float(f"{np.pi:.{n}g}"), 0.5 * 10.0 ** (1 - n)) for n in range(2, 7)}
-        hold = [n for n, (at, half) in ends.items() if (below(at - half)[0], below(at + half)[0]) == (True, False)]
-        assert found.digits == max(hold, default=0)
 
 
 @pytest.mark.parametrize("K2", [0.3, 1.3])

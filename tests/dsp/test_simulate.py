@@ -11,21 +11,10 @@ from scipy.signal import lfilter
 
 import tfarm
 from tfarm.arm import HubFeedback
-from tfarm.dsp import (
-    Actuator,
-    Chain,
-    Converters,
-    Sampling,
-    Simulator,
-    Slew,
-    pulse_transfer,
-    sampled_loop,
-    scenario,
-)
+from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, pulse_transfer, sampled_loop, scenario
 from tfarm.dsp.kernel import estimate
 from tfarm.dsp.modes import dominant
 from tfarm.dsp.results import (
-    change,
     ideal_chain,
     limit_cycle,
     residual_moment_rms,
@@ -151,23 +140,6 @@ def test_the_decay_in_time_is_the_spectral_radius(lab, K2):
     rate = run.at_samples.hub_rate[-200:]
     slope = np.polyfit(np.arange(200), np.log(abs(rate)), 1)[0]
     assert slope == pytest.approx(loop.poles.log_spectral_radius, rel=1e-6)
-
-
-def test_the_slew_arrives(lab):
-    run = simulator(lab, chain=Chain(slew=Slew(travel=-0.6, rise_time=0.83))).linear(
-        HubFeedback(K1=0.3, K2=0.3, Kp=2.0)
-    )
-    assert run.at_samples.tip_displacement[-1] == pytest.approx(-0.6, rel=0.01)
-    reference = scenario("slew", lab, Chain(), 3.0)
-    assert reference.hub_angle[-1] == pytest.approx(1.15, rel=1e-12)
-    assert reference.hub_rate.max() == pytest.approx(2.3)
-    assert np.sum(reference.feedforward) == pytest.approx(0, abs=1e-12)
-
-
-def test_the_total_reading_feeds_the_whole_moment_back(lab):
-    total = simulator(lab, chain=Chain(slew=Slew(reading="total")))
-    assert not total.scenario.moment_reference.any()
-    assert residual_moment_rms(total.linear(GAINS)) != residual_moment_rms(simulator(lab).linear(GAINS))
 
 
 def test_converters_round_and_saturate(lab):
@@ -357,17 +329,6 @@ def test_a_disturbance_is_held_over_its_sample(lossless):
         np.testing.assert_allclose(got.hub_angle, np.array(expected)[:, 1], atol=1e-12)
 
 
-@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
-def test_the_change_of_a_trace_is_relative_to_each_signal_and_of_the_samples_that_both_have(lab, scale):
-    """Moments that differ by 3 % of their largest change by 0.03, in whatever unit; times of another run count not."""
-    run = Simulator(lab, Chain(), scenario("slew", lab, Chain(), 0.5), count=4).linear(GAINS).at_samples
-    trace = replace(run, root_moment=scale * run.root_moment)
-    other = replace(trace, t=trace.t + 1.0, root_moment=trace.root_moment + 0.03 * abs(trace.root_moment).max())
-    assert change(other, trace) == pytest.approx(0.03, rel=1e-12)
-    shorter = type(trace)(trace.t[:-7], *(trace.signal(name)[:-7] for name in trace.names))
-    assert change(shorter, trace) == change(trace, shorter) == 0.0
-
-
 def test_what_an_ideal_chain_leaves_decides_while_signals_are_clipped(lab):
     """A steady ringing that is clipped: kept up where the ideal loop grows, if not beyond bounds, and not where it has
     died down to no less than half of it; an ideal loop that has died down further tells it either way."""
@@ -394,8 +355,3 @@ def test_a_filtered_difference_is_the_filter_that_is_said_from_an_angle_that_sto
     through = (1 - a) / T
     np.testing.assert_allclose(found, lfilter([through, -through], [1, -a], angle - angle[0]), rtol=1e-9, atol=1e-11)
     assert found[0] == 0.0
-
-
-@pytest.mark.parametrize("rate", [0.0, -3.0])
-def test_a_rate_that_is_read_is_taken_as_it_is(rate):
-    assert estimate(1.0, rate, np.zeros(3), False, 0.5, T) == rate

@@ -112,9 +112,6 @@ def some_place(rng, arm):
     return float(rng.choice(joints)) if joints.size and rng.random() < 0.1 else some_share(rng)
 
 
-# ------------------------------------------------------------ where
-
-
 def near(rng, centre, closest=1e-14, farthest=0.1):
     """A frequency next to `centre`, at a distance that is anything between the two shares of it."""
     distance = 10 ** rng.uniform(math.log10(closest), math.log10(farthest))

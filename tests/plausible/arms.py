@@ -5,6 +5,7 @@ nothing from tfarm.
 """
 
 import math
+import tomllib
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,6 +90,13 @@ class Case:
     beam: Beam
     first: float  # rad/s, of the first flexible mode, undamped
     law: Law
+
+    @property
+    def arm(self):
+        """The arm of that file."""
+        from tfarm.arm.schema import arm_of_table
+
+        return arm_of_table(tomllib.loads(self.toml))
 
     @property
     def rng(self):

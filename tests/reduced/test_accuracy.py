@@ -19,16 +19,7 @@ from tests.shared import thinned
 from tests.strategies import some_arm
 from tests.survey import Finding, each_of
 from tfarm.reduced import modal_model, reduce
-from tfarm.reduced.partial_fractions import (
-    EXACT_ROUNDING,
-    FOUND_TO_WORST,
-    Ruler,
-)
-
-
-@pytest.fixture(scope="module")
-def arm():
-    return tfarm.load("sasaki2012")
+from tfarm.reduced.partial_fractions import EXACT_ROUNDING, FOUND_TO_WORST, Ruler
 
 
 def test_a_planted_error_is_found_whole(arm):

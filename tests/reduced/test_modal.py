@@ -13,7 +13,7 @@ import tfarm
 from tests.shared import thinned
 from tests.spectrum.test_double import pinned_pinned, steel
 from tests.strategies import BOUNDARY_CASES, some_arm
-from tfarm import Hub, ParameterError, Payload
+from tfarm import Hub, ParameterError
 from tfarm.arm import Arm, Link, Section
 from tfarm.reduced import modal_model, reduce, relaxed_model, slow_model
 from tfarm.response import transfer
@@ -29,16 +29,6 @@ def by_contour(G, p, radius, points=64):
     """(1 / 2 pi i) times the integral of G around p: the trapezoid rule, geometrically convergent."""
     arrow = radius * np.exp(2j * np.pi * (np.arange(points) + 0.5) / points)
     return (G(p + arrow) * arrow).mean(axis=-1)
-
-
-@pytest.fixture(scope="module")
-def arm():
-    return tfarm.load("sasaki2012")
-
-
-@pytest.fixture(scope="module")
-def lab():
-    return tfarm.load("sasaki2012-lab")
 
 
 def norm_error(model, w):
@@ -105,13 +95,6 @@ def test_lossless_to_the_bit_at_no_damping(arm):
     np.testing.assert_allclose(rotation @ rotation.T, np.eye(60), atol=1e-12)
 
 
-def test_static_model_without_modes(arm):
-    model = modal_model(arm, "root_moment", 0)
-    A, B, C, D = model.matrices()
-    assert (A.size, B.size, C.size) == (0, 0, 0)
-    np.testing.assert_allclose(D, -(arm.total_inertia - arm.hub.inertia) / arm.total_inertia, rtol=1e-14)
-
-
 def test_order_of_convergence(arm):
     """The tail of the hub angle: b^2 = (modal moment)^2/(I_h w^2)^2 with moments ~ w and w ~ k^2, so sum of k^-12."""
     w = np.geomspace(0.1, 100, 200)
@@ -156,12 +139,6 @@ def test_locked_hub(arm):
     np.testing.assert_allclose(model(3.0j)[1], 1.0, rtol=1e-14)
     with pytest.raises(ParameterError, match="hub_rate"):
         modal_model(locked, "hub_rate", 3)
-
-
-def test_tip_pinned_has_no_rigid_body(arm):
-    model = modal_model(replace(arm, payload=Payload(mass=math.inf)), ("hub_angle", "tip_displacement"), 5)
-    assert model.order == 10
-    assert (model(1j)[1], model(50j)[1]) == (0, 0)
 
 
 @pytest.mark.parametrize("count", [-1, 1001, 2.5, True, "3"])

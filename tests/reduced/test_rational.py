@@ -20,11 +20,6 @@ HUB = ("root_moment", "hub_rate", "hub_angle")
 ALL = (*HUB, "tip_displacement", "tip_deflection", "tip_acceleration", "root_shear")
 
 
-@pytest.fixture(scope="module")
-def arm():
-    return tfarm.load("sasaki2012")
-
-
 def norm_error(model, w):
     G = tfarm.transfer(model.arm, model.outputs, x=model.x)
     exact = G(1j * w)
@@ -106,12 +101,6 @@ def test_more_poles_than_digits_do_no_harm(arm):
         assert reduced.worst_error < 2e-13
         assert reduced.order <= order
         assert reduced.order == order or "passed the checks" in reduced.note
-
-
-def test_along_the_arm(arm):
-    reduced = reduce(arm, ("moment", "deflection"), order=14, x=0.4)
-    assert reduced.method == "aaa"
-    assert reduced.worst_error < 1e-6
 
 
 def test_locked_hub_and_pinned_tip(arm):

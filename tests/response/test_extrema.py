@@ -136,10 +136,7 @@ def judged(data):
     G = tfarm.transfer(data.arm, data.row, x=data.x)
     roots = np.r_[data.poles, data.zeros]
     false, missed = [], []
-    for sign, listed, on_axis, limit in (
-        (1, data.peaks, data.infinite, np.inf),
-        (-1, data.dips, data.vanishing, 0.0),
-    ):
+    for sign, listed, on_axis, limit in ((1, data.peaks, data.infinite, np.inf), (-1, data.dips, data.vanishing, 0.0)):
         false += [each.omega for each in listed if not is_extremum(G, each, sign, roots, on_axis, limit)]
         inside = on_axis[(on_axis > data.band[0]) & (on_axis < data.band[1])]
         missed += sorted(set(inside) - {each.omega for each in listed if each.magnitude == limit})

@@ -110,8 +110,6 @@ def test_a_row_of_the_table_is_known_on_the_command_line(capsys, monkeypatch: py
     assert abs(complex(*value) - expected) <= 1e-13 * abs(expected)
 
 
-# ---------------------------------------------------------------- what an end condition holds
-
 HELD = [
     ("lab", "rotation", 0.0, 0.0),
     ("lab", "deflection", 0.0, 0.0),
@@ -133,9 +131,6 @@ def test_what_is_held_constant_has_its_value_at_a_resonance_too(name: str, wante
         tfarm.transfer(arm, "tip_deflection")(s)
     assert (G(s), G.derivative(s), G(0)) == (value, 0.0, value)
     assert [float(part) for part in G.digits(s, 30)] == [value, 0.0]
-
-
-# ---------------------------------------------------------------- refusals
 
 
 @pytest.mark.parametrize(
@@ -172,8 +167,3 @@ def test_two_outputs_of_one_name_are_not_confused() -> None:
         tfarm.transfer(LAB, false)
     with pytest.raises(ParameterError, match="the name of an output"):
         tfarm.transfer(LAB, [3])  # type: ignore[list-item]
-
-
-def test_the_table_is_no_global_to_be_changed() -> None:
-    with pytest.raises(TypeError):
-        outputs.OUTPUTS["tip_velocity"] = TURN  # type: ignore[index]

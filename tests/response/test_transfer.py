@@ -53,13 +53,6 @@ def test_derivative_is_the_limit_of_differences_with_many_digits(arm: Arm, name:
         assert abs(G.derivative(s) - expected) <= 4000 * EPS * scale
 
 
-def test_derivative_along_the_arm() -> None:
-    arm = tfarm.load("sasaki2012-lab")
-    G, s, h = tfarm.transfer(arm, "moment", x=0.4), 30.0 + 40.0j, 1e-3
-    difference = (8 * (G(s + h) - G(s - h)) - (G(s + 2 * h) - G(s - 2 * h))) / (12 * h)
-    assert_allclose(G.derivative(s), difference, rtol=1e-10)
-
-
 def test_expansion_at_zero_is_the_rigid_arm(arm: Arm) -> None:
     J, length = arm.total_inertia, arm.link.length
     flexible = replace(arm, hub=Hub(inertia=0.0)).total_inertia
@@ -77,12 +70,6 @@ def test_static_compliance_of_a_locked_arm_is_a_cantilever_free_at_its_tip() -> 
     assert_allclose(G(0), [1.0, 0.0, 0.0, 1.0], atol=EPS)  # turned without acceleration it does not bend
 
 
-def test_the_constant_term_is_the_limit_of_what_is_left() -> None:
-    G = tfarm.transfer(tfarm.load("sasaki2012-lab"), "tip_displacement")
-    s = 0.01j
-    assert_allclose(G(s) - G.rigid_body / s**2, G.static, rtol=1e-4)
-
-
 @pytest.mark.parametrize("preset", ["sasaki2012", "sasaki2012-lab"])
 def test_digits_agree_with_the_paper_to_forty(preset: str) -> None:
     import mpmath
@@ -96,9 +83,6 @@ def test_digits_agree_with_the_paper_to_forty(preset: str) -> None:
             for text, part in ((re, expected.real), (im, expected.imag)):
                 assert abs(mpmath.mpf(text) - part) <= abs(part) * mpmath.mpf(10) ** -39
                 assert len(text.replace("-", "").replace(".", "").lstrip("0")) >= 38 or part == 0
-
-
-# ---------------------------------------------------------------- poles, zeros, special points
 
 
 @pytest.mark.parametrize("s", [1e-80j, 1e-120 + 0j, 1e-200j, 1e-300j])
@@ -121,23 +105,6 @@ def test_a_pole_is_named() -> None:
         tfarm.transfer(arm, "root_moment")([1j, 1j * omega])
     with pytest.raises(ParameterError, match="rigid body"):
         tfarm.transfer(arm, "hub_angle")(0)
-
-
-def test_next_to_a_pole_there_is_a_value() -> None:
-    arm = tfarm.load("sasaki2012")
-    omega = float(tfarm.modes(arm, 1).natural_frequency[1])
-    s = 1j * omega * (1 + 1e-13)
-    expected = complex(appendix.response(arm, "root_moment", s, 20))
-    assert_allclose(tfarm.transfer(arm, "root_moment")(s), expected, rtol=64 * EPS)
-
-
-def test_where_two_waves_coincide_there_is_a_value(arm: Arm) -> None:
-    a, b, g = system_of(arm).segments[0][:3]
-    s = 2 * math.sqrt(g) / abs(float(a - b))
-    G = tfarm.transfer(arm, "root_moment")
-    for near in (s, s * (1 + 1e-12), s * (1 + 1e-3j)):
-        if abs(near) < 1e5:  # e^{-t} of slender arms underflows elsewhere
-            assert_allclose(G(near), complex(appendix.response(arm, "root_moment", near, 25)), rtol=100 * EPS)
 
 
 def test_poles_without_damping_are_the_natural_frequencies() -> None:
@@ -189,9 +156,6 @@ def test_an_outermost_zero_on_the_edge_of_the_box_moves_the_box() -> None:
     assert np.isclose(poles.values, pole).any()
 
 
-# ---------------------------------------------------------------- shapes, names and refusals
-
-
 def test_shapes() -> None:
     arm = tfarm.load("sasaki2012")
     one, two = tfarm.transfer(arm, "root_moment"), tfarm.transfer(arm, ["root_moment", "hub_rate"])
@@ -202,12 +166,6 @@ def test_shapes() -> None:
     assert two(1j).shape == (2,)
     assert (two(s)[0] == one(s)).all()
     assert one(np.empty(0, complex)).shape == (0,)
-
-
-def test_blocks_of_points_do_not_matter() -> None:
-    G = tfarm.transfer(tfarm.load("sasaki2012-lab"), "tip_displacement")
-    s = 1j * np.geomspace(0.1, 1e4, 1001)
-    assert (G(s) == np.array([G(point) for point in s])).all()
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ on rigs of three segments (time of the CPU).
 """
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,30 +23,18 @@ AGREED = 1e-7  # of the elements with a frequency: it is a matter of which, not 
 SPLIT = 1e-10  # of a frequency, between both signs of the determinant where the elements are in doubt
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What came of one rig: "right", "refused" or "wrong", why; how far the models are apart; milliseconds."""
-
-    outcome: str
-    reason: str = ""
-    distance: float = 0.0
-    listing: float = 0.0
-    proving: float = 0.0
-    segments: int = 0
-
-
 def judge(arm, *, certify=False, count=MODES):
-    """The first frequencies of one undamped rig."""
+    """The finding on the first frequencies of one undamped rig."""
     start = time.process_time()
     table = tfarm.modes(arm, count)
-    listing, proving, wrong = _since(start), 0.0, []
+    figures, wrong = {"list of three segments [ms]": _since(start)} if len(arm.links) == 3 else {}, []
     if certify:
         start = time.process_time()
         try:
             proof = table.certify()
         except CertificationError as error:
-            return Verdict("refused", str(error).partition(" near ")[0], listing=listing)
-        proving = _since(start)
+            return Finding("refused", f"{str(error).partition(' near ')[0]} {arm}")
+        figures["proof [ms]"] = _since(start)
         if proof.count != len(table):
             wrong.append(f"{proof.count} proven, {len(table)} listed")
     omega = table.natural_frequency[table.index > 0]
@@ -62,8 +49,9 @@ def judge(arm, *, certify=False, count=MODES):
         float(w) for w, away in zip(omega, distance, strict=True) if away > AGREED and not changes_sign(arm, float(w))
     ]
     wrong += [f"no frequency at {w:.10g}" for w in off]
-    outcome = "wrong" if wrong else "right"
-    return Verdict(outcome, ", ".join(wrong), float(distance.max()), listing, proving, len(arm.links))
+    figures["distance from the other model"] = float(distance.max())
+    words = f"{', '.join(wrong)} {arm}" if wrong else ""
+    return Finding("wrong" if wrong else "right", words, bool(wrong), figures)
 
 
 def changes_sign(arm, omega):
@@ -76,20 +64,11 @@ def _since(start):
     return 1e3 * (time.process_time() - start)
 
 
-def finding(arm, verdict):
-    """The finding of a verdict."""
-    figures = {"distance from the other model": verdict.distance}
-    figures |= {"list of three segments [ms]": verdict.listing} if verdict.segments == 3 else {}
-    figures |= {"proof [ms]": verdict.proving} if verdict.proving else {}
-    words = f"{verdict.reason} {arm}" if verdict.outcome != "right" else ""
-    return Finding(verdict.outcome, words, verdict.outcome == "wrong", figures)
-
-
 def frequencies(size, seed):
     """Rigs without damping; every tenth is certified."""
     for n in range(size):
         arm = some_rig(np.random.default_rng([seed, n]), damped=False)
-        yield finding(arm, judge(arm, certify=n % 10 == 0))
+        yield judge(arm, certify=n % 10 == 0)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ is "short".
 """
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -34,18 +33,6 @@ AGREED = 1e-6  # of the model with the listed eigenvalues: it is a matter of whi
 ROUNDING = 64 * np.finfo(float).eps  # of the model's flexibilities 1/w^2, in units of the largest
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What came of one arm: "right", "refused" or "wrong", and why; milliseconds of the list and of the proof."""
-
-    outcome: str
-    reason: str = ""
-    listing: float = 0.0
-    proving: float = 0.0
-    inside: int = 0
-    overdamped: int = 0
-
-
 def some_damped_arm(rng):
     """A random arm with C = 1e-7..1e-3 s, and a number of modes to ask for."""
     arm = some_arm(rng, damping=float(10 ** rng.uniform(-7, -3)))
@@ -53,16 +40,16 @@ def some_damped_arm(rng):
 
 
 def judge(arm, count, *, certify=True, model=True):
-    """List the damped modes of one arm and count them again."""
+    """The finding on the damped modes of one arm, listed and counted again."""
     start = time.perf_counter()
     try:
         damped = damped_modes(tfarm.modes(arm, count))
-        listing = 1e3 * (time.perf_counter() - start)
+        figures = {"list [ms]": 1e3 * (time.perf_counter() - start)}
         start = time.perf_counter()
         proof = damped.certify() if certify else None
-        proving = 1e3 * (time.perf_counter() - start)
+        figures |= {"proof [ms]": 1e3 * (time.perf_counter() - start)} if certify else {}
     except (ConvergenceError, CertificationError) as error:
-        return Verdict("refused", f"{type(error).__name__}: {str(error).partition(' near ')[0]}")
+        return refused(error, count, arm)
     flexible = damped.eigenvalues[damped.index > 0].ravel()
     inside = flexible[damped.box.holds(flexible)]
     wrong = []
@@ -74,8 +61,19 @@ def judge(arm, count, *, certify=True, model=True):
         1 if pair[0].imag > 0 else int(np.isfinite(pair).sum()) for pair in pairs(damped)
     ]:
         wrong.append("not a disc for each eigenvalue")
-    outcome, text = ("wrong", ", ".join(wrong)) if wrong else ("right", "")
-    return Verdict(outcome, text, listing, proving, inside.size, int(damped.is_overdamped.sum()))
+    return finding("wrong" if wrong else "right", wrong, count, damped, inside, figures)
+
+
+def refused(error, count, arm):
+    """The finding where there is no list, or no proof of it."""
+    return Finding("refused", f"{type(error).__name__}: {str(error).partition(' near ')[0]} {count} {arm}")
+
+
+def finding(outcome, wrong, count, damped, inside, figures):
+    """The finding on a list of damped modes."""
+    words = f"{', '.join(wrong)} {count} {damped.undamped.arm}" if outcome in ("wrong", "short") else ""
+    figures |= {"eigenvalues in the box": inside.size, "overdamped": int(damped.is_overdamped.sum())}
+    return Finding(outcome, words, outcome == "wrong", figures)
 
 
 def pairs(damped):
@@ -95,10 +93,10 @@ def judge_rig(arm, count, *, certify=True):
     start = time.process_time()
     try:
         damped = damped_modes(tfarm.modes(arm, count))
-        listing = 1e3 * (time.process_time() - start)
+        figures = {"list [ms]": 1e3 * (time.process_time() - start)}
         proof = damped.certify() if certify else None
     except (ConvergenceError, CertificationError) as error:
-        return Verdict("refused", f"{type(error).__name__}: {str(error).partition(' near ')[0]}")
+        return refused(error, count, arm)
     every = np.r_[damped.eigenvalues.ravel(), damped.single, damped.unassigned_pairs.ravel()]
     every = np.unique(every[np.isfinite(every) & (every != 0)])
     inside = every[damped.box.holds(every)]
@@ -115,7 +113,7 @@ def judge_rig(arm, count, *, certify=True):
     if proof is not None and sum(map(len, proof)) < mine.size:
         wrong.append("not a disc for each eigenvalue")
     outcome = "wrong" if wrong else "short" if damped.left_out else "unassigned" if damped.unassigned else "right"
-    return Verdict(outcome, ", ".join(wrong), listing, 0.0, inside.size, int(damped.is_overdamped.sum()))
+    return finding(outcome, wrong, count, damped, inside, figures)
 
 
 def _away(zero, others):
@@ -135,22 +133,12 @@ def compared(arm, damped, inside):
     return [f"eigenvalue {inside[int(np.argmax(far))]:.6g} not in the model"] if max(far, default=0) > 1 else []
 
 
-def finding(arm, count, verdict):
-    """The finding of a verdict."""
-    words = f"{verdict.reason} {count} {arm}" if verdict.outcome in ("wrong", "refused", "short") else ""
-    figures = {"list [ms]": verdict.listing, "eigenvalues in the box": verdict.inside, "overdamped": verdict.overdamped}
-    figures |= {"proof [ms]": verdict.proving} if verdict.proving > 0.1 else {}
-    return Finding(verdict.outcome, words, verdict.outcome == "wrong", figures)
-
-
 def arms(rng):
-    arm, count = some_damped_arm(rng)
-    return finding(arm, count, judge(arm, count))
+    return judge(*some_damped_arm(rng))
 
 
 def rigs(rng):
-    arm, count = some_damped_rig(rng)
-    return finding(arm, count, judge_rig(arm, count))
+    return judge_rig(*some_damped_rig(rng))
 
 
 def few_refused(size, seed):

@@ -7,7 +7,6 @@ the flexibilities 1/w^2 come to ROUNDING x epsilon of the largest, so w_n to tha
 """
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,26 +23,14 @@ ROUNDING = 256
 EPS = np.finfo(float).eps
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What came of one arm: "proven", "refused" or "wrong", why, and how far the model could tell."""
-
-    outcome: str
-    reason: str
-    milliseconds: float
-    tolerance: float = 0.0  # the model's, of the highest mode
-    distance: float = 0.0  # the largest distance of the model's frequencies from the brackets, in its tolerances
-    gaps: int = 0  # gaps between brackets that are wide enough for the model to count below them
-
-
 def judge(arm):
-    """Certify one arm and compare."""
+    """The finding on one arm, certified and compared; gaps are those in which the model can count."""
     start = time.perf_counter()
     try:
         proof = tfarm.modes(arm, MODES).certify()
     except CertificationError as error:
-        return Verdict("refused", str(error).partition(" near ")[2] or str(error), _since(start))
-    spent = _since(start)
+        return Finding("refused", f"{str(error).partition(' near ')[2] or error} {arm}")
+    spent = 1e3 * (time.perf_counter() - start)
     low, high = np.array(proof.brackets, float).T
     omega = Ritz(arm, TERMS).natural_frequencies(MODES + 5)
     tolerance = ROUNDING * EPS * (omega / omega[0]) ** 2 + 4 * EPS  # the brackets' ends are rounded too
@@ -59,24 +46,16 @@ def judge(arm):
         wrong.append(f"no frequency of the model in bracket {int(outside.argmax()) + 1}")
     if not counted[clear[:-1]].all():
         wrong.append("another count between the brackets")
-    outcome = "wrong" if wrong else "proven"
-    return Verdict(outcome, ", ".join(wrong), spent, float(relative[-1]), float(outside.max()), int(clear[:-1].sum()))
-
-
-def _since(start):
-    return 1e3 * (time.perf_counter() - start)
+    if wrong:
+        return Finding("wrong", f"{', '.join(wrong)} {arm}", is_wrong=True)
+    figures = {"model's distance over its tolerance": float(outside.max()), "tolerance": float(relative[-1])}
+    return Finding(
+        "proven", figures=figures | {f"gaps counted, of {MODES - 1}": int(clear[:-1].sum()), "milliseconds": spent}
+    )
 
 
 def arms(rng):
-    """The finding on one arm."""
-    arm = random_arm(rng)
-    verdict = judge(arm)
-    figures = {"milliseconds": verdict.milliseconds}
-    if verdict.outcome == "proven":
-        figures |= {"model's distance over its tolerance": verdict.distance, "tolerance": verdict.tolerance}
-        figures |= {f"gaps counted, of {MODES - 1}": verdict.gaps}
-    words = f"{verdict.reason} {arm}" if verdict.outcome != "proven" else ""
-    return Finding(verdict.outcome, words, verdict.outcome == "wrong", figures)
+    return judge(random_arm(rng))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
 """D(i w) and the count in balls, of arms and of rigs: signs and numbers between frequencies that are known."""
 
 import math
-from itertools import pairwise
 
 import flint
 import numpy as np
@@ -13,15 +12,7 @@ from tests.strategies import BOUNDARY_CASES, some_arm
 from tfarm.arm import THEORIES
 from tfarm.exact import balls
 from tfarm.exact.system import system_of
-from tfarm.spectrum.frequencies import (
-    AXIS_STEPS,
-    MOST_AXIS_BITS,
-    Counter,
-    RealAxis,
-    axis_precisions,
-    pinned_count,
-    secant,
-)
+from tfarm.spectrum.frequencies import Counter, RealAxis, pinned_count, secant
 
 COUNT = 7
 
@@ -81,13 +72,3 @@ def test_a_secant_ends_next_to_its_start_with_all_digits(arm):
             tenth = root * flint.arb(10) ** -61
             assert axis.drive(root - tenth) * axis.drive(root + tenth) < 0
         assert secant(axis, float(omega[1] * 0.6 + omega[2] * 0.4), 60) is None
-
-
-def test_precisions_double_from_what_the_digits_need():
-    """16 digits need 53 bits; those beyond are for what cancels."""
-    for digits in (1, 16, 300):
-        bits = list(axis_precisions(digits))
-        assert digits * math.log2(10) + 50 < bits[0] < digits * math.log2(10) + 120 + digits / 50
-        assert all(more == 2 * less for less, more in pairwise(bits))
-        assert MOST_AXIS_BITS / 2 <= bits[-1] < MOST_AXIS_BITS
-    assert 2**AXIS_STEPS > MOST_AXIS_BITS

@@ -119,41 +119,10 @@ def test_a_zero_has_all_its_digits_whatever_its_size(size):
     assert len(calls) < 9
 
 
-def test_no_step_is_longer_than_a_share_of_where_it_starts():
-    """A start far from all zeros of a flat function would be thrown across the plane."""
-    asked = []
-
-    def function(s):
-        asked.append(s.copy())
-        return Analytic(s**0 + 0j, s**0 * 1e-9 + 0j, s * 0.0)
-
-    newton(function, np.array([1.0 + 0j]))
-    places = np.ravel(asked)
-    np.testing.assert_allclose(places[1:] / places[:-1], 0.7, rtol=1e-12)
-
-
 def test_points_side_by_side_are_one():
     """The first of them is kept; how near is measured by their size."""
     points = np.array([1e6, 2.0, 1e6 + 1e-4, 2.0 + 1e-4, 0.0, 0.0, 2.0 + 1e-10j])
     np.testing.assert_array_equal(distinct(points), [1e6, 2.0, 2.0 + 1e-4, 0.0])
-
-
-@pytest.mark.parametrize(
-    ("box", "low", "high"),
-    [
-        (Box(-1.0, 3.0, -1.0, 1.0), 0.8, 1.0), (Box(-1.0, 1.0, -1.0, 3.0), 0.8, 1.0),  # near the middle
-        (Box(1e-6, 1.0, 0.0, 0.1), 5e-4, 2e-3), (Box(-1.0, -1e-6, 0.0, 0.1), -2e-3, -5e-4),  # in the middle of decades
-        (Box(0.0, 0.1, 1.0, 7.0), 3.8, 4.0), (Box(0.0, 0.1, -7.0, -1.0), -4.2, -3.9),
-    ],
-)  # fmt: skip
-def test_halves_meet_across_the_longer_side_and_make_up_the_box(box, low, high):
-    one, two = box.halves()
-    (cut,) = {*one, *two} - {*box}
-    assert low < cut < high
-    assert (one.re_min, one.im_min, two.re_max, two.im_max) == (box.re_min, box.im_min, box.re_max, box.im_max)
-    wide = box.re_max - box.re_min > box.im_max - box.im_min
-    assert (one.re_max, two.re_min) == ((cut, cut) if wide else (box.re_max, box.re_min))
-    assert (one.im_max, two.im_min) == ((box.im_max, box.im_min) if wide else (cut, cut))
 
 
 @pytest.mark.parametrize("unit", UNITS)
@@ -191,15 +160,6 @@ def test_a_known_zero_is_taken_as_it_is_and_once():
     known = np.array([-1.0 + 0j, 7.0])  # of which one lies in the box, and is a zero that would be found anyway
     found = zeros_in_box(polynomial(*zeros, 7.0), box, zeros * 1.01, known)
     assert np.sort_complex(found) == pytest.approx(np.sort_complex(zeros), rel=1e-12)
-
-
-def test_what_lies_inside_is_inside_of_all_four_edges():
-    box = Box(-1.0, 2.0, -3.0, 4.0)
-    points = np.array([0.0, -1.1, 2.1, -3.1j, 4.1j, 1.9 + 3.9j, -0.9 - 2.9j])
-    np.testing.assert_array_equal(box.holds(points), [True, False, False, False, False, True, True])
-    assert not box.holds(box.corners).any()
-    np.testing.assert_array_equal(box.corners[[0, 2]], [-1 - 3j, 2 + 4j])
-    np.testing.assert_array_equal(np.diff(box.corners), [3, 7j, -3, -7j])  # counter-clockwise
 
 
 def test_a_fast_turning_function_is_not_aliased(monkeypatch: pytest.MonkeyPatch) -> None:

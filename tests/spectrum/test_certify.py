@@ -40,14 +40,6 @@ def test_brackets_are_one_unit_wide_and_hold_a_root_of_the_papers_determinant(pr
             assert mpmath.re(signs[0] / signs[1]) < 0
 
 
-def test_a_hundred_modes_agree_with_the_float_ones() -> None:
-    modes = tfarm.modes(tfarm.load("sasaki2012"), 100)
-    proof = modes.certify(30)
-    assert proof.count == 101
-    middle = np.array([float(lower) for lower, _ in proof.brackets])
-    np.testing.assert_allclose(modes.natural_frequency[1:], middle, rtol=4 * np.finfo(float).eps)
-
-
 def test_a_list_with_a_missing_mode_is_not_certified() -> None:
     k = system_of(tfarm.load("sasaki2012"))
     omega = natural_frequencies(k, 2, 7)

@@ -18,6 +18,7 @@ from tfarm import Attachment, Hub, Payload, RotarySpring
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exact.system import system_of
 from tfarm.reduced.modal import end_residues, undamped_residues
+from tfarm.spectrum.damped import damped_at_hub
 
 NAMES = ("hub_angle", "root_moment", "root_shear", "tip_displacement", "tip_deflection")
 
@@ -29,9 +30,9 @@ def rigs(seed, count, **kind):
 @pytest.mark.parametrize("count", sized(3, 8))
 def test_twenty_frequencies_of_random_rigs(count):
     """`python -m tests.spectrum.chains 1000` for more, here and below."""
-    verdicts = [judge(arm, certify=n == 0) for n, arm in enumerate(rigs(11, count, damped=False))]
-    assert [each.reason for each in verdicts if each.outcome != "right"] == []
-    assert max(each.distance for each in verdicts) < 1e-8
+    found = [judge(arm, certify=n == 0) for n, arm in enumerate(rigs(11, count, damped=False))]
+    assert [each.words for each in found if each.outcome != "right"] == []
+    assert max(each.figures["distance from the other model"] for each in found) < 1e-8
 
 
 def test_a_prescribed_angle_has_the_modes_of_a_locked_hub():
@@ -136,3 +137,26 @@ def test_a_spring_on_the_axis_holds_nothing():
     assert not off.has_rigid_mode
     first = math.sqrt(1e-3 * 0.05**2 / off.total_inertia)
     assert tfarm.modes(off, 1).natural_frequency[0] == pytest.approx(first, rel=1e-3)  # so soft that the rig is rigid
+
+
+@pytest.mark.parametrize("name", ["tests/rigs/bench-rig.toml", "quanser-flexlink"])
+def test_a_rigid_body_turns_about_the_axis_and_the_root_moment_is_that_of_the_field(name):
+    """The turning rig moves its tip by (r + L + ...): the residue at 0 of tip over torque, without friction."""
+    arm = tfarm.load(name).elastic.lossless_hub
+    arm = replace(arm, clamp=replace(arm.clamp, damping=0.0), input="hub_torque")
+    table = tfarm.modes(arm, 3)
+    s = 1e-3j
+    tip = tfarm.transfer(arm, "tip_displacement")(s) * s**2
+    assert table.shape(arm.length)[0] * table.hub_participation[0] == pytest.approx(tip.real, rel=1e-6)
+    np.testing.assert_allclose(table.modal_moment, table.moment(0.0), rtol=1e-9, atol=1e-12)
+
+
+def test_with_the_losses_of_the_hub_alone_clamp_and_link_lose_nothing():
+    """A clamp and a link that lose nothing have the rig's own poles; what they would lose changes nothing."""
+    rig = tfarm.load("quanser-2dsfl")
+    yielding = replace(rig, clamp=replace(rig.clamp, stiffness=300.0))
+    lossy = replace(yielding, clamp=replace(yielding.clamp, damping=1e-3)).having(damping=1e-3)
+    found, expected = damped_at_hub(lossy, 3), tfarm.damped_modes(tfarm.modes(yielding, 3))
+    np.testing.assert_allclose(found.eigenvalues, expected.eigenvalues, rtol=1e-9)
+    assert (tfarm.damped_modes(tfarm.modes(lossy, 3)).eigenvalues[1:, 0].real < 2 * found.eigenvalues[1:, 0].real).any()
+    assert damped_at_hub(tfarm.load("sasaki2012-lab"), 3) is None

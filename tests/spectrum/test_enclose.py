@@ -13,10 +13,9 @@ from tests.shared import sized, thinned
 from tests.spectrum.damped import pairs
 from tests.spectrum.damped_roads import newton_root, newton_step, pinned, ritz_eigenvalues, sine_waves
 from tests.spectrum.test_damped import damped_arm, listed
-from tfarm import CertificationError, HubFeedback
+from tfarm import CertificationError
 from tfarm.exact.balls import point, precision
 from tfarm.exact.system import system_of
-from tfarm.loop.loop import Loop
 from tfarm.spectrum import frequencies, proofs
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.proofs import Disc, _holds_one, disjoint, enclosed, proven_count
@@ -27,9 +26,6 @@ LAB = tfarm.load("sasaki2012-lab")
 def box_of(height, reach):
     """From -reach to 0.1 height."""
     return Box(-reach, 0.1 * height, -height, height)
-
-
-# ------------------------------------------------------------ discs
 
 
 @pytest.mark.parametrize("digits", [15, 40, 200])
@@ -90,18 +86,6 @@ def test_a_double_eigenvalue_has_no_disc(monkeypatch: pytest.MonkeyPatch) -> Non
     assert "double" in str(refused.value)
 
 
-def test_a_closed_loop_pole_is_enclosed() -> None:
-    loop = Loop(LAB, HubFeedback(K1=0.3, K2=0.3))
-    s = np.array([-3 + 70j])
-    for _ in range(60):
-        at = loop.function(s)
-        s = s - at.value / at.slope
-    disc = enclosed(loop.k, complex(s[0]), 30, loop.exact)
-    near = complex(float(disc.re), float(disc.im))
-    assert newton_step(LAB, near, K1=0.3, K2=0.3) < 1e-15
-    assert abs(near - s[0]) < 1e-12 * abs(near)
-
-
 def test_touching_discs_are_seen() -> None:
     def disc(re, im, radius="1e-3"):
         return Disc(re, im, radius)
@@ -137,9 +121,6 @@ def test_rouches_theorem_is_right_about_discs_of_any_size() -> None:
     assert said > 20
 
 
-# ------------------------------------------------------------ counts
-
-
 @pytest.mark.parametrize("boxes", sized(1, 2))
 @pytest.mark.parametrize("theory", thinned(["timoshenko", "shear", "euler-bernoulli"], 3))
 def test_counts_of_sine_waves_are_those_of_the_closed_form(theory: str, boxes: int) -> None:
@@ -169,9 +150,6 @@ def test_counts_are_those_of_a_galerkin_model(hub: float, mass: float, boxes: in
         height = float(10 ** rng.uniform(2.5, 4.2))
         box = Box(-min(0.9 / 4e-5, height * float(rng.uniform(0.2, 3))), height * 0.3, -height, height)
         assert proven_count(k, box) == box.holds(theirs).sum() + k.at_rest
-
-
-# ------------------------------------------------------------ refusals
 
 
 def one_line(error) -> str:
@@ -224,11 +202,10 @@ def test_a_forged_list_is_refused(name: str) -> None:
         one_line(refused)
 
 
-@pytest.mark.parametrize("change", [1])
-def test_a_wrong_count_or_box_is_refused(change: int) -> None:
+def test_a_wrong_count_or_box_is_refused() -> None:
     damped = listed(LAB, 3)
     with pytest.raises(CertificationError, match="are there"):
-        replace(damped, count=damped.count + change).certify()
+        replace(damped, count=damped.count + 1).certify()
     lower = Box(damped.box.re_min, damped.box.re_max, damped.box.im_min * 0.6, damped.box.im_max * 0.6)
     with pytest.raises(CertificationError, match="are there"):
         replace(damped, box=lower).certify()
@@ -243,18 +220,6 @@ def test_an_eigenvalue_beside_its_zero_is_refused(turn: complex) -> None:
     zeros[2] = [moved, moved.conjugate()]
     with pytest.raises(CertificationError):
         replace(damped, eigenvalues=zeros).certify()
-
-
-def test_certified_discs_hold_the_listed_eigenvalues() -> None:
-    for arm in (LAB, pinned(damped_arm(3e-3, slenderness=200.0).link)):
-        damped = listed(arm, 6)
-        proof = damped.certify(13)
-        for pair, discs in zip(pairs(damped), proof, strict=True):
-            assert len(discs) == (1 if pair[0].imag else 2)
-            for zero, disc in zip(pair, discs, strict=False):
-                middle = complex(float(disc.re), float(disc.im))
-                assert abs(zero - middle) <= 2 * float(disc.radius)
-                assert disc.is_real == (zero.imag == 0)
 
 
 def test_a_contour_that_takes_too_many_pieces_is_given_up(monkeypatch):

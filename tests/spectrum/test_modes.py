@@ -1,7 +1,6 @@
 """Mode shapes, hub participation, energies, nodes and sensitivities, each by a road the code does not take."""
 
 import math
-import tracemalloc
 from dataclasses import replace
 from itertools import pairwise
 
@@ -195,10 +194,6 @@ def test_sensitivities_add_up(modes):
     np.testing.assert_allclose(metres[flexible], -1.0, rtol=0, atol=1e4 * EPS)
 
 
-def test_no_points_have_no_values():
-    assert tfarm.modes(tfarm.load("sasaki2012"), 3).shape(np.empty(0)).shape == (4, 0)
-
-
 @pytest.mark.parametrize("x", [-0.1, 1.1, math.nan])
 def test_a_point_outside_the_arm_has_no_shape(x):
     with pytest.raises(ParameterError, match="a point of the arm lies between 0 and"):
@@ -220,24 +215,6 @@ def test_the_root_moment_of_a_light_hub_is_not_rounding():
     assert not modes.modal_moment.any()
     limit = -(modes.natural_frequency[1:] ** 2) * modes.hub_participation[1:]
     np.testing.assert_allclose(tfarm.modes(light, COUNT).modal_moment[1:] / 1e-12, limit, rtol=1e-6)
-
-
-@pytest.mark.survey
-def test_memory_does_not_grow_with_the_square_of_the_count(monkeypatch):
-    """Twice the modes have four times the points; what is evaluated at once stays the same, and so do the numbers."""
-    whole = tfarm.modes(tfarm.load("sasaki2012"), 40)
-    expected = whole.hub_participation, whole.sensitivity["length"]
-    monkeypatch.setattr("tfarm.spectrum.shapes.QUADRATURE_BLOCK", 2**10)
-    peaks = []
-    for count in (40, 80):
-        table = tfarm.modes(tfarm.load("sasaki2012"), count)
-        tracemalloc.start()
-        found = table.hub_participation, table.sensitivity["length"]
-        peaks.append(tracemalloc.get_traced_memory()[1])
-        tracemalloc.stop()
-        for ours, theirs in zip(found, expected, strict=True):
-            np.testing.assert_allclose(ours[:41], theirs, rtol=1e-12)  # rounding of sums over 40 modes' points
-    assert peaks[1] < 2.5 * peaks[0]
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])

@@ -30,5 +30,5 @@ def test_a_wrong_proof_would_be_seen(monkeypatch) -> None:
     monkeypatch.setattr(Modes, "certify", forged)
     verdict = judge(arm)
     assert verdict.outcome == "wrong"
-    assert "counted" in verdict.reason
-    assert "in bracket 8" in verdict.reason
+    assert "counted" in verdict.words
+    assert "in bracket 8" in verdict.words

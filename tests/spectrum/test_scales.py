@@ -38,19 +38,6 @@ def similar(arm, size, stiffness, density):
     return units.arm(arm), units.time, units.of(INERTIA)
 
 
-@pytest.mark.parametrize("arm", [STOCKY, LAB], ids=lambda arm: arm.name)
-@pytest.mark.parametrize("size", [0.01, 30.0])
-def test_similar_arms_have_the_same_loop(arm, size):
-    """J w1 grows as inertia/time, and the poles of the default loops are one spectrum, but for the rounding of K1."""
-    other, time, inertia = similar(arm, size, 0.3, 5.0)
-    assert rate_unit(other) == pytest.approx(rate_unit(arm) * inertia / time, rel=100 * EPS)
-    assert angle_unit(other) == pytest.approx(angle_unit(arm) * inertia / time**2, rel=100 * EPS)
-    rounding = 10.0 ** (1 - DEFAULT_DIGITS)  # of both gains together
-    assert pytest.approx(default_gains(arm).K1 * inertia / time, rel=rounding) == default_gains(other).K1
-    here, there = (tfarm.closed_loop_poles(each, default_gains(each), 3).values for each in (arm, other))
-    assert there * time == pytest.approx(here, rel=rounding)  # none moves by more than its gain does
-
-
 def test_the_papers_arms_keep_the_papers_gains():
     """The misprinted density too, though its J w1 is twice as large; any other arm has its own."""
     assert {name for name in tfarm.presets() if name.startswith("sasaki")} == set(OF_THE_PAPER)

@@ -11,15 +11,7 @@ from tests.rigs import some_rig
 from tests.shared import thinned
 from tests.similar import EITHER, FAST, FREQUENCY, INERTIA, LENGTH, SLOW, TORQUE
 from tfarm.errors import ConvergenceError
-from tfarm.spectrum.table import (
-    DEFAULT_DIGITS,
-    angle_unit,
-    check_gains,
-    default_gains,
-    gain_unit,
-    most_gain,
-    rate_unit,
-)
+from tfarm.spectrum.table import DEFAULT_DIGITS, angle_unit, check_gains, default_gains, gain_unit, most_gain, rate_unit
 
 LAB = tfarm.load("sasaki2012-lab")
 HEAVY = tfarm.load("quanser-2dsfl")

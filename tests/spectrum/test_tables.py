@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.shared import thinned
 from tfarm.errors import ParameterError
 from tfarm.schema import table
 from tfarm.spectrum.listing import listed_modes
-from tfarm.spectrum.table import compare_theories, hub_locked, modes_below
+from tfarm.spectrum.table import hub_locked, modes_below
 
 EPS = 2.0**-52
 LAB, STEEL = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
@@ -27,6 +28,8 @@ def test_every_row_is_of_its_mode(arm):
     np.testing.assert_array_equal([row.natural_frequency_hz for row in listed.modes], found.natural_frequency_hz)
     np.testing.assert_allclose(2 * math.pi * found.natural_frequency_hz, found.natural_frequency, rtol=4 * EPS)
     assert listed.count == 3
+    ends = found.natural_frequency[[-3, -1]]
+    assert found.finding == "3 flexible, {:.6g} to {:.6g} rad/s".format(*ends)
     keys = [column.key for column in table(listed.modes).columns]
     assert ("eigenvalue" in keys) == (not arm.is_undamped)
     assert "hub_locked_rad_s" in keys
@@ -52,15 +55,6 @@ def test_digits_beyond_a_double_are_strings_of_them(digits):
     assert answer.proof.count == len(table)
 
 
-def test_a_table_says_how_many_and_from_where_to_where():
-    table = tfarm.modes(STEEL, 4)
-    first, last = table.natural_frequency[[1, 4]]
-    assert table.finding == f"4 flexible, {first:.6g} to {last:.6g} rad/s"
-    pinned = tfarm.modes(PINNED, 4)
-    assert pinned.finding.startswith("4 flexible, ")
-    assert (len(table), len(pinned)) == (4 + STEEL.has_rigid_mode, 4 + PINNED.has_rigid_mode)
-
-
 def test_every_road_to_the_frequencies_ends_at_them():
     """Balls and the appendix; the table of all methods says by how little they part."""
     table = tfarm.modes(STEEL, 4)
@@ -73,15 +67,6 @@ def test_every_road_to_the_frequencies_ends_at_them():
     np.testing.assert_allclose([float(text) for text in texts], table.frequencies("balls"), rtol=EPS)
     assert all(len(text.replace(".", "")) == 20 for text in texts[1:])
     assert list(table.by_methods().values) == ["closed-form", "balls", "appendix"]
-
-
-def test_theories_are_matched_by_number():
-    """Each as its own table; the one that the table is of is the table's."""
-    table = tfarm.modes(STEEL, 3, theory="shear")
-    by_theory = compare_theories(table)
-    assert list(by_theory) == ["timoshenko", "shear", "rayleigh", "euler-bernoulli"]
-    for theory, omega in by_theory.items():
-        np.testing.assert_array_equal(omega, tfarm.modes(STEEL, 3, theory=theory).natural_frequency)
 
 
 def test_as_many_modes_as_lie_below():
@@ -123,3 +108,39 @@ def test_every_theory_tends_to_euler_bernoulli_as_the_beam_gets_slender(theory):
         differences.append(1 - mine / reference)
     order = np.log2(differences[0] / differences[1]), np.log2(differences[1] / differences[2])
     np.testing.assert_allclose(order, 2.0, atol=0.02)
+
+
+RIG = tfarm.load("quanser-2dsfl")
+
+
+RUBBED = replace(LAB, name="rubbed", hub=replace(LAB.hub, friction=0.4))
+
+
+@pytest.mark.parametrize(("arm", "count"), thinned([(LAB.having(damping=1e-3), 8), (LAB, 4), (RUBBED, 3)], 2))
+def test_each_disc_is_in_the_row_of_its_eigenvalue(arm, count):
+    rows = listed_modes(tfarm.modes(arm, count), 15, certify=True).modes
+    assert [row.index for row in rows] == list(range(count + 1))
+    compared = 0
+    for row in rows:
+        if row.discs is None:
+            assert row.eigenvalue in (None, 0) or row.second_eigenvalue is not None
+            continue
+        values = [each for each in (row.eigenvalue, row.second_eigenvalue) if each]
+        assert len(values) == len(row.discs)
+        for disc in row.discs:
+            middle = complex(float(disc.re), float(disc.im))
+            assert min(abs(middle - each) for each in values) <= 1e-9 * abs(middle)
+            compared += 1
+    assert compared >= count - 3
+
+
+def test_modes_that_are_not_followed_have_their_rows(monkeypatch):
+    """They keep their frequency; their damping is not determined."""
+    monkeypatch.setattr("tfarm.spectrum.damped.MOST_MODES", 2)
+    modes = tfarm.modes(RIG, 4)
+    followed = len(tfarm.damped_modes(modes).index)
+    assert followed < len(modes)
+    rows = listed_modes(modes).modes
+    assert len(rows) == len(modes)
+    assert [row.eigenvalue is None for row in rows] == [n >= followed for n in range(len(modes))]
+    assert all(row.damping_ratio is None for row in rows[followed:])

@@ -1,6 +1,6 @@
 """Surveys of designs:  python -m tests.synthesis.designs SIZE SEED [optima or held]
 
-Presets and plausible arms at random (see `arms`).  `optima`: SciPy's differential evolution, of at least 5,000 laws,
+Presets and plausible arms (`tests.plausible.arms`).  `optima`: SciPy's differential evolution, of at least 5,000 laws,
 minimises the same score within the bounds that a design prints; wrong where it finds a law that holds and is better by
 more than half a per cent.  The cases take turns, so that every structure, objective, and kind of design comes up.
 `held`: the law recommended, and the same a quarter larger and smaller, has to hold by a Galerkin model of 20 terms
@@ -15,8 +15,8 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 import tfarm
+from tests.plausible.arms import draw, log
 from tests.survey import Finding, main, numbered
-from tests.synthesis.arms import log, some_arm
 from tests.synthesis.held_loop import HeldLoop
 from tfarm import ConvergenceError, ParameterError
 from tfarm.arm import as_law
@@ -35,6 +35,11 @@ CASES = [
     if not (kind == "continuous" and objective == "cost")
 ]
 PRESETS = [name for name in tfarm.presets() if not tfarm.load(name).has_massless_hub]
+
+
+def some_arm(rng):
+    """A plausible arm."""
+    return draw(int(rng.integers(1_000_000)), 0).arm
 
 
 def sampled_often_enough(arm, rng):

@@ -129,9 +129,6 @@ def test_gains_for_a_random_rig_hold_on_another_model():
     assert own < 0
 
 
-# ------------------------------------------------------------ designs that once stopped short of a point inside
-
-
 DATA = Path(__file__).parents[1] / "data" / "reproductions"
 ARMS = {name: tfarm.load(DATA / f"{name}.toml") for name in ("r2", "r3", "r7")}
 BETTER = {  # coefficients after Kp, and the residual [N m] that they leave

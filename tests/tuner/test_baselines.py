@@ -15,7 +15,6 @@ from tfarm.tuner import (
     baselines,
     best_constant,
     extra_insensitive,
-    lq_bound,
     residual_rms,
     shaped_trial,
     slew_trial,
@@ -114,9 +113,3 @@ def test_shaping_keeps_the_slew():
         ends = [task.t[np.flatnonzero(abs(task.feedforward) > 1e-12)[-1]] for task in (trial.task, late)]
         assert late.busy_until - trial.task.busy_until == pytest.approx(ends[1] - ends[0], rel=1e-9)
         assert late.feedforward.sum() == pytest.approx(0, abs=1e-10)
-
-
-def test_shaping_beats_what_feedback_can_do_for_the_slew_as_it_is():
-    trial = slew_trial(tfarm.load("sasaki2012-lab"))
-    for kind in ("ZV", "EI"):
-        assert shaped_trial(trial, kind).with_constant(0.0).cost < lq_bound(trial).cost / 5

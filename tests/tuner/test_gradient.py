@@ -5,7 +5,6 @@ from itertools import product
 import numpy as np
 import pytest
 
-import tfarm
 from tests.shared import thinned
 from tests.tuner.plain import PlainTrial, complex_step, gradient_of, gradient_of_sample, plain_gain
 from tfarm.dsp import Chain, Converters, Sampling
@@ -15,11 +14,6 @@ from tfarm.tuner.kernel import Limits
 pytestmark = pytest.mark.kernels
 
 NONE, SECTOR = Limits(0.0, np.inf), Limits(0.3, 0.64)
-
-
-@pytest.fixture(scope="module")
-def lab():
-    return tfarm.load("sasaki2012-lab")
 
 
 def some_network(seed, inputs=6, hidden=6):

@@ -1,7 +1,6 @@
 """What the tuner takes from the arm: ranges of converters, units of its cost, the arms it is tried on, its shapers."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
@@ -70,9 +69,3 @@ def test_an_arm_without_damping_is_tried_with_two_dampings_of_its_first_mode(hub
     assert [each.damping for each in given] == wanted
     ratios = [tfarm.damped_modes(tfarm.modes(each, 1)).damping_ratio[-1] for each in given]
     assert ratios == pytest.approx([3.575e-4, 3.575e-2], rel=0.1)
-
-
-@pytest.mark.parametrize("rise", [0.5, 2.0])
-def test_a_trial_lasts_three_slews(rise):
-    chain = Chain(slew=replace(Chain().slew, rise_time=rise))
-    assert usual_plan(tfarm.load("sasaki2012-lab"), chain).duration == 3 * rise

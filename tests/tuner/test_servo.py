@@ -7,16 +7,12 @@ import pytest
 
 import tfarm
 from tests.dsp.roads import aliased, aliased_loop
-from tests.shell import answer, run
+from tests.shell import answer, refused
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import ParameterError
 from tfarm.report import tuner_section
-from tfarm.tuner import (
-    Plan,
-    find_guard,
-    tune,
-)
+from tfarm.tuner import Plan, find_guard, tune
 from tfarm.tuner.guard import MovingGain
 from tfarm.tuner.kernel import Limits
 from tfarm.tuner.trial import usual_rate_gain
@@ -90,6 +86,4 @@ def test_the_command_says_where_the_tip_ends(capsys):
     assert found["Kp"] == 10.0
     assert abs(found["tip_error_m"]) < 1e-3
     assert "damps the rigid arm under Kp" in found["default_gains_in_words"]
-    code, out, err = run(capsys, "tune", "sasaki2012-lab", "--Kp=-1")
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "Kp" in err
+    assert "Kp" in refused(capsys, "tune", "sasaki2012-lab", "--Kp=-1")

@@ -1,7 +1,5 @@
 """Learning: the rules against NumPy, what they reach, when they stop, and that the same seed gives the same bits."""
 
-import tracemalloc
-
 import numpy as np
 import pytest
 
@@ -167,18 +165,6 @@ def test_the_same_seed_gives_the_same_bits(trial, guards, learning):
     first, second = (train(trial, initial_network(9), guards["frozen"], learning, 20) for _ in range(2))
     np.testing.assert_array_equal(first.network.weights, second.network.weights)
     np.testing.assert_array_equal(first.costs, second.costs)
-
-
-def test_memory_does_not_grow_with_the_trials(trial, guards):
-    def peak(trials):
-        tracemalloc.start()
-        train(trial, initial_network(0), guards["frozen"], Learning(), trials)
-        size = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-        return size - 8 * trials  # their costs
-
-    peak(2)
-    assert peak(400) <= peak(4) + 2000
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 
-import tfarm
 from tfarm import Hub
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Converters, Sampling, Simulator, pulse_transfer
@@ -16,11 +15,6 @@ from tfarm.tuner.kernel import Limits
 from tfarm.tuner.trial import judged
 
 NONE, SECTOR = Limits(0.0, np.inf), Limits(0.3, 0.64)
-
-
-@pytest.fixture(scope="module")
-def lab():
-    return tfarm.load("sasaki2012-lab")
 
 
 @pytest.mark.parametrize("inputs", [6, 7])
@@ -47,13 +41,6 @@ def test_a_trial_is_that_of_the_simulator(lab, inputs, signals, chain, K1, Kp):
     assert other.cost == pytest.approx(record.cost, rel=1e-11)
 
 
-def test_six_modes_are_enough(lab):
-    few, many = slew_trial(lab), slew_trial(lab, count=16)
-    assert lq_bound(few).cost == pytest.approx(lq_bound(many).cost, rel=1e-6)
-    for K in (0.0, 0.34):
-        assert few.with_constant(K).cost == pytest.approx(many.with_constant(K).cost, rel=1e-6)
-
-
 def test_under_the_total_reading_the_best_constant_gain_is_none(lab):
     trial = slew_trial(lab, signals="total")
     assert best_constant(trial).gain < 1e-4
@@ -74,9 +61,6 @@ def test_the_best_constant_gain_is_global(lab):
 
     assert best.cost == pytest.approx(cost(best.gain), rel=1e-10)
     assert best.cost <= min(cost(K) for K in np.arange(0, 1.16, 0.01))
-
-
-# ---------------------------------------------------------------- the linear-quadratic bound
 
 
 @pytest.mark.parametrize(
@@ -101,9 +85,6 @@ def test_the_bound_is_batch_least_squares(lab, signals, delay, a, b):
     cost = 0.01 * np.sum(a * (x0 + G @ e) ** 2 + b * e**2) / 2
     assert bound.cost == pytest.approx(cost, rel=1e-9)
     np.testing.assert_allclose(bound.e, e, atol=1e-6 * abs(e).max())
-
-
-# ---------------------------------------------------------------- what is refused, and what runs away
 
 
 def test_a_trial_that_runs_away_stops_and_says_where(lab):

@@ -1,0 +1,6 @@
+import pytest
+
+
+@pytest.fixture
+def arm(lossless):
+    return lossless
