@@ -82,8 +82,8 @@ def fit(
 ) -> None:
     """Fit of an arm's numbers to measured responses and ring-downs, with confidence intervals."""
     from tfarm.fitting import model, overlay
-    from tfarm.fitting.fit import save_fit
     from tfarm.fitting.data import data_of
+    from tfarm.fitting.fit import save_fit
 
     subject, measured, page = load_arm(arm, theory), [data_of(text) for text in data or []], None
     for each in measured:
