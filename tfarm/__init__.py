@@ -2,12 +2,12 @@
 
     arm = tfarm.load("sasaki2012")            # a preset or a TOML file
     G = tfarm.transfer(arm, "root_moment")    # exact; callable at any complex s
-    modes = tfarm.modes(arm, count=10)        # complete by construction
+    modes = tfarm.modes(arm, count=10)        # complete
     law = tfarm.HubFeedback(K1=0.3, K2=0.3)   # u = -K1 theta_t - K2 E I phi'(0)
-    found = tfarm.margins(arm, law)           # the verdict first
-    tfarm.plots.modes(modes)                  # a picture; so are bode, nyquist, ... of what these return
+    found = tfarm.margins(arm, law)           # verdict and stability margins
+    tfarm.plots.modes(modes)                  # pictures of records: modes, bode, nyquist, ...
 
-What is not needed is not imported: each name below is fetched at its first use.
+Each name below is imported at its first use.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ __all__ = [
     "tune",
 ]
 
-_ROOMS = {  # where a name stands; what it is called there after a colon, if not the same
+_ROOMS = {  # the module of a name; after a colon another name there
     "bode": "response",
     "design": "synthesis.design",
     "locus": "loop.locus",
@@ -127,9 +127,9 @@ _ROOMS = {  # where a name stands; what it is called there after a colon, if not
 def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module 'tfarm' has no attribute {name!r}")
-    room, _, called = _ROOMS.get(name, "errors" if name.endswith("Error") else "arm").partition(":")
+    room, _, other = _ROOMS.get(name, "errors" if name.endswith("Error") else "arm").partition(":")
     module = import_module(f"tfarm.{room}")
-    value = module if room == name else getattr(module, called or name)
+    value = module if room == name else getattr(module, other or name)
     globals()[name] = value
     return value
 

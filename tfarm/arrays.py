@@ -1,4 +1,4 @@
-"""The arrays of every room, for readers and for mypy: real, complex and whole numbers in double precision."""
+"""Types of arrays: real, complex and whole numbers in double precision."""
 
 from typing import Any
 
@@ -9,4 +9,4 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Whole = NDArray[np.int64]
 
-LEAST_SIZE = 1e-300  # in place of a size of 0 that divides, or whose logarithm is taken: huge, but a number
+LEAST_SIZE = 1e-300  # in place of 0 in a denominator or logarithm

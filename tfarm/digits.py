@@ -1,4 +1,4 @@
-"""Numbers as a person reads them: sensible digits, a true minus sign, powers of ten, no NaN."""
+"""Numbers as text: significant digits, a true minus sign, powers of ten."""
 
 from __future__ import annotations
 
@@ -10,38 +10,38 @@ from typing import Any
 
 POWER_OF_TEN = re.compile(r"(?<![\w.])(\d(?:\.\d+)?)e([-+]?\d{1,2})(?!\w|\.\d)")
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-DOUBLE_DIGITS = 15  # that a decimal number keeps on its way through a double
-LEAST_PLAIN, MOST_PLAIN = 1e-3, 1e7  # outside, powers of ten read better
-SPARE_DIGITS = 2  # digits beyond its own that the largest number of a column may have for the sake of the smallest
-MOST_DECIMALS = 7  # of a column with one number of them; where more are needed each number has digits of its own
-CellsOf = Callable[[Sequence[Any]], Sequence[str]]  # the values of a column to its cells
+DOUBLE_DIGITS = 15  # of a decimal number that a double preserves
+LEAST_PLAIN, MOST_PLAIN = 1e-3, 1e7  # outside, numbers have powers of ten
+SPARE_DIGITS = 2  # more digits of the largest number of a column, for those of the smallest
+MOST_DECIMALS = 7  # of a column; where more are needed each number has its own
+CellsOf = Callable[[Sequence[Any]], Sequence[str]]  # from the values of a column to its cells
 
 
 def singly(how: Callable[..., str], *digits: int) -> CellsOf:
-    """Cells one by one: `how(value, *digits)` of each number; words stay as they are."""
+    """Return a format of each number by itself, `how(value, *digits)`; texts are unchanged."""
     return lambda values: [value if isinstance(value, str) else how(value, *digits) for value in values]
 
 
 def lined(digits: int, least: int) -> CellsOf:
-    """Cells with one number of decimals, as `aligned` has them."""
+    """Return a format of a column by `aligned`."""
     return partial(aligned, digits=digits, least=least)
 
 
 def worded(how: Callable[[str], str]) -> CellsOf:
-    """Cells of texts, such as formulas in plain letters that a page sets in Greek ones."""
+    """Return a format of texts, such as formulas with Greek letters."""
     return lambda values: [how(value) for value in values]
 
 
-TEXTS = singly(str)  # words and whole numbers as they are
+TEXTS = singly(str)  # words and whole numbers
 
 
 def general(x: float, digits: int) -> str:
-    """`x` as a terminal shows it, in at most so many significant digits: 71.5057, 1.8e-09, inf."""
+    """Return `x` with at most `digits` significant digits: 71.5057, 1.8e-09, inf."""
     return f"{x:.{digits}g}"
 
 
 def significant(x: float, digits: int) -> str:
-    """`x` with exactly that many significant digits, e.g. 71.505682 or 1.800 × 10⁻⁹."""
+    """Return `x` with exactly `digits` significant digits: 71.505682, 1.800 × 10⁻⁹."""
     if x == 0 or math.isinf(x):
         return _special(x)
     if not LEAST_PLAIN <= abs(x) < MOST_PLAIN:
@@ -51,7 +51,7 @@ def significant(x: float, digits: int) -> str:
 
 
 def plain(x: float, digits: int = 10) -> str:
-    """`x` as a person types it: no trailing zeros, e.g. 2766.7 or 6.8944 × 10¹⁰."""
+    """Return `x` without trailing zeros: 2766.7, 6.8944 × 10¹⁰."""
     if x == 0 or math.isinf(x):
         return _special(x)
     if not LEAST_PLAIN <= abs(x) < MOST_PLAIN:
@@ -60,10 +60,9 @@ def plain(x: float, digits: int = 10) -> str:
 
 
 def aligned(values: Iterable[float], digits: int, *, least: int = 6) -> tuple[str, ...]:
-    """A column with one number of decimals: the largest has `digits` digits, the smallest at least `least`.
+    """Return a column with a common number of decimals: the largest with `digits` digits, the smallest with `least`.
 
-    Where a small value asks for more decimals than the largest one has a use for, each has `digits` digits of its own,
-    as a power of ten if that reads better.
+    Where that needs too many decimals, each number has `digits` digits of its own (`significant`).
     """
     column = [float(x) for x in values]
     finite = [abs(x) for x in column if x != 0 and math.isfinite(x)]
@@ -77,17 +76,17 @@ def aligned(values: Iterable[float], digits: int, *, least: int = 6) -> tuple[st
 
 
 def fixed(values: Iterable[float], decimals: int) -> tuple[str, ...]:
-    """A column with that many decimals; a value that rounds to zero keeps its sign off."""
+    """Return a column with that many decimals; zero has no sign."""
     return tuple(_signed(f"{x:.{decimals}f}") for x in values)
 
 
 def kept_digits(values: Iterable[float], digits: int) -> list[float]:
-    """Numbers as a file has them whose last digits depend on the processor: rounded to so many significant digits."""
+    """Return numbers rounded to `digits` significant digits, independent of the processor."""
     return [float(f"{value:.{digits - 1}e}") for value in values]
 
 
 def within(value: float, error: float, most: int) -> str:
-    """A number in the digits that an absolute error leaves, at most so many; where it leaves none, 0 and the error."""
+    """Return a number with the digits above an absolute error, at most `most`; without any, 0 and the error."""
     if value == 0:
         return "0"
     digits = math.floor(math.log10(abs(value) / error))
@@ -95,50 +94,53 @@ def within(value: float, error: float, most: int) -> str:
 
 
 def scientific(x: float, digits: int) -> str:
-    """`x` as a power of ten, e.g. 5.7456 × 10⁶."""
+    """Return `x` as a power of ten: 5.7456 × 10⁶."""
     return _special(x) if x == 0 or math.isinf(x) else _power_of_ten(f"{x:.{digits - 1}e}")
 
 
 def how_many(count: float, what: str) -> str:
-    """How many of something: no poles, 1 pole, 2 poles."""
+    """Return a number and its noun: no poles, 1 pole, 2 poles."""
     return f"{plain(count) if count else 'no'} {what}{'s' * (count != 1)}"
 
 
 def listed(words: Sequence[str]) -> str:
-    """One, or several with commas and an "and" before the last."""
+    """Return words with commas and an "and" before the last."""
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def powers(text: str) -> str:
-    """A text in which numbers as files have them are set: 1.8e-9 becomes 1.8 × 10⁻⁹."""
+    """Return a text with powers of ten: 1.8 × 10⁻⁹ for 1.8e-9."""
     return POWER_OF_TEN.sub(lambda number: f"{number[1]} × 10{str(int(number[2])).translate(SUPERSCRIPT)}", text)
 
 
 def unit(text: str) -> str:
-    """A unit with true exponents: m^2 becomes m²."""
+    """Return a unit with exponents: m² for m^2."""
     return re.sub(r"\^(-?\d)", lambda power: power[1].translate(SUPERSCRIPT), text)
 
 
 def _exponent(x: float, digits: int) -> int:
-    """The power of ten of `x` once it is rounded to `digits` digits."""
+    """Return the power of ten of `x` rounded to `digits` digits."""
     return int(f"{x:.{digits - 1}e}".partition("e")[2])
 
 
 def _special(x: float) -> str:
+    """Return zero or an infinity as text."""
     return "0" if x == 0 else _signed("-∞" if x < 0 else "∞")
 
 
 def _signed(text: str) -> str:
+    """Return a number with a true minus sign, none for zero."""
     is_zero = not text.strip("-0.")
     return text.lstrip("-") if is_zero else text.replace("-", "−")
 
 
 def _bare(text: str) -> str:
-    """Without trailing zeros."""
+    """Return a number without trailing zeros."""
     mantissa, e, exponent = text.partition("e")
     return (mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa) + e + exponent
 
 
 def _power_of_ten(text: str) -> str:
+    """Return a number such as 1.8e-9 as 1.8 × 10⁻⁹."""
     mantissa, _, exponent = text.partition("e")
     return f"{_signed(mantissa)} × 10{str(int(exponent)).translate(SUPERSCRIPT)}"

@@ -1,4 +1,4 @@
-"""What can go wrong: bad input, a search that stopped short, a proof that failed."""
+"""Errors: bad input, a search without convergence, a failed certification."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any, Final
 
 
 class Missing(Enum):
-    """The value of a key that is not there."""
+    """The value of a missing key."""
 
     MISSING = "missing"
 
@@ -21,11 +21,11 @@ MISSING: Final = Missing.MISSING
 
 
 class TfarmError(Exception):
-    """Base of every error that tfarm raises on purpose."""
+    """Base of every error of tfarm."""
 
 
 class ParameterError(TfarmError, ValueError):
-    """Bad input.  Its text is one line: the file (if there is one), the key, the value and the remedy."""
+    """Bad input.  Its text is one line: the file (if any), the key, the value and the remedy."""
 
     def __init__(self, *, key: str, value: object, remedy: str, file: str | os.PathLike[str] | None = None) -> None:
         self.key, self.value, self.remedy = key, value, remedy
@@ -43,13 +43,13 @@ class ParameterError(TfarmError, ValueError):
         return again, ()
 
     def in_file(self, file: str | os.PathLike[str]) -> ParameterError:
-        """The same error, with the file it was found in."""
+        """Return the same error with a file."""
         return type(self)(key=self.key, value=self.value, remedy=self.remedy, file=file)
 
 
 @contextmanager
 def naming(file: str | os.PathLike[str]) -> Iterator[None]:
-    """What is refused inside of this is refused with the name of the file, unless it names one."""
+    """Add the name of a file to a ParameterError raised inside, unless it has one."""
     try:
         yield
     except ParameterError as error:
@@ -57,7 +57,7 @@ def naming(file: str | os.PathLike[str]) -> Iterator[None]:
 
 
 class ConvergenceError(TfarmError):
-    """A search stopped short.  Carries the best value found and its residual."""
+    """A search without convergence, with the best value found and its residual."""
 
     def __init__(self, message: str, best: Any, residual: Any) -> None:
         super().__init__(message, best, residual)
@@ -68,11 +68,11 @@ class ConvergenceError(TfarmError):
 
 
 class CertificationError(TfarmError):
-    """A result could not be proven."""
+    """A result that is not certified."""
 
 
 def did_you_mean(word: str, choices: Iterable[str]) -> str:
-    """The remedy for a misspelt word: the nearest choice, or those that begin with it, if any, and all of them."""
+    """Return the remedy for a misspelt word: the nearest choices (`close_to`), if any, and all of them."""
     known = list(choices)
     near = close_to(word, known)
     hint = "did you mean " + " or ".join(f'"{choice}"' for choice in near) + "? " if near else ""
@@ -80,20 +80,20 @@ def did_you_mean(word: str, choices: Iterable[str]) -> str:
 
 
 def close_to(word: str, choices: Iterable[str]) -> list[str]:
-    """What may be meant by a misspelt word: the nearest choice, else up to three that begin with it; empty if none."""
+    """Return the nearest choice to a misspelt word, else up to three that begin with it."""
     known = list(choices)
     begun = [choice for choice in known if word and choice.startswith(word)][:3]
     return difflib.get_close_matches(word[:80], known, n=1) or begun
 
 
 def must_be_known(key: str, value: object, choices: Collection[str]) -> None:
-    """Refuse, by ParameterError, what is none of the choices."""
+    """Raise ParameterError for a value that is none of the choices."""
     if value not in choices:
         raise ParameterError(key=key, value=value, remedy=did_you_mean(str(value), choices))
 
 
 def one_line(text: str, longest: int) -> str:
-    """`text` with what does not print escaped, cut in its middle to `longest` characters."""
+    """Return `text` with unprintable characters escaped, cut in its middle to `longest` characters."""
     if len(text) > longest:
         half = (longest - 5) // 2
         text = f"{text[:half]} ... {text[-half:]}"
@@ -101,7 +101,7 @@ def one_line(text: str, longest: int) -> str:
 
 
 def shown(value: object) -> str:
-    """A value as a person would type it, in at most 60 characters."""
+    """Return the text of a value, in at most 60 characters."""
     if isinstance(value, bool):
         return str(value).lower()
     try:

@@ -1,6 +1,6 @@
-"""What frozen records with arrays promise: arrays that cannot be written, an `==` that answers, a short repr, HTML.
+"""Frozen records with arrays: read-only arrays, an `==` of all entries, a short repr, HTML.
 
-A repr begins with what was found: the entry of a record, or a property, that bears one of the names in `SHOWN_FIRST`.
+A repr begins with the finding: the entries or properties of a record with a name in `SHOWN_FIRST`.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ import numpy as np
 
 _Class = TypeVar("_Class", bound=type[Any])
 
-SHOWN_FIRST = ("verdict", "word", "text", "finding", "unstable", "worst_error")  # what was found, before all else
+SHOWN_FIRST = ("verdict", "word", "text", "finding", "unstable", "worst_error")  # the finding
 LONGEST_REPR = 200  # characters of a repr: a line or two of a terminal
-LONGEST_ENTRY, LONGEST_FINDING = 60, 100  # characters of an entry of it, and of what was found
-PLAIN = (float, int, str, bool, type(None))  # kinds that hold no array: most entries of most records
-SHOWN_SINGLY = 3  # numbers that are shown one by one
+LONGEST_ENTRY, LONGEST_FINDING = 60, 100  # characters of an entry, and of the finding
+PLAIN = (float, int, str, bool, type(None))  # types without arrays
+SHOWN_SINGLY = 3  # numbers of an array or a list that are shown
 
 
 def record(cls: _Class) -> _Class:
-    """Decorates a class inside `@dataclass(frozen=True)`.
+    """Decorate a class below `@dataclass(frozen=True)`.
 
-    Arrays in its fields (in tuples, lists and dictionaries too) and in its cached properties become read-only views;
-    two records of a class are equal where all their entries are, NaN to NaN; the repr is short, the verdict first,
-    entries that are their defaults left out, and a notebook shows the same as a small table.  A class with a method
-    `as_typed` is shown by the pairs of names and texts that this gives, before its other entries.
+    Arrays in its fields (also in tuples, lists and dictionaries) and in its cached properties become read-only views.
+    Two records of a class are equal where all their entries are, NaN to NaN.  The repr is short, with the finding first
+    and without defaults; a notebook shows the same as a table.  The pairs of names and texts of a method `as_typed`
+    come before the other entries.
     """
     after = cls.__dict__.get("__post_init__")
 
@@ -40,8 +40,8 @@ def record(cls: _Class) -> _Class:
         for name in _names_of(kind):
             if type(value := getattr(self, name)) in PLAIN:
                 continue
-            if (held := read_only(value)) is not value:
-                object.__setattr__(self, name, held)
+            if (view := read_only(value)) is not value:
+                object.__setattr__(self, name, view)
 
     for value in vars(cls).values():
         if isinstance(value, cached_property):
@@ -60,19 +60,20 @@ def record(cls: _Class) -> _Class:
 
 @cache
 def _names_of(cls: type[Any]) -> tuple[str, ...]:
+    """Return the names of the fields of a record."""
     return tuple(each.name for each in fields(cls))
 
 
 def read_only(value: Any) -> Any:
-    """The value with views that cannot be written in the place of its arrays; itself where it has none."""
+    """Return the value with read-only views of its arrays; itself where it has none."""
     if isinstance(value, np.ndarray):
         if value.flags.writeable:
             value = value.view()
             value.flags.writeable = False
         return value
     if isinstance(value, dict):
-        held = {key: read_only(entry) for key, entry in value.items()}
-        return held if any(held[key] is not entry for key, entry in value.items()) else value
+        views = {key: read_only(entry) for key, entry in value.items()}
+        return views if any(views[key] is not entry for key, entry in value.items()) else value
     if isinstance(value, tuple | list):
         entries = [read_only(entry) for entry in value]
         if all(mine is theirs for mine, theirs in zip(entries, value, strict=True)):
@@ -112,7 +113,7 @@ def _hash(self: Any) -> int:
 
 
 def _key(value: Any) -> Any:
-    """Something with a hash that equal entries share."""
+    """Return a hashable value that is equal for equal entries."""
     if isinstance(value, np.ndarray):
         return value.shape
     if isinstance(value, dict):
@@ -129,14 +130,14 @@ def _repr(self: Any) -> str:
 
 
 def _repr_html(self: Any) -> str:
-    """A row an entry, the finding first, for a notebook; whatever a name holds is text."""
+    """Return a table with a row for each entry, the finding first, for a notebook."""
     row = '<tr><th scope="row" style="text-align:left">{}</th><td style="text-align:left">{}</td></tr>'
     rows = "".join(row.format(escape(name), escape(shown)) for name, shown in _entries(self))
     return f"<table><caption>{escape(type(self).__name__)}</caption><tbody>{rows}</tbody></table>"
 
 
 def _entries(self: Any) -> Iterator[tuple[str, str]]:
-    """What is shown, as texts: the finding, what was typed, then the fields that are not their defaults."""
+    """Yield the shown names and texts: the finding, those of `as_typed`, then the fields other than defaults."""
     found = _found(self)
     for name in found:
         yield name, _shown(getattr(self, name), LONGEST_FINDING)
@@ -148,18 +149,18 @@ def _entries(self: Any) -> Iterator[tuple[str, str]]:
 
 
 def _is_default(self: Any, entry: Field[Any]) -> bool:
-    """Whether an entry is what it is if nothing is said."""
+    """Whether an entry has its default."""
     default = entry.default if entry.default_factory is MISSING else entry.default_factory()
     return default is not MISSING and _same(getattr(self, entry.name), default)
 
 
 def _found(self: Any) -> list[str]:
-    """Those of `SHOWN_FIRST` that a record has, as a field or a property."""
+    """Return the names in `SHOWN_FIRST` of a record's fields and properties."""
     return [name for name in SHOWN_FIRST if hasattr(type(self), name) or name in self.__dataclass_fields__]
 
 
 def _shown(value: Any, longest: int = LONGEST_ENTRY) -> str:
-    """An entry in a few characters: six digits of a number, a record's finding or name, an array's shape."""
+    """Return an entry in a few characters: six digits of a number, a record's finding or name, an array's shape."""
     if isinstance(value, np.ndarray):
         small = value.ndim == 1 and value.size <= SHOWN_SINGLY
         return f"[{', '.join(map(_shown, value.tolist()))}]" if small else f"<array {value.shape}>"
@@ -178,8 +179,9 @@ def _shown(value: Any, longest: int = LONGEST_ENTRY) -> str:
 
 
 def _named(value: Any) -> str:
-    """A record inside another: its finding or its name, or all of it where that is short."""
-    names = [each for each in fields(value) if each.name == "name"]
-    known = _found(value) or [each.name for each in names if not _is_default(value, each)]
+    """Return the text of a record inside another: its finding or its name, or all of it where that is short."""
+    known = _found(value) or [
+        each.name for each in fields(value) if each.name == "name" and not _is_default(value, each)
+    ]
     text = _shown(getattr(value, known[0])) if known else repr(value)
     return text if len(text) <= 80 else f"{type(value).__name__}(...)"

@@ -124,7 +124,7 @@ def test_from_another_input_it_is_the_ratio_of_two_responses():
     ("asked", "words"),
     [
         ({"output": "root_moment", "x": 0.5}, "leave x out"),
-        ({"output": "root_moment", "input": "force@0.3"}, "known for an input at the hub"),
+        ({"output": "root_moment", "input": "force@0.3"}, "needs an input at the hub"),
         ({"output": "root_moment", "input": "motor_voltage"}, "there is no motor"),
         ({"output": "root_moment", "band": 3}, "two frequencies in rad/s"),
         ({"output": "root_moment", "band": (5.0, 1.0)}, "two frequencies in rad/s"),

@@ -172,7 +172,7 @@ def test_shapes() -> None:
     ("outputs", "x", "message"),
     [
         ("root_momnt", None, 'did you mean "root_moment"'),
-        ("moment", None, "say where"),
+        ("moment", None, "give the place"),
         ("moment", 1.5, "between 0 and 1 m"),
         ("moment", math.nan, "between 0 and 1 m"),
         ("hub_angle", 0.5, "leave x out"),

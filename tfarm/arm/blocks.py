@@ -93,8 +93,11 @@ class Rational:
     def matrices(self) -> Matrices:
         """Return a state space (controllable form, balanced).  Raises ParameterError where it is not proper."""
         if self.excess > 0:
-            remedy = "of a higher degree than its denominator: it has no state space; add a pole"
-            raise ParameterError(key="num", value=list(self.num), remedy=remedy)
+            raise ParameterError(
+                key="num",
+                value=list(self.num),
+                remedy="of a higher degree than its denominator: it has no state space; add a pole",
+            )
         den = np.array(self.den) / self.den[0]
         num = np.r_[np.zeros(-self.excess), np.array(self.num) / self.den[0]]
         n = self.order
@@ -132,8 +135,11 @@ class StateSpace:
         n, m = len(self.A), self.D.shape[1]
         for name, shape in {"A": (n, n), "B": (n, m), "C": (1, n), "D": (1, m)}.items():
             if getattr(self, name).shape != shape:
-                remedy = f"{getattr(self, name).shape}, expected {shape}: A (n, n), B (n, m), C (1, n), D (1, m)"
-                raise ParameterError(key=name, value="matrix", remedy=remedy)
+                raise ParameterError(
+                    key=name,
+                    value="matrix",
+                    remedy=f"{getattr(self, name).shape}, expected {shape}: A (n, n), B (n, m), C (1, n), D (1, m)",
+                )
         if n > MOST_DEGREE:
             raise ParameterError(key="A", value=n, remedy=f"at most {MOST_DEGREE} states are read")
 
@@ -213,14 +219,20 @@ def block_of(key: str, entry: Any) -> tuple[LawBlock, float | None]:
     if hasattr(entry, "num") and hasattr(entry, "den"):
         num, den = (np.asarray(part[0][0], dtype=float) for part in (entry.num, entry.den))
         if len(entry.num) != 1 or len(entry.num[0]) != 1:
-            remedy = "has several inputs or outputs; give one transfer function a signal, or matrices"
-            raise ParameterError(key=key, value=type(entry).__name__, remedy=remedy)
+            raise ParameterError(
+                key=key,
+                value=type(entry).__name__,
+                remedy="has several inputs or outputs; give one transfer function a signal, or matrices",
+            )
         return Rational(tuple(num.tolist()), tuple(den.tolist())), period
     if isinstance(entry, dict):
         unknown = set(entry) - {"zeros", "poles", "gain"}
         if unknown or "gain" not in entry:
-            remedy = "a mapping holds gain, and zeros and poles where there are any"
-            raise ParameterError(key=key, value=sorted(map(str, entry)), remedy=remedy)
+            raise ParameterError(
+                key=key,
+                value=sorted(map(str, entry)),
+                remedy="a mapping holds gain, and zeros and poles where there are any",
+            )
         return Rational.of_roots(entry.get("zeros", ()), entry.get("poles", ()), entry["gain"]), None
     if isinstance(entry, tuple | list) and len(entry) == 2:
         return Rational(*(tuple(np.atleast_1d(np.asarray(part, dtype=float)).tolist()) for part in entry)), None
@@ -259,15 +271,19 @@ def _of_roots(name: str, roots: ArrayLike) -> Real:
     try:
         found = np.array([complex(*each) if isinstance(each, tuple | list) else complex(each) for each in list(roots)])  # type: ignore[arg-type]
     except (TypeError, ValueError):
-        remedy = "numbers, complex ones as [re, im], with their conjugates"
-        raise ParameterError(key=name, value=roots, remedy=remedy) from None
+        raise ParameterError(
+            key=name, value=roots, remedy="numbers, complex ones as [re, im], with their conjugates"
+        ) from None
     if len(found) > MOST_DEGREE:
         raise ParameterError(key=name, value=len(found), remedy=f"at most {MOST_DEGREE}")
     upper = np.sort_complex(found[found.imag > 0])
     lower = np.sort_complex(found[found.imag < 0].conj())
     if upper.size != lower.size or (abs(upper - lower) > REAL_PAIR * abs(upper)).any():
-        remedy = "a complex root without its conjugate: real coefficients need both"
-        raise ParameterError(key=name, value=[f"{each:g}" for each in found], remedy=remedy)
+        raise ParameterError(
+            key=name,
+            value=[f"{each:g}" for each in found],
+            remedy="a complex root without its conjugate: real coefficients need both",
+        )
     pairs = [np.array([1.0, -2 * each.real, abs(each) ** 2]) for each in upper]
     alone = [np.array([1.0, -each.real]) for each in found[found.imag == 0]]
     return reduce(np.convolve, [*pairs, *alone], np.ones(1))

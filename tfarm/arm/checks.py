@@ -6,7 +6,7 @@ Each check runs once, where a record is built.  `key` is the name in the TOML fi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from numbers import Integral, Real
 from typing import Literal, get_args
 
@@ -91,9 +91,7 @@ def on_the_arm(key: str, x: Reals | float, length: float) -> Reals:
     return points
 
 
-def check_fields(
-    record: object, kind: str, check: Callable[[str, object, str], float], meanings: Mapping[str, str]
-) -> None:
+def check_fields(record: object, kind: str, check: Callable[[str, object, str], float], **meanings: str) -> None:
     """Replace fields of a frozen record by their checked values, each under the key `kind.field`."""
     for name, meaning in meanings.items():
         key = f"{kind}.{name}" if kind else name

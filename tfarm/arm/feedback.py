@@ -93,8 +93,8 @@ class HubFeedback:
         """Return the law with its gains of the plane at this point of it."""
         return replace(self, **dict(zip(PLANE, (across, up), strict=True)))
 
-    def told(self, name: str, how: Callable[[float], str], arm: Arm | None = None) -> str:
-        """`K1 = 0.3`: the gain of that name, its value written by `how`, with its unit on an arm."""
+    def gain_text(self, name: str, how: Callable[[float], str], arm: Arm | None = None) -> str:
+        """Return `K1 = 0.3`: the gain of that name, its value written by `how`, with its unit on an arm."""
         return f"{name} = {how(self[name])}{'' if arm is None else written_unit(name, arm)}"
 
     def having(self, name: str, value: float) -> HubFeedback:

@@ -71,14 +71,20 @@ class Law:
         parts, periods = (self.parts, ()) if self.parts else _parts_of(self.entries)
         object.__setattr__(self, "parts", parts)
         object.__setattr__(self, "entries", {})
-        meanings = {"delay": "a delay in s, 0 or more", "prewarp": "a frequency in rad/s, or 0"}
-        check_fields(self, "", not_negative, meanings)
+        check_fields(
+            self,
+            "",
+            not_negative,
+            delay="a delay in s, 0 or more",
+            prewarp="a frequency in rad/s, or 0",
+        )
         known = {float(each) for each in periods}
         if self.period is not None:
             known.add(positive("period", self.period, "a sampling period in s; leave it out for a continuous-time law"))
         if len(known) > 1:
-            remedy = "the parts of a law have one sampling period in common"
-            raise ParameterError(key="period", value=sorted(known), remedy=remedy)
+            raise ParameterError(
+                key="period", value=sorted(known), remedy="the parts of a law have one sampling period in common"
+            )
         object.__setattr__(self, "period", known.pop() if known else None)
         object.__setattr__(self, "references", tuple(self.references))
         if isinstance(self.sign, bool) or self.sign not in (-1, 1):
@@ -91,16 +97,18 @@ class Law:
         for each in self.references:
             must_be_known("references", each, self.signals)
         if self.period is not None and self.is_improper:
-            remedy = "a discrete-time law is causal: give num at most the degree of den"
-            raise ParameterError(key="num", value=self.name, remedy=remedy)
+            raise ParameterError(
+                key="num", value=self.name, remedy="a discrete-time law is causal: give num at most the degree of den"
+            )
 
     @classmethod
     def of_matrices(cls, A: Any, B: Any, C: Any, D: Any, signals: Sequence[str], **others: Any) -> Law:
         """Build a law of one state space from several signals, in the order of the columns of B and D."""
         block = StateSpace(A, B, C, D)
         if block.signals != len(signals):
-            remedy = f"B has {block.signals} columns: name one signal for each"
-            raise ParameterError(key="signals", value=list(signals), remedy=remedy)
+            raise ParameterError(
+                key="signals", value=list(signals), remedy=f"B has {block.signals} columns: name one signal for each"
+            )
         columns = tuple(name if name == "" else _signal(name, of_reference=True) for name in signals)
         law = cls({}, parts=(Part(columns, block),), **others)
         if not law.signals:
@@ -307,8 +315,9 @@ def _parts_of(entries: Mapping[str, Any]) -> tuple[tuple[Part, ...], tuple[float
     for name, entry in entries.items():
         block, period = block_of(_signal(name), entry)
         if block.signals != 1:
-            remedy = "has several signals: use Law.of_matrices and name them"
-            raise ParameterError(key=name, value=type(entry).__name__, remedy=remedy)
+            raise ParameterError(
+                key=name, value=type(entry).__name__, remedy="has several signals: use Law.of_matrices and name them"
+            )
         found.append(Part((name,), block))
         periods += [] if period is None else [period]
     return tuple(found), tuple(periods)
@@ -318,8 +327,11 @@ def _signal(name: Any, *, of_reference: bool = False) -> str:
     """Return the name of an output, or of its reference.  Raises ParameterError for other texts."""
     plain = name.removeprefix(REFERENCE) if of_reference and isinstance(name, str) else name
     if not isinstance(plain, str) or not re.fullmatch(r"[A-Za-z_]\w*(@[0-9.eE+-]+)?", plain):
-        remedy = 'an output such as hub_rate, or one along the link with its place, "strain@0.05"'
-        raise ParameterError(key="signal", value=plain, remedy=remedy)
+        raise ParameterError(
+            key="signal",
+            value=plain,
+            remedy='an output such as hub_rate, or one along the link with its place, "strain@0.05"',
+        )
     return str(name)
 
 
@@ -340,8 +352,11 @@ def _varied(block: LawBlock, rest: str, value: float, key: str) -> LawBlock:
         if int(place) < len(numbers):
             numbers[int(place)] = value
             return replace(block, **{polynomial: tuple(numbers)})
-    remedy = "a number of the law is named signal, signal.num.N or signal.den.N with N counted from 0"
-    raise ParameterError(key="law", value=key, remedy=remedy)
+    raise ParameterError(
+        key="law",
+        value=key,
+        remedy="a number of the law is named signal, signal.num.N or signal.den.N with N counted from 0",
+    )
 
 
 AnyLaw = HubFeedback | Law
@@ -389,11 +404,14 @@ def tracked(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
 def must_not_be_algebraic(arm: Arm, key: str, value: object) -> None:
     """Raise ParameterError where the hub has no inertia: its root moment is the torque itself."""
     if arm.has_massless_hub:
-        remedy = (
-            "with hub.inertia = 0 the root moment is -u itself, so that moment feedback is an algebraic loop; "
-            "give the hub an inertia, or a moment gain of 0"
+        raise ParameterError(
+            key=key,
+            value=value,
+            remedy=(
+                "with hub.inertia = 0 the root moment is -u itself, so that moment feedback is an algebraic loop; "
+                "give the hub an inertia, or a moment gain of 0"
+            ),
         )
-        raise ParameterError(key=key, value=value, remedy=remedy)
 
 
 def cancelled(law: Law) -> tuple[str, ...]:

@@ -62,8 +62,9 @@ class SignalTable(StrictTable):
         """Return the entry of `Law`.  Raises ParameterError for keys that exclude each other."""
         if self.num is not None:
             if self.gain is not None or self.zeros is not None or self.poles is not None:
-                remedy = "either num and den, or zeros, poles, gain"
-                raise ParameterError(key=f"{key}.num", value=self.num, remedy=remedy)
+                raise ParameterError(
+                    key=f"{key}.num", value=self.num, remedy="either num and den, or zeros, poles, gain"
+                )
             return tuple(self.num), tuple(self.den or [1.0])
         if self.den is not None:
             raise ParameterError(key=f"{key}.num", value=MISSING, remedy="den needs num")
@@ -90,19 +91,24 @@ def law_of_table(table: Any, folder: Path) -> Law:
     others = {key: value for key, value in table.items() if key not in signals}
     for key, value in others.items():  # hub_angle = 2.0, and no misspelt delay
         if type(value) in (int, float) and not close_to(key, LawTable.model_fields):
-            remedy = f"a signal has a table of its own: [{LAW_TABLE}.{key}] with gain = {value:g}"
-            raise ParameterError(key=f"{LAW_TABLE}.{key}", value=value, remedy=remedy)
+            raise ParameterError(
+                key=f"{LAW_TABLE}.{key}",
+                value=value,
+                remedy=f"a signal has a table of its own: [{LAW_TABLE}.{key}] with gain = {value:g}",
+            )
     head = validated(LawTable, others, LAW_TABLE)
     common = head.model_dump(include={"name", "input", "delay", "period", "sign", "references", "rule", "prewarp"})
     try:
         if head.matrices is not None:
             if signals:
-                remedy = "either matrices and signals, or a table for each signal"
-                raise ParameterError(key=next(iter(signals)), value=MISSING, remedy=remedy)
+                raise ParameterError(
+                    key=next(iter(signals)),
+                    value=MISSING,
+                    remedy="either matrices and signals, or a table for each signal",
+                )
             return _of_file(head, folder, common)
         if head.signals is not None or head.system is not None or head.scales is not None:
-            remedy = "signals, system and scales need a .mat file"
-            raise ParameterError(key="matrices", value=MISSING, remedy=remedy)
+            raise ParameterError(key="matrices", value=MISSING, remedy="signals, system and scales need a .mat file")
         entries = {}
         for name, values in signals.items():
             given = validated(SignalTable, values, f"{LAW_TABLE}.{name}")
@@ -129,8 +135,11 @@ def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
         names = holder.dtype.names
     missing = [name for name in "ABCD" if name not in names]
     if missing:
-        remedy = f"holds no {', '.join(missing)}; it has {', '.join(names)} (system = names a structure)"
-        raise ParameterError(key="matrices", value=head.matrices, remedy=remedy)
+        raise ParameterError(
+            key="matrices",
+            value=head.matrices,
+            remedy=f"holds no {', '.join(missing)}; it has {', '.join(names)} (system = names a structure)",
+        )
     try:
         A, B, C, D = (np.atleast_2d(np.asarray(holder[name], dtype=float)) for name in "ABCD")
     except (TypeError, ValueError):

@@ -85,11 +85,13 @@ class Section:
     dimensions: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
-        meanings = {
-            "area": "a section has a positive, finite area in m^2",
-            "second_moment": "a section has a positive, finite second moment in m^4",
-        }
-        check_fields(self, KEY, positive, meanings)
+        check_fields(
+            self,
+            KEY,
+            positive,
+            area="a section has a positive, finite area in m^2",
+            second_moment="a section has a positive, finite second moment in m^4",
+        )
         if self.shear_factor is not None:
             meaning = "a shear factor multiplies G A: above 0, up to 1 (a form factor of 6/5 is entered as 5/6)"
             kappa = positive(f"{KEY}.shear_factor", self.shear_factor, meaning)
@@ -98,11 +100,17 @@ class Section:
             object.__setattr__(self, "shear_factor", kappa)
         if self.shape != "general":
             if (self.area, self.second_moment) != _properties(self.shape, dict(self.dimensions)):
-                remedy = f"does not fit this {self.shape}; use Section.{self.shape}() or Section.general()"
-                raise ParameterError(key=f"{KEY}.area", value=self.area, remedy=remedy)
+                raise ParameterError(
+                    key=f"{KEY}.area",
+                    value=self.area,
+                    remedy=f"does not fit this {self.shape}; use Section.{self.shape}() or Section.general()",
+                )
         elif self.shear_factor is None:
-            remedy = "a general section needs its own, e.g. 0.8333333333333334 for a rectangle"
-            raise ParameterError(key=f"{KEY}.shear_factor", value=MISSING, remedy=remedy)
+            raise ParameterError(
+                key=f"{KEY}.shear_factor",
+                value=MISSING,
+                remedy="a general section needs its own, e.g. 0.8333333333333334 for a rectangle",
+            )
 
     @classmethod
     def rectangle(cls, *, width: float, depth: float, shear_factor: float | None = None) -> Section:
@@ -162,11 +170,17 @@ def _properties(shape: str, dimensions: Mapping[str, float]) -> tuple[float, flo
         raise ParameterError(key=f"{KEY}.shape", value=shape, remedy=did_you_mean(str(shape), [*SHAPES, "general"]))
     names = SHAPES[shape].dimensions
     if set(dimensions) != set(names):
-        remedy = f"a {shape} has {' and '.join(names)}: build it with Section.{shape}()"
-        raise ParameterError(key=f"{KEY}.dimensions", value=tuple(dimensions), remedy=remedy)
+        raise ParameterError(
+            key=f"{KEY}.dimensions",
+            value=tuple(dimensions),
+            remedy=f"a {shape} has {' and '.join(names)}: build it with Section.{shape}()",
+        )
     if shape == "tube" and dimensions["inner_diameter"] >= dimensions["outer_diameter"]:
-        remedy = f"a tube is hollow: less than its outer diameter, {dimensions['outer_diameter']:g} m"
-        raise ParameterError(key=f"{KEY}.inner_diameter", value=dimensions["inner_diameter"], remedy=remedy)
+        raise ParameterError(
+            key=f"{KEY}.inner_diameter",
+            value=dimensions["inner_diameter"],
+            remedy=f"a tube is hollow: less than its outer diameter, {dimensions['outer_diameter']:g} m",
+        )
     return SHAPES[shape].area(**dimensions), SHAPES[shape].second_moment(**dimensions)
 
 
@@ -185,18 +199,29 @@ class Link:
     damping: float = 0.0
 
     def __post_init__(self) -> None:
-        check_fields(self, "link", positive, MEANINGS)
-        check_fields(self, "link", not_negative, {"damping": DAMPING})
+        check_fields(self, "link", positive, **MEANINGS)
+        check_fields(
+            self,
+            "link",
+            not_negative,
+            damping=DAMPING,
+        )
         if self.slenderness > SLENDEREST:
-            remedy = f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units"
-            raise ParameterError(key="link.length", value=self.length, remedy=remedy)
+            raise ParameterError(
+                key="link.length",
+                value=self.length,
+                remedy=f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units",
+            )
         nu = self.poissons_ratio  # the argument of Cowper's factor; the margins allow for a rounded G
         if self.section.shear_factor is None and not -1 + 1e-9 <= nu <= 0.5 + 1e-12:
-            remedy = (
-                f"with this Young's modulus it means a Poisson's ratio of {nu:.4g}, outside (-1, 0.5]; "
-                "correct it, or give link.section.shear_factor for a material that is not isotropic"
+            raise ParameterError(
+                key="link.shear_modulus",
+                value=self.shear_modulus,
+                remedy=(
+                    f"with this Young's modulus it means a Poisson's ratio of {nu:.4g}, outside (-1, 0.5]; "
+                    "correct it, or give link.section.shear_factor for a material that is not isotropic"
+                ),
             )
-            raise ParameterError(key="link.shear_modulus", value=self.shear_modulus, remedy=remedy)
 
     @classmethod
     def isotropic(

@@ -46,13 +46,15 @@ def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], s
     is_named = not isinstance(name_or_path, os.PathLike)
     name: object = name_or_path if is_named else os.fspath(name_or_path)
     if not isinstance(name, str) or not name.strip() or "\0" in name:
-        remedy = f"give a preset ({', '.join(presets())}) or a path"
-        raise ParameterError(key="arm", value=name, remedy=remedy)
+        raise ParameterError(key="arm", value=name, remedy=f"give a preset ({', '.join(presets())}) or a path")
     if is_named and name in presets():
         data, name = PRESETS.joinpath(f"{name}.toml").read_bytes(), f"{name}.toml"
     elif is_named and not ({"/", "\\", os.sep} & set(name) or name.endswith(".toml") or os.path.lexists(name)):
-        remedy = f"no such preset: {did_you_mean(name, presets())}; or give the path of a .toml file"
-        raise ParameterError(key="arm", value=name, remedy=remedy)
+        raise ParameterError(
+            key="arm",
+            value=name,
+            remedy=f"no such preset: {did_you_mean(name, presets())}; or give the path of a .toml file",
+        )
     else:
         data = read_file(name, MOST_ARM_BYTES, key="arm", what="a .toml file")
     with naming(name):
@@ -79,14 +81,16 @@ def _table_of(data: bytes) -> dict[str, Any]:
     for i, line in enumerate(lines, 1):
         for number, what, most in ((len(line), "characters", LONGEST_LINE), (line.count("."), "dots", MOST_DOTS)):
             if number > most:
-                remedy = f"{number} {what} in a line; at most {most}"
-                raise ParameterError(key=f"line {i}", value=line, remedy=remedy)
+                raise ParameterError(key=f"line {i}", value=line, remedy=f"{number} {what} in a line; at most {most}")
     for bracket in re.finditer(r"[\[\]{}]", text):
         depth = depth + 1 if bracket[0] in "[{" else max(depth - 1, 0)
         if depth > MOST_BRACKETS:
             i = text.count("\n", 0, bracket.start()) + 1
-            remedy = f"more than {MOST_BRACKETS} brackets open; an arm's file needs no nesting"
-            raise ParameterError(key=f"line {i}", value=lines[i - 1], remedy=remedy)
+            raise ParameterError(
+                key=f"line {i}",
+                value=lines[i - 1],
+                remedy=f"more than {MOST_BRACKETS} brackets open; an arm's file needs no nesting",
+            )
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -95,5 +99,6 @@ def _table_of(data: bytes) -> dict[str, Any]:
         line = lines[int(at[1]) - 1 if at else -1]
         raise ParameterError(key=where or "TOML", value=line, remedy=f"is not TOML: {what}") from None
     except (ValueError, RecursionError):
-        remedy = "an integer of thousands of digits, or brackets nested too deep"
-        raise ParameterError(key="TOML", value=text, remedy=remedy) from None
+        raise ParameterError(
+            key="TOML", value=text, remedy="an integer of thousands of digits, or brackets nested too deep"
+        ) from None

@@ -64,15 +64,24 @@ class Arm:
         must_be_known("input", self.input, INPUTS)
         slenderness = min(self.length / link.section.radius_of_gyration for link in self.links)  # of the whole length
         if slenderness < FLATTEST:
-            remedy = f"{slenderness:.3g} times the section's radius of gyration is no beam; check the units"
-            raise ParameterError(key="length" if self.outer else "link.length", value=self.length, remedy=remedy)
+            raise ParameterError(
+                key="length" if self.outer else "link.length",
+                value=self.length,
+                remedy=f"{slenderness:.3g} times the section's radius of gyration is no beam; check the units",
+            )
         self._check_places()
         if self.motor is None and self.input in ("motor_voltage", "motor_current"):
-            remedy = "there is no motor; describe it under [motor], or take hub_torque or hub_angle"
-            raise ParameterError(key="input", value=self.input, remedy=remedy)
+            raise ParameterError(
+                key="input",
+                value=self.input,
+                remedy="there is no motor; describe it under [motor], or take hub_torque or hub_angle",
+            )
         if self.motor is not None and math.isinf(self.hub.inertia):
-            remedy = "locks the hub, so the motor has no effect; leave out the motor, or give the hub's own inertia"
-            raise ParameterError(key="hub.inertia", value=self.hub.inertia, remedy=remedy)
+            raise ParameterError(
+                key="hub.inertia",
+                value=self.hub.inertia,
+                remedy="locks the hub, so the motor has no effect; leave out the motor, or give the hub's own inertia",
+            )
 
     def __repr__(self) -> str:
         return brief_repr(self, always=4)
@@ -83,13 +92,19 @@ class Arm:
         places = [(f"attachment.{i}", each.x, end) for i, each in enumerate(self.attachments, 1)]
         for part, x, most in [*places, ("gauge", self.gauge.x, self.length)]:
             if x > most:
-                remedy = f"is beyond the tip; x counts from the clamp, up to the link's length of {self.length!r} m"
-                raise ParameterError(key=f"{part}.x", value=x, remedy=remedy)
+                raise ParameterError(
+                    key=f"{part}.x",
+                    value=x,
+                    remedy=f"is beyond the tip; x counts from the clamp, up to the link's length of {self.length!r} m",
+                )
         on_it = tuple(each if each.x <= self.length else replace(each, x=self.length) for each in self.attachments)
         object.__setattr__(self, "attachments", on_it)
         if math.isinf(self.payload.mass) and abs(self.centre_distance) < 1e-9 * (self.hub.radius + self.length):
-            remedy = "puts the pinned centre of mass on the axis, which is fixed anyway; give a finite payload.mass"
-            raise ParameterError(key="payload.offset", value=self.payload.offset, remedy=remedy)
+            raise ParameterError(
+                key="payload.offset",
+                value=self.payload.offset,
+                remedy="puts the pinned centre of mass on the axis, which is fixed anyway; give a finite payload.mass",
+            )
 
     @property
     def links(self) -> tuple[Link, ...]:
@@ -172,7 +187,7 @@ class Arm:
 
     @property
     def is_locked(self) -> bool:
-        """Whether the hub angle is the input instead of a torque: I_h = inf, or `input` says so."""
+        """Whether the hub angle is the input instead of a torque: I_h = inf, or by `input`."""
         return math.isinf(self.hub.inertia) or self.input == "hub_angle"
 
     @property
@@ -321,8 +336,11 @@ class Arm:
                 arm = replace(arm, link=replace(arm.link, damping=value), outer=others)
                 continue
             if room == "link" and arm.outer:
-                remedy = f"ambiguous, as there are {len(arm.links)} segments: change their [[link]] tables"
-                raise ParameterError(key=name, value=value, remedy=remedy)
+                raise ParameterError(
+                    key=name,
+                    value=value,
+                    remedy=f"ambiguous, as there are {len(arm.links)} segments: change their [[link]] tables",
+                )
             if name == "hub_inertia" and value == math.inf:
                 idle = replace(arm.hub, friction=0.0, stiffness=0.0)
                 driven: Input = "hub_angle" if arm.input == "hub_angle" else "hub_torque"
@@ -380,8 +398,9 @@ def must_turn(arm: Arm) -> None:
         raise ParameterError(key=key, value=value, remedy="an arm that cannot turn has no slew; give finite inertias")
     for key, value in arm._springs_to_ground():
         if value > 0.0:
-            remedy = "an arm with a spring to ground has no slew; leave the spring out"
-            raise ParameterError(key=key, value=value, remedy=remedy)
+            raise ParameterError(
+                key=key, value=value, remedy="an arm with a spring to ground has no slew; leave the spring out"
+            )
 
 
 def _parts(key: str, parts: object, kind: type[_Part], most: int) -> tuple[_Part, ...]:

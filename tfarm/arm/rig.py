@@ -44,18 +44,27 @@ class Hub:
     stiffness: float = 0.0
 
     def __post_init__(self) -> None:
-        inertia = "a hub inertia is zero (free pin), positive in kg m^2, or inf (locked)"
-        check_fields(self, "hub", extended, {"inertia": inertia})
-        meanings = {
-            "friction": "a hub friction is zero or a positive, finite number in N m s/rad",
-            "radius": "a hub radius, from the axis to the clamp, is zero or a positive, finite number of metres",
-            "stiffness": "a spring from hub to ground is zero or positive, finite, in N m/rad (inertia = inf locks)",
-        }
-        check_fields(self, "hub", not_negative, meanings)
+        check_fields(
+            self,
+            "hub",
+            extended,
+            inertia="a hub inertia is zero (free pin), positive in kg m^2, or inf (locked)",
+        )
+        check_fields(
+            self,
+            "hub",
+            not_negative,
+            friction="a hub friction is zero or a positive, finite number in N m s/rad",
+            radius="a hub radius, from the axis to the clamp, is zero or a positive, finite number of metres",
+            stiffness="a spring from hub to ground is zero or positive, finite, in N m/rad (inertia = inf locks)",
+        )
         for name in ("friction", "stiffness"):
             if math.isinf(self.inertia) and getattr(self, name) > 0.0:
-                remedy = f"no effect, as inertia = inf locks the hub; leave out the {name}, or give a finite inertia"
-                raise ParameterError(key=f"hub.{name}", value=getattr(self, name), remedy=remedy)
+                raise ParameterError(
+                    key=f"hub.{name}",
+                    value=getattr(self, name),
+                    remedy=f"no effect, as inertia = inf locks the hub; leave out the {name}, or give a finite inertia",
+                )
 
     def __repr__(self) -> str:
         return brief_repr(self, always=1)
@@ -70,14 +79,21 @@ class RotarySpring:
 
     def __post_init__(self) -> None:
         meaning = "the stiffness of a clamp or joint is positive in N m/rad, or inf (rigid)"
-        check_fields(self, "spring", extended, {"stiffness": meaning})
+        check_fields(self, "spring", extended, stiffness=meaning)
         if self.stiffness == 0.0:
             raise ParameterError(key="spring.stiffness", value=self.stiffness, remedy=meaning)
-        damping = "damping c is zero or a positive time in seconds, as in k (1 + c s)"
-        check_fields(self, "spring", not_negative, {"damping": damping})
+        check_fields(
+            self,
+            "spring",
+            not_negative,
+            damping="damping c is zero or a positive time in seconds, as in k (1 + c s)",
+        )
         if self.damping > 0.0 and self.is_rigid:
-            remedy = "a rigid spring has no damping: give a finite stiffness in N m/rad, or leave the damping out"
-            raise ParameterError(key="spring.damping", value=self.damping, remedy=remedy)
+            raise ParameterError(
+                key="spring.damping",
+                value=self.damping,
+                remedy="a rigid spring has no damping: give a finite stiffness in N m/rad, or leave the damping out",
+            )
 
     @property
     def is_rigid(self) -> bool:
@@ -110,20 +126,23 @@ class Motor:
             "gear_ratio": "a gear ratio, motor turns per hub turn, is a positive, finite number",
             "gear_efficiency": "an efficiency is above 0, up to 1 (75 % is entered as 0.75)",
         }
-        check_fields(self, "motor", positive, meanings)
+        check_fields(self, "motor", positive, **meanings)
         if self.gear_efficiency > 1.0:
-            remedy = meanings["gear_efficiency"]
-            raise ParameterError(key="motor.gear_efficiency", value=self.gear_efficiency, remedy=remedy)
+            raise ParameterError(
+                key="motor.gear_efficiency", value=self.gear_efficiency, remedy=meanings["gear_efficiency"]
+            )
         given: object = self.back_emf_constant
         if given is None:
             object.__setattr__(self, "back_emf_constant", self.torque_constant)
-        others = {
-            "back_emf_constant": "a back-EMF constant is zero or a positive, finite number in V s/rad",
-            "inductance": "an inductance is zero or a positive, finite number of henries",
-            "rotor_inertia": "a rotor inertia is zero or a positive, finite number in kg m^2, before the gear",
-            "rotor_friction": "a rotor friction is zero or a positive, finite number in N m s/rad, before the gear",
-        }
-        check_fields(self, "motor", not_negative, others)
+        check_fields(
+            self,
+            "motor",
+            not_negative,
+            back_emf_constant="a back-EMF constant is zero or a positive, finite number in V s/rad",
+            inductance="an inductance is zero or a positive, finite number of henries",
+            rotor_inertia="a rotor inertia is zero or a positive, finite number in kg m^2, before the gear",
+            rotor_friction="a rotor friction is zero or a positive, finite number in N m s/rad, before the gear",
+        )
 
     @property
     def reflected_inertia(self) -> float:
@@ -145,17 +164,22 @@ class Attachment:
     rotational_stiffness: float = 0.0
 
     def __post_init__(self) -> None:
-        meanings = {
-            "x": "an attachment's place is zero or a positive number of metres from the clamp, up to the tip",
-            "mass": "an attached mass is zero or a positive, finite number in kg",
-            "inertia": "an attached inertia is zero or a positive, finite number in kg m^2",
-            "stiffness": "an attached spring to ground is zero or positive, finite, in N/m",
-            "rotational_stiffness": "an attached rotary spring to ground is zero or positive, finite, in N m/rad",
-        }
-        check_fields(self, "attachment", not_negative, meanings)
+        check_fields(
+            self,
+            "attachment",
+            not_negative,
+            x="an attachment's place is zero or a positive number of metres from the clamp, up to the tip",
+            mass="an attached mass is zero or a positive, finite number in kg",
+            inertia="an attached inertia is zero or a positive, finite number in kg m^2",
+            stiffness="an attached spring to ground is zero or positive, finite, in N/m",
+            rotational_stiffness="an attached rotary spring to ground is zero or positive, finite, in N m/rad",
+        )
         if not (self.mass or self.inertia or self.is_held):
-            remedy = "an empty attachment: give a mass, an inertia, a stiffness or a rotational_stiffness"
-            raise ParameterError(key="attachment.x", value=self.x, remedy=remedy)
+            raise ParameterError(
+                key="attachment.x",
+                value=self.x,
+                remedy="an empty attachment: give a mass, an inertia, a stiffness or a rotational_stiffness",
+            )
 
     @property
     def is_held(self) -> bool:
@@ -174,8 +198,12 @@ class Gauge:
     side: Literal["outer", "inner"] = "outer"
 
     def __post_init__(self) -> None:
-        meaning = "a gauge's place is zero or a positive number of metres from the clamp"
-        check_fields(self, "gauge", not_negative, {"x": meaning})
+        check_fields(
+            self,
+            "gauge",
+            not_negative,
+            x="a gauge's place is zero or a positive number of metres from the clamp",
+        )
         if self.side not in ("outer", "inner"):
             raise ParameterError(key="gauge.side", value=self.side, remedy='"outer" or "inner"')
 
@@ -192,13 +220,19 @@ class Payload:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        meanings = {
-            "mass": "a payload mass is zero, positive in kg, or inf (tip pinned)",
-            "inertia": "a payload inertia is zero, positive in kg m^2, or inf (tip cannot rotate)",
-        }
-        check_fields(self, "payload", extended, meanings)
-        offset = "a payload's offset is a finite number of metres beyond the tip, negative before it"
-        check_fields(self, "payload", signed, {"offset": offset})
+        check_fields(
+            self,
+            "payload",
+            extended,
+            mass="a payload mass is zero, positive in kg, or inf (tip pinned)",
+            inertia="a payload inertia is zero, positive in kg m^2, or inf (tip cannot rotate)",
+        )
+        check_fields(
+            self,
+            "payload",
+            signed,
+            offset="a payload's offset is a finite number of metres beyond the tip, negative before it",
+        )
 
     def __repr__(self) -> str:
         return brief_repr(self, always=2)

@@ -126,11 +126,15 @@ class LinkTable(TomlTable):
     def build(self) -> Link:
         given = {**self.given(), "section": self.section.build()}
         if self.shear_modulus is None and self.poissons_ratio is None:
-            remedy = "give it in Pa, or give poissons_ratio"
-            raise ParameterError(key="link.shear_modulus", value=MISSING, remedy=remedy)
+            raise ParameterError(
+                key="link.shear_modulus", value=MISSING, remedy="give it in Pa, or give poissons_ratio"
+            )
         if self.shear_modulus is not None and self.poissons_ratio is not None:
-            remedy = "shear_modulus is given too, and one follows from the other; leave one out"
-            raise ParameterError(key="link.poissons_ratio", value=self.poissons_ratio, remedy=remedy)
+            raise ParameterError(
+                key="link.poissons_ratio",
+                value=self.poissons_ratio,
+                remedy="shear_modulus is given too, and one follows from the other; leave one out",
+            )
         return Link(**given) if self.poissons_ratio is None else Link.isotropic(**given)
 
 

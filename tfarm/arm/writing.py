@@ -118,8 +118,11 @@ def _signal(part: Part) -> Iterable[str]:
     """Yield the lines of the table of one signal; a name with a place is quoted."""
     block, name = part.block, part.signals[0]
     if not isinstance(block, Rational) or len(part.signals) > 1:
-        remedy = "save a state space as a .mat file: scipy.io.savemat(file, {'A': ..}), matrices = file in [law]"
-        raise ParameterError(key="law", value=name, remedy=remedy)
+        raise ParameterError(
+            key="law",
+            value=name,
+            remedy="save a state space as a .mat file: scipy.io.savemat(file, {'A': ..}), matrices = file in [law]",
+        )
     yield f"[law.{json.dumps(name) if '@' in name else name}]"
     if len(block.num) == len(block.den) == 1 and block.den[0] == 1.0:
         yield f"gain = {block.num[0]!r}"

@@ -384,7 +384,7 @@ def _names(pairs: list[tuple[Arm, AnyLaw]]) -> tuple[str, ...]:
 
 def _called(law: Law) -> str:
     gains = law.gains
-    return law.name if gains is None else ", ".join(gains.told(name, "{:.4g}".format) for name in PLANE)
+    return law.name if gains is None else ", ".join(gains.gain_text(name, "{:.4g}".format) for name in PLANE)
 
 
 def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_sampled: bool) -> ComparedSide:

@@ -1,5 +1,5 @@
-"""The exact solution of the arm at one s, or at many: three ways, one truth.
+"""The exact solution of the arm at one s, or at many, by three methods.
 
-`appendix` is the paper's own determinant in mpmath, `sweep` the solution of a chain of segments in float64, `balls` the
-same with error bounds.  They share the arm's dimensionless numbers (`system`) and the algebra (`waves`, `compound`).
+`appendix` is the paper's determinant in mpmath, `sweep` the solution of a chain of segments in float64, `balls` the
+same with error bounds.  The last two share the dimensionless numbers (`system`) and the algebra (`waves`).
 """

@@ -1,11 +1,11 @@
-"""The paper's appendix as it stands, letter by letter, with mpmath at any number of digits.
+"""The paper's appendix, letter by letter, with mpmath at any number of digits.
 
-Advances in Acoustics and Vibration, 2012, article 852780, appendix: (A.1), (A.2), the a_ij and Cramer's rule.
-It is slow and heeds no cancellation: it is what the fast roads are measured against.  Three slips of the
-print are mended: the inner square root of (A.2), the signs of k3 and k4 in Y (A.1), and the unit of C (s).
+Advances in Acoustics and Vibration, 2012, article 852780, appendix: (A.1), (A.2), the a_ij and Cramer's rule.  It is
+slow, without measures against cancellation, and the reference of the fast methods.  Three misprints are corrected: the
+inner square root of (A.2), the signs of k3 and k4 in Y (A.1), and the unit of C (s).
 
-The arm's float64 parameters are taken as exact numbers.  Every public function doubles its working precision
-until two evaluations agree in the digits asked for, and gives the better one.
+The arm's float64 parameters are exact numbers.  Every public function doubles its working precision until two
+evaluations agree to the required digits, and returns the better one.
 """
 
 from __future__ import annotations
@@ -26,16 +26,15 @@ from .outputs import Output, output
 
 Number = Any  # mpmath.mpf or mpmath.mpc, which come without types
 
-FEWEST_DIGITS = 15  # two noises never agree in as many
+FEWEST_DIGITS = 15  # of agreement, beyond coincidence
 MOST_DIGITS = 10_000  # of working precision
 
 
 class Appendix:
-    """The appendix at one s, at the working precision it is used in; the torque U is one.
+    """The appendix at one s, at the working precision, with the torque U = 1.
 
-    With lambda_3 = -lambda_1 and lambda_4 = -lambda_2 the four columns of a_ij, printed one by one in the
-    paper, are one formula.  A row with an infinite inertia is divided by it: motion = 0 at the tip, and
-    Psi(0) = U at a locked hub, which is so driven by its angle.
+    With lambda_3 = -lambda_1 and lambda_4 = -lambda_2 the four columns of a_ij are one formula.  A row with an infinite
+    inertia is divided by it: motion = 0 at the tip, and Psi(0) = U at a locked hub, the hub angle being its input.
     """
 
     def __init__(self, arm: Arm, s: Number) -> None:
@@ -52,7 +51,7 @@ class Appendix:
         self.waves = tuple(zip(self.lambdas, self.gammas, strict=True))
 
     def wave_numbers(self, Ed: Number) -> tuple[Number, Number]:
-        """lambda_1 and lambda_2 of (A.2), with its inner square root; Ed = E (1 + C s)."""
+        """Return lambda_1 and lambda_2 of (A.2), with its inner square root; Ed = E (1 + C s)."""
         rho, A, s, kG, EI = self.rho, self.A, self.s, self.kappa_G, self.EI * self.damper
         outer = (1 / Ed + 1 / kG) * rho * s**2
         inner = mpmath.sqrt((1 / Ed - 1 / kG) ** 2 * rho**2 * s**4 - 4 * rho * A * s**2 / EI)
@@ -77,7 +76,7 @@ class Appendix:
         return _determinant(self.a)
 
     def Delta_k(self, i: int) -> Number:
-        """Delta with (0, 0, 0, U) for its column i."""
+        """Return Delta with (0, 0, 0, U) for its column i."""
         a = [row.copy() for row in self.a]
         for row, right_side in zip(a, (0, 0, 0, 1), strict=True):
             row[i - 1] = mpf(right_side)
@@ -94,20 +93,20 @@ class Appendix:
         return self.sum(self.gammas, mpf(0))
 
     def Y(self, x: Number) -> Number:
-        """Deflection (A.1), with + before k_3 and k_4."""
+        """Return the deflection (A.1), with + before k_3 and k_4."""
         return self.sum([mpf(1)] * 4, x) - x * self.Theta
 
     def Phi(self, x: Number) -> Number:
-        """Rotation (A.1)."""
+        """Return the rotation (A.1)."""
         return self.sum(self.gammas, x) - self.Theta
 
     def sum(self, weights: Any, x: Number) -> Number:
-        """sum over j of weight_j k_j e^{lambda_j x}."""
+        """Return the sum over j of weight_j k_j e^{lambda_j x}."""
         terms = zip(weights, self.k, self.lambdas, strict=True)
         return mpmath.fsum(weight * k * mpmath.exp(l * x) for weight, k, l in terms)
 
     def value(self, wanted: Output, x: Number) -> Number:
-        """The output's quantity at x [m]; M = E I (1 + C s) Phi' and Q = kappa G A (Y' - Phi) wave by wave."""
+        """Return the output's quantity at x [m]; M = E I (1 + C s) Phi', Q = kappa G A (Y' - Phi)."""
         EI = self.EI if wanted.gauge else self.EI * self.damper
         fields: dict[str, Callable[[], Number]] = {
             "theta": lambda: self.Theta,
@@ -121,28 +120,27 @@ class Appendix:
 
 
 def determinant(arm: Arm, s: complex, digits: int) -> Number:
-    """The paper's Delta at s [1/s], right to `digits`; ConvergenceError at s = 0 and at the cut-off."""
+    """Return the paper's Delta at s [1/s] to `digits`.  Raises ConvergenceError at s = 0 and at the cut-off."""
     try:
-        return _proven(lambda: [Appendix(arm, mpc(s)).Delta], digits, f"Delta at s = {s}")[0]
+        return _agreed(lambda: [Appendix(arm, mpc(s)).Delta], digits, f"Delta at s = {s}")[0]
     except ZeroDivisionError:
         raise ConvergenceError(f"Delta has no value at s = {s}, where a wave number is zero", None, None) from None
 
 
-def response(arm: Arm, asked: str | Output, s: complex, digits: int, x: float | None = None) -> Number:
-    """An output per unit torque (per unit hub angle where the hub is locked) at s [1/s], right to `digits`.
+def response(arm: Arm, name: str | Output, s: complex, digits: int, x: float | None = None) -> Number:
+    """Return an output for unit torque (for unit hub angle of a locked hub) at s [1/s] to `digits`.
 
-    Real and imaginary part have as many right digits each; x [m] is for the outputs along the arm.  Where two
-    of the four waves coincide the appendix is 0/0: s is moved aside, by ever less as the precision grows.
+    Real and imaginary part have that many right digits each; x [m] is for the outputs along the arm.  Where two of the
+    four waves coincide the appendix is 0/0: s is changed by a share that falls with the precision.
     Raises ConvergenceError at a pole, ParameterError for an unknown output or an x outside the arm.
     """
-    wanted = output(asked)
+    wanted = output(name)
     place = {"root": 0.0, "tip": arm.link.length, "x": x}[wanted.place]
     if place is None or not 0.0 <= place <= arm.link.length:
-        remedy = f"a point of the arm lies between 0 and {arm.link.length} m"
-        raise ParameterError(key="x", value=x, remedy=remedy)
-    held = {"W": math.isinf(arm.payload.mass), "Q": arm.payload.mass == 0, "M": arm.payload.inertia == 0}
-    at_tip = place == arm.link.length and held.get(wanted.quantity, False)
-    if at_tip or (place == 0 and wanted.quantity in ("Y", "Phi")):  # by an end condition: no digits would ever agree
+        raise ParameterError(key="x", value=x, remedy=f"a point of the arm lies between 0 and {arm.link.length} m")
+    zero = {"W": math.isinf(arm.payload.mass), "Q": arm.payload.mass == 0, "M": arm.payload.inertia == 0}
+    at_tip = place == arm.link.length and zero.get(wanted.quantity, False)
+    if at_tip or (place == 0 and wanted.quantity in ("Y", "Phi")):  # by an end condition: no digits would agree
         return mpf(0)
     is_real = _is_real(arm, wanted, s, place)
 
@@ -156,54 +154,50 @@ def response(arm: Arm, asked: str | Output, s: complex, digits: int, x: float | 
         value = value if is_real else value * at**wanted.power
         return [value.real] if is_real else [value.real, value.imag]
 
-    found = _proven(parts, digits, f"{wanted.name} at s = {s}")
+    found = _agreed(parts, digits, f"{wanted.name} at s = {s}")
     with mpmath.workdps(2 * digits + FEWEST_DIGITS):
         return found[0] * mpc(s) ** wanted.power if is_real else mpc(*found)
 
 
-def roots_near(arm: Arm, omega: float | str | Number, digits: int) -> int:
-    """How many roots Delta(i w), undamped, has within 10^-digits omega of omega [rad/s]; two if it is double.
+def _smooth(arm: Arm, w: Number) -> Number:
+    """Return Delta lambda_1 lambda_2 at s = i w: for real w and C = 0 it is real, without a branch."""
+    at = Appendix(arm, mpc(0, 1) * w)
+    return at.Delta * at.lambdas[0] * at.lambdas[1]
 
-    Delta lambda_1 lambda_2 is real for real w and has no branch; the turns of its phase along a half circle
-    about omega count its roots inside.  omega may be a text or an mpmath number of any number of digits.
+
+def roots_near(arm: Arm, omega: float | str | Number, digits: int) -> int:
+    """Return the number of roots of Delta(i w), undamped, within 10^-digits omega of omega [rad/s]; 2 if double.
+
+    It is the change of phase of Delta lambda_1 lambda_2 along a half circle about omega, in half turns.  omega may be a
+    text or an mpmath number of any number of digits.
     """
     undamped = arm.having(damping=0.0)
     with mpmath.workdps(2 * digits + FEWEST_DIGITS):
         half_circle = [mpf(omega) * (1 + mpmath.expjpi(mpf(n) / 8) / mpf(10) ** digits) for n in range(9)]
-
-    def smooth(w: Number) -> list[Number]:
-        at = Appendix(undamped, mpc(0, 1) * w)
-        return [at.Delta * at.lambdas[0] * at.lambdas[1]]
-
-    values = [_proven(lambda w=w: smooth(w), FEWEST_DIGITS, f"Delta at {w}")[0] for w in half_circle]  # type: ignore[misc]
+    values = [_agreed(lambda w=w: [_smooth(undamped, w)], FEWEST_DIGITS, f"Delta at {w}")[0] for w in half_circle]  # type: ignore[misc]
     turns = [float(mpmath.arg(after / before)) for before, after in pairwise(values)]
     return round(sum(turns) / math.pi)
 
 
 def natural_frequency(arm: Arm, near: float, digits: int) -> Number:
-    """The root w [rad/s] of Delta(i w), undamped, next to `near`, right to `digits`.
+    """Return the root w [rad/s] of Delta(i w), undamped, next to `near`, to `digits`, by the secant method.
 
-    By the secant method on Delta lambda_1 lambda_2, which is real for real w and has no branch.  Raises
-    ConvergenceError where two precisions do not agree: at a double frequency.
+    Raises ConvergenceError where two precisions do not agree: at a double frequency.
     """
     undamped = arm.having(damping=0.0)
 
-    def smooth(w: Number) -> Number:
-        at = Appendix(undamped, mpc(0, 1) * w)
-        return (at.Delta * at.lambdas[0] * at.lambdas[1]).real
-
     def root() -> list[Number]:
-        start = mpf(near)
+        ends = mpf(near), mpf(near) * (1 + mpf(10) ** -8)
         try:
-            return [mpmath.findroot(smooth, (start, start * (1 + mpf(10) ** -8)), solver="secant", tol=0, verify=False)]
+            return [mpmath.findroot(lambda w: _smooth(undamped, w).real, ends, solver="secant", tol=0, verify=False)]
         except ZeroDivisionError:  # both ends are the root, to the last digit
-            return [start]
+            return [ends[0]]
 
-    return _proven(root, digits, f"the root of Delta near {near} rad/s")[0]
+    return _agreed(root, digits, f"the root of Delta near {near} rad/s")[0]
 
 
-def _proven(evaluate: Callable[[], list[Number]], digits: int, what: str) -> list[Number]:
-    """What evaluate() gives at a working precision doubled until two results agree, each number in its digits."""
+def _agreed(evaluate: Callable[[], list[Number]], digits: int, what: str) -> list[Number]:
+    """Return evaluate() at a working precision doubled until two results agree, each number to its digits."""
     digits = max(digits, FEWEST_DIGITS)
     work, last, misses = digits + FEWEST_DIGITS, [mpf(0)], [mpf(0)]
     while work < MOST_DIGITS + 4 * digits:
@@ -217,7 +211,7 @@ def _proven(evaluate: Callable[[], list[Number]], digits: int, what: str) -> lis
 
 
 def _determinant(a: list[list[Number]]) -> Number:
-    """Laplace's expansion in 2x2 minors: mpmath's own calls a badly scaled matrix singular."""
+    """Return a determinant by Laplace's expansion in 2x2 minors, as mpmath's fails for a badly scaled matrix."""
     pairs = list(combinations(range(4), 2))
     upper, lower = ([row[i] * next_[j] - row[j] * next_[i] for i, j in pairs] for row, next_ in (a[:2], a[2:]))
     return sum(sign * m * n for sign, m, n in zip((1, -1, 1, 1, -1, 1), upper, reversed(lower), strict=True))
@@ -228,7 +222,7 @@ def _is_real(arm: Arm, wanted: Output, s: complex, x: float) -> bool:
     if s.imag == 0 or (s.real == 0 and arm.link.damping == 0):
         return True
     if arm.is_locked:
-        held = {"Y": math.isinf(arm.payload.mass), "Phi": math.isinf(arm.payload.inertia)}
-        return wanted.quantity == "theta" or (x == arm.link.length and held.get(wanted.quantity, False))
-    feels_no_damping = not wanted.gauge or arm.link.damping == 0
-    return arm.hub.inertia == 0 and wanted.quantity == "M" and x == 0 and feels_no_damping
+        fixed = {"Y": math.isinf(arm.payload.mass), "Phi": math.isinf(arm.payload.inertia)}
+        return wanted.quantity == "theta" or (x == arm.link.length and fixed.get(wanted.quantity, False))
+    is_undamped = not wanted.gauge or arm.link.damping == 0
+    return arm.hub.inertia == 0 and wanted.quantity == "M" and x == 0 and is_undamped

@@ -1,9 +1,9 @@
-"""The exact solution in ball arithmetic (python-flint): every number comes with a bound on its error.
+"""The exact solution in ball arithmetic (python-flint): every number has a bound on its error.
 
-No wave is ever separated here.  With z1 + z2 and z1 z2 from the dispersion relation, the functions F0..F3 of `waves`
-are the last column of the exponential of a 4x4 companion matrix, entire in s^2/(1 + C s): there is no cut-off, no pair
-of equal waves and no low frequency where this form loses its meaning, only digits, and then the precision is raised
-until the digits asked for are proven.  The sweeps are those of `sweep`, with the error of every number enclosed.
+With z1 + z2 and z1 z2 from the dispersion relation, the functions F0..F3 of `waves` are the last column of the
+exponential of a 4x4 companion matrix.  They are entire in s^2/(1 + C s), without separate waves: the cut-off, equal
+waves and low frequencies cost digits alone, and the precision is raised until the required digits are certified.  The
+sweeps are those of `sweep`, with the error of every number enclosed.
 """
 
 from __future__ import annotations
@@ -35,18 +35,10 @@ from .waves import (
     transition_rows,
 )
 
-_end_plane, _inside_offset, _inside_spring = python_of(end_plane), python_of(inside_offset), python_of(inside_spring)
-_inside_body, _across_rows, _transition_rows = (
-    python_of(inside_body),
-    python_of(across_rows),
-    python_of(transition_rows),
+_end_plane, _inside_offset, _inside_spring, _inside_body, _beyond_offset, _beyond_spring, _beyond_body = map(
+    python_of, (end_plane, inside_offset, inside_spring, inside_body, beyond_offset, beyond_spring, beyond_body)
 )
-_beyond_offset, _beyond_spring, _beyond_body = (
-    python_of(beyond_offset),
-    python_of(beyond_spring),
-    python_of(beyond_body),
-)
-_row_across, _met = python_of(row_across), python_of(met)
+_across_rows, _transition_rows, _row_across, _met = map(python_of, (across_rows, transition_rows, row_across, met))
 Ball = Any  # flint.acb or flint.arb, which come without types
 
 
@@ -54,22 +46,22 @@ precision = flint.ctx.workprec  # flint's working precision [bits], inside a `wi
 
 
 def rational(value: Fraction | float) -> Ball:
-    """The ball of a fraction or float, at the working precision."""
+    """Return the ball of a fraction or float, at the working precision."""
     return flint.arb(flint.fmpq(*value.as_integer_ratio()))
 
 
 def point(s: complex) -> Ball:
-    """The exact ball of a complex float."""
+    """Return the exact ball of a complex float."""
     return flint.acb(flint.arb(s.real), flint.arb(s.imag))
 
 
 def root(z: Ball) -> Ball:
-    """A square root whose branch cut lies away from the ball; which of the two is nothing to even functions."""
+    """Return a square root with its branch cut away from the ball, of either sign, for even functions."""
     return z.sqrt() if z.real.mid() >= 0 else (-z).sqrt() * flint.acb(0, 1)
 
 
 def transition(z_sum: Ball, z_product: Ball) -> tuple[Ball, Ball, Ball, Ball]:
-    """F0..F3, by the two waves where they differ and by the matrix exponential where they may not.
+    """Return F0..F3, by the two waves where they certainly differ, else by the matrix exponential.
 
     That is of F'''' = (z1 + z2) F'' - z1 z2 F as a first-order system, with F'''(0) = 1.
     """
@@ -87,12 +79,18 @@ def transition(z_sum: Ball, z_product: Ball) -> tuple[Ball, Ball, Ball, Ball]:
 
 
 def nearest_float(ball: Ball) -> complex:
-    """The complex float at the middle of a ball."""
+    """Return the complex float at the middle of a ball."""
     return complex(float(ball.real.mid()), float(ball.imag.mid()))
 
 
+def exact_middle(ball: Ball) -> Any:
+    """Return the middle of a real ball as a rational number (`flint.fmpq`)."""
+    whole, power = ball.mid().man_exp()
+    return flint.fmpq(whole) * flint.fmpq(2) ** int(power)
+
+
 def summed(z_sum: Any, z_product: Any, count: int) -> list[Any]:
-    """F0..F3 at a segment's end by so many terms of their series in z1 + z2 and z1 z2, series of flint."""
+    """Return F0..F3 at a segment's end by `count` terms of their series in z1 + z2 and z1 z2, series of flint."""
     h, before, sums = 0 * z_sum + 1, 0 * z_sum, [0 * z_sum] * 4
     factorial = Fraction(1)
     for n in range(count):
@@ -122,20 +120,20 @@ class Sweep:
         self.theta, self.M, self.Q = p[:3]
 
     def numbers_of(self, layout: Layout) -> Numbers:
-        """The layout's numbers as those that s can be multiplied by."""
+        """Return the layout's numbers in the arithmetic of s."""
         return layout.numbers(flint.ctx.prec, rational)
 
     def exact(self, number: Any) -> Any:
-        """An exact number of an output as one that s can be multiplied by."""
+        """Return an exact number in the arithmetic of s."""
         return rational(number)
 
     @cached_property
     def input(self) -> Any:
-        """What the input must be for this response: zero at a pole."""
+        """The input of this response: zero at a pole."""
         return self.drive_of(self.theta, self.M)
 
     def drive_of(self, theta: Any, M: Any) -> Any:
-        """The input behind a response with that hub angle and moment on the hub."""
+        """Return the input of a response with that hub angle and moment on the hub."""
         s, (A0, A1, A2, A3), (B0, B1) = self.s, self.numbers.of_angle, self.numbers.of_moment
         return (((s * A3 + A2) * s + A1) * s + A0) * theta - (s * B1 + B0) * M
 
@@ -155,9 +153,9 @@ class Sweep:
         return found
 
     def output(self, one: Reading) -> Any:
-        """An output of this response, in SI units."""
+        """Return an output of this response, in SI units."""
         value, exact = self.theta * self.exact(one.theta), self.exact
-        if one.is_current:  # what is left of the input after back-EMF turns the hub
+        if one.is_current:  # the input less back-EMF, through the lag
             drive = self.layout.chain.drive
             value = (self.input - self.s * exact(drive.back_emf) * value) / (self.s * exact(drive.lag) + 1)
         if one.place is not None:
@@ -209,7 +207,7 @@ class Sweep:
         return self._rows[id(segment)]
 
     def _functions(self, z_sum: Any, z_product: Any) -> tuple[Any, ...]:
-        """F0..F3 at the segment's end."""
+        """Return F0..F3 at the segment's end."""
         return transition(z_sum, z_product)
 
     def _spring(self, spring: Any) -> tuple[Any, Any]:
@@ -221,42 +219,42 @@ class Sweep:
 
 
 def into_own(p: Plane, w: Any, m: Any, q: Any) -> Plane:
-    """A plane in a segment's own units, which W, M and Q are multiplied by for it (`Segment.units`)."""
+    """Return a plane in a segment's own units, the factors of W, M and Q (`Segment.units`)."""
     return p[0] * w, p[1] * (w * m), p[2] * m, p[3] * q, p[4] * (m * q)
 
 
 def out_of_own(p: Sequence[Any], w: Any, m: Any, q: Any) -> Plane:
-    """The plane in the chain's units again."""
+    """Return the plane in the units of the chain."""
     return p[0] / w, p[1] / (w * m), p[2] / m, p[3] / q, p[4] / (m * q)
 
 
 class State:
-    """The free response of a system at one s in balls, to read outputs of."""
+    """The free response of a system at one s in balls, and its outputs."""
 
     def __init__(self, system: System, s: Any) -> None:
         self.system, self.s = system, s
 
     @cached_property
     def input(self) -> Any:
-        """What the input must be for this response: zero at a pole."""
+        """The input of this response: zero at a pole."""
         return Sweep(readings(self.system, (), 0.0).layout, self.s).input
 
     def numerator(self, output: Output, x: float = 0.0) -> Any:
-        """The output of the free response, in SI units."""
+        """Return the output of the free response, in SI units."""
         those = readings(self.system, (output,), x)
         return Sweep(those.layout, self.s).output(those.each[0])
 
     def value(self, output: Output, x: float = 0.0) -> Ball:
-        """The output for a unit input, in SI units; x is a share of the length."""
+        """Return the output for a unit input, in SI units; x is a share of the length."""
         constant, drive = constant_of(self.system, output, x), self.system.drive
         those = readings(self.system, (output,), x)
         (one,) = those.each
-        if one.is_current and not (drive.back_emf or drive.lag):  # the input itself, but for its unit
+        if one.is_current and not (drive.back_emf or drive.lag):  # the input in another unit
             constant = 1
         if constant is None:
             return self.numerator(output, x) / self.input
         return self.s**one.power * constant * rational(one.unit) / (1 + rational(those.gauges[0]) * self.s)
 
     def determines(self, output: Output, x: float) -> bool:
-        """Whether the output has a value here: everywhere but where the input may be zero, at a pole."""
+        """Whether the output has a value: where the input is certainly not zero, as at a pole."""
         return constant_of(self.system, output, x) is not None or not self.input.contains(0)

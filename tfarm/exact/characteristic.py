@@ -1,24 +1,23 @@
 """The characteristic function of the arm and of its closed loop: entire at C = 0, analytic but for s = -1/C.
 
-The free response needs an input at the hub, the *drive*; a law asks for another, minus the sum of its gains times the
-outputs that they multiply of that response, the *numerators*, and an eigenvalue is where both agree:
+The free response has an input at the hub, the *drive*.  The law has another one, minus the sum of its gains times their
+outputs, the *numerators*.  At an eigenvalue the two are equal:
 
     D(s) = drive + gains . numerators,     numerators = theta, s theta, M(0)/(1 + C s)
 
-(the gauge at the root reads the moment without its damping part), so feedback changes one row of the paper's matrix,
-and closed-loop poles are zeros of a function as exact as the arm's own.
+(the gauge at the root measures the moment without its damping part).  So feedback changes one row of the paper's
+matrix, and closed-loop poles are zeros of a function as exact as that of the arm.
 
-The characteristic function D over a whole piece of a contour: balls as wide as a step, and still narrow values.
-
-Evaluated on a wide ball an expression forgets that its parts move together.  By Taylor's theorem
+The characteristic function D over a piece of a contour.  On a wide ball an expression loses the dependence between its
+parts.  By Taylor's theorem
 
     D(s) = D(m) + D'(m) (s - m) + ... + D^(n)(.) (s - m)^n / n!
 
-where only the last term is taken over the wide ball, so that a step may be long.
+with only the last term over the wide ball, so that a step may be long.
 
-A fast segment is crossed by its two waves, kept apart and scaled by e^{-t}: in the form of `balls.Sweep` a wide s would
-lose what products of a wave with itself lose by cancelling, at any precision.  A slow one is crossed by the power
-series of its transition functions, whose tail is bounded.  Where two waves may be one, the form of `balls` is taken.
+For a fast segment the two waves are separate and scaled by e^{-t}: in the form of `balls.Sweep` products of a wave with
+itself would cancel over a wide s, at any precision.  For a slow one the power series of its transition functions are
+used, with a bounded tail.  Where two waves may be one, the form of `balls` is used.
 """
 
 from __future__ import annotations
@@ -35,7 +34,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import GAINS, Law
-from tfarm.arm.blocks import LawBlock, Rational
 from tfarm.arrays import Complex, Real
 from tfarm.records import read_only
 
@@ -43,13 +41,14 @@ from .balls import Ball, Sweep, into_own, out_of_own, point, rational, summed
 from .compiled import python_of
 from .layout import Layout, Readings, laid_out, readings
 from .outputs import OUTPUTS, Output, unit_scale
+from .rationals import polynomials
 from .system import Segment, System
 from .values import free_outputs, free_slopes
 from .waves import Plane, Row, across_waves
 
 FED = tuple(OUTPUTS[gain.output] for gain in GAINS)
 assert all(each.place != "x" for each in FED)  # a gain is on an output with a place of its own
-NEXT_TO_REST = 1e-60  # 1/s, for s = 0: there D over a power of s is its limit to the last digit, and no power is 0
+NEXT_TO_REST = 1e-60  # 1/s, for s = 0: there D over a power of s is at its limit, and no power is 0
 DIFFERENCE_STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
 
 
@@ -70,19 +69,19 @@ class LoopParts(NamedTuple):
 
 
 def characteristic(k: System, s: Complex, at_zero: int = 0) -> Analytic:
-    """D(s)/s^at_zero of a system without a law and its derivative at s (1-D, complex), in float64."""
+    """Return D(s)/s^at_zero of a system without a law and its derivative at s (1-D, complex), in float64."""
     s = off_rest(s) if at_zero else s
     here, slopes = free_slopes(k, [], s, 0.0)
     return deflated(here.drive, slopes.drive, here.scale, s, at_zero)
 
 
 def off_rest(s: Complex) -> Complex:
-    """s, and next to 0 for 0: where D is divided by a power of s."""
+    """Return s with 0 replaced by a tiny number, for a division by a power of s."""
     return np.where(s == 0, NEXT_TO_REST, s)
 
 
 def deflated(value: Complex, slope: Complex, scale: Complex, s: Complex, at_zero: int) -> Analytic:
-    """D/s^at_zero from D and its slope at s, which is not 0."""
+    """Return D/s^at_zero from D and its slope at s, which is not 0."""
     if at_zero:
         value = value / s**at_zero
         slope = slope / s**at_zero - at_zero * value / s
@@ -90,7 +89,7 @@ def deflated(value: Complex, slope: Complex, scale: Complex, s: Complex, at_zero
 
 
 def quick_characteristics(k: System, s: Complex, at_zero: int = 0) -> Analytic:
-    """`characteristic` with slopes from differences, right to about 1e-8: thirty times as fast for a hundred points."""
+    """Return `characteristic` with slopes from differences, to about 1e-8: thirty times faster for a hundred points."""
     s = off_rest(np.asarray(s, dtype=complex))
     h = difference_steps(k, s)
     at = np.array([s, s + h, s - h])
@@ -101,20 +100,20 @@ def quick_characteristics(k: System, s: Complex, at_zero: int = 0) -> Analytic:
 
 
 def float_units(k: System) -> Real:
-    """What a gain of one SI unit is without dimensions, as a column of doubles: SI outputs per numerator."""
+    """Return the SI value of each numerator of 1, as a column of doubles."""
     if "float units" not in k.kept:
         k.kept["float units"] = read_only(np.array([[float(unit_scale(output, k))] for output in FED]))
     return cast("Real", k.kept["float units"])
 
 
 def difference_steps(k: System, s: Complex) -> Real:
-    """h [1/s] for a slope at s from values at s +- h: a share of |s|, or of the way to a -1/C."""
+    """Return h [1/s] for a slope at s from values at s +- h: a share of |s|, or of the way to a -1/C."""
     near = np.min([np.ones(s.shape), *(abs(1.0 - s / each) for each in k.singular)], axis=0)
     return np.asarray(DIFFERENCE_STEP * np.maximum(abs(s) * near, 1e-300))
 
 
 def loop_parts(k: System, s: NDArray[Any]) -> LoopParts:
-    """Drive, numerators and scale at s: what gains make of them is linear, D = drive + gains . numerators."""
+    """Return drive, numerators and scale at s, with D = drive + gains . numerators."""
     free = free_outputs(k, FED, np.asarray(s, dtype=complex).ravel(), 0.0)
     numerators = free.outputs / float_units(k)
     return LoopParts(*(part.reshape(*part.shape[:-1], *s.shape) for part in (free.drive, numerators, free.scale)))
@@ -126,17 +125,17 @@ Series = Any  # flint.acb_series, which comes without types
 _across_waves = python_of(across_waves)
 
 LONG_WAVE = 0.3  # |z| below which a wave is not separated from the others
-TAYLOR_TERMS = 4  # of D over a piece of a contour, the last of them over the wide ball
-SLOW_WAVES = 6.0  # |z1| + |z2| below which a segment is crossed by power series
-WIDE_TERMS = 40  # of them at least: of arguments up to twice that the tail is below 1e-60; two a wave more
+TAYLOR_TERMS = 4  # of D over a piece of a contour, the last one over the wide ball
+SLOW_WAVES = 6.0  # |z1| + |z2| below which power series are used
+WIDE_TERMS = 40  # of them at least: up to twice that argument the tail is below 1e-60; two more for each wave
 
 
 class InseparableError(Exception):
-    """Two waves of a segment may be one over this ball, or a wave has no definite square root there."""
+    """Two waves of a segment may be one over this ball, or a square root is not definite."""
 
 
 class WideSweep(Sweep):
-    """The sweep at a Taylor series s; `phase` is the series of t1 + t2 of all segments that waves have crossed."""
+    """The sweep at a Taylor series s; `phase` is the series of t1 + t2 of all fast segments."""
 
     def __init__(self, layout: Any, s: Series, shortest: float) -> None:
         self._shortest, self.phase = shortest, 0 * s
@@ -174,20 +173,20 @@ class WideSweep(Sweep):
 
     @cached_property
     def states(self) -> dict[int, Row]:
-        """W, Psi, M and Q at each mark, in the scale of the plane at the axis; carried there at full size."""
+        """W, Psi, M and Q at each mark, in the scale of the plane at the axis."""
         shrunk, full = (-self.phase).exp(), super().states
         return {n: (W * shrunk, Psi * shrunk, M * shrunk, Q * shrunk) for n, (W, Psi, M, Q) in full.items()}
 
     def _functions(self, z_sum: Series, z_product: Series) -> tuple[Series, ...]:
-        """F0..F3 as truncated power series, the tail added as a ball to every coefficient.
+        """Return F0..F3 as truncated power series, with the tail as a ball in every coefficient.
 
-        In the sum of the sizes of the coefficients, h_k of `waves` is at most (k + 1) q^k with q = |z1 + z2| +
-        |z1 z2|^(1/2), and the terms left out below sum to less than twice the first of them.
+        The sum of the coefficients' magnitudes of h_k in `waves` is at most (k + 1) q^k with q = |z1 + z2| +
+        |z1 z2|^(1/2).  The omitted terms below sum to less than twice the first of them.
         """
         q = _size(z_sum) + _size(z_product).sqrt()
         count = WIDE_TERMS + 2 * math.isqrt(int(float(q)))
         tail = (count + 1) * q**count * rational(Fraction(2, math.factorial(2 * count)))
-        if not q < count**2:  # then each term is less than half of the one before
+        if not q < count**2:  # each term is less than half of the one before
             raise InseparableError
         ball = flint.acb(flint.arb(0, tail.upper()), flint.arb(0, tail.upper()))
         terms_kept = z_sum.prec
@@ -196,7 +195,7 @@ class WideSweep(Sweep):
 
 
 def _size(series: Series) -> Ball:
-    """The sum of the sizes of a series' coefficients."""
+    """Return the sum of the magnitudes of a series' coefficients."""
     total = flint.arb(0)
     for coefficient in series.coeffs():
         total += abs(coefficient)
@@ -213,12 +212,12 @@ class Feedback(NamedTuple):
 
 
 def characteristic_ball(k: System, s: Ball, law: Feedback | None = None) -> Ball:
-    """D(s) enclosed, at the working precision: for points, at any s."""
+    """Return D(s) enclosed, at the working precision: for points, at any s."""
     return _fed_back(Sweep(_layout(k, law), s), law)
 
 
 def characteristic_over(k: System, s: Ball, law: Feedback | None = None) -> Ball:
-    """D enclosed over the wide ball s, but for a factor that depends on its middle alone and is positive."""
+    """Return D enclosed over the wide ball s, up to a positive factor that depends on its middle alone."""
     middle, is_point = s.mid(), s.real.is_exact() and s.imag.is_exact()
     here = _by_waves(k, middle, law, None, LONG_WAVE, 1 if is_point else TAYLOR_TERMS - 1)
     if here is not None and is_point:
@@ -233,7 +232,7 @@ def characteristic_over(k: System, s: Ball, law: Feedback | None = None) -> Ball
 
 
 def tangent(k: System, m: Ball, r: Ball, law: Feedback | None = None) -> tuple[Ball, Ball, Ball] | None:
-    """D(m), D'(m) and D''/2 over the disc of radius r around m, apart from one factor; None where waves may be one."""
+    """Return D(m), D'(m) and D''/2 over the disc of radius r around m, up to a factor; None where waves may be one."""
     here = _by_waves(k, m, law, None, 0.0, 2)
     disc = flint.acb(flint.arb(m.real.mid(), r), flint.arb(m.imag.mid(), r))
     there = None if here is None else _by_waves(k, disc, law, here[1], 0.0, 3)
@@ -243,7 +242,7 @@ def tangent(k: System, m: Ball, r: Ball, law: Feedback | None = None) -> tuple[B
 def _by_waves(
     k: System, at: Ball, law: Feedback | None, scale: Ball | None, shortest: float, terms: int
 ) -> tuple[Series, Ball] | None:
-    """D e^{-scale} as a series of so many terms around `at`, and scale: t1 + t2 there if none is given.
+    """Return D e^{-scale} as a series of `terms` terms around `at`, and scale, by default t1 + t2 there.
 
     None where waves may be one.
     """
@@ -257,22 +256,27 @@ def _by_waves(
 
 
 def _layout(k: System, law: Feedback | None) -> Layout:
+    """Return the layout of a system with the signals of a law."""
     return readings(k, (), 0.0).layout if law is None else law.read.layout
 
 
 def _fed_back(sweep: Sweep, law: Feedback | None) -> Any:
-    """drive q + e^{-s tau} sum of p_i numerator_i of a sweep, for balls and for series."""
+    """Return drive q + e^{-s tau} sum of p_i numerator_i of a sweep, for balls and for series."""
     if law is None:
         return sweep.input
     s = sweep.s
-    parts = [_at(p, s) * sweep.output(one) for p, one in zip(law.entries, law.read.each, strict=True)]
-    value = sweep.input * _at(law.whole, s)
+    whole, *entries = (  # polynomials at s, by Horner's rule
+        reduce(lambda value, each: value * s + flint.arb(each), reversed(polynomial.coeffs()), 0 * s)
+        for polynomial in (law.whole, *law.entries)
+    )
+    parts = [p * sweep.output(one) for p, one in zip(entries, law.read.each, strict=True)]
+    value = sweep.input * whole
     return value + (s * rational(-law.delay)).exp() * reduce(add, parts) if parts else value
 
 
 def feedback(k: System, law: Law, outputs: Sequence[Output], shares: Sequence[float]) -> Feedback:
-    """What a law in s feeds back of these outputs, those of its signals, each read at a share of the length."""
-    blocks = [_exactly(part.block) for part in law.parts]
+    """Return a law in s of these outputs, those of its signals, each at a share of the length."""
+    blocks = [polynomials(part.block) for part in law.parts]
     entries = dict.fromkeys(law.signals, flint.fmpq_poly([0]))
     for n, (part, (nums, _)) in enumerate(zip(law.parts, blocks, strict=True)):
         others = _product(den for m, (_, den) in enumerate(blocks) if m != n) * -law.sign
@@ -284,40 +288,15 @@ def feedback(k: System, law: Law, outputs: Sequence[Output], shares: Sequence[fl
     return Feedback(read, _product(den for _, den in blocks), tuple(filter(None, entries.values())), law.delay)
 
 
-def _exactly(block: LawBlock) -> tuple[list[Polynomial], Polynomial]:
-    """Numerators of a block and its denominator; of matrices det(s - A + B_j C) + (D_j - 1) det(s - A) of each j."""
-    if isinstance(block, Rational):
-        num, den = (flint.fmpq_poly([_fraction(each) for each in reversed(row)]) for row in (block.num, block.den))
-        return [num], den
-    A, C = _matrix(block.A), _matrix(block.C)
-    whole, nums = A.charpoly(), []
-    for b, d in zip(block.B.T, block.D[0], strict=True):
-        nums.append((A - _matrix(b[:, None]) * C).charpoly() + (_fraction(d) - 1) * whole)
-    return nums, whole
-
-
-def _matrix(values: Real) -> Any:
-    rows, columns = values.shape
-    return flint.fmpq_mat(rows, columns, [_fraction(each) for each in values.ravel()])
-
-
-def _fraction(value: float) -> Any:
-    return flint.fmpq(*float(value).as_integer_ratio())
-
-
-def _product(polynomials: Iterable[Polynomial]) -> Polynomial:
-    return reduce(mul, polynomials, flint.fmpq_poly([1]))
-
-
-def _at(polynomial: Polynomial, s: Any) -> Any:
-    """A polynomial at s, by Horner's rule."""
-    return reduce(lambda value, each: value * s + flint.arb(each), reversed(polynomial.coeffs()), 0 * s)
+def _product(factors: Iterable[Polynomial]) -> Polynomial:
+    """Return the product of polynomials."""
+    return reduce(mul, factors, flint.fmpq_poly([1]))
 
 
 def _waves(
     a: Ball, b: Ball, g: Ball, S: Series, d: Series, shortest: float
 ) -> tuple[tuple[Series, ...], tuple[Series, ...]] | None:
-    """Both waves of a uniform piece (see `_wave`); None where they may be one, or one is too long."""
+    """Return both waves of a uniform piece (see `_wave`); None where they may be one, or one is too long."""
     if S[0].contains(0) or d[0].contains(0):
         return None
     half = (S * b + S * a / d) / 2
@@ -329,7 +308,7 @@ def _waves(
 
 
 def _root(z: Series) -> Series | None:
-    """A square root whose cut lies away from the ball (which of the two does not matter); None if it may vanish."""
+    """Return a square root with its cut away from the ball, of either sign; None if it may vanish."""
     if z[0].contains(0):
         return None
     root = z.sqrt() if z[0].real.mid() >= 0 else (-z).sqrt() * point(1j)
@@ -337,7 +316,7 @@ def _root(z: Series) -> Series | None:
 
 
 def _wave(z: Series, S: Series, d: Series, a: Ball, b: Ball, g: Ball, shortest: float) -> tuple[Series, ...] | None:
-    """c, s, z, v, e and t of one wave as `across_waves` wants them, scaled by e^{-t}."""
+    """Return c, s, z, v, e and t of one wave for `across_waves`, scaled by e^{-t}, or None."""
     t = _root(z) if abs(z[0]).mid() > shortest else None
     if t is None or t[0].contains(0):
         return None

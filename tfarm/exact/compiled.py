@@ -1,15 +1,14 @@
-"""Numba with its disk cache where a folder for it can be written, and without it where none can.
+"""Numba with its disk cache where a folder for it can be written, else without.
 
-numba keys a cached function by its own file only: an edited callee in another file would go unnoticed
-(measured with numba 0.68).  So the cache of this package lies in a folder named by a hash of all the sources
-that compiled code can come from: those of this room, and those that ask it to compile.
+numba keys a cached function by its own file only and ignores an edited callee in another file (numba 0.68).  So the
+cache of this package is in a folder named by a hash of all sources of compiled code: those of this room, and those that
+import this module.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -23,21 +22,27 @@ _HERE = Path(__file__).parent
 
 
 def compiled(function: _Function) -> _Function:
-    """The function compiled by numba (nopython, IEEE arithmetic, NumPy's rules for division)."""
+    """Return the function compiled by numba (nopython, IEEE arithmetic, NumPy's rules for division).
+
+    Its cache is below the user's cache folder of numba, or else below this room.
+    """
+    parent = config.CACHE_DIR
+    config.CACHE_DIR = str(Path(parent or _HERE / "__pycache__") / f"tfarm-{_SOURCE_HASH}")
     try:
-        with _cache_folder():
-            return njit(cache=True, error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
+        return njit(cache=True, error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
     except (RuntimeError, OSError):  # no folder for the cache can be written
         return njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
+    finally:
+        config.CACHE_DIR = parent
 
 
 def inlined(function: _Function) -> _Function:
-    """The same for a small formula, melted into its callers: a loop with a call in it does not vectorise."""
+    """Return a small function compiled and inlined into its callers, so that loops over it vectorise."""
     return njit(error_model="numpy", forceinline=True, no_cfunc_wrapper=True)(function)
 
 
-def python_of(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The Python function behind a compiled one, with those it calls, for numbers that numba does not know."""
+def python_of(function: Any) -> Callable[..., Any]:
+    """Return the Python function of a compiled one, with its callees, for numbers other than numba's."""
     python: Any = getattr(function, "py_func", function)
     called = {name: python.__globals__[name] for name in python.__code__.co_names if name in python.__globals__}
     replaced = {name: python_of(value) for name, value in called.items() if hasattr(value, "py_func")}
@@ -47,23 +52,13 @@ def python_of(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _source_hash() -> str:
+    """Return the hash of all sources of compiled code."""
     digest = hashlib.sha256()
     for source in sorted(_HERE.parent.rglob("*.py")):
         text = source.read_bytes()
         if source.parent == _HERE or b"exact.compiled import" in text:
             digest.update(text)
     return digest.hexdigest()[:16]
-
-
-@contextmanager
-def _cache_folder() -> Iterator[None]:
-    """numba's cache folder for the functions decorated inside; a folder the user chose stays its parent."""
-    chosen = config.CACHE_DIR
-    config.CACHE_DIR = str(Path(chosen or _HERE / "__pycache__") / f"tfarm-{_SOURCE_HASH}")
-    try:
-        yield
-    finally:
-        config.CACHE_DIR = chosen
 
 
 _SOURCE_HASH = _source_hash()
@@ -76,6 +71,6 @@ else:
 
     @intrinsic
     def fma(typing_context, a, b, c):
-        """a b + c with one rounding: the hardware instruction, which also vectorises."""
+        """Return a b + c with one rounding, by the hardware instruction, which also vectorises."""
         signature = types.float64(types.float64, types.float64, types.float64)
         return signature, lambda context, builder, signature, arguments: builder.fma(*arguments)

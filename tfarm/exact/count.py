@@ -1,12 +1,12 @@
-"""A chain without damping on the imaginary axis: the signs that its natural frequencies are counted by.
+"""A chain without damping on the imaginary axis: the signs of the count of its natural frequencies.
 
-Everything is real there.  The count climbs from the payload to the hub.  A segment clamped at both ends has the count
-of the pinned one, in closed form, less 0 or 1 for each rotation that is held.  Then at each joint, between a segment
-clamped at its inner end and all that lies outside of the joint, which was clamped there, first the displacement is let
-go and then the rotation; at last the clamp's spring, the joint and the hub.  Each step raises the count by 0 or 1
-(Rayleigh's theorem on one constraint), and the parity of the count is the sign of the determinant of that system,
-positive at rest.  Of the outer part these are p_WPsi where it is clamped, and with the numbers r of the states that a
-clamped inner end allows at the joint, r_PsiQ p_WPsi - r_WPsi p_PsiQ where W is free and Psi held.
+All numbers are real there.  The count proceeds from the payload to the hub.  A segment clamped at both ends has the
+count of the pinned one, in closed form, less 0 or 1 for each clamped rotation.  At each joint, between a segment with a
+clamped inner end and the outer part clamped at the joint, first the displacement is released and then the rotation; at
+last the clamp's spring, the joint and the hub.  Each step raises the count by 0 or 1 (Rayleigh's theorem on one
+constraint).  The parity of the count is the sign of the determinant of that system, positive at rest.  For the outer
+part these are p_WPsi where it is clamped and, with the numbers r of the plane of a clamped inner end at the joint,
+r_PsiQ p_WPsi - r_WPsi p_PsiQ where W is free and Psi clamped.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ from .waves import (
     transition_series,
 )
 
-FREE_MOTIONS = 12  # where the vector of ends says how many motions the payload leaves the tip
+FREE_MOTIONS = 12  # in the vector of ends: the number of free motions of the tip
 
 
 def rows_to_count(layout: Layout) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rows and ends of a layout without damping, for `chain_count` and `bisect`."""
+    """Return rows and ends of a layout without damping, for `chain_count` and `bisect_chain`."""
     chain = layout.chain
     free = sum(not isinstance(end, float) for end in (chain.tip_mass, chain.tip_inertia))
     return layout.rows, np.r_[layout.ends, float(free)]
@@ -69,13 +69,13 @@ def rows_to_count(layout: Layout) -> tuple[NDArray[np.float64], NDArray[np.float
 
 @inlined
 def _clamped(number: int, value: float, step: int) -> int:
-    """The count one step on: `step` is +1 or -1 where its parity must change to fit the sign of the determinant."""
+    """Return the count, changed by `step` where its parity differs from the sign of the determinant."""
     return number + step * ((number % 2 == 1) != (value < 0.0))
 
 
 @compiled
 def chain_count(omega: float, rows: Any, ends: Any, plane: Any) -> int:
-    """How many natural frequencies lie below omega [rad/s], the rigid-body mode included; `plane` (5,) is worked in."""
+    """Return the number of natural frequencies below omega [rad/s], with the rigid body; `plane` (5,) is scratch."""
     S = -omega * omega
     plane[0], plane[1], plane[2], plane[3], plane[4] = end_plane(*tip_conditions(ends, S))
     number, free = 0, int(ends[FREE_MOTIONS])
@@ -103,32 +103,32 @@ def chain_count(omega: float, rows: Any, ends: Any, plane: Any) -> int:
 
 @compiled
 def _joined(outside: int, omega: float, row: Any, plane: Any, free: int) -> int:
-    """The count with a segment more, clamped at its inner end; `plane` is carried across it.
+    """Return the count with one more segment, clamped at its inner end; `plane` is carried across it.
 
-    `outside` is the count of what lies beyond, clamped at the joint, which leaves so many motions `free` there.
+    `outside` is the count of the outer part clamped at the joint, `free` the number of free motions there.
     """
     to_w, to_m, to_q = row[TO_W], row[TO_M], row[TO_Q]
     p = plane[0] * to_w, plane[1] * (to_w * to_m), plane[2] * to_m, plane[3] * to_q, plane[4] * (to_m * to_q)
-    held = (0.0, 0.0, 0.0, 0.0, 1.0)  # W = Psi = 0
+    clamped = (0.0, 0.0, 0.0, 0.0, 1.0)  # W = Psi = 0
     s, _, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(complex(0.0, omega), row)
     number = half_waves(z1, t1, dt1) + half_waves(z2, t2, dt2) + (z1.real < 0.0 and z2.real < 0.0)
     S, z1, z2 = s.real, z1.real, z2.real
     if max(abs(z1), abs(z2)) < SERIES_RADIUS:
         F0, F1, F2, F3, _, _ = transition_series(z1 + z2, z1 * z2)
         W, Psi, M, Q = transition_rows(F0, F1, F2, F3, S, 1.0, row[A], row[B], row[G], row[SIGMA])
-        q, r = across_rows(W, Psi, M, Q, p), across_rows(W, Psi, M, Q, held)
+        q, r = across_rows(W, Psi, M, Q, p), across_rows(W, Psi, M, Q, clamped)
     else:
         c1, s1, e1 = real_functions(z1, t1, dt1)
         c2, s2, e2 = real_functions(z2, t2, dt2)
         gS, v_sum = gS.real, S * (row[A] - row[B])
         q = across_waves(c1, s1, z1, v1.real, e1, c2, s2, z2, v2.real, e2, gS, 1.0, v_sum, p)
-        r = across_waves(c1, s1, z1, v1.real, e1, c2, s2, z2, v2.real, e2, gS, 1.0, v_sum, held)
+        r = across_waves(c1, s1, z1, v1.real, e1, c2, s2, z2, v2.real, e2, gS, 1.0, v_sum, clamped)
         unit = 1.0 / (gS * (z1 - z2) * (z1 - z2))
         q = q[0] * unit, q[1] * unit, q[2] * unit, q[3] * unit, q[4] * unit
         r = r[0] * unit, r[1] * unit, r[2] * unit, r[3] * unit, r[4] * unit
     plane[0], plane[1], plane[2] = q[0] / to_w, q[1] / (to_w * to_m), q[2] / to_m
     plane[3], plane[4] = q[3] / to_q, q[4] / (to_m * to_q)
-    number = _clamped(number, r[1], -1)  # r at the outer end is, but for signs, the plane carried inwards (symmetry)
+    number = _clamped(number, r[1], -1)  # r at the outer end is, up to signs, the plane carried inwards (symmetry)
     number = _clamped(number, -r[0], -1) + outside
     if free == 2:
         number = _clamped(number, -r[0] * p[3] - r[3] * p[0], 1)
@@ -137,7 +137,7 @@ def _joined(outside: int, omega: float, row: Any, plane: Any, free: int) -> int:
 
 @compiled
 def chain_counts(omega: Any, rows: Any, ends: Any) -> Any:
-    """`chain_count` at every omega (1-D)."""
+    """Return `chain_count` at every omega (1-D)."""
     found, plane = np.empty(omega.size, np.int64), np.empty(5)
     for i in range(omega.size):
         found[i] = chain_count(omega[i], rows, ends, plane)
@@ -161,13 +161,13 @@ def bisect_chain(number: Any, rows: Any, ends: Any, low: Any, high: Any) -> None
 
 @inlined
 def half_waves(z: complex, t: complex, dt: complex) -> int:
-    """How many whole half waves fit strictly inside the length: n pi < k, for a travelling wave e^{i k x}."""
+    """Return the number of n with n pi < k, for a travelling wave e^{i k x}."""
     return max(0, math.ceil((abs(t.imag) + math.copysign(1.0, t.imag) * dt.imag) / math.pi) - 1) if z.real < 0.0 else 0
 
 
 @inlined
 def real_functions(z: float, t: complex, dt: complex) -> tuple[float, float, float]:
-    """c, S, e of `compound.across_waves` for real z: scaled where it decays, plain where it travels."""
+    """Return c, S, e of `waves.across_waves` for real z, scaled where the wave decays."""
     if abs(z) < 1.0:
         c, s = even_functions(z)
         return c, s, 1.0

@@ -1,4 +1,4 @@
-"""A system laid out to be read: cut and marked at places, as rows of the kernel, and what each output weighs."""
+"""Layouts of a system: cut and marked at places, as rows of the kernel, with the weights of each output."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
 LENGTH, NUMBER = 0, 0  # of an offset's row of the kernel, and of a mark's
 STIFFNESS, COMPLIANCE, LOSS = range(3)  # of a spring's row, the last the stiffness times the damping
 MASS, INERTIA, GROUND, TURNING_GROUND = range(4)  # of a body's row, in the order of `Body`
-AT_JOINT = 2.0**-50  # of the length: a place so near to a joint is at it, its share being a quotient of float64 numbers
-ROW_KIND, ROW_WIDTH = 8, 12  # where a row of the kernel says what it is, after the numbers of a segment (`waves`)
+AT_JOINT = 2.0**-50  # of the length: rounding of a place at a joint, a quotient of float64 numbers
+ROW_KIND, ROW_WIDTH = 8, 12  # the kind in a row of the kernel, after the numbers of a segment (`waves`), and its width
 TO_W, TO_M, TO_Q = 9, 10, 11  # from the chain's units to the segment's own
 OF_ANGLE, OF_MOMENT = 6, 10  # in the vector of ends: after six numbers of the payload A_0..A_3, then B_0 and B_1
-LAYOUTS_KEPT = 256  # of one system: more places than a page looks at
+LAYOUTS_KEPT = 256  # of one system: more places than those of a page
 
-# Of a uniform link what `uniform` has of an output: theta, M and Q at the root, W and W - theta at the tip.
+# The outputs of `uniform`, of a uniform link: theta, M and Q at the root, W and W - theta at the tip.
 AT_ENDS: Mapping[Any, int] = {
     ((0, 0, 0, 0), 1): 0,
     (0, (0, 0, 1, 0), 0): 1,
@@ -39,7 +39,7 @@ AT_ENDS: Mapping[Any, int] = {
 
 
 class Numbers(NamedTuple):
-    """A layout's numbers as those of one kind: elements; rest, inertia and force of both tip conditions; the drive's.
+    """A layout's numbers in one arithmetic: elements; rest, inertia and force of both tip conditions; drive.
 
     `of_angle` are A_0..A_3, `of_moment` B_0 and B_1 (see `system`).
     """
@@ -52,7 +52,7 @@ class Numbers(NamedTuple):
 
 
 class Layout:
-    """A chain cut and marked at places, as the compiled sweeps read it (`sweep`), and as elements for balls.
+    """A chain cut and marked at places, as rows of the compiled sweeps (`sweep`), and as elements for balls.
 
     `elements` run from the payload inwards.
     """
@@ -63,7 +63,7 @@ class Layout:
         self._numbers: dict[Any, Numbers] = {}
 
     def numbers(self, key: Any, exact: Callable[[Any], Any]) -> Numbers:
-        """Its numbers, each made one of another kind by `exact`: once for each `key`."""
+        """Return its numbers converted by `exact`, cached for each `key`."""
         if key not in self._numbers:
             elements = [
                 each if isinstance(each, Mark) else type(each)._make(n if n is None else exact(n) for n in each)
@@ -78,7 +78,7 @@ class Layout:
 
     @cached_property
     def rows(self) -> NDArray[np.float64]:
-        """The elements, which balls have no use for (elements, `ROW_WIDTH`)."""
+        """The elements for the kernel (elements, `ROW_WIDTH`)."""
         rows = np.array([kernel_row(each) for each in self.elements]).reshape(-1, ROW_WIDTH)
         return np.asarray(read_only(rows))
 
@@ -90,14 +90,12 @@ class Layout:
     @cached_property
     def ends(self) -> NDArray[np.float64]:
         """Payload and drive (12,)."""
-        chain = self.chain
-        tip = [EndCondition.of(inertia) for inertia in (chain.tip_mass, chain.tip_inertia)]
-        numbers = [number for end in tip for number in (end.rest, end.inertia, end.force)]
-        return np.asarray(read_only(np.array([*map(float, (*numbers, *chain.drive.of_angle, *chain.drive.of_moment))])))
+        _, *numbers = self.numbers("float64", float)
+        return np.asarray(read_only(np.concatenate(numbers)))
 
     @cached_property
     def read(self) -> tuple[Segment, ...]:
-        """The segment that each place belongs to."""
+        """The segment of each place."""
         return tuple(self._segment_at(number) for number in range(len(self.places)))
 
     def _segment_at(self, number: int) -> Segment:
@@ -109,7 +107,7 @@ class Layout:
 
 
 def _at_joints(elements: Sequence[Element], places: tuple[Place, ...]) -> tuple[Place, ...]:
-    """The places, one that rounding has moved off a joint, or off what is attached there, put back."""
+    """Return the places, those next to a joint at it."""
     lengths = [each.length for each in elements if isinstance(each, Segment)]
     joints = list(accumulate(lengths, lambda position, length: position - length, initial=Fraction(1)))
     ends = np.array([float(joint) for joint in joints])
@@ -121,11 +119,11 @@ def _at_joints(elements: Sequence[Element], places: tuple[Place, ...]) -> tuple[
 
 
 def _marked(elements: Sequence[Element], places: tuple[Place, ...]) -> tuple[Element, ...]:
-    """The elements with a mark for each place; segments are cut where a place lies inside."""
+    """Return the elements with a mark for each place; segments are cut at places inside."""
     order = sorted(range(len(places)), key=lambda n: (-places[n].share, places[n].side != "outer"))
     marks, position = [n for n in order if places[n].side != "payload"], Fraction(1)
     result: list[Element] = [Mark(n) for n in order if places[n].side == "payload"]
-    is_beyond = True  # still outside the link: the payload's offset
+    is_beyond = True  # outside the link: the payload's offset
     for each in elements:
         if is_beyond and isinstance(each, Offset):
             result.append(each)
@@ -151,7 +149,7 @@ def _marked(elements: Sequence[Element], places: tuple[Place, ...]) -> tuple[Ele
 
 
 def kernel_row(element: Element) -> list[float]:
-    """An element as a row of the kernel."""
+    """Return an element as a row of the kernel."""
     match element:
         case Segment():
             split = [part for value in element[:3] for part in double_double(value)]
@@ -169,7 +167,7 @@ def kernel_row(element: Element) -> list[float]:
 
 
 class Reading(NamedTuple):
-    """What an output weighs: W, Psi, M and Q at a place, theta; its power of s, its gauge's C [s], its SI unit."""
+    """The weights of an output, of W, Psi, M and Q at a place and of theta; its power of s, gauge and SI unit."""
 
     place: Place | None
     state: tuple[Fraction | int, ...]
@@ -181,20 +179,20 @@ class Reading(NamedTuple):
 
     @property
     def at(self) -> tuple[Fraction, ...]:
-        """The share of the length where it is read; none of the hub angle."""
+        """The place as a share of the length; none of the hub angle."""
         return () if self.place is None else (self.place.share,)
 
 
 @dataclass(frozen=True)
 class Readings:
-    """Several outputs of one chain: where and what, and the table that the compiled sweep takes."""
+    """Several outputs of one chain: layout, readings, and tables for the compiled sweeps."""
 
     layout: Layout = field(repr=False)
     each: tuple[Reading, ...] = field(repr=False)
 
     @property
     def gauges(self) -> list[float]:
-        """C [s] of each output's gauge, 0 for what is none."""
+        """C [s] of each output's gauge, 0 for other outputs."""
         places = self.layout.places
         return [
             self.layout.read[places.index(one.place)].damping if one.gauge and one.place is not None else 0.0
@@ -213,7 +211,7 @@ class Readings:
 
     @cached_property
     def ends_table(self) -> NDArray[np.float64] | None:
-        """Rows for `uniform.fill_ends`: its number, power of s, C of the gauge, factor; None if one is elsewhere."""
+        """Rows for `uniform.fill_ends`: number, power of s, C of the gauge, factor; None if one is not at the ends."""
         chain = self.layout.chain
         if not chain.is_uniform or chain.drive.friction or chain.drive.stiffness or chain.drive.lag:
             return None
@@ -225,7 +223,7 @@ class Readings:
 
 
 def reading_of(chain: System, wanted: Output, x: float) -> Reading:
-    """An output as weights; x is the share of the length for one along the link."""
+    """Return an output as weights; x is the share of the length for one along the link."""
     share = Fraction(wanted.share(x))
     weights: dict[str, tuple[Fraction | int, ...]] = {
         **dict.fromkeys(("W", "Y", "centre"), (1, 0, 0, 0)),
@@ -235,9 +233,10 @@ def reading_of(chain: System, wanted: Output, x: float) -> Reading:
     theta = {"Y": -(chain.radius + share), "Phi": Fraction(-1), "theta": Fraction(1)}
     if wanted.quantity == "current":
         if not chain.drive.per_ampere or not chain.drive.turns:
-            remedy = "needs a [motor] and another input than hub_angle, which says nothing of the current"
-            raise ParameterError(key="output", value="motor_current", remedy=remedy)
-        amperes = chain.EI / chain.length / chain.drive.per_ampere / chain.input_unit  # per torque without dimensions
+            raise ParameterError(
+                key="output", value="motor_current", remedy="needs a [motor] and another input than hub_angle"
+            )
+        amperes = chain.EI / chain.length / chain.drive.per_ampere / chain.input_unit  # per dimensionless torque
         return Reading(None, (0, 0, 0, 0), Fraction(1), wanted.power, False, amperes, True)
     place = None if wanted.quantity == "theta" else Place(share, wanted.side)
     if wanted.place == "root" and wanted.gauge:
@@ -249,14 +248,17 @@ def reading_of(chain: System, wanted: Output, x: float) -> Reading:
     if wanted.quantity == "strain" and place:  # at the surface: half the depth over E I/L
         (segment,) = Layout(chain, (place,)).read
         if segment.half_depth is None:
-            remedy = 'a "general" section does not say how deep it is: give rectangle, round or tube'
-            raise ParameterError(key="link.section.shape", value="general", remedy=remedy)
+            raise ParameterError(
+                key="link.section.shape",
+                value="general",
+                remedy='a "general" section has no depth: give rectangle, round or tube',
+            )
         unit = Fraction(segment.half_depth) / chain.length / segment.stiffness / chain.input_unit
     return Reading(place, state, theta.get(wanted.quantity, Fraction(0)), wanted.power, wanted.gauge, unit)
 
 
 def readings(chain: System, wanted: tuple[Output, ...], x: float) -> Readings:
-    """The outputs of a chain, laid out: once for each chain."""
+    """Return the outputs of a chain, laid out and cached with it."""
     key = wanted, x
     if key not in chain.kept:
         if len(chain.kept) >= LAYOUTS_KEPT:
@@ -266,17 +268,17 @@ def readings(chain: System, wanted: tuple[Output, ...], x: float) -> Readings:
 
 
 def laid_out(chain: System, wanted: Sequence[Output], shares: Sequence[float]) -> Readings:
-    """Outputs of a chain, each with its own share of the length, laid out anew."""
+    """Return outputs of a chain, each with its share of the length, laid out."""
     each = tuple(reading_of(chain, one, x) for one, x in zip(wanted, shares, strict=True))
     places = tuple(dict.fromkeys(one.place for one in each if one.place is not None))
     return Readings(Layout(chain, places), each)
 
 
 def constant_of(k: System, wanted: Output, x: float) -> int | None:
-    """What an end condition makes the quantity per unit of input, dimensionless and at any s: 0, 1 or -1, or None.
+    """Return the quantity for unit input, dimensionless, where an end condition fixes it: 0, 1 or -1; else None.
 
-    Held or free ends: W, Phi and Y are 0 at the root, and at the tip W where it is pinned, M and Q where nothing is
-    there to take them.  The hub angle is the input where the hub is locked, M(0) = -u where it has no inertia.
+    W, Phi and Y are 0 at the root, W at a pinned tip, M and Q at a free tip.  The hub angle is the input of a locked
+    hub, M(0) = -u of a hub without inertia.
     """
     at, locked = wanted.share(x), k.is_locked
     if wanted.quantity == "theta":

@@ -1,13 +1,13 @@
-"""Forces and couples on the link: what a disturbance, or a pair of moments of a piezo patch, moves.
+"""The response to loads on the link: a force, or a pair of moments of a piezo patch.
 
-The input of the hub is held at zero.  A load e (1 in Q or in M) makes z- = z+ + e of the states on both sides of it.
-With f z = 0 and g z = 0 for W = 0 at the axis and for the hub's balance, both carried out to the load, and with the
-plane of the payload's states there (`compound`), the state beyond it is
+The input of the hub is zero.  At a load e (1 in Q or in M) the states on both sides satisfy z- = z+ + e.  The
+conditions W = 0 at the axis and the hub's balance, carried out to the load, are f z = 0 and g z = 0.  With the plane of
+the payload's states there (`waves`) the outer state is
 
     z+ = -((g e) F - (f e) G)/(g F),     F = met(f), G = met(g),
 
-which is met(h) for the condition h = (g e) f - (f e) g that goes on outwards.  Balls throughout: f and g become
-parallel far out, and only digits part them.
+which is met(h) for the condition h = (g e) f - (f e) g, carried outwards.  All numbers are balls, as f and g become
+nearly parallel far out.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .values import PROVEN_BITS, precisions
 from .waves import Plane, Row, met
 
 _met = python_of(met)
-LOAD_KINDS = {"force": ("N", 3), "moment_pair": ("N m", 2)}  # unit, and which entry of (W, Psi, M, Q) jumps
+LOAD_KINDS = {"force": ("N", 3), "moment_pair": ("N m", 2)}  # unit, and the entry of (W, Psi, M, Q) that jumps
 LOAD_PATTERN = re.compile(r"(force|moment_pair)@([^,]+)(?:,([^,]+))?")
 
 
@@ -47,12 +47,12 @@ class Load(NamedTuple):
 
 
 def is_load(text: str) -> bool:
-    """Whether an input is named as a load is."""
+    """Whether an input has the name of a load."""
     return "@" in text
 
 
 def load_of(text: str, length: float) -> Load:
-    """force@X or moment_pair@X1,X2, with X [m] from the clamp.  Raises ParameterError for anything else."""
+    """Return the load of force@X or moment_pair@X1,X2, X [m] from the clamp.  Raises ParameterError for others."""
     found = LOAD_PATTERN.fullmatch(text.replace(" ", ""))
     remedy = "force@X or moment_pair@X1,X2, with X in m from the clamp, such as force@0.3"
     if not found or (found[1] == "force") == bool(found[3]):
@@ -69,7 +69,7 @@ def load_of(text: str, length: float) -> Load:
 
 
 def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float) -> Ball:
-    """The output per unit load at s, SI, to `PROVEN_BITS`.  Raises CertificationError at a pole or an exact zero."""
+    """Return the output for unit load at s, SI, to `PROVEN_BITS`.  Raises CertificationError at a pole or zero."""
     for working in precisions(PROVEN_BITS):
         with precision(working):
             value = _value(chain, load, wanted, point(s), x)
@@ -79,9 +79,10 @@ def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float
 
 
 def _value(chain: System, load: Load, wanted: Output, s: Ball, x: float) -> Ball | None:
+    """Return the enclosure at the working precision; None where it may be a pole."""
     one = reading_of(chain, wanted, x)
     if one.is_current:
-        raise ParameterError(key="output", value=wanted.name, remedy="is known for an input at the hub, not for a load")
+        raise ParameterError(key="output", value=wanted.name, remedy="needs an input at the hub instead of a load")
     signs = (1,) if load.kind == "force" else (-1, 1)
     total = rational(0) * s
     for share, sign in zip(load.shares, signs, strict=True):
@@ -89,12 +90,12 @@ def _value(chain: System, load: Load, wanted: Output, s: Ball, x: float) -> Ball
         if state.balance.contains(0):
             return None
         total += sign * state.read(one, LOAD_KINDS[load.kind][1])
-    unit = (chain.length / chain.EI) * (chain.length if load.kind == "force" else 1)  # of the load, without dimensions
+    unit = (chain.length / chain.EI) * (chain.length if load.kind == "force" else 1)  # of the dimensionless load
     return total * rational(one.unit * chain.input_unit * unit)
 
 
 class _Loaded(Sweep):
-    """The sweep with a mark at the load, and one at the place that is read, if it is on the link."""
+    """The sweep with a mark at the load, and one at the place of an output on the link."""
 
     def __init__(self, chain: System, s: Ball, at: Place, read: Place | None) -> None:
         self.places = (at,) if read is None or read == at else (at, read)
@@ -110,7 +111,7 @@ class _Loaded(Sweep):
 
     @property
     def plane(self) -> Plane:
-        """That of the payload's states at the load."""
+        """The plane of the payload's states at the load."""
         return self.planes[0]
 
     @property
@@ -119,7 +120,7 @@ class _Loaded(Sweep):
         return sum(a * b for a, b in zip(self.g, _met(self.f, self.plane), strict=True))
 
     def read(self, one: Reading, jumps: int) -> Ball:
-        """The reading, without its unit, for a unit jump of that entry of the state."""
+        """Return the reading, without its unit, for a unit jump of that entry of the state."""
         h = tuple(self.g[jumps] * a - self.f[jumps] * b for a, b in zip(self.f, self.g, strict=True))
         outer = tuple(-part / self.balance for part in _met(h, self.plane))
         inner = [part + (1 if n == jumps else 0) for n, part in enumerate(outer)]
@@ -132,7 +133,7 @@ class _Loaded(Sweep):
         return value * self.s**one.power / (1 + rational(C) * self.s)
 
     def _inwards(self, state: Any) -> tuple[Ball, Any]:
-        """The hub angle, and the state at the place that is read where that lies on this side of the load."""
+        """Return the hub angle, and the state at the place of the output if that is inside of the load."""
         found, elements = None, self.numbers.elements
         for each in elements[elements.index(Mark(0)) + 1 :]:
             if isinstance(each, Mark):
@@ -142,7 +143,7 @@ class _Loaded(Sweep):
         return state[1], found
 
     def _outwards(self, h: Any) -> Any:
-        """The state at a place beyond the load."""
+        """Return the state at a place beyond the load."""
         elements = self.numbers.elements
         for each in reversed(elements[: elements.index(Mark(0))]):
             if isinstance(each, Mark):
@@ -151,7 +152,7 @@ class _Loaded(Sweep):
         raise AssertionError("the place is on neither side of the load")
 
     def _state_inside(self, element: Any, z: Any) -> Any:
-        """A state at the inner end of an element from that at its outer one."""
+        """Return the state at the inner end of an element from that at its outer one."""
         W, Psi, M, Q = z
         match element:
             case Segment():

@@ -1,9 +1,8 @@
-"""What can be asked of the arm: one row an output, and nothing else to edit for a power of s or another place.
+"""The outputs of the arm: a power of s times one quantity of the exact solution, at the hub, at the tip or at x.
 
-Of a new quantity this file has the places where it is read, its unit and whether the appendix has it, and `reading_of`
-in `layout` how it weighs W, Psi, M and Q.  An output is a power of s times one quantity of the exact solution, at the
-hub, at the tip or at a point x of the arm.  Signs as in the paper: root moment E I phi'(0), shear force
-kappa G A (w' - psi).
+A new power of s or place is one row of `OUTPUTS`.  A new quantity has here its places, its unit and whether the
+appendix has it, and in `reading_of` (`layout`) its weights of W, Psi, M and Q.  Signs as in the paper: root moment
+E I phi'(0), shear force kappa G A (w' - psi).
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from tfarm.errors import ParameterError, did_you_mean, must_be_known
 # bending strain at the surface, displacement of the payload's centre of mass, current of the motor
 Quantity = Literal["theta", "M", "Q", "W", "Y", "Phi", "Psi", "strain", "centre", "current"]
 Place = Literal["root", "tip", "x"]
-Side = Literal["outer", "inner"]  # of a joint of two segments, or of what is attached there
+Side = Literal["outer", "inner"]  # of a joint of two segments, or of an attachment
 
 MOST_POWER = 4  # of s: rate, acceleration, jerk and its rate
 PLACES_OF: Mapping[str, tuple[Place, ...]] = MappingProxyType({
@@ -43,7 +42,7 @@ QUANTITY_UNITS = MappingProxyType({**_METRES, **_RADIANS, "M": "N m", "Q": "N", 
 
 
 class Units(Protocol):
-    """What an output needs of a system: the units of its numbers without dimensions, and whether the hub is held."""
+    """The units of a system's dimensionless numbers, and whether the hub is locked."""
 
     @property
     def length(self) -> Fraction: ...
@@ -57,10 +56,10 @@ class Units(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Output:
-    """`s`^power times a quantity at a place; `gauge` divides by 1 + C s (a strain gauge does not feel C).
+    """s^power times a quantity at a place; `gauge` divides by 1 + C s (a strain gauge has no part of the damping).
 
-    `unit` is the SI unit of what comes out, `label` what a person calls it, `name` what a program does (by default the
-    label's words joined by underscores).  Raises ParameterError for what is no output, naming the key and the remedy.
+    `unit` is its SI unit, `label` its words, `name` its identifier, by default the label's words joined by underscores.
+    Raises ParameterError, naming the key and the remedy, for illegal values.
     """
 
     quantity: Quantity
@@ -74,36 +73,38 @@ class Output:
 
     def __post_init__(self) -> None:
         if not isinstance(self.label, str) or not re.search(r"\w", self.label):
-            raise ParameterError(key="output.label", value=self.label, remedy="say in words what it is")
+            raise ParameterError(key="output.label", value=self.label, remedy="a text with a word")
         if not self.name:
             object.__setattr__(self, "name", "_".join(re.findall(r"\w+", self.label)))
         if not isinstance(self.name, str) or not re.fullmatch(r"\w+", self.name):
             raise ParameterError(key="output.name", value=self.name, remedy="letters, digits and underscores")
         if self.quantity not in get_args(Quantity):
-            remedy = did_you_mean(str(self.quantity), get_args(Quantity))
-            raise ParameterError(key="output.quantity", value=self.quantity, remedy=remedy)
+            raise ParameterError(
+                key="output.quantity", value=self.quantity, remedy=did_you_mean(str(self.quantity), get_args(Quantity))
+            )
         if self.place not in PLACES_OF[self.quantity]:
-            remedy = f"{self.quantity} is known at: {', '.join(PLACES_OF[self.quantity])} ({self._elsewhere})"
-            raise ParameterError(key="output.place", value=self.place, remedy=remedy)
+            raise ParameterError(
+                key="output.place",
+                value=self.place,
+                remedy=f"{self.quantity} is known at: {', '.join(PLACES_OF[self.quantity])}",
+            )
         whole("output.power", self.power, 0, MOST_POWER, f"a power of s: a whole number from 0 to {MOST_POWER}")
         if not isinstance(self.gauge, bool) or (self.gauge and self.quantity not in ("M", "strain")):
-            remedy = "true or false, and true for a moment only: a strain gauge reads E I phi' without its damping"
-            raise ParameterError(key="output.gauge", value=self.gauge, remedy=remedy)
+            raise ParameterError(
+                key="output.gauge",
+                value=self.gauge,
+                remedy="true or false, true for a moment only: a strain gauge measures E I phi' without its damping",
+            )
         if self.unit != _unit(self.quantity, self.power):
-            remedy = f'values are in SI units, here "{_unit(self.quantity, self.power)}"'
-            raise ParameterError(key="output.unit", value=self.unit, remedy=remedy)
-
-    @property
-    def _elsewhere(self) -> str:
-        if self.quantity == "theta":
-            return "the hub's angle is one number"
-        if self.place == "root":
-            return "it is 0 at the root"
-        return "it is read elsewhere"
+            raise ParameterError(
+                key="output.unit",
+                value=self.unit,
+                remedy=f'values are in SI units, here "{_unit(self.quantity, self.power)}"',
+            )
 
     @property
     def is_in_appendix(self) -> bool:
-        """Whether the paper's appendix has it: other quantities, and places of them, came with rigs."""
+        """Whether the paper's appendix has it."""
         along = self.quantity == "W" and self.place == "x"
         return not along and self.quantity not in ("Psi", "strain", "centre", "current") and self.side == "outer"
 
@@ -113,12 +114,12 @@ class Output:
         return replace(self, power=0, unit=QUANTITY_UNITS[self.quantity])
 
     def share(self, x: float) -> float:
-        """Where it is, as a share of the length; x is that share for an output along the arm."""
+        """Return its place as a share of the length; x is that share for an output along the arm."""
         return {"root": 0.0, "tip": 1.0, "x": x}[self.place]
 
 
 def _unit(quantity: Quantity, power: int) -> str:
-    """The SI unit of a quantity times s^power."""
+    """Return the SI unit of a quantity times s^power."""
     if power and QUANTITY_UNITS[quantity] == "1":
         return "1/s" if power == 1 else f"1/s^{power}"
     return QUANTITY_UNITS[quantity] + ("" if power == 0 else "/s" if power == 1 else f"/s^{power}")
@@ -149,7 +150,7 @@ OUTPUTS: Mapping[str, Output] = MappingProxyType({each.name: each for each in (
 
 
 def output(wanted: str | Output) -> Output:
-    """The output of that name, or the one given.  Raises ParameterError, with the nearest name."""
+    """Return the output of a name, or the output itself.  Raises ParameterError with the nearest name."""
     if isinstance(wanted, Output):
         if OUTPUTS.get(wanted.name, wanted) != wanted:
             raise ParameterError(key="output.name", value=wanted.name, remedy="the name of another output; choose one")
@@ -161,22 +162,25 @@ def output(wanted: str | Output) -> Output:
 
 
 def on_side(wanted: str | Output, side: Side) -> Output:
-    """The output along the arm as it is read on that side of a joint of two segments, or of what is attached there.
+    """Return an output along the arm on that side of a joint of two segments, or of an attachment.
 
-    One on the inner side has its own name.  Raises ParameterError for an output that is read at root or tip.
+    One on the inner side has another name.  Raises ParameterError for an output at root or tip.
     """
     found = output(wanted)
     must_be_known("side", side, get_args(Side))
     if found.place != "x":
-        remedy = f"{found.name} is read at one place; take an output along the arm, such as moment with its x"
-        raise ParameterError(key="side", value=side, remedy=remedy)
+        raise ParameterError(
+            key="side",
+            value=side,
+            remedy=f"{found.name} has a fixed place; give an output along the arm, such as moment with its x",
+        )
     if side == found.side:
         return found
     return replace(found, side=side, name=f"{found.name}_{side}", label=f"{found.label}, {side} side")
 
 
 def unit_scale(wanted: Output, k: Units) -> Fraction:
-    """SI value of the output per N m of torque (per radian where the hub is locked), for one dimensionless unit."""
+    """Return the SI value of one dimensionless unit of the output for 1 N m of torque, or 1 rad of a locked hub."""
     if wanted.quantity in ("W", "Y", "centre"):
         return k.length / k.input_unit
     if wanted.quantity in ("M", "Q"):

@@ -1,10 +1,9 @@
-"""Segments of a chain in float64, many s at a time: the plane carried inwards across one, the condition back outwards.
+"""Segments of a chain in float64, many s at a time: the plane carried inwards, the condition carried back outwards.
 
-The steps of a block of points are loops that hold nothing but arithmetic, so that they vectorise, and one that calls
-the exponentials (as in `waves`).  Of each segment its waves, or its transition functions where both waves are slow at
-that s, are kept for the way back.
+The steps of a block of points are loops of arithmetic alone, which vectorise, and one with the exponentials (as in
+`waves`).  The waves of each segment, or its transition functions where both are slow, are kept for the way back.
 
-Arrays of a block lie one behind the other in flat buffers: component j of point i at `BLOCK` j + i.
+Arrays of a block are flat buffers: component j of point i at `BLOCK` j + i.
 """
 
 from __future__ import annotations
@@ -37,17 +36,17 @@ from .waves import (
     wave_functions,
 )
 
-BLOCK = 32  # points a block: few, as single points fill one too; many, as each loop has its own beginning and end
+BLOCK = 32  # points of a block: few for single points, many for the overhead of loops
 S_SQUARED, D, GS, Z1, V1, T1, DT1, Z2, V2, T2, DT2 = (BLOCK * j for j in range(11))
 C1, S1, E1, C2, S2, E2 = (BLOCK * j for j in range(6))
 
 PLANE_SIZE, ROW_SIZE, NUMBERS_SIZE, FUNCTIONS_SIZE = (BLOCK * parts for parts in (5, 4, 11, 6))  # of the flat buffers
-SLOW_WAVE = 1.0  # |z_2| below which a wave hardly turns along a segment: next to its shear cut-off
+SLOW_WAVE = 1.0  # |z_2| below which a wave has little phase along a segment: next to its shear cut-off
 FADED = 1e-140  # |e^{-t}| below which its reciprocal would overflow
 
 
 class Kept(NamedTuple):
-    """Of each segment (rows) and point what the way in leaves for the way back: waves, or functions where `low`."""
+    """The data of each segment (rows) and point for the way back: waves, or transition functions where `low`."""
 
     low: NDArray[np.bool_]
     numbers: NDArray[np.complex128]
@@ -57,7 +56,7 @@ class Kept(NamedTuple):
 
 @inlined
 def times(z: complex, factor: float) -> complex:
-    """z times a real number: numba's own would multiply complex ones."""
+    """Return z times a real number, which numba would convert to a complex one."""
     return complex(z.real * factor, z.imag * factor)
 
 
@@ -65,10 +64,10 @@ def times(z: complex, factor: float) -> complex:
 def cross(
     points: Any, row: Any, plane: Any, inner: Any, scale: Any, lost: Any, watched: Any, kept: Any, number: int
 ) -> None:
-    """The plane at the inner end of a segment (into `inner`) from that at its outer one, at the points of a block.
+    """Compute the plane at the inner end of a segment (`inner`) from that at its outer one, at the points of a block.
 
-    Scales are added to `scale`, lost digits and points next to the shear cut-off marked.  What the way back needs is
-    `kept` (`Kept`) under its number.
+    Scales are added to `scale`, lost digits and points next to the shear cut-off are marked.  Data for the way back are
+    in `kept` (`Kept`) under its number.
     """
     low, numbers, series, slow = kept.low[number], kept.numbers[number], kept.series[number], 0
     for i in range(BLOCK):
@@ -94,7 +93,7 @@ def cross(
 
 @compiled
 def all_wave_numbers(points: Any, row: Any, numbers: Any) -> None:
-    """`dispersion` at every point of a block."""
+    """Compute `dispersion` at every point of a block."""
     for i in range(BLOCK):
         S, d, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(points[i], row)
         numbers[S_SQUARED + i], numbers[D + i], numbers[GS + i] = S, d, gS
@@ -104,7 +103,7 @@ def all_wave_numbers(points: Any, row: Any, numbers: Any) -> None:
 
 @compiled
 def all_wave_functions(numbers: Any, functions: Any) -> None:
-    """The two complex exponentials a point: the only loop that calls a library."""
+    """Compute the two complex exponentials of each point, the only loop that calls a library."""
     for i in range(BLOCK):
         c1, s1, e1 = wave_functions(numbers[Z1 + i], numbers[T1 + i], numbers[DT1 + i])
         c2, s2, e2 = wave_functions(numbers[Z2 + i], numbers[T2 + i], numbers[DT2 + i])
@@ -114,7 +113,7 @@ def all_wave_functions(numbers: Any, functions: Any) -> None:
 
 @compiled
 def take_where(low: Any, source: Any, target: Any) -> None:
-    """Take the slow points of another buffer."""
+    """Copy the slow points of another buffer."""
     for j in range(len(target) // BLOCK):
         for i in range(BLOCK):
             if low[i]:
@@ -123,7 +122,7 @@ def take_where(low: Any, source: Any, target: Any) -> None:
 
 @compiled
 def _by_waves(row: Any, numbers: Any, functions: Any, plane: Any, inner: Any) -> None:
-    """`across_waves` in the segment's own units, at every point of a block."""
+    """Compute `across_waves` in the segment's own units, at every point of a block."""
     w, wm, m, q, mq = row[TO_W], row[TO_W] * row[TO_M], row[TO_M], row[TO_Q], row[TO_M] * row[TO_Q]
     over_w, over_wm, over_m, over_q, over_mq = 1.0 / w, 1.0 / wm, 1.0 / m, 1.0 / q, 1.0 / mq
     for i in range(BLOCK):
@@ -146,7 +145,7 @@ def _by_waves(row: Any, numbers: Any, functions: Any, plane: Any, inner: Any) ->
 
 @compiled
 def _transition(points: Any, row: Any, series: Any) -> None:
-    """F0..F3 of a slow segment, at every point of a block."""
+    """Compute F0..F3 of a slow segment, at every point of a block."""
     for i in range(BLOCK):
         S = points[i] * points[i]
         over_d = reciprocal(1.0 + row[DAMPING] * points[i])
@@ -157,7 +156,7 @@ def _transition(points: Any, row: Any, series: Any) -> None:
 
 @inlined
 def _rows(i: int, points: Any, row: Any, series: Any) -> Any:
-    """The transition matrix of a slow segment at a point."""
+    """Return the transition matrix of a slow segment at a point."""
     S, over_d = points[i] * points[i], reciprocal(1.0 + row[DAMPING] * points[i])
     F0, F1, F2, F3 = series[i], series[BLOCK + i], series[2 * BLOCK + i], series[3 * BLOCK + i]
     return transition_rows(F0, F1, F2, F3, S, over_d, row[A], row[B], row[G], row[SIGMA])
@@ -165,7 +164,7 @@ def _rows(i: int, points: Any, row: Any, series: Any) -> Any:
 
 @compiled
 def _by_series(points: Any, row: Any, series: Any, plane: Any, inner: Any) -> None:
-    """`across_rows` in the segment's own units, at every point of a block."""
+    """Compute `across_rows` in the segment's own units, at every point of a block."""
     w, wm, m, q, mq = row[TO_W], row[TO_W] * row[TO_M], row[TO_M], row[TO_Q], row[TO_M] * row[TO_Q]
     over_w, over_wm, over_m, over_q, over_mq = 1.0 / w, 1.0 / wm, 1.0 / m, 1.0 / q, 1.0 / mq
     for i in range(BLOCK):
@@ -185,9 +184,9 @@ def _by_series(points: Any, row: Any, series: Any, plane: Any, inner: Any) -> No
 
 @compiled
 def cross_back(points: Any, row: Any, f: Any, outer: Any, scale: Any, faded: Any, kept: Any, number: int) -> None:
-    """The condition at the outer end of a segment (into `outer`) from that at its inner one; see `cross`.
+    """Compute the condition at the outer end of a segment (`outer`) from that at its inner one; see `cross`.
 
-    The scales less those of the plane are added to `scale`; `faded` (4 blocks) is worked in.
+    The scales less those of the plane are added to `scale`; `faded` (4 blocks) is scratch.
     """
     low, slow = kept.low[number], 0
     for i in range(BLOCK):
@@ -204,7 +203,7 @@ def cross_back(points: Any, row: Any, f: Any, outer: Any, scale: Any, faded: Any
 
 @inlined
 def _ratio(e1: complex, e2: complex, t1: complex, t2: complex) -> complex:
-    """e^{-t} of the faster wave over that of the slower: of two that both have faded it may still be near 1."""
+    """Return e^{-t} of the faster wave over that of the slower one, also where both underflow."""
     if t1.real < t2.real:
         e1, e2, t1, t2 = e2, e1, t2, t1
     if magnitude(e2) > FADED:
@@ -215,7 +214,7 @@ def _ratio(e1: complex, e2: complex, t1: complex, t2: complex) -> complex:
 
 @compiled
 def _fade(numbers: Any, functions: Any, faded: Any, scale: Any, low: Any) -> None:
-    """c and s of both waves by the scale of the faster one; the other's is taken out."""
+    """Compute c and s of both waves in the scale of the faster one."""
     for i in range(BLOCK):
         c1, s1, c2, s2 = functions[C1 + i], functions[S1 + i], functions[C2 + i], functions[S2 + i]
         t1, t2 = numbers[T1 + i] + numbers[DT1 + i], numbers[T2 + i] + numbers[DT2 + i]
@@ -232,7 +231,7 @@ def _fade(numbers: Any, functions: Any, faded: Any, scale: Any, low: Any) -> Non
 
 @compiled
 def _row_by_waves(row: Any, numbers: Any, faded: Any, f: Any, outer: Any) -> None:
-    """`row_across_waves` in the segment's own units, at every point of a block."""
+    """Compute `row_across_waves` in the segment's own units, at every point of a block."""
     w, m, q = row[TO_W], row[TO_M], row[TO_Q]
     over_w, over_m, over_q = 1.0 / w, 1.0 / m, 1.0 / q
     for i in range(BLOCK):
@@ -249,7 +248,7 @@ def _row_by_waves(row: Any, numbers: Any, faded: Any, f: Any, outer: Any) -> Non
 
 @compiled
 def _row_by_series(points: Any, row: Any, series: Any, f: Any, outer: Any) -> None:
-    """`row_across` in the segment's own units, at every point of a block."""
+    """Compute `row_across` in the segment's own units, at every point of a block."""
     w, m, q = row[TO_W], row[TO_M], row[TO_Q]
     over_w, over_m, over_q = 1.0 / w, 1.0 / m, 1.0 / q
     for i in range(BLOCK):

@@ -1,14 +1,13 @@
-"""Doubles as the rational numbers they are (FLINT): what is shown of these is shown exactly.
+"""Doubles as exact rational numbers (FLINT): definite matrices, and blocks of a law as polynomials in s and in z.
 
-Matrices of whole numbers over a power of two, and the zeros and poles in z of a block of a law, each as
-delta = z - 1:
+A matrix is one of whole numbers over a power of two.  Zeros and poles in z of a block are in delta = z - 1:
 
     tustin   s - r = (c - r)(delta - 2 r/(c - r))/(delta + 2)
     matched  delta = e^{rT} - 1, with the same value at rest
     zoh      poles so; zeros of C(z): det(z - Phi + Gamma C) + (D - 1) det(z - Phi), in balls
     none     a block in z: roots of num(1 + delta) and den(1 + delta)
 
-Each is right to some last bits of delta, however many others are next to it, and one at z = 1 is 0.
+Each has an error of some last bits of delta, also in a cluster, and one at z = 1 is 0.
 """
 
 from __future__ import annotations
@@ -21,11 +20,13 @@ import numpy as np
 from tfarm.arm.blocks import LawBlock, Rational
 from tfarm.arrays import Complex, Real
 
+from .balls import exact_middle
+
 IntegerMatrix = list[list[int]]
 
 
 def as_integers(matrix: Real) -> tuple[IntegerMatrix, int]:
-    """The whole numbers N and the shift k with matrix = N / 2^k, exactly."""
+    """Return the whole numbers N and the shift k with matrix = N / 2^k, exactly."""
     pairs = [[float(value).as_integer_ratio() for value in row] for row in matrix]
     shift = max(bottom.bit_length() - 1 for row in pairs for _, bottom in row)
     return [[top << (shift - bottom.bit_length() + 1) for top, bottom in row] for row in pairs], shift
@@ -34,7 +35,7 @@ def as_integers(matrix: Real) -> tuple[IntegerMatrix, int]:
 def is_positive_definite(matrix: IntegerMatrix) -> bool:
     """Whether a symmetric matrix of whole numbers has only positive leading minors (Bareiss' elimination).
 
-    FLINT's whole numbers, as the minors have thousands of digits.
+    With whole numbers of FLINT, as the minors have thousands of digits.
     """
     M, before = [[flint.fmpz(value) for value in row] for row in matrix], flint.fmpz(1)
     n = len(M)
@@ -58,20 +59,20 @@ def falls(P: IntegerMatrix, A: Real) -> bool:
     return is_positive_definite((form * 4**shift - N.transpose() * form * N).tolist())
 
 
-AT_MINUS_ONE = -2.0  # delta of z = -1, where Tustin's rule puts what is at infinity in s
-BITS_A_STATE, SPARE_STATES = 64, 8  # of the precision with which a held block begins, doubled until it is enough
-ENOUGH_BITS = 80  # of a coefficient of a held block: those of a double, and some
+AT_MINUS_ONE = -2.0  # delta of z = -1, the image of s = infinity under Tustin's rule
+BITS_A_STATE, SPARE_STATES = 64, 8  # of the first precision of a held block, which is doubled
+ENOUGH_BITS = 80  # of a coefficient of a held block: more than a double
 MOST_DOUBLINGS = 5  # of the precision: a coefficient without digits by then is 0
 
 Gained = tuple[float, Complex]  # g and the zeros of g prod(delta - zeros)
 
 
 def block_factors(block: LawBlock, rule: str, T: float, c: float) -> tuple[Complex, list[Gained]]:
-    """The poles of a block in z, and of each of its signals the factor and the zeros, all as delta.
+    """Return the poles of a block in z, and the factor and the zeros of each of its signals, all as delta.
 
-    `rule` is that by which it is sampled with the period `T` [s], "none" of one in z; `c` [1/s] is Tustin's 2/T.
+    `rule` is that of its discretisation with the period `T` [s], "none" of one in z; `c` [1/s] is Tustin's 2/T.
     """
-    nums, den = _polynomials(block)
+    nums, den = polynomials(block)
     if rule == "none":
         shift = flint.fmpq_poly([1, 1])
         return _roots(den(shift)), [(_leading(num, den), _roots(num(shift))) for num in nums]
@@ -88,37 +89,38 @@ def block_factors(block: LawBlock, rule: str, T: float, c: float) -> tuple[Compl
 # ------------------------------------------------------------ polynomials over the rationals
 
 
-def _polynomials(block: LawBlock) -> tuple[list[Any], Any]:
-    """Of each signal the numerator, and the denominator: polynomials over the rationals (`flint.fmpq_poly`)."""
+def polynomials(block: LawBlock) -> tuple[list[Any], Any]:
+    """Return the numerator of each signal j and the denominator of a block, over the rationals (`flint.fmpq_poly`).
+
+    Those of matrices are det(s - A + B_j C) + (D_j - 1) det(s - A) and det(s - A).
+    """
     if isinstance(block, Rational):
         num, den = (flint.fmpq_poly([_rational(each) for each in reversed(of)]) for of in (block.num, block.den))
         return [num], den
     A, B, C, D = (_exact(each) for each in block.matrices())
     den = A.charpoly()
-    nums = [
-        (A - flint.fmpq_mat([[B[i, j] * C[0, k] for k in range(block.order)] for i in range(block.order)])).charpoly()
-        + (D[0, j] - 1) * den
-        for j in range(block.signals)
-    ]
-    return nums, den
+    columns = (flint.fmpq_mat(block.order, 1, [B[i, j] for i in range(block.order)]) for j in range(block.signals))
+    return [(A - each * C).charpoly() + (D[0, j] - 1) * den for j, each in enumerate(columns)], den
 
 
 def _zeros_at_0(polynomial: Any) -> int:
-    """How often a polynomial that is not 0 everywhere vanishes at 0."""
+    """Return the order of the zero at 0 of a polynomial other than 0."""
     return next(n for n, each in enumerate(polynomial.coeffs()) if each)
 
 
 def _rational(x: float) -> Any:
+    """Return a double as a rational number."""
     return flint.fmpq(*float(x).as_integer_ratio())
 
 
 def _exact(matrix: Real) -> Any:
+    """Return a matrix of doubles over the rationals."""
     rows, columns = matrix.shape
     return flint.fmpq_mat(rows, columns, [_rational(each) for each in matrix.ravel().tolist()])
 
 
 def _roots(polynomial: Any) -> Complex:
-    """The roots, to the last bit, each as often as it is one; of 0 none."""
+    """Return the roots to the last bit, with multiplicity; none of 0."""
     if polynomial.degree() < 1:
         return np.empty(0, complex)
     found = [complex(root) for root, times in polynomial.complex_roots() for _ in range(times)]
@@ -126,7 +128,7 @@ def _roots(polynomial: Any) -> Complex:
 
 
 def _leading(num: Any, den: Any) -> float:
-    """The ratio of the highest coefficients; as a rational number it may have larger parts than any double."""
+    """Return the ratio of the leading coefficients, whose parts may be larger than any double."""
     ratio = num.leading_coefficient() / den.leading_coefficient() if num else flint.fmpq(0)
     return int(ratio.p) / int(ratio.q)
 
@@ -135,7 +137,7 @@ def _leading(num: Any, den: Any) -> float:
 
 
 def _of_tustin(num: Any, den: Any, c: float, most: int) -> Gained:
-    """Gain and zeros of num/den with s = c delta/(delta + 2), times (delta + 2)^most of both."""
+    """Return gain and zeros of num/den with s = c delta/(delta + 2), both times (delta + 2)^most."""
     zeros, poles = _roots(num), _roots(den)
     gain = _leading(num, den) * np.prod(1 - zeros / c) / np.prod(1 - poles / c) * c ** (zeros.size - poles.size)
     at_end = np.full(most - zeros.size, AT_MINUS_ONE) if num else np.empty(0)
@@ -143,11 +145,11 @@ def _of_tustin(num: Any, den: Any, c: float, most: int) -> Gained:
 
 
 def _of_matched(num: Any, den: Any, T: float) -> Gained:
-    """Gain and zeros where every root r becomes e^{rT}; at rest both go the same way, as powers of s and delta/T."""
+    """Return gain and zeros with e^{rT} for every root r; at rest both agree, as powers of s and delta/T."""
     zeros, poles = _roots(num), _roots(den)
 
     def growth(roots: Complex) -> complex:
-        """prod((e^{rT} - 1)/(r T)) of those that are not 0."""
+        """Return prod((e^{rT} - 1)/(r T)) of the roots other than 0."""
         x = roots[roots != 0] * T
         return complex(np.prod(np.expm1(x) / x))
 
@@ -156,7 +158,7 @@ def _of_matched(num: Any, den: Any, T: float) -> Gained:
 
 
 def _of_held(block: LawBlock, nums: list[Any], den: Any, T: float) -> list[Gained]:
-    """Of each signal gain and zeros of what the block makes of a held one."""
+    """Return gain and zeros of each signal behind a zero-order hold."""
     states = _companion(nums[0], den) if isinstance(block, Rational) else tuple(map(_exact, block.matrices()))
     prec = flint.ctx.prec
     try:
@@ -168,7 +170,7 @@ def _of_held(block: LawBlock, nums: list[Any], den: Any, T: float) -> list[Gaine
 
 
 def _companion(num: Any, den: Any) -> tuple[Any, Any, Any, Any]:
-    """States of num/den in controllable form, exactly."""
+    """Return the state space of num/den in controllable form, exactly."""
     n, first = den.degree(), den.leading_coefficient()
     D = num[n] / first
     A = flint.fmpq_mat([[-den[n - 1 - k] / first if i == 0 else int(k == i - 1) for k in range(n)] for i in range(n)])
@@ -177,9 +179,9 @@ def _companion(num: Any, den: Any) -> tuple[Any, Any, Any, Any]:
 
 
 def _held_numerator(states: Any, j: int, num: Any, den: Any, T: Any) -> Any:
-    """The polynomial in delta of signal j, over the rationals, with coefficients that are right to `ENOUGH_BITS`.
+    """Return the polynomial in delta of signal j, over the rationals, with coefficients of `ENOUGH_BITS`.
 
-    Where the block has no value at rest it vanishes at delta = 0, once: held signals leave no second zero there.
+    For a block without a value at rest it has a simple zero at delta = 0.
     """
     D, known = states[3][0, j], min(_zeros_at_0(num), _zeros_at_0(den) + 1) if num else 0
     for _ in range(MOST_DOUBLINGS):
@@ -187,12 +189,12 @@ def _held_numerator(states: Any, j: int, num: Any, den: Any, T: Any) -> Any:
         if not num or all(each.rel_accuracy_bits() >= ENOUGH_BITS for each in balls):
             break
         flint.ctx.prec *= 2
-    middles = [flint.fmpq(0) if each.contains(0) else _middle(each) for each in balls]
+    middles = [flint.fmpq(0) if each.contains(0) else exact_middle(each) for each in balls]
     return flint.fmpq_poly([0] * known + middles + [D])
 
 
 def _held_coefficients(states: Any, j: int, T: Any) -> list[Any]:
-    """Those of delta^0 to delta^(n - 1), n the order of the block, as balls."""
+    """Return those of delta^0 to delta^(n - 1), n the order of the block, as balls."""
     A, B, C, D = states
     n = A.nrows()
     both = flint.arb_mat([*([A[i, k] * T for k in range(n)] + [B[i, j] * T] for i in range(n)), [0] * (n + 1)]).exp()
@@ -200,8 +202,3 @@ def _held_coefficients(states: Any, j: int, T: Any) -> list[Any]:
     fed = flint.arb_mat(n, n, [both[i, n] * C[0, k] for i in range(n) for k in range(n)])
     p, q = (less - fed).charpoly(), less.charpoly()
     return [p[k] + (flint.arb(D[0, j]) - 1) * q[k] for k in range(n)]
-
-
-def _middle(ball: Any) -> Any:
-    whole, power = ball.mid().man_exp()
-    return flint.fmpq(whole) * flint.fmpq(2) ** int(power)

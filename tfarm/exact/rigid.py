@@ -1,6 +1,6 @@
-"""The response of a rig whose links are rigid: hub, joint, clamp, motor, payload and attachments stay as they are.
+"""The response of a rig with rigid links and its own hub, joint, clamp, motor, payload and attachments.
 
-It is the limit of ever stiffer links.  A rigid segment of length l is half of its offset, a body of mass rho A l and
+It is the limit of stiff links.  A rigid segment of length l is half of its offset, a body of mass rho A l and
 inertia rho A l^3/12 + rho I l, and the other half of the offset.
 """
 
@@ -21,14 +21,14 @@ from .outputs import Output
 from .system import Body, Offset, Place, Segment, Spring, system_of
 from .waves import Plane, Row
 
-ROUNDING = 64 * float(np.finfo(float).eps)  # share of the hub's motion that rounding leaves of a link that is held
+ROUNDING = 64 * float(np.finfo(float).eps)  # share of the hub's motion: rounding of that of a fixed link
 
 
 def rigid_response(arm: Arm, wanted: Output, s: Complex, x: float = 0.0) -> Complex:
-    """One output in SI units per unit of the arm's input at s [1/s] (1-D), all links rigid; x is a share of the length.
+    """Return one output in SI units for unit input at s [1/s] (1-D), with rigid links; x is a share of the length.
 
-    Zero is returned for a strain, and where rigid parts contradict each other or leave the output open: a payload of
-    infinite mass and inertia, or either of them with a hub whose angle is the input.
+    It is zero for a strain, and where the constraints of rigid parts are contradictory or redundant: a payload of
+    infinite mass and inertia, or either of them with the hub angle as the input.
     """
     if wanted.quantity == "strain":
         return np.zeros(s.size, complex)
@@ -47,12 +47,12 @@ def rigid_response(arm: Arm, wanted: Output, s: Complex, x: float = 0.0) -> Comp
 class RigidSweep(Sweep):
     """The sweep over rigid segments at an array of s, in float64.
 
-    W and Psi at a mark are less the motion of a rig without springs, (r + x) theta and theta: a deflection at low
+    W and Psi at a mark are those minus the motion without springs, (r + x) theta and theta, as a deflection at low
     frequency is a small difference of both.
     """
 
     def output(self, one: Reading) -> Any:
-        """An output of this response, in SI units."""
+        """Return an output of this response, in SI units."""
         if one.place is not None:  # W = (r + x) theta + its mark's, Psi = theta + its mark's
             reach = self.layout.chain.radius + self._from_clamp(one.place)
             one = one._replace(theta=one.theta + one.state[0] * reach + one.state[1])
@@ -67,7 +67,7 @@ class RigidSweep(Sweep):
 
     @cached_property
     def _yielded(self) -> tuple[Any, Any]:
-        """What joint and clamp add to W and Psi at the clamp."""
+        """W and Psi at the clamp from the deformation of joint and clamp."""
         lift, turn, M = 0.0 * self.s, 0.0 * self.s, self.M
         for each in reversed(self.numbers.elements):
             if isinstance(each, Segment | Body):
@@ -80,15 +80,15 @@ class RigidSweep(Sweep):
         return lift, turn
 
     def _from_clamp(self, place: Place) -> Fraction:
-        """Its distance from the clamp, a share of the length."""
+        """Return the distance of a place from the clamp, a share of the length."""
         return place.share + (self.layout.chain.offset if place.side == "payload" else 0)
 
     def exact(self, number: Any) -> Any:
-        """The nearest float64."""
+        """Return the nearest float64."""
         return float(number)
 
     def numbers_of(self, layout: Layout) -> Numbers:
-        """The layout's numbers as float64."""
+        """Return the layout's numbers as float64."""
         return layout.numbers("float64", float)
 
     def _inside(self, element: Any, p: Plane) -> Plane:
@@ -103,7 +103,7 @@ class RigidSweep(Sweep):
 
 
 def _rigid(element: Any) -> tuple[Any, ...]:
-    """A segment as a rigid body between two halves of its length; any other element as it is."""
+    """Return a segment as a rigid body between two halves of its length; any other element itself."""
     if not isinstance(element, Segment):
         return (element,)
     l, EI = element.length, element.stiffness

@@ -1,11 +1,11 @@
 """The free response of a chain in float64: the plane swept inwards from the payload, the hub's condition outwards.
 
-At each s the plane of states (`compound`) is carried from the payload to the axis, where W = 0 leaves theta and the
-moment on the hub; the condition W = 0 is carried back to the places that something is read at.  Every segment takes its
-waves where one is fast and its transition functions where both are slow; each scale e^{t} is taken out and kept.  What
-is read has the scales of the segments inside of it alone: the difference of two sums over all would cost their digits.
+At each s the plane of states (`waves`) is carried from the payload to the axis, where W = 0 determines theta and the
+moment on the hub.  The condition W = 0 is carried back to the places of the outputs.  For a segment with a fast wave
+the waves are used, else its transition functions; each scale e^{t} is factored out.  An output has the scales of the
+segments inside of it alone, as a difference of two sums over all segments would lose digits.
 
-Points are worked through in blocks, component by component (`pieces`).
+Points are processed in blocks, component by component (`pieces`).
 """
 
 from __future__ import annotations
@@ -62,22 +62,22 @@ from .waves import (
     transition_series,
 )
 
-OVERFLOW, UNDERFLOW = 1e80, 1e-80  # a plane beyond is brought back to 1, by a power of two
+OVERFLOW, UNDERFLOW = 1e80, 1e-80  # a plane beyond is rescaled by a power of two
 LN_2 = math.log(2.0)
-POLE = 1e-11  # drive below this share of its own terms: flagged, it may be a pole
-DIFFERENCE = 0.5  # an output below this share of its own terms has lost a bit: it is summed up from the axis instead,
-SMALL_DIFFERENCE = 0.05  # and where that cannot be, flagged below this share, which has lost four bits
+POLE = 1e-11  # a drive below this share of its terms is flagged, as it may be a pole
+DIFFERENCE = 0.5  # an output below this share of its terms has lost a bit and is summed from the axis instead,
+SMALL_DIFFERENCE = 0.05  # or else flagged below this share, with four lost bits
 AXIS = read_only(np.array([[1.0], [0.0], [0.0], [0.0]]))  # the condition W = 0 there, at every point
 
 
 class Work(NamedTuple):
-    """What a block is worked in: planes (2) here and beyond, and at marks; conditions (2); the scales of all.
+    """Scratch arrays of a block: planes (2) here and beyond, and at marks; conditions (2); the scales of all.
 
-    `powers` (elements, points) are those of two that the plane was divided by after each; a mark's state times e^scale
-    2^shift goes with the plane at the axis.  `inner` are the planes at the inner side of each element, `inside`
-    is W there of the last spring on the way back; `lift`, `turn`
-    are W - r theta and Psi - theta on the way back, r the distance from the axis, as long as all segments are `slow`,
-    and `yielded` both at each mark, where `known`.  `watched` are points next to a segment's shear cut-off.
+    The plane was divided by 2^`powers` (elements, points) after each element; a mark's state times e^scale 2^shift has
+    the scale of the plane at the axis.  `inner` are the planes at the inner side of each element, `inside` is W there
+    of the last spring on the way back.  `lift` and `turn` are W - r theta and Psi - theta on the way back, r the
+    distance from the axis, as long as all segments are `slow`; `yielded` are both at each mark, where `known`.
+    `watched` are points next to a segment's shear cut-off.
     """
 
     planes: NDArray[np.complex128]
@@ -102,7 +102,7 @@ class Work(NamedTuple):
 
 @compiled
 def _work(rows: Any) -> Work:
-    """Room for a chain."""
+    """Return the scratch arrays of a chain."""
     marks = segments = 0
     for j in range(len(rows)):
         marks += rows[j, ROW_KIND] == MARK
@@ -138,7 +138,7 @@ def _work(rows: Any) -> Work:
 
 @compiled
 def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
-    """The plane at the axis, into work.planes[0], and at each mark, with its scale; whether digits are lost."""
+    """Compute the plane at the axis, work.planes[0], and at each mark, with its scale; mark lost digits."""
     plane, beyond, scale, number = work.planes[0], work.planes[1], work.scale, 0
     _begin(points, ends, plane)
     scale[:], lost[:], work.watched[:] = 0.0, False, False
@@ -160,7 +160,7 @@ def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
 
 @compiled
 def _begin(points: Any, ends: Any, plane: Any) -> None:
-    """The plane at the payload."""
+    """Compute the plane at the payload."""
     for i in range(BLOCK):
         S = points[i] * points[i]
         mass, shear, inertia, moment = tip_conditions(ends, S)
@@ -170,7 +170,7 @@ def _begin(points: Any, ends: Any, plane: Any) -> None:
 
 @compiled
 def _small(points: Any, row: Any, plane: Any) -> None:
-    """The plane inside an offset, a spring or a body, in place."""
+    """Compute the plane inside an offset, a spring or a body, in place."""
     for i in range(BLOCK):
         s, S = points[i], points[i] * points[i]
         p = plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i]
@@ -185,7 +185,7 @@ def _small(points: Any, row: Any, plane: Any) -> None:
 
 @compiled
 def _brought_back(buffer: Any, parts: int, powers: Any) -> None:
-    """Divide each point's numbers by a power of two, in place, where they come near to over- or underflow."""
+    """Divide each point's numbers by a power of two, in place, where they are near over- or underflow."""
     is_extreme = False
     for i in range(BLOCK):
         largest = 0.0
@@ -207,9 +207,9 @@ def _brought_back(buffer: Any, parts: int, powers: Any) -> None:
 
 @compiled
 def _go_back(points: Any, rows: Any, axis: Any, work: Work, differs: bool, lost: Any) -> None:
-    """The state at each mark, in place of its plane: the condition of the axis, carried outwards, meets it.
+    """Compute the state at each mark, in place of its plane, from the condition of the axis carried outwards.
 
-    That is axis . (W, Psi, M, Q) = 0; the hub angle under it is left in work.theta.
+    That is axis . (W, Psi, M, Q) = 0; the hub angle is work.theta.
     """
     f, beyond, plane = work.conditions[0], work.conditions[1], work.planes[0]
     for i in range(BLOCK):
@@ -239,13 +239,13 @@ def _go_back(points: Any, rows: Any, axis: Any, work: Work, differs: bool, lost:
             left, mark = left - 1, int(row[NUMBER])
             work.scales[mark], work.shifts[mark] = scale, shift
             _meet(f, work.marked[mark])
-            if number < len(work.kept.low):  # of W, M and Q little may be left there
+            if number < len(work.kept.low):  # there W, M and Q may have lost digits
                 for i in range(BLOCK):
                     lost[i] = lost[i] or work.watched[i]
-            elif is_rigid:  # nothing yields between the axis and the mark
+            elif is_rigid:  # no spring or segment between the axis and the mark
                 for i in range(BLOCK):
                     work.marked[mark, i] = times(work.theta[i], reach * math.ldexp(1.0, -shift[i]))
-            elif of_spring:  # W is what it was inside of the spring
+            elif of_spring:  # W is that inside of the spring
                 for i in range(BLOCK):
                     work.marked[mark, i] = times(work.inside[i], math.ldexp(1.0, -shift[i]))
         else:
@@ -256,7 +256,7 @@ def _go_back(points: Any, rows: Any, axis: Any, work: Work, differs: bool, lost:
 
 @compiled
 def _small_back(points: Any, row: Any, f: Any) -> None:
-    """The condition beyond an offset, a spring or a body, in place."""
+    """Compute the condition beyond an offset, a spring or a body, in place."""
     for i in range(BLOCK):
         s, S = points[i], points[i] * points[i]
         own = f[i], f[BLOCK + i], f[2 * BLOCK + i], f[3 * BLOCK + i]
@@ -271,7 +271,7 @@ def _small_back(points: Any, row: Any, f: Any) -> None:
 
 @compiled
 def _meet(f: Any, plane: Any) -> None:
-    """The state that a condition leaves of a plane, in the place of the plane's first four numbers."""
+    """Compute the state of a plane with a condition, in place of the plane's first four numbers."""
     for i in range(BLOCK):
         own = f[i], f[BLOCK + i], f[2 * BLOCK + i], f[3 * BLOCK + i]
         p = plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i]
@@ -280,9 +280,9 @@ def _meet(f: Any, plane: Any) -> None:
 
 @compiled
 def _yield(points: Any, row: Any, f: Any, plane: Any, shift: Any, reach: float, work: Work) -> float:
-    """W - r theta and Psi - theta at the outer side of an element from those at its inner one, r from the axis, and r.
+    """Compute W - r theta and Psi - theta at the outer side of an element from those at its inner one; return r.
 
-    Only while all segments are slow; f and the plane at the inner side give M and Q there with all their digits.
+    r is the distance from the axis.  Valid while all segments are slow; M and Q are those of f and the inner plane.
     """
     if row[ROW_KIND] == MARK:
         mark = int(row[NUMBER])
@@ -313,9 +313,9 @@ def _yield(points: Any, row: Any, f: Any, plane: Any, shift: Any, reach: float, 
 def _beyond_slow(
     s: complex, row: Any, reach: float, theta: complex, lift: complex, turn: complex, M: complex, Q: complex
 ) -> tuple[complex, complex]:
-    """W - r theta and Psi - theta at the outer end of a slow segment from the state at its inner one.
+    """Return W - r theta and Psi - theta at the outer end of a slow segment from the state at its inner one.
 
-    It is `compound.transition_rows` seen from the other end, where Psi and Q have the other sign, less the identity.
+    It is `waves.transition_rows` from the other end, with the other sign of Psi and Q, minus the identity.
     """
     w, M, Q = row[TO_W], row[TO_M] * M, row[TO_Q] * Q
     lift, W, Psi = w * lift, w * (reach * theta + lift), theta + turn
@@ -330,7 +330,7 @@ def _beyond_slow(
 
 @inlined
 def drive_at(s: complex, ends: Any, theta: complex, M: complex) -> complex:
-    """The input behind a response with that hub angle and moment on the hub."""
+    """Return the input of a response with that hub angle and moment on the hub."""
     A0, B0 = OF_ANGLE, OF_MOMENT
     of_angle = ends[A0] + s * (ends[A0 + 1] + s * (ends[A0 + 2] + s * ends[A0 + 3]))
     return of_angle * theta - (ends[B0] + s * ends[B0 + 1]) * M
@@ -338,7 +338,7 @@ def drive_at(s: complex, ends: Any, theta: complex, M: complex) -> complex:
 
 @inlined
 def drive_terms(s: complex, segment: Any, ends: Any, theta: complex, M: complex) -> float:
-    """What the drive would be away from a pole: its two terms, and each with the other's size of motion."""
+    """Return the scale of the drive away from a pole: its two terms, and each with the motion of the other."""
     A0, B0 = OF_ANGLE, OF_MOMENT
     S = magnitude(s * s)
     of_angle = magnitude(ends[A0] + s * (ends[A0 + 1] + s * (ends[A0 + 2] + s * ends[A0 + 3])))
@@ -350,13 +350,12 @@ def drive_terms(s: complex, segment: Any, ends: Any, theta: complex, M: complex)
 
 @compiled
 def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, lost: Any) -> None:
-    """Drive, scale and each output of the free response at s (1-D), a row each; whether digits are lost.
+    """Compute drive, scale and each output of the free response at s (1-D), rows of `found`; mark lost digits.
 
-    It obeys axis . (W, Psi, M, Q) = 0 on the hub's axis, W = 0 for `AXIS`; `axis` (4, n) has a column a point or one.
-
-    A row of `table` is an output: its place (or -1), weights of W, Psi, M, Q there and of theta, power of s, C of the
-    gauge, factor.  Digits are lost where two waves of a segment are nearly one, where an output is a small difference
-    of what fast waves carry, and where the drive is: there it may be a pole.
+    It satisfies axis . (W, Psi, M, Q) = 0 on the hub's axis, W = 0 for `AXIS`; `axis` (4, n) has one column, or one for
+    each point.  A row of `table` is an output: its place (or -1), weights of W, Psi, M, Q there and of theta, power of
+    s, C of the gauge, factor.  Digits are lost where two waves of a segment are nearly one, where an output is a small
+    difference of fast waves, and where the drive is one, near a pole.
     """
     differs = False
     for o in range(len(table)):
@@ -381,7 +380,7 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
 
 @inlined
 def _innermost(rows: Any) -> Any:
-    """The row of the segment at the hub."""
+    """Return the row of the segment at the hub."""
     last = rows[0]
     for j in range(len(rows)):
         if rows[j, ROW_KIND] == SEGMENT:
@@ -391,7 +390,7 @@ def _innermost(rows: Any) -> Any:
 
 @compiled
 def _drive(points: Any, segment: Any, ends: Any, plane: Any, drive: Any, lost: Any) -> None:
-    """The drive at every point of a block; digits are lost where it is small."""
+    """Compute the drive at every point of a block; digits are lost where it is small."""
     for i in range(BLOCK):
         drive[i] = drive_at(points[i], ends, plane[i], plane[BLOCK + i])
     for i in range(BLOCK):
@@ -401,7 +400,7 @@ def _drive(points: Any, segment: Any, ends: Any, plane: Any, drive: Any, lost: A
 
 @compiled
 def _output(points: Any, want: Any, work: Work, value: Any, lost: Any) -> None:
-    """An output of a row of the table, at every point of a block; digits are lost where it is a small difference."""
+    """Compute an output of the table at every point of a block; digits are lost where it is a small difference."""
     of_theta, power, C, unit = want[5], int(want[6]), want[7], want[8]
     for i in range(BLOCK):
         value[i] = times(work.theta[i], of_theta)

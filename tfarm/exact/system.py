@@ -1,18 +1,14 @@
-"""The elements of a rig without dimensions, as exact fractions: what stands in a chain from the payload inwards.
+"""The exact system of an arm: a chain of dimensionless elements, as exact fractions, from the payload inwards.
 
 Lengths are in L (clamp to tip), moments in EI/L, forces in EI/L^2 of the segment at the hub, time in seconds.
 
-The exact system that an arm is: a chain of elements without dimensions, from the payload inwards.
-
-One uniform link is a chain of one segment.
-
-Payload, offset of its centre, segments with bodies and springs between them, clamp, hub radius, joint, and at last the
-drive: what the input must be for the response that is left,
+The chain has the payload, the offset of its centre, segments with bodies and springs between them, clamp, hub radius,
+joint, and the drive, which is the input of the free response,
 
     input = sum of A_n s^n theta - sum of B_n s^n M_axis,
 
-with M_axis the moment that the link puts on the hub.  Torque has A = (k_theta, b, I_h + N^2 J_m), B = 1; a motor's
-voltage and a prescribed hub angle have others (see `Drive`).
+with M_axis the moment of the link on the hub.  For a torque A = (k_theta, b, I_h + N^2 J_m) and B = 1; for a motor's
+voltage and a prescribed hub angle see `Drive`.  One uniform link is a chain of one segment.
 """
 
 from __future__ import annotations
@@ -28,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Arm, Attachment, Link, RotarySpring, Theory
-from tfarm.errors import ParameterError
+from tfarm.errors import must_be_known
 from tfarm.records import record
 
 from .outputs import Side
@@ -49,7 +45,7 @@ class Segment(NamedTuple):
     half_depth: float | None = None
 
     def piece(self, share: Fraction) -> Segment:
-        """That share of it."""
+        """Return that share of the segment."""
         return self._replace(
             a=self.a * share**2,
             b=self.b * share**2,
@@ -60,12 +56,12 @@ class Segment(NamedTuple):
 
     @property
     def units(self) -> tuple[Fraction, Fraction, Fraction]:
-        """What W, M and Q in the chain's units are multiplied by to be in the segment's own."""
+        """The factors of W, M and Q from the chain's units to those of the segment."""
         return 1 / self.length, self.length / self.stiffness, self.length * self.length / self.stiffness
 
 
 class Offset(NamedTuple):
-    """A rigid massless piece of that length, of L; of either sign."""
+    """A rigid massless piece of that length in L, of either sign."""
 
     length: Fraction
 
@@ -88,7 +84,7 @@ class Body(NamedTuple):
 
 
 class Mark(NamedTuple):
-    """A place that something is read at: its number in the list of places."""
+    """A place of an output: its number in the list of places."""
 
     number: int
 
@@ -107,7 +103,7 @@ Element = Segment | Offset | Spring | Body | Mark
 
 
 class Drive(NamedTuple):
-    """What the hub asks of its input: inertia [s^2], friction [s], stiffness, back-EMF [s] and the lag L_a/R [s].
+    """The drive at the hub: inertia [s^2], friction [s], stiffness, back-EMF [s] and the lag L_a/R [s].
 
     The input turns the hub against  Z_h = inertia s^2 + friction s + stiffness,  or is its angle (`turns` false).  A
     voltage has back-EMF and lag too:  (1 + lag s)(Z_h theta - M_axis) + back_emf s theta.  `unit` is the SI value of
@@ -149,44 +145,42 @@ class EndCondition:
     force: Fraction
 
     @classmethod
-    @lru_cache(maxsize=64)  # a proof asks for the same three at every step of its contour
+    @lru_cache(maxsize=64)  # a proof needs the same three at every step of its contour
     def of(cls, inertia: Inertia) -> EndCondition:
-        """The condition of a body of that dimensionless inertia (0..inf)."""
+        """Return the condition of a body of that dimensionless inertia (0..inf)."""
         if not isinstance(inertia, Fraction):
             return cls(rest=Fraction(1), inertia=Fraction(0), force=Fraction(0))
         return cls(rest=Fraction(0), inertia=inertia / (1 + inertia), force=1 / (1 + inertia))
 
 
 def double_double(value: Fraction) -> tuple[float, float]:
-    """The two floats whose sum is nearest to the fraction."""
+    """Return the two floats whose sum is nearest to the fraction."""
     high = float(value)
     return high, float(value - Fraction(high))
 
 
 def uniform(link: Link, theory: Theory) -> tuple[Fraction, Fraction, Fraction, Fraction]:
-    """a, b, g [s^2] and sigma of a link under one of `THEORIES`.  Raises ParameterError for another name."""
-    if theory not in THEORIES:
-        raise ParameterError(key="theory", value=theory, remedy=f"use one of {', '.join(THEORIES)}")
+    """Return a, b, g [s^2] and sigma of a link under one of `THEORIES`.  Raises ParameterError for others."""
+    must_be_known("theory", theory, THEORIES)
     length, density, E = Fraction(link.length), Fraction(link.density), Fraction(link.youngs_modulus)
     kG = Fraction(link.shear_factor) * Fraction(link.shear_modulus)
     area, EI = Fraction(link.section.area), stiffness_of(link)
-    rotary = theory in WITH_ROTARY_INERTIA
-    flexible = theory in WITH_SHEAR
-    a, b = density * length**2 / E * rotary, density * length**2 / kG * flexible
-    return a, b, density * area * length**4 / EI, EI / (kG * area * length**2) * flexible
+    a = density * length**2 / E * (theory in WITH_ROTARY_INERTIA)
+    b, sigma = (number * (theory in WITH_SHEAR) for number in (density * length**2 / kG, EI / (kG * area * length**2)))
+    return a, b, density * area * length**4 / EI, sigma
 
 
 def stiffness_of(link: Link) -> Fraction:
-    """E I [N m^2] of a link, exact."""
+    """Return E I [N m^2] of a link, exact."""
     return Fraction(link.youngs_modulus) * Fraction(link.section.second_moment)
 
 
 def scaled_inertia(value: float, unit: Fraction) -> Inertia:
-    """A mass or inertia in that unit; inf stays."""
+    """Return a mass or inertia in that unit, or inf."""
     return math.inf if math.isinf(value) else Fraction(value) * unit
 
 
-SYSTEMS_KEPT = 64  # arms whose exact numbers are kept: one page asks for those of one arm some thousand times
+SYSTEMS_KEPT = 64  # arms whose exact numbers are cached: one page needs those of one arm some thousand times
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,8 +188,8 @@ SYSTEMS_KEPT = 64  # arms whose exact numbers are kept: one page asks for those 
 class System:
     """An arm or rig: its elements from the payload inwards, the conditions of both ends, and the units.
 
-    `gauge` is where the moment that a law feeds back is read; `radius` and `offset` of hub and payload are shares of
-    the link's `length` [m]; `EI` [N m^2] is that at the hub.
+    `gauge` is the place of the moment that a law feeds back; `radius` and `offset` of hub and payload are shares of the
+    link's `length` [m]; `EI` [N m^2] is that at the hub.
     """
 
     elements: tuple[Element, ...]
@@ -210,7 +204,7 @@ class System:
 
     @cached_property
     def kept(self) -> dict[Any, Any]:
-        """What is laid out or worked out of it once (`layout.readings`), with the system and gone with it."""
+        """The cache of layouts and other results of the system (`layout.readings`)."""
         return {}
 
     @cached_property
@@ -220,12 +214,12 @@ class System:
 
     @property
     def is_uniform(self) -> bool:
-        """Whether it is one uniform link that hub and payload are fixed to, centre to end."""
+        """Whether it is one uniform link on a hub, with the payload centred on the tip."""
         return len(self.elements) == 1
 
     @property
     def reads_hub_moment(self) -> bool:
-        """Whether the link's moment at its root is what acts on the hub: clamped on the axis, with no body there."""
+        """Whether the root moment acts on the hub: a clamp on the axis, without a body there."""
         inside = takewhile(lambda each: not isinstance(each, Segment), reversed(self.elements))
         return not self.radius and not any(isinstance(each, Body) for each in inside)
 
@@ -241,14 +235,10 @@ class System:
 
     @property
     def has_rigid_mode(self) -> bool:
-        """Whether it can turn as a rigid body: nothing is infinite and no spring holds it."""
-        free = all(isinstance(end, Fraction) for end in (self.tip_mass, self.tip_inertia)) and not self.is_locked
-        bodies = [each for each in self.elements if isinstance(each, Body)]
-        return (
-            free
-            and not self.drive.stiffness
-            and not any(each.stiffness or each.rotational_stiffness for each in bodies)
-        )
+        """Whether it can turn as a rigid body: without infinite inertias and springs to ground."""
+        ends, bodies = (self.tip_mass, self.tip_inertia), (each for each in self.elements if isinstance(each, Body))
+        springs = any(each.stiffness or each.rotational_stiffness for each in bodies) or self.drive.stiffness
+        return not (springs or self.is_locked) and all(isinstance(end, Fraction) for end in ends)
 
     @property
     def transit(self) -> float:
@@ -257,14 +247,14 @@ class System:
 
     @property
     def at_rest(self) -> int:
-        """How often the drive vanishes at s = 0: twice where the rig turns freely, once where friction resists it."""
+        """The order of the drive's zero at s = 0: 2 of a free rig, 1 with friction, 0 without a rigid-body mode."""
         if not self.has_rigid_mode:
             return 0
         return 1 if self.drive.friction or self.drive.back_emf else 2
 
     @cached_property
     def singular(self) -> tuple[float, ...]:
-        """-1/C [1/s] of each damped segment, ascending: there eigenvalues accumulate."""
+        """-1/C [1/s] of each damped segment, ascending, where eigenvalues accumulate."""
         return tuple(sorted({-1.0 / each.damping for each in self.segments if each.damping}))
 
     @property
@@ -275,7 +265,7 @@ class System:
 
     @property
     def is_real_on_axis(self) -> bool:
-        """Whether drive and outputs are real at s = i w, but for odd powers of s: no loss, and no inductance's lag."""
+        """Whether drive and outputs are real at s = i w, up to odd powers of s: no dissipation and no lag."""
         return self.is_undamped and not self.drive.lag
 
     @property
@@ -284,7 +274,7 @@ class System:
         return self.drive.unit
 
     def with_damping(self, share: float) -> System:
-        """The chain with so much of every damper: of C, of the dashpots, and of what the drive has in odd powers."""
+        """Return the chain with a share of all damping: C, dashpots, friction and back-EMF."""
         parts: list[Element] = [
             each._replace(damping=each.damping * share) if isinstance(each, Segment | Spring) else each
             for each in self.elements
@@ -297,7 +287,7 @@ class System:
 
 @lru_cache(maxsize=SYSTEMS_KEPT)
 def system_of(arm: Arm, theory: Theory | None = None) -> System:
-    """The system of an arm under its own theory, or another.  Raises ParameterError for an unknown theory."""
+    """Return the system of an arm under its own theory, or another.  Raises ParameterError for an unknown one."""
     theory = theory or arm.theory
     unit_length, EI = sum((Fraction(link.length) for link in arm.links), Fraction(0)), stiffness_of(arm.link)
     translation, rotation = unit_length**3 / EI, unit_length / EI
@@ -321,7 +311,7 @@ def system_of(arm: Arm, theory: Theory | None = None) -> System:
         pieces.append(own.piece((position - start) / Fraction(link.length)))
         position = start
     at_clamp = [_body(each, translation, rotation) for each in reversed(waiting)]
-    if not arm.hub.radius:  # on the axis nothing moves: a spring there holds nothing
+    if not arm.hub.radius:  # on the axis, which is fixed, a spring has no effect
         at_clamp = [each._replace(stiffness=Fraction(0)) for each in at_clamp]
     pieces += at_clamp
     pieces += _springs(arm.clamp, rotation)
@@ -341,17 +331,12 @@ def system_of(arm: Arm, theory: Theory | None = None) -> System:
 
 
 def hub_drive(arm: Arm, rotation: Fraction) -> Drive:
-    """The drive of an arm's input; `rotation` is L/EI."""
+    """Return the drive of an arm's input; `rotation` is L/EI."""
     hub, motor, none = arm.hub, arm.motor, Fraction(0)
     if arm.is_locked:
         return Drive(False, none, none, none, none, none, Fraction(1))
-    inertia, friction, per_ampere, lag, back_emf = (
-        Fraction(hub.inertia),
-        Fraction(hub.friction),
-        Fraction(1),
-        none,
-        none,
-    )
+    inertia, friction, per_ampere = Fraction(hub.inertia), Fraction(hub.friction), Fraction(1)
+    lag = back_emf = none
     if motor is not None:
         N = Fraction(motor.gear_ratio)
         inertia += N**2 * Fraction(motor.rotor_inertia)
@@ -369,6 +354,7 @@ def hub_drive(arm: Arm, rotation: Fraction) -> Drive:
 
 
 def _body(each: Attachment, translation: Fraction, rotation: Fraction) -> Body:
+    """Return an attachment as an element."""
     return Body(
         mass=Fraction(each.mass) * translation,
         inertia=Fraction(each.inertia) * rotation,
@@ -378,7 +364,7 @@ def _body(each: Attachment, translation: Fraction, rotation: Fraction) -> Body:
 
 
 def _springs(spring: RotarySpring, rotation: Fraction) -> list[Element]:
-    """The spring as an element, or nothing where it is rigid."""
+    """Return the spring as an element, or none where it is rigid."""
     if math.isinf(spring.stiffness):
         return []
     k = Fraction(spring.stiffness) * rotation
@@ -386,7 +372,7 @@ def _springs(spring: RotarySpring, rotation: Fraction) -> list[Element]:
 
 
 def shear_flexibility(k: System, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """E I/(kappa G A L^2) at the shares x (1-D) of the length, with E I and L of the whole: W' = Psi + that Q."""
+    """Return E I/(kappa G A L^2) at the shares x (1-D), E I and L those of the chain: W' = Psi + that Q."""
     inner = list(reversed(k.segments))
     edges = np.cumsum([float(each.length) for each in inner])[:-1]
     own = np.array([float(each.sigma * each.length**2 / each.stiffness) for each in inner])

@@ -1,10 +1,10 @@
-"""One uniform link in float64: hub and tip in closed form, fused; the fast path of `values.free_outputs`.
+"""One uniform link in float64: hub and tip in closed form, the fast path of `values.free_outputs`.
 
-With torque and hub angle left open, the link's equations and its tip conditions leave one solution up to a factor: the
-3x3 minors of the paper's matrix.  `compound` and `sweep` say the same of any chain, at two to three times the cost.
+With torque and hub angle free, the link's equations and tip conditions have one solution up to a factor: the 3x3 minors
+of the paper's matrix.  `sweep` solves the same for any chain, in two to three times the time.
 
-Points are worked through in blocks, each in loops that hold nothing but arithmetic (these vectorise) and one that calls
-the two complex exponentials a point, the floor for speed.
+Points are processed in blocks, each in loops of arithmetic alone, which vectorise, and one with the two complex
+exponentials of each point, the limit of speed.
 """
 
 from __future__ import annotations
@@ -56,9 +56,9 @@ from .waves import (
     transition_series,
 )
 
-LIFT = 2.0**100  # W at the tip is held this much larger: it would underflow where s^2 W does not
-TIP = 3  # which of the numbers at the ends that is
-DRIVE, SCALE, PARTS = 5, 6, 7  # where drive and scale are among them, and how many there are
+LIFT = 2.0**100  # factor of W at the tip, which would underflow where s^2 W does not
+TIP = 3  # its index among the numbers at the ends
+DRIVE, SCALE, PARTS = 5, 6, 7  # the indices of drive and scale, and the number of all
 
 
 @inlined
@@ -80,12 +80,12 @@ def from_waves(
     tip_inertia: Number,
     moment: Number,
 ) -> tuple[Number, Number, Number, Number]:
-    """(theta, M0, Q0, W1) of the free response, up to one common factor, from the two waves.
+    """Return (theta, M0, Q0, W1) of the free response, up to one common factor, from the two waves.
 
-    The tip obeys  tip_mass W + shear Q = 0  and  tip_inertia Psi + moment M = 0,  that is (m s^2, 1) for
-    a finite inertia and (1, 0) for an infinite one.  c, s are scaled by e = e^{-t}.  In the notation of the
-    paper's appendix these are its 3x3 minors: theta vanishes at the hub-locked frequencies and
-    M0 at those of a pinned root.  No product of a wave with itself is left: it would cancel.
+    The tip satisfies  tip_mass W + shear Q = 0  and  tip_inertia Psi + moment M = 0,  with (m s^2, 1) for a finite
+    inertia and (1, 0) for an infinite one.  c, s are scaled by e = e^{-t}.  In the paper's appendix these are the 3x3
+    minors: theta vanishes at the hub-locked frequencies and M0 at those of a pinned root.  There is no product of a
+    wave with itself, which would cancel.
     """  # fmt: skip
     So1, So2 = tip_mass * z1 * s1 + shear * gS * c1, tip_mass * z2 * s2 + shear * gS * c2
     Se1, Se2 = tip_mass * c1 + shear * gS * s1, tip_mass * c2 + shear * gS * s2
@@ -119,11 +119,11 @@ def from_transition(
     tip_inertia: Number,
     moment: Number,
 ) -> tuple[Number, Number, Number, Number, Number]:
-    """(theta, M0, Q0, W1, W1 - theta) of the free response, up to one factor, without wave numbers.
+    """Return (theta, M0, Q0, W1, W1 - theta) of the free response, up to one factor, without wave numbers.
 
-    F0 = (sinh t1 / t1 - sinh t2 / t2)/(z1 - z2) and its derivatives F1, F2, F3 along x at the tip are entire in
-    s^2 (C = 0) and give the state-transition matrix of (W, Psi, M, Q); the tip's two conditions are solved by
-    Cramer's rule; over_d = 1/(1 + C s).  Best for small |t|: for large ones products of a wave with itself cancel.
+    F0 = (sinh t1 / t1 - sinh t2 / t2)/(z1 - z2) and its derivatives F1, F2, F3 along x at the tip are entire in s^2
+    (C = 0) and give the state-transition matrix of (W, Psi, M, Q).  The tip's two conditions are solved by Cramer's
+    rule; over_d = 1/(1 + C s).  For small |t|: for large ones products of a wave with itself cancel.
     """  # fmt: skip
     bS, gS = b * S, g * S
     bend = F2 - bS * F0
@@ -145,15 +145,15 @@ def from_transition(
 
 @compiled
 def fill_ends(s: Any, row: Any, ends: Any, table: Any, per_input: bool, found: Any, lost: Any) -> None:
-    """Drive, scale and each output of the free response at s (1-D), a row each; whether digits are lost.
+    """Compute drive, scale and each output of the free response at s (1-D), rows of `found`; mark lost digits.
 
-    `row` and `ends` are those of the layout.  A row of `table` is an output: which of theta, M, Q, W, W - theta; power
-    of s, C of its gauge, factor.  Outputs are those of a unit input with `per_input`, else times e^{-scale}.
+    `row` and `ends` are those of the layout.  A row of `table` is an output: the index of theta, M, Q, W or W - theta,
+    power of s, C of its gauge, factor.  Outputs are those of a unit input with `per_input`, else times e^{-scale}.
     """
     points, low = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_)
     numbers, functions = np.empty(NUMBERS_SIZE, np.complex128), np.empty(FUNCTIONS_SIZE, np.complex128)
     parts, of_slow = np.empty(PARTS * BLOCK, np.complex128), np.empty(PARTS * BLOCK, np.complex128)
-    small = 1.0  # keeps squares of the drive from overflow beside a heavy hub
+    small = 1.0  # against overflow of squares of the drive with a heavy hub
     for j in range(4):
         small = max(small, abs(ends[OF_ANGLE + j]))
     small = 1.0 / small
@@ -187,7 +187,7 @@ def fill_ends(s: Any, row: Any, ends: Any, table: Any, per_input: bool, found: A
 
 @compiled
 def _by_waves(ends: Any, numbers: Any, functions: Any, parts: Any) -> None:
-    """theta, M, Q, W and W - theta times e^{-scale}, and scale, by the two waves."""
+    """Compute theta, M, Q, W and W - theta times e^{-scale}, and scale, by the two waves."""
     for i in range(BLOCK):
         S, d, gS, z1, z2 = numbers[S_SQUARED + i], numbers[D + i], numbers[GS + i], numbers[Z1 + i], numbers[Z2 + i]
         theta, M, Q, W = from_waves(
@@ -203,7 +203,7 @@ def _by_waves(ends: Any, numbers: Any, functions: Any, parts: Any) -> None:
 
 @compiled
 def _by_series(points: Any, row: Any, ends: Any, parts: Any) -> None:
-    """The same by the series of the transition functions, of slow points."""
+    """Compute the same by the series of the transition functions, at slow points."""
     for i in range(BLOCK):
         s = points[i]
         S, over_d = s * s, reciprocal(1.0 + row[DAMPING] * s)
@@ -215,12 +215,12 @@ def _by_series(points: Any, row: Any, ends: Any, parts: Any) -> None:
         )
         parts[i], parts[BLOCK + i], parts[2 * BLOCK + i] = theta, M, Q
         parts[3 * BLOCK + i], parts[4 * BLOCK + i] = LIFT * W, Y
-    parts[SCALE * BLOCK : PARTS * BLOCK] = 0.0  # in the loop above it would keep that from being vectorised
+    parts[SCALE * BLOCK : PARTS * BLOCK] = 0.0  # in the loop above it would prevent vectorisation
 
 
 @compiled
 def _driven(points: Any, row: Any, ends: Any, small: float, per_input: bool, parts: Any, lost: Any) -> None:
-    """The drive of all points, what is left of its terms, and with `per_input` all numbers over it."""
+    """Compute the drive of all points, mark lost digits, and with `per_input` divide all numbers by it."""
     for i in range(BLOCK):
         drive = drive_at(points[i], ends, parts[i], parts[BLOCK + i])
         parts[DRIVE * BLOCK + i] = drive
@@ -236,7 +236,7 @@ def _driven(points: Any, row: Any, ends: Any, small: float, per_input: bool, par
 
 @inlined
 def _output(points: Any, want: Any, parts: Any, n: int, value: Any) -> None:
-    """An output of a row of the table at n points of a block."""
+    """Compute an output of the table at n points of a block."""
     start, power, C = BLOCK * int(want[0]), int(want[1]), want[2]
     factor = want[3] / LIFT if want[0] == TIP else want[3]
     for i in range(n):

@@ -1,11 +1,11 @@
-"""Outputs at any s: the compiled sweeps where they have all digits, ball arithmetic at the few points where not.
+"""Outputs at any s: the compiled sweeps where they have all digits, ball arithmetic at the few other points.
 
-Three roads to one number, to be taken beside each other: by hand what the tests do everywhere.
+There are three methods for one number:
 
-closed-form   the fused formulas in float64, with ball arithmetic where they lose digits: what tfarm takes
-balls         ball arithmetic alone (python-flint): a proven enclosure, and the float64 nearest to it
-appendix      the paper's own 4x4 determinant and Cramer's rule with mpmath, at a precision that is doubled until
-              two results agree; it shares no formula with the other two
+closed-form   the formulas in float64, with ball arithmetic where they lose digits (the default)
+balls         ball arithmetic alone (python-flint): a certified enclosure, and the float64 nearest to it
+appendix      the paper's 4x4 determinant and Cramer's rule with mpmath, at a precision that is doubled until two
+              results agree, without a formula of the other two
 """
 
 from __future__ import annotations
@@ -13,14 +13,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, cast
 
+import flint
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, Theory
 from tfarm.arrays import Complex, Real
-from tfarm.errors import CertificationError, ParameterError, did_you_mean
+from tfarm.errors import CertificationError, ParameterError, must_be_known
 from tfarm.records import record
 from tfarm.schema import Quantity
 
@@ -33,11 +34,11 @@ from .sweep import AXIS, fill_free
 from .system import Place, System
 from .uniform import fill_ends
 
-AT_A_POLE = 4 * float(np.finfo(float).eps)  # nearer than this share of |s|, no digit of the answer can be right
-PROVEN_BITS = 60  # a little more than a float64 holds
+AT_A_POLE = 4 * float(np.finfo(float).eps)  # of |s|: the distance of a pole within which no digit is right
+PROVEN_BITS = 60  # more than a float64 has
 MOST_ENCLOSURE_BITS = 1 << 18  # of working precision: at a pole no number of them is enough
 _UPPER_HALF = np.exp(1j * np.pi * np.arange(1, 8) / 8)
-SLOPE_CIRCLE = np.r_[1.0, _UPPER_HALF, -1.0, _UPPER_HALF[::-1].conj()]  # as many points above the axis as below
+SLOPE_CIRCLE = np.r_[1.0, _UPPER_HALF, -1.0, _UPPER_HALF[::-1].conj()]  # in conjugate pairs
 SLOPE_RADIUS = 0.3  # of that circle, of |s| over the phase of all waves: the 16th Taylor term is below 1e-17
 CLEAR_OF_SINGULAR = 0.1  # of the way to a -1/C: its radius at most
 
@@ -55,11 +56,12 @@ class Free(NamedTuple):
 
 
 def free_outputs(chain: System, wanted: Sequence[Output], s: Complex, x: float) -> Free:
-    """The free response at s (1-D): outputs in SI per unit of the input that the drive is."""
+    """Return the free response at s (1-D), with outputs in SI for one unit of the drive."""
     return _free(readings(chain, tuple(wanted), x), s)
 
 
 def _free(those: Readings, s: Complex) -> Free:
+    """Return the free response of a layout, by the fast path where it applies."""
     found, lost = np.empty((2 + len(those.each), s.size), complex), np.empty(s.size, bool)
     s, layout, ends = np.ascontiguousarray(s, dtype=complex), those.layout, those.ends_table
     if ends is not None:
@@ -68,14 +70,14 @@ def _free(those: Readings, s: Complex) -> Free:
     fill_free(s, layout.rows, layout.ends, AXIS, those.table, found, lost)
     drive = those.layout.chain.drive
     for row, one in enumerate(those.each):
-        if one.is_current:  # the row holds theta: what is left of the input after back-EMF turns the hub
+        if one.is_current:  # the row has theta: the input less back-EMF, through the lag
             unit, back = float(one.unit) * s**one.power, float(drive.back_emf) * s
             found[2 + row] = (unit * found[0] - back * found[2 + row]) / (1.0 + float(drive.lag) * s)
     return Free(found[0], found[2:], found[1], lost)
 
 
 def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -> tuple[Free, Free]:
-    """The free response and its derivative at s (1-D), by Cauchy's integral on a circle that is right to rounding."""
+    """Return the free response and its derivative at s (1-D), by Cauchy's integral on a circle, to rounding."""
     those = readings(chain, tuple(wanted), x)
     here = _free(those, s)
     radius = SLOPE_RADIUS * np.maximum(abs(s), 1e-150) / np.maximum(1.0, abs(here.scale))
@@ -86,7 +88,7 @@ def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -
     here = here._replace(scale=np.where(np.isfinite(here.scale), here.scale, scales[:, 0]))
     values, slope = np.exp(scales - here.scale[:, None]), 1.0 / SLOPE_CIRCLE / radius[:, None]
     drive, outputs = around.drive.reshape(scales.shape) * values, around.outputs.reshape(-1, *scales.shape) * values
-    if here.lost.any():  # there the values are the mean of those around, as where two waves are one
+    if here.lost.any():  # there the values are means over the circle, as where two waves are one
         here = here._replace(
             drive=np.where(here.lost, _mean(drive), here.drive),
             outputs=np.where(here.lost, _mean(outputs), here.outputs),
@@ -95,7 +97,7 @@ def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -
 
 
 def _mean(values: Complex) -> Complex:
-    """The mean over the circle (last axis), summed so that conjugate points have conjugate means to the last bit."""
+    """Return the mean over the circle (last axis), with exactly conjugate means at conjugate points."""
     half = SLOPE_CIRCLE.size // 2
     pairs = values[..., 1:half] + values[..., :half:-1]
     return np.asarray((values[..., 0] + values[..., half] + pairs.sum(axis=-1)) / SLOPE_CIRCLE.size)
@@ -104,9 +106,9 @@ def _mean(values: Complex) -> Complex:
 def free_fields(
     chain: System, s: Complex, places: Sequence[Place], axis: Real = AXIS
 ) -> tuple[NDArray[Any], NDArray[Any], Complex]:
-    """W, Psi, M, Q (4, s, places) and hub angle (s,) times e^{-scale}, and scale: dimensionless.
+    """Return W, Psi, M, Q (4, s, places) and hub angle (s,) times e^{-scale}, and scale: dimensionless.
 
-    Of the states that the payload allows those with axis . (W, Psi, M, Q) = 0 on the hub's axis: W = 0 by default.
+    The states satisfy axis . (W, Psi, M, Q) = 0 on the hub's axis, by default W = 0.
     """
     different = tuple(dict.fromkeys(places))
     if different not in chain.kept:
@@ -128,7 +130,7 @@ def free_fields(
 
 
 def evaluate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float = 0.0) -> Complex:
-    """Outputs (rows) for a unit input at s (1-D), SI; x is a share of the length, for outputs along the arm.
+    """Return outputs (rows) for a unit input at s (1-D), SI; x is a share of the length, for outputs along the arm.
 
     Raises ParameterError at a pole, naming it.
     """
@@ -148,24 +150,24 @@ def evaluate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float =
 
 
 def differentiate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float = 0.0) -> Complex:
-    """The derivatives of the outputs (rows) with respect to s: N'/D - N D'/D^2, by balls where digits are lost."""
+    """Return the derivatives N'/D - N D'/D^2 of the outputs (rows) in s, by balls where digits are lost."""
     with np.errstate(all="ignore"):
         free, slopes = free_slopes(k, wanted, s, x)
         values: Complex = (slopes.outputs - free.outputs * slopes.drive / free.drive) / free.drive
     for i in np.flatnonzero(free.lost | (s == 0) | ~np.isfinite(values).all(axis=0)):
-        values[:, i] = [_slope_with_care(k, each, complex(s[i]), x) for each in wanted]
+        values[:, i] = [value_with_care(k, each, complex(s[i]), x, of_slope=True) for each in wanted]
     return values
 
 
-def value_with_care(k: System, wanted: Output, s: complex, x: float = 0.0) -> complex:
-    """One output at one s from a proven enclosure, or from the expansion at s = 0.
+def value_with_care(k: System, wanted: Output, s: complex, x: float = 0.0, *, of_slope: bool = False) -> complex:
+    """Return one output, or its slope, at one s from a certified enclosure, or from the expansion at s = 0.
 
-    Raises ParameterError at a pole, and where the value is larger than any float64.
+    Raises ParameterError at a pole, and for a value larger than any float64.
     """
     _refuse_pole(k, wanted, s, x)
     if s == 0:
-        return complex(expansions_at_zero(k, [wanted], x)[0][2])
-    value = nearest_float(enclose(k, wanted, s, bits=PROVEN_BITS, x=x))
+        return complex(expansions_at_zero(k, [wanted], x)[0][2 + of_slope])
+    value = nearest_float(slope(k, wanted, s, x=x) if of_slope else enclose(k, wanted, s, bits=PROVEN_BITS, x=x))
     if not np.isfinite(value):
         raise ParameterError(
             key="s", value=s, remedy=f"{wanted.name} is larger than any float64 there; choose another s"
@@ -174,13 +176,13 @@ def value_with_care(k: System, wanted: Output, s: complex, x: float = 0.0) -> co
 
 
 def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:
-    """Real and imaginary part as decimal strings, each with that many right digits."""
+    """Return real and imaginary part as decimal strings with that many digits.  Raises ParameterError at a pole."""
     _refuse_pole(k, wanted, s, x)
     return decimals(k, wanted, s, digits, x)
 
 
 def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
-    """Raise ParameterError if s is a pole to the last digit that a float64 holds."""
+    """Raise ParameterError if s is a pole to the last digit of a float64."""
     if constant_of(k, wanted, x) is not None:
         return
     if s == 0:
@@ -194,20 +196,13 @@ def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
         raise ParameterError(key="s", value=s, remedy=f"a pole: {name}; the response is infinite there, move s")
 
 
-def _slope_with_care(k: System, wanted: Output, s: complex, x: float) -> complex:
-    _refuse_pole(k, wanted, s, x)
-    if s == 0:
-        return complex(expansions_at_zero(k, [wanted], x)[0][3])
-    return nearest_float(slope(k, wanted, s, x=x))
-
-
-# ------------------------------------------------------------ enclosures: a precision that grows until it does
+# ------------------------------------------------------------ enclosures, at a growing precision
 
 
 def enclose(k: System, wanted: Output, s: complex, *, bits: int, x: float = 0.0) -> Ball:
-    """A ball around the output at s whose relative radius is below 2^-bits.
+    """Return a ball around the output at s with a relative radius below 2^-bits.
 
-    Raises CertificationError where no precision up to `MOST_ENCLOSURE_BITS` gives one: at a pole, or at an exact zero.
+    Raises CertificationError where that needs more than `MOST_ENCLOSURE_BITS`: at a pole or an exact zero.
     """
     for working in precisions(bits):
         with precision(working):
@@ -220,7 +215,7 @@ def enclose(k: System, wanted: Output, s: complex, *, bits: int, x: float = 0.0)
 
 
 def slope(k: System, wanted: Output, s: complex, *, bits: int = 60, x: float = 0.0) -> Ball:
-    """dG/ds at s, by a difference so short that its error is below 2^-bits of the larger of G/s and dG/ds."""
+    """Return dG/ds at s, by a difference with an error below 2^-bits of the larger of G/s and dG/ds."""
     step = rational(Fraction(1, 1 << (2 * bits)))
     for working in precisions(4 * bits):
         with precision(working):
@@ -234,9 +229,10 @@ def slope(k: System, wanted: Output, s: complex, *, bits: int = 60, x: float = 0
 
 
 def decimals(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:
-    """Real and imaginary part to `digits` significant right digits each ("0" where it vanishes identically).
+    """Return real and imaginary part to `digits` significant right digits each, "0.0" where it is identically zero.
 
-    By symmetry G is real for real s, and without losses a function of s^2: then one of the two parts is exactly zero.
+    By symmetry G is real for real s, and without dissipation a function of s^2: then one part is exactly zero.
+    Raises CertificationError at a pole or an exact zero.
     """
     vanish = False, s.imag == 0  # of the real and of the imaginary part
     if s.real == 0 != s.imag and k.is_real_on_axis:
@@ -248,23 +244,15 @@ def decimals(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0)
                 continue
             value = state.value(wanted, x)
             parts = zip(vanish, (value.real, value.imag), strict=True)
-            texts = ["0.0" if is_zero else _decimal(part, digits) for is_zero, part in parts]
-            if None not in texts:
-                return str(texts[0]), str(texts[1])
+            known = [flint.arb(0) if is_zero else part for is_zero, part in parts]
+            if all(part.is_zero() or part.rel_accuracy_bits() >= 3.33 * digits + 8 for part in known):
+                re, im = ("0.0" if each.is_zero() else str(each.mid().str(digits, radius=False)) for each in known)
+                return re, im
     raise CertificationError(f"no {digits} digits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
 
 
-def _decimal(part: Ball, digits: int) -> str | None:
-    """A ball rounded to so many digits, None if it does not determine them."""
-    if part.is_zero():
-        return "0.0"
-    if part.rel_accuracy_bits() < 3.33 * digits + 8:
-        return None
-    return str(part.mid().str(digits, radius=False))
-
-
 def precisions(bits: int) -> Iterator[int]:
-    """Working precisions worth trying for so many right bits, each twice the one before."""
+    """Yield working precisions for a number of right bits, each twice the one before."""
     working = 2 * bits + 64
     while working < MOST_ENCLOSURE_BITS:
         yield working
@@ -275,7 +263,7 @@ Method = Literal["closed-form", "balls", "appendix"]
 METHODS: tuple[Method, ...] = ("closed-form", "balls", "appendix")
 
 APPENDIX_DIGITS = 17  # of the appendix: more than a float64 holds
-METHODS_AGREE = 1e-14  # relative: some tens of roundings of a float64, by which each of two roads may be off
+METHODS_AGREE = 1e-14  # relative: some tens of roundings of a float64
 
 
 class MethodRow(NamedTuple):
@@ -289,84 +277,77 @@ class MethodRow(NamedTuple):
 
 @dataclass(frozen=True)
 @record
-class Roads:
-    """The same numbers by each method that has them (`values`), and in words why another is left out (`left_out`)."""
+class ByMethod:
+    """The same numbers by each method that has them (`values`), and the reason for a missing one (`left_out`)."""
 
     values: Annotated[dict[Method, NDArray[Any]], Quantity(key="methods")]
     left_out: Annotated[dict[Method, str], Quantity("left out")]
 
     @property
     def differences(self) -> Annotated[dict[Method, Real], Quantity(help="relative, from the closed form")]:
-        """How far each is from the closed form, as a share of that; of 1 where that is 0."""
+        """The relative difference of each from the closed form; the absolute one where that is 0."""
         fast = self.values["closed-form"]
         size = np.where(fast == 0, 1.0, abs(fast))
         return {name: np.asarray(abs(each - fast) / size) for name, each in self.values.items() if each is not fast}
 
     @property
     def largest_difference(self) -> Annotated[float, Quantity("maximum relative difference", digits=2)]:
-        """The largest of these."""
+        """The largest of the differences."""
         return max(float(each.max(initial=0.0)) for each in self.differences.values())
 
     @property
     def finding(self) -> Annotated[str, Quantity("methods")]:
-        """How well the methods agree, in words."""
+        """The agreement of the methods in words."""
         word = "agree to rounding" if self.agree else "differ by more than rounding"
         return f"{', '.join(self.values)}: {word}"
 
     def rows(self, at: Sequence[Any]) -> list[MethodRow]:
-        """A row a place: the closed form's value, and the relative difference of the others."""
+        """Return a row for each place: the value of the closed form, and the differences of the others."""
         values, apart = self.values["closed-form"].tolist(), {k: v.tolist() for k, v in self.differences.items()}
         balls, appendix = (apart.get(name, [None] * len(values)) for name in ("balls", "appendix"))
         return list(map(MethodRow, at, values, balls, appendix))
 
     @property
     def agree(self) -> bool:
-        """Whether they differ by no more than their rounding."""
+        """Whether they differ by rounding alone."""
         return self.largest_difference <= METHODS_AGREE
 
 
-def by_roads(value: Callable[[Method], NDArray[Any]], no_appendix: str) -> Roads:
-    """The values of each method, without the appendix where words say why it has none."""
+def by_method(value: Callable[[Method], NDArray[Any]], no_appendix: str) -> ByMethod:
+    """Return the values of each method, without the appendix where `no_appendix` is a reason."""
     left_out: dict[Method, str] = {"appendix": no_appendix} if no_appendix else {}
-    return Roads({method: np.asarray(value(method)) for method in METHODS if method not in left_out}, left_out)
+    return ByMethod({method: np.asarray(value(method)) for method in METHODS if method not in left_out}, left_out)
 
 
 def known_method(method: str) -> Method:
-    """The method of that name.  Raises ParameterError for any other."""
-    if method not in METHODS:
-        raise ParameterError(key="method", value=method, remedy=did_you_mean(method, METHODS))
-    return method
+    """Return the method of that name.  Raises ParameterError for any other."""
+    must_be_known("method", method, METHODS)
+    return cast("Method", method)
 
 
 def why_no_appendix(arm: Arm, theory: Theory, wanted: Sequence[Output] = ()) -> str:
-    """Why the paper's appendix has no value of these outputs, or no frequencies; "" where it has."""
+    """Return the reason why the paper's appendix has no value of these outputs, or no frequencies, or ""."""
     if theory != "timoshenko" or not arm.is_uniform:
         return "the paper's appendix is of one Timoshenko beam on a hub"
     others = [each.name for each in wanted if not each.is_in_appendix]
-    return (
-        f"the paper's appendix has no {others[0]}: it is an output of rigs, worked out by closed form and balls"
-        if others
-        else ""
-    )
+    return f"the paper's appendix has no {others[0]}, an output of rigs" if others else ""
 
 
 def must_be_of_appendix(arm: Arm, theory: Theory, wanted: Sequence[Output] = ()) -> None:
-    """Raise ParameterError where the appendix has no answer."""
+    """Raise ParameterError where the appendix has no value."""
     if words := why_no_appendix(arm, theory, wanted):
         raise ParameterError(key="method", value="appendix", remedy=words)
 
 
 def slow_values(method: Method, arm: Arm, k: System, wanted: Sequence[Output], s: Complex, x: float) -> Complex:
-    """Outputs (rows) at s (1-D) one by one, by the balls or by the appendix; x is a share of the length.
+    """Return outputs (rows) at s (1-D) one by one, by the balls or by the appendix; x is a share of the length.
 
-    Raises ParameterError at a pole that float64 cannot tell s from, ConvergenceError where the appendix has no limit.
+    Raises ParameterError at a pole to the last digit of float64, ConvergenceError where the appendix has no limit.
     """
     if method == "balls":
         return np.array([[value_with_care(k, each, complex(at), each.share(x)) for at in s] for each in wanted])
-
     must_be_of_appendix(arm, arm.theory, wanted)
-
-    place = x * arm.link.length
+    place, digits = x * arm.link.length, APPENDIX_DIGITS
     return np.array(
-        [[complex(appendix.response(arm, each, complex(at), APPENDIX_DIGITS, place)) for at in s] for each in wanted]
+        [[complex(appendix.response(arm, each, complex(at), digits, place)) for at in s] for each in wanted]
     )

@@ -1,47 +1,44 @@
-"""The waves of a uniform segment: their numbers, and the functions that carry a state from one end of it to the other.
+"""The waves of a uniform segment: their numbers, and the functions that carry a state from one end to the other.
 
-Everything is dimensionless in the segment's length l and bending stiffness EI: deflection W/l, rotation Psi, moment
-M l/EI, shear force Q l^2/EI, while s stays in 1/s.  With S = s^2 and d = 1 + C s, two pairs of waves e^{+-t_j x},
-z_j = t_j^2, solve the dispersion relation
+All is dimensionless in the segment's length l and bending stiffness EI: deflection W/l, rotation Psi, moment M l/EI,
+shear force Q l^2/EI; s is in 1/s.  With S = s^2 and d = 1 + C s, two pairs of waves e^{+-t_j x}, z_j = t_j^2, solve the
+dispersion relation
 
     (d z - a S)(z - b S) + g S = 0      a = rho l^2/E   b = rho l^2/(kappa G)   g = rho A l^4/(E I)
 
 which is (A.2) of the paper (with its inner square root) without fractions.  Written with v_j = z_j - b S and the even
 functions c_j = cosh t_j, S_j = sinh t_j / t_j nothing is singular at the shear cut-off (t_2 = 0).
 
-Three things keep the last digits, each measured against balls:
+Three measures keep the last digits, each verified against balls:
 
 * every hyperbolic function is scaled by e^{-t_j} (Re t_j >= 0), so nothing overflows or cancels;
-* t_j = sqrt(z_j) is a phase of hundreds of radians at high frequency, and half a unit in its last place would be 1e-13
-  of the answer; above the cut-off two such errors do not even act together.  So each root of the dispersion relation is
-  corrected by one Newton step whose residual is formed in double-double arithmetic: products split exactly by fused
-  multiply-add, sums by Knuth's two-sum.  No branch, so that loops over it vectorise;
+* t_j = sqrt(z_j) is a phase of hundreds of radians at high frequency, and half a unit in its last place would be a
+  relative error of 1e-13.  So each root of the dispersion relation is corrected by one Newton step with a residual in
+  double-double arithmetic: products split exactly by fused multiply-add, sums by Knuth's two-sum.  There is no branch,
+  so that loops over it vectorise;
 * as s -> 0 the four waves become parallel; there the transition functions F0 = (S_1 - S_2)/(z_1 - z_2) and its
   derivatives F1, F2, F3 along x, at x = l, are summed as series in z_1 + z_2 and z_1 z_2.
 
-Where z_1 = z_2 (never on the imaginary axis at C = 0) both forms lose digits: such points are flagged (`PARALLEL`).
-Floats, complex arrays, power series and balls run through the same lines; numba melts them into its loops.
+Where z_1 = z_2 (never on the imaginary axis at C = 0) both forms lose digits, and such points are flagged (`PARALLEL`).
 
-A chain of segments without cancelling waves: the plane of states that the outer end allows, carried inwards.
+A chain of segments without cancelling waves.  The state along a chain is z = (W, Psi, M, Q).  The condition at the
+outer end leaves a plane of states.  A product of 4x4 matrices would make its two vectors parallel, as both follow the
+fastest growing wave.  So the plane is carried by its second compound (Ng and Reid 1979; Allen and Bridges 2002):
+p_ij = z_i y_j - z_j y_i for two states z, y of it.  Every element is symplectic, also for complex s and with damping,
+so p_WQ = -p_PsiM, and there are five numbers,
 
-The state along a chain is z = (W, Psi, M, Q).  The end of it leaves a plane of states; multiplying 4x4 matrices would
-make the two vectors that span it parallel, as both follow the wave that grows fastest.  So the plane is carried by its
-second compound (Ng and Reid 1979; Allen and Bridges 2002): p_ij = z_i y_j - z_j y_i for two states z, y of it.  Every
-element is symplectic, for complex s and with damping too, which leaves p_WQ = -p_PsiM: five numbers,
+    p = (p_WPsi, p_WM, p_WQ, p_PsiQ, p_MQ).
 
-    p = (p_WPsi, p_WM, p_WQ, p_PsiQ, p_MQ),
+A condition f z = 0 at the other end, a row f = (f_W, f_Psi, f_M, f_Q) carried outwards, determines one state of the
+plane, z_j = sum over i of f_i p_ij: the free response.  For one segment with W = 0 at its root it is theta = p_WPsi,
+M(0) = p_WM and Q(0) = p_WQ.
 
-and a condition f z = 0 at the other end, a row f = (f_W, f_Psi, f_M, f_Q) carried outwards, leaves of the plane one
-state, z_j = sum over i of f_i p_ij: the free response.  Of one segment with W = 0 at its root they are theta = p_WPsi,
-M(0) = p_WM and Q(0) = p_WQ, the functions of `waves`.
+A uniform segment has two pairs of waves, W = cosh(t_j x) and sinh(t_j x)/t_j with z_j = t_j^2.  Their weights
+(alpha_j, beta_j) become (c alpha - z s beta, c beta - s alpha) for an origin moved inwards by the length, with
+determinant 1.  So alpha_1 beta_1 and alpha_2 beta_2 are constant.  The rest of p is a 2x2 matrix, multiplied by the
+first wave from the left and the second from the right: there is no product of a wave with itself.
 
-A uniform segment has two pairs of waves, W = cosh(t_j x) and sinh(t_j x)/t_j with z_j = t_j^2, whose weights
-(alpha_j, beta_j) turn into (c alpha - z s beta, c beta - s alpha) where the origin is moved inwards by the length.
-This has the determinant 1, so alpha_1 beta_1 and alpha_2 beta_2 stay as they are, and what is left of p is a 2x2
-matrix that the first wave turns from the left and the second from the right: no product of a wave with itself appears.
-
-In these formulas lengths are in the segment's own length, moments in EI/l, forces in EI/l^2 (`waves`); numbers
-are floats, arrays, balls or series alike.
+Numbers are floats, arrays, balls or series.
 """
 
 from __future__ import annotations
@@ -55,7 +52,7 @@ from .compiled import compiled, fma, inlined
 
 Number = Any  # float, complex, ndarray, series or ball
 
-# Where a segment's row of the kernel has a, b, g as two doubles each, sigma and C (`layout.kernel_row`).
+# The indices of a segment's row of the kernel: a, b, g as two doubles each, sigma and C (`layout.kernel_row`).
 A, A_LOW, B, B_LOW, G, G_LOW, SIGMA, DAMPING = range(8)
 
 SERIES_RADIUS = 6.0  # |z_j| below which the series are used
@@ -66,7 +63,7 @@ PARALLEL = 0.15  # |z_1 - z_2| below this share of |z_1| + |z_2|: flagged
 
 @inlined
 def _two_sum(a: complex, b: complex) -> tuple[complex, complex]:
-    """a + b = total + error exactly (Knuth 1969), real and imaginary part each."""
+    """Return total and error with a + b = total + error exactly (Knuth 1969), real and imaginary part each."""
     total = a + b
     shadow = total - a
     return total, (a - (total - shadow)) + (b - shadow)
@@ -74,7 +71,7 @@ def _two_sum(a: complex, b: complex) -> tuple[complex, complex]:
 
 @inlined
 def _two_product(a: complex, b: complex) -> tuple[complex, complex]:
-    """a b = product + error, error to about 2^-100 of |a b|."""
+    """Return product and error of a b, the error to about 2^-100 of |a b|."""
     rr, ii, ri, ir = a.real * b.real, a.imag * b.imag, a.real * b.imag, a.imag * b.real
     product, rest = _two_sum(complex(rr, ri), complex(-ii, ir))
     split = complex(
@@ -86,7 +83,7 @@ def _two_product(a: complex, b: complex) -> tuple[complex, complex]:
 
 @inlined
 def _scaled(high: float, low: float, x: complex, x_low: complex) -> tuple[complex, complex]:
-    """(high + low) (x + x_low) for a real double-double and a complex one."""
+    """Return (high + low) (x + x_low) for a real double-double and a complex one."""
     product = high * x
     split = complex(fma(high, x.real, -product.real), fma(high, x.imag, -product.imag))
     return product, split + (high * x_low + low * x)
@@ -94,7 +91,7 @@ def _scaled(high: float, low: float, x: complex, x_low: complex) -> tuple[comple
 
 @inlined
 def _square_root(z: complex) -> complex:
-    """Principal square root without branches, so that loops over it vectorise."""
+    """Return the principal square root without branches, so that loops over it vectorise."""
     size = math.sqrt(z.real * z.real + z.imag * z.imag)
     large = math.sqrt(0.5 * (size + abs(z.real)))
     small = 0.5 * abs(z.imag) / (large + 1e-300)
@@ -104,19 +101,20 @@ def _square_root(z: complex) -> complex:
 
 @inlined
 def reciprocal(z: complex) -> complex:
-    """1/z; the numbers here stay within 1e+-140, so the plain formula neither over- nor underflows."""
+    """Return 1/z for numbers within 1e+-140, by the plain formula."""
     scale = 1.0 / (z.real * z.real + z.imag * z.imag)
     return complex(z.real * scale, -z.imag * scale)
 
 
 @inlined
 def magnitude(z: complex) -> float:
+    """Return the larger of |Re z| and |Im z|."""
     return max(abs(z.real), abs(z.imag))
 
 
 @inlined
 def dispersion(s: complex, k: Any) -> tuple[complex, ...]:
-    """S, d, d_low and for both waves z, v = z - b S, t with its correction dt:  e^{-t_j} = e^{-t} (1 - dt).
+    """Return S, d, b S, g S and for both waves z, v = z - b S, t with its correction dt:  e^{-t_j} = e^{-t} (1 - dt).
 
     `k` is the row of a segment: a, b, g as double-doubles, then sigma and C.
     """
@@ -153,7 +151,7 @@ def _corrected(
     gS: complex,
     gS_low: complex,
 ) -> tuple[complex, complex, complex, complex]:
-    """One Newton step on (d z - a S)(z - b S) + g S with its residual in double-double."""  # fmt: skip
+    """Return z, v, t, dt after a Newton step on (d z - a S)(z - b S) + g S, a double-double residual."""  # fmt: skip
     dz, dz_low = _two_product(d, z)
     dz_low = dz_low + d_low * z
     u, u_low = _two_sum(dz, -aS)
@@ -172,7 +170,7 @@ def _corrected(
 
 @compiled
 def fill_wave_numbers(s: Any, k: Any, found: Any) -> None:
-    """z, v and t of both waves at s (1-D), the larger z first: rows of `found` (6, n)."""
+    """Compute z, v and t of both waves at s (1-D), the larger z first: rows of `found` (6, n)."""
     for i in range(s.size):
         _, _, _, _, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(s[i], k)
         found[0, i], found[1, i], found[2, i] = z1, v1, t1 + dt1
@@ -181,10 +179,10 @@ def fill_wave_numbers(s: Any, k: Any, found: Any) -> None:
 
 @inlined
 def wave_functions(z: complex, t: complex, dt: complex) -> tuple[complex, complex, complex]:
-    """c = cosh t e^{-t}, S = sinh t / t e^{-t} and e = e^{-t}, with t + dt for t."""
+    """Return c = cosh t e^{-t}, S = sinh t / t e^{-t} and e = e^{-t}, with t + dt for t."""
     decay = math.exp(-t.real)
     e = decay * complex(math.cos(t.imag), -math.sin(t.imag))
-    if abs(z.real) + abs(z.imag) < 1.0:  # 1 - e^2 would cancel; here e is a common factor, whatever its error
+    if abs(z.real) + abs(z.imag) < 1.0:  # 1 - e^2 would cancel; here e is a common factor
         c, s = even_functions(z)
         return e * c, e * s, e
     e = e - e * dt
@@ -194,7 +192,7 @@ def wave_functions(z: complex, t: complex, dt: complex) -> tuple[complex, comple
 
 @inlined
 def is_low(s: complex, k: Any) -> bool:
-    """Whether both |z| are surely below SERIES_RADIUS."""
+    """Whether both |z| are certainly below SERIES_RADIUS."""
     S, over_d = s * s, reciprocal(1.0 + k[DAMPING] * s)
     half_sum = 0.5 * magnitude(S * (k[B] + k[A] * over_d))
     product = magnitude(S * (k[A] * k[B] * S + k[G]) * over_d)
@@ -203,9 +201,9 @@ def is_low(s: complex, k: Any) -> bool:
 
 @inlined
 def _series(shift: int, z_sum: Number, z_product: Number) -> tuple[Number, Number]:
-    """sum over k of h_k/(2k + shift)!, whole and less its first term.
+    """Return the sum over k of h_k/(2k + shift)!, and the same without its first term.
 
-    h_k, the complete homogeneous polynomial of z1 and z2, obeys h_k = (z1 + z2) h_{k-1} - z1 z2 h_{k-2}: Clenshaw.
+    h_k, the complete homogeneous polynomial of z1 and z2, satisfies h_k = (z1 + z2) h_{k-1} - z1 z2 h_{k-2}: Clenshaw.
     """
     now = rest = after = 0.0 * z_sum
     for n in range(SERIES_TERMS):
@@ -216,7 +214,7 @@ def _series(shift: int, z_sum: Number, z_product: Number) -> tuple[Number, Numbe
 
 @inlined
 def transition_series(z_sum: Number, z_product: Number) -> tuple[Number, Number, Number, Number, Number, Number]:
-    """F0, F1, F2, F3 at the tip, F2 - 1 and F3 - 1 as series, exact to 1e-17 for |z| < 6."""
+    """Return F0, F1, F2, F3 at the tip, F2 - 1 and F3 - 1 as series, to 1e-17 for |z| < 6."""
     F0, _ = _series(3, z_sum, z_product)
     F1, _ = _series(2, z_sum, z_product)
     F2, F2_less_1 = _series(1, z_sum, z_product)
@@ -226,7 +224,7 @@ def transition_series(z_sum: Number, z_product: Number) -> tuple[Number, Number,
 
 @inlined
 def even_functions(z: Number) -> tuple[Number, Number]:
-    """cosh sqrt z and sinh sqrt z / sqrt z by Horner's rule; ten terms are exact to 1e-19 for |z| < 1."""
+    """Return cosh sqrt z and sinh sqrt z / sqrt z by Horner's rule; ten terms are enough to 1e-19 for |z| < 1."""
     c = s = 1.0 + 0.0 * z
     for k in range(10, 0, -1):
         c = 1.0 + z * c / ((2 * k - 1) * (2 * k))
@@ -236,16 +234,16 @@ def even_functions(z: Number) -> tuple[Number, Number]:
 
 @inlined
 def tip_conditions(ends: Any, S: Number) -> tuple[Number, Number, Number, Number]:
-    """tip_mass, shear, tip_inertia and moment of the tip's conditions at S = s^2, of the numbers of its ends.
+    """Return tip_mass, shear, tip_inertia and moment of the tip's conditions at S = s^2 from the vector of ends.
 
-    Rest, inertia and force of the mass come first and those of the inertia next (see `elements.EndCondition`).
+    Rest, inertia and force of the mass come first and those of the inertia next (see `system.EndCondition`).
     """
     return ends[0] + ends[1] * S, ends[2], ends[3] + ends[4] * S, ends[5]
 
 
 @inlined
 def impedance(S: float, k: Any) -> float:
-    """Size of M0/theta for a free tip, dimensionless: of its inertia when slow, of one wave number when fast."""
+    """Return the scale of M0/theta for a free tip, dimensionless: its inertia if slow, one wave number if fast."""
     inertia = k[G] * S
     return min(inertia, math.sqrt(math.sqrt(inertia)) + math.sqrt(S * (k[A] + k[B])))
 
@@ -256,20 +254,20 @@ Row = tuple[Number, Number, Number, Number]  # f_W, f_Psi, f_M, f_Q
 
 @inlined
 def end_plane(mass: Number, shear: Number, inertia: Number, moment: Number) -> Plane:
-    """The states that obey  mass W + shear Q = 0  and  inertia Psi + moment M = 0: those of a body at the end."""
+    """Return the plane of states with  mass W + shear Q = 0  and  inertia Psi + moment M = 0, of a body at the end."""
     return shear * moment, -shear * inertia, 0.0 * shear, mass * moment, -mass * inertia
 
 
 @inlined
 def inside_offset(a: Number, p: Plane) -> Plane:
-    """The plane on the inner side of a rigid massless offset: W + a Psi and M - a Q are its outer W and M."""
+    """Return the plane inside a rigid massless offset: W + a Psi and M - a Q are its outer W and M."""
     WPsi, WM, WQ, PsiQ, MQ = p
     return WPsi, WM + a * (2.0 * WQ - a * PsiQ), WQ - a * PsiQ, PsiQ, MQ
 
 
 @inlined
 def inside_spring(stiffness: Number, compliance: Number, p: Plane) -> Plane:
-    """The plane inside a rotational spring, stiffness (Psi_outer - Psi_inner) = compliance M, times the stiffness."""
+    """Return the plane inside a spring, stiffness (Psi_outer - Psi_inner) = compliance M, times the stiffness."""
     WPsi, WM, WQ, PsiQ, MQ = p
     return (
         stiffness * WPsi - compliance * WM,
@@ -282,7 +280,10 @@ def inside_spring(stiffness: Number, compliance: Number, p: Plane) -> Plane:
 
 @inlined
 def inside_body(translation: Number, rotation: Number, p: Plane) -> Plane:
-    """The plane inside a body: Q + translation W and M + rotation Psi are its outer Q and M (inertia s^2 + spring)."""
+    """Return the plane inside a body: Q + translation W and M + rotation Psi are its outer Q and M.
+
+    translation and rotation are inertia s^2 + spring.
+    """
     WPsi, WM, WQ, PsiQ, MQ = p
     return (
         WPsi,
@@ -310,7 +311,7 @@ def across_waves(
     v_sum: Number,
     p: Plane,
 ) -> Plane:
-    """The plane at the inner end of a segment from that at its outer one, times g S d (z1 - z2)^2 e^{-(t1 + t2)}.
+    """Return the plane at the inner end of a segment from the outer one, times g S d (z1 - z2)^2 e^{-(t1 + t2)}.
 
     c, s are scaled by e = e^{-t}, v_j = z_j - b S and v1 v2 = g S/d, v_sum = v1 + v2 (see `waves`).
     """  # fmt: skip
@@ -345,7 +346,7 @@ def transition_rows(
     g: Number,
     sigma: Number,
 ) -> tuple[Row, Row, Row, Row]:
-    """The matrix that carries a state from the outer to the inner end of a segment, by its transition functions."""
+    """Return the matrix from the state at the outer end of a segment to that at the inner end, by F0..F3."""
     aS, bS, gS = a * S, b * S, g * S
     even, odd = F3 - aS * over_d * F1, F3 - bS * F1
     bend, lift = F2 - bS * F0, F2 - aS * over_d * F0
@@ -359,7 +360,7 @@ def transition_rows(
 
 @inlined
 def _minor(i: Row, j: Row, p: Plane) -> Number:
-    """q_ij of the carried plane: the minors of rows i and j times p."""
+    """Return q_ij of the carried plane: the minors of rows i and j times p."""
     WPsi, WM, WQ, PsiQ, MQ = p
     return (
         (i[0] * j[1] - i[1] * j[0]) * WPsi
@@ -372,13 +373,13 @@ def _minor(i: Row, j: Row, p: Plane) -> Number:
 
 @inlined
 def across_rows(W: Row, Psi: Row, M: Row, Q: Row, p: Plane) -> Plane:
-    """The plane carried by `transition_rows`: for slow waves, and wherever digits are no matter."""
+    """Return the plane carried by `transition_rows`, for slow waves and for balls."""
     return _minor(W, Psi, p), _minor(W, M, p), _minor(W, Q, p), _minor(Psi, Q, p), _minor(M, Q, p)
 
 
 @inlined
 def met(f: Row, p: Plane) -> Row:
-    """The state (W, Psi, M, Q) of the plane p with f z = 0, up to one factor."""
+    """Return the state (W, Psi, M, Q) of the plane p with f z = 0, up to one factor."""
     WPsi, WM, WQ, PsiQ, MQ = p
     return (
         -f[1] * WPsi - f[2] * WM - f[3] * WQ,
@@ -390,19 +391,19 @@ def met(f: Row, p: Plane) -> Row:
 
 @inlined
 def beyond_offset(a: Number, f: Row) -> Row:
-    """The condition f z = 0 at the outer side of an offset, from that at its inner one."""
+    """Return the condition f z = 0 at the outer side of an offset, from that at its inner one."""
     return f[0], f[1] - a * f[0], f[2], f[3] + a * f[2]
 
 
 @inlined
 def beyond_spring(stiffness: Number, compliance: Number, f: Row) -> Row:
-    """The condition beyond a rotational spring, times its stiffness."""
+    """Return the condition beyond a rotational spring, times its stiffness."""
     return stiffness * f[0], stiffness * f[1], stiffness * f[2] - compliance * f[1], stiffness * f[3]
 
 
 @inlined
 def beyond_body(translation: Number, rotation: Number, f: Row) -> Row:
-    """The condition beyond a body."""
+    """Return the condition beyond a body."""
     return f[0] - translation * f[3], f[1] - rotation * f[2], f[2], f[3]
 
 
@@ -420,7 +421,7 @@ def row_across_waves(
     d: Number,
     f: Row,
 ) -> Row:
-    """The condition at the outer end of a segment from that at its inner one, times g S d (z1 - z2).
+    """Return the condition at the outer end of a segment from that at its inner one, times g S d (z1 - z2).
 
     c, s of both waves are scaled by the same factor.
     """  # fmt: skip
@@ -438,7 +439,7 @@ def row_across_waves(
 
 @inlined
 def row_across(W: Row, Psi: Row, M: Row, Q: Row, f: Row) -> Row:
-    """The condition carried outwards by `transition_rows`, f T^-1."""
+    """Return the condition carried outwards by `transition_rows`, f T^-1."""
     return (
         f[0] * W[0] + f[1] * Psi[0] + f[2] * M[0] + f[3] * Q[0],
         f[0] * W[1] + f[1] * Psi[1] + f[2] * M[1] + f[3] * Q[1],

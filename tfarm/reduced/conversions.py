@@ -58,8 +58,11 @@ def closed(plant: Matrices, law: Matrices) -> Real:
     Ak, Bk, Ck, Dk = law
     whole = 1.0 + (Dk @ D)[0, 0]
     if abs(whole) < ALGEBRAIC:
-        remedy = "the feedthroughs of the law and the model have the product -1: an algebraic loop"
-        raise ParameterError(key="law", value=float((Dk @ D)[0, 0]), remedy=remedy)
+        raise ParameterError(
+            key="law",
+            value=float((Dk @ D)[0, 0]),
+            remedy="the feedthroughs of the law and the model have the product -1: an algebraic loop",
+        )
     v = np.hstack([-Dk @ C, -Ck]) / whole  # of plant and law states
     y = np.hstack([C, np.zeros((len(C), len(Ak)))]) + D @ v
     top = np.hstack([A, np.zeros((len(A), len(Ak)))]) + B @ v
@@ -118,8 +121,11 @@ def _must_be_ours(script: Path, path: Path, key: str) -> None:
         text = ""
     first, _, rest = text.partition("\n")
     if not (first.endswith(WRITTEN_BY) and _loads(path) in rest):
-        remedy = f"{script.name} in that folder is not its script and would be replaced; choose another name"
-        raise ParameterError(key=key, value=str(path), remedy=remedy)
+        raise ParameterError(
+            key=key,
+            value=str(path),
+            remedy=f"{script.name} in that folder is not its script and would be replaced; choose another name",
+        )
 
 
 def _loads(path: Path) -> str:

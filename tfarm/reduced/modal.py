@@ -282,11 +282,17 @@ def _at_rest(G: TransferFunction, single: Real, table: Modes) -> tuple[Real, NDA
 def proper(k: System, wanted: Output, share: float) -> Output:
     """Return the output.  Raises ParameterError where no state space of finite order has it."""
     if wanted.power and constant_of(k, wanted, share):
-        remedy = "a power of s times the input, which no state space has; choose another output"
-        raise ParameterError(key="outputs", value=wanted.name, remedy=remedy)
+        raise ParameterError(
+            key="outputs",
+            value=wanted.name,
+            remedy="a power of s times the input, which no state space has; choose another output",
+        )
     if wanted.power > MOST_PROPER:
-        remedy = f"s^{wanted.power} makes it improper, which no state space is; choose a lower derivative"
-        raise ParameterError(key="outputs", value=wanted.name, remedy=remedy)
+        raise ParameterError(
+            key="outputs",
+            value=wanted.name,
+            remedy=f"s^{wanted.power} makes it improper, which no state space is; choose a lower derivative",
+        )
     return wanted
 
 

@@ -59,8 +59,9 @@ def modes_in(arm: Arm, high: float) -> int:
     """Return the number of exact modes of a model up to `high` [rad/s].  Raises ParameterError over 1000."""
     count = modes_below(arm, BEYOND_BAND * high)
     if count > MOST_MODELLED:
-        remedy = f"{count} modes lie below it, over {MOST_MODELLED}; lower it"
-        raise ParameterError(key="band", value=high, remedy=remedy)
+        raise ParameterError(
+            key="band", value=high, remedy=f"{count} modes lie below it, over {MOST_MODELLED}; lower it"
+        )
     return count
 
 
@@ -74,8 +75,11 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
         raise ParameterError(key="method", value="aaa", remedy="AAA in s^2 is for C = 0; use modal")
     exact = modes_in(arm, high)
     if pairs <= exact:
-        remedy = f"{exact} modes lie in the range, and AAA needs more pairs of poles; use modal"
-        raise ParameterError(key="pairs", value=pairs, remedy=remedy)
+        raise ParameterError(
+            key="pairs",
+            value=pairs,
+            remedy=f"{exact} modes lie in the range, and AAA needs more pairs of poles; use modal",
+        )
     rows = transfer(arm, outputs, x=x).rows
     hub = "root_moment" if arm.is_locked else "hub_rate"
     G = transfer(arm, (hub, *rows), x=x)

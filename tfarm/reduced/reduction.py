@@ -153,8 +153,11 @@ class ReducedModel:
         """
         w = np.atleast_1d(np.asarray(omega, dtype=float))
         if not ((w >= self.band[0]) & (w <= self.band[1])).all():
-            remedy = f"the error is known from {self.band[0]:g} to {self.band[1]:g} rad/s; stay in this range"
-            raise ParameterError(key="omega", value=omega, remedy=remedy)
+            raise ParameterError(
+                key="omega",
+                value=omega,
+                remedy=f"the error is known from {self.band[0]:g} to {self.band[1]:g} rad/s; stay in this range",
+            )
         return self.errors[:, None] * Ruler(self.arm, self.model.rows, self.band, self.model.x).norm(w)
 
     def matrices(self) -> Matrices:
@@ -193,16 +196,25 @@ def reduce(
     if method is not None and method not in get_args(Reduction):
         raise ParameterError(key="method", value=method, remedy="modal or aaa, or leave it out for the better one")
     if method == "aaa" and (not arm.is_undamped or arm.input_lags):
-        remedy = "AAA in s^2 is for C = 0, no friction and no inductance; take modal, which has them"
-        raise ParameterError(key="method", value="aaa", remedy=remedy)
+        raise ParameterError(
+            key="method",
+            value="aaa",
+            remedy="AAA in s^2 is for C = 0, no friction and no inductance; take modal, which has them",
+        )
     if (order is None) == (error is None):
-        remedy = "give either an order (a number of states) or an error"
-        raise ParameterError(key="order", value=MISSING if order is None else order, remedy=remedy)
+        raise ParameterError(
+            key="order",
+            value=MISSING if order is None else order,
+            remedy="give either an order (a number of states) or an error",
+        )
     if order is None:
         error = positive("error", error, "a positive number, such as 1e-6")
         if error < EXACT_ROUNDING:
-            remedy = f"below the rounding of the exact values; give {EXACT_ROUNDING:g} or more"
-            raise ParameterError(key="error", value=error, remedy=remedy)
+            raise ParameterError(
+                key="error",
+                value=error,
+                remedy=f"below the rounding of the exact values; give {EXACT_ROUNDING:g} or more",
+            )
         return _Bench(arm, rows, band, x, method).within(error)
     return _Bench(arm, rows, band, x, method).of_order(order)
 

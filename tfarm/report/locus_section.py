@@ -134,7 +134,10 @@ def locus_section(arm: Arm, chain: Chain) -> PageSection:
 def _along(data: Loci) -> str:
     """The first crossing of the imaginary axis, where mode 1 is damped most, and the gap to python-control's locus."""
     exact, found, name = data.exact, most_damped(data.exact), data.name
-    unit, fixed = written_unit(name, exact.arm), [exact.gains.told(each, shortly) for each in PLANE if each != name]
+    unit, fixed = (
+        written_unit(name, exact.arm),
+        [exact.gains.gain_text(each, shortly) for each in PLANE if each != name],
+    )
     unstable = [each.gain for each in exact.crossings if each.direction == "unstable"]
     parts = ["no drawn branch becomes unstable"]
     if unstable:
@@ -177,8 +180,8 @@ def beyond_table(arm: Arm, held: HubFeedback) -> Table:
     on_edge = np.isclose(gains, edge, rtol=1e-9, atol=0.0) & (not arm.is_undamped)  # no list of poles ends there
     laws = [held.having(MOMENT_GAIN, float(gain)) for gain in gains]
     found = [None if on else _judged(arm, law) for law, on in zip(laws, on_edge, strict=True)]
-    one = held.having(MOMENT_GAIN, unit).told(MOMENT_GAIN, shortly, arm)
-    title = f"What {one} and beyond does, at {held.told(RATE_GAIN, shortly)}"
+    one = held.having(MOMENT_GAIN, unit).gain_text(MOMENT_GAIN, shortly, arm)
+    title = f"What {one} and beyond does, at {held.gain_text(RATE_GAIN, shortly)}"
     return _poles_table("beyond", title, _beyond_caption(arm), MOMENT_GAIN, arm, gains, found)
 
 
@@ -186,7 +189,7 @@ def rates_table(arm: Arm, held: HubFeedback) -> Table:
     """Verdict and poles of the exact loop for a few rate gains."""
     gains = np.array([float(f"{share * rate_unit(arm):.3g}") for share in LISTED_RATE_GAINS])
     found = [_judged(arm, held.having(RATE_GAIN, float(gain))) for gain in gains]
-    title = f"Poles at a few {RATE_GAIN}, at {held.told(MOMENT_GAIN, shortly)}"
+    title = f"Poles at a few {RATE_GAIN}, at {held.gain_text(MOMENT_GAIN, shortly)}"
     caption = "Exact poles, each list complete in its box."
     return _poles_table("rates", title, caption, RATE_GAIN, arm, gains, found)
 

@@ -214,7 +214,7 @@ def _intervals(arm: Arm) -> str:
 
 def _best_words(data: MapOfArm, found: Design) -> str:
     """The gains that damp the sampled loop best, and the verdicts on them."""
-    gains = ", ".join(found.law.told(name, lambda gain: significant(gain, 4), data.arm) for name in PLANE)
+    gains = ", ".join(found.law.gain_text(name, lambda gain: significant(gain, 4), data.arm) for name in PLANE)
     cut = ", ".join(name for name in found.at_bound if name not in found.at_limit)
     edge = f" That is no optimum: {cut} lies on the dotted frame, the bound of the search." * bool(cut)
     return (

@@ -207,7 +207,7 @@ def periods_table(arm: Arm, gains: HubFeedback, chain: Chain) -> Table:
         stem="sampled-periods",
         title="Stability at other sampling periods",
         caption=(
-            f"The same gains, {' and '.join(gains.told(name, plain) for name in PLANE)}. Growth: of the dominant "
+            f"The same gains, {' and '.join(gains.gain_text(name, plain) for name in PLANE)}. Growth: of the dominant "
             "pole, per second: negative is stable. Verdicts hold for the modes given where they are not certified."
         ),
         record=rows,
@@ -252,7 +252,7 @@ def overlay_picture(regions: StableRegions, found: SampledCase) -> Picture:
     arm, gains = found.each.arm, found.analysis.loop.gains
     layers = "Nested blues: C = 0 (first modes only), and the same arm with a little damping. "
     low = plain(float(regions.continuous.axes[0][0]), 2)
-    held = gains.told(RATE_GAIN, plain)
+    held = gains.gain_text(RATE_GAIN, plain)
     before = margins_of(arm, gains).windows[MOMENT_GAIN]
     after = found.analysis.interval(MOMENT_GAIN)
     both = f"{MOMENT_GAIN} {span(before.around, before.looked_at)} continuous, {span(after)} sampled"

@@ -177,7 +177,7 @@ def servo_table(data: TunerNumbers, held: Tuning) -> Table:
         "bound": held.bound.cost,
     }
     caption = SERVO_CAPTION.format(
-        gains=", ".join(law.told(name, lambda x: significant(x, 3), data.arm) for name in (ANGLE_GAIN, RATE_GAIN)),
+        gains=", ".join(law.gain_text(name, lambda x: significant(x, 3), data.arm) for name in (ANGLE_GAIN, RATE_GAIN)),
         end="unstable" if error is None else f"tip {off_target(data, error)} mm off its target at the end",
         low=significant(guard.lo, 3), high=significant(guard.hi, 3),
         proven="proven" if guard.is_proven else "of the first modes alone,",
@@ -304,7 +304,7 @@ def _gain_picture(data: TunerNumbers) -> Picture:
     tuning = data.tuning
     plane = stable_regions(data.arm, tuning.constant, tuning.trial.loop.chain)
     guard, K = tuning.training.guard, tuning.training.result.K
-    rate = tuning.constant.told(RATE_GAIN, plain)
+    rate = tuning.constant.gain_text(RATE_GAIN, plain)
     return Picture(
         stem="tune-gain",
         title="The tuner's path and its guard on the map",

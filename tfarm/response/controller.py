@@ -1,4 +1,4 @@
-"""A controller as the results of its loops name it: gains or transfer functions, signals, units, sign convention."""
+"""A controller in the results of its loops: gains or transfer functions, signals, units, sign convention."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .signals import Signals
 
 @dataclass(frozen=True)
 class Controller:
-    """A law on an arm.  `gains` are those at the hub (empty of a law that is more), `signals` have their SI units."""
+    """A law on an arm.  `gains` are those at the hub, empty of another law; `signals` have their SI units."""
 
     arm: Annotated[str, Quantity("arm")]
     law: Annotated[str, Quantity("controller")]
@@ -27,7 +27,7 @@ class Controller:
 
 
 def controller(law: Law, arm: Arm) -> Controller:
-    """The description of a law on an arm."""
+    """Return the description of a law on an arm."""
     gains = {} if law.gains is None else law.gains.by_name
     units = {gain.name: unit_of(gain.name, arm) for gain in LISTED} if gains else {}
     return Controller(
@@ -44,16 +44,16 @@ def controller(law: Law, arm: Arm) -> Controller:
 
 
 def sign_convention(law: Law, arm: Arm) -> str:
-    """The control law; for gains at the hub with the moment that a static torque gives, and so the sign of K2."""
+    """Return the control law in words; for gains at the hub with the moment of a static torque."""
     if law.gains is not None:
         return sign_of(arm)
     sign, variable = "-" if law.sign < 0 else "+", "z" if law.is_discrete else "s"
-    late = f", {law.delay:g} s late" if law.delay else ""
+    late = f", delay {law.delay:g} s" if law.delay else ""
     return f"v = {sign}sum of C_i({variable}) y_i{late}; v is {input_words(arm)}, y = ({', '.join(law.signals)})"
 
 
 def sign_of(arm: Arm) -> str:
-    """The control law of gains at the hub, and the moment of a static torque: with it the sign of K2."""
+    """Return the law of gains at the hub in words, and the moment of a static torque, which fixes the sign of K2."""
     words = f"u = -{SPELT_OUT} + r"
     if arm.is_uniform and arm.has_rigid_mode:
         return f"{words}; a static torque u gives the moment -(J - I_h)/J u"

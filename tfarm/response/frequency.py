@@ -1,18 +1,16 @@
-"""What a Bode plot draws, computed before anything is drawn: a grid that misses no peak, exact values, exact phase.
+"""The data of a Bode plot: a grid that misses no peak, exact values, exact phase.
 
-The grid.  Around every pole and zero s = -sigma + i w the response changes on the scale sigma, however small that
-is against the spacing of any even grid.  So each brings its own points, w and w +- sigma t with t growing
-geometrically until the even grid takes over; on the axis itself (sigma = 0) t shrinks to a millionth of w.
+The grid.  Around every pole and zero s = -sigma + i w the response changes on the scale sigma.  So each has points of
+its own, w and w +- sigma t with t in geometric steps up to the spacing of the even grid.  On the axis (sigma = 0) the
+nearest point is at a millionth of w.
 
-The phase.  At C = 0 the response is real, and its phase is counted, not unwrapped: 180 degrees down at every pole on
-the axis and up at every zero on it, which is the limit of vanishing damping.  Elsewhere the refined grid turns by far
-less than 180 degrees from point to point, and unwrapping is safe.
+The phase.  At C = 0 the response is real, and its phase is counted: 180 degrees down at every pole on the axis and up
+at every zero on it, the limit of vanishing damping.  Elsewhere the phase of the refined grid changes by far less than
+180 degrees between two points, and is unwrapped.
 
-Peaks and dips are local maxima and minima of |G(i omega)|, sought in |G| itself.  A damped pole need not make a peak:
-where its share of G is small against the others', |G| falls past it.  The mean slopes of ln |G| over the intervals of
-a grid show where the slope may vanish: where it changes, from one interval to the next, by more than its size.  Such
-intervals are halved until nothing above `LEAST` can hide in them; a parabola through three points then gives the
-frequency.
+Peaks and dips are local maxima and minima of |G(i omega)|.  A damped pole with a small residue may have no peak.  The
+slope of ln |G| may vanish where it changes, from one interval to the next, by more than its size.  Such intervals are
+halved until no extremum above `LEAST` fits in them.  A parabola through three points then gives the frequency.
 """
 
 from __future__ import annotations
@@ -38,14 +36,14 @@ from tfarm.spectrum import modes
 
 from .transfer import TransferFunction, transfer
 
-BAND_POINTS = 100  # at which the error is looked at, even in ln w
-RIGHT_DIGITS = 30  # of the value that is taken for exact: twice those of float64
+BAND_POINTS = 100  # of the error, even in ln w
+RIGHT_DIGITS = 30  # of the reference value: twice those of float64
 
 
 def worst_error(arm: Arm, output: str, band: tuple[float, float]) -> float | None:
-    """The worst error along the imaginary axis over a band [rad/s]; None where the response is zero throughout.
+    """Return the largest error along the imaginary axis over a range [rad/s]; None where G is zero throughout.
 
-    Counted in the change of G that a relative change of its argument brings about: |G_64/G - 1| / (1 + |s G'/G|).
+    Relative to the condition number with respect to s: |G_64/G - 1| / (1 + |s G'/G|).
     """
     G = transfer(arm, output)
     s = 1j * np.geomspace(*band, BAND_POINTS)
@@ -56,7 +54,7 @@ def worst_error(arm: Arm, output: str, band: tuple[float, float]) -> float | Non
     for point, value, slope in zip(s, values, slopes, strict=True):
         try:
             pair = G.digits(complex(point), RIGHT_DIGITS)
-        except (CertificationError, ConvergenceError):  # a zero of G, where a relative error means nothing
+        except (CertificationError, ConvergenceError):  # a zero of G, without a relative error
             continue
         parts = zip(pair, (value.real, value.imag), strict=True)
         off = complex(*(float(Fraction(exact) - Fraction(float(part))) for exact, part in parts))
@@ -65,8 +63,8 @@ def worst_error(arm: Arm, output: str, band: tuple[float, float]) -> float | Non
 
 
 HERTZ = 2 * math.pi  # rad/s
-ZERO_ON_AXIS = 1e-13  # of |s|: what rounding leaves of Re s where a zero of an elastic link lies on the axis
-LEAST = 1e-9  # of |G|: a smaller rise or fall makes no peak; rounding makes smaller ones of a constant
+ZERO_ON_AXIS = 1e-13  # of |s|: rounding of Re s of a zero on the axis, for an elastic link
+LEAST = 1e-9  # of |G|: the least rise and fall of a peak, above rounding
 ROUNDING = 1e-14  # relative error of a value, over |s/(s - p)| of the nearest pole or zero p
 HALVINGS = 40  # of an interval of the grid, at most: to the spacing of float64 numbers
 NARROWEST = 4 * float(np.finfo(float).eps)  # relative width below which no interval is halved
@@ -102,10 +100,10 @@ class Root(NamedTuple):
 def extrema(
     G: Response, omega: Real, value: Complex, roots: Complex, infinite: Real, vanishing: Real
 ) -> tuple[tuple[Extremum, ...], tuple[Extremum, ...]]:
-    """Peaks and dips between the ends of a grid omega [rad/s] (ascending) that resolves poles and zeros.
+    """Return peaks and dips between the ends of a grid omega [rad/s] (ascending) that resolves poles and zeros.
 
-    `value` is G on the grid, `roots` [1/s] are poles and zeros near it, `infinite` and `vanishing` [rad/s] the places
-    of those on the imaginary axis, which the grid does not hold.
+    `value` is G on the grid, `roots` [1/s] are poles and zeros near it, `infinite` and `vanishing` [rad/s] the
+    frequencies of those on the imaginary axis, which are not in the grid.
     """
     on_axis = np.sort(np.r_[infinite, vanishing])
     between = (on_axis[:-1] + on_axis[1:]) / 2  # two roots may have no point of the grid between them
@@ -120,18 +118,18 @@ def extrema(
 
 
 def _height(G: Response, omega: Real) -> Real:
-    """ln |G(i omega)|."""
+    """Return ln |G(i omega)|."""
     return np.asarray(np.log(abs(G(1j * omega))), float)
 
 
 def _least(omega: Real, roots: Complex) -> Real:
-    """By how much ln |G| must rise and fall to make a peak, at each frequency."""
+    """Return the least rise and fall of ln |G| at a peak, at each frequency."""
     distance = abs(1j * omega[:, None] - roots).min(axis=1, initial=np.inf)
     return np.asarray(LEAST + ROUNDING * omega / np.maximum(distance, NARROWEST * omega), float)
 
 
 def _halved(G: Response, omega: Real, height: Real, roots: Complex) -> tuple[Real, Real]:
-    """The grid with more points where the slope of ln |G| may vanish between two of its own."""
+    """Return the grid with more points where the slope of ln |G| may vanish between two of its points."""
     for _ in range(HALVINGS):
         with np.errstate(invalid="ignore"):
             slope = np.diff(height) / np.diff(omega)
@@ -150,7 +148,7 @@ def _halved(G: Response, omega: Real, height: Real, roots: Complex) -> tuple[Rea
 
 
 def _turns(height: Real, least: Real) -> tuple[list[int], list[int]]:
-    """The places of maxima and minima, where the height rises and falls by more than `least`."""
+    """Return the indices of maxima and minima, where the height rises and falls by more than `least`."""
     maxima: list[int] = []
     minima: list[int] = []
     rises, high, low = None, 0, 0
@@ -166,7 +164,7 @@ def _turns(height: Real, least: Real) -> tuple[list[int], list[int]]:
 
 
 def _refined(G: Response, omega: Real, height: Real, places: list[int]) -> tuple[Extremum, ...]:
-    """The extrema near these places: at the vertex of the parabola through each and its neighbours, where finite."""
+    """Return the extrema near these indices, finite ones at the vertex of a parabola through three points."""
     at = np.array(places, int)
     at = at[np.isfinite(height[at])]
     middle = (omega[1:] + omega[:-1]) / 2
@@ -179,10 +177,10 @@ def _refined(G: Response, omega: Real, height: Real, places: list[int]) -> tuple
     return tuple(Extremum(*finite.get(i) or (float(omega[i]), limit[float(height[i])])) for i in places)
 
 
-BODE_BAND = "two frequencies in rad/s, the lower first: (1.0, 1000.0)"  # what is asked for
-RESONANCES_SHOWN = 10  # flexible modes in a band, unless told
+BODE_BAND = "two frequencies in rad/s, the lower first: (1.0, 1000.0)"  # the expected form
+RESONANCES_SHOWN = 10  # flexible modes in the range, by default
 EVEN_PER_DECADE = 120  # points of the even grid
-PER_ROOT_DECADE = 12  # points a decade of distance, on each side of a pole or zero
+PER_ROOT_DECADE = 12  # points for each decade of distance, on each side of a pole or zero
 NEAREST = 1e-6  # relative distance of the nearest point to a root on the axis
 AXIS_SHARE = 1e-12  # |Re s|/|s| below which a root is on the imaginary axis
 COINCIDE = 1e-9  # relative distance below which a pole and a zero cancel
@@ -193,10 +191,10 @@ COINCIDE = 1e-9  # relative distance below which a pole and a zero cancel
 class Bode:
     """A frequency response with its poles and zeros.  omega in rad/s, `value` in SI units, `phase` in degrees.
 
-    `poles` and `zeros` are those with Im s >= 0 that the output shows (every cancellation made), s = 0 apart, complete
-    up to `band`[1] in the ranges `pole_width` and `zero_width` of Re s [1/s]; the grid holds none of those on the axis.
-    `rigid` is the response of the same rig with rigid links (`rigid_response`).  `row` is the output itself, `x` [m]
-    its place, None where it has its own.
+    `poles` and `zeros` are those of the output with Im s >= 0 after cancellation, without s = 0.  They are complete up
+    to `band`[1] in the ranges `pole_width` and `zero_width` of Re s [1/s]; the grid has none of those on the axis.
+    `rigid` is the response of the same rig with rigid links (`rigid_response`).  `row` is the output, `x` [m] its
+    place, None where that is fixed.
     """
 
     arm: Arm
@@ -223,7 +221,7 @@ class Bode:
 
     @property
     def input(self) -> Annotated[str, Quantity("input")]:
-        """The input that the response is to."""
+        """The input."""
         return "hub_angle" if self.arm.is_locked else self.arm.input
 
     @property
@@ -233,12 +231,12 @@ class Bode:
 
     @property
     def pole_list(self) -> Annotated[list[Root], Quantity("poles", key="poles")]:
-        """Those of the upper half-plane."""
+        """The poles of the upper half-plane."""
         return list(map(self._root, itertools.repeat("pole"), self.poles.tolist(), self.at_poles.tolist()))
 
     @property
     def zero_list(self) -> Annotated[list[Root], Quantity("zeros", key="zeros")]:
-        """Those of the upper half-plane; what rounding leaves of Re s of a zero on the axis is left out."""
+        """The zeros of the upper half-plane, without rounding of Re s on the axis."""
         zeros = self.zeros
         if self.arm.has_elastic_link:
             zeros = np.where(abs(zeros.real) < ZERO_ON_AXIS * abs(zeros), 1j * zeros.imag, zeros)
@@ -249,7 +247,7 @@ class Bode:
 
     @property
     def finding(self) -> Annotated[str, Quantity("poles and zeros")]:
-        """How many poles and zeros the output shows, and up to where, in words."""
+        """The numbers of poles and zeros in words."""
         return f"{self.poles.size} poles and {self.zeros.size} zeros up to {self.band[1]:.6g} rad/s"
 
     @property
@@ -259,12 +257,12 @@ class Bode:
 
     @property
     def infinite(self) -> Real:
-        """Frequencies [rad/s] where the response is truly infinite."""
+        """Frequencies [rad/s] where the response is infinite."""
         return np.asarray(self.poles.imag[_on_axis(self.poles)], float)
 
     @property
     def vanishing(self) -> Real:
-        """Frequencies [rad/s] where the response is truly zero."""
+        """Frequencies [rad/s] where the response is zero."""
         return np.asarray(self.zeros.imag[_on_axis(self.zeros)], float)
 
     @property
@@ -274,7 +272,7 @@ class Bode:
 
     @property
     def is_zero(self) -> bool:
-        """Whether the output does not move at all (a pinned tip)."""
+        """Whether the output is zero throughout, as that of a pinned tip."""
         return not self.value.any()
 
     @property
@@ -296,7 +294,7 @@ class Bode:
 
 
 def resonant_band(arm: Arm, resonances: int = RESONANCES_SHOWN) -> tuple[float, float]:
-    """From far below the first flexible mode to midway (geometrically) between the last shown and the next [rad/s]."""
+    """Return the range [rad/s] from far below the first flexible mode to midway from the last to the next."""
     table = modes(arm, resonances + 1)
     natural_frequency = table.natural_frequency[table.index > 0]
     low = natural_frequency[0] / 20
@@ -313,12 +311,11 @@ def bode(
     x: float | None = None,
     input: str | None = None,
 ) -> Bode:
-    """The exact frequency response of one output over a band [rad/s], refined at every pole and zero.
+    """Return the exact frequency response of one output over a range `band` [rad/s], refined at every pole and zero.
 
-    `x` [m] is the place of an output along the arm, `input` another input at the hub than the arm's own, as
-    `tfarm.transfer` has them.  Without a band it holds the first ten flexible modes (`resonant_band`).  Raises
-    ParameterError for an unknown output, a place that is missing, not wanted or off the arm, a load on the link (its
-    zeros are not known), and what is no band.
+    `x` [m] is the place of an output along the arm, `input` another input at the hub (see `tfarm.transfer`).  By
+    default the range has the first ten flexible modes (`resonant_band`).
+    Raises ParameterError for an unknown output, a wrong place, a load on the link, and an illegal range.
     """
     G = transfer(arm, output, x=x, input=input)
     arm, (row,) = G.arm, G.rows
@@ -326,15 +323,16 @@ def bode(
     G.must_be_of_the_hub("a Bode plot, with its zeros,")
     if not np.any(G(1j * np.geomspace(*band, 3))):
         return _no_motion(arm, row, G.x, band)
-    beyond = 1.3 * band[1]  # roots just above the band shape its edge
+    beyond = 1.3 * band[1]  # roots just above the range shape its edge
     all_poles, all_zeros = G.poles(up_to=beyond), G.zeros(up_to=beyond)
     poles, zeros = without_cancelled(_upper(all_poles.values), _upper(all_zeros.values))
-    if all_zeros.proof == "constant":  # held by its end condition: it shows no pole of the arm
+    if all_zeros.proof == "constant":  # by an end condition: it has no pole of the arm
         poles = poles[:0]
     omega = refined_grid(band, np.r_[poles, zeros])
     value = G(1j * omega)
     inside_poles, inside_zeros = poles[poles.imag < band[1]], zeros[zeros.imag < band[1]]
-    infinite, vanishing = (_axis_frequencies(each, band) for each in (inside_poles, inside_zeros))
+    on_axis = (each.imag[_on_axis(each)] for each in (inside_poles, inside_zeros))
+    infinite, vanishing = (np.asarray(each[each > band[0]], float) for each in on_axis)
     peaks, dips = extrema(G, omega, value, np.r_[poles, zeros], infinite, vanishing)
     return Bode(
         arm=arm,
@@ -357,12 +355,12 @@ def bode(
 
 
 def _upper(roots: Complex) -> Complex:
-    """The roots with Im s >= 0, those at s = 0 apart."""
+    """Return the roots with Im s >= 0, without s = 0."""
     return roots[(roots.imag >= 0) & (roots != 0)]
 
 
 def known_band(band: tuple[float, float], remedy: str, widest: float = math.inf) -> tuple[float, float]:
-    """The two ends of a band, not farther apart than `widest` times.  Raises ParameterError for what is none."""
+    """Return the two ends of a range, with a ratio of at most `widest`.  Raises ParameterError for another value."""
     try:
         low, high = map(float, band)
     except (TypeError, ValueError):
@@ -382,7 +380,7 @@ def _no_motion(arm: Arm, row: Output, x: float | None, band: tuple[float, float]
 
 
 def without_cancelled(poles: Complex, zeros: Complex) -> tuple[Complex, Complex]:
-    """Poles and zeros without the pairs that coincide, which the output does not show."""
+    """Return poles and zeros without the pairs that cancel."""
     kept_poles, kept_zeros = [], list(zeros)
     for pole in poles:
         near = [i for i, zero in enumerate(kept_zeros) if abs(zero - pole) <= COINCIDE * abs(pole)]
@@ -394,19 +392,19 @@ def without_cancelled(poles: Complex, zeros: Complex) -> tuple[Complex, Complex]
 
 
 def refined_grid(band: tuple[float, float], roots: Complex) -> Real:
-    """Frequencies [rad/s], ascending, even on a log scale and geometric around every root off the real axis."""
+    """Return frequencies [rad/s], ascending, even on a log scale and geometric around every root off the real axis."""
     low, high = band
     even = np.geomspace(low, high, 1 + math.ceil(EVEN_PER_DECADE * math.log10(high / low)))
     grid = np.unique(np.r_[even, *(_around(root) for root in roots if root.imag > 0)])
     on_axis = roots.imag[_on_axis(roots)]
-    if on_axis.size:  # none on a root itself, nor nearer than rounding lets a value mean something
+    if on_axis.size:  # none so near to a root that the value is rounding
         gap = abs(grid[:, None] / on_axis - 1).min(axis=1)
         grid = grid[gap >= 0.5 * NEAREST]
     return grid[(grid >= low) & (grid <= high)]
 
 
 def _around(root: complex) -> Real:
-    """w and w +- sigma t, as far out as two steps of the even grid."""
+    """Return w and w +- sigma t, up to two steps of the even grid."""
     centre = root.imag
     reach = 2 * centre * math.log(10) / EVEN_PER_DECADE
     on_axis = abs(root.real) <= AXIS_SHARE * abs(root)
@@ -420,9 +418,9 @@ def _around(root: complex) -> Real:
 
 
 def phase_of(omega: Real, value: Complex, poles: Complex, zeros: Complex, *, is_real: bool) -> Real:
-    """Phase [degrees], continuous where the response is, beginning near 0 or -180, or at 90 or -90 of a rate.
+    """Return the phase [degrees], continuous where the response is, from near 0 or -180, or 90 or -90 of a rate.
 
-    `is_real`: without losses or lag a response is real, or imaginary where it is a rate's.
+    `is_real`: without losses or lag a response is real, or imaginary for a rate.
     """
     start = 0.0 if value[0].real > 0 else -180.0
     if not is_real:
@@ -436,17 +434,12 @@ def phase_of(omega: Real, value: Complex, poles: Complex, zeros: Complex, *, is_
 
 
 def _on_axis(roots: Complex) -> NDArray[np.bool_]:
+    """Return which roots are on the positive imaginary axis."""
     return (abs(roots.real) <= AXIS_SHARE * abs(roots)) & (roots.imag > 0)
 
 
-def _axis_frequencies(roots: Complex, band: tuple[float, float]) -> Real:
-    """The frequencies inside a band of the roots on the imaginary axis."""
-    omega = roots.imag[_on_axis(roots)]
-    return np.asarray(omega[(omega > band[0]) & (omega < band[1])], float)
-
-
 def _magnitude_at(G: TransferFunction, roots: Complex, *, on_axis: float) -> Real:
-    """|G(i Im s)| at each root; the given value at those on the axis."""
+    """Return |G(i Im s)| at each root, `on_axis` for those on the axis."""
     result = np.full(roots.size, on_axis)
     off = ~_on_axis(roots)
     if off.any():

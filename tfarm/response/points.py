@@ -1,4 +1,4 @@
-"""Values of one response at given points, as `tfarm response` has them, and by each method."""
+"""Values of one response at points s, those of `tfarm response`, and by each method."""
 
 from __future__ import annotations
 
@@ -10,48 +10,28 @@ import numpy as np
 
 from tfarm.arrays import Complex
 from tfarm.columns import Column, Table
-from tfarm.exact.values import MethodRow, Roads
+from tfarm.digits import DOUBLE_DIGITS
+from tfarm.exact.values import ByMethod, MethodRow
 from tfarm.records import record
 from tfarm.schema import Quantity, roots_table
 
 from .transfer import TransferFunction
 
-DOUBLE_DIGITS = 15  # more are asked for as texts
-
 
 @dataclass(frozen=True)
 @record
 class Points:
-    """G(s) of one output at `s`; `value` are pairs of texts where more than 15 digits were asked for."""
+    """G(s) of one output at `s`; `value` are pairs of texts for more than 15 digits."""
 
-    transfer: TransferFunction
     s: Annotated[Complex, Quantity("s", "1/s", curve=True)]
     value: Annotated[Any, Quantity(curve=True)]
-
-    @property
-    def arm(self) -> Annotated[str, Quantity("arm")]:
-        """The name of the arm."""
-        return self.transfer.arm.name
-
-    @property
-    def input(self) -> Annotated[str, Quantity("input")]:
-        """The input."""
-        return self.transfer.input
-
-    @property
-    def input_unit(self) -> Annotated[str, Quantity()]:
-        """The unit of the input."""
-        return self.transfer.input_unit
-
-    @property
-    def output(self) -> Annotated[str, Quantity("output")]:
-        """The output."""
-        return self.transfer.outputs[0]
-
-    @property
-    def unit(self) -> Annotated[str, Quantity()]:
-        """The unit of the output."""
-        return self.transfer.units[0]
+    arm: Annotated[str, Quantity("arm")]
+    input: Annotated[str, Quantity("input")]
+    input_unit: Annotated[str, Quantity()]
+    output: Annotated[str, Quantity("output")]
+    unit: Annotated[str, Quantity()]
+    x: Annotated[float | None, Quantity(help="place of the output [m]")]
+    method: Annotated[str, Quantity("method")]
 
     @property
     def gain_unit(self) -> Annotated[str, Quantity("unit")]:
@@ -59,23 +39,13 @@ class Points:
         return f"{self.unit} / {self.input_unit}"
 
     @property
-    def x(self) -> Annotated[float | None, Quantity(help="place of the output [m]")]:
-        """The place of an output along the arm."""
-        return self.transfer.x
-
-    @property
-    def method(self) -> Annotated[str, Quantity("method")]:
-        """The method of the values."""
-        return self.transfer.method
-
-    @property
     def largest(self) -> Annotated[float, Quantity("largest magnitude")]:
-        """The largest |G| of these points."""
+        """The largest |G| at these points."""
         return float(abs(self._numbers).max())
 
     @property
     def largest_at(self) -> Annotated[complex, Quantity("at s", "1/s", 10)]:
-        """The point of that."""
+        """The point of the largest |G|."""
         return complex(self.s[int(abs(self._numbers).argmax())])
 
     @property
@@ -86,7 +56,7 @@ class Points:
 
     @property
     def csv_table(self) -> Table:
-        """A row a point."""
+        """A row for each point."""
         first = roots_table(self.s, Quantity("s", "1 / s", 12)).columns
         pairs = self.value if isinstance(self.value, list) else [(each.real, each.imag) for each in self.value.tolist()]
         parts = zip(("re", "im"), zip(*pairs, strict=True), strict=True)
@@ -98,23 +68,23 @@ class Points:
 
 
 def points(G: TransferFunction, s: Complex, digits: int | None = None) -> Points:
-    """The response at s, with so many right digits where more than 15 are asked for."""
-    if digits is not None and digits > DOUBLE_DIGITS:
-        return Points(G, s, [list(G.digits(complex(point), digits)) for point in s])
-    return Points(G, s, np.asarray(G(s)))
+    """Return the response at s, with certified digits for more than 15 of them."""
+    right = digits or 0
+    value = np.asarray(G(s)) if right <= DOUBLE_DIGITS else [list(G.digits(complex(each), right)) for each in s]
+    return Points(s, value, G.arm.name, G.input, G.input_unit, G.outputs[0], G.units[0], G.x, G.method)
 
 
 @dataclass(frozen=True)
 class ByMethods:
-    """The same numbers of an arm by each method, a row a mode or point of `at`."""
+    """The same numbers of an arm by each method, a row for each mode or point of `at`."""
 
     arm: Annotated[str, Quantity("arm")]
     of: Annotated[str, Quantity("quantity", key="output")]
     unit: Annotated[str, Quantity("unit")]
     at: Annotated[Sequence[Any], Quantity()]
-    roads: Annotated[Roads, Quantity(flat=True)]
+    values: Annotated[ByMethod, Quantity(flat=True)]
 
     @property
     def rows(self) -> Annotated[list[MethodRow], Quantity("by method", key="rows")]:
-        """A row a mode or point."""
-        return self.roads.rows(self.at)
+        """A row for each mode or point."""
+        return self.values.rows(self.at)

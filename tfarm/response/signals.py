@@ -1,7 +1,6 @@
-"""What a controller reads of a rig: named outputs, along the link with their place, as one row of analytic functions.
+"""The signals of a controller: named outputs, along the link with their place, as one row of analytic functions.
 
-A transfer function is numerator over drive, both analytic; a loop needs them apart, for its poles are where their sum
-vanishes, and there neither may be infinite.
+A transfer function is numerator over drive, both analytic.  The characteristic function of a loop is a sum of both.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from tfarm.exact.system import System, system_of
 from tfarm.exact.values import free_outputs
 from tfarm.records import read_only, record
 
-GRIDS_KEPT = 24  # sets of points whose values are kept: memory against time, of no effect on an answer
+GRIDS_KEPT = 24  # sets of points whose values are cached
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ GRIDS_KEPT = 24  # sets of points whose values are kept: memory against time, of
 class Signals:
     """Outputs of an arm by name, those along the link with their place in m: "hub_rate", "strain@0.05".
 
-    Raises ParameterError for an unknown output, and for a place that is missing, not wanted, or off the link.
+    Raises ParameterError for an unknown output, and for a place that is missing, superfluous or off the link.
     """
 
     arm: Arm
@@ -45,12 +44,12 @@ class Signals:
 
     @property
     def outputs(self) -> tuple[Output, ...]:
-        """The output that each reads."""
+        """The output of each signal."""
         return tuple(wanted for wanted, _ in self._placed)
 
     @cached_property
     def places(self) -> tuple[float, ...]:
-        """Where each is, as a share of the length; 0 for those that have their own place."""
+        """The place of each as a share of the length; 0 for outputs with a fixed place."""
         return tuple(place / self.arm.length for _, place in self._placed)
 
     @property
@@ -60,11 +59,11 @@ class Signals:
 
     @cached_property
     def system(self) -> System:
-        """The exact system that they are read from."""
+        """The exact system of the arm."""
         return system_of(self.arm)
 
     def kept(self, s: Complex) -> LoopParts:
-        """`parts`, not worked out again where they were asked for lately at the same points, as of another law."""
+        """Return `parts`, cached for the last sets of points."""
         key, kept = (s.shape, s.tobytes()), self._kept
         found = kept.pop(key, None) or read_only(self.parts(s))
         kept[key] = found  # the last one is the latest
@@ -77,7 +76,7 @@ class Signals:
         return {}
 
     def parts(self, s: NDArray[Any]) -> LoopParts:
-        """Drive (n,), numerators (signals, n) in SI per unit of the input, and scale, at s of any shape."""
+        """Return drive (n,), numerators (signals, n) in SI per unit of the input, and scale, at s of any shape."""
         k, s = self.system, np.asarray(s, dtype=complex)
         numerators = np.empty((len(self.names), s.size), complex)
         first: LoopParts | None = None
@@ -85,23 +84,19 @@ class Signals:
             rows = [n for n, place in enumerate(self.places) if place == share]
             free = free_outputs(k, [self.outputs[n] for n in rows], s.ravel(), share)
             first = first or LoopParts(free.drive, numerators, free.scale)
-            same = free.outputs * np.exp(free.scale - first.scale)  # a layout with more places may be scaled otherwise
-            numerators[rows] = same
+            numerators[rows] = free.outputs * np.exp(free.scale - first.scale)  # each layout has its own scale
         assert first is not None  # there is at least one signal
-        shape = s.shape
-        return LoopParts(
-            first.drive.reshape(shape), numerators.reshape(len(self.names), *shape), first.scale.reshape(shape)
-        )
+        return LoopParts(*(part.reshape(*part.shape[:-1], *s.shape) for part in first))
 
     def values(self, s: NDArray[Any]) -> Complex:
-        """The transfer functions (signals, ...) at s; infinite at their poles."""
+        """Return the transfer functions (signals, ...) at s; infinite at their poles."""
         drive, numerators, _ = self.parts(s)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(numerators / drive)
 
     @cached_property
     def orders(self) -> tuple[int, ...]:
-        """How often each numerator vanishes at s = 0; the drive does `system.at_rest` times."""
+        """The order of each numerator's zero at s = 0; that of the drive is `system.at_rest`."""
         return tuple(
             order_at_zero(self.system, wanted, share) for wanted, share in zip(self.outputs, self.places, strict=True)
         )
@@ -113,16 +108,17 @@ class Signals:
 
 
 def placed(name: str, length: float) -> tuple[Output, float]:
-    """The output of a name and its place [m] on an arm of this length."""
+    """Return the output of a name and its place [m] on an arm of this length.  Raises ParameterError for others."""
     plain, at, text = name.partition("@")
     wanted = known_output(plain)
     if wanted.place != "x":
         if at:
-            raise ParameterError(key=name, value=text, remedy=f"{plain} has its own place; leave out {at}{text}")
+            raise ParameterError(key=name, value=text, remedy=f"{plain} has a fixed place; leave out {at}{text}")
         return wanted, 0.0
     if not at:
-        remedy = f"say where: {plain}@x with x between 0 and {length:g} m"
-        raise ParameterError(key=f"{name}.x", value=MISSING, remedy=remedy)
+        raise ParameterError(
+            key=f"{name}.x", value=MISSING, remedy=f"add the place: {plain}@x with x between 0 and {length:g} m"
+        )
     try:
         x = float(text)
     except ValueError:

@@ -1,6 +1,6 @@
-"""The exact transfer function, with the vocabulary of python-control and none of its approximations.
+"""The exact transfer function, with the names of python-control.
 
-Its poles and zeros are complete: by a count where the spectrum is real, by a winding number where it is not.
+Its poles and zeros are complete: by a count for real spectra, else by a winding number.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from tfarm.exact.outputs import Output, output
 from tfarm.exact.series import expansions_at_zero, order_at_zero
 from tfarm.exact.system import System, system_of
 from tfarm.exact.values import (
+    ByMethod,
     Method,
-    Roads,
-    by_roads,
+    by_method,
     differentiate_outputs,
     digits_of,
     evaluate_outputs,
@@ -47,8 +47,8 @@ from tfarm.spectrum.box import REAL_SHARE, TOWARD_SINGULAR, Box, Function, compl
 class Roots:
     """Poles or zeros `values` [1/s], with multiplicity, ascending in |Im s|: all there are in `box`.
 
-    `box` is (re_min, re_max, im_min, im_max); `proof` says how completeness is known: "count", "winding number" or
-    "constant" (an end condition holds the output: none but at 0).
+    `box` is (re_min, re_max, im_min, im_max); `proof` of completeness is "count", "winding number" or "constant" (an
+    end condition fixes the output, which has none but at 0).
     """
 
     values: Complex
@@ -57,7 +57,7 @@ class Roots:
 
 
 def poles_of(arm: Arm, up_to: float) -> Roots:
-    """The poles of every transfer function of the arm with |Im s| <= up_to."""
+    """Return the poles of every transfer function of the arm with |Im s| <= up_to."""
     k = system_of(arm)
     if arm.is_undamped:
         return _on_axis(flexible_frequencies(arm, up_to), k.at_rest, up_to)
@@ -65,9 +65,9 @@ def poles_of(arm: Arm, up_to: float) -> Roots:
 
 
 def zeros_of(arm: Arm, wanted: Output, up_to: float, x: float) -> Roots:
-    """The zeros of one output with |Im s| <= up_to; x is a share of the length, for outputs along the arm.
+    """Return the zeros of one output with |Im s| <= up_to; x is a share of the length, for outputs along the arm.
 
-    One that its end condition holds constant has none but those of its power of s (at the tip: 0 throughout has none).
+    One that an end condition makes constant has those of its power of s, or none if it is 0 throughout.
     """
     share = wanted.share(x)
     k = system_of(arm)
@@ -93,7 +93,7 @@ def _on_axis(frequencies: NDArray[np.float64], at_zero: int, up_to: float) -> Ro
 
 
 def _damped_starts(arm: Arm, up_to: float) -> Complex:
-    """First-order estimates s = -C w^2/2 +- i w sqrt(1 - (C w/2)^2) from the undamped frequencies."""
+    """Return first-order estimates s = -C w^2/2 +- i w sqrt(1 - (C w/2)^2) from the undamped frequencies."""
     omega, C = flexible_frequencies(arm, 1.5 * up_to), arm.damping
     root = np.sqrt((1 - (C * omega / 2) ** 2).astype(complex))
     starts = np.r_[omega * (-C * omega / 2 + 1j * root), omega * (-C * omega / 2 - 1j * root)]
@@ -101,7 +101,7 @@ def _damped_starts(arm: Arm, up_to: float) -> Complex:
 
 
 def _starts_by_sampling(numerator: Function, up_to: float) -> Complex:
-    """Dips of the numerator along the imaginary and the real axis."""
+    """Return dips of the numerator along the imaginary and the real axis."""
     line = np.r_[np.geomspace(1e-4 * up_to, up_to, 400), np.linspace(0.01 * up_to, up_to, 1600)]
     line.sort()
     starts = []
@@ -115,7 +115,7 @@ def _starts_by_sampling(numerator: Function, up_to: float) -> Complex:
 
 
 def _numerator(k: System, wanted: Output, x: float) -> tuple[int, Function]:
-    """How often an output over its power of s vanishes at s = 0, and the function without these zeros."""
+    """Return the order of the zero at s = 0 of an output over its power of s, and the function without it."""
     base = replace(wanted.base, gauge=False)
     order = order_at_zero(k, base, x)
 
@@ -128,7 +128,7 @@ def _numerator(k: System, wanted: Output, x: float) -> tuple[int, Function]:
 
 
 def _in_box(k: System, function: Function, at_zero: int, up_to: float, starts: Complex) -> Roots:
-    """Zeros of the quantity in a box of that height; the box grows a little where a zero lies on its edge."""
+    """Return the zeros of a function in a box of that height; the box grows where a zero lies on its edge."""
 
     def box_of(height: float) -> Box:
         return Box(-min(TOWARD_SINGULAR / k.damping, height) if k.damping else -height, height, -height, height)
@@ -143,9 +143,9 @@ def _in_box(k: System, function: Function, at_zero: int, up_to: float, starts: C
 if TYPE_CHECKING:
     import control
 
-POINTS_AT_ONCE = 1 << 16  # points s at once: their values fill a megabyte an output, and few loops are begun
-LARGEST_S = 1e20  # 1/s: far beyond any arm, and the powers of s that are taken do not overflow
-MOST_ASKED_DIGITS = 1000  # of a value
+POINTS_AT_ONCE = 1 << 16  # points s at once: a megabyte for each output
+LARGEST_S = 1e20  # 1/s: far above any arm, and powers of s do not overflow
+MOST_DIGITS = 1000  # of a value
 A_FREQUENCY = "a positive, finite frequency in rad/s"
 
 
@@ -155,16 +155,15 @@ Wanted = str | Output | Sequence[str | Output]  # one output or several
 def transfer(
     arm: Arm, outputs: Wanted, *, x: float | None = None, method: Method = "closed-form", input: str | None = None
 ) -> TransferFunction:
-    """The exact transfer function from the arm's input (hub torque, unless it has another) to one output or several.
+    """Return the exact transfer function from the arm's input to one output or several.
 
-    `input` takes the place of the arm's own: one of `tfarm.arm.INPUTS`, or a load on the link while the hub's input is
-    held at zero, force@X [N] (positive with the displacement) or moment_pair@X1,X2 [N m] (as a piezo patch between them
-    gives), with X in m from the clamp; then every value is an enclosure in balls, about a millisecond each.
-
-    `outputs` are names of `tfarm.exact.outputs.OUTPUTS`, or an `Output` of your own; `x` [m] is the place of those
-    along the arm.  `method` is the road to its values: the closed form in float64, "balls" for ball arithmetic alone,
-    or "appendix" for the paper's own determinant with mpmath, some milliseconds a point (`tfarm.exact.values`).
-    Raises ParameterError for an unknown output or method, or for a place missing or outside the arm.
+    `outputs` are names of `tfarm.exact.outputs.OUTPUTS`, or `Output` records; `x` [m] is the place of those along the
+    arm.  `input` replaces that of the arm: one of `tfarm.arm.INPUTS`, or a load on the link with the hub's input at
+    zero.  Loads are force@X [N], positive with the displacement, and moment_pair@X1,X2 [N m], that of a piezo patch,
+    with X in m from the clamp.  Their values are enclosures in balls, about a millisecond each.
+    `method` is that of the values: the closed form in float64, "balls" for ball arithmetic alone, or "appendix" for the
+    paper's determinant with mpmath, some milliseconds a point (`tfarm.exact.values`).
+    Raises ParameterError for an unknown output or method, and a place that is missing or off the arm.
     """
     return TransferFunction(arm, outputs, x=x, method=method, input=input)
 
@@ -172,8 +171,8 @@ def transfer(
 class TransferFunction:
     """G(s), exact, for one output or a list of them (see `transfer`).
 
-    Calling it at a complex scalar or array of s [1/s] gives values of that shape; a list of outputs adds a leading
-    axis.  At a pole it raises ParameterError naming the pole; everywhere else it has full float64 accuracy.
+    A call with a complex scalar or array of s [1/s] returns values of that shape, with a leading axis for a list of
+    outputs.  They have full float64 accuracy.  Raises ParameterError, naming the pole, at a pole.
     """
 
     def __init__(
@@ -189,15 +188,15 @@ class TransferFunction:
         self.load = load_of(input, arm.length) if input is not None and is_load(input) else None
         self._input = input
         if input is not None and self.load is None:
-            arm = replace(arm, input=cast("Input", input))  # the record refuses what is none
+            arm = replace(arm, input=cast("Input", input))  # checked by the record
         self.method = known_method(method)
         self.arm = arm
         self.is_single = isinstance(outputs, str | Output)
-        asked = tuple(outputs) if isinstance(outputs, Iterable) and not isinstance(outputs, str) else (outputs,)
-        if not asked:
+        each = tuple(outputs) if isinstance(outputs, Iterable) and not isinstance(outputs, str) else (outputs,)
+        if not each:
             raise ParameterError(key="outputs", value=outputs, remedy="name at least one output")
-        self.rows: tuple[Output, ...] = tuple(output(each) for each in asked)
-        self.system: System = system_of(arm)  # the exact system that it is read from
+        self.rows: tuple[Output, ...] = tuple(map(output, each))
+        self.system: System = system_of(arm)
         self.x = self._place(x)
 
     @property
@@ -212,7 +211,7 @@ class TransferFunction:
 
     @property
     def input(self) -> str:
-        """The input: the arm's own, "hub_torque" [N m] of the paper's; "hub_angle" [rad] where the hub is locked."""
+        """The input of the arm, "hub_angle" [rad] where the hub is locked, or the load."""
         if self.load is not None:
             return str(self._input)
         return "hub_angle" if self.arm.is_locked else self.arm.input
@@ -229,42 +228,41 @@ class TransferFunction:
     # ------------------------------------------------------------ values
 
     def __call__(self, s: ArrayLike) -> Any:
-        """G(s) at a complex scalar or array."""
+        """Return G(s) at a complex scalar or array."""
         points = _finite(s)
         return self._shaped(self._values(points.ravel()).reshape(len(self.outputs), *points.shape))
 
-    def by_methods(self, s: ArrayLike) -> Roads:
-        """G(s) at an array of s by every method that has it (`tfarm.exact.values`), and how far these part."""
+    def by_methods(self, s: ArrayLike) -> ByMethod:
+        """Return G(s) at an array of s by every method that has it (`tfarm.exact.values`), with their differences."""
         self.must_be_of_the_hub("a comparison of methods")
         wanted = self.rows[0] if self.is_single else self.rows
         points = np.atleast_1d(np.asarray(s))
 
-        def value(method: Method) -> Complex:
-            return np.asarray(transfer(self.arm, wanted, x=self.x, method=method)(points))
-
-        return by_roads(value, why_no_appendix(self.arm, self.arm.theory, self.rows))
+        return by_method(
+            lambda method: np.asarray(transfer(self.arm, wanted, x=self.x, method=method)(points)),
+            why_no_appendix(self.arm, self.arm.theory, self.rows),
+        )
 
     def derivative(self, s: ArrayLike) -> Any:
-        """dG/ds at a complex scalar or array, by the same formulas carried as power series."""
+        """Return dG/ds at a complex scalar or array."""
         self.must_be_of_the_hub("a derivative")
         points = _finite(s)
         flat = differentiate_outputs(self.system, self.rows, points.ravel(), self.share)
         return self._shaped(flat.reshape(len(self.outputs), *points.shape))
 
     def digits(self, s: complex, digits: int) -> Any:
-        """G(s) as pairs of decimal strings (re, im), each with that many right digits, proven in ball arithmetic.
+        """Return G(s) as pairs of decimal strings (re, im), each with that many digits certified in ball arithmetic.
 
-        s and the arm's parameters are taken as the float64 numbers they are.  Raises CertificationError at a pole.
+        s and the arm's parameters are exact float64 numbers.  Raises CertificationError at a pole.
         """
-        most = MOST_ASKED_DIGITS
-        digits = whole("digits", digits, 1, most, f"a whole number of digits from 1 to {most}")
+        digits = whole("digits", digits, 1, MOST_DIGITS, f"a whole number of digits from 1 to {MOST_DIGITS}")
         self.must_be_of_the_hub("digits")
         point = complex(_finite(s))
         pairs = [digits_of(self.system, wanted, point, digits, self.share) for wanted in self.rows]
         return pairs[0] if self.is_single else pairs
 
     def frequency_response(self, omega: ArrayLike) -> control.FrequencyResponseData:
-        """G(i omega) as python-control data with named signals; omega in rad/s (1-D, increasing)."""
+        """Return G(i omega) as python-control data with named signals; omega in rad/s (1-D, increasing)."""
         import control
 
         grid = np.atleast_1d(np.asarray(omega, dtype=float))
@@ -284,15 +282,13 @@ class TransferFunction:
             return slow_values(self.method, self.arm, self.system, self.rows, s, self.share)
         if s.size <= POINTS_AT_ONCE:
             return evaluate_outputs(self.system, self.rows, s, self.share)
-        values = np.empty((len(self.outputs), s.size), complex)
-        for start in range(0, s.size, POINTS_AT_ONCE):
-            part = slice(start, start + POINTS_AT_ONCE)
-            values[:, part] = evaluate_outputs(self.system, self.rows, s[part], self.share)
-        return values
+        blocks = np.split(s, range(POINTS_AT_ONCE, s.size, POINTS_AT_ONCE))
+        return np.concatenate([evaluate_outputs(self.system, self.rows, each, self.share) for each in blocks], axis=1)
 
-    def _shaped(self, values: Complex) -> Any:
+    def _shaped(self, values: NDArray[Any]) -> Any:
+        """Return values (outputs, ...) without the first axis for a single output, a scalar as a Python number."""
         values = values[0] if self.is_single else values
-        return complex(values) if values.ndim == 0 else values
+        return values if np.ndim(values) else values.item()
 
     # ------------------------------------------------------------ s = 0, poles and zeros
 
@@ -304,33 +300,30 @@ class TransferFunction:
 
     @property
     def rigid_body(self) -> Any:
-        """The coefficient of 1/s^2 at s = 0: the arm turning as a rigid body."""
-        return self._shaped_real(self.expansion[:, 0])
+        """The coefficient of 1/s^2 at s = 0, of the rigid body."""
+        return self._shaped(self.expansion[:, 0])
 
     @property
     def static(self) -> Any:
         """The constant term of the expansion at s = 0: the static gain where the output is finite there."""
-        return self._shaped_real(self.expansion[:, 2])
-
-    def _shaped_real(self, values: NDArray[np.float64]) -> Any:
-        return float(values[0]) if self.is_single else values
+        return self._shaped(self.expansion[:, 2])
 
     def poles(self, *, up_to: float) -> Roots:
-        """The poles with |Im s| <= up_to [rad/s], complete in the box of the record (see `Roots`).
+        """Return the poles with |Im s| <= up_to [rad/s], complete in the box of the record (see `Roots`).
 
-        At C = 0 they are +-i times the natural frequencies, complete by their count, and 0 twice for the
-        rigid-body mode; at C > 0 complete by the winding number of the characteristic function around the box.
+        At C = 0 they are +-i times the natural frequencies, complete by their count, and 0 twice for the rigid-body
+        mode.  At C > 0 they are complete by the winding number of the characteristic function.
         """
         return poles_of(self.arm, positive("up_to", up_to, A_FREQUENCY))
 
     def zeros(self, *, up_to: float) -> Roots:
-        """The zeros of a single output with |Im s| <= up_to [rad/s], complete in the box of the record.
+        """Return the zeros of a single output with |Im s| <= up_to [rad/s], complete in the box of the record.
 
-        By a count for hub angle, hub rate and root moment at C = 0, else by the winding number around the box.
+        By a count for hub angle, hub rate and root moment at C = 0, else by the winding number.
         """
         self.must_be_of_the_hub("zeros")
         if not self.is_single:
-            raise ParameterError(key="outputs", value=self.outputs, remedy="ask for the zeros of one output at a time")
+            raise ParameterError(key="outputs", value=self.outputs, remedy="zeros are those of one output; give one")
         return zeros_of(self.arm, self.rows[0], positive("up_to", up_to, A_FREQUENCY), self.share)
 
     # ------------------------------------------------------------ inside
@@ -338,12 +331,13 @@ class TransferFunction:
     def must_be_of_the_hub(self, what: str) -> None:
         """Raise ParameterError where the input is a load on the link."""
         if self.load is not None:
-            remedy = f"{what} is known for an input at the hub; ask for values G(s)"
-            raise ParameterError(key="input", value=self._input, remedy=remedy)
+            raise ParameterError(
+                key="input", value=self._input, remedy=f"{what} needs an input at the hub; a load has values G(s) only"
+            )
 
     @property
     def share(self) -> float:
-        """The place `x` as a share of the length; 0 of outputs that have their own."""
+        """The place `x` as a share of the length; 0 for outputs with a fixed place."""
         return 0.0 if self.x is None else self.x / self.arm.length
 
     def _place(self, x: float | None) -> float | None:
@@ -351,20 +345,20 @@ class TransferFunction:
         length = self.arm.length
         if not along:
             if x is not None:
-                raise ParameterError(key="x", value=x, remedy=f"{self.outputs[0]} has its own place; leave x out")
+                raise ParameterError(key="x", value=x, remedy=f"{self.outputs[0]} has a fixed place; leave x out")
             return None
         if x is None:
-            raise ParameterError(key="x", value=MISSING, remedy=f"say where {along[0]} is meant, 0 to {length:g} m")
+            raise ParameterError(key="x", value=MISSING, remedy=f"give the place of {along[0]}, 0 to {length:g} m")
         return float(on_the_arm("x", number("x", x, f"a point between 0 and {length:g} m"), length))
 
 
 def _finite(s: ArrayLike) -> Complex:
     points = np.asarray(s, dtype=complex)
-    if not np.isfinite(points.sum()) and not np.isfinite(points).all():  # the sum needs no array of its own
+    if not np.isfinite(points.sum()) and not np.isfinite(points).all():  # the sum is cheaper
         bad = points[~np.isfinite(points)].ravel()[0]
-        raise ParameterError(key="s", value=complex(bad), remedy="a transfer function wants finite s in 1/s")
+        raise ParameterError(key="s", value=complex(bad), remedy="a transfer function needs finite s in 1/s")
     parts = (points.real, points.imag) if points.size else ()
     if any(part.max() > LARGEST_S or part.min() < -LARGEST_S for part in parts):
         bad = points.ravel()[abs(points.ravel()).argmax()]
-        raise ParameterError(key="s", value=complex(bad), remedy=f"beyond any arm; at most {LARGEST_S:g} 1/s")
+        raise ParameterError(key="s", value=complex(bad), remedy=f"at most {LARGEST_S:g} 1/s")
     return points

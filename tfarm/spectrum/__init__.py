@@ -1,4 +1,4 @@
-"""Natural frequencies and mode shapes: counted, so that none is missing, then found to the last digit."""
+"""Natural frequencies, mode shapes and damped modes, complete by counts."""
 
 from tfarm.spectrum.damped import DampedModes, damped_modes
 from tfarm.spectrum.shapes import PARAMETERS

@@ -1,9 +1,8 @@
 """Zeros of an analytic function in a box of the complex plane, complete by the argument principle.
 
-Newton's method from many starts finds most of them; the winding number of the function around the box says how
-many there are; where the two disagree the box is cut, each half counted, and the search goes on inside.
-After Kravanja and Van Barel (2000), with the function given as mantissa and exponent, so that it may be
-of any size.
+Newton's method from many starts finds most of them, and the winding number around the box is their number.  Where the
+two differ the box is cut into halves.  After Kravanja and Van Barel (2000), with the function as mantissa and exponent,
+so that it may be of any size.
 """
 
 from __future__ import annotations
@@ -22,26 +21,26 @@ from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 
 LONGEST_TURN = 0.6  # rad: a longer step of the phase along the contour is halved
-FORESEEN = 1.0  # so is one over which ln f, phase or size, would change by more at the rate of either end
+FORESEEN = 1.0  # so is one with a larger change of ln f at the rate of either end
 NEAREST_TO_ZERO = 1e-13  # a contour cannot be resolved closer to a zero than this share of |s|
-NARROW_BOX = 1e-8  # of a box: in a wide one the part near s = 0 is resolved as finely as in one of this size
+NARROW_BOX = 1e-8  # of a box: the least |s| of that resolution
 MOST_CONTOUR_POINTS = 200_000  # of a contour
-FIRST_POINTS = 40  # of each edge of a contour, to begin with: those between are put in where they are needed
+FIRST_POINTS = 40  # of each edge of a contour, before refinement
 MOST_CALLS = 30_000  # of the function in one search; the most that 300 random loops took is 4,100
-DEAD_ZONE = 1e-8  # nearer to s = 0 than this share of a box Newton's method is not believed: a zero there forces cuts
-SAME_BOX_ZERO = 0.1  # of its size: a zero found so near a known one is that one
-MOST_CUTS = 60  # cuts: then a box is a share of 2^-30 of the first, less than float64 can search
+DEAD_ZONE = 1e-8  # of a box: nearer to s = 0 zeros of Newton's method are rejected, and a zero there forces cuts
+SAME_BOX_ZERO = 0.1  # of its size: distance within which a zero is a known one
+MOST_CUTS = 60  # cuts: then a box is 2^-30 of the first, below the resolution of float64
 REAL_SHARE = 1e-11  # of its size: a smaller imaginary part is rounding
 TRIED_HEIGHTS = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)  # of a box, where a zero lies on its edge
-NEWTON_STEPS = 60  # at most, of a start: those that have not settled by then are dropped
-FARTHEST_MOVE = 0.3  # of |s|: no step of Newton's method is longer, lest a start leave its neighbourhood
-SETTLED_MOVE, LAST_MOVE = 1e-11, 1e-15  # of |s|: a start that moves less has settled; and will move no more
-SAME_POINT = 1e-9  # of its size: two starts that settle so near each other found one zero
-SHRINKING = 0.9  # of a move of Newton's: the next one, at a zero of order up to ten
-SPLIT = 0.4871  # where a box is cut: off the axes, on which zeros like to lie
-UNEVEN = 8  # ratio of two edges on one side of 0 from which on a box is cut at about their geometric mean
+NEWTON_STEPS = 60  # at most, of a start that has not converged
+FARTHEST_MOVE = 0.3  # of |s|: the longest step of Newton's method
+SETTLED_MOVE, LAST_MOVE = 1e-11, 1e-15  # of |s|: a start with a smaller step has converged; and ends
+SAME_POINT = 1e-9  # of its size: distance within which two starts have the same zero
+SHRINKING = 0.9  # ratio of two successive steps at a zero of order up to ten
+SPLIT = 0.4871  # of a side, where a box is cut: off the axes, on which zeros often are
+UNEVEN = 8  # ratio of two edges on one side of 0, above which a box is cut near their geometric mean
 OF_CORNER, OF_OPPOSITE = (0.8, 0.55), (0.2, 0.45)  # weights of each corner and of its opposite: eight starts of a box
-POINT_BOX = 1e-6  # of |s|: in a box so small one zero that is found is a multiple one, as often as it is counted
+POINT_BOX = 1e-6  # of |s|: size of a box in which one zero has the multiplicity of the count
 
 
 Function = Callable[[Complex], Analytic]
@@ -56,7 +55,7 @@ class Box(NamedTuple):
     im_max: float
 
     def holds(self, points: Complex) -> NDArray[np.bool_]:
-        """Which points lie inside."""
+        """Return which points are inside."""
         inside: NDArray[np.bool_] = (self.re_min < points.real) & (points.real < self.re_max)
         return inside & (self.im_min < points.imag) & (points.imag < self.im_max)
 
@@ -67,7 +66,7 @@ class Box(NamedTuple):
         return np.array([left + 1j * low, right + 1j * low, right + 1j * high, left + 1j * high, left + 1j * low])
 
     def halves(self) -> tuple[Box, Box]:
-        """The box cut across its longer side, geometrically where that side spans decades."""
+        """Return the box cut across its longer side, geometrically where that side spans decades."""
         left, right, low, high = self
         if high - low >= right - left:
             cut = _between(low, high)
@@ -77,15 +76,16 @@ class Box(NamedTuple):
 
 
 def _between(low: float, high: float) -> float:
+    """Return the point at which a side is cut."""
     if (low > 0 and high > UNEVEN * low) or (high < 0 and low < UNEVEN * high):
         return math.copysign(abs(low) ** (1 - SPLIT) * abs(high) ** SPLIT, low)
     return low + SPLIT * (high - low)
 
 
 def winding_number(function: Function, box: Box, points: int = FIRST_POINTS) -> int:
-    """How many zeros lie in the box, each as often as its order.
+    """Return the number of zeros in the box, with multiplicity.
 
-    Raises ConvergenceError where a zero lies on the contour, to what float64 resolves.
+    Raises ConvergenceError where a zero is on the contour, within the resolution of float64.
     """
     corners = box.corners
     path = np.concatenate([np.linspace(a, b, points, endpoint=False) for a, b in pairwise(corners)])
@@ -94,10 +94,10 @@ def winding_number(function: Function, box: Box, points: int = FIRST_POINTS) -> 
 
 
 def turned(function: Function, path: Complex, across: float, nearest: float = NEAREST_TO_ZERO) -> float:
-    """The angle [rad] by which a function turns around 0 along a path of points, more of which are put in as needed.
+    """Return the change of the argument [rad] of a function along a path of points, which is refined.
 
-    Raises ConvergenceError where a zero is nearer to the path than the share `nearest` of |s|, of |s| between that of
-    `NARROW_BOX` and all of the size `across`.
+    Raises ConvergenceError where a zero is nearer to the path than the share `nearest` of |s|, with |s| between
+    `NARROW_BOX` and 1 times `across`.
     """
     phase, rate = _phase(function, path)
     start, end = np.array([path[:-1], phase[:-1], rate[:-1]]), np.array([path[1:], phase[1:], rate[1:]])
@@ -105,7 +105,7 @@ def turned(function: Function, path: Complex, across: float, nearest: float = NE
     while True:
         length, step = end[0] - start[0], np.angle(np.exp(1j * (end[1] - start[1]).real))
         foreseen = abs(length) * np.maximum(abs(start[2]), abs(end[2]))
-        smooth = (abs(step) <= LONGEST_TURN) & (foreseen <= FORESEEN)  # not so what is no number
+        smooth = (abs(step) <= LONGEST_TURN) & (foreseen <= FORESEEN)  # nan is not smooth
         angle += float(step[smooth].sum())
         start, end, length, step = start[:, ~smooth], end[:, ~smooth], length[~smooth], step[~smooth]
         if not length.size:
@@ -119,24 +119,24 @@ def turned(function: Function, path: Complex, across: float, nearest: float = NE
 
 
 def _phase(function: Function, points: Complex) -> tuple[NDArray[np.float64], Complex]:
-    """arg f and f'/f: the second tells where the first may have gone once around between two points."""
+    """Return arg f and f'/f, the rate of the first between two points."""
     at = function(points)
     phase: NDArray[np.float64] = np.angle(at.value) + at.scale.imag
-    with np.errstate(all="ignore"):  # a value of zero is caught as a rough step
+    with np.errstate(all="ignore"):  # a zero is a rough step
         rate = np.where(at.value == 0, 0.0, at.slope / at.value)
     return phase, rate
 
 
 def newton(function: Function, starts: Complex) -> Complex:
-    """Newton's method from every start at once; the points that have settled, each zero once.
+    """Return the zeros that Newton's method finds from the starts, each once.
 
-    A point that has settled goes on while its moves shrink: until they are what f is rounded by.
+    A converged point continues while its steps shrink, down to rounding.
     """
     s = np.array(starts, dtype=complex)
     settled, moving, last = np.zeros(s.size, bool), np.arange(s.size), np.full(s.size, np.inf)
     for _ in range(NEWTON_STEPS):
         at = function(s[moving])
-        with np.errstate(all="ignore"):  # a start that runs away, or stands where f is flat, is dropped
+        with np.errstate(all="ignore"):  # a diverging start, or one at f' = 0, is dropped
             move = at.value / at.slope
         known = np.isfinite(move)
         settled[moving[~known]] = False
@@ -154,7 +154,7 @@ def newton(function: Function, starts: Complex) -> Complex:
 
 
 def distinct(points: Complex) -> Complex:
-    """The points, those next to an earlier one left out."""
+    """Return the points without those next to an earlier one."""
     kept: list[complex] = []
     for point in points:
         if all(abs(point - other) > SAME_POINT * abs(point) for other in kept):
@@ -166,17 +166,18 @@ NOTHING_KNOWN: Complex = np.empty(0, complex)
 
 
 def zeros_in_box(function: Function, box: Box, starts: Complex, known: Complex = NOTHING_KNOWN) -> Complex:
-    """All zeros in the box, each as often as its order, as many as the winding number says.
+    """Return all zeros in the box with multiplicity, by their winding number.
 
-    `known` zeros are taken as they are: such as lie so near s = 0 that Newton's method is not believed there.
-    Raises ConvergenceError if they cannot all be found, with those that were.
+    `known` zeros are not searched, such as those next to s = 0, where Newton's method is not reliable.
+    Raises ConvergenceError, with the zeros found, where others are missing.
     """
     calls = count()
 
     def counted(s: Complex) -> Analytic:
         if next(calls) > MOST_CALLS:
-            text = f"no end of cuts below Im s = {box.im_max:.4g}: float64 knows too little there"
-            raise ConvergenceError(text, s, 0)
+            raise ConvergenceError(
+                f"too many cuts below Im s = {box.im_max:.4g}: float64 does not separate the zeros there", s, 0
+            )
         return function(s)
 
     return _search(counted, box, starts, known, depth=0)
@@ -190,10 +191,10 @@ def complete(
     known: Complex = NOTHING_KNOWN,
     factors: Sequence[float] = TRIED_HEIGHTS,
 ) -> tuple[Complex, Box]:
-    """All zeros of a function that is real on the real axis in the box of a height, and that box.
+    """Return all zeros of a function, real on the real axis, in the box of a height, and that box.
 
-    Zeros that are real but for rounding are real.  Where a zero lies on the edge of the box the next of the `factors`
-    on the height is tried; raises ConvergenceError where none does.
+    Zeros that are real to rounding are real.  Where a zero is on the edge of the box the next of the `factors` on the
+    height is tried.  Raises ConvergenceError where all fail.
     """
     for factor in factors[:-1]:
         with suppress(ConvergenceError):
@@ -204,15 +205,16 @@ def complete(
 
 
 def _search(function: Function, box: Box, starts: Complex, known: Complex, depth: int) -> Complex:
+    """Return all zeros in the box, by halves where some are missing."""
     expected = winding_number(function, box)
     if not expected:
         return np.empty(0, complex)
-    grid = (
-        box.corners[:4, None] * np.array(OF_CORNER) + box.corners[[2, 3, 0, 1], None] * np.array(OF_OPPOSITE)
-    ).ravel()
-    found = newton(function, np.concatenate([starts[box.holds(starts)], grid]))
+    grid = np.outer(box.corners[:4], OF_CORNER) + np.outer(box.corners[[2, 3, 0, 1]], OF_OPPOSITE)
+    found = newton(function, np.concatenate([starts[box.holds(starts)], grid.ravel()]))
     width = max(box.re_max - box.re_min, box.im_max - box.im_min)
-    found = found[box.holds(found) & (abs(found) > DEAD_ZONE * width)]  # deflated zeros at s = 0 leave noise around it
+    found = found[
+        box.holds(found) & (abs(found) > DEAD_ZONE * width)
+    ]  # deflation of zeros at s = 0 leaves noise around it
     again = (abs(found[:, None] - known) < SAME_BOX_ZERO * abs(known)).any(axis=1)
     found = np.concatenate([known[box.holds(known)], found[~again]])
     if found.size == expected:
@@ -221,32 +223,29 @@ def _search(function: Function, box: Box, starts: Complex, known: Complex, depth
         return np.repeat(found, expected)
     if depth > MOST_CUTS:
         where = f"{box.re_min:.3g} < Re s < {box.re_max:.3g}, {box.im_min:.3g} < Im s < {box.im_max:.3g}"
-        raise ConvergenceError(
-            f"of {expected} zeros with {where} only {found.size} could be told apart", found, expected
-        )
-    parts = [_search(function, half, starts, known, depth + 1) for half in box.halves()]
-    return np.concatenate(parts)
+        raise ConvergenceError(f"only {found.size} of {expected} zeros with {where} are separable", found, expected)
+    return np.concatenate([_search(function, half, starts, known, depth + 1) for half in box.halves()])
 
 
-TOWARD_SINGULAR = 0.8  # how far towards -1/C, where real eigenvalues accumulate, a box may reach
-LEFT_EDGES = (TOWARD_SINGULAR, 0.77, 0.74, 0.7)  # likewise: those that are tried, lest a zero lie on the edge
-HEIGHTS_LEFT = 1.5  # heights that a box reaches left: zeros further left die out faster than any in it swings
-RIGHT_OF_AXIS = 0.1  # heights that a box reaches right at least: its edge is clear of zeros on the axis
-ABOVE_LAST = 1.05  # times the last zero known: up to there a box may reach half-way
-SAME_ZERO = 1e-7  # of its size: a zero that two searches found, one of them next to another zero
-POINTS_A_ZERO = 8  # of a contour, to begin with, for each zero that it should hold: time alone
+TOWARD_SINGULAR = 0.8  # of -1/C, where real eigenvalues accumulate: the farthest left edge of a box
+LEFT_EDGES = (TOWARD_SINGULAR, 0.77, 0.74, 0.7)  # likewise: tried in turn, as a zero may be on the edge
+HEIGHTS_LEFT = 1.5  # width of a box left of the axis, in heights: zeros beyond are highly damped
+RIGHT_OF_AXIS = 0.1  # width of a box right of the axis, in heights: its edge is clear of zeros on the axis
+ABOVE_LAST = 1.05  # times the last known zero: a box may end half-way to that
+SAME_ZERO = 1e-7  # of its size: distance of one zero in two searches, next to another zero
+POINTS_A_ZERO = 8  # first points of a contour for each expected zero: time alone
 
 
 def is_among(zeros: Complex, others: Complex) -> NDArray[np.bool_]:
-    """Which of the zeros are one of the others, which another search found."""
+    """Return which of the zeros are among the others, of another search."""
     away = abs(zeros[..., None] - others)
     return np.asarray((away < SAME_ZERO * abs(zeros)[..., None]).any(axis=-1))
 
 
 def complete_box(f: Function, listed: Complex, others: Complex, C: float) -> Box | None:
-    """The highest box in which the listed pairs are all the zeros of f, by winding number; None where there is none.
+    """Return the highest box in which the listed pairs are all the zeros of f, by winding number, or None.
 
-    `others` are zeros known but not listed.
+    `others` are known zeros that are not listed.
     """
     known, heights = np.concatenate([listed, others])[:, 0], _heights(listed, others, C)
     low, high = 0, len(heights) - 1
@@ -271,9 +270,9 @@ def complete_box(f: Function, listed: Complex, others: Complex, C: float) -> Box
 def filled_box(
     f: Function, listed: Complex, others: Complex, height: float, starts: Complex, C: float
 ) -> tuple[Box, Complex]:
-    """A box that goes above the listed pairs below that height, or so high where there are none, and all zeros in it.
+    """Return a box above the listed pairs below that height, or of that height without such pairs, and its zeros.
 
-    Raises ConvergenceError if they cannot all be found.
+    Raises ConvergenceError where some are missing.
     """
     starts = starts[np.isfinite(starts)]
     first = listed[:, 0]
@@ -285,12 +284,12 @@ def filled_box(
 
 
 def is_right(zeros: Complex, C: float) -> NDArray[np.bool_]:
-    """Which zeros are right of where a box may reach; not those that are NaN."""
+    """Return which zeros are right of the farthest left edge of a box, without NaN."""
     return np.asarray(zeros.real > (-TOWARD_SINGULAR / C if C else -np.inf))
 
 
 def _heights(listed: Complex, others: Complex, C: float) -> Real:
-    """Heights between the zeros to the right of -1/C, ascending, below the first one that is not listed."""
+    """Return heights between the zeros right of -1/C, ascending, below the first one that is not listed."""
     known, mine = np.concatenate([listed, others])[:, 0], np.arange(len(listed) + len(others)) < len(listed)
     right = is_right(known, C)
     imag, mine = known.imag[right], mine[right]
@@ -304,7 +303,7 @@ def _heights(listed: Complex, others: Complex, C: float) -> Real:
 
 
 def _box(height: float, known: Complex, C: float) -> Box:
-    """A box of that height, its left edge clear of -1/C and, of a few, the furthest from any known zero."""
+    """Return a box of that height, its left edge right of -1/C and far from known zeros."""
     reach = HEIGHTS_LEFT * height
     if C and reach > TOWARD_SINGULAR / C:
         edges = -np.array(LEFT_EDGES) / C

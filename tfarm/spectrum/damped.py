@@ -1,9 +1,9 @@
-"""Damped modes: every eigenvalue in a printed box, and which undamped mode it continues from.
+"""Damped modes: every eigenvalue in a box, and the undamped mode from which it continues.
 
-With C > 0 there are two families.  Bending modes become overdamped, and their slow real eigenvalues accumulate at -1/C,
-from the left only.  Shear is undamped in this model, so at any C infinitely many lightly damped modes remain, near
-Im s = (n - 1/2) pi c/L for a free tip, c^2 = kappa G/rho, their damping vanishing as 1/w^2.  No list of damped modes
-can be complete but in a box, and no box can hold -1/C.
+With C > 0 there are two families.  Bending modes become overdamped, and their slow real eigenvalues accumulate at -1/C
+from the left.  Shear is undamped in this model.  So at any C infinitely many lightly damped modes remain, near
+Im s = (n - 1/2) pi c/L for a free tip, c^2 = kappa G/rho, with a damping that vanishes as 1/w^2.  A list of damped
+modes is complete in a box only, and no box contains -1/C.
 """
 
 from __future__ import annotations
@@ -32,19 +32,23 @@ from .proofs import Disc, disjoint, enclosed, proven_count
 from .shapes import mode_field
 from .table import Modes, first_frequency, modes
 
-COMPANY = 6  # modes named beyond those wanted: below them a box may end
+COMPANY = 6  # modes named beyond the list: a box may end below them
 MOST_MODES = 300  # of a damped table
-BESIDE_DISC = 1e-12  # how far a listed eigenvalue may be from its disc, of its size (more beside its own partner)
-SLOWEST, REAL_POINTS = 1e-6, 300  # of the lowest frequency, and how many: signs read on the negative real axis
-DRIVE_PARTS = {"friction": "hub friction", "back_emf": "back-EMF", "lag": "electrical pole"}  # what may set a zero
+OFF_DISC = 1e-12  # largest distance of a listed eigenvalue from its disc, of its size (more near its partner)
+SLOWEST, REAL_POINTS = 1e-6, 300  # of the lowest frequency, and number: points of the negative real axis
+DRIVE_PARTS = {
+    "friction": "hub friction",
+    "back_emf": "back-EMF",
+    "lag": "electrical pole",
+}  # parts that may determine a zero
 NOT_ASSIGNED = "not assigned"
-LEAST_INFLUENCE = 0.3  # |d ln s/d ln p| of a part p that an eigenvalue is named after: it is 1/2 where two share it
+LEAST_INFLUENCE = 0.3  # |d ln s/d ln p| of the part p of an eigenvalue's origin: 1/2 for two parts
 PART_STEP = Fraction(1, 10_000)  # of a part, for differences: float64 has D to 1e-15 of its terms
-PLAIN_SHARE = 0.2  # how far an eigenvalue may be from the frequency it is named after, in distances to the next one
+PLAIN_SHARE = 0.2  # largest distance of an eigenvalue from its frequency, in distances to the next one
 
 
 class Unassigned(NamedTuple):
-    """An eigenvalue [1/s] of no mode, Im >= 0, a complex one with its conjugate; `origin` is `origin_of` it."""
+    """An eigenvalue [1/s] of no mode, Im >= 0, a complex one with its conjugate; see `origin_of`."""
 
     eigenvalue: complex
     origin: str
@@ -53,15 +57,15 @@ class Unassigned(NamedTuple):
 @dataclass(frozen=True)
 @record
 class DampedModes:
-    """The modes of an arm with its damping, in the order of the undamped modes they continue from.
+    """The modes of an arm with its damping, in the order of the undamped modes from which they continue.
 
     `eigenvalues` (n, 2) [1/s] are both zeros of each mode: a conjugate pair with Im > 0 first, or two real ones, the
-    slower first (overdamped); 0 and 0 for the rigid body.  (An overdamped mode whose fast zero has met the third one of
-    its wave rings again, in shear: that pair is listed, not its slow zero near -1/C.)  `box` [1/s] holds `count`
-    eigenvalues, all of them listed.  `left_out` modes that were asked for are not in the record: from the next one on
-    branches could not be told apart.  `others` are real eigenvalues of the motor's circuit, which belong to no mode.
-    Where friction at the hub resists the turning rig, the second eigenvalue of mode 0 is not 0 but about -b/J.
-    `unassigned` are eigenvalues that no mode certainly goes over into; a mode without an eigenvalue of its own has NaN.
+    slower first (overdamped); 0 and 0 for the rigid body.  The fast zero of an overdamped mode may meet the third zero
+    of its wave and oscillate again, in shear: then that pair is listed, not the slow zero near -1/C.  `box` [1/s] has
+    `count` eigenvalues, all of them listed.  `left_out` is the number of requested modes that the record lacks, as
+    their branches are not separable.  `others` are real eigenvalues of the motor's circuit, of no mode.  With friction
+    at the hub the second eigenvalue of mode 0 is about -b/J instead of 0.  `unassigned` are eigenvalues without a
+    certain mode; a mode without an eigenvalue has NaN.
     """
 
     undamped: Modes
@@ -89,7 +93,7 @@ class DampedModes:
 
     @property
     def is_assigned(self) -> NDArray[np.bool_]:
-        """Which modes have an eigenvalue of their own; of mode 0 it may be the 0 alone."""
+        """Which modes have an eigenvalue; that of mode 0 may be 0."""
         return np.isfinite(self.eigenvalues[:, 0])
 
     @cached_property
@@ -101,9 +105,9 @@ class DampedModes:
         return np.divide(-(p + q).real / 2, size, out=unknown, where=size > 0)
 
     def certify(self, digits: int = DOUBLE_DIGITS) -> tuple[tuple[Disc, ...], ...]:
-        """A disc around each eigenvalue of the flexible modes (one for a pair), and a proof that the box has no other.
+        """Return a disc around each eigenvalue, one for a pair, and certify that the box has no other.
 
-        Raises CertificationError where something cannot be proven.
+        Raises CertificationError where that fails.
         """
         k, discs = self.undamped.system, []
         for pair in self._listed:
@@ -112,21 +116,23 @@ class DampedModes:
             for zero, disc in zip(wanted.tolist(), discs[-1], strict=True):
                 apart = max(abs(pair[0] - pair[-1]) if np.isfinite(pair[-1]) else abs(zero), LEAST_SIZE)
                 away = abs(complex(float(disc.re), float(disc.im)) - zero)
-                if away > float(disc.radius) + BESIDE_DISC * abs(zero) * max(1.0, abs(zero) / apart):
-                    text = f"next to {zero:.12g} 1/s lies {disc.re} + {disc.im}i, not the eigenvalue listed"
-                    raise CertificationError(text)
+                if away > float(disc.radius) + OFF_DISC * abs(zero) * max(1.0, abs(zero) / apart):
+                    raise CertificationError(
+                        f"next to {zero:.12g} 1/s lies {disc.re} + {disc.im}i, not the eigenvalue listed"
+                    )
         if not disjoint([disc for pair in discs for disc in pair]):
-            raise CertificationError("the discs of two eigenvalues touch: ask for more digits")
+            raise CertificationError("the discs of two eigenvalues touch: more digits are needed")
         proven = proven_count(k, self.box)
         listed = int(self.box.holds(self._listed.ravel()).sum()) + k.at_rest
         if not listed == self.count == proven:
-            text = f"{listed} eigenvalues in the box are listed and {self.count} claimed, but {proven} are there"
-            raise CertificationError(text)
+            raise CertificationError(
+                f"the box has {proven} eigenvalues, but the list {listed} and the record {self.count}"
+            )
         return tuple(discs)
 
     @property
     def single(self) -> Real:
-        """Real eigenvalues [1/s] of no flexible mode: what friction makes of the second 0 at rest, then `others`."""
+        """Real eigenvalues [1/s] of no flexible mode: that of friction in mode 0, then `others`."""
         turning = self.eigenvalues[self.index == 0][:, 1].real
         return np.r_[turning[abs(turning) > 0], np.array(self.others)]
 
@@ -138,9 +144,9 @@ class DampedModes:
 
     @property
     def _listed(self) -> Complex:
-        """Every eigenvalue of the record but those at 0, (n, 2): of the flexible modes, single ones, unassigned ones.
+        """Every eigenvalue of the record other than 0, (n, 2): of the flexible modes, single ones, unassigned ones.
 
-        NaN stands where a row has one eigenvalue or none.
+        Rows with one eigenvalue or none have NaN.
         """
         alone = np.stack([self.single, np.full(self.single.size, np.nan)], axis=-1)
         return np.concatenate([self.eigenvalues[self.index > 0], alone, self.unassigned_pairs])
@@ -148,19 +154,19 @@ class DampedModes:
     # ------------------------------------------------------------ shapes
 
     def shape(self, x: NDArray[np.float64] | float) -> Complex:
-        """Total displacement w(x) [m] of both eigenvalues of each flexible mode at x [m]: shape (n, 2, *x.shape).
+        """Return the displacement w(x) [m] of both eigenvalues of each flexible mode at x [m]: (n, 2, *x.shape).
 
-        NaN of a mode without an eigenvalue of its own.
-        Scaled so that the residue of w(x) over torque is w(x) psi(0)/(2 s), as for undamped modes of unit modal mass.
+        NaN for a mode without an eigenvalue.  Scaled so that the residue of w(x) over torque is w(x) psi(0)/(2 s), as
+        for undamped modes of unit modal mass.
         """
         return self._field("W", x) * float(self.undamped.system.length)
 
     def rotation(self, x: NDArray[np.float64] | float) -> Complex:
-        """Total rotation psi(x) [rad], as `shape`."""
+        """Return the rotation psi(x) [rad], as `shape`."""
         return self._field("Psi", x)
 
     def moment(self, x: NDArray[np.float64] | float) -> Complex:
-        """Elastic bending moment E I psi'(x) [N m], without its damping part, as `shape`."""
+        """Return the elastic bending moment E I psi'(x) [N m], without its damping part, as `shape`."""
         k = self.undamped.system
         return self._field("M", x) * float(k.EI / k.length)
 
@@ -177,23 +183,23 @@ class DampedModes:
 
 
 def damped_modes(undamped: Modes) -> DampedModes:
-    """The modes of the arm with its own C, and every eigenvalue of a box that goes up to half-way to the next mode.
+    """Return the modes of the arm with its damping, and every eigenvalue of a box up to half-way to the next mode.
 
-    Eigenvalues in the box that continue from no mode for certain are listed as `unassigned`.  Of more than 300 modes of
-    a damped arm, or where a box cannot be searched, the record holds fewer than are asked for, and `left_out` is how
-    many are missing.  Raises ConvergenceError where not even the box of the first mode can be searched.
+    Eigenvalues in the box without a certain mode are `unassigned`.  The record has at most 300 modes of a damped arm,
+    fewer where a box cannot be searched; `left_out` is the number of others.
+    Raises ConvergenceError where not even the box of the first mode can be searched.
     """
     if not isinstance(undamped, Modes):
         raise ParameterError(key="modes", value=undamped, remedy="give what tfarm.modes returns")
-    asked = int(undamped.index.max())
-    count = asked if undamped.arm.is_undamped else min(asked, MOST_MODES)
-    found = _searched_once(undamped.arm, undamped.theory, count)
-    return replace(found, left_out=asked - int(found.index.max()))
+    count = int(undamped.index.max())
+    most = count if undamped.arm.is_undamped else min(count, MOST_MODES)
+    found = _searched_once(undamped.arm, undamped.theory, most)
+    return replace(found, left_out=count - int(found.index.max()))
 
 
-@lru_cache(maxsize=LISTS_KEPT)  # loops, plants and simulations of one page ask for the same modes some ninety times
+@lru_cache(maxsize=LISTS_KEPT)  # one page needs the same modes some ninety times
 def _searched_once(arm: Arm, theory: Theory, count: int) -> DampedModes:
-    """So many modes of an arm, or half as many where their box cannot be searched."""
+    """Return the first `count` modes of an arm, or half of them where their box cannot be searched."""
     try:
         return _searched(modes(arm, count, theory=theory))
     except ConvergenceError:
@@ -203,9 +209,9 @@ def _searched_once(arm: Arm, theory: Theory, count: int) -> DampedModes:
 
 
 def damped_at_hub(arm: Arm, count: int) -> DampedModes | None:
-    """The first `count` flexible modes with what the hub itself loses, and nothing else: neither links nor clamp.
+    """Return the first `count` flexible modes with the dissipation at the hub alone.
 
-    None where it loses nothing, or they cannot be followed.
+    None without any, or where they cannot be followed.
     """
     clamp, joint = replace(arm.clamp, damping=0.0), replace(arm.joint, damping=0.0)
     hub_alone = replace(arm.elastic, clamp=clamp, joint=joint)
@@ -218,7 +224,7 @@ def damped_at_hub(arm: Arm, count: int) -> DampedModes | None:
 
 
 def _searched(undamped: Modes) -> DampedModes:
-    """All eigenvalues in a box, under the names that they have for certain."""
+    """Return all eigenvalues in a box, assigned to their modes where that is certain."""
     k, count, function = undamped.system, int(undamped.index.max()), function_of(undamped.system)
     single, every = named(undamped, count + COMPANY)
     pairs, company = every[:count], every[count:]
@@ -229,15 +235,15 @@ def _searched(undamped: Modes) -> DampedModes:
     if box is None:
         omega = modes(undamped.arm, count + 1, theory=undamped.theory).natural_frequency[-count - 1 :]
         starts = np.r_[listed.ravel(), company.ravel(), 1j * omega, -1j * omega]
-        below = listed if not lost.size else listed[:0]  # what is not known may be above any that is
+        below = listed if not lost.size else listed[:0]  # unknown ones may be above known ones
         box, found = filled_box(function, below, company, float(omega[-2:].mean()), starts, k.damping)
         for zeros in (single, pairs):
             zeros[box.holds(zeros) & ~is_among(zeros, found)] = LOST
         more = found[(found.imag >= 0) & ~is_among(found, np.r_[single, pairs.ravel()])]
         inside, free = found.size, np.r_[free, more]
-    if free.size:  # then the drive's own zeros may have taken the places of modes
-        led = np.array([any(origin_of(k, s) != NOT_ASSIGNED for s in pair[np.isfinite(pair)]) for pair in pairs])
-        free, pairs[led] = np.r_[free, pairs[led].ravel()], LOST
+    if free.size:  # zeros of the drive may be in the place of modes
+        of_drive = np.array([any(origin_of(k, s) != NOT_ASSIGNED for s in pair[np.isfinite(pair)]) for pair in pairs])
+        free, pairs[of_drive] = np.r_[free, pairs[of_drive].ravel()], LOST
     for row in lost.tolist():
         if (near := _plainly(omega, row, found, free)) is not None:
             pairs[row], free = [near, near.conjugate()], free[free != near]
@@ -246,12 +252,13 @@ def _searched(undamped: Modes) -> DampedModes:
     rigid = np.zeros((undamped.index.size - count, 2), complex)
     rigid[:, 1] = single[0] if resisted else 0.0
     others = tuple(each for each in single[resisted:].tolist() if np.isfinite(each))
-    eigenvalues, unassigned = np.concatenate([rigid, pairs]), _with_origins(k, free)
+    upper = sorted(free[np.isfinite(free) & (free.imag >= 0)].tolist(), key=abs)
+    eigenvalues, unassigned = np.concatenate([rigid, pairs]), tuple(Unassigned(s, origin_of(k, s)) for s in upper)
     return DampedModes(undamped, eigenvalues, box, inside + k.at_rest, others=others, unassigned=unassigned)
 
 
 def _plainly(omega: Real, mode: int, found: Complex, free: Complex) -> complex | None:
-    """The free zero that a frequency has moved to by little beside the distance of each to all others; else None."""
+    """Return the free zero of a frequency whose distance is small compared with those to all others, else None."""
     ringing = free[free.imag > 0]
     if not ringing.size:
         return None
@@ -261,17 +268,11 @@ def _plainly(omega: Real, mode: int, found: Complex, free: Complex) -> complex |
     return near if abs(near - start) < PLAIN_SHARE * min(apart) else None
 
 
-def _with_origins(k: System, zeros: Complex) -> tuple[Unassigned, ...]:
-    """Those of them with Im s >= 0 that are numbers, by size."""
-    upper = zeros[np.isfinite(zeros) & (zeros.imag >= 0)]
-    return tuple(Unassigned(each, origin_of(k, each)) for each in sorted(upper.tolist(), key=abs))
-
-
 def origin_of(k: System, s: complex) -> str:
-    """The parts p of the drive that set an eigenvalue, |d ln s/d ln p| > 0.3; "not assigned" where there are none.
+    """Return the parts p of the drive with |d ln s/d ln p| > 0.3 of an eigenvalue; "not assigned" without any.
 
-    By differences: ds = -dD/D'(s).  Of -b/J and of -k/b the one of b is 1, of -R/L_a that of the lag, of a pair
-    s^2 = -K^2/(J L_a) that of either 1/2; of a mode it is no more than the loss there does to its frequency.
+    By differences: ds = -dD/D'(s).  It is 1 for b in -b/J and -k/b and for the lag in -R/L_a, and 1/2 for both parts of
+    a pair s^2 = -K^2/(J L_a).  For a mode it is as small as the effect of the dissipation on its frequency.
     """
     at, found = np.array([s]), []
     here = function_of(k)(at)
@@ -285,12 +286,12 @@ def origin_of(k: System, s: complex) -> str:
 
 
 def entered(damped: DampedModes) -> Real:
-    """Real eigenvalues (n,) [1/s] right of -1/C, or nearer than the last mode, that the record has not.
+    """Return real eigenvalues (n,) [1/s] right of -1/C, or nearer than the last mode, that the record lacks.
 
-    Where nothing weighs at the hub its friction brings one in from -inf, and a dashpot at clamp or joint does: it
-    continues from no mode.  Others may be of modes beyond the record.
+    Friction at a hub without inertia, and a dashpot at clamp or joint, add one from -inf: it continues from no mode.
+    Others may be of modes beyond the record.
     """
-    from scipy.optimize import brentq  # takes half a second to load, and no undamped arm comes here
+    from scipy.optimize import brentq  # half a second to import, and not needed for an undamped arm
 
     k = damped.undamped.system
     lowest, last = first_frequency(damped.undamped.arm), float(damped.natural_frequency.max())

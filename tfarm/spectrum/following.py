@@ -1,12 +1,12 @@
-"""Roots followed as one number of a family of functions varies: each keeps its column.
+"""Roots of a family of functions followed as one number varies: each keeps its column.
 
-Predictor: polynomials through the last values.  Of two roots that are each other's nearest, such as a pair next to the
-real axis, these are polynomials of their mean and of the square of half their distance, which are smooth where the two
-meet and part at a right angle.  Corrector: the family's own (`Family.near`), for many values and all roots at once.  A
-step is taken where no root moved further from its prediction than a share of its distance to the next root, and is
-halved otherwise.  Where no step is short enough the family's complete set is assigned to the predictions.
+Predictor: polynomials through the last values.  For two roots that are each other's nearest, such as a pair next to the
+real axis, they are polynomials of the mean and of the square of half the distance.  Both are smooth where the two meet
+and separate at a right angle.  Corrector: that of the family (`Family.near`), for many values and all roots at once.  A
+step is halved where a root is further from its prediction than a share of its distance to the next root.  Where no step
+is short enough the complete set of the family is assigned to the predictions.
 
-The functions are real on the real axis: of a conjugate pair both have a column, and the lower is the mirror image.
+The functions are real on the real axis: both of a conjugate pair have a column, the lower being the mirror image.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from numpy.typing import NDArray
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.errors import ConvergenceError
 
-PAST = 4  # values through which predictions go
+PAST = 4  # values of the predicting polynomials
 MOST_AHEAD = 64  # values predicted at once, at most: memory and time alone
 MOST_DISTANCES = 4_000_000  # between roots at these values: memory alone
-FIRST_STEP = 1e-4  # of the first step: how far the first value is that tells the slopes
-PLAIN_MOVE = 0.1  # of the distance to the next root: one that is off its prediction by less is itself
-PLAIN_IN_COUPLE = 0.2  # the same, of the distance to the other one of two that meet or part
-ENDS_BEFORE = 0.05  # of its size: a real root so near to a singular point, right of it, ends there
-JUMP = 0.5  # of its size: a root that is not found nearer, however short the step, is lost
-SAME_ROOT = 1e-9  # of its size: two so near each other are one
-TURNED = 0.5  # of a right angle's cosine: below it the two of a couple have met between two values
+FIRST_STEP = 1e-4  # of the first step: the distance of the value that determines the first slopes
+PLAIN_MOVE = 0.1  # of the distance to the next root: largest distance from the prediction
+PLAIN_IN_COUPLE = 0.2  # the same, for two roots that meet or separate
+ENDS_BEFORE = 0.05  # of its size: distance of a singular point at which a real root right of it ends
+JUMP = 0.5  # of its size: a root found no nearer with the shortest step is lost
+SAME_ROOT = 1e-9  # of its size: distance of two copies of one root
+TURNED = 0.5  # cosine below which the two of a couple have met between two values
 
 
 class Family(Protocol):
-    """What is followed: `least_step` is the shortest step, as a share of the way, `blur` a distance that is none.
+    """A family of functions: `least_step` is the shortest step, as a share of the way, `blur` a negligible distance.
 
-    `most_halvings` of steps are made; a branch that meets the axis takes some 40.  Where no more than the share `alone`
-    of the roots is stray these are followed alone in shorter steps.
+    There are at most `most_halvings` of steps; a branch that meets the axis needs some 40.  Stray roots, up to the
+    share `alone` of all, are followed alone in shorter steps.
     """
 
     least_step: float
@@ -44,27 +44,26 @@ class Family(Protocol):
     blur: float
 
     def near(self, values: Real, guess: Complex) -> Complex:
-        """The roots (m, b) next to the guesses at m values, NaN where there is none; real ones of real guesses.
+        """Return the roots (m, b) next to the guesses at m values, or NaN; real ones for real guesses.
 
-        Of the guess 0 those next to 0, the upper one or the larger real one first.
+        For the guess 0 those next to 0, the upper one or the larger real one first.
         """
         ...
 
     def complete(self, value: float, guess: Complex) -> Complex:
-        """All roots that the family knows at a value, in any order, those next to the guesses (b,) among them."""
+        """Return all known roots at a value, in any order, with those next to the guesses (b,)."""
         ...
 
     def singular(self, values: Real) -> Real:
-        """Points (m, p) that no root passes, at m values: a real root that comes to one from the right ends there."""
+        """Return points (m, p) that no root passes, at m values: a real root right of one ends there."""
         ...
 
 
 def follow(family: Family, values: Real, start: Complex) -> Complex:
     """Return the roots (n, b) at each of the values (n,), from those at the first; NaN from where one is lost.
 
-    A root is lost where it comes to a singular point, and where it is next to none of the family's complete set.
-    Raises ConvergenceError where too many steps would have to be halved, with the last value and the roots there, and
-    which of them are stray.
+    A root is lost at a singular point, and where it is next to no root of the complete set.
+    Raises ConvergenceError after too many halvings, with the last value, its roots, and which of them are stray.
     """
     rows = np.full((values.size, start.size), np.nan, complex)
     rows[0], past, span = start, [(float(values[0]), start)], abs(values[-1] - values[0])
@@ -80,7 +79,7 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
         plain = are_plain.all(axis=1)
         good = len(block) if plain.all() else int(np.argmin(plain))
         if not good and len(block) == 1 and np.mean(~are_plain[0]) <= family.alone:
-            stray = beside(~are_plain[0], last)
+            stray = with_partners(~are_plain[0], last)
             try:
                 found[0, stray] = follow(family, np.array([past[-1][0], at[0]]), last[stray])[1]
             except ConvergenceError as lost:
@@ -91,8 +90,9 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
                 ahead.append(((past[-1][0] + float(at[0])) / 2, 0))
                 halvings += 1
                 if halvings > family.most_halvings:
-                    text = f"branches cannot be told apart beyond {past[-1][0]:.10g}"
-                    raise ConvergenceError(text, past[-1], ~are_plain[0])
+                    raise ConvergenceError(
+                        f"branches are not separable beyond {past[-1][0]:.10g}", past[-1], ~are_plain[0]
+                    )
             else:
                 near, good = assigned(family, float(at[0]), guess[0]), 1
                 found = np.where((abs(near - last) > JUMP * abs(last)) & (last != 0), np.nan, near)[None]
@@ -105,8 +105,8 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
     return rows
 
 
-def beside(stray: NDArray[np.bool_], last: Complex) -> NDArray[np.bool_]:
-    """These roots, and of each couple and conjugate pair the other one."""
+def with_partners(stray: NDArray[np.bool_], last: Complex) -> NDArray[np.bool_]:
+    """Return these roots and the partners of each in a couple or conjugate pair."""
     both, (first, second) = stray.copy(), couples(last)
     both[first] |= stray[second]
     both[second] |= stray[first]
@@ -117,7 +117,7 @@ def beside(stray: NDArray[np.bool_], last: Complex) -> NDArray[np.bool_]:
 def between(family: Family, values: Real, rows: Complex, wanted: Real) -> Complex:
     """Return the roots (m, b) at wanted values (m,) between the known ones (n,), ascending.
 
-    By interpolation, and where that is not plain by following them from the known value below.
+    By interpolation, or where that is uncertain by following them from the known value below.
     """
     found = np.empty((wanted.size, rows.shape[1]), complex)
     right = np.clip(np.searchsorted(values, wanted), 1, values.size - 1)
@@ -132,15 +132,15 @@ def between(family: Family, values: Real, rows: Complex, wanted: Real) -> Comple
 
 
 def is_over(family: Family, value: float, row: Complex) -> NDArray[np.bool_]:
-    """Which of the roots (b,) have come to a singular point from the right."""
+    """Return which of the roots (b,) are at a singular point, right of it."""
     points = family.singular(np.array([value]))[0]
     away = row.real[:, None] - points
     return np.asarray((row.imag == 0) & ((away > 0) & (away < ENDS_BEFORE * abs(points))).any(axis=1))
 
 
 def assigned(family: Family, value: float, guess: Complex) -> Complex:
-    """The complete set at a value in the order of the guesses (b,); NaN where there are fewer."""
-    from scipy.optimize import linear_sum_assignment  # takes half a second to load, and few branches come here
+    """Return the complete set at a value in the order of the guesses (b,); NaN where there are fewer."""
+    from scipy.optimize import linear_sum_assignment  # half a second to import, and rarely needed
 
     every = family.complete(value, guess)
     alive = np.flatnonzero(~np.isnan(guess))
@@ -151,11 +151,11 @@ def assigned(family: Family, value: float, guess: Complex) -> Complex:
 
 
 def predicted(at: Real, rows: Complex, wanted: Real, base: Complex) -> Complex:
-    """Guesses (m, b) by polynomials through known roots (k, b) at k values; `base` (b,) says which are couples."""
+    """Return guesses (m, b) by polynomials through known roots (k, b) at k values; `base` (b,) has the couples."""
     own = np.eye(at.size, dtype=bool)
     ratios = (wanted[:, None, None] - at) / np.where(own, 1.0, at[:, None] - at)
     weights = np.where(own, 1.0, ratios).prod(axis=2)
-    guess = weights @ np.where((rows.imag == 0) == (base.imag == 0), rows, np.nan)  # what it was before it met another
+    guess = weights @ np.where((rows.imag == 0) == (base.imag == 0), rows, np.nan)  # without values from before two met
     first, second = couples(base)
     mean, half = (rows[:, first] + rows[:, second]) / 2, (rows[:, first] - rows[:, second]) / 2
     mean = np.where((mean.imag == 0) == ((base[first] + base[second]).imag == 0), mean, np.nan)
@@ -173,7 +173,7 @@ def predicted(at: Real, rows: Complex, wanted: Real, base: Complex) -> Complex:
 
 
 def couples(row: Complex) -> tuple[Whole, Whole]:
-    """Of each two roots (b,) that are each other's nearest the first and the second: conjugates, or of one half."""
+    """Return first and second of each two roots (b,) nearest to each other: conjugates, or of one half-plane."""
     away = distances(row)
     nearest, every = away.argmin(axis=1), np.arange(row.size)
     alike = (row == row[nearest].conj()) | (np.sign(row.imag) == np.sign(row[nearest].imag))
@@ -182,7 +182,7 @@ def couples(row: Complex) -> tuple[Whole, Whole]:
 
 
 def corrected(family: Family, values: Real, guess: Complex, base: Complex) -> Complex:
-    """The roots (m, b) next to the guesses: those below the real axis as mirror images of those above it."""
+    """Return the roots (m, b) next to the guesses, those below the real axis as mirror images."""
     partner = np.arange(base.size)
     first, second = couples(np.where(base.imag == 0, base, np.nan))
     partner[first], partner[second] = second, first
@@ -195,7 +195,7 @@ def corrected(family: Family, values: Real, guess: Complex, base: Complex) -> Co
 
 
 def distances(row: Complex) -> Real:
-    """How far the roots (..., b) are from each other (..., b, b); from themselves and from NaN infinitely."""
+    """Return the distances (..., b, b) of the roots (..., b); inf from themselves and from NaN."""
     away = abs(row[..., :, None] - row[..., None, :])
     away[..., np.arange(row.shape[-1]), np.arange(row.shape[-1])] = np.inf
     away[np.isnan(away)] = np.inf
@@ -203,9 +203,9 @@ def distances(row: Complex) -> Real:
 
 
 def which_plain(family: Family, values: Real, guess: Complex, found: Complex, base: Complex) -> NDArray[np.bool_]:
-    """Which of the roots (m, b) are next to their prediction, compared with the distance to any other.
+    """Return which roots (m, b) are close to their prediction, compared with the distance to any other.
 
-    To its mirror image too, of one that has none in the base (b,).
+    Others include the mirror image of a root without one in the base (b,).
     """
     away, moved = distances(found), abs(found - guess)
     nearest = away.argmin(axis=2)[..., None]

@@ -1,17 +1,17 @@
-"""Natural frequencies from a count alone, which cannot miss, to the last float64 digit or to any number of digits.
+"""Natural frequencies from a count, complete, to the last float64 digit or to any number of digits.
 
-Wittrick and Williams (1971) count through the pivots of a dynamic stiffness; Howson and Williams (1973) start from the
-beam whose frequencies are known in closed form.  Put together for a chain of segments the count becomes a climb from
-the payload to the hub, each step a sign (`tfarm.exact.count`):
+Wittrick and Williams (1971) count through the pivots of a dynamic stiffness.  Howson and Williams (1973) start from the
+pinned beam, whose frequencies are known in closed form.  For a chain of segments the count proceeds from the payload to
+the hub, each step by a sign (`tfarm.exact.count`):
 
-* with both ends of a segment pinned, n pi < k counts the waves that fit (and W = 0, Psi = const above the cut-off);
-* releasing a motion, or adding inertia to it, raises the count by 0 or 1, holding it lowers the count by 0 or 1
-  (Rayleigh's theorem on one constraint);
+* with both ends of a segment pinned, it is the number of n with n pi < k, and one for W = 0, Psi = const above the
+  cut-off;
+* a released motion, or more inertia of it, raises the count by 0 or 1, a constraint lowers it by 0 or 1 (Rayleigh);
 * the parity of each count is the sign of that system's characteristic function D(i w).
 
-A double root changes no sign and still raises the count by two.  Between two close frequencies D(i w) is a small
-product, whose sign drowns in rounding: float64 alone would leave a pair with a relative gap of 1e-9 right to 1e-11
-only.  Such pairs are bisected again with the count in real balls, where each sign is certain or not.
+A double root changes no sign but raises the count by two.  Between two close frequencies the sign of D(i w) is lost in
+rounding: in float64 a pair with a relative gap of 1e-9 has errors of 1e-11.  Such pairs are bisected with the count in
+real balls, in which each sign is either certain or not determined.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ from tfarm.errors import ConvergenceError
 from tfarm.exact.balls import Ball, Sweep, into_own, out_of_own, precision, rational
 from tfarm.exact.compiled import python_of
 from tfarm.exact.count import bisect_chain, chain_counts, rows_to_count
-from tfarm.exact.layout import Layout
+from tfarm.exact.layout import Layout, readings
 from tfarm.exact.system import Segment, Spring, System
 from tfarm.exact.waves import Plane, across_waves
 
 
 class Counter:
-    """N(omega) of a system: how many natural frequencies [rad/s] lie below omega, the rigid-body mode included."""
+    """N(omega) of a system: the number of natural frequencies [rad/s] below omega, with the rigid-body mode."""
 
     def __init__(self, system: System) -> None:
         self._rows, self._ends = rows_to_count(Layout(system.with_damping(0.0)))
 
     def __call__(self, omega: NDArray[np.float64]) -> NDArray[np.int64]:
-        """The counts, in the shape of omega (1-D, rad/s, positive)."""
+        """Return the counts at omega (1-D, rad/s, positive)."""
         return chain_counts(np.ascontiguousarray(omega, dtype=float), self._rows, self._ends)
 
     def first_reaching(self, number: NDArray[np.int64], below: float) -> NDArray[np.float64]:
-        """The smallest floats [rad/s] with a count of `number` at least, by bisection of 0..below."""
+        """Return the smallest floats [rad/s] with a count of at least `number`, by bisection of 0..below."""
         low, high = np.zeros(number.size), np.full(number.size, below)
         bisect_chain(number, self._rows, self._ends, low, high)
         return high
@@ -54,20 +54,21 @@ class Counter:
 _across_waves = python_of(across_waves)
 
 MOST_AXIS_BITS = 40_000  # of working precision: a root that needs more is double
-BITS_A_DIGIT, SPARE_BITS = 3.33, 80  # log2 10, rounded up; and beyond the digits asked for, for what cancels
-SECOND_START = 50  # bits to which the two first points of a secant are one: a few last units of a float64 apart
-CLOSE_BY = 36  # bits that a root must share with its start: of a simple root float64 has more
-AXIS_STEPS = 40  # of the secant, at most: each has 1.6 times the digits, so that a single root has thousands in twenty
+BITS_A_DIGIT, SPARE_BITS = 3.33, 80  # log2 10, rounded up; and beyond the digits, for cancellation
+SECOND_START = 50  # equal bits of the two first points of a secant
+CLOSE_BY = 36  # equal bits of a root and its start: a simple root in float64 has more
+AXIS_STEPS = 40  # of the secant, at most: each has 1.6 times the digits
 
 
 def real_waves(a: Ball, b: Ball, g: Ball, S: Ball) -> tuple[tuple[Ball, ...], tuple[Ball, ...]]:
-    """c, sinh t / t, z, v and the scale of both waves at S = -omega^2; real, whether they decay or travel."""
+    """Return c, sinh t / t, z, v and the scale of both waves at S = -omega^2, which are real."""
     half, product = S * (a + b) / 2, S * (a * b * S + g)
     spread = (half * half - product).sqrt()
     return _wave(half + spread, b * S), _wave(half - spread, b * S)
 
 
 def _wave(z: Ball, bS: Ball) -> tuple[Ball, ...]:
+    """Return those of one wave, which travels for z < 0 and decays for z > 0."""
     if z < 0:
         k = (-z).sqrt()
         sine, cosine = k.sin_cos()
@@ -79,7 +80,7 @@ def _wave(z: Ball, bS: Ball) -> tuple[Ball, ...]:
 
 
 def pinned_count(squares: Iterable[Ball]) -> int | None:
-    """The count for both ends pinned: half waves inside the length, and one above the cut-off; None if not certain."""
+    """Return the count for both ends pinned: half waves inside the length, one above the cut-off; None if uncertain."""
     number, travelling = 0, 0
     for z in squares:
         if z < 0:
@@ -93,17 +94,16 @@ def pinned_count(squares: Iterable[Ball]) -> int | None:
 
 
 class UncertainError(Exception):
-    """A sign, or a number of half waves, that these balls do not determine."""
+    """A sign, or a number of half waves, not determined by these balls."""
 
 
 class AxisSweep(Sweep):
-    """The sweep at s = i omega, in real balls: its s is 0, its S is -omega^2.  It counts on its way."""
+    """The sweep at s = i omega in real balls, with the count: its s is 0, its S is -omega^2."""
 
     def __init__(self, system: System, omega: Ball, counting: bool) -> None:
         self._counting, self.number = counting, 0
         self._free = sum(not isinstance(end, float) for end in (system.tip_mass, system.tip_inertia))
-        layout = system.kept.setdefault("layout", Layout(system))
-        super().__init__(layout, flint.arb(0), -omega * omega)
+        super().__init__(readings(system, (), 0.0).layout, flint.arb(0), -omega * omega)
 
     @property
     def drive(self) -> Ball:
@@ -146,7 +146,7 @@ class AxisSweep(Sweep):
             self._step(q[0], 1)
 
     def _step(self, value: Ball, step: int) -> None:
-        """The count one step on, where the sign of the determinant asks for it."""
+        """Change the count by `step` where its parity differs from the sign of the determinant."""
         if not self._counting:
             return
         if not (value > 0 or value < 0):
@@ -154,24 +154,24 @@ class AxisSweep(Sweep):
         self.number += step * ((self.number % 2 == 1) != bool(value < 0))
 
     def released(self) -> int:
-        """The count with the hub let go, where it is not held."""
+        """Return the count with the hub released, where it is not locked."""
         if self.layout.chain.drive.turns:
             self._step(self.drive, 1)
         return self.number
 
 
 class RealAxis:
-    """A system without its damping on the imaginary axis in real balls, at the working precision."""
+    """A system without its damping on the imaginary axis, in real balls at the working precision."""
 
     def __init__(self, system: System) -> None:
         self._system = system if system.is_undamped else system.with_damping(0.0)
 
     def drive(self, omega: Ball) -> Ball:
-        """D(i omega) times a positive factor."""
+        """Return D(i omega) times a positive factor."""
         return AxisSweep(self._system, omega, counting=False).drive
 
     def count(self, omega: Ball) -> int | None:
-        """N(omega), the rigid-body mode included; None if a sign or a half wave is not certain."""
+        """Return N(omega), with the rigid-body mode; None if a sign or a half wave is uncertain."""
         try:
             return AxisSweep(self._system, omega, counting=True).released()
         except UncertainError:
@@ -179,7 +179,7 @@ class RealAxis:
 
 
 def secant(axis: RealAxis, omega: float, digits: int) -> Ball | None:
-    """The root next to omega by the secant method on midpoints; None if it does not settle close by."""
+    """Return the root next to omega by the secant method on midpoints; None if it does not converge there."""
     before, now = flint.arb(omega), flint.arb(omega) * (1 + flint.arb(2) ** -SECOND_START)
     value_before = axis.drive(before).mid()
     small, near = now * flint.arb(10) ** -(digits + 2), now * flint.arb(2) ** -CLOSE_BY
@@ -197,31 +197,30 @@ def secant(axis: RealAxis, omega: float, digits: int) -> Ball | None:
 
 
 def axis_precisions(digits: int) -> Iterator[int]:
-    """Working precisions [bits] worth trying for so many digits, each twice the one before."""
+    """Yield working precisions [bits] for a number of digits, each twice the one before."""
     bits = int(BITS_A_DIGIT * digits) + SPARE_BITS
     while bits < MOST_AXIS_BITS:
         yield bits
         bits *= 2
 
 
-CLOSE_SHARE = 1e-3  # share of the mean spacing; further apart, rounding moves neither by more than a few last units
-PAIR_REACH = 4e-6  # relative width in which float64 surely has each of a close pair
+CLOSE_SHARE = 1e-3  # of the mean spacing: above it rounding moves neither root by more than a few last units
+PAIR_REACH = 4e-6  # relative width around each of a close pair in float64
 PAIR_BITS = 256  # of working precision, for a double frequency to its last float64 digit
-HIGHEST_BOUND = 1e12  # times what a slender beam has: a count that has not got there by then never will
-LISTS_KEPT = 32  # lists of modes, of arms asked for again and again: memory against time, of no effect on an answer
-ARMS_KEPT = 64  # arms whose single numbers are kept, likewise
+HIGHEST_BOUND = 1e12  # times the estimate of a slender beam: the end of the search
+LISTS_KEPT = 32  # lists of modes in the cache
+ARMS_KEPT = 64  # arms whose single numbers are in the cache
 
 
-@lru_cache(maxsize=LISTS_KEPT)  # a table of sampled verdicts asks for the same undamped arm some twenty times
+@lru_cache(maxsize=LISTS_KEPT)  # a table of sampled verdicts needs those of one arm some twenty times
 def natural_frequencies(k: System, first: int, last: int) -> NDArray[np.float64]:
-    """The natural frequencies [rad/s] number first..last of the undamped arm, counted from 1, double ones twice.
+    """Return the natural frequencies [rad/s] number first..last of the undamped arm, from 1, double ones twice.
 
-    Each is the point where the count steps from below its number to it, bisected to neighbouring floats: no
-    start value, no sign change needed, so close and double roots are like any other.  Those close to a neighbour are
-    bisected by the count in balls, or in float64 where a ball cannot tell.
+    Each is the step of the count to its number, bisected to neighbouring floats, without a start value or a change of
+    sign.  Those close to a neighbour are bisected by the count in balls, or in float64 where that is uncertain.
     Raises ConvergenceError if the count does not reach `last` (up to `HIGHEST_BOUND`).
     """
-    lowest = min(first, 1 + k.has_rigid_mode)  # not the rigid body at zero: bisection would run down all exponents
+    lowest = min(first, 1 + k.has_rigid_mode)  # not the rigid body at zero: bisection would go through all exponents
     number = np.arange(max(first - 1, lowest), last + 2)  # with both neighbours: one of them may be close
     count = Counter(k)
     omega = count.first_reaching(number, _upper_bound(count, k, int(number[-1])))
@@ -241,12 +240,12 @@ def natural_frequencies(k: System, first: int, last: int) -> NDArray[np.float64]
 
 
 def count_below(k: System, omega: float) -> int:
-    """How many natural frequencies lie below omega [rad/s]."""
+    """Return the number of natural frequencies below omega [rad/s]."""
     return int(Counter(k)(np.array([omega]))[0])
 
 
 def _upper_bound(count: Counter, k: System, last: int) -> float:
-    """A frequency above the last one wanted: the Euler-Bernoulli estimate, doubled until the count says so."""
+    """Return a frequency above number `last`: the Euler-Bernoulli estimate, doubled until the count reaches it."""
     omega = unit = ((last + 1) * math.pi) ** 2 / k.transit**2
     while omega < HIGHEST_BOUND * unit:
         if count(np.array([omega]))[0] >= last:
@@ -256,10 +255,10 @@ def _upper_bound(count: Counter, k: System, last: int) -> float:
 
 
 def refine(k: System, omega: float, digits: int) -> str:
-    """The natural frequency next to omega [rad/s], with that many right digits, as a decimal string.
+    """Return the natural frequency next to omega [rad/s] as a decimal string with that many right digits.
 
-    The sign of D(i w) is proven to change within a tenth of the last digit of the root that is printed.
-    Raises ConvergenceError where it does not: for a double frequency, or a pair closer than float64 can tell.
+    The sign of D(i w) changes within a tenth of the last digit, certified.
+    Raises ConvergenceError where it does not: at a double frequency, or a pair that float64 does not separate.
     """
     for bits in axis_precisions(digits):
         with precision(bits):

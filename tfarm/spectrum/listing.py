@@ -1,4 +1,4 @@
-"""The list of modes as commands and pages have it: undamped, damped and hub-locked frequencies, mode by mode."""
+"""The list of modes of commands and pages: undamped, damped and hub-locked frequencies, mode by mode."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from .damped import DampedModes, damped_modes
 from .proofs import Certificate, Disc
 from .table import Modes, compare_theories, hub_locked
 
-LESS_DAMPED = "they are ever less damped, as no segment is (C = 0)"
+LESS_DAMPED = "their damping decreases with frequency, as no segment has damping (C = 0)"
 OF_SHEAR = "shear is undamped in this model, so lightly damped modes exist at ever higher frequency"
 OF_ELASTIC = "segments without damping have lightly damped modes at ever higher frequency"
 OF_BENDING = "in this theory, which leaves out shear, all of them are overdamped from some frequency on"
 ACCUMULATE = "the slow real eigenvalues of overdamped bending modes accumulate at -1/C"
 LOCKED_NOTE = (
-    "frequencies with the hub held still, as dry friction mostly holds it once a slew is over; a measured frequency "
+    "frequencies with a locked hub, as dry friction mostly locks it after a slew; a measured frequency "
     "near this column indicates a hub at rest"
 )
-SHAPE_DIGITS = 10  # in a report's files, of what shapes are needed for: these differ by 1e-14 between processors
+SHAPE_DIGITS = 10  # in a report's files, of numbers from shapes, which differ by 1e-14 between processors
 
 
 @dataclass(frozen=True, slots=True)
 class ListedMode:
-    """One mode.  Frequencies are texts where more than 15 digits are asked for."""
+    """One mode.  Frequencies are texts for more than 15 digits."""
 
     index: Annotated[int, Quantity("mode")]
     natural_frequency: Annotated[float | str, Quantity("natural frequency", "rad/s", 12)]
@@ -53,26 +53,19 @@ class ListedMode:
 
 
 class Unlisted(NamedTuple):
-    """An eigenvalue of the box that is assigned to no mode, and the part of the drive that sets it, if one does."""
+    """An eigenvalue of the box that is assigned to no mode, and the part of the drive that determines it."""
 
     origin: Annotated[str, Quantity("origin")]
     eigenvalue: Annotated[complex, Quantity("eigenvalue", "1/s", 10)]
     discs: Annotated[tuple[Disc, ...] | None, Quantity()] = None
 
 
-@dataclass(frozen=True, slots=True)
-class Proof:
-    """How many frequencies lie below a frequency, certified."""
-
-    count: Annotated[int, Quantity("frequencies in all")]
-    below: Annotated[str, Quantity("below", "rad/s")]
-
-
 @dataclass(frozen=True)
 class ModeList:
     """The first flexible modes, none missing.
 
-    `damped` are None where there is no damping, or where they cannot be found or certified: `damped_failure` says why.
+    `damped` is None without damping, and where the damped modes cannot be found or certified, for the reason in
+    `damped_failure`.
     """
 
     found: Modes
@@ -81,7 +74,7 @@ class ModeList:
     unassigned: Annotated[list[Unlisted], Quantity("eigenvalues of no mode", key="unassigned_eigenvalues")]
     method: Annotated[Method, Quantity("method")]
     digits: Annotated[int | None, Quantity()]
-    proof: Annotated[Proof | None, Quantity("certified")]
+    proof: Annotated[Certificate | None, Quantity("certified")]
     damped_failure: Annotated[str | None, Quantity("damped modes not determined")]
     is_proven_in_box: Annotated[bool, Quantity(key="proven_complete_in_box")]
 
@@ -117,22 +110,22 @@ class ModeList:
 
     @property
     def eigenvalues_in_box(self) -> Annotated[int | None, Quantity("eigenvalues in the box, all listed")]:
-        """How many there are, conjugates counted."""
+        """Their number, with conjugates."""
         return None if self.damped is None else self.damped.count
 
     @property
     def box_note(self) -> Annotated[str | None, Quantity("beyond the box")]:
-        """The eigenvalues beyond it."""
+        """The eigenvalues beyond the box, in words."""
         return None if self.damped is None else beyond_the_box(self.found.arm)
 
     @property
     def hub_locked_note(self) -> Annotated[str | None, Quantity("hub locked")]:
-        """The meaning of the column; None of an arm whose hub is locked itself."""
+        """The meaning of the column; None for an arm with a locked hub."""
         return None if self.found.arm.is_locked else LOCKED_NOTE
 
     @property
     def damped_note(self) -> Annotated[str | None, Quantity("damped modes")]:
-        """Up to where eigenvalues are listed, where that is not all."""
+        """The last mode with eigenvalues, where not all have them."""
         if self.damped is None or not self.damped.left_out:
             return None
         return f"eigenvalues up to mode {self.damped.index[-1]} only: the box of more could not be searched"
@@ -146,10 +139,10 @@ class ModeList:
 def listed_modes(
     found: Modes, digits: int | None = None, certify: bool = False, method: Method = "closed-form"
 ) -> ModeList:
-    """The modal table, frequencies as strings of so many digits where more than 15 are asked for.
+    """Return the list of modes, with frequencies as strings for more than 15 digits.
 
-    With `certify` each flexible mode has its bracket and its discs, and the list the count that proves it complete;
-    `method` is that of the frequencies.
+    With `certify` each flexible mode has its bracket and its discs, and the list a certified count.  `method` is that
+    of the frequencies.  Raises CertificationError where a bracket fails.
     """
     wanted = None if not certify else DOUBLE_DIGITS if digits is None else digits
     proof = None if wanted is None else found.certify(wanted)
@@ -161,9 +154,12 @@ def listed_modes(
         except (ConvergenceError, CertificationError) as error:
             damped, failure = None, f"damped modes: {error}"
     rows = list(_rows(found, digits, method, damped, proof, discs))
+    free = () if damped is None else damped.unassigned
+    enclosed = [None] * len(free) if discs is None else [tuple(each) for each in discs[len(discs) - len(free) :]]
+    unassigned = [Unlisted(each.origin, each.eigenvalue, disc) for each, disc in zip(free, enclosed, strict=True)]
     return ModeList(
-        found=found, damped=damped, modes=rows, unassigned=list(_unassigned(damped, discs)), method=method,
-        digits=digits, proof=None if proof is None else Proof(proof.count, proof.below), damped_failure=failure,
+        found=found, damped=damped, modes=rows, unassigned=unassigned, method=method,
+        digits=digits, proof=proof, damped_failure=failure,
         is_proven_in_box=discs is not None,
     )  # fmt: skip
 
@@ -176,7 +172,7 @@ def _rows(
     proof: Certificate | None,
     discs: Sequence[Sequence[Disc]] | None,
 ) -> Iterator[ListedMode]:
-    """A row a mode."""
+    """Yield a row for each mode."""
     locked, rigid = hub_locked(found), int(np.sum(found.index == 0))
     flexible = int((locked.index > 0).sum())
     omega: list[Any] = found.frequencies(method).tolist()
@@ -202,11 +198,11 @@ def _rows(
 
 
 def _damped(damped: DampedModes, row: int) -> tuple[complex | None, float | None, float | None]:
-    """Eigenvalue, second real eigenvalue and damping ratio of a mode, as far as it has them."""
+    """Return eigenvalue, second real eigenvalue and damping ratio of a mode, or None."""
     if row >= len(damped.index) or not damped.is_assigned[row]:
         return None, None, None
     p, q = damped.eigenvalues[row].tolist()
-    turning = damped.index[row] == 0 and q != 0  # friction resists the rigid body
+    turning = damped.index[row] == 0 and q != 0  # friction at the hub
     both = (damped.is_overdamped[row] or turning) and not math.isnan(q.real)
     return p, q.real if both else None, float(damped.damping_ratio[row])
 
@@ -214,7 +210,7 @@ def _damped(damped: DampedModes, row: int) -> tuple[complex | None, float | None
 def _discs_by_row(
     found: Modes, damped: DampedModes | None, discs: Sequence[Sequence[Disc]] | None
 ) -> list[tuple[Disc, ...] | None]:
-    """The discs of each mode: those of flexible modes first, then what friction makes of the rigid body's second 0."""
+    """Return the discs of each mode, also of the rigid body with friction."""
     rigid = int(np.sum(found.index == 0))
     if damped is None or discs is None:
         return [None] * len(found)
@@ -225,17 +221,8 @@ def _discs_by_row(
     return rows + [None] * (len(found) - len(rows))
 
 
-def _unassigned(damped: DampedModes | None, discs: Sequence[Sequence[Disc]] | None) -> Iterator[Unlisted]:
-    """The eigenvalues of the box that are assigned to no mode."""
-    if damped is None:
-        return
-    proven = [None] * len(damped.unassigned) if discs is None else discs[len(discs) - len(damped.unassigned) :]
-    for each, enclosed in zip(damped.unassigned, proven, strict=True):
-        yield Unlisted(each.origin, each.eigenvalue, None if enclosed is None else tuple(enclosed))
-
-
 def beyond_the_box(arm: Arm) -> str:
-    """The eigenvalues of a damped arm beyond any box, in words."""
+    """Return a description of the eigenvalues of a damped arm beyond any box."""
     if arm.has_elastic_link:
         return LESS_DAMPED
     dampings = {link.damping for link in arm.links}

@@ -1,8 +1,8 @@
-"""Which mode an eigenvalue is of: each undamped one is followed as all damping grows from none to what it is.
+"""The modes of eigenvalues: each undamped eigenvalue is followed as all damping grows from zero to its value.
 
-A search finds the eigenvalues, and this only their names (`damped`): where a step is not plain, one may be lost or
-come to a neighbour's place.  A damped Timoshenko beam has a third, real zero for each bending wave, coming from
-s = -inf as C grows from 0.  It meets the fast zero of the overdamped mode; together they ring again, in shear.
+The eigenvalues themselves are found by a search (`damped`).  Where a step is uncertain, a branch may be lost or change
+to a neighbour.  A damped Timoshenko beam has a third, real zero for each bending wave, from s = -inf at C = 0.  It
+meets the fast zero of the overdamped mode, and the two oscillate again, in shear.
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ from .box import REAL_SHARE, Function, newton
 from .following import follow
 from .table import Modes, modes
 
-FIRST_SHARE = 1e-3  # of all damping, or less: there an undamped mode has hardly moved
-NEWTON_STEPS = 8  # from a guess right to some digits: what has not settled then is followed in shorter steps
-SETTLED = 1e-10  # of its size: one step more is taken where Newton's method still moves a zero by this
-DECADES = 3  # of the share at a time: the shortest step is a share of these
-HALVINGS = (250, *[80] * 8)  # of steps until those that are stray are lost, and the others followed alone
-LONG_LIST = 40  # modes: more are asked for by models, which need no names
-MOST_STEPS, MOST_OF_LONG, LATE_HALVINGS = 4_000, 1_000, 8  # after so many, time alone: what is stray is soon lost
+FIRST_SHARE = 1e-3  # of all damping, at most: there an eigenvalue is close to its undamped value
+NEWTON_STEPS = 8  # from a close guess: others are followed in shorter steps
+SETTLED = 1e-10  # of its size: the largest last step of a converged zero
+DECADES = 3  # of the share at a time, which scale the shortest step
+HALVINGS = (250, *[80] * 8)  # of steps, after which stray branches are lost and the others followed
+LONG_LIST = 40  # modes: longer lists are those of models, which need no names
+MOST_STEPS, MOST_OF_LONG, LATE_HALVINGS = 4_000, 1_000, 8  # after these steps stray branches are lost soon: time alone
 AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])  # starts next to a guess, of it
 NEAR_REAL = 1e-7  # of its size: the imaginary part of a double zero is rounding
 LOST = complex(np.nan, np.nan)
 
 
 def function_of(k: System) -> Function:
-    """The characteristic function without its zeros at the origin."""
+    """Return the characteristic function without its zeros at the origin."""
     return lambda s: quick_characteristics(k, s, k.at_rest)
 
 
 def settled(function: Function, guess: Complex) -> Complex:
-    """The zero next to each of the guesses (n,) by Newton's method, a real one of a real guess; NaN where none is."""
+    """Return the zero next to each guess (n,) by Newton's method, a real one for a real guess, or NaN."""
     s, still = guess.copy(), ~np.isnan(guess)
     with np.errstate(all="ignore"):
         for _ in range(NEWTON_STEPS):
@@ -56,7 +56,7 @@ def settled(function: Function, guess: Complex) -> Complex:
 class Damping:
     """The eigenvalues of a system with a share of all its damping, s times that share of `level` [s].
 
-    In these units one next to -1/C hardly moves as the share grows, and all are 0 where it is.
+    In these units one next to -1/C hardly changes with the share, and all are 0 at a share of 0.
     """
 
     k: System
@@ -69,7 +69,7 @@ class Damping:
     alone = 0.15
 
     def near(self, values: Real, guess: Complex) -> Complex:
-        """As `following` wants it."""
+        """Return the roots next to the guesses (see `Family`)."""
         self.steps_left -= 1
         if self.steps_left < 0:
             self.most_halvings = min(self.most_halvings, LATE_HALVINGS)
@@ -79,7 +79,7 @@ class Damping:
         return np.array(found) * units[:, None]
 
     def complete(self, value: float, guess: Complex) -> Complex:
-        """Those next to the guesses; the mirror image only of one that a guess below the real axis is next to."""
+        """Return the roots next to the guesses, with mirror images for guesses below the real axis."""
         unit, wanted = value * self.level, guess[~np.isnan(guess)]
         starts = np.outer(wanted[wanted.imag >= 0] / unit, AROUND).ravel()
         with np.errstate(all="ignore"):
@@ -90,12 +90,12 @@ class Damping:
         return np.r_[found[found.imag >= 0], upper[away < abs(AROUND[-1] - 1) * abs(upper)].conj()]
 
     def singular(self, values: Real) -> Real:
-        """-1/C of the damped segments in these units."""
+        """Return -1/C of the damped segments in these units."""
         return np.tile(np.array(self.k.singular) * self.level, (values.size, 1))
 
 
 def single_zeros(undamped: Modes, share: float = 1.0) -> list[float]:
-    """Real eigenvalues [1/s] that no flexible mode goes over into, under a share of the damping: -b/J, and -R/L_a."""
+    """Return the real eigenvalues [1/s] of no flexible mode, with a share of the damping: -b/J, and -R/L_a."""
     k = undamped.system
     friction = float((k.drive.friction + k.drive.back_emf) * k.EI / k.length)
     turning = [-share * friction / undamped.arm.total_inertia] if k.at_rest == 1 else []
@@ -103,9 +103,9 @@ def single_zeros(undamped: Modes, share: float = 1.0) -> list[float]:
 
 
 def named(undamped: Modes, count: int) -> tuple[Complex, Complex]:
-    """What `single_zeros` (m,) and the first `count` flexible modes (count, 2) go over into; NaN where that is lost.
+    """Return the eigenvalues of `single_zeros` (m,) and of the first `count` flexible modes (count, 2), NaN if lost.
 
-    Of a mode a conjugate pair, Im > 0 first, or two real ones, the slower first.
+    A mode has a conjugate pair, Im > 0 first, or two real ones, the slower first.
     """
     k = undamped.system
     omega = modes(undamped.arm, count, theory=undamped.theory).natural_frequency[-count:]
@@ -136,12 +136,12 @@ def named(undamped: Modes, count: int) -> tuple[Complex, Complex]:
 
 
 def in_pairs(single: Complex, pairs: Complex) -> tuple[Complex, Complex]:
-    """The same with whole pairs: where real zeros of two modes, or of one and none, have met those that ring are one.
+    """Return whole pairs: where real zeros of two modes, or of a mode and none, have met, they oscillate as one.
 
-    Of two modes the higher has them, and the lower the two left; of a mode and a single zero the mode.
+    Of two modes the higher one has the pair, and the lower one the other two zeros; a single zero is left to none.
     """
     single, pairs = single.copy(), pairs.copy()
-    for n in (*range(len(pairs)), *range(len(pairs))):  # twice, as one of two may be left with half of another pair
+    for n in (*range(len(pairs)), *range(len(pairs))):  # twice, as one of two may have half of another pair
         rings = np.flatnonzero(np.isfinite(pairs[n]) & (pairs[n].imag != 0))
         if rings.size == 1:
             one, rest = pairs[n, rings[0]], pairs[n, 1 - rings[0]]

@@ -1,25 +1,25 @@
 """Proofs in ball arithmetic (python-flint): every frequency or eigenvalue enclosed, none missing.
 
-Three facts together prove a list of n natural frequencies complete:
+Three facts prove a list of n natural frequencies complete:
 
-* n disjoint brackets, at both ends of which the sign of the real characteristic function D(i w) is certain and
-  differs, hold at least one frequency each;
-* one count N(w) just above the last bracket, each of whose signs and half waves is certain (see `frequencies` for
-  why it is a count), says that n lie below w, a rigid-body mode included;
-* so each bracket holds exactly one.
+* n disjoint brackets have at least one frequency each, as the sign of the real characteristic function D(i w) is
+  certain at both ends and differs;
+* one count N(w) just above the last bracket, with certain signs and half waves (see `frequencies`), is n, the
+  rigid-body mode included;
+* so each bracket has exactly one.
 
-A ball that is too wide to decide makes the precision grow, and if that does not help it is an error: there is no
-silent downgrade.  Exactly double frequencies change no sign and cannot be certified so.
+Where a ball is too wide the precision grows, up to an error.  Exactly double frequencies change no sign and cannot be
+certified so.
 
-Off the axis two more:
+Off the axis there are two more:
 
 *One zero in a disc.*  On |s - m| <= r the function differs from its tangent at m by no more than |D''/2| r^2, with D''
 enclosed over the disc.  If |D'(m)| r exceeds that and |D(m)| together, D has by Rouche's theorem as many zeros in the
 disc as the tangent: one.  A disc around a real m holds a real one, since zeros come in conjugate pairs.
 
-*How many in a box.*  The argument principle on its upper half, the lower being a mirror image: the contour is cut into
-pieces so short that D, enclosed over each, misses zero.  What stays in a ball off zero stays in a half-plane, so its
-argument turns by the principal argument of end over start; the sum over the half contour encloses pi times one integer.
+*The number in a box.*  The argument principle on its upper half, the lower being a mirror image: the contour is cut
+into pieces so short that D, enclosed over each, is off zero.  Then it is in a half-plane, and the change of its
+argument is the principal argument of end over start.  The sum over the half contour encloses pi times one integer.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.errors import CertificationError
-from tfarm.exact.balls import Ball, point, precision, rational
+from tfarm.exact.balls import Ball, exact_middle, point, precision, rational
 from tfarm.exact.characteristic import Feedback, characteristic_over, tangent
 from tfarm.exact.system import System
 from tfarm.records import record
@@ -46,7 +46,7 @@ from .box import Box
 from .frequencies import RealAxis, axis_precisions, secant
 
 COUNTED_AT = tuple(Fraction(*share) for share in ((1, 2), (2, 5), (3, 5), (1, 7), (6, 7)))  # of a gap: tried in turn
-COUNTING_BITS = (128, 512, 4096)  # of working precision, tried there: a count is certain unless it is on a half wave
+COUNTING_BITS = (128, 512, 4096)  # of working precision there: a count is certain unless it is on a half wave
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,21 +55,21 @@ class Certificate:
     """Brackets (lower, upper) as decimal strings, and the count below a frequency that proves them complete."""
 
     brackets: tuple[tuple[str, str], ...]
-    count: int
-    below: str
+    count: Annotated[int, Quantity("frequencies in all")]
+    below: Annotated[str, Quantity("below", "rad/s")]
 
 
 def certify(k: System, omega: NDArray[np.float64], above: float, digits: int, rigid: int) -> Certificate:
-    """Prove that the frequencies omega (ascending) are all there are below a point before `above`, the next one.
+    """Certify that the frequencies omega (ascending) are all those below a point before `above`, the next one.
 
-    Raises CertificationError saying what could not be proven.
+    Raises CertificationError with the fact that failed.
     """
     k = k.with_damping(0.0)
     brackets = [_bracket(k, float(each), digits) for each in omega]
     for (_, upper), (lower, _), each in zip(brackets, brackets[1:], omega, strict=False):
         if upper > lower:
             raise CertificationError(
-                f"the brackets of two frequencies near {each:.10g} rad/s overlap: ask for more digits"
+                f"the brackets of two frequencies near {each:.10g} rad/s overlap: more digits are needed"
             )
     count, below = _count_above(k, brackets[-1][1], above)
     if count != len(brackets) + rigid:
@@ -81,7 +81,7 @@ def certify(k: System, omega: NDArray[np.float64], above: float, digits: int, ri
 
 
 def _bracket(k: System, omega: float, digits: int) -> tuple[Fraction, Fraction]:
-    """Neighbouring decimals of so many digits with a proven sign change of D between them."""
+    """Return neighbouring decimals of that many digits with a certified sign change of D between them."""
     exponent = math.floor(math.log10(omega)) - digits + 1
     unit = Fraction(10) ** exponent
     for bits in axis_precisions(digits):
@@ -97,12 +97,12 @@ def _bracket(k: System, omega: float, digits: int) -> tuple[Fraction, Fraction]:
             if axis.drive(rational(lower)) * axis.drive(rational(upper)) < 0:
                 return lower, upper
     raise CertificationError(
-        f"no proven sign change in {digits} digits near {omega:.15g} rad/s: a double or a very close pair"
+        f"no certified sign change in {digits} digits near {omega:.15g} rad/s: a double or a very close pair"
     )
 
 
 def _count_above(k: System, last: Fraction, above: float) -> tuple[int, str]:
-    """A proven count somewhere between the last bracket and the next frequency, and where."""
+    """Return a certified count between the last bracket and the next frequency, and its frequency."""
     gap = Fraction(above) - last
     for share in COUNTED_AT:
         point = Fraction(float(last + gap * share))
@@ -111,33 +111,29 @@ def _count_above(k: System, last: Fraction, above: float) -> tuple[int, str]:
                 count = RealAxis(k).count(rational(point)) if point > last else None
                 if count is not None:
                     return count, repr(float(point))
-    raise CertificationError(f"no proven count between {float(last):.10g} and {above:.10g} rad/s")
+    raise CertificationError(f"no certified count between {float(last):.10g} and {above:.10g} rad/s")
 
 
 def _text(value: Fraction) -> str:
-    """An exact decimal string."""
-    exponent = 0
-    while value.denominator != 1:
-        value, exponent = value * 10, exponent - 1
-    digits = str(value.numerator)
-    if not exponent:
-        return digits
-    digits = digits.rjust(1 - exponent, "0")
-    return f"{digits[:exponent]}.{digits[exponent:]}"
+    """Return a positive number as an exact decimal string."""
+    unit = Fraction(1)
+    while (value / unit).denominator != 1:
+        unit /= 10
+    return _decimal(value, unit)
 
 
-SHORTEST_PIECE = 2.0**-26  # a piece of contour shorter than this share of it means a zero on it
-MOST_PIECES = 6000  # of one side of a contour, some 10 s of CPU time; the longest of the presets' lists take 2,000
-CONTOUR_BITS = 96  # of working precision along a contour, whose angles alone are wanted
-STEP_GROWTH = 1.125  # of a step that went well; tuned: with 2 every second step went too far, and was half of the work
-FIRST_PIECE = 1 / 32  # of a side of the contour: the first piece, from which others are adapted; time alone
+SHORTEST_PIECE = 2.0**-26  # share of a side of the contour: a shorter piece means a zero on it
+MOST_PIECES = 6000  # of one side of a contour, some 10 s of CPU time; the presets need up to 2,000
+CONTOUR_BITS = 96  # of working precision along a contour
+STEP_GROWTH = 1.125  # of a step after a good one; tuned: with 2 every second step was too long
+FIRST_PIECE = 1 / 32  # of a side of the contour, before adaptation: time alone
 BALL_STEPS = 40  # of Newton's method on middles of balls, at most: each doubles the digits
-DIGITS_BEYOND = 3  # digits to which it goes on beyond those of the disc: its middle is right to a part of the last
+DIGITS_BEYOND = 3  # digits of its convergence beyond those of the disc
 
 
 @dataclass(frozen=True, slots=True)
 class Disc:
-    """A closed disc of the complex plane with exactly one zero, simple: middle as decimal strings, radius one."""
+    """A closed disc of the complex plane with exactly one zero, a simple one: middle and radius as decimal strings."""
 
     re: Annotated[str, Quantity("Re s", "1/s", key="re")]
     im: Annotated[str, Quantity("Im s", "rad/s", key="im")]
@@ -150,13 +146,13 @@ class Disc:
 
 
 def proven_count(k: System, box: Box, law: Feedback | None = None) -> int:
-    """How many zeros of D lie in a box symmetric about the real axis, with multiplicity, those at s = 0 included.
+    """Return the certified number of zeros of D in a box symmetric about the real axis, with multiplicity.
 
-    Raises CertificationError where a zero is too near the contour, where it would take too many pieces, or -1/C is
-    inside.
+    Zeros at s = 0 are included.  Raises CertificationError where a zero is too near the contour, for too many pieces,
+    and with -1/C inside.
     """
     if k.damping and box.re_min <= -1.0 / k.damping:
-        raise CertificationError(f"a box from {box.re_min:g} 1/s on holds or touches the accumulation point -1/C")
+        raise CertificationError(f"a box from {box.re_min:g} 1/s on contains the accumulation point -1/C")
     right, left, top = box.re_max, box.re_min, box.im_max
     corners = [complex(right, 0), complex(right, top), complex(left, top), complex(left, 0)]
     with precision(CONTOUR_BITS):
@@ -165,12 +161,12 @@ def proven_count(k: System, box: Box, law: Feedback | None = None) -> int:
             turned += _turning(k, law, point(a), point(b))
         number = (turned / flint.arb.pi()).unique_fmpz()
     if number is None:
-        raise CertificationError("the turning of D around the box is no certain multiple of pi")
+        raise CertificationError("the change of arg D around the box is no certain multiple of pi")
     return int(number)
 
 
 def _turning(k: System, law: Feedback | None, a: Ball, b: Ball) -> Ball:
-    """The change of arg D along the piece from a to b."""
+    """Return the change of arg D along the side from a to b."""
     total, start, step, pieces = flint.arb(0), 0.0, FIRST_PIECE, 0
     here, value = a, characteristic_over(k, a, law)
     while start < 1:
@@ -179,7 +175,9 @@ def _turning(k: System, law: Feedback | None, a: Ball, b: Ball) -> Ball:
         over = characteristic_over(k, here.union(there), law)
         pieces += 1
         if pieces > MOST_PIECES:
-            raise CertificationError(f"the edge of the box takes more than {MOST_PIECES} pieces: prove a shorter list")
+            raise CertificationError(
+                f"the edge of the box needs more than {MOST_PIECES} pieces: certify a shorter list"
+            )
         if not over.is_finite() or over.contains(0):
             step /= 2
             if step < SHORTEST_PIECE:
@@ -192,9 +190,9 @@ def _turning(k: System, law: Feedback | None, a: Ball, b: Ball) -> Ball:
 
 
 def enclosed(k: System, near: complex, digits: int, law: Feedback | None = None) -> Disc:
-    """A disc with one zero, its radius one unit in the last of `digits` significant digits of |s| or less.
+    """Return a disc with one zero, its radius one unit in the last of `digits` significant digits of |s| or less.
 
-    Raises CertificationError where no disc can be proven, around a double zero for instance.
+    Raises CertificationError where none is certified, as around a double zero.
     """
     for bits in axis_precisions(digits):
         with precision(bits):
@@ -202,16 +200,17 @@ def enclosed(k: System, near: complex, digits: int, law: Feedback | None = None)
             if middle is None:
                 continue
             unit = Fraction(10) ** (int(np.floor(np.log10(abs(complex(middle.mid()))))) - digits + 1)
-            re, im = (_rounded(part, unit) for part in (middle.real, middle.imag))
+            exact = (exact_middle(part) for part in (middle.real, middle.imag))
+            re, im = (round(Fraction(int(part.p), int(part.q)) / unit) * unit for part in exact)
             if _holds_one(k, law, flint.acb(rational(re), rational(im)), rational(unit)):
                 return Disc(_decimal(re, unit), _decimal(im, unit), f"{float(unit):.0e}")
     raise CertificationError(
-        f"no proven disc of {digits} digits around {near:.12g} 1/s: a double zero, or close to one"
+        f"no certified disc of {digits} digits around {near:.12g} 1/s: a double zero, or close to one"
     )
 
 
 def _newton(k: System, law: Feedback | None, near: complex, digits: int) -> Ball | None:
-    """Newton's method on the middles of balls; real starts stay real."""
+    """Return the zero by Newton's method on the middles of balls, or None; real starts stay real."""
     s = point(near)
     for _ in range(BALL_STEPS):
         parts = tangent(k, s, flint.arb(0), law)
@@ -226,7 +225,7 @@ def _newton(k: System, law: Feedback | None, near: complex, digits: int) -> Ball
 
 
 def _holds_one(k: System, law: Feedback | None, m: Ball, r: Ball) -> bool:
-    """Rouche's theorem with the tangent at m, on the disc of radius r."""
+    """Whether the disc of radius r around m has one zero, by Rouche's theorem with the tangent at m."""
     parts = tangent(k, m, r, law)
     if parts is None:
         return False
@@ -234,12 +233,8 @@ def _holds_one(k: System, law: Feedback | None, m: Ball, r: Ball) -> bool:
     return bool(slope * r > value + half_curvature * r * r)
 
 
-def _rounded(part: Ball, unit: Fraction) -> Fraction:
-    exact = flint.fmpq(*part.mid().man_exp()[:1]) * flint.fmpq(2) ** int(part.mid().man_exp()[1])
-    return round(Fraction(int(exact.p), int(exact.q)) / unit) * unit
-
-
 def _decimal(value: Fraction, unit: Fraction) -> str:
+    """Return a multiple of a power of ten as a decimal string."""
     places = max(0, len(str(unit.denominator)) - 1)
     scaled = value * 10**places
     sign, digits = "-" if scaled < 0 else "", str(abs(int(scaled))).rjust(places + 1, "0")

@@ -1,29 +1,28 @@
-"""Mode shapes: the free response at the natural frequencies, in float64, of unit modal mass.
+"""Mode shapes: the free response at the natural frequencies, in float64, of unit modal mass; exact sensitivities.
 
-At an eigenvalue the state that the axis allows (W = 0) meets the plane of the payload's states everywhere along the
-link, so the sweeps of the response give the states at both ends of every segment.  Between them each wave is what
-decays from the inner end and what decays from the outer one,
+At an eigenvalue the state with W = 0 on the axis is in the plane of the payload's states everywhere along the link.  So
+the sweeps of the response have the states at both ends of every segment.  Between them each wave is the sum of one
+decaying from the inner end and one decaying from the outer end,
 
     W_j(x) = P_j e^{-t_j x} + R_j e^{-t_j (1 - x)},     2 P_j = W_j(0) - t_j s_j(0),     2 R_j = W_j(1) + t_j s_j(1),
 
-with W_j' = z_j s_j, so that nothing grows or cancels; slow segments are crossed by their transition functions.
-Of a double frequency the whole plane obeys both conditions of the hub: two others pick two modes of it, which are made
-orthogonal in the modal mass.
+with W_j' = z_j s_j, so that nothing grows or cancels.  For slow segments the transition functions are used.  At a
+double frequency the whole plane satisfies both conditions of the hub.  Two other conditions determine two modes, which
+are made orthogonal in the modal mass.
 
-How each parameter moves each natural frequency: d ln w/d ln p, exact, from the energies of the mode.
+The sensitivities d ln w/d ln p are exact, from the energies of the mode.  Rayleigh's quotient w^2 = V/T is stationary
+at a mode, so for a parameter p of the energies
 
-Rayleigh's quotient w^2 = V/T is stationary at a mode, so of a parameter p that enters the energies
+    2 d ln w/d ln p = (dV/d ln p - w^2 dT/d ln p)/V
 
-    2 d ln w/d ln p = (dV/d ln p - w^2 dT/d ln p)/V,
-
-with the fields held.  Held as functions of x/l, they leave of a piece's length l  -2 P l/V,  where
+with constant fields.  With constant functions of x/l, the term of a piece's length l is  -2 P l/V,  where
 
     P = M^2/(2 EI) + Q^2/(2 kappa G A) + Q Psi + w^2 (rhoA W^2 + rhoI Psi^2)/2
 
-is the same all along a uniform piece, as its energy-momentum (Eshelby 1951) is; a rigid piece (the hub's radius, the
-payload's offset) has P = Q Psi, and an attachment that moves outwards lengthens the piece inside of it.
+is constant along a uniform piece, its energy-momentum (Eshelby 1951).  A rigid piece (the hub's radius, the payload's
+offset) has P = Q Psi.  An attachment that moves outwards lengthens the piece inside of it.
 
-In these functions energies are shares of the mode's: potential and kinetic ones sum to 1 each.
+In these functions energies are shares of those of the mode: potential and kinetic ones sum to 1 each.
 """
 
 from __future__ import annotations
@@ -51,22 +50,22 @@ from tfarm.exact.waves import SERIES_RADIUS, even_functions, fill_wave_numbers, 
 
 _even, _rows, _series = python_of(even_functions), python_of(transition_rows), python_of(transition_series)
 
-GAUSS_POINTS = 16  # a panel; exact for the products of waves once a panel holds a few radians
-PANEL_WAVES = 4.0  # rad of the fastest wave in a panel: there 16 points integrate products of two to the last digit
-LEAST_PANELS = 2  # of a segment, however slow its waves: more than they need
+GAUSS_POINTS = 16  # of a panel; exact for products of waves over a few radians
+PANEL_WAVES = 4.0  # rad of the fastest wave in a panel, integrated to the last digit
+LEAST_PANELS = 2  # of a segment with slow waves
 DOUBLE = 1e-15  # relative gap under which two frequencies are one, with two modes
 CLOSE_MODES = 1e-5  # relative gap under which rounding would leave two modes not quite orthogonal
-QUADRATURE_BLOCK = 2**17  # modes times points that are evaluated at once, each of 256 bytes: memory, whatever the count
-FIRST_BLOCK = 4  # modes, of which each next block has twice as many, as their panels differ: time alone
-NO_MOTION = 1e-9  # of another motion of the tip or hub: a smaller one is rounding, and has no sign
+QUADRATURE_BLOCK = 2**17  # modes times points at once, each of 256 bytes: memory alone
+FIRST_BLOCK = 4  # modes; each next block has twice as many: time alone
+NO_MOTION = 1e-9  # of another motion of the tip or hub: a smaller one is rounding
 AT_HUB, AT_TIP = Place(Fraction(0), "inner"), Place(Fraction(1))
 
 
 class Shapes:
     """The modes of an undamped system at its natural frequencies, dimensionless, of unit modal mass times EI/L.
 
-    Call it with x (shares of the length, 1-D) for W, Psi, M, Q, each of shape (modes, x); at a joint or a body they are
-    those of its outer side.  Raises ConvergenceError for a mode without a shape of its own.
+    A call with x (shares of the length, 1-D) returns W, Psi, M, Q, each of shape (modes, x), at a joint or a body those
+    of its outer side.  Raises ConvergenceError for a mode without a shape.
     """
 
     def __init__(self, system: System, omega: Real) -> None:
@@ -74,13 +73,13 @@ class Shapes:
         inner = list(reversed(system.segments))
         edges = np.cumsum([0.0, *(float(each.length) for each in inner)])
         self._segments, self._edges = inner, edges / edges[-1]
-        # Each mode is a sum of four responses, two of its own and two of the neighbour below that a close one is freed
-        # of: frequency, condition on the axis (`_condition`), scale and factor of each, of shape (4, modes).
+        # Each mode is a sum of four responses, two of its own and two of a close neighbour below, for orthogonality:
+        # frequency, condition on the axis (`_condition`), scale and factor of each, of shape (4, modes).
         gap = np.r_[np.inf, np.diff(omega) / omega[1:], np.inf]
         is_first, is_second = gap[1:] < DOUBLE, gap[:-1] < DOUBLE
         close = np.minimum(gap[1:], gap[:-1]) < CLOSE_MODES
         left = np.array([self._at_axis(which) for which in (0, 1)])
-        best = (abs(left[1]).max(axis=0) > abs(left[0]).max(axis=0)).astype(int)  # the one of which more is left
+        best = (abs(left[1]).max(axis=0) > abs(left[0]).max(axis=0)).astype(int)  # the larger one
         Psi, M, Q = np.where(best, left[1], left[0])
         own = np.array([Q, -Psi if system.drive.turns else -M])
         own = np.where(is_first, [[1.0], [0.0]], np.where(is_second, [[0.0], [1.0]], own))
@@ -88,7 +87,7 @@ class Shapes:
         self._factors = np.concatenate([np.where(close, own, [[1.0], [0.0]]), np.zeros((2, omega.size))])
         self._which = np.concatenate([which, np.roll(which, 1, axis=1)])
         self._omegas = np.array([omega, omega, np.roll(omega, 1), np.roll(omega, 1)])
-        size = free_fields(system, 1j * omega, ())[2].real  # a system that is cut has other scales
+        size = free_fields(system, 1j * omega, ())[2].real  # a cut system has other scales
         self._sizes = np.array([size, size, np.roll(size, 1), np.roll(size, 1)])
         self._normalise()
 
@@ -101,14 +100,14 @@ class Shapes:
         return result
 
     def part(self, first: int, last: int) -> Shapes:
-        """The same with the modes first..last - 1 alone."""
+        """Return the modes first..last - 1."""
         part = copy(self)
         for name in ("omega", "_omegas", "_which", "_sizes", "_factors"):
             setattr(part, name, getattr(self, name)[..., first:last])
         return part
 
     def blocks(self) -> Iterator[Shapes]:
-        """Parts of neighbouring modes, so few that `panels` have `QUADRATURE_BLOCK` points for them in all."""
+        """Yield blocks of neighbouring modes with at most `QUADRATURE_BLOCK` points of `panels`."""
         first = 0
         while first < self.omega.size:
             last = min(2 * first + FIRST_BLOCK, self.omega.size)
@@ -118,13 +117,13 @@ class Shapes:
             first = last
 
     def tip(self) -> Real:
-        """W, Psi, M, Q of each mode at the tip, (4, modes)."""
+        """Return W, Psi, M, Q of each mode at the tip, (4, modes)."""
         return self.states((AT_TIP,))[0][..., 0]
 
     def theta(self) -> Real:
-        """Hub angle of each mode, 0 of a hub that is held.
+        """Return the hub angle of each mode, 0 of a locked hub.
 
-        From the hub's own balance A theta = M where A, its inertia and spring, leads, so that no digit is lost.
+        From the hub's balance A theta = M where A, its inertia and spring, dominates, so that no digit is lost.
         """
         drive = self.system.drive
         if not drive.turns:
@@ -136,15 +135,15 @@ class Shapes:
         return np.where(heavy, (M + float(self.system.radius) * Q) / np.where(heavy, A, 1.0), theta)
 
     def masses(self) -> Real:
-        """The modal masses."""
+        """Return the modal masses."""
         return np.sum([weight @ motion**2 for weight, motion in self._moving()], axis=0)
 
     def mass_matrix(self) -> Real:
-        """Modal masses (diagonal) and products of different modes, in EI/L: the identity, if all is well."""
+        """Return modal masses (diagonal) and products of different modes, in EI/L: the identity to rounding."""
         return np.asarray(sum((motion.T * weight) @ motion for weight, motion in self._moving()))
 
     def states(self, places: tuple[Place, ...]) -> tuple[Real, Real]:
-        """W, Psi, M, Q (fields, modes, places) and the hub angle (modes,)."""
+        """Return W, Psi, M, Q (fields, modes, places) and the hub angle (modes,)."""
         fields, theta = np.zeros((4, self.omega.size, len(places))), np.zeros(self.omega.size)
         for row in range(len(self._factors)):
             (used,) = np.nonzero(self._factors[row])
@@ -154,7 +153,7 @@ class Shapes:
         return fields, theta
 
     def panels(self) -> Iterator[tuple[Segment, Real, Real]]:
-        """Each segment with weights of Gauss points along it, as shares of the whole length, and W, Psi, M, Q there."""
+        """Yield each segment, weights of its Gauss points as shares of the whole length, and W, Psi, M, Q there."""
         nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
         for number, (each, count) in enumerate(zip(self._segments, self._counts, strict=True)):
             shares = ((np.arange(count)[:, None] + (nodes + 1) / 2) / count).ravel()
@@ -164,7 +163,7 @@ class Shapes:
 
     @property
     def _counts(self) -> list[int]:
-        """Panels of each segment that are short against every wave of these modes."""
+        """Numbers of panels of the segments, short against every wave of these modes."""
         S = self.omega.max() ** 2
         waves = [(float(each.g) * S) ** 0.25 + math.sqrt(S * float(each.a + each.b)) for each in self._segments]
         return [LEAST_PANELS + math.ceil(each / PANEL_WAVES) for each in waves]
@@ -174,14 +173,14 @@ class Shapes:
         return GAUSS_POINTS * sum(self._counts)
 
     def _at_axis(self, which: int) -> Real:
-        """Psi, M and Q (3, modes) on the axis of the state that a condition leaves of the plane at each frequency."""
+        """Return Psi, M and Q (3, modes) on the axis, of the state with a condition at each frequency."""
         axis = self._condition(which, self.omega)
         fields, theta, _ = free_fields(self.system, 1j * self.omega, (AT_HUB,), axis)
         _, _, M, Q = fields[..., 0]
         return np.array([theta, M + float(self.system.radius) * Q, Q]).real
 
     def _condition(self, which: int, omega: Real) -> Real:
-        """The condition (4, modes) on the axis: W = 0, the hub's balance A Psi = M, or one of two for close modes."""
+        """Return a condition (4, modes) on the axis: W = 0, the balance A Psi = M, or one of two for close modes."""
         A = float(self.system.drive.stiffness) - float(self.system.drive.inertia) * omega**2
         moment = 1.0 if self.system.drive.turns else 0.0
         size = np.maximum(abs(A), moment) if moment else np.ones(omega.size)
@@ -190,7 +189,7 @@ class Shapes:
         return (units[0], balance, units[1] if moment else units[2], units[3])[which]
 
     def _raw(self, row: int, modes: Any, places: tuple[Place, ...]) -> tuple[Real, Real]:
-        """States and hub angles of those modes in one of their four responses."""
+        """Return states and hub angles of those modes in one of their four responses."""
         omega, which = self._omegas[row, modes], self._which[row, modes]
         fields, theta = np.empty((4, omega.size, len(places))), np.empty(omega.size)
         for number in np.unique(which):
@@ -202,7 +201,7 @@ class Shapes:
         return fields, theta
 
     def _along(self, number: int, x: Real) -> Real:
-        """W, Psi, M, Q (4, modes, x) at the shares x of a segment, in the units of the system."""
+        """Return W, Psi, M, Q (4, modes, x) at the shares x of a segment, in the units of the system."""
         segment, ends = self._segments[number], Fraction(0)
         for each in self._segments[:number]:
             ends += each.length
@@ -218,7 +217,7 @@ class Shapes:
         return result
 
     def _moving(self) -> list[tuple[Real, Real]]:
-        """Inertias (n,) and the motions (n, modes) that they have: along the segments, of bodies, payload and hub."""
+        """Return inertias (n,) and their motions (n, modes): along the segments, of bodies, payload and hub."""
         system, parts = self.system, []
         for piece, weights, (W, Psi, _, _) in self.panels():
             parts.append((float(piece.g * piece.stiffness / piece.length**4) * weights, W.T))
@@ -235,7 +234,7 @@ class Shapes:
         return parts + [(np.array([float(size)]), motion[None]) for size, motion in ends if math.isfinite(size)]
 
     def _bodies(self) -> Iterator[tuple[Fraction, Body]]:
-        """Each body with its place."""
+        """Yield the place and each body."""
         position = Fraction(1)
         for each in self.system.elements:
             if isinstance(each, Segment):
@@ -244,7 +243,7 @@ class Shapes:
                 yield position, each
 
     def _normalise(self) -> None:
-        """Unit modal mass, modes of close frequencies orthogonal, tip (else its rotation, else the hub) positive."""
+        """Scale to unit modal mass and a positive tip (else its rotation, else the hub), close modes orthogonal."""
         if not self.omega.size:
             return
         with np.errstate(all="ignore"):
@@ -252,7 +251,7 @@ class Shapes:
         lost = ~np.isfinite(self._factors).all(axis=0)
         if lost.any():
             worst = float(self.omega[lost][0])
-            raise ConvergenceError(f"the mode at {worst:.10g} rad/s has no shape of its own", worst, 0.0)
+            raise ConvergenceError(f"the mode at {worst:.10g} rad/s has no shape", worst, 0.0)
         for lower in map(int, np.flatnonzero(np.diff(self.omega) < CLOSE_MODES * self.omega[1:])):
             overlap = self.part(lower, lower + 2).mass_matrix()[0, 1]
             self._factors[2:, lower + 1] = -overlap * self._factors[:2, lower]
@@ -264,7 +263,7 @@ class Shapes:
 
 
 def _of_segment(segment: Segment, omega: Real, ends: Real, own: Real, x: Real) -> Real:
-    """W, Psi, M, Q (4, modes, x) from the states (4, modes, 2) at inner and outer end; `own` leads to its own units."""
+    """Return W, Psi, M, Q (4, modes, x) from the states (4, modes, 2) at both ends; `own` are the segment's units."""
     numbers = np.empty((6, omega.size), complex)
     fill_wave_numbers(1j * omega, np.array(kernel_row(segment)), numbers)
     inner, outer = ends[..., 0] * own, ends[..., 1] * own
@@ -277,7 +276,7 @@ def _of_segment(segment: Segment, omega: Real, ends: Real, own: Real, x: Real) -
 
 
 def _by_series(segment: Segment, omega: Real, inner: Real, x: Real) -> Real:
-    """W, Psi, M, Q in a slow segment's own units, carried outwards: there Psi and Q have the other sign."""
+    """Return W, Psi, M, Q in a slow segment's own units, carried outwards, with the other sign of Psi and Q."""
     a, b, g, sigma = (float(each) for each in segment[:4])
     S, outwards = -(omega[:, None] ** 2), np.array([1.0, -1.0, 1.0, -1.0])[:, None]
     F0, F1, F2, F3, _, _ = _series(S * (a + b) * x**2, S * (a * b * S + g) * x**4)
@@ -288,7 +287,7 @@ def _by_series(segment: Segment, omega: Real, inner: Real, x: Real) -> Real:
 
 
 def _by_waves(segment: Segment, omega: Real, numbers: Complex, inner: Real, outer: Real, x: Real) -> Real:
-    """W, Psi, M, Q in a fast segment's own units, of both waves."""
+    """Return W, Psi, M, Q in a fast segment's own units, of both waves."""
     gS = -float(segment.g) * omega**2
     pairs = (numbers[:3], numbers[3:]), (numbers[3:], numbers[:3])
     fields: Any = np.zeros((4, omega.size, x.size), complex)
@@ -296,7 +295,7 @@ def _by_waves(segment: Segment, omega: Real, numbers: Complex, inner: Real, oute
         (W0, s0), (W1, s1) = (
             ((M - v_other * W) / (z - other), (Psi - v_other * Q / gS) / (z - other)) for W, Psi, M, Q in (inner, outer)
         )
-        slow = abs(z) < 1.0  # it hardly turns along the segment: P and R would cancel
+        slow = abs(z) < 1.0  # little phase along the segment: P and R would cancel
         z, t = (np.where(is_used, part, 1.0)[:, None] for is_used, part in ((slow, z), (~slow, t)))
         from_inner = (W0 - t[:, 0] * s0)[:, None] / 2 * np.exp(-t * x)
         from_outer = (W1 + t[:, 0] * s1)[:, None] / 2 * np.exp(-t * (1 - x))
@@ -309,7 +308,7 @@ def _by_waves(segment: Segment, omega: Real, numbers: Complex, inner: Real, oute
 
 
 def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> Complex:
-    """ "W", "Psi" or "M" (dimensionless lengths and moments) at the shares x, of unit modal mass in SI units.
+    """Return "W", "Psi" or "M" (dimensionless lengths and moments) at the shares x, of unit modal mass in SI units.
 
     At an eigenvalue  D'(s) theta = a  (locked hub: D'(s) M = a),  a the mode's  2 s (mass) + (damping)  in the shape's
     own scale (reciprocity, differentiated); the shape is scaled to  a = 2 s, its tip moving up (turning, if pinned).
@@ -317,17 +316,17 @@ def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> 
     at, places = np.array([s]), [Place(Fraction(float(share))) for share in (*x, 1.0)]
     fields, angle, scale = free_fields(k, at, [*places, AT_HUB])
     drive = characteristic(k, at)
-    slope, back = drive.slope[0], np.exp(scale - drive.scale)  # a system that is cut has another scale
+    slope, back = drive.slope[0], np.exp(scale - drive.scale)  # a cut system has another scale
     fields, theta = fields * back, complex((angle * back)[0])
     _, _, M, Q = fields[:, 0, -1]
     M = M + float(k.radius) * Q
     lag = 1.0 + float(k.drive.lag) * s
     A = np.polyval([float(each) for each in reversed(k.drive.of_angle)], s)
-    if k.drive.turns and abs(A) > abs(lag):  # the hub's own balance: a heavy one hardly turns, and M keeps its digits
+    if k.drive.turns and abs(A) > abs(lag):  # the balance of a heavy hub, for the digits of M
         theta = M * lag / A
     product = complex(slope * (theta / lag if k.drive.turns else M))
     if product == 0 or not np.isfinite(product):
-        raise ConvergenceError(f"the hub does not feel the mode at {s:.6g} 1/s, or it is double", s, slope)
+        raise ConvergenceError(f"the mode at {s:.6g} 1/s is double, or the hub is at a node of it", s, slope)
     values = fields[("W", "Psi", "M").index(quantity), 0, :-1]
     if quantity == "M":
         layout = Layout(k, tuple(dict.fromkeys(places)))
@@ -345,11 +344,10 @@ PARAMETERS = (*LINK, "hub_inertia", "payload_mass", "payload_inertia")  # of eve
 
 
 def sensitivities(arm: Arm, shapes: Shapes) -> dict[str, Real]:
-    """d ln w/d ln p of the arm's own parameters, by parameter, for each mode of `shapes`.
+    """Return d ln w/d ln p of the arm's parameters, by parameter, for each mode of `shapes`.
 
-    All have those of the link, hub and payload (of a rig those of all segments together); "segment_1_length", ... of
-    each where there are several; "attachment_1_x", ... and the springs, rotor and offsets that it has.  A length takes
-    along what is attached to it.
+    All arms have those of link (all segments together), hub and payload; others "segment_1_length", ... of each
+    segment, "attachment_1_x", ... and those of springs, rotor and offsets.  Attachments move with a length.
     """
     parts = [_of_modes(arm, part) for part in shapes.blocks()]
     return {name: np.concatenate([each[name] for each in parts]) / 2 + 0.0 for name in parts[0]}
@@ -373,7 +371,7 @@ def _of_modes(arm: Arm, shapes: Shapes) -> Doubled:
 
 
 def _of_link(bend: Real, shear: Real, slide: Real, move: Real, turn: Real) -> Doubled:
-    """A link's parameters by its energies; `slide` is the integral of Q W', twice that of the shear force's work."""
+    """Return those of a link from its energies; `slide` is the integral of Q W', twice the work of the shear force."""
     return {
         "length": -bend + shear - 2 * slide - move - turn,
         "density": -move - turn,
@@ -385,11 +383,8 @@ def _of_link(bend: Real, shear: Real, slide: Real, move: Real, turn: Real) -> Do
     }
 
 
-# ------------------------------------------------------------ rigs
-
-
 def _densities(piece: Segment, omega: Any, W: Any, Psi: Any, M: Any, Q: Any) -> tuple[Any, ...]:
-    """Energies of a piece, as in `_of_link`, per length."""
+    """Return energies of a piece, as in `_of_link`, per length."""
     length, stiffness, square = float(piece.length), float(piece.stiffness), omega**2
     slip = float(piece.sigma) * length**2 / stiffness  # W' = Psi + slip Q
     bend, shear, slide = M**2 / stiffness / square, slip * Q**2 / square, Q * (Psi + slip * Q) / square
@@ -403,7 +398,7 @@ def _densities(piece: Segment, omega: Any, W: Any, Psi: Any, M: Any, Q: Any) -> 
 
 
 def _hub(arm: Arm, shapes: Shapes) -> Doubled:
-    """Of hub, rotor, clamp and joint: behind the clamp the link turns by Psi - M/k, W = r times that, theta at last."""
+    """Return those of hub, rotor, clamp and joint; behind the clamp the rotation is Psi - M/k, at the joint theta."""
     chain, hub, square = shapes.system, arm.hub, shapes.omega**2
     per_rotation, theta = float(chain.length / chain.EI), shapes.theta()
     _, Psi, M, Q = shapes.states((AT_HUB,))[0][..., 0]
@@ -425,7 +420,7 @@ def _hub(arm: Arm, shapes: Shapes) -> Doubled:
 
 
 def _payload(arm: Arm, shapes: Shapes) -> Doubled:
-    """Of the payload: it moves by W + e Psi."""
+    """Return those of the payload, with the displacement W + e Psi."""
     chain, square = shapes.system, shapes.omega**2
     W, Psi, _, Q = shapes.tip()
     motions = (("mass", chain.tip_mass, W + float(chain.offset) * Psi), ("inertia", chain.tip_inertia, Psi))
@@ -439,7 +434,7 @@ def _payload(arm: Arm, shapes: Shapes) -> Doubled:
 
 
 def _attachment(arm: Arm, shapes: Shapes, number: int) -> Iterator[tuple[str, Real]]:
-    """Of an attachment what it has; its place too, where the link is uniform around it and nothing else is there."""
+    """Yield those of an attachment; also of its place, where the link is uniform around it and has no other there."""
     each, chain, square = arm.attachments[number], shapes.system, shapes.omega**2
     share = min(Fraction(each.x) / chain.length, Fraction(1))
     sides = Place(share, "inner"), Place(share, "outer")

@@ -1,9 +1,7 @@
-"""The modal table of an arm: frequencies, shapes, hub participation, nodes and exact sensitivities.
+"""The modal table of an arm: frequencies, shapes, hub participation, nodes and exact sensitivities; its default gains.
 
-The units of an arm, in which its gains are neither small nor large, and the gains that it has where none are said.
-
-A rate gain K1 is measured in J w1 and an angle gain Kp in J w1^2: J the arm's inertia about the hub, w1 its first
-flexible frequency.  In these units a loop does not know whether the arm is a boom or a needle.
+The natural unit of a rate gain K1 is J w1 and that of an angle gain Kp is J w1^2, with J the arm's inertia about the
+hub and w1 its first flexible frequency.
 """
 
 from __future__ import annotations
@@ -26,9 +24,9 @@ from tfarm.exact.appendix import natural_frequency, roots_near
 from tfarm.exact.system import System, shear_flexibility, system_of
 from tfarm.exact.values import (
     APPENDIX_DIGITS,
+    ByMethod,
     Method,
-    Roads,
-    by_roads,
+    by_method,
     known_method,
     must_be_of_appendix,
     why_no_appendix,
@@ -39,13 +37,13 @@ from .frequencies import ARMS_KEPT, count_below, natural_frequencies, refine
 from .proofs import Certificate, certify
 from .shapes import Shapes, sensitivities
 
-BEYOND_DOUBLE = 20  # digits of a bracket: it is a ten-thousandth of a float64's rounding
-MOST_TABLE_MODES = 10_000  # at a time
-FEWEST_LISTED = 12  # digits of a frequency that is listed by itself
-NODE_POINTS, HALF_WAVES_BEYOND = 24, 3  # points a half wave, of so many more than the mode has, between which nodes lie
-NEAREST_NODE, FIRST_EVEN, END_POINTS = 1e-9, 0.9, 40  # so many points from there to nearly the first of these
+BEYOND_DOUBLE = 20  # digits of a bracket: 1e-4 of a float64's rounding
+MOST_TABLE_MODES = 10_000  # of one table
+FEWEST_LISTED = 12  # digits of a frequency as text
+NODE_POINTS, HALF_WAVES_BEYOND = 24, 3  # grid points for each half wave, of 3 more half waves than the mode has
+NEAREST_NODE, FIRST_EVEN, END_POINTS = 1e-9, 0.9, 40  # geometric points from an end to the first even one
 NO_DEFLECTION = 1e-13  # of the largest field of a mode: less is rounding
-NODE_STEPS = 6  # of Newton's method from a secant of that grid: doubling the digits from two on, more than doubles have
+NODE_STEPS = 6  # of Newton's method from a secant of that grid: from two digits to more than 64 bits
 
 
 @dataclass(frozen=True)
@@ -53,9 +51,9 @@ NODE_STEPS = 6  # of Newton's method from a secant of that grid: doubling the di
 class Modes:
     """The undamped modes of an arm, in ascending order, complete up to the last one.
 
-    A rigid-body mode, where there is one, comes first as index 0; flexible modes count from 1.  Every mode has
-    unit modal mass (1 kg m^2 of hub inertia counts as 1) and a positive tip displacement.
-    `natural_frequency` [rad/s] and `index` have one entry a mode; C does not enter them.
+    A rigid-body mode has the index 0, flexible modes those from 1.  Every mode has unit modal mass (1 kg m^2 of hub
+    inertia counts as 1) and a positive tip displacement.  `natural_frequency` [rad/s] and `index` have one entry for
+    each mode, without the effect of C.
     """
 
     arm: Arm
@@ -66,7 +64,7 @@ class Modes:
 
     @property
     def finding(self) -> str:
-        """How many flexible modes there are, and from which frequency to which, in words."""
+        """The number of flexible modes and their range of frequencies, in words."""
         flexible = self.natural_frequency[self._rigid :]
         if not flexible.size:
             return "no flexible mode"
@@ -83,10 +81,10 @@ class Modes:
         return self.natural_frequency / (2 * math.pi)
 
     def digits(self, digits: int) -> list[str]:
-        """The frequencies [rad/s] with so many right digits (`FEWEST_LISTED` at least), as strings.
+        """Return the frequencies [rad/s] as strings with that many right digits, at least 12.
 
-        Under the Timoshenko theory each is also confirmed as a root of the paper's own Delta(s), by mpmath.
-        Raises ConvergenceError where a digit cannot be told (a double frequency) or Delta has no root there.
+        Under the Timoshenko theory each is also confirmed as a root of the paper's Delta(s), by mpmath.
+        Raises ConvergenceError where a digit is not determined (a double frequency) or Delta has no root there.
         """
         digits = max(digits, FEWEST_LISTED)
         flexible = [refine(self._k, float(omega), digits) for omega in self.natural_frequency[self._rigid :]]
@@ -96,12 +94,11 @@ class Modes:
         return ["0.0"] * self._rigid + flexible
 
     def frequencies(self, method: Method = "closed-form") -> Real:
-        """The frequencies [rad/s] by another road (`tfarm.exact.values`), float64, one a mode.
+        """Return the frequencies [rad/s] by a method (see `tfarm.exact.values`), float64, one for each mode.
 
-        "balls": the middle of each proven bracket, wide as the last of 20 digits, nothing beside a float64's rounding;
-        "appendix": the roots of the paper's Delta next to them.
-        Raises ParameterError for the appendix of another theory, CertificationError where a bracket is not proven and
-        ConvergenceError where Delta's root has no digits: both at a double frequency.
+        "balls": the middle of each certified bracket of 20 digits; "appendix": the roots of the paper's Delta.
+        Raises ParameterError for the appendix of another theory.  At a double frequency raises CertificationError for
+        balls and ConvergenceError for the appendix.
         """
         if known_method(method) == "closed-form":
             return self.natural_frequency
@@ -110,23 +107,21 @@ class Modes:
             flexible = [float((Fraction(lower) + Fraction(upper)) / 2) for lower, upper in brackets]
         else:
             must_be_of_appendix(self.arm, self.theory)
-            flexible = [
-                float(natural_frequency(self.arm, float(omega), APPENDIX_DIGITS))
-                for omega in self.natural_frequency[self._rigid :]
-            ]
+            starts = self.natural_frequency[self._rigid :].tolist()
+            flexible = [float(natural_frequency(self.arm, omega, APPENDIX_DIGITS)) for omega in starts]
         return np.r_[[0.0] * self._rigid, flexible]
 
-    def by_methods(self) -> Roads:
-        """The frequencies [rad/s] by every method that has them, and how far these part.
+    def by_methods(self) -> ByMethod:
+        """Return the frequencies [rad/s] by every method that has them, with their differences.
 
         Raises CertificationError or ConvergenceError as `frequencies` does.
         """
-        return by_roads(self.frequencies, why_no_appendix(self.arm, self.theory))
+        return by_method(self.frequencies, why_no_appendix(self.arm, self.theory))
 
     def certify(self, digits: int = DOUBLE_DIGITS) -> Certificate:
-        """Proven brackets of the flexible frequencies to so many digits, and the proof that none is missing.
+        """Return certified brackets of the flexible frequencies to that many digits, none missing.
 
-        Raises CertificationError where something cannot be proven, a double frequency for instance.
+        Raises CertificationError where that fails, as at a double frequency.
         """
         beyond = len(self) + 1
         above = float(natural_frequencies(self._k, beyond, beyond)[0])
@@ -138,32 +133,32 @@ class Modes:
     # ------------------------------------------------------------ shapes
 
     def shape(self, x: NDArray[np.float64] | float) -> Real:
-        """Total displacement w(x) [m per unit modal coordinate] at x [m]: shape (modes, *x.shape)."""
+        """Return the displacement w(x) [m for unit modal coordinate] at x [m]: (modes, *x.shape)."""
         return self._field(0, x) * float(self._k.length)
 
     def rotation(self, x: NDArray[np.float64] | float) -> Real:
-        """Total rotation psi(x) [rad] of the cross-section at x [m]: shape (modes, *x.shape)."""
+        """Return the rotation psi(x) [rad] of the cross-section at x [m]: (modes, *x.shape)."""
         return self._field(1, x)
 
     def moment(self, x: NDArray[np.float64] | float) -> Real:
-        """Bending moment E I psi'(x) [N m] at x [m]: shape (modes, *x.shape)."""
+        """Return the bending moment E I psi'(x) [N m] at x [m]: (modes, *x.shape)."""
         return self._field(2, x) * float(self._k.EI / self._k.length)
 
     def shear(self, x: NDArray[np.float64] | float) -> Real:
-        """Shear force kappa G A (w' - psi) [N] at x [m]: shape (modes, *x.shape)."""
+        """Return the shear force kappa G A (w' - psi) [N] at x [m]: (modes, *x.shape)."""
         return self._field(3, x) * float(self._k.EI / self._k.length**2)
 
     @cached_property
     def hub_participation(self) -> Real:
-        """b = psi(0) of each mode; b^2 is the residue of hub angle/torque in the variable s^2.  Zero if locked."""
+        """b = psi(0) of each mode; b^2 is the residue of hub angle/torque in s^2.  Zero if locked."""
         rigid = 1.0 / math.sqrt(self.arm.total_inertia) if self._rigid else 0.0
         return np.r_[[rigid] * self._rigid, self._shapes.theta() * self._unit]
 
     @cached_property
     def modal_moment(self) -> Real:
-        """Root moment E I psi'(0) [N m] of each mode: (k - I_h w^2) b where the clamp lies on the axis of a free hub.
+        """Root moment E I psi'(0) [N m] of each mode: (k - I_h w^2) b with the clamp on the axis of a free hub.
 
-        Of a hub lighter than the link it is taken from there, as the field at the root cancels: 0 for a free pin.
+        For a hub lighter than the link it is computed so, as the field at the root cancels: 0 for a free pin.
         """
         link, inertia = self.arm.link, self.arm.hub_side_inertia
         if self.arm.reads_hub_moment and not self.arm.is_locked and inertia < link.rhoA * link.length**3 / 3:
@@ -172,7 +167,7 @@ class Modes:
 
     @cached_property
     def nodes(self) -> tuple[Real, ...]:
-        """Points x [m] strictly inside the arm where the total displacement of each mode vanishes."""
+        """Points x [m] strictly inside the arm where the displacement of each mode vanishes."""
         rigid: tuple[Real, ...] = (np.empty(0),) * self._rigid
         return rigid + tuple(self._nodes(mode) * float(self._k.length) for mode in range(len(self) - self._rigid))
 
@@ -180,10 +175,10 @@ class Modes:
 
     @cached_property
     def sensitivity(self) -> dict[str, Real]:
-        """d ln w / d ln p, per cent per per cent, of each frequency by each parameter p (zero for a rigid mode).
+        """d ln w / d ln p of each frequency for each parameter p, exact (`sensitivities`); 0 for a rigid mode.
 
-        Exact (`sensitivities`).  Each parameter varies alone: Young's modulus with G held, the area with I held.  An
-        infinite or zero inertia counts as zero.  A rig has entries for its own parts, and for each of its segments.
+        Each parameter varies alone: Young's modulus at constant G, the area at constant I.  An infinite or zero inertia
+        has 0.  A rig has entries for its parts and each of its segments.
         """
         found = sensitivities(self.arm, self._shapes)
         return {name: np.r_[[0.0] * self._rigid, values] for name, values in found.items()}
@@ -196,7 +191,7 @@ class Modes:
 
     @property
     def _unit(self) -> float:
-        """From modes of unit dimensionless mass to modes of unit modal mass."""
+        """The factor from modes of unit dimensionless mass to modes of unit modal mass."""
         return math.sqrt(float(self._k.length / self._k.EI))
 
     @cached_property
@@ -214,10 +209,10 @@ class Modes:
         return values.reshape(len(values), *share.shape)
 
     def _nodes(self, mode: int) -> Real:
-        """Interior zeros of W: bracketed on a grid finer than its waves, polished by Newton (W' = Psi + sigma Q)."""
+        """Return interior zeros of W, bracketed on a fine grid and refined by Newton (W' = Psi + sigma Q)."""
         shape = self._shapes.part(mode, mode + 1)
         even = NODE_POINTS * (mode + HALF_WAVES_BEYOND)
-        ends = np.geomspace(NEAREST_NODE, FIRST_EVEN / even, END_POINTS)  # a heavy hub draws a node close to it
+        ends = np.geomspace(NEAREST_NODE, FIRST_EVEN / even, END_POINTS)  # a heavy hub has a node close to it
         grid = np.r_[ends, np.linspace(0.0, 1.0, even)[1:-1], 1.0 - ends[::-1]]
         W, Psi, *_ = shape(grid)[:, 0]
         least = NO_DEFLECTION * max(abs(W).max(), abs(Psi).max())
@@ -232,10 +227,10 @@ class Modes:
 
 
 def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, theory: Theory | None = None) -> Modes:
-    """All undamped modes of the arm: the first `count` flexible ones, or all with a frequency below `up_to` [rad/s].
+    """Return all undamped modes of the arm: the first `count` flexible ones, or those below `up_to` [rad/s].
 
-    Complete by construction (Wittrick and Williams 1971), for any hub and payload, above the shear cut-off, and with
-    double frequencies listed twice.  `theory` is one of timoshenko, shear, rayleigh, euler-bernoulli.
+    Complete by their count (Wittrick and Williams 1971), for any hub and payload, also above the shear cut-off, double
+    frequencies twice.  `theory` is one of timoshenko, shear, rayleigh, euler-bernoulli.
     Raises ParameterError for a count outside 1..10000 or a frequency that is not positive.
     """
     must_be_arm(arm)
@@ -253,17 +248,17 @@ def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, the
     if count == 0:
         raise ParameterError(key="up_to", value=up_to, remedy="no flexible mode lies below it; choose a higher one")
     if count > MOST_TABLE_MODES:
-        raise ParameterError(key="count", value=count, remedy=f"at most {MOST_TABLE_MODES} modes at a time")
+        raise ParameterError(key="count", value=count, remedy=f"at most {MOST_TABLE_MODES} modes")
     flexible = natural_frequencies(k, rigid + 1, rigid + count)
     index = np.arange(1 - rigid, count + 1)
     return Modes(arm, theory, index, np.r_[[0.0] * rigid, flexible], k)
 
 
 def compare_theories(table: Modes) -> dict[Theory, Real]:
-    """The same modes' frequencies [rad/s] by each of the four theories, in the order of `THEORIES`.
+    """Return the frequencies [rad/s] of the modes by each of the four theories, in the order of `THEORIES`.
 
-    Modes are matched by their number; above the shear cut-off, where the Timoshenko beam alone has a second spectrum,
-    equal numbers need not mean alike shapes.
+    Modes are matched by their number.  Above the shear cut-off, where the Timoshenko beam has a second spectrum, equal
+    numbers may have different shapes.
     """
     count = int(table.index.max())
     by_theory = {theory: modes(table.arm, count, theory=theory) for theory in THEORIES if theory != table.theory}
@@ -271,9 +266,9 @@ def compare_theories(table: Modes) -> dict[Theory, Real]:
 
 
 def hub_locked(table: Modes) -> Modes:
-    """As many modes of the same arm with its hub held still; the table itself where it is held anyway.
+    """Return as many modes of the same arm with a locked hub; the table itself where the hub is locked already.
 
-    The joint, which lies behind the hub, goes on yielding.
+    The joint behind the hub stays flexible.
     """
     if table.arm.is_locked:
         return table
@@ -281,12 +276,12 @@ def hub_locked(table: Modes) -> Modes:
 
 
 def modes_below(arm: Arm, up_to: float, *, theory: Theory | None = None) -> int:
-    """How many flexible modes the undamped arm has below up_to [rad/s], by the count alone."""
+    """Return the number of flexible modes of the undamped arm below up_to [rad/s], by the count."""
     return count_below(system_of(arm, theory).with_damping(0.0), up_to) - arm.has_rigid_mode
 
 
 def flexible_frequencies(arm: Arm, up_to: float) -> Real:
-    """The flexible natural frequencies [rad/s] of the undamped arm below `up_to`, which may have none."""
+    """Return the flexible natural frequencies [rad/s] of the undamped arm below `up_to`."""
     if modes_below(arm, up_to) == 0:
         return np.empty(0)
     table = modes(arm, up_to=up_to)
@@ -294,31 +289,31 @@ def flexible_frequencies(arm: Arm, up_to: float) -> Real:
 
 
 PAPER_GAINS = HubFeedback(K1=0.3, K2=0.3)  # of the paper's arms
-RATE_SHARE = 6.42e-3  # of J w1: what K1 = 0.3 N m s/rad is on the preset sasaki2012
-MOST_UNITS = 1e9  # of J w1, 1 and J w1^2: far beyond what a loop can tell from infinite, far from overflow
-DEFAULT_DIGITS = 3  # of a default K1, so that it can be read and typed
+RATE_SHARE = 6.42e-3  # of J w1: K1 = 0.3 N m s/rad on the preset sasaki2012
+MOST_UNITS = 1e9  # of J w1, 1 and J w1^2: practically infinite, far from overflow
+DEFAULT_DIGITS = 3  # of a default K1
 OF_THE_PAPER = ("sasaki2012", "sasaki2012-lab", "sasaki2012-as-printed")  # presets
 
 
-@lru_cache(maxsize=ARMS_KEPT)  # each loop of a search looks whether its gains are possible
+@lru_cache(maxsize=ARMS_KEPT)  # each loop of a search checks its gains
 def turning_inertia(arm: Arm) -> float:
-    """J, the arm's inertia about the hub, without the parts that are infinite: these do not turn.
+    """Return J, the arm's inertia about the hub without infinite parts.
 
-    In kg m^2 where torque is the input, else in the input's own unit times s^2.
+    In kg m^2 for a torque, else in the unit of the input times s^2.
     """
-    finite = [each if np.isfinite(each) else 0.0 for each in (arm.hub.inertia, arm.payload.mass, arm.payload.inertia)]
-    hub, mass, inertia = finite
+    parts = (arm.hub.inertia, arm.payload.mass, arm.payload.inertia)
+    hub, mass, inertia = (each if np.isfinite(each) else 0.0 for each in parts)
     payload = replace(arm.payload, mass=mass, inertia=inertia)
     return replace(arm, hub=replace(arm.hub, inertia=hub), payload=payload).turned_inertia
 
 
 def rate_unit(arm: Arm) -> float:
-    """J w1 [N m s/rad], the unit of K1."""
+    """Return J w1 [N m s/rad], the natural unit of K1."""
     return turning_inertia(arm) * first_frequency(arm)
 
 
 def angle_unit(arm: Arm) -> float:
-    """J w1^2 [N m/rad], the unit of Kp."""
+    """Return J w1^2 [N m/rad], the natural unit of Kp."""
     return turning_inertia(arm) * first_frequency(arm) ** 2
 
 
@@ -326,31 +321,34 @@ UNITS_OF_OUTPUTS = {"hub_angle": ("J w1^2", angle_unit), "hub_rate": ("J w1", ra
 
 
 def gain_unit(arm: Arm, name: str) -> float:
-    """The unit of the gain of that name on this arm, in that gain's SI unit."""
+    """Return the natural unit of the gain of that name on this arm, in its SI unit."""
     (output,) = (gain.output for gain in GAINS if gain.name == name)
     return UNITS_OF_OUTPUTS[output][1](arm) if output in UNITS_OF_OUTPUTS else arm.input_per_torque
 
 
 def most_gain(arm: Arm, name: str) -> float:
-    """The largest size that the gain of that name may have on this arm: beyond any machine."""
+    """Return the largest magnitude of the gain of that name on this arm."""
     return MOST_UNITS * gain_unit(arm, name)
 
 
 def check_gains(arm: Arm, law: HubFeedback) -> None:
-    """Raise ParameterError for a gain that is too large for the arm, whatever it would be for another."""
+    """Raise ParameterError for a gain that is too large for the arm."""
     for gain in GAINS:
         value = law[gain.name]
         if value and not abs(value) <= (most := most_gain(arm, gain.name)):
             unit = UNITS_OF_OUTPUTS[gain.output][0] if gain.output in UNITS_OF_OUTPUTS else "1"
-            remedy = f"for this arm at most {MOST_UNITS:g} times {unit} in size, {most:.3g}: beyond any machine"
-            raise ParameterError(key=gain.name, value=value, remedy=remedy)
+            raise ParameterError(
+                key=gain.name,
+                value=value,
+                remedy=f"for this arm at most {MOST_UNITS:g} times {unit} in size, {most:.3g}",
+            )
 
 
 def default_gains(arm: Arm) -> HubFeedback:
-    """The law of an arm for which no gains are given: K1 = 0.00642 J w1 to three digits, K2 = 0.3.
+    """Return the default law of an arm: K1 = 0.00642 J w1 to three digits, K2 = 0.3.
 
-    On the paper's arm that is K1 = 0.3 N m s/rad, and all its presets have that.  A hub without inertia has K2 = 0:
-    more would be an algebraic loop.
+    On the paper's arm and its presets K1 = 0.3 N m s/rad.  For a hub without inertia K2 = 0, as any other value is an
+    algebraic loop.
     """
     must_be_arm(arm)
     if _is_of_the_paper(arm):
@@ -361,7 +359,7 @@ def default_gains(arm: Arm) -> HubFeedback:
 
 
 def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
-    """What `default_gains` gives to the gains of these names, and why, in one clause."""
+    """Return the default gains of these names and their reason, in one clause."""
     law, is_paper = default_gains(arm), _is_of_the_paper(arm)
     why = "as in the paper" if is_paper else f"{RATE_SHARE:g} J w1 of this arm"
     units = {name: written_unit(name, arm) for name in ("K1", "K2")}
@@ -372,7 +370,7 @@ def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
 
 @lru_cache(maxsize=ARMS_KEPT)
 def first_frequency(arm: Arm) -> float:
-    """w1 [rad/s], the lowest flexible frequency of the undamped arm."""
+    """Return w1 [rad/s], the lowest flexible frequency of the undamped arm."""
     return float(modes(arm.elastic, 1).natural_frequency[-1])
 
 

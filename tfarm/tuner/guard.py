@@ -392,7 +392,7 @@ def _remedy(loop: Sampled, kind: GuardKind) -> str:
     arm = loop.plant.arm
     what = "no sector of moving gains" if kind == "time-varying" else "no constant gain"
     served = [name for name in (RATE_GAIN, ANGLE_GAIN) if name == RATE_GAIN or loop.number(name)]
-    at = ", ".join(loop.gains.told(name, "{:g}".format) for name in served)
+    at = ", ".join(loop.gains.gain_text(name, "{:g}".format) for name in served)
     start = f"{arm.name}: {what} is proven stable at {at}, C = {arm.damping:g} s"
     for C in REMEDY_DAMPINGS[arm.damping < REMEDY_DAMPINGS]:
         with suppress(ConvergenceError):

@@ -61,7 +61,7 @@ class Cost:
 
     def __post_init__(self) -> None:
         meanings = {name: f"the weighting coefficient {name} is zero or positive" for name in ("a", "b")}
-        check_fields(self, "", not_negative, meanings)
+        check_fields(self, "", not_negative, **meanings)
         if self.a == 0.0 == self.b:
             raise ParameterError(key="a", value=self.a, remedy="a and b are both zero: a cost of nothing")
 
