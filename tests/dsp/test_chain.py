@@ -81,7 +81,7 @@ def test_an_arm_still_refuses_other_tables(tmp_path):
 
 
 BAD = [
-    ("sampling", {"period": 0.0}, "sampling.period = 0.0: a sample period is a positive"),
+    ("sampling", {"period": 0.0}, "sampling.period = 0.0: a sampling period is a positive"),
     ("sampling", {"period": -0.01}, "sampling.period = -0.01"),
     ("sampling", {"period": math.nan}, "nan is none"),
     ("sampling", {"period": math.inf}, "sampling.period = inf"),
@@ -93,7 +93,7 @@ BAD = [
     ("sampling", {"perod": 0.01}, 'did you mean "period"'),
     ("converters", {"moment_bits": 0, "moment_range": 1.0}, "moment_bits = 0: a whole number of bits from 2 to 32"),
     ("converters", {"moment_bits": 70, "moment_range": 1.0}, "converters.moment_bits = 70"),
-    ("converters", {"torque_bits": 12}, "converters.torque_range = None: 12 bits of what"),
+    ("converters", {"torque_bits": 12}, "converters.torque_range = None: 12 bits need a range"),
     ("converters", {"torque_range": -3.0}, "the range +-R of a converter"),
     ("converters", {"encoder_counts": 0}, "counts a revolution from 2"),
     ("converters", {"encoder_counts": 2**31 + 1}, "counts a revolution from 2"),
