@@ -140,7 +140,7 @@ def test_a_simulation_says_how_it_went() -> None:
     largest = abs(run.at_samples.root_moment).max()
     assert repr(run).startswith(f"Simulation(finding='ran to 0.5 s, root moment up to {largest:.4g} N m', ")
     lost = tfarm.simulate(LAB, LAW.having("K2", 1.5), duration=2.0, count=4)
-    assert "finding='ran away, stopped at " in repr(lost)
+    assert "finding='unstable, stopped at " in repr(lost)
 
 
 def test_a_law_is_shown_as_it_is_typed() -> None:

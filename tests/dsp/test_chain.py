@@ -79,13 +79,13 @@ def test_an_arm_still_refuses_other_tables(tmp_path):
 
 
 BAD = [
-    ("sampling", {"period": 0.0}, "sampling.period = 0.0: a sample period is a positive"),
+    ("sampling", {"period": 0.0}, "sampling.period = 0.0: a sampling period is a positive"),
     ("sampling", {"period": True}, "sampling.period = true"),
     ("sampling", {"delay_samples": -1.0}, "sampling.delay_samples = -1.0: a computational delay is zero or positive"),
     ("sampling", {"antialias_corner": 0.0}, "positive in rad/s, or inf"),
     ("sampling", {"perod": 0.01}, 'did you mean "period"'),
     ("converters", {"moment_bits": 0, "moment_range": 1.0}, "moment_bits = 0: a whole number of bits from 2 to 32"),
-    ("converters", {"torque_bits": 12}, "converters.torque_range = None: 12 bits of what"),
+    ("converters", {"torque_bits": 12}, "converters.torque_range = None: 12 bits need a range"),
     ("converters", {"torque_range": -3.0}, "the range +-R of a converter"),
     ("converters", {"encoder_counts": 2**31 + 1}, "counts a revolution from 2"),
     ("converters", {"hub_rate": "guess"}, "converters.hub_rate = 'guess'"),

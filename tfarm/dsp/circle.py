@@ -1,12 +1,12 @@
-"""How many poles of a sampled loop lie outside the unit circle, proven between the points of the circle too.
+"""Number of poles of a sampled loop outside the unit circle, certified between the points of the circle too.
 
 With x = 1 - 1/z, a_j = e^{p_j (1-f) T}, b_j = e^{p_j T} and g0 the finite part of G at s = 0, the pulse transfer
 function of the plant is
 
     H(z) = z^-d [ g0/z + x sum over poles of (r_j/p_j) a_j/(z - b_j) + the rigid body's terms in 1/x ]
 
-so a pole that has settled before the sample weighs nothing.  Of a slow one, as friction at the hub makes it, the share
-in g0 nearly cancels that in the sum: both are taken as one, (r_j/p_j) (a_j - 1 + (b_j - a_j)/z)/(z - b_j).  So are
+so a pole that has settled before the sample has no effect.  Of a slow one, as friction at the hub makes it, the share
+in g0 nearly cancels that in the sum.  Both are taken as one, (r_j/p_j) (a_j - 1 + (b_j - a_j)/z)/(z - b_j).  So are
 that pole p and the integral of the rate of a braked hub, R/s - R/(s - p) of the angle with R = 1/b large:
 
     x H(z) = -R p (c0 + c1/z + c2/z^2)/(z - e^{pT}),  c0 = t^2 phi(p t), t = (1 - f) T,
@@ -17,22 +17,22 @@ With n the order of the law, q and p_i its polynomials in z, and H_i x^{n_i} as 
     x^k F z^-n = q z^-n x^k + sum over signals of p_i z^-n x^{k - n_i} (H_i x^{n_i})
 
 is analytic on the circle and outside, and no pole of the law is one of it: its zeros outside are the unstable poles.
-Of a root r the factor (z - r)/z is r x + 1 - r.  Those that are x, as of an integrator or a difference, are taken
-together, and so is what all terms have of them in common.
+Of a root r the factor (z - r)/z is r x + 1 - r.  Factors that are x, as of an integrator or a difference, are taken
+together, and so are those that all terms have in common.
 
 On an arc it stays in a disc about its value in the middle, for 1/(z - b) changes by h/(|z - b| (|z - b| - h)) at most
-over h.  Where no disc holds 0, the phase between neighbouring middles is known without doubt, and half the circle gives
-the count (the argument principle).  Arcs whose disc holds 0 are cut.
+over h.  Where no disc contains 0, the phase between neighbouring middles is certain, and half the circle gives the
+count (the argument principle).  Arcs whose disc contains 0 are cut.
 
-In a band of the arm a modal model holds every pole that outlives a sample: to the right of a line Re s = -c and below
-Im s = top, the argument principle for the exact arm counts as many poles as the model has there.  All others of the
-band lie left of the line, slow real ones near -1/C and all: by Cauchy they add
+In a band of the arm a modal model has every pole that does not decay within a sample: to the right of a line Re s = -c
+and below Im s = top, the argument principle for the exact arm counts as many poles as the model has there.  All others
+of the band lie left of the line, also the real ones that accumulate at -1/C: by Cauchy they add
 
     x sum of (r/p) a/(z - b) = x/(2 pi i) times the integral over the edge of  G(s)/s e^{s (1-f) T}/(z - e^{sT}) ds
 
 to a pulse transfer function (letters as above), the edge being that line and the two that lead from its ends to
-Re s = -inf.  So its absolute values bound them on the whole unit circle.  Beyond the band nothing is known: there the
-undamped shear of this model has poles as near to the imaginary axis as one likes.
+Re s = -inf.  So its absolute values bound them on the whole unit circle.  Beyond the band stability is not determined:
+there the undamped shear of this model has poles arbitrarily near to the imaginary axis.
 """
 
 from __future__ import annotations
@@ -53,29 +53,28 @@ from tfarm.spectrum import modes
 from tfarm.spectrum.box import TOWARD_SINGULAR, Box, winding_number
 from tfarm.spectrum.naming import function_of
 
-MACHINE_EPS = float(np.finfo(float).eps)  # of a float64, times the counts of operations beside it
+MACHINE_EPS = float(np.finfo(float).eps)  # of a float64, to be multiplied by counts of operations
 ARCS = 64  # of half the circle to begin with
 SHORTEST_ARC = 1e-13  # rad: no arc is cut further, as its ends are known to a few last bits
 PIECES_OF_ARC = 4  # into which one is cut that is too long
 MOST_ARCS = 60_000  # a loop that takes more is not shown
-ON_IT = 1e-100  # stands for the distance from the circle of a pole on it: its disc is wide, and holds 0
+ON_IT = 1e-100  # distance from the circle of a pole on it: its disc is wide, and contains 0
 ROUNDINGS = 8  # of a factor of the law: of its root, of its middle, and of the products
 TERMS_AT_A_TIME = 1 << 19  # terms 1/(z - b) at a time, lest they leave the cache
 DECAYED_EXPONENT = 30.0  # e^-30 = 1e-13 is left over a sample of the poles on the line
-HIGHER = (2.0, 8.0, 32.0, 128.0, 512.0)  # times the last pole of the model: how far up no other is looked for
+HIGHER = (2.0, 8.0, 32.0, 128.0, 512.0)  # times the last pole of the model: heights up to which there may be no other
 ABOVE_MODEL = 1.02  # times the last pole of the model: the least height at which all of them are in the box
 FINER = 10  # times finer than the distance of the line from the axis: the first panel up that line
 NEAREST_LEFT, FARTHEST_LEFT = 0.01, 45.0  # of 1/remaining: panels along the top, until e^-45 = 3e-20 is left
 PANEL_ENDS = 40  # of panels, that are halved where quadratures differ: time alone
 SURE = 0.1  # by which two quadratures of an absolute value may differ; the larger counts, with as much again
-MOST_MIDPOINTS = 200_000  # of a quadrature: one that does not settle by then is not had
+MOST_MIDPOINTS = 200_000  # of a quadrature, which has not converged if that is not enough
 
 
 @dataclass(frozen=True)
 @record
 class Discs:
-    """Discs in the complex plane, `middle` and `radius` arrays of one shape; what is computed with them holds for every
-    point."""
+    """Discs in the complex plane, `middle` and `radius` arrays of one shape: results contain those of every point."""
 
     middle: Complex
     radius: Real
@@ -137,7 +136,10 @@ class Circle:
         self.parts = self._parts(self.low, self.high)
 
     def count(self, weights: Sequence[float]) -> int | None:
-        """Poles of the loop with these weights outside the circle, z = 1 of a free angle apart; None if not shown."""
+        """Return the number of poles outside the circle under these weights, without z = 1 of a free angle.
+
+        None if it is not certified.
+        """
         while True:
             F = self.characteristic(weights)
             rough = ~(abs(F.middle) > F.radius)
@@ -154,7 +156,7 @@ class Circle:
 
     @cached_property
     def terms(self) -> list[tuple[int, int, float, Complex]]:
-        """Of q, whose part and row are -1, and of each p_i: part, row of the signal, gain, roots less 1."""
+        """Part, row of the signal, gain and roots less 1 of q (part and row -1) and of each p_i."""
         return [(-1, -1, 1.0, self.loop.in_z.poles), *self.loop.in_z.terms]
 
     @cached_property
@@ -197,7 +199,7 @@ class Circle:
         held = Discs(sums.middle, sums.radius + self.missing[row]) + late.times(at_rest) + slow
         total = power(x, order) * held
         push = arcs.turned(0).times((1 - f) * T) + late.times(f * T)
-        if twice:  # then there is no 1/s beside it: of an arm that turns freely nothing at the hub is lost
+        if twice:  # then there is no 1/s: an arm that turns freely has no friction at the hub
             ramp = arcs.turned(0).times(pulse.ramps[0]) + late.times(pulse.ramps[1])
             total = total + ((push * late).times(T) + x * ramp).times(twice) * late
         elif once:
@@ -221,7 +223,7 @@ class Circle:
 
     @cached_property
     def is_slow(self) -> NDArray[np.bool_]:
-        """Which poles hardly decay in a sample, as that of friction at the hub."""
+        """Whether each pole hardly decays in a sample, as that of friction at the hub."""
         return np.asarray(self.kept & (abs(self.loop.plant.poles) * self.loop.chain.sampling.period < SLOW))
 
     def _sums(self, arcs: _Arcs) -> Discs:
@@ -232,7 +234,7 @@ class Circle:
         return self._summed(arcs, p, plant.residues[:, which] / p * np.exp(p * remaining))
 
     def _slow_sums(self, arcs: _Arcs) -> Discs:
-        """sum over slow poles of (r/p) (a - 1 + (b - a)/z)/(z - b), all that they give: discs (outputs, arcs)."""
+        """sum over slow poles of (r/p) (a - 1 + (b - a)/z)/(z - b), their whole share: discs (outputs, arcs)."""
         plant, sampling = self.loop.plant, self.loop.chain.sampling
         p, T, f = plant.poles[self.is_slow], sampling.period, sampling.fraction
         residues = plant.residues.copy()
@@ -244,7 +246,7 @@ class Circle:
 
     @cached_property
     def braked(self) -> int | None:
-        """Which pole is that of a hub that friction brings to rest, if it is slow and kept; None if there is none."""
+        """The pole of a hub that friction brings to rest, if it is slow and kept; else None."""
         found = self.loop.plant.braked(SLOW / self.loop.chain.sampling.period)
         return found if found is not None and self.is_slow[found] else None
 
@@ -294,15 +296,18 @@ def product(x: Discs, roots: Complex) -> Discs:
 
 
 def _to_the_axis(angle: float) -> float:
-    """The angle of a value from the real axis, on whichever side of 0 it lies."""
+    """The angle of a value from the nearer half of the real axis."""
     return angle - np.pi * round(angle / np.pi)
 
 
 @dataclass(frozen=True)
 @record
 class Band:
-    """The poles of a loop's plant in a band up to `top` [rad/s], `kept` (poles,), and the bound `missing` (outputs,) on
-    what the others of that band add to the pulse transfer functions, on the whole unit circle."""
+    """The poles `kept` (poles,) of a loop's plant in a band up to `top` [rad/s].
+
+    `missing` (outputs,) bounds the share of all other poles of that band in the pulse transfer functions, on the whole
+    unit circle.
+    """
 
     loop: Sampled
     top: float
@@ -311,24 +316,21 @@ class Band:
 
     @property
     def modes(self) -> int:
-        """The last flexible mode in it, which need not be the fastest: damping slows some down more than others."""
+        """The last flexible mode in it, which need not be the fastest, as damping slows modes down unequally."""
         return int(self.loop.plant.mode[abs(self.loop.plant.poles.imag) < self.top].max(initial=0))
 
     @cached_property
     def full(self) -> Sampled:
-        """The loop with all of them, or with one where there is none."""
+        """The loop with all modes of the band, and at least one."""
         return resized(self.loop, max(1, self.modes))
 
     def circle(self) -> Circle:
-        """The unit circle, on which poles outside are counted."""
+        """The unit circle, for counts of the poles outside."""
         return Circle(self.loop, self.kept, self.missing)
 
 
 def complete_band(loop: Sampled) -> Band | None:
-    """The highest band in which the loop's plant is complete; None where it cannot be shown to be.
-
-    Not without damping.
-    """
+    """Return the highest band in which the loop's plant is certified to be complete; None without one, as at C = 0."""
     plant, sampling = loop.plant, loop.chain.sampling
     C, remaining = plant.arm.damping, sampling.period * (1 - sampling.fraction)
     if C == 0.0:
@@ -343,7 +345,7 @@ def complete_band(loop: Sampled) -> Band | None:
 
 
 def _highest(loop: Sampled, line: float) -> float | None:
-    """The top of the highest box right of the line in which the exact arm has the plant's poles and no other."""
+    """The top of the highest box right of the line in which the exact arm has the plant's poles alone."""
     plant, function = loop.plant, function_of(modes(loop.plant.model.arm, 1).system)
     poles = np.r_[plant.poles[(plant.mode > 0) | (plant.poles.imag != 0)], plant.model.single]
     poles = poles[poles.real > -line]
@@ -371,7 +373,7 @@ def _highest(loop: Sampled, line: float) -> float | None:
 
 
 def _left_of(loop: Sampled, line: float, top: float) -> Real | None:
-    """The bound on all poles of the band left of the line; None where the integral cannot be had."""
+    """The bound on all poles of the band left of the line; None where the integral does not converge."""
     sampling, exact = loop.chain.sampling, loop.exact
     T, remaining = sampling.period, sampling.period * (1 - sampling.fraction)
 
@@ -392,7 +394,7 @@ def _graded(first: float, last: float) -> Real:
 
 
 def _integral(size: Callable[[Real], Real], ends: Real) -> Real | None:
-    """The integral (outputs,) of an absolute value by midpoints, halved until it stays; None if it never does."""
+    """The integral (outputs,) of an absolute value by midpoints, halved until it converges; None if it does not."""
     before: Real | None = None
     while ends.size < MOST_MIDPOINTS:
         values = size((ends[1:] + ends[:-1]) / 2) @ np.diff(ends)
@@ -403,7 +405,7 @@ def _integral(size: Callable[[Real], Real], ends: Real) -> Real | None:
 
 
 def _filter_factors(loop: Sampled, s: Complex) -> Complex:
-    """What the analog filter makes of each output: wc/(s + wc) or 1."""
+    """Transfer function of the analog filter of each output: wc/(s + wc) or 1."""
     corner = loop.chain.sampling.antialias_corner
     if np.isinf(corner):
         return np.ones((len(loop.analog), 1), complex)

@@ -1,10 +1,10 @@
-"""Where along a number of the law, or over two, the sampled loop changes its count of unstable poles.
+"""Changes of the count of unstable poles of a sampled loop along a number of the law, or over two.
 
 It is `tfarm.crossing` on the unit circle.
 
-On z = e^{iq} the characteristic function is A + g B, g one number of the law, or a factor on all of it, and A what is
-without it.  Each open-loop pole near the circle gives A and B a feature as narrow as its residue: so the grid in q is
-laid around each of them, geometrically, and A, B are computed from the offset to it, which loses nothing.  At z = 1 and
+On z = e^{iq} the characteristic function is A + g B, g one number of the law, or a factor on all of it, and A the terms
+without it.  Each open-loop pole near the circle gives A and B a feature as narrow as its residue.  So the grid in q has
+points at geometric distances around each, and A, B are computed without loss from the offset to it.  At z = 1 and
 z = -1 a single pole crosses (see also Ackermann, Robust Control, 1993, ch. 4).
 """
 
@@ -45,22 +45,22 @@ from tfarm.schema import Quantity
 from tfarm.spectrum.table import most_gain
 
 A_DECADE = 48  # grid points a decade of the distance to a pole
-NARROWEST_WIDTH = 1e-17  # rad, of a pole: closer to it no angle is told from another
+NARROWEST_WIDTH = 1e-17  # rad, of a pole: closer to it angles are not distinct
 WIDTH_SHARE = 1e-2  # of the distance of a pole from the circle: the grid begins so near to it
-BRIGHT = 1e-2  # poles and roots nearer to z = 0 leave nothing on the circle to resolve
-NO_EFFECT = 1e-12  # of what is there without a gain: what it adds, if less, is rounding of none
+BRIGHT = 1e-2  # poles and roots nearer to z = 0 have no narrow feature on the circle
+NO_EFFECT = 1e-12  # of the terms without a gain: smaller terms of the gain are rounding
 COARSEST = 2000  # points of the uniform grid over the half circle
-STILL = 1e-8  # of the way from z = 1 to the nearest pole of an arm that something holds: nearer than that it stands
-# still, its rate is rounding, and a gain on it would have to be so many times too large to move a pole
-LEAST_FACTOR = 1e-9  # on a law, that is looked at: with less it is none
+STILL = 1e-8  # of the way from z = 1 to the nearest pole of a held arm: nearer than that the rate of the arm is
+# rounding, and a gain on it would have to be 1e8 times too large to move a pole
+LEAST_FACTOR = 1e-9  # on a law, of those searched: with less it is none
 MOST_FACTOR = 1e9  # with more its gain is beyond any number
 MOST_GAINS = 4000  # of a map, along one gain
-ENDS_AT = (-0.9, 0.3, 0.9)  # K2 at which upright edges are looked for, of what balances a torque
+ENDS_AT = (-0.9, 0.3, 0.9)  # K2 at which upright edges are searched, times `input_per_torque`
 MOST_COLUMNS = 400  # of K1 in a picture
 OUTLINE_ROUNDS = 12  # of halving where its outline bends
-BESIDE_EDGE = 1e-9  # relative: so far to either side of such an edge a region is cut
+OFF_EDGE = 1e-9  # relative: distance to either side of such an edge at which a region is cut
 CLEAR_OF_CIRCLE = 1e-9  # of ln|z|: a pole nearer to the circle may be counted on either side
-GOLDEN = 0.6180339887498949  # of a range: a place that no rounded number of a person or a grid falls on
+GOLDEN = 0.6180339887498949  # of a range: a place on no rounded number and no grid
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class CircleGrid:
 
 
 def circle_grid(loop: Sampled) -> CircleGrid:
-    """The grid that resolves every pole of the plant and every pole and zero of the law, whatever its weights."""
+    """The grid that resolves every pole of the plant and every pole and zero of the law, for any weights."""
     grid = _plant_grid(loop)
     q, angles = [np.empty(0)], grid.q
     roots = 1 + np.r_[loop.in_z.poles, loop.in_z.zeros]
@@ -147,10 +147,9 @@ def geometric(edge: float, width: float) -> Real:
 
 
 def number_crossings(grid: CircleGrid, name: str, rows: Real) -> list[Crossings]:
-    """Where poles cross the circle, at angles `at`, as one number of the law runs over all its values; to rounding.
+    """Return the crossings of the circle, at angles `at`, along all values of one number of the law, to rounding.
 
-    The others are those of each of `rows` (lines, 1 + parts), as `Sampled.row`.  A gain at the hub runs as far as
-    `most_gain`.
+    The others are those of each of `rows` (lines, 1 + parts), as `Sampled.row`.  A gain at the hub ends at `most_gain`.
     """
     place = 1 + grid.loop.part(name)
     others, alone = np.array(rows), np.zeros(rows.shape[1])
@@ -161,7 +160,7 @@ def number_crossings(grid: CircleGrid, name: str, rows: Real) -> list[Crossings]
 
 
 def crossing_factors(loop: Sampled) -> Crossings:
-    """The positive factors on the law at which poles are on the circle, `at` which angle [rad a sample]."""
+    """Return the positive factors on the law with poles on the circle, `at` angles [rad a sample]."""
     whole, fed_back = loop.row.copy(), loop.row.copy()
     whole[1:], fed_back[0] = 0.0, 0.0
     (found,) = _crossed(circle_grid(loop), whole[None], fed_back)
@@ -172,8 +171,8 @@ def _crossed(grid: CircleGrid, others: Real, alone: Real) -> list[list[Crossing]
     """The crossings of A + g B as g grows along each of some lines, all solved for at once.
 
     A are the `terms` under the weights `others` (lines, 1 + parts) of each line, B those under `alone` (1 + parts,).
-    Each crossing is solved for by its angle from a pole next to it, down to its last bit.  At z = 1 and z = -1, where a
-    single pole crosses, h = Im(A conj B) vanishes: so it falls towards the end where it is positive just before.
+    Each crossing is solved for by its angle from the next pole, to the last bit.  At z = 1 and z = -1, where a single
+    pole crosses, h = Im(A conj B) vanishes: it falls towards that end where it is positive just before.
     """
     A, B = others @ grid.terms, alone @ grid.terms
     h = (A * B.conj()).imag
@@ -196,7 +195,7 @@ def _crossed(grid: CircleGrid, others: Real, alone: Real) -> list[list[Crossing]
             Crossing(_real_gain(complex(row @ at_end), complex(alone @ at_end)), math.pi, 1 if last >= 0 else -1)
         )
         lowest, at_one = _lowest(grid.loop.near_one(row))
-        if least <= lowest:  # A and B go there as the same power of x = 1 - 1/z, or A as a higher one: it is there at 0
+        if least <= lowest:  # A and B are of the same order in x = 1 - 1/z, or A is of a higher one: it crosses at 0
             static = _real_gain(at_one, moving) if least == lowest else 0.0
             here.append(Crossing(static, 0.0, -1 if first >= 0 else 1))
     return found
@@ -217,19 +216,18 @@ def _real_gain(A: complex, B: complex) -> float:
 
 
 def stable_windows(loop: Sampled, name: str) -> list[Window]:
-    """Every open interval of one number of the law in which the loop is stable, the others as they are, as its poles
-    confirm."""
+    """Return every stability interval of one number of the law, the others constant, confirmed by the poles."""
     (found,) = number_crossings(circle_grid(loop), name, loop.row[None])
     return confirmed(found, -math.inf, math.inf, lambda value: loop.having(**{name: value}).poles.is_stable)
 
 
 def stable_factors(loop: Sampled) -> list[Window]:
-    """Every open interval of positive factors on the law in which the loop is stable, as its poles confirm."""
+    """Return every stability interval of positive factors on the law, confirmed by the poles."""
     return confirmed(crossing_factors(loop), 0.0, math.inf, lambda factor: loop.times(factor).poles.is_stable)
 
 
 def around(windows: list[Window], gain: float) -> Window | None:
-    """The window that a gain lies in."""
+    """The interval that contains a gain."""
     return next((window for window in windows if window[0] < gain < window[1]), None)
 
 
@@ -287,11 +285,11 @@ class GainMap(PlaneOfCounts):
 def sampled_map(
     loop: Sampled, x: Sequence[float] | Real, y: Sequence[float] | Real, vary: tuple[str, str] = PLANE
 ) -> GainMap:
-    """The map over any two numbers of the law of a loop, x and y (both ascending), all others as those of the loop.
+    """Return the map over two numbers of the law of a loop, x and y (both ascending), all others constant.
 
-    `vary` names them as `Law.having` does, or "K1", "K2" and "Kp" of gains at the hub.  Of two gains of its parts the
-    edges are exact (D-decomposition), and along one of them for each value of any other number; of two others poles are
-    counted at every point.  Raises ConvergenceError where the crossings and a count by eigenvalues differ.
+    `vary` names them as `Law.having` does, or "K1", "K2" and "Kp" of gains at the hub.  The edges are exact
+    (D-decomposition) for two gains of its parts, and along such a gain for each value of any other number.  For two
+    others poles are counted at every point.  Raises ConvergenceError where crossings and a count by eigenvalues differ.
     """
     x, y = ascending(vary[0], x, 1, MOST_GAINS), ascending(vary[1], y, 1, MOST_GAINS)
     across, up = (loop.place(name) for name in vary)
@@ -329,15 +327,15 @@ def _map_of_gains(loop: Sampled, x: Real, y: Real, vary: tuple[str, str]) -> Gai
         is_clear = abs(corner.poles.log_radius).min() >= CLEAR_OF_CIRCLE  # else on an edge, or too close to it
         if is_clear and (count := corner.poles.unstable) != plane.unstable[i, j]:
             where = ", ".join(f"{name} = {corner.number(name):g}" for name in vary)
-            message = f"at {where} the crossings count {plane.unstable[i, j]} growing poles, not {count}"
+            message = f"at {where} crossings count {plane.unstable[i, j]} unstable poles, eigenvalues {count}"
             raise ConvergenceError(message, plane, abs(count - int(plane.unstable[i, j])))
     return plane
 
 
 def rounded_map(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainMap:
-    """The same region at more values of K1, until its outline has no corner in a picture that the region has not.
+    """Return the same region at more values of K1, until the corners of its drawn outline are those of the region.
 
-    `drawn` says where points of the plane are in the picture, 1 high.
+    `drawn` maps points of the plane to the picture, 1 high.
     """
     for _ in range(OUTLINE_ROUNDS):
         more = loose_columns(plane.x, pieces(plane.x, plane.stable_intervals), drawn)
@@ -348,7 +346,7 @@ def rounded_map(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainM
 
 
 def with_more(plane: GainMap, x: Real) -> GainMap:
-    """The map with further values across, of those that it has not."""
+    """The map with further values across."""
     fresh = np.setdiff1d(x, plane.x)
     if not fresh.size:
         return plane
@@ -361,17 +359,17 @@ def with_more(plane: GainMap, x: Real) -> GainMap:
 
 
 def ends_of_K1(loop: Sampled) -> Real:
-    """Where stable intervals of K1 end, but at 0, at a few K2: there the region has upright edges."""
+    """Ends of stability intervals of K1 at a few K2, without 0: upright edges of the region."""
     unit = loop.plant.arm.input_per_torque
     found = [window for K2 in ENDS_AT for window in stable_windows(loop.having(K2=unit * K2), "K1")]
     return np.array(sorted({end for window in found for end in window if math.isfinite(end) and end}))
 
 
 def with_both_sides(K1: Real, ends: Real) -> Real:
-    """Values of K1 ascending, and among them either side of each upright edge."""
-    return np.unique(np.concatenate([K1, ends * (1 - BESIDE_EDGE), ends * (1 + BESIDE_EDGE)]))
+    """Values of K1, ascending, with both sides of each upright edge."""
+    return np.unique(np.concatenate([K1, ends * (1 - OFF_EDGE), ends * (1 + OFF_EDGE)]))
 
 
 def _off_the_edge(values: Real) -> float:
-    """A gain inside the range that no rounded edge falls on."""
+    """A gain inside the range that is on no rounded edge."""
     return float(values[0] + GOLDEN * (values[-1] - values[0])) if values.size > 1 else float(values[0])

@@ -1,19 +1,19 @@
-"""A law in s made one in z, by a rule that is named: Tustin's (with prewarping), zero-order hold, or matched roots.
+"""Discretisation of a law in s: Tustin's rule (with prewarping), zero-order hold, or matched poles and zeros.
 
-    tustin   s = c (z - 1)/(z + 1),  c = 2/T, or w0/tan(w0 T/2) where the values at w0 are to be kept
-    zoh      what the law makes of signals that are held between the samples
+    tustin   s = c (z - 1)/(z + 1),  c = 2/T, or w0/tan(w0 T/2) with the exact values at w0
+    zoh      the response of the law to signals that are held between the samples
     matched  every pole and zero s becomes e^{sT}, with the same value at rest
 
-A law in z is taken as it is.  All the delay of a law stays a delay.  (Franklin, Powell and Workman, Digital Control of
-Dynamic Systems, 1998, ch. 6.)
+A law in z is not changed, nor is a delay.  (Franklin, Powell and Workman, Digital Control of Dynamic Systems, 1998,
+ch. 6.)
 
 For the characteristic function a law is kept as factors in delta = z - 1, from the numbers that were given:
 
     p_i = g prod(delta - zeros),  q = prod(delta - poles)
 
 The coefficients of a law of high order are products of roots next to z = 1, and rounding loses those.  So the roots are
-those of the given numbers (`tfarm.exact.rationals`), and an integrator is one that is 0.  A hub rate that a chain
-has as the filtered difference of the encoder is (1 - a)/T (z - 1)/(z - a) times the angle, a part of the law.
+those of the given numbers (`tfarm.exact.rationals`), and an integrator has the root 0.  The filtered difference of the
+encoder, where a chain estimates the hub rate, is (1 - a)/T (z - 1)/(z - a) times the angle, a part of the law.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import AT_HUB, GAINS, MOMENT_GAIN, AnyLaw, Arm, HubFeedback, must_not_be_algebraic
+from tfarm.arm import MOMENT_GAIN, AnyLaw, Arm, as_law, full_law, must_not_be_algebraic
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace
 from tfarm.arm.law import Law, Part, is_measured
 from tfarm.arrays import Complex, Real
@@ -37,18 +37,18 @@ from tfarm.records import record
 from tfarm.spectrum.table import check_gains
 
 SAME_PERIOD = 1e-9  # relative: 1/100 s in two files may differ in its last digits
-VANISHED = 1e-12  # of its terms: what several signals give together where they cancel
+VANISHED = 1e-12  # of its terms: a sum over several signals that cancel
 NONE = np.empty(0, complex)
 
 
 def discretised(law: Law, period: float) -> Law:
-    """The law in z with this period [s].
+    """Return the law in z with this period [s].
 
-    Raises ParameterError for a law in z with another period, and for what its rule cannot take.
+    Raises ParameterError for a law in z with another period, and for a law that its rule is not defined for.
     """
     if law.period is not None:
         if abs(law.period - period) > SAME_PERIOD * period:
-            remedy = f"the law's period is {law.period:g} s and the chain samples every {period:g} s; make them one"
+            remedy = f"the period of the law is {law.period:g} s, that of the chain {period:g} s; make them equal"
             raise ParameterError(key="period", value=law.period, remedy=remedy)
         return law
     if law.prewarp and (law.rule != "tustin" or law.prewarp * period >= math.pi):
@@ -59,20 +59,18 @@ def discretised(law: Law, period: float) -> Law:
 
 
 def rule_in_words(law: Law) -> str:
-    """How a law comes to be one in z."""
+    """Discretisation of a law, in words."""
     if law.is_discrete:
-        return "in z, taken as it is"
-    if law.rule == "tustin" and law.prewarp:
-        return f"made discrete by Tustin's rule, exact at {law.prewarp:g} rad/s"
-    words = {"tustin": "Tustin's rule", "zoh": "zero-order hold", "matched": "matched poles and zeros"}
-    return f"made discrete by {words[law.rule]}"
+        return "in z, as given"
+    names = {"tustin": "Tustin's rule", "zoh": "zero-order hold", "matched": "matched poles and zeros"}
+    return f"discretised by {names[law.rule]}{f', exact at {law.prewarp:g} rad/s' if law.prewarp else ''}"
 
 
 def _in_z(part: Part, law: Law, period: float) -> LawBlock:
     """A block of the law in z."""
     block, key = part.block, f"law.{part.signals[0]}.num"
     if block.excess > 0 and law.rule != "tustin":
-        remedy = f"the rule {law.rule} makes nothing of a law that differentiates: add a pole to den, or take tustin"
+        remedy = f"the rule {law.rule} is not for a law that differentiates: add a pole to den, or take tustin"
         raise ParameterError(key=key, value=law.name, remedy=remedy)
     if not block.order and block.excess <= 0:
         return block
@@ -87,13 +85,13 @@ def _in_z(part: Part, law: Law, period: float) -> LawBlock:
 
 
 def tustin(block: LawBlock, period: float, prewarp: float = 0.0) -> LawBlock:
-    """The block with s = c (z - 1)/(z + 1).  Raises ParameterError where it has a pole at s = c."""
+    """Return the block with s = c (z - 1)/(z + 1).  Raises ParameterError where it has a pole at s = c."""
     c = prewarped(period, prewarp)
     if isinstance(block, Rational) and block.excess > 0:
         return substituted(block, c)
     A = block.matrices()[0]
     if np.linalg.cond(np.eye(len(A)) - A / c) > 1 / np.finfo(float).eps:
-        remedy = f"the law has a pole at {c:g} 1/s, which this rule sends to infinity; take another rule or period"
+        remedy = f"the law has a pole at {c:g} 1/s, which this rule maps to infinity; take another rule or period"
         raise ParameterError(key="rule", value="tustin", remedy=remedy)
     return by_scipy(block, 2 / c, "bilinear")
 
@@ -104,14 +102,14 @@ def prewarped(period: float, prewarp: float) -> float:
 
 
 def by_scipy(block: LawBlock, period: float, rule: Literal["zoh", "bilinear"]) -> StateSpace:
-    """The block in z by a rule of `scipy.signal.cont2discrete`: "zoh" of signals that are held, or "bilinear"."""
+    """The block in z by a rule of `scipy.signal.cont2discrete`."""
     from scipy.signal import cont2discrete  # here, because it takes a while to load
 
     return StateSpace(*cont2discrete(block.matrices(), period, rule)[:4])
 
 
 def matched(block: Rational, period: float) -> Rational:
-    """Poles and zeros at e^{sT}; at rest both go the same way, as the same power of s and of (z - 1)/T."""
+    """The ratio with poles and zeros at e^{sT}; at rest both have the same power of s and of (z - 1)/T."""
     num, zeros, at_zero = _roots(block.num, period)
     den, poles, integrators = _roots(block.den, period)
     gain = num / den * np.prod(1 - poles).real / np.prod(1 - zeros).real * period ** (integrators - at_zero)
@@ -120,16 +118,16 @@ def matched(block: Rational, period: float) -> Rational:
 
 
 def _roots(polynomial: tuple[float, ...], period: float) -> tuple[float, NDArray[np.complex128], int]:
-    """The lowest coefficient that is not 0, e^{sT} of the roots other than 0, and how many are 0."""
+    """The lowest coefficient that is not 0, e^{sT} of the roots other than 0, and the number of roots 0."""
     coefficients = np.trim_zeros(np.array(polynomial), "b")
     if not coefficients.size:
-        return 0.0, np.empty(0, complex), 0
+        return 0.0, NONE, 0
     roots = np.exp(np.roots(coefficients).astype(complex) * period)
     return float(coefficients[-1]), roots, len(polynomial) - coefficients.size
 
 
 def substituted(block: Rational, c: float) -> Rational:
-    """The ratio of polynomials with s = c (z - 1)/(z + 1), small coefficients kept as they are."""
+    """The ratio of polynomials with s = c (z - 1)/(z + 1), without loss of small coefficients."""
     n = max(len(block.num), len(block.den)) - 1
 
     def of(polynomial: tuple[float, ...]) -> Real:
@@ -144,32 +142,34 @@ def substituted(block: Rational, c: float) -> Rational:
     return Rational(tuple(of(block.num)), tuple(of(block.den)))
 
 
-# ------------------------------------------------------------ the law as the computer has it
+# ------------------------------------------------------------ the law in the computer
 
 
 def with_all_gains(arm: Arm, law: AnyLaw) -> Law:
-    """The law, of gains at the hub with a part for each of them, those that are 0 too.
+    """Return the law; gains at the hub that follow all their references with a part for each gain, also for 0.
 
-    Raises ParameterError for the loop that does not exist, I_h = 0 and K2 != 0, and for a gain that is absurdly large.
+    Raises ParameterError for the algebraic loop, I_h = 0 and K2 != 0, and for a gain that is too large.
     """
-    if not isinstance(law, HubFeedback):
+    law = as_law(law)
+    gains = law.gains if set(law.signals) <= set(law.references) else None
+    if gains is None:
         return law
-    if law.K2:
-        must_not_be_algebraic(arm, MOMENT_GAIN, law.K2)
-    check_gains(arm, law)
-    return Law({gain.output: law[gain.name] for gain in GAINS}, name="gains at the hub", references=AT_HUB)
+    if gains.K2:
+        must_not_be_algebraic(arm, MOMENT_GAIN, gains.K2)
+    check_gains(arm, gains)
+    return full_law(law)
 
 
 def acting_law(arm: Arm, law: Law, chain: Chain) -> tuple[Law, Chain]:
-    """The law in z, and the chain with its delay.
+    """Return the law in z, and the chain with its delay.
 
-    Raises ParameterError for a delay that is too long, for what `discretised` refuses, and for a massless hub whose
-    moment is fed back (an algebraic loop).
+    Raises ParameterError for a delay that is too long, for a massless hub whose moment is fed back (an algebraic loop),
+    and as `discretised` does.
     """
     T = chain.sampling.period
     samples = chain.sampling.delay_samples + law.delay / T
     if samples > MOST_DELAY:
-        remedy = f"with the chain's delay that is {samples:.4g} samples; at most {MOST_DELAY:g}"
+        remedy = f"with the delay of the chain it is {samples:.4g} samples; at most {MOST_DELAY:g}"
         raise ParameterError(key="delay", value=law.delay, remedy=remedy)
     if "root_moment" in law.signals and law.part_gains.get("root_moment", (0, 1.0))[1]:
         must_not_be_algebraic(arm, "signals", "root_moment")
@@ -178,7 +178,7 @@ def acting_law(arm: Arm, law: Law, chain: Chain) -> tuple[Law, Chain]:
 
 
 def with_estimate(law: Law, chain: Chain) -> Law:
-    """The law in z with the difference of the encoder in it, where the chain makes the hub's rate so."""
+    """The law in z, with the filtered difference of the encoder where the chain estimates the hub rate by it."""
     if chain.converters.hub_rate != "difference" or "hub_rate" not in law.signals:
         return law
     T = chain.sampling.period
@@ -187,7 +187,7 @@ def with_estimate(law: Law, chain: Chain) -> Law:
 
 
 def _differenced(part: Part, a: float, T: float) -> Part:
-    """A part of a law with its columns of the hub's rate led to the hub's angle."""
+    """A part of a law with its columns of the hub rate replaced by columns of the hub angle."""
     if "hub_rate" not in part.signals:
         return part
     signals = tuple("hub_angle" if name == "hub_rate" else name for name in part.signals)
@@ -214,7 +214,7 @@ def _differenced(part: Part, a: float, T: float) -> Part:
 @dataclass(frozen=True)
 @record
 class Column:
-    """g prod(delta - zeros): what a part of a law multiplies a signal by, times the part's denominator."""
+    """g prod(delta - zeros): the entry of a part of a law for a signal, times the part's denominator."""
 
     signal: str
     gain: float
@@ -233,7 +233,7 @@ class PartFactors:
 @dataclass(frozen=True)
 @record
 class LawInZ:
-    """The parts of a law as they act, with the sign of u = -sum, over `signals`: factors, and states.
+    """The parts of a law in z, with the sign of u = -sum, over `signals`: factors, and states.
 
     `matrices`: A, B of x_{k+1} = A x_k + B y_k, and a row of C and of D for each part.
     """
@@ -254,15 +254,13 @@ class LawInZ:
 
     @cached_property
     def terms(self) -> list[tuple[int, int, float, Complex]]:
-        """Of each column its part, the row of its signal, and gain and zeros of p_i, the poles of other parts too."""
+        """Part, row of the signal, gain and zeros of p_i for each column; the poles of other parts are zeros too."""
+        poles = [each.poles for each in self.parts]
         return [
-            (n, self.signals.index(each.signal), each.gain, np.concatenate([each.zeros, *self._others(n)]))
+            (n, self.signals.index(each.signal), each.gain, np.concatenate([each.zeros, *poles[:n], *poles[n + 1 :]]))
             for n, part in enumerate(self.parts)
             for each in part.columns
         ]
-
-    def _others(self, part: int) -> list[Complex]:
-        return [each.poles for n, each in enumerate(self.parts) if n != part]
 
     def under(self, weights: Sequence[float]) -> Matrices:
         """States of the law with a factor on each part."""
@@ -271,7 +269,7 @@ class LawInZ:
         return A, B, row @ C, row @ D
 
     def ignores(self, turned: Mapping[str, float], weights: Sequence[float]) -> bool:
-        """Whether it comes to rest, and does nothing, where its signals stay at such values."""
+        """Whether its output tends to 0 where its signals stay at these values."""
         out = []
         for part, weight in zip(self.parts, weights, strict=True):
             held, below = lowest_power(part.poles)
@@ -295,7 +293,7 @@ def lowest_power(roots: Complex) -> tuple[int, float]:
 
 
 def law_in_z(law: Law, acting: Law, chain: Chain) -> LawInZ:
-    """The parts of a law as it was given, `acting` in z, at the period of a chain that may estimate the hub's rate."""
+    """The parts of a law, and of the same in z (`acting`), at the period of a chain that may estimate the hub rate."""
     acting = with_estimate(acting, chain)
     alone = [acting.weighted(row).matrices() for row in np.eye(len(acting.parts)).tolist()]
     (A, B, _, _), C, D = alone[0], *(np.vstack([each[n] for each in alone]) for n in (2, 3))

@@ -1,8 +1,8 @@
-"""How far a sampled loop is from its edges, in each number of its law, in delay and in damping, and with what digits.
+"""Limits of stability of a sampled loop, in each number of its law, in delay and in damping, with certified digits.
 
-A number printed with n digits stands for an interval.  It is settled where the loop is proven stable at the one end of
-it and unstable at the other, for every mode of the band.  Where that cannot be shown the number holds for the first N
-modes, and those digits are kept that a loop with twice as many (or half as many, of many) confirms in the same way.
+A number printed with n digits is an interval.  It is certified where the loop is certified stable at one end of it and
+unstable at the other, for every mode of the band.  Else the number is converged for the first N modes, with the digits
+that a loop of twice as many (or half as many, of many) confirms in the same way.
 """
 
 from __future__ import annotations
@@ -30,43 +30,43 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.table import first_frequency
 
-LONGEST_DELAY_SAMPLES = 20.0  # samples: the delay margin is looked for up to here
+LONGEST_DELAY_SAMPLES = 20.0  # samples: end of the search of a delay margin
 MOST_STEPS = 2000  # of a scan of the delay
-LONGEST_SCAN_STEP, STEPS_A_TURN = 0.05, 12  # samples, and steps in a turn of the fastest mode that may be driven
-PUSH_ROOM = 4  # times what the feedback pushes a pole by to first order: what damps itself more than that is not driven
-DELAY_KNOWN = 1e-10  # samples: to so much a delay margin is solved for
-CLEARLY = 1e-6  # within the circle: an eigenvalue there is not polished, as even a double one is right to 1e-7
-KEPT_BEYOND = 2  # modes kept beyond the last one that outlives a sample
-MODES_BEYOND = 4  # those of a whole loop that do not outlive a sample
+LONGEST_SCAN_STEP, STEPS_A_TURN = 0.05, 12  # samples, and steps in a turn of the fastest mode that may be unstable
+PUSH_ROOM = 4  # times the first-order shift of a pole by the feedback: a mode with more damping stays stable
+DELAY_KNOWN = 1e-10  # samples: tolerance of a delay margin
+CLEARLY = 1e-6  # within the circle: an eigenvalue there is not polished, as even a double one has an error of 1e-7
+KEPT_BEYOND = 2  # modes kept beyond the last one that does not decay within a sample
+MODES_BEYOND = 4  # those of a whole loop that decay within a sample
 MOST_LOOP_MODES = 128  # of a whole loop: half a second of work
 SURELY_OVERDAMPED = 2.5  # C w from which on a mode surely is: following it further costs a hundred times as much
-FAR_BEYOND = 5.0  # of critical in the first mode: all poles of bending lie left of any line, one mode shows it as well
-STRONGEST = 0.15  # of critical in the first mode: no stronger damping is looked at
-DAMPING_MODES = 40  # of the loop in which a required damping is looked for, where no number is said
+FAR_BEYOND = 5.0  # of critical in the first mode: all poles of bending lie left of any line, one mode is enough
+STRONGEST = 0.15  # of critical in the first mode: the largest damping of the search
+DAMPING_MODES = 40  # of the loop in which a required damping is searched, by default
 DAMPING_DECADES = 16  # down from there
 DAMPING_XTOL, DAMPING_RTOL, MADE_SURE = 1e-7, 4e-7, 1e-6  # relative: C is solved for to the first two, then raised
 NUDGES = (0.0, 1e-6, -1e-6)  # of C, tried in turn where two damped modes are one at it
-MOST_EDGE_MODES = 64  # edges are not looked for with more modes
-GAIN_DIGITS, OTHER_DIGITS = 6, 4  # that are printed where all are settled
-TOLD_FROM_ZERO = 1e-6  # of a window's other edge: what an edge at 0 is told from
+MOST_EDGE_MODES = 64  # of loops in which edges are searched
+GAIN_DIGITS, OTHER_DIGITS = 6, 4  # that are printed where all are certified
+DISTINCT_FROM_ZERO = 1e-6  # of the other edge of an interval: distance from 0 at which an edge at 0 is tested
 
-Proof = tuple[bool | None, float]  # whether a loop is stable (None: not shown), and in which band [rad/s] that is shown
+Proof = tuple[bool | None, float]  # whether a loop is stable (None: not shown), and the band [rad/s] of that proof
 Test = Callable[[float], Proof]
 
 
 @dataclass(frozen=True)
 @record
 class DelayMargin:
-    """`samples` of further delay that the loop bears; `is_bound` where none up to there makes it unstable."""
+    """The smallest destabilising delay in `samples`; `is_bound` where no delay up to there destabilises the loop."""
 
     samples: float
     is_bound: bool
 
 
 def delay_margin(loop: Sampled) -> DelayMargin:
-    """How many samples of further delay, any fraction, until a stable loop is stable no more; 0 if it is not stable.
+    """Return the delay margin in samples, any fraction; 0 of an unstable loop.
 
-    Scanned finely enough for the fastest mode that the loop can drive unstable, then bisected to 1e-10.
+    The step of the scan resolves the fastest mode that may become unstable; the margin is then solved for to 1e-10.
     """
     now = loop.chain.sampling.delay_samples
 
@@ -82,7 +82,7 @@ def delay_margin(loop: Sampled) -> DelayMargin:
         return DelayMargin(0.0, False)
     plant, T = loop.plant, loop.chain.sampling.period
     reach = PUSH_ROOM * loop.push * abs(held_amplitude(plant.poles, T))
-    risky = (reach > -plant.poles.real * T) & (plant.poles.imag > 0)  # whose own damping the feedback could outweigh
+    risky = (reach > -plant.poles.real * T) & (plant.poles.imag > 0)  # the feedback may exceed their own damping
     fastest = (plant.poles.imag[risky] * T).max(initial=np.pi / 4)
     step = float(min(LONGEST_SCAN_STEP, 2 * np.pi / fastest / STEPS_A_TURN))  # samples
     for i in range(1, MOST_STEPS + 1):
@@ -96,18 +96,17 @@ def delay_margin(loop: Sampled) -> DelayMargin:
 
 
 def required_damping(arm: Arm, law: AnyLaw, chain: Chain, *, count: int = DAMPING_MODES) -> float:
-    """The smallest C [s] from which on the loop of this law is stable on this arm (its own C is set aside).
+    """Return the smallest C [s] from which on the loop of this law is stable on this arm (without its own C).
 
-    0 where it is stable without damping, inf where none up to 15 % of critical in the first mode helps.
+    0 where it is stable without damping, inf where it is unstable up to 15 % of critical in the first mode.
     """
     return damping_edge(sampled_loop(arm.elastic, law, chain, count=count))
 
 
 def damping_edge(loop: Sampled) -> float:
-    """`required_damping` of an undamped loop, with its number of modes.
+    """Return the `required_damping` of an undamped loop, with its number of modes, to 1e-6.
 
-    Every decade is looked at from the strongest C down, so that larger ones on that grid are stable too; the edge is
-    found to 1e-6.
+    Decades are searched from the strongest C down, so that larger ones on that grid are stable too.
     """
 
     @cache
@@ -131,7 +130,7 @@ def damping_edge(loop: Sampled) -> float:
 def log_radius_with(loop: Sampled, C: float, count: int) -> float:
     """The log spectral radius at C; where two damped modes are one there, at a C that differs by 1e-6.
 
-    Modes that a strong C has settled before the next sample, or overdamped, are left to the remainder, but for a few.
+    Modes that decay within a sample, or are overdamped, are in the remainder, but for a few.
     """
     arm = loop.plant.arm
     outliving = min(alive(arm.having(damping=C), loop.chain), modes_below(arm, SURELY_OVERDAMPED / C))
@@ -147,15 +146,15 @@ def log_radius_with(loop: Sampled, C: float, count: int) -> float:
 
 
 def alive(arm: Arm, chain: Chain) -> int:
-    """How many bending modes of a damped arm outlive the rest of a sample: C w^2 T (1 - f)/2 below 40."""
+    """Number of bending modes of a damped arm that do not decay within a sample: C w^2 T (1 - f)/2 below 40."""
     remaining = chain.sampling.period * (1 - chain.sampling.fraction)
     return modes_below(arm, math.sqrt(2 * FORGOTTEN / (arm.least_damping * remaining)))
 
 
 def most_modes(arm: Arm, chain: Chain) -> int:
-    """The most that a loop has: of a damped arm those that outlive a sample and ring, and a few; never more than 128.
+    """Largest number of modes of a loop: of a damped arm those that ring longer than a sample, and a few; at most 128.
 
-    What is overdamped has its slow poles beside -1/C, where the remainder has them too.
+    Overdamped modes have their slow poles next to -1/C, where those of the remainder are too.
     """
     if not arm.least_damping:
         return MOST_LOOP_MODES
@@ -164,10 +163,7 @@ def most_modes(arm: Arm, chain: Chain) -> int:
 
 
 def whole_loop(arm: Arm, law: AnyLaw, chain: Chain) -> Sampled:
-    """The loop of a damped arm with every mode that outlives a sample and a few, or the first 128.
-
-    With one where the first is far overdamped.
-    """
+    """Return the loop of a damped arm with `most_modes`, or with one mode where that is far overdamped."""
     criticals = arm.damping * first_frequency(arm) / 2
     most = most_modes(arm, acting_law(arm, with_all_gains(arm, law), chain)[1])
     return sampled_loop(arm, law, chain, count=1 if criticals > FAR_BEYOND else max(1, most))
@@ -176,7 +172,7 @@ def whole_loop(arm: Arm, law: AnyLaw, chain: Chain) -> Sampled:
 @dataclass(frozen=True)
 @record
 class Figure:
-    """A number with as many significant `digits` as hold: proven up to `band` [rad/s], or for the first `modes` modes.
+    """A number with its significant `digits`: certified up to `band` [rad/s], or converged for the first `modes` modes.
 
     One of `band` and `modes` is None.
     """
@@ -188,16 +184,16 @@ class Figure:
 
     @property
     def is_settled(self) -> Annotated[bool, Quantity("certified", key="certified")]:
-        """Whether it is proven in a band."""
+        """Whether it is certified in a band."""
         return self.band is not None
 
     def is_sharp(self, digits: int) -> bool:
-        """Whether it is proven in that many."""
+        """Whether that number of digits is certified."""
         return self.is_settled and (self.digits >= digits or self.value == 0.0)
 
     @property
     def text(self) -> Annotated[str, Quantity("in these digits")]:
-        """The number in these digits; "?" where not one holds."""
+        """The number in these digits; "?" where there are none."""
         if self.value == 0.0 or math.isinf(self.value):
             return f"{self.value:g}"
         return f"{self.value:.{self.digits}g}" if self.digits else "?"
@@ -211,18 +207,18 @@ Interval = tuple[Figure, Figure]  # both edges of a stable interval
 
 
 def figure(value: float, digits: int, modes: int, proven: Test, other: Test, *, below: bool, spare: float) -> Figure:
-    """A value at which stability turns, a loop being stable `below` it, or above.
+    """Return a limit of stability, with a loop stable `below` it or above, and its significant digits.
 
-    With the most digits that are `proven` (two at least), or else that hold in the `other` loop too; a 0 is tried so
-    far, `spare`, from 0.
+    These are the most digits that are `proven` (at least two), or else that the `other` loop confirms.  An edge at 0 is
+    tested at the distance `spare` from 0.
     """
 
     def most(test: Test, least: int) -> tuple[int, float]:
-        """So many digits that hold, and in which band; by bisection, as an interval of fewer holds that of more."""
+        """The most digits that pass, and their band; by bisection, as intervals of fewer digits contain the others."""
 
         @cache
         def turns(number: int) -> float:
-            """The band in which the loop is stable at one end of these digits' interval, not at the other; 0: none."""
+            """The band in which the loop is stable at one end of the interval of these digits alone; 0: none."""
             if math.isinf(value):
                 return 0.0
             rounded = float(f"{value:.{number}g}")
@@ -245,7 +241,7 @@ def figure(value: float, digits: int, modes: int, proven: Test, other: Test, *, 
 
 
 def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]:
-    """The stable intervals of a number, with more modes than the loop's until they are proven to the last digit."""
+    """Return the stability intervals of a number, with more and more modes until all digits are certified."""
     circle, found = None if band is None else band.circle(), []
     for each in _sizes(loop, band, MOST_EDGE_MODES):
         found = _windows(each, band, circle, name)
@@ -255,7 +251,7 @@ def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]
 
 
 def _sizes(loop: Sampled, band: Band | None, most: int) -> Iterator[Sampled]:
-    """The loop, at most MOST_EDGE_MODES of its modes, and where anything can be proven with 2, 4 ... times as many."""
+    """The loop with at most MOST_EDGE_MODES of its modes, and in a certified band with 2, 4 ... times as many."""
     loop = loop if loop.plant.count <= MOST_EDGE_MODES else resized(loop, MOST_EDGE_MODES)
     yield loop
     most = min(most, _most(loop)) if band is not None else 0
@@ -267,29 +263,25 @@ def _sizes(loop: Sampled, band: Band | None, most: int) -> Iterator[Sampled]:
 
 
 def _windows(loop: Sampled, band: Band | None, circle: Circle | None, name: str) -> list[Interval]:
-    """The intervals of this very loop."""
+    """The stability intervals of a loop with its own number of modes."""
     other = _with_others(loop)
 
     def proof(value: float) -> Proof:
         count = None if circle is None else circle.count(loop.having(**{name: value}).weights)
         return None if count is None else count == 0, 0.0 if band is None else band.top
 
+    def confirmed(value: float) -> Proof:
+        return other().having(**{name: value}).poles.is_stable, math.inf
+
     def edge(value: float, opposite: float, *, below: bool) -> Figure:
-        return figure(
-            value, GAIN_DIGITS, loop.plant.count, proof,
-            lambda each: (other().having(**{name: each}).poles.is_stable, math.inf),
-            below=below, spare=_near_zero(opposite),
-        )  # fmt: skip
+        spare = DISTINCT_FROM_ZERO * (abs(opposite) if opposite and math.isfinite(opposite) else 1.0)
+        return figure(value, GAIN_DIGITS, loop.plant.count, proof, confirmed, below=below, spare=spare)
 
     return [(edge(low, high, below=False), edge(high, low, below=True)) for low, high in stable_windows(loop, name)]
 
 
-def _near_zero(other: float) -> float:
-    return TOLD_FROM_ZERO * (abs(other) if other and math.isfinite(other) else 1.0)
-
-
 def _with_others(loop: Sampled) -> Callable[[], Sampled]:
-    """The loop with another number of modes to compare with, made when first asked for."""
+    """The loop with another number of modes to compare with, made at its first use."""
     return cache(lambda: resized(loop, another(loop.plant.count, _most(loop))))
 
 
@@ -299,7 +291,7 @@ def another(count: int, most: int) -> int:
 
 
 def _most(loop: Sampled) -> int:
-    """The most that edges are looked for with: what a sample leaves nothing of is hard to follow and adds nothing."""
+    """Largest number of modes of a search of edges: modes that decay within a sample add nothing."""
     return min(MOST_EDGE_MODES, most_modes(loop.plant.arm, loop.chain))
 
 
@@ -311,7 +303,7 @@ def _proof_of(loop: Sampled) -> Proof:
 
 
 def shown_delay(loop: Sampled, band: Band | None) -> tuple[DelayMargin, Figure]:
-    """The delay margin, and its samples as a figure, with more modes until it is proven to the last digit."""
+    """Return the delay margin, and its samples as a figure, with more and more modes until all digits are certified."""
     found = DelayMargin(0.0, False), Figure(0.0, 0, None, 0)
     for each in _sizes(loop, band, MOST_EDGE_MODES // 2):
         found = _delay(each, band)
@@ -321,7 +313,7 @@ def shown_delay(loop: Sampled, band: Band | None) -> tuple[DelayMargin, Figure]:
 
 
 def _delay(loop: Sampled, band: Band | None) -> tuple[DelayMargin, Figure]:
-    """The delay margin of this very loop; the 0 of one that is unstable is as settled as its verdict."""
+    """The delay margin of a loop with its own number of modes; 0 is as certain as the verdict that it is unstable."""
     margin, now, modes = delay_margin(loop), loop.chain.sampling.delay_samples, loop.plant.count
     if margin.samples == 0.0:
         return margin, Figure(0.0, OTHER_DIGITS, band.top if band else None, None if band else modes)
@@ -339,9 +331,9 @@ def _delay(loop: Sampled, band: Band | None) -> tuple[DelayMargin, Figure]:
 
 
 def shown_damping(loop: Sampled, count: int) -> Figure:
-    """The damping from which on a loop is stable, looked for with so many modes, as a figure [s]."""
+    """Return the damping [s] from which on a loop is stable, as a figure, by a search with `count` modes."""
     count = min(count, MOST_EDGE_MODES)
-    bare, law = loop.on(loop.plant.arm.elastic, count), replace(loop.given, delay=0.0)  # which is in the chain's
+    bare, law = loop.on(loop.plant.arm.elastic, count), replace(loop.given, delay=0.0)  # that is in the chain
     C = damping_edge(bare)
     if C == 0.0:
         return Figure(C, OTHER_DIGITS, None, count)

@@ -1,8 +1,7 @@
 """The compiled heart of the simulation: exact steps of the modal amplitudes between the samples, and the linear law.
 
-All compiled functions stand in this one file, for numba's cache does not notice an edited callee elsewhere.  What they
-share goes by name in tuples that numba knows: a `Model` of the arm, the `State` that moves, the `Forcing` of a
-scenario and the `Electronics` of a chain.
+All compiled functions are in this one file, for numba's cache does not notice an edited callee elsewhere.  They share
+named tuples: a `Model` of the arm, its `State`, the `Forcing` of a scenario and the `Electronics` of a chain.
 """
 
 from __future__ import annotations
@@ -20,20 +19,20 @@ from tfarm.exact.compiled import compiled, inlined
 
 ANGLE, RATE, MOMENT = 0, 1, 2  # of the outputs, which begin with what is fed back (`tfarm.arm.FED_BACK`)
 ENCODER, AMPLIFIER, DAC = 0, 1, 2  # rows of the quantisers, and places in `saturated`
-DOUBLY, ONCE = 0, 1  # integrals of the torque in `rigid`, and what they add to an output in `rates`
-DURATION, IS_NEW, IS_RECORD = 0, 1, 2  # of a piece of a sample: how long [s], whether the new torque acts, whether seen
-DONE, MOVED = 0, 1  # of `work` [J]: done on the hub, and its size, what went to and fro
+DOUBLY, ONCE = 0, 1  # integrals of the torque in `rigid`, and their weights in an output in `rates`
+DURATION, IS_NEW, IS_RECORD = 0, 1, 2  # of a piece of a sample: its length [s], whether the new torque acts, a record
+DONE, MOVED = 0, 1  # of `work` [J]: done on the hub, and the sum of its absolute values
 STEP, LOWEST, HIGHEST = 0, 1, 2  # of a row of the quantisers
-ANGLE_BEFORE, RATE_BEFORE, BEGUN = 0, 1, 2  # what the estimate of the hub rate remembers
-YES = 0.5  # a number above it stands for true among floats
+ANGLE_BEFORE, RATE_BEFORE, BEGUN = 0, 1, 2  # memory of the estimate of the hub rate
+YES = 0.5  # a number above it is true among floats
 
 
 class Model(NamedTuple):
     """The arm between the samples: outputs = Re(weights amplitude) + rates rigid + static torque.
 
     `turn`, `push` (pieces, m) are e^{p dt} and (e^{p dt} - 1)/p of each piece of a sample between two switches or
-    records, `piece` (pieces, 3) what it is; `weights` (outputs, m), `rates` (outputs, 2), `static` (outputs,); `hub`
-    (2 + m,) is the hub angle's row, rates first, without its static remainder.
+    records, `piece` (pieces, 3) its properties; `weights` (outputs, m), `rates` (outputs, 2), `static` (outputs,);
+    `hub` (2 + m,) is the hub angle's row, rates first, without its static remainder.
     """
 
     turn: Complex
@@ -46,7 +45,7 @@ class Model(NamedTuple):
 
 
 def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: int) -> Model:
-    """A plant's poles `kept`, and so many records in each sample; `hub` is the row of the hub angle."""
+    """The model of a plant's poles `kept`, with `between` records in each sample; `hub` is the row of the hub angle."""
     p, T, f = plant.poles[kept], sampling.period, sampling.fraction
     records = T * (np.arange(between) + 1) / (between + 1)
     ends = np.unique(np.r_[records, [f * T] if f else [], T])
@@ -64,7 +63,7 @@ def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: i
 
 
 class State(NamedTuple):
-    """What changes while a simulation runs.
+    """State and record of a simulation.
 
     `amplitude` (m,) one a pole with Im p > 0 or real, a' = p a + u; `rigid` (2,) double integral and integral of the
     torque; `held` a ring of the last delay + 2 torques; `work` (2,) [J].  Filled sample by sample: `record`
@@ -82,8 +81,7 @@ class State(NamedTuple):
 
 
 class Forcing(NamedTuple):
-    """What a scenario does at each sample (n,): torque fed forward, torque from outside [N m], and once, after the
-    first, an impulse [N m s] on the hub."""
+    """Torque fed forward and disturbance torque [N m] at each sample (n,), and an impulse [N m s] after the first."""
 
     feedforward: Real
     disturbance: Real
@@ -91,7 +89,7 @@ class Forcing(NamedTuple):
 
 
 class Electronics(NamedTuple):
-    """A chain as the kernels take it.
+    """A chain for the kernels.
 
     `quantisers` (3, 3): step, lowest and highest of encoder, amplifier and DAC; `is_differenced`, `pole` and `period`
     [s] of the hub rate's estimate; `delay` whole samples; `is_single` where every step is rounded to float32; `bound`
@@ -130,7 +128,7 @@ def advance(
     turn: Any, push: Any, piece: Any, weights: Any, rates: Any, static: Any, hub: Any, amplitude: Any, rigid: Any,
     work: Any, fine: Any, old: float, new: float, push_on: float,
 ) -> None:  # fmt: skip
-    """One sample on: `old` torque up to the switch, `new` after it, `push_on` (a disturbance) throughout.
+    """Advance by one sample: `old` torque up to the switch, `new` after it, `push_on` (a disturbance) throughout.
 
     The first are those of a `Model`.  Fills a row of `fine` at each record, and adds to the work.
     """
@@ -155,7 +153,7 @@ def advance(
 
 @compiled
 def _angle(hub: Any, amplitude: Any, rigid: Any) -> float:
-    """The hub angle of the modes at hand, without the static remainder."""
+    """The hub angle of the modes, without the static remainder."""
     value = hub[DOUBLY].real * rigid[DOUBLY] + hub[ONCE].real * rigid[ONCE]
     for i in range(amplitude.size):
         value += hub[i + 2].real * amplitude[i].real - hub[i + 2].imag * amplitude[i].imag
@@ -164,7 +162,7 @@ def _angle(hub: Any, amplitude: Any, rigid: Any) -> float:
 
 @compiled
 def quantise(value: float, row: Any, saturated: Any, which: int) -> float:
-    """`value` on the steps of a converter, clipped to its range; says so in `saturated` (3,) where it is clipped."""
+    """`value` on the steps of a converter, clipped to its range and then marked in `saturated` (3,)."""
     step, low, high = row[STEP], row[LOWEST], row[HIGHEST]
     if step > 0.0:
         value = np.rint(value / step) * step
@@ -179,7 +177,7 @@ def quantise(value: float, row: Any, saturated: Any, which: int) -> float:
 
 @compiled
 def estimate(angle: float, rate: float, memory: Any, is_differenced: bool, pole: float, period: float) -> float:
-    """The hub rate as the controller knows it: its own reading, or the filtered difference of the encoder."""
+    """The hub rate of the controller: a reading of its own, or the filtered difference of the encoder."""
     if not is_differenced:
         return rate
     if memory[BEGUN] < YES:
@@ -191,14 +189,14 @@ def estimate(angle: float, rate: float, memory: Any, is_differenced: bool, pole:
 
 
 def converted(record: Any, saturated: Any, memory: Any, of: Any) -> Any:
-    """Hub angle, hub rate and root moment as the controller of that `Electronics` has them, of one sample's outputs."""
+    """Hub angle, hub rate and root moment of one sample's outputs, through the converters of `Electronics`."""
     angle = quantise(record[ANGLE], of.quantisers[ENCODER], saturated, ENCODER)
     moment = quantise(record[MOMENT], of.quantisers[AMPLIFIER], saturated, AMPLIFIER)
     return angle, estimate(angle, record[RATE], memory, of.is_differenced, of.pole, of.period), moment
 
 
 def before(k: int, model: Any, state: Any, forcing: Any, of: Any) -> bool:
-    """Read the outputs just before sample k; whether the arm is still an arm, its root moment within its bound."""
+    """Read the outputs just before sample k; return whether the root moment is within its bound."""
     torque, rigid = state.held[(k - of.delay - 1) % state.held.size], state.rigid
     torque += forcing.disturbance[k - 1] if k > 0 else 0.0
     read_outputs(model.weights, model.rates, model.static, state.amplitude, rigid, torque, state.record[k])
@@ -206,7 +204,7 @@ def before(k: int, model: Any, state: Any, forcing: Any, of: Any) -> bool:
 
 
 def after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> None:
-    """Ask for the torque u at sample k: it leaves the DAC, is held, and acts a delay later; one sample on."""
+    """Pass the torque u at sample k through the DAC, where it is held and acts a delay later; advance by one sample."""
     ring = state.held.size
     old = state.held[(k - of.delay - 1) % ring]
     state.held[k % ring] = state.torque[k] = quantise(u, of.quantisers[DAC], state.saturated[k], DAC)
@@ -219,7 +217,7 @@ def after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> No
     )  # fmt: skip
 
 
-_before, _converted, _after = inlined(before), inlined(converted), inlined(after)  # a loop in Python takes them as such
+_before, _converted, _after = inlined(before), inlined(converted), inlined(after)  # those of Python loops are plain
 
 
 @compiled
@@ -238,11 +236,11 @@ def product(row: Any, values: Any, start: float, single: bool) -> float:
 
 @compiled
 def run(model: Any, state: Any, forcing: Any, electronics: Any, matrices: Any, sources: Any, references: Any) -> int:
-    """A law over all samples; returns how many were made before the root moment passed its bound.
+    """Run a law over all samples; return their number before the root moment passes its bound.
 
     u = r + C x + D e, x_{k+1} = A x + B e of the errors e = reference - signal, `references` (n, columns); D has a row,
-    or one for each sample.  `sources` (columns,) is the output that a column reads, hub angle, hub rate and root moment
-    through their converters, or -1 of none: a reference alone.
+    or one for each sample.  `sources` (columns,) are the outputs of the columns, hub angle, hub rate and root moment
+    through their converters, or -1 for a reference alone.
     """
     A, B, C, D = matrices
     n, single, memory, known = state.torque.size, electronics.is_single, np.zeros(3), np.zeros(3)

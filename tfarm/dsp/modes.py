@@ -1,14 +1,14 @@
-"""What sampling does to each mode, to first order in the gains, and what it really does at finite gains.
+"""Effect of sampling on each mode, to first order in the gains, and exact at finite gains.
 
 To first order a gain K adds Re[-K (z - z_p) H(z)/z_p] to ln|z| per sample of the mode with the open-loop pole z_p, H
-what the gain multiplies, through filters, differences and delay.  Of an undamped arm whose rate and root moment are
-read without any that is, w its frequency, b its hub participation, q = w T and delay d samples (any fraction),
+the signal of the gain, through filters, differences and delay.  Without any of these it is for an undamped arm, w its
+frequency, b its hub participation, q = w T and delay d samples (any fraction),
 
     -b^2 sin(q/2) (K1/w) cos((d + 1/2) q)   and   -b^2 sin(q/2) K2 I_h sin((d + 1/2) q):
 
 at d = 0 the hub rate damps from 0 to 1/(2T) [Hz] and destabilises from there to 1/T, and so on in bands, and K2 > 0
-never destabilises.  At finite gains the closed-loop pole itself says it: it is followed from zero gain.  A locus along
-one gain has as many values as it takes to be round, and each branch is named after the mode that it comes from.
+never destabilises.  At finite gains the closed-loop pole itself is followed from zero gain.  A locus along one gain has
+enough values to be smooth, and each branch is named after the mode where it begins.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from tfarm.spectrum import modes
 
 FOLLOWING_STEPS = 24  # of the continuation from zero gain
 FIRST_SCALE = 1e-6  # of the gains: there each pole is still at that of the plant
-LOOPS_KEPT = 4  # of which origins are asked for again: memory against time, of no effect on an answer
+LOOPS_KEPT = 4  # whose origins are kept: memory against time, of no effect on a result
 SAMPLED_LOCUS_VALUES = 61  # of a gain along its locus, to begin with
 BRANCH_ROUNDS = 24  # of halving the steps where a branch bends, at most
 IMAGINARY_ROUNDING = 1e-12  # imaginary part of a real z: rounding
@@ -46,12 +46,12 @@ LOG_RADIUS = "ln|z| per sample, or its change to first order in the gains"
 @dataclass(frozen=True)
 @record
 class ModeTable:
-    """A row a mode that outlives a sample.
+    """One row for each mode that does not decay within a sample.
 
-    `log_radius`: ln|z| of the closed-loop pole that it becomes, the larger where its pair has become two real poles;
-    `first_order` is the change of it to first order in the law, the sum of `by_rate` (what is on the hub rate alone,
-    K1), `by_moment` (on the root moment, K2) and `by_others`; `by_damping`: Re(p) T, from the arm's own C (and analog
-    hub damping).  `band`: 0 from 0 to 1/(2T) [Hz], and so on; `aliased`: where the samples see the mode [rad/s].
+    `log_radius`: ln|z| of its closed-loop pole, the larger where its pair has become two real poles.  `first_order` is
+    the change of it to first order in the law, the sum of `by_rate` (parts on the hub rate alone, K1), `by_moment` (on
+    the root moment, K2) and `by_others`; `by_damping`: Re(p) T, from the arm's own C (and analog hub damping).
+    `band`: 0 from 0 to 1/(2T) [Hz], and so on; `aliased`: the apparent frequency of the mode [rad/s].
     """
 
     is_table = True
@@ -73,7 +73,7 @@ class ModeTable:
 
 
 def first_order(loop: Sampled, poles: Whole) -> Real:
-    """What each part of the law alone changes of ln|z| (parts, poles) at open-loop poles of these numbers."""
+    """Change of ln|z| (parts, poles) to first order by each part of the law alone, at open-loop poles by number."""
     z = loop.pulse.multipliers[poles]
     _, *rows = loop.terms(z, poles, np.zeros(z.size))
     whole = (loop.pulse.shifts[poles][:, None] - loop.in_z.poles).prod(axis=1)
@@ -81,7 +81,7 @@ def first_order(loop: Sampled, poles: Whole) -> Real:
 
 
 def mode_table(loop: Sampled) -> ModeTable:
-    """The modes of a loop one by one."""
+    """Return the modes of a loop one by one."""
     pulse = loop.pulse
     own = np.asarray(pulse.poles.real * pulse.sampling.period, dtype=float)
     upper = np.nonzero((pulse.poles.imag > 0) & (pulse.mode > 0) & (own > LISTED_DECAY))[0]
@@ -92,7 +92,7 @@ def mode_table(loop: Sampled) -> ModeTable:
     by, reads = first_order(loop, upper), [part.signals for part in loop.law.parts]
     by_rate, by_moment = (by[[each == (name,) for each in reads]].sum(axis=0) for name in ("hub_rate", "root_moment"))
     turns, origin = np.round(w * T / (2 * np.pi)), origins(loop)
-    # what comes from a mode's pole or its conjugate: two radii where both have become real
+    # poles from a mode's pole and its conjugate: two radii where both have become real
     conjugate = abs(pulse.poles - pulse.poles[upper].conj()[:, None]).argmin(axis=1)
     radii = [loop.poles.log_radius[np.isin(origin, pair)].max() for pair in zip(upper, conjugate, strict=True)]
     return ModeTable(
@@ -111,7 +111,7 @@ def mode_table(loop: Sampled) -> ModeTable:
 def followed_branches(poles: Sequence[Complex], values: Real) -> Complex:
     """The poles at each of the values, in any order, as branches (values, poles): each column is continuous.
 
-    Values are taken as they are: give them close enough to tell branches apart.
+    The values must be close enough for branches to be distinguished.
     """
     rows: list[Complex] = []
     for number, z in enumerate(poles):
@@ -121,10 +121,10 @@ def followed_branches(poles: Sequence[Complex], values: Real) -> Complex:
 
 @lru_cache(maxsize=LOOPS_KEPT)
 def origins(loop: Sampled) -> NDArray[np.int64]:
-    """For each closed-loop pole the open-loop pole that it comes from, or -1.
+    """For each closed-loop pole the open-loop pole where its branch begins, or -1.
 
-    These are numbered as in `PulseTransfer.poles`, those of the law after them.  The whole law grows from nearly
-    nothing, and each pole is followed.
+    These are numbered as in `PulseTransfer.poles`, those of the law after them.  A factor on the law grows from nearly
+    0, and each pole is followed.
     """
     open_loop = np.r_[loop.pulse.multipliers, 1 + loop.in_z.poles]
     labels = np.nonzero(np.r_[loop.pulse.poles != 0, loop.in_z.poles + 1 != 0])[0]
@@ -142,7 +142,7 @@ def origins(loop: Sampled) -> NDArray[np.int64]:
 
 
 def dominant(loop: Sampled) -> str:
-    """What the pole with the largest radius comes from: a mode, a pole of the law, or the hub (a filter, the delay)."""
+    """Origin of the pole with the largest radius: a mode, a pole of the law, or the hub (a filter, the delay)."""
     origin = int(origins(loop)[loop.poles.log_radius.argmax()])
     if origin >= loop.pulse.poles.size:
         return "a pole of the law"
@@ -151,7 +151,7 @@ def dominant(loop: Sampled) -> str:
 
 
 def _ahead(rows: list[Complex], values: Real) -> Complex:
-    """Where the branches should be at the last of the values, the rows before it being those of the others."""
+    """Extrapolation of the branches to the last of the values, from the rows at the others."""
     if len(rows) < 3:
         return rows[-1]
     before, last, wanted = values
@@ -159,7 +159,7 @@ def _ahead(rows: list[Complex], values: Real) -> Complex:
 
 
 def _matched(ahead: Complex, z: Complex) -> NDArray[np.int64]:
-    """Which pole continues which branch: the assignment with the shortest way in all."""
+    """The poles in the order of the branches that they continue: the assignment of least total distance."""
     _, order = linear_sum_assignment(abs(ahead[:, None] - z))
     return order
 
@@ -172,7 +172,7 @@ def _matched(ahead: Complex, z: Complex) -> NDArray[np.int64]:
 class SampledLocus:
     """The locus of one number of a law, the others those of `loop`: `z` (values, branches), and each branch's mode.
 
-    The mode is 0 for one that comes from the hub, a filter, the delay or the law.
+    The mode is 0 for a branch from the hub, a filter, the delay or the law.
     """
 
     loop: Sampled
@@ -192,7 +192,7 @@ class SampledLoci:
 
     @property
     def half_rate(self) -> float:
-        """1/(2T) [Hz]: what lies above is aliased."""
+        """1/(2T) [Hz], above which modes are aliased."""
         return 0.5 / self.loop.chain.sampling.period
 
     def is_aliased(self, mode: int) -> bool:
@@ -202,7 +202,7 @@ class SampledLoci:
 
 
 def sampled_loci(loop: Sampled, top: float, moments: tuple[float, float]) -> SampledLoci:
-    """The loci of the rate gain from nearly 0 to `top` and of the moment gain over `moments`, the other as it is.
+    """Return the loci of the rate gain, nearly 0 to `top`, and of the moment gain over `moments`, the other constant.
 
     That of the rate gain begins below the gain of the loop.
     """
@@ -212,7 +212,7 @@ def sampled_loci(loop: Sampled, top: float, moments: tuple[float, float]) -> Sam
 
 
 def sampled_locus(loop: Sampled, gain: str, values: Real) -> SampledLocus:
-    """The locus of a number at these values, that of the loop, and those between at which a branch turns."""
+    """Return the locus of a number at these values, at that of the loop, and between where a branch turns."""
 
     def poles(value: float) -> Complex:
         z = loop.having(**{gain: value}).poles.z

@@ -1,9 +1,9 @@
-"""The analog plant that is sampled: poles and residues of the modal model, with an analog filter.
+"""The analog plant of a sampled loop: poles and residues of the modal model, with an analog filter.
 
     G_o(s) = rigid[o,0]/s^2 + rigid[o,1]/s + static[o] + sum over poles of residues[o,i]/(s - poles[i])
 
-A first-order filter wc/(s + wc) on an output adds one pole and changes residues; that stays in this form, and the
-discretisation knows nothing of it.  Analog damping of the hub is friction of the arm.
+A first-order filter wc/(s + wc) on an output adds one pole and changes residues; the form is the same.  Analog damping
+of the hub is friction of the arm.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from tfarm.response import transfer
 from tfarm.response.signals import Signals
 from tfarm.spectrum.frequencies import LISTS_KEPT
 
-AMPLIFIED = ("M", "Q", "strain", "current")  # what a strain gauge, a load cell or a shunt reads
+AMPLIFIED = ("M", "Q", "strain", "current")  # quantities of strain gauges, load cells and shunts
 RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")  # of a simulation, not filtered
-USUAL_MODES = 20  # flexible, of a sampled loop or a simulation whose number is not said
+USUAL_MODES = 20  # flexible, of a sampled loop or a simulation by default
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class Plant:
     """Poles (m,) [1/s] other than s = 0, conjugates listed too; residues (outputs, m), rigid (outputs, 2), static
     (outputs,).
 
-    `mode` (m,) is the flexible mode that a pole belongs to; 0 for those of a filter, the hub, or no mode for certain.
-    `model` is what it was made from; it may have more modes.
+    `mode` (m,) is the flexible mode of a pole; 0 for those of a filter, the hub, or no certain mode.
+    `model` is its modal model, which may have more modes.
     """
 
     arm: Arm
@@ -63,9 +63,9 @@ class Plant:
             self, outputs=tuple(names), residues=self.residues[at], rigid=self.rigid[at], static=self.static[at]
         )
 
-    def beside(self, more: Plant) -> Plant:
-        """The plant with the outputs of another after its own, both of one arm; that may lack the filter's pole."""
-        assert np.array_equal(more.poles, self.poles[: more.poles.size])  # the arm's, whatever is read
+    def joined(self, more: Plant) -> Plant:
+        """The plant with the outputs of another of the same arm after its own; the other may lack the filter's pole."""
+        assert np.array_equal(more.poles, self.poles[: more.poles.size])  # those of the arm, for any output
         lacking = self.poles.size - more.poles.size
         return replace(
             self,
@@ -77,13 +77,13 @@ class Plant:
 
     @property
     def at_rest(self) -> Real:
-        """G_o(0) of every output that does not turn with the arm (outputs,), and H_o(1) at any period: a held input."""
+        """G_o(0) of every output that does not turn with the arm (outputs,), and H_o(1) at any period."""
         return np.asarray(self.static - (self.residues / self.poles).sum(axis=1).real)
 
     def braked(self, slower_than: float) -> int | None:
-        """Which pole is that of a hub that friction brings to rest, if |p| is below that [1/s]; None if there is none.
+        """The pole of a hub that friction brings to rest, if |p| is below `slower_than` [1/s]; else None.
 
-        Its residues nearly cancel what turns with the arm, rigid[:, 1], the more the less friction there is.
+        Its residues nearly cancel rigid[:, 1], the more the less friction there is.
         """
         (slow,) = np.nonzero((self.poles.imag == 0) & (abs(self.poles) < slower_than))
         turns = self.rigid[:, 1].any() and not self.rigid[:, 0].any()
@@ -107,20 +107,25 @@ def damped_at_hub(arm: Arm, chain: Chain) -> Arm:
 def undelayed_plant(arm: Arm, outputs: Sequence[str], count: int, x: float | None = None) -> Plant:
     """The arm with `count` flexible modes, its outputs not filtered; `x` [m] is the place of outputs along the arm."""
     if arm.is_locked:
-        remedy = "a locked hub has no loop: no torque turns it; give a finite inertia"
+        remedy = "a locked hub has no loop; give it a finite inertia"
         raise ParameterError(key="hub.inertia", value=math.inf, remedy=remedy)
     return with_modes(_modelled_once(arm, tuple(outputs), count, x), count)
 
 
-@lru_cache(maxsize=LISTS_KEPT)  # the simulations of one page ask for the same model some twenty times
+@lru_cache(maxsize=LISTS_KEPT)  # the simulations of one page need the same model some twenty times
 def _modelled_once(arm: Arm, names: tuple[str, ...], count: int, x: float | None) -> ModalModel:
     return modal_model(arm, names, count, x)
 
 
 def with_modes(model: ModalModel, count: int) -> Plant:
-    """The plant with the first `count` modes of a model."""
-    some = model.first(count)
-    plant, C = replace(_of_model(some), model=model), model.arm.damping
+    """The plant with the first `count` modes of a model, and slow real poles for all others where C is large."""
+    some, C = model.first(count), model.arm.damping
+    poles, mode = some.eigenvalues.ravel(), np.repeat(some.index, 2)
+    residues = some.residues.reshape(len(some.outputs), poles.size)
+    if some.single_residues is not None:
+        poles, residues = np.r_[poles, some.single], np.c_[residues, some.single_residues]
+        mode = np.r_[mode, np.zeros(some.single.size, np.int64)]
+    plant = Plant(some.arm, some.outputs, poles, residues, some.rigid, some.static, mode, model)
     if C * some.natural_frequency.max(initial=0.0) < SLOW_POLES_FROM:
         return plant
     exact = transfer(model.arm, model.outputs, x=model.x)
@@ -146,14 +151,14 @@ def is_analog(wanted: Output, chain: Chain) -> bool:
 
 
 def with_filter(plant: Plant, rows: Sequence[int], corner: float) -> Plant:
-    """wc/(s + wc) after some outputs: a pole at -wc, with the residue wc G(-wc).
+    """The plant with wc/(s + wc) after some outputs: a pole at -wc, with the residue wc G(-wc).
 
     Raises ParameterError for an output with the double integral of the torque, an angle or a displacement: encoders
     are digital and have no analog filter.
     """
     for row in rows:
         if plant.rigid[row, 0] != 0.0:
-            remedy = "it follows the turning hub without bound; an analog filter is for the gauge and the tachometer"
+            remedy = "it turns with the hub; an analog filter is for the gauge and the tachometer"
             raise ParameterError(key="filtered output", value=plant.outputs[row], remedy=remedy)
     residues = np.c_[plant.residues, np.zeros(len(plant.outputs), complex)]
     static = plant.static.copy()
@@ -171,22 +176,12 @@ def with_filter(plant: Plant, rows: Sequence[int], corner: float) -> Plant:
     )
 
 
-def _of_model(model: ModalModel) -> Plant:
-    poles = model.eigenvalues.ravel()
-    residues = model.residues.reshape(len(model.outputs), poles.size)
-    mode = np.repeat(model.index, 2)
-    if model.single_residues is not None:
-        poles, residues = np.r_[poles, model.single], np.c_[residues, model.single_residues]
-        mode = np.r_[mode, np.zeros(model.single.size, np.int64)]
-    return Plant(model.arm, model.outputs, poles, residues, model.rigid, model.static, mode, model)
-
-
 @dataclass(frozen=True)
 @record
 class SensedPlant:
-    """An arm's signals with `count` modes: one plant for each place that signals are read at, and all of it together.
+    """An arm's signals with `count` modes: a plant for each place of signals, and one of all together.
 
-    `read` is of the arm with what the actuator damps; `plants` are not filtered, one for each of `places` [share of the
+    `read` is of the arm with the actuator's damping; `plants` are not filtered, one for each of `places` [share of the
     length].  Raises ParameterError as `Signals` does, for a locked hub, and for an output that grows with s without
     bound.
     """
@@ -205,12 +200,12 @@ class SensedPlant:
 
     @property
     def unfiltered(self) -> Plant:
-        """All signals in the order of their names, as they are."""
+        """All signals in the order of their names, without filters."""
         places = list(dict.fromkeys(self.read.places))
         first, rows = self.plants[0], []
         for wanted, place in zip(self.read.outputs, self.read.places, strict=True):
             plant = self.plants[places.index(place)]
-            assert np.array_equal(plant.poles, first.poles)  # the poles are the arm's, wherever it is looked at
+            assert np.array_equal(plant.poles, first.poles)  # those of the arm, at every place
             rows.append((plant, plant.outputs.index(wanted.name)))
         return replace(
             first,
@@ -222,14 +217,14 @@ class SensedPlant:
         )
 
     def with_modes(self, count: int) -> SensedPlant:
-        """The same with another number of modes; no work where the models have as many."""
+        """The same with another number of modes; cheap where the models have as many."""
         if count > self.plants[0].model.index.max(initial=0):
             return sensed_plant(self.arm, self.chain, self.read.names, count)
         return replace(self, plants=tuple(with_modes(each.model, count) for each in self.plants))
 
 
 def sensed_plant(arm: Arm, chain: Chain, names: Sequence[str], count: int) -> SensedPlant:
-    """The signals of that name with `count` flexible modes, of an arm whose hub a chain may damp."""
+    """Return the signals of these names with `count` flexible modes, of an arm whose hub a chain may damp."""
     read, plants = Signals(damped_at_hub(arm, chain), tuple(names)), []
     for share in dict.fromkeys(read.places):
         here = zip(read.outputs, read.places, strict=True)

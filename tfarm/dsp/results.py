@@ -1,9 +1,9 @@
-"""A simulation in a few numbers: residual vibration, settling, limit cycles.
+"""Figures of a simulation: residual vibration, settling time, limit cycles.
 
-How many flexible modes it takes for the digits that are asked for, the signals with twice the modes tell: their largest
-change, relative to the largest value of each signal, is what half the modes were off by, and mostly more than what is
-left.  It is no bound: without damping the moment after an impulse converges slowly (of 70 random arms one had nearly
-twice the change left); a loop whose high modes grow is for `dsp.verdict` to find.
+The number of flexible modes follows from the signals with twice the modes.  Their largest change, relative to the
+largest value of each signal, is the error of half the modes, and mostly more than the error that is left.  It is no
+bound: without damping the moment after an impulse converges slowly (of 70 random arms one had nearly twice the change
+left).  Instability of high modes is decided by `dsp.verdict`.
 """
 
 from __future__ import annotations
@@ -30,27 +30,27 @@ from tfarm.schema import Quantity
 
 RESIDUAL = "residual root moment after the slew"
 MODE_COUNTS = (10, 20, 40)  # flexible modes; 80 would take a heavily damped arm 8 s of CPU time
-ENOUGH_CHANGE = 1e-4  # of each signal's largest value: as many as a table of a simulation shows
+ENOUGH_CHANGE = 1e-4  # of each signal's largest value: the digits of a table of a simulation
 SETTLED_SHARE = 0.05  # of the largest root moment, within which a slew has settled
-LEFT_OF_RECORD = 10  # one part in so many of a record has to follow a settling time
+LEFT_OF_RECORD = 10  # a tenth of a record has to follow a settling time
 CYCLE_LASTS = 0.7  # a limit cycle keeps at least this much of its amplitude over a quarter of the record
-BEYOND_IDEAL = 2.0  # and is this much larger than what an ideal chain leaves at that time
-GROWS = 1.02  # in a quarter of the record, of an ideal loop that runs away: less may be how samples fall on its peaks
+BEYOND_IDEAL = 2.0  # and is this much larger than the vibration of an ideal chain at that time
+GROWS = 1.02  # in a quarter of the record, of an unstable ideal loop: a smaller change may be one of sampled peaks
 FEWEST_TURNS = 1.0  # of the moment about its mean in a quarter of the record: fewer are a drift and no vibration
-FEWEST_SAMPLES = 40  # samples without which a limit cycle cannot be told
+FEWEST_SAMPLES = 40  # samples of a record with limit cycles
 
 
 class Enough(NamedTuple):
-    """How many flexible `modes`; `change` of the signals, in their largest, when the modes were doubled to these."""
+    """The number of flexible `modes`, and the relative `change` of the signals when it was doubled to that."""
 
     modes: int
     change: float
 
 
 def enough_modes(simulate: Callable[[int], Simulation], count: int | None = None) -> Enough:
-    """The fewest of 20 or 40 modes that change no signal by more than 1e-4, else the most there are; or `count`.
+    """Return the fewest of 20 or 40 modes that change no signal by more than 1e-4, else the most there are; or `count`.
 
-    `simulate` makes the simulation with so many modes, its converters ideal: steps would hide what modes do.
+    `simulate` makes the simulation with a number of modes, its converters ideal, as quantisation would hide the modes.
     """
     if count is not None:
         return Enough(count, math.nan)
@@ -58,7 +58,7 @@ def enough_modes(simulate: Callable[[int], Simulation], count: int | None = None
     for count in MODE_COUNTS[1:]:
         try:
             now = simulate(count)
-        except ConvergenceError:  # two damped modes that cannot be told apart: what there is must do
+        except ConvergenceError:  # two damped modes are not distinguished: the number before is used
             return found
         found = Enough(count, change(before.at_samples, now.at_samples))
         if found.change <= ENOUGH_CHANGE:
@@ -68,7 +68,7 @@ def enough_modes(simulate: Callable[[int], Simulation], count: int | None = None
 
 
 def change(before: Trace, after: Trace) -> float:
-    """The largest change of any signal at the samples that both have, relative to that signal's largest value."""
+    """The largest change of any signal at the samples of both, relative to that signal's largest value."""
     n, changes = min(before.t.size, after.t.size), [0.0]
     for name in after.names:
         old, new = before.signal(name)[:n], after.signal(name)[:n]
@@ -80,10 +80,10 @@ def change(before: Trace, after: Trace) -> float:
 
 @dataclass(frozen=True)
 class LimitCycle:
-    """A vibration that does not end: half peak to peak of root moment [N m], hub rate [rad/s] and torque [N m].
+    """A sustained vibration: half peak to peak of root moment [N m], hub rate [rad/s] and torque [N m].
 
-    `frequency` [rad/s] as the samples see it, from the zero crossings of the moment about its mean.  `kept_up_by`:
-    "saturation" where a signal is still clipped (an unstable loop that its limits hold), else "quantisation".
+    `frequency` [rad/s] of the sampled signal, from the zero crossings of the moment about its mean.  `kept_up_by`:
+    "saturation" where a signal is still clipped (an unstable loop within its limits), else "quantisation".
     """
 
     root_moment: Annotated[float, Quantity("root moment amplitude", "N m", 4, key="root_moment_amplitude")]
@@ -95,19 +95,19 @@ class LimitCycle:
 
 @dataclass(frozen=True)
 class Run:
-    """A simulated scenario: its signals, and the numbers that they come to."""
+    """A simulated scenario: its signals, and figures of these."""
 
     arm: Arm
     law: AnyLaw
     simulation: Simulation
     used: Enough
     scenario_in_words: Annotated[str, Quantity("scenario", key="scenario_in_words")]
-    cycle: LimitCycle | None = None
+    limit_cycle: Annotated[LimitCycle | None, Quantity("limit cycle")] = None
     tuner: Annotated[dict[str, Any] | None, Quantity("tuner", key="controller", help="that set the moment gain")] = None
 
     @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
-        """Arm and law in words, as results name them."""
+        """Names of the arm and the controller."""
         return controller(with_all_gains(self.arm, self.law), self.arm)
 
     @property
@@ -117,7 +117,7 @@ class Run:
 
     @property
     def rule(self) -> Annotated[str, Quantity("discretisation")]:
-        """How the law came to be one in z."""
+        """The discretisation of the law."""
         return rule_in_words(with_all_gains(self.arm, self.law))
 
     @property
@@ -137,18 +137,18 @@ class Run:
 
     @property
     def modes_used(self) -> Annotated[int, Quantity("flexible modes")]:
-        """How many flexible modes there are."""
+        """The number of flexible modes."""
         return self.used.modes
 
     @property
     def modes_change(self) -> Annotated[float | None, Quantity("change of signals from half of them", digits=2)]:
-        """Relative to the largest value of each; None where the number of modes was asked for."""
+        """Relative to the largest value of each; None where the number of modes was given."""
         return None if math.isnan(self.used.change) else self.used.change
 
     @property
     def residual_moment(self) -> Annotated[float | None, Quantity(f"{RESIDUAL} less the rigid arm's", "N m rms",
                                                                   key="residual_moment_rms")]:  # fmt: skip
-        """None where the run stopped, or its record ends before the slew."""
+        """The residual; None where the run stopped, or its record ends before the slew."""
         return residual_moment_rms(self.simulation)
 
     @property
@@ -158,51 +158,43 @@ class Run:
 
     @property
     def settling_time(self) -> Annotated[float | None, Quantity("settling time (5 %)", "s", 4)]:
-        """None where the moment does not settle within the record."""
+        """The settling time; None where the moment does not settle within the record."""
         settled = settling_time(self.simulation)
         return settled if math.isfinite(settled) else None
 
     @property
     def note(self) -> Annotated[str | None, Quantity("not determined", key="note")]:
-        """Why there is no residual or no settling time."""
-        run, reasons = self.simulation, []
-        if self.residual_moment is None:
-            ends = (
-                "the record ends before the slew"
-                if run.stopped is None
-                else f"the run stops at {self.stopped_at:.6g} s"
-            )
-            reasons.append(f"residual root moment, as {ends}")
-        if self.settling_time is None:
-            reasons.append(f"settling time: not settled within {run.t[-1]:.4g} s")
-        return "; ".join(reasons) or None
+        """The reason why there is no residual or no settling time."""
+        run, ends = self.simulation, "the record ends before the slew"
+        if run.stopped is not None:
+            ends = f"the run stops at {self.stopped_at:.6g} s"
+        reasons = {
+            f"residual root moment, as {ends}": self.residual_moment,
+            f"settling time: not settled within {run.t[-1]:.4g} s": self.settling_time,
+        }
+        return "; ".join(reason for reason, value in reasons.items() if value is None) or None
 
     @property
     def saturated(self) -> Annotated[dict[str, int], Quantity("saturated samples", key="saturated_samples")]:
-        """At how many samples encoder, strain amplifier and torque were clipped."""
+        """Numbers of samples at which encoder, strain amplifier and torque were clipped."""
         return self.simulation.saturated
 
     @property
     def energy_error(self) -> Annotated[float | None, Quantity()]:
-        """Of an arm without damping."""
+        """The relative error of energy, of an arm without damping."""
         return self.simulation.energy_error
 
     @property
     def stopped_at(self) -> Annotated[float | None, Quantity(key="stopped_at_s")]:
-        """When an unstable loop was stopped [s]."""
+        """The time at which an unstable loop was stopped [s]."""
         stopped = self.simulation.stopped
         return None if stopped is None else stopped.time
 
     @property
     def growing_mode(self) -> Annotated[int | None, Quantity()]:
-        """The mode that grew, 0 the hub."""
+        """The unstable mode, 0 for the hub."""
         stopped = self.simulation.stopped
         return None if stopped is None else stopped.mode
-
-    @property
-    def limit_cycle(self) -> Annotated[LimitCycle | None, Quantity("limit cycle")]:
-        """A vibration that does not end."""
-        return self.cycle
 
     @property
     def units(self) -> Annotated[dict[str, str], Quantity(key="outputs")]:
@@ -224,46 +216,41 @@ class Run:
 
     @property
     def between(self) -> Annotated[dict[str, Real] | None, Quantity()]:
-        """The same between the samples, of those that change there."""
+        """The same between the samples, of the signals that change there."""
         return None if self.simulation.between is None else _signals(self.simulation.between)
 
     @property
     def csv_table(self) -> Table:
-        """The signals in the order of time; between the samples what changes at these only is empty."""
+        """The signals in the order of time; those that change at samples only are empty between them."""
         finer, coarse = self.between or {"t": np.empty(0)}, self.signals
         order = np.argsort(np.r_[coarse["t"], finer["t"]], kind="stable").tolist()
-        empty, columns = [""] * len(finer["t"]), []
-        for name, values in coarse.items():
-            if len(values):
-                joined = [*values.tolist(), *(finer[name].tolist() if name in finer else empty)]
-                columns.append(Column(name, *self._titled(name), of=[joined[row] for row in order]))
-        return Table(columns=tuple(columns))
-
-    def _titled(self, name: str) -> tuple[str, str]:
-        """Title and unit of a signal."""
-        own = {
+        known = {
             "t": ("time", "s"),
             "torque": ("torque", self.torque_unit),
             "gain": ("gain", "-"),
             "volts": ("volts", "V"),
         }
-        if name in own:
-            return own[name]
-        of, _, at = name.partition("@")
-        return f"{OUTPUTS[of].label}{at and f' = {at} m'}", OUTPUTS[of].unit
+        empty, columns = [""] * len(finer["t"]), []
+        for name, values in coarse.items():
+            if len(values):
+                of, _, at = name.partition("@")
+                joined = [*values.tolist(), *(finer[name].tolist() if name in finer else empty)]
+                title = known.get(name) or (f"{OUTPUTS[of].label}{at and f' = {at} m'}", OUTPUTS[of].unit)
+                columns.append(Column(name, *title, of=[joined[row] for row in order]))
+        return Table(columns=tuple(columns))
 
 
 def residual_moment_rms(simulation: Simulation) -> float | None:
-    """Root mean square of the arm's own root moment less the rigid arm's [N m], from the end of the slew on.
+    """Return the root mean square of the arm's own root moment less the rigid arm's [N m], from the end of the slew on.
 
-    Whatever the moment feedback reads of it, and ahead of the anti-alias filter.  None where the simulation stopped,
-    or its record ends before the slew does.
+    The moment is that before the anti-alias filter.  None where the simulation stopped, or its record ends before the
+    slew.
     """
     return residual_left(simulation.scenario, simulation.at_samples.root_moment)
 
 
 def residual_raw_moment_rms(simulation: Simulation) -> float | None:
-    """The same of the root moment itself, to whose first sample the slew's last torque still belongs."""
+    """The same of the root moment itself; its first sample is one of the slew's last torque."""
     task, moment = simulation.scenario, simulation.at_samples.root_moment
     return _rms(moment[task.is_after]) if moment.size == task.t.size else None
 
@@ -290,10 +277,10 @@ def settling_time(simulation: Simulation) -> float:
 
 
 def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
-    """The limit cycle in the last quarter of the record, if there is one.
+    """Return the limit cycle in the last quarter of the record, if there is one.
 
-    It lasts: a quarter earlier it was not much larger, and, where signals are still clipped, not much smaller either.
-    The same loop with ideal converters (`ideal`) has died down further, or where they are clipped it runs away.
+    A quarter earlier it was not much larger, and, where signals are still clipped, not much smaller either.  The same
+    loop with ideal converters (`ideal`) has decayed further, or is unstable where signals are clipped.
     """
     n = simulation.t.size
     if simulation.stopped or simulation.chain.is_linear or n < FEWEST_SAMPLES:
@@ -304,8 +291,8 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     is_clipped = bool(simulation.saturated_at[last].any())
     if size == 0.0 or size < CYCLE_LASTS * earlier or (is_clipped and earlier < CYCLE_LASTS * size):
         return None
-    runs_away = ideal.stopped is not None or _left(ideal, last) > GROWS * _left(ideal, before)
-    if not (is_clipped and runs_away) and size <= BEYOND_IDEAL * _left(ideal, last):
+    is_unstable = ideal.stopped is not None or _left(ideal, last) > GROWS * _left(ideal, before)
+    if not (is_clipped and is_unstable) and size <= BEYOND_IDEAL * _left(ideal, last):
         return None
     about = moment[last] - moment[last].mean()
     turns = np.count_nonzero(np.diff(np.signbit(about))) / 2
@@ -321,7 +308,7 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
 
 
 def _left(ideal: Simulation, part: slice) -> float:
-    """What the ideal chain leaves of the moment there, as half of its range; inf where it ran away."""
+    """Half of the range of the moment of the ideal chain in a part of the record; inf where that was stopped."""
     return math.inf if ideal.stopped else _half_range(ideal.at_samples.root_moment[part])
 
 
@@ -334,7 +321,7 @@ def _signals(trace: Trace) -> dict[str, Real]:
 
 
 def ideal_chain(chain: Chain) -> Chain:
-    """The same clock, filters and rate estimate, with ideal converters: no steps, no ranges, no limit, float64."""
+    """The chain with the same sampling and filters, and ideal converters: no steps, no ranges, no limit, float64."""
     converters = replace(
         chain.converters,
         encoder_counts=None,
@@ -358,12 +345,11 @@ def simulate(
     between: int = 0,
     outputs: Sequence[str] = (),
 ) -> Simulation:
-    """The sampled loop in time, exact between the samples: a "slew", "step", "decay" or "impulse" of `duration` [s].
+    """Simulate the sampled loop, exact between the samples: a "slew", "step", "decay" or "impulse" of `duration` [s].
 
-    With `count` flexible modes, or as many as the digits of the signals take, and `between` records between two
-    samples; `outputs` are recorded besides, as "tip_rotation" or "strain@0.05".  Raises ParameterError for a locked
-    hub, an algebraic loop, an unknown signal, a law in z whose period is not the chain's, and for what `scenario`
-    refuses.
+    With `count` flexible modes, or enough for the digits of the signals, and `between` records between two samples;
+    `outputs` are recorded in addition, as "tip_rotation" or "strain@0.05".  Raises ParameterError for a locked hub, an
+    algebraic loop, an unknown signal, a law in z whose period is not the chain's, and as `scenario` does.
     """
     chain = chain_or_usual(chain)
     arm, law = tracked(arm, law)
@@ -371,7 +357,7 @@ def simulate(
 
 
 def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: float) -> Simulation:
-    """The same for a picture: with 20 records in each period of the fastest mode that is seen (`traces.resolved`)."""
+    """Simulate the same for a picture: 20 records in each period of the fastest visible mode (`traces.resolved`)."""
     arm, law = tracked(arm, law)
     task = scenario(scenario_name, arm, chain, duration)
     used = enough_modes(lambda n: Simulator(arm, ideal_chain(chain), task, law, count=n).run())
@@ -388,9 +374,9 @@ def simulated(
     between: int = 0,
     outputs: Sequence[str] = (),
 ) -> tuple[Simulation, Enough]:
-    """The simulation with `count` modes, or as many as it takes, and how many these are.
+    """Simulate with `count` modes, or enough, and return that number too.
 
-    Gains at the hub follow references in all that they feed back.
+    Gains at the hub follow the references of all their signals.
     """
     ideal = ideal_chain(chain)
     used = enough_modes(lambda n: Simulator(arm, ideal, task, law, count=n, outputs=outputs).run(), count)
@@ -408,7 +394,7 @@ def simulated_run(
     between: int = 0,
     outputs: Sequence[str] = (),
 ) -> Run:
-    """Simulate a scenario by its name: with `count` modes, or as many as its digits take.
+    """Simulate a scenario by its name: with `count` modes, or enough for its digits.
 
     Raises ParameterError as `simulate` does.
     """

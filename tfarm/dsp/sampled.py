@@ -6,9 +6,9 @@
 Gains at the hub are a law of three parts without states, u = -Kp theta - K1 theta_t - K2 M + r, M the root moment
 E I phi'(0) as a strain gauge reads it.  F is affine in the weights of the parts, and `Sampled.terms` has its terms.
 
-Matrix eigenvalues are right to about 1e-14, and a mode may grow by 1e-10 a sample; those of n poles next to each other,
-as a law of high order has them next to z = 1, are right to the nth root of that.  So all are polished together, each as
-an offset o from the nearest open-loop pole, of the plant (e^{pT}) or of the law, by the Ehrlich-Aberth method on
+Matrix eigenvalues have an error of about 1e-14, and a mode may grow by 1e-10 a sample; n poles next to each other, as a
+law of high order has them next to z = 1, have the nth root of that error.  So all are polished together, each as an
+offset o from the nearest open-loop pole, of the plant (e^{pT}) or of the law, by the Ehrlich-Aberth method on
 P(z) = F(z) prod(z - poles of F),
 
     step = 1/(P'/P - sum over the other roots of 1/(z - root))
@@ -40,22 +40,22 @@ from tfarm.records import record
 from tfarm.reduced.conversions import closed
 
 STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes
-SMALLEST_LOG = -745.0  # of the smallest double: stands for the logarithm of 0
-OFF_POLE = 1e-17  # stands for an offset of 0: next to 1 that is none
+SMALLEST_LOG = -745.0  # of the smallest double: for the logarithm of 0
+OFF_POLE = 1e-17  # for an offset of 0: next to 1 that is none
 DIFFERENCE = 1e-7  # of an offset: between two points that give a slope
 MOST_STEPS = 200  # of all roots together: from four digits on two are enough, of a cluster of twelve a hundred
 LAST_STEP = 1e-12  # of the offset: below its rounding
 SETTLED, EIGENVALUE_ROUNDING = 1e-6, 1e-9  # of the offset, and beyond: one that still steps by more is put back
 UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
-LEAST_SQUARE = -1.0 + 1e-15  # stands for |z|^2 - 1 of a pole at z = 0, which no root is laid out from
-FADED_RADIUS = 0.2  # a pole nearer to z = 0 decides nothing and is not polished
+LEAST_SQUARE = -1.0 + 1e-15  # for |z|^2 - 1 of a pole at z = 0, the base of no root
+FADED_RADIUS = 0.2  # a pole nearer to z = 0 is stable and not polished
 OUTPUT_OF = {gain.name: gain.output for gain in GAINS}
 
 
 @dataclass(frozen=True)
 @record
 class SampledPoles:
-    """Closed-loop poles `z` and `log_radius` ln|z| of each, the z = 1 of a hub angle that nothing regulates left out.
+    """Closed-loop poles `z` and `log_radius` ln|z| of each, without z = 1 of a free hub angle.
 
     `mode` is the flexible mode of the open-loop pole that is nearest (0: none).
     """
@@ -71,12 +71,12 @@ class SampledPoles:
 
     @property
     def unstable(self) -> int:
-        """How many lie outside the unit circle."""
+        """Number of poles outside the unit circle."""
         return int((self.log_radius > 0).sum())
 
     @property
     def is_stable(self) -> bool:
-        """Whether all lie inside the unit circle; nothing is rounded."""
+        """Whether all lie inside the unit circle, without a tolerance."""
         return self.log_spectral_radius < 0.0
 
 
@@ -85,8 +85,8 @@ class SampledPoles:
 class Sampled:
     """A rig under a law at the samples of a chain, which has the law's delay too.
 
-    `sensed` is what the law reads, `law` its parts, of plain gains 1 in the place of each, and `in_z` these as they
-    act; `weights` are the numbers that the parts are multiplied by: such a gain, or 1.
+    `sensed` are the signals of the law, `law` its parts, with 1 for each plain gain, and `in_z` these in z; `weights`
+    are the factors on the parts: such a gain, or 1.
     """
 
     sensed: SensedPlant
@@ -108,14 +108,14 @@ class Sampled:
     @cached_property
     def own_moment(self) -> Real:
         """The row of C that reads the arm's own root moment, a signal of the law, ahead of the anti-alias filter."""
-        plant = self.plant.beside(self.sensed.unfiltered.rows(["root_moment"]))
+        plant = self.plant.joined(self.sensed.unfiltered.rows(["root_moment"]))
         return np.asarray(PulseTransfer(plant, self.chain.sampling).folded().matrices()[2][-1])
 
     # ------------------------------------------------------------ its numbers, and other loops
 
     @property
     def given(self) -> Law:
-        """The law in the form in which it was given."""
+        """The law with its weights, in its given form."""
         return self.law.weighted(self.weights)
 
     @property
@@ -125,12 +125,12 @@ class Sampled:
 
     @property
     def gains(self) -> HubFeedback:
-        """The gains at the hub, of a loop that has all of them and no more."""
+        """The gains at the hub, of a loop with these alone."""
         assert self.is_of_gains
         return law_of(self.weights)
 
     def place(self, name: str) -> int | None:
-        """The part that a number is the weight of, by its name in `Law.having`; None of any other number."""
+        """The part whose weight is a number, by its name in `Law.having`; None of any other number."""
         known, name = self.law.part_gains, OUTPUT_OF.get(name, name).removesuffix(".gain")
         return next((known[key][0] for key in (name, f"{name}.gain") if key in known), None)
 
@@ -139,19 +139,19 @@ class Sampled:
         return self.weights[self.part(name)]
 
     def part(self, name: str) -> int:
-        """The part that a number is the weight of.  Raises ParameterError where it is none."""
+        """The part whose weight is a number.  Raises ParameterError for any other number."""
         if (place := self.place(name)) is None:
             raise ParameterError(key="law", value=name, remedy=did_you_mean(name, list(self.law.part_gains)))
         return place
 
     def weighted(self, weights: Sequence[float]) -> Sampled:
-        """The same loop with other weights; plant and pulse transfer functions, which know no law, are shared."""
+        """The same loop with other weights; plant and pulse transfer functions are shared."""
         other = replace(self, weights=tuple(weights))
         vars(other).update(plant=self.plant, pulse=self.pulse)
         return other
 
     def having(self, **numbers: float) -> Sampled:
-        """The same loop with other values of the numbers that are named."""
+        """The same loop with other values of some numbers, by name."""
         weights = list(self.weights)
         for name, value in numbers.items():
             weights[self.part(name)] = value
@@ -162,28 +162,28 @@ class Sampled:
         return self.weighted([factor * each for each in self.weights])
 
     def with_delay(self, samples: float) -> Sampled:
-        """The same loop with another delay in all."""
+        """The same loop with another total delay."""
         chain = replace(self.chain, sampling=replace(self.chain.sampling, delay_samples=samples))
         other = replace(self, chain=chain)
         vars(other).update(plant=self.plant)
         return other
 
     def with_modes(self, count: int) -> Sampled:
-        """The same loop with another number of flexible modes; no work where its models have as many."""
+        """The same loop with another number of flexible modes; cheap where its models have as many."""
         return replace(self, sensed=self.sensed.with_modes(count))
 
     def under(self, law: Law) -> Sampled:
-        """Another law on the same arm, with as many modes."""
+        """The loop of another law on the same arm, with the same number of modes."""
         sampling = self.chain.sampling
         own = max(0.0, sampling.delay_samples - self.law.delay / sampling.period)
         chain = replace(self.chain, sampling=replace(sampling, delay_samples=own))
         return sampled_loop(self.plant.arm, law, chain, count=self.plant.count)
 
     def on(self, arm: Arm, count: int) -> Sampled:
-        """The same law on another arm, with so many flexible modes."""
+        """The loop of the same law on another arm, with `count` flexible modes."""
         return replace(self, sensed=sensed_plant(arm, self.chain, self.in_z.signals, count))
 
-    # ------------------------------------------------------------ what it feeds back
+    # ------------------------------------------------------------ its signals
 
     @property
     def exact(self) -> Callable[[Complex], Complex]:
@@ -192,12 +192,12 @@ class Sampled:
 
     @property
     def analog(self) -> tuple[bool, ...]:
-        """Which signals pass the anti-alias filter."""
+        """Whether each signal passes the anti-alias filter."""
         return tuple(is_analog(each, self.chain) for each in self.sensed.read.outputs)
 
     @property
     def push(self) -> Real:
-        """What the law adds to each pole of the plant, at most, where the samples see it [1/s]."""
+        """Bound on the shift of each pole of the plant by the law, at its aliased frequency [1/s]."""
         delta = np.exp(1j * self.plant.poles.imag * self.chain.sampling.period) - 1
         entries = np.zeros(self.plant.residues.shape, complex)
         for part, row, gain, zeros in self.in_z.terms:
@@ -214,7 +214,7 @@ class Sampled:
 
     @cached_property
     def row(self) -> Real:
-        """What the rows of `terms` are multiplied by."""
+        """The weights of the rows of `terms`."""
         return np.array([1.0, *self.weights])
 
     def terms(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
@@ -259,7 +259,7 @@ class Sampled:
 
     @cached_property
     def has_free_angle(self) -> bool:
-        """Whether the hub angle is a pole at z = 1 that nothing regulates."""
+        """Whether the hub angle is a pole at z = 1 without feedback."""
         turned = dict(zip(self.in_z.signals, self.plant.rigid[:, int(self.is_damped)], strict=True))
         return bool(self.plant.arm.has_rigid_mode and self.in_z.ignores(turned, self.weights))
 
@@ -275,7 +275,7 @@ class Sampled:
         own, B, _, _ = self.in_z.matrices
         angle = self.pulse.matrices()[2][:, first + int(self.is_damped)]
         shift = np.zeros(len(A))
-        shift[first] = 1.0  # and the states of the law where the hub stands still an angle off
+        shift[first] = 1.0  # and the states of the law where the hub is at rest at that angle
         shift[len(A) - len(own) :] = np.linalg.lstsq(np.eye(len(own)) - own, B @ angle, rcond=None)[0]
         others = np.arange(len(A)) != first  # the quotient by that direction
         return np.asarray(A[others][:, others] - np.outer(shift[others], A[first, others]))
@@ -286,10 +286,7 @@ class Sampled:
         return np.linalg.eigvals(self.reduced_matrix()).astype(complex)
 
     def near_one(self, weights: Real) -> list[tuple[int, float]]:
-        """The rows of `terms` times weights (1 + parts,), each as (n, c) of c x^n where x = 1 - 1/z is small.
-
-        Those of weight 0 are left out.
-        """
+        """The rows of `terms` times weights (1 + parts,) other than 0, each as (n, c) of c x^n at small x = 1 - 1/z."""
         plant, T, at_rest = self.plant, self.chain.sampling.period, self.plant.at_rest
         size = abs(plant.static) + abs(plant.residues / plant.poles).sum(axis=1)
         found = [lowest_power(self.in_z.poles)] if weights[0] else []
@@ -307,30 +304,52 @@ class Sampled:
 
     @cached_property
     def poles_at_one(self) -> int:
-        """How many closed-loop poles are at z = 1 for whatever numbers, a free hub angle apart.
+        """Number of closed-loop poles at z = 1 for any numbers, without a free hub angle.
 
-        So are an integrator of what is 0 at rest, one of two integrators side by side, a hub whose rate nothing feels:
-        x^N F, N the poles of the plant there, vanishes at x = 1 - 1/z = 0 as often as all of its terms do.
+        Such are an integrator of a signal that is 0 at rest, one of two parallel integrators, a hub without feedback of
+        its rate.  The order of x^N F, N the poles of the plant there, at x = 1 - 1/z = 0 is the least of its terms.
         """
         poles = 0 if not self.plant.arm.has_rigid_mode else (1 if self.is_damped else 2) - self.has_free_angle
         return max(0, poles + min(n for n, _ in self.near_one(self.row)))
 
     @cached_property
     def poles(self) -> SampledPoles:
-        """The closed-loop poles, polished, those that are at z = 1 for whatever numbers put there."""
+        """The closed-loop poles, polished; `poles_at_one` of them are exactly 1."""
         return self.polished()
 
     def polished(self, which: Any = None) -> SampledPoles:
-        """Those poles, or some of them."""
-        z = self.eigenvalues.copy()
+        """The polished poles, each as an offset from its nearest open-loop pole; of a mask `which` those alone."""
+        z, shifts, pulse = self.eigenvalues.copy(), self.open_loop, self.pulse
         z[np.argsort(abs(z - 1), kind="stable")[: self.poles_at_one]] = 1.0
-        return _polished(self, z, which)
+        delta = z - 1
+        base = _nearest(self, delta)
+        offset = delta - shifts[base]
+        bright = (abs(z) > FADED_RADIUS) & (delta != 0) & (True if which is None else which)
+        rows = np.flatnonzero(bright)
+        if rows.size:
+            _settle(base, offset, rows, self)
+            moved = _nearest(self, shifts[base] + offset)
+            if (rows := np.flatnonzero(bright & (moved != base))).size:  # then all digits are kept from there
+                offset[rows] += shifts[base[rows]] - shifts[moved[rows]]
+                base[rows] = moved[rows]
+                _settle(base, offset, rows, self)
+        at = base[bright]
+        with np.errstate(divide="ignore"):
+            log_radius = np.maximum(np.log(abs(z)), SMALLEST_LOG)
+        own = 2 * self.in_z.poles.real + abs(self.in_z.poles) ** 2
+        start = np.r_[pulse.poles.real * pulse.sampling.period, np.log1p(np.maximum(own, LEAST_SQUARE)) / 2]
+        ratio = offset[bright] / (1 + shifts[at])
+        log_radius[bright] = start[at] + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
+        z[bright] = (1 + shifts[at]) + offset[bright]
+        mode = pulse.mode[abs(z[:, None] - pulse.multipliers).argmin(axis=1)]
+        shown = slice(None) if which is None else which
+        return SampledPoles(z[shown], log_radius[shown], mode[shown])
 
 
 def _nearest(loop: Sampled, delta: Complex) -> Whole:
-    """The number of the open-loop pole nearest to each z = 1 + delta, of those that have not faded.
+    """The number of the open-loop pole nearest to each z = 1 + delta, of those that are not near z = 0.
 
-    The integrals of a hub that cannot drift are none: next to them F has no digits of its own.
+    The integrals of a hub that cannot drift are not among them, as F has no digits next to them.
     """
     away = abs(delta[:, None] - loop.open_loop)
     away[:, abs(1 + loop.open_loop) <= FADED_RADIUS] = np.inf
@@ -339,44 +358,14 @@ def _nearest(loop: Sampled, delta: Complex) -> Whole:
     return np.asarray(away.argmin(axis=1))
 
 
-def _polished(loop: Sampled, z: Complex, which: Any = None) -> SampledPoles:
-    """Closed-loop poles from eigenvalues that are nearly right, each as an offset from its nearest open-loop pole.
-
-    Those of a mask alone where `which` is one; those that are 1 stay.
-    """
-    delta, shifts, pulse = z - 1, loop.open_loop, loop.pulse
-    base = _nearest(loop, delta)
-    offset = delta - shifts[base]
-    bright = (abs(z) > FADED_RADIUS) & (delta != 0) & (True if which is None else which)
-    rows = np.flatnonzero(bright)
-    if rows.size:
-        _settle(base, offset, rows, loop)
-        moved = _nearest(loop, shifts[base] + offset)
-        if (rows := np.flatnonzero(bright & (moved != base))).size:  # then all digits are kept from there
-            offset[rows] += shifts[base[rows]] - shifts[moved[rows]]
-            base[rows] = moved[rows]
-            _settle(base, offset, rows, loop)
-    at = base[bright]
-    with np.errstate(divide="ignore"):
-        log_radius = np.maximum(np.log(abs(z)), SMALLEST_LOG)
-    own = 2 * loop.in_z.poles.real + abs(loop.in_z.poles) ** 2
-    start = np.r_[pulse.poles.real * pulse.sampling.period, np.log1p(np.maximum(own, LEAST_SQUARE)) / 2]
-    ratio = offset[bright] / (1 + shifts[at])
-    log_radius[bright] = start[at] + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
-    z[bright] = (1 + shifts[at]) + offset[bright]
-    mode = pulse.mode[abs(z[:, None] - pulse.multipliers).argmin(axis=1)]
-    found = SampledPoles(z, log_radius, mode)
-    return found if which is None else SampledPoles(z[which], log_radius[which], mode[which])
-
-
 def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> None:
-    """Bring some roots to rest, in place: those that never come there stay where their step was shortest."""
+    """Iterate some roots until they converge, in place: others stay where their step was shortest."""
     kept, shifts, pulse = offset.copy(), loop.open_loop, loop.pulse
-    known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0)]  # of F; what is left is at z = 1
+    known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0)]  # of F; the others are at z = 1
     poles = np.r_[known, np.zeros(max(0, offset.size - known.size - loop.in_z.poles.size))]
     last, shortest = np.full((2, offset.size), np.inf)
     offset[rows] = np.where(offset[rows] == 0, OFF_POLE, offset[rows])
-    with np.errstate(all="ignore"):  # a root on an open-loop pole, and one that strays beyond any number
+    with np.errstate(all="ignore"):  # a root on an open-loop pole, and one that diverges
         for _ in range(MOST_STEPS):
             b, o = base[rows], offset[rows]
             both, one = np.r_[o, o * (1 + DIFFERENCE)], shifts[b]
@@ -410,10 +399,10 @@ def sampled_loop(
     *,
     count: int = USUAL_MODES,
 ) -> Sampled:
-    """The loop with `count` flexible modes.
+    """Return the loop with `count` flexible modes.
 
-    Raises ParameterError for a locked hub, an unknown signal, a law in z of another period, what `discretised` refuses,
-    and a massless hub whose moment is fed back (an algebraic loop).
+    Raises ParameterError for a locked hub, an unknown signal, a law in z of another period, a massless hub whose moment
+    is fed back (an algebraic loop), and as `discretised` does.
     """
     law = with_all_gains(arm, law)
     acting, chain = acting_law(arm, law, chain_or_usual(chain))
@@ -426,7 +415,7 @@ def sampled_loop(
 
 
 def resized(loop: Sampled, count: int) -> Sampled:
-    """The loop with another number of flexible modes, or a few less or more where two damped modes are one there."""
+    """The loop with another number of flexible modes, or up to two more or less where two damped modes are one."""
     for number in (count, count - 1, count + 1, count - 2, count + 2):
         try:
             return loop.with_modes(max(1, number))

@@ -39,7 +39,7 @@ FORGOTTEN = 40.0  # e^-40 = 4e-18: such a pole has settled before the next sampl
 @dataclass(frozen=True)
 @record
 class PulseTransfer:
-    """H_o(z), the pulse transfer functions from the torque computed at a sample to what the next samples measure.
+    """H_o(z), the pulse transfer functions from the torque computed at a sample to the next samples.
 
     Poles at e^{pT}, those of s = 0 at z = 1, and a delay z^-d.  Callable at complex z.
     """
@@ -75,12 +75,12 @@ class PulseTransfer:
 
     @cached_property
     def early(self) -> Complex:
-        """What u_{k-d} adds to an amplitude within a sample."""
+        """Share of u_{k-d} in an amplitude within a sample."""
         return held_amplitude(self.poles, (1 - self.sampling.fraction) * self.sampling.period)
 
     @cached_property
     def late(self) -> Complex:
-        """What u_{k-d-1} adds, from before the switch."""
+        """Share of u_{k-d-1}, from before the switch."""
         T, f = self.sampling.period, self.sampling.fraction
         return np.exp(self.poles * ((1 - f) * T)) * held_amplitude(self.poles, f * T)
 
@@ -93,7 +93,7 @@ class PulseTransfer:
 
     @property
     def ramps(self) -> tuple[float, float]:
-        """What u_{k-d} and u_{k-d-1} add to the double integral of the torque within a sample."""
+        """Shares of u_{k-d} and u_{k-d-1} in the double integral of the torque within a sample."""
         T, f = self.sampling.period, self.sampling.fraction
         return (1 - f) ** 2 * T * T / 2, f * (1 - f / 2) * T * T
 
@@ -106,9 +106,9 @@ class PulseTransfer:
     def scaled(
         self, z: Complex, base: NDArray[np.int64] | None, offset: NDArray[Any], delta: Complex | None = None
     ) -> Complex:
-        """offset H(z) at z = multipliers[base] + offset, without loss however small the offset: (outputs, n).
+        """offset H(z) at z = multipliers[base] + offset, without loss for any offset: (outputs, n).
 
-        With no `base`, or one of -1, it is offset H(z); `delta` is z - 1, where that is known to more digits than z.
+        With no `base`, or one of -1, it is offset H(z); `delta` is z - 1, where that has more digits than z.
         """
         gap = z[:, None] - self.multipliers if delta is None else delta[:, None] - self.shifts
         rows = np.empty(0, np.int64) if base is None else np.flatnonzero(base >= 0)
@@ -127,7 +127,7 @@ class PulseTransfer:
         return value * z ** (-self.sampling.whole_delay)
 
     def folded(self) -> PulseTransfer:
-        """The same with every pole that a sample leaves nothing of counted as static."""
+        """The same with every pole that decays within a sample as a static share."""
         gone = self.plant.poles.real * (1 - self.sampling.fraction) * self.sampling.period < -FORGOTTEN
         if not gone.any():
             return self
@@ -145,7 +145,7 @@ class PulseTransfer:
 
     @property
     def integrals_at(self) -> int:
-        """The place of the torque's two integrals among the states; behind them is the input of the sample before."""
+        """The index of the torque's two integrals among the states; the next state is the input of the last sample."""
         upper, real = self.kept()
         return int(2 * upper.size + real.size)
 
@@ -153,8 +153,8 @@ class PulseTransfer:
         """A (n, n), B (n,), C (outputs, n) of x_{k+1} = A x_k + B u_k, y_k = C x_k, real.
 
         States: real and imaginary part of the amplitude of each pole with Im p > 0, the amplitude of each real one, the
-        double integral and the integral of the torque, and u_{k-1} to u_{k-d-1}.  Of a hub that friction brings to rest
-        slowly (`Plant.braked`) the integral of that pole's amplitude stands for that of the torque.
+        double integral and the integral of the torque, and u_{k-1} to u_{k-d-1}.  For a hub that friction brings to
+        rest slowly (`Plant.braked`) the last integral is that of that pole's amplitude.
         """
         return self._matrices
 
@@ -203,7 +203,7 @@ class PulseTransfer:
             B[row] = now**2 * phi(p * now)
 
     def kept(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Indices of the poles with Im p > 0 and of the real ones, those of s = 0 apart."""
+        """Indices of the poles with Im p > 0 and of the real ones, without s = 0."""
         p = self.plant.poles
         return np.nonzero(p.imag > 0)[0], np.nonzero(p.imag == 0)[0]
 
@@ -227,7 +227,7 @@ class PulseTransfer:
             np.zeros((len(C), 1)),
             self.sampling.period,
             inputs=["hub_torque"],
-            outputs=[name.replace(".", "_") for name in self.plant.outputs],  # a dot says there whose signal it is
+            outputs=[name.replace(".", "_") for name in self.plant.outputs],  # a dot separates a system and its signal
             name=f"{self.plant.arm.name} sampled",
         )
 
@@ -235,12 +235,11 @@ class PulseTransfer:
 def pulse_transfer(
     arm: Arm, outputs: tuple[str, ...] | list[str], sampling: Sampling | None = None, *, count: int = USUAL_MODES
 ) -> PulseTransfer:
-    """The sampled arm with `count` flexible modes: exact for its modal model, callable at z, `.state_space()`.
+    """Return the sampled arm with `count` flexible modes: exact for its modal model, callable at z, `.state_space()`.
 
     Raises ParameterError for an unknown output, a locked hub or a count out of range.
     """
-    clock = Sampling() if sampling is None else sampling
-    return PulseTransfer(undelayed_plant(arm, outputs, count), clock)
+    return PulseTransfer(undelayed_plant(arm, outputs, count), sampling or Sampling())
 
 
 def phi(u: float) -> float:
@@ -249,7 +248,7 @@ def phi(u: float) -> float:
 
 
 def held_amplitude(p: Complex, duration: float) -> Complex:
-    """(e^{p t} - 1)/p: the amplitude that a unit torque leaves after `duration` t [s]."""
+    """(e^{p t} - 1)/p: the amplitude of a unit torque after `duration` t [s]."""
     x = p * duration
     safe = np.where(x == 0, 1.0, x)
     return np.where(x == 0, duration, np.expm1(safe) / safe * duration)

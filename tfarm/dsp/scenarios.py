@@ -1,4 +1,4 @@
-"""What the loop is asked to do: references, feedforward, disturbances and the state that it starts from."""
+"""Scenarios of a sampled loop: references, feedforward, disturbances and initial state."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from tfarm.records import record
 from tfarm.spectrum.table import turning_inertia
 
 MOST_TASK_SAMPLES = 4_000_000  # of a record, a few hundred MB of signals
-STEP_TORQUE, IMPULSE, TIP_OFFSET = 0.1, 0.01, 0.01  # N m, N m s, m: what the scenarios of the paper's arm start with
-TRIAL_COST = (1.0, 2.6)  # 1/(N m)^2 s: weights a and b of the paper's (23), of what vibrates and of what a law adds
-TRIAL_SLEWS = 3.0  # times the slew: how long a trial is that is made for an arm and its chain
-TRIAL_DURATION = 3.0  # s, of a trial or a simulation whose length is not said: three times the paper's slew
+STEP_TORQUE, IMPULSE, TIP_OFFSET = 0.1, 0.01, 0.01  # N m, N m s, m: sizes of the scenarios of the paper's arm
+TRIAL_COST = (1.0, 2.6)  # 1/(N m)^2 s: weights a and b of the paper's (23), of vibration and of the law's own share
+TRIAL_SLEWS = 3.0  # times the slew: length of a trial for an arm and its chain
+TRIAL_DURATION = 3.0  # s, of a trial or a simulation by default: three times the paper's slew
 PAPER_TORQUE = 3.0  # N m, of the slew of 1.15 m in 1 s of the preset sasaki2012
 
 
 @dataclass(frozen=True)
 @record
 class Scenario:
-    """A row a sample: `feedforward` r [N m], `hub_angle` and `hub_rate` references, `rigid_moment` [N m] at the root of
-    the rigid arm on them, `disturbance` [N m] at the hub (held over the sample, not delayed).
+    """One row for each sample: `feedforward` r [N m], `hub_angle` and `hub_rate` references, `rigid_moment` [N m] at
+    the root of the rigid arm on them, `disturbance` [N m] at the hub (held over the sample, not delayed).
 
-    It starts at rest, but for the first mode released with `tip_offset` [m] at the tip; `impulse` [N m s] strikes the
+    It starts at rest, but for the first mode released with `tip_offset` [m] at the tip; `impulse` [N m s] acts on the
     hub just after the sample at t = 0. `busy_until` [s]: the residual vibration is measured from there on.  `reading`:
-    whether the moment feedback takes the rigid arm's moment off.
+    whether the moment feedback subtracts the rigid arm's moment.
     """
 
     name: str
@@ -55,12 +55,12 @@ class Scenario:
 
     @property
     def references(self) -> dict[str, Real]:
-        """What outputs should be, by name: hub angle [rad], hub rate [rad/s], root moment [N m]."""
+        """References of outputs, by name: hub angle [rad], hub rate [rad/s], root moment [N m]."""
         return dict(zip(AT_HUB, (self.hub_angle, self.hub_rate, self.moment_reference), strict=True))
 
     @property
     def moment_reference(self) -> Real:
-        """What the moment feedback takes off [N m]: the rigid arm's moment, or nothing under the reading "total"."""
+        """Reference of the moment feedback [N m]: the rigid arm's moment, or 0 under the reading "total"."""
         return self.rigid_moment * float(self.reading == "vibration")
 
     def residual(self, moment: Real) -> Real:
@@ -69,51 +69,45 @@ class Scenario:
 
     @property
     def is_after(self) -> NDArray[np.bool_]:
-        """Which samples (n,) are from the end of the slew on."""
+        """Whether each sample (n,) is from the end of the slew on."""
         return np.asarray(self.t >= self.busy_until * (1 - TIME_ROUNDING))
 
     @property
     def wanted(self) -> Real:
-        """The references of all that gains are on (n, gains), in the order of `GAINS`: 0 of what has none."""
+        """The references of the signals of all gains (n, gains), in the order of `GAINS`; 0 without one."""
         known, none = self.references, np.zeros(self.feedforward.size)
         return np.stack([known.get(output, none) for output in FED_BACK], axis=1)
 
 
 def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
-    """The bang-bang slew: hub acceleration +-4 travel/((r + L) rise^2), its mean over a sample, J of it fed forward.
+    """Return the bang-bang slew: hub acceleration +-4 travel/((r + L) rise^2), means over a sample, fed forward with J.
 
-    On a rig also what friction and back-EMF take at the mean rate, all in the unit of its input.
+    On a rig also friction and back-EMF at the mean rate, all in the unit of its input.
     The rigid arm's moment is -(J - I_h) theta_dd_ref of the interval before the sample.  Raises ParameterError for an
     arm that cannot turn.
     """
     must_turn(arm)
     T, manoeuvre = chain.sampling.period, chain.slew
-    n = _samples(duration, T)
-    peak = manoeuvre.acceleration(arm.reach)
-    t = T * np.arange(n + 1)
-    rate = peak * np.clip(np.minimum(t, manoeuvre.rise_time - t), 0.0, None)
-    acceleration = np.diff(rate) / T
-    mean = (rate[1:] + rate[:-1]) / 2
-    angle = np.r_[0.0, np.cumsum(mean * T)][:-1]
-    before = np.r_[0.0, acceleration[:-1]]
-    rigid = -arm.gauged_inertia * before
+    t = T * np.arange(_samples(duration, T) + 1)
+    rate = manoeuvre.acceleration(arm.reach) * np.clip(np.minimum(t, manoeuvre.rise_time - t), 0.0, None)
+    acceleration, mean = np.diff(rate) / T, (rate[1:] + rate[:-1]) / 2
     return Scenario(
         name="slew",
         period=T,
         feedforward=arm.turned_inertia * acceleration + arm.rate_loss * mean,
-        hub_angle=angle,
+        hub_angle=np.r_[0.0, np.cumsum(mean * T)][:-1],
         hub_rate=rate[:-1],
-        rigid_moment=rigid,
-        disturbance=np.zeros(n),
+        rigid_moment=-arm.gauged_inertia * np.r_[0.0, acceleration[:-1]],
+        disturbance=np.zeros(mean.size),
         busy_until=manoeuvre.rise_time,
         reading=manoeuvre.reading,
     )
 
 
 def torque_unit(arm: Arm, chain: Chain) -> float:
-    """What the slew's torque J theta_dd is in units of that of the paper's arm [N m], to one digit: 1 there.
+    """The slew's torque J theta_dd over that of the paper's arm [N m], to one digit: 1 there.
 
-    An arm that makes no slew has the torque of its own inertia about the hub for one, what is held apart.
+    For an arm without a slew J is its own inertia about the hub, without the held parts.
     """
     share = abs(turning_inertia(arm) * chain.slew.acceleration(arm.reach)) / PAPER_TORQUE
     return float(f"{share:.1g}")
@@ -126,7 +120,7 @@ def trial_weights(arm: Arm, chain: Chain) -> tuple[float, float]:
 
 
 def step(arm: Arm, chain: Chain, duration: float, torque: float | None = None) -> Scenario:
-    """A step of the reference torque r [N m] at t = 0: 0.1 of the arm's unit of torque unless told."""
+    """A step of the reference torque r [N m] at t = 0, by default 0.1 of the arm's unit of torque."""
     torque = STEP_TORQUE * torque_unit(arm, chain) if torque is None else torque
     resting = _rest("step", chain, duration)
     size = number("torque", torque, "a torque is a finite number of N m")
@@ -134,7 +128,7 @@ def step(arm: Arm, chain: Chain, duration: float, torque: float | None = None) -
 
 
 def decay(arm: Arm, chain: Chain, duration: float, tip_offset: float | None = None) -> Scenario:
-    """Free decay: the first mode released from rest with the tip displaced by `tip_offset` [m], 0.01 L unless told."""
+    """Free decay of the first mode from rest with the tip displaced by `tip_offset` [m], by default 0.01 L."""
     tip_offset = TIP_OFFSET * arm.length if tip_offset is None else tip_offset
     size = number("tip_offset", tip_offset, "a tip offset is a finite number of metres")
     return replace(_rest("decay", chain, duration), tip_offset=size)
@@ -143,8 +137,8 @@ def decay(arm: Arm, chain: Chain, duration: float, tip_offset: float | None = No
 def impulse(arm: Arm, chain: Chain, duration: float, impulse: float | None = None) -> Scenario:
     """A disturbance impulse [N m s] on the hub just after the sample at t = 0: 0.01 s of the arm's unit of torque.
 
-    So it is first seen a sample later.  (Just before, the moment of a damped arm would be measured where it grows as
-    t^-1/2, without bound, and no number of modes has that.)
+    So it is first measured a sample later.  (Just before a sample the moment of a damped arm would be measured where it
+    grows as t^-1/2, without bound, and no number of modes converges.)
     """
     impulse = IMPULSE * torque_unit(arm, chain) if impulse is None else impulse
     size = number("impulse", impulse, "an impulse is a finite number of N m s")
@@ -160,7 +154,7 @@ SCENARIOS: dict[str, Callable[[Arm, Chain, float], Scenario]] = {
 
 
 def described(task: Scenario, arm: Arm, chain: Chain) -> str:
-    """What a scenario asks of the arm, with its size."""
+    """A scenario with its size, in words."""
     if task.name == "slew":
         return f"a slew: the tip moves {chain.slew.travel_of(arm.reach):.4g} m in {chain.slew.rise_time:g} s"
     if task.name == "step":
@@ -171,7 +165,7 @@ def described(task: Scenario, arm: Arm, chain: Chain) -> str:
 
 
 def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
-    """The scenario of that name with its usual size.  Raises ParameterError for an unknown one."""
+    """Return the scenario of that name with its usual size.  Raises ParameterError for an unknown one."""
     must_be_known("scenario", name, SCENARIOS)
     return SCENARIOS[name](arm, chain, duration)
 
@@ -183,7 +177,7 @@ def _rest(name: str, chain: Chain, duration: float) -> Scenario:
 
 
 def _samples(duration: float, period: float) -> int:
-    """How many samples lie in 0 .. duration, both ends counted."""
+    """Number of samples in 0 .. duration, both ends included."""
     length = positive("duration", duration, "a duration is a positive, finite number of seconds")
     if length / period >= MOST_TASK_SAMPLES:
         remedy = f"at most {MOST_TASK_SAMPLES} samples of {period:g} s; a shorter one, or a longer period"

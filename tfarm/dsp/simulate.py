@@ -1,11 +1,11 @@
-"""The sampled loop in time: exact between the samples, with any controller, recorded at the samples and between.
+"""Simulation of the sampled loop: exact between the samples, with any controller, recorded at the samples and between.
 
 A signal among a law's references enters as signal - reference: those of the hub's angle and rate are the slew's, that
-of the root moment is the rigid arm's.  A column "reference:hub_angle" takes the reference alone.  The encoder's counts
-and the strain amplifier's range act on hub angle and root moment; other signals are read as they are.
+of the root moment is the rigid arm's.  A column "reference:hub_angle" is the reference alone.  The encoder's counts
+and the strain amplifier's range act on hub angle and root moment; other signals are read without a converter.
 
-A signal is rounded to the nearest step (mid-tread) and clipped to the codes that its bits have, as two's complement has
-them: -2^(b-1) .. 2^(b-1) - 1 steps of 2 R / 2^b.  An ideal converter has step 0.
+A signal is rounded to the nearest step (mid-tread) and clipped to the codes of its bits in two's complement:
+-2^(b-1) .. 2^(b-1) - 1 steps of 2 R / 2^b.  An ideal converter has step 0.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from tfarm.dsp import kernel
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.discretise import acting_law, with_all_gains
 from tfarm.dsp.kernel import DAC, HIGHEST, LOWEST
-from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, sensed_plant
+from tfarm.dsp.plant import RECORDED, USUAL_MODES, sensed_plant
 from tfarm.dsp.scenarios import Scenario
 from tfarm.errors import ParameterError, must_be_known
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
 
-FOLDED_UP = 10.0  # rad: an arm bent by the moment EI/L times this is no arm any more, and the simulation stops
+FOLDED_UP = 10.0  # rad: the simulation stops at the root moment EI/L times this, far beyond small deflections
 MOST_BETWEEN = 1000  # records between two samples
 NO_GAINS = HubFeedback()
 
@@ -65,7 +65,7 @@ def _converter(bits: int | None, span: float | None) -> list[float]:
 
 
 class Measurement(NamedTuple):
-    """What a controller gets at sample `k`, time `t` [s]: what the sensors read, and what is wanted.
+    """Readings of the sensors, and references, for a controller at sample `k`, time `t` [s].
 
     `vibration` is the root moment less `rigid_moment` (the paper's x under either reading of it); `feedforward` is r.
     """
@@ -82,12 +82,12 @@ class Measurement(NamedTuple):
     rigid_moment: float
 
     def servo(self, law: HubFeedback) -> float:
-        """What a law asks of the input [N m] for the hub's angle and rate, as they are off what is wanted."""
+        """Input [N m] of a law by the errors of the hub's angle and rate."""
         angle_off, rate_off = self.angle_reference - self.hub_angle, self.rate_reference - self.hub_rate
         return law[ANGLE_GAIN] * angle_off + law[RATE_GAIN] * rate_off
 
-    def asked(self, law: HubFeedback, moment_gain: float) -> float:
-        """What is fed forward and what the servo asks, less the gain at this sample times the vibration."""
+    def command(self, law: HubFeedback, moment_gain: float) -> float:
+        """Feedforward and servo, less the gain at this sample times the vibration."""
         return self.feedforward + self.servo(law) - moment_gain * self.vibration
 
 
@@ -99,7 +99,7 @@ Controller = Callable[[Measurement], float]
 class Trace:
     """Signals, not filtered, at `t` [s]: hub angle [rad], hub rate [rad/s], root moment [N m], tip displacement [m].
 
-    `others` are those asked for besides, by name and in SI units.
+    `others` are further outputs, by name and in SI units.
     """
 
     t: Real
@@ -110,24 +110,24 @@ class Trace:
     others: dict[str, Real] = field(default_factory=dict)
 
     def signal(self, name: str) -> Real:
-        """One of the signals by its name.  Raises ParameterError for one that was not asked for."""
+        """Return a signal by its name.  Raises ParameterError for one that was not recorded."""
         must_be_known("output", name, self.names)
         return self.others[name] if name in self.others else cast("Real", getattr(self, name))
 
     @property
     def units(self) -> dict[str, str]:
-        """The SI units of what was asked for besides."""
+        """The SI units of the further outputs."""
         return {name: OUTPUTS[name.partition("@")[0]].unit for name in self.others}
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The signals that it has."""
+        """The names of all signals."""
         return (*RECORDED, *self.others)
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Why a simulation ended early: at `time` [s] the arm was folded up, by `mode` above all (0: the hub)."""
+    """Early end of a simulation: at `time` [s] the root moment passed its bound, mostly by `mode` (0: the hub)."""
 
     time: float
     mode: int
@@ -136,12 +136,12 @@ class Stop:
 @dataclass(frozen=True)
 @record
 class Simulation:
-    """A simulated loop: `at_samples` just before each update, `between` the records asked for between the samples.
+    """A simulated loop: `at_samples` just before each update, `between` the records between the samples, if any.
 
-    `torque` [N m] is what leaves the DAC at each sample, `gain` that on the root moment there (None where a controller
-    does not say), `measured` (n, 3) what the analog filters pass of hub angle, hub rate and root moment.
-    `saturated_at` (n, 3) says at which samples the encoder, the strain amplifier and the torque were clipped.
-    `energy_error` is |energy gained - work done| over the energy that went to and fro, for an arm without damping; None
+    `torque` [N m] is the output of the DAC at each sample, `gain` that on the root moment there (None of a controller
+    without one), `measured` (n, 3) hub angle, hub rate and root moment behind the analog filters.  `saturated_at`
+    (n, 3): whether the encoder, the strain amplifier and the torque were clipped at each sample.
+    `energy_error` is |energy gained - work done| over initial energy and total work, for an arm without damping; None
     with damping.
     """
 
@@ -158,10 +158,10 @@ class Simulation:
 
     @property
     def finding(self) -> str:
-        """How far it ran, the largest root moment on the way, and what was clipped, in words."""
+        """End of the run, largest root moment, and clipped signals."""
         end, moment = float(self.t.max(initial=0.0)), float(abs(self.at_samples.root_moment).max(initial=0.0))
         clipped = [f"{name} clipped at {n} samples" for name, n in self.saturated.items() if n]
-        ran = f"ran to {end:.6g} s" if self.stopped is None else f"ran away, stopped at {self.stopped.time:.6g} s"
+        ran = f"ran to {end:.6g} s" if self.stopped is None else f"unstable, stopped at {self.stopped.time:.6g} s"
         return ", ".join([ran, f"root moment up to {moment:.4g} N m", *clipped])
 
     @property
@@ -171,7 +171,7 @@ class Simulation:
 
     @property
     def saturated(self) -> dict[str, int]:
-        """At how many samples encoder, strain amplifier and torque were clipped."""
+        """Numbers of samples at which encoder, strain amplifier and torque were clipped."""
         counts = self.saturated_at.sum(axis=0)
         return {name: int(n) for name, n in zip(("encoder", "moment", "torque"), counts, strict=True)}
 
@@ -185,10 +185,10 @@ class Simulation:
 class Simulator:
     """An arm with `count` modes, a chain, a scenario and a law, prepared once; each call simulates it from the start.
 
-    `between` asks for so many records in each sample, `outputs` for more signals than those of `RECORDED`, by name,
-    those along the arm with their place [m]: "tip_rotation", "strain@0.05".  Raises ParameterError for a locked hub,
-    for an unknown output or signal, one that grows with s without bound, a signal whose reference no scenario has, and
-    as `acting_law` does.
+    `between` is the number of records in each sample, `outputs` are signals beyond those of `RECORDED`, by name, those
+    along the arm with their place [m]: "tip_rotation", "strain@0.05".  Raises ParameterError for a locked hub, for an
+    unknown output or signal, one that grows with s without bound, a signal whose reference no scenario has, and as
+    `acting_law` does.
     """
 
     def __init__(
@@ -207,25 +207,34 @@ class Simulator:
         given = with_all_gains(arm, law)
         self.gains = given.gains if given.references == AT_HUB else None
         self.law, self.chain = acting_law(arm, given, chain)
-        references_of(self.law, scenario)  # which it has to have
+        references_of(self.law, scenario)  # raises for one that is missing
         self.scenario, self.between, self._wanted = scenario, between, scenario.wanted
         self.others = tuple(dict.fromkeys(name for name in outputs if name not in RECORDED))
         self.measured = tuple(dict.fromkeys((*AT_HUB, *self.law.signals)))
         self.plant = sensed_plant(arm, chain, self.measured, count).together
         for names in filter(None, (RECORDED, self.others)):
-            self.plant = self.plant.beside(sensed_plant(arm, chain, names, count).unfiltered)
+            self.plant = self.plant.joined(sensed_plant(arm, chain, names, count).unfiltered)
         self._kept = np.nonzero(self.plant.poles.imag >= 0)[0]
         self._model = self._prepared()
         self._forcing = kernel.Forcing(scenario.feedforward, scenario.disturbance, float(scenario.impulse))
-        self._electronics = _electronics(self.chain, FOLDED_UP * arm.bending_scale)
+        c, sampling = self.chain.converters, self.chain.sampling
+        self._electronics = kernel.Electronics(
+            quantisers=quantisers(self.chain),
+            is_differenced=c.hub_rate == "difference",
+            pole=math.exp(-c.rate_filter * sampling.period),
+            period=float(sampling.period),
+            delay=sampling.whole_delay,
+            is_single=c.arithmetic == "float32",
+            bound=float(FOLDED_UP * arm.bending_scale),
+        )
 
     def run(self) -> Simulation:
-        """The law over the scenario, from its start."""
+        """Simulate the law over the scenario, from its start."""
         n, gains = self.scenario.feedforward.size, self.gains
         return self._driven(self.law, None if gains is None else np.full(n, gains.K2))
 
     def linear(self, gains: HubFeedback, K2: Real | None = None) -> Simulation:
-        """The law u = r + gains . (wanted - measured) in the place of the simulator's own; `K2` (n,) may vary.
+        """Simulate u = r + gains . (wanted - measured) instead of the simulator's own law; `K2` (n,) may vary.
 
         Raises ParameterError for I_h = 0 with moment feedback, and for gains that are not one finite number a sample.
         """
@@ -251,32 +260,32 @@ class Simulator:
         return self._result(state, int(done), gain)
 
     def controller(self, controller: Controller) -> Simulation:
-        """Any callable from a `Measurement` to a torque [N m]; its numbers are float32 if the arithmetic is."""
+        """Simulate a callable from a `Measurement` to a torque [N m]; its numbers are float32 if the arithmetic is."""
         return self._stepped(lambda m: (float(controller(m)), 0.0), None)
 
     def gain_schedule(self, K1: float, gain: Callable[[Measurement], float], Kp: float = 0.0) -> Simulation:
-        """The law of `linear` with K2 = gain(measurement) at each sample, recorded as `gain`."""
+        """Simulate the law of `linear` with K2 = gain(measurement) at each sample, recorded as `gain`."""
         law = HubFeedback(K1=K1, Kp=Kp)
 
         def torque(m: Measurement) -> tuple[float, float]:
             K = float(gain(m))
-            return m.asked(law, K), K
+            return m.command(law, K), K
 
         return self._stepped(torque, np.zeros(self.scenario.feedforward.size))
 
     def finer(self, between: int) -> Self:
-        """The same with so many records in each sample."""
+        """The same with `between` records in each sample."""
         other = copy(self)
         other.between = between
         other._model = other._prepared()
         return other
 
     def modal(self) -> tuple[Complex, Complex]:
-        """Poles (m,) [1/s] with Im p >= 0, and what each amplitude adds to hub angle, rate, moment and tip (4, m)."""
+        """Poles (m,) [1/s] with Im p >= 0, and their weights in hub angle, rate, moment and tip (4, m)."""
         return self.plant.poles[self._kept], self._model.weights[len(self.measured) :][: len(RECORDED)]
 
     def first_amplitudes(self) -> Complex:
-        """The modal amplitudes (m,) after the sample at t = 0, once the hub was struck."""
+        """The modal amplitudes (m,) after the sample at t = 0 and the impulse."""
         return self._at_first() + self.scenario.impulse
 
     # ------------------------------------------------------------ inside
@@ -287,22 +296,18 @@ class Simulator:
         for k in range(state.torque.size):
             if not kernel.before(k, self._model, state, forcing, of):
                 return self._result(state, k, gain)
-            u, K = rule(self._measurement(k, state, memory))
+            angle, rate, moment = kernel.converted(state.record[k], state.saturated[k], memory, of)
+            *wanted, rigid = self._wanted[k, : len(AT_HUB)].tolist()
+            values = [angle, rate, moment, moment - rigid, float(forcing.feedforward[k]), *wanted, rigid]
+            if of.is_single:
+                values = [float(np.float32(value)) for value in values]
+            u, K = rule(Measurement(k, k * self.scenario.period, *values))
             if not math.isfinite(u):
                 raise ParameterError(key="controller", value=u, remedy=f"its torque at sample {k} is not finite")
             kernel.after(k, float(np.float32(u)) if of.is_single else u, self._model, state, forcing, of)
             if gain is not None:
                 gain[k] = K
         return self._result(state, state.torque.size, gain)
-
-    def _measurement(self, k: int, state: kernel.State, memory: Real) -> Measurement:
-        angle, rate, moment = kernel.converted(state.record[k], state.saturated[k], memory, self._electronics)
-        angle_wanted, rate_wanted, rigid = (float(value) for value in self._wanted[k, : len(AT_HUB)])
-        forward = float(self.scenario.feedforward[k])
-        values = [angle, rate, moment, moment - rigid, forward, angle_wanted, rate_wanted, rigid]
-        if self._electronics.is_single:
-            values = [float(np.float32(value)) for value in values]
-        return Measurement(k, k * self.scenario.period, *values)
 
     def _start(self) -> kernel.State:
         n, outputs = self.scenario.feedforward.size, len(self.plant.outputs)
@@ -318,15 +323,23 @@ class Simulator:
         )
 
     def _at_first(self) -> Complex:
-        """The modal amplitudes (m,) at t = 0: none, but where the tip is let go."""
+        """The modal amplitudes (m,) at t = 0: 0, or of the first mode at rest with the tip displaced.
+
+        a = i x/(p r), x = offset |p|^2/(2 Im p).
+        """
         amplitude: Complex = np.zeros(self._kept.size, complex)
-        if self.scenario.tip_offset:
-            i, value = _released(self.plant, self._kept, self.scenario.tip_offset)
-            amplitude[i] = value
+        if offset := self.scenario.tip_offset:
+            poles, tip = self.plant.poles[self._kept], self.plant.residues[self.plant.outputs.index("tip_displacement")]
+            first = np.flatnonzero((self.plant.mode[self._kept] == 1) & (poles.imag > 0) & (tip[self._kept] != 0))[:1]
+            if not first.size:
+                remedy = "no free decay: the tip is pinned, or the first mode is overdamped; take another scenario"
+                raise ParameterError(key="scenario", value="decay", remedy=remedy)
+            p, r = poles[first], tip[self._kept][first]
+            amplitude[first] = 1j * offset * abs(p) ** 2 / (2 * p.imag) / (p * r)
         return amplitude
 
     def _energy(self, amplitude: Complex, rate: float) -> float:
-        """Of an undamped arm [J]: b^2 |a|^2/2 a mode, b^2 twice the residue of the hub rate, and the rigid arm's."""
+        """Energy of an undamped arm [J]: b^2 |a|^2/2 a mode, b^2 twice the residue of the hub rate, and rigid."""
         row = self.plant.outputs.index("hub_rate", len(self.measured))
         rigid = self.plant.rigid[row, 1] * rate**2 / 2
         return float(self.plant.residues[row, self._kept].real @ abs(amplitude) ** 2 + rigid)
@@ -362,7 +375,7 @@ class Simulator:
         )
 
     def _prepared(self) -> kernel.Model:
-        """What the compiled loop takes of the plant, with the records between two samples."""
+        """The plant for the compiled loop, with the records between two samples."""
         row = self.plant.outputs.index("hub_angle", len(self.measured))
         return kernel.model_of(self.plant, self._kept, self.chain.sampling, self.between, row)
 
@@ -372,33 +385,8 @@ class Simulator:
         return Trace(t, angle, rate, moment, tip, dict(zip(self.others, more, strict=True)))
 
 
-def _electronics(chain: Chain, bound: float) -> kernel.Electronics:
-    c, T = chain.converters, chain.sampling.period
-    return kernel.Electronics(
-        quantisers=quantisers(chain),
-        is_differenced=c.hub_rate == "difference",
-        pole=math.exp(-c.rate_filter * T),
-        period=float(T),
-        delay=chain.sampling.whole_delay,
-        is_single=c.arithmetic == "float32",
-        bound=float(bound),
-    )
-
-
-def _released(plant: Plant, kept: NDArray[np.int64], offset: float) -> tuple[int, complex]:
-    """The amplitude of the first mode at rest with the tip displaced: a = i x/(p r), x = offset |p|^2/(2 Im p)."""
-    row = plant.outputs.index("tip_displacement")
-    first = np.nonzero((plant.mode[kept] == 1) & (plant.poles[kept].imag > 0))[0]
-    if not first.size or plant.residues[row, kept[first[0]]] == 0:
-        remedy = "the tip cannot be released: it is pinned, or the first mode is overdamped; take another scenario"
-        raise ParameterError(key="scenario", value="decay", remedy=remedy)
-    i = int(first[0])
-    p, r = plant.poles[kept[i]], plant.residues[row, kept[i]]
-    return i, complex(1j * offset * abs(p) ** 2 / (2 * p.imag) / (p * r))
-
-
 def references_of(law: Law, task: Scenario) -> Real:
-    """What is taken off each column of the law at each sample (n, columns): of a column of references, minus it.
+    """Return the reference of each column of the law at each sample (n, columns), negative of a reference column.
 
     Raises ParameterError for a signal whose reference a scenario does not have.
     """

@@ -1,11 +1,11 @@
-"""Signals in time as they are drawn: fine enough for the fastest mode that is seen, or a band that says so.
+"""Signals over time for pictures: resolved for the fastest visible mode, or a band from lowest to highest value.
 
-Under the torque u that is held a mode goes round its rest, a + u/p, on a circle that shrinks with Re p.  The torques of
-a simulation are played again, and the largest circle of every mode, times what it shows in an output, is its share.
+Under a held torque u a mode circles its rest position, a + u/p, and the circle shrinks with Re p.  The torques of a
+simulation are applied again; the largest circle of every mode, times its weight in an output, is its amplitude there.
 
-So a simulation is made twice: first at its samples, to see which modes ring visibly, then with at least 20 records in
-each period of the fastest of them.  Where that is more than a page can show as a line, the curve is drawn, and written
-to its file, as the band between its smallest and largest value over at least two such periods.
+So a simulation is made twice: first at its samples, to find the modes that ring visibly, then with at least 20 records
+in each period of the fastest of them.  Where that is too much for a line on a page, the curve is drawn, and written to
+its file, as the band between its smallest and largest value over at least two such periods.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.records import record
 
-POINTS_A_PERIOD = 20  # of a curve in each period of the fastest mode that is seen
+POINTS_A_PERIOD = 20  # of a curve in each period of the fastest visible mode
 VISIBLE = 1 / 300  # of the height of a curve: a pixel of a picture
 AnySimulator = TypeVar("AnySimulator", bound=Simulator)
 
@@ -35,23 +35,23 @@ MOST_LINE = 6000  # points of a line: at 20 a period still three pixels a period
 PERIODS = 2  # of the fastest mode that each piece of a band holds at least
 BAND_PIECES = 1500  # of a band at most
 MOST_RECORDS = 400_000  # of a simulation for a picture, some 30 MB
-RECORD_LENGTH = 3.0  # times the slew: how long a record is
+RECORD_LENGTH = 3.0  # times the slew: length of a record
 
 
 class Ringing(NamedTuple):
-    """`frequency` (m,) [rad/s] of the modes that ring, and how far they do in `RECORDED` (4, m)."""
+    """`frequency` (m,) [rad/s] of the modes that ring, and their amplitude in `RECORDED` (4, m)."""
 
     frequency: Real
     size: Real
 
     def fastest(self, signal: str, height: float) -> float:
-        """The highest frequency [rad/s] that is seen in a curve of that height; 0 where none is."""
+        """The highest visible frequency [rad/s] in a curve of that height; 0 without one."""
         seen = self.size[RECORDED.index(signal)] > VISIBLE * height
         return float(self.frequency[seen].max(initial=0.0))
 
 
 def ringing(simulator: Simulator, run: Simulation) -> Ringing:
-    """The ringing of a simulation by this simulator, its torques played again; no mode rings that decays faster."""
+    """Return the ringing of a simulation by this simulator, its torques applied again, of modes with Im p > -Re p."""
     p, weights = simulator.modal()
     rings = p.imag > -p.real
     p, weights, amplitude = p[rings], weights[:, rings], simulator.first_amplitudes()[rings]
@@ -70,7 +70,7 @@ def ringing(simulator: Simulator, run: Simulation) -> Ringing:
 
 
 def records_between(simulator: Simulator, run: Simulation, heights: dict[str, float]) -> int:
-    """How many records between two samples show every mode that is seen in curves of these heights [SI]."""
+    """Number of records between two samples that resolve every visible mode in curves of these heights [SI]."""
     found = ringing(simulator, run)
     fastest = max((found.fastest(signal, height) for signal, height in heights.items()), default=0.0)
     return max(0, math.ceil(POINTS_A_PERIOD * fastest * run.scenario.period / (2 * math.pi)) - 1)
@@ -87,14 +87,14 @@ class TimeCurve:
     is_band: bool
 
     def at(self, t: Real) -> TimeCurve:
-        """The same at other times, which its own begin with or hold, for a file with one column of time."""
+        """The same at other times, at or after its own, for a file with one column of time."""
         if self.t.size == t.size:
             return self
         k = np.clip(np.searchsorted(self.t, t * (1 + TIME_ROUNDING), side="right") - 1, 0, self.t.size - 1)
         return TimeCurve(t, self.low[k], self.high[k], self.is_band)
 
     def columns(self, key: str, title: str, unit: str) -> Sequence[Column]:
-        """What is drawn, for the file: one column, or both edges of the band."""
+        """The drawn curve, for its file: one column, or both edges of the band."""
         name = f"{key}_{unit.replace(' ', '_')}"
         if not self.is_band:
             return (Column(name, title, unit, of=self.low),)
@@ -105,7 +105,7 @@ class TimeCurve:
 
 
 def resolved(simulator: AnySimulator, arm: Arm, *runs: Callable[[AnySimulator], Simulation]) -> list[Simulation]:
-    """The simulations of one picture, with as many records between their samples as its fastest visible mode takes."""
+    """Return the simulations of one picture, with enough records between their samples for its fastest visible mode."""
     rough = [run(simulator) for run in runs]
     needed = [records_between(simulator, each, _heights(arm, each)) for each in rough if each.t.size > 1]
     most = max(LEAST_BETWEEN, MOST_RECORDS // simulator.scenario.t.size)
@@ -114,8 +114,10 @@ def resolved(simulator: AnySimulator, arm: Arm, *runs: Callable[[AnySimulator], 
 
 
 def points_a_period(arm: Arm, run: Simulation) -> tuple[float, int]:
-    """How many points the records have in a period of the fastest mode that is seen, and how many between two samples
-    there would have to be for 20; infinitely many where none is seen."""
+    """Points of the records in a period of the fastest visible mode (inf without one), and number needed for 20.
+
+    That number is of records between two samples.
+    """
     simulator = Simulator(arm, run.chain, run.scenario)
     needed = records_between(simulator, run, _heights(arm, run)) if run.t.size > 1 else 0
     there = 0 if run.between is None else run.between.t.size // max(1, run.t.size)
@@ -123,12 +125,12 @@ def points_a_period(arm: Arm, run: Simulation) -> tuple[float, int]:
 
 
 def _heights(arm: Arm, run: Simulation) -> dict[str, float]:
-    """How high the curves are that are drawn, by the signal that they come from."""
+    """Heights of the drawn curves, by signal."""
     return {"root_moment": float(np.ptp(run.at_samples.root_moment)), "tip_displacement": float(np.ptp(away(arm, run)))}
 
 
 def away(arm: Arm, simulation: Simulation) -> Real:
-    """Tip displacement less where a rigid arm on its reference has it [m], at the samples."""
+    """Tip displacement less that of a rigid arm on its reference [m], at the samples."""
     reference = arm.reach * simulation.scenario.hub_angle[: simulation.t.size]
     return simulation.at_samples.tip_displacement - reference
 
@@ -144,7 +146,7 @@ def tip(simulation: Simulation) -> TimeCurve:
 
 
 def tip_deviation(arm: Arm, simulation: Simulation) -> TimeCurve:
-    """Tip displacement less where a rigid arm on its reference has it [m]."""
+    """Tip displacement less that of a rigid arm on its reference [m]."""
     t, displacement = continuous(simulation, "tip_displacement")
     return curve(t, displacement - arm.reach * reference_angle(simulation.scenario, t))
 
@@ -159,7 +161,7 @@ def reference_angle(task: Scenario, t: Real) -> Real:
 
 
 def curve(t: Real, y: Real) -> TimeCurve:
-    """A line where a page can show one, else a band."""
+    """A line where it is short enough for a page, else a band."""
     if t.size <= MOST_LINE:
         return TimeCurve(t, y, y, False)
     step = max(PERIODS * POINTS_A_PERIOD, math.ceil(t.size / BAND_PIECES))
@@ -178,6 +180,6 @@ def continuous(simulation: Simulation, signal: str) -> tuple[Real, Real]:
 
 
 def held_at(simulation: Simulation, values: Real, t: Real) -> Real:
-    """What is held from sample to sample, at the times t [s]."""
+    """Values held from sample to sample, at the times t [s]."""
     k = np.floor(t / simulation.scenario.period * (1 + TIME_ROUNDING)).astype(np.int64)
     return values[np.minimum(k, values.size - 1)]

@@ -1,9 +1,9 @@
-"""Is the sampled loop stable?  Proven for every mode of a band, or said of the first N modes alone."""
+"""Stability of the sampled loop: certified for every mode of a band, or converged for the first N modes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, NamedTuple
@@ -34,21 +34,21 @@ from tfarm.schema import Quantity
 
 LAW_DELAY_DIGITS = 4  # of the delay margin of a law that is more than gains at the hub
 UNDAMPED_MODES = 20  # of an undamped arm, whose verdict is of the first modes alone
-FEWEST_COMPARED = 8  # modes of the first loop with fewer, twice as many in each next
+FEWEST_COMPARED = 8  # modes of the smallest loop, twice as many in each next
 LARGEST_LOG = 700.0  # whose exponential is a double
-RADIUS_AGREES = 1e-4  # of ln of the spectral radius: how well fewer modes must have it
-RADIUS_NOISE = 1e-12  # and what it is known to at all
-MOST_ASKED = 400  # modes that may be asked for
+RADIUS_AGREES = 1e-4  # of ln of the spectral radius: its largest error with fewer modes
+RADIUS_NOISE = 1e-12  # and its rounding error
+MOST_COUNT = 400  # modes that may be asked for
 PERIOD_SHARES = (0.1, 0.5, 1.0, 2.0, 5.0)  # of the chain's own period
 
 
 @dataclass(frozen=True)
 @record
 class Verdict:
-    """Whether a sampled loop is stable, apart from z = 1 of a hub angle that nothing regulates.
+    """Whether a sampled loop is stable, without z = 1 of a free hub angle.
 
-    `band` is the part of the arm for which it is proven (`tfarm.dsp.circle`); None where nothing is, as at C = 0: then
-    the verdict holds for the first `modes_used` modes, those of `loop`, and high ones may grow by 1e-9 a sample.
+    `band` is the part of the arm for which it is certified (`tfarm.dsp.circle`).  Without one, as at C = 0, the verdict
+    holds for the first `modes_used` modes, those of `loop`, and high ones may grow by 1e-9 a sample.
     """
 
     loop: Sampled
@@ -56,12 +56,12 @@ class Verdict:
 
     @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
-        """Arm and law in words, as results name them."""
+        """Names of the arm and the controller."""
         return controller(self.loop.given, self.loop.plant.arm)
 
     @property
     def rule(self) -> Annotated[str, Quantity("discretisation")]:
-        """How the law came to be one in z."""
+        """The discretisation of the law."""
         return rule_in_words(self.loop.given)
 
     @property
@@ -71,17 +71,17 @@ class Verdict:
 
     @property
     def is_settled(self) -> Annotated[bool, Quantity(key="certified")]:
-        """Whether no mode of the band, in the loop or not, and no slow real pole can change the verdict."""
+        """Whether the verdict is certified for every mode of the band and every slow real pole."""
         return self.band is not None
 
     @property
     def band_rad_s(self) -> Annotated[float | None, Quantity("certified up to", "rad/s", key="up_to_rad_s")]:
-        """Up to where the verdict is proven [rad/s]; None where it is not."""
+        """End of the range in which the verdict is certified [rad/s]; None without one."""
         return None if self.band is None else self.band.top
 
     @property
     def modes_used(self) -> Annotated[int, Quantity("flexible modes")]:
-        """How many flexible modes the loop has."""
+        """Number of flexible modes in the loop."""
         return self.loop.plant.count
 
     @property
@@ -91,9 +91,9 @@ class Verdict:
 
     @property
     def log_radius(self) -> Annotated[float, Quantity(key="log_spectral_radius")]:
-        """ln of the spectral radius, of every mode of the band, or of the first `modes_used` where nothing is proven.
+        """ln of the spectral radius, of every mode of the band, or of the first `modes_used` without a band.
 
-        Few modes settle a verdict, but not the later digits of this number.
+        The verdict needs few modes, but not the later digits of this number.
         """
         return self.full.poles.log_spectral_radius
 
@@ -104,12 +104,12 @@ class Verdict:
 
     @property
     def unstable_poles(self) -> Annotated[int, Quantity("unstable poles")]:
-        """Outside the unit circle."""
+        """Number of poles outside the unit circle."""
         return self.loop.poles.unstable
 
     @property
     def full(self) -> Sampled:
-        """The loop with every mode of the band, for other gains than these; that of the verdict where there is none."""
+        """The loop with every mode of the band, for other gains; that of the verdict without a band."""
         return self.loop if self.band is None else self.band.full
 
     @property
@@ -120,12 +120,12 @@ class Verdict:
 
     @property
     def sentence(self) -> Annotated[str, Quantity(key="verdict_in_words")]:
-        """Stability, and of which modes it is known."""
+        """Stability, its certainty, and the dominant pole."""
         return f"{self.word} ({self.holds_for}); dominant pole: {self.slowest}"
 
     @property
     def slowest(self) -> Annotated[str, Quantity("dominant pole", key="dominant")]:
-        """What has the largest radius: a mode, the hub, or a pole of the law."""
+        """Origin of the pole of largest radius: a mode, the hub, or a pole of the law."""
         return dominant(self.loop)
 
     @property
@@ -137,51 +137,42 @@ class Verdict:
 
     @property
     def time_constant(self) -> Annotated[float | None, Quantity("dominant time constant", "s")]:
-        """That of the dominant pole, below 0 where it grows."""
+        """Time constant of the dominant pole, below 0 where it grows."""
         return -self.loop.chain.sampling.period / self.log_radius if self.log_radius else None
 
 
 def sampled_verdict(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | None = None) -> Verdict:
-    """The verdict, with `count` modes, or as many as it takes (C > 0), or the first 20 (C = 0).
+    """Return the verdict, with `count` modes, or enough of them (C > 0), or the first 20 (C = 0).
 
-    As many as it takes: poles of the loop outside the circle are as many as are proven for its whole band, and the
-    largest radius is that of the loop with every mode of the band.  Raises ParameterError for what `sampled_loop`
-    refuses, and a count outside 1..400.
+    They are enough when the number of poles outside the circle is that certified for the whole band, and the largest
+    radius that of the loop with every mode of the band.  Raises ParameterError as `sampled_loop` does, and for a count
+    outside 1..400.
     """
     chain = chain_or_usual(chain)
     if count is not None:
-        count = whole("modes", count, 1, MOST_ASKED, f"a whole number of flexible modes from 1 to {MOST_ASKED}")
+        count = whole("modes", count, 1, MOST_COUNT, f"a whole number of flexible modes from 1 to {MOST_COUNT}")
         return Verdict(sampled_loop(arm, law, chain, count=count))
     if arm.has_elastic_link:
         return Verdict(sampled_loop(arm, law, chain, count=UNDAMPED_MODES))
-    return settled_verdict(whole_loop(arm, law, chain))
-
-
-def settled_verdict(largest: Sampled) -> Verdict:
-    """The verdict on a damped arm by as few modes as it takes, from the loop with all."""
+    largest = whole_loop(arm, law, chain)
     band = complete_band(largest)
     full = largest if band is None else band.full
     proven, radius = None if band is None else band.circle().count(full.weights), full.poles.log_spectral_radius
-    for loop in _growing(full):
+    number = min(FEWEST_COMPARED, full.plant.count // 2)
+    while True:
+        loop = resized(full, number) if 0 < number < full.plant.count else full
         agrees = abs(loop.poles.log_spectral_radius - radius) <= RADIUS_AGREES * abs(radius) + RADIUS_NOISE
         if agrees and loop.poles.unstable == full.poles.unstable and proven in (None, loop.poles.unstable):
             break
+        if loop is full:
+            break
+        number *= 2
     is_proven = proven is not None and (proven == 0) == (loop.poles.unstable == 0)
     return Verdict(loop, band if is_proven else None)
 
 
-def _growing(full: Sampled) -> Iterator[Sampled]:
-    """Loops of 8, 16, 32 ... modes, and the full one."""
-    most = full.plant.count
-    number = min(FEWEST_COMPARED, most // 2)
-    while 0 < number < most:
-        yield resized(full, number)
-        number *= 2
-    yield full
-
-
 class SampledNumber(NamedTuple):
-    """One number of a law, the gain of a part or a factor on it, and how far it may go alone at the samples."""
+    """One number of a law, the gain of a part or a factor on it, and its stability intervals at the samples."""
 
     number: Annotated[str, Quantity("gain or coefficient")]
     value: Annotated[float, Quantity("value")]
@@ -190,23 +181,19 @@ class SampledNumber(NamedTuple):
 
 
 def sampled_numbers(loop: Sampled) -> list[SampledNumber]:
-    """How far the gain of each part of the law may go, the others held."""
-    names = [name for name in loop.law.part_gains if loop.number(name)]
-    return [number_of(name, loop.number(name), stable_windows(loop, name)) for name in names]
-
-
-def number_of(name: str, value: float, windows: list[Window]) -> SampledNumber:
-    """A number with the interval that its value lies in."""
-    return SampledNumber(name, value, windows, around(windows, value))
+    """Return the stability intervals of the gain of each part of the law, the others constant."""
+    values = {name: loop.number(name) for name in loop.law.part_gains}
+    found = {name: stable_windows(loop, name) for name, value in values.items() if value}
+    return [SampledNumber(name, values[name], each, around(each, values[name])) for name, each in found.items()]
 
 
 @dataclass(frozen=True)
 @record
 class Analysis:
-    """A sampled loop: its verdict, and found when first read how far it is from its edges, and its modes one by one.
+    """A sampled loop: its verdict, and, computed when first read, its limits of stability and its modes.
 
-    `shown`, `delay` and `damping` are edges with the digits that are proven, or hold with other modes too;
-    the damping is looked for with `damping_modes`.
+    `shown`, `delay` and `damping` are limits with their certified digits, or those that other modes confirm; the
+    damping is searched with `damping_modes`.
     """
 
     verdict: Annotated[Verdict, Quantity(flat=True)]
@@ -214,7 +201,7 @@ class Analysis:
 
     @property
     def stability_intervals(self) -> Annotated[list[SampledNumber], Quantity("stability intervals")]:
-        """A row a gain at the hub, or a number of another law, the others held."""
+        """One row for each gain at the hub, or number of another law, the others constant."""
         if not self.loop.is_of_gains:
             return self.numbers
         return [SampledNumber(n, self.loop.number(n), each, self.interval(n)) for n, each in self.shown.items()]
@@ -231,12 +218,12 @@ class Analysis:
 
     @property
     def is_lower_bound(self) -> Annotated[bool, Quantity("delay margin or more", key="delay_margin_is_lower_bound")]:
-        """Whether no further delay up to there makes the loop unstable."""
+        """Whether no further delay up to the margin destabilises the loop."""
         return self.delay_margin.is_bound
 
     @property
     def free_hub_angle(self) -> Annotated[str | None, Quantity("free hub angle")]:
-        """The pole at z = 1 from which the verdict is apart."""
+        """The pole at z = 1 that the verdict leaves out."""
         return "its pole at z = 1 is left out" if self.loop.has_free_angle else None
 
     @property
@@ -251,14 +238,14 @@ class Analysis:
 
     @cached_property
     def shown(self) -> Mapping[str, list[Interval]]:
-        """The stable intervals of each gain at the hub, the others held, by name."""
+        """The stability intervals of each gain at the hub, the others constant, by name."""
         without_loop = (MOMENT_GAIN,) if self.loop.plant.arm.has_massless_hub else ()
         return {
             name: [] if name in without_loop else shown_windows(self.loop, self.verdict.band, name) for name in NAMES
         }
 
     def interval(self, name: str) -> Window | None:
-        """The stable interval around a gain; one on the angle that is 0, where nothing holds that, is its end."""
+        """The stability interval around a gain; a gain of 0 on a free angle is the end of its own interval."""
         value, windows = self.loop.number(name), self.windows[name]
         if name == ANGLE_GAIN and value == 0.0 and self.verdict.is_stable:
             return next((window for window in windows if window[0] <= 0.0 < window[1]), None)
@@ -269,18 +256,14 @@ class Analysis:
         """The same intervals without the digits of their edges."""
         return {name: [(low.value, high.value) for low, high in each] for name, each in self.shown.items()}
 
-    @property
+    @cached_property
     def modes(self) -> Annotated[ModeTable, Quantity("modes", help="ln|z| per sample")]:
         """The modes one by one."""
-        return self._modes
-
-    @cached_property
-    def _modes(self) -> ModeTable:
         return mode_table(self.loop)
 
     @property
     def first_unstable_mode(self) -> Annotated[int | None, Quantity("first unstable mode")]:
-        """The lowest mode that grows."""
+        """The lowest unstable mode."""
         grows = self.modes.index[self.modes.log_radius > 0]
         return int(grows[0]) if grows.size else None
 
@@ -290,14 +273,14 @@ class Analysis:
 
     @property
     def delay(self) -> Annotated[Figure, Quantity("delay margin in samples", key="delay_margin")]:
-        """The further delay that the loop can take [samples]; of a law with the modes of the verdict."""
+        """The delay margin [samples]; of any law but gains at the hub with the modes of the verdict."""
         if self.loop.is_of_gains:
             return self._delay[1]
         return Figure(self.delay_margin.samples, LAW_DELAY_DIGITS, None, self.verdict.modes_used)
 
     @cached_property
     def delay_margin(self) -> DelayMargin:
-        """The further delay that the loop bears; of any law but gains at the hub with the modes of the verdict."""
+        """The delay margin; of any law but gains at the hub with the modes of the verdict."""
         return self._delay[0] if self.loop.is_of_gains else delay_margin(self.loop)
 
     @cached_property
@@ -317,7 +300,7 @@ class Analysis:
 
     @cached_property
     def factors(self) -> list[Window]:
-        """Every interval of a factor on the whole law in which the loop is stable, with the modes of the verdict."""
+        """Every stability interval of a factor on the whole law, with the modes of the verdict."""
         return stable_factors(self.loop)
 
     @property
@@ -327,7 +310,7 @@ class Analysis:
 
     @property
     def gain_factors(self) -> Annotated[Window | None, Quantity("gain margin, factors down and up")]:
-        """The interval around 1 in which a factor on the law may lie; None where the loop is not stable."""
+        """The stability interval around 1 of a factor on the law; None unless the loop is stable."""
         return around(self.factors, 1.0)
 
     @property
@@ -337,20 +320,19 @@ class Analysis:
 
     @property
     def rule(self) -> str:
-        """How the law came to be one in z."""
+        """The discretisation of the law."""
         return self.verdict.rule
 
     @cached_property
     def numbers(self) -> list[SampledNumber]:
-        """How far the gain of each part of the law may go, the others held, with the modes of the verdict."""
+        """Stability intervals of the gain of each part of the law, with the modes of the verdict."""
         return sampled_numbers(self.loop)
 
 
 def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | None = None) -> Analysis:
-    """Is the sampled loop stable?  With stable intervals of each number of the law, the further delay that it bears,
-    its modes one by one, and the structural damping that makes it stable.
+    """Return the verdict on the sampled loop, stability intervals, delay margin, modes and minimum structural damping.
 
-    `count` is the number of flexible modes, as many as it takes if not given.  Raises ParameterError for a locked hub,
+    `count` is the number of flexible modes, by default enough for the verdict.  Raises ParameterError for a locked hub,
     an algebraic loop, an unknown signal, and a law in z whose period is not the chain's.
     """
     arm, law = arm_and_law(arm, law)
@@ -359,10 +341,10 @@ def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | N
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampledBrief:
-    """Whether a loop holds at a chain's sampling, apart from z = 1 of a free hub angle.
+    """Whether a loop is stable at a chain's sampling, without z = 1 of a free hub angle.
 
-    `is_stable` and `log_radius`, ln of the spectral radius, are None where the loop could not be judged; `sentence`
-    then says why.
+    `is_stable` and `log_radius`, ln of the spectral radius, are None where that is not determined; `sentence` then has
+    the reason.
     """
 
     sampling: Sampling
@@ -387,13 +369,13 @@ class SampledBrief:
 
     @property
     def spectral_radius(self) -> Annotated[float | None, Quantity("spectral radius")]:
-        """Largest |z|, infinity where it is no double."""
+        """Largest |z|; infinity where it overflows."""
         size = self.log_radius
         return None if size is None else math.exp(size) if size < LARGEST_LOG else math.inf
 
     @property
     def at(self) -> str:
-        """The clock in words, and whether it is only tfarm's default: a file that names no period has that."""
+        """Sampling period and delay in words, and whether the period is tfarm's default."""
         T, delay = self.sampling.period, self.sampling.delay_samples
         late = f", {delay:g} samples late" if delay else ""
         default = " (tfarm's default period)" if Sampling().period == T else ""
@@ -413,7 +395,7 @@ class SampledBrief:
 
 
 def sampled_brief(arm: Arm, law: AnyLaw, chain: Chain) -> SampledBrief:
-    """The verdict on a law at the clock of a chain.  Raises ParameterError where the arm has no such loop."""
+    """Return the verdict on a law at the sampling of a chain.  Raises ParameterError where the arm has no such loop."""
     try:
         verdict = sampled_verdict(arm, law, chain)
     except ConvergenceError as error:
@@ -440,7 +422,7 @@ class AtPeriod(NamedTuple):
 
 
 def at_periods(arm: Arm, gains: HubFeedback, chain: Chain) -> tuple[AtPeriod, ...]:
-    """The gains from a tenth to five times the chain's own period.  Raises ParameterError for an arm without a loop."""
+    """Return the verdicts at a tenth to five times the chain's period.  Raises ParameterError without a loop."""
     rows = []
     for share in PERIOD_SHARES:
         period = float(f"{share * chain.sampling.period:.12g}")  # 1 ms, and no 1.0000000000000002 ms

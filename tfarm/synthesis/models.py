@@ -189,7 +189,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
     A, B, C = pulse.matrices()
     own = C[0] * 0.0
     if "root_moment" in signals:
-        beside = sensed.together.beside(sensed.unfiltered.rows(["root_moment"]))
+        beside = sensed.together.joined(sensed.unfiltered.rows(["root_moment"]))
         own = np.asarray(PulseTransfer(beside, chain.sampling).folded().matrices()[2][-1])
     first = pulse.integrals_at
     damped, felt = bool(sensed.read.arm.rate_loss), arm.has_rigid_mode
