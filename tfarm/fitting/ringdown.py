@@ -267,12 +267,17 @@ def nearest_sum(t: Real, y: Real, start: Complex) -> DampedSum | None:
 def starting_poles(t: Real, y: Real, modes: int) -> Complex:
     """Poles to start from: of ESPRIT's at several rates of sampling those with the least residuals, one by one.
 
-    Fewer if there are not enough poles that turn half a turn in the record, and neither die in a sample nor explode.
+    Of a rate they are ln of the eigenvalues by which the signal subspace of the Hankel matrix moves in one sample.
+    There are fewer where not enough poles turn half a turn in the record, and neither die in a sample nor explode.
     """
     period, duration, thin, found = t[1] - t[0], t[-1] - t[0], 1, []
     while thin == 1 or t.size // thin >= MOST_ROWS:
         means = (y - y.mean())[: t.size // thin * thin].reshape(-1, thin).mean(axis=1)
-        found.append(_poles(means, 2 * modes + SPARE_POLES) / (thin * period))
+        rows = min(means.size // 2, MOST_ROWS)
+        hankel = np.lib.stride_tricks.sliding_window_view(means, rows)
+        V = np.linalg.eigh(hankel.T @ hankel)[1][:, -min(2 * modes + SPARE_POLES, rows - 1) :]
+        z = np.linalg.eigvals(np.linalg.lstsq(V[:-1], V[1:], rcond=None)[0])
+        found.append(np.log(z[z != 0]) / (thin * period))
         thin *= THINNER
     s = np.concatenate(found)
     s = s[(s.imag > math.pi / duration) & (s.real * period > -1) & (s.real * duration < FASTEST)]
@@ -281,15 +286,6 @@ def starting_poles(t: Real, y: Real, modes: int) -> Complex:
         tried = [np.r_[chosen, each] for each in s if each not in chosen]
         chosen = min(tried, key=lambda poles: float((_linear(poles, t, y)[1] ** 2).sum()))
     return chosen
-
-
-def _poles(y: Real, count: int) -> Complex:
-    """ln of the eigenvalues by which the signal subspace of that many dimensions moves in one sample."""
-    rows = min(y.size // 2, MOST_ROWS)
-    hankel = np.lib.stride_tricks.sliding_window_view(y, rows)
-    V = np.linalg.eigh(hankel.T @ hankel)[1][:, -min(count, rows - 1) :]
-    z = np.linalg.eigvals(np.linalg.lstsq(V[:-1], V[1:], rcond=None)[0])
-    return np.asarray(np.log(z[z != 0]))
 
 
 def _meat(J: Real, e: Real) -> Real:
