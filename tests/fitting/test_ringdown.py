@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.fitting.recording import Recording
-from tfarm.fitting.ringdown import DampedSum, basis, ring, whiteness
+from tfarm.fitting.resonances import DampedSum, basis, ring, whiteness
 
 T = 0.01
 t = T * np.arange(150)

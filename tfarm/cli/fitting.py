@@ -157,8 +157,8 @@ def ring(
 ) -> None:
     """Frequency and damping of a decay, with intervals."""
     from tfarm.fitting.recording import read_recording
-    from tfarm.fitting.ringdown import MOST_RINGING
-    from tfarm.fitting.ringdown import ring as find
+    from tfarm.fitting.resonances import MOST_RINGING
+    from tfarm.fitting.resonances import ring as find
 
     count = whole_number("--modes", modes, 1, MOST_RINGING)
     found = find(read_recording(record), signal, start=start, stop=stop, modes=count)
