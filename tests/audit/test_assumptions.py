@@ -177,7 +177,7 @@ def test_the_answer_is_plain_json_with_the_numbers_of_the_studies():
 
 
 def test_verdicts_are_those_of_the_loop_itself():
-    """The arm's own row says what `margins` says of it, and every row what its own closed-loop poles say."""
+    """The arm's own row is that of `margins`, and every row that of its own closed-loop poles."""
     arm = tfarm.load("sasaki2012-lab")
     study = hub_study(arm, (0.05, 0.1, 0.5))
     verdicts = study.candidates

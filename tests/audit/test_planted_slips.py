@@ -183,7 +183,7 @@ def test_a_slip_in_a_correction_stops_the_audit():
         printed=claim.printed,
         corrected=claim.printed,
         check=claim.check,
-        evidence="the print, said to be its own correction",
+        evidence="the print as its own correction",
     )
     with pytest.raises(CertificationError, match=r"\(A\.1\), as corrected, leaves"):
         wrong.row()
@@ -197,15 +197,15 @@ def test_turned_signs_are_caught_and_no_formula_is_compared_with_itself(name):
 
 
 def test_increment_and_update_are_judged_by_descent_on_numbers():
-    """Momentum's own claim, by running the rule: the mended one falls to the minimum, the printed one runs away."""
+    """Momentum's own claim, by running the rule: the corrected one falls to the minimum, the printed one diverges."""
     ends = {}
-    for name, sign in (("printed", -1), ("mended", 1)):
+    for name, sign in (("printed", -1), ("corrected", 1)):
         w, dw = 1.0, 0.0
         for _ in range(200):
             dw = -0.1 * w + 0.6 * dw
             w += sign * dw
         ends[name] = abs(w)
-    assert ends["mended"] < 1e-9
+    assert ends["corrected"] < 1e-9
     assert ends["printed"] > 1e9
     assert paper.UPDATE == "w_next = w + dw"
     assert paper.UPDATE_PRINTED == "w_next = w - dw"

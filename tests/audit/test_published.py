@@ -27,7 +27,7 @@ def changed(key: str, **changes):
     return replace(source, cases=(replace(source.cases[0], **changes),))
 
 
-def test_every_row_agrees_or_says_why() -> None:
+def test_every_row_agrees_or_has_a_reason() -> None:
     table = validate()
     assert len(table) == sum(len(case.printed) for source in SOURCES for case in source.cases)
     assert all(row.agrees != bool(row.why) for row in table)
@@ -102,7 +102,7 @@ def test_the_verb_prints_the_table_or_one_object(capsys: pytest.CaptureFixture[s
     assert json.loads(out)["explained"] == 21
 
 
-def test_the_verb_exits_3_and_says_which_row(
+def test_the_command_exits_3_and_names_the_row(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     wrong = changed("nafems-fv5", why={})

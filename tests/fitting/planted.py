@@ -5,7 +5,7 @@
 Random arms, two or three responses of an independent model (`tests.chain_elements`, nothing of tfarm in it), noise of
 known size, four to six free numbers, each started up to 30 % off.  A fit is right where its sum of squares is at most
 that of the truth and every number within five deviations of it; nominal 95 % intervals are counted.  With "pairs" two
-of the numbers are known by their product or ratio alone, and a fit is right where it says so of these two and no other.
+of the numbers are known by their product or ratio alone, and a fit is right where it finds these two and no other.
 With "rigs" they have springs, friction, a radius and a motor at the hub, over whatever drives them, their
 frequencies even or in proportion and often few for the sharpness of a resonance.  None may end above the truth's sum.
 """
@@ -210,12 +210,12 @@ def planted_pair(rng):
 
 
 def judged_pair(seed):
-    """Whether the two, and no other, are said to be known in one combination only."""
+    """Whether the two, and no other, are found to be known in one combination only."""
     arm, data, keys, start, both = planted_pair(np.random.default_rng([852780, seed]))
     found = fit(arm, [data], free=keys, start=start, profile=False)
     unknown = [each.key for each in found.parameters if not each.identified]
-    said = [words for words in found.not_determined if all(key in words for key in both) and "only" in words]
-    is_right = found.converged and unknown == both and len(said) == 1
+    message = [words for words in found.not_determined if all(key in words for key in both) and "only" in words]
+    is_right = found.converged and unknown == both and len(message) == 1
     return "right" if is_right else f"wrong: {unknown}, {found.not_determined}"
 
 

@@ -1,4 +1,4 @@
-"""Arms fitted to responses of finite elements with noise, and to decays; what the data leave open is said."""
+"""Arms fitted to responses of finite elements with noise, and to decays; what the data leave open is message."""
 
 import math
 import tomllib
@@ -110,7 +110,7 @@ def test_profiles_are_where_the_sum_of_squares_has_grown_by_the_quantile():
 
 
 @pytest.mark.parametrize("seed", thinned([0, 1], 2))  # E and the density; E and I
-def test_planted_pairs_are_told_apart(seed):
+def test_planted_pairs_are_known_by_one_combination(seed):
     assert judged_pair(seed) == "right"
 
 
@@ -142,7 +142,7 @@ def test_decays_alone():
 
 
 def test_noise_by_its_coherence_and_by_its_scatter():
-    """Coherence of n averages: sqrt((1 - g)/(2 n g)) of each part; with nothing said, the values' own scatter."""
+    """Coherence of n averages: sqrt((1 - g)/(2 n g)) of each part; with nothing message, the values' own scatter."""
     rng, sigma = np.random.default_rng(3), 0.03
     H = 1 / (1 + 1j * OMEGA / 100)
     values = H + sigma * abs(H) * (rng.standard_normal(OMEGA.size) + 1j * rng.standard_normal(OMEGA.size))
@@ -156,7 +156,7 @@ def test_noise_by_its_coherence_and_by_its_scatter():
     assert known.sigma == pytest.approx(sigma * abs(values), rel=1e-12)
 
 
-def test_a_value_of_0_beside_a_coherence_says_nothing():
+def test_a_value_of_0_with_a_coherence_has_no_weight():
     """A line that was lost on the way, 0 with the coherence of its neighbours: the fit is that without it."""
     omega = OMEGA[::4]
     values = tfarm.transfer(LAB.having(hub_inertia=1.1 * LAB.hub_inertia), "root_moment")(1j * omega)
@@ -177,7 +177,7 @@ def test_a_value_of_0_beside_a_coherence_says_nothing():
         assert each.parameters[0].deviation == pytest.approx(found[1].parameters[0].deviation, rel=1e-6)
 
 
-def test_noise_that_is_not_said_comes_from_the_residuals():
+def test_unknown_noise_comes_from_the_residuals():
     data = [
         tfarm.Measured(output=e.output, input=e.input, omega=e.omega, values=e.values)
         for e in measured(pairs=PAIRS[:1])
@@ -189,8 +189,8 @@ def test_noise_that_is_not_said_comes_from_the_residuals():
     assert abs(found.arm.link.youngs_modulus / LAB.link.youngs_modulus - 1) < 2e-3
 
 
-def test_an_arm_that_is_wrong_is_not_said_to_explain_anything(monkeypatch):
-    """The data are those of an arm with a clamp that yields; with a rigid one the fit ends, and says so."""
+def test_a_wrong_arm_is_rejected(monkeypatch):
+    """The data are those of an arm with a clamp that yields; with a rigid one the fit is rejected."""
     monkeypatch.setattr("tfarm.fitting.solve.STRAYED", 1)  # no start makes a clamp yield
     soft = tfarm.Arm(link=LAB.link, hub=LAB.hub, clamp=tfarm.RotarySpring(stiffness=300.0), name="soft")
     found = fit(LAB, measured(soft, PAIRS[:1], omega=OMEGA[::3]), free=["link.youngs_modulus"], profile=False)
@@ -242,7 +242,7 @@ def test_the_command_and_its_file(tmp_path, capsys):
 
 
 def test_from_a_file_to_margins_in_three_commands(tmp_path, capsys):
-    """The README's example; what the file was made of is in the README beside it."""
+    """The README's example; the file's README has its source."""
     save = tmp_path / "fitted.toml"
     free = "link.youngs_modulus,link.damping,hub.inertia,payload.mass"
     data = "tip_acceleration/hub_torque=tests/data/sweep/tip.csv"
@@ -258,7 +258,7 @@ def test_from_a_file_to_margins_in_three_commands(tmp_path, capsys):
     assert proven["completeness"] == "certified"
 
 
-def test_rad_s_given_as_hz_are_asked_about(tmp_path, capsys):
+def test_rad_s_given_as_hz_are_refused(tmp_path, capsys):
     cells = [row.split(",") for row in Path("tests/data/sweep/tip.csv").read_text().splitlines()[2:]]
     wrong = tmp_path / "wrong.csv"
     wrong.write_text("\n".join(["hz,re,im,sigma", *(f"{6.283185 * float(f)!r},{a},{b},{c}" for f, a, b, c in cells)]))
@@ -300,7 +300,7 @@ def test_young_s_modulus_takes_the_shear_modulus_along():
 
 
 def test_a_step_to_no_arm_is_a_wall(monkeypatch):
-    """An attachment beside the tip that would pass it where the link grows shorter: the search ends at an arm."""
+    """An attachment near the tip that would pass it where the link grows shorter: the search ends at an arm."""
     monkeypatch.setattr("tfarm.fitting.solve.STRAYED", 1)
     rig = tfarm.load("tests/rigs/bench-rig.toml")
     omega = np.geomspace(20, 600, 20)

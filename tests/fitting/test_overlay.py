@@ -1,4 +1,4 @@
-"""A measured response beside the exact one: planted differences are named, mode by mode, and mixed up units."""
+"""A measured response and the exact one: planted differences are named, mode by mode, and mixed up units."""
 
 import csv
 from dataclasses import replace
@@ -52,7 +52,7 @@ def test_each_resonance_is_the_true_arms_pole_and_residue(pair, found):
     assert one.unmatched.size == 0
 
 
-def test_a_noise_said_too_small_is_taken_from_the_residuals():
+def test_a_noise_given_too_small_is_taken_from_the_residuals():
     data = measured(*PAIRS[1])
     (place, *_) = peaks_of(data, data.sigma)
     given, small = (resonance_at(data, data.sigma / by, place).std for by in (1, 10))
@@ -60,7 +60,7 @@ def test_a_noise_said_too_small_is_taken_from_the_residuals():
 
 
 def test_the_one_number_that_explains_a_mode_does(found):
-    """With Young's modulus changed as it says the arm has the measured frequency; of a power law all modes agree."""
+    """With Young's modulus changed by it the arm has the measured frequency; of a power law all modes agree."""
     one = found[PAIRS[0]]
     factors = {each[:2]: 1 + each.change / 100 for each in one.required_changes}
     for row in one.modes:
@@ -82,12 +82,12 @@ def test_a_peak_that_the_arm_does_not_have_is_named():
     assert [row.mode for row in one.modes if row.peak is not None] == [1, 2, 3]
 
 
-@pytest.mark.parametrize(("scale", "said"), [(2 * np.pi, "6.28"), (1 / (2 * np.pi), "0.159")])
-def test_frequencies_in_another_unit_than_the_file_says_are_one_line(scale, said):
+@pytest.mark.parametrize(("scale", "message"), [(2 * np.pi, "6.28"), (1 / (2 * np.pi), "0.159")])
+def test_frequencies_in_another_unit_than_the_header_are_one_line(scale, message):
     with pytest.raises(ParameterError) as error:
         overlay(BARE, measured("root_moment", "hub_torque", scale=scale))
     words = "are rad/s given as Hz?" if scale > 1 else "are Hz given as rad/s?"
-    assert f"its peaks are {said} times the arm's frequencies: {words}" in str(error.value)
+    assert f"its peaks are {message} times the arm's frequencies: {words}" in str(error.value)
 
 
 def test_peaks_a_third_off_and_missing_ones_are_no_other_unit():
@@ -113,7 +113,7 @@ def test_peaks_a_third_off_and_missing_ones_are_no_other_unit():
 
 
 def test_pairs_are_in_order_and_of_least_cost():
-    """By hand: 1.3 is nearer to 1 than leaving both costs; of 5 and 6 the nearer one; 40 has nobody."""
+    """By hand: 1.3 is nearer to 1 than leaving both costs; of 5 and 6 the nearer one; 40 has no partner."""
     pairs, cost = matched_peaks(np.array([1.3, 5.0, 40.0]), np.array([1.0, 4.0, 6.0]), (0.5, 100.0))
     assert pairs == [(0, 0), (1, 2)]
     assert cost == pytest.approx(np.log(1.3) + np.log(6 / 5) + 0.3 + 0.3)
@@ -138,15 +138,15 @@ def sweep(tmp_path_factory):
 
 
 def test_the_command_prints_writes_and_draws(sweep, tmp_path, capsys):
-    asked = ("response", "sasaki2012", "--measured", f"root_moment/hub_torque={sweep}")
+    options = ("response", "sasaki2012", "--measured", f"root_moment/hub_torque={sweep}")
     png, table = tmp_path / "o.png", tmp_path / "o.csv"
-    code, out, err = run(capsys, *asked, "--png", str(png), "--csv", str(table))
+    code, out, err = run(capsys, *options, "--png", str(png), "--csv", str(table))
     assert (code, err) == (0, f"written: {table}\nwritten: {png}\n")
     assert png.read_bytes().startswith(b"\x89PNG")
     assert len(list(csv.reader(table.read_text().splitlines()))) == 1 + OMEGA.size
     assert "single changes that explain a mode" in out
     assert "N m/(N m)" in out
-    given = answer(capsys, *asked)
+    given = answer(capsys, *options)
     one = overlay(BARE, measured("root_moment", "hub_torque"))
     hz = [row["measured_hz"] for row in given["modes"]]
     assert hz == pytest.approx([abs(row.measured.pole) / (2 * np.pi) for row in one.modes], rel=1e-4)
@@ -159,17 +159,17 @@ def test_the_command_prints_writes_and_draws(sweep, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("extra", "said"),
+    ("extra", "message"),
     [
         (("--output", "root_moment"), "--output = 'root_moment': a measured response has its own"),
         (("--omega", "1,2"), "--omega = '1,2'"),
     ],
 )
-def test_what_does_not_go_with_it_is_said(extra, said, sweep, capsys):
-    asked = ("response", "sasaki2012", "--measured", f"root_moment/hub_torque={sweep}")
-    code, _, err = run(capsys, *asked, *extra)
+def test_options_that_do_not_go_with_it_are_refused(extra, message, sweep, capsys):
+    options = ("response", "sasaki2012", "--measured", f"root_moment/hub_torque={sweep}")
+    code, _, err = run(capsys, *options, *extra)
     assert code == 2
-    assert said in err
+    assert message in err
     assert len(err.splitlines()) == 1
 
 

@@ -1,4 +1,4 @@
-"""The arms that the data leave possible: spread as the covariance says, and honest about what is not known.
+"""The arms that the data leave possible: spread by the covariance, and wide where numbers are not determined.
 
 Several records of one response: their scatter is the noise's where nothing else differs, and more where it does.
 """
@@ -21,7 +21,7 @@ def known():
     return fit(LAB, measured(share=0.1), free=["link.youngs_modulus", "link.damping"], profile=False)
 
 
-def test_draws_are_spread_as_the_covariance_says(known):
+def test_draws_are_spread_by_the_covariance(known):
     those = possible(known, count=400)
     covariance = np.linalg.inv(known.solution.jacobian.T @ known.solution.jacobian)
     spread = np.cov(those.points.T)

@@ -66,7 +66,7 @@ def test_residues_are_those_by_the_derivative():
 
 
 @pytest.mark.parametrize(
-    ("arm", "output", "input", "said"),
+    ("arm", "output", "input", "message"),
     [
         (LAB, "tip_acceleration", "tip_acceleration", "a signal over itself is 1"),
         (LAB, "strain@0.05", "hub_rate", "link.section.shape"),
@@ -76,8 +76,8 @@ def test_residues_are_those_by_the_derivative():
         (LAB.having(payload_mass=math.inf), "root_moment", "tip_acceleration", "it is held"),
     ],
 )
-def test_signals_that_the_arm_does_not_have_are_said(arm, output, input, said):
-    with pytest.raises(ParameterError, match=said):
+def test_signals_that_the_arm_does_not_have_are_refused(arm, output, input, message):
+    with pytest.raises(ParameterError, match=message):
         Ratio(arm, output, input)(S)
 
 

@@ -1,10 +1,11 @@
-"""Measured responses from files: the same response however a laboratory writes it, and one line for what is none."""
+"""Measured responses and records from files: the same however a laboratory writes them, and one line for bad ones."""
 
 import hashlib
 import sys
 
 import numpy as np
 import pytest
+import scipy.io
 
 from tfarm.errors import ParameterError
 from tfarm.fitting.data import data_of, read_measured
@@ -48,7 +49,7 @@ def test_every_way_to_write_a_response_is_the_same_response(how, tmp_path):
     assert (found.sigma, found.coherence, found.averages) == (None, None, None)
 
 
-def test_how_sure_it_is_stands_beside_it(tmp_path):
+def test_coherence_and_sigma_are_read(tmp_path):
     path = tmp_path / "sweep=1.csv"
     path.write_text(text(("hz", "re", "im", "coherence", "averages"), (HZ, *[HZ / 40] * 3, [12] * 4)))
     found = data_of(f"tip_acceleration/hub_angle={path}")
@@ -94,14 +95,14 @@ def test_a_file_that_is_none_is_one_line_with_the_file(content, tmp_path):
     path.write_text(content)
     with pytest.raises(ParameterError) as error:
         read_measured(path, *NAMES)
-    said = str(error.value)
-    assert said.startswith(f"{path}: ")
-    assert BAD[content] in said
-    assert "\n" not in said
+    message = str(error.value)
+    assert message.startswith(f"{path}: ")
+    assert BAD[content] in message
+    assert "\n" not in message
 
 
 @pytest.mark.parametrize(
-    ("asked", "said"),
+    ("options", "message"),
     [
         ("sweep.csv", "--data = 'sweep.csv': write OUTPUT/INPUT=FILE"),
         ("tip_acceleration=sweep.csv", "write OUTPUT/INPUT=FILE"),
@@ -112,10 +113,10 @@ def test_a_file_that_is_none_is_one_line_with_the_file(content, tmp_path):
         ("tip_acceleration/hub_angle=/", "is a folder"),
     ],
 )
-def test_what_is_asked_wrongly_is_said(asked, said):
+def test_a_wrong_option_is_refused(options, message):
     with pytest.raises(ParameterError) as error:
-        data_of(asked)
-    assert said in str(error.value)
+        data_of(options)
+    assert message in str(error.value)
 
 
 def test_signals_along_the_link_and_inputs_of_the_hub_are_known(tmp_path):
@@ -142,9 +143,9 @@ def test_a_uff_file_is_read_and_its_responses_are_chosen_by_number(tmp_path):
     assert found.values == pytest.approx(VALUES[1:], rel=1e-12)
     path.write_text(uff(VALUES, 1.0, 0.5) + uff(VALUES, 1.0, 0.5, function=6) + uff(2 * VALUES, 1.0, 0.5))
     assert data_of(f"tip_acceleration/hub_angle={path}#2").values == pytest.approx(2 * VALUES, rel=1e-12)
-    for asked, said in ((path, "holds 2 responses; choose one"), (f"{path}#3", "data set = 3: from 1 to 2")):
-        with pytest.raises(ParameterError, match=said):
-            data_of(f"tip_acceleration/hub_angle={asked}")
+    for options, message in ((path, "holds 2 responses; choose one"), (f"{path}#3", "data set = 3: from 1 to 2")):
+        with pytest.raises(ParameterError, match=message):
+            data_of(f"tip_acceleration/hub_angle={options}")
 
 
 def test_a_uff_file_without_its_package_or_without_a_response_is_one_line(tmp_path, monkeypatch):
@@ -161,31 +162,15 @@ def test_a_uff_file_without_its_package_or_without_a_response_is_one_line(tmp_pa
 
 
 ODD = (
-    "",
-    "nan",
-    "inf",
-    "1e400",
-    "-1",
-    "1_0",
-    "é",
-    '"',
-    "\0",
-    "1e-320",
-    "9" * 300,
-    "hz",
-    "#",
-    "[",
-    ";",
-    "\t",
-    "1;2",
-    "\u2028",
-)
+    "", "nan", "inf", "1e400", "-1", "1_0", "é", '"', "\0", "1e-320", "9" * 300, "hz", "#", "[", ";", "\t",
+    "1;2", "\u2028",
+)  # fmt: skip
 
 
 def test_whatever_is_in_a_file_it_is_read_or_refused_in_one_line(tmp_path):
     """Cells, lines and bytes of a good file changed at random, 300 times: a record or a ParameterError, never more."""
     rng, path, found = np.random.default_rng(6), tmp_path / "odd.csv", 0
-    said: list[str] = []
+    message: list[str] = []
     for _ in range(300):
         lines = [line.split(",") for line in text(("hz", "re", "im", "coherence"), (HZ, *[HZ / 40] * 3)).splitlines()]
         for _ in range(rng.integers(1, 3)):
@@ -200,6 +185,68 @@ def test_whatever_is_in_a_file_it_is_read_or_refused_in_one_line(tmp_path):
                 read()
                 found += 1
             except ParameterError as error:
-                said.append(str(error))
+                message.append(str(error))
     assert found > 10
-    assert not any("\n" in each for each in said)
+    assert not any("\n" in each for each in message)
+
+
+T = 0.002 * np.arange(50) + 1.0
+X, Y = np.sin(T), np.cos(T)
+
+
+def written(path, names, *columns):
+    rows = (",".join(f"{x:.17g}" for x in row) for row in zip(*columns, strict=True))
+    path.write_text("\n".join([",".join(names), *rows]))
+    return path
+
+
+def test_csv_and_mat_hold_the_same_record(tmp_path):
+    text = written(tmp_path / "a.csv", ("torque", "t [s]", "acc [m/s^2]"), X, T, Y)
+    scipy.io.savemat(
+        tmp_path / "a.mat", {"time": T, "torque": X[:, None], "both": np.c_[X, Y], "rate": 500, "name": "a"}
+    )
+    one, other = read_recording(text), read_recording(tmp_path / "a.mat")
+    assert (list(one.signals), list(other.signals)) == (["torque", "acc"], ["torque", "both.1", "both.2"])
+    for found, name in ((one, "acc"), (other, "both.2")):
+        assert found.signal(name, "--signal").tolist() == Y.tolist()
+        assert found.times == pytest.approx(T, rel=4e-16)
+        assert (found.period, found.note) == (pytest.approx(0.002, rel=1e-13), "")
+
+
+def test_times_in_few_digits_are_even_and_uneven_sampling_is_noted(tmp_path):
+    rounded = read_recording(written(tmp_path / "a.csv", ("t", "x"), np.round(T / 3, 6), X))
+    assert rounded.note == ""
+    wandering = T + 5e-5 * np.sin(40 * T)
+    found = read_recording(written(tmp_path / "b.csv", ("t", "x"), wandering, X))
+    assert found.note.startswith("sampled unevenly, by up to")
+
+
+BAD_RECORDS = {
+    "none": (("x", "y"), (X, Y), "t is missing: a record has a column t, in seconds; this one has x, y"),
+    "alone": (("t",), (T,), "signals is missing"),
+    "dropped": (("t", "x"), (np.delete(T, 20), np.delete(X, 20)), "t of sample 21"),
+    "doubled": (("t", "x"), (np.insert(T, 20, T[20]), np.insert(X, 20, 0)), "t of sample 22"),
+    "short": (("t", "x"), (T[:7], X[:7]), "samples = 7"),
+    "milliseconds": (("t [ms]", "x"), (T, X), "unit of t = 'ms': times are in seconds"),
+}
+
+
+@pytest.mark.parametrize("what", BAD_RECORDS)
+def test_a_record_that_is_none_is_one_line_with_the_file(what, tmp_path):
+    names, columns, message = BAD_RECORDS[what]
+    path = written(tmp_path / "bad.csv", names, *columns)
+    with pytest.raises(ParameterError) as error:
+        read_recording(path)
+    assert str(error.value).startswith(f"{path}: {message}")
+
+
+def test_mat_files_that_are_none_are_one_line(tmp_path):
+    path = tmp_path / "bad.mat"
+    path.write_bytes(b"MATLAB 7.3 MAT-file")
+    with pytest.raises(ParameterError, match=r"no \.mat file that can be read"):
+        read_recording(path)
+    scipy.io.savemat(path, {"t": T, "x": np.where(T > 1.05, np.nan, X)})
+    with pytest.raises(ParameterError, match="x, sample 27 = nan: no finite number"):
+        read_recording(path)
+    with pytest.raises(ParameterError, match="record = '/nowhere"):
+        read_recording("/nowhere/a.mat")

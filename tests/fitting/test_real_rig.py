@@ -1,4 +1,4 @@
-"""A real rig that rings, beside the exact arm of its maker's numbers: tests/data/quanser-2dsfl (B. Basta, MIT licence).
+"""A real rig that rings, and the exact arm of its maker's numbers: tests/data/quanser-2dsfl (B. Basta, MIT licence).
 
 Nothing is tuned.  The inertia of the load about the hub's axis and the place of its centre of mass are as the preset
 assumes them; how the inertia splits is not published, and the whole range of what it leaves possible is looked at.
@@ -41,7 +41,7 @@ def first(offset):
 
 @pytest.mark.parametrize("name", RUNS)
 def test_the_inner_stage_rings_between_1_79_and_1_86_hz(name, capsys):
-    """The hub moves by less than a quarter of what the tip does; what is left is no noise, and that is said."""
+    """The hub moves by less than a quarter of what the tip does; what is left is no noise, and that is message."""
     found = answer(capsys, "ring", str(DATA / name), "--signal", "tip_angle_against_hub", "--from", "2")
     (mode,) = found["modes"]
     assert 1.79 < mode["frequency_hz"] < 1.86
@@ -68,7 +68,7 @@ def test_the_held_arm_of_the_published_numbers_is_in_that_range_and_so_are_other
     print(f"held rig, all legal offsets: {ends[0]:.3f} to {ends[1]:.3f} Hz; at 0.079 m {first(0.079):.3f} Hz")
 
 
-def test_for_a_person_the_ring_says_what_its_interval_is_worth(capsys):
+def test_the_text_of_a_ring_has_the_limits_of_its_interval(capsys):
     code, out, err = run(capsys, "ring", str(DATA / RUNS[0]), "--signal", "tip_angle_against_hub", "--from", "2")
     assert (code, err) == (0, "")
     assert "the residuals are correlated" in out

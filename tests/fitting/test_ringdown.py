@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.fitting.recording import Recording
-from tfarm.fitting.ringdown import DampedSum, basis, ring, whiteness
+from tfarm.fitting.resonances import DampedSum, basis, ring, whiteness
 
 T = 0.01
 t = T * np.arange(150)
@@ -21,7 +21,7 @@ def decay(t, w, zeta, amplitude=1.0, phase=0.0):
 
 
 def test_two_modes_and_an_offset_without_noise_come_back_to_rounding():
-    """At the condition of two modes an octave apart, some 1e3, times epsilon; that of most energy stands first."""
+    """At the condition of two modes an octave apart, some 1e3, times epsilon; that of most energy is first."""
     y = 3.0 + decay(t, 20.0, 0.02, 0.3, 1.0) + decay(t, 41.0, 0.05, 1.0, -0.5)
     found = ring(recorded(y), "y", modes=2)
     rows = [(2 * np.pi * row.natural_frequency, row.damping_ratio, row.amplitude) for row in found.modes]
@@ -94,8 +94,8 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     assert drifts <= 0.02
 
 
-def test_noise_that_rings_with_the_decay_is_said_and_widens_the_intervals():
-    """Said of nearly every one; intervals hold the truth in some 85 of 100, by the formula for white noise in 65."""
+def test_noise_that_rings_with_the_decay_is_noted_and_widens_the_intervals():
+    """Noted of nearly every one; intervals hold the truth in some 85 of 100, by the formula for white noise in 65."""
     frequency, damping, white, _ = covered(cases(100, seed=12, colour=0.7))
     assert white <= 0.05
     assert min(frequency, damping) >= 0.79  # 85 less two deviations
@@ -103,16 +103,16 @@ def test_noise_that_rings_with_the_decay_is_said_and_widens_the_intervals():
     assert any("residuals are correlated" in note for note in found.notes)
 
 
-def test_a_mode_left_out_and_a_frequency_that_drifts_are_said():
+def test_a_mode_left_out_and_a_frequency_that_drifts_are_noted():
     noise = 1e-3 * np.random.default_rng(3).standard_normal(t.size)
     two = ring(recorded(decay(t, 20.0, 0.02) + decay(t, 61.0, 0.02, 0.1) + noise), "y")
     assert not two.is_white
     chirp = np.exp(-0.4 * t) * np.cos(20.0 * t + 0.5 * t**2) + noise
-    said = ring(recorded(chirp), "y").notes
-    assert any("mode 1 rings at" in note and "friction" in note for note in said)
+    message = ring(recorded(chirp), "y").notes
+    assert any("mode 1 rings at" in note and "friction" in note for note in message)
 
 
-def test_white_noise_is_white_as_often_as_the_probability_says():
+def test_white_noise_is_white_with_the_probability_computed():
     rng = np.random.default_rng(4)
     found = np.array([whiteness(rng.standard_normal(200)) for _ in range(400)])
     for level in (0.1, 0.5):
@@ -120,7 +120,7 @@ def test_white_noise_is_white_as_often_as_the_probability_says():
 
 
 @pytest.mark.parametrize(
-    ("y", "options", "error", "said"),
+    ("y", "options", "error", "message"),
     [
         (decay(t, 20.0, 0.01), {"start": 1.4}, ParameterError, "--from = 1.4: 10 samples from 1.4 to 1.49 s"),
         (decay(t, 20.0, 0.01), {"modes": 0}, ParameterError, "--modes = 0"),
@@ -128,10 +128,10 @@ def test_white_noise_is_white_as_often_as_the_probability_says():
         (np.r_[1.0, np.zeros(t.size - 1)], {}, ConvergenceError, "no oscillation found"),
     ],
 )
-def test_what_is_no_decay_is_said(y, options, error, said):
+def test_a_signal_without_decay_is_refused(y, options, error, message):
     with pytest.raises(error) as raised:
         ring(recorded(y), "y", **options)
-    assert said in str(raised.value)
+    assert message in str(raised.value)
 
 
 def test_a_signal_that_is_not_there_is_named():

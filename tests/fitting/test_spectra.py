@@ -1,10 +1,14 @@
-"""Frequency responses of records: against scipy, a known filter, and the scatter of Bendat and Piersol."""
+"""Frequency responses of records, against SciPy, a known filter, the scatter of Bendat and Piersol; the commands."""
+
+import re
 
 import numpy as np
 import pytest
 from scipy import signal
 
+from tests.shell import answer, run
 from tfarm.errors import ParameterError
+from tfarm.fitting.data import data_of
 from tfarm.fitting.recording import Recording, frequency_response, independent_averages
 
 T = 0.01
@@ -86,7 +90,7 @@ def test_noise_on_the_input_lowers_h1_and_not_h2():
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         ({"segment": 50.0}, "--segment = 50.0: seconds between 0.08 and 5"),
         ({"segment": 0.01}, "--segment = 0.01"),
@@ -96,15 +100,73 @@ def test_noise_on_the_input_lowers_h1_and_not_h2():
         ({"columns": ("acc", "hub_torque")}, "--output = 'acc'"),
     ],
 )
-def test_what_cannot_be_estimated_is_said(options, said):
+def test_options_of_an_impossible_estimate_are_refused(options, message):
     x, y = noisy(np.random.default_rng(4), 1000)
     with pytest.raises(ParameterError) as error:
         estimate(x, y, **options)
-    assert said in str(error.value)
+    assert message in str(error.value)
 
 
-@pytest.mark.parametrize(("x", "y", "said"), [(0.0, 1.0, "'hub_torque': does not move"), (1.0, 0.0, "'tip_acc")])
-def test_a_signal_that_does_not_move_is_named(x, y, said):
+@pytest.mark.parametrize(("x", "y", "message"), [(0.0, 1.0, "'hub_torque': does not move"), (1.0, 0.0, "'tip_acc")])
+def test_a_signal_that_does_not_move_is_named(x, y, message):
     drawn = np.random.default_rng(5).standard_normal(400)
-    with pytest.raises(ParameterError, match=said):
+    with pytest.raises(ParameterError, match=message):
         estimate(x * drawn, y * drawn)
+
+
+@pytest.fixture
+def record(tmp_path):
+    x = np.random.default_rng(1).standard_normal(1600)
+    y = signal.lfilter(B, A, x)
+    path = tmp_path / "run.csv"
+    rows = (f"{T * n:.2f},{u:.9g},{v:.9g}" for n, (u, v) in enumerate(zip(x, y, strict=True)))
+    path.write_text("\n".join(["t,hub_torque,acc1", *rows]))
+    return path
+
+
+NAMED = ("--input", "hub_torque", "--output", "tip_acceleration=acc1")
+
+
+def test_a_record_becomes_a_file_that_the_other_commands_read(record, tmp_path, capsys):
+    save = tmp_path / "sweep.csv"
+    code, out, err = run(capsys, "frf", str(record), *NAMED, "--save", str(save))
+    assert (code, err) == (0, f"written: {save}\n")
+    assert re.search(r"^independent averages +14.2", out, re.MULTILINE)
+    data = data_of(f"tip_acceleration/hub_torque={save}")
+    found = answer(capsys, "frf", str(record), *NAMED)
+    assert [row["hz"] for row in found["response"]] == pytest.approx(list(data.omega / 2 / np.pi), rel=1e-15)
+    assert [row["re"] for row in found["response"]] == data.values.real.tolist()
+    assert data.coherence.tolist() == [row["coherence"] for row in found["response"]]
+    assert data.averages == int(found["independent_averages"])
+    H = signal.freqz(B, A, worN=data.omega * T)[1]
+    inside = slice(1, 90)
+    assert abs(data.values / H - 1)[inside].max() < 0.05  # what hann segments of 200 samples leave of a ring of ten
+
+
+def test_the_table_is_printed_without_a_file(record, capsys):
+    code, out, _ = run(capsys, "frf", str(record), *NAMED, "--segment", "0.2", "--estimator", "Hv")
+    assert code == 0
+    table = out[out.index("frequency [Hz]") :].splitlines()
+    assert len(table) == 1 + 9
+    assert re.search(r"^segments +159$", out, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("frf", "RUN", "--input", "hub_torque", "--output", "tip_acceleration"), "--output = 'tip_acceleration'"),
+        (("frf", "RUN", "--input", "torque=hub_torque", "--output", "tip_acceleration=acc1"), "--input = 'torque'"),
+        (("frf", "RUN", "--input", "hub_torque", "--output", "tip_acceleration="), "write NAME=COLUMN"),
+        (("frf", "RUN", *NAMED, "--segment", "9"), "--segment = 9.0"),
+        (("frf", "/nowhere.csv", *NAMED), "does not exist"),
+        (("ring", "RUN", "--signal", "acc2"), 'did you mean "acc1"'),
+        (("ring", "RUN", "--signal", "acc1", "--from", "20"), "0 samples from 20 to 15.99 s"),
+        (("ring", "RUN", "--signal", "acc1", "--modes", "0"), "--modes = '0'"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(arguments, message, record, capsys):
+    code, out, err = run(capsys, *(str(record) if each == "RUN" else each for each in arguments))
+    assert (code, out) == (2, "")
+    assert err.startswith("tfarm: ")
+    assert len(err.splitlines()) == 1
+    assert message in err

@@ -138,7 +138,7 @@ def test_the_masses_of_ghali_neville_2017_however_they_are_put():
 
     The outer mass is the payload, or an attachment at the tip; the link is one segment or three.
     """
-    light = 1e-9  # kg/m beside masses of 1 kg
+    light = 1e-9  # kg/m, with masses of 1 kg
     x = np.arange(1.0, 4.0)
     low, high = np.minimum.outer(x, x), np.maximum.outer(x, x)
     exact = np.sort(1 / np.sqrt(eigvals(low**2 * (3 * high - low) / 6 * [1.0, 1.0, 4.0]).real))

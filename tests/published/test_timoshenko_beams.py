@@ -1,6 +1,6 @@
 """Published tables of Timoshenko beams: nafems-fv5, code-aster-sdlv302 (both pinned) and lee-schultz-2004 (clamped).
 
-As `tfarm.audit` has them; `validate` says which digits agree, and why others do not.
+As `tfarm.audit` has them; `validate` has the digits that agree, and reasons for the others.
 """
 
 import math

@@ -2,7 +2,7 @@
 
 blevins-1979, blevins-1979-sliding, thomson-appendix-d, code-aster-v2.05.400, vpcs-sdll15, bir-2010, wang-2017,
 chun-1972, bhat-wagner-1976 and bellezza-lanari-ulivi-1990, as `tfarm.audit` has them; which of their printed
-digits are ours, and why others are not, `validate` says.
+digits are ours, and reasons for the others, `validate` has.
 """
 
 import math

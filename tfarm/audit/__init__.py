@@ -20,6 +20,4 @@ __all__ = ["PAPER", "Audit", "AuditRow", "Claim", "audit", "claims", "is_zero"]
 def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module 'tfarm.audit' has no attribute {name!r}")
-    value = getattr(import_module("tfarm.audit.paper"), name)
-    globals()[name] = value
-    return value
+    return getattr(import_module("tfarm.audit.paper"), name)

@@ -214,7 +214,6 @@ BEAMS = (  # payload and damping, orders of one, so that no term hides; s on and
     (1.3, 0.7, 1.1, 2.9, 0.31, 0.83, 1.7, 0.013, 0.37, 0.053, 0.23, 0.9 + 2.3j),
     (2.1, 0.45, 0.8, 5.3, 0.12, 0.77, 2.2, 0.21, 0.0, 0.11, 0.61, 4.7j),
 )
-BeamNumbers = dict[str, Any]
 
 
 def _columns_replaced(column: int) -> str:
@@ -342,7 +341,7 @@ def disagreement(text: str) -> str:
         return str(mpmath.nstr(max(abs(one / other - 1) for one, other in pairs), 2))
 
 
-def by_transition(v: BeamNumbers) -> list[Any]:
+def by_transition(v: dict[str, Any]) -> list[Any]:
     """theta, w(L), psi(L), M(0) for a unit torque, from exp(A(s) L) of the state (w, psi, Q, M)."""
     EI, kGA = v["E"] * (1 + v["C"] * v["s"]) * v["I"], v["kappa"] * v["G"] * v["A"]
     s2 = v["s"] ** 2
@@ -362,7 +361,7 @@ def by_transition(v: BeamNumbers) -> list[Any]:
     return [theta, end[0], end[1], v["I_h"] * s2 * theta - 1]
 
 
-def by_appendix(text: str, v: BeamNumbers) -> list[Any]:
+def by_appendix(text: str, v: dict[str, Any]) -> list[Any]:
     """The same by (A.1), (A.2) of a text, the a_ij and Cramer's rule."""
     values = {symbol(name): sp.sympify(value) for name, value in v.items()} | {symbol("U"): sp.Integer(1)}
 

@@ -79,7 +79,7 @@ class Claim:
     evidence: str
     corrected: str = ""  # empty: the print is right
     doubt: str = ""  # what cannot be decided
-    measured: Callable[[], str] | None = None  # numbers that go with the evidence
+    measured: Callable[[], str] = str  # numbers that go with the evidence
 
     def row(self) -> AuditRow:
         """Run the check on both texts.  Raises CertificationError where the corrected one leaves a residual."""
@@ -88,13 +88,12 @@ class Claim:
         residual_corrected = self.check(corrected) if self.corrected else residual_printed
         if not is_zero(residual_corrected):
             raise CertificationError(f"{self.equation}, as corrected, leaves {residual_corrected}")
-        numbers = "" if self.measured is None else self.measured()
         return AuditRow(
             equation=self.equation,
             verdict="undecided" if self.doubt else "ok" if is_zero(residual_printed) else "corrected",
             printed=self.printed,
             corrected=corrected,
-            evidence=" ".join(part for part in (self.evidence, self.doubt, numbers) if part),
+            evidence=" ".join(part for part in (self.evidence, self.doubt, self.measured()) if part),
             residual_printed=residual_printed,
             residual_corrected=residual_corrected,
             printed_tex=tex(self.printed),

@@ -159,7 +159,7 @@ def ring(
     json: Json = False,
 ) -> None:
     """Frequencies and damping ratios of a decay, with confidence intervals."""
-    from tfarm.fitting import recording, ringdown
+    from tfarm.fitting import recording, resonances
 
-    found = ringdown.ring(recording.read_recording(record), signal, start=start, stop=stop, modes=modes)
+    found = resonances.ring(recording.read_recording(record), signal, start=start, stop=stop, modes=modes)
     emit(found, json)

@@ -233,20 +233,17 @@ def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: An
         places = {}
         for kind in (kind for kind in (SENSOR_GAIN, SENSOR_DELAY) if kind in free):
             places[kind] = len(own)
-            own.append(_of_sensor(kind, kind if len(data) == 1 else f"{kind}:{n}", each))
+            is_gain, key = kind == SENSOR_GAIN, kind if len(data) == 1 else f"{kind}:{n}"
+            size = 1.0 if is_gain else 1.0 / each.band[1]  # of a delay, over the inverse of the highest frequency
+            own.append(Parameter(
+                key=key, start=float(is_gain), low=-np.inf, high=np.inf, by_logarithm=is_gain, size=size,
+            ))  # fmt: skip
         responses.append(Response(each, noise_of(each), **places))
     require(own, "free", "nothing", "name what is free, such as link.youngs_modulus")
     subject = Problem(family, tuple(own), tuple(responses), tuple(rings))
     size = subject.residuals(np.zeros(len(own))).size
     require(size >= len(own), "free", len(own), f"{size} numbers were measured; leave some out")
     return subject
-
-
-def _of_sensor(kind: str, key: str, data: Measured) -> Parameter:
-    """The gain of a response's sensor, by its logarithm, or its delay, over the inverse of the highest frequency."""
-    is_gain = kind == SENSOR_GAIN
-    size = 1.0 if is_gain else 1.0 / float(data.omega[-1])
-    return Parameter(key=key, start=float(is_gain), low=-np.inf, high=np.inf, by_logarithm=is_gain, size=size)
 
 
 ARMS = 40  # that a report draws

@@ -75,19 +75,14 @@ class Parameter:
         """Of the coordinate."""
         if not self.by_logarithm:
             return self.coordinate(self.low), self.coordinate(self.high)
-        low = self.coordinate(self.low) if self.low > 0 else -math.inf
-        high = self.coordinate(self.high) if self.high < math.inf else math.inf
-        return max(low, -math.log(FARTHEST_FROM_START)), min(high, math.log(FARTHEST_FROM_START))
+        shares = np.clip([self.low / self.start, self.high / self.start], 1 / FARTHEST_FROM_START, FARTHEST_FROM_START)
+        return math.log(shares.min()), math.log(shares.max())
 
     def ends(self, coordinates: Sequence[float]) -> list[float | None]:
         """The numbers at the ends of an interval, the lower first; None where only the reach of the search ended it."""
         farthest = math.log(FARTHEST_FROM_START) - AT_REACH if self.by_logarithm else math.inf
         found = [self.value(each) if abs(each) < farthest else None for each in coordinates]
         return found if self.start > 0 or not self.by_logarithm else found[::-1]
-
-    def slope(self, coordinate: float) -> float:
-        """d value/d coordinate."""
-        return self.value(coordinate) if self.by_logarithm else self.size
 
 
 def parameters(

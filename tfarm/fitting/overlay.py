@@ -182,77 +182,56 @@ class Counterpart:
 
     `peak` [rad/s] is that of the measured curve; `measured` is the pole fitted there, None where its lines do not
     determine one.  `mode` is the number of the arm's mode, from 1; None where the ratio's poles are no modes.
+    `frequency_ratio` is |s| measured over exact, by the peak where there is no pole.  `level` is the measured residue
+    over the exact one: the sensor's gain and sign, and what shifts the mode besides.
     """
 
     pole: complex
     residue: complex
-    mode: Annotated[int | None, Quantity("mode")]
     peak: float | None
     measured: Resonance | None
+    frequency_ratio: float | None
+    level: complex | None
+    mode: Annotated[int | None, Quantity("mode")]
+    exact: Annotated[float, Quantity("exact", "Hz", 7)]
+    frequency: Annotated[float | None, Quantity("measured", "Hz", 7, key="measured_hz")]
+    frequency_std: Annotated[float | None, Quantity("deviation", "Hz", 2, key="measured_std_hz")]
+    off: Annotated[float | None, Quantity("difference", "%", 3, key="frequency_residual_percent")]
+    measured_damping: Annotated[float | None, Quantity("measured damping ratio", digits=4,
+                                                       key="measured_damping_ratio")]  # fmt: skip
+    damping_std: Annotated[float | None, Quantity("deviation", digits=2, key="measured_damping_ratio_std")]
+    level_db: Annotated[float | None, Quantity("residue, measured over exact", "dB", 3)]
+    level_degrees: Annotated[float | None, Quantity("turned", "deg", 3, key="level_degrees")]
+    is_peak_only: Annotated[bool, Quantity()]
+    damping_ratio: Annotated[float, Quantity("exact damping ratio", digits=4, key="exact_damping_ratio")]
 
-    @property
-    def exact(self) -> Annotated[float, Quantity("exact", "Hz", 7)]:
-        """The exact natural frequency."""
-        return abs(self.pole) / HERTZ
 
-    @property
-    def frequency(self) -> Annotated[float | None, Quantity("measured", "Hz", 7, key="measured_hz")]:
-        """The measured one."""
-        return None if self.frequency_ratio is None else self.frequency_ratio * self.exact
-
-    @property
-    def frequency_std(self) -> Annotated[float | None, Quantity("deviation", "Hz", 2, key="measured_std_hz")]:
-        """The standard deviation of that."""
-        return None if self.measured is None else float(self.measured.std[1]) / HERTZ
-
-    @property
-    def off(self) -> Annotated[float | None, Quantity("difference", "%", 3, key="frequency_residual_percent")]:
-        """Measured less exact."""
-        return None if self.frequency_ratio is None else 100 * (self.frequency_ratio - 1)
-
-    @property
-    def measured_damping(self) -> Annotated[float | None, Quantity("measured damping ratio", digits=4,
-                                                                   key="measured_damping_ratio")]:  # fmt: skip
-        """That of the fitted pole."""
-        return None if self.measured is None else self.measured.damping_ratio
-
-    @property
-    def damping_std(self) -> Annotated[float | None, Quantity("deviation", digits=2,
-                                                              key="measured_damping_ratio_std")]:  # fmt: skip
-        """The standard deviation of that."""
-        return None if self.measured is None else float(self.measured.std[0]) / abs(self.measured.pole)
-
-    @property
-    def level_db(self) -> Annotated[float | None, Quantity("residue, measured over exact", "dB", 3)]:
-        """Its size."""
-        return 20 * math.log10(abs(self.level)) if self.level else None
-
-    @property
-    def level_degrees(self) -> Annotated[float | None, Quantity("turned", "deg", 3, key="level_degrees")]:
-        """Its angle."""
-        return math.degrees(np.angle(self.level)) if self.level else None
-
-    @property
-    def is_peak_only(self) -> Annotated[bool, Quantity()]:
-        """Whether a peak was measured and no pole could be fitted."""
-        return self.peak is not None and self.measured is None
-
-    @property
-    def frequency_ratio(self) -> float | None:
-        """|s| measured over exact; by the peak where there is no more."""
-        if self.measured is not None:
-            return abs(self.measured.pole) / abs(self.pole)
-        return None if self.peak is None else self.peak / abs(self.pole)
-
-    @property
-    def damping_ratio(self) -> Annotated[float, Quantity("exact damping ratio", digits=4, key="exact_damping_ratio")]:
-        """Of the exact pole."""
-        return -self.pole.real / abs(self.pole) + 0.0
-
-    @property
-    def level(self) -> complex | None:
-        """The measured residue over the exact one: the sensor's gain and sign, and what shifts the mode besides."""
-        return self.measured.residue / self.residue if self.measured is not None and self.residue else None
+def _counterpart(
+    pole: complex, residue: complex, mode: int | None, peak: float | None, own: Resonance | None
+) -> Counterpart:
+    """A pole with its measured peak [rad/s] and resonance, if there are any."""
+    size = abs(pole)
+    ratio = abs(own.pole) / size if own is not None else None if peak is None else peak / size
+    level = own.residue / residue if own is not None and residue else None
+    return Counterpart(
+        pole=pole,
+        residue=residue,
+        peak=peak,
+        measured=own,
+        frequency_ratio=ratio,
+        level=level,
+        mode=mode,
+        exact=size / HERTZ,
+        frequency=None if ratio is None else ratio * size / HERTZ,
+        frequency_std=None if own is None else float(own.std[1]) / HERTZ,
+        off=None if ratio is None else 100 * (ratio - 1),
+        measured_damping=None if own is None else own.damping_ratio,
+        damping_std=None if own is None else float(own.std[0]) / abs(own.pole),
+        level_db=20 * math.log10(abs(level)) if level else None,
+        level_degrees=math.degrees(np.angle(level)) if level else None,
+        is_peak_only=peak is not None and own is None,
+        damping_ratio=-pole.real / size + 0.0,
+    )
 
 
 class RequiredChange(NamedTuple):
@@ -395,7 +374,7 @@ def _counterparts(
             mode = nearest if away.min() < SAME_MODE and nearest > 0 else None
         peak = None if place is None else float(measured.omega[place])
         own = None if place is None else resonance_at(measured, noise.sigma, place)
-        found.append(Counterpart(pole=pole, residue=ratio.residue(pole, others), mode=mode, peak=peak, measured=own))
+        found.append(_counterpart(pole, ratio.residue(pole, others), mode, peak, own))
     return tuple(found)
 
 

@@ -340,7 +340,7 @@ def confidence_intervals(
             own = math.sqrt(covariance[n, n])
             ends = [_end(found, n, way, own, quantile, held) if profile else point + way * quantile * own
                     for way in (-1, 1)]  # fmt: skip
-            (low, high), deviation = each.ends(ends), own * abs(each.slope(point))
+            (low, high), deviation = each.ends(ends), own * abs(each.value(point) if each.by_logarithm else each.size)
         elif n in alone:
             low, high = _one_sided(found, n, quantile)
             words[alone[n]] = words[alone[n]] if low is None else ""
