@@ -28,6 +28,8 @@ if sys.platform != "win32":
 
 STANDARD_OUTPUT = "-"  # in the place of a path, as other programs have it; a file of that name is written as a/-
 PART, FOLDER = ".part", ".writing-"  # how the names of temporary files end, and those of temporary folders begin
+MAT_HEADER = b"MATLAB 5.0 MAT-file, written by tfarm"
+HEADER_TEXT = 116  # bytes of text that a MAT-file begins with, before its version
 SUFFIX = "[a-z0-9_]{8}"  # in their middle or at their end: eight hexadecimal digits, once Python's tempfile
 
 
@@ -69,6 +71,15 @@ def read_mat(path: str | os.PathLike[str], most: int, *, key: str) -> tuple[dict
         remedy = f"no .mat file that can be read (up to version 7.2): {str(error)[:80]}"
         raise ParameterError(key=key, value=os.fspath(path), remedy=remedy) from None
     return {name: value for name, value in found.items() if not name.startswith("__")}, data
+
+
+def write_mat(path: Path, variables: dict[str, Any], *, key: str, oned_as: str = "column") -> None:
+    """Write a MATLAB file (level 5) without SciPy's date in its header: same inputs, same bytes."""
+    from scipy.io import savemat
+
+    content = io.BytesIO()
+    savemat(cast("Any", content), variables, oned_as=cast("Any", oned_as))
+    write_file(path, MAT_HEADER.ljust(HEADER_TEXT) + content.getvalue()[HEADER_TEXT:], key=key)
 
 
 def write_file(path: Path, content: bytes, *, key: str) -> None:
