@@ -68,7 +68,7 @@ def preset_names(incomplete: str) -> list[str]:
 
 
 def numbers(count: int = 0, kind: Callable[[str], Any] = float) -> Callable[[str], tuple[Any, ...]]:
-    """Return the parser of an option's numbers, which commas separate: so many, or any number of them."""
+    """Return the parser of an option's numbers, which commas separate: `count` of them, or any number."""
 
     def parse(text: str) -> tuple[Any, ...]:
         with suppress(ValueError):
