@@ -67,25 +67,24 @@ def preset_names(incomplete: str) -> list[str]:
     return [name for name in tfarm.presets() if name.startswith(incomplete)]
 
 
-def numbers(count: int = 0, kind: Callable[[str], Any] = float) -> Callable[[str], tuple[Any, ...]]:
-    """Return the parser of an option's numbers, which commas separate: `count` of them, or any number."""
+def numbers(form: str, count: int = 0, kind: Callable[[str], Any] = float) -> Callable[[str], tuple[Any, ...]]:
+    """Return the parser of numbers that commas separate, `count` of them or any; `form` is that of the option."""
 
     def parse(text: str) -> tuple[Any, ...]:
         with suppress(ValueError):
             found = tuple(kind(part.strip()) for part in text.split(","))
             if len(found) == (count or len(found)) and not any(map(isnan, found)):
                 return found
-        expected = ",".join(["NUMBER"] * count) or "NUMBER,NUMBER,..."
-        raise typer.BadParameter(f"{text!r} is not of the form {expected}")
+        raise typer.BadParameter(f"{text!r}: write {form}")
 
     return parse
 
 
 def interval(text: str) -> tuple[float, ...]:
     """Return the two numbers of LOW,HIGH."""
-    low, high = numbers(2)(text)
+    low, high = numbers("LOW,HIGH", 2)(text)
     if not -inf < low < high < inf:
-        raise typer.BadParameter(f"{text!r} is no interval. Give two numbers, the lower first, such as -1,3")
+        raise typer.BadParameter(f"{text!r}: write LOW,HIGH, the lower number first, such as -1,3")
     return low, high
 
 

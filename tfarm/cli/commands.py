@@ -118,13 +118,13 @@ def response(
         Any,
         typer.Option(
             "--s",
-            parser=numbers(kind=lambda text: complex(text.replace("i", "j"))),
+            parser=numbers("0.3+57.1j,10j", kind=lambda text: complex(text.replace("i", "j"))),
             metavar="S,S",
             help="points s [1/s]: 0.3+57.1j,10j",
         ),
     ] = None,
     omega: Annotated[
-        Any, typer.Option("--omega", parser=numbers(), metavar="W,W", help="frequencies [rad/s]: 1,10,100")
+        Any, typer.Option("--omega", parser=numbers("1,10,100"), metavar="W,W", help="frequencies [rad/s]: 1,10,100")
     ] = None,
     start: Annotated[float, typer.Option("--from", help="lowest frequency [rad/s]")] = 0.1,
     stop: Annotated[float, typer.Option("--to", help="highest frequency [rad/s]")] = 1000.0,
@@ -277,15 +277,24 @@ def fit(
     ] = "",
     start: Annotated[
         list[Any] | None,
-        typer.Option("--start", parser=named(numbers(1)), metavar="KEY=VALUE", help="first value, if not the arm's"),
+        typer.Option(
+            "--start", parser=named(numbers("KEY=NUMBER", 1)), metavar="KEY=VALUE", help="first value, if not the arm's"
+        ),
     ] = None,
     bounds: Annotated[
         list[Any] | None,
-        typer.Option("--bounds", parser=named(numbers(2)), metavar="KEY=LO,HI", help="bounds of a number"),
+        typer.Option(
+            "--bounds", parser=named(numbers("KEY=NUMBER,NUMBER", 2)), metavar="KEY=LO,HI", help="bounds of a number"
+        ),
     ] = None,
     prior: Annotated[
         list[Any] | None,
-        typer.Option("--prior", parser=named(numbers(2)), metavar="KEY=MEAN,STD", help="prior mean and deviation"),
+        typer.Option(
+            "--prior",
+            parser=named(numbers("KEY=NUMBER,NUMBER", 2)),
+            metavar="KEY=MEAN,STD",
+            help="prior mean and deviation",
+        ),
     ] = None,
     mode: Annotated[
         list[str] | None,

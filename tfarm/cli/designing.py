@@ -172,7 +172,7 @@ def tune(
         rate = usual_rate_gain(subject, kp)
         defaults = {
             "default_gains": [RATE_GAIN],
-            "default_gains_in_words": f"{RATE_GAIN} = {rate:.4g}, damping ratio 0.71 with {ANGLE_GAIN}, rigid arm",
+            "default_gains_in_words": f"{RATE_GAIN} = {rate:.4g} (damping ratio 0.71 of the rigid arm under Kp)",
         }
     learning: Any = {"mode": mode, "rule": rule, "sensitivity": sensitivity}
     given: Any = {"signals": signals, "duration": duration}
