@@ -1,4 +1,4 @@
-"""Work shared by processes: each task once, what runs is named, and a process that dies is one error."""
+"""Work shared by processes: each task once, the running ones are named, and a process that dies is one error."""
 
 import os
 import time
@@ -10,7 +10,7 @@ import tfarm
 from tfarm.processes import BLAS, shared
 
 
-def test_each_task_has_its_result_and_what_runs_is_named(monkeypatch):
+def test_each_task_has_its_result_and_the_running_ones_are_named(monkeypatch):
     """Two at first, then one more whenever one ends; each process has one thread of BLAS."""
     monkeypatch.delenv(BLAS, raising=False)
     tasks = {name: partial(str.upper, name) for name in "abcd"} | {"threads": partial(os.getenv, BLAS)}
@@ -23,7 +23,7 @@ def test_each_task_has_its_result_and_what_runs_is_named(monkeypatch):
     assert BLAS not in os.environ
 
 
-def test_what_a_task_raises_is_raised_and_the_rest_is_not_begun(tmp_path):
+def test_an_error_of_a_task_is_raised_and_the_rest_is_not_begun(tmp_path):
     tasks = {"fails": partial(os.listdir, tmp_path / "none"), "slow": partial(time.sleep, 0.3)}
     tasks |= {i: partial(os.mkdir, tmp_path / str(i)) for i in range(9)}
     with pytest.raises(FileNotFoundError):

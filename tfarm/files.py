@@ -1,7 +1,7 @@
-"""Reading and writing files so that nobody ever sees half of one, and nothing but a file is replaced.
+"""Reading and writing files: never half of one is visible, and nothing but a file is replaced.
 
-A file is written beside its place and renamed.  What a run that was killed left there is removed by the next one:
-each temporary file or folder is locked as long as its writer lives, so a lock that can be had says that nobody writes.
+A file is written under a temporary name in its folder and renamed.  Leftovers of a killed run are removed by the next
+one: each temporary file or folder is locked while its writer lives, so one that can be locked has no writer.
 """
 
 from __future__ import annotations
@@ -28,11 +28,13 @@ if sys.platform != "win32":
 
 STANDARD_OUTPUT = "-"  # in the place of a path, as other programs have it; a file of that name is written as a/-
 PART, FOLDER = ".part", ".writing-"  # how the names of temporary files end, and those of temporary folders begin
+MAT_HEADER = b"MATLAB 5.0 MAT-file, written by tfarm"
+HEADER_TEXT = 116  # bytes of text that a MAT-file begins with, before its version
 SUFFIX = "[a-z0-9_]{8}"  # in their middle or at their end: eight hexadecimal digits, once Python's tempfile
 
 
 def read_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -> bytes:
-    """The bytes of a regular file of at most so many; a device, a pipe or a folder is refused unopened.
+    """Return the bytes of a regular file of at most `most`; a device, a pipe or a folder is refused unopened.
 
     Raises ParameterError, naming `key`; `what` names the kind of file in the remedy ("a .toml file").
     """
@@ -56,7 +58,7 @@ def read_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -
 
 
 def read_mat(path: str | os.PathLike[str], most: int, *, key: str) -> tuple[dict[str, Any], bytes]:
-    """The variables of a .mat file (up to version 7.2) by name, and its bytes.
+    """Return the variables of a .mat file (up to version 7.2) by name, and its bytes.
 
     Raises ParameterError, naming `key`, where there is none or it cannot be read.
     """
@@ -71,22 +73,33 @@ def read_mat(path: str | os.PathLike[str], most: int, *, key: str) -> tuple[dict
     return {name: value for name, value in found.items() if not name.startswith("__")}, data
 
 
+def write_mat(path: Path, variables: dict[str, Any], *, key: str, oned_as: str = "column") -> None:
+    """Write a MATLAB file (level 5) without SciPy's date in its header: same inputs, same bytes."""
+    from scipy.io import savemat
+
+    content = io.BytesIO()
+    savemat(cast("Any", content), variables, oned_as=cast("Any", oned_as))
+    write_file(path, MAT_HEADER.ljust(HEADER_TEXT) + content.getvalue()[HEADER_TEXT:], key=key)
+
+
 def write_file(path: Path, content: bytes, *, key: str) -> None:
-    """Write beside the path, then rename; symbolic links are followed, and a file that is replaced keeps its mode.
+    """Write under a temporary name, then rename; symbolic links are followed, and a replaced file keeps its mode.
 
     What is no regular file (a device, a pipe, /dev/stdout, or "-" for that) is written straight to.  Raises
     ParameterError, naming `key`, where that cannot be done, and BrokenPipeError where the reader of a pipe has left.
     """
     try:
         number = _descriptor(path)
-        if number is not None:
-            _write_straight(os.dup(number), content)
-        elif path.exists() and not path.is_file():  # a pipe without a reader, and a folder, raise OSError at once
+        if number is None and not (path.exists() and not path.is_file()):
+            _replace(Path(os.path.realpath(path)), content)
+            return
+        if number is None:  # a pipe without a reader, and a folder, raise OSError at once
             handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
             os.set_blocking(handle, True)
-            _write_straight(handle, content)
         else:
-            _replace(Path(os.path.realpath(path)), content)
+            handle = os.dup(number)
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
     except BrokenPipeError:
         raise
     except (OSError, ValueError) as error:
@@ -95,20 +108,20 @@ def write_file(path: Path, content: bytes, *, key: str) -> None:
 
 
 def is_standard_output(path: Path) -> bool:
-    """Whether a path such as /dev/stdout, or "-", stands for this process's own standard output."""
+    """Return whether a path such as /dev/stdout, or "-", is this process's own standard output."""
     return _descriptor(path) == 1
 
 
 @contextmanager
 def temporary_folder(place: Path) -> Iterator[Path]:
-    """A new folder in `place`, gone afterwards with all that is in it; those that killed runs left there go first."""
+    """Yield a new folder in `place`, removed afterwards with its content; leftovers of killed runs go first."""
     _remove_leftovers(place, re.escape(FOLDER) + SUFFIX)
     with _temporary(place, FOLDER, "", partial(Path.mkdir, mode=0o700)) as folder:
         yield folder
 
 
 def _descriptor(path: Path) -> int | None:
-    """The number of the open file that a path such as "-", /dev/stdout or /dev/fd/3 stands for."""
+    """Return the number of the open file of a path such as "-", /dev/stdout or /dev/fd/3."""
     if str(path) == STANDARD_OUTPUT:
         return 1
     name = os.path.abspath(path)
@@ -118,13 +131,8 @@ def _descriptor(path: Path) -> int | None:
     return {"/dev/stdout": 1, "/dev/stderr": 2}.get(name)
 
 
-def _write_straight(handle: int, content: bytes) -> None:
-    with os.fdopen(handle, "wb") as file:
-        file.write(content)
-
-
 def _replace(path: Path, content: bytes) -> None:
-    """A regular file, new or in the place of another, whose mode and owner it keeps."""
+    """Write a regular file, new or in the place of another, whose mode and owner it keeps."""
     if path.is_symlink():  # of a chain of links without an end
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
     old = path.stat() if path.exists() else None
@@ -143,7 +151,7 @@ def _replace(path: Path, content: bytes) -> None:
 
 @contextmanager
 def _temporary(folder: Path, prefix: str, suffix: str, make: Callable[[Path], object]) -> Iterator[Path]:
-    """What `make` makes, locked while it is in use, and gone afterwards; made again if another run tidied it away."""
+    """Yield the path that `make` makes, locked until it is removed afterwards; made again if another run removed it."""
     while True:
         path = folder / f"{prefix}{secrets.token_hex(4)}{suffix}"
         with undone_if_stopped(partial(_remove, path)):
@@ -160,7 +168,7 @@ def _temporary(folder: Path, prefix: str, suffix: str, make: Callable[[Path], ob
 
 
 def _remove_leftovers(folder: Path, pattern: str) -> None:
-    """Remove what is named so and locked by nobody: its writer is gone."""
+    """Remove temporary files of that name that are not locked: their writers are gone."""
     with suppress(PermissionError):  # of a folder that cannot be listed, and may yet be written to
         for name in filter(re.compile(pattern).fullmatch, os.listdir(folder)):
             with suppress(OSError):
@@ -171,7 +179,7 @@ def _remove_leftovers(folder: Path, pattern: str) -> None:
 
 
 def _locked(path: Path, *, wait: bool) -> int | None:
-    """An open file that holds the lock; None where there are no locks or the path is gone.
+    """Return an open file that holds the lock; None where there are no locks or the path is gone.
 
     Raises BlockingIOError where another process has it and `wait` is false.
     """
@@ -204,7 +212,7 @@ def _reason(error: Exception) -> str:
 
 
 def _umask() -> int:
-    """The mode bits that new files go without; there is no way to read them but to set them."""
+    """Return the mode bits that new files go without; they can only be read by setting them."""
     mask = os.umask(0)
     os.umask(mask)
     return mask

@@ -1,6 +1,6 @@
-"""Loaded first by the process that others are forked from: these are a group of their own, which can be ended at once.
+"""Puts the process that workers are forked from in a process group of its own, which can be killed at once.
 
-A terminal's Ctrl-C does not reach them.
+It is the first module that this process imports.  Ctrl-C in a terminal does not reach the group.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Work shared by a few processes, which end with the one that started them."""
+"""Tasks on a pool of a few processes, which end with the one that started them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from typing import TypeVar
 from tfarm.errors import ConvergenceError
 from tfarm.stopping import SIGNALS, undone_if_stopped
 
-BLAS, WARNINGS = "OPENBLAS_NUM_THREADS", "PYTHONWARNINGS"
+BLAS = "OPENBLAS_NUM_THREADS"
 LOADS_ONCE = sys.platform == "linux"  # macOS' own libraries do not survive a fork, and Windows has none
 
 Task = TypeVar("Task")
@@ -31,10 +31,10 @@ def shared(
     modules: Sequence[str] = (),
     begun: Callable[[Sequence[Task]], object] = lambda _: None,
 ) -> Iterator[tuple[Task, Result]]:
-    """Yield each task with its result as it comes, made by `count` processes, which have the `modules`.
+    """Yield each task with its result as it comes, by `count` processes, which have imported the `modules`.
 
-    `begun` is called with the tasks that run whenever one is begun.  What a task raises is raised here once those that
-    run have ended; the others are not begun.  Raises ConvergenceError where a process dies.
+    `begun` is called with the running tasks whenever one is begun.  An error of a task is raised here once the running
+    ones have ended; the others are not begun.  Raises ConvergenceError where a process dies.
     """
     waiting = iter(tasks)
     running: dict[Future[Result], Task] = {}
@@ -51,18 +51,17 @@ def shared(
 
 @contextmanager
 def _pool(count: int, modules: Sequence[str]) -> Iterator[ProcessPoolExecutor]:
-    """Processes with one thread of BLAS each, unless the user chose a number; killed where this one is stopped.
+    """Yield processes with one thread of BLAS each, unless the user chose a number; killed where this one is stopped.
 
     On matrices of a hundred rows more threads only wait for each other.  On Linux they are forked from a process that
     has loaded the modules (none from the caller's own, whose threads it would lack), and inherit that signals are
-    blocked; elsewhere each begins anew.
+    blocked; elsewhere each one starts anew.
     """
     others, context = set(active_children()), get_context("forkserver" if LOADS_ONCE else "spawn")
-    quiet = "ignore:resource_tracker"  # of the semaphores of a process that was stopped
     with _environment(BLAS, os.environ.get(BLAS, "1")), undone_if_stopped(kill_workers):
         if LOADS_ONCE:
             context.set_forkserver_preload(["tfarm.grouped", *modules])
-            with _environment(WARNINGS, quiet):
+            with _environment("PYTHONWARNINGS", "ignore:resource_tracker"):  # of semaphores of a stopped process
                 resource_tracker.ensure_running()
             before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
             try:
@@ -82,7 +81,7 @@ def _pool(count: int, modules: Sequence[str]) -> Iterator[ProcessPoolExecutor]:
 
 
 def kill_workers() -> None:
-    """End the process that workers are forked from, and all of these, at once; they are gone when this returns."""
+    """Kill the process that workers are forked from, and all of these; they are gone when this returns."""
     server = getattr(forkserver._forkserver, "_forkserver_pid", None)
     for child in active_children() if server is None else []:
         child.kill()
@@ -100,20 +99,18 @@ def kill_workers() -> None:
 
 @contextmanager
 def _environment(name: str, value: str) -> Iterator[None]:
-    """That variable is so for new processes."""
-    before = os.environ.get(name)
+    """Set a variable of the environment of new processes."""
+    before = dict(os.environ)
     os.environ[name] = value
     try:
         yield
     finally:
-        if before is None:
-            del os.environ[name]
-        else:
-            os.environ[name] = before
+        del os.environ[name]
+        os.environ |= before
 
 
 def leave_with_parent() -> None:
-    """In a worker: end when the process that started it is gone; a pool's workers would wait for work for ever."""
+    """End a worker when the process that started it is gone: it would wait for work for ever."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for that process
     parent = parent_process()
 
@@ -126,7 +123,7 @@ def leave_with_parent() -> None:
 
 
 def may_start_processes() -> bool:
-    """A new process runs the main script again: not where that is a plain script, which may have no guard."""
+    """Return whether processes can be started: they run the main script again, which may have no guard."""
     main = sys.modules.get("__main__")
     file = getattr(main, "__file__", None)
     return file is None or getattr(main, "__spec__", None) is not None or not str(file).endswith(".py")

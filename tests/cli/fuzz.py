@@ -1,4 +1,4 @@
-"""Arm files and options that nobody would write, through the command line:  python -m tests.cli.fuzz SIZE SEED
+"""Arm files and options that no person would write, through the command line:  python -m tests.cli.fuzz SIZE SEED
 
 SIZE arm files (presets with lines changed, doubled, cut or filled with odd values, and files of noise), each through
 one verb with its defaults, and SIZE/17 sets of odd options on the presets.  Each command must exit 0, 2 or 3, say
@@ -22,6 +22,7 @@ import numpy as np
 
 import tfarm
 from tests import survey
+from tests.shell import heard
 from tests.survey import Finding
 
 CPU_SECONDS = 20
@@ -200,14 +201,14 @@ class Worker:
 def judge(arguments, code, out, err, seconds):
     """The case with what is wrong with it, or with an empty text."""
     lines = [line for line in err.splitlines() if line and not line.startswith("written: ")]
-    errors = [line for line in lines if not line.startswith(("tfarm: warning:", "tfarm: compiling once"))]
+    errors = [line for line in heard("\n".join([*lines, ""])).splitlines() if not line.startswith("tfarm: warning:")]
     wrong = ""
     if code is None or seconds > CPU_SECONDS:
         wrong = f"more than {CPU_SECONDS} CPU seconds"
     elif code not in (0, 2, 3):
         wrong = f"exit {code}: {err.strip()[-200:]}"
     elif strangers := [line for line in lines if not line.startswith("tfarm: ")]:
-        wrong = f"says {strangers[0][:200]}"
+        wrong = f"prints {strangers[0][:200]}"
     elif len(errors) > 1:
         wrong = f"{len(errors)} errors: {errors[1][:200]}"
     elif code and not errors:

@@ -86,7 +86,7 @@ def _is_writing(folder):
 
 
 def killed(arguments, folder, after, from_writing):
-    """Kill a run so many seconds after its start or, with `from_writing`, after its first temporary file."""
+    """Kill a run some seconds after its start or, with `from_writing`, after its first temporary file."""
     child = started(arguments, folder)
     while from_writing and not _is_writing(folder) and not os.waitpid(child, os.WNOHANG)[0]:
         time.sleep(1e-3)
@@ -126,7 +126,7 @@ def _here(arguments, folder, arm):
 
 
 def kills(size, seed):
-    """The outcome of each of so many kills of every command, and of each run after some."""
+    """The outcome of each of some kills of every command, and of each run after some."""
     rng = np.random.default_rng(seed)
     lab = tfarm.load("sasaki2012-lab")
     other = replace(lab, hub=tfarm.Hub(inertia=0.2))

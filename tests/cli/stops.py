@@ -19,6 +19,7 @@ import numpy as np
 
 from tests import survey
 from tests.cli.kills import Files
+from tests.shell import heard
 from tests.survey import Finding
 
 COMMAND = (sys.executable, "-m", "tfarm", "report", "sasaki2012-lab", "--out", "pages")
@@ -29,7 +30,7 @@ HANDLED = 1 << signal.SIGTERM - 1  # in the mask of signals that a process handl
 
 @dataclass(frozen=True)
 class Stop:
-    """Signals, the seconds between them, to the process or its group, and how long after its handlers stand."""
+    """Signals, the seconds between them, to the process or its group, and how long after its handlers are set."""
 
     signals: tuple[int, ...]
     apart: float
@@ -62,7 +63,7 @@ def members(session):
 
 
 def handles_signals(process):
-    """Whether its handlers stand."""
+    """Whether its handlers are set."""
     try:
         status = Path(f"/proc/{process}/status").read_text()
     except FileNotFoundError:
@@ -92,8 +93,8 @@ def outcome(stop, folder):
         took = time.monotonic() - sent
         while members(process.pid) and time.monotonic() - sent < WITHIN:
             time.sleep(0.01)
-        said = [line for line in err.splitlines() if " done" not in line]
-        return wrong_with(process.returncode, out, said, took, members(process.pid), stop) or (
+        lines = heard(err).splitlines()
+        return wrong_with(process.returncode, out, lines, took, members(process.pid), stop) or (
             "clean" if (Files.of(folder), sorted(folder.rglob("*"))) == before else f"files are left: {stop}"
         )
     except subprocess.TimeoutExpired:
@@ -110,12 +111,12 @@ def send(process, number, to_group):
         (os.killpg if to_group else os.kill)(process, number)
 
 
-def wrong_with(code, out, said, took, left, stop):
+def wrong_with(code, out, lines, took, left, stop):
     """What is wrong with the end of a run, or an empty text."""
     if code not in {128 + each for each in stop.signals}:
-        return f"exit code {code}: {said} {stop}"
-    if said != ["tfarm: stopped"] or out:
-        return f"says {said} {out!r}: {stop}"
+        return f"exit code {code}: {lines} {stop}"
+    if lines != ["tfarm: stopped"] or out:
+        return f"prints {lines} {out!r}: {stop}"
     if took > WITHIN or left:
         return f"took {took:.2f} s, left {left}: {stop}"
     return ""

@@ -96,12 +96,12 @@ BAD = [
     (["margins", "sasaki2012", "--K1", "1_0"], "write numbers as 50"),
     (["design", "sasaki2012", "--K1", "0,1_0"], "write numbers as 50"),
     (["response", "sasaki2012", "--output", "root_moment", "--s", "1_0j"], "write numbers as 50"),
-    (["sampled", "sasaki2012", "--Ts", "0.01"], "did you mean --period?"),
-    (["modes", "sasaki2012", "--n", "3"], "did you mean --count?"),
+    (["sampled", "sasaki2012", "--Ts", "0.01"], "Did you mean --period?"),
+    (["modes", "sasaki2012", "--n", "3"], "Did you mean --count?"),
     (["rlocus", "sasaki2012"], 'Did you mean "locus"?'),
     (["response", "sasaki2012", "--output", "tip"], 'did you mean "tip_displacement"'),
     (["modes", "sasaki2012", "--digits", "1001"], "--digits = '1001'"),
-    (["modes", "sasaki2012", "--cuont", "3"], "did you mean --count"),
+    (["modes", "sasaki2012", "--cuont", "3"], "Possible options: --count"),
     (["modes", "sasaki2012", "--theory", "timo"], "'timoshenko', 'shear', 'rayleigh', 'euler-bernoulli'"),
     (["mode", "sasaki2012"], "Did you mean 'modes'"),
     (["modes"], "ARM"),
@@ -114,8 +114,8 @@ BAD = [
     (["response", "sasaki2012", "--output", "root_moment", "--from", "0"], "--from = 0.0"),
     (["response", "sasaki2012", "--output", "root_moment", "--from", "abc"], "--from"),
     (["response", "sasaki2012", "--output", "root_moment", "--to", "inf"], "--to = inf"),
-    (["response", "sasaki2012", "--output", "root_moment", "--s", "abc"], "--s: 'abc' is not of the form"),
-    (["response", "sasaki2012", "--output", "root_moment", "--s", "nan"], "not of the form"),
+    (["response", "sasaki2012", "--output", "root_moment", "--s", "abc"], "--s: 'abc': write"),
+    (["response", "sasaki2012", "--output", "root_moment", "--s", "nan"], "write 0.3"),
     (["response", "sasaki2012", "--output", "root_moment", "--s", "1j", "--omega", "1"], "not both"),
     (["response", "sasaki2012", "--output", "hub_angle", "--s", "0"], "rigid body"),
     (["response", "sasaki2012", "--output", "hub_angle", "--s", "1e300j"], "at most 1e+20 1/s"),
@@ -135,7 +135,7 @@ def test_bad_input_is_one_line_and_exit_2(
     assert message in err
 
 
-def test_what_cannot_be_told_is_exit_3(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unproven_digit_is_exit_3(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tfarm.spectrum.table.roots_near", lambda *_: 0)
     code, _, err = run(capsys, "modes", "sasaki2012", "--digits", "20", "--json")
     assert code == 3
@@ -193,8 +193,8 @@ def test_without_arguments_there_is_help(capsys: pytest.CaptureFixture[str]) -> 
     assert "modes" in out
 
 
-def test_damped_modes_stand_beside_the_undamped_ones(capsys: pytest.CaptureFixture[str]) -> None:
-    """Each eigenvalue near its own frequency, overdamped ones in pairs, and as many in the box as are said to be."""
+def test_damped_modes_are_listed_with_the_undamped_ones(capsys: pytest.CaptureFixture[str]) -> None:
+    """Each eigenvalue near its own frequency, overdamped ones in pairs, and as many as counted in the box."""
     result = answer(capsys, "modes", "sasaki2012-lab", "--count", "17", "--certify")
     flexible = result["modes"][1:]
     assert [mode["second_eigenvalue"] is None for mode in flexible] == [True] * 15 + [False] * 2
@@ -206,7 +206,7 @@ def test_damped_modes_stand_beside_the_undamped_ones(capsys: pytest.CaptureFixtu
     assert 2 * inside == result["eigenvalues_in_box"]
 
 
-def test_modes_that_cannot_be_followed_are_said_not_left_out(
+def test_modes_that_cannot_be_followed_are_listed_with_a_note(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tfarm.spectrum.damped.MOST_MODES", 4)
@@ -217,7 +217,7 @@ def test_modes_that_cannot_be_followed_are_said_not_left_out(
 
 
 def test_a_slip_of_units_is_a_warning_and_no_error(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """One line for all of them; the answer is that of the file as it stands."""
+    """One line for all of them; the result is that of the file unchanged."""
     text = PRESETS.joinpath("stocky-steel.toml").read_text(encoding="utf-8")
     slips = {"length = 0.5": "length = 500.0", "density = 7850.0": "density = 7.85"}
     for right, slip in slips.items():
@@ -276,6 +276,6 @@ def test_numbers_that_no_arm_has_end_in_one_line(tmp_path, capsys, preset, lines
     (tmp_path / "odd.toml").write_text(text)
     verb, *options = command.split()
     code, _, err = run(capsys, verb, str(tmp_path / "odd.toml"), *options)
-    told = [line for line in err.splitlines() if line and "warning" not in line and "compiling" not in line]
+    errors = [line for line in err.splitlines() if line and "warning" not in line and "compiling" not in line]
     assert code == expected[0]
-    assert [expected[1] in line for line in told] == [True] * (expected[0] != 0)
+    assert [expected[1] in line for line in errors] == [True] * (expected[0] != 0)

@@ -92,14 +92,14 @@ def test_help_is_whole_and_has_an_example_that_is_understood(capsys, monkeypatch
     command.make_context(verb, rest)
 
 
-def test_commands_stand_in_their_groups(capsys):
+def test_commands_are_in_their_groups(capsys):
     out = run(capsys, "--help")[1]
     places = [out.index(f"─ {title} ─") for title in GROUPS]
     assert places == sorted(places)
     assert "…" not in out
 
 
-def test_the_version_is_said_by_every_way_in(capsys):
+def test_both_ways_to_start_print_the_version(capsys):
     assert run(capsys, "--version") == (0, f"tfarm {tfarm.__version__}\n", "")
     done = subprocess.run([sys.executable, "-m", "tfarm", "--version"], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == (f"tfarm {tfarm.__version__}\n", "")

@@ -1,4 +1,4 @@
-"""The verbs that draw, and --png: the picture is a picture, and the numbers beside it are those of Python."""
+"""The verbs that draw, and --png: the picture is a picture, and its numbers are those of Python."""
 
 import csv
 import re
@@ -48,7 +48,7 @@ DRAWN = {
 
 
 @pytest.mark.parametrize("words", thinned([(each,) for each in DRAWN.values()], 3), ids=DRAWN)
-def test_a_picture_is_written_and_said(words, law, tmp_path, capsys):
+def test_a_picture_is_written_and_named(words, law, tmp_path, capsys):
     file = tmp_path / "drawn.png"
     code, out, err = run(capsys, *(law if word == "LAW" else word for word in words), "--png", str(file))
     assert (code, err) == (0, f"written: {file}\n")
@@ -119,7 +119,7 @@ def test_nyquist_counts_what_the_map_counts(capsys, K2, unstable):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["bode", LAB, "--output", "root_momnt"], 'did you mean "root_moment"'),
         (["bode", LAB, "--from", "-1"], "--from = -1.0: a positive frequency"),
@@ -130,8 +130,8 @@ def test_nyquist_counts_what_the_map_counts(capsys, K2, unstable):
         (["nyquist", LAB, "--law", "no-such.toml"], "no-such.toml"),
     ],
 )
-def test_bad_input_is_one_line(capsys, words, said):
+def test_bad_input_is_one_line(capsys, words, message):
     code, out, err = run(capsys, *words)
     assert (code, out) == (2, "")
-    assert said in err
+    assert message in err
     assert err.count("\n") == 1

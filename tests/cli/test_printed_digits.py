@@ -34,7 +34,7 @@ def pole_rows(printed):
 
 
 def test_poles_of_a_hardly_damped_arm_are_printed_as_far_as_they_are_proven(capsys, tmp_path) -> None:
-    """C = 1e-10 s and a weak law: real parts a millionth of the frequencies and less, beside discs of 25 digits."""
+    """C = 1e-10 s and a weak law: real parts below a millionth of the frequencies, against discs of 25 digits."""
     lab = tfarm.load("sasaki2012-lab")
     arm, file = replace(lab, link=replace(lab.link, damping=1e-10)), tmp_path / "arm.toml"
     file.write_text(to_toml(arm), encoding="utf-8")

@@ -18,7 +18,7 @@ def rig(request):
     return RIGS[request.param]
 
 
-def test_hub_locked_frequencies_stand_beside_the_free_ones_and_between_them(rig, capsys):
+def test_hub_locked_frequencies_are_listed_with_the_free_ones_and_interlace_them(rig, capsys):
     """Elements of another kind have the same locked hub, and one constraint parts the frequencies (Rayleigh)."""
     found = answer(capsys, "modes", rig, "--count", "4")
     rigid, *flexible = found["modes"]
@@ -65,7 +65,7 @@ QUICK = {  # each verb, as short as it goes
 
 
 @pytest.mark.parametrize("verb", thinned(QUICK, 2))
-def test_every_verb_says_through_what_the_loop_closes_and_each_gains_unit(capsys, verb):
+def test_every_command_names_the_input_and_each_gains_unit(capsys, verb):
     found = answer(capsys, verb, RIGS["quanser-2dsfl"], *QUICK[verb])
     assert found["input"] == "motor_current"
     if verb != "reduce":
@@ -73,7 +73,7 @@ def test_every_verb_says_through_what_the_loop_closes_and_each_gains_unit(capsys
         assert "the motor's current [A]" in found.get("sign_convention", found.get("law"))
 
 
-def test_a_voltage_has_its_units_wherever_gains_stand(capsys):
+def test_gains_of_a_voltage_have_its_units(capsys):
     _, out, _ = run(capsys, "margins", RIGS["quanser-flexlink"])
     assert "V s/rad" in out
     assert "V/(N m)" in out
@@ -84,7 +84,7 @@ def test_a_voltage_has_its_units_wherever_gains_stand(capsys):
     assert found["y"][-1] == pytest.approx(2 * arm.input_per_torque * 2 / 3)
 
 
-def test_a_response_is_of_the_input_that_is_asked_for(capsys):
+def test_a_response_is_of_the_input_of_the_option(capsys):
     """A response to the angle is that to the torque over the angle's own; a current is a torque through the gear."""
     file, values, units = RIGS["quanser-flexlink"], {}, {}
     for name in ("hub_torque", "motor_current", "motor_voltage", "hub_angle"):
@@ -103,7 +103,7 @@ def test_a_response_is_of_the_input_that_is_asked_for(capsys):
 
 
 @pytest.mark.parametrize("arguments", [["modes", "--method", "appendix"], ["assumptions"]])
-def test_what_is_of_the_papers_arm_says_so_in_one_line(capsys, arguments):
+def test_commands_of_the_papers_arm_refuse_a_rig_in_one_line(capsys, arguments):
     verb, *rest = arguments
     code, _, err = run(capsys, verb, RIGS["bench-rig"], *rest)
     assert (code, err.count("\n")) == (2, 1)

@@ -45,7 +45,7 @@ def test_output_that_cannot_be_written_is_one_line(command, code, why):
 
 
 @pytest.mark.parametrize("command", thinned(["tfarm modes sasaki2021 2>&-", "tfarm modes sasaki2021 2>/dev/full"], 2))
-def test_a_message_that_nobody_hears_goes_nowhere_else(command):
+def test_a_message_to_a_closed_stream_goes_nowhere_else(command):
     assert shell(command) == (2, b"", "")
 
 
@@ -61,7 +61,7 @@ def test_letters_that_a_terminal_does_not_have_are_escaped(encoding, tmp_path, m
     name, file = "Ölarm-λ", tmp_path / "a.toml"
     file.write_text(text.replace('"stocky-steel"', f'"{name}"', 1), encoding="utf-8")
 
-    def said(*more):
+    def printed(*more):
         stream = io.TextIOWrapper(written := io.BytesIO(), encoding, errors="strict")
         with monkeypatch.context() as patch:
             patch.setattr(sys, "stdout", stream)
@@ -70,8 +70,8 @@ def test_letters_that_a_terminal_does_not_have_are_escaped(encoding, tmp_path, m
         assert not stop.value.code
         return written.getvalue()
 
-    assert name.encode(encoding, "backslashreplace") in said()
-    assert json.loads(said("--json"))["arm"] == name
+    assert name.encode(encoding, "backslashreplace") in printed()
+    assert json.loads(printed("--json"))["arm"] == name
 
 
 DASHED = [
@@ -84,7 +84,7 @@ DASHED = [
 
 @pytest.mark.parametrize(("verb", "option"), DASHED)
 def test_a_dash_is_standard_output(verb, option, capfdbinary, tmp_path, monkeypatch):
-    """What stands there is what stands in a file of that option, and nothing else: no table, no file called "-".
+    """The output is the content of a file of that option, and nothing else: no table, no file called "-".
 
     In this process, whose standard output is caught as the file number 1 that it is.
     """
@@ -140,7 +140,7 @@ def test_an_interrupt_while_things_are_imported_is_one_line(tmp_path):
         (MemoryError(), 3, "not enough memory"),
     ],
 )
-def test_what_befalls_a_command_midway_is_one_line(error, code, line, capsys, monkeypatch):
+def test_an_error_midway_is_one_line(error, code, line, capsys, monkeypatch):
     def fail(*_):
         raise error
 

@@ -24,7 +24,7 @@ def test_odd_files_and_options_end_in_one_line():
         (1, "ValueError: x\n", "exit 1"),
         (2, "", "without a word"),
         (2, "tfarm: a\ntfarm: b\n", "2 errors"),
-        (0, "RuntimeWarning: overflow\n", "says RuntimeWarning"),
+        (0, "RuntimeWarning: overflow\n", "prints RuntimeWarning"),
         (None, "", "more than 20 CPU seconds"),
         (0, "tfarm: warning: a\ntfarm: b\n", ""),
     ],

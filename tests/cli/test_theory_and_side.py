@@ -27,7 +27,7 @@ ARM = "sasaki2012-lab"
 
 @pytest.fixture(scope="module")
 def slender(tmp_path_factory):
-    """The same arm as a file that says another theory."""
+    """The same arm as a file with another theory."""
     file = tmp_path_factory.mktemp("theory") / f"{ARM}.toml"
     file.write_bytes(b'theory = "euler-bernoulli"\n' + PRESETS.joinpath(f"{ARM}.toml").read_bytes())
     return str(file)
@@ -44,9 +44,9 @@ def test_every_command_that_takes_an_arm_has_the_option():
 @pytest.mark.parametrize("verb", thinned(VERBS, 4))
 def test_the_option_does_what_the_files_key_does(verb, slender, capsys):
     """All numbers are those of the file with that theory, and not those of the arm's own."""
-    asked = answer(capsys, verb, ARM, *VERBS[verb], "--theory", "euler-bernoulli")
-    assert asked == answer(capsys, verb, slender, *VERBS[verb])
-    assert asked != answer(capsys, verb, ARM, *VERBS[verb])
+    given = answer(capsys, verb, ARM, *VERBS[verb], "--theory", "euler-bernoulli")
+    assert given == answer(capsys, verb, slender, *VERBS[verb])
+    assert given != answer(capsys, verb, ARM, *VERBS[verb])
 
 
 def test_the_papers_determinants_are_of_one_theory(capsys):
@@ -73,7 +73,7 @@ def stepped(tmp_path_factory):
 
 
 @pytest.mark.parametrize(("output", "jump"), [("moment", 2e-3), ("full_moment", 2e-3), ("shear", 0.3)])
-def test_what_jumps_at_a_joint_is_read_on_the_side_asked_for(stepped, output, jump, capsys):
+def test_a_jump_at_a_joint_is_read_on_the_side_of_the_option(stepped, output, jump, capsys):
     """Newton: what is attached takes m s^2 w of the force, and iota s^2 psi of the moment (with its damping)."""
     file, rig = stepped
     s = -0.4 + 35.0j
@@ -90,7 +90,7 @@ def test_what_jumps_at_a_joint_is_read_on_the_side_asked_for(stepped, output, ju
     assert outer * felt - inner == pytest.approx(taken, rel=1e-9)
 
 
-def test_a_reduced_model_reads_the_side_asked_for(stepped, capsys):
+def test_a_reduced_model_reads_the_side_of_the_option(stepped, capsys):
     file, _ = stepped
     found = {
         side: answer(capsys, "reduce", file, "--outputs", "moment", "--x", "0.4", "--side", side, "--order", "8")

@@ -162,7 +162,7 @@ def test_the_command_prints_writes_and_draws(sweep, tmp_path, capsys):
     ("extra", "message"),
     [
         (("--output", "root_moment"), "--output = 'root_moment': a measured response has its own"),
-        (("--omega", "1,2"), "--omega = '1,2'"),
+        (("--omega", "1,2"), "--omega = (1.0, 2.0)"),
     ],
 )
 def test_options_that_do_not_go_with_it_are_refused(extra, message, sweep, capsys):
@@ -173,7 +173,8 @@ def test_options_that_do_not_go_with_it_are_refused(extra, message, sweep, capsy
     assert len(err.splitlines()) == 1
 
 
-def test_without_an_output_the_command_asks_for_one(capsys):
-    code, out, err = run(capsys, "response", "sasaki2012-lab", "--s", "1j")
-    assert (code, out) == (2, "")
-    assert "--output is missing: say which response" in err
+def test_without_an_output_the_command_has_the_root_moment_and_no_picture_without_a_measurement(capsys, tmp_path):
+    code, out, _ = run(capsys, "response", "sasaki2012-lab", "--s", "1j", "--json")
+    assert (code, '"output": "root_moment"' in out) == (0, True)
+    code, out, err = run(capsys, "response", "sasaki2012-lab", "--png", str(tmp_path / "a.png"))
+    assert (code, out, "needs --measured" in err) == (2, "", True)

@@ -85,5 +85,5 @@ def test_the_command_says_where_the_tip_ends(capsys):
     found = answer(capsys, "tune", "sasaki2012-lab", "--Kp", "10", "--trials", "5")
     assert found["Kp"] == 10.0
     assert abs(found["tip_error_m"]) < 1e-3
-    assert "damps the rigid arm under Kp" in found["default_gains_in_words"]
+    assert "damping ratio 0.71 of the rigid arm under Kp" in found["default_gains_in_words"]
     assert "Kp" in refused(capsys, "tune", "sasaki2012-lab", "--Kp=-1")

@@ -13,47 +13,33 @@ from functools import cache, wraps
 from inspect import Parameter, signature
 from pathlib import Path
 from threading import Event, Thread
-from typing import IO, TYPE_CHECKING, Annotated, Any, cast
+from typing import IO, Annotated, Any, cast
 
 import typer
 
 import tfarm
-from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, RATE_GAIN, Arm, Theory, implausible
+from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm, Theory, implausible
 from tfarm.errors import ParameterError, one_line
 from tfarm.files import is_standard_output
 from tfarm.tables.files import to_json, write_csv
 
-if TYPE_CHECKING:
-    from tfarm.arm import AnyLaw, Input
-    from tfarm.dsp import Chain
-    from tfarm.exact.outputs import Output, Side
-
 app = typer.Typer(name="tfarm", rich_markup_mode="rich", pretty_exceptions_enable=False)
 GROUPS = ("Arm", "Loop", "Sampled loop", "Design", "Measurement", "Report")  # of commands in the help, in its order
 PROGRESS_AFTER, PROGRESS_EVERY = 2.0, 4.0  # seconds to the first line of progress, and from one to the next
-INPUT_REMEDY = "Set input to hub_torque, motor_voltage or motor_current at the top of the file."
 
 
 @cache  # some 35 ms, which a process with several commands need not spend on each
 def whole_command() -> Any:
     """Return the command with all its subcommands; called once every module of commands is loaded.
 
-    A [unit] in a help text is no markup of rich.
+    An epilog is the example of its command, and a [unit] in a help text no markup of rich.
     """
     command: Any = typer.main.get_command(app)
     command.commands = dict(sorted(command.commands.items(), key=lambda each: GROUPS.index(each[1].rich_help_panel)))
     for each in command.commands.values():
+        each.epilog = f"Example: tfarm {each.epilog}"
         for text in (each, *each.params):
             text.help = (text.help or "").replace("[", r"\[")
-    return command
-
-
-def group(title: str) -> Callable[..., Callable[[Callable[..., None]], Callable[..., None]]]:
-    """Return the decorator of a command in a group of the help: `command(example, name=None)`."""
-
-    def command(example: str, **options: Any) -> Any:
-        return app.command(rich_help_panel=title, epilog=f"Example: tfarm {example}", **options)
-
     return command
 
 
@@ -81,25 +67,24 @@ def preset_names(incomplete: str) -> list[str]:
     return [name for name in tfarm.presets() if name.startswith(incomplete)]
 
 
-def numbers(count: int = 0, kind: Callable[[str], Any] = float) -> Callable[[str], tuple[Any, ...]]:
-    """Return the parser of an option's numbers, which commas separate: so many, or any number of them."""
+def numbers(form: str, count: int = 0, kind: Callable[[str], Any] = float) -> Callable[[str], tuple[Any, ...]]:
+    """Return the parser of numbers that commas separate, `count` of them or any; `form` is that of the option."""
 
     def parse(text: str) -> tuple[Any, ...]:
         with suppress(ValueError):
             found = tuple(kind(part.strip()) for part in text.split(","))
             if len(found) == (count or len(found)) and not any(map(isnan, found)):
                 return found
-        expected = ",".join(["NUMBER"] * count) or "NUMBER,NUMBER,..."
-        raise typer.BadParameter(f"{text!r} is not of the form {expected}")
+        raise typer.BadParameter(f"{text!r}: write {form}")
 
     return parse
 
 
 def interval(text: str) -> tuple[float, ...]:
     """Return the two numbers of LOW,HIGH."""
-    low, high = numbers(2)(text)
+    low, high = numbers("LOW,HIGH", 2)(text)
     if not -inf < low < high < inf:
-        raise typer.BadParameter(f"{text!r} is no interval. Give two numbers, the lower first, such as -1,3")
+        raise typer.BadParameter(f"{text!r}: write LOW,HIGH, the lower number first, such as -1,3")
     return low, high
 
 
@@ -194,21 +179,25 @@ def with_gains(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def load_arm(name: str, theory: Theory | None = None, driven: str | None = None) -> Arm:
-    """Return the preset or file of that name, under that theory, with `driven` as its input.
+    """Return the arm of a preset or file, under that theory.
 
-    Values that look like a wrong unit, and a motor without an input, are named on standard error.
+    Values that look like a wrong unit, and a motor without an input (`driven` or the file's), are named on standard
+    error.
     """
     from tfarm.arm.reading import arm_in, load_tables
 
     table, file = load_tables(name)
     arm = arm_in(table, file)
     if "motor" in table and "input" not in table and driven is None:
-        print_line(f"warning: {file}: input: not given with a [motor], {arm.input} is assumed. {INPUT_REMEDY}")
+        print_line(
+            f"warning: {file}: input: not given with a [motor], {arm.input} is assumed. "
+            "Set input to hub_torque, motor_voltage or motor_current at the top of the file."
+        )
     if theory is not None:
         arm = arm.under(theory)
     if texts := implausible(arm):
         print_line(f"warning: {arm.name}: {'; '.join(texts)}")
-    return arm if driven is None or "@" in driven else replace(arm, input=cast("Input", driven))
+    return arm
 
 
 def load_law(arm: Arm, name: str, gains: Gains, file: Path | None = None) -> tuple[AnyLaw, dict[str, Any]]:
@@ -220,11 +209,8 @@ def load_law(arm: Arm, name: str, gains: Gains, file: Path | None = None) -> tup
     from tfarm.spectrum.table import default_words
 
     typed = {gain: value for gain, value in gains.items() if value is not None}
-    if file is not None and typed:
-        gain, value = next(iter(typed.items()))
-        raise ParameterError(
-            key=f"--{gain}", value=value, remedy=f"the law is that of {file}; leave out --{gain}, or --law"
-        )
+    if file is not None:
+        refuse({f"--{gain}": value for gain, value in typed.items()}, f"the law is that of {file}; leave this out")
     own = None if typed else read(name if file is None else file)
     if own is not None:
         return own, {}
@@ -232,8 +218,7 @@ def load_law(arm: Arm, name: str, gains: Gains, file: Path | None = None) -> tup
         raise ParameterError(key="--law", value=str(file), remedy="has no table [law]")
     missing = [gain for gain in DEFAULT_GAINS if gain not in typed]
     words = default_words(arm, missing) if missing else None
-    law = replace(tfarm.default_gains(arm), **typed)
-    return law, {"default_gains": missing, "default_gains_in_words": words}
+    return replace(tfarm.default_gains(arm), **typed), {"default_gains": missing, "default_gains_in_words": words}
 
 
 def load_loop(name: str, theory: Theory | None, gains: Gains, law: Path | None) -> tuple[Arm, AnyLaw, dict[str, Any]]:
@@ -242,21 +227,21 @@ def load_loop(name: str, theory: Theory | None, gains: Gains, law: Path | None) 
     return arm, *load_law(arm, name, gains, law)
 
 
-def load_chain(name: str, period: float | None, delay_samples: float | None) -> Chain:
+def load_chain(name: str, period: float | None, delay_samples: float | None) -> Any:
     """Return the sampled chain of a file, with the period and the delay that are given instead."""
     from tfarm.dsp.chain import load_chain as read
 
     chain = read(name)
-    options = {"period": period, "delay_samples": delay_samples}
-    given = {key: value for key, value in options.items() if value is not None}
-    return replace(chain, sampling=replace(chain.sampling, **given))
+    period = chain.sampling.period if period is None else period
+    delay_samples = chain.sampling.delay_samples if delay_samples is None else delay_samples
+    return replace(chain, sampling=replace(chain.sampling, period=period, delay_samples=delay_samples))
 
 
-def outputs_on(names: Sequence[str], side: str | None) -> list[str | Output]:
+def outputs_on(names: Sequence[str], side: str | None) -> list[Any]:
     """Return the outputs of these names, on one side of a joint where that is given."""
     from tfarm.exact.outputs import on_side
 
-    return [name if side is None else on_side(name, cast("Side", side)) for name in names]
+    return [name if side is None else on_side(name, cast("Any", side)) for name in names]
 
 
 def refuse(others: Mapping[str, Any], remedy: str) -> None:
@@ -284,7 +269,6 @@ def emit(
     standard output is one of the files.
     """
     from tfarm.schema import curve_table, sections, to_dict
-    from tfarm.tables.terminal import show, show_pairs
 
     if csv is not None:
         write_csv(curve_table(record), csv)
@@ -302,6 +286,8 @@ def emit(
     if json:
         print(to_json({**to_dict(record), **(defaults or {})}))
         return
+    from tfarm.tables.terminal import show, show_pairs
+
     for number, each in enumerate(sections(record)):
         if number and (each.pairs or each.table or each.drawing):
             print(f"\n{each.title}" if each.title else "")
@@ -331,13 +317,11 @@ def progress() -> Iterator[Callable[[int, int, str], None]]:
         while not over.wait(PROGRESS_EVERY if time.monotonic() - began > PROGRESS_AFTER else PROGRESS_AFTER):
             print_line(f"{_state[0]} ({time.monotonic() - began:.0f} s)")
 
-    speaker = Thread(target=speak, daemon=True)
-    speaker.start()
+    Thread(target=speak, daemon=True).start()
     try:
         yield advance
     finally:
         over.set()
-        speaker.join()
 
 
 def print_line(message: str) -> None:

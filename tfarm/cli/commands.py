@@ -1,9 +1,10 @@
-"""The commands on an arm, and the reduced model.  Packages are imported inside them: `tfarm --help` needs none."""
+"""The commands on an arm and on measured data.  Packages are imported inside them: `tfarm --help` needs none."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -20,10 +21,12 @@ from tfarm.cli.app import (
     Png,
     SideName,
     TheoryName,
+    advance,
+    app,
     emit,
-    group,
     interval,
     load_arm,
+    named,
     numbers,
     outputs_on,
     print_line,
@@ -31,7 +34,11 @@ from tfarm.cli.app import (
 )
 from tfarm.schema import Quantity
 
-command = group("Arm")
+command = partial(app.command, rich_help_panel="Arm")
+measuring_command = partial(app.command, rich_help_panel="Measurement")
+RecordName = Annotated[
+    Path, typer.Argument(metavar="RECORD", exists=True, help="CSV or .mat file: t [s] and signals", show_default=False)
+]
 MethodName = Annotated[str, typer.Option("--method", help="closed-form, balls, or appendix (the paper's determinant)")]
 Compare = Annotated[bool, typer.Option("--compare", help="all three methods and their differences")]
 DigitCount = Annotated[
@@ -60,21 +67,20 @@ class Presets:
     presets: Annotated[list[Preset], Quantity("arms")]
 
 
-@command("presets")
+@command(epilog="presets")
 def presets(json: Json = False) -> None:
     """List the arms that come with tfarm, with their assumptions."""
-    arms = map(tfarm.load, tfarm.presets())
     rows = [
         Preset(
             *(arm.name, arm.length, arm.damping, arm.hub.inertia, arm.payload.mass, arm.payload.inertia),
             arm.assumptions,
         )
-        for arm in arms
+        for arm in map(tfarm.load, tfarm.presets())
     ]
     emit(Presets(rows), json)
 
 
-@command("modes sasaki2012-lab --count 5")
+@command(epilog="modes sasaki2012-lab --count 5")
 def modes(
     arm: ArmName,
     count: Annotated[int, typer.Option("--count", min=1, max=1000, help="flexible modes")] = 10,
@@ -102,22 +108,23 @@ def modes(
         raise typer.Exit(3)  # as where nothing could be solved
 
 
-def as_complex(text: str) -> complex:
-    """Return the number of 0.3+57.1j or 0.3+57.1i."""
-    return complex(text.replace("i", "j"))
-
-
-@command("response sasaki2012-lab --from 1 --to 100 --csv root.csv")
+@command(epilog="response sasaki2012-lab --from 1 --to 100 --csv root.csv")
 def response(
     arm: ArmName,
     output: Annotated[
         str | None, typer.Option("--output", help="output, such as tip_displacement; by default root_moment")
     ] = None,
     s: Annotated[
-        Any, typer.Option("--s", parser=numbers(kind=as_complex), metavar="S,S", help="points s [1/s]: 0.3+57.1j,10j")
+        Any,
+        typer.Option(
+            "--s",
+            parser=numbers("0.3+57.1j,10j", kind=lambda text: complex(text.replace("i", "j"))),
+            metavar="S,S",
+            help="points s [1/s]: 0.3+57.1j,10j",
+        ),
     ] = None,
     omega: Annotated[
-        Any, typer.Option("--omega", parser=numbers(), metavar="W,W", help="frequencies [rad/s]: 1,10,100")
+        Any, typer.Option("--omega", parser=numbers("1,10,100"), metavar="W,W", help="frequencies [rad/s]: 1,10,100")
     ] = None,
     start: Annotated[float, typer.Option("--from", help="lowest frequency [rad/s]")] = 0.1,
     stop: Annotated[float, typer.Option("--to", help="highest frequency [rad/s]")] = 1000.0,
@@ -146,8 +153,10 @@ def response(
     if measured is not None:
         from tfarm.fitting.data import data_of
 
-        others = {"--s": s, "--omega": omega, "--output": output, "--x": x, "--side": side, "--digits": digits}
-        refuse(others, "a measured response has its own outputs and frequencies; leave this out")
+        refuse(
+            {"--s": s, "--omega": omega, "--output": output, "--x": x, "--side": side, "--digits": digits},
+            "a measured response has its own outputs and frequencies; leave this out",
+        )
         emit(tfarm.overlay(load_arm(arm, theory), data_of(measured, "--measured")), json, csv=csv, png=png)
         return
     refuse({"--png": png}, "a picture needs --measured; tfarm bode draws the exact response")
@@ -156,34 +165,31 @@ def response(
     from tfarm.tables.terminal import show
 
     (wanted,) = outputs_on([output or "root_moment"], side)
-    subject, load = load_arm(arm, theory, driven), load_on_link(driven)
+    G = tfarm.transfer(load_arm(arm, theory, driven), wanted, x=x, method=cast("Any", method), input=driven)
     if s is None and omega is None:
         check_range(start, stop)
         omega = np.geomspace(start, stop, points)
     at = np.array(s) if s else 1j * np.array(omega)
     check_method(method, at.size, digits, compare)
     if compare:
+        load = driven if G.load else None
         refuse({"--csv": csv, "--input": load}, "--compare prints a table of its own: ask for one of them")
-        G = tfarm.transfer(subject, wanted, x=x)
-        emit(results.ByMethods(subject.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)), json)
+        emit(results.ByMethods(G.arm.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)), json)
         return
-    found = results.points(tfarm.transfer(subject, wanted, x=x, method=cast("Any", method), input=load), at, digits)
+    found = results.points(G, at, digits)
     emit(found, json, csv=csv)
     if csv is None and not json:
         show(found.csv_table)
-
-
-def load_on_link(driven: str | None) -> str | None:
-    """Return the input where it is a load on the link, force@X or moment_pair@X1,X2."""
-    return driven if driven and "@" in driven else None
 
 
 def check_method(method: str, number: int, digits: int | None, compare: bool) -> None:
     """Raise ParameterError for digits, or too many points, by one of the slow methods."""
     if method != "closed-form" or compare:
         refuse({"--digits": digits}, "they are certified by balls in any case: leave --method and --compare out")
-        most = f"at most {MOST_SLOW} by balls or the appendix, which take milliseconds for each"
-        refuse({"points": number if number > MOST_SLOW else None}, most)
+        refuse(
+            {"points": number if number > MOST_SLOW else None},
+            f"at most {MOST_SLOW} by balls or the appendix, which take milliseconds for each",
+        )
 
 
 def check_range(start: float, stop: float) -> None:
@@ -192,7 +198,7 @@ def check_range(start: float, stop: float) -> None:
     refuse({"--to": None if start < stop < math.inf else stop}, f"a frequency above --from, {start:g} rad/s")
 
 
-@command("bode sasaki2012-lab --output tip_displacement --png bode.png")
+@command(epilog="bode sasaki2012-lab --output tip_displacement --png bode.png")
 def bode(
     arm: ArmName,
     output: Annotated[str, typer.Option("--output", help="output, such as tip_displacement")] = "root_moment",
@@ -212,13 +218,13 @@ def bode(
     from tfarm.response.frequency import resonant_band
 
     subject, (wanted,) = load_arm(arm, theory, driven), outputs_on([output], side)
-    low, high = resonant_band(subject)
+    low, high = resonant_band(tfarm.transfer(subject, wanted, x=x, input=driven).arm)
     band = low if start is None else start, high if stop is None else stop
     check_range(*band)
-    emit(tfarm.bode(subject, wanted, band, x=x, input=load_on_link(driven)), json, csv=csv, png=png)
+    emit(tfarm.bode(subject, wanted, band, x=x, input=driven), json, csv=csv, png=png)
 
 
-@command("reduce sasaki2012 --outputs root_moment,hub_rate --order 14")
+@command(epilog="reduce sasaki2012 --outputs root_moment,hub_rate --order 14")
 def reduce(
     arm: ArmName,
     outputs: Annotated[str, typer.Option("--outputs", help="names separated by commas")] = "root_moment,hub_rate",
@@ -242,6 +248,152 @@ def reduce(
     from tfarm.reduced import save_mat
 
     wanted = outputs_on([name.strip() for name in outputs.split(",")], side)
-    how: Any = {"order": order, "error": error, "method": method, "band": band, "x": x}
-    reduced = tfarm.reduce(load_arm(arm, theory), wanted, **how)
+    reduced = tfarm.reduce(
+        load_arm(arm, theory), wanted, order=order, error=error, method=cast("Any", method), band=band, x=x
+    )
     emit(reduced, json, also=() if mat is None else save_mat(reduced, mat, key="--mat"))
+
+
+@measuring_command(
+    epilog="fit rig.toml --data tip_acceleration/hub_angle=sweep.csv --free link.youngs_modulus,delay --json"
+)
+def fit(
+    arm: ArmName,
+    data: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--data",
+            metavar="OUTPUT/INPUT=FILE",
+            help="measured response; may be repeated",
+        ),
+    ] = None,
+    free: Annotated[
+        str,
+        typer.Option(
+            "--free",
+            metavar="KEY,KEY",
+            help="free numbers: keys of the arm's file, such as link.youngs_modulus, and gain, delay of each sensor",
+        ),
+    ] = "",
+    start: Annotated[
+        list[Any] | None,
+        typer.Option(
+            "--start", parser=named(numbers("KEY=NUMBER", 1)), metavar="KEY=VALUE", help="first value, if not the arm's"
+        ),
+    ] = None,
+    bounds: Annotated[
+        list[Any] | None,
+        typer.Option(
+            "--bounds", parser=named(numbers("KEY=NUMBER,NUMBER", 2)), metavar="KEY=LO,HI", help="bounds of a number"
+        ),
+    ] = None,
+    prior: Annotated[
+        list[Any] | None,
+        typer.Option(
+            "--prior",
+            parser=named(numbers("KEY=NUMBER,NUMBER", 2)),
+            metavar="KEY=MEAN,STD",
+            help="prior mean and deviation",
+        ),
+    ] = None,
+    mode: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--mode",
+            metavar="N=HZ,RATIO",
+            help="mode of a ring-down: 1=2.52hz,0.006, with standard deviations 1=2.52hz~0.01,0.006~0.001",
+        ),
+    ] = None,
+    covariance: Annotated[
+        bool, typer.Option("--covariance", help="intervals by the covariance alone, without profiles")
+    ] = False,
+    save: Annotated[
+        Path | None, typer.Option("--save", metavar="FILE", help="write the fitted arm to this TOML file")
+    ] = None,
+    png: Png = None,
+    report: Annotated[bool, typer.Option("--report", help="write the pages of the fitted arm")] = False,
+    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="the folder of the pages")] = Path("reports"),
+    theory: TheoryName = None,
+    json: Json = False,
+) -> None:
+    """Fit of an arm's numbers to measured responses and ring-downs, with confidence intervals."""
+    from tfarm.fitting import model, overlay
+    from tfarm.fitting.data import data_of
+    from tfarm.fitting.fit import save_fit
+
+    subject, measured, page = load_arm(arm, theory), [data_of(text) for text in data or []], None
+    for each in measured:
+        overlay.check_unit(subject, each)
+    found = tfarm.fit(
+        subject, measured, [key.strip() for key in free.split(",") if key.strip()],
+        rings=[model.mode_of(text) for text in mode or []], profile=not covariance, progress=advance,
+        start={key: value for key, (value,) in start or []}, bounds=dict(bounds or []), priors=dict(prior or []),
+    )  # fmt: skip
+    if save is not None:
+        save_fit(found, save)
+    if report:
+        from tfarm.report import write
+
+        page = write([found.arm], out, fits=[found], progress=advance, notice=print_line)
+    emit(found, json, png=png, also=(save, page))
+    if not found.converged:
+        raise typer.Exit(3)
+
+
+@measuring_command(epilog="frf record.csv --input hub_torque --output tip_acceleration=acc1 --save measured.csv")
+def frf(
+    record: RecordName,
+    input: Annotated[str, typer.Option("--input", help="such as hub_torque; or hub_torque=COLUMN of the record")],
+    output: Annotated[str, typer.Option("--output", help="such as tip_acceleration; or tip_acceleration=COLUMN")],
+    estimator: Annotated[
+        str, typer.Option("--estimator", help="H1 (noise on the output), H2 (on the input) or Hv")
+    ] = "H1",
+    window: Annotated[
+        str, typer.Option("--window", help="hann for random excitation, boxcar for whole sweeps")
+    ] = "hann",
+    segment: Annotated[
+        float | None, typer.Option("--segment", help="length of a segment [s]; by default an eighth of the record")
+    ] = None,
+    overlap: Annotated[
+        float | None, typer.Option("--overlap", help="share of a segment; by default 0.5, or 0 with boxcar")
+    ] = None,
+    csv: Annotated[
+        Path | None,
+        typer.Option("--save", "--csv", metavar="FILE", help="write the response, for --measured and --data"),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Frequency response of a record over time, by averaged cross-spectra, with coherence."""
+    from tfarm.fitting import recording
+    from tfarm.tables.terminal import show
+
+    refuse(
+        {"signal": next((text for text in (output, input) if text.endswith("=")), None)},
+        "write NAME=COLUMN, such as tip_acceleration=acc1",
+    )
+    (signal, column), (driven, driven_column) = (text.partition("=")[::2] for text in (output, input))
+    found = recording.frequency_response(
+        recording.read_recording(record), signal, driven, columns=(column or signal, driven_column or driven),
+        estimator=cast("Any", estimator), window=cast("Any", window), segment=segment, overlap=overlap,
+    )  # fmt: skip
+    emit(found, json, csv=csv)
+    if csv is None and not json:
+        show(found.csv_table)
+    if found.note:
+        print_line(found.note)
+
+
+@measuring_command(epilog="ring record.csv --signal root_strain --from 2.5")
+def ring(
+    record: RecordName,
+    signal: Annotated[str, typer.Option("--signal", help="column of the record that decays")],
+    start: Annotated[float | None, typer.Option("--from", help="time [s] at which the excitation ends")] = None,
+    stop: Annotated[float | None, typer.Option("--to", help="last time [s]")] = None,
+    modes: Annotated[int, typer.Option("--modes", min=1, help="number of oscillations")] = 1,
+    json: Json = False,
+) -> None:
+    """Frequencies and damping ratios of a decay, with confidence intervals."""
+    from tfarm.fitting import recording, resonances
+
+    found = resonances.ring(recording.read_recording(record), signal, start=start, stop=stop, modes=modes)
+    emit(found, json)

@@ -1,7 +1,10 @@
-"""The commands on the continuous-time loop."""
+"""The commands on the continuous-time loop and on the sampled one."""
 
 from __future__ import annotations
 
+import re
+from functools import partial
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -20,24 +23,29 @@ from tfarm.cli.app import (
     Period,
     Png,
     TheoryName,
+    app,
     emit,
-    group,
     interval,
     load_arm,
     load_chain,
     load_law,
     load_loop,
     named,
+    print_line,
     refuse,
     with_gains,
 )
+from tfarm.files import write_mat
 
-command = group("Loop")
+command = partial(app.command, rich_help_panel="Loop")
+sampled_command = partial(app.command, rich_help_panel="Sampled loop")
+ModeCount = Annotated[
+    int | None, typer.Option("--modes", min=1, max=400, help="flexible modes; by default as many as the result takes")
+]
 NUMBERS = "gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N"  # of a law
-PARAMETERS = "payload_mass, payload_inertia, hub_inertia, length or damping"
 
 
-@command("poles sasaki2012-lab --K1 0.3 --K2 0.3 --count 8")
+@command(epilog="poles sasaki2012-lab --K1 0.3 --K2 0.3 --count 8")
 @with_gains
 def poles(
     arm: ArmName,
@@ -60,7 +68,7 @@ def poles(
     emit(found.certified() if certify else found, json, defaults)
 
 
-@command("margins sasaki2012-lab --K1 0.3 --K2 0.3")
+@command(epilog="margins sasaki2012-lab --K1 0.3 --K2 0.3")
 @with_gains
 def margins(arm: ArmName, law: LawFile = None, theory: TheoryName = None, json: Json = False, *, gains: Gains) -> None:
     """Stability, the stability interval of each gain, and the margins of the exact loop function."""
@@ -68,7 +76,7 @@ def margins(arm: ArmName, law: LawFile = None, theory: TheoryName = None, json: 
     emit(tfarm.margins(subject, controller), json, defaults)
 
 
-@command("nyquist sasaki2012-lab --K1 0.3 --K2 0.3 --png nyquist.png")
+@command(epilog="nyquist sasaki2012-lab --K1 0.3 --K2 0.3 --png nyquist.png")
 @with_gains
 def nyquist(
     arm: ArmName,
@@ -85,7 +93,7 @@ def nyquist(
     emit(tfarm.nyquist(subject, controller), json, defaults, csv=csv, png=png)
 
 
-@command("spill sasaki2012-lab --K1 0.3 --K2 -2")
+@command(epilog="spill sasaki2012-lab --K1 0.3 --K2 -2")
 @with_gains
 def spill(
     arm: ArmName,
@@ -101,12 +109,17 @@ def spill(
     emit(tfarm.spill(subject, controller, modes), json, defaults)
 
 
-@command("locus sasaki2012-lab --vary K2 --from 0 --to 2 --png locus.png")
+@command(epilog="locus sasaki2012-lab --vary K2 --from 0 --to 2 --png locus.png")
 @with_gains
 def locus(
     arm: ArmName,
     vary: Annotated[
-        str, typer.Option("--vary", help=f"{', '.join(NAMES)}, all (a factor on these), {PARAMETERS}; or {NUMBERS}")
+        str,
+        typer.Option(
+            "--vary",
+            help=f"{', '.join(NAMES)}, all (a factor on these), payload_mass, payload_inertia, "
+            f"hub_inertia, length or damping; or {NUMBERS}",
+        ),
     ],
     start: Annotated[float, typer.Option("--from", help="first value")],
     stop: Annotated[float, typer.Option("--to", help="last value")],
@@ -135,7 +148,7 @@ def locus(
     emit(Loci(found, reduced_of(found)), json, defaults, csv=csv, png=png)
 
 
-@command("map sasaki2012-lab --K1 -1,3 --K2 -2,2 --png map.png", name="map")
+@command(epilog="map sasaki2012-lab --K1 -1,3 --K2 -2,2 --png map.png", name="map")
 def gain_map(
     arm: ArmName,
     k1: Annotated[
@@ -189,10 +202,14 @@ def gain_map(
     subject, typed = load_arm(arm, theory), {RATE_GAIN: k1, MOMENT_GAIN: k2}
     of_law, ranges = bool(vary or law), vary or []
     if of_law:
-        remedy = "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice"
-        refuse({f"--{name}": value for name, value in (typed | {ANGLE_GAIN: kp or None}).items()}, remedy)
-        remedy = "give two numbers of the law, such as --vary hub_angle=0,10 --vary delay=0,0.02"
-        refuse({"--vary": [name for name, _ in ranges] if len(ranges) != 2 else None}, remedy)
+        refuse(
+            {f"--{name}": value for name, value in (typed | {ANGLE_GAIN: kp or None}).items()},
+            "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice",
+        )
+        refuse(
+            {"--vary": [name for name, _ in ranges] if len(ranges) != 2 else None},
+            "give two numbers of the law, such as --vary hub_angle=0,10 --vary delay=0,0.02",
+        )
         controller, _ = load_law(subject, arm, {}, law)
     else:
         ranges = [(name, typed[name] or usual) for name, usual in zip(PLANE, ranges_of(subject), strict=True)]
@@ -207,3 +224,85 @@ def gain_map(
         chain = load_chain(dsp or arm, period, delay_samples)
         found = crossings.sampled_map(verdict.sampled_verdict(subject, full, chain).full, x, y, (first, second))
     emit(found, json, csv=csv, png=png)
+
+
+@sampled_command(epilog="sampled sasaki2012-lab --K1 0.3 --K2 0.3 --period 0.01")
+@with_gains
+def sampled(
+    arm: ArmName,
+    period: Period = None,
+    delay_samples: Delay = None,
+    dsp: DspFile = None,
+    modes: ModeCount = None,
+    law: LawFile = None,
+    theory: TheoryName = None,
+    json: Json = False,
+    *,
+    gains: Gains,
+) -> None:
+    """Stability of the sampled loop: verdict, intervals, modes, margins.
+
+    A law of a file acts with its own period, which has to be that of the chain; one in s is made discrete by its rule.
+    """
+    subject, controller, defaults = load_loop(arm, theory, gains, law)
+    chain = load_chain(dsp or arm, period, delay_samples)
+    emit(tfarm.sampled(subject, controller, chain, count=modes), json, defaults)
+
+
+@sampled_command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")
+@with_gains
+def simulate(
+    arm: ArmName,
+    scenario: Annotated[str, typer.Option("--scenario", help="slew, step, decay or impulse")] = "slew",
+    duration: Annotated[float, typer.Option("--duration", help="duration [s]")] = 3.0,
+    period: Period = None,
+    delay_samples: Delay = None,
+    dsp: DspFile = None,
+    modes: ModeCount = None,
+    output: Annotated[
+        list[str] | None,
+        typer.Option("--output", metavar="NAME", help="further signal, as strain@0.05; may be repeated"),
+    ] = None,
+    between: Annotated[int, typer.Option("--between", min=0, max=1000, help="records between two samples")] = 0,
+    csv: Csv = None,
+    mat: Annotated[
+        Path | None, typer.Option("--mat", metavar="FILE", help="write the signals to a MATLAB file")
+    ] = None,
+    controller: Annotated[
+        Path | None,
+        typer.Option(
+            "--controller",
+            metavar="FILE",
+            exists=True,
+            help=f"tuner of `tfarm tune --save`: it sets {MOMENT_GAIN}, with its own {RATE_GAIN}",
+        ),
+    ] = None,
+    law: LawFile = None,
+    theory: TheoryName = None,
+    json: Json = False,
+    *,
+    gains: Gains,
+) -> None:
+    """Time response of the sampled loop: hub angle, tip, root moment and torque, exact between the samples."""
+    how: Any = {"count": modes, "between": between, "outputs": output or ()}
+    chain, defaults = load_chain(dsp or arm, period, delay_samples), None
+    if controller is None:
+        from tfarm.dsp.results import simulated_run
+
+        subject, control, defaults = load_loop(arm, theory, gains, law)
+        found = simulated_run(subject, control, chain, scenario, duration, **how)
+    else:
+        from tfarm.tuner.trial import load_tuner
+        from tfarm.tuner.tuning import controlled_run
+
+        found = controlled_run(load_arm(arm, theory), load_tuner(controller), chain, scenario, duration, **how)
+    if mat is not None:
+        name = partial(re.sub, r"\W", "_")  # as MATLAB takes it: strain_0_05 of strain@0.05
+        signals: dict[str, Any] = {name(key): values for key, values in found.signals.items() if len(values)}
+        if found.between:
+            signals["between"] = {name(key): values for key, values in found.between.items()}
+        write_mat(mat, signals, key="--mat")
+    if found.stopped_at is not None:
+        mode = f"mode {found.growing_mode}" if found.growing_mode else "the hub"
+        print_line(f"unstable: stopped at {found.stopped_at:.6g} s, {mode} grows")
+    emit(found, json, defaults, csv=csv, also=(mat,))

@@ -25,8 +25,8 @@ from tfarm.cli.app import (
     Png,
     TheoryName,
     advance,
+    app,
     emit,
-    group,
     interval,
     load_arm,
     load_chain,
@@ -34,16 +34,14 @@ from tfarm.cli.app import (
     named,
     preset_names,
     print_line,
+    refuse,
     with_gains,
 )
-from tfarm.errors import ParameterError
 
-command = group("Design")
-RATE_HELP = f"hub rate gain [N m s/rad]; by default 0.00642 J w1, or a damping ratio of 0.71 under {ANGLE_GAIN}"
-LEARNING, COST = "Learning", "Cost"  # groups of the tuner's options
+command = partial(app.command, rich_help_panel="Design")
 
 
-@command("design sasaki2012-lab --structure PD+notch --save notch.toml")
+@command(epilog="design sasaki2012-lab --structure PD+notch --save notch.toml")
 def design(
     arm: ArmName,
     objective: Annotated[
@@ -97,19 +95,19 @@ def design(
     emit(found, json, also=(save,))
 
 
-@command("tune sasaki2012-lab --trials 100 --save tuned.json")
+@command(epilog="tune sasaki2012-lab --trials 100 --save tuned.json")
 def tune(
     arm: ArmName,
     trials: Annotated[int, typer.Option("--trials", min=1, max=1_000_000, help="slews to learn from")] = 100,
     mode: Annotated[
         str,
-        typer.Option("--mode", help="trial: after each slew; online: at every sample", rich_help_panel=LEARNING),
+        typer.Option("--mode", help="trial: after each slew; online: at every sample", rich_help_panel="Learning"),
     ] = "trial",
     signals: Annotated[
         str | None, typer.Option("--signals", help="vibration or total, in x and u; by default that of [slew]")
     ] = None,
     seed: Annotated[
-        int, typer.Option("--seed", min=0, max=2**53, help="of the initial weights", rich_help_panel=LEARNING)
+        int, typer.Option("--seed", min=0, max=2**53, help="of the initial weights", rich_help_panel="Learning")
     ] = 0,
     curves: Annotated[
         int, typer.Option("--curves", min=0, max=10_000, help="learning curves over N seeds (the paper's Figure 5)")
@@ -117,28 +115,37 @@ def tune(
     guard: Annotated[str, typer.Option("--guard", help="time-varying (proven), frozen or none")] = "time-varying",
     rule: Annotated[
         str,
-        typer.Option("--rule", help="dynamic, clipped or plain: form of (21)", rich_help_panel=LEARNING),
+        typer.Option("--rule", help="dynamic, clipped or plain: form of (21)", rich_help_panel="Learning"),
     ] = "dynamic",
     sensitivity: Annotated[
         str,
         typer.Option(
-            "--sensitivity", help="of the plant, online: one-step (the paper's) or whole", rich_help_panel=LEARNING
+            "--sensitivity", help="of the plant, online: one-step (the paper's) or whole", rich_help_panel="Learning"
         ),
     ] = "one-step",
-    eta: Annotated[float, typer.Option("--eta", help="learning rate", rich_help_panel=LEARNING)] = 0.8,
-    alpha: Annotated[float, typer.Option("--alpha", help="momentum, in [0, 1)", rich_help_panel=LEARNING)] = 0.6,
+    eta: Annotated[float, typer.Option("--eta", help="learning rate", rich_help_panel="Learning")] = 0.8,
+    alpha: Annotated[float, typer.Option("--alpha", help="momentum, in [0, 1)", rich_help_panel="Learning")] = 0.6,
     a: Annotated[
         float,
-        typer.Option("--a", help="weight of the root moment, in the arm's unit", rich_help_panel=COST),
+        typer.Option("--a", help="weight of the root moment, in the arm's unit", rich_help_panel="Cost"),
     ] = 1.0,
-    b: Annotated[float, typer.Option("--b", help="weight of the control signal, likewise", rich_help_panel=COST)] = 2.6,
-    k1: Annotated[float | None, typer.Option(f"--{RATE_GAIN}", help=RATE_HELP, rich_help_panel=CONTROLLER)] = None,
+    b: Annotated[
+        float, typer.Option("--b", help="weight of the control signal, likewise", rich_help_panel="Cost")
+    ] = 2.6,
+    k1: Annotated[
+        float | None,
+        typer.Option(
+            f"--{RATE_GAIN}",
+            help=f"hub rate gain [N m s/rad]; by default 0.00642 J w1, 0.71 damping with {ANGLE_GAIN}",
+            rich_help_panel=CONTROLLER,
+        ),
+    ] = None,
     kp: AngleGain = 0.0,
     duration: Annotated[
         float | None, typer.Option("--duration", help="duration of a trial [s]; by default three slews")
     ] = None,
     enough: Annotated[
-        float, typer.Option("--enough", help="stop once the rms of x is below this [N m]", rich_help_panel=LEARNING)
+        float, typer.Option("--enough", help="stop once the rms of x is below this [N m]", rich_help_panel="Learning")
     ] = 0.0,
     hidden: Annotated[int, typer.Option("--hidden", min=1, max=1000, help="hidden neurons")] = 6,
     seventh_input: Annotated[bool, typer.Option("--seventh-input", help="feed K(t-1) to the network too")] = False,
@@ -160,11 +167,13 @@ def tune(
 
     subject, chain = load_arm(arm, theory), load_chain(dsp or arm, period, delay_samples)
     law, defaults = load_law(subject, arm, {RATE_GAIN: k1, MOMENT_GAIN: 0.0})
-    servo: Any = {RATE_GAIN: cast("tfarm.HubFeedback", law)[RATE_GAIN], ANGLE_GAIN: kp}
+    rate = cast("tfarm.HubFeedback", law)[RATE_GAIN]
     if k1 is None and kp:
-        servo[RATE_GAIN] = usual_rate_gain(subject, kp)
-        words = f"{RATE_GAIN} = {servo[RATE_GAIN]:.4g}, a damping ratio of 0.71 of the rigid arm under {ANGLE_GAIN}"
-        defaults = {"default_gains": [RATE_GAIN], "default_gains_in_words": words}
+        rate = usual_rate_gain(subject, kp)
+        defaults = {
+            "default_gains": [RATE_GAIN],
+            "default_gains_in_words": f"{RATE_GAIN} = {rate:.4g} (damping ratio 0.71 of the rigid arm under Kp)",
+        }
     learning: Any = {"mode": mode, "rule": rule, "sensitivity": sensitivity}
     given: Any = {"signals": signals, "duration": duration}
     plan = replace(
@@ -172,7 +181,7 @@ def tune(
         cost=tuner.Cost(a=a, b=b),
         learning=tuner.Learning(**learning, eta=eta, alpha=alpha, enough=enough),
         trials=trials, seed=seed, count=modes, hidden=hidden, guard=cast("Any", guard), seventh_input=seventh_input,
-        **servo,
+        **cast("Any", {RATE_GAIN: rate, ANGLE_GAIN: kp}),
         **{name: value for name, value in given.items() if value is not None},
     )  # fmt: skip
     tuning = tuner.tune(subject, plan, chain)
@@ -186,7 +195,7 @@ def tune(
     emit(found, json, defaults, also=(save,))
 
 
-@command("compare sasaki2012 sasaki2012-lab --png both.png")
+@command(epilog="compare sasaki2012 sasaki2012-lab --png both.png")
 @with_gains
 def compare(
     arms: Annotated[
@@ -215,11 +224,11 @@ def compare(
     Of one arm give --law twice; of two arms once for both, or once for each.
     """
     files, page = law or [], None
-    for key, given in (("ARM", arms), ("--law", files)):
-        if len(given) > 2:
-            raise ParameterError(key=key, value=str(given[2]), remedy="two at most can be compared")
-    if len(arms) == 1 and len(files) < 2:
-        raise ParameterError(key="ARM", value=arms[0], remedy="give a second arm, or --law FILE twice")
+    refuse({"ARM": arms[2:] or None, "--law": [*map(str, files[2:])] or None}, "two at most can be compared")
+    refuse(
+        {"ARM": arms[0] if len(arms) + len(files) < 2 or len(arms) == len(files) == 1 else None},
+        "give a second arm, or --law FILE twice",
+    )
     subjects = [load_arm(name, theory) for name in arms]
     chain = load_chain(dsp or arms[0], period, delay_samples)
     wanted: list[Path | None] = [*files * (2 // len(files))] if files else [None, None]

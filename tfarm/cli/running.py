@@ -11,8 +11,8 @@ from typing import Any
 import typer
 from typer.exceptions import TyperException
 
-from tfarm.arm import GAINS
-from tfarm.cli import commands, control, designing, fitting, sampling, trust  # noqa: F401  each adds its commands
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
+from tfarm.cli import commands, control, designing, trust  # noqa: F401  each adds its commands
 from tfarm.cli.app import discard, print_line, progress, whole_command
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError
 from tfarm.files import STANDARD_OUTPUT
@@ -34,7 +34,6 @@ OF_OTHER_TOOLS = {
     "version": "--version",
     "help": "--help",
 }
-GAINS_ELSEWHERE = {"hub_angle": ("--K0",), "hub_rate": ("--Kd",), "root_moment": ("--Km",)}
 OPTIONS: dict[str, tuple[str, ...]] = {
     "--period": ("--Ts", "--ts", "--dt", "--T", "--sample-time", "--sampling-time", "--sample", "-T"),
     "--count": ("--n", "--num", "--number", "--modes", "-n", "-N"),
@@ -44,37 +43,35 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "--csv": ("--out", "--file", "--save", "-o"),
     "--out": ("--output", "--folder", "--dir", "-o"),
     "--duration": ("--time", "--tend", "--tmax", "-t"),
-    **{f"--{gain.name}": (*GAINS_ELSEWHERE.get(gain.output, ()), f"--{gain.name.lower()}") for gain in GAINS},
+    f"--{ANGLE_GAIN}": ("--K0", "--kp"),
+    f"--{RATE_GAIN}": ("--Kd", "--k1"),
+    f"--{MOMENT_GAIN}": ("--Km", "--k2"),
     "--from": ("--start", "--wmin", "--min"),
     "--to": ("--stop", "--end", "--wmax", "--max"),
 }
 STREAMED = ("--csv", "--png", "--mat", "--save")  # of files that may go to standard output instead, called "-"
 PATHS = (*STREAMED, "--out", "--dsp", "--law", "--controller")  # may be called 1_0
-PLAIN_NUMBERS = "write numbers as 50, 0.5 or 5e1"
+ODD_NUMBER = re.compile(r"(?=.*(_|[^\x00-\x7f]))[-+.\d_eEij]*\d[-+.\d_eEij]*")  # to Python alone: 5_0, or other digits
 
 
 def run(arguments: list[str]) -> int:
-    """Return the exit code of a command: 0, 2 bad input, 3 not solved or not proven, 130 interrupted."""
+    """Return the exit code of a command: 0, 2 for bad input, 3 for what could not be solved or proven."""
     open_streams()
     message, code = "", 0
     try:
         with progress():
             code = call(arguments or ["--help"])
         sys.stdout.flush()
-    except (ConvergenceError, CertificationError) as error:
-        message, code = str(error), 3
+    except (ConvergenceError, CertificationError, MemoryError) as error:
+        message, code = str(error) or "not enough memory for this; ask for less at a time", 3
     except (TfarmError, TyperException) as error:
         message, code = usage(error), 2
     except BrokenPipeError:  # the reader, head for instance, has left
         discard(sys.stdout)
-    except MemoryError:
-        message, code = "not enough memory for this; ask for less at a time", 3
     except OSError as error:  # of standard output, or of a folder that compiled code is kept in
         discard(sys.stdout)
-        reason = error.strerror or str(error)
-        message, code = f"{error.filename}: {reason}; free some space, or set NUMBA_CACHE_DIR to a folder with some", 2
-        if error.filename is None:
-            message = f"standard output cannot be written ({reason}); free some space, or send it elsewhere"
+        remedy = "free some space, or write elsewhere (NUMBA_CACHE_DIR is the folder of compiled code)"
+        message, code = f"{error.filename or 'standard output'}: {error.strerror or error}; {remedy}", 2
     if message:
         print_line(message)
         try:  # what was printed before the error
@@ -105,8 +102,8 @@ def open_streams() -> None:
     if sys.stderr is None:
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115  for as long as the process lives
     if sys.stdout is None:
-        read_only = os.open(os.devnull, os.O_RDONLY)
-        sys.stdout = open(read_only, "w", encoding="utf-8")  # noqa: SIM115  writing raises OSError
+        # writing to what is open for reading raises OSError
+        sys.stdout = open(os.open(os.devnull, os.O_RDONLY), "w", encoding="utf-8")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
@@ -116,25 +113,17 @@ def check_words(arguments: list[str]) -> None:
     """Raise ParameterError for numbers in Python's own spelling, 5_0, and a "-" that is no file or one of two."""
     words = [word for argument in arguments for word in argument.split("=", 1 if argument.startswith("--") else 0)]
     options = [(option, text) for option, text in pairwise(words) if option.startswith("--")]
-    streamed = [option for option, text in options if text == STANDARD_OUTPUT]
+    takers = [option for option, text in options if text == STANDARD_OUTPUT] + ["--json"] * ("--json" in words)
     for option, text in options:
-        if option not in PATHS and any(map(is_odd, re.split("[,=]", text))):
-            raise ParameterError(key=option, value=text, remedy=PLAIN_NUMBERS)
-    for option in streamed:
-        remedy = "standard output takes one thing at a time: name a file, or leave the other out"
-        if option not in STREAMED:
-            remedy = f"- stands for standard output, and only {', '.join(STREAMED)} may go there: give a name"
-        if option not in STREAMED or len(streamed) > 1 or "--json" in words:
-            raise ParameterError(key=option, value=STANDARD_OUTPUT, remedy=remedy)
-
-
-def is_odd(text: str) -> bool:
-    """Return whether a text is a number to Python, by an underscore or digits that are not ASCII, or no text at all."""
-    try:
-        complex(text.strip().replace("i", "j"))
-    except ValueError:
-        return "\0" in text
-    return "_" in text or not text.isascii()
+        if option not in PATHS and any(map(ODD_NUMBER.fullmatch, re.split("[,=]", text))):
+            raise ParameterError(key=option, value=text, remedy="write numbers as 50, 0.5 or 5e1")
+        if text == STANDARD_OUTPUT and option not in STREAMED:
+            remedy = f"- is standard output, and only {', '.join(STREAMED)} may go there: give a name"
+            raise ParameterError(key=option, value=text, remedy=remedy)
+        if text == STANDARD_OUTPUT and len(takers) > 1:
+            raise ParameterError(
+                key=option, value=text, remedy="standard output takes one thing at a time: name a file"
+            )
 
 
 def usage(error: Any) -> str:
@@ -145,9 +134,7 @@ def usage(error: Any) -> str:
     if text.startswith("No such option"):
         known = [option for each in error.ctx.command.params for option in each.opts]
         meant = [option for option, others in OPTIONS.items() if name in others and option in known]
-        near = meant or sorted(error.possibilities or ())
-        hint = f": did you mean {' or '.join(near)}?" if near else f"; known are {', '.join(sorted(known))}"
-        return f"{name}: no such option{hint}"
+        return f"No such option: {name}. Did you mean {' or '.join(meant)}?" if meant else text
     for problem in getattr(error.__cause__, "errors", list)():  # of pydantic, which converts for Typer
         low, high = error.param.min, error.param.max
         within = f", from {low} to {high}" if None not in (low, high) else ""

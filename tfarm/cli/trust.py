@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -19,8 +20,8 @@ from tfarm.cli.app import (
     Period,
     TheoryName,
     advance,
+    app,
     emit,
-    group,
     load_arm,
     load_chain,
     load_law,
@@ -29,10 +30,10 @@ from tfarm.cli.app import (
     with_gains,
 )
 
-command = group("Report")
+command = partial(app.command, rich_help_panel="Report")
 
 
-@command("report sasaki2012-lab --out pages")
+@command(epilog="report sasaki2012-lab --out pages")
 @with_gains
 def report(
     arms: Annotated[
@@ -61,28 +62,29 @@ def report(
     from tfarm.fitting import data, recording
     from tfarm.report import cases, write
 
-    names, files = arms or tfarm.presets(), law or []
-    left_out: list[str] = []
+    names: list[str] = arms or list(tfarm.presets())
+    files: list[Path | None] = [*(law or [])]
     subjects = [load_arm(name, theory) for name in names]
-    has_gains = any(value is not None for value in gains.values())
-    laws: list[list[cases.GivenLaw]] = [[] for _ in names]
-    for own, arm, name in zip(laws, subjects, names, strict=True):
-        if not files and (has_gains or law_tables.load_law(name) is not None):
-            own.append(cases.GivenLaw(load_law(arm, name, gains)[0]))
-        own += [
-            cases.GivenLaw(load_law(arm, name, gains, file)[0], file.name, recording.load_run(file)) for file in files
+    laws = [
+        [
+            cases.GivenLaw(
+                load_law(arm, name, gains, file)[0],
+                file.name if file else "",
+                recording.load_run(file) if file else None,
+            )
+            for file in files or [None] * (set(gains.values()) != {None} or law_tables.load_law(name) is not None)
         ]
+        for arm, name in zip(subjects, names, strict=True)
+    ]
     page = write(
-        subjects, out, laws=laws, only=None if only is None else (only,), progress=advance, notice=left_out.append,
+        subjects, out, laws=laws, only=None if only is None else (only,), progress=advance, notice=print_line,
         chains=[load_chain(dsp or name, period, delay_samples) for name in names],
         measured=[data.data_of(text, "--measured") for text in measured or []],
     )  # fmt: skip
-    for text in left_out:
-        print_line(text)
     print(page)
 
 
-@command("audit")
+@command(epilog="audit")
 def audit(json: Json = False) -> None:
     """Every equation of the paper, as printed and as corrected, with the check of each."""
     from tfarm import audit as paper
@@ -90,7 +92,7 @@ def audit(json: Json = False) -> None:
     emit(paper.Audit(paper.PAPER, paper.audit()), json)
 
 
-@command("assumptions sasaki2012")
+@command(epilog="assumptions sasaki2012")
 def assumptions(
     arm: ArmName,
     count: Annotated[int, typer.Option("--count", min=1, max=100, help="flexible modes")] = 4,
@@ -103,7 +105,7 @@ def assumptions(
     emit(find(load_arm(arm, theory), count), json)
 
 
-@command("validate")
+@command(epilog="validate")
 def validate(json: Json = False) -> None:
     """Natural frequencies of published tables compared with the exact ones, with the reason of each difference."""
     from tfarm.audit import published
@@ -111,7 +113,7 @@ def validate(json: Json = False) -> None:
     emit(published.Validation(published.validate()), json)
 
 
-@command("glossary margin")
+@command(epilog="glossary margin")
 def glossary(
     words: Annotated[str | None, typer.Argument(metavar="[TERM]", help="part of a term; by default all")] = None,
     json: Json = False,
@@ -122,7 +124,7 @@ def glossary(
     emit(find(words), json)
 
 
-@command("completion bash")
+@command(epilog="completion bash")
 def completion(
     shell: Annotated[
         Literal["bash", "zsh", "fish", "powershell"],

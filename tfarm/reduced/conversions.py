@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 import os
 import re
@@ -11,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.io
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices, Rational
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError
-from tfarm.files import is_standard_output, write_file
+from tfarm.files import is_standard_output, write_file, write_mat
 from tfarm.reduced.modal import modal_model
 from tfarm.response import transfer
 from tfarm.response.signals import Signals
@@ -86,8 +84,6 @@ def in_series(first: Matrices, second: Matrices) -> Matrices:
     return whole, np.vstack([B, b @ D]), np.hstack([d @ C, c]), d @ D
 
 
-MAT_HEADER = b"MATLAB 5.0 MAT-file, written by tfarm"  # SciPy's own has the date in it: same inputs, same bytes
-HEADER_TEXT = 116  # bytes of free text at the beginning of a MAT-file, before its version
 WRITTEN_BY = ": written by tfarm."  # ends the first line of every script
 MAT_POINTS = 1000  # of the exact response in the file, even in ln w
 
@@ -104,10 +100,8 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     path = path if path.suffix == ".mat" else path.with_name(path.name + ".mat")
     script = path.with_name(f"load_{re.sub(r'[^A-Za-z0-9_]', '_', path.stem)}.m")
     _must_be_ours(script, path, key)
-    content = io.BytesIO()
-    scipy.io.savemat(content, _contents(reduced), oned_as="row")  # type: ignore[arg-type]
     write_file(script, _script(reduced, path).encode(), key=key)
-    write_file(path, MAT_HEADER.ljust(HEADER_TEXT) + content.getvalue()[HEADER_TEXT:], key=key)
+    write_mat(path, _contents(reduced), key=key, oned_as="row")
     return path, script
 
 
