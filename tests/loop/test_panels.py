@@ -10,8 +10,6 @@ import pytest
 import tfarm
 from tfarm.loop.panels import Positions, positions, sensed_places
 
-# ------------------------------------------------------------ sensors along the arm
-
 
 @pytest.mark.parametrize(("sensor", "share"), [("displacement", 0.6), ("moment", 0.3)])
 def test_zeros_are_those_of_the_complete_search(sensor, share):
