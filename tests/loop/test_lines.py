@@ -12,7 +12,7 @@ from tests.loop.arms import held, held_stiffness, some_loop, window_arm
 from tests.loop.ritz_loop import RitzLoop
 from tfarm import Hub, HubFeedback, ParameterError
 from tfarm.loop.lines import line_crossings
-from tfarm.loop.loop import Loop, grid, steep_places
+from tfarm.loop.loop import Loop
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import band_of_loop
 
@@ -91,17 +91,6 @@ def test_a_held_tip_gives_way_where_stiffness_vanishes() -> None:
     for K1, change in ((0.3, 1), (-3.0, -1)):
         static = at_rest(arm, HubFeedback(K1=K1, Kp=20.0), "K2", 5.0)
         assert (static.t, static.change) == (pytest.approx(1 + 20.0 * flexibility, rel=1e-9), change)
-
-
-def test_the_grid_has_points_closer_to_every_steep_place_than_its_width() -> None:
-    """It begins at a millionth of the first of them, and ends where it is to."""
-    omega = np.asarray(grid(LAB, 5000.0))
-    assert (np.diff(omega) > 0).all()
-    locked = tfarm.modes(LAB.having(hub_inertia=math.inf), up_to=5000.0).natural_frequency
-    assert (omega[0], omega[-1]) == (pytest.approx(1e-6 * locked[0], rel=1e-12), 5000.0)
-    for place in locked:
-        assert np.isin(np.round(place, 9), np.round(np.asarray(steep_places(LAB, 5250.0)), 9))
-        assert abs(omega - place).min() < LAB.link.damping * place**2
 
 
 ARM = tfarm.load("sasaki2012")
