@@ -13,19 +13,25 @@ NAME = "Ärm & co's {{7+7}} שלום #1 $x$ 100% &amp;"  # for an arm: as bad as
 
 
 class Read(HTMLParser):
-    """A page's tags, attributes, and texts."""
+    """A page's tags, attributes, and texts, and those of its tables' cells, a list a row."""
 
     def __init__(self, page):
         super().__init__()
-        self.tags, self.attributes, self.texts = set(), [], []
+        self.tags, self.attributes, self.texts, self.rows = set(), [], [], []
         self.feed(page)
 
     def handle_starttag(self, tag, attrs):
         self.tags.add(tag)
         self.attributes += attrs
+        if tag == "tr":
+            self.rows.append([])
+        elif tag in ("th", "td"):
+            self.rows[-1].append("")
 
     def handle_data(self, data):
         self.texts.append(data)
+        if self.rows and self.rows[-1]:
+            self.rows[-1][-1] += data
 
 
 def check_page(page, *wanted, scripts=0):

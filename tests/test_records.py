@@ -5,12 +5,12 @@ import importlib
 import pkgutil
 import re
 from functools import cached_property
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 
 import tfarm
+from tests.hostile import Read
 from tfarm import HubFeedback
 from tfarm.dsp import Chain
 from tfarm.dsp.crossings import sampled_map
@@ -149,7 +149,7 @@ def test_a_law_is_shown_as_it_is_typed() -> None:
     A, row = -np.eye(2), np.ones((1, 2))
     matrices = tfarm.Law.of_matrices(A, -A, row, 0 * row, ["hub_angle", "hub_rate"])
     assert repr(matrices) == "Law(hub_angle, hub_rate=<2 states>)"
-    assert Texts(LEAD._repr_html_()).rows == [
+    assert Read(LEAD._repr_html_()).rows == [
         ["hub_angle", "([2, 1], [0.01, 1])"],
         ["deflection@0.3", "0.5"],
         ["delay", "0.002"],
@@ -196,32 +196,11 @@ def test_every_record_with_arrays_is_one() -> None:
             assert name.startswith("_") or value.__repr__.__module__ == "tfarm.records", (module, name)
 
 
-class Texts(HTMLParser):
-    """The texts of a table's cells, a list a row, and every tag that there is."""
-
-    def __init__(self, html: str) -> None:
-        super().__init__()
-        self.rows: list[list[str]] = []
-        self.tags: set[str] = set()
-        self.feed(html)
-
-    def handle_starttag(self, tag: str, attrs: object) -> None:
-        self.tags.add(tag)
-        if tag == "tr":
-            self.rows.append([])
-        elif tag in ("th", "td"):
-            self.rows[-1].append("")
-
-    def handle_data(self, data: str) -> None:
-        if self.rows:
-            self.rows[-1][-1] += data
-
-
 @pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
 def test_a_notebook_shows_a_record_as_a_small_table(make) -> None:
     """What the repr says where it is not cut, an entry a row, and the same entry first."""
     answer = make()
-    found = Texts(answer._repr_html_())
+    found = Read(answer._repr_html_())
     assert found.tags == {"table", "caption", "tbody", "tr", "th", "td"}
     first, *_ = ("=".join(row) for row in found.rows)
     assert repr(answer).startswith(f"{type(answer).__name__}({first}"[:150])
@@ -232,4 +211,4 @@ def test_a_hostile_name_is_text_in_a_notebook() -> None:
     hostile = "<script>alert('&amp;')</script>"
     html = Pair(np.zeros(1), {hostile: 1})._repr_html_()
     assert "<script" not in html
-    assert Texts(html).rows == [["here", "[0]"], ["there", f"<{hostile}>"]]
+    assert Read(html).rows == [["here", "[0]"], ["there", f"<{hostile}>"]]

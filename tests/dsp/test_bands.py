@@ -12,7 +12,7 @@ from tfarm.arm import FED_BACK, Hub, HubFeedback, Law
 from tfarm.dsp import Chain, Converters, Sampling, circle, pulse_transfer, sampled_loop, sampled_verdict
 from tfarm.dsp.circle import Circle, Discs, _Arcs, complete_band, product
 from tfarm.dsp.crossings import crossing_factors, stable_windows
-from tfarm.dsp.edges import shown_delay, whole_loop
+from tfarm.dsp.edges import Figure, shown_delay, whole_loop
 from tfarm.dsp.verdict import Verdict
 from tfarm.reduced import modal_model, relaxed_model
 
@@ -97,6 +97,18 @@ def test_a_disc_holds_every_value_on_its_arc_and_is_no_larger_than_its_terms(nam
     sizes = abs(-np.expm1(-1j * angles)[:, None] * (1 + roots) - roots)
     most = (sizes + radius[:, None] * abs(1 + roots)).prod(axis=1)
     assert (found.radius <= most - sizes.prod(axis=1) + 1e-13 * (1 + most)).all()
+
+
+@pytest.mark.parametrize(
+    ("figure", "sharp"),
+    [
+        (Figure(1.2345, 4, 500.0, None), [3, 4]),
+        (Figure(1.2345, 4, None, 12), []),  # of the first modes alone: no digit is proven
+        (Figure(0.0, 0, 500.0, None), [3, 4, 5]),  # nothing is left to be rounded
+    ],
+)
+def test_a_figure_is_sharp_in_the_digits_that_are_proven(figure, sharp):
+    assert [digits for digits in (3, 4, 5) if figure.is_sharp(digits)] == sharp
 
 
 def test_a_disc_about_a_point_is_as_wide_as_rounding_next_to_a_pole_too():

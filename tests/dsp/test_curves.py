@@ -109,3 +109,14 @@ def test_what_is_played_again_is_the_simulation(delay):
     found = ringing(simulator, run)
     assert found.frequency == pytest.approx(tfarm.modes(arm, 1).natural_frequency[-1:])
     assert found.size[2, 0] == pytest.approx(np.ptp(moment) / 2, rel=2e-3)  # 400 records a sample: 96 a period
+
+
+@pytest.mark.parametrize("delay", [0.0, 1.0])
+def test_a_mode_rings_as_far_as_in_the_sample_where_it_rings_most(delay):
+    """A slew, whose torque changes at each sample; four periods of the mode fit into one."""
+    arm = replace(STEEL, link=replace(STEEL.link, damping=0.0))
+    chain = Chain(sampling=Sampling(delay_samples=delay))
+    simulator = Simulator(arm, chain, scenario("slew", arm, chain, 1.5), count=1, between=400)
+    run = simulator.linear(HubFeedback(K1=0.0, K2=0.0))
+    samples = run.between.root_moment.reshape(-1, 400)
+    assert ringing(simulator, run).size[2, 0] == pytest.approx(np.ptp(samples, axis=1).max() / 2, rel=2e-3)

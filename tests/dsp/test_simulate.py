@@ -286,11 +286,6 @@ def test_a_settling_time_has_a_tenth_of_the_record_after_it(lab, more):
     assert settled == (pytest.approx(k * T, rel=1e-12) if more else math.inf)
 
 
-def test_a_controller_must_give_a_finite_torque(lab):
-    with pytest.raises(ParameterError, match="not finite"):
-        simulator(lab).controller(lambda m: np.nan)
-
-
 def test_what_cannot_be_simulated_is_refused(lab):
     from tfarm.arm import Payload
 
@@ -309,6 +304,8 @@ def test_what_cannot_be_simulated_is_refused(lab):
         scenario("step", lab, Chain(), -1.0)
     with pytest.raises(ParameterError, match="0 to 1000"):
         simulator(lab, between=-1)
+    with pytest.raises(ParameterError, match="not finite"):
+        simulator(lab).controller(lambda m: np.nan)
 
 
 def test_a_disturbance_is_held_over_its_sample(lossless):

@@ -46,13 +46,6 @@ def test_no_error_above_the_bound_that_is_not_flagged(place):
     assert_accurate(points)
 
 
-def test_every_output_at_random_arms_and_s():
-    points = run(PLACES["link anywhere"], 60, seed=1000)
-    assert len(points) > 700
-    assert not any(point.flagged for point in points)
-    assert_accurate(points)
-
-
 @pytest.mark.parametrize(
     ("number", "seed"), [(75, 8), pytest.param(300, 3, marks=pytest.mark.survey)]
 )  # few are flagged: of seed 8 two of 75

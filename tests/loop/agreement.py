@@ -8,12 +8,12 @@ Left out are gains within 1e-3 (of the hub's own unit) of the boundary, and loop
 a sample of 10 ms.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from tests import survey
-from tests.loop.arms import hub_units, with_damping
+from tests.loop.arms import hub_units
 from tests.loop.ritz_loop import RitzLoop
 from tests.strategies import some_arm
 from tests.survey import Finding
@@ -27,35 +27,13 @@ SLOW = 1e-5 / 0.01  # 1/s
 TERMS = 24
 
 
-@dataclass(frozen=True)
-class Case:
-    """One loop and what the three roads say: `growth` is ln of the energy over the last ten time constants."""
-
-    arm: object
-    law: HubFeedback
-    of_map: int
-    verdict: str
-    unstable_roots: int
-    infinite: bool
-    growth: float
-
-    @property
-    def outcome(self) -> str:
-        """Whether map, count and simulation agree."""
-        if self.of_map != (INFINITE if self.infinite else self.unstable_roots):
-            return "map and count differ"
-        if self.verdict != ("stable" if self.of_map == 0 else "unstable"):
-            return "verdict and count differ"
-        return "agree" if (self.growth > 0) == (self.of_map != 0) else "simulation differs"
-
-
 def some_free_arm(rng, damped):
     """An arm whose hub has a fifth to five times the beam's inertia; damping 1e-3 to 0.1 of the critical one."""
     case = ["some", *rng.choice(["zero", "some", "infinite"], size=2, p=(0.4, 0.4, 0.2))]
     arm = some_arm(rng, case, damping=0.0, slenderness=(5, 60))
     beam = arm.link.rhoA * arm.link.length**3 / 3
     arm = replace(arm, hub=Hub(inertia=beam * float(5 ** rng.uniform(-1, 1))))
-    return with_damping(arm, float(10 ** rng.uniform(-2.7, -0.7)) / hub_units(arm)[1]) if damped else arm
+    return arm.having(damping=float(10 ** rng.uniform(-2.7, -0.7)) / hub_units(arm)[1]) if damped else arm
 
 
 def some_gains(rng, arm, number):
@@ -75,39 +53,37 @@ def far_from_boundary(found, law, unit):
     return bool(away.min(initial=np.inf) > NEAR)
 
 
-def some_cases(number, seed=2012, arms=ARMS):
-    """So many loops judged; gains too close to the boundary, or too slow to tell, drawn but left out."""
-    rng, cases = np.random.default_rng(seed), []
+def loops(size, seed, arms=ARMS):
+    """Of each loop whether map, count and simulation agree; gains too close to the boundary are left out."""
+    rng = np.random.default_rng(seed)
     for n in range(arms):
         arm = some_free_arm(rng, damped=n % 3 != 0)
-        size = max(2, int(np.ceil(np.sqrt(number / arms))))  # a map has two values of either gain at least
-        K1, K2, Kp = some_gains(rng, arm, size)
+        number = max(2, int(np.ceil(np.sqrt(size / arms))))  # a map has two values of either gain at least
+        K1, K2, Kp = some_gains(rng, arm, number)
         found, model = gain_map(arm, K1, K2, Kp), RitzLoop(arm, TERMS)
-        for j, i in np.ndindex(size, size):
+        for j, i in np.ndindex(number, number):
             law = HubFeedback(K1=float(K1[i]), K2=float(K2[j]), Kp=Kp)
             if far_from_boundary(found, law, np.prod(hub_units(arm))):
-                case = judge(model, law, int(found.unstable[j, i]), rng)
-                cases += [] if case is None else [case]
-    return cases
+                finding = judge(model, law, int(found.unstable[j, i]), rng)
+                if finding is not None:
+                    yield finding
 
 
 def judge(model, law, of_map, rng):
-    """One loop, or None where it grows or decays too slowly."""
+    """The finding on one loop, or None where it grows or decays too slowly."""
     rightmost = model.rightmost(law)
     if abs(rightmost) < SLOW:
         return None
     verdict = stability(model.arm, law)
     growth = model.energy_growth(law, rightmost, rng)
-    return Case(
-        model.arm, law, of_map, verdict.verdict, verdict.unstable_roots, verdict.unstable_roots_infinite, growth
-    )  # fmt: skip
-
-
-def loops(size, seed):
-    """Of each loop whether map, count and simulation agree."""
-    for case in some_cases(size, seed):
-        is_wrong = case.outcome != "agree"
-        yield Finding(case.outcome, str(case) if is_wrong else "", is_wrong, {"unstable": case.of_map})
+    if of_map != (INFINITE if verdict.unstable_roots_infinite else verdict.unstable_roots):
+        outcome = "map and count differ"
+    elif verdict.verdict != ("stable" if of_map == 0 else "unstable"):
+        outcome = "verdict and count differ"
+    else:
+        outcome = "agree" if (growth > 0) == (of_map != 0) else "simulation differs"
+    words = "" if outcome == "agree" else f"{model.arm} {law} {of_map} {verdict.verdict} {growth}"
+    return Finding(outcome, words, bool(words), {"unstable": of_map})
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Loops drawn at random, and the arms that the tests of the loop name."""
 
-from dataclasses import replace
+import math
 
 import tfarm
 from tests.strategies import some_arm
@@ -16,8 +16,15 @@ def window_arm() -> Arm:
     return Arm(link=link, hub=Hub(inertia=1.0))
 
 
-def with_damping(arm: Arm, C: float) -> Arm:
-    return replace(arm, link=replace(arm.link, damping=C))
+def held(C=1e-4) -> Arm:
+    """The lab arm with its tip pinned: no rigid-body mode, a static stiffness."""
+    return tfarm.load("sasaki2012-lab").having(damping=C, payload_mass=math.inf)
+
+
+def held_stiffness(arm) -> float:
+    """Moment at the root over its rotation [N m/rad] where the tip is pinned: bending and shear, by unit loads."""
+    link = arm.link
+    return 1 / (link.length / (3 * link.EI) + 1 / (link.kGA * link.length))
 
 
 def hub_units(arm: Arm) -> tuple[float, float]:
@@ -33,7 +40,7 @@ def some_loop(rng, *, damping=None, slenderness=(5, 100)) -> tuple[Arm, HubFeedb
     arm = some_arm(rng, case, damping=0.0, slenderness=slenderness)
     inertia, omega = hub_units(arm)
     if damping is None and rng.random() < 0.5:
-        arm = with_damping(arm, float(10 ** rng.uniform(-4, -0.7)) / omega)
+        arm = arm.having(damping=float(10 ** rng.uniform(-4, -0.7)) / omega)
     K1 = rng.choice([0.0, 1.0, -1.0], p=(0.15, 0.65, 0.2)) * inertia * omega * 10 ** rng.uniform(-3, 1)
     K2 = rng.choice([rng.uniform(-1, 1.5), -(10 ** rng.uniform(0, 1.5)), 0.0], p=(0.6, 0.3, 0.1))
     Kp = rng.choice([0.0, 1.0, -1.0], p=(0.66, 0.24, 0.1)) * inertia * omega**2 * 10 ** rng.uniform(-3, 0)

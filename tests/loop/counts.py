@@ -8,7 +8,6 @@ arithmetic too.  The highest pole of each loop takes a Newton step on the paper'
 """
 
 import time
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -30,26 +29,13 @@ PROVEN = 20
 STEP = 0.5  # rad: longer steps of the phase are halved
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What came of one loop: "right", "refused" or "wrong", why, whether proven, and how far the last pole is off."""
-
-    outcome: str
-    reason: str = ""
-    proven: bool = False
-    poles: int = 0
-    unstable: int = 0
-    step: float = 0.0
-    milliseconds: float = 0.0
-
-
-def judge(arm, law, count, *, balls=False) -> Verdict:
+def judge(arm, law, count, *, balls=False) -> Finding:
     """List the poles of one loop and count them again."""
     start = time.perf_counter()
     try:
         poles = closed_loop_poles(arm, law, count)
     except (ConvergenceError, ParameterError) as error:
-        return Verdict("refused", str(error).splitlines()[0])
+        return Finding("refused", f"{str(error).splitlines()[0]} {arm} {law} {count}")
     spent = 1e3 * (time.perf_counter() - start)
     listed = int(np.where(poles.values.imag > 0, 2, 1).sum())
     counts = [nyquist_count(poles.loop, poles.box)]
@@ -57,12 +43,15 @@ def judge(arm, law, count, *, balls=False) -> Verdict:
         try:
             counts.append(proven_count(poles.loop.k, poles.box, poles.loop.exact))
         except CertificationError as error:
-            return Verdict("refused", f"proof: {error}")
+            return Finding("refused", f"proof: {error} {arm} {law} {count}")
     step = max((newton_step(arm, complex(s), K1=law.K1, K2=law.K2, Kp=law.Kp) for s in poles.moving[-1:]), default=0.0)
     wrong = [f"{listed} listed, {there} counted" for there in counts if there != listed]
     if step > 1e-12:
         wrong.append(f"no zero of the determinant: {step:.0e} off")
-    return Verdict("wrong" if wrong else "right", ", ".join(wrong), balls, listed, poles.unstable, step, spent)
+    if wrong:
+        return Finding("wrong", f"{', '.join(wrong)} {arm} {law} {count}", is_wrong=True)
+    figures = {"poles": listed, "unstable": poles.unstable, "proven in balls": balls}
+    return Finding("right", figures=figures | {"Newton's step": step, "milliseconds": spent})
 
 
 def nyquist_count(loop, box) -> int:
@@ -70,20 +59,25 @@ def nyquist_count(loop, box) -> int:
     arm, law = loop.arm, loop.gains
     plant = tfarm.transfer(arm, ["hub_angle", "root_moment"])
 
-    def phase(s):
+    def returned(s):
         theta, moment = plant(s)
-        return np.angle(1 + (law.Kp + law.K1 * s) * theta + law.K2 * moment)
+        return 1 + (law.Kp + law.K1 * s) * theta + law.K2 * moment
 
     path = np.append(np.concatenate([edge(a, b) for a, b in pairwise(box.corners)]), box.corners[0])
-    angle = phase(path)
+    return turns(returned, path) + own_poles(arm, box)
+
+
+def turns(function, path) -> int:
+    """How often a function turns around 0 along a closed path, whose steps are halved while it turns fast."""
+    angle = np.angle(function(path))
     for _ in range(40):
         turn = np.angle(np.exp(1j * np.diff(angle)))
         (rough,) = np.nonzero(abs(turn) > STEP)
         if not rough.size:
-            return round(float(turn.sum()) / (2 * np.pi)) + own_poles(arm, box)
+            return round(float(turn.sum()) / (2 * np.pi))
         middle = (path[rough] + path[rough + 1]) / 2
-        path, angle = np.insert(path, rough + 1, middle), np.insert(angle, rough + 1, phase(middle))
-    raise AssertionError("the phase of 1 + L does not settle on the contour")
+        path, angle = np.insert(path, rough + 1, middle), np.insert(angle, rough + 1, np.angle(function(middle)))
+    raise AssertionError("the phase does not settle on the contour")
 
 
 def edge(a, b):
@@ -105,13 +99,7 @@ def loops(size, seed):
     """Of each loop the finding; every so many are counted in balls too."""
     rng = np.random.default_rng(seed)
     drawn = [(*some_loop(rng), int(rng.integers(3, 16))) for _ in range(size)]
-    for n, case in enumerate(drawn):
-        verdict = judge(*case, balls=n % PROVEN == 0)
-        words = " ".join(map(str, (verdict.reason, *case))) if verdict.outcome != "right" else ""
-        figures = {"poles": verdict.poles, "unstable": verdict.unstable, "proven in balls": verdict.proven}
-        figures |= {"Newton's step": verdict.step, "milliseconds": verdict.milliseconds}
-        is_right = verdict.outcome == "right"
-        yield Finding(verdict.outcome, words, verdict.outcome == "wrong", figures if is_right else {})
+    yield from (judge(*case, balls=n % PROVEN == 0) for n, case in enumerate(drawn))
 
 
 if __name__ == "__main__":

@@ -6,17 +6,16 @@ Both commands' work is timed, to the JSON, in process, on empty caches of the pa
 """
 
 import time
-import tomllib
+from dataclasses import replace
 
 import numpy as np
 
 from tests import caches, survey
 from tests.dsp.law_orders import some_roots
-from tests.plausible.arms import draw
+from tests.plausible.arms import draw, log
 from tests.rigs import some_rig
 from tests.survey import Finding
 from tfarm.arm import Law
-from tfarm.arm.schema import arm_of_table
 from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.verdict import sampled
 from tfarm.errors import ConvergenceError, ParameterError
@@ -52,10 +51,10 @@ def some_case(seed, number):
 
 def plausible(seed, rng):
     """One of the arms of `tests.plausible`, some with friction at the hub."""
-    table = tomllib.loads(draw(int(rng.integers(10_000)), seed).toml)
+    arm = draw(int(rng.integers(10_000)), seed).arm
     if rng.random() < 0.3:
-        table["hub"]["friction"] = table["hub"]["inertia"] * log(rng, 1e-2, 1e1)
-    return arm_of_table(table)
+        arm = replace(arm, hub=replace(arm.hub, friction=arm.hub.inertia * log(rng, 1e-2, 1e1)))
+    return arm
 
 
 def some_law(rng, arm, w1):
@@ -97,10 +96,6 @@ def is_stable(plant, law):
     """Whether the loop of a modal model is, but for a pole or two at s = 0."""
     s = np.linalg.eigvals(closed(plant, law.matrices()))
     return (s.real < 1e-9 * abs(s).max()).all()
-
-
-def log(rng, low, high):
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def of_margins(arm, law, chain):

@@ -5,9 +5,6 @@ with those of a box that a winding number completes; how many loci were refused,
 how many crossings are on no branch.
 """
 
-import tempfile
-from pathlib import Path
-
 import numpy as np
 
 import tfarm
@@ -27,10 +24,7 @@ CLOSE = 1e-4  # of its size: poles so near to each other are not compared, nor t
 def some_locus(number, seed):
     """Arm, law, what varies and the range."""
     case, rng = draw(number, seed), np.random.default_rng([seed, number])
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "arm.toml"
-        path.write_text(case.toml)
-        arm = tfarm.load(path)
+    arm = case.arm
     law = tfarm.HubFeedback(K1=case.law.K1, K2=case.law.K2, Kp=case.law.Kp)
     vary = str(rng.choice(list(SHARES), p=list(SHARES.values())))
     beam = arm.link.rhoA * arm.link.length

@@ -116,9 +116,6 @@ def test_the_command_proves_a_law_of_a_file(capsys, tmp_path):
     assert '"completeness": "certified"' in out
 
 
-# ------------------------------------------------------------ what friction at the hub alone does
-
-
 @pytest.mark.parametrize("stiffness", [0.0, 3.0])
 @pytest.mark.parametrize("friction", [0.05, 20.0])
 def test_friction_at_the_hub_alone_damps_every_mode_that_the_hub_takes_part_in(friction, stiffness):

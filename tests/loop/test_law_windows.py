@@ -7,8 +7,7 @@ import pytest
 
 import tfarm
 from tests import caches
-from tests.loop import number_windows
-from tests.loop.arms import some_loop, with_damping
+from tests.loop.arms import some_loop
 from tests.loop.law_counts import some_delay, some_law
 from tests.loop.law_times import of_margins, some_case
 from tests.shared import sized, thinned
@@ -91,14 +90,6 @@ def test_a_number_whose_poles_cannot_be_counted_is_named(monkeypatch):
     assert found.intervals_note.endswith("poles not counted along hub_angle.num.1")
 
 
-@pytest.mark.survey
-def test_random_laws_agree_with_their_verdicts():
-    """A small case of the survey (`make survey SURVEYS=loop.number_windows`)."""
-    found = number_windows.main(2, 5)
-    assert found["wrong"] == 0
-    assert found["right"] >= 3
-
-
 LAG = {"hub_angle": 1.0, "hub_rate": ([0.5], [0.05, 1.0]), "tip_displacement": ([0.3, 1.0], [0.02, 1.0])}
 RESONATOR = {"hub_angle": 1.0, "hub_rate": 0.3, "tip_deflection": ([-2556.5], [1.0, 0.186, 8641.0])}
 NARROW = {  # two crossings 0.15 rad/s apart, near 72 and 93, lie between neighbours of the arm's grid
@@ -134,7 +125,7 @@ def test_next_to_zero_windows_are_not_cut_by_rounding(damping) -> None:
     """
     stocky = tfarm.load("stocky-steel")
     hub = replace(stocky.hub, friction=0.3)
-    arm = replace(with_damping(stocky, damping), hub=hub, joint=RotarySpring(stiffness=1.0))
+    arm = replace(stocky.having(damping=damping), hub=hub, joint=RotarySpring(stiffness=1.0))
     law = Law({"hub_angle": ([0.03, 0.07], [1.0, 0.0])})
     found = windows_of(stability(arm, law))["hub_angle.den.0"]
     probes = [*np.geomspace(1e-8, 5.0, 8), *((low + high) / 2 for low, high in found.all)]
@@ -171,33 +162,6 @@ def test_a_leading_coefficient_without_which_there_is_no_loop_keeps_its_sign() -
     found = windows_of(stability(LAB, law))["hub_rate.den.0"]
     assert found.looked_at == (0.001, 0.1)
     assert all(0.001 <= low < high <= 0.1 for low, high in found.all)
-
-
-@pytest.mark.survey
-def test_where_nothing_is_known_beyond_the_band_a_window_is_not_made_of_poles_that_left_through_its_top() -> None:
-    """Two real poles right of the axis became a pair above the band on the way: carried on, the count was two less."""
-    link = Link(
-        length=0.364, density=3406.0, youngs_modulus=1.345e11, shear_modulus=4.727e10, damping=9.86e-8,
-        section=Section.rectangle(width=0.4345, depth=0.05517),
-    )  # fmt: skip
-    arm = replace(LAB, link=link, hub=Hub(inertia=0.00228), payload=Payload(mass=11.79, inertia=0.01442))
-    law = Law({
-        "hub_rate": ([45059.7, 9.52461e8, 2.83382e12], [1.0, 115200.0, 1.52468e10]),
-        "moment@0.247": (
-            [-1.51976e18, -6.80338e21], [1.0, 156361.0, 7.70012e9, 3.4974e14, -1.72357e17, 8.09767e20]
-        ),
-        "tip_acceleration": -0.238785,
-    })  # fmt: skip
-    verdict = stability(arm, law)
-    assert not verdict.is_known_beyond
-    found = windows_of(verdict)["hub_rate.num.0"]
-    for value in (-2e5, 5e4):
-        is_inside = any(low < value < high for low, high in found.all)
-        there = stability(arm, law.having("hub_rate.num.0", value), band=found.band)
-        assert is_inside == (there.unstable_roots == 0)
-
-
-# ------------------------------------------------------------ how much is worked out for windows, poles and the
 
 
 @pytest.mark.parametrize("number", thinned([128, 72, 120, 133], 2))

@@ -16,14 +16,13 @@ from tests.loop.law_counts import judge, some_delay, some_law
 from tests.shared import remember, sized, thinned
 from tests.shell import run
 from tfarm import ConvergenceError, Law, ParameterError
-from tfarm.arm import full_law
 from tfarm.loop.lines import through_infinity, unstable_below
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import loop_margins
 from tfarm.loop.plane import between, plane
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
-from tfarm.loop.theorem import definite, is_hurwitz, on_axis, polynomial, signs_of
+from tfarm.loop.theorem import definite, is_hurwitz, polynomial, signs_of
 from tfarm.reduced.conversions import sensed_model
 from tfarm.response.signals import Signals
 
@@ -253,30 +252,6 @@ def test_turns_around_the_point_are_the_poles_that_were_found(arm, law):
     assert np.isfinite(plot.L[~plot.is_arc]).all()
 
 
-@pytest.mark.parametrize(
-    "entries", [{"hub_rate": 0.1, "root_moment": 0.8}, {"root_moment": 0.8, "tip_acceleration": 0.01}]
-)
-def test_a_loop_under_another_law_is_that_made_anew(entries):
-    """Of the same signals, which are taken over, and of others, which are not."""
-    first, law = Loop(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3})), Law(entries)
-    mine, anew, s = first.under(law), Loop(LAB, law), np.array([0.3 + 2j, 70j, -5 + 400j])
-    assert (mine.signals is first.signals) is (set(full_law(law).signals) == set(first.law.signals))
-    assert mine.zeros_at_origin == anew.zeros_at_origin
-    np.testing.assert_array_equal(mine.loop_function(s), anew.loop_function(s))
-
-
-def test_parts_on_the_axis_are_those_of_the_quotient_there():
-    """Real part, and imaginary part over w, of num/den at i w, times |den|^2: exact polynomials in w^2."""
-    rng = np.random.default_rng(12)
-    for _ in range(6):
-        num, den = rng.uniform(-2, 2, rng.integers(1, 5)), rng.uniform(-2, 2, rng.integers(2, 6))
-        real, imaginary = on_axis(polynomial(num), polynomial(den))
-        for w in (0.3, 1.7):
-            whole = np.polyval(num, 1j * w) * np.conj(np.polyval(den, 1j * w))
-            assert float(real.eval(w * w)) == pytest.approx(whole.real, rel=1e-12, abs=1e-13)
-            assert w * float(imaginary.eval(w * w)) == pytest.approx(whole.imag, rel=1e-12, abs=1e-13)
-
-
 @pytest.mark.parametrize("rest", thinned([-1e-9, 1e-4, 1e-7, -1e-7, 1e-9], 4))
 def test_however_slow_a_law_s_corner_is_its_slow_pole_is_on_its_own_side(rest):
     """s + rest on the angle and 0.3 s on top: the pole at rest is at -rest/1.3, never taken for one at 0 itself."""
@@ -285,9 +260,6 @@ def test_however_slow_a_law_s_corner_is_its_slow_pole_is_on_its_own_side(rest):
     slowest = found.poles.values[abs(found.poles.values).argmin()]
     assert slowest == pytest.approx(-rest / 1.3, rel=1e-3)
     assert (found.verdict, found.unstable_roots) == (("stable", 0) if rest > 0 else ("unstable", 1))
-
-
-# ------------------------------------------------------------ maps over two numbers of a law
 
 
 LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)
@@ -338,8 +310,7 @@ def test_the_gain_that_takes_up_all_waves_of_an_arm_without_a_hub_brings_a_pole_
 
 
 @pytest.mark.parametrize(
-    ("vary", "key"),
-    [(("gain", "gain"), "vary"), (("gain", "hub_speed"), "law"), (("gain", "hub_angle.num.7"), "law")],
+    ("vary", "key"), [(("gain", "gain"), "vary"), (("gain", "hub_speed"), "law"), (("gain", "hub_angle.num.7"), "law")]
 )
 def test_what_is_no_pair_of_numbers_is_refused(vary, key):
     with pytest.raises(ParameterError) as error:

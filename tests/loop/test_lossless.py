@@ -159,9 +159,6 @@ def test_massless_hub_with_a_radius_is_refused():
         stability(arm, HubFeedback(K1=0.3, K2=0.3))
 
 
-# ------------------------------------------------------------ what a hub loses beside an arm without losses is a
-
-
 ELASTIC = tfarm.load("sasaki2012")
 LOSS = 0.5  # N m s/rad
 ROOT = replace(ELASTIC, name="root", hub=Hub(inertia=ELASTIC.hub.inertia, friction=LOSS))

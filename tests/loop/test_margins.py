@@ -11,8 +11,8 @@ import pytest
 from scipy.optimize import brentq
 
 import tfarm
-from tests.loop.arms import window_arm, with_damping
-from tests.loop.test_lines import held
+from tests.loop.arms import held, held_stiffness, window_arm
+from tests.loop.counts import turns
 from tests.loop.test_stability import exceptional
 from tests.odd_arms import odd_arms
 from tests.shared import thinned
@@ -96,7 +96,7 @@ def test_the_disk_margin_is_that_of_python_control_for_a_modal_model(arm, law) -
     assert found.disk == pytest.approx(alpha, rel=5e-3)
 
 
-def turns(arm, law, delay, height) -> int:
+def unstable(arm, law, delay, height) -> int:
     """Zeros right of the axis of 1 + L e^{-s delay}: its turns around a half-disc, L's own poles at 0 left out."""
     loop, small = Loop(arm, law), 1e-7 * height
     omega = np.asarray(grid(arm, height))
@@ -105,28 +105,16 @@ def turns(arm, law, delay, height) -> int:
     edge = np.concatenate([np.linspace(a, b, 400, endpoint=False) for a, b in pairwise(corners)])
     near = axis[0].imag * np.exp(1j * np.linspace(-math.pi / 2, math.pi / 2, 50))
     path = np.concatenate([axis, edge, axis[::-1].conj(), near])
-
-    def phase(s):
-        return np.angle(1 + loop.loop_function(s) * np.exp(-s * delay))
-
-    angle = phase(path)
-    for _ in range(40):
-        turn = np.angle(np.exp(1j * np.diff(angle)))
-        (rough,) = np.nonzero(abs(turn) > 0.7)
-        if not rough.size:
-            return -round(float(turn.sum()) / (2 * math.pi))
-        middle = (path[rough] + path[rough + 1]) / 2
-        path, angle = np.insert(path, rough + 1, middle), np.insert(angle, rough + 1, phase(middle))
-    raise AssertionError("the phase does not settle")
+    return -turns(lambda s: 1 + loop.loop_function(s) * np.exp(-s * delay), path)
 
 
 @pytest.mark.parametrize(("arm", "law"), thinned(LOOPS[:5], 2))
 def test_the_loop_bears_just_less_than_the_delay_margin(arm, law) -> None:
     found = margins(arm, law)
     band = 1.01 * found.in_band.at["delay"] * 3
-    assert turns(arm, law, 0.0, band) == 0
-    assert turns(arm, law, found.exact_delay * (1 - 1e-5), band) == 0
-    assert turns(arm, law, found.exact_delay * (1 + 1e-5), band) == 2
+    assert unstable(arm, law, 0.0, band) == 0
+    assert unstable(arm, law, found.exact_delay * (1 - 1e-5), band) == 0
+    assert unstable(arm, law, found.exact_delay * (1 + 1e-5), band) == 2
 
 
 def test_what_nothing_bounds_beyond_the_band_is_not_called_exact() -> None:
@@ -149,7 +137,7 @@ def test_what_nothing_bounds_beyond_the_band_is_not_called_exact() -> None:
 
 def test_resonances_too_narrow_for_any_grid_bound_the_exact_delay_margin() -> None:
     """With C = 1e-10 s modes 13 to 19 of the paper's arm ring through |L| = 1; by the product of 4x4 matrices."""
-    arm = with_damping(BARE, 1e-10)
+    arm = BARE.having(damping=1e-10)
 
     def minus_L(omega: float) -> complex:
         rate, moment = (complex(each) for each in transition(arm, 1j * omega, ("hub_rate", "root_moment"), 20).values())
@@ -167,7 +155,7 @@ def test_resonances_too_narrow_for_any_grid_bound_the_exact_delay_margin() -> No
 
 @pytest.mark.parametrize(("C", "K2"), [(1e-10, 0.3), (1e-10, -1.0), (1e-9, -1.0)])
 def test_no_resonance_beyond_a_band_that_is_called_quiet_is_loud(C, K2) -> None:
-    arm = with_damping(BARE, C)
+    arm = BARE.having(damping=C)
     found = margins(arm, HubFeedback(K1=0.3, K2=K2))
     omega = tfarm.modes(arm, 200).natural_frequency
     beyond = 1j * omega[omega > found.stability.band]
@@ -192,9 +180,7 @@ def test_the_loop_bears_just_less_than_the_gain_margin(arm, law) -> None:
 
 
 def test_a_spring_that_pushes_limits_the_gain_of_an_undamped_held_arm() -> None:
-    link = held(0.0).link
-    stiffness = 1 / (link.length / (3 * link.EI) + 1 / (link.kGA * link.length))
-    law = HubFeedback(K1=0.3, K2=0.1, Kp=-0.4 * stiffness)
+    law = HubFeedback(K1=0.3, K2=0.1, Kp=-0.4 * held_stiffness(held(0.0)))
     assert margins(held(0.0), law, 1e3).in_band.gain[1] == pytest.approx(1 / (0.1 + 0.4), rel=1e-9)
 
 

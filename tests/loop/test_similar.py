@@ -11,7 +11,7 @@ import tfarm
 from tests.loop.test_lossless import CLAMP
 from tests.rigs import some_rig
 from tests.shared import thinned
-from tests.similar import EITHER, TORQUE
+from tests.similar import EITHER
 from tfarm import HubFeedback, Law
 from tfarm.errors import ConvergenceError
 from tfarm.loop import panels
@@ -128,16 +128,6 @@ def test_a_locus_has_the_same_branches(vary, units):
     np.testing.assert_allclose(there.branches * units.time, here.branches, rtol=1e-7, atol=1e-9)
 
 
-def test_the_units_are_those_of_mechanics():
-    """A torque's unit from those of mass, length and time; a moment's gain is a torque for a torque."""
-    units = EITHER["slow"]
-    assert units.of(TORQUE) == units.mass * units.length**2 / units.time**2
-    assert units.law(LAB, HubFeedback(K2=0.3)).K2 == 0.3
-
-
-# ------------------------------------------------------------ nothing is told by how large a number is in its un
-
-
 BARE = tfarm.load("sasaki2012")
 
 
@@ -160,21 +150,6 @@ def test_zeros_of_a_sensor_are_the_same_in_any_unit_or_refused_in_any(size, monk
     wide = panels._Panels.of(LAB, "moment", 1j, 2e4)
     with pytest.raises(ConvergenceError, match="do not follow the numerator of moment"):
         wide.zeros(Scaled(size))
-
-
-def test_the_miss_of_a_panel_is_a_share_of_each_parts_own_size(monkeypatch):
-    """Drive, angle or gauge in a unit 2^30 times as large misses by as large a share."""
-    parts, small, errors = panels.loop_parts, 2.0**-30, []
-    for drive, angle, gauge in ((1.0, 1.0, 1.0), (small, 1.0, 1.0), (1.0, small, 1.0), (1.0, 1.0, small)):
-
-        def read(k, s, drive=drive, shares=(angle, 1.0, gauge)):
-            found = parts(k, s)
-            return found.drive * drive, found.numerators * np.array(shares)[:, None], found.scale
-
-        monkeypatch.setattr(panels, "loop_parts", read)
-        errors.append(panels._panel(LAB, 2, -2e4, 2e4)[1])
-    assert errors[0] > 1e-9
-    np.testing.assert_allclose(errors, errors[0], rtol=1e-6)
 
 
 def test_a_slow_pair_is_no_real_pole_to_a_locus():
@@ -202,15 +177,6 @@ def test_models_that_nothing_damps_are_not_unstable_by_rounding():
     assert found.rightmost.real.max() > 0
     assert found.unstable.tolist() == [0] * 4
     assert found.driven.size == 0
-
-
-def test_a_law_that_differentiates_the_angle_is_one_on_the_rate():
-    """(a s^2 + b s + c) of the angle is (a s + b) of the rate and c of the angle, over one denominator."""
-    den, s = [0.01, 1.0], np.array([0.3 + 2j, 40j, 5.0])
-    improper = Law({"hub_angle": ([0.1, 1.0, 2.0], den)})
-    proper = Law({"hub_rate": ([0.1, 1.0], den), "hub_angle": ([2.0], den)})
-    one, other = (Loop(LAB, law).loop_function(s) for law in (improper, proper))
-    np.testing.assert_allclose(one, other, rtol=1e-12)
 
 
 def test_margins_look_at_what_is_narrow_in_the_law_itself():

@@ -1,5 +1,7 @@
 """Where searches for poles start, how far they reach, and what lists are cut to: against closed forms."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -14,45 +16,23 @@ from tests.loop.test_lossless import RIGS as REACTIVE
 from tests.loop.test_lossless import edges_of
 from tests.shared import thinned
 from tests.similar import EITHER
-from tfarm import HubFeedback, Law
+from tfarm import Hub, HubFeedback, Law, Payload
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.exact.characteristic import loop_parts
 from tfarm.loop import panels
-from tfarm.loop.locus import BranchCrossing, Locus, open_poles
+from tfarm.loop.locus import BranchCrossing, Locus
 from tfarm.loop.loop import Loop
-from tfarm.loop.nyquist import poles_on_axis
-from tfarm.loop.panels import CHEBYSHEV, loop_panels
+from tfarm.loop.nyquist import compressed, poles_on_axis, upper_contour
+from tfarm.loop.panels import CHEBYSHEV, Positions, loop_panels, positions, sensed_places
 from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
-from tfarm.loop.poles import Poles, count_with_mirrors, first_poles, poles_below, quiet_edge
+from tfarm.loop.poles import Poles, count_with_mirrors, first_poles, poles_below
 from tfarm.loop.stability import stability
 from tfarm.loop.theorem import lyapunov
-from tfarm.loop.windows import looked_at, windows_of
-from tfarm.schema import curve_table, to_dict
+from tfarm.loop.windows import windows_of
 from tfarm.spectrum.box import Box
-from tfarm.spectrum.table import angle_unit, rate_unit
+from tfarm.spectrum.table import rate_unit
 
 LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
-
-
-# ------------------------------------------------------------ starts
-
-
-@pytest.mark.parametrize("K1", [0.3, -30.0])
-def test_a_box_reaches_right_to_where_no_pole_can_be(K1):
-    """From the first edge that is tried on: on the one that is taken Re L > -1/2, on the one before it was not."""
-    loop, height, first = Loop(LAB, HubFeedback(K1=K1)), 300.0, 30.0
-    right = quiet_edge(loop, first, height)
-    edge = 1j * np.linspace(0.0, height, 400)
-    assert loop.loop_function(right + edge).real.min() > -0.6
-    if right > first:
-        before = right / 1.7
-        near = np.r_[before + edge, before * np.array([2.0, 5.0, 20.0])]
-        assert loop.loop_function(near).real.min() <= -0.45
-    poles = poles_below(loop, height).values
-    assert (poles.real < right).all()
-    assert (right > first) == (poles.real.max() > first)
-
-
-# ------------------------------------------------------------ lists
 
 
 def listed(*values):
@@ -99,23 +79,6 @@ def test_of_a_rig_without_losses_each_driven_mode_of_the_box_is_two_unstable_pol
     assert poles.unstable == 2 * driven.sum() > 0
 
 
-# ------------------------------------------------------------ how far windows are looked for
-
-
-@pytest.mark.parametrize("arm", [LAB, STOCKY], ids=lambda arm: arm.name)
-def test_windows_are_looked_for_well_beyond_what_matters_to_the_first_mode(arm):
-    """20 J w1 of a rate, 20 J w1^2 of an angle; 50 of a moment, or where twice the inertia is taken off."""
-    loop = Loop(arm, HubFeedback(K1=1e-3 * rate_unit(arm), K2=0.3))
-    assert looked_at(loop, "K1") == pytest.approx((-20 * rate_unit(arm), 20 * rate_unit(arm)), rel=1e-12)
-    assert looked_at(loop, "Kp") == pytest.approx((-20 * angle_unit(arm), 20 * angle_unit(arm)), rel=1e-12)
-    most = max(50.0, 2 * arm.total_inertia / arm.carried_inertia)
-    assert looked_at(loop, "K2") == pytest.approx((-most, most), rel=1e-12)
-    far = Loop(arm, HubFeedback(K1=5 * rate_unit(arm), K2=-9.0))
-    assert looked_at(far, "K1")[1] == pytest.approx(50 * rate_unit(arm), rel=1e-12)
-    assert looked_at(far, "K2")[1] == pytest.approx(max(most, 90.0), rel=1e-12)
-    assert looked_at(Loop(arm, HubFeedback(K1=5e8 * rate_unit(arm))), "K1")[1] == 1e9 * rate_unit(arm)
-
-
 @pytest.mark.parametrize("friction", [0.0, 0.02])
 def test_a_hub_without_inertia_is_stable_from_where_it_loses_something_on(friction):
     """The law is in its window, whose lower end is where K1 takes back what the hub loses: a pole passes infinity."""
@@ -126,9 +89,6 @@ def test_a_hub_without_inertia_is_stable_from_where_it_loses_something_on(fricti
         low, high = windows_of(verdict, ["K1"])["K1"].around
         assert low == pytest.approx(-friction, abs=1e-12)
         assert low < K1 < high
-
-
-# ------------------------------------------------------------ the function of a law
 
 
 LEAD = {"hub_angle": ([0.7, 3.0, 20.0], [0.002, 0.3, 1.0]), "root_moment": ([0.2], [1e-4, 2e-2, 1.0])}
@@ -151,49 +111,7 @@ def test_the_slope_of_the_function_is_its_difference_quotient(name):
         assert difference == pytest.approx(at.slope[0], rel=1e-6)
 
 
-@pytest.mark.parametrize("name", LAWS)
-def test_two_laws_have_one_factor_of_the_rig(name):
-    """D of one over D of the other, of laws with one denominator, is the quotient of 1 + L."""
-    one, s = Loop(LAB, LAWS[name]), np.array([0.3 + 2j, -5 + 40j, 2.0 + 0j])
-    half = {signal: ([0.5 * n for n in num], den) for signal, (num, den) in LEAD.items()}
-    other = one.under(Law(half, delay=0.001)) if name != "integral" else one.under(LAWS[name].having("gain", 0.5))
-    of_rig = one.signals.parts(s)
-    ratio = one.characteristic(s, of_rig) / other.characteristic(s, of_rig)
-    expected = (1 + one.loop_function(s)) / (1 + other.loop_function(s))
-    np.testing.assert_allclose(ratio, expected, rtol=1e-10)
-
-
-# ------------------------------------------------------------ what answers and words say of a loop is what its r
-
-
 BARE = tfarm.load("sasaki2012")
-BOTH = {"stable": HubFeedback(K1=0.3, K2=0.3), "unstable": HubFeedback(K1=0.3, K2=1.5)}
-
-
-@pytest.mark.parametrize("name", BOTH)
-def test_an_answer_of_nyquist_s_criterion_is_its_record(name):
-    """Turns, poles by both roads and every point of the contour, as numbers without a sign of j."""
-    found = tfarm.nyquist(LAB, BOTH[name])
-    answer, table = to_dict(found), curve_table(found)
-    assert answer["unstable_by_nyquist"] == answer["unstable_roots"] == -answer["encirclements"]
-    assert (answer["unstable_roots"] == 0) == (name != "unstable") == (answer["verdict"] == "stable")
-    np.testing.assert_array_equal(np.array(answer["s"]) @ [1, 1j], found.s)
-    np.testing.assert_array_equal(np.array(answer["L"]) @ [1, 1j], found.L)
-    rows = np.array([[row[key] for key in ("re_s", "im_s", "re_L", "im_L")] for row in table])
-    np.testing.assert_array_equal(rows @ [1, 1j, 0, 0], found.s)
-    np.testing.assert_array_equal(rows @ [0, 0, 1, 1j], found.L)
-    np.testing.assert_allclose(found.L[5::100], Loop(LAB, BOTH[name]).loop_function(found.s[5::100]), rtol=1e-12)
-
-
-def test_an_answer_of_poles_is_its_record():
-    found = tfarm.closed_loop_poles(STOCKY, tfarm.default_gains(STOCKY), 2)
-    answer = to_dict(found.certified())
-    np.testing.assert_array_equal(np.array(answer["poles"]) @ [1, 1j], found.values)
-    assert answer["box"] == list(found.box)
-    assert answer["unstable"] == found.unstable
-    assert len(answer["discs"]) == np.count_nonzero(found.values)
-    for disc, pole in zip(answer["discs"], found.moving, strict=True):
-        assert abs(complex(float(disc["re"]), float(disc["im"])) - pole) <= 1e-12 * abs(pole)
 
 
 def test_a_finding_has_three_crossings_and_counts_the_others():
@@ -210,17 +128,6 @@ def test_a_finding_has_three_crossings_and_counts_the_others():
     assert finding(each[:3]) == "a pole becomes stable at K2 = 0, unstable at K2 = 0.5, stable at K2 = 1"
     assert finding(each) == finding(each[:3]) + " and 3 more"
     assert each[3].frequency == pytest.approx(3.0, rel=1e-15)
-
-
-# ------------------------------------------------------------ the map
-
-
-@pytest.mark.parametrize("arm", [LAB, STOCKY], ids=lambda arm: arm.name)
-def test_the_rate_axis_is_linear_up_to_the_power_of_ten_below_the_default_gain(arm):
-    axis, K1 = rate_axis(arm), tfarm.default_gains(arm).K1
-    assert axis.linear <= K1 < 10 * axis.linear
-    assert math.log10(axis.linear) == pytest.approx(round(math.log10(axis.linear)), abs=1e-12)
-    assert (axis.low, axis.high) == (-axis.linear, pytest.approx(10 * rate_unit(arm), rel=1e-12))
 
 
 def test_the_moment_axis_holds_the_default_range_and_all_that_is_unstable_below():
@@ -256,22 +163,6 @@ def test_the_stable_edge_is_the_boundary_with_stable_points_on_one_side():
     assert told >= 5
     blank = np.full((2, 3), np.nan)
     assert stable_edge(plane, blank, x, y).size == 0
-
-
-def test_what_a_locus_of_a_damped_rig_begins_with():
-    """About -b/J of the hub's friction, then the modes in their order, each of them a pole of the open rig."""
-    arm = tfarm.load("quanser-2dsfl")
-    poles, mode = open_poles(arm, 4)
-    damped = tfarm.damped_modes(tfarm.modes(arm, 4)).eigenvalues
-    np.testing.assert_array_equal(poles, damped.ravel()[1:])
-    assert damped[0, 0] == 0
-    assert poles[0].imag == 0 > poles[0].real
-    assert mode.tolist() == [0, 1, 1, 2, 2, 3, 3, 4, 4]
-    bare, _ = open_poles(BARE, 4)
-    assert bare[::2].tolist() == (1j * tfarm.modes(BARE, 4).natural_frequency[1:]).tolist()
-
-
-# ------------------------------------------------------------ panels
 
 
 def test_a_panel_that_its_polynomials_miss_is_halved(monkeypatch):
@@ -316,9 +207,6 @@ def test_between_its_samples_a_panel_is_the_loop_function_too(arm):
         np.testing.assert_allclose(fed_back / (d * s**found.order), whole, rtol=1e-6 * (1 + abs(whole).max()))
 
 
-# ------------------------------------------------------------ what theorems and lists take for granted
-
-
 def test_a_contour_passes_the_poles_of_a_law_on_the_axis_below_its_band():
     """Where it rings without damping, and its integrator if the rig has no zero there."""
     slow, fast = ([1.0, 0.0, w**2] for w in (30.0, 900.0))
@@ -352,3 +240,126 @@ def test_resonators_in_one_fraction_are_passed_as_they_are_in_several():
     found = tfarm.nyquist(LAB, law)
     np.testing.assert_allclose(found.poles, [0.0, 30.0, 200.0], rtol=1e-9)
     assert (found.unstable_open, found.unstable_by_nyquist) == (0, found.verdict.unstable_roots)
+
+
+ARMS = {
+    "free": LAB,
+    "held by a spring at the hub": replace(LAB, hub=Hub(inertia=0.1, stiffness=3.0)),
+    "held at the payload": replace(LAB, payload=Payload(mass=np.inf)),
+}
+
+
+@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("law", [{"K1": 0.3}, {"Kp": 2.0}, {"K1": 0.3, "K2": 0.3}, {"K2": 0.3}])
+def test_the_loop_function_has_a_pole_at_rest_where_it_grows_without_bound(name, law):
+    """Nearer to 0 by a factor of ten L is ten or a hundred times as large there, and nowhere else."""
+    loop = Loop(ARMS[name], HubFeedback(**law))
+    near = abs(loop.loop_function(1j * 1e-4 * np.array([10.0, 1.0])))
+    grows = bool(near[1] > 5 * near[0])
+    assert (0.0 in poles_on_axis(loop, 1000.0)) == grows
+
+
+def test_the_plane_is_drawn_in_a_disc():
+    """r at r/(1 + r), its direction kept: back again r/(1 - r); what is infinite at 1."""
+    L = np.array([0.0, 0.3 - 0.4j, -1.0, 7j, -1e8 + 1e8j])
+    drawn = compressed(L)
+    assert (abs(drawn) < 1).all()
+    np.testing.assert_allclose(drawn / (1 - abs(drawn)), L, rtol=1e-7)
+    assert compressed(np.array([complex(np.inf, 3.0)])).tolist() == [1.0]
+
+
+def test_the_contour_ends_at_the_band_wherever_the_law_has_poles():
+    """One below the band has points all around it, one above it has none; and at -1 +- 1/2 of its distance too."""
+    band = 300.0
+    for ringing, is_near in ((0.6 * band, True), (1.004 * band, False)):
+        damped = 0.01 * ringing
+        den = [1.0, 2 * damped, damped**2 + ringing**2]
+        loop = Loop(LAB, Law({"hub_rate": ([ringing**2], den)}))
+        s, is_arc = upper_contour(loop, np.array([0.0]), band, np.array([-1 + 20j]))
+        w = s.imag[~is_arc]
+        assert w.max() == pytest.approx(band, rel=1e-12)
+        assert (np.diff(s.imag) >= 0).all()
+        near = np.sort(w[abs(w - ringing) <= 4 * damped])
+        if is_near:
+            assert np.diff(near).max() < 0.5 * damped
+            assert near[-1] > ringing + 3.5 * damped
+            assert near[0] < ringing - 3.5 * damped
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_function_of_a_law_is_the_rig_s_drive_times_one_plus_l(name):
+    """D s^n/(q drive) is 1 + L, up to the time that waves take and one factor."""
+    loop = Loop(LAB, LAWS[name])
+    s = np.array([0.3 + 2j, -5 + 40j, 2.0 + 9j])
+    at = loop.function(s)
+    drive, _, scale = loop_parts(loop.k, s)
+    whole = np.prod([s[:, None] - loop.law.poles], axis=2)[0]
+    mine = at.value * np.exp(at.scale) * s**loop.zeros_at_origin * np.exp(loop.delay_of_waves * s)
+    ratio = mine / (drive * np.exp(scale) * whole * (1 + loop.loop_function(s)))
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-8)
+
+
+@pytest.mark.parametrize(("sensor", "share"), [("displacement", 0.6), ("moment", 0.3)])
+def test_zeros_are_those_of_the_complete_search(sensor, share):
+    """`zeros` counts them by the winding number around a box; slow real ones to the left are not looked for here."""
+    arm = tfarm.load("sasaki2012-lab")
+    x = share * arm.length
+    found = positions(arm, sensor, np.array([x]), 4)
+    all_zeros = tfarm.transfer(arm, sensor, x=x).zeros(up_to=found.band).values
+    wanted = all_zeros[(all_zeros.imag > 1e-6) | ((all_zeros.real > 1e-6) & (all_zeros.real < found.band))]
+    here = found.zeros[0]
+    assert len(here) == len(wanted) > 2
+    for s in wanted:
+        assert abs(here - s).min() < 1e-7 * abs(s)
+
+
+@pytest.mark.parametrize("C", [0.01, 0.1])
+def test_the_zeros_of_a_heavily_damped_arm_are_those_of_the_complete_search(C):
+    """-1/C lies nearer to s = 0 than the first mode: every real zero to the right is found, and no other is told."""
+    arm = tfarm.load("sasaki2012-lab").having(damping=C)
+    for sensor, share in (("displacement", 1.0), ("moment", 0.3)):
+        x = share * arm.length
+        found = positions(arm, sensor, np.array([x]), 4)
+        all_zeros = tfarm.transfer(arm, sensor, x=x).zeros(up_to=found.band).values
+        assert all(abs(all_zeros - s).min() < 1e-7 * abs(s) for s in found.zeros[0])
+        real = all_zeros[(abs(all_zeros.imag) < 1e-6) & (all_zeros.real > 1e-6)]
+        assert len(real) == (sensor == "displacement")
+        assert all(abs(found.zeros[0] - s).min() < 1e-7 * abs(s) for s in real)
+
+
+@pytest.mark.parametrize("name", ["sasaki2012", "quanser-2dsfl"])
+def test_a_sensor_at_a_node_has_the_mode_for_a_zero_and_sees_none_of_it(name):
+    arm = tfarm.load(name)
+    modes = tfarm.modes(arm, count=3)
+    node = modes.nodes[-1][0]
+    found = positions(arm, "displacement", np.array([node, arm.length]), 3)
+    assert found.participation[2, 0] == pytest.approx(0.0, abs=1e-9)
+    assert abs(found.zeros[0] - 1j * modes.natural_frequency[-1]).min() < 1e-7 * modes.natural_frequency[-1]
+
+
+def test_participation_is_the_shape_over_its_largest():
+    arm = tfarm.load("stocky-steel")
+    x = np.linspace(0.0, arm.length, 5)[1:]
+    found, modes = positions(arm, "displacement", x, 2), tfarm.modes(arm, count=2)
+    w = modes.shape(x)[1:]
+    assert found.participation == pytest.approx(w / abs(w).max(axis=1)[:, None])
+    assert found.natural_frequency == pytest.approx(modes.natural_frequency[1:])
+
+
+def test_of_a_zero_what_is_no_more_than_its_error_is_left_out():
+    zeros = np.array([3.0 + 4e-9j, 1e-9 + 5j, -2.0 + 2j])
+    found = Positions(np.array([0.5]), 10.0, np.ones(1), np.ones((1, 1)), (zeros, zeros[:0]))
+    assert [each.tolist() for each in found.known_zeros] == [[3.0, 5j, -2.0 + 2j], []]
+
+
+def test_an_end_that_no_mode_moves_is_no_place_for_a_sensor():
+    """The clamp of a hub without radius does not move, nor does the tip without payload bend."""
+    arm = tfarm.load("sasaki2012").having(payload_mass=0.0, payload_inertia=0.0)
+    x = np.linspace(0.0, arm.length, 5)
+    assert sensed_places(arm, "displacement", x, 3).tolist() == x[1:].tolist()
+    assert sensed_places(arm, "moment", x, 3).tolist() == x[:-1].tolist()
+
+
+def test_an_arm_that_cannot_turn_has_no_such_zeros():
+    with pytest.raises(tfarm.ParameterError):
+        positions(tfarm.load("sasaki2012").having(hub_inertia=math.inf), "moment", np.array([0.1]), 2)

@@ -9,9 +9,8 @@ import pytest
 
 import tfarm
 from tests.loop.agreement import some_free_arm, some_gains
-from tests.loop.arms import window_arm
+from tests.loop.arms import held, held_stiffness, window_arm
 from tests.loop.ritz_loop import RitzLoop
-from tests.loop.test_lines import held
 from tfarm import Hub, HubFeedback, Payload
 from tfarm.loop.lines import line_crossings
 from tfarm.loop.loop import Loop
@@ -103,8 +102,7 @@ def test_kp_has_its_edge_at_zero_and_none_below() -> None:
 def test_a_held_arm_bears_a_negative_spring_down_to_its_stiffness() -> None:
     for C in (0.0, 1e-4):
         arm = held(C)
-        link = arm.link
-        stiffness = 1 / (link.length / (3 * link.EI) + 1 / (link.kGA * link.length))
+        stiffness = held_stiffness(arm)
         found = windows(arm, HubFeedback(K1=0.3, K2=0.25, Kp=-0.1 * stiffness), "Kp")
         assert found.around[0] == pytest.approx(-0.75 * stiffness, rel=1e-10)
 
@@ -152,9 +150,6 @@ def test_of_a_heavy_hub_k2_is_looked_at_beyond_where_it_cancels_the_inertia(C) -
     assert found.end(found.around[1]) == "edge"
     assert found.around[1] <= 101
     assert stability(arm, HubFeedback(K1=1e-3, K2=101.5)).unstable_roots > 0
-
-
-# ------------------------------------------------------------ window ends that are those of a band alone say so,
 
 
 def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():

@@ -1,5 +1,6 @@
 """reduce() and its command: by order, by error, by method; what it carries, prints, and refuses."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.shell import refused
+from tests.shell import refused, run
 from tfarm import ConvergenceError, Hub, ParameterError
 from tfarm.reduced import reduce
 from tfarm.schema import to_dict
@@ -108,6 +109,16 @@ def test_outputs_without_a_model(arm):
         reduce(replace(arm, hub=Hub(inertia=math.inf)), "hub_rate", order=4)
     with pytest.raises(ParameterError, match="once"):
         reduce(arm, ["root_moment", "root_moment"], order=4)
+
+
+def test_by_error_with_a_band_and_a_file(capsys, tmp_path):
+    given = ("--error", "1e-6", "--band", "1,500", "--method", "modal", "--mat", str(tmp_path / "arm.mat"), "--json")
+    code, out, _ = run(capsys, "reduce", "sasaki2012", "--outputs", "tip_displacement", *given)
+    answer = json.loads(out)
+    assert code == 0
+    assert answer["worst_error"] <= 1e-6
+    assert answer["method"] == "modal"
+    assert (tmp_path / "arm.mat").exists()
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ def test_every_number_of_the_file_stands_in_the_table_of_parameters(name):
 
 
 def test_the_gauge_stands_there_where_it_is_not_at_the_root_and_a_cut_off_where_the_theory_has_one():
-    """The second pair of waves travels in Timoshenko's theory alone (tests/spectrum/test_beyond_the_box.py)."""
+    """The second pair of waves travels in Timoshenko's theory alone (tests/spectrum/test_tables.py)."""
     rig = RIGS["bench-rig"]
     for arm in (rig, replace(rig, gauge=Gauge(x=0.013)), rig.under("rayleigh")):
         section = arm_section(arm)

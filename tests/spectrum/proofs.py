@@ -13,7 +13,7 @@ import numpy as np
 import tfarm
 from tests import survey
 from tests.models import Ritz
-from tests.spectrum.test_certify import random_arm
+from tests.strategies import some_arm
 from tests.survey import Finding, each_of
 from tfarm import CertificationError
 
@@ -55,9 +55,9 @@ def judge(arm):
 
 
 def arms(rng):
-    return judge(random_arm(rng))
+    return judge(some_arm(rng, damping=0.0))
 
 
 if __name__ == "__main__":
-    judge(random_arm(np.random.default_rng(0)))  # compile and cache
+    judge(some_arm(np.random.default_rng(0), damping=0.0))  # compile and cache
     survey.main(each_of(arms), size=1000, seed=2012)
