@@ -120,8 +120,7 @@ def emit(
         write_csv(curve_table(found), csv)
     if png is not None:
         import tfarm.plots  # noqa: F401  every picture is known once they are loaded
-        from tfarm.plots.files import save_png
-        from tfarm.plots.style import FIGURES
+        from tfarm.plots.style import FIGURES, save_png
 
         save_png(FIGURES[type(found)](found), png)
     if not (say_written(*also, csv, png) or json):
