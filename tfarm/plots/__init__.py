@@ -1,4 +1,4 @@
-"""Pictures of what tfarm computes: a record in, matplotlib axes in and out::
+"""Pictures of records of tfarm: records in, matplotlib axes in and out::
 
     tfarm.plots.bode(tfarm.bode(arm, "root_moment"))              # a figure of its own; the axes are returned
     tfarm.plots.nyquist(tfarm.nyquist(arm, law), ax=axes)         # or in axes that are there

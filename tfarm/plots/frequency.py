@@ -76,7 +76,7 @@ def _title(data: Bode | Mapping[str, Bode]) -> str:
 
 @picture((Bode, "tfarm.bode returns"), size=(9.0, 6.2), rows=(1.75, 1.0), title=_title)
 def bode(data: Bode | Mapping[str, Bode], *, ax: Sequence[Axes]) -> None:
-    """Magnitude over phase of a response (what `tfarm.bode` returns), in two axes, those given or new ones: these axes.
+    """Magnitude over phase of a response (from `tfarm.bode`), in two axes, those given or new ones: these axes.
 
     Several are given by name.  Magnitudes in the response's SI units, phases in degrees; an infinite resonance is
     broken, a triangle at its place.
@@ -254,7 +254,7 @@ def _mark_margins(margins: LoopMargins, omega: Real, upper: Axes, lower: Axes) -
     title=lambda data: f"{data.verdict.loop.arm.name}: the loop function L(iω)",
 )  # fmt: skip
 def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
-    """L on Nyquist's contour (what `tfarm.nyquist` returns), stability and encirclements above it; the axes.
+    """L on Nyquist's contour (from `tfarm.nyquist`), stability and encirclements above it; the axes.
 
     A size r of L is drawn as r/(1 + r): the rim is infinity, -1 lies half way.  `name`: that of the controller.
     """
@@ -363,8 +363,10 @@ def draw_band(those: Possible, output: str) -> Figure:
     least, most, best = response_band(those, output, omega)
     name = output.replace("_", " ")
     with page(9.0, 4.6, f"{those.fit.before.name}: {name} of the arms that the data leave possible") as (figure, ax):
-        label = f"all of {len(those.arms)} arms that the data leave possible"
-        ax.fill_between(omega / RAD_PER_CYCLE, least, most, color=BLUE, alpha=0.3, lw=0, label=label)
+        ax.fill_between(
+            omega / RAD_PER_CYCLE, least, most, color=BLUE, alpha=0.3, lw=0,
+            label=f"all of {len(those.arms)} arms that the data leave possible",
+        )  # fmt: skip
         ax.plot(omega / RAD_PER_CYCLE, best, color=BLUE, lw=1.3, label="the arm that fits best")
         ax.set(xscale="log", yscale="log", xlabel=FREQUENCY_HZ, ylabel=f"|{name}|, SI")
         plain_ticks(ax.xaxis)
@@ -394,7 +396,7 @@ FIGURES[FitResult] = lambda data: fitted.figure(data.fit)
     title=lambda data: f"{data.arm.name}: " + f"{data.measured.output} over {data.measured.input}".replace("_", " "),
 )  # fmt: skip
 def measured(data: Overlay, *, ax: Sequence[Axes]) -> None:
-    """Magnitude, phase and coherence (what `tfarm.overlay` returns), in three axes, those given or new ones: these.
+    """Magnitude, phase and coherence (from `tfarm.overlay`), in three axes, those given or new ones: these.
 
     Phases lie between -180 and 180 degrees, broken where they wrap: a sign that differs is half a turn.  Where no
     coherence is known the third axes show the noise as a share of the measured value.  Upright lines: the arm's poles,

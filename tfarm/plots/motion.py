@@ -42,7 +42,7 @@ def _slew_title(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str
     title=_slew_title,
 )  # fmt: skip
 def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", *, ax: Sequence[Axes]) -> None:
-    """Simulations of one scenario (what `tfarm.simulate` returns; several by name) in three axes, given or new; these.
+    """Simulations of one scenario (from `tfarm.simulate`; several by name) in three axes, given or new; these.
 
     Root moment [N m], tip less a rigid arm's on its reference [mm], and the torque of the motor [N m], or its input.
     A note above them names records with too few points for the fastest mode that shows.  `what` is their headline.
@@ -110,7 +110,7 @@ def draw_beside(title: str, each: Mapping[str, Beside]) -> Figure:
     title=lambda found: f"{found.trial.arm.name}: the tuner's gain, and where it is proven stable",
 )  # fmt: skip
 def tuned_gain(found: Tuning, *, ax: Axes) -> None:
-    """A tuned gain over time (what `tfarm.tune` returns) in its guard, in the axes given or new ones; the axes."""
+    """A tuned gain over time (from `tfarm.tune`) in its guard, in the axes given or new ones; the axes."""
     guard, result = found.training.guard, found.training.result
     ax.axhspan(guard.lo, guard.hi, color=GUARD, lw=0, zorder=0.5, label="guard: proven for any K(t) in it")
     ax.step(result.t, result.K, where="post", color=INK, lw=1.4, label="the tuner's gain K(t)")

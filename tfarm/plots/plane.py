@@ -54,7 +54,7 @@ def _title(found: Plane | GainMap) -> str:
 
 @picture((Plane | GainMap, "tfarm.map returns"), title=_title)
 def gain_map(found: Plane | GainMap, *, ax: Axes) -> None:
-    """The plane of both gains, or of two numbers of a law (what `tfarm.map` returns), in the axes given or in new ones.
+    """The plane of both gains, or of two numbers of a law (from `tfarm.map`), in the axes given or in new ones.
 
     Colours for the number of unstable poles; a black line for the exact boundary with frequencies [rad/s] along it, of
     a law or a sampled loop dots where a pole is on the axis or the unit circle.  Returns the axes.
@@ -101,8 +101,10 @@ def _counts(found: Plane | GainMap, counts: NDArray[np.int64], ax: Axes) -> None
         if room.max() > LEAST_ROOM:
             middles = np.argwhere(room > NEAR_MIDDLE * room.max())
             row, column = min(middles, key=lambda at: abs(at - middles.mean(axis=0)).sum())
-            text = "∞" if count == INFINITE else str(count)
-            ax.text(found.x[column], found.y[row], text, fontsize=9.0, ha="center", va="center", clip_on=True)
+            ax.text(
+                found.x[column], found.y[row], "∞" if count == INFINITE else str(count), fontsize=9.0, ha="center",
+                va="center", clip_on=True,
+            )  # fmt: skip
 
 
 def colours(unstable: NDArray[np.int64]) -> Real:
@@ -152,7 +154,7 @@ def draw_boundary(found: Plane, points: Real, x: Axis, y: Axis, ax: Axes) -> Non
 
 
 def _undamped_boundary(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
-    """Strong around what is stable, thin where only the number of unstable poles changes.
+    """Strong around what is stable, thin where the number of unstable poles changes.
 
     That is at the edge of each mode of the locked hub, with its frequency at the right; of a uniform arm all these
     edges are one line.

@@ -28,21 +28,24 @@ from .frequency import MOST_DRAWN, bode, draw_loops
 from .plane import draw_region
 from .style import BLUE, COLOURS, GREEN, GREY, INK, LYAPUNOV, ORANGE, gains_words, name_axes, picture, plain_ticks
 
-K2_RANGE = (-1.0, 1.5)  # of what balances a torque: 1 where the input is one, less where it is a motor's current
+K2_RANGE = (
+    -1.0,
+    1.5,
+)  # of the gain that balances a torque: 1 where the input is one, less where it is a motor's current
 CUT_RANGE = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
 OVERLAY_COLUMNS = 72  # values of the gain across, and either side of upright edges
-LITTLE_DAMPINGS = (1e-4, 1e-6)  # s: what is drawn beside C = 0
+LITTLE_DAMPINGS = (1e-4, 1e-6)  # s: drawn too at C = 0
 OVERLAY_ASPECT = 1.8  # times as wide as high the picture is, about
 BEYOND_STABLE = 1.7  # of the largest stable gain across: how far the picture goes
 SEEN_AS_ONE = 1e-3  # ends as close as this are seen as one
-BELOW_GAIN = 15.0  # so many times below the gain across of the law the picture begins, on its logarithmic axis
+BELOW_GAIN = 15.0  # divisor of the gain across of the controller: where the picture begins, on its logarithmic axis
 SAMPLED_COLUMNS = 120  # values of the gain across at which the sampled region is cut, besides its exact ends
 MAP_ASPECT = 1.5  # times as wide as high the picture is, about
 BEYOND_PICTURE = 0.1  # of the gain up the plane, beyond the picture: an edge there is none of the region
 
 
 class StableRegions(NamedTuple):
-    """Both regions of one arm.  `sampled` has the arm's own C; at C = 0 also what a little damping would give."""
+    """Both regions of one arm.  `sampled` has the arm's own C; at C = 0 also the regions with a little damping."""
 
     continuous: Plane
     sampled: tuple[GainMap, ...]  # most damping first, so that each lies on the one before
@@ -82,8 +85,7 @@ def regions_table(data: StableRegions, stem: str) -> Table:
     ]
     across, up = PLANE
     values = Column(across, across, shown_unit(across, data.continuous.arm), of=data.continuous.axes[0])
-    title = f"Stable intervals of {up}, continuous and sampled"
-    return Table(stem=stem, title=title, columns=(values, *columns))
+    return Table(stem=stem, title=f"Stable intervals of {up}, continuous and sampled", columns=(values, *columns))
 
 
 @lru_cache(maxsize=8)
@@ -111,7 +113,7 @@ CONVENTION = "u = −{} dθ/dt − {} M;  a positive root moment M accelerates t
 def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes) -> None:
     """Both regions of the two gains, in the axes given or in new ones; the axes.
 
-    `continuous` is what `tfarm.map` returns, `sampled` what `tfarm.dsp.sampled_map` does: several, for arms with ever
+    `continuous` is from `tfarm.map`, `sampled` from `tfarm.dsp.sampled_map`: several, for arms with ever
     less damping, lie on each other.  The point is the controller of the sampled loop.
     """
     planes = sampled if isinstance(sampled, Sequence) else [sampled]
@@ -129,9 +131,8 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
     )  # fmt: skip
     for plane, colour in zip(planes, DAMPING_BLUES[len(planes) == 1 :], strict=False):
         C = plane.loop.plant.arm.damping
-        condition = "" if continuous.arm.damping == C else f", if C were {scientific(C, 1)} s"
-        condition = condition if C else f", C = 0: the first {plane.modes_used} modes"
-        label = f"stable, sampled every {ms} ms{condition}"
+        hypothesis = "" if continuous.arm.damping == C else f", if C were {scientific(C, 1)} s"
+        label = f"stable, sampled every {ms} ms{hypothesis if C else f', C = 0: the first {plane.modes_used} modes'}"
         draw_region(plane.x, plane.stable_intervals, BLUE, label, ax, width=0.9, facecolor=colour)
     if continuous.arm.is_uniform:  # of a rig the argument needs more: see `tfarm.loop.theorem`
         label = f"below it: proven by energy at C = 0 ({LYAPUNOV})"
@@ -143,8 +144,7 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
 def draw_overlay(data: StableRegions) -> Figure:
     """Both regions of an arm on a figure of its own, as high as moment gains are of use."""
     figure = overlay.figure(*data)
-    unit = data.continuous.arm.input_per_torque
-    figure.axes[0].set_ylim(*(unit * end for end in K2_RANGE))
+    figure.axes[0].set_ylim(*(data.continuous.arm.input_per_torque * end for end in K2_RANGE))
     return figure
 
 
@@ -158,7 +158,7 @@ def _grid(figure: Figure, _: Comparison) -> list[Axes]:
 
 @picture((Comparison, "tfarm.compare returns"), size=(12.0, 6.2), grid=_grid, title=lambda data: data.verdict)
 def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
-    """Magnitude, phase and map of both (what `tfarm.compare` returns), in three axes, those given or new ones: these.
+    """Magnitude, phase and map of both (from `tfarm.compare`), in three axes, those given or new ones: these.
 
     Of two arms the exact responses, of two laws the loop functions L; the map is that of both gains, with exact edges,
     or, where a law is more than these gains, or one in z, of a factor on each law and its further delay.  With a law

@@ -25,7 +25,7 @@ ROOM_AROUND = 0.12  # around a branch, as a share of its extent
 CROSS_AT_ZERO: dict[str, Any] = {"marker": "x", "ms": 6, "mew": 1.4}  # poles without the feedback that varies
 CIRCLE_AT_FIRST: dict[str, Any] = {"marker": "o", "ms": 6, "mfc": "white", "mew": 1.2}  # at the start
 LONGEST_LAW = 40  # characters of the controller in a title
-PARTS = 4  # of the range of what varies: at their ends dots are on each branch
+PARTS = 4  # of the range of the varied number: at their ends dots are on each branch
 MOST_NAMED = 6  # crossings in a legend
 
 
@@ -108,7 +108,7 @@ def _panel(fine: Locus, exact: Locus, reduced: ReducedLocus | None, numbers: Seq
 
 @picture((Locus, "tfarm.locus returns"), size=(7.0, 5.8), title=_title)
 def locus(exact: Locus, reduced: ReducedLocus | None = None, *, ax: Axes) -> None:
-    """Closed-loop poles as one number varies (what `tfarm.locus` returns), in the axes given or in new ones; the axes.
+    """Closed-loop poles as one number varies (from `tfarm.locus`), in the axes given or in new ones; the axes.
 
     Broad lines: the branches [1/s], a colour a mode, with values between those of `exact` where they bend; a cross
     where the gain is 0, an open circle at another beginning, dots at equal steps from there to the end, and a diamond

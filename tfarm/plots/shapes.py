@@ -54,7 +54,7 @@ def _grid(figure: Figure, found: Modes) -> None:
     grid=_grid, title=lambda found: f"{found.arm.name}: mode shapes",
 )  # fmt: skip
 def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
-    """The shapes of flexible modes (what `tfarm.modes` returns), an axes each, in those given or in new ones; these.
+    """The shapes of flexible modes (from `tfarm.modes`), an axes each, in those given or in new ones; these.
 
     Displacement along the arm [m], largest 1, with the places of the nodes [m].  Of more modes than axes the first are
     drawn.
@@ -82,8 +82,10 @@ def draw_differences(name: str, differences: Mapping[str, Real]) -> Figure:
     with page(9.0, 3.6, f"{name}: simpler beam theories against the Timoshenko theory") as (figure, ax):
         for theory, values in differences.items():
             color, marker = looks[theory]
-            numbers = np.arange(1, len(values) + 1)
-            ax.plot(numbers, values, marker=marker, ms=5, lw=1.2, color=color, label=theory_name(theory))
+            ax.plot(
+                np.arange(1, len(values) + 1), values, marker=marker, ms=5, lw=1.2, color=color,
+                label=theory_name(theory),
+            )  # fmt: skip
         if all((values > 0).all() for values in differences.values()):
             ax.set_yscale("log")
             plain_ticks(ax.yaxis)
@@ -146,7 +148,7 @@ def sketch(arm: Arm, *, ax: Axes) -> None:
 
 
 def _link(arm: Arm, ax: Axes) -> None:
-    """The segments, what is before and on them, and their length below."""
+    """The segments with everything mounted on them, and their length below."""
     root = start = arm.hub.radius / arm.length
     for link, colour in zip(arm.links, cycle(SEGMENT_COLOURS), strict=False):
         share, height = (link.length / arm.length if arm.outer else 1.0), _depth(link) / arm.length

@@ -71,7 +71,7 @@ STYLE = {
 WIDEST_LEGEND = 0.95  # of a figure's width: letters are a little wider or narrower in a file of other dots an inch
 LETTERS_PER_INCH = 11.5  # of a headline
 
-LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)  # what the paper's argument proves at C = 0
+LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)  # proven by the argument of the paper at C = 0
 NOT_THE_PAPERS = ("hub_angle",)  # outputs whose gain is an extension of the paper's law: named where it is used
 
 METADATA: dict[str, dict[str, str | None]] = {
@@ -230,7 +230,7 @@ def gains_words(law: AnyLaw, digits: int = 4, but: str = "") -> str:
 
 
 def name_axes(arm: Arm, ax: Axes) -> None:
-    """Along the axes of the plane of gains: their names, what they act on, and their units."""
+    """Along the axes of the plane of gains: their names, their signals and their units."""
     outputs = {gain.name: gain.output.replace("_", " ") for gain in GAINS}
     across, up = (f"{name}, gain on the {outputs[name]} [{shown_unit(name, arm) or '−'}]" for name in PLANE)
     ax.set(xlabel=across, ylabel=up)
