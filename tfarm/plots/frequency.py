@@ -63,6 +63,7 @@ FITTED_POINTS = 1200  # of a computed curve, besides the measured frequencies: m
 POINTS_OF_BAND = 800  # of a band of responses, about one to a pixel: each is computed for every possible arm
 MAP_MESH = 60  # gains of each axis of a map, each pair counted for every possible arm
 SPAN = 1.25  # of the decades that are measured: an infinite peak of the exact curve leaves the picture
+TICKS_A_DECADE = (1.0, 2.0, 5.0)  # where a measurement covers few of them
 FREQUENCY_HZ = "frequency [Hz]"
 POINTS: dict[str, Any] = {"ls": "none", "marker": ".", "ms": 3.5, "color": ORANGE, "zorder": 3}
 EXACT = "flexible arm, exact"
@@ -353,7 +354,7 @@ def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
             draw_wrapped(omega / RAD_PER_CYCLE, H, lower, color=colour, lw=width)
         upper.set(xscale="log", yscale="log", title=one.name, ylabel="" if number else "magnitude, SI")
         lower.set(xlabel=FREQUENCY_HZ, ylabel="" if number else PHASE)
-        plain_ticks(lower.xaxis)
+        plain_ticks(lower.xaxis, subs=TICKS_A_DECADE)
 
 
 def draw_band(those: Possible, output: str) -> Figure:
@@ -369,7 +370,7 @@ def draw_band(those: Possible, output: str) -> Figure:
         )  # fmt: skip
         ax.plot(omega / RAD_PER_CYCLE, best, color=BLUE, lw=1.3, label="the arm that fits best")
         ax.set(xscale="log", yscale="log", xlabel=FREQUENCY_HZ, ylabel=f"|{name}|, SI")
-        plain_ticks(ax.xaxis)
+        plain_ticks(ax.xaxis, subs=TICKS_A_DECADE)
     return figure
 
 
@@ -433,4 +434,4 @@ def measured(data: Overlay, *, ax: Sequence[Axes]) -> None:
     for each in ax:
         each.set(xlabel=FREQUENCY_HZ, xscale="log" if hertz[-1] > 5 * hertz[0] else "linear")
         each.margins(x=0)
-        plain_ticks(each.xaxis, 4)
+        plain_ticks(each.xaxis, 4, TICKS_A_DECADE)

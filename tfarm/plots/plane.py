@@ -130,7 +130,7 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
     longest = (max(pieces, key=len) for pieces in lines.allsegs if pieces)
     middles = [piece[len(piece) // 2] for piece in longest if len(piece) > LEAST_NAMED]
     for text in ax.clabel(lines, fontsize=8.0, fmt=lambda log: f"{plain(100 * math.exp(log), 3)} %", manual=middles):
-        text.set_path_effects(HALO)
+        text.set(path_effects=HALO, zorder=6)
     ax.plot([], [], color=BLUE, lw=0.9, label="least damping ratio of the first two modes")
 
 
@@ -145,12 +145,13 @@ def draw_boundary(found: Plane, points: Real, x: Axis, y: Axis, ax: Axes) -> Non
         if at is not None:
             line(at, color=INK, lw=1.6)
     along = stable_edge(found, points, x, y)
-    last = 0.0
+    last = max(0.0, float(x.place(np.array(0.0))))
     for place, (across, up, omega) in sorted(zip(x.place(along[:, 0]).tolist(), along.tolist(), strict=True)):
         if last + NUMBERS_ACROSS / 2 < place < 1 - NUMBERS_ACROSS / 2 and y.low < up < y.high:
             last = place + NUMBERS_ACROSS / 2
-            looks: dict[str, Any] = {"ha": "center", "va": "center", "path_effects": HALO, "zorder": 5}
-            ax.text(across, up, significant(omega, 3), fontsize=8.0, **looks)
+            ax.text(
+                across, up, significant(omega, 3), fontsize=8.0, ha="center", va="center", path_effects=HALO, zorder=5
+            )
 
 
 def _undamped_boundary(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
@@ -177,8 +178,10 @@ def _undamped_boundary(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
     for (t, w), place in zip(resting, y.place(levels), strict=True):
         if place > last + NUMBERS_UP:
             last = place
-            at: dict[str, Any] = {"xycoords": ax.get_yaxis_transform(), "textcoords": "offset points"}
-            ax.annotate(significant(w, 4), (1.0, t), xytext=(4, 0), va="center", fontsize=7.5, **at)
+            ax.annotate(
+                significant(w, 4), (1.0, t), xytext=(4, 0), va="center", fontsize=7.5, textcoords="offset points",
+                xycoords=ax.get_yaxis_transform(),
+            )  # fmt: skip
 
 
 def draw_sampled(plane: GainMap | None, ax: Axes) -> None:

@@ -22,7 +22,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure as Figure  # which pages name too
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tfarm.arm import GAINS, LISTED, PLANE, AnyLaw, Arm, as_law, shown_unit
 from tfarm.digits import plain
@@ -193,7 +193,7 @@ def legend_below(figure: Figure) -> None:
 
 def headline(figure: Figure, text: str) -> None:
     """Text above everything, at the left, in lines that fit."""
-    text = textwrap.fill(text, round(LETTERS_PER_INCH * figure.get_figwidth()))
+    text = textwrap.fill(text.replace(" = ", "\u00a0=\u00a0"), round(LETTERS_PER_INCH * figure.get_figwidth()))
     figure.suptitle(safe(text), x=0.012, ha="left", fontsize=10.5, color=INK)
 
 
@@ -213,8 +213,10 @@ def axis_label(kind: Any, name: str) -> str:
     return f"{of.label} [{of.unit}]"
 
 
-def plain_ticks(axis: Axis, digits: int = 3) -> None:
-    """Numbers at the major ticks without powers of ten, and none at the minor ones."""
+def plain_ticks(axis: Axis, digits: int = 3, subs: Sequence[float] = (1.0,)) -> None:
+    """Numbers at the major ticks without powers of ten, none at the minor ones; `subs` of each decade on a log axis."""
+    if axis.get_scale() == "log":
+        axis.set_major_locator(LogLocator(subs=subs))
     axis.set_major_formatter(FuncFormatter(lambda x, _: plain(x, digits)))
     axis.set_minor_formatter(NullFormatter())
 
