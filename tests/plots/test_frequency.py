@@ -84,10 +84,9 @@ def test_breaking_a_curve_keeps_every_point_in_order():
 def test_no_label_is_clipped_and_none_overlap(data):
     figure = tfarm.plots.bode.figure(data)
     figure.draw_without_rendering()
-    renderer = figure.canvas.get_renderer()
     upper = figure.axes[0]
     texts = [t for t in (*upper.texts, upper.yaxis.label, figure._suptitle, figure.axes[1].xaxis.label) if t.get_text()]
-    boxes = [t.get_window_extent(renderer) for t in texts]
+    boxes = [t.get_window_extent() for t in texts]
     for i, box in enumerate(boxes):
         assert figure.bbox.x0 <= box.x0
         assert box.x1 <= figure.bbox.x1

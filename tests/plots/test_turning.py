@@ -46,7 +46,7 @@ def test_no_branch_turns_by_more_than_five_degrees(arm, vary, start, stop, corne
     """Two roots that meet on the real axis part at a right angle: a true corner, once on either branch."""
     found = locus(arm, default_gains(arm), vary, start, stop, points=60, branches=5)
     figure = locus_plot.figure(found)
-    figure.canvas.draw()
+    figure.draw_without_rendering()
     told = [seen_turns(line) for line in figure.axes[0].lines if line.get_linewidth() == 2.6]
     assert sum(count for _, count in told) == corners
     assert max(turn.max(initial=0.0) for turn, _ in told) <= MOST
@@ -68,7 +68,7 @@ def test_the_values_between_are_poles_too():
 def test_the_sampled_locus_is_round_too():
     loop = sampled_loop(LAB, default_gains(LAB), count=3)
     figure = draw_sampled_loci(sampled_loci(loop, 25.0, (-0.5, 1.5)))
-    figure.canvas.draw()
+    figure.draw_without_rendering()
     for ax in figure.axes:
         told = [seen_turns(line)[0] for line in ax.lines if line.get_linewidth() == 1.4 and len(line.get_xdata()) > 1]
         assert sum(turn.size for turn in told) > 5
@@ -129,6 +129,6 @@ def test_a_locus_under_any_law_is_round_too():
         told = fine.branches[np.isfinite(fine.branches[:, n]), n]
         assert abs(1 + loop.loop_function(told)).max() < 1e-6
     figure = locus_plot.figure(found)
-    figure.canvas.draw()
+    figure.draw_without_rendering()
     told = [seen_turns(line)[0] for line in figure.axes[0].lines if line.get_linewidth() == 2.6]
     assert max(turn.max(initial=0.0) for turn in told) <= MOST

@@ -5,7 +5,7 @@ from tfarm.dsp import modes as sampled_loci
 from tfarm.dsp import verdict
 from tfarm.loop import loci
 from tfarm.plots import regions
-from tfarm.report import assumptions_section, cards, live, map_section, writing
+from tfarm.report import cards, live, map_section, writing
 
 COARSE = (
     (map_section, "GRID_COLUMNS", 48),
@@ -16,7 +16,6 @@ COARSE = (
     (loci, "LOCUS_POINTS", 60),
     (sampled_loci, "SAMPLED_LOCUS_VALUES", 31),
     (verdict, "PERIOD_SHARES", (1.0, 5.0)),
-    (assumptions_section, "CURVE_POINTS", 9),
     (writing, "MOST_WORKERS", 1),  # a second process would have its own grids
     (map_section, "sampled_region", regions.sampled_region.__wrapped__),  # what is kept of it is of other grids
     (live, "sampled_region", regions.sampled_region.__wrapped__),

@@ -11,7 +11,7 @@ import tfarm
 from tfarm import plots
 from tfarm.arm import Gauge, written_unit
 from tfarm.dsp.crossings import sampled_map
-from tfarm.plots.sketch import sketch
+from tfarm.plots.shapes import sketch
 from tfarm.plots.style import blank
 from tfarm.report.arm_section import arm_section
 from tfarm.report.assumptions_section import assumptions_section
@@ -99,5 +99,5 @@ def test_no_line_of_energy_where_it_is_no_argument(name):
     sampled = sampled_map(tfarm.sampled(arm, law).verdict.loop, K1, K2)
     (ax,) = blank(6, 4).subplots(1, 1, squeeze=False).ravel()
     plots.overlay(tfarm.map(arm, K1, K2), sampled, ax=ax)
-    words = " ".join(text.get_text() for text in ax.get_legend().get_texts())
+    words = " ".join(ax.get_legend_handles_labels()[1])
     assert ("proven by energy" in words) == arm.is_uniform

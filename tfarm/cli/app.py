@@ -273,10 +273,9 @@ def emit(
     if csv is not None:
         write_csv(curve_table(record), csv)
     if png is not None:
-        from tfarm.plots.files import save_png
-        from tfarm.plots.style import FIGURES
+        import tfarm.plots  # noqa: F401  every picture is registered once they are loaded
+        from tfarm.plots.style import FIGURES, save_png
 
-        assert tfarm.plots  # every picture is registered once they are loaded
         save_png(FIGURES[type(record)](record), png)
     written = [path for path in (*also, csv, png) if path is not None]
     if any(map(is_standard_output, written)):

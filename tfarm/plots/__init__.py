@@ -1,4 +1,4 @@
-"""Pictures of what tfarm computes: a record in, matplotlib axes in and out::
+"""Pictures of records of tfarm: records in, matplotlib axes in and out::
 
     tfarm.plots.bode(tfarm.bode(arm, "root_moment"))              # a figure of its own; the axes are returned
     tfarm.plots.nyquist(tfarm.nyquist(arm, law), ax=axes)         # or in axes that are there
@@ -6,16 +6,12 @@
 In the look of the report's pages, whose pictures these are.  This is the only room with matplotlib.
 """
 
-from tfarm.plots.compared import comparison
-from tfarm.plots.disc import nyquist
-from tfarm.plots.fitted import measured
-from tfarm.plots.frequency import bode
+from tfarm.plots.frequency import bode, measured, nyquist
 from tfarm.plots.motion import slew, tuned_gain
 from tfarm.plots.plane import gain_map
-from tfarm.plots.regions import overlay
+from tfarm.plots.regions import comparison, overlay
 from tfarm.plots.roots import locus
-from tfarm.plots.shapes import modes
-from tfarm.plots.sketch import sketch
+from tfarm.plots.shapes import modes, sketch
 
 __all__ = [
     "bode",

@@ -1,44 +1,84 @@
-"""Curves over frequency: exact responses, and the loop function with the places where each margin is read.
+"""Curves over frequency: exact responses, the loop function with its margins, and Nyquist plots.
 
-An infinite resonance is drawn as one: the curve runs off the picture, broken.
+At an infinite resonance a Bode plot is broken and leaves the picture.  A Nyquist plot is a disc: infinity is the rim,
+poles on the axis are arcs beyond it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
+from itertools import cycle
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MultipleLocator, NullFormatter
+from matplotlib.patches import Circle
+from matplotlib.ticker import MaxNLocator, NullFormatter
+from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real
 from tfarm.digits import plain, significant
+from tfarm.fitting.fit import Fit, Possible, response_band, share_stable
+from tfarm.fitting.overlay import Overlay
 from tfarm.loop.margins import LoopMargins, Margins, loop_curve
+from tfarm.loop.nyquist import Nyquist, compressed
 from tfarm.response.frequency import Bode
 
-from .labels import OFFSETS_BESIDE, Label
-from .style import BLUE, FAINT, GREEN, GREY, INK, ORANGE, PURPLE, legend_below, page, picture
+from .style import (
+    BLUE,
+    COLOURS,
+    FAINT,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PURPLE,
+    axis_label,
+    by_name,
+    gains_words,
+    name_axes,
+    page,
+    picture,
+    plain_ticks,
+    safe,
+)
 
 RAD_PER_CYCLE = 2 * math.pi  # rad/s of 1 Hz
 NUMBER_STRIP = 0.085  # height of the strip of mode numbers above the magnitude, as a share of its axes: a line of them
 NUMBERS_APART = 0.019  # share of the width below which two mode numbers would touch: two digits of 8 points on 9 inches
-MOST_NAMED = 6  # crossings that bear their number; of more the mark alone
-BEYOND_MARKED = 1e3  # beyond all that is marked |L| is a pole or a zero on the axis, and leaves the picture
-LEAST_REACH = 3.0  # factors of |L| beyond 1 that the picture reaches at least, either way
+NEAR_ROOT = 0.004  # of a frequency: nearer to a root on the axis a magnitude sets no limit of the picture
+LEAST_DRAWN, MOST_DRAWN = 1e-4, 1e3  # sizes of L that are drawn: so that the part near 1 shows
+RIGHT_ANGLES = (1, 1.8, 4.5, 9, 10)  # steps between ticks of a phase, up to powers of ten
+RING_SIZES = (0.2, 0.5, 1.0, 2.0, 5.0, math.inf)  # |L| of the rings
+ARC_RADIUS, LAST_RADIUS, RADIUS_STEP = 1.04, 1.2, 0.03  # of the first arc at infinity, of the last, and between two
+ARC_COUNT, REACH = 1.28, 1.35  # radii of the number of arcs that turn alike, and of the picture
+ARCS_ALIKE = math.radians(20.0)  # arcs whose ends are as near as that turn alike
+ARROWS_AT = np.array([0.12, 0.4, 0.75])  # of the drawn length of the curve, arcs at infinity apart
+FITTED_POINTS = 1200  # of a computed curve, besides the measured frequencies: more than a column has pixels
+POINTS_OF_BAND = 800  # of a band of responses, about one to a pixel: each is computed for every possible arm
+MAP_MESH = 60  # gains of each axis of a map, each pair counted for every possible arm
+SPAN = 1.25  # of the decades that are measured: an infinite peak of the exact curve leaves the picture
+TICKS_A_DECADE = (1.0, 2.0, 5.0)  # where a measurement covers few of them
+FREQUENCY_HZ = "frequency [Hz]"
+POINTS: dict[str, Any] = {"ls": "none", "marker": ".", "ms": 3.5, "color": ORANGE, "zorder": 3}
+EXACT = "flexible arm, exact"
+FREQUENCY, PHASE = axis_label(Bode, "omega"), axis_label(Bode, "phase")
 
 
-@picture(
-    (Bode, "tfarm.bode returns"), size=(9.0, 6.2), rows=(1.75, 1.0),
-    title=lambda data: f"{data.arm.name}: {data.input_label} to {data.label}",
-)  # fmt: skip
-def bode(data: Bode, *, ax: Sequence[Axes]) -> None:
-    """Magnitude over phase of a response (what `tfarm.bode` returns), in two axes, those given or new ones: these axes.
+def _title(data: Bode | Mapping[str, Bode]) -> str:
+    first = next(iter(by_name(data, EXACT).values()))
+    return f"{first.arm.name}: {first.input_label} to {first.label}"
 
-    Magnitudes in the response's SI units, phases in degrees; an infinite resonance is broken, a triangle at its place.
+
+@picture((Bode, "tfarm.bode returns"), size=(9.0, 6.2), rows=(1.75, 1.0), title=_title)
+def bode(data: Bode | Mapping[str, Bode], *, ax: Sequence[Axes]) -> None:
+    """Magnitude over phase of a response (from `tfarm.bode`), in two axes, those given or new ones: these axes.
+
+    Several are given by name.  Magnitudes in the response's SI units, phases in degrees; an infinite resonance is
+    broken, a triangle at its place.
     """
     draw_magnitude(data, ax=ax[0])
     draw_phase(data, ax=ax[1])
@@ -47,66 +87,63 @@ def bode(data: Bode, *, ax: Sequence[Axes]) -> None:
 def draw_card(data: Bode) -> Figure:
     """The magnitude alone, small, for the index."""
     with page(4.4, 2.5, "") as (figure, ax):
-        draw_magnitude(data, ax=ax, is_small=True)
+        draw_magnitude(data, ax=ax)
+        ax.set_ylabel(f"|{data.label}| [{data.gain_unit}]", fontsize=8.5)
+        for each in (ax.get_legend(), *ax.texts, *ax.child_axes):
+            each.set_visible(False)
     return figure
 
 
-def draw_magnitude(data: Bode, *, ax: Axes, is_small: bool = False, label: str = "flexible arm, exact") -> None:
-    """|G| on log scales: rad/s below, Hz above; triangles where it is infinite or zero."""
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    ax.set_xlim(*data.band)
-    ax.set_ylim(*magnitude_limits(data))
-    low, high = ax.get_ylim()
-    jumps = np.r_[data.infinite, data.vanishing]
-    edges = np.r_[np.full(data.infinite.size, 10 * high), np.full(data.vanishing.size, low / 10)]
-    ax.plot(*broken(data.omega, np.abs(data.value), jumps, edges), color=BLUE, label=label)
-    if np.any(data.rigid):
-        ax.plot(data.omega, abs(data.rigid), color=GREY, lw=1.0, ls=(0, (4, 3)), zorder=1.5, label="rigid arm")
-    _mark_roots(data, ax)
-    if (
-        data.arm.has_cutoff and data.band[0] < data.arm.shear_cutoff < data.band[1]
-    ):  # where the second pair of waves begins to travel
-        ax.axvline(data.arm.shear_cutoff, color=ORANGE, lw=1.0, ls="-.", label="shear cut-off")
-    ax.set_xlabel("angular frequency [rad/s]")
+def draw_compared(main: Bode, other: Bode, labels: tuple[str, str]) -> Figure:
+    """Two responses of one output in one magnitude plot; the roots marked are those of the first."""
+    with page(9.0, 5.0, "") as (figure, ax):
+        draw_magnitude(dict(zip(labels, (main, other), strict=True)), ax=ax)
+    return figure
+
+
+def draw_magnitude(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
+    """|G| on log scales: rad/s below, Hz above; roots on the axis, modes and cut-off are those of the first."""
+    each = by_name(data, EXACT)
+    first = next(iter(each.values()))
+    limits = np.array([magnitude_limits(one) for one in each.values()])
+    low, high = float(limits[:, 0].min()), float(limits[:, 1].max())
+    ax.set(xscale="log", yscale="log", xlim=first.band, ylim=(low, high), xlabel=FREQUENCY)
+    for (name, one), colour in zip(each.items(), cycle(COLOURS), strict=False):
+        edges = np.r_[np.full(one.infinite.size, 10 * high), np.full(one.vanishing.size, low / 10)]
+        jumps = np.r_[one.infinite, one.vanishing]
+        ax.plot(*broken(one.omega, np.abs(one.value), jumps, edges), color=colour, label=safe(name))
+    if np.any(first.rigid):
+        ax.plot(first.omega, abs(first.rigid), color=GREY, lw=1.0, ls=(0, (4, 3)), zorder=1.5, label="rigid arm")
+    _mark_roots(first, ax)
+    if first.arm.has_cutoff and first.band[0] < first.arm.shear_cutoff < first.band[1]:
+        ax.axvline(first.arm.shear_cutoff, color=ORANGE, lw=1.0, ls="-.", label="shear cut-off")
     ax.yaxis.set_minor_formatter(NullFormatter())
-    if is_small:
-        ax.set_ylabel(f"|{data.label}| [{data.gain_unit}]", fontsize=8.5)
-        return
-    ax.set_ylabel(f"|{data.label} / {data.input_label}|  [{data.gain_unit}]")
-    if data.is_zero:
+    ax.set_ylabel(f"|{first.label} / {first.input_label}|  [{first.gain_unit}]")
+    if first.is_zero:
         ax.text(0.5, 0.5, "zero at every frequency", ha="center", va="center", transform=ax.transAxes)
-    _number_modes(data, ax)
     hertz_axis(ax, 1.0 + NUMBER_STRIP)
-    starts_low = abs(data.value[0]) < math.sqrt(low * high)
+    starts_low = abs(first.value[0]) < math.sqrt(low * high)
     ax.legend(loc="upper left" if starts_low else "lower left")
 
 
-def draw_phase(data: Bode, *, ax: Axes) -> None:
+def draw_phase(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
     """The phase in degrees; at C = 0 it steps by 180 degrees at every root on the axis."""
-    ax.set_xscale("log")
-    ax.set_xlim(*data.band)
-    for root in data.infinite:
-        ax.axvline(root, color=FAINT, lw=0.8, zorder=0.5)
-    jumps = np.r_[data.infinite, data.vanishing]
-    ax.plot(data.omega, data.phase, color=BLUE, lw=0.7, ls=(0, (1, 1.5)) if jumps.size else "-")
-    ax.plot(*broken(data.omega, data.phase, jumps, np.full(jumps.size, np.nan)), color=BLUE)
-    span = float(np.ptp(data.phase))
-    ax.set_ylim(data.phase.min() - 0.08 * span - 15, data.phase.max() + 0.08 * span + 15)
-    ax.yaxis.set_major_locator(MultipleLocator(next((step for step in (90, 180, 360) if span / step <= 5), 720)))
-    ax.set_ylabel("phase [deg]")
-    ax.set_xlabel("angular frequency [rad/s]")
+    each = by_name(data, EXACT)
+    for one, colour in zip(each.values(), cycle(COLOURS), strict=False):
+        if (jumps := np.r_[one.infinite, one.vanishing]).size:
+            ax.plot(one.omega, one.phase, color=colour, lw=0.7, ls=(0, (1, 1.5)))
+        ax.plot(*broken(one.omega, one.phase, jumps, np.full(jumps.size, np.nan)), color=colour)
+    ax.set(xscale="log", xlim=one.band, xlabel=FREQUENCY, ylabel=PHASE)
+    ax.margins(y=0.1)
+    ax.yaxis.set_major_locator(MaxNLocator(5, steps=RIGHT_ANGLES))
 
 
 def hertz_axis(ax: Axes, height: float) -> None:
     """A second frequency axis in Hz, at that height above the axes."""
-
-    upper = ax.secondary_xaxis(
-        height, functions=(partial(np.multiply, 1 / RAD_PER_CYCLE), partial(np.multiply, RAD_PER_CYCLE))
-    )
+    ratios = (partial(np.multiply, 1 / RAD_PER_CYCLE), partial(np.multiply, RAD_PER_CYCLE))
+    upper = ax.secondary_xaxis(height, functions=ratios)
     upper.set_xlabel("frequency [Hz]", labelpad=5.0)
-    upper.xaxis.set_major_formatter(FuncFormatter(lambda x, _: plain(x, 3)))
-    upper.xaxis.set_minor_formatter(NullFormatter())
+    plain_ticks(upper.xaxis)
 
 
 def draw_wrapped(x: Real, values: Complex, ax: Axes, **looks: Any) -> None:
@@ -114,7 +151,7 @@ def draw_wrapped(x: Real, values: Complex, ax: Axes, **looks: Any) -> None:
     angle = np.degrees(np.angle(values))
     jump = np.flatnonzero(abs(np.diff(angle)) > 180) + 1
     ax.plot(np.insert(x, jump, np.nan), np.insert(angle, jump, np.nan), **looks)
-    ax.set(ylim=(-190, 190), yticks=[-180, -90, 0, 90, 180], ylabel="phase [deg]")
+    ax.set(ylim=(-190, 190), yticks=[-180, -90, 0, 90, 180], ylabel=PHASE)
 
 
 def broken(x: Real, y: Real, at: Real, limit: Real) -> tuple[Real, Real]:
@@ -126,23 +163,19 @@ def broken(x: Real, y: Real, at: Real, limit: Real) -> tuple[Real, Real]:
 
 
 def magnitude_limits(data: Bode) -> tuple[float, float]:
-    """Everything finite with a margin; roots on the axis run off the picture."""
-    size = abs(data.value)
-    roots = np.r_[data.infinite, data.vanishing]
-    if roots.size:
-        away = abs(data.omega[:, None] / roots - 1).min(axis=1) > 0.004
-        size = size[away] if away.any() else size
+    """Everything finite with a margin; roots on the axis leave the picture."""
     if data.is_zero:
         return 0.1, 10.0
-    seen = np.r_[size[size > 0], abs(data.rigid[:1][data.rigid[:1] != 0])]
-    low, high = math.log10(seen.min()), math.log10(seen.max())
-    margin = max(0.25, 0.06 * (high - low))
-    return 10 ** (low - margin), 10 ** (high + margin)
+    roots = np.r_[data.infinite, data.vanishing]
+    away = (abs(data.omega[:, None] / roots - 1) > NEAR_ROOT).all(axis=1)
+    size = np.log10([each for each in (*abs(data.value[away]), *abs(data.rigid[:1])) if each > 0])
+    margin = max(0.25, 0.06 * np.ptp(size))
+    return 10 ** (size.min() - margin), 10 ** (size.max() + margin)
 
 
 def _mark_roots(data: Bode, ax: Axes) -> None:
-    """Open triangles: at the top edge where |G| is infinite, at the bottom edge where it is zero."""
-    for root in (*data.infinite, *data.vanishing):
+    """Triangles at the top edge where |G| is infinite, at the bottom edge where it is 0; numbers above resonances."""
+    for root in (*data.infinite, *data.vanishing, *data.resonances.imag):
         ax.axvline(root, color=FAINT, lw=0.8, zorder=0.5)
     for roots, height, marker, label in (
         (data.infinite, 1.0, "^", "infinite: pole on the imaginary axis"),
@@ -153,31 +186,30 @@ def _mark_roots(data: Bode, ax: Axes) -> None:
                 roots, np.full(roots.size, height), marker, transform=ax.get_xaxis_transform(), clip_on=False,
                 mfc="white", mec=INK, ms=6.0, mew=1.0, zorder=5, label=label,
             )  # fmt: skip
+    last, width = -math.inf, NUMBERS_APART * math.log(data.band[1] / data.band[0])
+    for number, omega in enumerate(data.resonances.imag, 1):
+        if math.log(omega) - last > width:
+            last = math.log(omega)
+            ax.text(
+                omega, 1.0 + 0.38 * NUMBER_STRIP, str(number), transform=ax.get_xaxis_transform(), ha="center",
+                va="bottom", fontsize=8.0, color=GREY,
+            )  # fmt: skip
 
 
-def _number_modes(data: Bode, ax: Axes) -> None:
-    """The number of each resonance above the axes, as many as do not touch."""
-    low, high = np.log(data.band)
-    last = -1.0
-    for number, pole in enumerate(data.resonances, 1):
-        place = (math.log(pole.imag) - low) / (high - low)
-        if place - last < NUMBERS_APART:
-            continue
-        last = place
-        ax.text(
-            pole.imag, 1.0 + 0.38 * NUMBER_STRIP, str(number), transform=ax.get_xaxis_transform(), ha="center",
-            va="bottom", fontsize=8.0, color=GREY,
-        )  # fmt: skip
-        if pole.imag not in data.infinite:
-            ax.axvline(pole.imag, color=FAINT, lw=0.8, zorder=0.5)
-
-
-def draw_compared(main: Bode, other: Bode, labels: tuple[str, str]) -> Figure:
-    """Two responses of one output in one magnitude plot; the roots marked are those of the first."""
-    with page(9.0, 5.0, "") as (figure, ax):
-        ax.plot(other.omega, abs(other.value), color=ORANGE, lw=1.8, zorder=3, label=labels[1])
-        draw_magnitude(main, ax=ax, label=labels[0])
-    return figure
+def draw_loops(each: Mapping[str, tuple[Real, Complex]], upper: Axes, lower: Axes) -> None:
+    """|L| of each loop over its frequencies with the line 1, and its angle from -180 to 180 degrees."""
+    for (name, (omega, L)), colour in zip(each.items(), cycle(COLOURS), strict=False):
+        upper.plot(omega, abs(L), color=colour, label=safe(name) if len(each) > 1 else None)
+        draw_wrapped(omega, L, lower, color=colour)
+    upper.axhline(1.0, color=GREY, lw=0.9)
+    for edge in (-180, 180):
+        lower.axhline(edge, color=GREY, lw=0.9)
+    upper.set(xscale="log", yscale="log", ylabel="|L|")
+    upper.margins(x=0)
+    low, high = upper.get_ylim()
+    upper.set_ylim(max(low, LEAST_DRAWN * min(1.0, high)), min(high, MOST_DRAWN * max(1.0, low)))
+    lower.set(xscale="log", xlim=upper.get_xlim(), xlabel=FREQUENCY)
+    hertz_axis(upper, 1.0)
 
 
 def draw_loop(found: Margins, name: str) -> Figure:
@@ -185,50 +217,216 @@ def draw_loop(found: Margins, name: str) -> Figure:
     omega, L = loop_curve(found)
     title = f"{found.stability.loop.arm.name}: the loop function L(iω) of {name}"
     with page(9.0, 5.8, title, nrows=2, sharex=True, height_ratios=[1.5, 1.0]) as (figure, (upper, lower)):
-        upper.set(xscale="log", yscale="log", xlim=(omega[0], omega[-1]), ylabel="|L|")
-        upper.plot(omega, abs(L), color=BLUE)
-        upper.axhline(1.0, color=GREY, lw=0.9)
-        draw_wrapped(omega, L, lower, color=BLUE)
-        lower.set_xlabel("angular frequency [rad/s]")
-        for edge in (-180, 180):
-            lower.axhline(edge, color=GREY, lw=0.9)
-        if found.in_band is None:
-            upper.set_ylim(*_reach(np.abs(L), []))
-        else:
-            _mark_margins(found.in_band, omega, np.abs(L), upper, lower)
-        hertz_axis(upper, 1.0)
-        if upper.get_legend_handles_labels()[0]:
-            legend_below(figure)
+        draw_loops({name: (omega, L)}, upper, lower)
+        if found.in_band is not None:
+            _mark_margins(found.in_band, omega, upper, lower)
     return figure
 
 
-def _reach(size: Real, crossed: Sequence[float]) -> tuple[float, float]:
-    """Limits of |L| with all that is marked; infinite resonances leave the picture."""
-    low, high = min([1 / LEAST_REACH, *crossed]), max([LEAST_REACH, float(size[0]), *crossed])
-    return max(float(size.min()), low / BEYOND_MARKED) / 1.5, min(float(size.max()), high * BEYOND_MARKED) * 1.5
+def _mark_margins(margins: LoopMargins, omega: Real, upper: Axes, lower: Axes) -> None:
+    """At each L < 0 the gain margin up to |L| = 1; at each |L| = 1 the phase margin, lag green and lead purple.
 
-
-def _mark_margins(margins: LoopMargins, omega: Real, size: Real, upper: Axes, lower: Axes) -> None:
-    """At each L < 0 the factor on the whole law that puts a pole there; at each |L| = 1 the phase margin.
-
-    That is green where it is lag, purple where it is lead.
+    The legend has the least of each.
     """
-    upper.set_ylim(*_reach(size, [1 / factor for _, factor in margins.phase_crossovers]))
-    seen = [each for each in margins.phase_crossovers if omega[0] <= each[0] <= omega[-1]]
-    for number, (w, factor) in enumerate(seen):
-        label = None if number else "L < 0, and the factor to −1"
-        upper.plot([w, w], [1.0, 1 / factor], color=ORANGE, lw=1.0, ls=(0, (2, 1.5)))
-        upper.plot([w], [1 / factor], "o", color=ORANGE, ms=4.5, label=label)
-        if number < MOST_NAMED:
-            upper.add_artist(Label(f"× {significant(factor, 3)}", [(w, 1 / factor)], OFFSETS_BESIDE, fontsize=7.5))
-    for kind, colour, sign in (("lag", GREEN, 1), ("lead", PURPLE, -1)):
-        found = [each for each in margins.gain_crossovers if (each[1] > 0) == (sign > 0)]
-        for w, margin in found:
-            lower.plot([w, w], [-180 * sign, margin - 180 * sign], color=colour, lw=1.0, ls=(0, (2, 1.5)))
-            lower.plot([w], [margin - 180 * sign], "D", color=colour, ms=4.5, zorder=4)
-        if found:
-            at = [w for w, _ in found]
-            upper.plot(at, [1.0] * len(at), "D", color=colour, ms=4.5, zorder=4, label=f"|L| = 1, {kind} to −1")
-    for w, margin in margins.gain_crossovers[:MOST_NAMED]:
-        place = (w, margin - 180 if margin > 0 else margin + 180)
-        lower.add_artist(Label(f"{significant(margin, 3)}°", [place], OFFSETS_BESIDE, fontsize=7.5))
+    seen = [(w, 1 / factor) for w, factor in margins.phase_crossovers if omega[0] <= w <= omega[-1]]
+    if seen:
+        least = ", ".join(f"× {significant(factor, 3)}" for factor in margins.gain if 0 < factor < math.inf)
+        w, size = np.transpose(seen)
+        upper.vlines(w, size, 1.0, color=ORANGE, lw=1.0, ls=(0, (2, 1.5)))
+        upper.plot(w, size, "o", color=ORANGE, ms=4.5, label=f"L < 0, gain margin {least or 'unlimited'}")
+    for kind, colour, sign, margin in (
+        ("lag", GREEN, 1, margins.phase_lag), ("lead", PURPLE, -1, margins.phase_lead)
+    ):  # fmt: skip
+        if found := [each for each in margins.gain_crossovers if (each[1] > 0) == (sign > 0)]:
+            w, angle = np.transpose(found)
+            label = f"|L| = 1, phase margin {significant(margin, 3)}° for {kind}"
+            lower.vlines(w, -180 * sign, angle - 180 * sign, color=colour, lw=1.0, ls=(0, (2, 1.5)))
+            lower.plot(w, angle - 180 * sign, "D", color=colour, ms=4.5, zorder=4)
+            upper.plot(w, np.ones(w.size), "D", color=colour, ms=4.5, zorder=4, label=label)
+
+
+# ------------------------------------------------------------ Nyquist
+
+
+@picture(
+    (Nyquist, "tfarm.nyquist returns"), size=(5.0, 6.1),
+    title=lambda data: f"{data.verdict.loop.arm.name}: the loop function L(iω)",
+)  # fmt: skip
+def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
+    """L on Nyquist's contour (from `tfarm.nyquist`), stability and encirclements above it; the axes.
+
+    A size r of L is drawn as r/(1 + r): the rim is infinity, -1 lies half way.  `name`: that of the controller.
+    """
+    radii = [1.0 if math.isinf(size) else size / (1 + size) for size in RING_SIZES]
+    for radius in radii:
+        ax.add_patch(Circle((0, 0), radius, fill=False, ec=GREY if radius in (0.5, 1.0) else FAINT, lw=0.7, zorder=0.6))
+    ax.plot([-1, 1, math.nan, 0, 0], [0, 0, math.nan, -1, 1], color=FAINT, lw=0.7, zorder=0.5)
+    _curve(data, ax)
+    ax.plot([-0.5], [0], "+", color=ORANGE, ms=11, mew=2.2, zorder=6, ls="none", label="the point −1")
+    ax.set(aspect="equal", yticks=[], xlim=(-REACH, REACH), ylim=(-REACH, REACH), frame_on=False)
+    ax.set_xlabel("|L| at the rings", loc="right")
+    ax.set_xticks(radii, [plain(size).replace("inf", "∞") for size in RING_SIZES], fontsize=7.5)
+    ax.grid(False)
+    verdict = data.verdict
+    gains = gains_words(verdict.loop.law).removeprefix(f"{name}, ")
+    counts = f"encirclements of −1: {data.encirclements:d};  unstable poles: {verdict.unstable_roots}"
+    lines = f"{safe(name)}{': ' * bool(name)}{verdict.verdict.upper()}\n{safe(gains)}\n{counts}"
+    ax.set_title(lines, fontsize=9.0, loc="center")
+
+
+def draw_nyquist(title: str, plots: Mapping[str, Nyquist]) -> Figure:
+    """One disc a controller, of at most two, by name."""
+    band = significant(max(data.verdict.band for data in plots.values()), 5)
+    title = f"{title}: the loop function L(iω) up to {band} rad/s"
+    with page(9.0 if len(plots) > 1 else 5.6, 5.3, title, ncols=len(plots), squeeze=False) as (figure, axes):
+        for ax, (name, data) in zip(axes[0], plots.items(), strict=True):
+            nyquist(data, ax=ax, name=name)
+    return figure
+
+
+def _curve(data: Nyquist, ax: Axes) -> None:
+    """Along the axis as a line, past poles as arcs beyond the rim, one for all that turn alike; arrows as w rises."""
+    z = compressed(data.L)
+    along = np.where(data.is_arc, np.nan, z)
+    ax.plot(along.real, along.imag, color=BLUE, lw=1.3, zorder=3, label="ω > 0, arrows as it rises")
+    ax.plot(along.real, -along.imag, color=BLUE, lw=0.6, alpha=0.55, zorder=2, label="ω < 0")
+    alike: dict[tuple[int, ...], list[NDArray[np.int64]]] = {}
+    for piece in np.split(np.arange(z.size), np.flatnonzero(np.diff(data.is_arc.astype(int))) + 1):
+        if data.is_arc[piece[0]]:
+            ends = np.unwrap(np.angle(data.L[piece]))[[0, -1]] / ARCS_ALIKE
+            alike.setdefault(tuple(ends.round().astype(int)), []).append(piece)
+    step = min(RADIUS_STEP, (LAST_RADIUS - ARC_RADIUS) / max(1, len(alike) - 1))
+    for number, pieces in enumerate(alike.values()):
+        piece = pieces[0]
+        angle = np.unwrap(np.angle(data.L[piece]))
+        turn = np.exp(1j * np.interp(np.linspace(0, 1, 61), np.linspace(0, 1, angle.size), angle))
+        ring = (ARC_RADIUS + step * number) * turn
+        whole = np.r_[z[piece[0] - 1 : piece[0]], ring, z[piece[-1] + 1 : piece[-1] + 2]]
+        ax.plot(whole.real, whole.imag, color=BLUE, lw=0.8, ls=(0, (3, 1.5)), zorder=3, label="past poles on the axis")
+        _arrows(ring[1:], np.diff(ring), np.array([30]), ax)
+        if len(pieces) > 1:
+            place = complex(ARC_COUNT * turn[30])
+            ax.text(place.real, place.imag, f"{len(pieces)} ×", fontsize=8.0, color=BLUE, ha="center", va="center")
+    drawn = z[~data.is_arc]
+    way = np.diff(drawn)
+    length = np.cumsum(abs(way))
+    _arrows(drawn[1:], way, np.searchsorted(length, length[-1] * ARROWS_AT), ax)
+
+
+def _arrows(z: Complex, way: Complex, at: NDArray[np.int64], ax: Axes) -> None:
+    """Heads along the curve z with steps `way`."""
+    at = at[way[at] != 0]
+    unit = way[at] / abs(way[at])
+    ax.quiver(
+        z[at].real, z[at].imag, unit.real, unit.imag, angles="xy", pivot="mid", color=BLUE, zorder=4, scale=60,
+        width=0.003, headwidth=9, headlength=10, headaxislength=10,
+    )  # fmt: skip
+
+
+# ------------------------------------------------------------ measured responses
+
+
+def _fit_grid(figure: Figure, fit: Fit) -> Any:
+    return figure.subplots(2, max(1, len(fit.responses)), sharex="col", height_ratios=[1.75, 1.0], squeeze=False)
+
+
+@picture(
+    (Fit, "tfarm.fit returns"), size=lambda fit: (max(7.0, 5.2 * len(fit.responses)), 6.0), grid=_fit_grid,
+    title=lambda fit: f"{fit.before.name}: {fit.verdict}",
+)  # fmt: skip
+def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
+    """Each measured response with the arm's before and after: magnitude over phase, a column a response.
+
+    Phases are broken where they wrap.
+    """
+    count, problem = len(fit.responses), fit.solution.problem
+    curves = ((fit.solution.point * 0, GREY, "start", 1.0), (fit.solution.point, BLUE, "fitted, exact", 1.4))
+    for number, (one, upper, lower) in enumerate(zip(fit.responses, ax[:count], ax[count:], strict=False)):
+        hertz = one.omega / RAD_PER_CYCLE
+        omega = np.unique(np.r_[np.geomspace(one.omega[0], one.omega[-1], FITTED_POINTS), one.omega])
+        upper.plot(hertz, abs(one.values), label="measured", **POINTS)
+        lower.plot(hertz, np.degrees(np.angle(one.values)), **POINTS)
+        for point, colour, label, width in curves:
+            H = problem.at(number, omega).computed(point)[0]
+            upper.plot(omega / RAD_PER_CYCLE, abs(H), color=colour, lw=width, label=label)
+            draw_wrapped(omega / RAD_PER_CYCLE, H, lower, color=colour, lw=width)
+        upper.set(xscale="log", yscale="log", title=one.name, ylabel="" if number else "magnitude, SI")
+        lower.set(xlabel=FREQUENCY_HZ, ylabel="" if number else PHASE)
+        plain_ticks(lower.xaxis, subs=TICKS_A_DECADE)
+
+
+def draw_band(those: Possible, output: str) -> Figure:
+    """Magnitude of a response of the arm that fits best, in the band of all arms that the data leave possible."""
+    ends = [end for each in those.fit.responses for end in each.omega[[0, -1]]]
+    omega = np.geomspace(min(ends), max(ends), POINTS_OF_BAND)
+    least, most, best = response_band(those, output, omega)
+    name = output.replace("_", " ")
+    with page(9.0, 4.6, f"{those.fit.before.name}: {name} of the arms that the data leave possible") as (figure, ax):
+        ax.fill_between(
+            omega / RAD_PER_CYCLE, least, most, color=BLUE, alpha=0.3, lw=0,
+            label=f"all of {len(those.arms)} arms that the data leave possible",
+        )  # fmt: skip
+        ax.plot(omega / RAD_PER_CYCLE, best, color=BLUE, lw=1.3, label="the arm that fits best")
+        ax.set(xscale="log", yscale="log", xlabel=FREQUENCY_HZ, ylabel=f"|{name}|, SI")
+        plain_ticks(ax.xaxis, subs=TICKS_A_DECADE)
+    return figure
+
+
+def draw_share(those: Possible, ranges: Sequence[tuple[float, float]]) -> Figure:
+    """The share of the possible arms that each pair of gains stabilises in continuous time; `ranges` of both gains."""
+    across, up = (np.linspace(*ends, MAP_MESH) for ends in ranges)
+    title = f"{those.fit.before.name}: stabilising gains for the arms that the data leave possible"
+    with page(8.0, 5.0, title) as (figure, ax):
+        mesh = ax.pcolormesh(
+            across, up, share_stable(those, across, up), cmap="Blues", vmin=0.0, vmax=1.0, shading="nearest",
+            rasterized=True,
+        )  # fmt: skip
+        figure.colorbar(mesh, ax=ax).set_label("share of the arms with a stable loop")
+        name_axes(those.fit.arm, ax)
+        ax.grid(False)
+    return figure
+
+
+@picture(
+    (Overlay, "tfarm.overlay returns"), size=(9.0, 7.4), rows=(2.2, 1.2, 0.8),
+    title=lambda data: f"{data.arm.name}: " + f"{data.measured.output} over {data.measured.input}".replace("_", " "),
+)  # fmt: skip
+def measured(data: Overlay, *, ax: Sequence[Axes]) -> None:
+    """Magnitude, phase and coherence (from `tfarm.overlay`), in three axes, those given or new ones: these.
+
+    Phases lie between -180 and 180 degrees, broken where they wrap: a sign that differs is half a turn.  Where no
+    coherence is known the third axes show the noise as a share of the measured value.  Upright lines: the arm's poles,
+    their measured frequencies, and measured peaks far from every pole.
+    """
+    upper, middle, lower = ax
+    one, hertz, size = data.measured, data.measured.omega / RAD_PER_CYCLE, abs(data.measured.values)
+    upper.plot(hertz, size, label="measured", **POINTS)
+    upper.plot(data.omega / RAD_PER_CYCLE, abs(data.curve), color=BLUE, label="exact")
+    within = np.log10([each for each in (*size, np.median(abs(data.curve))) if each > 0])
+    margin = 0.15 + (SPAN - 1) / 2 * np.ptp(within)
+    limits = 10 ** np.array([within.min() - margin, within.max() + margin])
+    upper.yaxis.set_minor_formatter(NullFormatter())
+    paired = [(abs(row.pole) / RAD_PER_CYCLE, row.frequency_ratio) for row in data.modes]
+    upper.set(yscale="log", ylim=limits, ylabel=f"magnitude [{data.ratio.unit}]")
+    guides: tuple[tuple[Any, dict[str, Any]], ...] = (
+        ([pole for pole, _ in paired], {"color": FAINT, "lw": 0.8, "label": "pole of the arm"}),
+        ([pole * ratio for pole, ratio in paired if ratio is not None],
+         {"color": ORANGE, "lw": 0.7, "ls": (0, (2, 3)), "label": "its measured frequency"}),
+        (np.divide(data.unmatched, RAD_PER_CYCLE), {"color": INK, "lw": 0.8, "ls": ":", "label": "peak of no pole"}),
+    )  # fmt: skip
+    for at, looks in guides:
+        for frequency in at:
+            upper.axvline(frequency, zorder=0.6, **looks)
+    middle.plot(hertz, np.degrees(np.angle(one.values)), **POINTS)
+    draw_wrapped(data.omega / RAD_PER_CYCLE, data.curve, middle, color=BLUE)
+    if one.coherence is not None:
+        lower.plot(hertz, one.coherence, color=GREY, lw=1.0)
+        lower.set(ylim=(-0.05, 1.05), ylabel="coherence [-]")
+    else:
+        known = (size > 0) & np.isfinite(data.noise.sigma)
+        lower.plot(hertz[known], data.noise.sigma[known] / size[known], color=GREY, lw=1.0)
+        lower.set(yscale="log", ylabel="noise/value [-]")
+    for each in ax:
+        each.set(xlabel=FREQUENCY_HZ, xscale="log" if hertz[-1] > 5 * hertz[0] else "linear")
+        each.margins(x=0)
+        plain_ticks(each.xaxis, 4, TICKS_A_DECADE)

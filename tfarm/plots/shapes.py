@@ -1,26 +1,30 @@
-"""Pictures of the modes: their shapes, how far the simpler beam theories are off, and frequencies over a parameter."""
+"""Pictures of the arm itself, to scale with its numbers, of its modes, and of the error of simpler beam theories."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import cycle
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
+from matplotlib.ticker import MaxNLocator
 
+from tfarm.arm import Arm, Link
 from tfarm.arrays import Real
-from tfarm.audit.assumptions import Study
-from tfarm.digits import plain, significant
+from tfarm.digits import plain, significant, unit
 from tfarm.spectrum import Modes
 
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, page, picture
+from .style import BLUE, FAINT, GREEN, GREY, INK, ORANGE, PURPLE, page, picture, plain_ticks
 
 SHAPE_POINTS = 401  # of a drawn mode: about one to a pixel of its picture
 ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [-]"
-CURVE_COLOURS = (BLUE, ORANGE, GREEN, PURPLE)  # of natural frequencies, from the first mode on
+HUB_RADIUS = 0.055  # radius of the drawn hub, and half the payload's side, as shares of the length
+SEGMENT_COLOURS = ("#cfe0ee", "#e3ecd5")  # colours of neighbours
+LEFT, RIGHT, HALF_HEIGHT = -0.2, 0.2, 0.16  # room left of the hub, right of the tip, and above and below at least
 HUB_WIDTH = 0.06  # width of the drawn hub, as a share of the length
 
 
@@ -34,58 +38,42 @@ def scaled(found: Modes, count: int) -> dict[int, Real]:
     return {number: w / (float(abs(w).max()) or 1.0) for number, w in rows if 0 < number <= count}
 
 
+def _rows(found: Modes) -> int:
+    return math.ceil((found.index > 0).sum() / 2)
+
+
 def _grid(figure: Figure, found: Modes) -> None:
-    count = _flexible(found)
-    axes = figure.subplots(math.ceil(count / 2), 2, sharex=True, sharey=True).ravel()
-    for ax in axes[count:]:
+    for ax in figure.subplots(_rows(found), 2, sharey=True).ravel()[(found.index > 0).sum() :]:
         ax.remove()
-    for ax in axes[max(0, count - 2) : count]:
-        ax.tick_params(labelbottom=True)
+    figure.supxlabel(ALONG, fontsize=10.0, color=INK)
     figure.supylabel(DISPLACEMENT, fontsize=10.0, color=INK)
 
 
-def _flexible(found: Modes) -> int:
-    return int((found.index > 0).sum())
-
-
 @picture(
-    (Modes, "tfarm.modes returns"), size=lambda found: (9.0, 0.7 + 1.75 * math.ceil(_flexible(found) / 2)),
+    (Modes, "tfarm.modes returns"), size=lambda found: (9.0, 0.8 + 1.9 * _rows(found)),
     grid=_grid, title=lambda found: f"{found.arm.name}: mode shapes",
 )  # fmt: skip
 def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
-    """The shapes of flexible modes (what `tfarm.modes` returns), an axes each, in those given or in new ones; these.
+    """The shapes of flexible modes (from `tfarm.modes`), an axes each, in those given or in new ones; these.
 
     Displacement along the arm [m], largest 1, with the places of the nodes [m].  Of more modes than axes the first are
     drawn.
     """
-    payload, length, count = found.arm.payload, found.arm.length, _flexible(found)
-    for one, (number, w) in zip(ax, scaled(found, count).items(), strict=False):
+    payload, length = found.arm.payload, found.arm.length
+    for one, (number, w) in zip(ax, scaled(found, len(ax)).items(), strict=False):
         row = int(np.flatnonzero(found.index == number)[0])
-        _draw_shape(w, found.nodes[row], length, payload.mass > 0 or payload.inertia > 0, one)
+        one.axhline(0.0, color=GREY, lw=0.8)
+        one.plot(np.linspace(0.0, length, w.size), w, color=BLUE, lw=1.8)
+        one.add_patch(Rectangle((-HUB_WIDTH * length, -0.25), HUB_WIDTH * length, 0.5, fc=GREY, ec="none", zorder=3))
+        if payload.mass > 0 or payload.inertia > 0:
+            one.plot(length, w[-1], "s", ms=8.0, mfc=GREY, mec="none", zorder=3)
+        one.plot(found.nodes[row], 0 * found.nodes[row], "o", ms=5.5, mfc="white", mec=ORANGE, mew=1.3, zorder=4)
+        one.set(xlim=(-0.085 * length, 1.11 * length), ylim=(-1.28, 1.28), yticks=[-1, 0, 1])
         omega, hertz = (significant(float(of[row]), 7) for of in (found.natural_frequency, found.natural_frequency_hz))
-        one.set_title(f"Mode {number}:  {omega} rad/s  ({hertz} Hz)", fontsize=9.5)
-        is_own = bool(one.figure.get_supylabel())
-        one.set(xlabel=ALONG if not is_own or number > count - 2 else "", ylabel="" if is_own else DISPLACEMENT)
-
-
-def _draw_shape(w: Real, nodes: Real, length: float, has_payload: bool, ax: Axes) -> None:
-    """One mode: its line, the arm at rest, hub, payload, and the nodes with their places."""
-    x = np.linspace(0.0, length, w.size)
-    ax.axhline(0.0, color=GREY, lw=0.8)
-    ax.plot(x, w, color=BLUE, lw=1.8)
-    ax.add_patch(Rectangle((-HUB_WIDTH * length, -0.25), HUB_WIDTH * length, 0.5, fc=GREY, ec="none", zorder=3))
-    if has_payload:
-        ax.plot(length, w[-1], "s", ms=8.0, mfc=GREY, mec="none", zorder=3)
-    ax.plot(nodes, np.zeros(len(nodes)), "o", ms=5.5, mfc="white", mec=ORANGE, mew=1.3, zorder=4)
-    decimals = max(0, 3 - round(math.log10(length)))
-    for node in nodes:  # its place [m] at its right, on the side of the line that the curve leaves free
-        rises = np.interp(node + 0.01 * length, x, w) > np.interp(node - 0.01 * length, x, w)
-        if round(float(node), decimals) > 0:
-            ax.annotate(
-                f"{node:.{decimals}f}", (node, 0.0), textcoords="offset points", xytext=(4, -6 if rises else 6),
-                va="top" if rises else "bottom", fontsize=7.5, color=ORANGE,
-            )  # fmt: skip
-    ax.set(xlim=(-0.085 * length, 1.11 * length), ylim=(-1.28, 1.28), yticks=[-1, 0, 1])
+        places = ", ".join(plain(float(node), 3) for node in found.nodes[row]) or "none"
+        one.set_title(f"Mode {number}:  {omega} rad/s  ({hertz} Hz)\nnodes [m]: {places}", fontsize=9.5)
+        if not one.figure.get_supylabel():
+            one.set(xlabel=ALONG, ylabel=DISPLACEMENT)
 
 
 def draw_differences(name: str, differences: Mapping[str, Real]) -> Figure:
@@ -94,57 +82,108 @@ def draw_differences(name: str, differences: Mapping[str, Real]) -> Figure:
     with page(9.0, 3.6, f"{name}: simpler beam theories against the Timoshenko theory") as (figure, ax):
         for theory, values in differences.items():
             color, marker = looks[theory]
-            numbers = np.arange(1, len(values) + 1)
-            ax.plot(numbers, values, marker=marker, ms=5, lw=1.2, color=color, label=theory_name(theory))
+            ax.plot(
+                np.arange(1, len(values) + 1), values, marker=marker, ms=5, lw=1.2, color=color,
+                label=theory_name(theory),
+            )  # fmt: skip
         if all((values > 0).all() for values in differences.values()):
             ax.set_yscale("log")
-            ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: plain(y, 3)))
+            plain_ticks(ax.yaxis)
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         ax.set(xlabel="mode", ylabel="frequency above Timoshenko's [%]")
-        ax.legend(loc="upper left")
     return figure
 
 
 def theory_name(theory: str) -> str:
     """As a person writes it: Euler-Bernoulli, Rayleigh, shear, Timoshenko."""
-    names = {"timoshenko": "Timoshenko", "rayleigh": "Rayleigh", "euler-bernoulli": "Euler-Bernoulli"}
-    return names.get(theory, theory)
+    return theory if theory == "shear" else theory.title()
 
 
-def draw_over(curve: Study, study: Study, label: str) -> Figure:
-    """Frequencies over one assumed parameter: curves, the candidates of the table as rings, the arm itself filled."""
-    is_own, x, candidates = study.is_own, curve.values, study.values
-    parameter = "hub inertia" if study.pinned.size else "depth of the section, at this area"
-    title = f"{study.arm.name}: natural frequencies over the {parameter}"
-    with page(9.0, 4.6, title) as (figure, ax):
-        ax.set(xscale="log", yscale="log", xlabel=label, ylabel="natural frequency [rad/s]")
-        ax.axvline(candidates[is_own][0], color=INK, lw=1.0, ls=(0, (4, 3)), zorder=1.5)
-        for number, (color, omega) in enumerate(zip(CURVE_COLOURS, curve.natural_frequency.T, strict=True), 1):
-            ax.plot(x, omega, color=color)
-            marked = study.natural_frequency[:, number - 1]
-            ax.plot(candidates[~is_own], marked[~is_own], "o", ms=4.5, mfc="white", mec=color, mew=1.1)
-            ax.plot(candidates[is_own], marked[is_own], "o", ms=7.0, mfc=color, mec="white", mew=0.8, zorder=4)
-            ax.annotate(
-                f"mode {number}", (candidates[-1], marked[-1]), textcoords="offset points", xytext=(8, 0), va="center",
-                color=color, fontsize=9.0,
-            )  # fmt: skip
-        if study.pinned.size:
-            _mark_limits(study.pinned, study.locked, ax)
-        ax.margins(y=0.09)
-        for axis in (ax.xaxis, ax.yaxis):
-            axis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0)))
-            axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, 3)))
-            axis.set_minor_formatter(NullFormatter())
-        span = float(x[-1] / x[0])
-        ax.set_xlim(x[0] / span**0.06, x[-1] * span**0.13)  # room for the bars, and for these and the modes' names
-    return figure
+# ------------------------------------------------------------ the arm
 
 
-def _mark_limits(pinned: Real, locked: Real, ax: Axes) -> None:
-    """Short bars at the left edge for the free pin, at the right edge for the locked hub."""
-    for omegas, low, high in ((pinned, 0.0, 0.018), (locked, 0.982, 1.0)):
-        for color, omega in zip(CURVE_COLOURS, omegas, strict=True):
-            if omega > 0:  # the first of an arm that its tip holds falls to 0: beyond a logarithmic axis
-                ax.axhline(omega, low, high, color=color, lw=2.4)
-    for place, text, side in ((0.0, "free pin", "left"), (1.0, "locked hub", "right")):
-        ax.text(place, 1.015, text, transform=ax.transAxes, ha=side, fontsize=9.0, color=GREY)
+def _ends(arm: Arm) -> tuple[float, float, float, float]:
+    """Left, right, bottom and top of the picture, in lengths of the link."""
+    tip = 1 + (arm.hub.radius + max(0.0, arm.payload.offset)) / arm.length
+    half = max(HALF_HEIGHT, max(map(_depth, arm.links)) / arm.length / 2 + 0.09)
+    return LEFT, tip + RIGHT, -half, half
+
+
+def _depth(link: Link) -> float:
+    """The depth [m] of one segment: that of its shape, or sqrt(12) times the radius of gyration, as of a rectangle."""
+    sizes = dict(link.section.dimensions)
+    own = sizes.get("depth") or sizes.get("diameter") or sizes.get("outer_diameter")
+    return own or math.sqrt(12) / link.slenderness * link.length
+
+
+@picture(
+    (Arm, "tfarm.load returns"),
+    size=lambda arm: (9.0, 0.2 + 9.0 * np.ptp(_ends(arm)[2:]) / np.ptp(_ends(arm)[:2])),
+    title=lambda _: "",
+)
+def sketch(arm: Arm, *, ax: Axes) -> None:
+    """Hub, link and payload from the side, lengths in shares of the link's, in the axes given or new ones; the axes."""
+    left, right, low, high = _ends(arm)
+    ax.set(aspect="equal", xlim=(left, right), ylim=(low, high))
+    ax.set_axis_off()
+    ax.axhline(0, color=FAINT, lw=0.8, ls=(0, (6, 3, 1, 3)), zorder=0)
+    _link(arm, ax)
+    _payload(arm, ax)
+    ax.add_patch(Circle((0, 0), HUB_RADIUS, fc="#e9e9e9" if arm.hub.inertia else "white", ec=INK, lw=1.2, zorder=3))
+    ax.plot(0, 0, "o", ms=3.5, color=INK, zorder=4)
+    turn: dict[str, Any] = {
+        "connectionstyle": "arc3,rad=0.75",
+        "arrowstyle": "-|>",
+        "mutation_scale": 11,
+        "color": ORANGE,
+        "lw": 1.3,
+    }
+    ax.add_patch(FancyArrowPatch((0.085, -0.055), (-0.055, 0.085), zorder=4, **turn))
+    ax.text(-0.07, 0.08, "θ" if arm.is_locked else "u", color=ORANGE, ha="right", va="bottom", fontsize=11)
+    text = (
+        f"hub  $I_h$ = {plain(arm.hub.inertia, 6)} {unit('kg m^2')}" if arm.hub.inertia else "free pin, no hub inertia"
+    )
+    text = "hub locked: driven by its angle" if arm.is_locked else text
+    ax.text(0.13, high - 0.04, text, fontsize=9.0, color=INK)
+
+
+def _link(arm: Arm, ax: Axes) -> None:
+    """The segments with everything mounted on them, and their length below."""
+    root = start = arm.hub.radius / arm.length
+    for link, colour in zip(arm.links, cycle(SEGMENT_COLOURS), strict=False):
+        share, height = (link.length / arm.length if arm.outer else 1.0), _depth(link) / arm.length
+        ax.add_patch(Rectangle((start, -height / 2), share, height, fc=colour, ec=BLUE, lw=1.0, zorder=2))
+        start += share
+    ax.plot([0, root], [0, 0], color=INK, lw=4.0, solid_capstyle="butt", zorder=1.5)
+    if not arm.clamp.is_rigid:
+        ax.plot([root], [0], "o", ms=7.0, mfc="white", mec=ORANGE, mew=1.4, zorder=5)
+    ax.plot([root + each.x / arm.length for each in arm.attachments], [0] * len(arm.attachments), "o", ms=5.0,
+            color=INK, zorder=5)  # fmt: skip
+    deepest = max(map(_depth, arm.links))
+    below = -max(deepest / arm.length / 2, HUB_RADIUS) - 0.035
+    ax.annotate("", (root, below), (root + 1, below), arrowprops={"arrowstyle": "<->", "color": GREY, "lw": 0.8})
+    depths = (
+        f"{len(arm.links)} segments, at most {plain(deepest, 4)} m deep"
+        if arm.outer
+        else f"depth {plain(deepest, 4)} m"
+    )
+    radius = f",  r = {plain(arm.hub.radius, 6)} m" if root else ""
+    text = f"L = {plain(arm.length, 6)} m,  {depths} (to scale){radius}"
+    ax.text(root + 0.5, below - 0.012, text, ha="center", va="top", fontsize=9.0, color=INK)
+
+
+def _payload(arm: Arm, ax: Axes) -> None:
+    """The mass at the tip, or beyond it, with its numbers; a triangle below one that is pinned."""
+    mass, inertia, offset = arm.payload.mass, arm.payload.inertia, arm.payload.offset
+    tip = 1 + arm.hub.radius / arm.length
+    at = tip + offset / arm.length
+    text = "free tip, no payload"
+    if mass or inertia:
+        masses = "tip pinned" if math.isinf(mass) else f"m = {plain(mass, 6)} kg"
+        turns = "tip cannot rotate" if math.isinf(inertia) else f"$I_c$ = {plain(inertia, 6)} {unit('kg m^2')}"
+        text = f"payload  {masses},  {turns}" + (f",  e = {plain(offset, 6)} m" if offset else "")
+        side = max(0.03, min(HUB_RADIUS, max(map(_depth, arm.links)) / arm.length * 0.75))
+        ax.plot([tip, at], [0, 0], color=INK, lw=2.0, zorder=2.5)
+        ax.add_patch(Rectangle((at - side, -side), 2 * side, 2 * side, fc="#8c8c8c", ec=INK, lw=1.0, zorder=3))
+    _, right, _, high = _ends(arm)
+    ax.text(right - 0.15, high - 0.04, text, ha="right", fontsize=9.0, color=INK)

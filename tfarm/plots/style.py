@@ -1,26 +1,38 @@
-"""What all pictures share: one style, whatever the user's own matplotlib settings are, and figures to draw on.
+"""The common style of all pictures, whatever the user's own matplotlib settings are, figures to draw on, and files.
 
-A page's figure (`blank`) knows nothing of pyplot: nothing global, nothing on a screen.  One that is asked for without
-`ax` (`window`) is pyplot's, so that a notebook shows it.
+The figure of a page does not touch pyplot: nothing global, nothing on a screen.  A picture drawn without `ax` is a
+figure of pyplot, so that a notebook shows it.  The same figure gives the same bytes on every run: fixed fonts, a fixed
+salt, no dates.
 """
 
 from __future__ import annotations
 
+import io
+import re
+import textwrap
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import wraps
-from typing import Any, Protocol, cast
+from functools import partial, wraps
+from pathlib import Path
+from typing import Any, Protocol, cast, get_args
 
 import matplotlib.style
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure as Figure  # which pages name too
-from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from tfarm.arm import GAINS, LISTED, PLANE, AnyLaw, Arm, as_law, shown_unit
+from tfarm.digits import plain
 from tfarm.errors import ParameterError
+from tfarm.files import write_file
+from tfarm.schema import quantities
 
 INK, GREY, FAINT = "#1a1a1a", "#6b6b6b", "#d4d4d4"
-BLUE, ORANGE, GREEN, PURPLE = "#0060a8", "#c4500a", "#00795a", "#8a3b8f"  # told apart by the colour-blind too
+BLUE, ORANGE, GREEN, PURPLE = "#0060a8", "#c4500a", "#00795a", "#8a3b8f"  # distinct for the colour-blind too
+COLOURS = (BLUE, ORANGE, GREEN, PURPLE)  # of several records in one picture
 
 STYLE = {
     "font.family": "DejaVu Sans",
@@ -34,7 +46,7 @@ STYLE = {
     "axes.labelcolor": INK,
     "axes.linewidth": 0.8,
     "axes.grid": True,
-    "axes.formatter.useoffset": False,  # ticks are read as they stand, with no "+3.322e4" to add
+    "axes.formatter.useoffset": False,  # full numbers at the ticks, with no "+3.322e4" to add
     "axes.axisbelow": True,
     "grid.color": "#e6e6e6",
     "grid.linewidth": 0.6,
@@ -47,6 +59,8 @@ STYLE = {
     "lines.linewidth": 1.5,
     "legend.fontsize": 9.0,
     "legend.frameon": False,
+    "figure.constrained_layout.w_pad": 0.08,
+    "figure.constrained_layout.h_pad": 0.08,
     "savefig.facecolor": "white",
     "svg.hashsalt": "tfarm",
     "svg.fonttype": "path",
@@ -55,46 +69,34 @@ STYLE = {
 }
 
 WIDEST_LEGEND = 0.95  # of a figure's width: letters are a little wider or narrower in a file of other dots an inch
-Keys = tuple[list[Line2D], list[str]]  # of a legend
-New = Callable[[float, float], Figure]  # how a figure of that width and height [inches] is made
+LETTERS_PER_INCH = 11.5  # of a headline
+
+LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)  # proven by the argument of the paper at C = 0
+NOT_THE_PAPERS = ("hub_angle",)  # outputs whose gain is an extension of the paper's law: named where it is used
+
+METADATA: dict[str, dict[str, str | None]] = {
+    "svg": {"Date": None, "Creator": "tfarm"},
+    "png": {"Software": "tfarm"},
+}
+PICTURE_DOTS = 160  # an inch, of a PNG: lines of 0.6 points are more than a pixel wide
+COORDINATES, LONG_NUMBER = re.compile(rb'(?<= [dxy]=")[^"]+'), re.compile(rb"-?\d+\.\d{3,}")  # in an SVG
 
 
-@contextmanager
-def style() -> Iterator[None]:
-    """The house style, whatever the user's own matplotlib settings are."""
-    with matplotlib.style.context(["default", STYLE]):
-        yield
+style = partial(matplotlib.style.context, ["default", STYLE])  # whatever the user's own settings are
 
 
-def must_be(kind: Any, value: object, wanted: str) -> None:
-    """Raise ParameterError for what is no record of that kind, or several, saying which is `wanted`."""
-    values = list(value.values()) if isinstance(value, Mapping) else value
-    for each in (values or [None]) if isinstance(values, list | tuple) else [values]:
-        if not isinstance(each, kind):
-            raise ParameterError(key="plot", value=each, remedy=f"give what {wanted}")
-
-
-def blank(width: float, height: float) -> Figure:
+def blank(width: float, height: float, new: Callable[..., Figure] = Figure) -> Figure:
     """An empty figure of that size [inches], its parts laid out so that no label is clipped."""
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.get_layout_engine().set(w_pad=0.08, h_pad=0.08)  # type: ignore[union-attr, call-arg]
-    return figure
-
-
-def window(width: float, height: float) -> Figure:
-    """The same as a figure of pyplot's, which a notebook or `pyplot.show` shows."""
-    from matplotlib import pyplot  # not needed, and not loaded, for a page
-
-    return pyplot.figure(figsize=(width, height), layout="constrained")
+    return new(figsize=(width, height), layout="constrained")
 
 
 @contextmanager
 def page(width: float, height: float, title: str, **grid: Any) -> Iterator[tuple[Figure, Any]]:
-    """A figure of that size [inches] with axes as `subplots` makes them of `grid`, to draw on; then its headline."""
+    """A figure of that size [inches] with axes as `subplots` makes them of `grid`; after drawing, legend and title."""
     with style():
         figure = blank(width, height)
         yield figure, figure.subplot_mosaic(**grid) if "mosaic" in grid else figure.subplots(**grid)
+        legend_below(figure)
         headline(figure, title)
 
 
@@ -107,53 +109,57 @@ class Drawing(Protocol):
         """Draw it."""
 
 
-FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the kind of a record what draws it on a figure of its own
+FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the class of a record the picture of it as a figure of its own
 
 
 def picture(
-    *of: tuple[Any, str], size: Any = (7.0, 5.4), title: Callable[..., str], rows: Sequence[float] = (1.0,),
-    grid: Callable[..., Any] | None = None, keys: bool = False,
-) -> Callable[[Callable[..., Keys | None]], Drawing]:  # fmt: skip
+    *of: tuple[Any, str], title: Callable[..., str], size: Any = (7.0, 5.4), rows: Sequence[float] = (1.0,),
+    grid: Callable[..., Any] | None = None,
+) -> Callable[[Callable[..., None]], Drawing]:  # fmt: skip
     """Make of a function that draws records in `ax` (its axes, or a list of several) a `Drawing`.
 
     Parameters
     ----------
     of
-        Kind of each record, and what returns one ("tfarm.bode returns"): others are refused by ParameterError.
-    size
-        Width and height [inches] of a figure of its own, or a function of the records.
+        Class of each record, and its origin ("tfarm.bode returns"): other objects are refused by ParameterError.  Of
+        several records, in a list or by name, each is checked.
     title
         A function of the records: the headline of that figure.
+    size
+        Width and height [inches] of a figure of its own, or a function of the records.
     rows
         Relative heights of axes above each other; a `grid` of axes is a function of the figure and the records.
-    keys
-        Whether that figure has a legend: of all labels, or of what the function returns.
     """
 
-    def decorated(draw: Callable[..., Keys | None]) -> Drawing:
+    def decorated(draw: Callable[..., None]) -> Drawing:
         is_one = grid is None and len(rows) == 1
 
-        def figure(*found: Any, new: New = blank, **how: Any) -> Figure:
+        def figure(*found: Any, new: Callable[..., Figure] = Figure, **how: Any) -> Figure:
             with style():
-                drawn = new(*(size(*found) if callable(size) else size))
+                width, height = size(*found) if callable(size) else size
+                drawn = blank(width, height, new)
                 if grid is None:
                     drawn.subplots(len(rows), 1, sharex=True, height_ratios=rows)
                 else:
                     grid(drawn, *found)
-                told = draw(*found, ax=drawn.axes[0] if is_one else drawn.axes, **how)
+                draw(*found, ax=drawn.axes[0] if is_one else drawn.axes, **how)
                 for ax in drawn.axes[:-1] if grid is None else []:
                     ax.set_xlabel("")
-                if told or (keys and any(ax.get_legend_handles_labels()[0] for ax in drawn.axes)):
-                    legend_below(drawn, told)
+                legend_below(drawn)
                 headline(drawn, title(*found))
             return drawn
 
         @wraps(draw)
         def shown(*found: Any, ax: Any = None, **how: Any) -> Any:
-            for (kind, wanted), value in zip(of, found, strict=False):
-                must_be(kind, value, wanted)
+            for (kind, origin), value in zip(of, found, strict=False):
+                values = list(value.values()) if isinstance(value, Mapping) else value
+                for each in (values or [None]) if isinstance(values, list | tuple) else [values]:
+                    if not isinstance(each, kind):
+                        raise ParameterError(key="plot", value=each, remedy=f"give what {origin}")
             if ax is None:
-                axes = figure(*found, new=window, **how).axes
+                from matplotlib import pyplot  # not needed, and not loaded, for a page
+
+                axes = figure(*found, new=pyplot.figure, **how).axes
                 return axes[0] if is_one else tuple(axes)
             axes = list(np.ravel(np.asarray(ax, dtype=object)))
             if grid is None and len(axes) != len(rows):
@@ -163,31 +169,107 @@ def picture(
                 draw(*found, ax=axes[0] if is_one else axes, **how)
             return axes[0] if is_one else tuple(axes)
 
-        if len(of) == 1:
-            FIGURES[of[0][0]] = figure
+        for kind in get_args(of[0][0]) or (of[0][0],) if len(of) == 1 else ():
+            FIGURES[kind] = figure
         shown.figure = figure  # type: ignore[attr-defined]
         return cast("Drawing", shown)
 
     return decorated
 
 
-def legend_below(figure: Figure, keys: Keys | None = None) -> None:
-    """A legend of all labels, or of `keys`, below the axes, in as many columns, up to five, as fit into the figure."""
-    for number in (5, 3, 2, 1):
+def legend_below(figure: Figure) -> None:
+    """A legend, below the axes, of all labels that no axes has in a legend of its own; in as many columns as fit."""
+    each = (ax.get_legend_handles_labels() for ax in figure.axes if ax.get_legend() is None)
+    keys = {label: handle for own in each for handle, label in zip(*own, strict=True)}
+    for number in (5, 3, 2, 1) if keys else ():
         legend = figure.legend(
-            *(keys or ()), loc="outside lower left", ncols=number, fontsize=8.2, handlelength=1.8, columnspacing=1.2
-        )
-        width = legend.get_window_extent().width
-        if number == 1 or width < WIDEST_LEGEND * figure.bbox.width:
+            keys.values(), keys, loc="outside lower left", ncols=number, fontsize=8.2,
+            handlelength=1.8, columnspacing=1.2,
+        )  # fmt: skip
+        if number == 1 or legend.get_window_extent().width < WIDEST_LEGEND * figure.bbox.width:
             return
         legend.remove()
 
 
 def headline(figure: Figure, text: str) -> None:
-    """One line above everything, at the left."""
+    """Text above everything, at the left, in lines that fit."""
+    text = textwrap.fill(text.replace(" = ", "\u00a0=\u00a0"), round(LETTERS_PER_INCH * figure.get_figwidth()))
     figure.suptitle(safe(text), x=0.012, ha="left", fontsize=10.5, color=INK)
+
+
+def by_name(records: Any, name: str = "") -> Mapping[str, Any]:
+    """Several records as they are, or one under this name."""
+    return records if isinstance(records, Mapping) else {name: records}
 
 
 def safe(text: str) -> str:
     """A name that a person gave as a picture shows it: a dollar begins no formula."""
     return text.replace("$", r"\$")
+
+
+def axis_label(kind: Any, name: str) -> str:
+    """Label and unit of a quantity as its class of records declares it."""
+    of = quantities(kind)[name]
+    return f"{of.label} [{of.unit}]"
+
+
+def plain_ticks(axis: Axis, digits: int = 3, subs: Sequence[float] = (1.0,)) -> None:
+    """Numbers at the major ticks without powers of ten, none at the minor ones; `subs` of each decade on a log axis."""
+    if axis.get_scale() == "log":
+        axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_major_formatter(FuncFormatter(lambda x, _: plain(x, digits)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def gains_words(law: AnyLaw, digits: int = 4, but: str = "") -> str:
+    """Each gain with its value, for reading; `but` names one that varies and is left out.  Another law by its name."""
+    any_law = as_law(law)
+    if any_law.gains is None:
+        return f"{any_law.name}, of {', '.join(any_law.signals)}"
+    gains = any_law.gains
+    named = [gain.name for gain in LISTED if gains[gain.name] or gain.output not in NOT_THE_PAPERS]
+    return ", ".join(f"{name} = {plain(gains[name], digits)}" for name in named if name != but)
+
+
+def name_axes(arm: Arm, ax: Axes) -> None:
+    """Along the axes of the plane of gains: their names, their signals and their units."""
+    outputs = {gain.name: gain.output.replace("_", " ") for gain in GAINS}
+    across, up = (f"{name}, gain on the {outputs[name]} [{shown_unit(name, arm) or '−'}]" for name in PLANE)
+    ax.set(xlabel=across, ylabel=up)
+
+
+# ------------------------------------------------------------ files
+
+
+def save_figure(figure: Figure, folder: Path, stem: str, formats: tuple[str, ...], dpi: int = PICTURE_DOTS) -> None:
+    """The figure as folder/stem.svg and .png, or as one of these."""
+    for kind, content in zip(formats, _drawn(figure, formats, dpi), strict=True):
+        (folder / f"{stem}.{kind}").write_bytes(content)
+
+
+def save_png(figure: Figure, path: Path) -> None:
+    """The figure as one PNG file, written whole.  Raises ParameterError, naming --png, where it cannot."""
+    (content,) = _drawn(figure, ("png",), PICTURE_DOTS)
+    write_file(path, content, key="--png")
+
+
+def _drawn(figure: Figure, formats: tuple[str, ...], dpi: int) -> Iterator[bytes]:
+    """The figure in each format, its layout made once for all of them.
+
+    In an SVG coordinates have two decimals of a point, a 60th of a pixel, where matplotlib writes six.
+    """
+    with style(), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing")  # an arm's name may hold any letter
+        if (layout := figure.get_layout_engine()) is not None:
+            layout.execute(figure)
+            figure.set_layout_engine(None)
+        for ax in figure.axes:  # at ten digits: the layout's solver orders by address, so its last bit differs
+            left, bottom, width, height = (round(float(x), 10) for x in ax.get_position(original=True).bounds)
+            ax.set_position((left, bottom, width, height))
+        for kind in formats:
+            content = io.BytesIO()
+            figure.savefig(content, format=kind, dpi=dpi, metadata=METADATA[kind])
+            short = COORDINATES.sub(
+                lambda part: LONG_NUMBER.sub(lambda x: b"%.2f" % float(x[0]), part[0]), content.getvalue()
+            )
+            yield short if kind == "svg" else content.getvalue()

@@ -14,7 +14,7 @@ from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, implausible, input_words, uni
 from tfarm.arm.writing import number_unit, to_toml
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant, singly, unit
-from tfarm.plots.sketch import sketch
+from tfarm.plots.shapes import sketch
 from tfarm.report.sections import Fact, PageSection, Picture
 from tfarm.schema import Quantity, table
 

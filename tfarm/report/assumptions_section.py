@@ -12,9 +12,8 @@ from tfarm.audit.assumptions import (
     hub_study,
     section_study,
 )
-from tfarm.columns import Column, Table
+from tfarm.columns import Table
 from tfarm.digits import fixed, plain, significant
-from tfarm.plots.shapes import CURVE_COLOURS, draw_over
 from tfarm.report.arm_section import is_from_paper
 from tfarm.report.sections import PageSection, Picture
 from tfarm.schema import table
@@ -49,29 +48,17 @@ HUB_TABLE = (
     "Sensitivity: per cent of natural frequency for one per cent more of I_h, all else "
     "held, exact. The closer to zero, the less that frequency depends on the hub."
 )
-CURVE_POINTS = 49  # of each curve, which bends slowly on two logarithmic axes
-
-SECTION_PICTURE = (
-    "First natural frequencies over the depth of a rectangle of this area, exact (C = 0), both axes logarithmic. The "
-    "dashed line and the filled dots are this arm{equivalent}. As long as the arm is slender all curves rise in "
-    "proportion to the depth; they bend where shear and rotary inertia begin to tell."
-)
-EQUIVALENT = " (as the rectangle with its area and second moment; shear factor unchanged)"
-HUB_PICTURE = (
-    "First natural frequencies over the hub inertia, exact (C = 0), both axes logarithmic. The dashed line and the "
-    "filled dots are this arm. Bars at the edges are the limits of each mode: a free pin (left), a locked hub (right)."
-)
 
 
 def assumptions_section(arm: Arm) -> PageSection:
-    """Frequencies over depth and over hub inertia, with sensitivities, each as a picture and as a table."""
+    """Frequencies over depth and over hub inertia, with sensitivities, each as a table."""
     title = "What the assumptions do"
     if not arm.is_uniform:
         return PageSection(anchor="assumptions", title=title, words=(OF_ONE_BEAM,))
     section = section_study(arm)
     area, slope = plain(arm.link.section.area, 4), fixed(2 * section.sensitivity[section.is_own][0, :1], 3)[0]
     words = [opening(arm), SECTION_WORDS.format(area=area, slope=slope, **_ends(section.values, section))]
-    blocks: list[Picture | Table] = [section_picture(section)]
+    blocks: list[Picture | Table] = []
     title_of = "Candidate sections: rectangles of this area"
     blocks.append(table(section.candidates, stem="assumptions-section", title=title_of, caption=SECTION_TABLE))
     if has_hub_inertia(arm):
@@ -79,7 +66,6 @@ def assumptions_section(arm: Arm) -> PageSection:
         limits = {"locked": significant(float(hub.locked[0]), 5), "pinned": significant(float(hub.pinned[0]), 5)}
         slope = fixed(hub.sensitivity[hub.is_own][0, :1], 3)[0]
         words.append(HUB_WORDS.format(slope=slope, **limits, **_ends(hub.values, hub)))
-        blocks.append(hub_picture(hub))
         of_hub = {"stem": "assumptions-hub", "title": "Candidate hub inertias", "caption": HUB_TABLE}
         blocks.append(table(hub.candidates, **of_hub))
     else:
@@ -108,42 +94,3 @@ def _ends(values: Real, study: Study) -> dict[str, str]:
     return {name: plain(float(x), 4) for name, x in texts.items()} | {
         name: significant(float(x), 5) for name, x in frequencies.items()
     }
-
-
-# ------------------------------------------------------------ pictures
-
-
-def section_picture(study: Study) -> Picture:
-    """Frequencies over the depth of the section."""
-    curve = section_study(study.arm, _between(study.values))
-    depth = Column("depth_m", "depth of the rectangle, in the plane of bending", "m", of=curve.values)
-    equivalent = "" if study.arm.link.section.shape == "rectangle" else EQUIVALENT
-    return _picture("depth", SECTION_PICTURE.format(equivalent=equivalent), depth, curve, study)
-
-
-def hub_picture(study: Study) -> Picture:
-    """Frequencies over the hub inertia."""
-    curve = hub_study(study.arm, _between(study.values))
-    inertia = Column("hub_inertia_kg_m2", "hub inertia", "kg m²", of=curve.values)
-    return _picture("inertia", HUB_PICTURE, inertia, curve, study)
-
-
-def _picture(stem: str, caption: str, x: Column, curve: Study, study: Study) -> Picture:
-    """The curves over x, and the candidates on them."""
-    ends = _ends(study.values, study)
-    modes = (Column(f"mode_{i}_rad_s", f"mode {i}", "rad/s", of=omega)
-             for i, omega in enumerate(curve.natural_frequency.T, 1))  # fmt: skip
-    return Picture(
-        stem=f"assumptions-{stem}",
-        title=f"Natural frequencies over the {x.title.partition(',')[0]}",
-        caption=caption,
-        alt=f"Natural frequencies 1 to {len(CURVE_COLOURS)} over the {x.title}; the first between {ends['low']} and "
-        f"{ends['high']} rad/s.",
-        figure=draw_over(curve, study, f"{x.title} [{x.unit}]"),
-        data=Table(stem=f"assumptions-{stem}-data", title="Natural frequencies", columns=(x, *modes)),
-    )
-
-
-def _between(values: Real) -> list[float]:
-    """The range of the candidates, evenly on a logarithmic axis."""
-    return [float(x) for x in np.geomspace(values.min(), values.max(), CURVE_POINTS)]

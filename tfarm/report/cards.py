@@ -12,8 +12,8 @@ from tfarm.arm import PLANE, Arm
 from tfarm.digits import plain
 from tfarm.dsp import Chain
 from tfarm.errors import TfarmError
-from tfarm.plots.files import save_figure
 from tfarm.plots.frequency import draw_card
+from tfarm.plots.style import save_figure
 from tfarm.report.arm_section import headline_numbers
 from tfarm.report.cases import GivenLaw, LawOnArm, brief_on, cases_of, has_loop, margins_of
 from tfarm.report.page import QUESTIONS, summary

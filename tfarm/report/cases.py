@@ -18,7 +18,7 @@ from tfarm.fitting.fit import Fit
 from tfarm.fitting.recording import MeasuredRun
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import Margins, margins
-from tfarm.plots.words import gains_words
+from tfarm.plots.style import gains_words
 from tfarm.records import record
 from tfarm.report.sections import typeset
 from tfarm.response.controller import sign_of

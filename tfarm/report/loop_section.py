@@ -17,8 +17,7 @@ from tfarm.loop.nyquist import Nyquist, nyquist_of
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.loop.spill import Spill, spill
 from tfarm.loop.theorem import lyapunov, signs_of_loop
-from tfarm.plots.disc import draw_nyquist
-from tfarm.plots.frequency import draw_loop
+from tfarm.plots.frequency import draw_loop, draw_nyquist
 from tfarm.report.cases import GivenLaw, LawOnArm, brief_on, continuous_cases, margins_of, why_no_loop
 from tfarm.report.sections import Fact, PageSection, Picture, typeset, upper
 from tfarm.schema import across, curve_table, quantities, roots_table, table

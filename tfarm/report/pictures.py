@@ -7,10 +7,10 @@ from pathlib import Path
 import tfarm
 from tfarm.digits import plain
 from tfarm.dsp import load_chain
-from tfarm.plots.files import save_figure
 from tfarm.plots.frequency import draw_compared
 from tfarm.plots.regions import draw_overlay, stable_regions
 from tfarm.plots.shapes import modes
+from tfarm.plots.style import save_figure
 from tfarm.response.frequency import bode, resonant_band
 from tfarm.spectrum.table import default_gains
 

@@ -17,10 +17,10 @@ from tfarm.fitting.fit import ARMS, Fit, Possible, possible
 from tfarm.fitting.overlay import overlay
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import ranges_of
-from tfarm.plots.fitted import draw_band, draw_share, fitted
-from tfarm.plots.fitted import measured as measured_plot
 from tfarm.plots.frequency import bode as bode_plot
-from tfarm.plots.words import gains_words
+from tfarm.plots.frequency import draw_band, draw_share, fitted
+from tfarm.plots.frequency import measured as measured_plot
+from tfarm.plots.style import gains_words
 from tfarm.report.cases import has_loop
 from tfarm.report.sections import PageSection, Picture, typeset, upper
 from tfarm.response.frequency import AXIS_SHARE, Bode, Extremum, bode

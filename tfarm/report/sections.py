@@ -16,7 +16,7 @@ from tfarm.crossing import Window
 from tfarm.digits import plain, significant
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.crossings import around
-from tfarm.plots.files import save_figure
+from tfarm.plots.style import save_figure
 from tfarm.tables.files import save_table
 from tfarm.tables.html import as_html
 

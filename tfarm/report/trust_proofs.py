@@ -22,7 +22,7 @@ from tfarm.dsp import Chain
 from tfarm.dsp.chain import file_text
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.loop.poles import Poles, closed_loop_poles
-from tfarm.plots.words import gains_words
+from tfarm.plots.style import gains_words
 from tfarm.report.cards import keep, kept
 from tfarm.report.cases import has_loop
 from tfarm.report.modes_section import BRACKET_DIGITS, PROVEN_DIGITS, PROVEN_MODES, proven_damped_modes

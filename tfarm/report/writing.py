@@ -16,7 +16,7 @@ from tfarm.errors import ParameterError, TfarmError, must_be_known
 from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
-from tfarm.plots.compared import comparison
+from tfarm.plots.regions import comparison
 from tfarm.processes import may_start_processes, shared
 from tfarm.report.cards import COMPARISON_KIND, COMPARISON_PAGE, keep, kept_comparison, save_card, written_cards
 from tfarm.report.cases import GivenLaw, Subject, check_laws
