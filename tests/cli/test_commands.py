@@ -115,7 +115,7 @@ BAD = [
     (["response", "sasaki2012", "--output", "root_moment", "--from", "abc"], "--from"),
     (["response", "sasaki2012", "--output", "root_moment", "--to", "inf"], "--to = inf"),
     (["response", "sasaki2012", "--output", "root_moment", "--s", "abc"], "--s: 'abc': write"),
-    (["response", "sasaki2012", "--output", "root_moment", "--s", "nan"], "write 0.3"),
+    (["response", "sasaki2012", "--output", "root_moment", "--s", "nan"], "write numbers in 1/s"),
     (["response", "sasaki2012", "--output", "root_moment", "--s", "1j", "--omega", "1"], "not both"),
     (["response", "sasaki2012", "--output", "hub_angle", "--s", "0"], "rigid body"),
     (["response", "sasaki2012", "--output", "hub_angle", "--s", "1e300j"], "at most 1e+20 1/s"),

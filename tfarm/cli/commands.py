@@ -118,13 +118,19 @@ def response(
         Any,
         typer.Option(
             "--s",
-            parser=numbers("0.3+57.1j,10j", kind=lambda text: complex(text.replace("i", "j"))),
+            parser=numbers("numbers in 1/s such as 0.3+57.1j,10j", kind=lambda text: complex(text.replace("i", "j"))),
             metavar="S,S",
             help="points s [1/s]: 0.3+57.1j,10j",
         ),
     ] = None,
     omega: Annotated[
-        Any, typer.Option("--omega", parser=numbers("1,10,100"), metavar="W,W", help="frequencies [rad/s]: 1,10,100")
+        Any,
+        typer.Option(
+            "--omega",
+            parser=numbers("frequencies in rad/s such as 1,10,100"),
+            metavar="W,W",
+            help="frequencies [rad/s]: 1,10,100",
+        ),
     ] = None,
     start: Annotated[float, typer.Option("--from", help="lowest frequency [rad/s]")] = 0.1,
     stop: Annotated[float, typer.Option("--to", help="highest frequency [rad/s]")] = 1000.0,
