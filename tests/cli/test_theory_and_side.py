@@ -102,7 +102,7 @@ def test_a_reduced_model_reads_the_side_of_the_option(stepped, capsys):
 
 
 @pytest.mark.parametrize(
-    ("output", "side", "words"), [("root_moment", "inner", "read at one place"), ("moment", "left", "outer, inner")]
+    ("output", "side", "words"), [("root_moment", "inner", "has a fixed place"), ("moment", "left", "outer, inner")]
 )
 def test_sides_that_there_are_not(stepped, output, side, words, capsys):
     code, _, error = run(capsys, "response", stepped[0], "--output", output, "--x", "0.4", "--side", side, "--s", "1j")

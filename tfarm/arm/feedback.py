@@ -112,10 +112,10 @@ def unit_of(name: str, arm: Arm) -> str:
     K2 is a pure number for a torque, and in A/(N m) or V/(N m) for a motor.
     """
     (unit,) = (gain.unit for gain in GAINS if gain.name == name)
-    given = INPUT_UNITS["hub_torque" if arm.is_locked else arm.input]
+    unit_of_input = INPUT_UNITS["hub_torque" if arm.is_locked else arm.input]
     if unit == "1":
-        return "1" if given == "N m" else f"{given}/(N m)"
-    return unit.replace("N m", given)
+        return "1" if unit_of_input == "N m" else f"{unit_of_input}/(N m)"
+    return unit.replace("N m", unit_of_input)
 
 
 def shown_unit(name: str, arm: Arm) -> str:

@@ -397,8 +397,8 @@ def tracked(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
 
     So a law of gains alone is returned as gains only where each of its signals is among its references.
     """
-    (driven, plain), led = arm_and_law(arm, law), as_law(law)
-    return driven, plain if set(led.signals) <= set(led.references) else law
+    (driven, gains), full = arm_and_law(arm, law), as_law(law)
+    return driven, gains if set(full.signals) <= set(full.references) else law
 
 
 def must_not_be_algebraic(arm: Arm, key: str, value: object) -> None:

@@ -111,8 +111,8 @@ def law_of_table(table: Any, folder: Path) -> Law:
             raise ParameterError(key="matrices", value=MISSING, remedy="signals, system and scales need a .mat file")
         entries = {}
         for name, values in signals.items():
-            given = validated(SignalTable, values, f"{LAW_TABLE}.{name}")
-            entries[name if given.x is None else f"{name}@{given.x!r}"] = given.build(f"{LAW_TABLE}.{name}")
+            block = validated(SignalTable, values, f"{LAW_TABLE}.{name}")
+            entries[name if block.x is None else f"{name}@{block.x!r}"] = block.build(f"{LAW_TABLE}.{name}")
         return Law(entries, **common)
     except ParameterError as error:
         key = error.key if error.key.startswith(LAW_TABLE) else f"{LAW_TABLE}.{error.key}"

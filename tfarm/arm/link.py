@@ -133,9 +133,9 @@ class Section:
         return cls(shape="general", area=area, second_moment=second_moment, shear_factor=shear_factor)
 
     @classmethod
-    def _named(cls, shape: str, shear_factor: float | None, **given: float) -> Section:
+    def _named(cls, shape: str, shear_factor: float | None, **sizes: float) -> Section:
         dimensions = {}
-        for name, value in given.items():
+        for name, value in sizes.items():
             meaning = f"the {name.replace('_', ' ')} is a positive, finite number of metres"
             dimensions[name] = positive(f"{KEY}.{name}", value, meaning)
         area, second_moment = _properties(shape, dimensions)
@@ -257,8 +257,8 @@ class Link:
     @property
     def shear_factor(self) -> float:
         """kappa [-] of the section, or else Cowper's (1966) from Poisson's ratio."""
-        given = self.section.shear_factor
-        return self.section.cowper_factor(self.poissons_ratio) if given is None else given
+        own = self.section.shear_factor
+        return self.section.cowper_factor(self.poissons_ratio) if own is None else own
 
     @property
     def EI(self) -> float:

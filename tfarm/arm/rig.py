@@ -131,8 +131,8 @@ class Motor:
             raise ParameterError(
                 key="motor.gear_efficiency", value=self.gear_efficiency, remedy=meanings["gear_efficiency"]
             )
-        given: object = self.back_emf_constant
-        if given is None:
+        back_emf: object = self.back_emf_constant
+        if back_emf is None:
             object.__setattr__(self, "back_emf_constant", self.torque_constant)
         check_fields(
             self,

@@ -100,8 +100,8 @@ def law_toml(law: Law) -> str:
     Raises ParameterError for a law with a state space, whose form is a .mat file, and for two blocks on one signal.
     """
     head = [f"name = {_text(law.name)}"]
-    given = ((key, getattr(law, key), usual) for key, usual in LAW_DEFAULTS.items())
-    head += [f"{key} = {_value(value)}" for key, value, usual in given if value != usual]
+    keys = ((key, getattr(law, key), usual) for key, usual in LAW_DEFAULTS.items())
+    head += [f"{key} = {_value(value)}" for key, value, usual in keys if value != usual]
     names = [name for part in law.parts for name in part.signals]
     if len(set(names)) < len(names):
         raise ParameterError(key="law", value=law.name, remedy="two blocks on one signal: add them up first")

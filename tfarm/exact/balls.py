@@ -8,10 +8,10 @@ sweeps are those of `sweep`, with the error of every number enclosed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import flint
 
@@ -40,9 +40,19 @@ _end_plane, _inside_offset, _inside_spring, _inside_body, _beyond_offset, _beyon
 )
 _across_rows, _transition_rows, _row_across, _met = map(python_of, (across_rows, transition_rows, row_across, met))
 Ball = Any  # flint.acb or flint.arb, which come without types
+_Found = TypeVar("_Found")
 
 
 precision = flint.ctx.workprec  # flint's working precision [bits], inside a `with` block
+
+
+def first_success(bits: Iterable[int], attempt: Callable[[], _Found | None], failure: Exception) -> _Found:
+    """Return the first result other than None of attempts at working precisions [bits].  Raises `failure` else."""
+    for working in bits:
+        with precision(working):
+            if (found := attempt()) is not None:
+                return found
+    raise failure
 
 
 def rational(value: Fraction | float) -> Ball:

@@ -18,12 +18,12 @@ from typing import Any, NamedTuple
 
 from tfarm.errors import CertificationError, ParameterError
 
-from .balls import Ball, Sweep, point, precision, rational
+from .balls import Ball, Sweep, first_success, point, rational
 from .compiled import python_of
 from .layout import Layout, Reading, reading_of
 from .outputs import Output
 from .system import Body, Mark, Offset, Place, Segment, Spring, System
-from .values import PROVEN_BITS, precisions
+from .values import NO_NUMBER, PROVEN_BITS, precisions
 from .waves import Plane, Row, met
 
 _met = python_of(met)
@@ -70,28 +70,22 @@ def load_of(text: str, length: float) -> Load:
 
 def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float) -> Ball:
     """Return the output for unit load at s, SI, to `PROVEN_BITS`.  Raises CertificationError at a pole or zero."""
-    for working in precisions(PROVEN_BITS):
-        with precision(working):
-            value = _value(chain, load, wanted, point(s), x)
-            if value is not None and (value.rel_accuracy_bits() >= PROVEN_BITS or value.is_zero()):
-                return value
-    raise CertificationError(f"no {PROVEN_BITS} bits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
-
-
-def _value(chain: System, load: Load, wanted: Output, s: Ball, x: float) -> Ball | None:
-    """Return the enclosure at the working precision; None where it may be a pole."""
-    one = reading_of(chain, wanted, x)
+    one, jumps = reading_of(chain, wanted, x), LOAD_KINDS[load.kind][1]
     if one.is_current:
         raise ParameterError(key="output", value=wanted.name, remedy="needs an input at the hub instead of a load")
     signs = (1,) if load.kind == "force" else (-1, 1)
-    total = rational(0) * s
-    for share, sign in zip(load.shares, signs, strict=True):
-        state = _Loaded(chain, s, Place(Fraction(share)), one.place)
-        if state.balance.contains(0):
-            return None
-        total += sign * state.read(one, LOAD_KINDS[load.kind][1])
     unit = (chain.length / chain.EI) * (chain.length if load.kind == "force" else 1)  # of the dimensionless load
-    return total * rational(one.unit * chain.input_unit * unit)
+
+    def attempt() -> Ball | None:
+        states = [_Loaded(chain, point(s), Place(Fraction(share)), one.place) for share in load.shares]
+        if any(state.balance.contains(0) for state in states):
+            return None
+        total = sum(sign * state.read(one, jumps) for sign, state in zip(signs, states, strict=True))
+        value = total * rational(one.unit * chain.input_unit * unit)
+        return value if value.rel_accuracy_bits() >= PROVEN_BITS or value.is_zero() else None
+
+    failure = CertificationError(NO_NUMBER.format(f"{PROVEN_BITS} bits", s))
+    return first_success(precisions(PROVEN_BITS), attempt, failure)
 
 
 class _Loaded(Sweep):

@@ -361,15 +361,15 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
     for o in range(len(table)):
         differs = differs or (table[o, 0] >= 0.0 and table[o, 5] != 0.0)
     work, values = _work(rows), np.empty((1 + len(table), BLOCK), np.complex128)
-    points, lost_here, held = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_), np.empty((4, BLOCK))
+    points, lost_here, axes = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_), np.empty((4, BLOCK))
     for first in range(0, s.size, BLOCK):
         n = min(BLOCK, s.size - first)
         points[:n] = s[first : first + n]
         points[n:] = points[0]
         _sweep(points, rows, ends, work, lost_here)
         for i in range(BLOCK):
-            held[:, i] = axis[:, min(first + min(i, n - 1), axis.shape[1] - 1)]
-        _go_back(points, rows, held, work, differs, lost_here)
+            axes[:, i] = axis[:, min(first + min(i, n - 1), axis.shape[1] - 1)]
+        _go_back(points, rows, axes, work, differs, lost_here)
         _drive(points, _innermost(rows), ends, work.planes[0], values[0], lost_here)
         for o in range(len(table)):
             _output(points, table[o], work, values[1 + o], lost_here)

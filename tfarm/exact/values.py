@@ -26,7 +26,7 @@ from tfarm.records import record
 from tfarm.schema import Quantity
 
 from . import appendix
-from .balls import Ball, State, nearest_float, point, precision, rational
+from .balls import Ball, State, first_success, nearest_float, point, rational
 from .layout import Layout, Readings, constant_of, readings
 from .outputs import Output
 from .series import expansions_at_zero
@@ -36,6 +36,7 @@ from .uniform import fill_ends
 
 AT_A_POLE = 4 * float(np.finfo(float).eps)  # of |s|: the distance of a pole within which no digit is right
 PROVEN_BITS = 60  # more than a float64 has
+NO_NUMBER = "no {} at s = {:g} 1/s: it is a pole or a zero, or too close to one"
 MOST_ENCLOSURE_BITS = 1 << 18  # of working precision: at a pole no number of them is enough
 _UPPER_HALF = np.exp(1j * np.pi * np.arange(1, 8) / 8)
 SLOPE_CIRCLE = np.r_[1.0, _UPPER_HALF, -1.0, _UPPER_HALF[::-1].conj()]  # in conjugate pairs
@@ -83,11 +84,11 @@ def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -
     radius = SLOPE_RADIUS * np.maximum(abs(s), 1e-150) / np.maximum(1.0, abs(here.scale))
     for C in {each.damping for each in chain.segments if each.damping}:
         radius = np.minimum(radius, CLEAR_OF_SINGULAR * abs(s + 1.0 / C))
-    around = _free(those, (s[:, None] + radius[:, None] * SLOPE_CIRCLE).ravel())
-    scales = around.scale.reshape(-1, SLOPE_CIRCLE.size)
+    circle = _free(those, (s[:, None] + radius[:, None] * SLOPE_CIRCLE).ravel())
+    scales = circle.scale.reshape(-1, SLOPE_CIRCLE.size)
     here = here._replace(scale=np.where(np.isfinite(here.scale), here.scale, scales[:, 0]))
     values, slope = np.exp(scales - here.scale[:, None]), 1.0 / SLOPE_CIRCLE / radius[:, None]
-    drive, outputs = around.drive.reshape(scales.shape) * values, around.outputs.reshape(-1, *scales.shape) * values
+    drive, outputs = circle.drive.reshape(scales.shape) * values, circle.outputs.reshape(-1, *scales.shape) * values
     if here.lost.any():  # there the values are means over the circle, as where two waves are one
         here = here._replace(
             drive=np.where(here.lost, _mean(drive), here.drive),
@@ -204,28 +205,29 @@ def enclose(k: System, wanted: Output, s: complex, *, bits: int, x: float = 0.0)
 
     Raises CertificationError where that needs more than `MOST_ENCLOSURE_BITS`: at a pole or an exact zero.
     """
-    for working in precisions(bits):
-        with precision(working):
-            state = State(k, point(s))
-            if state.determines(wanted, x):
-                value = state.value(wanted, x)
-                if value.rel_accuracy_bits() >= bits or value.is_zero():
-                    return value
-    raise CertificationError(f"no {bits} bits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
+
+    def attempt() -> Ball | None:
+        state = State(k, point(s))
+        value = state.value(wanted, x) if state.determines(wanted, x) else None
+        return value if value is not None and (value.rel_accuracy_bits() >= bits or value.is_zero()) else None
+
+    return first_success(precisions(bits), attempt, CertificationError(NO_NUMBER.format(f"{bits} bits", s)))
 
 
 def slope(k: System, wanted: Output, s: complex, *, bits: int = 60, x: float = 0.0) -> Ball:
     """Return dG/ds at s, by a difference with an error below 2^-bits of the larger of G/s and dG/ds."""
     step = rational(Fraction(1, 1 << (2 * bits)))
-    for working in precisions(4 * bits):
-        with precision(working):
-            here, there = State(k, point(s)), State(k, point(s) * (1 + step))
-            if here.determines(wanted, x) and there.determines(wanted, x):
-                value = here.value(wanted, x)
-                difference = (there.value(wanted, x) - value) / (step * point(s))
-                if (difference + value / point(s)).rel_accuracy_bits() >= bits or value.is_zero():
-                    return difference
-    raise CertificationError(f"no derivative at s = {s:g} 1/s: it is a pole, or too close to one")
+
+    def attempt() -> Ball | None:
+        here, there = State(k, point(s)), State(k, point(s) * (1 + step))
+        if not (here.determines(wanted, x) and there.determines(wanted, x)):
+            return None
+        value = here.value(wanted, x)
+        difference = (there.value(wanted, x) - value) / (step * point(s))
+        is_known = (difference + value / point(s)).rel_accuracy_bits() >= bits or value.is_zero()
+        return difference if is_known else None
+
+    return first_success(precisions(4 * bits), attempt, CertificationError(NO_NUMBER.format("derivative", s)))
 
 
 def decimals(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:
@@ -237,18 +239,19 @@ def decimals(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0)
     vanish = False, s.imag == 0  # of the real and of the imaginary part
     if s.real == 0 != s.imag and k.is_real_on_axis:
         vanish = wanted.power % 2 == 1, wanted.power % 2 == 0
-    for working in precisions(4 * digits):
-        with precision(working):
-            state = State(k, point(s))
-            if not state.determines(wanted, x):
-                continue
-            value = state.value(wanted, x)
-            parts = zip(vanish, (value.real, value.imag), strict=True)
-            known = [flint.arb(0) if is_zero else part for is_zero, part in parts]
-            if all(part.is_zero() or part.rel_accuracy_bits() >= 3.33 * digits + 8 for part in known):
-                re, im = ("0.0" if each.is_zero() else str(each.mid().str(digits, radius=False)) for each in known)
-                return re, im
-    raise CertificationError(f"no {digits} digits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
+
+    def attempt() -> tuple[str, str] | None:
+        state = State(k, point(s))
+        if not state.determines(wanted, x):
+            return None
+        value = state.value(wanted, x)
+        parts = zip(vanish, (value.real, value.imag), strict=True)
+        known = [flint.arb(0) if is_zero else part for is_zero, part in parts]
+        re, im = ("0.0" if each.is_zero() else str(each.mid().str(digits, radius=False)) for each in known)
+        enough = 3.33 * digits + 8
+        return (re, im) if all(each.is_zero() or each.rel_accuracy_bits() >= enough for each in known) else None
+
+    return first_success(precisions(4 * digits), attempt, CertificationError(NO_NUMBER.format(f"{digits} digits", s)))
 
 
 def precisions(bits: int) -> Iterator[int]:

@@ -283,14 +283,14 @@ class Bode:
     @property
     def gain_unit(self) -> Annotated[str, Quantity("unit", key="unit")]:
         """SI unit of the response, e.g. N m/(N m)."""
-        given = self.arm.input_unit
-        return f"{self.row.unit}/{f'({given})' if ' ' in given else given}"
+        unit = self.arm.input_unit
+        return f"{self.row.unit}/{f'({unit})' if ' ' in unit else unit}"
 
     @property
     def input_label(self) -> str:
         """The input in words."""
-        given = "hub_angle" if self.arm.is_locked else self.arm.input
-        return "torque" if given == "hub_torque" else given.replace("_", " ")
+        name = "hub_angle" if self.arm.is_locked else self.arm.input
+        return "torque" if name == "hub_torque" else name.replace("_", " ")
 
 
 def resonant_band(arm: Arm, resonances: int = RESONANCES_SHOWN) -> tuple[float, float]:
@@ -413,8 +413,8 @@ def _around(root: complex) -> Real:
         return np.array([centre])
     count = 2 + math.ceil(PER_ROOT_DECADE * math.log10(reach / nearest))
     steps = np.geomspace(nearest, reach, count)
-    around = np.r_[centre - steps, centre + steps]
-    return around if on_axis else np.r_[around, centre]
+    sides = np.r_[centre - steps, centre + steps]
+    return sides if on_axis else np.r_[sides, centre]
 
 
 def phase_of(omega: Real, value: Complex, poles: Complex, zeros: Complex, *, is_real: bool) -> Real:

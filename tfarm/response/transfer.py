@@ -56,14 +56,6 @@ class Roots:
     proof: str
 
 
-def poles_of(arm: Arm, up_to: float) -> Roots:
-    """Return the poles of every transfer function of the arm with |Im s| <= up_to."""
-    k = system_of(arm)
-    if arm.is_undamped:
-        return _on_axis(flexible_frequencies(arm, up_to), k.at_rest, up_to)
-    return _in_box(k, lambda s: characteristic(k, s, at_zero=k.at_rest), k.at_rest, up_to, _damped_starts(arm, up_to))
-
-
 def zeros_of(arm: Arm, wanted: Output, up_to: float, x: float) -> Roots:
     """Return the zeros of one output with |Im s| <= up_to; x is a share of the length, for outputs along the arm.
 
@@ -197,7 +189,14 @@ class TransferFunction:
             raise ParameterError(key="outputs", value=outputs, remedy="name at least one output")
         self.rows: tuple[Output, ...] = tuple(map(output, each))
         self.system: System = system_of(arm)
-        self.x = self._place(x)
+        along = [each.name for each in self.rows if each.place == "x"]
+        if along and x is None:
+            remedy = f"give the place of {along[0]}, 0 to {arm.length:g} m"
+            raise ParameterError(key="x", value=MISSING, remedy=remedy)
+        if x is not None and not along:
+            raise ParameterError(key="x", value=x, remedy=f"{self.outputs[0]} has a fixed place; leave x out")
+        meaning = f"a point between 0 and {arm.length:g} m"
+        self.x = None if x is None else float(on_the_arm("x", number("x", x, meaning), arm.length))
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -314,7 +313,11 @@ class TransferFunction:
         At C = 0 they are +-i times the natural frequencies, complete by their count, and 0 twice for the rigid-body
         mode.  At C > 0 they are complete by the winding number of the characteristic function.
         """
-        return poles_of(self.arm, positive("up_to", up_to, A_FREQUENCY))
+        k, up_to = self.system, positive("up_to", up_to, A_FREQUENCY)
+        if self.arm.is_undamped:
+            return _on_axis(flexible_frequencies(self.arm, up_to), k.at_rest, up_to)
+        starts = _damped_starts(self.arm, up_to)
+        return _in_box(k, lambda s: characteristic(k, s, at_zero=k.at_rest), k.at_rest, up_to, starts)
 
     def zeros(self, *, up_to: float) -> Roots:
         """Return the zeros of a single output with |Im s| <= up_to [rad/s], complete in the box of the record.
@@ -339,17 +342,6 @@ class TransferFunction:
     def share(self) -> float:
         """The place `x` as a share of the length; 0 for outputs with a fixed place."""
         return 0.0 if self.x is None else self.x / self.arm.length
-
-    def _place(self, x: float | None) -> float | None:
-        along = [name for name, wanted in zip(self.outputs, self.rows, strict=True) if wanted.place == "x"]
-        length = self.arm.length
-        if not along:
-            if x is not None:
-                raise ParameterError(key="x", value=x, remedy=f"{self.outputs[0]} has a fixed place; leave x out")
-            return None
-        if x is None:
-            raise ParameterError(key="x", value=MISSING, remedy=f"give the place of {along[0]}, 0 to {length:g} m")
-        return float(on_the_arm("x", number("x", x, f"a point between 0 and {length:g} m"), length))
 
 
 def _finite(s: ArrayLike) -> Complex:

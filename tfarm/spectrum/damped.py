@@ -248,10 +248,10 @@ def _searched(undamped: Modes) -> DampedModes:
         if (near := _plainly(omega, row, found, free)) is not None:
             pairs[row], free = [near, near.conjugate()], free[free != near]
     single = np.where(single.imag == 0, single.real, np.nan)
-    resisted = int(bool(single.size) and k.at_rest == 1)
+    slow = int(bool(single.size) and k.at_rest == 1)
     rigid = np.zeros((undamped.index.size - count, 2), complex)
-    rigid[:, 1] = single[0] if resisted else 0.0
-    others = tuple(each for each in single[resisted:].tolist() if np.isfinite(each))
+    rigid[:, 1] = single[0] if slow else 0.0
+    others = tuple(each for each in single[slow:].tolist() if np.isfinite(each))
     upper = sorted(free[np.isfinite(free) & (free.imag >= 0)].tolist(), key=abs)
     eigenvalues, unassigned = np.concatenate([rigid, pairs]), tuple(Unassigned(s, origin_of(k, s)) for s in upper)
     return DampedModes(undamped, eigenvalues, box, inside + k.at_rest, others=others, unassigned=unassigned)

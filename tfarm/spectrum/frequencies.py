@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
-from tfarm.exact.balls import Ball, Sweep, into_own, out_of_own, precision, rational
+from tfarm.exact.balls import Ball, Sweep, first_success, into_own, out_of_own, precision, rational
 from tfarm.exact.compiled import python_of
 from tfarm.exact.count import bisect_chain, chain_counts, rows_to_count
 from tfarm.exact.layout import Layout, readings
@@ -126,8 +126,8 @@ class AxisSweep(Sweep):
         inside = tuple(part * unit for part in _across_waves(*one, *two, gS, flint.arb(1), S * (a - b), own))
         if self._counting:
             zero = flint.arb(0)
-            held = (zero, zero, zero, zero, flint.arb(1))
-            r = [part * unit for part in _across_waves(*one, *two, gS, flint.arb(1), S * (a - b), held)]
+            clamped = (zero, zero, zero, zero, flint.arb(1))
+            r = [part * unit for part in _across_waves(*one, *two, gS, flint.arb(1), S * (a - b), clamped)]
             self._count_segment([one[2], two[2]], own, inside, r)
         self._free = 2
         return out_of_own(inside, *units)
@@ -260,15 +260,14 @@ def refine(k: System, omega: float, digits: int) -> str:
     The sign of D(i w) changes within a tenth of the last digit, certified.
     Raises ConvergenceError where it does not: at a double frequency, or a pair that float64 does not separate.
     """
-    for bits in axis_precisions(digits):
-        with precision(bits):
-            axis = RealAxis(k)
-            root = secant(axis, omega, digits)
-            if root is None:
-                continue
-            tenth = root * flint.arb(10) ** -(digits + 1)
-            if axis.drive(root - tenth) * axis.drive(root + tenth) < 0:
-                return str(root.str(digits, radius=False))
-    raise ConvergenceError(
-        f"no {digits} digits of the frequency near {omega:.10g} rad/s: no sign change", omega, digits
-    )
+    axis, text = RealAxis(k), f"no {digits} digits of the frequency near {omega:.10g} rad/s: no sign change"
+
+    def attempt() -> str | None:
+        root = secant(axis, omega, digits)
+        if root is None:
+            return None
+        tenth = root * flint.arb(10) ** -(digits + 1)
+        is_bracket = axis.drive(root - tenth) * axis.drive(root + tenth) < 0
+        return str(root.str(digits, radius=False)) if is_bracket else None
+
+    return first_success(axis_precisions(digits), attempt, ConvergenceError(text, omega, digits))

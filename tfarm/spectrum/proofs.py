@@ -36,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.errors import CertificationError
-from tfarm.exact.balls import Ball, exact_middle, point, precision, rational
+from tfarm.exact.balls import Ball, exact_middle, first_success, point, precision, rational
 from tfarm.exact.characteristic import Feedback, characteristic_over, tangent
 from tfarm.exact.system import System
 from tfarm.records import record
@@ -83,22 +83,18 @@ def certify(k: System, omega: NDArray[np.float64], above: float, digits: int, ri
 def _bracket(k: System, omega: float, digits: int) -> tuple[Fraction, Fraction]:
     """Return neighbouring decimals of that many digits with a certified sign change of D between them."""
     exponent = math.floor(math.log10(omega)) - digits + 1
-    unit = Fraction(10) ** exponent
-    for bits in axis_precisions(digits):
-        with precision(bits):
-            axis = RealAxis(k)
-            root = secant(axis, omega, digits)
-            if root is None:
-                continue
-            number = (root / rational(unit)).floor().unique_fmpz()
-            if number is None:
-                continue
-            lower, upper = int(number) * unit, (int(number) + 1) * unit
-            if axis.drive(rational(lower)) * axis.drive(rational(upper)) < 0:
-                return lower, upper
-    raise CertificationError(
-        f"no certified sign change in {digits} digits near {omega:.15g} rad/s: a double or a very close pair"
-    )
+    axis, unit = RealAxis(k), Fraction(10) ** exponent
+
+    def attempt() -> tuple[Fraction, Fraction] | None:
+        root = secant(axis, omega, digits)
+        number = None if root is None else (root / rational(unit)).floor().unique_fmpz()
+        if number is None:
+            return None
+        lower, upper = int(number) * unit, (int(number) + 1) * unit
+        return (lower, upper) if axis.drive(rational(lower)) * axis.drive(rational(upper)) < 0 else None
+
+    text = f"no certified sign change in {digits} digits near {omega:.15g} rad/s: a double or a very close pair"
+    return first_success(axis_precisions(digits), attempt, CertificationError(text))
 
 
 def _count_above(k: System, last: Fraction, above: float) -> tuple[int, str]:
@@ -194,19 +190,19 @@ def enclosed(k: System, near: complex, digits: int, law: Feedback | None = None)
 
     Raises CertificationError where none is certified, as around a double zero.
     """
-    for bits in axis_precisions(digits):
-        with precision(bits):
-            middle = _newton(k, law, near, digits)
-            if middle is None:
-                continue
-            unit = Fraction(10) ** (int(np.floor(np.log10(abs(complex(middle.mid()))))) - digits + 1)
-            exact = (exact_middle(part) for part in (middle.real, middle.imag))
-            re, im = (round(Fraction(int(part.p), int(part.q)) / unit) * unit for part in exact)
-            if _holds_one(k, law, flint.acb(rational(re), rational(im)), rational(unit)):
-                return Disc(_decimal(re, unit), _decimal(im, unit), f"{float(unit):.0e}")
-    raise CertificationError(
-        f"no certified disc of {digits} digits around {near:.12g} 1/s: a double zero, or close to one"
-    )
+
+    def attempt() -> Disc | None:
+        middle = _newton(k, law, near, digits)
+        if middle is None:
+            return None
+        unit = Fraction(10) ** (int(np.floor(np.log10(abs(complex(middle.mid()))))) - digits + 1)
+        exact = (exact_middle(part) for part in (middle.real, middle.imag))
+        re, im = (round(Fraction(int(part.p), int(part.q)) / unit) * unit for part in exact)
+        is_proven = _holds_one(k, law, flint.acb(rational(re), rational(im)), rational(unit))
+        return Disc(_decimal(re, unit), _decimal(im, unit), f"{float(unit):.0e}") if is_proven else None
+
+    text = f"no certified disc of {digits} digits around {near:.12g} 1/s: a double zero, or close to one"
+    return first_success(axis_precisions(digits), attempt, CertificationError(text))
 
 
 def _newton(k: System, law: Feedback | None, near: complex, digits: int) -> Ball | None:

@@ -425,8 +425,8 @@ def _payload(arm: Arm, shapes: Shapes) -> Doubled:
     W, Psi, _, Q = shapes.tip()
     motions = (("mass", chain.tip_mass, W + float(chain.offset) * Psi), ("inertia", chain.tip_inertia, Psi))
     found = {
-        f"payload_{name}": -float(held) * motion**2 if math.isfinite(held) else np.zeros_like(motion)
-        for name, held, motion in motions
+        f"payload_{name}": -float(inertia) * motion**2 if math.isfinite(inertia) else np.zeros_like(motion)
+        for name, inertia, motion in motions
     }
     if arm.payload.offset:
         found["payload_offset"] = -2 * float(chain.offset) * Q * Psi / square
@@ -448,12 +448,11 @@ def _attachment(arm: Arm, shapes: Shapes, number: int) -> Iterator[tuple[str, Re
             for piece, state in zip(pieces[::-1], (outer, inner), strict=True)
         )
         yield "x", (within - beyond) * float(share)
-    W, Psi = outer[:2]
-    if each.mass:
-        yield "mass", -each.mass * per_motion * W**2
-    if each.inertia:
-        yield "inertia", -each.inertia * per_rotation * Psi**2
-    if each.stiffness:
-        yield "stiffness", each.stiffness * per_motion * W**2 / square
-    if each.rotational_stiffness:
-        yield "rotational_stiffness", each.rotational_stiffness * per_rotation * Psi**2 / square
+    translation, rotation = per_motion * outer[0] ** 2, per_rotation * outer[1] ** 2
+    energies = {  # kinetic ones negative
+        "mass": -translation,
+        "inertia": -rotation,
+        "stiffness": translation / square,
+        "rotational_stiffness": rotation / square,
+    }
+    yield from ((name, value * energy) for name, energy in energies.items() if (value := getattr(each, name)))
