@@ -17,6 +17,17 @@ def test_a_circle_is_round_where_it_turns_by_less_than_two_and_a_half_degrees(po
     assert loose(arc(points), 1.0, 1.0).tolist() == [wanted] * (points - 1)
 
 
+def test_turns_are_those_of_the_picture():
+    """Of what is drawn four times as wide as high, a steep part turns less and a flat part more."""
+    flat, steep = np.array([[1j, 1 + 1j, 2 + 1.02j]]), np.array([[1j, 2j, 0.02 + 3j]])
+    assert [loose(flat, 1.0, 1.0).all(), loose(steep, 1.0, 1.0).all()] == [False, False]  # both by 1.1 degrees
+    assert [loose(flat, 4.0, 1.0).all(), loose(steep, 4.0, 1.0).all()] == [True, False]
+    assert [loose(flat, 1.0, 4.0).all(), loose(steep, 1.0, 4.0).all()] == [False, True]
+    sizes = np.array([[4.0], [1.0]])
+    assert loose(np.r_[flat[:, :], steep], sizes, 1.0).tolist() == [True, True]
+    assert loose(np.r_[steep, flat], sizes, 1.0).tolist() == [False, False]
+
+
 def test_only_the_pieces_beside_a_corner_are_halved_and_only_while_they_are_seen():
     corner = np.array([[0, 1, 2, 3, 3 + 1j, 3 + 2j, 3 + 3j]]) + 5j
     assert loose(corner, 4.0, 4.0).tolist() == [False, False, True, True, False, False]
@@ -24,6 +35,23 @@ def test_only_the_pieces_beside_a_corner_are_halved_and_only_while_they_are_seen
     assert loose(corner, 499.0, 499.0).tolist() == [False, False, True, True, False, False]
     short = np.array([[5j, 1 + 5j, 1 + 5.001j]])
     assert loose(short, 2.0, 2.0).tolist() == [True, False]
+
+
+def test_curves_that_stay_on_the_axis_or_end_want_nothing():
+    turning_back = np.array([[1.0, 2.0, 1.5, 3.0]], dtype=complex)
+    ended = np.array([[5j, 1 + 5j, np.nan, 2 + 7j, 1 + 6j]])
+    assert not loose(turning_back, 1.0, 1.0).any()
+    assert not loose(ended, 1.0, 1.0)[1:3].any()
+
+
+def test_two_zeros_that_part_on_the_axis_are_approached_where_they_part_and_nowhere_else():
+    """sqrt(gain): real and then a pair, at a right angle; only the piece in which it leaves the axis."""
+    gain = np.linspace(1.0, -1.0, 101) + 1e-3
+    pair = np.emath.sqrt(gain)[None, :]
+    (n,) = np.flatnonzero(np.diff(pair.imag[0] != 0))
+    assert pair[0, n].imag == 0 < pair[0, n + 1].imag
+    (found,) = np.flatnonzero(loose(pair, 1.0, 1.0))
+    assert found == n
 
 
 def piece(gains, low, high):
@@ -43,6 +71,14 @@ def test_a_regions_corner_halves_the_sides_beside_it():
     assert wanted(tip, [-1.0, 9.0]) == pytest.approx([3.5])
     flat = piece([-1.0, 9.0], [-1.0, 3.0], [3.0, 3.0])  # along one of its sides
     assert wanted(flat, [-1.0, 9.0]) == pytest.approx([3.5])
+
+
+def test_corners_outside_the_picture_are_not_seen():
+    across = [1.0, 4.0, 9.0]
+    above = piece(across, [0.0, 0.0, 0.0], [0.0, 11.0, 0.0])
+    left = piece([-9.0, -4.0, -1.0], [2.0, 2.0, 2.0], [2.0, 8.0, 2.0])
+    assert wanted(above, across) == []
+    assert wanted(left, [-9.0, -4.0, -1.0]) == []
 
 
 def test_an_outline_that_turns_by_less_than_five_degrees_is_round():

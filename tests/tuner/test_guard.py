@@ -22,7 +22,7 @@ from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import CertificationError
 from tfarm.exact.rationals import is_positive_definite
 from tfarm.tuner import find_guard, guard, slew_trial
-from tfarm.tuner.guard import RADIUS_SHARE, MovingGain, common_lyapunov, upper_modes_are_quiet
+from tfarm.tuner.guard import RADIUS_SHARE, MovingGain, _peak, common_lyapunov, upper_modes_are_quiet
 
 FINE = np.r_[np.geomspace(1e-6, 1e-2, 500), np.linspace(1e-2, np.pi, 100_001)]
 
@@ -56,6 +56,14 @@ def test_the_radius_is_where_the_criterion_first_fails(lab, m, delay):
     radius = loop.radius(m)
     assert criterion(loop, m - 0.998 * radius, m + 0.998 * radius).min() > 0
     assert criterion(loop, m - 1.002 * radius, m + 1.002 * radius).min() < 0
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-3, 0.7, np.pi])
+def test_the_peak_of_one_pole_is_at_its_own_angle(angle):
+    """|r/(z - p)| is largest, |r|/(1 - |p|), where z has the angle of p: at both ends of the half circle too."""
+    for size in (0.5, 0.9, 1 - 1e-6):
+        peak = _peak(np.array([0.3 - 0.4j]), np.array([size * np.exp(1j * angle)]))
+        assert peak == pytest.approx(0.5 / (1 - size), rel=1e-9)
 
 
 @pytest.mark.parametrize(("m", "servo"), [(0.2, {}), (0.47, {}), (0.3, {"K1": 3.6, "Kp": 10.0})])
