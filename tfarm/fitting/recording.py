@@ -37,11 +37,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm, tracked
 from tfarm.arm.reading import load_tables
 from tfarm.arm.schema import StrictTable, validated
-from tfarm.arrays import Real
+from tfarm.arrays import Complex, Real
 from tfarm.columns import Table
 from tfarm.dsp.chain import TIME_ROUNDING, Chain
 from tfarm.dsp.results import enough_modes
@@ -303,7 +304,7 @@ def frequency_response(
     Raises ParameterError for signals that are not there, for a segment that leaves no two of them, and for an input
     that does not move.
     """
-    from scipy.signal import csd, get_window, welch
+    from scipy.signal import get_window
 
     check_signal(output, "--output")
     check_signal(input, "--input")
@@ -312,25 +313,18 @@ def frequency_response(
     names = columns or (output, input)
     y, x = recording.signal(names[0], "--output"), recording.signal(names[1], "--input")
     size, step = _cut(recording, segment, (0.5 if window == "hann" else 0.0) if overlap is None else overlap)
-    how: Any = {"window": window, "nperseg": size, "noverlap": size - step}
-    S_xx, S_xy, S_yy = welch(x, **how)[1], csd(x, y, **how)[1], welch(y, **how)[1]
-    lines = np.arange(1, S_xx.size - 1)  # without 0 and half the rate of sampling, where a line is real
-    lines = lines[S_xx[lines] > LEAST_POWER * S_xx.max()]
+    how = {"window": window, "nperseg": size, "noverlap": size - step}
+    lines, values, coherence = _estimated(estimator, x, y, how)
     require(lines.size, "record", names[1], "does not move", recording.source)
-    require(S_yy.any(), "record", names[0], "does not move", recording.source)
-    S_xx, S_xy, S_yy, cross = S_xx[lines], S_xy[lines], S_yy[lines], abs(S_xy[lines])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        sizes = {"H1": cross / S_xx, "H2": np.where(cross == 0, 0.0, S_yy / cross), "Hv": np.sqrt(S_yy / S_xx)}
-        phase = np.where(cross == 0, 1.0, S_xy / cross)
-        coherence = np.where(S_yy > 0, cross**2 / (S_xx * S_yy), 0.0)
+    require(coherence.any(), "record", names[0], "does not move", recording.source)
     count, duration = 1 + (recording.count - size) // step, size * recording.period
     averages = independent_averages(get_window(window, size), step, count)
     measured = Measured(
         output=output,
         input=input,
-        omega=2 * np.pi * lines / duration,
-        values=sizes[estimator] * phase,
-        coherence=np.clip(coherence, 0.0, 1.0),
+        omega=np.asarray(2 * np.pi * lines / duration, dtype=float),
+        values=values,
+        coherence=coherence,
         averages=max(1, math.floor(averages)),
         source=recording.source,
         digest=recording.digest,
@@ -345,6 +339,24 @@ def frequency_response(
         independent=averages,
         note=recording.note,
     )
+
+
+def _estimated(estimator: str, x: Real, y: Real, how: dict[str, Any]) -> tuple[NDArray[np.intp], Complex, Real]:
+    """The lines that the input has power in, the response and the coherence there.
+
+    Without the line at 0 and the last one, at half the rate of sampling, which are real.
+    """
+    from scipy.signal import csd, welch
+
+    S_xx, S_xy, S_yy = welch(x, **how)[1], csd(x, y, **how)[1], welch(y, **how)[1]
+    lines = np.arange(1, S_xx.size - 1)
+    lines = lines[S_xx[lines] > LEAST_POWER * S_xx.max()]
+    S_xx, S_xy, S_yy, cross = S_xx[lines], S_xy[lines], S_yy[lines], abs(S_xy[lines])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sizes = {"H1": cross / S_xx, "H2": np.where(cross == 0, 0.0, S_yy / cross), "Hv": np.sqrt(S_yy / S_xx)}
+        phase = np.where(cross == 0, 1.0, S_xy / cross)
+        coherence = np.where(S_yy > 0, cross**2 / (S_xx * S_yy), 0.0)
+    return lines, sizes[estimator] * phase, np.clip(coherence, 0.0, 1.0)
 
 
 def independent_averages(w: Real, step: int, count: int) -> float:
