@@ -22,7 +22,7 @@ from tfarm.loop.margins import loop_margins
 from tfarm.loop.plane import between, plane
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
-from tfarm.loop.theorem import definite, is_hurwitz, polynomial, signs_of
+from tfarm.loop.theorem import definite, is_hurwitz, on_axis, polynomial, signs_of
 from tfarm.reduced.conversions import sensed_model
 from tfarm.response.signals import Signals
 
@@ -250,6 +250,18 @@ def test_turns_around_the_point_are_the_poles_that_were_found(arm, law):
     assert plot.unstable_open == (law.poles.real > 0).sum()
     assert plot.encirclements == plot.unstable_open - plot.unstable_by_nyquist
     assert np.isfinite(plot.L[~plot.is_arc]).all()
+
+
+def test_parts_on_the_axis_are_those_of_the_quotient_there():
+    """Real part, and imaginary part over w, of num/den at i w, times |den|^2: exact polynomials in w^2."""
+    rng = np.random.default_rng(12)
+    for _ in range(6):
+        num, den = rng.uniform(-2, 2, rng.integers(1, 5)), rng.uniform(-2, 2, rng.integers(2, 6))
+        real, imaginary = on_axis(polynomial(num), polynomial(den))
+        for w in (0.3, 1.7):
+            whole = np.polyval(num, 1j * w) * np.conj(np.polyval(den, 1j * w))
+            assert float(real.eval(w * w)) == pytest.approx(whole.real, rel=1e-12, abs=1e-13)
+            assert w * float(imaginary.eval(w * w)) == pytest.approx(whole.imag, rel=1e-12, abs=1e-13)
 
 
 @pytest.mark.parametrize("rest", thinned([-1e-9, 1e-4, 1e-7, -1e-7, 1e-9], 4))

@@ -25,7 +25,7 @@ from tfarm.loop.loop import Loop
 from tfarm.loop.nyquist import compressed, poles_on_axis, upper_contour
 from tfarm.loop.panels import CHEBYSHEV, Positions, loop_panels, positions, sensed_places
 from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
-from tfarm.loop.poles import Poles, count_with_mirrors, first_poles, poles_below
+from tfarm.loop.poles import Poles, count_with_mirrors, first_poles, poles_below, quiet_edge
 from tfarm.loop.stability import stability
 from tfarm.loop.theorem import lyapunov
 from tfarm.loop.windows import windows_of
@@ -33,6 +33,22 @@ from tfarm.spectrum.box import Box
 from tfarm.spectrum.table import rate_unit
 
 LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
+
+
+@pytest.mark.parametrize("K1", [0.3, -30.0])
+def test_a_box_reaches_right_to_where_no_pole_can_be(K1):
+    """From the first edge that is tried on: on the one that is taken Re L > -1/2, on the one before it was not."""
+    loop, height, first = Loop(LAB, HubFeedback(K1=K1)), 300.0, 30.0
+    right = quiet_edge(loop, first, height)
+    edge = 1j * np.linspace(0.0, height, 400)
+    assert loop.loop_function(right + edge).real.min() > -0.6
+    if right > first:
+        before = right / 1.7
+        near = np.r_[before + edge, before * np.array([2.0, 5.0, 20.0])]
+        assert loop.loop_function(near).real.min() <= -0.45
+    poles = poles_below(loop, height).values
+    assert (poles.real < right).all()
+    assert (right > first) == (poles.real.max() > first)
 
 
 def listed(*values):
@@ -128,6 +144,14 @@ def test_a_finding_has_three_crossings_and_counts_the_others():
     assert finding(each[:3]) == "a pole becomes stable at K2 = 0, unstable at K2 = 0.5, stable at K2 = 1"
     assert finding(each) == finding(each[:3]) + " and 3 more"
     assert each[3].frequency == pytest.approx(3.0, rel=1e-15)
+
+
+@pytest.mark.parametrize("arm", [LAB, STOCKY], ids=lambda arm: arm.name)
+def test_the_rate_axis_is_linear_up_to_the_power_of_ten_below_the_default_gain(arm):
+    axis, K1 = rate_axis(arm), tfarm.default_gains(arm).K1
+    assert axis.linear <= K1 < 10 * axis.linear
+    assert math.log10(axis.linear) == pytest.approx(round(math.log10(axis.linear)), abs=1e-12)
+    assert (axis.low, axis.high) == (-axis.linear, pytest.approx(10 * rate_unit(arm), rel=1e-12))
 
 
 def test_the_moment_axis_holds_the_default_range_and_all_that_is_unstable_below():
