@@ -70,7 +70,7 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
         one.plot(found.nodes[row], 0 * found.nodes[row], "o", ms=5.5, mfc="white", mec=ORANGE, mew=1.3, zorder=4)
         one.set(xlim=(-0.085 * length, 1.11 * length), ylim=(-1.28, 1.28), yticks=[-1, 0, 1])
         omega, hertz = (significant(float(of[row]), 7) for of in (found.natural_frequency, found.natural_frequency_hz))
-        places = ", ".join(plain(float(node), 3) for node in found.nodes[row]) or "none"
+        places = ", ".join(plain(round(float(node), 4), 3) for node in found.nodes[row]) or "none"
         one.set_title(f"Mode {number}:  {omega} rad/s  ({hertz} Hz)\nnodes [m]: {places}", fontsize=9.5)
         if not one.figure.get_supylabel():
             one.set(xlabel=ALONG, ylabel=DISPLACEMENT)

@@ -79,7 +79,9 @@ METADATA: dict[str, dict[str, str | None]] = {
     "png": {"Software": "tfarm"},
 }
 PICTURE_DOTS = 160  # an inch, of a PNG: lines of 0.6 points are more than a pixel wide
-COORDINATES, LONG_NUMBER = re.compile(rb'(?<= [dxy]=")[^"]+'), re.compile(rb"-?\d+\.\d{3,}")  # in an SVG
+COORDINATES, LONG_NUMBER, PATH_LETTER = (  # in an SVG
+    re.compile(pattern) for pattern in (rb'(?<= [dxy]=")[^"]+', rb"-?\d+\.\d{3,}", rb"\s*([MLQCz])\s*")
+)
 
 
 style = partial(matplotlib.style.context, ["default", STYLE])  # whatever the user's own settings are
@@ -264,12 +266,13 @@ def _drawn(figure: Figure, formats: tuple[str, ...], dpi: int) -> Iterator[bytes
             layout.execute(figure)
             figure.set_layout_engine(None)
         for ax in figure.axes:  # at ten digits: the layout's solver orders by address, so its last bit differs
-            left, bottom, width, height = (round(float(x), 10) for x in ax.get_position(original=True).bounds)
-            ax.set_position((left, bottom, width, height))
+            ax.set_position(tuple(np.round(ax.get_position(original=True).bounds, 10).tolist()))
         for kind in formats:
             content = io.BytesIO()
             figure.savefig(content, format=kind, dpi=dpi, metadata=METADATA[kind])
-            short = COORDINATES.sub(
-                lambda part: LONG_NUMBER.sub(lambda x: b"%.2f" % float(x[0]), part[0]), content.getvalue()
-            )
-            yield short if kind == "svg" else content.getvalue()
+            yield COORDINATES.sub(_short, content.getvalue()) if kind == "svg" else content.getvalue()
+
+
+def _short(part: re.Match[bytes]) -> bytes:
+    """Two decimals, and no space around the letters of a path."""
+    return PATH_LETTER.sub(rb"\1", LONG_NUMBER.sub(lambda number: b"%.2f" % float(number[0]), part[0]))

@@ -27,10 +27,9 @@ AROUND_EDGE = (0.9, 1.1)  # times the edge, if that lies above all of them
 RANGE_OF_K2 = (-1.0, 1.6)  # of the locus, times what balances a torque: both sides of 0, and beyond 1
 shortly = partial(plain, digits=4)  # how a gain is written in a sentence
 LOCUS_CAPTION = (
-    "Broad lines: exact poles, followed along {name}. Dashed: python-control on a modal model of order {order}, its "
-    "error band (at most {worst} of |s|) shaded where it is wider than the line. At the left all branches on one "
-    "scale, at the right each mode on its own. Shown are Im s ≥ 0, and the lower half of a pair that meets on the real "
-    "axis."
+    "Broad lines: exact poles, followed along {name}. Dashed: python-control on a modal model of order {order}, "
+    "with an error of at most {worst} of |s|. At the left all branches on one scale, at the right each mode on its "
+    "own. Shown are Im s ≥ 0, and the lower half of a pair that meets on the real axis."
 )
 BEYOND_UNDAMPED = (
     "Exact poles, each list complete in its box. At C = 0 and K2 = 1 the law cancels the root moment: the hub no "

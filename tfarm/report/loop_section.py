@@ -59,8 +59,8 @@ CROSSINGS_CAPTION = (
     "pole there."
 )
 BODE_CAPTION = (
-    "Diamonds: |L| = 1, with the phase margin there, green for lag and purple for lead. Dots: L is real and below 0, "
-    "and the dashed line is the way to −1, with the factor on the whole law that goes it."
+    "Diamonds: |L| = 1, green for lag and purple for lead; dashed lines below them are phase margins. Dots: L is real "
+    "and below 0; dashed lines from them are gain margins. The legend has the least of each."
 )
 SPILL_CAPTION = (
     "What models of so many flexible modes say of the same law: how many poles are unstable, and the rightmost."

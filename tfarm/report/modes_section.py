@@ -70,7 +70,7 @@ FREE_PIN = "; a free pin bears no moment, so that at the root is 0"
 NO_DAMPED_TABLE = "The damped modes of this arm could not be listed with a proof, and are left out: {why}."
 MODE_SHAPES = (
     "Total displacement w(x), each mode scaled to a largest value of one; hub at the left (grey), nodes as "
-    "open circles with their distance from the hub in m. A force or a displacement sensor at a node does not "
+    "open circles, their distances from the hub above. A force or a displacement sensor at a node does not "
     "touch that mode."
 )
 FOUR_THEORIES = (
