@@ -71,7 +71,7 @@ def test_without_a_guard_the_upper_end_is_inf_and_a_divergence_is_told(capsys):
 def test_tables_for_people(capsys):
     _, out, _ = run(capsys, "tune", "sasaki2012-lab", "--trials", "2", "--mode", "online", "--seventh-input")
     assert "linear-quadratic bound of the unshaped slew" in out
-    assert "proven for any K(t)" in out
+    assert "certified for any K(t)" in out
 
 
 def test_learning_curves_are_the_tunings_of_their_seeds(capsys):

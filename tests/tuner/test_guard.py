@@ -165,7 +165,7 @@ def test_the_default_sector(lab):
         assert proof.is_proven()
     ends = [(A.T @ proof.P @ A, proof.P) for proof in guard.proofs for A in (proof.low, proof.high)]
     slowest = np.sqrt(max(eigh(*each, eigvals_only=True)[-1] for each in ends))
-    ((sector, shrinks),) = re.findall(r"^(.*): proven for any K\(t\), shrinking by (.*) a sample", guard.sentence)
+    ((sector, shrinks),) = re.findall(r"^(.*): certified for any K\(t\), contraction by (.*) a sample", guard.sentence)
     assert sector == f"[{guard.lo:.4g}, {guard.hi:.4g}]"
     assert float(shrinks) == pytest.approx(1 - slowest, rel=0.05)  # two digits
 
@@ -202,7 +202,7 @@ def test_the_frozen_guard_is_stable_inside_and_not_beyond(lab):
     loop = slew_trial(lab).loop
     guard = find_guard(loop, "frozen", 0.336)
     assert not guard.is_proven
-    assert "not proven for one that moves" in guard.sentence
+    assert "not certified for one that varies" in guard.sentence
     for K in np.linspace(guard.lo, guard.hi, 25):
         assert loop.having(K1=0.3, K2=float(K)).poles.is_stable
     assert not loop.having(K1=0.3, K2=guard.hi * 1.02).poles.is_stable
@@ -215,7 +215,7 @@ def test_without_damping_a_proof_is_of_the_first_modes_and_no_proof_of_the_loop(
     assert all(proof.is_proven() for proof in guard.proofs)
     assert not guard.is_settled
     assert not guard.is_proven
-    assert "proven for the first 20 modes" in guard.sentence
+    assert "certified for the first 20 modes" in guard.sentence
 
 
 def test_an_empty_guard_names_the_damping_that_would_have_one():

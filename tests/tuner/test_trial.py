@@ -105,7 +105,7 @@ def test_the_same_slew_asked_of_another_arm_is_as_long_and_made_for_the_first(la
     """Sample by sample, at periods that no double holds too."""
     for period in (0.01, 0.007):
         trial = slew_trial(lab, Chain(sampling=Sampling(period=period)), K1=0.3)
-        other = trial.asked_of(lab.having(payload_mass=0.1), trial.loop.chain, HubFeedback(K1=0.2))
+        other = trial.on(lab.having(payload_mass=0.1), trial.loop.chain, HubFeedback(K1=0.2))
         assert other.n == trial.n
         np.testing.assert_array_equal(other.task.hub_angle, trial.task.hub_angle)
         assert other.loop.gains.K1 == 0.2

@@ -1,6 +1,6 @@
-"""Where zeros of A + g B cross a curve as a real gain g runs, and how many lie beyond it (D-decomposition).
+"""Crossings of a curve by zeros of A + g B along a real gain g, and counts of zeros beyond it (D-decomposition).
 
-The curve may be the imaginary axis or the unit circle; nothing here knows what A and B are.
+The curve may be the imaginary axis or the unit circle, and A and B any functions.
 """
 
 from tfarm.crossing.line import (

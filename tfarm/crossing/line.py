@@ -1,4 +1,4 @@
-"""Along one real gain g: where a zero of A + g B is on the curve, for which gain, and to which side it goes.
+"""Crossings of a curve by zeros of A + g B along one real gain g: place, gain and direction.
 
 At a point of the curve the zero is there for g = -A/B, which is a gain where it is real: where
 
@@ -68,7 +68,7 @@ class Crossings:
         return self.gain.size
 
     def within(self, low: float, high: float) -> Crossings:
-        """Those at gains between two."""
+        """The crossings at gains between two."""
         inside = (low < self.gain) & (self.gain < high)
         return Crossings(self.gain[inside], self.at[inside], self.change[inside])
 

@@ -116,14 +116,6 @@ def read_outputs(weights: Any, rates: Any, static: Any, amplitude: Any, rigid: A
 
 
 @compiled
-def strike(amplitude: Any, rigid: Any, impulse: float) -> None:
-    """An impulse of torque [N m s] on the hub: every amplitude jumps by it."""
-    for i in range(amplitude.size):
-        amplitude[i] += impulse
-    rigid[ONCE] += impulse
-
-
-@compiled
 def advance(
     turn: Any, push: Any, piece: Any, weights: Any, rates: Any, static: Any, hub: Any, amplitude: Any, rigid: Any,
     work: Any, fine: Any, old: float, new: float, push_on: float,
@@ -208,8 +200,10 @@ def after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> No
     ring = state.held.size
     old = state.held[(k - of.delay - 1) % ring]
     state.held[k % ring] = state.torque[k] = quantise(u, of.quantisers[DAC], state.saturated[k], DAC)
-    if k == 0:
-        strike(state.amplitude, state.rigid, forcing.impulse)
+    if k == 0:  # the impulse: every amplitude jumps by it
+        for i in range(state.amplitude.size):
+            state.amplitude[i] += forcing.impulse
+        state.rigid[ONCE] += forcing.impulse
     advance(
         model.turn, model.push, model.piece, model.weights, model.rates, model.static, model.hub,
         state.amplitude, state.rigid, state.work, state.fine[k], old, state.held[(k - of.delay) % ring],

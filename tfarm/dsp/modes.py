@@ -58,7 +58,7 @@ class ModeTable:
 
     index: Annotated[NDArray[np.int64], Quantity("mode")]
     natural_frequency: Annotated[Real, Quantity("natural frequency", "rad/s")]
-    band: Annotated[NDArray[np.int64], Quantity("band", help="0 from 0 to half the sampling rate, and so on")]
+    band: Annotated[NDArray[np.int64], Quantity("Nyquist zone", help="0 from 0 to half the sampling rate, and so on")]
     aliased: Annotated[Real, Quantity("aliased to", "rad/s")]
     by_rate: Annotated[Real, Quantity("by K1", digits=3, key="first_order_by_K1", help=LOG_RADIUS)]
     by_moment: Annotated[Real, Quantity("by K2", digits=3, key="first_order_by_K2", help=LOG_RADIUS)]

@@ -175,7 +175,11 @@ class PulseTransfer:
         A[n - 2, n - 1] = self.sampling.period
         C[:, n - 2 : n] = self.plant.rigid
         C[:, last] = self.plant.static
-        now, before = self._drive(upper, real)
+        pushes = (self.early, self.ramps[0]), (self.late, self.ramps[1])
+        now, before = (
+            np.r_[np.c_[push[upper].real, push[upper].imag].ravel(), push[real].real, ramp, push[-1].real]
+            for push, ramp in pushes
+        )
         A[:n, last] = before
         if d:
             A[:n, last - 1] = now
@@ -206,14 +210,6 @@ class PulseTransfer:
         """Indices of the poles with Im p > 0 and of the real ones, without s = 0."""
         p = self.plant.poles
         return np.nonzero(p.imag > 0)[0], np.nonzero(p.imag == 0)[0]
-
-    def _drive(self, upper: NDArray[np.int64], real: NDArray[np.int64]) -> tuple[Real, Real]:
-        """The columns of u_{k-d} and of u_{k-d-1}."""
-        columns = []
-        for push, ramp in ((self.early, self.ramps[0]), (self.late, self.ramps[1])):
-            pairs = np.c_[push[upper].real, push[upper].imag].ravel()
-            columns.append(np.r_[pairs, push[real].real, ramp, push[-1].real])
-        return columns[0], columns[1]
 
     def state_space(self) -> control.StateSpace:
         """The same as a discrete `control.StateSpace` with dt = T and named signals, "moment@0_3" of moment@0.3."""

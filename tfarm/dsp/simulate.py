@@ -344,18 +344,16 @@ class Simulator:
         rigid = self.plant.rigid[row, 1] * rate**2 / 2
         return float(self.plant.residues[row, self._kept].real @ abs(amplitude) ** 2 + rigid)
 
-    def _energy_error(self, state: kernel.State) -> float | None:
-        if not self.plant.arm.is_undamped or self.chain.actuator.hub_damping > 0:
-            return None
-        before = self._energy(self.first_amplitudes(), self.scenario.impulse)
-        after, (work, moved) = self._energy(state.amplitude, state.rigid[kernel.ONCE]), state.work
-        return float(abs(after - before - work) / max(before + moved, LEAST_SIZE))
-
     def _result(self, state: kernel.State, done: int, gain: Real | None) -> Simulation:
-        stopped = None
+        """The record of `done` samples."""
+        stopped, error = None, None
         if done < state.torque.size:
             of_root = np.nan_to_num(abs(self.plant.residues[kernel.MOMENT, self._kept] * state.amplitude), nan=np.inf)
             stopped = Stop(done * self.scenario.period, int(self.plant.mode[self._kept][int(np.argmax(of_root))]))
+        elif self.plant.arm.is_undamped and not self.chain.actuator.hub_damping > 0:
+            before = self._energy(self.first_amplitudes(), self.scenario.impulse)
+            after, (work, moved) = self._energy(state.amplitude, state.rigid[kernel.ONCE]), state.work
+            error = float(abs(after - before - work) / max(before + moved, LEAST_SIZE))
         T, m = self.scenario.period, self.between
         between = None
         if m:
@@ -370,7 +368,7 @@ class Simulator:
             torque=state.torque[:done],
             gain=None if gain is None else gain[:done],
             saturated_at=state.saturated[:done],
-            energy_error=None if stopped else self._energy_error(state),
+            energy_error=error,
             stopped=stopped,
         )
 

@@ -289,11 +289,6 @@ class Analysis:
         return shown_damping(self.loop, self.damping_modes)
 
     @property
-    def required_damping(self) -> float:
-        """The damping C [s] from which on the loop is stable."""
-        return self.damping.value
-
-    @property
     def minimum_damping(self) -> Annotated[Figure | None, Quantity("minimum structural damping for stability", "s")]:
         """The same with its digits, for gains at the hub."""
         return self.damping if self.loop.is_of_gains else None
@@ -317,11 +312,6 @@ class Analysis:
     def warnings(self) -> Annotated[tuple[str, ...], Quantity("warnings")]:
         """Unstable poles of the law that its own zeros cancel."""
         return cancelled(self.loop.given)
-
-    @property
-    def rule(self) -> str:
-        """The discretisation of the law."""
-        return self.verdict.rule
 
     @cached_property
     def numbers(self) -> list[SampledNumber]:

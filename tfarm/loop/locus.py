@@ -312,37 +312,33 @@ class BranchCrossing:
 def branch_crossings(family: Varied, gain: Real, branches: Complex, top: float) -> tuple[BranchCrossing, ...]:
     """Return the crossings of the imaginary axis in the order of the way.
 
-    Of a damped rig along a number of its law those of poles on no branch too, up to `top` [rad/s].
+    Of a damped rig along a number of its law those of poles on no branch too, up to `top` [rad/s].  Where D is linear
+    in the number they are those of D-decomposition.
     """
     sign, span = float(np.sign(gain[-1] - gain[0])), abs(float(gain[-1] - gain[0]))
     changes, is_damped = _changes(branches), not family.is_reactive
     band = max(top, JUST_ABOVE * float(np.nanmax(branches.imag, initial=0.0)))
-    known = _on_line(family, gain, band) if changes or is_damped else []
+    known: list[Crossing] = []
+    if (changes or is_damped) and not (family.is_of_arm or family.vary == "delay"):
+        loop, name = family.first.under(family.full), "gain" if family.vary == "all" else family.vary
+        if is_damped:
+            known = list(line_crossings(loop, name, float(gain.min()), float(gain.max()), band))
+        else:
+            gains, places, changed = crossed(np.asarray(grid(loop.arm, band)), family.on_axis)
+            known = [*map(Crossing, _corrected(family, gains, places), places, changed)]
     found: list[BranchCrossing] = []
     for number, low, high in changes:
         ends, points = gain[[low, high]], branches[number, [low, high]]
         at, omega = _crossed(family, ends, points, known, top)
         direction = "unstable" if points[1].real > points[0].real else "stable"
         found.append(BranchCrossing(gain=at, omega=omega, branch=number, direction=direction))
-    seen = {(each.gain, each.omega) for each in found}
-    for t, omega, change in known if is_damped else ():
-        is_between = AT_END * span < sign * (t - float(gain[0])) < (1 - AT_END) * span
-        if is_between and not top < omega < math.inf and (t, omega) not in seen:
-            direction = "unstable" if sign * change > 0 else "stable"
-            found.append(BranchCrossing(gain=t, omega=omega, branch=None, direction=direction))
-    return tuple(sorted(found, key=lambda each: (sign * each.gain, each.omega)))
-
-
-def _on_line(family: Varied, gain: Real, top: float) -> list[Crossing]:
-    """Crossings by D-decomposition where D is linear in the number; else none."""
-    if family.is_of_arm or family.vary == "delay":
-        return []
-    loop = family.first.under(family.full)
-    if family.is_reactive:
-        t, at, change = crossed(np.asarray(grid(loop.arm, top)), family.on_axis)
-        return [Crossing(*each) for each in zip(_corrected(family, t, at), at, change, strict=True)]
-    name = "gain" if family.vary == "all" else family.vary
-    return list(line_crossings(loop, name, float(gain.min()), float(gain.max()), top))
+    seen = {(own.gain, own.omega) for own in found}
+    for each in known if is_damped else ():
+        is_between = AT_END * span < sign * (each.t - float(gain[0])) < (1 - AT_END) * span
+        if is_between and not top < each.at < math.inf and (each.t, each.at) not in seen:
+            direction = "unstable" if sign * each.change > 0 else "stable"
+            found.append(BranchCrossing(gain=each.t, omega=each.at, branch=None, direction=direction))
+    return tuple(sorted(found, key=lambda own: (sign * own.gain, own.omega)))
 
 
 def _corrected(family: Varied, t: Real, at: Real) -> Real:

@@ -149,7 +149,7 @@ class Plane(PlaneOfCounts):
 
     @property
     def stable(self) -> NDArray[np.bool_]:
-        """Where no pole is unstable, the free hub angle has no double pole at 0 (K1 = Kp = 0), and modes are damped."""
+        """Points without unstable pole, double pole of the free hub angle at 0 (K1 = Kp = 0), or undamped modes."""
         if not self.is_of_gains:
             return np.asarray(self.unstable == 0)
         arm = self.arm
@@ -363,7 +363,7 @@ def rate_axis(arm: Arm) -> Axis:
 
 
 def rate_columns(arm: Arm, x: Axis, number: int) -> Real:
-    """Those of `number` rate gains at even places of an axis at which an arm may be stable.
+    """Rate gains at `number` even places of an axis, without those at which the arm is unstable for any moment gain.
 
     A free hub is unstable where its gain exceeds the friction: 1 + L is below 0 next to s = 0, and above it far right.
     """

@@ -253,23 +253,16 @@ def starting_points(loop: Loop, up_to: float) -> Complex:
     if not (loop.law.is_static or loop.law.is_improper):  # which has no states
         count = min(modes_below(loop.arm, up_to) + MODES_ABOVE_BOX, MOST_MODEL_MODES)
         with suppress(ParameterError, ConvergenceError):  # the winding number shows whether a pole is missing
-            of_model = poles_of_model(loop, _lightly_damped(loop, count))
+            # undamped modes, each with the damping C w of bending: following the damped ones takes far longer
+            model, drive, read, direct = sensed_model(loop.arm.lossless, (*loop.law.signals, "hub_rate"), count)
+            w = np.diag(model, 1)
+            (pair,) = np.nonzero((w > 0) & (np.diag(model, -1) == -w))
+            model[pair + 1, pair + 1] -= C * w[pair] ** 2
+            model = model - loop.arm.rate_loss * drive @ read[-1:]
+            of_model = poles_of_model(loop, (model, drive, read[:-1], direct[:-1]))
     near_own = [own * FARTHER_OWN, own * NEARER_OWN + ASIDE_OWN * abs(own)]
     starts = np.concatenate([near, near.conj(), slow, real, -real, *near_own, of_model])
     return starts[abs(starts) > LEAST_START]
-
-
-def _lightly_damped(loop: Loop, count: int) -> Matrices:
-    """A model of the rig in its undamped modes, each with the damping C w, and the friction of the hub.
-
-    Bending of one C has just that; following the damped modes themselves takes far longer than starts are worth.
-    """
-    arm, signals = loop.arm, loop.law.signals
-    A, B, C, D = sensed_model(arm.lossless, (*signals, "hub_rate"), count)
-    omega = np.diag(A, 1)
-    (pair,) = np.nonzero((omega > 0) & (np.diag(A, -1) == -omega))
-    A[pair + 1, pair + 1] -= arm.damping * omega[pair] ** 2
-    return A - arm.rate_loss * B @ C[-1:], B, C[:-1], D[:-1]
 
 
 def poles_of_model(loop: Loop, plant: Matrices) -> Complex:

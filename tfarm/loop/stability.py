@@ -44,8 +44,8 @@ BEYOND_LAW_POLES = 1.3  # of the fastest pole of the law that rings: a band reac
 DULL = 0.7  # damping ratio from which on a pole of the law makes no peak
 NEAREST_TO_AXIS = 1e-4  # of a band: first distance from the axis at which L is evaluated on the upper edge of the box
 UNCONTROLLABLE = 1e-9  # a hub participation below this share of an ordinary one is none
-DELAYED = "without any damping a delayed law drives infinitely many modes beyond the band"
-SMALL_GAIN = f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)"
+DELAYED = "without any damping a delayed law destabilises infinitely many modes beyond the frequency range"
+SMALL_GAIN = f"beyond the frequency range |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)"
 UNKNOWN_ABOVE = "converged up to {band:.4g} rad/s, not determined beyond, neither by small gain nor by a theorem"
 
 
@@ -96,20 +96,15 @@ def verdict_on(loop: Loop, band: float | None = None) -> Stability:
     theorem = theorem_of(loop)
     height, quiet = (band, False) if band is not None else band_of_loop(loop, theorem)
     poles = poles_below(loop, height, LISTED_LEFT)
-    words, is_infinite, is_known = _beyond(loop, theorem, quiet, height)
-    verdict = _verdict(poles, theorem, is_infinite)
-    return Stability(loop, verdict, poles.unstable, is_infinite, poles.box.im_max, words, poles, is_known)
-
-
-def _beyond(loop: Loop, theorem: Theorem, quiet: bool, band: float) -> tuple[str, bool, bool]:
-    """Stability beyond the band: the reason; whether infinitely many poles there are unstable; whether it is known."""
     if theorem.energy is not None:
-        return theorem.reason, theorem.energy == GIVES, True
-    if quiet:
-        return SMALL_GAIN, False, True
-    if loop.arm.is_undamped and loop.law.delay and loop.feeds_back:
-        return DELAYED, True, True
-    return UNKNOWN_ABOVE.format(band=band), False, False
+        tail = theorem.reason
+    elif quiet:
+        tail = SMALL_GAIN
+    else:
+        tail = DELAYED if loop.arm.is_undamped and loop.law.delay and loop.feeds_back else ""
+    is_infinite = theorem.energy == GIVES or tail == DELAYED
+    verdict, words = _verdict(poles, theorem, is_infinite), tail or UNKNOWN_ABOVE.format(band=height)
+    return Stability(loop, verdict, poles.unstable, is_infinite, poles.box.im_max, words, poles, bool(tail))
 
 
 def _verdict(poles: Poles, theorem: Theorem, is_infinite: bool) -> str:

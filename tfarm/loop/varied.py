@@ -36,7 +36,7 @@ SETTLED = 1e-10  # of its size: one step more is taken where Newton's method sti
 SERIES_RADIUS, SERIES_POINTS = 0.2, 16  # of the first frequency: where a power series next to 0 is read off
 NO_PART = 1e-9  # of a pole's size: a smaller imaginary part is rounding
 EMPTY = Box(0.0, 0.0, 0.0, 0.0)
-ARMS_KEPT = 200  # at values needed again: memory against time, of no effect on an answer
+ARMS_KEPT = 200  # at values needed again: memory against time, of no effect on a result
 
 
 @dataclass(frozen=True)

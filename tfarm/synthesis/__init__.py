@@ -1,1 +1,1 @@
-"""Controllers chosen for the exact arm: the best coefficients of a law, for its sampled loop or the continuous one."""
+"""Controller design for the exact arm: best coefficients of a law, for its sampled or its continuous-time loop."""

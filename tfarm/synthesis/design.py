@@ -1,8 +1,7 @@
-"""The law of a structure that serves an objective best, for one arm or for the worst of several.
+"""The law of a structure with the best value of an objective, for one arm or for the worst of several.
 
-A search over bounds with a judge of few modes, and the exact verdicts on what it finds: laws that do not hold never
-win.  How many strategies agreed, how flat the optimum is, and whether it is one or only where the bounds cut the search
-off, is part of the record.
+A search within bounds by a judge of few modes is followed by exact verdicts, which exclude unstable laws.  The record
+has the number of strategies that agreed, the width of the optimum, and whether the bounds cut the search off.
 """
 
 from __future__ import annotations
@@ -37,10 +36,7 @@ LoopKind = Literal["sampled", "continuous"]
 @dataclass(frozen=True)
 @record
 class OnArm:
-    """What a law is on one of the arms it was chosen for: its objective's `value`, and both verdicts.
-
-    `numbers` are those that a box gave the arm.
-    """
+    """Value of the objective and both verdicts on one of the arms of a design; `numbers` are those of the box."""
 
     name: Annotated[str, Quantity("arm", key="name")]
     numbers: Annotated[dict[str, float], Quantity("numbers of the arm")]
@@ -50,27 +46,27 @@ class OnArm:
 
     @property
     def stability(self) -> Annotated[str, Quantity("continuous-time loop", key="verdict")]:
-        """The word of the continuous loop's verdict."""
+        """The verdict on the continuous-time loop."""
         return self.verdict.verdict
 
     @property
     def known_beyond(self) -> Annotated[bool, Quantity()]:
-        """Whether that is known beyond its frequency range."""
+        """Whether that holds beyond its frequency range."""
         return self.verdict.is_known_beyond
 
     @property
     def band(self) -> Annotated[float, Quantity(key="up_to_rad_s")]:
-        """That range [rad/s]."""
+        """The frequency range of that verdict [rad/s]."""
         return self.verdict.band
 
     @property
     def sampled_loop(self) -> Annotated[str, Quantity("sampled loop", key="sampled")]:
-        """The same of the sampled loop."""
+        """The verdict on the sampled loop."""
         return self.sampled.short
 
 
 class Coefficient(NamedTuple):
-    """A coefficient of a design, how flat the optimum is along it, and where it was searched."""
+    """A coefficient of a design, the width of the optimum along it, and its bounds."""
 
     name: Annotated[str, Quantity("coefficient", key="name")]
     value: Annotated[float, Quantity("value", digits=7)]
@@ -82,16 +78,16 @@ class Coefficient(NamedTuple):
 @dataclass(frozen=True)
 @record
 class Design:
-    """The best law of a `structure` and its `coefficients`, the value of the objective, both verdicts, how flat it is.
+    """The best law of a `structure` and its `coefficients`, the value of the objective, both verdicts, and its width.
 
     `value` is a damping ratio, a disk margin, the largest |S|, a delay margin [s], a residual moment [N m] or a cost.
-    `loop` is what it was designed for: the "sampled" loop of `chain` or the "continuous" one; `verdict` is that of the
-    continuous loop, `sampled` that of the sampled one, both of the arm itself; `arms` has them for each arm that it was
-    chosen for, the arm itself first, and `value` is the worst among them.  `bounds` of the free coefficients were
-    searched, and those of `widened` are wider than at first.  `flat` has the coefficients between which, the others
-    held, the value is within one per cent of the best.  `at_bound` names those that lie at an end of their bounds even
-    so: there the search was cut off, and the value is no optimum; `at_limit` those of them at a physical end, K1 = 0,
-    the K2 = 1 that stops the hub, or 2/T of a pole.  Of `starts` strategies `agreed` came to the best score.
+    `loop` is that of the design: the "sampled" one of `chain` or the "continuous" one.  `verdict` is that of the
+    continuous-time loop, `sampled` that of the sampled one, both of the arm itself.  `arms` has them for each arm of a
+    design, the arm itself first, and `value` is the worst among them.  `bounds` are those of the free coefficients;
+    those of `widened` are wider than at first.  `flat` are ranges of each coefficient, the others constant, in which
+    the value is within one per cent of the best.  `at_bound` names coefficients at an end of their bounds: there the
+    search was cut off, and the value is no optimum.  Those in `at_limit` are at a physical end, K1 = 0, the K2 = 1 that
+    stops the hub, or 2/T of a pole.  Of `starts` strategies `agreed` reached the best score.
     """
 
     objective: Annotated[str, Quantity("objective")]
@@ -116,25 +112,18 @@ class Design:
 
     @property
     def rows(self) -> Annotated[list[Coefficient], Quantity("coefficients", key="coefficients")]:
-        """A row a coefficient."""
+        """One row for each coefficient."""
+        optima = dict.fromkeys(self.bounds, "inside") | dict.fromkeys(self.widened, "inside bounds that were widened")
+        optima |= dict.fromkeys(self.at_bound, "none: search cut off at the bound")
+        optima |= dict.fromkeys(self.at_limit, "at the physical limit")
         return [
-            Coefficient(name, value, self.flat.get(name), self.bounds.get(name), self._optimum(name))
+            Coefficient(name, value, self.flat.get(name), self.bounds.get(name), optima.get(name, "given"))
             for name, value in self.coefficients.items()
         ]
 
-    def _optimum(self, name: str) -> str:
-        """The place of the best value within the bounds."""
-        if name in self.at_limit:
-            return "at the physical limit"
-        if name in self.at_bound:
-            return "none: search cut off at the bound"
-        return (
-            "inside bounds that were widened" if name in self.widened else "inside" if name in self.bounds else "given"
-        )
-
     @property
     def slew_duration(self) -> Annotated[float | None, Quantity("record of the slew", "s", 6)]:
-        """Length of the record that a residual or a cost is of, for `tfarm simulate --duration`; None of others."""
+        """Length of the record of a residual or a cost, for `tfarm simulate --duration`; None of others."""
         arm, chain = self.verdict.loop.arm, self.chain
         if self.loop == "continuous":
             return None
@@ -143,22 +132,22 @@ class Design:
 
     @property
     def worst_arm(self) -> Annotated[str, Quantity("worst arm")]:
-        """The arm that the value is of."""
+        """The arm with that value."""
         return next(each.name for each in self.arms if each.value == self.value)
 
     @property
     def tried(self) -> Annotated[int, Quantity(key="arms_tried_inside")]:
-        """Arms inside the box that were looked at."""
+        """Number of arms inside the box that were tried."""
         return self.worst_case.tried
 
     @property
     def worst_case_words(self) -> Annotated[str, Quantity("worst case", key="worst_case_in_words")]:
-        """How the arms were chosen."""
+        """Choice of the arms."""
         return self.worst_case.sentence(len(self.arms))
 
 
 class _Choice(NamedTuple):
-    """A law that holds on all arms, by the judges of `worst`."""
+    """A law that is stable on all arms, by the judges of `worst`."""
 
     worst: Worst
     search: Search
@@ -172,24 +161,24 @@ def design(
     K2: Bounds | None = None, Kp: float = 0.0, modes: int = 2, chain: Chain | None = None, continuous: bool = False,
     progress: Tell | None = None, also: Sequence[Arm] = (), ranges: Mapping[str, Bounds] | None = None,
 ) -> Design:  # fmt: skip
-    """The law of a structure that serves an objective best in the sampled loop of a chain (10 ms unless given).
+    """Return the law of a structure with the best value of an objective in the sampled loop of a chain (default 10 ms).
 
     Structures are "K1-K2", gains of rate and moment, within the bounds `K1` and `K2` where given, "PD", "PD+notch",
     "lead", "PPF" of the first `modes` modes and "strain-rate"; `Kp` is chosen where it is 0, but of "K1-K2".
     Objectives are "damping" of the first `modes` modes, "margin", "sensitivity", "delay", "residual" and "cost" (see
-    `objectives`).  What is recommended holds when sampled, with all gains a quarter larger or smaller, and without
-    sampling.  `continuous`: for the continuous loop instead; what is best there need not hold when sampled.
+    `objectives`).  The law is stable when sampled, with all gains a quarter larger or smaller, and in continuous time.
+    `continuous`: for the continuous-time loop instead; its best law may be unstable when sampled.
     `progress` is called with one line at a time.
 
-    `also` are further arms that the law has to serve, `ranges` the ends of numbers of the arm, such as
-    {"payload.mass": (0.1, 0.5)}: the objective is then the worst of the arm, of those, of the corners of the box, and
-    of arms inside it that a search finds to be worse, which is no proof over the box.  The law holds on each arm that
-    is named in `.arms`; references and feed-forward are made for the arm itself.  Raises ParameterError for what does
-    not go together, ConvergenceError where nothing found holds.
+    `also` are further arms for the law, `ranges` the ends of numbers of the arm, such as {"payload.mass": (0.1, 0.5)}.
+    The objective is then the worst of the arm, of those, of the corners of the box, and of worse arms inside it that a
+    search finds, which is no proof over the box.  The law is stable on each arm in `.arms`; references and feed-forward
+    are those of the arm itself.  Raises ParameterError for options that exclude each other, ConvergenceError where no
+    stable law is found.
     """
     must_be_known("objective", objective, OBJECTIVES)
     if objective == "cost" and continuous:
-        remedy = "the cost of the tuner's trial is one of samples: leave the continuous loop out"
+        remedy = "the cost of the tuner's trial is one of samples: design for the sampled loop"
         raise ParameterError(key="objective", value=objective, remedy=remedy)
     ends = {key: (float(low), float(high)) for key, (low, high) in (ranges or {}).items()}
     box = ArmBox(arm, ends) if ends else None
@@ -208,7 +197,7 @@ def design(
 @dataclass(frozen=True)
 @record
 class _Task:
-    """What is asked of a design: one arm, for which slews are made, an objective, and a structure with its bounds."""
+    """A task of design: the arm of the slews, an objective, and a structure with its bounds."""
 
     arm: Arm
     objective: str
@@ -219,15 +208,19 @@ class _Task:
     tell: Tell
 
     def judges(self, on: Arm) -> Iterator[Judge]:
-        """Judges on an arm, of ever more modes."""
+        """Judges on an arm, of more and more modes."""
         continuous = self.loop == "continuous"
         return judges_of(on, self.arm, self.chain, self.objective, self.form, self.modes, continuous=continuous)
 
     def find(self, named: Sequence[NamedArm]) -> _Choice:
-        """The best law that holds on all arms.  Raises ConvergenceError where none is found."""
+        """Return the best law that is stable on all arms.  Raises ConvergenceError where none is found.
+
+        If the best law under fewer conditions is stable, it is the best under all: so that one is tried first.
+        """
         nearest: tuple[float, Any] | None = None
         for several in in_step([self.judges(each.arm) for each in named]):
-            for judges, most in self._steps(several):
+            relaxed = tuple(replace(each, is_relaxed=True) for each in several)
+            for judges, most in [*([(relaxed, 1)] if self.loop == "sampled" else []), (several, CANDIDATES)]:
                 found = search(Worst(judges), self.form, self.tell)
                 nearest = min([*([nearest] if nearest else []), found.found[0]], key=itemgetter(0))
                 for score, x in found.found[:most]:
@@ -239,19 +232,13 @@ class _Task:
         chain = self.chain if self.loop == "sampled" else None
         raise ConvergenceError(_why_none(named, self.form, law, chain), law, nearest[0])
 
-    def _steps(self, several: tuple[Judge, ...]) -> list[tuple[tuple[Judge, ...], int]]:
-        """Judges to search with, and how many of the laws found are tried: the best under fewer conditions, if it
-        holds, is the best under all."""
-        relaxed = tuple(replace(each, is_relaxed=True) for each in several)
-        return [*([(relaxed, 1)] if self.loop == "sampled" else []), (several, CANDIDATES)]
-
     def score_on(self, choice: _Choice, on: Arm) -> float:
-        """What a law minimised, on another arm; inf where the loop does not hold."""
+        """The score of a law on another arm; inf where the loop is unstable."""
         score = next(self.judges(on)).score(choice.law)
         return score if score < LOST else np.inf
 
     def design(self, choice: _Choice, named: Sequence[NamedArm], case: WorstCase) -> Design:
-        """The record of a law that was chosen for these arms."""
+        """The record of a law for these arms."""
         law, x, own = choice.law, choice.x, choice.search.form
         on_arms = tuple(
             OnArm(each.name, each.numbers, judge.value(law), stability(each.arm, law),
@@ -272,27 +259,27 @@ class _Task:
 
 
 def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Chain | None) -> str:
-    """What grows under the law that came nearest, on the arm where it grows most (of a sampled loop), and a remedy."""
+    """The most unstable mode under the law nearest to stability (of a sampled loop), and a remedy."""
     within = " and ".join(f"{each.name} in ({each.bounds[0]:g}, {each.bounds[1]:g})" for each in form.free)
     text = f"no law {form.name} with {within} was found that is stable"
     if chain is None:
         return f"{text}: widen the bounds"
     verdict = max((sampled_verdict(each.arm, law, chain) for each in arms), key=lambda each: each.log_radius)
     growth = float(np.expm1(verdict.log_radius))
-    grows = (
-        f"under the nearest {verdict.slowest} grows by {growth:.2g} a sample" if growth > 0 else "none has a reserve"
+    nearest = f"{verdict.slowest} grows by {growth:.2g} a sample" if growth > 0 else "there is no reserve"
+    text = (
+        f"{text} when sampled: under the nearest law {nearest}; widen the bounds, or try another {ANGLE_GAIN} or period"
     )
-    text = f"{text} when sampled: {grows}; widen the bounds, or try another {ANGLE_GAIN} or period"
     if not verdict.loop.plant.arm.has_elastic_link or form.name == TWO_GAINS:
         return text
     return (
-        f"{text}; with link.damping = 0 no mode loses energy of its own, and a held input drives each one that the law "
-        f"does not damp where its alias is seen: give link.damping, or take {TWO_GAINS}"
+        f"{text}; with link.damping = 0 every mode that the law does not damp at its alias is unstable under a held "
+        f"input: give link.damping, or take {TWO_GAINS}"
     )
 
 
 def in_step(each: Sequence[Iterable[_One]]) -> Iterator[tuple[_One, ...]]:
-    """The first of all, the second of all, ...; one that has ended stays at its last."""
+    """The first items of all, the second, ...; an iterable that has ended repeats its last item."""
     last: list[_One | None] = [None] * len(each)
     for row in zip_longest(*each):
         last = [old if new is None else new for old, new in zip(last, row, strict=True)]

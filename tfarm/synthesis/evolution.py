@@ -1,4 +1,4 @@
-"""Evolution strategies with adapted covariance, many of them in step: where a function of a box is least.
+"""Minimum of a function in a box by evolution strategies with covariance adaptation, many of them in step.
 
 Each draws points from a normal distribution N(m, step^2 C), moves m to the weighted mean of the best, and learns
 from such moves the covariance C and the step:
@@ -8,9 +8,9 @@ from such moves the covariance C and the step:
     p_c' = (1 - c_c) p_c + sqrt(c_c (2 - c_c) mu) y
     C'  = (1 - c_1 - c_mu) C + c_1 p_c' p_c'^T + c_mu sum of w_i y_i y_i^T
 
-It uses no slopes and goes along edges, where the largest of several values has none.  Constants are those of N. Hansen,
-The CMA Evolution Strategy: A Tutorial (arXiv 1604.00772).  A strategy finds the minimum of its own valley: of many the
-worse half ends every few rounds.
+It uses no slopes, so that it works along edges, where the largest of several values has none.  Constants are those of
+N. Hansen, The CMA Evolution Strategy: A Tutorial (arXiv 1604.00772).  A strategy finds a local minimum: the worse half
+of all ends every few rounds.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ import numpy as np
 from tfarm.arrays import Real, Whole
 
 POINTS = 12  # of each strategy in a round
-HALVED_EVERY, FINALISTS = 10, 4  # rounds after which the better half goes on, down to so many
+HALVED_EVERY, FINALISTS = 10, 4  # rounds after which the better half goes on, and the least number left
 MOST_ROUNDS = 160  # a ridge in five coordinates takes most of them
 FIRST_STEP = 0.05  # of the box: short, as good valleys are narrow
 LEAST_PROGRESS, SHORT_STEP = 1e-5, 1e-3  # of the score between halvings, of the box: with less of both all end
 STEP_GROWS = 0.6  # of ln(step) in a round, at most
 LEAST_SPREAD = 1e-20  # of C: an eigenvalue below it is rounding
-STALLED = 1.4  # of the length by chance, and 2/(n + 1): a longer path of the step leaves that of C as it is
+STALLED = 1.4  # of the length by chance, and 2/(n + 1): beyond that length of the step's path that of C is not updated
 SEED = 0
 
 
@@ -47,7 +47,7 @@ class Constants(NamedTuple):
 
     @classmethod
     def of(cls, n: int) -> Constants:
-        """Those for n coordinates."""
+        """The constants for n coordinates."""
         weights = np.log(POINTS / 2 + 0.5) - np.log(np.arange(1, POINTS // 2 + 1))
         weights /= weights.sum()
         mu = float(1 / (weights**2).sum())
@@ -74,14 +74,14 @@ class Strategies(NamedTuple):
     score: Real
 
     def some(self, which: Whole) -> Strategies:
-        """Those of these numbers."""
+        """The strategies of some indices."""
         return Strategies(*(each[which] for each in self))
 
 
 def evolved(
     score: Callable[[Real], Real], starts: Real, box: tuple[Real, Real], tell: Callable[[int, float], None]
 ) -> tuple[Real, Real]:
-    """Return the points (n, m) that strategies from m starts (n, m) come to, and their scores, the lowest first.
+    """Return the points (n, m) reached by strategies from m starts (n, m), and their scores, the lowest first.
 
     `score` takes points (n, k) of the box.  `tell` is called with the number of each tenth round, and the lowest score.
     """
@@ -113,7 +113,7 @@ def evolved(
 def _next(
     now: Strategies, of: Constants, score: Callable[[Real], Real], rng: np.random.Generator, number: int
 ) -> Strategies:
-    """The strategies a round later."""
+    """The strategies after one round."""
     (m, n), step = now.mean.shape, now.step[:, None]
     spread, axes = np.linalg.eigh(now.C)
     spread = np.sqrt(np.maximum(spread, LEAST_SPREAD))

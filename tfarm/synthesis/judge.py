@@ -1,4 +1,4 @@
-"""Objectives and one judge of laws: whether a loop of few modes is stable with a reserve, and the scores of laws in it.
+"""Objectives and one judge of laws: stability with a reserve in a loop of few modes, and the scores of laws in it.
 
 damping       least damping ratio of the oscillating poles of the first modes
 margin        disk margin min 2 |1 + L|/|1 - L|; of nearly equal ones that with more damping
@@ -8,12 +8,12 @@ residual      root mean square of the arm's own root moment less the rigid arm's
               the slew
 cost          T sum of (a x^2 + b e^2)/2 over a slew, the tuner's: x as the controller reads it, e what is added
 
-Where two poles are about as near to that of a higher mode, the one that has decayed more is taken for it, so that no
-damping is claimed that is not there.
+Where two poles are nearly as close to that of a higher mode, the one with more decay is taken for it, so that damping
+is not overestimated.
 
-A design is for the sampled loop or for the continuous-time one.  In the sampled one all poles are stable with every
-gain a quarter larger and smaller, too, and in continuous time: the best damping of few modes often lies where a higher
-one is about to grow.  What wins is judged once more by the exact verdicts; a model only says where to look.
+A design is for the sampled loop or for the continuous-time one.  In the sampled one all poles are stable also with
+every gain a quarter larger and smaller, and in continuous time: the best damping of few modes is often next to the
+instability of a higher one.  The result is checked by the exact verdicts; a model is only for the search.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm, as_law, tracked
 from tfarm.arm.blocks import Rational
@@ -41,7 +40,7 @@ from tfarm.synthesis.models import Model, Slews, continuous_model, sampled_model
 from tfarm.synthesis.structures import Entry, Structure
 
 REAL_ANGLE = 1e-9  # rad, of ln z or s: a pole at a smaller angle is real
-AS_NEAR = 4.0  # of the least distance to an open-loop pole: as far off a pole may be its own too
+AS_NEAR = 4.0  # of the least distance to an open-loop pole: up to there a pole may be its own too
 LONGEST_MARGIN = 100.0  # samples, or s: the delay margin where |L| is nowhere 1
 TIE = 1e-3  # weight of the damping ratio in a disk margin: without sampling rate feedback alone has margin 2
 
@@ -81,26 +80,22 @@ class Objective:
 
 
 def damping_of(model: Model, poles: Complex) -> Real:
-    """The least damping ratio (laws,) of the oscillating poles (laws, n) that count; 1 where a law has none."""
-    s = model.in_s(poles)
-    counted = of_first_modes(poles, model.higher) if model.higher else poles.imag >= 0
+    """The least damping ratio (laws,) of oscillating poles (laws, n); 1 where a law has none.
+
+    One of each pair counts.  The poles nearest to those of `higher` modes are left out.
+    """
+    s, counted, rows = model.in_s(poles), poles.imag >= 0, np.arange(len(poles))
+    for own in model.higher:
+        gap = np.where(counted, abs(poles - own), np.inf)
+        near = counted & (gap <= AS_NEAR * gap.min(axis=1, keepdims=True))
+        counted[rows, np.where(near, abs(poles), np.inf).argmin(axis=1)] = False
     counted &= (np.angle(poles) > REAL_ANGLE) & (poles != 0) & (s.imag < model.band)
     return np.where(counted, -s.real / np.maximum(abs(s), LEAST_SIZE), 1.0).min(axis=1, initial=1.0)
 
 
 def least_damping(model: Model, entries: Sequence[Entry]) -> Real:
-    """The least damping ratio (laws,) that counts, of stable laws and others: 1 where no pole oscillates."""
+    """The least damping ratio (laws,) of the first modes, of stable laws and others; 1 where no pole oscillates."""
     return damping_of(model, model.poles(entries))
-
-
-def of_first_modes(z: Complex, higher: Sequence[complex]) -> NDArray[np.bool_]:
-    """Which poles (laws, n) are none of a higher mode: one of each pair, those about the `higher` ones left out."""
-    left, rows = z.imag >= 0, np.arange(len(z))
-    for own in higher:
-        gap = np.where(left, abs(z - own), np.inf)
-        near = left & (gap <= AS_NEAR * gap.min(axis=1, keepdims=True))
-        left[rows, np.where(near, abs(z), np.inf).argmin(axis=1)] = False
-    return np.asarray(left)
 
 
 def disk_of(L: Complex) -> Real:
@@ -143,21 +138,21 @@ OBJECTIVES = {
 }
 
 
-RESERVE = 1.25  # the loop holds with all its gains larger or smaller by this factor: what a gauge or motor is off by
-SEARCH_RESERVE = 1.002 * RESERVE  # by as much in the search: the model's few modes have edges that are off by less
-FEWEST_MODES = 8  # of the first model; more where its best laws do not hold
-CONTINUOUS_TIMES = 2  # as many where the continuous loop is designed: two poles that meet double few digits
-LAWS_AT_ONCE = 256  # memory, whatever the number of laws
+RESERVE = 1.25  # factor on all gains with which the loop is stable, up and down: the error of a gauge or motor
+SEARCH_RESERVE = 1.002 * RESERVE  # in the search: edges of the model's few modes have a smaller error
+FEWEST_MODES = 8  # of the first model; more where its best laws are unstable
+CONTINUOUS_TIMES = 2  # times the modes where the continuous-time loop is designed
+LAWS_AT_ONCE = 256  # a limit of memory
 LOST = 1e3  # score where a condition of stability is not met, and as much for each later one
 
 
 @dataclass(frozen=True)
 @record
 class Judge:
-    """What laws are worth on an arm, by a `model` of few modes; the models `also` have to be stable, too.
+    """The objective of laws on an arm, by a `model` of few modes; the models `also` have to be stable, too.
 
-    Slews are made for the arm `known`, and damping is that of the first `modes` modes.  `is_relaxed`: the sampled loop
-    need hold with larger gains alone, which nearly always decides, and is half the work.
+    Slews are those of the arm `known`, and damping is that of the first `modes` modes.  `is_relaxed`: the sampled loop
+    has to be stable with larger gains alone, which nearly always decides, at half the work.
     """
 
     arm: Arm
@@ -184,19 +179,10 @@ class Judge:
         """The slews of the model."""
         return Slews(self.model, self.arm, self.known, self.chain)
 
-    @property
-    def _conditions(self) -> list[tuple[Model, float]]:
-        """What has to be stable, and a factor on the law: most of what is not fails the first, the last is the loop."""
-        own = [(self.model, 1.0)]
-        if not self.is_sampled:
-            return own
-        others = [] if self.is_relaxed else [(self.model, 1 / SEARCH_RESERVE), *((each, 1.0) for each in self.also)]
-        return [(self.model, SEARCH_RESERVE), *others, *own]
-
     # ------------------------------------------------------------ in the model
 
     def scores(self, form: Structure, x: Real) -> Real:
-        """What is minimised, at points x (n, laws); `LOST` and more where the loop does not hold with the reserve."""
+        """The function to be minimised, at points x (n, laws); `LOST` and more where the loop is unstable."""
         parts = [x[:, i : i + LAWS_AT_ONCE] for i in range(0, x.shape[1], LAWS_AT_ONCE)]
         return np.concatenate([self.scores_of(form.entries(form.coefficients(part)), part.shape[1]) for part in parts])
 
@@ -205,14 +191,22 @@ class Judge:
         return float(self.scores_of(entries_of(law), 1)[0])
 
     def scores_of(self, entries: Sequence[Entry], number: int) -> Real:
-        """The same of the entries of so many laws."""
-        scores, alive, poles, conditions = np.empty(number), np.arange(number), np.empty(0, complex), self._conditions
+        """The same of the entries of `number` laws.
+
+        The models that have to be stable, each with a factor on the law: most unstable laws fail the first.
+        """
+        conditions = [(self.model, 1.0)]
+        if self.is_sampled and not self.is_relaxed:
+            conditions = [(self.model, 1 / SEARCH_RESERVE), *((each, 1.0) for each in self.also), *conditions]
+        if self.is_sampled:
+            conditions = [(self.model, SEARCH_RESERVE), *conditions]
+        scores, alive, poles = np.empty(number), np.arange(number), np.empty(0, complex)
         for left, (model, share) in zip(range(len(conditions), 0, -1), conditions, strict=True):
             poles = model.poles(entries, share)
             growth = model.growth(poles).max(axis=1)
-            held = growth < 0.0
-            scores[alive[~held]] = LOST * (left + growth[~held] / (1 + growth[~held]))
-            alive, poles, entries = alive[held], poles[held], chosen(entries, held)
+            stable = growth < 0.0
+            scores[alive[~stable]] = LOST * (left + growth[~stable] / (1 + growth[~stable]))
+            alive, poles, entries = alive[stable], poles[stable], chosen(entries, stable)
             if not alive.size:
                 return scores
         scores[alive] = self.aim.scores(Reading(self.model, self.slews, entries, poles))
@@ -221,7 +215,7 @@ class Judge:
     # ------------------------------------------------------------ beyond it
 
     def value(self, law: AnyLaw) -> float:
-        """The objective of one law, as exactly as it is known."""
+        """The objective of one law, by the best available method."""
         return self.aim.value(self, law)
 
     def lowest(self, law: AnyLaw, of: Callable[[Complex], Real]) -> float:
@@ -235,7 +229,7 @@ class Judge:
         return largest if self.is_sampled else max(1.0, largest)
 
     def exact_damping(self, law: AnyLaw) -> float:
-        """The least damping ratio: of the continuous loop that of its exact poles."""
+        """The least damping ratio; of the continuous-time loop that of its exact poles."""
         if self.is_sampled:
             return -self.score(law)
         s = stability(self.arm, law, self.model.band).poles.values
@@ -243,7 +237,7 @@ class Judge:
         return float((-s.real / abs(s)).min(initial=1.0))
 
     def simulated_residual(self, law: AnyLaw) -> float:
-        """What `tfarm simulate` finds of the slew [N m], through the converters too; inf where it stops."""
+        """The residual of `tfarm simulate` after the slew [N m], with the converters; inf where it stops."""
         if not self.is_sampled:
             return self.score(law)
         run, _ = simulated(*tracked(self.arm, law), self.chain, slew_and_after(self.arm, self.known, self.chain))
@@ -251,21 +245,30 @@ class Judge:
         return np.inf if left is None else left
 
     def holds(self, law: AnyLaw) -> bool:
-        """Whether the loop is stable by the exact verdict, when sampled with a reserve, too."""
+        """Whether the loop is stable by the exact verdicts, when sampled also with a reserve."""
         shares = (1.0, 1 / RESERVE, RESERVE) if self.is_sampled else ()
         try:
             return stability(self.arm, law).is_stable and all(
                 sampled_verdict(self.arm, law.times(share), self.chain).is_stable for share in shares
             )
-        except ConvergenceError:  # on the edge
+        except ConvergenceError:  # a pole on the axis or the circle
             return False
 
 
 def judges_of(
     arm: Arm, known: Arm, chain: Chain, objective: str, form: Structure, modes: int, *, continuous: bool
 ) -> Iterator[Judge]:
-    """Judges of the laws of a structure on an arm, of ever more modes."""
-    counts = mode_counts(arm, chain, modes) if not continuous else iter((max(FEWEST_MODES, modes + FEWEST_MODES // 2),))
+    """Judges of the laws of a structure on an arm, of more and more modes until the best law is stable.
+
+    Without damping there is one, of the number of modes of the sampled verdict.
+    """
+    fewest = modes + FEWEST_MODES // 2
+    counts = [max(UNDAMPED_MODES if arm.has_elastic_link and not continuous else FEWEST_MODES, fewest)]
+    if not (continuous or arm.has_elastic_link):
+        most = most_modes(arm, chain)
+        while counts[-1] < most:
+            counts.append(2 * counts[-1])
+        counts = [*counts[:-1], most]
     for count in counts:
         yield judge_of(arm, known, chain, objective, form.signals, modes, count, continuous=continuous)
 
@@ -274,7 +277,7 @@ def judge_of(
     arm: Arm, known: Arm, chain: Chain, objective: str, signals: tuple[str, ...], modes: int, count: int, *,
     continuous: bool = False,
 ) -> Judge:  # fmt: skip
-    """The judge of laws that read these signals, with `count` flexible modes; more of the continuous loop."""
+    """The judge of laws on these signals, with `count` flexible modes; more of the continuous-time loop."""
     if OBJECTIVES[objective].of_slew and "root_moment" not in signals:
         signals = (*signals, "root_moment")
     own = continuous_model(
@@ -284,24 +287,8 @@ def judge_of(
     return Judge(arm, known, chain, objective, modes, models[0], tuple(models[1:]))
 
 
-def mode_counts(arm: Arm, chain: Chain, modes: int) -> Iterator[int]:
-    """Flexible modes of the first model, and of larger ones where what is best there does not hold.
-
-    Without damping as many as the sampled verdict takes.
-    """
-    if arm.has_elastic_link:
-        yield max(UNDAMPED_MODES, modes + FEWEST_MODES // 2)
-        return
-    most = most_modes(arm, chain)
-    count = min(most, max(FEWEST_MODES, modes + FEWEST_MODES // 2))
-    while count < most:
-        yield count
-        count *= 2
-    yield most
-
-
 def chosen(entries: Sequence[Entry], rows: Real) -> list[Entry]:
-    """The entries of some of the laws; what all laws have in common stays."""
+    """The entries of some of the laws; polynomials that are common to all laws stay."""
     return [
         Entry(each.signal, *(of[:, rows] if of.shape[1] > 1 else of for of in (each.num, each.den))) for each in entries
     ]

@@ -9,8 +9,8 @@ A slew under laws, sample by sample, many laws at once:
 
     x_{k+1} = A x_k + G (r_k + D_k ref_k) + E ref_k,   w = (r + D_k (ref - C x) - C_k x_k)/(1 + D_k D)
 
-A that of the closed loop, r the feed-forward, w the input, D_k what a law passes at once.  In continuous time the
-reference is a state of its own: its angle, rate and acceleration, constant over each half of the slew.
+A is that of the closed loop, r the feed-forward, w the input, D_k the direct term of a law.  In continuous time the
+reference has states: its angle, rate and acceleration, constant over each half of the slew.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from tfarm.response.signals import Signals
 from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.structures import Entry
 
-GROWTH_OF_MODEL = 1e-6  # of |s|: an eigenvalue so little right of the axis may be the model's own, of modes left out
+GROWTH_OF_MODEL = 1e-6  # of |s|: a smaller growth may be an error of the model
 AT_NYQUIST = 1e-12  # of z = -1, where Tustin's s is infinite
 POLE_OFFSETS = np.geomspace(1e-9, 0.5, 40)  # rad, to either side of the open loop's poles
 EVEN_ANGLES = 400  # points of the circle at equal distances
@@ -49,9 +49,9 @@ class Model:
     """A, B, C, D from the input to `signals`, of few modes; at samples of `period` [s], or in continuous time (None).
 
     `speed` [1/s] is c, the unit of a law's s.  `grid` gives angles (m,) of the circle [rad] or frequencies [rad/s], and
-    `response` the signals (signals, k) at k of them.  The damping of poles counts below `band` [rad/s], apart from one
-    each about the poles of open-loop modes `higher`, the highest first.  `last` is the state that keeps the input of
-    the sample before; `own_moment` (n,) reads the arm's own root moment of the states, ahead of the anti-alias filter.
+    `response` the signals (signals, k) at k of them.  The damping of poles counts below `band` [rad/s], without one
+    each near the poles of open-loop modes `higher`, the highest first.  `last` is the state with the input of the last
+    sample; `own_moment` (n,) is the row of the arm's own root moment, before the anti-alias filter.
     """
 
     plant: Matrices
@@ -93,9 +93,9 @@ class Model:
         return within @ (unit + A), 2 * within @ B, C @ within, D + C @ within @ B
 
     def closed(self, entries: Sequence[Entry], share: float = 1.0) -> Real:
-        """Closed-loop matrices (laws, n, n), the plant's states first; nan of algebraic loops.
+        """Closed-loop matrices (laws, n, n) with a factor `share` on the law, the plant's states first.
 
-        `share` is a factor on the whole law.
+        They are nan of algebraic loops.
         """
         A, B, C, D = self.plant
         Ak, Bk, Ck, Dk = self.states(entries)
@@ -113,19 +113,19 @@ class Model:
     # ------------------------------------------------------------ poles
 
     def poles(self, entries: Sequence[Entry], share: float = 1.0) -> Complex:
-        """Closed-loop poles (laws, n); of a matrix that is not finite they are far outside."""
+        """Closed-loop poles (laws, n), of a matrix that is not finite far outside."""
         found = self.closed(entries, share)
         bad = ~np.isfinite(found).all(axis=(1, 2))
         found[bad] = LOST_GROWTH * np.eye(found.shape[1])
         return np.linalg.eigvals(found).astype(complex)
 
     def growth(self, poles: Complex) -> Real:
-        """ln |z| of poles, or Re s/|s| less what the model may have of its own: to be below 0."""
+        """ln |z| of poles, or Re s/|s| less the error of the model: below 0 if stable."""
         size = np.maximum(abs(poles), LEAST_SIZE)
         return np.log(size) if self.period is not None else poles.real / size - GROWTH_OF_MODEL
 
     def in_s(self, poles: Complex) -> Complex:
-        """s of poles, times the period of a sampled loop; those at z = 0 are at 1."""
+        """s of poles, times the period of a sampled loop; 1 of poles at z = 0."""
         return poles if self.period is None else np.log(np.where(poles == 0, np.e, poles))
 
     # ------------------------------------------------------------ loop function
@@ -140,18 +140,13 @@ class Model:
         """The signals (signals, m) at all angles."""
         return self.response(self.angles)
 
-    def in_p(self, angles: Real) -> Complex:
-        """s/c at angles."""
-        if self.period is None:
-            return 1j * angles / self.speed
-        z = np.exp(1j * angles)
-        return (z - 1) / np.where(abs(z + 1) < AT_NYQUIST, AT_NYQUIST, z + 1)
-
     def loop(self, entries: Sequence[Entry], angles: Real | None = None) -> Complex:
         """L (laws, m) at the model's own angles, or at others."""
-        own = angles is None
-        response = self.responses if own else self.response(np.asarray(angles))
-        p, total = self.in_p(self.angles if own else np.asarray(angles)), 0.0
+        q = self.angles if angles is None else np.asarray(angles)
+        response, total = self.responses if angles is None else self.response(q), 0.0
+        p, z = 1j * q / self.speed, np.exp(1j * q)  # s/c
+        if self.period is not None:
+            p = (z - 1) / np.where(abs(z + 1) < AT_NYQUIST, AT_NYQUIST, z + 1)
         for signal, num, den in entries:
             total = total + self._at(num, p) / self._at(den, p) * response[self.signals.index(signal)]
         return np.asarray(total)
@@ -165,9 +160,9 @@ class Model:
 
 
 def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int, speed: float) -> Model:
-    """The loop without sampling, of `count` flexible modes; its response is that of the exact arm."""
+    """The continuous-time loop of `count` flexible modes; its response is that of the exact arm."""
     A, B, C, D = sensed_model(arm, signals, count)
-    if arm.has_rigid_mode and "hub_angle" not in signals:  # an angle that nothing reads is no state of the loop
+    if arm.has_rigid_mode and "hub_angle" not in signals:  # an angle without feedback is no state of the loop
         A, B, C = A[1:, 1:], B[1:], C[:, 1:]
     read, top = Signals(arm, signals), band_of(arm, modes)
     moment = C[signals.index("root_moment")] if "root_moment" in signals else np.zeros(len(A))
@@ -179,7 +174,7 @@ def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int,
 def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, count: int) -> Model:
     """The loop at the samples of a chain, of `count` flexible modes.
 
-    Poles of higher modes, which alias into the same angles, are told by where the open loop has them: a held torque
+    Poles of higher modes, which alias into the same angles, are those nearest to the open-loop ones: a held torque
     moves a pole less the higher its mode.
     """
     T, by_difference = chain.sampling.period, "hub_rate" in signals and chain.converters.hub_rate == "difference"
@@ -189,26 +184,28 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
     A, B, C = pulse.matrices()
     own = C[0] * 0.0
     if "root_moment" in signals:
-        beside = sensed.together.joined(sensed.unfiltered.rows(["root_moment"]))
-        own = np.asarray(PulseTransfer(beside, chain.sampling).folded().matrices()[2][-1])
+        more = sensed.together.joined(sensed.unfiltered.rows(["root_moment"]))
+        own = np.asarray(PulseTransfer(more, chain.sampling).folded().matrices()[2][-1])
     first = pulse.integrals_at
-    damped, felt = bool(sensed.read.arm.rate_loss), arm.has_rigid_mode
-    gone = [first] if damped or not felt else []
-    gone += [] if felt else [first + 1]
+    damped, turns = bool(sensed.read.arm.rate_loss), arm.has_rigid_mode
+    gone = [first] if damped or not turns else []
+    gone += [] if turns else [first + 1]
     angle = first + damped
     response: Callable[[Complex], Complex] = pulse
     if by_difference:
         estimate, n = _Difference(float(np.exp(-chain.converters.rate_filter * T)), T), read.index("hub_angle")
-        A, B, C = estimate.states(A, B, C, n, signals.index("hub_rate"), angle if felt else None)
+        A, B, C = estimate.states(A, B, C, n, signals.index("hub_rate"), angle if turns else None)
         own = np.append(own, 0.0)
         response = estimate.response(pulse, n, signals.index("hub_rate"))
-    if felt and "hub_angle" not in signals:
+    if turns and "hub_angle" not in signals:
         gone.append(angle)
     A, B, C = np.delete(np.delete(A, gone, 0), gone, 1), np.delete(B, gone), np.delete(C, gone, 1)[: len(signals)]
+    beyond = np.nonzero((pulse.mode > modes) & (pulse.poles.imag >= 0))[0]
+    higher = pulse.multipliers[beyond[np.argsort(-pulse.mode[beyond], kind="stable")]]  # the highest come first
     return Model(
         (A, B[:, None], C, np.zeros((len(C), 1))), signals, 2 / T, T, lambda: circle_angles(pulse),
-        lambda q: response(np.exp(1j * q))[: len(signals)], np.inf, tuple(higher_poles(pulse, modes)),
-        first + 2 - len(gone), np.delete(own, gone),
+        lambda q: response(np.exp(1j * q))[: len(signals)], np.inf,
+        tuple(complex(each.real, abs(each.imag)) for each in higher), first + 2 - len(gone), np.delete(own, gone),
     )  # fmt: skip
 
 
@@ -220,9 +217,9 @@ class _Difference:
     period: float
 
     def states(self, A: Real, B: Real, C: Real, n: int, row: int, angle: int | None) -> tuple[Real, Real, Real]:
-        """One state g more, a g + theta of the next sample, less its share of the state that turns with the arm.
+        """The matrices with one more state g, a g + theta of the next sample, less its share of the turning state.
 
-        `n` is the row of the angle, `row` that of the rate; nothing but the angle is then made of the state `angle`.
+        `n` is the row of the angle, `row` that of the rate; then the angle alone depends on the state `angle`.
         """
         through, size = (1 - self.a) / self.period, len(A)
         A, B, C = np.pad(A, (0, 1)), np.append(B, 0.0), np.pad(C, ((0, 0), (0, 1)))
@@ -247,15 +244,8 @@ class _Difference:
         return values
 
 
-def higher_poles(pulse: PulseTransfer, modes: int) -> list[complex]:
-    """Open-loop poles in z, Im z >= 0, of the modes beyond the first ones: the highest come first."""
-    places = np.nonzero((pulse.mode > modes) & (pulse.poles.imag >= 0))[0]
-    z = pulse.multipliers[places[np.argsort(-pulse.mode[places], kind="stable")]]
-    return [complex(each.real, abs(each.imag)) for each in z]
-
-
 def circle_angles(pulse: PulseTransfer) -> Real:
-    """Angles (0, pi] of the circle, dense about the poles of the open loop."""
+    """Angles (0, pi] of the circle, dense near the poles of the open loop."""
     angle = abs(np.angle(pulse.multipliers))
     close = (angle[:, None] + np.r_[-POLE_OFFSETS, POLE_OFFSETS]).ravel()
     return np.unique(np.r_[np.linspace(0, np.pi, EVEN_ANGLES + 1)[1:], close[(close > 0) & (close <= np.pi)]])
@@ -266,20 +256,20 @@ PERIOD_POINTS = 64  # of the period after the slew, in continuous time
 
 
 def slew_and_after(arm: Arm, known: Arm, chain: Chain) -> Scenario:
-    """The slew made for the arm `known`, and a period of the first mode of the one that moves."""
+    """The slew for the arm `known`, and a period of the first mode of the moving arm."""
     left = max(2 * np.pi / first_frequency(arm), SAMPLES_LEFT * chain.sampling.period)
     return scenario("slew", known, chain, chain.slew.rise_time + left)
 
 
 def trial_slew(known: Arm, chain: Chain) -> Scenario:
-    """The slew of the tuner's trials, made for the arm `known`."""
+    """The slew of the tuner's trials for the arm `known`."""
     return scenario("slew", known, chain, TRIAL_SLEWS * chain.slew.rise_time)
 
 
 @dataclass(frozen=True)
 @record
 class Slews:
-    """Slews of an arm in a model; they are made for the arm `known`."""
+    """Slews of an arm in a model, with references of the arm `known`."""
 
     model: Model
     arm: Arm
@@ -310,7 +300,7 @@ class Slews:
     # ------------------------------------------------------------ at samples
 
     def _run(self, task: Scenario, entries: Sequence[Entry], sense: Real) -> tuple[Real, Real]:
-        """A root moment, as a row `sense` reads it of the states, and the input at the samples, (samples, laws)."""
+        """A root moment, by the row `sense` of the states, and the input at the samples, (samples, laws)."""
         model = self.model
         A, (_, Bk, _, Dk) = model.closed(entries), model.states(entries)
         wanted = {name: task.references[name] for name in model.signals if name in task.references}
@@ -331,9 +321,9 @@ class Slews:
     # ------------------------------------------------------------ in continuous time
 
     def _left_in_time(self, entries: Sequence[Entry]) -> Real:
-        """The moment at points of the first mode's period after the slew: there the rigid arm's is 0.
+        """The moment at points of the first mode's period after the slew, where the rigid arm's is 0.
 
-        The moment feedback has no reference here: only angle and rate have.
+        Angle and rate have references here, the moment has none.
         """
         model, slew = self.model, self.chain.slew
         A, (_, Bk, Ck, Dk) = model.closed(entries), model.states(entries)

@@ -1,4 +1,4 @@
-"""Structures of a law: its entries as functions of free coefficients, each on a scale and within bounds of its own.
+"""Structures of a law: its entries as functions of free coefficients, each with a scale and bounds of its own.
 
     K1-K2         v = -Kp theta - K1 theta_t - K2 M                              the gains of the paper's law
     PD            v = -Kp theta - K1 theta_t
@@ -7,10 +7,9 @@
     PPF           PD, and -sum g_i w_i^2/(s^2 + 2 zeta_i w_i s + w_i^2) M        positive position feedback
     strain-rate   PD, and -g s/(1 + s/pole) M
 
-N(s) = (s^2 + 2 a w s + w^2)/(s^2 + 2 b w s + w^2).  M is the root moment: of either sign, as g and K2 are.  Kp is
-fixed: it is the speed of the angle, sqrt(Kp/J), and the objectives would have it small.  Signals enter less their
-references.
-A pole faster than 2/T is none when sampled by Tustin's rule, but rings: there the search ends.
+N(s) = (s^2 + 2 a w s + w^2)/(s^2 + 2 b w s + w^2).  M is the root moment; g and K2 are of either sign.  Kp is fixed: it
+gives the speed of the angle, sqrt(Kp/J), and all objectives are best at small Kp.  Signals enter less their references.
+A pole faster than 2/T rings when discretised by Tustin's rule: there the search ends.
 
 A coefficient is c = unit sinh(x), x the coordinate of the search: linear below its unit and logarithmic above.  So a
 positive one, far above its unit, is searched by decades, and one of either sign through 0.
@@ -34,7 +33,7 @@ from tfarm.spectrum.table import check_gains, first_frequency, rate_unit, turnin
 
 Bounds = tuple[float, float]
 
-ANGLE_SPEED = 0.1  # of the first frequency, and rad a sample: how fast the angle answers unless Kp is given
+ANGLE_SPEED = 0.1  # of the first frequency, and rad a sample: speed of the angle unless Kp is given
 LOGARITHMIC = 1e-8  # of the usual size: the unit of a positive coefficient
 REACH = np.exp(4.0)  # of a coefficient's usual size, up and down: its first bounds
 FILTER_REACH = np.exp(2.0)  # the same of the frequency and damping of a notch or filter
@@ -42,7 +41,7 @@ AT_END = 1e-3  # of the range of x: a coefficient so near to an end of its bound
 
 
 class Entry(NamedTuple):
-    """What a signal is multiplied by: polynomials in s, descending, (degree + 1, laws); proper."""
+    """Entry of a law for a signal: polynomials in s, descending, (degree + 1, laws); proper."""
 
     signal: str
     num: Real
@@ -50,10 +49,7 @@ class Entry(NamedTuple):
 
 
 class Coefficient(NamedTuple):
-    """A free coefficient: its name, `unit` of its scale, first bounds, and `ends` that are physical: no wider bounds.
-
-    `start` is where the search has one sensible point.
-    """
+    """A free coefficient: its name, `unit` of its scale, first bounds, physical `ends`, and a sensible `start`."""
 
     name: str
     unit: float
@@ -63,12 +59,12 @@ class Coefficient(NamedTuple):
 
 
 def positive(name: str, start: float, most: float = np.inf, reach: float = REACH) -> Coefficient:
-    """A coefficient above 0, at most `most`, that is usually of the size `start`."""
+    """A coefficient above 0, at most `most`, of the usual size `start`."""
     return Coefficient(name, LOGARITHMIC * start, (start / reach, min(start * reach, most)), (0.0, most), start)
 
 
 def signed(name: str, size: float) -> Coefficient:
-    """A coefficient of either sign that is usually of this size; 0 is its start."""
+    """A coefficient of either sign and this usual size; 0 is its start."""
     return Coefficient(name, size, (-REACH * size, REACH * size), (-np.inf, np.inf), 0.0)
 
 
@@ -94,7 +90,7 @@ class Structure:
 
     @property
     def size(self) -> int:
-        """How many are free."""
+        """Number of free coefficients."""
         return len(self.free)
 
     @property
@@ -114,7 +110,7 @@ class Structure:
 
     @property
     def box(self) -> tuple[Real, Real]:
-        """The least and the largest x (n,); from a bound of 0 that is a physical end, a unit is left out."""
+        """The least and the largest x (n,); a bound of 0 that is a physical end is replaced by a unit."""
         low, high = np.array([each.bounds for each in self.free]).T
         ends = np.array([each.ends for each in self.free]).T
         return self.at(np.where((low == 0) & (ends[0] == 0), self.units, low)), self.at(high)
@@ -137,14 +133,14 @@ class Structure:
         return Law(blocks, name=self.name, references=tuple(blocks))
 
     def at_ends(self, x: Real) -> list[tuple[int, int]]:
-        """The places of coefficients at an end of their bounds, and at which, 0 or 1."""
+        """The indices of coefficients at an end of their bounds, and that end, 0 or 1."""
         low, high = self.box
         share = (x - low) / (high - low)
         found = [*zip(*np.nonzero(np.array([share, 1 - share]).T < AT_END), strict=True)]
         return [(int(place), int(end)) for place, end in found]
 
     def is_physical(self, place: int, end: int) -> bool:
-        """Whether that end of its bounds is a physical one, which the bounds had of their own."""
+        """Whether an end of the bounds of a coefficient is a physical one, and not given."""
         each = self.free[place]
         return each.name not in self.given and each.bounds[end] == each.ends[end]
 
@@ -163,16 +159,19 @@ class Structure:
 def structure_of(
     name: str, arm: Arm, *, Kp: float, modes: int, period: float, bounds: Mapping[str, Bounds | None]
 ) -> Structure:
-    """The structure of that name for an arm at a sampling period [s]; `Kp` [input/rad] of 0 is chosen but of K1-K2.
+    """Return the structure of that name for an arm at a sampling period [s].
 
-    `bounds` of coefficients are those to be searched, where not None.
+    `Kp` [input/rad] of 0 is chosen but of K1-K2: a speed of the angle of a tenth of the first frequency, or of a radian
+    a sample if that is less.  `bounds` of coefficients are those to be searched, where not None.
     Raises ParameterError for an unknown structure, bad bounds or Kp, and for gains too large for the arm.
     """
     if name not in STRUCTURES:
         raise ParameterError(key="structure", value=name, remedy=did_you_mean(name, list(STRUCTURES)))
     if name != TWO_GAINS and not (0.0 <= Kp < np.inf):
         raise ParameterError(key=ANGLE_GAIN, value=Kp, remedy="the hub angle gain is zero (chosen) or positive")
-    form = STRUCTURES[name](arm, Kp if name == TWO_GAINS else Kp or usual_angle_gain(arm, period), modes, period)
+    speed = ANGLE_SPEED * min(first_frequency(arm), 1 / period)
+    usual = 0.0 if name == TWO_GAINS else float(f"{arm.turned_inertia * speed**2:.3g}")
+    form = STRUCTURES[name](arm, Kp or usual, modes, period)
     if "root_moment" in form.signals:
         must_not_be_algebraic(arm, "structure", name)
     given = {key: pair for key, pair in bounds.items() if pair is not None}
@@ -196,12 +195,6 @@ def check_bounds(form: Structure, arm: Arm) -> None:
             check_gains(arm, HubFeedback(**form.fixed, **dict(zip(form.names, bounds, strict=True))))
 
 
-def usual_angle_gain(arm: Arm, period: float) -> float:
-    """Kp [input/rad]: the angle answers at a tenth of the first frequency, or of a radian a sample if that is less."""
-    speed = ANGLE_SPEED * min(first_frequency(arm), 1 / period)
-    return float(f"{arm.turned_inertia * speed**2:.3g}")
-
-
 def product(first: Real, second: Real) -> Real:
     """The product of polynomials (degree + 1, laws)."""
     shape = (len(first) + len(second) - 1, max(first.shape[1], second.shape[1]))
@@ -220,7 +213,7 @@ ONE = np.ones((1, 1))
 
 
 def _rate_gain(arm: Arm, Kp: float) -> Coefficient:
-    """K1, usually such that it damps the rigid arm under Kp by 1/sqrt(2), without its losses."""
+    """K1, usually that of damping ratio 1/sqrt(2) of the rigid arm under Kp, without friction."""
     return positive("K1", float(np.sqrt(2 * Kp * arm.turned_inertia)))
 
 
@@ -235,7 +228,7 @@ def _second_order(w: Real, damping: Real) -> Real:
 
 
 def _two_gains(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
-    """The hub does not brake at K1 = 0 and stands still at K2 = 1 (of a torque): physical ends of both."""
+    """The gains of the paper's law, with physical ends: no damping at K1 = 0, a hub at rest at K2 = 1 (of a torque)."""
     unit = arm.input_per_torque
     most = 2.0 * turning_inertia(arm) * band_of(arm, 1)
     K1 = Coefficient("K1", LOGARITHMIC * rate_unit(arm), (0.0, most), (0.0, np.inf), 0.1 * rate_unit(arm))
@@ -261,7 +254,7 @@ def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
 
     free = (
         _rate_gain(arm, Kp),
-        positive("pole_rad_s", 2 / period, 2 / period),  # a derivative as fast as samples tell
+        positive("pole_rad_s", 2 / period, 2 / period),  # the fastest derivative of a sampled signal
         positive("notch_rad_s", min(first_frequency(arm), 1 / period), 2 / period),
         positive("notch_zero_damping", 0.1),
         positive("notch_pole_damping", 0.7),

@@ -1,8 +1,8 @@
 """A law for the worst of several arms: of a list, of the corners of a box over numbers of one, and of arms inside it.
 
-The law is chosen for the arms that are named; the box is then searched for an arm on which it is worse, which is named
-too, and the law chosen anew: the exchange of constraints that semi-infinite programmes are solved by (Hettich and
-Kortanek, 1993).  That is no proof over the box: between the arms that are named nothing is certain.
+The law is chosen for the arms of a list.  The box is then searched for an arm on which it is worse, which is added to
+the list, and the law is chosen again: the exchange method of semi-infinite programming (Hettich and Kortanek, 1993).
+That is no proof over the box: between the arms of the list nothing is certain.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from tfarm.synthesis.structures import Bounds
 _Found = TypeVar("_Found")
 Tell = Callable[[str], None]  # is called with one line of progress
 
-MOST_RANGES = 4  # 16 corners: a search takes so many times as long
+MOST_RANGES = 4  # 16 corners: a search takes 16 times as long
 MOST_ARMS = 8  # of a list, for the same reason
 DECADE = 10.0  # a range of numbers of one sign whose ends are further apart is one of logarithms
 ARMS_TRIED = 24  # arms at random inside the box
@@ -35,13 +35,13 @@ ARMS_SEED = 0  # of those
 BOX_STEPS = (0.25, 0.125, 0.0625)  # of the box: from the worst of them on, along each of its numbers
 DOTTED = {f"{room}.{field}": name for name, (room, field) in ADJUSTABLE.items()}
 MOST_EXCHANGES = 4  # of the exchange, at most
-MUCH_WORSE = 0.01  # of a score: an arm inside that is so much worse is named
+MUCH_WORSE = 0.01  # of a score: an arm inside is added if it is worse by more
 
 
 @dataclass(frozen=True)
 @record
 class NamedArm:
-    """An arm, its name in the answer, and the `numbers` that a box gave it, by key."""
+    """An arm, its name in the results, and its `numbers` of a box, by key."""
 
     name: str
     arm: Arm
@@ -49,9 +49,9 @@ class NamedArm:
 
 
 def varied(arm: Arm, key: str, value: float) -> Arm:
-    """The arm with another value of one number, named as in its file ("payload.mass", "hub.friction") or as of a locus.
+    """The arm with another value of one number, named as in its file ("payload.mass", "hub.friction") or in a locus.
 
-    Raises ParameterError for a key that it does not have, and for a value as its parts do.
+    Raises ParameterError for an unknown key, and for a value as its parts do.
     """
     name = DOTTED.get(key, key)
     if name in ADJUSTABLE:
@@ -62,10 +62,10 @@ def varied(arm: Arm, key: str, value: float) -> Arm:
 @dataclass(frozen=True)
 @record
 class ArmBox:
-    """The arms that have numbers of `ranges` (key: its ends), and all else of `arm`.
+    """The arms with numbers in `ranges` (key: its ends), and all other numbers of `arm`.
 
-    Raises ParameterError for an unknown key, too many of them, ends that are not finite or in order, and corners that
-    are no arm.
+    Raises ParameterError for an unknown key, too many of them, ends that are not finite or in order, and invalid
+    corners.
     """
 
     arm: Arm
@@ -95,14 +95,15 @@ class ArmBox:
             inside = low * (high / low) ** share if far else low + share * (high - low)
             numbers[key] = low if share == 0 else high if share == 1 else float(inside)
             arm = varied(arm, key, numbers[key])
-        told = ", ".join(f"{key} = {value:.6g}" for key, value in numbers.items())
-        return NamedArm(f"{self.arm.name}, {told}", arm, numbers)
+        values = ", ".join(f"{key} = {value:.6g}" for key, value in numbers.items())
+        return NamedArm(f"{self.arm.name}, {values}", arm, numbers)
 
 
 def worst_inside(box: ArmBox, badness: Callable[[Arm], float]) -> tuple[NamedArm, float, int]:
-    """The worst arm found in a box, how bad it is, and how many were tried.
+    """Return the worst arm found in a box, its badness, and the number of arms tried.
 
-    Arms at random, then steps along each number from the worst of them, ever smaller.  No proof that none is worse.
+    Arms at random, then smaller and smaller steps along each number from the worst of them.  No proof that none is
+    worse.
     """
     tried, size = 0, len(box.ranges)
 
@@ -134,9 +135,9 @@ def arms_of(arm: Arm, also: Sequence[Arm], box: ArmBox | None) -> list[NamedArm]
 @dataclass(frozen=True)
 @record
 class WorstCase:
-    """How the arms came to be named: the `ranges` of the box, and how many arms inside it were tried.
+    """Choice of the arms of a design: the `ranges` of the box, and the number of arms `tried` inside it.
 
-    `worse` names the arm inside on which the law is worse still, where the exchange ended before there was none.
+    `worse` names an arm inside on which the law is still worse, where the exchange ended before there was none.
     """
 
     ranges: dict[str, Bounds]
@@ -144,7 +145,7 @@ class WorstCase:
     worse: str | None = None
 
     def sentence(self, number: int) -> str:
-        """What so many arms were, and what is not known."""
+        """The choice in a sentence, with its limits."""
         if not self.ranges:
             return f"the worst of {number} arms" if number > 1 else ""
         box = ", ".join(f"{key} {low:g} to {high:g}" for key, (low, high) in self.ranges.items())
@@ -162,10 +163,10 @@ def for_the_worst(
     arms: Sequence[NamedArm], box: ArmBox | None, find: Callable[[Sequence[NamedArm]], _Found],
     score_on: Callable[[_Found, Arm], float], tell: Tell,
 ) -> tuple[_Found, list[NamedArm], WorstCase]:  # fmt: skip
-    """What `find` finds for the arms, and for those inside the box on which it is worse; all of these arms.
+    """Return the result of `find` for the arms and for worse ones inside the box, with all of these arms.
 
-    `score_on` is what is minimised, of one arm, inf where the law does not hold.  Raises ConvergenceError where no law
-    is found that holds on all arms that are named, or one inside the box stays on which it does not.
+    `score_on` is the score of one arm, inf where the law is unstable.  Raises ConvergenceError where no law is found
+    that is stable on all arms, or where it stays unstable on one inside the box.
     """
     named, tried = list(arms), 0
     while True:
@@ -185,16 +186,16 @@ def for_the_worst(
             return found, named, WorstCase(box.ranges, tried)
         if len(named) == len(arms) + MOST_EXCHANGES:
             if math.isinf(score):
-                raise ConvergenceError(f"no law found holds on {worst.name}: narrow the ranges", None, None)
+                raise ConvergenceError(f"no law found is stable on {worst.name}: narrow the ranges", None, None)
             return found, named, WorstCase(box.ranges, tried, worst.name)
-        tell(f"{worst.name} is worse than the {len(named)} arms before: the law is chosen for it too")
+        tell(f"{worst.name} is worse than the other {len(named)} arms, and added")
         named.append(worst)
 
 
 def same_input(arms: Sequence[NamedArm]) -> None:
-    """Raise ParameterError where a law would drive different inputs."""
+    """Raise ParameterError for arms with different inputs."""
     first = arms[0].arm.input
     for each in arms:
         if each.arm.input != first:
-            remedy = f"{each.name} is driven by {each.arm.input}, {arms[0].name} by {first}: one law drives one input"
+            remedy = f"the input of {each.name} is {each.arm.input}, that of {arms[0].name} {first}: one law has one"
             raise ParameterError(key="also", value=each.name, remedy=remedy)

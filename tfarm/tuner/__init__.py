@@ -1,4 +1,4 @@
-"""The neural gain tuner: a network that sets the moment gain while the arm slews, kept where that is proven stable."""
+"""Neural gain tuner: a network sets the moment gain during a slew, within a guard that is certified stable."""
 
 from tfarm.tuner.baselines import (
     BestConstant,

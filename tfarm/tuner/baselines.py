@@ -1,35 +1,34 @@
-"""Baselines of a gain that moves: the best constant gain, input shaping, and the bound that no controller passes.
+"""Baselines of a time-varying gain: the best constant gain, input shaping, and the linear-quadratic bound.
 
 The *bound* is the finite-horizon linear-quadratic optimum, with the full state and preview of the slew:
 
     minimise T sum of a x_k^2/2 + b e_k^2/2,   s_{k+1} = A s_k + B (e_k + r_k),   x_k = c s_k - m_k,   s_0 = 0
 
-with r (feedforward not counted in u) and m (what is taken off the moment) known beforehand.  The value of the remaining
+with r (feedforward not counted in u) and m (reference of the moment) known beforehand.  The value of the remaining
 samples is s^T P s/2 + q^T s + a constant, and e_k = -(B^T P (A s + B r) + B^T q)/(T b + B^T P B).  It bounds
-every e(t), for this arm, slew, sampling and cost, whatever network, gain or law makes it.
+every e(t), for this arm, slew, sampling and cost, for any network, gain or law.
 
 *Input shaping* is on the exact sampled poles of the loop.  The reference is passed through a few impulses whose sum
-vanishes at the poles z of the modes that it is not to excite (Singer and Seering, 1990).  On the sample grid a
+vanishes at the poles z of the modes that are not to be excited (Singer and Seering, 1990).  On the sample grid a
 zero-vibration shaper (ZV) has three impulses: now, n and n + 1 samples later, with n the whole samples of half
 a period:
 
     c_0 + c_n z^-n + c_{n+1} z^-(n+1) = 0,   c_0 + c_n + c_{n+1} = 1
 
-exactly zero for that mode of the linear loop, whatever the period.  The extra-insensitive one (EI; Singhose, Seering
-and Singer, 1994) lets a share V of the vibration remain at the mode itself, and is zero at two frequencies beside it,
+exactly zero for that mode of the linear loop, for any period.  The extra-insensitive one (EI; Singhose, Seering and
+Singer, 1994) leaves a share V of the vibration at the mode itself, and is zero at two frequencies next to it,
 w (1 +- d) with cos(pi d) = (1 - V)/(1 + V): two ZV shapers in a row.
 
-The tuner beside what it has to beat, in one run: no moment feedback, the best constant gain, input shaping, and the
-linear-quadratic optimum that nothing beats; with converters and delay, on the arm it was trained on and on others.
+The tuner is compared with no moment feedback, the best constant gain, input shaping, and the linear-quadratic optimum;
+with converters and delay, on the arm of the training and on others.
 
-Every controller knows the arm by its name plate only: feedforward, references, shapers, gains and weights are those of
-the arm that it was trained on, whatever arm moves.
+Feedforward, references, shapers, gains and weights of every controller are those of the arm of the training, for any
+moving arm.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -47,35 +46,32 @@ from tfarm.spectrum.table import first_frequency
 from tfarm.tuner.guard import Guard, MovingGain, constant_windows
 from tfarm.tuner.trial import Record, Trial, TunedGain, judged, residual_rms, tip_off
 
-CONSTANT_GAINS = 200  # constant gains of a window that are tried, before the best are refined
+CONSTANT_GAINS = 200  # constant gains of a stability interval that are tried, before the best are refined
 LEAST_GAINS = 20  # of them where trials are long
-GAIN_SAMPLES = 2_000_000  # that the trials of a window's gains may have together
+GAIN_SAMPLES = 2_000_000  # that the trials of an interval's gains may have together
 BEST_REFINED = 3  # of them
-GAIN_XTOL = 1e-9  # to so much they are refined: a cost is flat there, so that the last digits say nothing
+GAIN_XTOL = 1e-9  # tolerance of the refined gains: the cost is flat there
 Shaper = Literal["ZV", "EI"]
 SHAPERS: tuple[Shaper, ...] = ("ZV", "EI")
 SHAPED_MODES = 2  # which a slew excites most
-TOLERATED = 0.05  # V: the share of the vibration that EI leaves at the mode itself, as its authors have it
-NEARLY_PI = 0.999  # of pi rad a sample: the fastest frequency beside a mode that a shaper can have
+TOLERATED = 0.05  # V: the share of the vibration that EI leaves at the mode itself, that of its authors
+NEARLY_PI = 0.999  # of pi rad a sample: the highest frequency of a shaper
 
 
 class BestConstant(NamedTuple):
-    """The gain, and the trial's cost with it."""
+    """A constant gain, and the cost of a trial with it."""
 
     gain: float
     cost: float
 
 
 def tried_gains(samples: int) -> int:
-    """How many constant gains of a window are tried in trials of so many samples."""
+    """Number of constant gains of an interval that are tried in trials of `samples` samples."""
     return min(CONSTANT_GAINS, max(LEAST_GAINS, GAIN_SAMPLES // samples))
 
 
 def best_constant(trial: Trial) -> BestConstant:
-    """The best constant gain K >= 0 among those that leave the loop stable: all of a grid, the three lowest refined.
-
-    Where no constant gain is stable, K = 0.
-    """
+    """Return the best constant gain K >= 0 of a stable loop: a grid, its three lowest costs refined; 0 without one."""
     windows = constant_windows(trial.loop)
     number = tried_gains(trial.n)
     found = [BestConstant(0.0, trial.with_constant(0.0).cost)] if not windows or windows[0][0] == 0.0 else []
@@ -95,7 +91,7 @@ def best_constant(trial: Trial) -> BestConstant:
 
 
 def lq_bound(trial: Trial) -> Record:
-    """The optimal trial; its K is zero, for it is no moment feedback, and its u is e."""
+    """Return the optimal trial; its K is zero, as it has no moment feedback, and its u is e."""
     A, B, c = trial.model.A, trial.model.B, trial.model.moment
     r, m = trial.reference.rest, trial.reference.rigid
     a, b = trial.numbers.T * trial.cost.a, trial.numbers.T * trial.cost.b
@@ -119,7 +115,7 @@ def lq_bound(trial: Trial) -> Record:
 
 
 def zero_vibration(z: complex) -> Real:
-    """The impulses (n + 2,) of the shaper that is zero at z and its conjugate, 0 < arg z < pi."""
+    """Impulses (n + 2,) of the shaper with zeros at z and its conjugate, 0 < arg z < pi."""
     n = max(1, math.floor(math.pi / abs(np.angle(z)) * (1 + TIME_ROUNDING)))
     at = np.array([0, n, n + 1])
     powers = z ** (-at.astype(float))
@@ -130,15 +126,15 @@ def zero_vibration(z: complex) -> Real:
 
 
 def extra_insensitive(z: complex) -> Real:
-    """Two such shapers in a row, beside the frequency of z."""
+    """Impulses of two such shapers in a row, next to the frequency of z."""
     d = math.acos((1 - TOLERATED) / (1 + TOLERATED)) / math.pi
-    turn = float(np.angle(z))
-    beside = [abs(z) * np.exp(1j * min(turn * factor, NEARLY_PI * math.pi)) for factor in (1 - d, 1 + d)]
-    return np.convolve(zero_vibration(complex(beside[0])), zero_vibration(complex(beside[1])))
+    turns = (min(float(np.angle(z)) * factor, NEARLY_PI * math.pi) for factor in (1 - d, 1 + d))
+    first, second = (zero_vibration(complex(abs(z) * np.exp(1j * turn))) for turn in turns)
+    return np.convolve(first, second)
 
 
 def shaper(loop: Sampled, kind: Shaper, modes: int = SHAPED_MODES) -> Real:
-    """The impulses for the first modes below half the sample rate, at the poles of the loop without moment feedback."""
+    """Impulses for the first modes below half the sample rate, at the poles of the loop without moment feedback."""
     impulses, build = np.ones(1), zero_vibration if kind == "ZV" else extra_insensitive
     poles: Any = loop.having(**{MOMENT_GAIN: 0.0}).poles
     for mode in range(1, modes + 1):
@@ -150,7 +146,7 @@ def shaper(loop: Sampled, kind: Shaper, modes: int = SHAPED_MODES) -> Real:
 
 
 def shaped(task: Scenario, impulses: Real) -> Scenario:
-    """The scenario with every reference passed through the impulses; it is busy so much longer."""
+    """The scenario with every reference passed through the impulses; its slew ends later by their length."""
 
     def through(signal: Real) -> Real:
         return np.convolve(signal, impulses)[: signal.size]
@@ -166,10 +162,10 @@ def shaped(task: Scenario, impulses: Real) -> Scenario:
 
 
 def shaped_trial(trial: Trial, kind: Shaper) -> Trial:
-    """The trial with its slew shaped.
+    """Return the trial with its slew shaped.
 
-    x is then the moment less the rigid arm's under the shaped slew, and the linear-quadratic bound of the unshaped slew
-    does not hold: it arrives later.
+    x is then the moment less the rigid arm's under the shaped slew, which arrives later.  The linear-quadratic bound of
+    the unshaped slew is no bound of it.
     """
     return replace(trial, task=shaped(trial.task, shaper(trial.loop, kind)))
 
@@ -183,13 +179,13 @@ ENCODER_COUNTS = 8192  # a turn, of the encoder
 CONVERTER_BITS = 12  # of the other converters
 MOMENT_RANGE = 20.0  # N m, of the paper's arm: times the arm's unit of torque
 TORQUE_RANGE = 10.0  # N m, likewise
-COMPUTER_DELAY = 1.0  # samples that the computer takes, beyond the chain's own
+COMPUTER_DELAY = 1.0  # samples of computation, beyond the chain's own
 
 
 class Outcome(NamedTuple):
-    """`cost` of the trial, inf where the loop ran away, and `residual` root moment after the slew [N m], None there.
+    """`cost` of the trial, inf of an unstable loop, and `residual` root moment after the slew [N m], then None.
 
-    `tip_error` [m] is how far the tip is off its target when the trial ends; None where it ran away, and of the bound.
+    `tip_error` [m] is the distance of the tip from its target at the end; None of an unstable loop, and of the bound.
     """
 
     cost: Annotated[float, Quantity("cost")]
@@ -203,11 +199,11 @@ class Outcome(NamedTuple):
 
 @dataclass(frozen=True)
 class Outcomes:
-    """One condition: what each controller makes of it.
+    """Outcomes of all controllers in one condition.
 
-    `best_constant` is the best constant gain of the trained condition, used here; `own_constant` the best for this
-    condition, at `own_gain`.  `ZV` and `EI` are judged by their own, later slew, and so may pass `bound`, which is that
-    of the unshaped one.  `proven`: whether the tuner's guard is proven for this loop too.
+    `best_constant` has the best constant gain of the trained condition; `own_constant` the best one of this condition,
+    `own_gain`.  `ZV` and `EI` are compared with their own, later slew, and may pass `bound`, which is that of the
+    unshaped one.  `proven`: whether the tuner's guard is certified for this loop too.
     """
 
     condition: Annotated[str, Quantity("condition")]
@@ -232,7 +228,7 @@ class NamedLoop:
 
 
 def quantised_chain(arm: Arm, chain: Chain) -> Chain:
-    """The chain with its own converters, or where they are ideal with 12 bits over ranges that suit the arm's slew."""
+    """The chain with its own converters; ideal ones are replaced by 12 bits over ranges for the arm's slew."""
     if not chain.is_linear:
         return chain
     unit = torque_unit(arm, chain)
@@ -245,9 +241,9 @@ def quantised_chain(arm: Arm, chain: Chain) -> Chain:
 
 
 def tried_loops(arm: Arm, chain: Chain, quantised: Chain | None = None) -> list[NamedLoop]:
-    """The trained condition, converters, delay, and both; then the arms that it was not trained on.
+    """Return the trained condition, that with converters, with delay, and with both; then other arms.
 
-    `quantised` is the chain with converters, that of `quantised_chain` if it is not given.
+    `quantised` is the chain with converters, by default that of `quantised_chain`.
     """
     quantised = quantised_chain(arm, chain) if quantised is None else quantised
     sampling = replace(chain.sampling, delay_samples=chain.sampling.delay_samples + COMPUTER_DELAY)
@@ -278,35 +274,31 @@ def compare_controllers(
     listed: list[NamedLoop] | None = None,
     nominal: float | None = None,
 ) -> list[Outcomes]:
-    """A row a condition; `trial` is the one that the tuner was trained on, `nominal` its best constant gain."""
+    """Return the outcomes in each condition; `trial` is that of the training, `nominal` its best constant gain."""
     nominal = best_constant(trial).gain if nominal is None else nominal
-    wanted = tried_loops(trial.arm, trial.loop.chain) if listed is None else listed
     late = {kind: shaped_trial(trial, kind).task for kind in SHAPERS}
-    return [_row(trial, gain, guard, nominal, late, each) for each in wanted]
-
-
-def _row(
-    trial: Trial, gain: TunedGain, guard: Guard, nominal: float, late: Mapping[Shaper, Scenario], condition: NamedLoop
-) -> Outcomes:
-    """What each controller makes of a condition; `late` are the slews through the shapers."""
-    here = trial.asked_of(condition.arm, condition.chain, gain.servo)
-    own, bound = best_constant(here), lq_bound(here)
-    return Outcomes(
-        condition=condition.name,
-        without=_constant(here, here.task, 0.0),
-        best_constant=_constant(here, here.task, nominal),
-        own_constant=_constant(here, here.task, own.gain),
-        own_gain=own.gain,
-        ZV=_constant(here, late["ZV"], 0.0),
-        EI=_constant(here, late["EI"], 0.0),
-        tuner=_played(gain.run(here.simulator()), here),
-        bound=Outcome(bound.cost, residual_rms(bound, here.task), None),
-        proven=guard.is_proven and _proven(here, guard),
-    )
+    found = []
+    for condition in tried_loops(trial.arm, trial.loop.chain) if listed is None else listed:
+        here = trial.on(condition.arm, condition.chain, gain.servo)
+        own, bound = best_constant(here), lq_bound(here)
+        outcomes = Outcomes(
+            condition=condition.name,
+            without=_constant(here, here.task, 0.0),
+            best_constant=_constant(here, here.task, nominal),
+            own_constant=_constant(here, here.task, own.gain),
+            own_gain=own.gain,
+            ZV=_constant(here, late["ZV"], 0.0),
+            EI=_constant(here, late["EI"], 0.0),
+            tuner=_outcome(gain.run(here.simulator()), here),
+            bound=Outcome(bound.cost, residual_rms(bound, here.task), None),
+            proven=guard.is_proven and _proven(here, guard),
+        )
+        found.append(outcomes)
+    return found
 
 
 def _proven(here: Trial, guard: Guard) -> bool:
-    """Whether the sector is proven for this loop, with the trial's modes."""
+    """Whether the sector is certified for this loop, with the trial's modes."""
     if here.arm.is_undamped:
         return False
     try:
@@ -316,9 +308,11 @@ def _proven(here: Trial, guard: Guard) -> bool:
 
 
 def _constant(trial: Trial, task: Scenario, K: float) -> Outcome:
-    return _played(trial.simulator(task=task).linear(trial.loop.gains.having(MOMENT_GAIN, K)), trial)
+    """The outcome of a constant gain."""
+    return _outcome(trial.simulator(task=task).linear(trial.loop.gains.having(MOMENT_GAIN, K)), trial)
 
 
-def _played(run: Simulation, trial: Trial) -> Outcome:
+def _outcome(run: Simulation, trial: Trial) -> Outcome:
+    """The outcome of a simulation, by the cost of a trial."""
     record = judged(run, trial.cost, trial.signals)
     return Outcome(record.cost, residual_rms(record, run.scenario), tip_off(run, trial))

@@ -1,14 +1,14 @@
 """The compiled heart of the tuner: a trial forward, and its cost's gradient backward.
 
 N samples, n states, m inputs of the network and h hidden neurons; its weights are W1 (h, m) row by row, then w2 (h,).
-With u = (torque counted) + (what servo.s should be) - servo.s and e = u - K x the torque is e + (torque not counted).
+With u = (torque counted) + (reference of servo.s) - servo.s and e = u - K x the torque is e + (torque not counted).
 
 The paper's network: 6-6-1, linear, sigmoid and softplus, thresholds zero; sizes are free, and so is a seventh input.
 
     K = ln(1 + e^z),   z = sum over j of w2_j sigmoid( sum over i of W1_ji p_i )
 
-Inputs p: u(t), u(t-1), then e and x.  e(t) = u(t) - K(t) x(t) holds the gain that is to be found, an algebraic loop, so
-the network gets the two values before: e(t-1), e(t-2).  Then x(t), x(t-1), and if asked K(t-1).
+Inputs p: u(t), u(t-1), then e and x.  e(t) = u(t) - K(t) x(t) depends on the gain itself, an algebraic loop, so the
+inputs are the two values before: e(t-1), e(t-2).  Then x(t), x(t-1), and optionally K(t-1).
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from tfarm.errors import ParameterError
 from tfarm.exact.compiled import compiled, inlined
 from tfarm.records import record
 
-U_NOW, U_BEFORE, E_BEFORE, E_TWO_BEFORE, X_NOW, X_BEFORE, K_BEFORE = range(7)  # the inputs; the last only if asked for
+U_NOW, U_BEFORE, E_BEFORE, E_TWO_BEFORE, X_NOW, X_BEFORE, K_BEFORE = range(7)  # the inputs; the last is optional
 
 
 class Limits(NamedTuple):
-    """The ends of the guard that a gain is kept between; 0 and inf without one."""
+    """The ends of the guard of a gain; 0 and inf without one."""
 
     lo: float
     hi: float
 
 
 class Model(NamedTuple):
-    """s' = A s + B torque from sample to sample; servo.s reads angle and rate by their gains, moment.s the moment.
+    """s' = A s + B torque from sample to sample; servo.s are angle and rate by their gains, moment.s is the moment.
 
-    `own`.s is the arm's own root moment, which the anti-alias filter does not pass.
+    `own`.s is the arm's own root moment, before the anti-alias filter.
     """
 
     turned: Real  # A^T (n, n)
@@ -50,7 +50,7 @@ class Model(NamedTuple):
 
 
 class Reference(NamedTuple):
-    """At each sample (N,): what servo.s should be, torque counted in u and not counted, what is off the moment."""
+    """At each sample (N,): references of servo.s, torque counted in u and not counted, reference of the moment."""
 
     servo: Real
     counted: Real
@@ -59,7 +59,7 @@ class Reference(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """Weights `a` and `b` of the cost, period `T` [s], the largest |moment| [N m], samples until x answers a torque."""
+    """Weights `a` and `b` of the cost, period `T` [s], the largest |moment| [N m], samples from a torque to its x."""
 
     a: float
     b: float
@@ -69,7 +69,7 @@ class Numbers(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """All that stays while the weights are learnt; `scales` (m,) divide the network's inputs."""
+    """Constants of the training; `scales` (m,) divide the network's inputs."""
 
     model: Model
     reference: Reference
@@ -79,8 +79,10 @@ class Setting(NamedTuple):
 
 
 class Run(NamedTuple):
-    """What a trial fills, a row a sample: the network's inputs (N, m) and hidden neurons (N, h), signals (N,) [N m],
-    gain K, its slope dK/dz by the output neuron's sum, and the arm's own root moment."""
+    """Record of a trial, one row for each sample: the network's inputs (N, m) and hidden neurons (N, h), signals (N,).
+
+    These are x, u, e [N m], gain K, its slope dK/dz by the output neuron's sum, and the arm's own root moment [N m].
+    """
 
     inputs: Real
     hidden: Real
@@ -93,7 +95,7 @@ class Run(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Room for one sample: `state` and `spare` (n,), `by_input` (m,)."""
+    """Buffers of one sample: `state` and `spare` (n,), `by_input` (m,)."""
 
     state: Real
     spare: Real
@@ -124,7 +126,7 @@ def guarded(z: float, limits: Limits) -> tuple[float, float]:
 
 @compiled
 def network_gain(weights: Real, inputs: Real, hidden: Real, limits: Limits) -> tuple[float, float]:
-    """The network's gain and its derivative by the output neuron's sum; fills `hidden`."""
+    """Return the network's gain and its derivative by the output neuron's sum; fill `hidden`."""
     m, h = inputs.size, hidden.size
     z = 0.0
     for j in range(h):
@@ -138,7 +140,7 @@ def network_gain(weights: Real, inputs: Real, hidden: Real, limits: Limits) -> t
 
 @compiled
 def gain_gradient(weights: Real, inputs: Real, hidden: Real, by_sum: float, out: Real) -> None:
-    """Adds by_sum times the derivative of the output neuron's sum by every weight to `out`."""
+    """Add by_sum times the derivative of the output neuron's sum by every weight to `out`."""
     m, h = inputs.size, hidden.size
     for j in range(h):
         out[h * m + j] += by_sum * hidden[j]
@@ -175,7 +177,7 @@ def dot(a: Real, b: Real) -> float:
 
 @inlined
 def sense(k: int, setting: Setting, run: Run, work: Work) -> bool:
-    """Reads x and u at sample k and fills the network's inputs there; False where the moment passes the bound."""
+    """Read x and u at sample k and fill the network's inputs there; False where the moment passes the bound."""
     model, reference, scales, inputs = setting.model, setting.reference, setting.scales, run.inputs[k]
     moment = dot(model.moment, work.state)
     if not abs(moment) <= setting.numbers.bound:
@@ -197,7 +199,7 @@ def sense(k: int, setting: Setting, run: Run, work: Work) -> bool:
 
 @inlined
 def act(k: int, setting: Setting, weights: Real, run: Run, work: Work) -> None:
-    """The gain, e and the torque at sample k; then one sample on."""
+    """Set the gain, e and the torque at sample k; advance by one sample."""
     model, state, spare = setting.model, work.state, work.spare
     run.K[k], run.slope[k] = network_gain(weights, run.inputs[k], run.hidden[k], setting.limits)
     run.e[k] = run.u[k] - run.K[k] * run.x[k]
@@ -218,7 +220,7 @@ def trial_cost(done: int, numbers: Numbers, run: Run) -> float:
 
 @compiled
 def forward(setting: Setting, weights: Real, run: Run, work: Work) -> int:
-    """One trial with fixed weights; fills `run`, returns how many samples were made before the bound was passed."""
+    """Run one trial with fixed weights into `run`; return the number of samples before the bound is passed."""
     work.state.fill(0.0)
     n = run.x.size
     for k in range(n):
@@ -230,10 +232,10 @@ def forward(setting: Setting, weights: Real, run: Run, work: Work) -> int:
 
 @compiled
 def backward(setting: Setting, weights: Real, run: Run, work: Work, gradient: Real) -> None:
-    """The gradient of the cost of the trial in `run`, through network, plant and time (reverse accumulation).
+    """Set the gradient of the cost of the trial in `run`, through network, plant and time (reverse accumulation).
 
-    `back` is the derivative by the state of the next sample, `late_e`, `late_u`, `late_x`, `late_K` what the inputs of
-    later samples owe to e, u, x and K of this one, `later_e` to e of the sample before.
+    `back` is the derivative by the state of the next sample.  `late_e`, `late_u`, `late_x`, `late_K` are derivatives
+    by e, u, x and K of this sample through the inputs of later ones, `later_e` by e of the sample before.
     """
     model, scales, (a, b, T, _, _) = setting.model, setting.scales, setting.numbers
     (n, m), h = run.inputs.shape, run.hidden.shape[1]
@@ -262,15 +264,14 @@ def backward(setting: Setting, weights: Real, run: Run, work: Work, gradient: Re
 
 @compiled
 def sample_gradient(k: int, numbers: Numbers, reply: float, x_next: float, run: Run, weights: Real, out: Real) -> None:
-    """Gradient of a x_next^2/2 + b e^2/2 by the weights that made K at sample k; x_next answers to the torque by
-    `reply`."""
+    """Set the gradient of a x_next^2/2 + b e^2/2 by the weights of K at sample k; `reply` is dx_next/d(torque)."""
     by_gain = -run.x[k] * (numbers.a * x_next * reply + numbers.b * run.e[k])
     out.fill(0.0)
     gain_gradient(weights, run.inputs[k], run.hidden[k], by_gain * run.slope[k], out)
 
 
 MOST_HIDDEN = 1000  # neurons; the paper has 6
-PAPER_INPUTS, PAPER_HIDDEN = 6, 6  # of the paper's network; one input more, the gain before, where it is asked for
+PAPER_INPUTS, PAPER_HIDDEN = 6, 6  # of the paper's network; one input more, the gain before, is optional
 HALF_WIDTH = 0.5  # of the uniform distribution of the initial weights
 
 
@@ -310,17 +311,17 @@ class Network:
         return np.r_[self.W1.ravel(), self.w2]
 
     def with_weights(self, weights: Real) -> Network:
-        """The network of the same size with these weights (as `weights` lists them)."""
+        """The network of the same size with these weights (in the order of `weights`)."""
         first = self.W1.size
         return Network(weights[:first].reshape(self.W1.shape), weights[first:], self.scales)
 
     def gain(self, signals: Real, guard: Limits) -> float:
-        """K for one row of inputs [N m], before they are scaled; `guard` as in `guarded`."""
+        """K for one row of inputs [N m], not scaled; `guard` as in `guarded`."""
         return float(network_gain(self.weights, signals / self.scales, np.zeros(self.w2.size), guard)[0])
 
 
 def initial_network(seed: int, *, hidden: int = PAPER_HIDDEN, scales: Real | None = None) -> Network:
-    """Weights uniform in (-0.5, 0.5), by NumPy's PCG64 of that seed; `scales` (6 or 7) are 1 N m unless given."""
+    """Return weights uniform in (-0.5, 0.5), by NumPy's PCG64 of that seed; `scales` (6 or 7) default to 1 N m."""
     seed = whole("seed", seed, 0, 2**63 - 1, "a seed is a whole number from 0 to 2^63 - 1")
     hidden = whole("hidden", hidden, 1, MOST_HIDDEN, f"a whole number of neurons from 1 to {MOST_HIDDEN}")
     widths = np.ones(PAPER_INPUTS) if scales is None else np.asarray(scales, dtype=float)

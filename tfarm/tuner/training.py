@@ -1,16 +1,14 @@
-"""The compiled learning rules of the tuner: after each trial, or at every sample.
+"""Compiled learning rules of the tuner, the paper's momentum update after each trial or at every sample.
 
-Learning: the paper's momentum update over trials or at every sample, and what came of it.
-
-    dw(t) = -eta_c dE/dw + alpha_c dw(t-1)   (21),      w(t+1) = w(t) + dw(t)   ((22) with its sign mended)
+    dw(t) = -eta_c dE/dw + alpha_c dw(t-1)   (21),      w(t+1) = w(t) + dw(t)   ((22) with corrected sign)
 
 `trial`: E is the cost of a whole slew, its gradient goes back through network, plant and time, and the weights change
 after each slew.  `online`: the paper's delta rule at every sample, with the plant's one-step sensitivity.
 
-Plain (21) often dies at K = 0 or runs away.  "The momentum alpha_c is changed dynamically", by what rule the paper does
-not say; here `dynamic` cuts the gradient to norm 0.5, and where the cost rises the step is taken back and halved and
-the momentum set to zero.  `clipped` only cuts the gradient, `plain` is (21) as it stands.  Online there is no cost to
-compare at every sample, and `dynamic` is `clipped`.
+Plain (21) often ends at K = 0 or diverges.  "The momentum alpha_c is changed dynamically", without a rule in the paper.
+Here `dynamic` clips the gradient to norm 0.5; where the cost rises the step is taken back and halved, and the momentum
+set to zero.  `clipped` only clips the gradient, `plain` is (21) itself.  Online there is no cost to compare at every
+sample, and `dynamic` is `clipped`.
 """
 
 from __future__ import annotations
@@ -47,7 +45,7 @@ from .kernel import (
     trial_cost,
 )
 
-NEVER, ENOUGH = -1, -2  # in place of the sample where a trial was stopped: none was, or x had become small enough
+NEVER, ENOUGH = -1, -2  # instead of the sample where a trial was stopped: none was, or x was small enough
 X, U, E, K = range(4)  # rows of the derivatives that `derive` carries, of the signals now
 BEFORE = 4  # rows further are those of the sample before, and as many further again those of the one before that
 INPUT_ROWS = (U, U + BEFORE, E + BEFORE, E + 2 * BEFORE, X, X + BEFORE, K + BEFORE)  # of each input of the network
@@ -55,8 +53,10 @@ SHARE_FALLS, SHARE_GROWS = 0.5, 1.2  # times: a step of learning halves at once,
 
 
 class Steps(NamedTuple):
-    """How (21) and (22) are taken: rates of learning (weights,), the momentum, the norm that a gradient is cut to (inf:
-    never), and the root mean square of x [N m] over a trial that is small enough to stop."""
+    """Constants of (21) and (22): learning rates (weights,), momentum, largest norm of a gradient (inf: any).
+
+    `enough` is the root mean square of x [N m] over a trial that is small enough to stop.
+    """
 
     rates: Real
     momentum: float
@@ -75,7 +75,7 @@ def _rms(x: Real) -> float:
 
 @compiled
 def _step(weights: Real, change: Real, gradient: Real, steps: Steps, share: float) -> None:
-    """(21) and (22) with the sign mended: dw = -eta g + alpha dw, w = w + dw; eta times `share`, g cut to `longest`."""
+    """Take a step of (21) and (22): dw = -eta g + alpha dw, w = w + dw; eta times `share`, g clipped to `longest`."""
     norm = 0.0
     for i in range(gradient.size):
         norm += gradient[i] ** 2
@@ -90,12 +90,12 @@ def _step(weights: Real, change: Real, gradient: Real, steps: Steps, share: floa
 def learn_by_trials(
     setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, takes_back: bool
 ) -> tuple[int, int]:
-    """Learning after each trial; fills `costs`, changes `weights`.
+    """Learn after each trial: fill `costs`, change `weights`.
 
-    Returns how many trials were made and the sample at which the last one passed the bound, NEVER or ENOUGH; where it
-    passed it, `weights` are those of the last trial that did not.  Where the rule `takes_back`, a trial that costs more
-    than the last accepted one is taken back, its step shortened and the momentum set to zero; an accepted one lets the
-    step grow again, up to its full size.
+    Return the number of trials and the sample at which the last one passed the bound, NEVER or ENOUGH.  If it passed,
+    `weights` are those of the last trial that did not.  Where the rule `takes_back`, a trial that costs more than the
+    last accepted one is taken back, its step halved and the momentum set to zero; after an accepted one the step grows
+    again, up to its full size.
     """
     n, size = run.x.size, weights.size
     gradient, change, kept, slope = np.zeros(size), np.zeros(size), weights.copy(), np.zeros(size)
@@ -129,9 +129,9 @@ def learn_by_trials(
 
 @inlined
 def derive(k: int, setting: Setting, weights: Real, run: Run, S: Real, spare: Real, D: Real) -> None:
-    """Derivatives at sample k by every weight, forward: rows of D are those of x, u, e, K now and one, two samples ago.
+    """Set derivatives at sample k by every weight, forward: rows of D are those of x, u, e, K now and 1, 2 samples ago.
 
-    S (n, weights) is the state's; it is taken one sample on.
+    S (n, weights) is that of the state, and advances by one sample.
     """
     model, hidden, m, h = setting.model, run.hidden[k], run.inputs.shape[1], run.hidden.shape[1]
     for row in range(D.shape[0] - 1, BEFORE - 1, -1):
@@ -168,11 +168,11 @@ def derive(k: int, setting: Setting, weights: Real, run: Run, S: Real, spare: Re
 def learn_by_samples(
     setting: Setting, steps: Steps, weights: Real, costs: Real, run: Run, work: Work, reply: float, is_whole: bool
 ) -> tuple[int, int]:
-    """Learning at every sample: as x arrives, the weights that it answers to are corrected; returns as above.
+    """Learn at every sample, from x by the weights of its torque; return as `learn_by_trials`.
 
-    By the paper's delta rule a torque is answered `lag` samples later, by `reply`, the derivative of that x by the
-    torque.  `is_whole` carries the plant's whole sensitivity forward since the trial began: the gradient of
-    a x^2/2 + b e^2/2 now, by weights taken for constant all the trial (Williams and Zipser, 1989).
+    By the paper's delta rule x follows a torque `lag` samples later, with the derivative `reply`.  `is_whole` carries
+    the plant's whole sensitivity forward since the trial began: the gradient of a x^2/2 + b e^2/2 now, by weights that
+    are taken for constant (Williams and Zipser, 1989).
     """
     n, size, states, numbers = run.x.size, weights.size, work.state.size, setting.numbers
     gradient, change, past, kept = np.zeros(size), np.zeros(size), np.zeros((numbers.lag, size)), weights.copy()
@@ -194,7 +194,7 @@ def learn_by_samples(
                     gradient[p] = numbers.a * run.x[k] * D[X, p] + numbers.b * run.e[k] * D[E, p]
                 _step(weights, change, gradient, steps, 1.0)
                 continue
-            made = past[k % numbers.lag]  # the weights that made the torque which x answers now
+            made = past[k % numbers.lag]  # the weights of the torque that x follows now
             if k >= numbers.lag:
                 sample_gradient(k - numbers.lag, numbers, reply, run.x[k], run, made, gradient)
                 _step(weights, change, gradient, steps, 1.0)
@@ -210,17 +210,17 @@ Mode = Literal["trial", "online"]
 Rule = Literal["dynamic", "clipped", "plain"]
 Sensitivity = Literal["one-step", "whole"]
 
-MOST_TRIALS = 1_000_000  # of a tuning: a bound on what a slip of the hand may ask for
+MOST_TRIALS = 1_000_000  # of a tuning
 QUARTILES = (0.25, 0.5, 0.75)  # of learning curves over the seeds
-NO_GAIN = 1e-3  # of K: a network that gives less all along a trial has driven its gain to nothing
+NO_GAIN = 1e-3  # of K: a network with less throughout a trial has a gain of zero
 
 
 @dataclass(frozen=True, kw_only=True)
 @record
 class Learning:
-    """How to learn: `eta` (one number, or one a weight as `Network.weights` lists them), `alpha`, mode and rule.
+    """Options of learning: `eta` (a number, or one a weight in the order of `Network.weights`), `alpha`, mode and rule.
 
-    `clip` is the norm that the gradient is cut to; learning stops once the root mean square of x over a trial is below
+    `clip` is the largest norm of the gradient; learning stops once the root mean square of x over a trial is below
     `enough` [N m] (the paper's stopping rule; 0 never stops).
     """
 
@@ -241,10 +241,8 @@ class Learning:
                 raise ParameterError(key="eta", value=float(rate), remedy=remedy)
         momentum = not_negative("alpha", self.alpha, "the momentum factor lies in [0, 1)")
         if not momentum < 1.0:
-            raise ParameterError(
-                key="alpha", value=momentum, remedy="the momentum factor lies in [0, 1): 1 never forgets"
-            )
-        positive("clip", self.clip, "the norm that a gradient is cut to is positive and finite")
+            raise ParameterError(key="alpha", value=momentum, remedy="the momentum factor lies in [0, 1), below 1")
+        positive("clip", self.clip, "the largest norm of a gradient is positive and finite")
         not_negative("enough", self.enough, "the error to stop at is zero or positive, in N m")
 
     def rates(self, size: int) -> Real:
@@ -264,16 +262,14 @@ class Stopped:
     bound: float
 
     def __str__(self) -> str:
-        return (
-            f"diverged in trial {self.trial + 1} at sample {self.sample}: the root moment passed {self.bound:.4g} N m, "
-            "at which the arm is folded up"
-        )
+        where = f"trial {self.trial + 1} at sample {self.sample}"
+        return f"diverged in {where}: the root moment passed {self.bound:.4g} N m, the end of small deflections"
 
 
 @dataclass(frozen=True)
 @record
 class Training:
-    """`costs` of the trials as they were run, the network that came out, and a trial with it as it is.
+    """`costs` of the trials in their order, the trained network, and the `result` of a trial with it.
 
     Where learning diverged the last cost is inf and the network is that of the last trial that did not.
     """
@@ -287,16 +283,16 @@ class Training:
 
     @property
     def died(self) -> bool:
-        """Whether the gain was driven to nothing."""
+        """Whether the gain went to zero."""
         return bool(self.result.K.max(initial=0.0) < NO_GAIN)
 
 
 @dataclass(frozen=True)
 @record
 class LearningCurves:
-    """Trainings from several seeds: `costs` (seeds, trials) as they were run, inf from where one diverged.
+    """Trainings from several seeds: `costs` (seeds, trials) in their order, inf from a divergence on.
 
-    `final` (seeds,): the cost with what was learnt, inf where it diverged.  `diverged` and `died` count seeds.
+    `final` (seeds,): the cost with the trained network, inf where it diverged.  `diverged` and `died` count seeds.
     """
 
     costs: Real
@@ -306,7 +302,7 @@ class LearningCurves:
 
     @property
     def seeds(self) -> Annotated[int, Quantity("seeds")]:
-        """How many there are."""
+        """Number of seeds."""
         return int(self.final.size)
 
     @property
@@ -322,7 +318,7 @@ class LearningCurves:
 
     @classmethod
     def of(cls, trainings: Sequence[Training], trials: int) -> LearningCurves:
-        """Those of trainings of up to `trials` trials."""
+        """The curves of trainings of up to `trials` trials."""
         costs = np.full((len(trainings), trials), np.inf)
         for row, training in zip(costs, trainings, strict=True):
             row[: training.costs.size] = training.costs
@@ -331,7 +327,7 @@ class LearningCurves:
         return cls(costs, np.array(final), diverged, sum(each.died for each in trainings))
 
     def quantile(self, share: float) -> Real:
-        """The cost (trials,) that this share of the seeds is below, after each trial; always one of the costs."""
+        """The quantile of the costs over the seeds after each trial (trials,); always one of the costs."""
         return np.asarray(np.quantile(self.costs, share, axis=0, method="nearest"))
 
     def final_quantile(self, share: float) -> float:
@@ -340,9 +336,9 @@ class LearningCurves:
 
 
 def train(trial: Trial, network: Network, guard: Guard, learning: Learning, trials: int) -> Training:
-    """Learn for so many trials (1 to 1,000,000), starting with `network`; memory does not grow with them.
+    """Learn for a number of trials (1 to 1,000,000), starting with `network`; memory does not grow with them.
 
-    The same inputs give the same bits.  Raises ParameterError for a number of trials or rates that do not fit.
+    The same inputs give the same bits.  Raises ParameterError for an invalid number of trials or rates.
     """
     trials = whole("trials", trials, 1, MOST_TRIALS, f"a whole number of trials from 1 to {MOST_TRIALS}")
     weights, costs = network.weights, np.zeros(trials)

@@ -1,19 +1,19 @@
-"""A trial: the slew of an arm under u - K x, ready for the compiled loop, and what it costs.
+"""A trial: the slew of an arm under u - K x, for the compiled loop, and its cost.
 
     E(t) = a x(t)^2/2 + b e(t)^2/2,   e = u - K x   (23);   cost of a trial: T times the sum of E over its samples
 
-x is the root moment, u the control input, K the gain on the moment (K2 of the law (19)).  What u and x contain during
-the slew the paper leaves open:
+x is the root moment, u the control input, K the gain on the moment (K2 of the law (19)).  Their content during the slew
+is not defined in the paper; there are two readings:
 
     vibration   x: the moment less the rigid arm's; torque = J theta_dd_ref + e;
                 u = Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t)
-    total       x: the whole moment; u holds the feedforward J theta_dd_ref too; torque = e
+    total       x: the whole moment; u has the feedforward J theta_dd_ref too; torque = e
 
-The paper's law has Kp = 0: nothing holds the angle then, and a slew ends where the moment feedback's torque leaves it.
+The paper's law has Kp = 0: the angle is then free, and has a steady-state error after the slew.
 
-The trained network as a controller: a gain schedule of `tfarm.dsp.Simulator`, with converters, delay, on any arm.
+The trained network is a controller: a gain schedule of `tfarm.dsp.Simulator`, with converters, delay, on any arm.
 
-Its file is JSON: strict, finite, of shapes that fit; never pickle.
+Its file is JSON: strict, finite, of matching shapes; never pickle.
 """
 
 from __future__ import annotations
@@ -46,15 +46,15 @@ from tfarm.tuner import kernel
 from tfarm.tuner.guard import GuardKind
 from tfarm.tuner.kernel import PAPER_INPUTS, Limits, Network
 
-SILENT = Network(np.zeros((1, PAPER_INPUTS)), np.zeros(1), np.ones(PAPER_INPUTS))  # for a guard that leaves no choice
-TRIAL_MODES = 6  # flexible modes of a trial, unless told
-LAST_SAMPLE = 1e-9  # of a duration of whole samples, that is taken off it: their number is counted with both ends
+SILENT = Network(np.zeros((1, PAPER_INPUTS)), np.zeros(1), np.ones(PAPER_INPUTS))  # for a guard of one gain
+TRIAL_MODES = 6  # flexible modes of a trial, by default
+LAST_SAMPLE = 1e-9  # of a duration of whole samples, subtracted from it: their number includes both ends
 ANGLE_REMEDY = "the hub angle gain is zero or positive, in N m/rad"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cost:
-    """The weighting coefficients `a` [1/(N m)^2 s], of the root moment, and `b`, of the control signal e."""
+    """Weighting coefficients `a` [1/(N m)^2 s], of the root moment, and `b`, of the control signal e."""
 
     a: float = TRIAL_COST[0]
     b: float = TRIAL_COST[1]
@@ -63,20 +63,20 @@ class Cost:
         meanings = {name: f"the weighting coefficient {name} is zero or positive" for name in ("a", "b")}
         check_fields(self, "", not_negative, **meanings)
         if self.a == 0.0 == self.b:
-            raise ParameterError(key="a", value=self.a, remedy="a and b are both zero: a cost of nothing")
+            raise ParameterError(key="a", value=self.a, remedy="a and b are both zero: one of them has to be positive")
 
     def in_units_of(self, torque: float) -> Cost:
-        """The cost that counts moments and torques in units of `torque` [N m] with these weights."""
+        """The cost with these weights on moments and torques in units of `torque` [N m]."""
         return Cost(a=self.a / torque**2, b=self.b / torque**2)
 
 
 @dataclass(frozen=True)
 @record
 class Record:
-    """The signals of a trial at its samples: `x`, `u`, `e` [N m], gain `K`; `stopped`: the sample where it ran away.
+    """The signals of a trial at its samples: `x`, `u`, `e` [N m], gain `K`; `stopped`: the sample where it diverged.
 
-    `x` is what the controller reads, through the anti-alias filter and less what is taken off it under the reading of
-    the signals; `moment` [N m] is the arm's own at the root.
+    `x` is the input of the controller, through the anti-alias filter and less its reference; `moment` [N m] is the
+    arm's own at the root.
     """
 
     t: Real
@@ -94,7 +94,7 @@ class Record:
 class Trial:
     """An arm's loop with `K1` and `Kp`, a chain whose converters are taken as ideal, a slew `task` and a cost.
 
-    The controller knows the arm only by `task`, so the slew of one arm may be asked of another one's loop.
+    The references are in `task` alone, so the slew of one arm may be that of another one's loop.
     """
 
     loop: Sampled
@@ -104,19 +104,19 @@ class Trial:
 
     @property
     def arm(self) -> Arm:
-        """The arm that moves."""
+        """The moving arm."""
         return self.loop.plant.arm
 
     @property
     def n(self) -> int:
-        """How many samples it has."""
+        """Number of samples."""
         return self.task.feedforward.size
 
     @cached_property
     def model(self) -> kernel.Model:
-        """The loop from sample to sample, open at the torque, and the rows that read the servo and the moment."""
+        """The loop from sample to sample, open at the torque, and the rows of the servo and the moment."""
         A = self.loop.having(Kp=0.0, K1=0.0, K2=0.0).matrix()
-        last = self.loop.pulse.integrals_at + 2  # where the torque of the sample before is kept: B is 1 there
+        last = self.loop.pulse.integrals_at + 2  # the state with the torque of the last sample: B is 1 there
         servo = -self.loop.having(K2=0.0).matrix()[last]
         moment = -self.loop.having(Kp=0.0, K1=0.0, K2=1.0).matrix()[last]
         drive, own = (np.pad(of, (0, len(A) - of.size)) for of in (self.loop.pulse.matrices()[1], self.loop.own_moment))
@@ -124,7 +124,7 @@ class Trial:
 
     @cached_property
     def reference(self) -> kernel.Reference:
-        """What is wanted at each sample."""
+        """The references at each sample."""
         task, gains, none = self.task, self.loop.gains, np.zeros(self.n)
         counted, rest = (task.feedforward, none) if self.signals == "total" else (none, task.feedforward)
         wanted = gains.Kp * task.hub_angle + gains.K1 * task.hub_rate
@@ -132,23 +132,23 @@ class Trial:
 
     @cached_property
     def numbers(self) -> kernel.Numbers:
-        """The cost's weights, the period, the largest moment, and after how many samples x answers a torque."""
+        """The cost's weights, the period, the largest moment, and the number of samples from a torque to its x."""
         sampling = self.loop.chain.sampling
         bound = float(FOLDED_UP * self.arm.bending_scale)
         return kernel.Numbers(self.cost.a, self.cost.b, sampling.period, bound, 1 + sampling.whole_delay)
 
     def setting(self, network: Network, guard: kernel.Limits) -> kernel.Setting:
-        """All that the compiled loops take beside weights."""
+        """Arguments of the compiled loops, without weights."""
         return kernel.Setting(self.model, self.reference, self.numbers, network.scales, guard)
 
     @cached_property
     def reply(self) -> float:
-        """dx/d(torque) at the first sample that feels it: the one-step sensitivity of the plant."""
+        """dx/d(torque) at the first sample where it is not 0: the one-step sensitivity of the plant."""
         model = self.model
         return float(model.moment @ np.linalg.matrix_power(model.A, self.numbers.lag - 1) @ model.B)
 
-    def asked_of(self, arm: Arm, chain: Chain, servo: HubFeedback) -> Trial:
-        """The same slew asked of another loop, whose controller knows the arm of this one."""
+    def on(self, arm: Arm, chain: Chain, servo: HubFeedback) -> Trial:
+        """The same slew on another loop, with the references of this one's arm."""
         here = slew_trial(
             arm, chain, K1=servo.K1, Kp=servo.Kp, cost=self.cost, signals=self.signals, known=self.arm,
             duration=self.n * self.task.period * (1 - LAST_SAMPLE), count=self.loop.plant.count,
@@ -156,12 +156,12 @@ class Trial:
         return replace(here, task=self.task)
 
     def simulator(self, *, chain: Chain | None = None, task: Scenario | None = None) -> Simulator:
-        """The loop beside the compiled one, with converters where the chain has any: that of the trial unless given."""
+        """A simulator of the loop, with the converters of a chain, by default that of the trial."""
         chain, task = chain or self.loop.chain, task or self.task
         return Simulator(self.arm, chain, task, count=self.loop.plant.count)
 
     def room(self, network: Network) -> tuple[kernel.Run, kernel.Work]:
-        """What a trial with that network fills, and the room that it takes, empty."""
+        """Empty record and buffers of a trial with that network."""
         (hidden, inputs), n, states = network.W1.shape, self.n, self.model.B.size
         signals = (np.zeros(n) for _ in range(6))
         run = kernel.Run(np.zeros((n, inputs)), np.zeros((n, hidden)), *signals)
@@ -170,7 +170,7 @@ class Trial:
     # ------------------------------------------------------------ one trial
 
     def with_network(self, network: Network, guard: kernel.Limits) -> Record:
-        """The trial with a network as it is; where it was stopped it costs inf."""
+        """The trial with a fixed network; the cost is inf where it was stopped."""
         run, work = self.room(network)
         done = kernel.forward(self.setting(network, guard), network.weights, run, work)
         x, u, e, K, moment = (signal[:done].copy() for signal in (run.x, run.u, run.e, run.K, run.moment))
@@ -180,7 +180,7 @@ class Trial:
         return Record(self.task.t[:done], x, u, e, K, moment, cost, stopped)
 
     def with_constant(self, K: float) -> Record:
-        """The trial with a constant gain: a guard that leaves no choice."""
+        """The trial with a constant gain: a guard of one gain."""
         return self.with_network(SILENT, kernel.Limits(K, K))
 
 
@@ -196,10 +196,11 @@ def slew_trial(
     count: int = TRIAL_MODES,
     known: Arm | None = None,
 ) -> Trial:
-    """The slew of an arm with `count` flexible modes; `known` is the arm that the controller believes it moves,
-    `K1` by default that of `default_gains` for that arm, or with a `Kp` that of `usual_rate_gain`.
+    """Return the slew of an arm with `count` flexible modes.
 
-    Raises ParameterError for an arm that cannot turn, a hub without inertia, and numbers out of range.
+    `known` is the arm of the references, by default the same.  `K1` is by default that of `default_gains` for that arm,
+    or with a `Kp` that of `usual_rate_gain`.  Raises ParameterError for an arm that cannot turn, a hub without inertia,
+    and numbers out of range.
     """
     must_be_known("signals", signals, get_args(Reading))
     Kp = not_negative("Kp", Kp, ANGLE_REMEDY)
@@ -217,9 +218,9 @@ def slew_trial(
 
 
 def usual_rate_gain(arm: Arm, Kp: float) -> float:
-    """K1 [N m s/rad]: that of `default_gains`, or with Kp > 0 what damps the rigid arm under it by 1/sqrt(2).
+    """Return K1 [N m s/rad] of `default_gains`, or with Kp > 0 that of damping ratio 1/sqrt(2) of the rigid arm.
 
-    J theta_tt + (K1 + losses) theta_t + Kp theta = 0 is damped so with K1 + losses = sqrt(2 Kp J).  Raises
+    J theta_tt + (K1 + losses) theta_t + Kp theta = 0 has that ratio with K1 + losses = sqrt(2 Kp J).  Raises
     ParameterError for a Kp below zero.
     """
     Kp = not_negative("Kp", Kp, ANGLE_REMEDY)
@@ -234,9 +235,9 @@ def with_signals(chain: Chain, signals: Reading) -> Chain:
 
 
 def residual_rms(record: Record, task: Scenario) -> float | None:
-    """Root mean square of the arm's own root moment less the rigid arm's [N m], from the end of the slew on.
+    """Return the root mean square of the arm's own root moment less the rigid arm's [N m], from the end of the slew on.
 
-    None where the loop ran away.
+    None of an unstable loop.
     """
     return residual_left(task, record.moment)
 
@@ -248,9 +249,9 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 @dataclass
 class TunedGain:
-    """K for each measurement; it remembers u, e, x and K of the two samples before, and forgets them at sample 0.
+    """K for each measurement, from u, e, x and K of the last two samples, reset at sample 0.
 
-    `servo` is the law beside the moment.
+    `servo` is the law without moment feedback.
     """
 
     network: Network
@@ -260,7 +261,7 @@ class TunedGain:
     _past: list[tuple[float, float, float, float]] = field(default_factory=list, init=False)
 
     def run(self, simulator: Simulator) -> Simulation:
-        """The loop of a simulator under the servo and this gain."""
+        """Simulate the servo and this gain."""
         return simulator.gain_schedule(self.servo.K1, self, Kp=self.servo.Kp)
 
     def __call__(self, m: Measurement) -> float:
@@ -276,9 +277,9 @@ class TunedGain:
 
 
 def judged(simulation: Simulation, cost: Cost, signals: Reading) -> Record:
-    """A simulation as a record: x before the converters, as a trial has it, e from the torque after them.
+    """Return a simulation as a record of a trial: x before the converters, e from the torque after them.
 
-    So x has passed the anti-alias filter where there is one, but none of the ADC's steps.
+    So x has passed the anti-alias filter where there is one, but no quantisation.
     """
     task, done = simulation.scenario, simulation.torque.size
     rest = 0.0 if signals == "total" else task.feedforward[:done]
@@ -291,7 +292,7 @@ def judged(simulation: Simulation, cost: Cost, signals: Reading) -> Record:
 
 
 def tip_off(simulation: Simulation, trial: Trial) -> float | None:
-    """How far the tip is off its target [m] when a simulation of a slew ends; None where the loop ran away."""
+    """Distance of the tip from its target [m] at the end of a simulated slew; None of an unstable loop."""
     if simulation.stopped is not None:
         return None
     chain, arm = trial.loop.chain, trial.arm
@@ -301,9 +302,9 @@ def tip_off(simulation: Simulation, trial: Trial) -> float | None:
 @dataclass(frozen=True)
 @record
 class SavedTuner:
-    """What a tuner needs to run: network, guard, K1, Kp and the reading of the signals; and where it was trained.
+    """A tuner: network, guard, K1, Kp, the reading of the signals, and the arm and period of its training.
 
-    `cost` counts moments and torques in the unit by which the network divides them, the first of its scales [N m].
+    `cost` is of moments and torques in units of the first of the network's scales [N m].
     """
 
     network: Network
@@ -324,7 +325,7 @@ class SavedTuner:
 
 
 class TunerFile(StrictTable):
-    """The file."""
+    """The file of a tuner."""
 
     format: Literal["tfarm tuner 1"]
     arm: Annotated[str, Field(max_length=80)]
@@ -341,7 +342,7 @@ class TunerFile(StrictTable):
     w2: list[Finite]
 
     def build(self) -> SavedTuner:
-        """The tuner; ParameterError where its parts do not fit together."""
+        """Return the tuner.  Raises ParameterError where its parts do not match."""
         if (self.guard is None) != (self.guard_kind == "none"):
             raise ParameterError(key="guard", value=self.guard, remedy="two ends, or null with guard_kind none")
         lo, hi = (0.0, math.inf) if self.guard is None else self.guard
@@ -349,16 +350,15 @@ class TunerFile(StrictTable):
             raise ParameterError(key="guard", value=self.guard, remedy="its lower end, from 0 on, comes first")
         widths = {len(row) for row in self.W1}
         if widths != {len(self.scales)}:
-            raise ParameterError(
-                key="W1", value=sorted(widths), remedy=f"rows of {len(self.scales)}, one weight an input"
-            )
+            remedy = f"rows of {len(self.scales)}, one weight an input"
+            raise ParameterError(key="W1", value=sorted(widths), remedy=remedy)
         network = Network(np.array(self.W1), np.array(self.w2), np.array(self.scales))
         cost = Cost(a=self.a, b=self.b)
         return SavedTuner(network, self.guard_kind, lo, hi, self.K1, self.signals, cost, self.arm, self.period, self.Kp)
 
 
 def to_text(tuner: SavedTuner) -> str:
-    """The file's text; equal tuners give equal text, and it loads to the same bits."""
+    """Text of a tuner's file; equal tuners give equal text, and it loads to the same bits."""
     content = {
         "format": FORMAT,
         "arm": tuner.arm,
@@ -381,22 +381,21 @@ def weights_of(network: Network) -> dict[str, list[float] | list[list[float]]]:
 
 
 def save_tuner(tuner: SavedTuner, path: Path) -> None:
-    """Write it beside, then rename."""
+    """Write a tuner's file, atomically."""
     write_file(path, to_text(tuner).encode(), key="--save")
 
 
 def load_tuner(path: str | os.PathLike[str]) -> SavedTuner:
-    """The tuner of a file.  Raises ParameterError, in one line, for whatever is wrong with it."""
+    """Read the tuner of a file.  Raises ParameterError, in one line, for the first problem of the file."""
     text = read_file(path, MOST_TUNER_BYTES, key="controller", what="a tuner's file")
     try:
         return TunerFile.model_validate_json(text).build()
     except ValidationError as error:
         problem = error.errors(include_url=False)[0]
         key = ".".join(map(str, problem["loc"])) or "file"
-        special = {"json_invalid": os.fspath(path), "missing": MISSING}
-        what = special.get(problem["type"], problem["input"])
+        value = {"json_invalid": os.fspath(path), "missing": MISSING}.get(problem["type"], problem["input"])
         message = f"{problem['msg'][:1].lower()}{problem['msg'][1:]}"
         remedy = f"{message}; save it again with tfarm tune ARM --save FILE.json"
-        raise ParameterError(key=key, value=what, remedy=remedy, file=path) from None
+        raise ParameterError(key=key, value=value, remedy=remedy, file=path) from None
     except TfarmError as error:
         raise error.in_file(path) if isinstance(error, ParameterError) else error from None

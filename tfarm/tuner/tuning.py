@@ -1,4 +1,4 @@
-"""One call: the guard, the training, and what the tuner has to be held against, as records."""
+"""Tuning in one call: the guard, the training and the baselines, as records."""
 
 from __future__ import annotations
 
@@ -43,23 +43,21 @@ Advance = Callable[[int, int, str], None]
 
 MOST_SEEDS = 10_000  # of learning curves
 TRAINING_THREADS = 2  # a report uses no more cores
-SHAPED_NOTE = (
-    "no moment feedback; judged by the shaped slew, which arrives later, so that cost_lq_bound does not bound it"
-)
+SHAPED_NOTE = "no moment feedback; cost of the shaped slew, which arrives later: cost_lq_bound is no bound of it"
 BOUND_NOTES = {
     "vibration": "the least cost of any control signal e on this slew, with full state and preview",
-    "total": "the least cost of any torque: under this reading the cost does not ask the arm to move, so none is best",
+    "total": "the least cost of any torque: under this reading it is that of an arm at rest",
 }
 
 
 @dataclass(frozen=True, kw_only=True)
 @record
 class Plan:
-    """What to tune and how: the paper's figures where it gives them.
+    """Plan of a tuning, with the paper's figures by default.
 
     `K1` [N m s/rad] and `Kp` [N m/rad] of the servo, 0 in the paper, `duration` of a trial [s], flexible modes `count`,
-    `hidden` neurons; `seventh_input` feeds K(t-1) back too, the gain that the paper names among its inputs; `scale`
-    [N m] is the unit of moments and torques, of the other six and in the cost.
+    `hidden` neurons; `seventh_input` adds K(t-1), the gain that the paper names among its inputs; `scale` [N m] is the
+    unit of moments and torques, of the other six inputs and in the cost.
     """
 
     cost: Cost = field(default_factory=Cost)
@@ -82,11 +80,11 @@ class Plan:
 
     @property
     def servo(self) -> HubFeedback:
-        """The law beside the moment."""
+        """The law without moment feedback."""
         return HubFeedback(K1=self.K1, Kp=self.Kp)
 
     def holding(self, arm: Arm, Kp: float) -> Plan:
-        """The plan with the hub's angle held by this gain, and the rate gain that damps it."""
+        """The plan with this gain on the hub's angle, and its usual rate gain."""
         return replace(self, Kp=Kp, K1=usual_rate_gain(arm, Kp))
 
     @property
@@ -98,10 +96,10 @@ class Plan:
 @dataclass(frozen=True)
 @record
 class Tuning:
-    """A tuner, trained, beside its yardsticks; all are of one trial.
+    """A trained tuner and its baselines, all of one trial.
 
-    `shaped`: the slew through the ZV and the EI shaper without moment feedback.  It arrives later, and its x and e
-    count from its own reference, so that the bound of the slew as it is does not hold for it.
+    `shaped`: the slew through the ZV and the EI shaper without moment feedback.  It arrives later, and its x and e are
+    from its own reference, so that the bound of the unshaped slew is no bound of it.
     """
 
     trial: Trial
@@ -114,17 +112,17 @@ class Tuning:
 
     @property
     def finding(self) -> str:
-        """What the tuned slew costs, beside the best constant gain and none, in words."""
+        """Costs of the tuned slew, of the best constant gain, and without moment feedback."""
         tuned, constant, without = self.training.result.cost, self.best_constant.cost, self.without.cost
         return f"cost {tuned:.6g}; {constant:.6g} with the best constant gain, {without:.6g} without"
 
     def saved(self) -> SavedTuner:
-        """What `saving.save_tuner` writes."""
-        guard, plan, period = self.training.guard, self.plan, self.trial.task.period
-        arm, network = self.trial.arm.name, self.training.network
+        """The record that `save_tuner` writes."""
+        guard, plan, trial = self.training.guard, self.plan, self.trial
         return SavedTuner(
-            network, guard.kind, guard.lo, guard.hi, plan.K1, plan.signals, plan.cost, arm, period, plan.Kp
-        )
+            self.training.network, guard.kind, guard.lo, guard.hi, plan.K1, plan.signals, plan.cost, trial.arm.name,
+            trial.task.period, plan.Kp,
+        )  # fmt: skip
 
     def gain(self) -> TunedGain:
         """The trained controller."""
@@ -132,12 +130,12 @@ class Tuning:
 
     @property
     def shaped_costs(self) -> dict[str, float]:
-        """What the slew through each shaper costs."""
+        """Cost of the slew through each shaper."""
         return {kind: record.cost for kind, (_, record) in self.shaped.items()}
 
     @property
     def shaped_delays(self) -> dict[str, float]:
-        """How much later [s] the slew through each shaper arrives."""
+        """Delay [s] of the slew through each shaper."""
         arrives = self.trial.task.busy_until
         return {kind: trial.task.busy_until - arrives for kind, (trial, _) in self.shaped.items()}
 
@@ -148,8 +146,7 @@ class Tuning:
 
 
 def usual_plan(arm: Arm, chain: Chain | None = None) -> Plan:
-    """The paper's figures at the arm's own default rate gain, in its own unit of torque, and for the chain's own slew:
-    trials of three times as long, read as it says."""
+    """Return the paper's figures at the arm's default rate gain, in its unit of torque, for three times its slew."""
     chain = chain_or_usual(chain)
     return Plan(
         K1=default_gains(arm).K1,
@@ -160,7 +157,7 @@ def usual_plan(arm: Arm, chain: Chain | None = None) -> Plan:
 
 
 def trial_of(arm: Arm, plan: Plan, chain: Chain | None) -> Trial:
-    """The slew that a plan learns from."""
+    """The trial of a plan."""
     return slew_trial(
         arm, chain, K1=plan.K1, Kp=plan.Kp, cost=plan.cost.in_units_of(plan.scale), signals=plan.signals,
         duration=plan.duration, count=plan.count,
@@ -168,9 +165,9 @@ def trial_of(arm: Arm, plan: Plan, chain: Chain | None) -> Trial:
 
 
 def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuning:
-    """Find the guard, train, and measure the yardsticks.
+    """Find the guard, train, and compute the baselines.
 
-    Raises ParameterError for what cannot be, and CertificationError where there is no guard.
+    Raises ParameterError for an invalid plan, arm or chain, and CertificationError where there is no guard.
     """
     if not isinstance(plan, Plan | None):
         raise ParameterError(key="plan", value=plan, remedy="give a tfarm.tuner.Plan, such as Plan(trials=50, K1=0.3)")
@@ -194,7 +191,7 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
 
 
 def learning_curves(tuning: Tuning, seeds: int, advance: Advance | None = None) -> LearningCurves:
-    """Train the tuning's plan from as many seeds, its own and those that follow (the paper's Figure 5).
+    """Train the tuning's plan from a number of seeds, its own and those that follow (the paper's Figure 5).
 
     `advance(done, all, text)` is called after each.  Raises ParameterError for a number of seeds out of range.
     """
@@ -214,7 +211,7 @@ def learning_curves(tuning: Tuning, seeds: int, advance: Advance | None = None) 
 
 
 class Baseline(NamedTuple):
-    """The cost of a slew with a controller that the tuner is compared with."""
+    """The cost of a slew with a baseline."""
 
     name: Annotated[str, Quantity("controller")]
     cost: Annotated[float, Quantity("cost of a slew", digits=4)]
@@ -223,7 +220,7 @@ class Baseline(NamedTuple):
 
 @dataclass(frozen=True)
 class TuningResult:
-    """A tuning with the numbers that it comes to, and as far as asked for its learning curves and a comparison."""
+    """A tuning with its figures, and optionally its learning curves and a comparison."""
 
     tuning: Tuning
     curves: Annotated[LearningCurves | None, Quantity("learning curves")] = None
@@ -246,7 +243,7 @@ class TuningResult:
 
     @property
     def trials(self) -> Annotated[int, Quantity("trials")]:
-        """How many trials there were."""
+        """Number of trials."""
         return int(self.tuning.training.costs.size)
 
     @property
@@ -256,7 +253,7 @@ class TuningResult:
 
     @property
     def baselines(self) -> Annotated[list[Baseline], Quantity("compared with baselines")]:
-        """The cost with the tuner and with what it is compared with."""
+        """The costs with the tuner and with the baselines."""
         tuning, shaped = self.tuning, self.tuning.shaped_costs
         constant = f"best constant gain, K = {tuning.best_constant.gain:.4g}"
         late = tuning.shaped_delays
@@ -292,7 +289,7 @@ class TuningResult:
 
     @property
     def gain_range(self) -> Annotated[tuple[float, float], Quantity("moment gain", digits=4)]:
-        """Its least and its largest value."""
+        """The least and the largest moment gain."""
         K = self.tuning.training.result.K
         return float(K.min()), float(K.max())
 
@@ -302,7 +299,7 @@ class TuningResult:
 
     @property
     def residual_moment(self) -> Annotated[float | None, Quantity(RESIDUAL, "N m rms", key="residual_moment_rms")]:
-        """With the tuner, less the rigid arm's."""
+        """The residual with the tuner, less the rigid arm's."""
         return residual_moment_rms(self._runs[0])
 
     @property
@@ -317,7 +314,7 @@ class TuningResult:
 
     @property
     def tip_error(self) -> Annotated[float | None, Quantity("tip error at the end", "m", 3)]:
-        """How far off the tip is when the trial ends, tuned."""
+        """Distance of the tip from its target at the end, tuned."""
         return tip_off(self._runs[0], self.tuning.trial)
 
     @property
@@ -333,7 +330,7 @@ class TuningResult:
 
     @property
     def guard(self) -> Annotated[Guard, Quantity("guard of the gain")]:
-        """The gains that the tuner may take, and what is certified of them."""
+        """The interval of the tuner's gain, and its certificate."""
         return self.tuning.training.guard
 
     @property
@@ -343,7 +340,7 @@ class TuningResult:
 
     @property
     def stopped(self) -> Annotated[str | None, Quantity("stopped")]:
-        """Why the training stopped early."""
+        """The reason of an early end of the training."""
         stopped = self.tuning.training.stopped
         return None if stopped is None else str(stopped)
 
@@ -354,7 +351,7 @@ class TuningResult:
 
 
 def tip_errors(tuning: Tuning) -> dict[str, float | None]:
-    """How far off the tip is [m] when the trial ends: tuned, with the best constant gain, without moment feedback."""
+    """Distance of the tip from its target [m] at the end: tuned, best constant gain, without moment feedback."""
     keys = ("tip_error_m", "tip_error_best_constant_m", "tip_error_without_m")
     return {key: tip_off(run, tuning.trial) for key, run in zip(keys, _runs(tuning), strict=True)}
 
@@ -376,9 +373,9 @@ def controlled_run(
     between: int,
     outputs: Sequence[str] = (),
 ) -> Run:
-    """A scenario simulated with a saved tuner as the gain.
+    """Simulate a scenario with a saved tuner as the gain.
 
-    Its guard is proven for the loop that it was trained on, not for every arm and chain that it may be tried with.
+    Its guard is certified for the loop of its training, not for another arm or chain.
     """
     chain = with_signals(chain, saved.signals)
     task = scenario(name, arm, chain, duration)
