@@ -27,11 +27,6 @@ def lined(digits: int, least: int) -> CellsOf:
     return partial(aligned, digits=digits, least=least)
 
 
-def worded(how: Callable[[str], str]) -> CellsOf:
-    """Cells of texts, such as formulas in plain letters that a page sets in Greek ones."""
-    return lambda values: [how(value) for value in values]
-
-
 TEXTS = singly(str)  # words and whole numbers as they are
 
 

@@ -1,4 +1,4 @@
-"""Pictures of the modes: their shapes, how far the simpler beam theories are off, and frequencies over a parameter."""
+"""Pictures of the modes: their shapes, and how far the simpler beam theories are off."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from tfarm.arrays import Real
-from tfarm.audit.assumptions import Study
 from tfarm.digits import plain, significant
 from tfarm.spectrum import Modes
 
@@ -20,7 +19,6 @@ from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, page, picture
 
 SHAPE_POINTS = 401  # of a drawn mode: about one to a pixel of its picture
 ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [-]"
-CURVE_COLOURS = (BLUE, ORANGE, GREEN, PURPLE)  # of natural frequencies, from the first mode on
 HUB_WIDTH = 0.06  # width of the drawn hub, as a share of the length
 
 
@@ -109,42 +107,3 @@ def theory_name(theory: str) -> str:
     """As a person writes it: Euler-Bernoulli, Rayleigh, shear, Timoshenko."""
     names = {"timoshenko": "Timoshenko", "rayleigh": "Rayleigh", "euler-bernoulli": "Euler-Bernoulli"}
     return names.get(theory, theory)
-
-
-def draw_over(curve: Study, study: Study, label: str) -> Figure:
-    """Frequencies over one assumed parameter: curves, the candidates of the table as rings, the arm itself filled."""
-    is_own, x, candidates = study.is_own, curve.values, study.values
-    parameter = "hub inertia" if study.pinned.size else "depth of the section, at this area"
-    title = f"{study.arm.name}: natural frequencies over the {parameter}"
-    with page(9.0, 4.6, title) as (figure, ax):
-        ax.set(xscale="log", yscale="log", xlabel=label, ylabel="natural frequency [rad/s]")
-        ax.axvline(candidates[is_own][0], color=INK, lw=1.0, ls=(0, (4, 3)), zorder=1.5)
-        for number, (color, omega) in enumerate(zip(CURVE_COLOURS, curve.natural_frequency.T, strict=True), 1):
-            ax.plot(x, omega, color=color)
-            marked = study.natural_frequency[:, number - 1]
-            ax.plot(candidates[~is_own], marked[~is_own], "o", ms=4.5, mfc="white", mec=color, mew=1.1)
-            ax.plot(candidates[is_own], marked[is_own], "o", ms=7.0, mfc=color, mec="white", mew=0.8, zorder=4)
-            ax.annotate(
-                f"mode {number}", (candidates[-1], marked[-1]), textcoords="offset points", xytext=(8, 0), va="center",
-                color=color, fontsize=9.0,
-            )  # fmt: skip
-        if study.pinned.size:
-            _mark_limits(study.pinned, study.locked, ax)
-        ax.margins(y=0.09)
-        for axis in (ax.xaxis, ax.yaxis):
-            axis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0)))
-            axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, 3)))
-            axis.set_minor_formatter(NullFormatter())
-        span = float(x[-1] / x[0])
-        ax.set_xlim(x[0] / span**0.06, x[-1] * span**0.13)  # room for the bars, and for these and the modes' names
-    return figure
-
-
-def _mark_limits(pinned: Real, locked: Real, ax: Axes) -> None:
-    """Short bars at the left edge for the free pin, at the right edge for the locked hub."""
-    for omegas, low, high in ((pinned, 0.0, 0.018), (locked, 0.982, 1.0)):
-        for color, omega in zip(CURVE_COLOURS, omegas, strict=True):
-            if omega > 0:  # the first of an arm that its tip holds falls to 0: beyond a logarithmic axis
-                ax.axhline(omega, low, high, color=color, lw=2.4)
-    for place, text, side in ((0.0, "free pin", "left"), (1.0, "locked hub", "right")):
-        ax.text(place, 1.015, text, transform=ax.transAxes, ha=side, fontsize=9.0, color=GREY)

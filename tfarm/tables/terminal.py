@@ -1,7 +1,7 @@
 """Tables for a terminal: no number is ever cut.
 
 In a pipe every row is one line.  On a terminal that is too narrow titles and long texts are folded; if that is not
-enough, the columns that do not fit follow in a block below, beside the first column again.  What answers comes first.
+enough, the columns that do not fit follow in a block below, with the first column again.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def show_pairs(pairs: Sequence[tuple[str, str]]) -> None:
 
 
 def table_lines(table: Table, width: int) -> list[str]:
-    """The lines of the table, each in so many characters as far as its widest column allows."""
+    """The lines of the table, within a width as far as its widest column allows."""
     columns = table.columns
     cells = [column.cells for column in columns]
     titles, rows = [heading(column) for column in columns], list(zip(*cells, strict=True))
