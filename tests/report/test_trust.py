@@ -205,7 +205,7 @@ def test_every_source_of_a_number_is_named():
     """Tables of arms and of rigs: the numbers of the sources are all numbers that are compared."""
     first = [(source.key, source.cases[0]) for source in published.ALL]
     rows = [row for key, case in first for row in published.case_rows(key, case)]
-    table = sources_table(rows)
+    table = sources_table(published.Validation(tuple(rows)))
     columns = {column.key: column for column in table.columns}
     assert len(columns["numbers"].values) == len(published.ALL)
     assert sum(columns["numbers"].values) == len(rows)

@@ -53,7 +53,7 @@ class Piece:
 
     A page that it does not suit has no such section.  The page that `report --only` asks for is called by the first
     word of its sections' anchors; its `title` is that of one of them, and `is_also_on` picks the other pages of that
-    kind have a section.  The full page has all, and at its top the answers of those that have one (`is_answer`).
+    kind that have the section.  The full page has all, and at its top the answers of those that have one (`is_answer`).
     `seconds` is about how long a section takes to make, where that is long: the longest are begun first.
     """
 

@@ -12,7 +12,7 @@ from decimal import Decimal, localcontext
 from difflib import SequenceMatcher
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 from xml.etree import ElementTree
 
 from latex2mathml.converter import convert
@@ -33,7 +33,7 @@ from tfarm.plots.words import gains_words
 from tfarm.report.cases import has_loop
 from tfarm.report.modes_section import BRACKET_DIGITS, PROVEN_DIGITS, PROVEN_MODES, proven_damped_modes
 from tfarm.report.page import command_for_all, keep, kept
-from tfarm.report.sections import DATA, Fact, PageSection, prose, render, save_section
+from tfarm.report.sections import DATA, PageSection, prose, render, save_section
 from tfarm.response.frequency import BAND_POINTS, worst_error
 from tfarm.schema import Quantity, table
 from tfarm.spectrum import DampedModes
@@ -395,85 +395,49 @@ def gather() -> Evidence:
 def write_trust(evidence: Evidence, proofs: Sequence[ArmProof], folder: Path) -> None:
     """index.html and its tables, into a folder of their own."""
     folder.mkdir()
-    sections = {s.anchor: save_section(s, folder) for s in _sections(evidence, proofs)}
+    found = published.Validation(evidence.published)
+    contents: dict[str, tuple[str, Sequence[Table]]] = {
+        "proofs": ("Proofs", (counts_table(proofs), digits_table(proofs), *boxes_tables(proofs))),
+        "accuracy": ("Measured accuracy", (accuracy_table(proofs),)),
+        "published": ("Published numbers", (sources_table(found), differences_table(found), published_table(found))),
+        "again": ("Make it again", (inputs_table(proofs), versions_table())),
+    }
+    sections = {
+        anchor: save_section(PageSection(anchor=anchor, title=title, blocks=blocks), folder)
+        for anchor, (title, blocks) in contents.items()
+    }
     plain = table(evidence.audit, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation")
-    files = save_table(plain, folder / DATA)
+    save_table(plain, folder / DATA)
+    errors = [error for proof in proofs for _, error in proof.errors]
     page = render(
         "trust.html",
         title="Why trust this",
         sections=sections,
-        short=_short(evidence, proofs),
-        counts=[
-            (*VERDICT_MARKS[verdict], verdict, number) for verdict, number in verdict_counts(evidence.audit).items()
-        ],
+        proofs=proofs,
+        digits=BRACKET_DIGITS,
+        points=BAND_POINTS,
+        worst=scientific(max(errors), 2) if errors else "",
+        found=found,
+        verdicts=verdict_counts(evidence.audit),
+        marks=VERDICT_MARKS,
         equations=[shown_row(row) for row in evidence.audit],
-        audit_files=files,
-        paper=audit.PAPER,
         command=command_for_all([(proof.name, proof.is_preset) for proof in proofs]),
     )
     (folder / "index.html").write_text(page, encoding="utf-8", newline="")
 
 
-def _sections(evidence: Evidence, proofs: Sequence[ArmProof]) -> list[PageSection]:
-    rows, found = evidence.published, published.Validation(evidence.published)
-    agree, of = sum(row.agrees for row in rows), len({row.source for row in rows})
-    facts = (
-        Fact(label="numbers compared", value=str(len(rows)), note=f"from {of} sources"),
-        Fact(label="agree to the last printed digit", value=str(agree)),
-        Fact(label="differ, with the reason", value=str(len(rows) - agree)),
-    )
-    contents: dict[str, tuple[str, Sequence[Table]]] = {
-        "proofs": ("Proofs", (counts_table(proofs), digits_table(proofs), *boxes_tables(proofs))),
-        "accuracy": ("Measured accuracy", (accuracy_table(proofs),)),
-        "published": ("Published numbers", (sources_table(rows), differences_table(found), published_table(found))),
-        "again": ("Make it again", (inputs_table(proofs), versions_table())),
-    }
-    return [
-        PageSection(anchor=anchor, title=title, facts=facts * (anchor == "published"), blocks=blocks)
-        for anchor, (title, blocks) in contents.items()
-    ]
-
-
-def _short(evidence: Evidence, proofs: Sequence[ArmProof]) -> dict[str, Any]:
-    """The numbers of the five sentences at the top."""
-    proven = [proof for proof in proofs if not proof.failure]
-    errors = [error for proof in proofs for _, error in proof.errors]
-    found = verdict_counts(evidence.audit)
-    return {
-        "frequencies": sum(len(proof.brackets) for proof in proven),
-        "arms": len(proven),
-        "unproven": [proof.name for proof in proofs if proof.failure],
-        "digits": BRACKET_DIGITS,
-        "points": BAND_POINTS,
-        "worst": scientific(max(errors), 2) if errors else "",
-        "published": len(evidence.published),
-        "agree": sum(row.agrees for row in evidence.published),
-        "rows": len(evidence.audit),
-        **found,
-    }
-
-
 # ------------------------------------------------------------ published tables
 
 
-class SourceRow(NamedTuple):
-    """A source of published numbers."""
-
-    source: Annotated[str, Quantity("source")]
-    numbers: Annotated[int, Quantity("numbers")]
-    agree: Annotated[int, Quantity("agree")]
-    citation: Annotated[str, Quantity("citation")]
-    reached: Annotated[str, Quantity("access")]
-
-
-def sources_table(rows: Sequence[published.PublishedRow]) -> Table:
+def sources_table(found: published.Validation) -> Table:
     """The origin of the numbers, and how many agree."""
-    found = []
-    for source in published.ALL:
-        agrees = [row.agrees for row in rows if row.source == source.key]
-        if agrees:
-            found.append(SourceRow(source.key, len(agrees), sum(agrees), source.citation, source.reached))
-    return table(found, stem="sources", title="Sources", caption=prose("sources"))
+    agrees = [[row.agrees for row in found.rows if row.source == source.key] for source in found.sources]
+    columns = (
+        *table(found.sources).columns,
+        Column("numbers", "numbers", of=map(len, agrees)),
+        Column("agree", "agree", of=map(sum, agrees)),
+    )
+    return Table(stem="sources", title="Sources", caption=prose("sources"), columns=columns)
 
 
 def differences_table(found: published.Validation) -> Table:
