@@ -15,6 +15,7 @@ import tfarm
 from tests.shell import heard, run
 from tfarm.cli.running import whole_command
 from tfarm.report import writing
+from tfarm.report.page import PIECES
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -107,8 +108,8 @@ def test_the_example_of_a_report_runs(
     for dear in ("save_proof", "save_live"):
         monkeypatch.setattr(writing, dear, lambda *_: None)
     monkeypatch.setattr(writing, "write_assets", lambda folder: (folder.mkdir(), (folder / "live.js").touch()))
-    pieces = [each for each in writing.ARM_PIECES if each.name in ("the arm", "root moment")]
-    monkeypatch.setattr(writing, "ARM_PIECES", pieces)
+    pieces = [each for each in PIECES if each.name in ("the arm", "root moment")]
+    monkeypatch.setattr("tfarm.report.page.PIECES", pieces)
     (line,) = (line for line in COMMANDS if line.startswith("tfarm report "))
     code, out, err = run(capsys, *shlex.split(line)[1:])
     assert (code, out.strip()) == (0, "pages/index.html")

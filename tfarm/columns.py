@@ -1,9 +1,4 @@
-"""A column: one quantity of a record with its name, unit and digits, declared once, beside the record; a table of them.
-
-    FOUND = (
-        Column("omega_rad_s", "frequency", "rad/s", of="omega", digits=singly(significant, 7)),
-        Column("becomes", of="direction"),
-    )
+"""A column: one quantity with its name, unit and cells; a table of them.
 
 `tfarm.tables` makes terminals' tables, files and pages of a `Table`; `tfarm.schema` makes one of declared quantities.
 """
@@ -11,8 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import InitVar, dataclass, replace
-from operator import attrgetter
+from dataclasses import dataclass
 from typing import Any
 
 from tfarm.digits import TEXTS, CellsOf
@@ -22,31 +16,25 @@ from tfarm.digits import TEXTS, CellsOf
 class Column:
     """One quantity: `key` in JSON and files (with the unit, as omega_rad_s), `title` and `unit` where a person reads.
 
-    `of` says where its values are: the name of an attribute (that of the key if left out), a function of the record,
-    or the values themselves.  Of a list of records it is asked one by one.  `digits` makes cells of values; where
-    these do not say it all, `shown` is, like `of`, the cells.  Neighbours of one `group` share a heading on a page;
-    `tint` is, like `of`, a background colour a cell; on a narrow terminal a column that `folds` is folded.
+    `of` are its values, `digits` makes cells of them; where that is not enough, `shown` are the cells.  `tint` is a
+    background colour a cell; on a narrow terminal a column that `folds` is folded.
     """
 
     key: str
     title: str = ""
     unit: str = ""
-    of: Any = None
+    of: Any = ()
     digits: CellsOf = TEXTS
-    shown: Any = None
-    group: str = ""
-    tint: Any = ()
+    shown: Sequence[str] | None = None
+    tint: Sequence[str] = ()
     folds: bool = False
 
-    def read(self, record: Any) -> Column:
-        """The column with its values, cells and tints in the place of where they are."""
-        values = _read(self.key if self.of is None else self.of, record)
-        shown = None if self.shown is None else _read(self.shown, record)
-        return replace(self, of=values, shown=shown, tint=_read(self.tint, record))
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "of", self.of.tolist() if hasattr(self.of, "tolist") else list(self.of))
 
     @property
     def values(self) -> Sequence[Any]:
-        """The values of a column that was read."""
+        """The values."""
         return self.of
 
     @property
@@ -62,19 +50,17 @@ class Column:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """The columns of a record, read; a sequence of its rows as JSON has them.
+    """Columns of one length; a sequence of their rows as JSON has them.
 
-    `stem` names its files, `title` stands above, `caption` says what is to be seen and what it means.
+    `stem` names its files; `title` and `caption` are those of the page.
     """
 
     columns: tuple[Column, ...]
-    record: InitVar[Any] = None
     stem: str = ""
     title: str = ""
     caption: str = ""
 
-    def __post_init__(self, record: Any) -> None:
-        object.__setattr__(self, "columns", tuple(column.read(record) for column in self.columns))
+    def __post_init__(self) -> None:
         keys = [column.key for column in self.columns]
         assert len(set(keys)) == len(keys), f"{self.stem}: two columns of one key in {keys}"
         assert len({len(column.values) for column in self.columns}) <= 1, f"{self.stem}: columns of different lengths"
@@ -88,12 +74,3 @@ class Table:
     def __getitem__(self, row: int) -> dict[str, Any]:
         """A row by its keys."""
         return {column.key: column.values[row] for column in self.columns}
-
-
-def _read(how: Any, record: Any) -> list[Any]:
-    """What `Column.of` means for a record, or for a list of records."""
-    found = how
-    if isinstance(how, str) or callable(how):
-        of = attrgetter(how) if isinstance(how, str) else how
-        found = [of(row) for row in record] if isinstance(record, list | tuple) else of(record)
-    return found.tolist() if hasattr(found, "tolist") else list(found)

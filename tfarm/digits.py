@@ -27,12 +27,7 @@ def lined(digits: int, least: int) -> CellsOf:
     return partial(aligned, digits=digits, least=least)
 
 
-def worded(how: Callable[[str], str]) -> CellsOf:
-    """Return a format of texts, such as formulas with Greek letters."""
-    return lambda values: [how(value) for value in values]
-
-
-TEXTS = singly(str)  # words and whole numbers
+TEXTS = singly(str)  # words and whole numbers as they are
 
 
 def general(x: float, digits: int) -> str:

@@ -169,7 +169,7 @@ def across(
     """A row a quantity that has one value, a column a record; the records are named, `keys` are those of columns."""
     found = [{label: (of, value) for label, of, value in entries(each)} for each in records.values()]
     every = dict.fromkeys(label for each in found for label in each)
-    labels = [label for label in every if any(_is_short(each[label][1]) for each in found if label in each)]
+    labels = [label for label in every if any(str(each[label][1]) not in EMPTY for each in found if label in each)]
     units = [next(each[label][0].unit for each in found if label in each) for label in labels]
     columns = [Column("quantity", "quantity", of=labels), Column("unit", "unit", of=units)]
     for key, name, each in zip(keys or records, records, found, strict=True):
@@ -179,13 +179,6 @@ def across(
         cells = [with_unit(value, replace(of, unit="")) for of, value in pairs]
         columns.append(Column(key, name, of=values, shown=cells))
     return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
-
-
-def _is_short(value: Any) -> bool:
-    """Whether a value is there, and no sentence."""
-    return (
-        value is not None and str(value) not in EMPTY and not (isinstance(value, str) and len(value) > LONGEST_COMPARED)
-    )
 
 
 def entries(record: Any, under: str = "") -> Iterator[tuple[str, Quantity, Any]]:
@@ -293,9 +286,6 @@ def _parts_of(value: Any, of: Quantity, pairs: list[tuple[str, str]]) -> Iterato
         yield Section(of.label, table=table(value))
     elif is_declared(value) and not isinstance(value, At) and not hasattr(value, "as_text"):
         yield from sections(value, of.label)
-    elif isinstance(value, Mapping) and value and all(map(is_declared, value.values())):
-        names = Column("name", "", of=list(value))
-        yield Section(of.label, table=Table(columns=(names, *table(list(value.values())).columns)))
     elif _is_list_of_records(value):
         yield Section(of.label, table=table(value))
     elif isinstance(value, np.ndarray) and np.iscomplexobj(value) and value.size:

@@ -24,7 +24,7 @@ from tfarm.dsp.results import simulated_run
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import gain_map
 from tfarm.loop.stability import stability
-from tfarm.report.cases import Subject
+from tfarm.report.cases import Case
 from tfarm.report.live import ASSETS, save_live, write_assets
 from tfarm.schema import to_dict
 
@@ -45,7 +45,7 @@ def folder(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("pages")
     for name in ARMS:
         (out / name).mkdir()
-        save_live(Subject(tfarm.load(name), load_chain(name)), out / name)
+        save_live(Case(tfarm.load(name), load_chain(name)), out / name)
     write_assets(out / ASSETS)
     return out
 

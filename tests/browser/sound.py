@@ -25,13 +25,13 @@ from tests.shared import once
 from tfarm.dsp import load_chain
 from tfarm.fitting.fit import fit
 from tfarm.report import write, writing
-from tfarm.report.cases import GivenLaw, Subject
+from tfarm.report.cases import Case, GivenLaw
 from tfarm.report.live import ASSETS, save_live, write_assets
+from tfarm.report.page import PIECES, pieces_of
 from tfarm.report.writing import write_comparison
 
 LAB = replace(tfarm.load("sasaki2012-lab"), name=NAME, assumptions=ARM.assumptions)
 LAW = tfarm.Law({"hub_angle": ([2.0, 8.0], [0.02, 1.0]), "hub_rate": 0.4}, name=TEXT)
-PIECES = writing.ARM_PIECES
 SCREENS = 8.0  # of 1400 x 900 pixels, after the answers
 NEWER = "Unknown pseudo-element or pseudo-class “::details-content”"  # which prints what is folded: CSS of 2024
 HIDDEN = """() => [...document.querySelectorAll("body *")].filter(e => {
@@ -50,11 +50,9 @@ def few(tmp_path_factory):
     """Index, pages of one question, of a law, of a fit, of a comparison, and a live one: with few sections."""
     out = tmp_path_factory.mktemp("few")
     chain = load_chain("sasaki2012-lab")
-    few = [piece for piece in PIECES if piece.anchor in ("arm", "modes", "margins")]
-    laws = [piece for piece in writing.LAW_PIECES if piece.anchor in ("law", "margins")]
+    few = [piece for piece in PIECES if piece.anchor in ("arm", "modes", "margins", "law")]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(writing, "ARM_PIECES", tuple(few))
-        patch.setattr(writing, "LAW_PIECES", tuple(laws))
+        patch.setattr("tfarm.report.page.PIECES", tuple(few))
         patch.setattr(writing, "save_proof", lambda *_: None)
         write([LAB], out, only=("modes", "margins"))
         write([replace(LAB, name="law")], out, laws=[[GivenLaw(LAW)]], only=("margins",))
@@ -62,22 +60,20 @@ def few(tmp_path_factory):
         H = tfarm.transfer(LAB, "root_moment")(1j * omega)
         seen = tfarm.Measured(output="root_moment", input="hub_torque", omega=omega, values=H, sigma=abs(H))
         found = fit(LAB, [seen], free=["hub.inertia"], profile=False)
-        patch.setattr(writing, "ARM_PIECES", tuple(piece for piece in PIECES if piece.anchor in ("fit", "arm")))
-        _arm_page(Subject(replace(found.arm, name="fitted"), chain, (), found), out / "fitted")
-    save_live(Subject(LAB, chain), out / NAME)
+        patch.setattr("tfarm.report.page.PIECES", tuple(piece for piece in PIECES if piece.anchor in ("fit", "arm")))
+        _arm_page(Case(replace(found.arm, name="fitted"), chain, (), found), out / "fitted")
+    save_live(Case(LAB, chain), out / NAME)
     write_assets(out / ASSETS)
     laws_of_gains = [tfarm.HubFeedback(K1=0.3, K2=0.3), tfarm.HubFeedback(K1=14.7, K2=-0.26)]
     write_comparison(tfarm.compare(LAB, laws_of_gains, names=("as in the paper", TEXT), modes=2), out / "compared")
     return out
 
 
-def _arm_page(subject: Subject, folder: Path) -> None:
+def _arm_page(subject: Case, folder: Path) -> None:
     """The full page on a subject, of the sections that there are."""
     folder.mkdir()
     sections = [
-        writing.save_section(writing.section_or_why_not(piece, subject), folder)
-        for piece in writing.ARM_PIECES
-        if piece.is_for(subject)
+        writing.make_section(piece.name, piece.anchor, piece.make, subject, folder) for piece in pieces_of(subject)
     ]
     writing._write_pages(subject, folder, sections, None, "", folder)
 

@@ -50,7 +50,7 @@ def test_twice_the_damping_is_twice_the_ratio():
         assert apart == pytest.approx(one, rel=tolerance)
 
 
-def test_an_arm_beside_itself_differs_in_nothing():
+def test_an_arm_compared_with_itself_differs_in_nothing():
     found = tfarm.compare([LAB, LAB], LAW, modes=3)
     assert not found.is_of_arms
     for rows in (found.pole_differences, found.margin_differences):
@@ -178,7 +178,7 @@ def test_gains_as_a_law_in_z_are_the_same_loop_at_the_samples():
     assert [side.margins for side in found.sides] == [None, None]
 
 
-def test_a_law_in_z_beside_gains_is_judged_at_the_clock_of_both():
+def test_a_law_in_z_and_gains_are_compared_at_the_samples_of_both():
     """At the largest stable factor L passes -1 over it; at no further delay the plane's edges are these factors."""
     late = tfarm.Law({"hub_rate": ([0.35, -0.1], [1.0, -0.2]), "root_moment": 0.3}, period=0.01)
     found = tfarm.compare(LAB, [LAW, late], modes=1)
@@ -200,7 +200,7 @@ def test_a_law_in_z_beside_gains_is_judged_at_the_clock_of_both():
     assert [loop["stable"] for loop in answered["loops"]] == [True, True]
 
 
-def test_a_law_in_z_of_another_clock_is_one_line(capsys, files, tmp_path):
+def test_a_law_in_z_of_another_period_is_one_line(capsys, files, tmp_path):
     (tmp_path / "z.toml").write_text(f"{GAINS.format(0.3, 0.3)}".replace("[law]", "[law]\nperiod = 0.005", 1))
     code, out, err = run(capsys, "compare", "sasaki2012-lab", "--law", files["mild"], "--law", str(tmp_path / "z.toml"))
     assert (code, out, err.count("\n")) == (2, "", 1)

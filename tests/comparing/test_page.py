@@ -10,7 +10,7 @@ from tests.hostile import LONG, TEXT, Read, check_drawing, check_page
 from tests.shell import run
 from tfarm.dsp import Chain
 from tfarm.errors import one_line
-from tfarm.report.cases import Subject
+from tfarm.report.cases import Case
 from tfarm.report.writing import _write_pages, write_comparison
 from tfarm.schema import to_dict
 from tfarm.tables.files import json_value
@@ -87,7 +87,7 @@ def test_an_index_leads_to_the_comparison_and_back(compared, tmp_path, monkeypat
     check_page(index.read_text(encoding="utf-8"), one_line(HOSTILE, 60))
     assert "prefers-color-scheme: dark" in shown.read_text(encoding="utf-8")
     arm.mkdir()
-    _write_pages(Subject(LAB, Chain()), arm, [], ("modes",), "", arm)
+    _write_pages(Case(LAB, Chain()), arm, [], ("modes",), "", arm)
     assert "../compare.html" in _leads_to(arm / "modes.html")
 
 

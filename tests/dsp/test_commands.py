@@ -19,7 +19,7 @@ from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
 from tfarm.dsp.verdict import sampled_brief
 from tfarm.plots import slew
-from tfarm.report.motion import responses_table
+from tfarm.report.sampled_section import responses_table
 from tfarm.synthesis import design
 
 

@@ -23,7 +23,7 @@ from tfarm.dsp.traces import (
     ringing,
     root_moment,
 )
-from tfarm.report.motion import responses_table
+from tfarm.report.sampled_section import responses_table
 from tfarm.spectrum.table import default_gains
 
 STEEL = tfarm.load("stocky-steel")

@@ -11,7 +11,9 @@ import pytest
 import tfarm
 from tests.fitting.test_fit import LAB, PAIRS, measured
 from tests.shared import thinned
+from tfarm.dsp import Chain
 from tfarm.fitting.fit import fit, possible, repeats, response_band, share_stable
+from tfarm.report.cases import Case
 from tfarm.report.response_sections import fit_section
 from tfarm.spectrum.table import default_gains
 
@@ -51,13 +53,13 @@ def test_gains_and_responses_on_all_of_them(known):
 
 
 def test_the_section_of_a_page(known):
-    section = fit_section(known, count=3)
+    section = fit_section(Case(known.arm, Chain(), (), known), count=3)
     titles = [block.title for block in section.blocks]
     assert titles == [
         "Measured over fitted", "Fitted numbers", "Resonances", "The arms that the data leave possible",
         "Gains on all of these arms", "Margins over these arms",
     ]  # fmt: skip
-    assert "the loop holds on 3 of 3 of these arms" in " ".join(section.words)
+    assert "the loop is stable on 3 of 3 of these arms" in " ".join(section.words)
     table = section.blocks[1]
     assert [row["value"] for row in table] == [each.value for each in known.parameters]
     each = [tfarm.margins(arm, default_gains(known.arm)).in_band.disk for arm in possible(known, count=3).arms]

@@ -12,7 +12,7 @@ from tfarm.loop.plane import moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import stability
 from tfarm.plots.regions import sampled_region
 from tfarm.report.live import live_data
-from tfarm.report.sampled_section import beyond_words
+from tfarm.report.sections import prose
 
 LAB = tfarm.load("sasaki2012-lab")
 FRICTION = 0.02
@@ -59,7 +59,7 @@ def test_a_free_hub_that_loses_nothing_has_no_column_below_0_and_a_held_one_has(
 def test_nothing_is_stable_below_the_rate_gain_that_the_words_name(friction):
     """Just below it and far below, at every K2: poles of the exact loop, and eigenvalues of the sampled one."""
     arm = replace(LAB, hub=replace(LAB.hub, friction=friction))
-    assert beyond_words(arm).split("< ")[1].startswith("−0.02," if friction else "0")
+    assert prose("beyond_left", arm=arm, rate="K1").split("< ")[1].startswith("−0.02," if friction else "0")
     loop = region_of(arm).loop
     for K1 in (-friction - 1e-5, -friction - 0.3, -friction - 20.0):
         for K2 in K2S:

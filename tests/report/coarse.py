@@ -5,11 +5,11 @@ from tfarm.dsp import modes as sampled_loci
 from tfarm.dsp import verdict
 from tfarm.loop import loci
 from tfarm.plots import regions
-from tfarm.report import cards, live, map_section, writing
+from tfarm.report import gains_section, live, page, writing
 
 COARSE = (
-    (map_section, "GRID_COLUMNS", 48),
-    (map_section, "GRID_ROWS", 40),
+    (gains_section, "GRID_COLUMNS", 48),
+    (gains_section, "GRID_ROWS", 40),
     (regions, "SAMPLED_COLUMNS", 24),
     (regions, "OVERLAY_COLUMNS", 8),
     (sampled_regions, "MOST_COLUMNS", 0),  # with the corners that so few have
@@ -17,7 +17,7 @@ COARSE = (
     (sampled_loci, "SAMPLED_LOCUS_VALUES", 31),
     (verdict, "PERIOD_SHARES", (1.0, 5.0)),
     (writing, "MOST_WORKERS", 1),  # a second process would have its own grids
-    (map_section, "sampled_region", regions.sampled_region.__wrapped__),  # what is kept of it is of other grids
+    (gains_section, "sampled_region", regions.sampled_region.__wrapped__),  # what is kept of it is of other grids
     (live, "sampled_region", regions.sampled_region.__wrapped__),
 )
 
@@ -30,6 +30,6 @@ def coarsen(put=setattr):
 
 def plain_cards(put):
     """Cards of the index with an empty picture, for tests that are not about it: a response and a drawing each."""
-    put(cards, "bode", lambda *_: None)
-    put(cards, "draw_card", lambda _: None)
-    put(cards, "save_figure", lambda _, folder, stem, formats: (folder / f"{stem}.svg").write_text("<svg/>"))
+    put(page, "bode", lambda *_: None)
+    put(page, "draw_card", lambda _: None)
+    put(page, "save_figure", lambda _, folder, stem, formats: (folder / f"{stem}.svg").write_text("<svg/>"))

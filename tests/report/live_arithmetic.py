@@ -98,7 +98,7 @@ class Page:
             return "stable" if law.K1 > 0 and low < law.K2 < high and law.Kp >= 0 else "not"
         if self.count(law):
             return "unstable"
-        takes = np.sign(law.K1 + data["rate_loss"]) * np.sign(1 - law.K2 / data["whole"]) if data["told"] else 0
+        takes = np.sign(law.K1 + data["rate_loss"]) * np.sign(1 - law.K2 / data["whole"]) if data["by_sign"] else 0
         return "unstable" if data["kind"] == "band" and takes < 0 and data["hub_alone"] else "stable"
 
 

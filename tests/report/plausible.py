@@ -30,7 +30,7 @@ from tfarm.arm import to_toml
 
 WRITE = (
     "import sys; from pathlib import Path; import tfarm; from tfarm.report import write; "
-    "from tfarm.report.pieces import QUESTIONS; "
+    "from tfarm.report.page import QUESTIONS; "
     "write([tfarm.load(sys.argv[1])], Path(sys.argv[2]), only=tuple(QUESTIONS), notice=print)"
 )
 BY_NYQUIST = "unstable poles by Nyquist's criterion"
@@ -60,10 +60,10 @@ def _of_the_loop(folder: Path) -> list[str]:
         if row["number"] == "K2" and row["interval"] is not None
     ]
     found += [
-        f"K2 = {row['K2']} is {row['verdict']}, below the edge at {edge}"
+        f"K2 = {row['value']} is {row['verdict']}, below the edge at {edge}"
         for edge in edges
         for row in _rows(folder, "beyond")
-        if float(row["K2"]) < edge * (1 - 1e-9) and row["verdict"] != "stable"
+        if float(row["value"]) < edge * (1 - 1e-9) and row["verdict"] != "stable"
     ]
     return found
 

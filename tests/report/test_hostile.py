@@ -9,10 +9,10 @@ from tests.hostile import NAME, TEXT, check_drawing, check_page
 from tfarm.dsp import Chain
 from tfarm.fitting.fit import fit
 from tfarm.report import writing
-from tfarm.report.cases import Subject
+from tfarm.report.cases import Case
 from tfarm.report.live import save_live
 from tfarm.report.response_sections import fit_section
-from tfarm.report.sections import PageSection, save_section
+from tfarm.report.sections import save_section
 
 LAB = replace(tfarm.load("sasaki2012-lab"), name=NAME)
 OMEGA = np.geomspace(8.0, 300.0, 30)
@@ -22,12 +22,12 @@ def test_of_a_fit(tmp_path):
     H = tfarm.transfer(LAB, "root_moment")(1j * OMEGA)
     seen = tfarm.Measured(output="root_moment", input="hub_torque", omega=OMEGA, values=H, sigma=abs(H), source=TEXT)
     found = fit(LAB, [seen], free=["hub.inertia"], profile=False)
-    saved = save_section(fit_section(found, 2), tmp_path)
+    saved = save_section(fit_section(Case(found.arm, Chain(), (), found), 2), tmp_path)
     for suffix in ("svg", "json"):
         assert list(tmp_path.rglob(f"*.{suffix}"))
     for drawing in tmp_path.rglob("*.svg"):
         check_drawing(drawing.read_text(encoding="utf-8"))
-    writing._write_pages(Subject(found.arm, Chain(), (), found), tmp_path, [saved], None, "", tmp_path)
+    writing._write_pages(Case(found.arm, Chain(), (), found), tmp_path, [saved], None, "", tmp_path)
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     check_page(page, NAME)
     assert "\u202e" not in page
@@ -40,11 +40,9 @@ def test_of_a_section_and_a_live_page_that_cannot_be_made(tmp_path, monkeypatch)
         raise error
 
     monkeypatch.setattr("tfarm.report.live.live_data", fails)
-    save_live(Subject(LAB, Chain()), tmp_path)
+    save_live(Case(LAB, Chain()), tmp_path)
     check_page((tmp_path / "live.html").read_text(encoding="utf-8"), NAME, TEXT)
-    piece = replace(writing.ARM_PIECES[1], make=fails)
-    section = writing.section_or_why_not(piece, Subject(LAB, Chain()))
-    assert isinstance(section, PageSection)
-    saved = save_section(section, tmp_path)
-    writing._write_pages(Subject(LAB, Chain()), tmp_path, [saved], None, "", tmp_path)
+    saved = writing.make_section("map of the gains", "margins-map", fails, Case(LAB, Chain()), tmp_path)
+    assert saved.section.failure
+    writing._write_pages(Case(LAB, Chain()), tmp_path, [saved], None, "", tmp_path)
     check_page((tmp_path / "index.html").read_text(encoding="utf-8"), NAME, TEXT.partition(" & ")[0])

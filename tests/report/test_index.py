@@ -4,9 +4,8 @@ import pytest
 
 import tfarm
 from tfarm.dsp import Chain, load_chain
-from tfarm.report.cards import save_card, written_cards
-from tfarm.report.cases import GivenLaw
-from tfarm.report.page import index_page
+from tfarm.report.cases import Case, GivenLaw
+from tfarm.report.page import index_page, save_card, written_cards
 
 LAB = tfarm.load("sasaki2012-lab")
 FAST = tfarm.Law({"hub_angle": ((2.0, 30.0), (0.002, 1.0)), "root_moment": -0.2}, delay=0.002, name="PD, fast")
@@ -18,7 +17,7 @@ def rows_of(tmp_path, laws, chain):
     """The rows that the index has of an arm with a page."""
     folder = tmp_path / LAB.name
     folder.mkdir()
-    save_card(LAB, folder, laws, chain)
+    save_card(Case(LAB, chain, tuple(laws)), folder)
     (folder / "index.html").write_text("a page")
     (card,) = written_cards(tmp_path)
     return card["loops"], index_page([card], trust="")
@@ -39,7 +38,7 @@ def test_a_law_has_its_own_verdicts_and_nothing_of_the_default_gains(tmp_path, l
     assert "K1 = 0.3" not in page
 
 
-def test_each_law_has_a_row_and_one_in_z_no_verdict_without_a_clock(tmp_path):
+def test_each_law_has_a_row_and_one_in_z_no_continuous_verdict(tmp_path):
     rows, page = rows_of(tmp_path, [GivenLaw(AT_CLOCK), GivenLaw(tfarm.HubFeedback(K1=0.3, K2=0.3))], Chain())
     assert [row["verdict"] for row in rows] == ["", "stable"]
     assert [row["sampled"] for row in rows] == ["stable when sampled every 10 ms"] * 2

@@ -23,12 +23,10 @@ from tfarm.dsp.sampled import sampled_loop
 from tfarm.errors import one_line
 from tfarm.fitting.recording import compare_run, load_run, overshoot
 from tfarm.report import writing
-from tfarm.report.cases import GivenLaw, Subject, on_arm
-from tfarm.report.law_section import law_section, written_polynomial
-from tfarm.report.loop_section import margins_section
-from tfarm.report.motion import overshoot_table
-from tfarm.report.page import file_of
-from tfarm.report.sampled_section import sampled_section
+from tfarm.report.cases import Case, GivenLaw
+from tfarm.report.loop_section import law_section, margins_section
+from tfarm.report.page import PIECES, file_of, pieces_of
+from tfarm.report.sampled_section import measured_step, sampled_section
 from tfarm.tables.files import to_json
 
 LAB, BARE, PRESET = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))
@@ -76,7 +74,7 @@ def table(section, stem):
 def test_margins_on_the_page_are_those_of_the_command(capsys, file, given, monkeypatch):
     room = import_module("tfarm.loop.margins")
     monkeypatch.setattr(room, "windows_of", cache(room.windows_of))  # of the same loop both times
-    section, found = margins_section(LAB, Chain(), given), answer(capsys, "margins", LAB.name, "--law", str(file))
+    section, found = margins_section(Case(LAB, Chain(), given)), answer(capsys, "margins", LAB.name, "--law", str(file))
     shown = table(section, "margins")
     values = dict(zip(shown["quantity"], shown["law"], strict=True))
     assert (values["stability"], values["unstable poles"]) == (found["verdict"], found["unstable_roots"])
@@ -88,12 +86,12 @@ def test_margins_on_the_page_are_those_of_the_command(capsys, file, given, monke
     spilled = answer(capsys, "spill", LAB.name, "--law", str(file), "--modes", "12")
     assert table(section, "law-spill")["unstable"] == [row["unstable"] for row in spilled["models"]]
     assert "small gain" in found["beyond"]
-    assert "small gain" in section.words[0]
+    assert "small gain" in values["beyond that"]
 
 
 @pytest.mark.parametrize("rows", sized([1], [0, 1, 2]), ids=str)
 def test_radii_on_the_page_are_those_of_the_command_at_each_delay(capsys, file, given, rows):
-    section = sampled_section(LAB, Chain(), given)
+    section = sampled_section(Case(LAB, Chain(), given))
     shown = table(section, "sampled-delays")
     for row in rows:
         late = (0.0, 0.5, 1.0)[row]
@@ -101,46 +99,40 @@ def test_radii_on_the_page_are_those_of_the_command_at_each_delay(capsys, file, 
         assert shown["further_delay_ms"][row] == 10 * late
         assert (shown["verdict"][row], shown["spectral_radius"][row]) == (found["verdict"], found["spectral_radius"])
     assert len(set(shown["verdict"])) == 2  # half a sample more stabilises this one
-    assert "Tustin" in law_section(LAB, Chain(), given).words[0]
+    assert "Tustin" in law_section(Case(LAB, Chain(), given)).words[0]
 
 
 def test_gains_that_are_typed_have_their_windows_and_their_proof():
     gains = HubFeedback(K1=0.5, K2=0.3, Kp=2.0)
-    section, found = margins_section(BARE, Chain(), (GivenLaw(gains),)), tfarm.margins(BARE, gains)
+    section, found = margins_section(Case(BARE, Chain(), (GivenLaw(gains),))), tfarm.margins(BARE, gains)
     shown = table(section, "margins")
     values = dict(zip(shown["quantity"], shown["law"], strict=True))
     assert values["margins in the frequency range: delay margin"][0] == found.in_band.delay
     assert table(section, "law-windows")["value"] == [0.5, 0.3, 2.0]
-    assert "Lyapunov: proven" in section.words[0]
+    assert values["Lyapunov function of the paper: stability proven"]
 
 
 def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
     law = Law({"hub_angle": -5.0, "hub_rate": ([1.0], [0.01, 1.0])}, name="backwards")
-    section = margins_section(LAB, Chain(), (GivenLaw(law),))
+    section = margins_section(Case(LAB, Chain(), (GivenLaw(law),)))
     assert section.facts[0].value == "UNSTABLE"
-    assert {block.stem for block in section.blocks} == {"law-bode", "law-spill", "law-windows"}
+    assert {block.stem for block in section.blocks} == {"law-bode", "margins", "law-spill", "law-windows"}
     assert "interval" not in table(section, "law-windows")
 
 
 def test_every_entry_is_in_the_table_with_every_digit(given):
-    (entries,) = law_section(LAB, Chain(), given).blocks
-    (each,) = on_arm(LAB, given)
-    rows = [dict(zip(("num", "den"), (row["numerator"], row["denominator"]), strict=True)) for row in entries]
-    for row, part in zip(rows, each.law.parts, strict=True):
-        for key in ("num", "den"):
-            assert tuple(map(float, row[key].partition(": ")[2].split())) == getattr(part.block, key)
-    assert written_polynomial("s: 0.02 -1.0 0.0 3.5") == "0.02 s³ − s² + 3.5"
-    assert written_polynomial("z: -0.5") == "−0.5"
-    assert written_polynomial("s: 0.0") == "0"
+    (entries,) = law_section(Case(LAB, Chain(), given)).blocks
+    (each,) = Case(LAB, Chain(), given).controllers
+    for row, part in zip(entries, each.law.parts, strict=True):
+        assert (tuple(row["numerator"]), tuple(row["denominator"])) == (part.block.num, part.block.den)
 
 
 # ------------------------------------------------------------ pages
 
 
-def test_a_page_is_about_its_law_and_its_file_says_it_again(file, tmp_path, monkeypatch, capsys):
+def test_a_page_is_about_its_law_and_its_file_repeats_it(file, tmp_path, monkeypatch, capsys):
     plain_cards(monkeypatch.setattr)
-    few = [piece for piece in writing.LAW_PIECES if piece.anchor == "law"]
-    monkeypatch.setattr(writing, "LAW_PIECES", few)
+    monkeypatch.setattr("tfarm.report.page.PIECES", [piece for piece in PIECES if piece.anchor == "law"])
     code, out, err = run(
         capsys, "report", LAB.name, "--law", str(file), "--period", "0.004", "--only", "margins", "--out", str(tmp_path)
     )
@@ -163,28 +155,25 @@ def test_a_page_is_about_its_law_and_its_file_says_it_again(file, tmp_path, monk
 
 def test_gains_typed_are_in_the_file_of_the_page():
     gains = HubFeedback(K1=0.5, K2=-0.1)
-    text = file_of(Subject(LAB, Chain(), (GivenLaw(gains),)))
+    text = file_of(Case(LAB, Chain(), (GivenLaw(gains),)))
     assert "[law.hub_rate]\ngain = 0.5" in text
-    assert "[law]" not in file_of(Subject(LAB, Chain()))
+    assert "[law]" not in file_of(Case(LAB, Chain()))
 
 
-def test_each_loop_page_of_laws_has_a_section_that_says_what_it_is_about():
-    subject = Subject(LAB, Chain(), (GivenLaw(Law({"hub_rate": ([1.0], [0.01, 1.0])})),))
+def test_each_loop_page_of_laws_has_a_section_on_its_laws():
+    subject = Case(LAB, Chain(), (GivenLaw(Law({"hub_rate": ([1.0], [0.01, 1.0])})),))
     for page in ("margins", "locus", "sampled", "tune"):
-        assert "law" in [
-            each.anchor for each in writing.pieces_of(subject) if each.is_on(page) and each.is_for(subject)
-        ]
-    discrete = Subject(LAB, Chain(), (GivenLaw(Law({"hub_rate": 0.3}, period=0.01)),))
-    anchors = {each.anchor for each in writing.pieces_of(discrete) if each.is_for(discrete)}
+        assert "law" in [each.anchor for each in pieces_of(subject) if each.is_on(page)]
+    discrete = Case(LAB, Chain(), (GivenLaw(Law({"hub_rate": 0.3}, period=0.01)),))
+    anchors = {each.anchor for each in pieces_of(discrete)}
     assert not anchors & {"margins", "margins-nyquist", "locus", "margins-map", "tune"}
-    assert "sampled loop" in law_section(*discrete[:3]).words[1]
+    assert "sampled loop" in law_section(discrete).words[1]
     held = replace(LAB, hub=tfarm.Hub(inertia=math.inf))
-    first = (each.anchor for each in writing.LAW_PIECES if each.is_for(Subject(held, Chain(), subject.laws)))
-    assert next(first) == "no-loop"
+    assert pieces_of(Case(held, Chain(), subject.laws))[0].anchor == "no-loop"
 
 
 @pytest.mark.parametrize(
-    ("text", "typed", "told"),
+    ("text", "typed", "shown"),
     [
         ("[law.hub_spin]\ngain = 1.0\n", (), "hub_spin"),
         ("[law.hub_rate]\nnum = [1.0, 0.0, 0.0]\n", (), "num"),
@@ -196,7 +185,7 @@ def test_each_loop_page_of_laws_has_a_section_that_says_what_it_is_about():
         ("[law.hub_rate]\ngain = 1.0\n[measured]\nfile = 'other.csv'\n", (), "reference:hub_angle"),
     ],
 )
-def test_bad_input_is_one_line_and_nothing_is_written(capsys, tmp_path, text, typed, told):
+def test_bad_input_is_one_line_and_nothing_is_written(capsys, tmp_path, text, typed, shown):
     (tmp_path / "law.toml").write_text(text)
     (tmp_path / "words.csv").write_text("t,reference:hub_angle,hub_angle\n0,0,0\n1,one,0\n")
     (tmp_path / "other.csv").write_text("time,angle\n" + "".join(f"{n},0\n" for n in range(9)))
@@ -204,7 +193,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(capsys, tmp_path, text, ty
     code, _, err = run(capsys, "report", LAB.name, "--law", str(tmp_path / "law.toml"), *typed, "--out", str(out))
     assert code == 2
     assert err.count("\n") == 1
-    assert told in err
+    assert shown in err
     assert not out.exists()
 
 
@@ -240,9 +229,9 @@ def test_what_is_measured_and_computed_of_the_real_controllers():
         goal = measured.reference[-1]
         assert 100 * overshoot(measured.hub_angle, measured.step, goal) == pytest.approx(over, abs=1e-3)
         assert np.degrees(measured.hub_angle[-1] - goal) == pytest.approx(end, abs=1e-4)
-        (row,) = overshoot_table({name: found})
-        assert row["overshoot_measured_percent"] == pytest.approx(over, abs=1e-3)
-        assert row["end_computed_deg"] == pytest.approx(np.degrees(found.hub_angle[-1] - goal))
+        row = measured_step(name, found)
+        assert row.overshoot_measured == pytest.approx(over, abs=1e-3)
+        assert row.end_computed == pytest.approx(np.degrees(found.hub_angle[-1] - goal))
         first = [
             np.flatnonzero(abs(moment) > 0.5)[0] for moment in (measured.root_moment, found.run.at_samples.root_moment)
         ]
@@ -252,18 +241,18 @@ def test_what_is_measured_and_computed_of_the_real_controllers():
 
 def test_a_measured_run_is_put_in_the_place_of_the_slew():
     laws = tuple(GivenLaw(*_with_run(name)) for name in ("lqg", "hinf"))
-    section = sampled_section(tfarm.load(DATA / "rig.toml"), load_chain(DATA / "rig.toml"), laws)
+    section = sampled_section(Case(tfarm.load(DATA / "rig.toml"), load_chain(DATA / "rig.toml"), laws))
     stems = [block.stem for block in section.blocks]
     assert stems == [
-        "sampled-numbers-1", "sampled-numbers-2", "sampled-delays", "sampled-modes-law-1", "sampled-modes-law-2",
-        "sampled-measured", "sampled-overshoot",
+        "sampled", "sampled-numbers-law-1", "sampled-numbers-law-2", "sampled-delays", "sampled-modes-law-1",
+        "sampled-modes-law-2", "sampled-measured", "sampled-overshoot",
     ]  # fmt: skip
     shown = table(section, "sampled-delays")
     assert shown["verdict"] == ["unstable"] * 3 + ["stable"] * 3
     assert shown["further_delay_ms"] == [0.0, 5.0, 10.0] * 2
-    verdicts = [fact.value for fact in section.facts if fact.beside.startswith("ln|z|")]
+    verdicts = [fact.value for fact in section.facts if fact.note]
     assert verdicts == ["UNSTABLE", "STABLE"]
-    assert "MIT" in section.blocks[5].caption
+    assert "MIT" in section.blocks[6].caption
 
 
 def _with_run(name):
@@ -271,9 +260,9 @@ def _with_run(name):
     return law, f"{name}.toml", measured
 
 
-def test_laws_of_one_name_are_told_apart_and_what_no_arm_reads_is_refused():
+def test_laws_of_one_name_are_numbered_and_a_signal_that_no_arm_has_is_refused():
     two = tuple(GivenLaw(Law({"hub_rate": ([gain], [0.01, 1.0])}, name="PD")) for gain in (0.3, 0.6))
-    assert [each.name for each in on_arm(LAB, two)] == ["PD", "PD (2)"]
-    assert to_json({"rows": law_section(LAB, Chain(), two).blocks[0]}).count("PD (2)") == 1
+    assert [each.name for each in Case(LAB, Chain(), two).controllers] == ["PD", "PD (2)"]
+    assert to_json({"rows": law_section(Case(LAB, Chain(), two)).blocks[0]}).count("PD (2)") == 1
     with pytest.raises(ParameterError, match="hub_spin"):
         writing.write([LAB], Path("nowhere"), laws=[(GivenLaw(Law({"hub_spin": 1.0})),)])

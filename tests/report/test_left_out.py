@@ -17,9 +17,10 @@ from tests.shell import run
 from tfarm import processes
 from tfarm.arm import to_toml
 from tfarm.dsp import Chain, load_chain
-from tfarm.report import cards as card_room
+from tfarm.report import page as card_room
 from tfarm.report import write, writing
-from tfarm.report.cases import Subject
+from tfarm.report.cases import Case
+from tfarm.report.page import PIECES, Piece, pieces_of
 from tfarm.report.sections import PageSection
 
 
@@ -27,11 +28,11 @@ def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
     """Its sampling, converters and motor are those of the page, of the arm.toml beside it, and of the hash."""
     seen = []
 
-    def section(arm, chain):
-        seen.append((arm.name, chain))
+    def section(case):
+        seen.append((case.arm.name, case.chain))
         return PageSection(anchor="sampled", title="The sampled loop")
 
-    monkeypatch.setattr(writing, "ARM_PIECES", (writing.Piece("s", "sampled", section, of=("arm", "chain")),))
+    monkeypatch.setattr("tfarm.report.page.PIECES", (Piece("s", "sampled", section),))
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
     file = tmp_path / "bench.toml"
@@ -48,9 +49,9 @@ def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
 
 def without_a_section(monkeypatch, error):
     """A report of two sections, the second of which meets that error."""
-    pieces = {piece.name: piece for piece in writing.ARM_PIECES}
+    pieces = {piece.name: piece for piece in PIECES}
     broken = replace(pieces["root loci"], make=Unmakeable(error))
-    monkeypatch.setattr(writing, "ARM_PIECES", (pieces["the arm"], broken))
+    monkeypatch.setattr("tfarm.report.page.PIECES", (pieces["the arm"], broken))
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
 
@@ -63,7 +64,7 @@ def without_a_section(monkeypatch, error):
         tfarm.ParameterError(key="K2", value=2.0, remedy="stopped short of the pole"),
     ],
 )
-def test_a_section_that_cannot_be_made_says_why_in_its_place(tmp_path, monkeypatch, error):
+def test_a_section_that_cannot_be_made_has_its_reason_in_its_place(tmp_path, monkeypatch, error):
     without_a_section(monkeypatch, error)
     told = []
     page = write([ARM], tmp_path, only=("locus",), notice=told.append).read_text(encoding="utf-8")
@@ -100,15 +101,13 @@ def test_a_bug_of_ours_stays_loud(tmp_path, monkeypatch):
 
 def test_every_piece_knows_the_anchor_of_its_section(pages):
     ids = links_of(pages / NAME / "index.html").ids
-    assert [piece.anchor for piece in writing.ARM_PIECES if piece.is_for(Subject(ARM, Chain()))] == [
-        i for i in ids if i in ANCHORS
-    ]
+    assert [piece.anchor for piece in pieces_of(Case(ARM, Chain()))] == [i for i in ids if i in ANCHORS]
 
 
 def test_a_page_has_the_same_sections_whatever_is_written_with_it(tmp_path, monkeypatch):
     """Of an arm without a loop: what says so stands on the pages of the loop, and on no other."""
-    kept = tuple(replace(each, make=partial(bare, each.anchor)) for each in writing.ARM_PIECES)
-    monkeypatch.setattr(writing, "ARM_PIECES", kept)
+    kept = tuple(replace(each, make=partial(bare, each.anchor)) for each in PIECES)
+    monkeypatch.setattr("tfarm.report.page.PIECES", kept)
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
     for only in (("modes",), ("locus",), ("modes", "locus")):
@@ -152,7 +151,7 @@ STRANGE_CARDS = (
 
 @pytest.mark.usefixtures("audited")
 def test_other_files_in_the_folder_are_kept_and_strange_cards_passed_over(tmp_path, monkeypatch):
-    monkeypatch.setattr(writing, "ARM_PIECES", ())
+    monkeypatch.setattr("tfarm.report.page.PIECES", ())
     (tmp_path / NAME).mkdir()
     (tmp_path / NAME / "mine.txt").write_text("mine")
     for i, card in enumerate(STRANGE_CARDS):

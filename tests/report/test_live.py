@@ -20,7 +20,7 @@ from tfarm.exact.system import system_of
 from tfarm.loop.loop import Loop
 from tfarm.loop.panels import MOST_MISS, loop_panels
 from tfarm.loop.stability import stability
-from tfarm.report.cases import Subject
+from tfarm.report.cases import Case
 from tfarm.report.live import live_data, save_live, sensor_numbers, slew_numbers
 
 SIGNALS = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
@@ -162,7 +162,7 @@ def test_a_zero_on_the_axis_has_no_real_part_of_rounding():
     assert not [(re, im) for re, im in zeros if 0 < abs(re) < 1e-9 * abs(im)]
 
 
-def test_where_zeros_of_sensors_cannot_be_told_the_page_says_why(case, monkeypatch, tmp_path):
+def test_zeros_of_sensors_that_are_not_determined_have_their_reason(case, monkeypatch, tmp_path):
     _, data, _ = case
 
     def fails(*_):
@@ -173,8 +173,10 @@ def test_where_zeros_of_sensors_cannot_be_told_the_page_says_why(case, monkeypat
     found = sensor_numbers(arm)
     assert found == {"sensor": None, "no_sensor": "no polynomial follows"}
     monkeypatch.setattr("tfarm.report.live.live_data", lambda *_: {**data, **found})
-    save_live(Subject(arm, Chain()), tmp_path)
-    assert "as its zeros cannot be told: no polynomial follows." in (tmp_path / "live.html").read_text(encoding="utf-8")
+    save_live(Case(arm, Chain()), tmp_path)
+    assert "as its zeros are not determined: no polynomial follows." in (tmp_path / "live.html").read_text(
+        encoding="utf-8"
+    )
 
 
 def test_a_slew_of_too_many_samples_is_left_to_the_command():
@@ -185,7 +187,7 @@ def test_a_slew_of_too_many_samples_is_left_to_the_command():
 def test_the_page_stays_small_and_has_its_text_alone(tmp_path, monkeypatch):
     monkeypatch.setattr("tfarm.report.live.live_data", data_of)
     odd = replace(tfarm.load(ARMS[0]), name=ARMS[0] + ODD)
-    save_live(Subject(odd, chain_of(odd)), tmp_path)
+    save_live(Case(odd, chain_of(odd)), tmp_path)
     page = (tmp_path / "live.html").read_text(encoding="utf-8")
     assert len(page) < 3e6
     assert "<h1>sasaki2012-lab &amp; &#39;co&#39;: live loop</h1>" in page

@@ -2,8 +2,11 @@
 
 import tfarm
 from tests.shell import answer, run
+from tfarm.dsp import Chain
 from tfarm.fitting.data import read_measured
 from tfarm.report import writing
+from tfarm.report.cases import Case
+from tfarm.report.page import PIECES
 from tfarm.report.response_sections import measured_section
 
 FILE = "tests/data/sweep/tip.csv"
@@ -12,7 +15,7 @@ GIVEN = f"tip_acceleration/hub_torque={FILE}"
 
 def test_the_tables_are_those_of_the_command(capsys):
     arm = tfarm.load("sasaki2012-lab")
-    section = measured_section(arm, [read_measured(FILE, "tip_acceleration", "hub_torque")])
+    section = measured_section(Case(arm, Chain(), measured=(read_measured(FILE, "tip_acceleration", "hub_torque"),)))
     picture, modes, required = section.blocks
     assert (picture.stem, modes.stem, required.stem) == ("measured", "measured-modes", "measured-required")
     command = answer(capsys, "response", "sasaki2012-lab", "--measured", GIVEN)
@@ -22,12 +25,10 @@ def test_the_tables_are_those_of_the_command(capsys):
     assert len(picture.data) == command["points"]
 
 
-def test_the_page_says_how_it_is_made_again(tmp_path, capsys, monkeypatch):
+def test_the_page_has_the_command_that_makes_it(tmp_path, capsys, monkeypatch):
     for kept in ("save_proof", "save_card"):  # which have their own tests
         monkeypatch.setattr(writing, kept, lambda *_: None)
-    monkeypatch.setattr(
-        writing, "ARM_PIECES", [each for each in writing.ARM_PIECES if each.name == "measured responses"]
-    )
+    monkeypatch.setattr("tfarm.report.page.PIECES", [each for each in PIECES if each.name == "measured responses"])
     given = ("report", "sasaki2012-lab", "--only", "bode", "--measured", GIVEN, "--out", str(tmp_path))
     code, out, _ = run(capsys, *given)
     assert code == 0

@@ -14,10 +14,19 @@ from tests.report import full
 from tfarm.arm import to_toml
 from tfarm.audit import published
 from tfarm.audit.published import PublishedRow
-from tfarm.report import trust_proofs, write, writing
+from tfarm.report import trust as trust_proofs
+from tfarm.report import write, writing
 from tfarm.report.modes_section import how_proven, modal_table, rounds_to
-from tfarm.report.trust import Evidence, sources_table, write_trust
-from tfarm.report.trust_proofs import boxes_tables, prove, save_proof, shared_digits, written_proofs
+from tfarm.report.trust import (
+    Evidence,
+    boxes_tables,
+    prove,
+    save_proof,
+    shared_digits,
+    sources_table,
+    write_trust,
+    written_proofs,
+)
 from tfarm.response import frequency
 from tfarm.response.frequency import worst_error
 
@@ -92,15 +101,15 @@ def test_twenty_digits_with_their_zeros(lower, text):
 @pytest.mark.parametrize(
     ("cell", "bracket", "right"),
     [
-        ("71.50568", BRACKET, True), ("71.50569", BRACKET, False), ("7.151 × 10¹", BRACKET, True),
-        ("7.150 × 10¹", BRACKET, False), ("71.505682466890", BRACKET, True), ("0.5", ("0.4499", "0.4501"), False),
+        ("71.50568", BRACKET, True), ("71.50569", BRACKET, False), ("7.151e+01", BRACKET, True),
+        ("7.150e+01", BRACKET, False), ("71.505682466890", BRACKET, True), ("0.5", ("0.4499", "0.4501"), False),
     ],
 )  # fmt: skip
 def test_a_cell_is_proven_if_both_ends_round_to_it(cell, bracket, right):
     assert rounds_to(cell, bracket) == right
 
 
-def test_the_modal_table_says_how_its_digits_are_known(proven_modes, monkeypatch):
+def test_the_modal_table_has_the_proof_of_its_digits(proven_modes, monkeypatch):
     modes, table = proven_modes
     assert "Every printed digit of the natural frequencies is proven" in table.caption
     omega, hertz = (column.cells for column in table.columns[1:3])
@@ -108,8 +117,8 @@ def test_the_modal_table_says_how_its_digits_are_known(proven_modes, monkeypatch
     for i in (1, 10):  # a wrong last digit in either column is found out
         wrong = list(hertz)
         wrong[i] = wrong[i][:-1] + str((int(wrong[i][-1]) + 1) % 10)
-        assert "cannot be told" in how_proven(modes, omega, wrong)
-        assert "cannot be told" in how_proven(modes, wrong, hertz)
+        assert "not determined" in how_proven(modes, omega, wrong)
+        assert "not determined" in how_proven(modes, wrong, hertz)
 
     def fail(self, digits):
         raise tfarm.CertificationError("a double frequency near 7 rad/s")
@@ -179,7 +188,7 @@ def test_long_tables_and_claims_are_folded_below_their_answers(page):
     assert unfolded.count('href="#eq-') == len(CHEAP)
 
 
-def test_what_is_not_proven_is_said(page, proof):
+def test_a_failed_proof_is_noted(page, proof):
     assert "Not so for other" in page
     assert "not proven: a double frequency near 7 rad/s" in page
     assert f"{shared_digits(proof.brackets[0], 20)}…" in page
@@ -196,10 +205,10 @@ def test_every_source_of_a_number_is_named():
     """Tables of arms and of rigs: the numbers of the sources are all numbers that are compared."""
     first = [(source.key, source.cases[0]) for source in published.ALL]
     rows = [row for key, case in first for row in published.case_rows(key, case)]
-    table = sources_table(rows)
+    table = sources_table(published.Validation(tuple(rows)))
     columns = {column.key: column for column in table.columns}
-    assert len(columns["numbers"].of) == len(published.ALL)
-    assert sum(columns["numbers"].of) == len(rows)
+    assert len(columns["numbers"].values) == len(published.ALL)
+    assert sum(columns["numbers"].values) == len(rows)
 
 
 def test_versions_hashes_and_the_command_are_there(page, proof, tmp_path):
@@ -251,10 +260,10 @@ def test_damped_modes_and_closed_loop_poles_are_counted_and_kept(tmp_path, monke
     (table,) = boxes_tables([proof])
     assert table.columns[1].values[0] == "damped modes, C = 0.0001 s"
     (small,) = boxes_tables([replace(proof, boxes=(replace(loop, what="closed loop, K1 = 1.66e-05, K2 = 0.3"),))])
-    assert small.columns[1].cells[0] == "closed loop, K1 = 1.66 × 10⁻⁵, K2 = 0.3"
+    assert small.columns[1].cells[0] == "closed loop, K1 = 1.66e-05, K2 = 0.3"
 
 
-def test_a_box_that_cannot_be_proven_says_why(monkeypatch):
+def test_a_box_that_cannot_be_proven_has_its_reason(monkeypatch):
     def fails(*_):
         raise tfarm.CertificationError("a zero lies on the edge")
 

@@ -20,11 +20,9 @@ from tests.report.written import HELD, Links, files_of, ids_of, links_of, valida
 from tfarm.digits import plain
 from tfarm.dsp import Chain
 from tfarm.report import readme_pictures, write, writing
-from tfarm.report.cards import written_cards
-from tfarm.report.cases import Subject
-from tfarm.report.page import first_sentence, index_page
-from tfarm.report.trust import Evidence, write_trust
-from tfarm.report.trust_proofs import written_proofs
+from tfarm.report.cases import Case
+from tfarm.report.page import PIECES, first_sentence, index_page, pieces_of, written_cards
+from tfarm.report.trust import Evidence, write_trust, written_proofs
 from tfarm.spectrum.table import default_gains
 
 # ------------------------------------------------------------ the same bytes
@@ -35,11 +33,12 @@ def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_ro
     coarsen(monkeypatch.setattr)
     made = tmp_path / "made"
     made.mkdir()
-    for i, piece in enumerate(writing.ARM_PIECES):
+    case = Case(ARM, Chain())
+    for piece in pieces_of(case):
         if piece.anchor in ("margins-map", "bode-root-moment", "margins", "margins-nyquist"):
-            writing.make(Subject(ARM, Chain()), i, made)
+            writing.make_section(piece.name, piece.anchor, piece.make, case, made)
     there = files_of(pages / NAME)
-    pictures = ("map", "bode-root-moment", "nyquist")
+    pictures = ("map", "bode-root-moment", "default-nyquist")
     assert {f"pictures/{picture}.svg" for picture in pictures} <= set(files_of(made))
     assert {f"data/{name}" for name in ("map-data.csv", "nyquist-count.csv", "nyquist-count.json")} <= set(
         files_of(made)
@@ -124,7 +123,7 @@ def test_names_and_assumptions_are_text_and_nothing_else(pages):
         check_drawing(drawing.read_text(encoding="utf-8"))
 
 
-def test_the_foot_tells_how_to_write_the_page_again(pages):
+def test_the_foot_has_the_command_to_write_the_page_again(pages):
     page = (pages / NAME / "index.html").read_text(encoding="utf-8")
     toml = (pages / NAME / "arm.toml").read_bytes()
     assert hashlib.sha256(toml).hexdigest() in page
@@ -136,7 +135,7 @@ def test_the_foot_tells_how_to_write_the_page_again(pages):
 # ------------------------------------------------------------ what a reader sees at once
 
 
-def test_the_sign_of_the_gains_stands_once_and_the_words_are_explained(pages):
+def test_the_sign_of_the_gains_is_there_once_and_the_words_are_explained(pages):
     text = (pages / NAME / "index.html").read_text(encoding="utf-8")
     assert text.count("accelerates the hub") == 1
     for name in ("proven", "lyapunov-region"):
@@ -159,7 +158,7 @@ def test_long_matter_is_folded_away_and_answers_stand_first(pages):
     )
 
 
-def test_every_cell_of_a_narrow_page_says_what_it_is(pages):
+def test_every_cell_of_a_narrow_page_has_its_title(pages):
     """A table is stacked on a phone: each cell bears the title that stands above its column."""
     text = (pages / NAME / "index.html").read_text(encoding="utf-8")
     assert "<td" in text
@@ -169,8 +168,8 @@ def test_every_cell_of_a_narrow_page_says_what_it_is(pages):
 
 
 def test_the_pages_of_an_arm_lead_to_each_other(tmp_path, monkeypatch):
-    piece = next(piece for piece in writing.ARM_PIECES if piece.name == "the arm")
-    monkeypatch.setattr(writing, "ARM_PIECES", (piece,))
+    piece = next(piece for piece in PIECES if piece.name == "the arm")
+    monkeypatch.setattr("tfarm.report.page.PIECES", (piece,))
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
     write([replace(ARM, name="plain")], tmp_path, only=("modes", "bode"))
@@ -237,6 +236,7 @@ POOL = """
 import os, time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
+from tfarm.report.page import PIECES
 from tfarm.processes import leave_with_parent
 if __name__ == "__main__":
     pool = ProcessPoolExecutor(1, get_context("forkserver"), leave_with_parent)

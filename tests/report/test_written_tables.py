@@ -9,7 +9,9 @@ import pytest
 import tfarm
 from tests.hostile import NAME
 from tests.report.full import ARM
+from tfarm.dsp import Chain
 from tfarm.report.arm_section import is_from_paper, paper_section
+from tfarm.report.cases import Case
 
 
 def tables(pages, stem):
@@ -102,13 +104,13 @@ def test_parameters_that_change_nothing_are_left_out_with_a_word():
 
 def test_the_paper_is_corrected_where_the_arm_is_its_own():
     assert not is_from_paper(ARM)
-    for name, density in (("sasaki2012", "2766.7 kg/m³"), ("sasaki2012-as-printed", "2.7667 kg/m³")):
+    for name, density in (("sasaki2012", 2766.7), ("sasaki2012-as-printed", 2.7667)):
         arm = tfarm.load(name)
         assert is_from_paper(arm)
-        (table,) = paper_section(arm).blocks
+        (table,) = paper_section(Case(arm, Chain())).blocks
         rows = list(zip(*(column.values for column in table.columns), strict=True))
         (row,) = (row for row in rows if row[1] == "ρ")
-        assert row[2:4] == ("2.7667 kg/m³", density)
-        assert row[4]
-        assert [row[4] for row in rows if row[1] in ("I", "I_h")] == ["needed, but not in the paper: an assumption"] * 2
-        assert next(row for row in rows if row[1] == "C")[2:4] == ("0 kg/s", "0 s")
+        assert row[2:6] == (2.7667, "kg/m³", density, "kg/m³")
+        assert row[6]
+        assert [row[6] for row in rows if row[1] in ("I", "I_h")] == ["needed, but not in the paper: an assumption"] * 2
+        assert next(row for row in rows if row[1] == "C")[2:6] == (0.0, "kg/s", 0.0, "s")

@@ -8,9 +8,9 @@ from html.parser import HTMLParser
 import tfarm
 from tests.report.full import ARM
 from tfarm.audit.published import validate
-from tfarm.report import writing
+from tfarm.report.page import PIECES
 
-ANCHORS = {piece.anchor for piece in writing.ARM_PIECES}
+ANCHORS = {piece.anchor for piece in PIECES}
 HELD = replace(ARM, hub=tfarm.Hub(inertia=math.inf))  # no loop: its proofs are quick
 validated = cache(lambda: tuple(validate()))  # as this process has it
 

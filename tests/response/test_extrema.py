@@ -20,7 +20,8 @@ from tests.rigs import some_rig
 from tests.survey import Finding, numbered
 from tfarm.errors import TfarmError
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.report.response_sections import alt_text, highest_and_lowest, what_is_seen
+from tfarm.report.response_sections import bode_words
+from tfarm.report.sections import prose
 from tfarm.response.frequency import extrema, resonant_band
 
 FLEX, BARE = tfarm.load("quanser-flexlink"), tfarm.load("sasaki2012")
@@ -66,9 +67,9 @@ def test_a_damped_pole_past_which_the_magnitude_falls_is_no_peak():
     assert data.resonances.imag == pytest.approx([29.14], rel=1e-3)
     assert (np.diff(abs(data.value)) < 0).all()
     assert (data.peaks, data.dips) == ((), ())
-    assert highest_and_lowest(data) == "No peak: no local maximum of |G|; no dip: no local minimum of |G|."
-    assert what_is_seen(data).endswith(highest_and_lowest(data))
-    assert "no peaks" in alt_text(data)
+    assert prose("extrema", data=data) == "No peak: no local maximum of |G|; no dip: no local minimum of |G|."
+    assert prose("extrema", data=data) in bode_words(data)
+    assert "no peaks" in prose("bode_alt", data=data, start=1.0)
 
 
 def test_the_highest_peak_of_a_page_is_the_largest_maximum():
@@ -76,7 +77,7 @@ def test_the_highest_peak_of_a_page_is_the_largest_maximum():
     (peak,), (dip,) = data.peaks, data.dips
     inside = (data.omega > dip.omega) & (data.omega < 200.0)
     assert peak.magnitude == pytest.approx(abs(data.value[inside]).max(), rel=1e-3)
-    words = highest_and_lowest(data)
+    words = prose("extrema", data=data)
     assert words == "Highest peak: 0.02022 m/V at 140.285 rad/s; deepest dip: 8.597 × 10⁻⁴ m/V at 103.168 rad/s."
     assert (f"{peak.omega:.6g}", f"{dip.omega:.6g}") == ("140.285", "103.168")
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tfarm.columns import Column, Table
-from tfarm.digits import lined, significant, singly, worded
+from tfarm.digits import lined, significant, singly
 from tfarm.tables.files import as_csv, as_json, save_table, to_json
 from tfarm.tables.html import as_html, with_symbols
 
@@ -25,18 +25,19 @@ class Found:
     words: tuple = ("<b> & 'c'", 'a, "quoted" line\nand another', "I_h in m^2")
 
 
+FOUND = Found()
 COLUMNS = (
-    Column("index", "mode"),
-    Column("omega_rad_s", "frequency", "rad/s", of="omega", digits=singly(significant, 5), group="both"),
-    Column("frequency_hz", "", "Hz", of=lambda found: found.omega / (2 * math.pi), digits=lined(5, 3), group="both"),
-    Column("words", "what & why", tint=("", "#fff", "")),
+    Column("index", "mode", of=FOUND.index),
+    Column("omega_rad_s", "frequency", "rad/s", of=FOUND.omega, digits=singly(significant, 5)),
+    Column("frequency_hz", "", "Hz", of=FOUND.omega / (2 * math.pi), digits=lined(5, 3)),
+    Column("words", "what & why", of=FOUND.words, tint=("", "#fff", "")),
     Column("nodes_m", "nodes", "m", of=[(0.1, 0.25), (), (1e-300,)], shown=["0.1, 0.25", "none", "1e-300"]),
 )
 
 
 @pytest.fixture
 def table():
-    return Table(columns=COLUMNS, record=Found(), stem="found", title="What is <found>")
+    return Table(columns=COLUMNS, stem="found", title="What is <found>")
 
 
 class Parsed(HTMLParser):
@@ -91,23 +92,13 @@ def test_json_has_the_numbers_and_their_units(table):
 
 def test_the_page_has_the_cells_of_the_files_rounded(table):
     page = Parsed(as_html(table))
-    groups, heads, *rows = page.rows
-    assert groups == ["", "both", ""]
-    assert [int(group["colspan"]) for group in page.attributes[0]] == [1, 2, 2]
+    heads, *rows = page.rows
     assert heads == ["mode", "frequencyrad/s", "Hz", "what & why", "nodesm"]
     assert [row[1] for row in rows] == ["71.506", "1.0000 × 10⁻⁹", "∞"]
     assert [row[3] for row in rows] == [*Found().words[:2], "Ih in m²"]
-    assert [cell[3].get("style") for cell in page.attributes[2:]] == [None, "background:#fff", None]
-    assert "text" in page.attributes[2][3]["class"]
-    assert "text" not in page.attributes[2][1]["class"]
-
-
-def test_a_list_of_records_is_asked_one_by_one():
-    rows = [{"x": 1.5, "y": "a"}, {"x": 2.5, "y": "b"}]
-    columns = (Column("x", of=lambda row: row["x"]), Column("y", of=lambda row: row["y"], digits=worded(str.upper)))
-    table = Table(columns=columns, record=rows)
-    assert list(table) == rows
-    assert list(table.columns[1].cells) == ["A", "B"]
+    assert [cell[3].get("style") for cell in page.attributes[1:]] == [None, "background:#fff", None]
+    assert "text" in page.attributes[1][3]["class"]
+    assert "text" not in page.attributes[1][1]["class"]
 
 
 def test_no_nan_is_written(table):

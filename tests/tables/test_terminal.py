@@ -43,7 +43,7 @@ def test_no_word_is_cut_and_no_line_is_too_long(width):
     assert repeated == [word for word in whole if word not in ("mode", "1", "2")]
 
 
-def test_what_does_not_fit_stands_below_beside_the_first_column():
+def test_columns_that_do_not_fit_are_below_with_the_first_one():
     lines = printed(50, (*COLUMNS[:3], replace(COLUMNS[3], folds=False)))
     blank = lines.index("")
     assert [line.split()[0] for line in lines[blank - 2 : blank]] == ["1", "2"]

@@ -1,4 +1,4 @@
-"""Two arms, or two laws on one arm, beside each other, in per cent; one loop beside itself when it is sampled."""
+"""Two arms, or two laws on one arm, compared."""
 
 from tfarm.comparing.comparison import ComparedSide, Comparison, compare
 

@@ -1,8 +1,8 @@
-"""What is computed of two loops to set them beside each other; each by the very functions that answer for it alone."""
+"""Two loops compared; each is computed by the functions for one."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -41,11 +41,11 @@ FIRST_COLUMN = 1e-6  # of the largest rate gain: where the first column beyond 0
 BEYOND_LAWS = 1.5  # how far the plane reaches beyond the laws' own gains
 FURTHER_DELAYS = 25  # of which the plane of a factor on each law and its further delay consists
 MOST_FACTOR, FACTORS = 4.0, 40  # of a continuous-time law: where that plane ends, and values at which it is counted
-LONGEST_WAIT, BORNE = 2.0, 1.2  # samples up to which these go, or this much beyond what either loop bears
+LONGEST_WAIT, BORNE = 2.0, 1.2  # samples up to which these go, or times the larger delay margin
 MOST_DELAYED = 10.0  # samples at most
 CURVE_FROM = 0.05  # of the first mode: where the curve of a loop begins
 FARTHEST = 1.0  # |ln s - ln p|: by more a law moves no mode here, a factor e of its frequency or 57 deg of its angle
-HUB = 0  # stands for the pole below the first mode that no mode of the link is near
+HUB = 0  # the number of the pole below the first mode that no mode of the link is near
 GONE_AFTER_SAMPLE = 1e-3  # |z| of a pole that leaves this much of itself after a sample: of those nothing is compared
 REAL_Z = 1e-12  # imaginary part of a real z: rounding
 
@@ -66,7 +66,7 @@ class ComparedSide:
 
     `damping_ratio` is that of each flexible mode of the arm by itself, None where a mode could not be followed; `poles`
     are closed-loop poles with Im s >= 0, complete in their box; `open_loop` those of the arm with Im s > 0 by flexible
-    mode; `sampled` is the verdict at the chain's clock.  Where one of the laws compared is a law in z there is no
+    mode; `sampled` is the verdict at the chain's period.  Where one of the laws compared is a law in z there is no
     continuous-time loop on either side: no `margins`, and `analysis` is of the sampled loop, with poles s = ln(z)/T.
     """
 
@@ -214,21 +214,23 @@ class Comparison:
         return "arms" if self.is_of_arms else "laws"
 
     @property
-    def at_samples(self) -> Annotated[bool, Quantity("loops compared at their samples, s = ln(z)/T")]:
-        """The same as `is_sampled`."""
-        return self.is_sampled
+    def is_sampled(
+        self,
+    ) -> Annotated[bool, Quantity("loops compared at their samples, s = ln(z)/T", key="at_samples")]:
+        """Whether the loops are compared at their samples, one of the laws being a law in z."""
+        return self.one.analysis is not None
 
     @property
     def mode_differences(self) -> Annotated[list[Difference], Quantity("modes", key="modes")]:
         """Natural frequencies and damping ratios of both arms, by mode; of one arm none."""
         if not self.is_of_arms:
             return []
-        one, other = ([float(w) for w in side.modes.natural_frequency[side.modes.index > 0]] for side in self.sides)
-        ratios = enumerate(zip(self.one.damping_ratio, self.other.damping_ratio, strict=True), 1)
-        frequencies = [Difference(f"frequency of mode {n}", "rad/s", *pair) for n, pair in _numbered(one, other)]
+        frequencies = (side.modes.natural_frequency[side.modes.index > 0].tolist() for side in self.sides)
+        ratios = (side.damping_ratio for side in self.sides)
         return [
-            *frequencies,
-            *(Difference(f"damping ratio of mode {n}", "", *pair) for n, pair in ratios),
+            Difference(f"{what} of mode {n}", unit, *pair)
+            for what, unit, both in (("frequency", "rad/s", frequencies), ("damping ratio", "", ratios))
+            for n, pair in enumerate(zip(*both, strict=True), 1)
         ]
 
     @property
@@ -278,11 +280,6 @@ class Comparison:
         return "; ".join(f"{s.name}: {verdict}{s.sampled.short}" for s, verdict in zip(self.sides, each, strict=True))
 
     @property
-    def is_sampled(self) -> bool:
-        """Whether the loops are compared at their samples, one of the laws being a law in z."""
-        return self.one.analysis is not None
-
-    @property
     def is_of_arms(self) -> bool:
         """Whether two arms are compared, not two laws on one."""
         return self.one.arm != self.other.arm
@@ -324,10 +321,6 @@ class Comparison:
         return self.one.reach(delay), self.other.reach(delay)
 
 
-def _numbered(one: list[float], other: list[float]) -> Iterator[tuple[int, tuple[float, float]]]:
-    return enumerate(zip(one, other, strict=True), 1)
-
-
 def _mode(mode: int) -> str:
     return f"mode {mode}" if mode else "the hub"
 
@@ -343,7 +336,7 @@ def compare(
     """Two arms under one law, or each under its own, or one arm under two laws.
 
     Without a law each arm has its default gains.  `names` are what the two are called, if not by their arms or laws;
-    the sampled verdicts are those at the clock of `chain`, 10 ms unless given.  Where a law is one in z both loops are
+    the sampled verdicts are those at the period of `chain`, 10 ms unless given.  Where a law is one in z both loops are
     compared at their samples.  Raises ParameterError where there are not two, or where their laws close through
     different inputs, and what `tfarm.margins`, or then `tfarm.sampled`, raises for either.
     """

@@ -30,8 +30,9 @@ from tfarm.loop.plane import gain_map, moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots.regions import BEYOND_PICTURE, sampled_region
-from tfarm.report.cases import Subject, has_loop, sign_words
-from tfarm.report.page import TEMPLATES, argument, is_preset, render
+from tfarm.report.cases import Case, has_loop, sign_words
+from tfarm.report.page import argument, is_preset
+from tfarm.report.sections import TEMPLATES, render
 from tfarm.response import transfer
 from tfarm.spectrum.table import angle_unit, default_gains
 
@@ -44,7 +45,7 @@ ANGLE_LINEAR = 1e-4  # of that: where its slider begins to be logarithmic
 EDGE_DIGITS = 7  # of the edges of the map's regions: far more than a screen has
 SENSOR_PIECES = 16  # pieces of the arm between two positions
 SENSED_MODES = 6  # whose frequencies and zeros the chart of sensors has
-SENSOR_DIGITS = 6  # of what that chart draws and tells: far more than a screen has
+SENSOR_DIGITS = 6  # of the numbers of that chart: far more than a screen has
 LIVE_PAGE, ASSETS = "live.html", "assets"
 CHARTS, RUNTIME, SCRIPT = "live_charts.json", f"vega-{vl_convert.get_vega_version()}.js", "live.js"
 BUNDLED = "window.vegaEmbed = vegaEmbed;"
@@ -66,7 +67,7 @@ def sampled_numbers(loop: Sampled) -> dict[str, Any]:
     plant = sensed_plant(loop.plant.arm, loop.chain, FED_BACK, loop.plant.count).together
     twice, once = plant.rigid[0]
     states = {"states": 2 if twice else 1 if once else 0, "modes": plant.count}
-    return _clock(loop.chain) | _plant(PulseTransfer(plant, loop.chain.sampling).folded().plant) | states
+    return _sampling(loop.chain) | _plant(PulseTransfer(plant, loop.chain.sampling).folded().plant) | states
 
 
 def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback) -> dict[str, Any] | None:
@@ -79,12 +80,12 @@ def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback) -> dict[str, Any] | N
         linear = ideal_chain(chain)
         count = enough_modes(lambda number: Simulator(arm, linear, task, count=number).linear(law)).modes
         plant = Simulator(arm, chain, task, count=count).plant
-        return _clock(chain) | _upper(plant) | _task(task, chain, arm) | {"modes": count} | _shapes(arm, plant)
+        return _sampling(chain) | _upper(plant) | _task(task, chain, arm) | {"modes": count} | _shapes(arm, plant)
     except TfarmError:
         return None
 
 
-def _clock(chain: Chain) -> dict[str, Any]:
+def _sampling(chain: Chain) -> dict[str, Any]:
     """The period [s], the delay in samples, and how the hub rate is had: `smoothing` is the rate filter's pole."""
     converters, T = chain.converters, chain.sampling.period
     differences = converters.hub_rate == "difference"
@@ -123,7 +124,7 @@ def _kept(plant: Plant) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
 
 
 def _task(task: Scenario, chain: Chain, arm: Arm) -> dict[str, Any]:
-    """References a sample, converters, and what a person is told of the slew."""
+    """References a sample, converters, and the numbers of the slew."""
     rows = quantisers(chain).tolist()
     ideal = np.c_[task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment]
     return {
@@ -203,13 +204,13 @@ def _known(arm: Arm, is_quiet: bool) -> dict[str, Any]:
     by_energy = "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"
     beyond = "beyond the band |L| stays below one half at all gains of this page: no unstable pole there (small gain)"
     if arm.is_reactive and not arm.has_lyapunov_theorem:
-        by_energy = "C = 0: none of the modes looked at is driven; no theorem tells the others"
+        by_energy = "C = 0: none of the modes looked at is driven; no theorem on the others"
     moments = _stable_moments(arm) if arm.is_reactive else (-math.inf, math.inf)
     return {
         "kind": kind,
         "beyond": beyond if kind == "quiet" else by_energy,
         "moments": [None if math.isinf(end) else end for end in moments],  # JSON has no infinity
-        "told": arm.has_elastic_link and arm.reads_hub_moment and not arm.input_lags,
+        "by_sign": arm.has_elastic_link and arm.reads_hub_moment and not arm.input_lags,
         "hub_alone": arm.loses_at_hub_alone,
         "whole": arm.input_per_torque,
         "rate_loss": arm.rate_loss,
@@ -254,7 +255,7 @@ def _sampled(plane: SampledMap, chain: Chain) -> dict[str, Any]:
 def sensor_numbers(arm: Arm) -> dict[str, Any]:
     """`sensor`: participation and zeros at every position, by the kind of sensor, without ends that sense nothing.
 
-    None where they cannot be had, and then `no_sensor` says why.
+    None where they cannot be had, and then `no_sensor` is the reason.
     """
     x, sensors = np.linspace(0.0, arm.length, SENSOR_PIECES + 1), {}
     try:
@@ -278,17 +279,17 @@ def _numbers(found: Positions) -> dict[str, Any]:
     }
 
 
-def is_live(subject: Subject) -> bool:
+def is_live(case: Case) -> bool:
     """Whether the arm has such a page: its hub turns freely and has inertia."""
-    return has_loop(subject.arm) and subject.arm.has_rigid_mode
+    return has_loop(case.arm) and case.arm.has_rigid_mode
 
 
-def save_live(subject: Subject, folder: Path) -> None:
+def save_live(case: Case, folder: Path) -> None:
     """live.html in the arm's folder.  It begins at the gains that the arm's pages are about.
 
-    Where its numbers cannot be made the page says why.
+    Where its numbers cannot be made the page has the reason.
     """
-    arm, chain, laws = subject.arm, subject.chain, subject.laws
+    arm, chain, laws = case.arm, case.chain, case.laws
     title, out = f"{arm.name}: live loop", folder / LIVE_PAGE
     given = [gains for each in laws if (gains := as_law(each.law).gains) is not None]
     try:

@@ -1,201 +1,144 @@
-"""The sampled loop of each case of a page: verdict, margins, stability intervals, modes, and motion in time."""
+"""The sampled loops of a case: verdict, margins, stability intervals, modes, and motion in time.
+
+In time: slews, and steps that were measured with the exact sampled loop over them.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Annotated, NamedTuple
+
+import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit
 from tfarm.columns import Column, Table
-from tfarm.digits import how_many, plain, scientific, significant, singly
-from tfarm.dsp import Analysis, Chain, Verdict, sampled_verdict
+from tfarm.digits import how_many, kept_digits, plain, singly
+from tfarm.dsp import Analysis, Chain, Simulation, Verdict, sampled_verdict, traces
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.dsp.crossings import around
 from tfarm.dsp.modes import STRONGER, SampledLoci, sampled_loci
+from tfarm.dsp.results import drawn, residual_moment_rms, settling_time
+from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.dsp.verdict import at_periods, sampled
+from tfarm.errors import ParameterError
+from tfarm.fitting.recording import RunComparison, compare_run, overshoot
+from tfarm.plots.motion import draw_beside
+from tfarm.plots.motion import slew as slew_plot
 from tfarm.plots.regions import StableRegions, draw_overlay, regions_table, stable_regions
 from tfarm.plots.roots import draw_sampled_loci
-from tfarm.records import record
-from tfarm.report.cases import GivenLaw, LawOnArm, cases_of, has_loop, margins_of, on_hub, what_holds, why_no_loop
-from tfarm.report.motion import measured_blocks, slew
-from tfarm.report.sections import Fact, PageSection, Picture, in_ms, span, spans, typeset, upper
-from tfarm.schema import table
+from tfarm.plots.style import safe
+from tfarm.report.cases import Case, Controller, on_hub, what_holds
+from tfarm.report.sections import Fact, PageSection, Picture, facts_of, prose
+from tfarm.schema import Quantity, across, table, text
 
 MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict is given
 PAST_HUB = 1.25  # times the rate gain at which sampling alone makes the hub unstable: the end of its locus
 LOCUS_K2 = (-0.5, 1.5)  # of its locus: the stability interval of most arms, and a little to either side
-DELAYS_CAPTION = (
-    "The exact loop with further delay between reading and acting. Stable: every |z| below 1{apart}. {held}"
-)
 VERDICT_COLUMNS = ("word", "spectral_radius", "time_constant", "slowest", "holds_for")
-APART_FROM_FREE = ", that at z = 1 of a hub without angle feedback apart"
-NUMBERS_CAPTION = (
-    "Each number alone, the others fixed; a name that ends in “gain” is a factor on that part of the controller. At an "
-    "edge a pole of the sampled loop is on the unit circle ({modes})."
-)
-MODES_CAPTION = (
-    "ln|z|: change of a mode's size per sample of {ms} ms, negative where it decays. Own damping: without feedback; "
-    "{gains}: to first order; the closed loop is the exact pole. Modes above {half} Hz (band 1 and on) are aliased: "
-    "the samples show them at the frequency given."
-)
-LOCI_CAPTION = (
-    "z-plane, stable inside the circle. Open circles: where the range of the gain begins; dots: gains of the loop; "
-    "orange: modes above {half} Hz, which are aliased; grey: hub, filters and delay."
-)
-OVERLAY_CAPTION = (
-    "Sand: stability region of the continuous loop, with every mode. Blue: that of the sampled loop. {layers}{proven}"
-    "Edges are exact crossings of the imaginary axis or the unit circle. Logarithmic axis: {rate} = 0 lies beyond its "
-    "left end at {low}{beyond}."
-)
-NO_DAMPING_HELPS = "none up to 15 % of critical in the first mode"
+DELAY, DAMPING = "delay margin", "minimum structural damping for stability"  # headline numbers of an analysis
+CURVE_DIGITS = 7  # digits of a curve in its file: a hundredth of the width of a line is four
+Analysed = Sequence[tuple[Controller, Analysis]]
 
 
-@dataclass(frozen=True)
-@record
-class SampledCase:
-    """A case with the analysis of its sampled loop."""
-
-    each: LawOnArm
-    analysis: Analysis
-
-    @property
-    def verdict(self) -> Verdict:
-        """The verdict on the loop."""
-        return self.analysis.verdict
-
-
-def sampled_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw] = ()) -> PageSection:
-    """The sampled loop under the laws given, or the default gains; one sentence for an arm without a loop.
-
-    In time: runs measured under the laws with the exact loop over them, else the slew.
-    """
-    title = f"The sampled loop, {in_ms(chain)} ms"
-    if not laws and not has_loop(arm):
-        return PageSection(anchor="sampled", title=title, words=(why_no_loop(arm),))
-    cases = cases_of(arm, laws)
-    found = [SampledCase(each, sampled(each.arm, each.law, chain)) for each in cases]
-    words = [*map(answer, found), chain_words(arm, chain)]
-    blocks: list[Picture | Table] = [*map(numbers_table, found), delays_table(found, chain)]
-    if not laws:
-        gains = found[0].analysis.loop.gains
-        blocks = [overlay_picture(stable_regions(arm, gains, chain), found[0]), *blocks]
-        blocks += [periods_table(arm, gains, chain), loci_picture(found[0].analysis)]
-    blocks += [modes_table(each) for each in found]
-    if any(each.given.measured is not None for each in cases):
-        blocks += measured_blocks(cases, chain)
+def sampled_section(case: Case) -> PageSection:
+    """The sampled loop of each controller; in time runs measured under the laws, else the slew."""
+    arm, chain = case.arm, case.chain
+    found = [(each, sampled(each.arm, each.law, chain)) for each in case.controllers]
+    words, blocks = [chain_words(arm, chain)], list[Picture | Table]()
+    first = found[0][1]
+    if not case.laws:
+        blocks.append(overlay_picture(stable_regions(arm, first.loop.gains, chain)))
+    numbers = {each.title: it for each, it in found}
+    blocks.append(across(numbers, keys=[each.key for each, _ in found], stem="sampled",
+                         title="Verdict and margins of the sampled loop", caption=prose("sampled")))  # fmt: skip
+    blocks += [*(numbers_table(*each) for each in found), delays_table(found, chain)]
+    if not case.laws:
+        blocks += [periods_table(arm, first.loop.gains, chain), loci_picture(first)]
+    blocks += [modes_table(*each) for each in found]
+    blocks += measured_blocks(case)
     if not arm.has_rigid_mode:
         words.append(f"{what_holds(arm)}: no slew is simulated.")
-    elif any(each.given.measured is None for each in cases):
-        slewed = cases if laws else (without_moment(arm, found[0]), *cases)
-        pictures, said = slew(arm, chain, slewed)
-        blocks += pictures
-        words += said
-    facts = [fact for each in found for fact in facts_of(each)]
-    return PageSection(anchor="sampled", title=title, facts=facts, words=words, blocks=blocks)
+    elif any(each.given.measured is None for each in case.controllers):
+        without = [] if case.laws else [without_moment(arm, first.loop.gains)]
+        slewed, refused = slew(case, [*without, *case.controllers])
+        blocks += slewed
+        words += refused
+    facts = [fact for each in found for fact in facts_on(*each)]
+    return PageSection(
+        anchor="sampled",
+        title=f"The sampled loop, {plain(1e3 * chain.sampling.period)} ms",
+        facts=facts,
+        words=words,
+        blocks=blocks,
+    )
 
 
-def without_moment(arm: Arm, found: SampledCase) -> LawOnArm:
-    """The gains of a case without the feedback of the root moment."""
-    gains = found.analysis.loop.gains.having(MOMENT_GAIN, 0.0)
-    return on_hub(arm, gains, f"{MOMENT_GAIN} = 0", "without")
+def without_moment(arm: Arm, gains: HubFeedback) -> Controller:
+    """The gains without the feedback of the root moment."""
+    return on_hub(arm, gains.having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
 
 
 # ------------------------------------------------------------ verdict
 
 
-def answer(found: SampledCase) -> str:
-    """Verdict, delay margin, how far both are certified, and the dominant pole."""
-    verdict, T = found.verdict, found.verdict.loop.chain.sampling.period
-    delay = f", delay margin {delay_words(found)}" if verdict.is_stable else ""
-    radius, growth = math.exp(verdict.log_radius), verdict.log_radius
-    pace = f", time constant {significant(T / abs(growth), 3)} s" if growth else ""
-    return typeset(
-        f"{upper(found.each.name)}, {found.each.gains}: the loop is {verdict.word} when sampled every "
-        f"{in_ms(verdict.loop.chain)} ms{delay} ({verdict.holds_for}). "
-        f"Dominant pole: {verdict.slowest}, |z| = {plain(radius, 10)}{pace}."
-    )
-
-
-def delay_words(found: SampledCase) -> str:
-    """The delay margin in ms and samples."""
-    margin, T = found.analysis.delay_margin, found.verdict.loop.chain.sampling.period
-    ms = significant(1e3 * T * margin.samples, 3)
-    return f"{'over ' if margin.is_bound else ''}{ms} ms ({significant(margin.samples, 3)} samples)"
-
-
-def facts_of(found: SampledCase) -> list[Fact]:
-    """Verdict, delay margin and minimum structural damping of a case."""
-    verdict, name = found.verdict, f"{found.each.name}: "
-    beside = typeset(f"ln|z| = {scientific(verdict.log_radius, 3)} a sample")
-    facts = [Fact(label=f"{name}{found.each.gains}", value=verdict.word.upper(), beside=beside)]
-    if verdict.is_stable:
-        facts.append(Fact(label=f"{name}delay margin", value=delay_words(found)))
-    needed, arm = found.analysis.damping, found.each.arm
-    if arm.has_elastic_link or not verdict.is_stable:
-        held = "" if needed.is_settled else f"for the first {needed.modes} modes"
-        value = "none" if needed.value == 0 else NO_DAMPING_HELPS
-        if 0 < needed.value < math.inf:
-            percent = 50 * needed.value * float(found.analysis.modes.natural_frequency[0])
-            value = f"C = {scientific(needed.value, 2)} s"
-            held = f"{scientific(percent, 2)} % of critical in the first mode{f', {held}' if held else ''}"
-        facts.append(Fact(label=f"{name}minimum structural damping for stability", value=value, beside=held))
-    return facts
+def facts_on(each: Controller, found: Analysis) -> list[Fact]:
+    """Verdict, delay margin and minimum structural damping of a sampled loop."""
+    verdict = found.verdict
+    labels = [DELAY] * verdict.is_stable + [DAMPING] * (each.arm.has_elastic_link or not verdict.is_stable)
+    note = prose("dominant", it=verdict)
+    return [Fact(label=each.title, value=verdict.word.upper(), note=note), *facts_of(each.name, found, labels)]
 
 
 def chain_words(arm: Arm, chain: Chain) -> str:
     """Every part of the chain that is not ideal."""
-    sampling, converters, actuator = chain.sampling, chain.converters, chain.actuator
-    sides = (("moment read", converters.moment_bits, converters.moment_range),
-             ("torque written", converters.torque_bits, converters.torque_range))  # fmt: skip
-    parts = (
-        (True, f"sampled every {in_ms(chain)} ms"),
-        (sampling.delay_samples, f"{how_many(sampling.delay_samples, 'sample')} of delay"),
-        (math.isfinite(sampling.antialias_corner), f"an anti-alias filter at {plain(sampling.antialias_corner)} rad/s"),
-        (converters.encoder_counts, f"an encoder of {converters.encoder_counts} counts a turn"),
-        (converters.hub_rate == "difference", "the hub rate differenced from the encoder"),
-        *((bits, f"a {name} with {bits} bits{'' if span is None else f' over ±{plain(span, 3)} N m'}")
-          for name, bits, span in sides),
-        (math.isfinite(actuator.torque_limit), f"an input of at most {plain(actuator.torque_limit)} {arm.input_unit}"),
-        (actuator.hub_damping, f"hub damping of {plain(actuator.hub_damping)} N m s/rad"),
-    )  # fmt: skip
-    steps = " Verdicts are of the linear loop; steps and limits act in the simulations." * (not chain.is_linear)
-    paper = " These are the paper's: the arm's file has no chain of its own." * (chain == Chain())
-    return f"The chain: {', '.join(text for has, text in parts if has)}.{steps}{paper}"
+    return prose("chain", chain=chain, unit=arm.input_unit, is_default=chain == Chain())
 
 
-def numbers_table(found: SampledCase) -> Table:
-    """Stability intervals of each number of a case, the others fixed."""
-    stem = "sampled-numbers" if found.each.key in ("default", "law") else f"sampled-numbers-{found.each.key[4:]}"
-    caption = NUMBERS_CAPTION.format(modes=f"{found.verdict.modes_used} flexible modes")
-    title = f"Stability intervals, {found.each.name}"
-    return table(found.analysis.stability_intervals, stem=stem, title=title, caption=caption)
+def _stem(name: str, each: Controller) -> str:
+    """The name of a controller's table; the first has no more than the name."""
+    return f"sampled-{name}" if each.key in ("default", "law") else f"sampled-{name}-{each.key.replace('_', '-')}"
 
 
-def delays_table(found: Sequence[SampledCase], chain: Chain) -> Table:
-    """The verdict on each case as it is, and with half a sample and a whole one of further delay."""
+def numbers_table(each: Controller, found: Analysis) -> Table:
+    """Stability intervals of each number of a controller, the others fixed."""
+    return table(
+        found.stability_intervals,
+        stem=_stem("numbers", each),
+        title=f"Stability intervals, {each.name}",
+        caption=prose("sampled_numbers", modes=found.verdict.modes_used),
+    )
+
+
+def modes_table(each: Controller, found: Analysis) -> Table:
+    """The modes of the sampled loop one by one."""
+    return table(
+        found.modes,
+        stem=_stem("modes", each),
+        title=f"Modes of the sampled loop, {each.name}",
+        caption=prose("sampled_modes", period=found.loop.chain.sampling.period, plane=PLANE),
+    )
+
+
+def delays_table(found: Analysed, chain: Chain) -> Table:
+    """The verdict on each controller as it is, and with half a sample and a whole one of further delay."""
     rows: list[tuple[str, float, Verdict]] = []
     T = chain.sampling.period
-    for it in found:
+    for each, it in found:
         for more in MORE_DELAY:
             delay = chain.sampling.delay_samples + more
-            if more and delay + it.each.law.delay / T > MOST_DELAY:
+            if more and delay + each.law.delay / T > MOST_DELAY:
                 continue
             late = replace(chain, sampling=replace(chain.sampling, delay_samples=delay))
-            verdict = sampled_verdict(it.each.arm, it.each.law, late) if more else it.verdict
-            rows.append((it.each.name, more, verdict))
-    verdicts = [verdict for *_, verdict in rows]
-    held = dict.fromkeys(f"{upper(verdict.holds_for)}." for verdict in verdicts)
-    free = any(verdict.loop.has_free_angle for verdict in verdicts)
-    first = (
-        Column("law", "controller", of=[name for name, *_ in rows]),
-        Column("further_delay_ms", "further delay", "ms", of=[1e3 * T * more for _, more, _ in rows],
-               digits=singly(plain)),
-    )  # fmt: skip
+            verdict = sampled_verdict(each.arm, each.law, late) if more else it.verdict
+            rows.append((each.name, 1e3 * T * more, verdict))
+    names, delays, verdicts = zip(*rows, strict=True)
+    first = Column("law", "controller", of=names), Column("further_delay_ms", "further delay", "ms", of=delays)
     return Table(
         stem="sampled-delays",
         title="Stability with further delay",
-        caption=DELAYS_CAPTION.format(apart=APART_FROM_FREE * free, held=typeset(" ".join(held))),
+        caption=prose("sampled_delays", free=any(verdict.loop.has_free_angle for verdict in verdicts)),
         columns=(*first, *table(verdicts, VERDICT_COLUMNS).columns),
     )
 
@@ -203,79 +146,37 @@ def delays_table(found: Sequence[SampledCase], chain: Chain) -> Table:
 def periods_table(arm: Arm, gains: HubFeedback, chain: Chain) -> Table:
     """The gains at other sampling periods, with their stability intervals there."""
     rows = at_periods(arm, gains, chain)
+    columns = [Column("period_ms", "period", "ms", of=[1e3 * row.period for row in rows], digits=singly(plain))]
+    half_rates = [0.5 / row.period for row in rows]
+    columns.append(Column("half_rate_hz", "aliased above", "Hz", of=half_rates, digits=singly(plain)))
+    columns += table([row.verdict for row in rows], VERDICT_COLUMNS).columns
+    for name in PLANE:
+        windows = [list(row.windows[name]) for row in rows]
+        ends = [around(each, gains[name]) or tuple(end for pair in each for end in pair) for each in windows]
+        cells = [text(each, 4) or "none" for each in windows]
+        columns.append(Column(f"stable_{name}", f"stable {name}", shown_unit(name, arm), of=ends, shown=cells))
     return Table(
         stem="sampled-periods",
         title="Stability at other sampling periods",
-        caption=(
-            f"The same gains, {' and '.join(gains.gain_text(name, plain) for name in PLANE)}. Growth: of the dominant "
-            "pole, per second: negative is stable. Verdicts hold for the modes given where they are not certified."
-        ),
-        record=rows,
-        columns=(
-            Column("period_ms", "period", "ms", of=lambda row: 1e3 * row.period, digits=singly(plain)),
-            Column("half_rate_hz", "aliased above", "Hz", of=lambda row: 0.5 / row.period, digits=singly(plain)),
-            *table([row.verdict for row in rows], VERDICT_COLUMNS).columns,
-            *(
-                Column(
-                    f"stable_{name}", f"stable {name}", shown_unit(name, arm),
-                    of=[
-                        around(list(row.windows[name]), gains[name])
-                        or tuple(end for window in row.windows[name] for end in window)
-                        for row in rows
-                    ],
-                    shown=[spans(row.windows[name], gains[name]) for row in rows],
-                )
-                for name in PLANE
-            ),
-        ),
-    )  # fmt: skip
-
-
-def modes_table(found: SampledCase) -> Table:
-    """The modes of the sampled loop one by one."""
-    T = found.verdict.loop.chain.sampling.period
-    gains = " and ".join(PLANE)
-    suffix = "" if found.each.key in ("default", "law") else f"-{found.each.key.replace('_', '-')}"
-    return table(
-        found.analysis.modes,
-        stem=f"sampled-modes{suffix}",
-        title=f"Modes of the sampled loop, {found.each.name}",
-        caption=MODES_CAPTION.format(ms=plain(1e3 * T), half=plain(0.5 / T), gains=gains),
+        caption=prose("sampled_periods", gains=" and ".join(gains.gain_text(name, plain) for name in PLANE)),
+        columns=tuple(columns),
     )
 
 
 # ------------------------------------------------------------ pictures of gains
 
 
-def overlay_picture(regions: StableRegions, found: SampledCase) -> Picture:
+def overlay_picture(regions: StableRegions) -> Picture:
     """Stability regions of the continuous and of the sampled loop in one plane."""
-    arm, gains = found.each.arm, found.analysis.loop.gains
-    layers = "Nested blues: C = 0 (first modes only), and the same arm with a little damping. "
-    low = plain(float(regions.continuous.axes[0][0]), 2)
-    held = gains.gain_text(RATE_GAIN, plain)
-    before = margins_of(arm, gains).windows[MOMENT_GAIN]
-    after = found.analysis.interval(MOMENT_GAIN)
-    both = f"{MOMENT_GAIN} {span(before.around, before.looked_at)} continuous, {span(after)} sampled"
+    arm, (low, *_) = regions.continuous.arm, regions.continuous.axes[0]
     return Picture(
         stem="sampled-overlay",
         title="Stability regions, continuous and sampled",
-        caption=OVERLAY_CAPTION.format(
-            layers=layers * (len(regions.sampled) > 1),
-            proven="Below the dashed line: stable at C = 0 by the energy argument. " * arm.is_uniform,
-            rate=RATE_GAIN, low=low, beyond=beyond_words(arm),
-        ) + f" At {held}: stable for {both}.",
-        alt=f"Map of {' and '.join(PLANE)}: at {held} stable for {both}.",
+        caption=prose("overlay", arm=arm, rate=RATE_GAIN, low=float(low), nested=len(regions.sampled) > 1),
+        alt=f"Map of {' and '.join(PLANE)}: stability regions of the continuous and of the sampled loop.",
         figure=draw_overlay(regions),
         data=regions_table(regions, "sampled-overlay-data"),
-    )  # fmt: skip
-
-
-def beyond_words(arm: Arm) -> str:
-    """The rate gain below which a free hub is unstable, whatever the other gain; sampled too."""
-    if not arm.has_rigid_mode:
-        return ""
-    least = f"−{plain(arm.rate_loss, 5)}, which takes what the hub loses" if arm.rate_loss else "0"
-    return f", and nothing is stable at {RATE_GAIN} < {least}"
+    )
 
 
 def loci_picture(found: Analysis) -> Picture:
@@ -284,12 +185,12 @@ def loci_picture(found: Analysis) -> Picture:
     turning = arm.hub_side_inertia * arm.input_per_torque  # at the hub, in the unit of the input times s^2
     top = max(PAST_HUB * 2 * turning / loop.chain.sampling.period, STRONGER * loop.gains[RATE_GAIN])
     loci = sampled_loci(loop, top, LOCUS_K2)
-    aliased = int((found.modes.band > 0).sum())
+    aliased = how_many(int((found.modes.band > 0).sum()), "aliased mode")
     return Picture(
         stem="sampled-loci",
         title="Root loci of the sampled loop",
-        caption=LOCI_CAPTION.format(half=plain(loci.half_rate)),
-        alt=f"Root loci of the sampled loop in the z-plane; {how_many(aliased, 'aliased mode')}.",
+        caption=prose("sampled_loci", half=loci.half_rate),
+        alt=f"Root loci of the sampled loop in the z-plane; {aliased}.",
         figure=draw_sampled_loci(loci),
         data=loci_table(loci, "sampled-loci-data"),
     )
@@ -301,14 +202,164 @@ def loci_table(data: SampledLoci, stem: str) -> Table:
     for name, locus in data.by.items():
         for value, poles in zip(locus.values.tolist(), locus.z, strict=True):
             loop = locus.loop.having(**{locus.gain: value})
-            across, up = (loop.number(each) for each in PLANE)
             each = zip(locus.mode.tolist(), poles, strict=True)
-            rows += [(name, across, up, mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
+            rows += [(name, *map(loop.number, PLANE), mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
     titles = {"locus": "locus", **{name: name for name in PLANE}, "mode": "mode", "real": "Re z", "imaginary": "Im z"}
-    columns = [
-        Column(*title, of=list(cells)) for title, cells in zip(titles.items(), zip(*rows, strict=True), strict=True)
-    ]
+    columns = [Column(*title, of=cells) for title, cells in zip(titles.items(), zip(*rows, strict=True), strict=True)]
     return Table(stem=stem, title="Poles of the sampled loop", columns=tuple(columns))
 
 
 # ------------------------------------------------------------ in time
+
+
+class SlewRow(NamedTuple):
+    """A slew under one controller in numbers; what is not reached in the record, or of an unstable loop, is None."""
+
+    law: Annotated[str, Quantity("controller")]
+    residual: Annotated[float | None, Quantity("residual root moment", "N m rms", 3, key="residual_moment_rms")]
+    settling_time: Annotated[float | None, Quantity("settling time (5 %)", "s", 3)]
+    hub_error: Annotated[float | None, Quantity("hub error at the end", "deg", 3)]
+    stopped: Annotated[float | None, Quantity("unstable, stopped at", "s", 3)]
+
+
+def slew_row(name: str, run: Simulation) -> SlewRow:
+    """The numbers of a slew."""
+    if run.stopped is not None:
+        return SlewRow(name, None, None, None, run.stopped.time)
+    time = settling_time(run)
+    error = math.degrees(run.at_samples.hub_angle[-1] - run.scenario.hub_angle[-1])
+    return SlewRow(name, residual_moment_rms(run), time if math.isfinite(time) else None, error, None)
+
+
+def slew(case: Case, controllers: Sequence[Controller]) -> tuple[list[Picture | Table], list[str]]:
+    """The slew of the chain under each controller, and why one is not simulated."""
+    runs: dict[str, Simulation] = {}
+    words, task = [], case.chain.slew
+    for each in controllers:
+        try:
+            runs[each.name] = drawn(each.arm, each.law, case.chain, "slew", RECORD_LENGTH * task.rise_time)
+        except ParameterError as error:
+            words.append(f"No slew of {each.name} is simulated: {error}.")
+    simulated = [each for each in controllers if each.name in runs]
+    if len({each.arm.input_unit for each in controllers}) > 1:
+        words.append("The controllers drive inputs of different units: their slews are not drawn together.")
+    elif simulated:
+        arm, keys = simulated[0].arm, {each.key: runs[each.name] for each in simulated}
+        title = f"{plain(task.travel_of(case.arm.reach), 3)} m of tip travel in {plain(task.rise_time, 3)} s"
+        picture = Picture(
+            stem="sampled-slew",
+            title="The slew",
+            caption=prose("slew", runs=runs, piece=piece_of_bands(runs)),
+            alt=f"Root moment, tip and motor in a slew of {title}.",
+            figure=slew_plot.figure(arm, {safe(name): run for name, run in runs.items()}, title),
+            data=responses_table("sampled-slew-data", "The slew in time", arm, keys),
+        )
+        rows = [slew_row(name, run) for name, run in runs.items()]
+        return [picture, table(rows, stem="sampled-slew-numbers", title="The slew in numbers")], words
+    return [], words
+
+
+def piece_of_bands(runs: Mapping[str, Simulation]) -> float | None:
+    """The time [s] that each piece of a curve spans that is drawn as a band; None where all are lines."""
+    curves = map(traces.root_moment, runs.values())
+    return next((float(one.t[1] - one.t[0]) for one in curves if one.is_band), None)
+
+
+def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulation]) -> Table:
+    """The curves of some simulations of one scenario as they are drawn: a row a point, or a piece of the bands.
+
+    Torques and gains are those held at that time, the rigid arm's moment that of the sample after it.  Numbers have
+    `CURVE_DIGITS` digits: a page's folder is no place for six thousand rows of eleven columns to the last bit.
+    """
+    moments = {key: traces.root_moment(run) for key, run in each.items()}
+    t = min((moment.t for moment in moments.values()), key=len)
+    first = next(iter(each.values()))
+    rigid = first.scenario.rigid_moment
+    columns: list[Column] = [
+        Column("t_s", "time", "s", of=t),
+        Column("rigid_moment_N_m", "rigid arm", "N m", of=traces.held_at(first, np.r_[rigid[1:], rigid[-1:]], t)),
+    ]
+    driven, unit = "torque" if arm.input_unit == "N m" else "input", arm.input_unit
+    for key, run in each.items():
+        columns += moments[key].at(t).columns(f"root_moment_{key}", "root moment", "N m")
+        columns += traces.tip(run).at(t).columns(f"tip_{key}", "tip", "m")
+        columns += traces.tip_deviation(arm, run).at(t).columns(f"tip_error_{key}", "tip less reference", "m")
+        name = f"{driven}_{key}_{unit.replace(' ', '_')}"
+        columns.append(Column(name, driven, unit, of=traces.held_at(run, run.torque, t)))
+        if run.gain is not None and np.ptp(run.gain):
+            columns.append(Column(f"K_{key}", "gain", of=traces.held_at(run, run.gain, t)))
+    columns = [replace(each, of=kept_digits(map(float, each.values), CURVE_DIGITS)) for each in columns]
+    return Table(stem=stem, title=title, columns=tuple(columns))
+
+
+# ------------------------------------------------------------ measured in time
+
+
+class MeasuredStep(NamedTuple):
+    """A step under one law in numbers, measured and computed."""
+
+    law: Annotated[str, Quantity("law")]
+    step: Annotated[float, Quantity("step", "deg", 4)]
+    overshoot_measured: Annotated[float, Quantity("overshoot, measured", "%", 3, key="overshoot_measured_percent")]
+    overshoot_computed: Annotated[float, Quantity("overshoot, computed", "%", 3, key="overshoot_computed_percent")]
+    end_measured: Annotated[float, Quantity("error at the end, measured", "deg", 3)]
+    end_computed: Annotated[float, Quantity("error at the end, computed", "deg", 3)]
+    moment_measured: Annotated[float | None, Quantity("largest |moment|, measured", "N m", 3)]
+    moment_computed: Annotated[float, Quantity("largest |moment|, computed", "N m", 3)]
+    difference: Annotated[float, Quantity("difference, rms", "deg", 3, key="apart_rms_deg")]
+
+
+def measured_step(name: str, found: RunComparison) -> MeasuredStep:
+    """The numbers of a measured step."""
+    measured, computed = found.measured, found.run.at_samples.root_moment
+    step, end = measured.step, float(measured.reference[-1])
+    beyond = [100 * overshoot(angle, step, end) for angle in (measured.hub_angle, found.hub_angle)]
+    return MeasuredStep(
+        name,
+        math.degrees(step),
+        beyond[0],
+        beyond[1],
+        math.degrees(measured.hub_angle[-1] - end),
+        math.degrees(found.hub_angle[-1] - end),
+        float(abs(measured.root_moment).max()) if measured.root_moment.size else None,
+        float(abs(computed).max()),
+        math.degrees(found.difference_rms),
+    )
+
+
+def measured_blocks(case: Case) -> Iterator[Picture | Table]:
+    """Each measured run with the exact loop over it, and both in numbers; nothing where none was measured."""
+    runs = [(each, each.given.measured) for each in case.controllers if each.given.measured is not None]
+    found = {each.name: compare_run(each.arm, each.law, case.chain, run) for each, run in runs}
+    if not found:
+        return
+    yield Picture(
+        stem="sampled-measured",
+        title="Measured on the rig, and computed",
+        caption=prose("measured", found=found),
+        alt=f"Hub angle and root moment over time, measured and computed, under {' and '.join(found)}.",
+        figure=draw_beside("Measured steps, and the exact sampled loop", found),
+        data=compared_table({each.key: found[each.name] for each, _ in runs}),
+    )
+    if rows := [measured_step(name, it) for name, it in found.items() if it.measured.hub_angle.size]:
+        yield table(
+            rows, stem="sampled-overshoot", title="Measured and computed, in numbers", caption=prose("overshoot")
+        )
+
+
+def compared_table(found: Mapping[str, RunComparison]) -> Table:
+    """The curves of the picture: a row a sample, measured values taken between their rows."""
+    t = min((it.run.t for it in found.values()), key=len)
+    columns = [Column("t_s", "time", "s", of=t)]
+    for key, it in found.items():
+        measured = it.measured
+        reference = np.interp(t, measured.t, measured.reference)
+        columns.append(Column(f"reference_{key}_rad", "reference", "rad", of=reference))
+        for name, unit, values, computed in (
+            ("hub_angle", "rad", measured.hub_angle, it.hub_angle),
+            ("root_moment", "N_m", measured.root_moment, it.run.at_samples.root_moment),
+        ):
+            if values.size:
+                columns.append(Column(f"{name}_measured_{key}_{unit}", name, of=np.interp(t, measured.t, values)))
+            columns.append(Column(f"{name}_computed_{key}_{unit}", name, of=computed[: t.size]))
+    return Table(stem="sampled-measured-data", title="Measured and computed", columns=tuple(columns))

@@ -1,48 +1,33 @@
-"""What a page is made of: sections of words, pictures and tables, each saved before the page is written."""
+"""What a page is made of: sections of texts, pictures and tables, each saved before the page is written.
+
+Texts are in templates/prose.txt, pages in the other templates; here is how both are filled in.
+"""
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+import tfarm
 from tfarm.columns import Table
-from tfarm.crossing import Window
-from tfarm.digits import plain, significant
-from tfarm.dsp.chain import Chain
-from tfarm.dsp.crossings import around
+from tfarm.digits import how_many, listed, plain, scientific, significant
 from tfarm.plots.style import save_figure
+from tfarm.schema import entries, text, with_unit
 from tfarm.tables.files import save_table
-from tfarm.tables.html import as_html
+from tfarm.tables.html import as_html, with_symbols
 
 if TYPE_CHECKING:
     from tfarm.plots.style import Figure
 
-EVERYWHERE = (-math.inf, math.inf)  # gains of any size: an interval that has no end but its own
-TYPESET = {
-    "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", " theta": " θ", "phi'(0)": "φ′(0)",
-    "L(iw)": "L(iω)", "J w1": "J ω₁",
-    "(alpha_c, eta_c)": "momentum and learning rate",
-}  # fmt: skip
-POWER_WRITTEN, MINUS_WRITTEN = re.compile(r"\d(?:\.\d+)?e[-+]\d+"), re.compile(r"(?<= )-(?= ?[\w(])")
-PICTURES, DATA = "pictures", "data"  # the folders of an arm's folder, beside its pages
-
-
-def typeset(text: str) -> str:
-    """A sentence of the rooms below as a page shows it: Greek letters, powers of ten, and minus signs."""
-    for plain_text, shown in TYPESET.items():
-        text = text.replace(plain_text, shown)
-    return MINUS_WRITTEN.sub("−", POWER_WRITTEN.sub(lambda number: plain(float(number[0])), text))
-
-
-def residual_words(rms: float | None) -> str:
-    """The root moment left after a slew [N m]; None where the loop ran away."""
-    return "not computed (the loop ran away)" if rms is None else f"{significant(rms, 3)} N m rms"
+TEMPLATES = Path(__file__).parent / "templates"
+PICTURES, DATA = "pictures", "data"  # folders in that of an arm
 
 
 def upper(text: str) -> str:
@@ -50,30 +35,39 @@ def upper(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def in_ms(chain: Chain) -> str:
-    """The sampling period in ms."""
-    return plain(1e3 * chain.sampling.period)
+@cache
+def templates() -> Environment:
+    """All templates; only those of pages escape what is put into them."""
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=lambda name: name is not None and name.endswith(".html"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.globals["inf"] = math.inf
+    environment.filters.update(
+        symbol=with_symbols, text=text, plain=plain, significant=significant, scientific=scientific, upper_first=upper,
+        listed=listed, how_many=how_many,
+    )  # fmt: skip
+    return environment
 
 
-def spans(windows: Sequence[Window], gain: float, here: Window | None = None) -> str:
-    """The interval around a gain in a few digits, or the others where there is none around it."""
-    here = here or around(list(windows), gain)
-    if here is not None:
-        return span(here)
-    others = " or ".join(span(window) for window in windows)
-    return f"{others}, not {plain(gain, 3)}" if others else "none"
+@cache
+def _texts() -> Any:
+    """All texts by name; a line break behind a tag is a space in them."""
+    return templates().overlay(trim_blocks=False).get_template("prose.txt").module
 
 
-def span(window: Window | None, looked_at: Window = EVERYWHERE) -> str:
-    """An interval of a gain in a few digits; an end of what was looked at is no end."""
-    if window is None:
-        return "none"
-    low, high = window
-    no_low, no_high = low <= looked_at[0], high >= looked_at[1]
-    if no_low:
-        return "any" if no_high else f"< {significant(high, 4)}"
-    lower = f"{low:.2g}".replace("-", "−") if 1e-4 < abs(low) < 1e-3 else significant(low, 3)
-    return f"> {lower}" if no_high else f"{lower} … {significant(high, 4)}"
+def prose(name: str, /, **values: Any) -> str:
+    """The text of that name in templates/prose.txt with these values."""
+    return " ".join(getattr(_texts(), name)(**values).split())
+
+
+def render(template: str, **values: Any) -> str:
+    """A page from its template."""
+    return templates().get_template(template).render(version=tfarm.__version__, **values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +77,13 @@ class Fact:
     label: str
     value: str
     unit: str = ""
-    beside: str = ""
+    note: str = ""
+
+
+def facts_of(name: str, record: Any, labels: Iterable[str]) -> list[Fact]:
+    """The quantities of a record with these labels, under a name."""
+    found = {label: with_unit(value, of) for label, of, value in entries(record) if value is not None}
+    return [Fact(label=f"{name}: {label}", value=found[label]) for label in labels if label in found]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +108,7 @@ class Picture:
 class PageSection:
     """A part of a page.  `words` are paragraphs, `items` a list; `blocks` pictures and tables.
 
-    `failure` says why the section could not be made, where the words say so in its place; empty otherwise.
+    `failure` is the reason why the section could not be made, which its words have too; empty otherwise.
     """
 
     anchor: str
@@ -149,16 +149,12 @@ def save_section(section: PageSection, folder: Path) -> SavedSection:
     for block in section.blocks:
         words: dict[str, Any] = {"stem": block.stem, "title": block.title, "caption": block.caption}
         if isinstance(block, Table):
-            files = _below(DATA, save_table(block, folder / DATA))
-            blocks.append(SavedBlock(**words, table=as_html(block), files=files))
+            files = [f"{DATA}/{name}" for name in save_table(block, folder / DATA)]
+            blocks.append(SavedBlock(**words, table=as_html(block), files=tuple(files)))
             continue
         save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
-        files = _below(PICTURES, [f"{block.stem}.svg"])
+        files = [f"{PICTURES}/{block.stem}.svg"]
         if block.data is not None:
-            files += _below(DATA, save_table(block.data, folder / DATA, kinds=("csv",)))
-        blocks.append(SavedBlock(**words, alt=block.alt, size=block.size, files=files))
+            files += [f"{DATA}/{name}" for name in save_table(block.data, folder / DATA, kinds=("csv",))]
+        blocks.append(SavedBlock(**words, alt=block.alt, size=block.size, files=tuple(files)))
     return SavedSection(section=replace(section, blocks=()), blocks=tuple(blocks))
-
-
-def _below(folder: str, names: Sequence[str]) -> tuple[str, ...]:
-    return tuple(f"{folder}/{name}" for name in names)

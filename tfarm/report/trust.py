@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 import platform
 import re
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from decimal import Decimal, localcontext
 from difflib import SequenceMatcher
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 from xml.etree import ElementTree
 
 from latex2mathml.converter import convert
@@ -18,18 +20,232 @@ from markupsafe import Markup, escape
 
 import tfarm
 from tfarm import audit
-from tfarm.arm import load, presets
+from tfarm.arm import Arm, HubFeedback, load, presets
 from tfarm.audit import AuditRow, published
 from tfarm.audit.rows import is_zero
 from tfarm.columns import Column, Table
-from tfarm.digits import powers, scientific, unit
-from tfarm.report.modes_section import BRACKET_DIGITS
-from tfarm.report.page import command_for_all, render
-from tfarm.report.sections import DATA, Fact, PageSection, save_section
-from tfarm.report.trust_proofs import ArmProof, accuracy_table, boxes_tables, counts_table, digits_table, hash_of
-from tfarm.response.frequency import BAND_POINTS
-from tfarm.schema import table
+from tfarm.digits import powers, scientific, significant, unit
+from tfarm.dsp import Chain
+from tfarm.dsp.chain import file_text
+from tfarm.errors import CertificationError, ConvergenceError
+from tfarm.loop.poles import Poles, closed_loop_poles
+from tfarm.plots.style import gains_words
+from tfarm.report.cases import has_loop
+from tfarm.report.modes_section import BRACKET_DIGITS, PROVEN_DIGITS, PROVEN_MODES, proven_damped_modes
+from tfarm.report.page import command_for_all, keep, kept
+from tfarm.report.sections import DATA, PageSection, prose, render, save_section
+from tfarm.response.frequency import BAND_POINTS, worst_error
+from tfarm.schema import Quantity, table
+from tfarm.spectrum import DampedModes
+from tfarm.spectrum.table import default_gains
 from tfarm.tables.files import save_table
+
+PROVEN_OUTPUTS = ("root_moment", "tip_displacement")
+UNPROVEN = "not proven"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Boxed:
+    """Eigenvalues proven complete in a box: each in a disc, `count` in all.  `failure`: what could not be proven."""
+
+    arm: Annotated[str, Quantity("arm")]
+    what: Annotated[str, Quantity("eigenvalues")]
+    count: Annotated[int, Quantity("counted")] = 0
+    box: Annotated[list[float], Quantity("box: Re s from, to, Im s from, to", "1/s", 4)] = field(default_factory=list)
+    failure: str = ""
+
+    @property
+    def verdict(self) -> Annotated[str, Quantity("verdict")]:
+        """Whether they are complete."""
+        return self.failure or "complete, proven"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArmProof:
+    """Of one arm: brackets (lower, upper) [rad/s] of its first flexible frequencies, the count that completes them.
+
+    `count` frequencies lie below `below` [rad/s], a rigid-body mode included if `has_rigid_mode`.  `errors` has
+    (output, worst |G_64/G - 1| / (1 + |s G'/G|)) over `points` frequencies from `band`.  `failure` is what could
+    not be proven; then there are no brackets.  `boxes` are damped modes and poles of the default loop.  `sha256` is
+    that of the arm's file.
+    """
+
+    name: Annotated[str, Quantity("arm")]
+    sha256: Annotated[str, Quantity("SHA-256 of arm.toml")]
+    has_rigid_mode: Annotated[bool, Quantity("rigid body")]
+    digits: int = BRACKET_DIGITS
+    brackets: tuple[tuple[str, str], ...] = ()
+    count: Annotated[int, Quantity("counted")] = 0
+    below: str = ""
+    failure: str = ""
+    points: int = BAND_POINTS
+    band: tuple[float, float]
+    errors: tuple[tuple[str, float], ...]
+    boxes: tuple[Boxed, ...] = ()
+
+    @property
+    def enclosed(self) -> Annotated[int, Quantity("flexible modes enclosed")]:
+        """The number of brackets."""
+        return len(self.brackets)
+
+    @property
+    def count_below(self) -> Annotated[float | None, Quantity("below", "rad/s", 9)]:
+        """The frequency of the count."""
+        return float(self.below) if self.below else None
+
+    @property
+    def verdict(self) -> Annotated[str, Quantity("verdict")]:
+        """Whether the list is complete."""
+        return f"{UNPROVEN}: {self.failure}" if self.failure else "complete, proven"
+
+    @property
+    def source(self) -> Annotated[str, Quantity("source")]:
+        """Whether the arm's file is, byte for byte, that of a preset."""
+        return "preset" if self.is_preset else "file"
+
+    @property
+    def is_preset(self) -> bool:
+        """The same."""
+        return self.name in presets() and hash_of(load(self.name)) == self.sha256
+
+
+def prove(arm: Arm, chain: Chain | None = None) -> ArmProof:
+    """Certify the first modes of the arm and measure its responses; a failed proof is noted, not raised."""
+    modes = tfarm.modes(arm, count=PROVEN_MODES)
+    flexible = modes.natural_frequency[modes.index > 0]
+    band = float(0.1 * flexible[0]), float(1.1 * flexible[-1])
+    found: dict[str, Any] = {}
+    try:
+        proof = modes.certify(BRACKET_DIGITS)
+        found = {"brackets": proof.brackets, "count": proof.count, "below": proof.below}
+    except CertificationError as error:
+        found = {"failure": str(error)}
+    return ArmProof(
+        name=arm.name,
+        sha256=hash_of(arm, chain),
+        has_rigid_mode=arm.has_rigid_mode,
+        band=band,
+        errors=tuple(
+            (output, worst) for output in PROVEN_OUTPUTS if (worst := worst_error(arm, output, band)) is not None
+        ),
+        boxes=tuple(boxed(arm)),
+        **found,
+    )
+
+
+def boxed(arm: Arm) -> Iterator[Boxed]:
+    """Damped modes and the default loop's poles, each enclosed and counted; a failed proof is noted."""
+    boxes: list[tuple[str, Callable[[], DampedModes | Poles]]] = []
+    if not arm.is_undamped:
+        boxes.append((f"damped modes, C = {arm.damping:g} s", lambda: proven_damped_modes(arm, PROVEN_MODES)))
+    if has_loop(arm):
+        law = default_gains(arm)
+        boxes.append((f"closed loop, {gains_words(law, 6)}", lambda: _proven_poles(arm, law)))
+    for what, proven in boxes:
+        try:
+            found = proven()
+            yield Boxed(arm=arm.name, what=what, count=found.count, box=list(map(float, found.box)))
+        except (CertificationError, ConvergenceError) as error:
+            yield Boxed(arm=arm.name, what=what, failure=str(error))
+
+
+def _proven_poles(arm: Arm, law: HubFeedback) -> Poles:
+    poles = closed_loop_poles(arm, law, PROVEN_MODES)
+    poles.certify(PROVEN_DIGITS)
+    return poles
+
+
+def hash_of(arm: Arm, chain: Chain | None = None) -> str:
+    """SHA-256 of the arm's file, its chain with it."""
+    return hashlib.sha256(file_text(arm, chain).encode()).hexdigest()
+
+
+def save_proof(arm: Arm, folder: Path, chain: Chain | None = None) -> None:
+    """proof.json."""
+    keep(folder, "proof", asdict(prove(arm, chain)))
+
+
+def written_proofs(out: Path) -> Sequence[ArmProof]:
+    """The proofs of all arms in the folder of reports, by name; what is none of ours is passed over."""
+    return kept(out, "proof", _proof)
+
+
+def _proof(read: dict[str, Any], _: Path) -> ArmProof:
+    read["brackets"] = tuple((str(lower), str(upper)) for lower, upper in read["brackets"])
+    read["band"] = float(read["band"][0]), float(read["band"][1])
+    read["errors"] = tuple((str(output), float(error)) for output, error in read["errors"])
+    read["boxes"] = tuple(Boxed(**each | {"box": list(map(float, each["box"]))}) for each in read["boxes"])
+    return ArmProof(**read)
+
+
+# ------------------------------------------------------------ digits
+def shared_digits(bracket: tuple[str, str], digits: int) -> str:
+    """The leading digits that all numbers in a bracket share: its lower end, with its zeros."""
+    lower = Decimal(bracket[0])
+    with localcontext(prec=digits + 5):
+        return f"{lower.quantize(Decimal(1).scaleb(lower.adjusted() - digits + 1)):f}"
+
+
+def digits_table(proofs: Sequence[ArmProof]) -> Table:
+    """A row a mode, a column an arm: every digit that is proven."""
+    columns = [Column("mode", "mode", of=range(1, PROVEN_MODES + 1))]
+    for proof in proofs:
+        digits = [shared_digits(bracket, proof.digits) for bracket in proof.brackets] or [""] * PROVEN_MODES
+        cells = [f"{text}…" if text else UNPROVEN for text in digits]
+        columns.append(Column(f"{proof.name}_rad_s", proof.name, "rad/s", of=digits, shown=cells))
+    return Table(
+        stem="digits",
+        title=f"Natural frequencies, {BRACKET_DIGITS} digits",
+        caption=prose("digits", modes=PROVEN_MODES, digits=BRACKET_DIGITS),
+        columns=tuple(columns),
+    )
+
+
+def counts_table(proofs: Sequence[ArmProof]) -> Table:
+    """The number of frequencies below one, and of those enclosed."""
+    names = ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict")
+    return table(proofs, names, stem="counts", title="None missing", caption=prose("counts"))
+
+
+def boxes_tables(proofs: Sequence[ArmProof]) -> list[Table]:
+    """Damped modes and closed-loop poles, a row a box; no table where there is none."""
+    rows = [each for proof in proofs for each in proof.boxes]
+    return (
+        [
+            table(
+                rows,
+                stem="boxes",
+                title="Damped modes and closed-loop poles",
+                caption=prose("boxes", digits=PROVEN_DIGITS),
+            )
+        ]
+        if rows
+        else []
+    )
+
+
+def accuracy_table(proofs: Sequence[ArmProof]) -> Table:
+    """The worst error of each arm's two responses."""
+    columns = [
+        Column("arm", "arm", of=[proof.name for proof in proofs]),
+        Column("band_rad_s", "from … to, rad/s", of=[" … ".join(significant(x, 4) for x in p.band) for p in proofs]),
+    ]
+    for output in PROVEN_OUTPUTS:
+        errors = [dict(proof.errors).get(output) for proof in proofs]
+        cells = ["zero throughout" if error is None else scientific(error, 2) for error in errors]
+        columns.append(Column(output, output.replace("_", " "), of=errors, shown=cells))
+    return Table(
+        stem="accuracy",
+        title="Double precision against proven digits",
+        caption=prose("accuracy"),
+        columns=tuple(columns),
+    )
+
+
+def inputs_table(proofs: Sequence[ArmProof]) -> Table:
+    """The hash of each arm's file."""
+    return table(proofs, ("name", "source", "sha256"), stem="inputs", title="Inputs", caption=prose("inputs"))
+
 
 AUDIT_COLUMNS = (
     "equation", "verdict", "printed", "corrected", "residual_printed", "residual_corrected", "evidence",
@@ -58,25 +274,6 @@ PACKAGES = (
     "matplotlib",
     "latex2mathml",
     "vl-convert-python",
-)
-PROOFS_WORDS = (
-    "Modes are counted before they are looked for: a chain of signs in the manner of Wittrick and Williams (1971) "
-    "gives the number of natural frequencies below any frequency. Here both that count and the change of sign in each "
-    "enclosure are decided in ball arithmetic (python-flint), where every number carries a rigorous bound of its "
-    "error: what follows is a proof, not an estimate. Where the enclosures are as many as the count, none is missing."
-)
-ACCURACY_WORDS = (
-    f"The plots are computed in double precision from a closed form without cancellation. At {BAND_POINTS} "
-    "frequencies of each response, from a tenth of the first natural frequency to beyond the tenth, it was compared "
-    "with ball arithmetic at 30 proven digits. The error is counted in the change of G that a relative change of its "
-    "argument brings about, |G₆₄/G − 1| / (1 + |s G′/G|): near an undamped resonance no more can be asked of any "
-    "number format. One unit in the last place of a double is 2.2 × 10⁻¹⁶."
-)
-PUBLISHED_WORDS = (
-    "Natural frequencies of beams as others have printed them. Each beam is an arm here: a free pin is a hub without "
-    "inertia, a clamp a locked hub, a support at the tip an infinite payload mass. Ours agrees with a printed number "
-    "if it rounds to its last digit; where it does not, the reason stands beside it. A difference without a reason "
-    "would have stopped this page."
 )
 
 
@@ -154,12 +351,12 @@ def _set(tex: str) -> list[MathElement]:
         root = ElementTree.fromstring(re.sub(r' xmlns="[^"]*"', "", convert(upright, display="block"), count=1))
         if len(line) > LONG_TEX:
             root.set("class", "long")
-        _mend(root)
+        _corrected(root)
         found.append(root)
     return found
 
 
-def _mend(root: MathElement) -> None:
+def _corrected(root: MathElement) -> None:
     """Where the converter errs: plus-minus is an operator, infinity is none, a determinant's bars are as high as it."""
     for row in root.iter("mrow"):
         before = None
@@ -198,123 +395,68 @@ def gather() -> Evidence:
 def write_trust(evidence: Evidence, proofs: Sequence[ArmProof], folder: Path) -> None:
     """index.html and its tables, into a folder of their own."""
     folder.mkdir()
-    sections = {s.anchor: save_section(s, folder) for s in _sections(evidence, proofs)}
+    found = published.Validation(evidence.published)
+    contents: dict[str, tuple[str, Sequence[Table]]] = {
+        "proofs": ("Proofs", (counts_table(proofs), digits_table(proofs), *boxes_tables(proofs))),
+        "accuracy": ("Measured accuracy", (accuracy_table(proofs),)),
+        "published": ("Published numbers", (sources_table(found), differences_table(found), published_table(found))),
+        "again": ("Make it again", (inputs_table(proofs), versions_table())),
+    }
+    sections = {
+        anchor: save_section(PageSection(anchor=anchor, title=title, blocks=blocks), folder)
+        for anchor, (title, blocks) in contents.items()
+    }
     plain = table(evidence.audit, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation")
-    files = save_table(plain, folder / DATA)
+    save_table(plain, folder / DATA)
+    errors = [error for proof in proofs for _, error in proof.errors]
     page = render(
         "trust.html",
         title="Why trust this",
         sections=sections,
-        short=_short(evidence, proofs),
-        counts=[
-            (*VERDICT_MARKS[verdict], verdict, number) for verdict, number in verdict_counts(evidence.audit).items()
-        ],
+        proofs=proofs,
+        digits=BRACKET_DIGITS,
+        points=BAND_POINTS,
+        worst=scientific(max(errors), 2) if errors else "",
+        found=found,
+        verdicts=verdict_counts(evidence.audit),
+        marks=VERDICT_MARKS,
         equations=[shown_row(row) for row in evidence.audit],
-        audit_files=files,
-        paper=audit.PAPER,
-        command=command_for_all([(proof.name, _is_preset(proof)) for proof in proofs]),
+        command=command_for_all([(proof.name, proof.is_preset) for proof in proofs]),
     )
     (folder / "index.html").write_text(page, encoding="utf-8", newline="")
-
-
-def _sections(evidence: Evidence, proofs: Sequence[ArmProof]) -> list[PageSection]:
-    rows, found = evidence.published, published.Validation(evidence.published)
-    agree, of = sum(row.agrees for row in rows), len({row.source for row in rows})
-    facts = (
-        Fact(label="numbers compared", value=str(len(rows)), beside=f"from {of} sources"),
-        Fact(label="agree to the last printed digit", value=str(agree)),
-        Fact(label="differ, with the reason", value=str(len(rows) - agree)),
-    )
-    return [
-        PageSection(
-            anchor="proofs",
-            title="Proofs",
-            words=(PROOFS_WORDS,),
-            blocks=(digits_table(proofs), counts_table(proofs), *boxes_tables(proofs)),
-        ),
-        PageSection(
-            anchor="accuracy", title="Measured accuracy", words=(ACCURACY_WORDS,), blocks=(accuracy_table(proofs),)
-        ),
-        PageSection(
-            anchor="published",
-            title="Published numbers",
-            words=(PUBLISHED_WORDS,),
-            facts=facts,
-            blocks=(sources_table(rows), differences_table(found), published_table(found)),
-        ),
-        PageSection(anchor="again", title="Make it again", blocks=(inputs_table(proofs), versions_table())),
-    ]
-
-
-def _short(evidence: Evidence, proofs: Sequence[ArmProof]) -> dict[str, Any]:
-    """The numbers of the five sentences at the top."""
-    proven = [proof for proof in proofs if not proof.failure]
-    errors = [error for proof in proofs for _, error in proof.errors]
-    found = verdict_counts(evidence.audit)
-    return {
-        "frequencies": sum(len(proof.brackets) for proof in proven),
-        "arms": len(proven),
-        "unproven": [proof.name for proof in proofs if proof.failure],
-        "digits": BRACKET_DIGITS,
-        "points": BAND_POINTS,
-        "worst": scientific(max(errors), 2) if errors else "",
-        "published": len(evidence.published),
-        "agree": sum(row.agrees for row in evidence.published),
-        "rows": len(evidence.audit),
-        **found,
-    }
 
 
 # ------------------------------------------------------------ published tables
 
 
-def sources_table(rows: Sequence[published.PublishedRow]) -> Table:
-    """Where the numbers were printed, how they came here, and how many agree."""
-    sources = [s for s in published.ALL if any(row.source == s.key for row in rows)]
-    of = [[row for row in rows if row.source == source.key] for source in sources]
-    return Table(
-        stem="sources",
-        title="Sources",
-        caption="Few of the originals lay open on the desk; the last column says how each table was read. Where "
-        "no table but a frequency equation was published, the equation's roots stand for printed numbers.",
-        record=sources,
-        columns=(
-            Column("source", "source", of="key"),
-            Column("numbers", "numbers", of=[len(each) for each in of]),
-            Column("agree", "agree", of=[sum(row.agrees for row in each) for each in of]),
-            Column("citation", "where it was printed"),
-            Column("reached", "how it was read"),
-        ),
+def sources_table(found: published.Validation) -> Table:
+    """The origin of the numbers, and how many agree."""
+    agrees = [[row.agrees for row in found.rows if row.source == source.key] for source in found.sources]
+    columns = (
+        *table(found.sources).columns,
+        Column("numbers", "numbers", of=map(len, agrees)),
+        Column("agree", "agree", of=map(sum, agrees)),
     )
+    return Table(stem="sources", title="Sources", caption=prose("sources"), columns=columns)
 
 
 def differences_table(found: published.Validation) -> Table:
     """The printed numbers that ours does not round to, a row a reason."""
-    caption = "Largest difference: ours over printed, less one, of the modes named. All other numbers agree."
-    return table(found.differences, stem="differences", title="Where ours differs, and why", caption=caption)
+    return table(
+        found.differences,
+        stem="differences",
+        title="Where ours differs, and why",
+        caption="Largest difference: ours over printed, less one, of the modes named. All other numbers agree.",
+    )
 
 
 def published_table(found: published.Validation) -> Table:
     """Every printed number and ours."""
-    caption = "Relative difference: ours over printed, less one; the reasons are given above."
-    return table(found.rows, stem="published", title="All printed numbers, and ours", caption=caption)
-
-
-# ------------------------------------------------------------ making it again
-
-
-def inputs_table(proofs: Sequence[ArmProof]) -> Table:
-    """The hash of each arm's file."""
-    names, hashes = [proof.name for proof in proofs], [proof.sha256 for proof in proofs]
-    return Table(
-        stem="inputs",
-        title="Inputs",
-        caption="SHA-256 of each arm's file, arm.toml in its folder: all that its page depends on.",
-        columns=(
-            Column("arm", "arm", of=names),
-            Column("is", "where from", of=["comes with tfarm" if _is_preset(p) else "a file" for p in proofs]),
-            Column("sha256", "SHA-256 of arm.toml", of=hashes),
-        ),
+    return table(
+        found.rows,
+        stem="published",
+        title="All printed numbers, and ours",
+        caption="Relative difference: ours over printed, less one; the reasons are given above.",
     )
 
 
@@ -322,17 +464,8 @@ def versions_table() -> Table:
     """The versions that computed this."""
     found = {"tfarm": tfarm.__version__, "python": platform.python_version()}
     found |= {package: version(package) for package in PACKAGES}
-    return Table(
-        stem="versions",
-        title="Versions",
-        caption="With these versions, on one machine, two runs give the same bytes: no dates, no timings, fixed seeds.",
-        columns=(
-            Column("package", "package", of=list(found)),
-            Column("version", "version", of=list(found.values())),
-        ),
+    columns = (
+        Column("package", "package", of=list(found)),
+        Column("version", "version", of=list(found.values())),
     )
-
-
-def _is_preset(proof: ArmProof) -> bool:
-    """Whether the arm's file is, byte for byte, that of a preset."""
-    return proof.name in presets() and hash_of(load(proof.name)) == proof.sha256
+    return Table(stem="versions", title="Versions", caption=prose("versions"), columns=columns)

@@ -8,134 +8,108 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
+from typing import Any
 
-from tfarm.arm import PLANE, Arm
+import tfarm
+from tfarm.arm import Arm
 from tfarm.comparing import Comparison
-from tfarm.dsp import Chain
+from tfarm.digits import plain
+from tfarm.dsp import Chain, load_chain
 from tfarm.errors import ParameterError, TfarmError, must_be_known
 from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
-from tfarm.plots.regions import comparison
+from tfarm.plots.frequency import draw_compared
+from tfarm.plots.regions import comparison, draw_overlay, stable_regions
+from tfarm.plots.shapes import modes
+from tfarm.plots.style import save_figure
 from tfarm.processes import may_start_processes, shared
-from tfarm.report.cards import COMPARISON_KIND, COMPARISON_PAGE, keep, kept_comparison, save_card, written_cards
-from tfarm.report.cases import GivenLaw, Subject, check_laws
+from tfarm.report.cases import Case, GivenLaw, check_laws
 from tfarm.report.live import ASSETS, LIVE_PAGE, is_live, save_live, write_assets
 from tfarm.report.page import (
-    ARM_PIECES,
-    LAW_PIECES,
+    COMPARISON_KIND,
+    COMPARISON_PAGE,
     QUESTIONS,
-    Piece,
     arm_page,
     file_of,
     index_page,
+    keep,
+    kept_comparison,
     other_pages,
-    render,
+    pieces_of,
+    save_card,
+    written_cards,
 )
-from tfarm.report.sections import PageSection, Picture, SavedSection, save_section, typeset, upper
-from tfarm.report.trust import TRUST_FOLDER, Evidence, gather, write_trust
-from tfarm.report.trust_proofs import save_proof, written_proofs
-from tfarm.schema import table
+from tfarm.report.sections import PageSection, Picture, SavedSection, prose, render, save_section, upper
+from tfarm.report.trust import TRUST_FOLDER, Evidence, gather, save_proof, write_trust, written_proofs
+from tfarm.response.frequency import bode, resonant_band
+from tfarm.schema import quantities, table
+from tfarm.spectrum.table import default_gains
 from tfarm.stopping import undone_if_stopped
 
 ReportProgress = Callable[[int, int, str], object]
+Notice = Callable[[str], object]
 MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores as a small machine has
 WORTH_A_PROCESS = 8  # pieces for which a second process, which takes a second or two to start, is worth it
-CARD_WORK, CARD_ALONE_WORK = "card", "card alone"  # with the proofs of the arm, and without
-LIVE_WORK = "live loop"
-PieceWork = tuple[int, int | str]  # which arm, which piece (or its card and proof)
-Made = SavedSection | Evidence | None
-EVIDENCE_WORK: PieceWork = (-1, "why trust this")  # of no arm
-SCRIPTS_WORK: PieceWork = (-1, "scripts of the live pages")
-Notice = Callable[[str], object]
-RESERVED_NAMES = (  # which no arm's folder may have
-    "index.html", "README.md", "pictures", "bench.json", "trust", "data", "compare.html", "compare.json", ASSETS,
-)  # fmt: skip
+EVIDENCE, SCRIPTS = "why trust this", "scripts of the live pages"  # pieces of no arm
+RESERVED_NAMES = {  # of folders that no arm may have
+    "index.html", "readme.md", "pictures", "bench.json", "trust", "data", "compare.html", "compare.json", ASSETS,
+}  # fmt: skip
 TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
-LEFT_OUT_OF = "{name}: the page leaves out “{title}” and says why: {why}"
-DIFFERENCE_NOTE = "Differences are the second less the first, in the unit of the quantity."
-PAIRED_NOTE = "By the mode whose open-loop pole each is nearest to."
-UNPAIRED_NOTE = "Of a mode that has no oscillating pole on the other side, or of none."
-IN_Z_NOTE = "One of the laws is a law in z: both loops are compared at their samples, each pole z as s = ln(z)/T."
 
 
 def make_all(
-    subjects: Sequence[Subject],
+    cases: Sequence[Case],
     folders: Sequence[Path],
     only: tuple[str, ...],
     scripts: Path | None,
     progress: ReportProgress | None,
 ) -> tuple[list[list[SavedSection]], Evidence | None]:
-    """The sections of each arm's page, in the order of PIECES, and the evidence of a full report.
+    """The sections of each arm's page, in their order, and the evidence of a full report.
 
     `scripts` is the folder that the live pages' scripts are made in.
     """
-    work: dict[PieceWork, Callable[[], Made]] = {} if only else {EVIDENCE_WORK: gather}
+    work: dict[str, Callable[[], Any]] = {} if only else {EVIDENCE: gather}
     if scripts is not None:
-        work[SCRIPTS_WORK] = partial(write_assets, scripts)
-    for i, (subject, folder) in enumerate(zip(subjects, folders, strict=True)):  # of each the longest work first
-        suited = {j: piece for j, piece in enumerate(pieces_of(subject)) if piece.is_for(subject)}
-        wanted = [j for j, piece in suited.items() if not only or any(map(piece.is_on, only))]
-        pieces: list[int | str] = [*sorted(wanted, key=lambda j: -suited[j].seconds)]
-        pieces += [LIVE_WORK] * (not only and is_live(subject))
-        pieces.append(CARD_ALONE_WORK if subject.laws and only else CARD_WORK)
-        work |= {(i, piece): partial(make, subject, piece, folder) for piece in pieces}
-    done: dict[PieceWork, Made] = {}
+        work[SCRIPTS] = partial(write_assets, scripts)
+    pages: list[list[str]] = []
+    for case, folder in zip(cases, folders, strict=True):
+        of = f"{case.arm.name}: "
+        pieces = [piece for piece in pieces_of(case) if not only or any(map(piece.is_on, only))]
+        pages.append([of + piece.name for piece in pieces])
+        for piece in sorted(pieces, key=lambda piece: -piece.seconds):  # the longest first
+            work[of + piece.name] = partial(make_section, piece.name, piece.anchor, piece.make, case, folder)
+        if not only and is_live(case):
+            work[f"{of}live loop"] = partial(save_live, case, folder)
+        work[f"{of}card"] = partial(save_card, case, folder)
+        if not (only and case.laws):
+            work[f"{of}proof"] = partial(save_proof, case.arm, folder, case.chain)
+    done: dict[str, Any] = {}
 
-    def tell(running: Sequence[PieceWork]) -> None:
+    def begun(running: Sequence[str]) -> None:
         if progress is not None:
-            progress(len(done), len(work), ", ".join(_name_of(subjects, task) for task in running))
+            progress(len(done), len(work), ", ".join(running))
 
-    tell(())
+    begun(())
     if len(work) < WORTH_A_PROCESS or MOST_WORKERS == 1 or not may_start_processes():
         for task, call in work.items():
-            tell([task])
+            begun([task])
             done[task] = call()
     else:
-        for task, result in shared(work, MOST_WORKERS, [__name__], tell):
-            done[task] = result  # noqa: PERF403  `tell` counts them meanwhile
-    tell(())
-    sections = [
-        [s for j in range(len(pieces_of(subject))) if isinstance(s := done.get((i, j)), SavedSection)]
-        for i, subject in enumerate(subjects)
-    ]
-    evidence = done.get(EVIDENCE_WORK)
-    return sections, evidence if isinstance(evidence, Evidence) else None
+        for task, result in shared(work, MOST_WORKERS, [__name__], begun):
+            done[task] = result  # noqa: PERF403  `begun` counts them meanwhile
+    begun(())
+    return [[done[task] for task in page] for page in pages], done.get(EVIDENCE)
 
 
-def make(subject: Subject, piece: int | str, folder: Path) -> Made:
-    """A section of an arm's page, or its card, proof or live page, saved in the arm's folder."""
-    if piece == LIVE_WORK:
-        save_live(subject, folder)
-        return None
-    if isinstance(piece, str):
-        save_card(subject.arm, folder, subject.laws, subject.chain)
-        if piece == CARD_WORK:
-            save_proof(subject.arm, folder, subject.chain)
-        return None
-    return save_section(section_or_why_not(pieces_of(subject)[piece], subject), folder)
-
-
-def pieces_of(subject: Subject) -> Sequence[Piece]:
-    """The sections of a page on this subject, in their order."""
-    return LAW_PIECES if subject.laws else ARM_PIECES
-
-
-def section_or_why_not(piece: Piece, subject: Subject) -> PageSection:
-    """The section, or in its place why tfarm could not make it of this arm; a bug of ours stays loud."""
+def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], case: Case, folder: Path) -> SavedSection:
+    """A section saved in the arm's folder, or in its place why tfarm could not make it; a bug of ours stays loud."""
     try:
-        return piece.made(subject)
+        section = make(case)
     except TfarmError as error:
-        words = (f"This section could not be made for this arm: {typeset(str(error))}.",)
-        return PageSection(anchor=piece.anchor, title=upper(piece.name), words=words, failure=str(error))
-
-
-def _name_of(subjects: Sequence[Subject], task: PieceWork) -> str:
-    piece = task[1]
-    if task in (EVIDENCE_WORK, SCRIPTS_WORK):
-        return str(piece)
-    subject = subjects[task[0]]
-    return f"{subject.arm.name}: {piece if isinstance(piece, str) else pieces_of(subject)[piece].name}"
+        words = (f"This section could not be made for this arm: {error}.",)
+        section = PageSection(anchor=anchor, title=upper(name), words=words, failure=str(error))
+    return save_section(section, folder)
 
 
 def write(
@@ -158,87 +132,83 @@ def write(
     are laid over those of every arm.
     `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  `progress` gets
     (done, total, what runs) whenever a piece of work begins, and at the end.  A section that tfarm cannot make of an
-    arm says why in its place, and `notice` gets the same in one line once the pages are written.  Raises ParameterError
-    before any work if `out` cannot be written, two arms share a name or there is none, or an arm or its chain does not
-    suit a law; ConvergenceError if a process dies.  If the work itself fails, `out` is as it was.
+    arm has the reason in its place, and `notice` gets the same in one line at the end.  Raises ParameterError before
+    any work if `out` cannot be written, two arms share a name or there is none, or an arm or its chain does not suit a
+    law; ConvergenceError if a process dies.  If the work itself fails, `out` is as it was.
     """
-    _check(arms, only)
     out, n = Path(out), len(arms)
+    _check([arm.name for arm in arms], only or ())
     each = zip(arms, chains or [Chain()] * n, laws or [()] * n, fits or [None] * n, strict=True)
-    subjects = [Subject(arm, chain, tuple(own), fit, tuple(measured)) for arm, chain, own, fit in each]
-    for subject in subjects:
-        check_laws(subject.arm, subject.chain, subject.laws)
-    names = [arm.name for arm in arms] + [TRUST_FOLDER, ASSETS] * (not only)
-    with _beside(out, names) as beside:
-        told = _written(subjects, out, beside, only, progress)
-    for text in told:
+    cases = [Case(arm, chain, tuple(own), fit, tuple(measured)) for arm, chain, own, fit in each]
+    for case in cases:
+        check_laws(case)
+    with _temporary(out, [arm.name for arm in arms] + [TRUST_FOLDER, ASSETS] * (not only)) as folder:
+        failed = _written(cases, out, folder, only, progress)
+    for name, section in failed:
         if notice is not None:
-            notice(text)
-    alone = len(arms) == 1 and only is not None and len(only) == 1
-    return out / arms[0].name / f"{only[0]}.html" if alone and only else out / "index.html"
+            notice(f"{name}: the page leaves out “{section.title}”: {section.failure}")
+    alone = f"{arms[0].name}/{only[0]}.html" if n == 1 and only and len(only) == 1 else "index.html"
+    return out / alone
 
 
 def _written(
-    subjects: Sequence[Subject],
-    out: Path,
-    beside: Path,
-    only: tuple[str, ...] | None,
-    progress: ReportProgress | None,
-) -> list[str]:
-    """Make all pages in `beside`, move them to `out`, and the index last; what is to be said of them."""
+    cases: Sequence[Case], out: Path, place: Path, only: tuple[str, ...] | None, progress: ReportProgress | None
+) -> list[tuple[str, PageSection]]:
+    """Make all pages in `place`, move them to `out`, and the index last; the sections that failed, by their arms."""
     trust = TRUST_PAGE if not only or (out / TRUST_PAGE).is_file() else ""
-    folders = [beside / str(i) for i in range(len(subjects))]
+    folders = [place / str(i) for i in range(len(cases))]
     for folder in folders:
         folder.mkdir()
-    scripts = beside / ASSETS if not only and any(map(is_live, subjects)) else None
-    sections, evidence = make_all(subjects, folders, only or (), scripts, progress)
-    told = []
-    for subject, folder, parts in zip(subjects, folders, sections, strict=True):
-        _write_pages(subject, folder, parts, only, trust, out / subject.arm.name)
-        failed = [part.section for part in parts if part.section.failure]
-        told += [LEFT_OUT_OF.format(name=subject.arm.name, title=each.title, why=each.failure) for each in failed]
+    scripts = place / ASSETS if not only and any(map(is_live, cases)) else None
+    sections, evidence = make_all(cases, folders, only or (), scripts, progress)
+    for case, folder, parts in zip(cases, folders, sections, strict=True):
+        _write_pages(case, folder, parts, only, trust, out / case.arm.name)
     if scripts is not None:
         move_into(scripts, out / ASSETS)
-    for subject, folder in zip(subjects, folders, strict=True):
-        move_into(folder, out / subject.arm.name)
+    for case, folder in zip(cases, folders, strict=True):
+        move_into(folder, out / case.arm.name)
     if evidence is not None:
-        write_trust(evidence, written_proofs(out), beside / TRUST_FOLDER)
-        move_into(beside / TRUST_FOLDER, out / TRUST_FOLDER)
-    index = index_page(written_cards(out), trust=trust, compared=kept_comparison(out)[0])
-    (beside / "index.html").write_text(index, encoding="utf-8", newline="")
-    os.replace(beside / "index.html", out / "index.html")
-    return told
+        write_trust(evidence, written_proofs(out), place / TRUST_FOLDER)
+        move_into(place / TRUST_FOLDER, out / TRUST_FOLDER)
+    _write_index(place, out, trust, kept_comparison(out)[0])
+    os.replace(place / "index.html", out / "index.html")
+    named = [(case.arm.name, part.section) for case, parts in zip(cases, sections, strict=True) for part in parts]
+    return [(name, section) for name, section in named if section.failure]
 
 
-def _check(arms: Sequence[Arm], only: tuple[str, ...] | None) -> None:
-    if not arms:
+def _write_index(place: Path, out: Path, trust: str, compared: str) -> None:
+    """The index of the arms in a folder of reports, made in another place."""
+    page = index_page(written_cards(out), trust=trust, compared=compared)
+    (place / "index.html").write_text(page, encoding="utf-8", newline="")
+
+
+def _check(names: Sequence[str], only: tuple[str, ...]) -> None:
+    if not names:
         raise ParameterError(key="arms", value=(), remedy="name at least one arm to report on")
-    for question in only or ():
+    for question in only:
         must_be_known("only", question, QUESTIONS)
-    seen: set[str] = set()
-    for arm in arms:
-        if arm.name.casefold() in seen:
+    for number, name in enumerate(names):
+        if name.casefold() in (other.casefold() for other in names[:number]):
             remedy = "two arms of this name would share one folder; give one of them another name"
-            raise ParameterError(key="name", value=arm.name, remedy=remedy)
-        if arm.name.casefold() in {name.casefold() for name in RESERVED_NAMES}:
+            raise ParameterError(key="name", value=name, remedy=remedy)
+        if name.casefold() in RESERVED_NAMES:
             remedy = "the folder of reports has a file of this name; give the arm another name"
-            raise ParameterError(key="name", value=arm.name, remedy=remedy)
-        seen.add(arm.name.casefold())
+            raise ParameterError(key="name", value=name, remedy=remedy)
 
 
 @contextmanager
-def _beside(out: Path, names: Sequence[str]) -> Iterator[Path]:
+def _temporary(out: Path, names: Sequence[str]) -> Iterator[Path]:
     """A temporary folder in `out`, gone afterwards; what was made for it goes too if the work fails."""
     made: list[Path] = []
     why = "cannot be written ({}); give a folder that can"
     try:
         with undone_if_stopped(partial(_remove_empty, made)):
             _make_folders(out, made)
-            with temporary_folder(out) as beside:
+            with temporary_folder(out) as place:
                 for name in names:
                     _make_folders(out / name, made)
                 why = "could not be written to ({}); free some space, or give another folder"
-                yield beside
+                yield place
     except OSError as error:
         remedy = why.format(error.strerror or error)
         raise ParameterError(key="out", value=str(out), remedy=remedy) from None
@@ -266,7 +236,7 @@ def _make_folders(folder: Path, made: list[Path]) -> None:
 
 
 def _write_pages(
-    subject: Subject,
+    case: Case,
     folder: Path,
     sections: Sequence[SavedSection],
     only: tuple[str, ...] | None,
@@ -277,21 +247,21 @@ def _write_pages(
 
     These lead to each other, and to what is in the `earlier` folder of the arm.
     """
-    (folder / "arm.toml").write_text(file_of(subject), encoding="utf-8", newline="")
+    (folder / "arm.toml").write_text(file_of(case), encoding="utf-8", newline="")
     for question in only or (None,):
-        anchors = {piece.anchor for piece in pieces_of(subject) if question and piece.is_on(question)}
+        anchors = {piece.anchor for piece in pieces_of(case) if question and piece.is_on(question)}
         wanted = [each for each in sections if question is None or each.section.anchor in anchors]
         live = (folder / LIVE_PAGE).is_file()
         others = [
             *other_pages(earlier, only or ("index",), question or "index"),
-            *_compared(earlier.parent, subject.arm),
+            *_compared(earlier.parent, case.arm),
         ]
-        page = arm_page(subject, wanted, question, trust=f"../{trust}" if trust else "", live=live, others=others)
+        page = arm_page(case, wanted, question, trust=f"../{trust}" if trust else "", live=live, others=others)
         (folder / f"{question or 'index'}.html").write_text(page, encoding="utf-8", newline="")
 
 
 def _compared(out: Path, arm: Arm) -> list[tuple[str, str]]:
-    """(file, title) of the comparison beside the reports, as an arm's page sees it, where it is one of this arm."""
+    """(file, title) of the comparison in the folder of reports, as seen from an arm's page, if it is one of the arm."""
     title, arms = kept_comparison(out)
     return [(f"../{COMPARISON_PAGE}", title)] if arm.name in arms else []
 
@@ -311,24 +281,19 @@ def write_comparison(found: Comparison, out: Path) -> Path:
     It leads to the index and to the arms' own pages, as far as they are in the folder.  An index of reports that is
     there leads to it from then on, and pages of its arms that are made later.
     """
-    title, arms = (
-        f"{found.one.name} and {found.other.name} compared",
-        list(dict.fromkeys(s.arm.name for s in found.sides)),
-    )
-    lead = "Two arms, exact." if found.is_of_arms else f"Two laws on {found.one.arm.name}, exact."
+    title = f"{found.one.name} and {found.other.name} compared"
+    arms = list(dict.fromkeys(side.arm.name for side in found.sides))
     try:
         out.mkdir(parents=True, exist_ok=True)
         with temporary_folder(out) as made:
-            saved = [save_section(section, made) for section in _sections(found)]
+            saved = save_section(_comparison_section(found), made)
             others = [("index.html", "all arms"), *((f"{name}/index.html", name) for name in arms)]
             pages = [(file, name) for file, name in others if (out / file).is_file()]
-            page = render(COMPARISON_PAGE, title=title, lead=lead, sections=saved, pages=pages)
+            page = render(COMPARISON_PAGE, title=title, saved=saved, pages=pages)
             (made / COMPARISON_PAGE).write_text(page, encoding="utf-8", newline="")
             keep(made, COMPARISON_KIND, {"title": title, "arms": arms})
             if (out / "index.html").is_file():
-                trust = TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""
-                index = index_page(written_cards(out), trust=trust, compared=title)
-                (made / "index.html").write_text(index, encoding="utf-8", newline="")
+                _write_index(made, out, TRUST_PAGE if (out / TRUST_PAGE).is_file() else "", title)
             move_into(made, out)
     except OSError as error:
         remedy = f"cannot be written to ({error.strerror or error}); give a folder that can"
@@ -336,28 +301,40 @@ def write_comparison(found: Comparison, out: Path) -> Path:
     return out / COMPARISON_PAGE
 
 
-def _sections(found: Comparison) -> Iterator[PageSection]:
-    sides = table(found.rows, stem="compare-sides", title="Compared", caption="")
-    words = [IN_Z_NOTE] * found.is_sampled
-    yield PageSection(anchor="verdicts", title="Verdicts", words=words, blocks=(sides,))
-    curves = "exact response" if found.is_of_arms else "loop function"
-    plane = f"{' and '.join(PLANE)}, with exact edges"
-    if found.is_sampled or found.regions is None:
-        plane = "further delay and a factor on its law, with exact edges"
+def _comparison_section(found: Comparison) -> PageSection:
+    """The picture of a comparison, and its tables."""
     picture = Picture(
-        stem="comparison", title=f"{upper(curves)} and stable region", alt=f"{found.verdict}.",
-        caption=f"The {curves} of both over frequency, and where each loop is stable over {plane}; the points are the "
-        "laws.",
-        figure=comparison.figure(found),
+        stem="comparison", title="Frequency response and stability region", alt=f"{found.verdict}.",
+        caption=prose("compared_picture", found=found), figure=comparison.figure(found),
     )  # fmt: skip
-    yield PageSection(anchor="both", title="Both in one picture", blocks=(picture,))
-    tables = (
-        ("modes", "Natural frequencies and damping", found.mode_differences, DIFFERENCE_NOTE),
-        ("poles", "Closed-loop poles that oscillate", found.pole_differences, PAIRED_NOTE),
-        ("unpaired-poles", "Poles of one side alone", found.unpaired_poles, UNPAIRED_NOTE),
-        ("margins", "Stability and margins", found.margin_differences, DIFFERENCE_NOTE),
-    )
-    for stem, title, rows, caption in tables:
-        if rows:
-            blocks = (table(rows, stem=f"compare-{stem}", title=title, caption=caption),)
-            yield PageSection(anchor=stem, title=title, blocks=blocks)
+    quantities_of = quantities(type(found)).items()
+    rows = ((of, getattr(found, name)) for name, of in quantities_of if of.label and name != "is_sampled")
+    tables = [
+        table(each, stem=f"compare-{of.key}", title=upper(of.label), caption=prose("compared", key=of.key))
+        for of, each in rows if each
+    ]  # fmt: skip
+    return PageSection(anchor="compared", title="Compared", words=[prose("comparison", found=found)],
+                       blocks=[tables[0], picture, *tables[1:]])  # fmt: skip
+
+
+README_DOTS = 100  # an inch: pictures of a README are shown at their own size
+README_MODES = 4  # shapes: two rows
+
+
+def readme_pictures(out: Path) -> tuple[Path, ...]:
+    """Write bode-root-moment.png, gains.png and mode-shapes.png to the folder `out`; their paths.
+
+    Torque to root moment with and without damping, the gains that keep the loop stable, and the first mode shapes.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    lab, undamped = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
+    band, labels = resonant_band(lab, 6), ("exact, no damping", f"exact, damping C = {plain(lab.damping)} s")
+    main, other = (bode(arm, "root_moment", band) for arm in (undamped, lab))
+    figures = {
+        "bode-root-moment": draw_compared(main, other, labels),
+        "gains": draw_overlay(stable_regions(lab, default_gains(lab), load_chain(lab.name))),
+        "mode-shapes": modes.figure(tfarm.modes(lab, count=README_MODES)),
+    }
+    for stem, figure in figures.items():
+        save_figure(figure, out, stem, formats=("png",), dpi=README_DOTS)
+    return tuple(out / f"{stem}.png" for stem in figures)

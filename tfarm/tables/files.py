@@ -77,7 +77,7 @@ def _csv_cell(value: Any) -> str:
 
 
 def write_csv(table: Table, path: Path) -> None:
-    """A command's table to the file asked for, written beside and then renamed."""
+    """A command's table to the file asked for, in one step."""
     write_file(path, as_csv(table, units=True).encode(), key="--csv")
 
 

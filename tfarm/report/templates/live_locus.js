@@ -1,4 +1,4 @@
-// The locus of one gain: poles followed along it, the gain halved until no line turns by more than 5 degrees and every pole is told.
+// The locus of one gain: poles followed along it, the gain halved until no line turns by more than 5 degrees and every pole is distinct.
 "use strict";
 const STEPS = 24, FINEST = 1 / (STEPS * 4096), MOST = 600; // of the gain: its first steps, the shortest, as a share of its way, and values at most
 const LONG = 16, PIXEL = 1, TURN = 5 * Math.PI / 180; // pixels: a pole goes no further at a step; what is shorter has no corner that is seen

@@ -107,7 +107,7 @@ class LiveLoop {
   // The intervals of K2 from low to high in which no pole of the band is unstable, and beyond it not every mode is driven
   intervals(K1, Kp, low, high) {
     const at = t => low + t * (high - low), from = { K1, K2: low, Kp }, found = this.crossings(from, { K1, K2: high, Kp }).sort((a, b) => a.t - b.t);
-    const driven = this.told && this.hub_alone && this.kind === "band", end = driven && K1 + this.rate_loss > 0 ? this.whole : Infinity;
+    const driven = this.by_sign && this.hub_alone && this.kind === "band", end = driven && K1 + this.rate_loss > 0 ? this.whole : Infinity;
     const rows = [];
     let n = this.count(from), begin = n ? null : 0;
     for (const { t, change } of [...found, { t: 1, change: 0 }]) {
@@ -132,7 +132,7 @@ class LiveLoop {
     const n = Math.max(this.count(law), seen); // poles that came from beyond the band are seen alone
     if (n > 0) return ["unstable", `${n} unstable pole${n > 1 ? "s" : ""} up to ${band}`];
     if (this.kind === "quiet") return ["stable", this.beyond];
-    const takes = this.told ? Math.sign(K1 + this.rate_loss) * Math.sign(1 - K2 / this.whole) : 0;
+    const takes = this.by_sign ? Math.sign(K1 + this.rate_loss) * Math.sign(1 - K2 / this.whole) : 0;
     if (takes < 0 && this.hub_alone) return ["unstable", "C = 0: every mode beyond the band is driven"];
     return takes > 0 ? ["stable", this.beyond] : ["stable in the band", `no unstable pole up to ${band}; beyond it nothing is known`];
   }
@@ -271,7 +271,7 @@ function zerosOfSeries(f, near = null) {
   return warm && settled.includes(false) ? zerosOfSeries(f) : z;
 }
 
-// A number in at most so many digits, as `tfarm` prints it (Python's format %g)
+// A number in a few digits at most, as `tfarm` prints it (Python's format %g)
 function general(x, digits) {
   if (!Number.isFinite(x)) return x > 0 ? "inf" : x < 0 ? "-inf" : "nan";
   const power = x === 0 ? 0 : +x.toExponential(digits - 1).split("e")[1];

@@ -64,7 +64,7 @@
   const STACKED = { bode: 580, slew: 520 }; // pixels of charts that are several, one below the other
   function room(name) {
     const wide = Math.max($(name).clientWidth - 70, 200);
-    if (name === "sensor") return [Math.min(wide - 40, 420), Math.min(wide, 340)]; // names stand beside it
+    if (name === "sensor") return [Math.min(wide - 40, 420), Math.min(wide, 340)]; // names are at its side
     return STACKED[name] ? [wide, 0] : name === "zplane" ? [Math.min(wide, 340), Math.min(wide, 340)] : [Math.min(wide, 420), Math.min(wide, 340)];
   }
   function fit(name) {
@@ -152,7 +152,7 @@
   // What the margins up to the band say of the whole infinite-dimensional loop: `tfarm.loop.margins.margins`
   function whole() {
     if (loop.kind === "quiet") return "Beyond the band nothing comes nearer to −1: these margins are those of the whole loop.";
-    if (loop.kind !== "reactive" || !loop.told) return "Of the whole loop they are not known.";
+    if (loop.kind !== "reactive" || !loop.by_sign) return "Of the whole loop they are not known.";
     return law.K2 ? "Of the whole loop, whose undamped modes have no end, delay and disk margin are 0 and the peaks infinite." : "Of the whole loop, whose undamped modes have no end, the delay margin is 0; the others hold.";
   }
 

@@ -104,7 +104,7 @@ function makePlayer(slew, colours, first) {
   still.addEventListener("change", heed);
   addEventListener("resize", () => go(t));
   heed();
-  t = 0.4 * slew.rise; // a bent arm tells more than one at rest
+  t = 0.4 * slew.rise; // a bent arm shows more than one at rest
   show(first);
   return { show, go, play, pause, place: chart => { view = chart; mark(); }, get time() { return t; }, get playing() { return playing; } };
 }

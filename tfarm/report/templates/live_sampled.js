@@ -1,6 +1,6 @@
 // The sampled loop of any gains, and its slew, from the poles and residues of the modal plant: tfarm.dsp.sampling, loop, simulate.
 "use strict";
-const FAINT = 0.2; // a pole nearer to z = 0 decides nothing, and where many gather there none is told from the others
+const FAINT = 0.2; // a pole nearer to z = 0 decides nothing, and where many gather there none is distinct
 const doubles = packed => new Float64Array(Uint8Array.from(atob(packed), c => c.charCodeAt(0)).buffer);
 const exp = a => times(Math.exp(a[0]), [Math.cos(a[1]), Math.sin(a[1])]), pair = (v, i) => [v[2 * i], v[2 * i + 1]];
 // (e^{pt} - 1)/p, without loss where p t is small

@@ -12,7 +12,7 @@ function gainAt(axis, share, digits = 4) {
   return +(axis.linear === null ? y : Math.sign(y) * axis.linear * Math.expm1(Math.abs(y))).toPrecision(digits);
 }
 
-// The curve over w: points that would not be told apart left out, others put in where L turns (`fine`); it begins at the frequency `from`
+// The curve over w: points too near to each other left out, others put in where L turns (`fine`); it begins at the frequency `from`
 function curveOf(loop, law, points, fine, from) {
   const rows = [], small = L => times(1 / (1 + size(L)), L), apart = fine ? 2e-5 : 1e-3;
   let branch = 0, last = null;
