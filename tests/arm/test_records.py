@@ -197,7 +197,7 @@ def test_names_that_only_look_so(name):
     assert replace(ARM, name=name).name == name
 
 
-@pytest.mark.parametrize(("name", "value"), [("damping", 1e-4), ("length", 2.0)])
+@pytest.mark.parametrize(("name", "value"), [("damping", 1e-4), ("length", 2.0), ("hub_inertia", 0.3)])
 def test_an_arm_with_another_number_is_the_same_but_for_it(name: str, value: float) -> None:
     arm = tfarm.load("sasaki2012-lab")
     other = arm.having(**{name: value})
