@@ -177,7 +177,7 @@ def test_assumptions_become_a_tuple_of_single_lines():
     assert replace(ARM, assumptions=["two\n  lines", "one"]).assumptions == ("two lines", "one")
 
 
-@pytest.mark.parametrize(("name", "value"), [("damping", 1e-4), ("length", 2.0)])
+@pytest.mark.parametrize(("name", "value"), [("damping", 1e-4), ("length", 2.0), ("hub_inertia", 0.3)])
 def test_an_arm_with_another_number_is_the_same_but_for_it(name: str, value: float) -> None:
     arm = tfarm.load("sasaki2012-lab")
     other = arm.having(**{name: value})

@@ -132,6 +132,21 @@ class Arm:
         return math.fsum(link.rhoA * link.length for link in self.links)
 
     @property
+    def payload_mass(self) -> float:
+        """m [kg], at the tip; inf where that is pinned."""
+        return self.payload.mass
+
+    @property
+    def payload_inertia(self) -> float:
+        """I_c [kg m^2], about the payload's own centre of mass."""
+        return self.payload.inertia
+
+    @property
+    def hub_inertia(self) -> float:
+        """I_h [kg m^2]."""
+        return self.hub.inertia
+
+    @property
     def damping(self) -> float:
         """C [s] of the bending moment E I (1 + C s); of several segments the largest."""
         return max(link.damping for link in self.links)

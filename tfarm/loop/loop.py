@@ -75,7 +75,7 @@ class Loop:
             object.__setattr__(self, "arm", replace(self.arm, input=law.input))  # type: ignore[arg-type]
         if self.arm.is_locked:
             remedy = "a locked hub (inertia = inf) has no loop: give the hub a finite inertia"
-            raise ParameterError(key="hub.inertia", value=self.arm.hub.inertia, remedy=remedy)
+            raise ParameterError(key="hub.inertia", value=self.arm.hub_inertia, remedy=remedy)
         if law.is_discrete:
             remedy = "a law in z has a sampled loop: ask for that, or leave the period out of a law in s"
             raise ParameterError(key="period", value=law.period, remedy=remedy)
@@ -140,7 +140,7 @@ class Loop:
         arm, gains = self.arm, self.gains
         J = arm.turned_inertia - gains.K2 * arm.gauged_inertia
         if arm.is_uniform:  # to the last digit: I_h and (1 - K2) (J - I_h) may cancel
-            J = arm.hub.inertia + (1.0 - gains.K2) * arm.carried_inertia
+            J = arm.hub_inertia + (1.0 - gains.K2) * arm.carried_inertia
         return gains.Kp, gains.K1 + arm.rate_loss, J
 
     @property

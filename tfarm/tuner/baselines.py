@@ -254,7 +254,7 @@ def tried_loops(arm: Arm, chain: Chain, quantised: Chain | None = None) -> list[
         NamedLoop(late, arm, replace(chain, sampling=sampling)),
         NamedLoop(f"quantised, {late}", arm, replace(quantised, sampling=sampling)),
     ]
-    mass, own = arm.payload.mass, arm.damping
+    mass, own = arm.payload_mass, arm.damping
     masses = [share * mass for share in PAYLOAD_SHARES] if mass else [share * arm.own_mass for share in ADDED_MASSES]
     payloads = [float(f"{each:.2g}") for each in masses]
     if own:
@@ -262,7 +262,7 @@ def tried_loops(arm: Arm, chain: Chain, quantised: Chain | None = None) -> list[
     else:
         dampings = [float(f"{2 * zeta / first_frequency(arm):.1g}") for zeta in GIVEN_RATIOS]
     others = {f"payload {each:g} kg": arm.having(payload_mass=each) for each in payloads}
-    others |= {f"hub {share - 1:+.0%}": arm.having(hub_inertia=share * arm.hub.inertia) for share in HUB_SHARES}
+    others |= {f"hub {share - 1:+.0%}": arm.having(hub_inertia=share * arm.hub_inertia) for share in HUB_SHARES}
     others |= {f"C = {C:g} s": arm.having(damping=C) for C in dampings}
     return listed + [NamedLoop(name, other, chain) for name, other in others.items()]
 
