@@ -31,7 +31,7 @@ def test_pictures_load_matplotlib_where_they_are_asked_for_and_pyplot_for_figure
     """
     code = "import tfarm; from matplotlib.figure import Figure as F; arm = tfarm.load('sasaki2012');"
     sketched, with_pages = loaded_after(
-        f"{code} tfarm.plots.shapes(arm, ax=F().subplots())", "import tfarm.report.writing"
+        f"{code} tfarm.plots.sketch(arm, ax=F().subplots())", "import tfarm.report.writing"
     )
     assert "matplotlib" in sketched
     assert not {"matplotlib.pyplot", "control", "sympy"} & sketched

@@ -120,7 +120,7 @@ def test_of_one_arm_the_answer_says_as_much_and_keeps_the_bounds_given(capsys):
     ("arguments", "told"),
     [
         (["--range", "payload.mas=0.1,0.5"], "payload.mass"),
-        (["--range", "payload.mass=0.5,0.1"], "the lower first"),
+        (["--range", "payload.mass=0.5,0.1"], "the lower number first"),
         (["--range", "payload.mass=-1,0.1"], "a payload mass is zero, positive"),
         (["--range", "motor.resistance=1,2"], "known are"),
         ([f"--range=payload.{n}=0.1,0.2" for n in ("mass", "inertia", "offset")] + ["--range=hub.radius=0,1",
