@@ -19,6 +19,6 @@ def test_every_text_has_one_place_that_asks_for_it():
 
 def test_line_breaks_of_a_text_are_spaces():
     assert prose("spill", found="the loop is stable") == (
-        "Models of few flexible modes under the same law: the number of unstable poles, and the rightmost. "
+        "Models of few flexible modes under the same controller: the number of unstable poles, and the rightmost. "
         "The loop is stable."
     )

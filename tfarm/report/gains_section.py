@@ -228,8 +228,8 @@ def locus_section(case: Case) -> PageSection:
 def _first_unstable(name: str, data: Loci) -> Fact:
     """The value at which the first branch becomes unstable."""
     values = [each.gain for each in data.exact.crossings if each.direction == "unstable"]
-    value = significant(min(values), 6) if values else "none drawn"
-    return Fact(label=f"a branch becomes unstable at {name}", value=value, unit=data.unit * bool(values))
+    value = significant(min(values), 6) if values else "none in the range"
+    return Fact(label=f"first instability along {name}", value=value, unit=data.unit * bool(values))
 
 
 def locus_blocks(data: Loci) -> Iterator[Picture | Table]:

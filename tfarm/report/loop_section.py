@@ -189,13 +189,13 @@ def law_section(case: Case) -> PageSection:
     entries = [entry for each in named for entry in entries_of(each)]
     blocks = [table(entries, stem="law-entries", title="Transfer function from each signal", caption=prose("entries"))]
     blocks += [matrices for each in named for matrices in matrices_tables(each)]
-    return PageSection(anchor="law", title="The law" if len(named) == 1 else "The laws", words=words, blocks=blocks)
+    return PageSection(anchor="law", title="The controller" if len(named) == 1 else "The controllers", words=words, blocks=blocks)
 
 
 class Entry(NamedTuple):
     """A signal of a law: how it enters, and its numerator and denominator in descending powers."""
 
-    law: Annotated[str, Quantity("law")]
+    law: Annotated[str, Quantity("controller")]
     signal: Annotated[str, Quantity("signal")]
     unit: Annotated[str, Quantity("unit")]
     enters: Annotated[str, Quantity("enters")]

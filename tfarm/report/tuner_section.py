@@ -168,10 +168,10 @@ def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
     late = tuning.shaped_delays
     shaped = [f"{kind} {significant(cost, 2)}, {significant(1e3 * late[kind], 3)} ms later"
               for kind, cost in tuning.shaped_costs.items() if late[kind]]  # fmt: skip
-    certainty = "proven stable" if guard.is_proven else f"proven for the first {guard.modes_used} modes"
+    certainty = "certified stable" if guard.is_proven else f"certified for the first {guard.modes_used} modes"
     return (
-        Fact(label="does tuning beat a constant gain?", note=f"median of {final.size} seeds",
-             value=f"by {significant(gain, 2)} %" if gain > 100 * SAME_COST else "no"),
+        Fact(label="tuner against the best constant gain", note=f"median of {final.size} seeds",
+             value=f"{significant(gain, 2)} % less cost" if gain > 100 * SAME_COST else "no improvement"),
         Fact(label="cost without moment feedback", value=significant(tuning.without.cost, 4)),
         Fact(label="best constant gain", value=significant(tuning.best_constant.cost, 4),
              note=f"{MOMENT_GAIN} = {significant(tuning.best_constant.gain, 3)}"),
@@ -180,7 +180,7 @@ def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
         Fact(label="bound", value=significant(tuning.bound.cost, 4), note="linear-quadratic optimum"),
         Fact(label="input shaping", value=significant(min(tuning.shaped_costs.values()), 3),
              note="; ".join(shaped) or "no mode slow enough to shape"),
-        Fact(label="tip off its target at the end", value=tuned, unit="mm", note=f"constant gain: {constant} mm"),
+        Fact(label="tip error at the end", value=tuned, unit="mm", note=f"constant gain: {constant} mm"),
         Fact(label="guard", value=f"{guard.lo:.3f} … {guard.hi:.3f}", note=f"any K(t) in it: {certainty}"),
     )  # fmt: skip
 
