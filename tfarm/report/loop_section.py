@@ -189,7 +189,9 @@ def law_section(case: Case) -> PageSection:
     entries = [entry for each in named for entry in entries_of(each)]
     blocks = [table(entries, stem="law-entries", title="Transfer function from each signal", caption=prose("entries"))]
     blocks += [matrices for each in named for matrices in matrices_tables(each)]
-    return PageSection(anchor="law", title="The controller" if len(named) == 1 else "The controllers", words=words, blocks=blocks)
+    return PageSection(
+        anchor="law", title="The controller" if len(named) == 1 else "The controllers", words=words, blocks=blocks
+    )
 
 
 class Entry(NamedTuple):

@@ -54,7 +54,8 @@ class Piece:
     A page that it does not suit has no such section.  The page that `report --only` asks for is called by the first
     word of its sections' anchors; its `title` is that of one of them, and `is_also_on` picks the other pages of that
     kind that have the section.  The full page has all, and at its top the answers of those that have one (`is_answer`).
-    `seconds` is about how long a section takes to make, where that is long: the longest are begun first.
+    `seconds` is about how long a section takes to make, where that is long: the longest are begun first.  Sections of
+    one `task` are made one after the other in one process, as they share a design.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Piece:
     is_also_on: Callable[[str], bool] = lambda page: False
     is_answer: bool = False
     seconds: float = 0.0
+    task: str = ""
 
     @property
     def page(self) -> str:
@@ -77,6 +79,7 @@ class Piece:
 
 
 Answer = partial(Piece, is_answer=True)
+LOOP_TASK = "continuous loop"  # of the sections that have the gains of best damping
 LOOP_PAGES = ("margins", "locus", "sampled", "tune")  # on which an arm without a loop has nothing but that it has none
 OF_LAWS = (*LOOP_PAGES, "law", "no")  # first words of the sections that a page about laws begins with
 
@@ -93,7 +96,7 @@ def _of_gains(case: Case) -> bool:
 
 PIECES = (
     Answer("the fit", "fit", fit_section, lambda case: case.fit),
-    Answer("map of the gains", "margins-map", map_section, _of_gains),
+    Answer("map of the gains", "margins-map", map_section, _of_gains, seconds=2.0, task=LOOP_TASK),
     Piece("the arm", "arm", arm_section, is_also_on=lambda page: True),
     Piece("the paper's values", "paper", paper_section, lambda case: is_from_paper(case.arm)),
     Piece("root moment", "bode-root-moment", partial(bode_section, output="root_moment"), title="Bode plots"),
@@ -101,9 +104,9 @@ PIECES = (
     Piece("measured responses", "bode-measured", measured_section, lambda case: case.measured),
     Piece("modes", "modes", modes_section, title="Modes", seconds=1.0),
     Answer("no loop", "no-loop", no_loop_section, lambda case: not case.has_loop, is_also_on=LOOP_PAGES.__contains__),
-    Answer("margins", "margins", margins_section, _in_s, "Gains and margins"),
-    Answer("root loci", "locus", locus_section, _in_s, "Root loci", seconds=2.0),
-    Piece("Nyquist", "margins-nyquist", nyquist_section, _in_s),
+    Answer("margins", "margins", margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
+    Answer("root loci", "locus", locus_section, _in_s, "Root loci", seconds=7.0, task=LOOP_TASK),
+    Piece("Nyquist", "margins-nyquist", nyquist_section, _in_s, task=LOOP_TASK),
     Answer("sampled loop", "sampled", sampled_section, lambda case: case.has_loop, "The sampled loop", seconds=8.0),
     Answer("the law", "law", law_section, lambda case: case.laws and not case.arm.is_locked,
            is_also_on=LOOP_PAGES.__contains__),

@@ -30,6 +30,7 @@ from tfarm.report.page import (
     COMPARISON_KIND,
     COMPARISON_PAGE,
     QUESTIONS,
+    Piece,
     arm_page,
     file_of,
     index_page,
@@ -72,18 +73,25 @@ def make_all(
     work: dict[str, Callable[[], Any]] = {} if only else {EVIDENCE: gather}
     if scripts is not None:
         work[SCRIPTS] = partial(write_assets, scripts)
-    pages: list[list[str]] = []
+    seconds: dict[str, float] = {}
+    pages: list[list[tuple[str, str]]] = []
     for case, folder in zip(cases, folders, strict=True):
         of = f"{case.arm.name}: "
         pieces = [piece for piece in pieces_of(case) if not only or any(map(piece.is_on, only))]
-        pages.append([of + piece.name for piece in pieces])
-        for piece in sorted(pieces, key=lambda piece: -piece.seconds):  # the longest first
-            work[of + piece.name] = partial(make_section, piece.name, piece.anchor, piece.make, case, folder)
+        pages.append([(of + (piece.task or piece.name), piece.anchor) for piece in pieces])
+        tasks: dict[str, list[Piece]] = {}
+        for piece in pieces:
+            tasks.setdefault(piece.task or piece.name, []).append(piece)
+        for task, parts in tasks.items():
+            makers = [(piece.name, piece.anchor, piece.make) for piece in parts]
+            work[of + task] = partial(make_sections, makers, case, folder)
+            seconds[of + task] = sum(piece.seconds for piece in parts)
         if not only and is_live(case):
             work[f"{of}live loop"] = partial(save_live, case, folder)
         work[f"{of}card"] = partial(save_card, case, folder)
         if not (only and case.laws):
             work[f"{of}proof"] = partial(save_proof, case.arm, folder, case.chain)
+    work = dict(sorted(work.items(), key=lambda each: -seconds.get(each[0], 0.0)))  # the longest first
     done: dict[str, Any] = {}
 
     def begun(running: Sequence[str]) -> None:
@@ -99,7 +107,15 @@ def make_all(
         for task, result in shared(work, MOST_WORKERS, [__name__], begun):
             done[task] = result  # noqa: PERF403  `begun` counts them meanwhile
     begun(())
-    return [[done[task] for task in page] for page in pages], done.get(EVIDENCE)
+    return [[done[task][anchor] for task, anchor in page] for page in pages], done.get(EVIDENCE)
+
+
+Maker = tuple[str, str, Callable[[Case], PageSection]]  # a section's name, its anchor, and how to make it of a case
+
+
+def make_sections(makers: Sequence[Maker], case: Case, folder: Path) -> dict[str, SavedSection]:
+    """Sections by anchor, made one after the other."""
+    return {maker[1]: make_section(*maker, case, folder) for maker in makers}
 
 
 def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], case: Case, folder: Path) -> SavedSection:
