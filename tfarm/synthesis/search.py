@@ -21,7 +21,7 @@ from tfarm.synthesis.worst_case import Tell
 
 POINTS_LOG2 = 11  # of the number of points
 STARTS_EACH = 12  # strategies for each coefficient, from the best of them
-HOPS, HOPS_EACH, HOP_POINTS = 1, 4, 256  # searches near the best of more than two, strategies each, and points
+HOPS, HOPS_EACH, HOP_POINTS = 1, 8, 1024  # searches near the best of more than two, strategies each, and points
 CANDIDATES = 4  # laws for the exact verdicts, the best first
 BEYOND = 4.0  # of x: reach of a search beyond its bounds, a factor e^4 of a coefficient far above its unit
 APART = 0.02  # of the range of x: least distance of two starts
