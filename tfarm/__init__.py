@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from tfarm.synthesis.design import design
     from tfarm.tuner import tune
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 __all__ = [
     "Arm",
