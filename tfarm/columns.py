@@ -17,7 +17,8 @@ class Column:
     """One quantity: `key` in JSON and files (with the unit, as omega_rad_s), `title` and `unit` where a person reads.
 
     `of` are its values, `digits` makes cells of them; where that is not enough, `shown` are the cells.  `tint` is a
-    background colour a cell; on a narrow terminal a column that `folds` is folded.
+    background colour a cell; on a narrow terminal a column that `folds` is folded.  `help` is the meaning of the
+    quantity, `helps` one a cell: tooltips of a page.
     """
 
     key: str
@@ -28,6 +29,8 @@ class Column:
     shown: Sequence[str] | None = None
     tint: Sequence[str] = ()
     folds: bool = False
+    help: str = ""
+    helps: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "of", self.of.tolist() if hasattr(self.of, "tolist") else list(self.of))

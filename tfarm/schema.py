@@ -160,7 +160,8 @@ def _values(rows: Any, name: str) -> list[Any]:
 def _column(of: Quantity, values: Sequence[Any]) -> Column:
     cells = [NO_VALUE if isinstance(value, list | tuple) and not value else text(value, of.digits) for value in values]
     folds = max(map(len, cells), default=0) > LONGEST_LINE
-    return Column(of.key, of.label, of.unit, of=list(map(to_json_value, values)), shown=cells, folds=folds)
+    return Column(of.key, of.label, of.unit, of=list(map(to_json_value, values)), shown=cells, folds=folds,
+                  help=of.help)  # fmt: skip
 
 
 def across(
@@ -171,7 +172,8 @@ def across(
     every = dict.fromkeys(label for each in found for label in each)
     labels = [label for label in every if any(str(each[label][1]) not in EMPTY for each in found if label in each)]
     units = [next(each[label][0].unit for each in found if label in each) for label in labels]
-    columns = [Column("quantity", "quantity", of=labels), Column("unit", "unit", of=units)]
+    helps = [next(each[label][0].help for each in found if label in each) for label in labels]
+    columns = [Column("quantity", "quantity", of=labels, helps=helps), Column("unit", "unit", of=units)]
     for key, name, each in zip(keys or records, records, found, strict=True):
         pairs = [each.get(label, (Quantity(), None)) for label in labels]
         values = [to_json_value(value.value if isinstance(value, At) and value.omega is None else value)

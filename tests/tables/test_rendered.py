@@ -9,9 +9,13 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from markupsafe import escape
 
+import tfarm
 from tfarm.columns import Column, Table
 from tfarm.digits import lined, significant, singly
+from tfarm.loop.margins import LoopMargins
+from tfarm.schema import across, quantities
 from tfarm.tables.files import as_csv, as_json, save_table, to_json
 from tfarm.tables.html import as_html, with_symbols
 
@@ -131,3 +135,19 @@ def test_a_report_s_table_has_two_files(table, tmp_path):
 )
 def test_texts_of_files_have_their_powers_of_ten_set(text, shown):
     assert with_symbols(text) == shown
+
+
+def test_the_meaning_of_a_quantity_is_a_tooltip_of_its_heading_or_of_its_cell():
+    meanings = ("the first & <lowest>", "")
+    parsed = Parsed(as_html(Table(columns=(
+        Column("omega", "frequency", "rad/s", of=[1.0, 2.0], help="natural <frequency>"),
+        Column("quantity", "quantity", of=["a", "b"], helps=meanings),
+    ))))  # fmt: skip
+    titles = [each.get("title") for row in parsed.attributes for each in row]
+    assert [each for each in titles if each] == ["natural <frequency>", "the first & <lowest>"]
+
+
+def test_declared_meanings_come_to_the_tables_of_records():
+    damped = tfarm.load("sasaki2012-lab")
+    page = as_html(across({"one": tfarm.margins(damped, tfarm.HubFeedback(K1=0.3, K2=0.3)).in_band}))
+    assert f'title="{escape(quantities(LoopMargins)["delay_margin"].help)}"' in page

@@ -34,20 +34,27 @@ def _column(column: Column) -> list[Markup]:
     text, tinted, cells = "text" * column.is_text, " tinted" * bool(column.tint), column.cells
     of = Markup('<span class="unit">{}</span>').format(unit(column.unit)) if column.unit else ""
     tag, scope = ("th", Markup(' scope="col"')) if column.title else ("td", "")
-    shape = Markup('<{0}{1} class="{2}{3}" data-key="{4}">{5}{6}</{0}>')
-    head = shape.format(tag, scope, text, tinted, column.key, with_symbols(column.title), of)
+    shape = Markup('<{0}{1} class="{2}{3}" data-key="{4}"{5}>{6}{7}</{0}>')
+    head = shape.format(tag, scope, text, tinted, column.key, _tooltip(column.help), with_symbols(column.title), of)
     styles = (
         Markup(' style="background:{}"').format(tint) if tint else "" for tint in column.tint or [""] * len(cells)
     )
     label = f"{column.title} [{column.unit}]" if column.unit else column.title
-    cell = Markup('<td class="{}{}{}" data-label="{}"{}>{}</td>')
+    cell = Markup('<td class="{}{}{}" data-label="{}"{}{}>{}</td>')
+    helps = column.helps or [""] * len(cells)
     return [
         head,
         *(
-            cell.format(text, " wide" * (len(words) > WIDE_CELL), tinted, label, style, with_symbols(words))
-            for words, style in zip(cells, styles, strict=True)
+            cell.format(
+                text, " wide" * (len(words) > WIDE_CELL), tinted, label, style, _tooltip(meaning), with_symbols(words)
+            )
+            for words, style, meaning in zip(cells, styles, helps, strict=True)
         ),
     ]
+
+
+def _tooltip(meaning: str) -> Markup:
+    return Markup(' title="{}"').format(meaning) if meaning else Markup()
 
 
 def with_symbols(text: str) -> Markup:
