@@ -10,7 +10,7 @@ import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, sampled_loop
-from tfarm.dsp.modes import STRONGER, mode_table, sampled_loci, sampled_locus
+from tfarm.dsp.modes import STRONGER, dominant, mode_table, sampled_loci, sampled_locus
 from tfarm.errors import ParameterError
 
 pytestmark = pytest.mark.kernels
@@ -206,3 +206,15 @@ def test_a_branch_is_named_after_the_mode_whose_pole_it_leaves(found):
     for number, pair in zip(range(1, 7), eigenvalues[-6:], strict=True):
         mine = np.sort_complex(start[mode == number])
         np.testing.assert_allclose(mine, np.sort_complex(np.exp(pair * 0.01)), rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("K2", "named", "nameless"), [(0.3, "the hub", "the hub"), (1.4, "mode 1", "an unassigned mode")]
+)
+def test_the_dominant_pole_has_the_name_of_its_mode_or_none(K2, named, nameless):
+    """A pole that rings is none of the hub's, whether its mode is known or not."""
+    loop = sampled_loop(tfarm.load("sasaki2012-lab"), HubFeedback(K1=0.3, K2=K2))
+    assert dominant(loop) == named
+    without = replace(loop)
+    vars(without)["plant"] = replace(loop.plant, mode=0 * loop.plant.mode)
+    assert dominant(without) == nameless

@@ -142,12 +142,15 @@ def origins(loop: Sampled) -> NDArray[np.int64]:
 
 
 def dominant(loop: Sampled) -> str:
-    """Origin of the pole with the largest radius: a mode, a pole of the law, or the hub (a filter, the delay)."""
+    """Origin of the pole with the largest radius: a mode, a pole of the law, or the hub (a filter, the delay).
+
+    A pole of the plant that rings and is assigned to no mode is an unassigned mode.
+    """
     origin = int(origins(loop)[loop.poles.log_radius.argmax()])
     if origin >= loop.pulse.poles.size:
         return "a pole of the law"
-    mode = 0 if origin < 0 else int(loop.pulse.mode[origin])
-    return f"mode {mode}" if mode else "the hub"
+    mode, rings = (int(loop.pulse.mode[origin]), loop.pulse.poles[origin].imag != 0) if origin >= 0 else (0, False)
+    return f"mode {mode}" if mode else "an unassigned mode" if rings else "the hub"
 
 
 def _ahead(rows: list[Complex], values: Real) -> Complex:
