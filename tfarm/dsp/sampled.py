@@ -43,7 +43,7 @@ STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 mo
 SMALLEST_LOG = -745.0  # of the smallest double: for the logarithm of 0
 OFF_POLE = 1e-17  # for an offset of 0: next to 1 that is none
 DIFFERENCE = 1e-7  # of an offset: between two points that give a slope
-MOST_STEPS = 200  # of all roots together: from four digits on two are enough, of a cluster of twelve a hundred
+MOST_STEPS, SOME_STEPS = 200, 30  # of all roots together, a cluster of twelve takes a hundred; of some of them
 LAST_STEP = 1e-12  # of the offset: below its rounding
 SETTLED, EIGENVALUE_ROUNDING = 1e-6, 1e-9  # of the offset, and beyond: one that still steps by more is put back
 UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
@@ -327,12 +327,12 @@ class Sampled:
         bright = (abs(z) > FADED_RADIUS) & (delta != 0) & (True if which is None else which)
         rows = np.flatnonzero(bright)
         if rows.size:
-            _settle(base, offset, rows, self)
+            _settle(base, offset, rows, self, MOST_STEPS if which is None else SOME_STEPS)
             moved = _nearest(self, shifts[base] + offset)
             if (rows := np.flatnonzero(bright & (moved != base))).size:  # then all digits are kept from there
                 offset[rows] += shifts[base[rows]] - shifts[moved[rows]]
                 base[rows] = moved[rows]
-                _settle(base, offset, rows, self)
+                _settle(base, offset, rows, self, MOST_STEPS if which is None else SOME_STEPS)
         at = base[bright]
         with np.errstate(divide="ignore"):
             log_radius = np.maximum(np.log(abs(z)), SMALLEST_LOG)
@@ -358,7 +358,7 @@ def _nearest(loop: Sampled, delta: Complex) -> Whole:
     return np.asarray(away.argmin(axis=1))
 
 
-def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> None:
+def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled, most: int) -> None:
     """Iterate some roots until they converge, in place: others stay where their step was shortest."""
     kept, shifts, pulse = offset.copy(), loop.open_loop, loop.pulse
     known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0)]  # of F; the others are at z = 1
@@ -366,7 +366,7 @@ def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> None:
     last, shortest = np.full((2, offset.size), np.inf)
     offset[rows] = np.where(offset[rows] == 0, OFF_POLE, offset[rows])
     with np.errstate(all="ignore"):  # a root on an open-loop pole, and one that diverges
-        for _ in range(MOST_STEPS):
+        for _ in range(most):
             b, o = base[rows], offset[rows]
             both, one = np.r_[o, o * (1 + DIFFERENCE)], shifts[b]
             f, ahead = loop.characteristic(1 + (np.r_[one, one] + both), np.r_[b, b], both).reshape(2, -1)
