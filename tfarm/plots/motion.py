@@ -82,7 +82,7 @@ def _draw_curve(curve: TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, 
         ax.plot(curve.t, low, color=colour, lw=1.3, **looks)
 
 
-def draw_beside(title: str, each: Mapping[str, RunComparison]) -> Figure:
+def draw_measured_runs(title: str, each: Mapping[str, RunComparison]) -> Figure:
     """A column a controller: hub angle above, root moment below where it was measured."""
     moment = any(found.measured.root_moment.size for found in each.values())
     grid = {"nrows": 1 + moment, "ncols": len(each), "sharex": "col", "sharey": "row", "squeeze": False}

@@ -24,7 +24,7 @@ from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.dsp.verdict import at_periods, sampled
 from tfarm.errors import ParameterError
 from tfarm.fitting.recording import RunComparison, compare_run, overshoot
-from tfarm.plots.motion import draw_beside
+from tfarm.plots.motion import draw_measured_runs
 from tfarm.plots.motion import slew as slew_plot
 from tfarm.plots.regions import StableRegions, draw_overlay, regions_table, stable_regions
 from tfarm.plots.roots import draw_sampled_loci
@@ -338,7 +338,7 @@ def measured_blocks(case: Case) -> Iterator[Picture | Table]:
         title="Measured on the rig, and computed",
         caption=prose("measured", found=found),
         alt=f"Hub angle and root moment over time, measured and computed, under {' and '.join(found)}.",
-        figure=draw_beside("Measured steps, and the exact sampled loop", found),
+        figure=draw_measured_runs("Measured steps, and the exact sampled loop", found),
         data=compared_table({each.key: found[each.name] for each, _ in runs}),
     )
     if rows := [measured_step(name, it) for name, it in found.items() if it.measured.hub_angle.size]:
