@@ -138,7 +138,8 @@ def test_bad_input_is_one_line(capsys, arguments):
 
 
 def test_an_error_out_of_reach(capsys):
-    refused(capsys, "reduce", "sasaki2012", "--error", "1.1e-14", "--method", "aaa", "--band", "1,100", code=3)
+    given = ("--error", "1.1e-14", "--method", "aaa", "--band", "1,100")
+    assert "no model of" in refused(capsys, "reduce", "sasaki2012", *given, code=3)
 
 
 def test_an_error_below_that_of_the_exact_values_is_refused_at_once(capsys):

@@ -47,6 +47,11 @@ PAPER = (
 )
 
 
+def statements_beyond_the_first(text: str) -> str:
+    """How many statements follow the first."""
+    return str(len(clauses(text)) - 1)
+
+
 def quantity(clause: str) -> tuple[str, float, Expression]:
     """Name, value and dimension of a text such as "rho = 2766.7 kg/m^3"."""
     name, _, rest = clause.partition(" = ")
@@ -246,7 +251,7 @@ TUNER_CLAIMS = (  # the learning rule, the cost, and section 5 on them
         equation="section 5: alpha_c",
         printed="alpha_c changed dynamically; alpha_c = 0.6",
         corrected="alpha_c = 0.6",
-        check=lambda text: str(len(clauses(text)) - 1),  # statements beyond the first
+        check=statements_beyond_the_first,
         evidence="Section 4 changes the momentum dynamically, by no rule; section 5 has one best value (counted).",
         doubt="The constant 0.6 is used.",
     ),
@@ -254,7 +259,7 @@ TUNER_CLAIMS = (  # the learning rule, the cost, and section 5 on them
         equation="section 5: eta_c",
         printed="eta_c of each weight its own; eta_c = 0.8",
         corrected="eta_c = 0.8",
-        check=lambda text: str(len(clauses(text)) - 1),  # statements beyond the first
+        check=statements_beyond_the_first,
         evidence="Section 4 gives each weight a learning rate of its own, section 5 has one value (counted).",
         doubt="0.8 for all weights is used.",
     ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from tfarm.columns import Column, Table
 MOST_LINES, MOST_CHARACTERS = 24, 60  # of a coarse picture
 
 
-class PlaneOfCounts:
+class PlaneOfCounts(ABC):
     """Counts of unstable poles over the plane of two numbers: `vary` names them, `x` and `y` are their values."""
 
     vary: tuple[str, str]
@@ -20,9 +21,9 @@ class PlaneOfCounts:
     y: Real
 
     @property
+    @abstractmethod
     def counts(self) -> Any:
         """Unstable poles (len(y), len(x)); infinity where they are infinitely many."""
-        raise NotImplementedError
 
     @property
     def axes(self) -> tuple[Real, Real]:

@@ -325,14 +325,14 @@ class Sampled:
         base = _nearest(self, delta)
         offset = delta - shifts[base]
         bright = (abs(z) > FADED_RADIUS) & (delta != 0) & (True if which is None else which)
-        rows = np.flatnonzero(bright)
+        rows, steps = np.flatnonzero(bright), MOST_STEPS if which is None else SOME_STEPS
         if rows.size:
-            _settle(base, offset, rows, self, MOST_STEPS if which is None else SOME_STEPS)
+            _settle(base, offset, rows, self, steps)
             moved = _nearest(self, shifts[base] + offset)
             if (rows := np.flatnonzero(bright & (moved != base))).size:  # then all digits are kept from there
                 offset[rows] += shifts[base[rows]] - shifts[moved[rows]]
                 base[rows] = moved[rows]
-                _settle(base, offset, rows, self, MOST_STEPS if which is None else SOME_STEPS)
+                _settle(base, offset, rows, self, steps)
         at = base[bright]
         with np.errstate(divide="ignore"):
             log_radius = np.maximum(np.log(abs(z)), SMALLEST_LOG)

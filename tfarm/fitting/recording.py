@@ -320,25 +320,13 @@ def frequency_response(
     count, duration = 1 + (recording.count - size) // step, size * recording.period
     averages = independent_averages(get_window(window, size), step, count)
     measured = Measured(
-        output=output,
-        input=input,
-        omega=np.asarray(2 * np.pi * lines / duration, dtype=float),
-        values=values,
-        coherence=coherence,
-        averages=max(1, math.floor(averages)),
-        source=recording.source,
-        digest=recording.digest,
-    )
+        output=output, input=input, omega=np.asarray(2 * np.pi * lines / duration, dtype=float), values=values,
+        coherence=coherence, averages=max(1, math.floor(averages)), source=recording.source, digest=recording.digest,
+    )  # fmt: skip
     return Estimate(
-        measured=measured,
-        estimator=estimator,
-        window=window,
-        segment=duration,
-        segments=count,
-        overlap=1.0 - step / size,
-        independent=averages,
-        note=recording.note,
-    )
+        measured=measured, estimator=estimator, window=window, segment=duration, segments=count,
+        overlap=1.0 - step / size, independent=averages, note=recording.note,
+    )  # fmt: skip
 
 
 def _estimated(estimator: str, x: Real, y: Real, how: dict[str, Any]) -> tuple[NDArray[np.intp], Complex, Real]:

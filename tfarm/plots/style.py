@@ -114,6 +114,15 @@ class Drawing(Protocol):
 FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the class of a record the picture of it as a figure of its own
 
 
+def check_records(of: Sequence[tuple[Any, str]], found: Sequence[Any]) -> None:
+    """Raise ParameterError where a record, or one of several in a list or by name, is not of its class."""
+    for (kind, origin), value in zip(of, found, strict=False):
+        values = list(value.values()) if isinstance(value, Mapping) else value
+        for each in (values or [None]) if isinstance(values, list | tuple) else [values]:
+            if not isinstance(each, kind):
+                raise ParameterError(key="plot", value=each, remedy=f"give what {origin}")
+
+
 def picture(
     *of: tuple[Any, str], title: Callable[..., str], size: Any = (7.0, 5.4), rows: Sequence[float] = (1.0,),
     grid: Callable[..., Any] | None = None,
@@ -153,11 +162,7 @@ def picture(
 
         @wraps(draw)
         def shown(*found: Any, ax: Any = None, **how: Any) -> Any:
-            for (kind, origin), value in zip(of, found, strict=False):
-                values = list(value.values()) if isinstance(value, Mapping) else value
-                for each in (values or [None]) if isinstance(values, list | tuple) else [values]:
-                    if not isinstance(each, kind):
-                        raise ParameterError(key="plot", value=each, remedy=f"give what {origin}")
+            check_records(of, found)
             if ax is None:
                 from matplotlib import pyplot  # not needed, and not loaded, for a page
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import tfarm
 from tfarm.arm import Arm
@@ -70,28 +70,13 @@ def make_all(
 
     `scripts` is the folder that the live pages' scripts are made in.
     """
-    work: dict[str, Callable[[], Any]] = {} if only else {EVIDENCE: gather}
+    tasks = [] if only else [Task(EVIDENCE, gather)]
     if scripts is not None:
-        work[SCRIPTS] = partial(write_assets, scripts)
-    seconds: dict[str, float] = {}
-    pages: list[list[tuple[str, str]]] = []
-    for case, folder in zip(cases, folders, strict=True):
-        of = f"{case.arm.name}: "
-        pieces = [piece for piece in pieces_of(case) if not only or any(map(piece.is_on, only))]
-        pages.append([(of + (piece.task or piece.name), piece.anchor) for piece in pieces])
-        tasks: dict[str, list[Piece]] = {}
-        for piece in pieces:
-            tasks.setdefault(piece.task or piece.name, []).append(piece)
-        for task, parts in tasks.items():
-            makers = [(piece.name, piece.anchor, piece.make) for piece in parts]
-            work[of + task] = partial(make_sections, makers, case, folder)
-            seconds[of + task] = sum(piece.seconds for piece in parts)
-        if not only and is_live(case):
-            work[f"{of}live loop"] = partial(save_live, case, folder)
-        work[f"{of}card"] = partial(save_card, case, folder)
-        if not (only and case.laws):
-            work[f"{of}proof"] = partial(save_proof, case.arm, folder, case.chain)
-    work = dict(sorted(work.items(), key=lambda each: -seconds.get(each[0], 0.0)))  # the longest first
+        tasks.append(Task(SCRIPTS, partial(write_assets, scripts)))
+    pages = [[piece for piece in pieces_of(case) if not only or any(map(piece.is_on, only))] for case in cases]
+    for case, folder, pieces in zip(cases, folders, pages, strict=True):
+        tasks += tasks_of(case, folder, pieces, is_whole=not only)
+    work = {task.name: task.call for task in sorted(tasks, key=lambda task: -task.seconds)}  # the longest first
     done: dict[str, Any] = {}
 
     def begun(running: Sequence[str]) -> None:
@@ -107,7 +92,42 @@ def make_all(
         for task, result in shared(work, MOST_WORKERS, [__name__], begun):
             done[task] = result  # noqa: PERF403  `begun` counts them meanwhile
     begun(())
-    return [[done[task][anchor] for task, anchor in page] for page in pages], done.get(EVIDENCE)
+    made = [
+        [done[task_name(case, piece)][piece.anchor] for piece in pieces]
+        for case, pieces in zip(cases, pages, strict=True)
+    ]
+    return made, done.get(EVIDENCE)
+
+
+class Task(NamedTuple):
+    """What one process makes at a time, and about how long that takes [s] where it is long."""
+
+    name: str
+    call: Callable[[], Any]
+    seconds: float = 0.0
+
+
+def task_name(case: Case, piece: Piece) -> str:
+    """The name of the task that makes a section of an arm's page."""
+    return f"{case.arm.name}: {piece.task or piece.name}"
+
+
+def tasks_of(case: Case, folder: Path, pieces: Sequence[Piece], *, is_whole: bool) -> list[Task]:
+    """The tasks of one arm: its sections, its card and proof, and of a full report its live page."""
+    of, tasks = f"{case.arm.name}: ", []
+    together: dict[str, list[Piece]] = {}
+    for piece in pieces:
+        together.setdefault(task_name(case, piece), []).append(piece)
+    for name, parts in together.items():
+        makers = [(piece.name, piece.anchor, piece.make) for piece in parts]
+        seconds = sum(piece.seconds for piece in parts)
+        tasks.append(Task(name, partial(make_sections, makers, case, folder), seconds))
+    if is_whole and is_live(case):
+        tasks.append(Task(f"{of}live loop", partial(save_live, case, folder)))
+    tasks.append(Task(f"{of}card", partial(save_card, case, folder)))
+    if is_whole or not case.laws:
+        tasks.append(Task(f"{of}proof", partial(save_proof, case.arm, folder, case.chain)))
+    return tasks
 
 
 Maker = tuple[str, str, Callable[[Case], PageSection]]  # a section's name, its anchor, and how to make it of a case
