@@ -49,8 +49,9 @@ def test_a_message_to_a_closed_stream_goes_nowhere_else(command):
     assert shell(command) == (2, b"", "")
 
 
-def test_a_reader_that_leaves_is_silence():
-    code, _, err = shell("tfarm response sasaki2012 --output hub_rate | true; exit ${PIPESTATUS[0]}")
+@pytest.mark.parametrize("command", ["response sasaki2012 --output hub_rate", "margins --help"])
+def test_a_reader_that_leaves_is_silence(command):
+    code, _, err = shell(f"tfarm {command} | true; exit ${{PIPESTATUS[0]}}")
     assert (code, err) == (0, "")
 
 

@@ -91,6 +91,7 @@ def test_python_has_the_roads_beside_each_other():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (("response", "sasaki2012", "--output", "", "--omega", "1"), "output = '': known are: hub_angle"),
         (("modes", "sasaki2012", "--method", "fem"), "known are: closed-form, balls, appendix"),
         (("modes", "sasaki2012", "--theory", "shear", "--method", "appendix"), "Timoshenko beam"),
         (("modes", "sasaki2012", "--method", "balls", "--digits", "20"), "leave --method and --compare out"),

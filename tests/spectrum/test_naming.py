@@ -9,6 +9,7 @@ import tfarm
 from tests import caches
 from tests.loop.law_times import some_case
 from tfarm.errors import ConvergenceError
+from tfarm.reduced.modal import NAMING_STEPS
 from tfarm.spectrum import naming
 from tfarm.spectrum.damped import damped_modes
 from tfarm.spectrum.following import follow
@@ -109,8 +110,16 @@ def test_names_are_given_up_and_the_box_is_complete_all_the_same(monkeypatch):
 
     monkeypatch.setattr(naming.Damping, "near", counted)
     caches.empty()
-    damped = damped_modes(tfarm.modes(arm, 128))
+    damped = damped_modes(tfarm.modes(arm, 128), steps=NAMING_STEPS)
     inside = np.r_[damped.eigenvalues.ravel(), damped.single, damped.unassigned_pairs.ravel()]
-    assert len(steps) < 2 * naming.MOST_OF_LONG
+    assert len(steps) < 2 * NAMING_STEPS
     assert damped.box.holds(inside).sum() == damped.count
     assert damped.box.im_max > damped.natural_frequency[:100].max()
+
+
+def test_a_long_list_of_modes_keeps_their_names():
+    """40 modes of the lab arm with their eigenvalues, as 20 of them have: a reader's list is followed to its end."""
+    lab = tfarm.load("sasaki2012-lab")
+    long, short = (damped_modes(tfarm.modes(lab, count)) for count in (40, 20))
+    assert long.is_assigned.all()
+    np.testing.assert_allclose(long.eigenvalues[: len(short.index)], short.eigenvalues, rtol=1e-9)

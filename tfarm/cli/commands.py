@@ -170,7 +170,7 @@ def response(
     from tfarm.response import points as results
     from tfarm.tables.terminal import show
 
-    (wanted,) = outputs_on([output or "root_moment"], side)
+    (wanted,) = outputs_on(["root_moment" if output is None else output], side)
     G = tfarm.transfer(load_arm(arm, theory, driven), wanted, x=x, method=cast("Any", method), input=driven)
     if s is None and omega is None:
         check_range(start, stop)

@@ -66,7 +66,7 @@ def run(arguments: list[str]) -> int:
         message, code = str(error) or "not enough memory for this; ask for less at a time", 3
     except (TfarmError, TyperException) as error:
         message, code = usage(error), 2
-    except BrokenPipeError:  # the reader, head for instance, has left
+    except (BrokenPipeError, SystemExit):  # the reader, head for instance, has left; rich leaves with it
         discard(sys.stdout)
     except OSError as error:  # of standard output, or of a folder that compiled code is kept in
         discard(sys.stdout)

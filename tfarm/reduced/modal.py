@@ -166,6 +166,7 @@ def _from_shapes(table: Modes, wanted: Sequence[Output], k: System, x: float) ->
 
 MOST_MODELLED = 1000  # of a model: its matrices of 2000 states take 32 MB
 MOST_PROPER = 2  # power of s: r s^2/(s^2 + w^2) of a mode is bounded, and with s^3 it is not
+LARGE_MODEL, NAMING_STEPS = 40, 1_000  # modes from which on a model has no need of all names, and steps: time alone
 NEXT_TO_REST = 1e-3  # of the first frequency: a pole nearer to 0 leaves 1e-15 of itself five terms on
 
 
@@ -305,7 +306,7 @@ def _eigenvalues(arm: Arm, table: Modes) -> tuple[NDArray[np.int64], Complex, Re
             1j * np.outer(table.natural_frequency[flexible], [1, -1]),
             np.array(single_zeros(table)),
         )
-    damped = damped_modes(table)
+    damped = damped_modes(table, steps=NAMING_STEPS if len(table) > LARGE_MODEL else math.inf)
     pairs, more = damped.eigenvalues[flexible], damped.unassigned_pairs
     whole, rings = np.isfinite(pairs).all(axis=1), more[:, 0].imag > 0
     halves = pairs[~whole & np.isfinite(pairs[:, 0]), 0].real

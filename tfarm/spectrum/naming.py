@@ -26,8 +26,7 @@ NEWTON_STEPS = 8  # from a close guess: others are followed in shorter steps
 SETTLED = 1e-10  # of its size: the largest last step of a converged zero
 DECADES = 3  # of the share at a time, which scale the shortest step
 HALVINGS = (250, *[80] * 8)  # of steps, after which stray branches are lost and the others followed
-LONG_LIST = 40  # modes: longer lists are those of models, which need no names
-MOST_STEPS, MOST_OF_LONG, LATE_HALVINGS = 4_000, 1_000, 8  # after these steps stray branches are lost soon: time alone
+LATE_HALVINGS = 8  # after the steps that there are in all: roots that are stray are soon lost
 AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])  # starts next to a guess, of it
 NEAR_REAL = 1e-7  # of its size: the imaginary part of a double zero is rounding
 LOST = complex(np.nan, np.nan)
@@ -62,7 +61,7 @@ class Damping:
     k: System
     level: float
     most_halvings: int
-    steps_left: int
+    steps_left: float
 
     least_step = 1e-7
     blur = 0.0
@@ -102,17 +101,17 @@ def single_zeros(undamped: Modes, share: float = 1.0) -> list[float]:
     return turning + ([-1.0 / float(k.drive.lag)] if k.drive.lag else [])
 
 
-def named(undamped: Modes, count: int) -> tuple[Complex, Complex]:
+def named(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
     """Return the eigenvalues of `single_zeros` (m,) and of the first `count` flexible modes (count, 2), NaN if lost.
 
-    A mode has a conjugate pair, Im > 0 first, or two real ones, the slower first.
+    A mode has a conjugate pair, Im > 0 first, or two real ones, the slower first.  After so many steps those that are
+    not plain are lost.
     """
     k = undamped.system
     omega = modes(undamped.arm, count, theory=undamped.theory).natural_frequency[-count:]
     alone = single_zeros(undamped)
     if k.is_undamped:
         return np.array(alone, complex), 1j * np.outer(omega, [1, -1])
-    steps = MOST_STEPS if count <= LONG_LIST else MOST_OF_LONG
     family = Damping(k, k.damping or 1.0, HALVINGS[0], steps)
     slowest = [omega[0] / abs(each) for each in alone]
     share = FIRST_SHARE * min(1.0, 1 / (family.level * omega[-1]) if k.damping else 1.0, *slowest)
