@@ -38,7 +38,8 @@ class Quantity:
     `key` is its name in JSON and CSV, by default that of the attribute with its unit.  An entry without a label is in
     JSON alone.  A record (or dictionary) that is `flat` has its entries in the place of its own; the arrays that are a
     `curve` are of one length: columns in CSV, and not printed.  Where a number (`is_number`, by its type) has no value
-    a person reads "-", and nothing where a text or a record has none.
+    a person reads "-", and nothing where a text or a record has none.  `unit_of` is the attribute with the unit where
+    that depends on the record, or on the one whose row it is.
     """
 
     label: str = ""
@@ -49,6 +50,7 @@ class Quantity:
     flat: bool = False
     curve: bool = False
     is_number: bool = False
+    unit_of: str = ""
 
 
 class At(NamedTuple):
@@ -76,6 +78,14 @@ def _quantities(kind: Any) -> dict[str, Quantity]:
         for name, (kind, *marks) in ((name, get_args(hint) or (hint,)) for name, hint in hints.items())
         for of in marks
         if isinstance(of, Quantity)
+    }
+
+
+def declared(record: Any, parent: Any = None) -> dict[str, Quantity]:
+    """The quantities of a record, each with its unit; `parent` is the record that has it as a row."""
+    return {
+        name: replace(of, unit=getattr(record, of.unit_of, getattr(parent, of.unit_of, ""))) if of.unit_of else of
+        for name, of in quantities(type(record)).items()
     }
 
 
@@ -136,16 +146,18 @@ def _is_table(value: Any) -> bool:
 # ----------------------------------------------------------------------------------------------------------- tables
 
 
-def table(rows: Any, names: Sequence[str] = (), *, stem: str = "", title: str = "", caption: str = "") -> Table:
+def table(
+    rows: Any, names: Sequence[str] = (), *, parent: Any = None, stem: str = "", title: str = "", caption: str = ""
+) -> Table:
     """A row a record (or an entry of a record of columns), a column a quantity: those with a label, or these.
 
-    A column without any value is left out unless it is named.
+    A column without any value is left out unless it is named.  `parent` is the record that has these rows.
     """
     if not (_is_table(rows) or rows):
         return Table(columns=(), stem=stem, title=title, caption=caption)
-    declared = quantities(type(rows if _is_table(rows) else rows[0]))
-    wanted = names or [name for name, of in declared.items() if of.label]
-    found = ((declared[name], _values(rows, name)) for name in wanted)
+    each = declared(rows if _is_table(rows) else rows[0], parent)
+    wanted = names or [name for name, of in each.items() if of.label]
+    found = ((each[name], _values(rows, name)) for name in wanted)
     columns = (
         _column(of, values) for of, values in found if names or not values or any(value is not None for value in values)
     )
@@ -185,7 +197,7 @@ def across(
 
 def entries(record: Any, under: str = "") -> Iterator[tuple[str, Quantity, Any]]:
     """Label, quantity and value of what has one value, in records inside the record too."""
-    for name, of in quantities(type(record)).items():
+    for name, of in declared(record).items():
         value, label = getattr(record, name), f"{under}{of.label}"
         if hasattr(value, "as_text"):
             if of.label:
@@ -236,7 +248,7 @@ def curve_table(record: Any, *, stem: str = "", title: str = "") -> Table:
 
 def _with_flat(record: Any) -> Iterator[tuple[Any, Quantity]]:
     """Values and quantities of a record, those of records that are flat in their place."""
-    for name, of in quantities(type(record)).items():
+    for name, of in declared(record).items():
         value = getattr(record, name)
         if of.flat and is_declared(value):
             yield from _with_flat(value)
@@ -266,7 +278,7 @@ class Section:
 def sections(record: Any, title: str = "") -> list[Section]:
     """A record as a person reads it: its single values first, then its tables and the records inside it."""
     own, later = Section(title), []
-    for name, of in quantities(type(record)).items():
+    for name, of in declared(record).items():
         value = getattr(record, name)
         if of.flat and is_declared(value):
             first, *rest = sections(value)
@@ -276,20 +288,20 @@ def sections(record: Any, title: str = "") -> list[Section]:
             if of.is_number and of.label:
                 own.pairs.append((of.label, NO_VALUE))
         elif of.label:
-            later += list(_parts_of(value, of, own.pairs))
+            later += list(_parts_of(value, of, own.pairs, record))
     if hasattr(record, "drawing"):
         later.append(Section(drawing=record.drawing))
     return [own, *later]
 
 
-def _parts_of(value: Any, of: Quantity, pairs: list[tuple[str, str]]) -> Iterator[Section]:
-    """The sections of one entry; what is a single value joins the pairs instead."""
+def _parts_of(value: Any, of: Quantity, pairs: list[tuple[str, str]], parent: Any) -> Iterator[Section]:
+    """The sections of one entry of a record; what is a single value joins the pairs instead."""
     if _is_table(value):
         yield Section(of.label, table=table(value))
     elif is_declared(value) and not isinstance(value, At) and not hasattr(value, "as_text"):
         yield from sections(value, of.label)
     elif _is_list_of_records(value):
-        yield Section(of.label, table=table(value))
+        yield Section(of.label, table=table(value, parent=parent))
     elif isinstance(value, np.ndarray) and np.iscomplexobj(value) and value.size:
         yield Section(of.help or of.label, table=roots_table(value, of))
     elif shown := with_unit(value, of):

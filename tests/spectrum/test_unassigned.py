@@ -123,6 +123,8 @@ def test_tables_of_them_hold_every_eigenvalue_and_no_nan(number: int) -> None:
     assert np.isfinite(shapes[known]).all()
     assert np.isnan(shapes[~known]).all()
     assert np.isnan(damped.damping_ratio).sum() == (~damped.is_assigned).sum()
+    assert ("Damped modes: no eigenvalue" in first.caption) == (not damped.is_assigned.all())
+    assert ("Damped modes: " in first.caption) == (damped.left_out > 0 or not damped.is_assigned.all())
     locked_table(undamped)
 
 
@@ -138,8 +140,11 @@ def test_the_command_lists_them(capsys: pytest.CaptureFixture[str], proof: tuple
     inside = [each["eigenvalue"][1] > 0 for each in apart if each["eigenvalue"][0] > answer["box"][0]]
     assert answer["eigenvalues_in_box"] == sum(1 + is_pair for is_pair in inside) == 3
     assert [mode["damping_ratio"] for mode in answer["modes"]] == [None, None]
+    assert answer["damped_note"] == "no eigenvalue is assigned for certain to mode 1, 2"
     assert run(asked) == 0
-    assert re.search(r"hub friction +-9.269825", capsys.readouterr().out)
+    out = capsys.readouterr().out
+    assert re.search(r"hub friction +-9.269825", out)
+    assert re.search(rf"^damped modes +{answer['damped_note']}$", out, re.MULTILINE)
 
 
 def test_the_undamped_table_is_printed_whatever_happens_to_the_damped_one(

@@ -272,10 +272,16 @@ METHODS_AGREE = 1e-14  # relative: some tens of roundings of a float64
 class MethodRow(NamedTuple):
     """One number by several methods."""
 
-    at: Annotated[Any, Quantity("mode or s", digits=10)]
-    value: Annotated[Any, Quantity("closed form", digits=15)]
-    balls: Annotated[float | None, Quantity("difference of balls", digits=2)]
-    appendix: Annotated[float | None, Quantity("difference of the appendix", digits=2)]
+    at: Annotated[Any, Quantity("mode or s", digits=10, help="number of the mode, or the point s in 1/s")]
+    value: Annotated[Any, Quantity("closed form", digits=15, help="value of the float64 solution")]
+    balls: Annotated[
+        float | None,
+        Quantity("difference of balls", digits=2, help="relative, of ball arithmetic from the closed form"),
+    ]
+    appendix: Annotated[
+        float | None,
+        Quantity("difference of the appendix", digits=2, help="relative, of the paper's determinant in mpmath"),
+    ]
 
 
 @dataclass(frozen=True)
@@ -283,23 +289,29 @@ class MethodRow(NamedTuple):
 class ByMethod:
     """The same numbers by each method that has them (`values`), and the reason for a missing one (`left_out`)."""
 
-    values: Annotated[dict[Method, NDArray[Any]], Quantity(key="methods")]
-    left_out: Annotated[dict[Method, str], Quantity("left out")]
+    values: Annotated[dict[Method, NDArray[Any]], Quantity(key="methods", help="values of each method")]
+    left_out: Annotated[dict[Method, str], Quantity("left out", help="methods that do not apply, and why")]
 
     @property
-    def differences(self) -> Annotated[dict[Method, Real], Quantity(help="relative, from the closed form")]:
+    def differences(
+        self,
+    ) -> Annotated[dict[Method, Real], Quantity(help="relative difference of each method from the closed form")]:
         """The relative difference of each from the closed form; the absolute one where that is 0."""
         fast = self.values["closed-form"]
         size = np.where(fast == 0, 1.0, abs(fast))
         return {name: np.asarray(abs(each - fast) / size) for name, each in self.values.items() if each is not fast}
 
     @property
-    def largest_difference(self) -> Annotated[float, Quantity("maximum relative difference", digits=2)]:
+    def largest_difference(
+        self,
+    ) -> Annotated[float, Quantity("maximum relative difference", digits=2, help="largest of all methods")]:
         """The largest of the differences."""
         return max(float(each.max(initial=0.0)) for each in self.differences.values())
 
     @property
-    def finding(self) -> Annotated[str, Quantity("methods")]:
+    def finding(
+        self,
+    ) -> Annotated[str, Quantity("methods", help="methods compared, and whether they differ by rounding alone")]:
         """The agreement of the methods in words."""
         word = "agree to rounding" if self.agree else "differ by more than rounding"
         return f"{', '.join(self.values)}: {word}"

@@ -47,10 +47,10 @@ POLE_IS_MODE = 1e-6  # relative gap within which a pole of the model is a mode o
 class Channel(NamedTuple):
     """An output of a reduced model: its largest error over the range, and the frequency of that."""
 
-    output: Annotated[str, Quantity("output")]
-    unit: Annotated[str, Quantity("unit")]
-    error: Annotated[float, Quantity("worst error", digits=3)]
-    worst_at: Annotated[float, Quantity("at", "rad/s")]
+    output: Annotated[str, Quantity("output", help="output of the model")]
+    unit: Annotated[str, Quantity("unit", help="SI unit of the output")]
+    error: Annotated[float, Quantity("worst error", digits=3, help="largest relative error in the range")]
+    worst_at: Annotated[float, Quantity("at", "rad/s", help="frequency of the worst error")]
 
 
 @dataclass(frozen=True)
@@ -65,33 +65,42 @@ class ReducedModel:
     """
 
     model: PartialFractions
-    method: Annotated[Reduction, Quantity("method")]
-    band: Annotated[tuple[float, float], Quantity("frequency range", "rad/s", key="range_rad_s")]
+    method: Annotated[Reduction, Quantity("method", help="truncated modal series, or rational approximation (AAA)")]
+    band: Annotated[
+        tuple[float, float], Quantity("frequency range", "rad/s", help="in which the error is known", key="range_rad_s")
+    ]
     errors: Real
     worst_at: Real
-    first_mode_lacking: Annotated[int, Quantity("first mode missing")]
-    lacking_frequency: Annotated[float, Quantity("its frequency", "rad/s", 10, key="first_mode_lacking_rad_s")]
-    note: Annotated[str, Quantity("note")] = ""
+    first_mode_lacking: Annotated[
+        int, Quantity("first mode missing", help="first flexible mode of the arm without a pole of the model")
+    ]
+    lacking_frequency: Annotated[
+        float,
+        Quantity(
+            "its frequency", "rad/s", 10, "natural frequency of that mode, undamped", key="first_mode_lacking_rad_s"
+        ),
+    ]
+    note: Annotated[str, Quantity("note", help="deviation from the requested order or method")] = ""
 
     @property
-    def arm_name(self) -> Annotated[str, Quantity("arm", key="arm")]:
+    def arm_name(self) -> Annotated[str, Quantity("arm", help="name of the arm", key="arm")]:
         """The name of the arm."""
         return self.arm.name
 
     @property
-    def error_norm(self) -> Annotated[str, Quantity("error norm")]:
+    def error_norm(self) -> Annotated[str, Quantity("error norm", help="norm of the error at each frequency")]:
         """The norm of `errors`."""
         return NORM
 
     @property
-    def channels(self) -> Annotated[list[Channel], Quantity("outputs", key="channels")]:
+    def channels(self) -> Annotated[list[Channel], Quantity("outputs", help="each with its error", key="channels")]:
         """A row an output."""
         G = transfer(self.arm, self.model.rows, x=self.model.x)
         rows = zip(self.model.outputs, G.units, self.errors.tolist(), self.worst_at.tolist(), strict=True)
         return [Channel(*row) for row in rows]
 
     @property
-    def poles(self) -> Annotated[Complex, Quantity("s", "1/s", 10, key="poles")]:
+    def poles(self) -> Annotated[Complex, Quantity("s", "1/s", 10, "poles of the model", key="poles")]:
         """The poles of the model with Im s >= 0 and their mirror images."""
         model = self.model
         slow = [-1 / model.arm.damping] if model.relaxation is not None else []
@@ -103,22 +112,22 @@ class ReducedModel:
         return self.model.x
 
     @property
-    def input(self) -> Annotated[str, Quantity("input")]:
+    def input(self) -> Annotated[str, Quantity("input", help="input of the model")]:
         """The input."""
         return self.model.input
 
     @property
-    def states(self) -> Annotated[tuple[str, ...], Quantity()]:
+    def states(self) -> Annotated[tuple[str, ...], Quantity(help="names of the states")]:
         """Names of the states."""
         return tuple(self.model.states)
 
     @property
-    def named_matrices(self) -> Annotated[dict[str, Real], Quantity(flat=True)]:
+    def named_matrices(self) -> Annotated[dict[str, Real], Quantity(help="matrix of the state space", flat=True)]:
         """A, B, C and D by their names."""
         return dict(zip("ABCD", self.matrices(), strict=True))
 
     @property
-    def worst_error(self) -> Annotated[float, Quantity("worst error", digits=3)]:
+    def worst_error(self) -> Annotated[float, Quantity("worst error", digits=3, help="largest of all outputs")]:
         """The largest of `errors`."""
         return float(self.errors.max())
 
@@ -128,7 +137,7 @@ class ReducedModel:
         return self.model.arm
 
     @property
-    def order(self) -> Annotated[int, Quantity("order")]:
+    def order(self) -> Annotated[int, Quantity("order", help="number of states")]:
         """The number of states."""
         return self.model.order
 

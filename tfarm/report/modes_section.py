@@ -60,7 +60,8 @@ def damped_tables(undamped: Modes) -> list[Table]:
     inside = np.all(damped.box.holds(every) | np.isnan(every), axis=1)
     words_of, found = np.where(inside, *BOX_WORDS), listed_modes(undamped)
     caption = prose(
-        "damped", arm=arm, damped=damped, is_inside=bool(inside.all()), beyond=beyond_the_box(arm),
+        "damped", arm=arm, damped=damped, note=found.damped_note, is_inside=bool(inside.all()),
+        beyond=beyond_the_box(arm),
         resisted=damped.single.size - len(damped.others),
         edges=[plain(round(x)) if abs(x) >= 100 else plain(x, 3) for x in damped.box],
     )  # fmt: skip

@@ -52,7 +52,8 @@ def bode_section(case: Case, output: str) -> PageSection:
     if not data.poles.size and not data.zeros.size:
         return PageSection(anchor=anchor, title=title, words=(f"{complete} There are none.",), blocks=(picture,))
     caption, roots = f"{complete} {prose('bode_magnitudes')}", [*data.pole_list, *data.zero_list]
-    listed_roots = table(roots, stem=f"{anchor}-roots", title=f"Poles and zeros, {what}", caption=caption)
+    titles = {"stem": f"{anchor}-roots", "title": f"Poles and zeros, {what}", "caption": caption}
+    listed_roots = table(roots, parent=data, **titles)
     return PageSection(anchor=anchor, title=title, blocks=(picture, listed_roots))
 
 

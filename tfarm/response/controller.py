@@ -15,15 +15,15 @@ from .signals import Signals
 class Controller:
     """A law on an arm.  `gains` are those at the hub, empty of another law; `signals` have their SI units."""
 
-    arm: Annotated[str, Quantity("arm")]
-    law: Annotated[str, Quantity("controller")]
-    gains: Annotated[dict[str, float], Quantity(flat=True)]
-    gain_units: Annotated[dict[str, str], Quantity()]
-    signals: Annotated[dict[str, str], Quantity("signals")]
-    law_order: Annotated[int, Quantity("order of the controller")]
+    arm: Annotated[str, Quantity("arm", help="name of the arm")]
+    law: Annotated[str, Quantity("controller", help="its gains at the hub, or its name")]
+    gains: Annotated[dict[str, float], Quantity(help="gain at the hub", flat=True)]
+    gain_units: Annotated[dict[str, str], Quantity(help="SI unit of each gain")]
+    signals: Annotated[dict[str, str], Quantity("signals", help="outputs that are fed back, with their SI units")]
+    law_order: Annotated[int, Quantity("order of the controller", help="number of its states, without delays")]
     delay: Annotated[float, Quantity(unit="s", help="delay of the controller")]
-    sign_convention: Annotated[str, Quantity("sign convention")]
-    input: Annotated[str, Quantity("input")]
+    sign_convention: Annotated[str, Quantity("sign convention", help="control law from the signals to the input")]
+    input: Annotated[str, Quantity("input", help="actuating signal")]
 
 
 def controller(law: Law, arm: Arm) -> Controller:

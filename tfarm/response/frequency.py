@@ -78,11 +78,11 @@ class Extremum(NamedTuple):
     `magnitude` is inf at a pole on the imaginary axis and 0 at a zero on it.
     """
 
-    omega: Annotated[float, Quantity("angular frequency", "rad/s", 7)]
-    magnitude: Annotated[float, Quantity("magnitude")]
+    omega: Annotated[float, Quantity("angular frequency", "rad/s", 7, "frequency of the extremum")]
+    magnitude: Annotated[float, Quantity("magnitude", help="|G|; inf or 0 at a root on the axis", unit_of="gain_unit")]
 
     @property
-    def frequency(self) -> Annotated[float, Quantity("frequency", "Hz", 7)]:
+    def frequency(self) -> Annotated[float, Quantity("frequency", "Hz", 7, "angular frequency over 2 pi")]:
         """In Hz."""
         return self.omega / HERTZ
 
@@ -90,11 +90,11 @@ class Extremum(NamedTuple):
 class Root(NamedTuple):
     """A pole or zero of a Bode plot, and |G| at i Im s, of a real one at i |s|."""
 
-    kind: Annotated[str, Quantity("kind")]
-    s: Annotated[complex, Quantity("s", "1/s", 10, key="s")]
-    frequency: Annotated[float, Quantity("Im s/2 pi", "Hz", 8)]
-    damping: Annotated[float | None, Quantity("damping ratio", digits=6, key="damping_ratio")]
-    magnitude: Annotated[float, Quantity("magnitude there")]
+    kind: Annotated[str, Quantity("kind", help="pole or zero")]
+    s: Annotated[complex, Quantity("s", "1/s", 10, "of two conjugates that with Im s > 0", key="s")]
+    frequency: Annotated[float, Quantity("frequency", "Hz", 8, "Im s over 2 pi; 0 if real")]
+    damping: Annotated[float | None, Quantity("damping ratio", help="-Re s/|s|", key="damping_ratio")]
+    magnitude: Annotated[float, Quantity("magnitude", help="|G| at i Im s, or i |s| if real", unit_of="gain_unit")]
 
 
 def extrema(
@@ -177,6 +177,13 @@ def _refined(G: Response, omega: Real, height: Real, places: list[int]) -> tuple
     return tuple(Extremum(*finite.get(i) or (float(omega[i]), limit[float(height[i])])) for i in places)
 
 
+GRID_RANGE = Quantity("frequency range", "rad/s", help="first and last frequency", key="range_rad_s")
+POLES_IN = Quantity(
+    "poles complete in Re s", "1/s", help="all with Im s up to the last frequency", key="poles_between_re_1_s"
+)
+ZEROS_IN = Quantity(
+    "zeros complete in Re s", "1/s", help="all with Im s up to the last frequency", key="zeros_between_re_1_s"
+)
 BODE_BAND = "two frequencies in rad/s, the lower first: (1.0, 1000.0)"  # the expected form
 RESONANCES_SHOWN = 10  # flexible modes in the range, by default
 EVEN_PER_DECADE = 120  # points of the even grid
@@ -198,44 +205,44 @@ class Bode:
     """
 
     arm: Arm
-    output: Annotated[str, Quantity("output")]
+    output: Annotated[str, Quantity("output", help="output of the transfer function")]
     row: Output = field(repr=False)
     x: Annotated[float | None, Quantity(help="place of the output [m]")] = None
-    omega: Annotated[Real, Quantity("angular frequency", "rad/s", curve=True)]
-    value: Annotated[Complex, Quantity("value", curve=True)]
-    phase: Annotated[Real, Quantity("phase", "deg", curve=True)]
+    omega: Annotated[Real, Quantity("angular frequency", "rad/s", help="grid refined at poles and zeros", curve=True)]
+    value: Annotated[Complex, Quantity("value", help="G(i omega), output over input", curve=True, unit_of="gain_unit")]
+    phase: Annotated[Real, Quantity("phase", "deg", help="continuous; -180 deg at a pole on the axis", curve=True)]
     poles: Complex
     zeros: Complex
     rigid: Complex
     at_poles: Real  # |G| at the frequency of each pole; inf on the axis
     at_zeros: Real  # and of each zero; 0 on the axis
-    peaks: Annotated[tuple[Extremum, ...], Quantity("peaks, local maxima of the magnitude")]  # ascending
-    dips: Annotated[tuple[Extremum, ...], Quantity("dips, local minima of the magnitude")]
-    pole_width: Annotated[tuple[float, float], Quantity("poles complete in Re s [1/s]", key="poles_between_re_1_s")]
-    zero_width: Annotated[tuple[float, float], Quantity("zeros complete in Re s [1/s]", key="zeros_between_re_1_s")]
+    peaks: Annotated[tuple[Extremum, ...], Quantity("peaks", help="local maxima of the magnitude")]  # ascending
+    dips: Annotated[tuple[Extremum, ...], Quantity("dips", help="local minima of the magnitude")]
+    pole_width: Annotated[tuple[float, float], POLES_IN]
+    zero_width: Annotated[tuple[float, float], ZEROS_IN]
 
     @property
-    def arm_name(self) -> Annotated[str, Quantity("arm", key="arm")]:
+    def arm_name(self) -> Annotated[str, Quantity("arm", help="name of the arm", key="arm")]:
         """The name of the arm."""
         return self.arm.name
 
     @property
-    def input(self) -> Annotated[str, Quantity("input")]:
+    def input(self) -> Annotated[str, Quantity("input", help="input of the transfer function")]:
         """The input."""
         return "hub_angle" if self.arm.is_locked else self.arm.input
 
     @property
-    def magnitude(self) -> Annotated[Real, Quantity("magnitude", curve=True)]:
+    def magnitude(self) -> Annotated[Real, Quantity("magnitude", help="|G(i omega)|", curve=True, unit_of="gain_unit")]:
         """|G|."""
         return np.abs(self.value)
 
     @property
-    def pole_list(self) -> Annotated[list[Root], Quantity("poles", key="poles")]:
+    def pole_list(self) -> Annotated[list[Root], Quantity("poles", help="not cancelled, without 0", key="poles")]:
         """The poles of the upper half-plane."""
         return list(map(self._root, itertools.repeat("pole"), self.poles.tolist(), self.at_poles.tolist()))
 
     @property
-    def zero_list(self) -> Annotated[list[Root], Quantity("zeros", key="zeros")]:
+    def zero_list(self) -> Annotated[list[Root], Quantity("zeros", help="not cancelled, without 0", key="zeros")]:
         """The zeros of the upper half-plane, without rounding of Re s on the axis."""
         zeros = self.zeros
         if self.arm.has_elastic_link:
@@ -246,12 +253,12 @@ class Bode:
         return Root(kind, s, s.imag / HERTZ, -s.real / abs(s) + 0.0 if s else None, size)
 
     @property
-    def finding(self) -> Annotated[str, Quantity("poles and zeros")]:
+    def finding(self) -> Annotated[str, Quantity("poles and zeros", help="with Im s >= 0, after cancellation")]:
         """The numbers of poles and zeros in words."""
         return f"{self.poles.size} poles and {self.zeros.size} zeros up to {self.band[1]:.6g} rad/s"
 
     @property
-    def band(self) -> Annotated[tuple[float, float], Quantity("frequency range", "rad/s", key="range_rad_s")]:
+    def band(self) -> Annotated[tuple[float, float], GRID_RANGE]:
         """First and last frequency [rad/s]."""
         return float(self.omega[0]), float(self.omega[-1])
 
@@ -281,7 +288,7 @@ class Bode:
         return self.row.label if self.x is None else self.row.label.replace("at x", f"at x = {self.x:g} m")
 
     @property
-    def gain_unit(self) -> Annotated[str, Quantity("unit", key="unit")]:
+    def gain_unit(self) -> Annotated[str, Quantity("unit", help="SI unit of G, output over input", key="unit")]:
         """SI unit of the response, e.g. N m/(N m)."""
         unit = self.arm.input_unit
         return f"{self.row.unit}/{f'({unit})' if ' ' in unit else unit}"

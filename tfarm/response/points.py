@@ -23,28 +23,30 @@ from .transfer import TransferFunction
 class Points:
     """G(s) of one output at `s`; `value` are pairs of texts for more than 15 digits."""
 
-    s: Annotated[Complex, Quantity("s", "1/s", curve=True)]
-    value: Annotated[Any, Quantity(curve=True)]
-    arm: Annotated[str, Quantity("arm")]
-    input: Annotated[str, Quantity("input")]
-    input_unit: Annotated[str, Quantity()]
-    output: Annotated[str, Quantity("output")]
-    unit: Annotated[str, Quantity()]
+    s: Annotated[Complex, Quantity("s", "1/s", help="Laplace variable", curve=True)]
+    value: Annotated[Any, Quantity(help="G(s), output over input", curve=True)]
+    arm: Annotated[str, Quantity("arm", help="name of the arm")]
+    input: Annotated[str, Quantity("input", help="input of the transfer function")]
+    input_unit: Annotated[str, Quantity(help="SI unit of the input")]
+    output: Annotated[str, Quantity("output", help="output of the transfer function")]
+    unit: Annotated[str, Quantity(help="SI unit of the output")]
     x: Annotated[float | None, Quantity(help="place of the output [m]")]
-    method: Annotated[str, Quantity("method")]
+    method: Annotated[str, Quantity("method", help="closed form, ball arithmetic or the paper's appendix")]
 
     @property
-    def gain_unit(self) -> Annotated[str, Quantity("unit")]:
+    def gain_unit(self) -> Annotated[str, Quantity("unit", help="SI unit of G, output over input")]:
         """The unit of G."""
         return f"{self.unit} / {self.input_unit}"
 
     @property
-    def largest(self) -> Annotated[float, Quantity("largest magnitude")]:
+    def largest(
+        self,
+    ) -> Annotated[float, Quantity("largest magnitude", help="largest |G| of these points", unit_of="gain_unit")]:
         """The largest |G| at these points."""
         return float(abs(self._numbers).max())
 
     @property
-    def largest_at(self) -> Annotated[complex, Quantity("at s", "1/s", 10)]:
+    def largest_at(self) -> Annotated[complex, Quantity("at s", "1/s", 10, "point of the largest magnitude")]:
         """The point of the largest |G|."""
         return complex(self.s[int(abs(self._numbers).argmax())])
 
@@ -78,13 +80,13 @@ def points(G: TransferFunction, s: Complex, digits: int | None = None) -> Points
 class ByMethods:
     """The same numbers of an arm by each method, a row for each mode or point of `at`."""
 
-    arm: Annotated[str, Quantity("arm")]
-    of: Annotated[str, Quantity("quantity", key="output")]
-    unit: Annotated[str, Quantity("unit")]
-    at: Annotated[Sequence[Any], Quantity()]
-    values: Annotated[ByMethod, Quantity(flat=True)]
+    arm: Annotated[str, Quantity("arm", help="name of the arm")]
+    of: Annotated[str, Quantity("quantity", help="natural frequency, or the output of a response", key="output")]
+    unit: Annotated[str, Quantity("unit", help="SI unit of the values")]
+    at: Annotated[Sequence[Any], Quantity(help="numbers of the modes, or points s in 1/s")]
+    values: Annotated[ByMethod, Quantity(help="values by method", flat=True)]
 
     @property
-    def rows(self) -> Annotated[list[MethodRow], Quantity("by method", key="rows")]:
+    def rows(self) -> Annotated[list[MethodRow], Quantity("by method", help="a row a mode or point", key="rows")]:
         """A row for each mode or point."""
         return self.values.rows(self.at)

@@ -155,19 +155,19 @@ class DampedModes:
     # ------------------------------------------------------------ shapes
 
     def shape(self, x: NDArray[np.float64] | float) -> Complex:
-        """Return the displacement w(x) [m] of both eigenvalues of each flexible mode at x [m]: (n, 2, *x.shape).
+        """Return the displacement w(x) [m/sqrt(kg m^2)] of each flexible mode at x [m]: (n, 2, *x.shape).
 
-        NaN for a mode without an eigenvalue.  Scaled so that the residue of w(x) over torque is w(x) psi(0)/(2 s), as
-        for undamped modes of unit modal mass.
+        Both eigenvalues of a mode have one; NaN for a mode without an eigenvalue.  Scaled so that the residue of
+        w(x) over torque is w(x) psi(0)/(2 s), as for undamped modes of unit modal mass.
         """
         return self._field("W", x) * float(self.undamped.system.length)
 
     def rotation(self, x: NDArray[np.float64] | float) -> Complex:
-        """Return the rotation psi(x) [rad], as `shape`."""
+        """Return the rotation psi(x) [rad/sqrt(kg m^2)], as `shape`."""
         return self._field("Psi", x)
 
     def moment(self, x: NDArray[np.float64] | float) -> Complex:
-        """Return the elastic bending moment E I psi'(x) [N m], without its damping part, as `shape`."""
+        """Return the elastic bending moment E I psi'(x) [N m/sqrt(kg m^2)], without its damping part, as `shape`."""
         k = self.undamped.system
         return self._field("M", x) * float(k.EI / k.length)
 

@@ -15,7 +15,7 @@ from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.exact.values import Method
 from tfarm.schema import Quantity
 
-from .damped import DampedModes, damped_modes
+from .damped import MOST_MODES, DampedModes, damped_modes
 from .proofs import Certificate, Disc
 from .table import Modes, compare_theories, hub_locked
 
@@ -35,29 +35,37 @@ SHAPE_DIGITS = 10  # in a report's files, of numbers from shapes, which differ b
 class ListedMode:
     """One mode.  Frequencies are texts for more than 15 digits."""
 
-    index: Annotated[int, Quantity("mode")]
-    natural_frequency: Annotated[float | str, Quantity("natural frequency", "rad/s", 12)]
-    natural_frequency_hz: Annotated[float, Quantity("frequency", "Hz", 9, key="natural_frequency_hz")]
-    eigenvalue: Annotated[complex | None, Quantity("eigenvalue", "1/s", 10)]
-    second_eigenvalue: Annotated[float | None, Quantity("second eigenvalue", "1/s", 8, "of an overdamped mode")]
-    damping_ratio: Annotated[float | None, Quantity("damping ratio")]
+    index: Annotated[int, Quantity("mode", help="number of the mode; 0 is the rigid body")]
+    natural_frequency: Annotated[float | str, Quantity("natural frequency", "rad/s", 12, "of the undamped arm")]
+    natural_frequency_hz: Annotated[
+        float, Quantity("frequency", "Hz", 9, "natural frequency over 2 pi", key="natural_frequency_hz")
+    ]
+    eigenvalue: Annotated[complex | None, Quantity("eigenvalue", "1/s", 10, "of the damped arm, Im >= 0")]
+    second_eigenvalue: Annotated[
+        float | None, Quantity("second eigenvalue", "1/s", 8, "faster one of an overdamped mode")
+    ]
+    damping_ratio: Annotated[float | None, Quantity("damping ratio", help="-Re s/|s|; above 1 for an overdamped mode")]
     hub_locked: Annotated[float | str | None, Quantity("hub locked", "rad/s", 12, LOCKED_NOTE)]
-    hub_participation: Annotated[float, Quantity("hub participation b", help="hub angle of the mode of unit mass")]
-    modal_moment: Annotated[float, Quantity("modal moment", "N m", help="root moment of the mode of unit mass")]
-    nodes: Annotated[list[float], Quantity("nodes", "m", 4)]
-    theories: Annotated[dict[str, float], Quantity(key="theories_rad_s")]
-    sensitivity: Annotated[dict[str, float], Quantity(help="relative change of frequency over that of a parameter")]
-    lower: Annotated[str | None, Quantity(key="lower_rad_s", help="certified bracket")] = None
-    upper: Annotated[str | None, Quantity(key="upper_rad_s")] = None
+    hub_participation: Annotated[float, Quantity(
+        "hub participation b", "rad/sqrt(kg m^2)", help="hub angle of the mode of unit modal mass"
+    )]  # fmt: skip
+    modal_moment: Annotated[float, Quantity(
+        "modal moment", "N m/sqrt(kg m^2)", help="root moment of the mode of unit modal mass"
+    )]  # fmt: skip
+    nodes: Annotated[list[float], Quantity("nodes", "m", 4, "points of the link without displacement, from the hub")]
+    theories: Annotated[dict[str, float], Quantity(key="theories_rad_s", help="natural frequency by each beam theory")]
+    sensitivity: Annotated[dict[str, float], Quantity(help="d ln w/d ln p, relative change of frequency by parameter")]
+    lower: Annotated[str | None, Quantity(key="lower_rad_s", help="lower end of the certified bracket")] = None
+    upper: Annotated[str | None, Quantity(key="upper_rad_s", help="upper end of the certified bracket")] = None
     discs: Annotated[tuple[Disc, ...] | None, Quantity(help="certified enclosures of the eigenvalues")] = None
 
 
 class Unlisted(NamedTuple):
     """An eigenvalue of the box that is assigned to no mode, and the part of the drive that determines it."""
 
-    origin: Annotated[str, Quantity("origin")]
-    eigenvalue: Annotated[complex, Quantity("eigenvalue", "1/s", 10)]
-    discs: Annotated[tuple[Disc, ...] | None, Quantity()] = None
+    origin: Annotated[str, Quantity("origin", help="part of the drive that determines it")]
+    eigenvalue: Annotated[complex, Quantity("eigenvalue", "1/s", 10, "one of the damped arm, Im >= 0")]
+    discs: Annotated[tuple[Disc, ...] | None, Quantity(help="its certified enclosure")] = None
 
 
 @dataclass(frozen=True)
@@ -70,68 +78,92 @@ class ModeList:
 
     found: Modes
     damped: DampedModes | None
-    modes: Annotated[list[ListedMode], Quantity("modes")]
-    unassigned: Annotated[list[Unlisted], Quantity("eigenvalues of no mode", key="unassigned_eigenvalues")]
-    method: Annotated[Method, Quantity("method")]
-    digits: Annotated[int | None, Quantity()]
-    proof: Annotated[Certificate | None, Quantity("certified")]
-    damped_failure: Annotated[str | None, Quantity("damped modes not determined")]
-    is_proven_in_box: Annotated[bool, Quantity(key="proven_complete_in_box")]
+    modes: Annotated[list[ListedMode], Quantity("modes", help="in ascending order of natural frequency")]
+    unassigned: Annotated[list[Unlisted], Quantity(
+        "eigenvalues of no mode", help="in the box, assigned to no mode for certain", key="unassigned_eigenvalues"
+    )]  # fmt: skip
+    method: Annotated[Method, Quantity("method", help="of the natural frequencies: closed-form, balls or appendix")]
+    digits: Annotated[int | None, Quantity(help="digits of the natural frequencies, if more than 15")]
+    proof: Annotated[Certificate | None, Quantity("certified", help="brackets, and a count that proves them complete")]
+    damped_failure: Annotated[str | None, Quantity("damped modes not determined", help="the reason")]
+    is_proven_in_box: Annotated[
+        bool, Quantity(key="proven_complete_in_box", help="whether the list of eigenvalues in the box is certified")
+    ]
 
     @property
-    def arm(self) -> Annotated[str, Quantity("arm")]:
+    def arm(self) -> Annotated[str, Quantity("arm", help="name of the arm")]:
         """The name of the arm."""
         return self.found.arm.name
 
     @property
-    def theory(self) -> Annotated[str, Quantity("beam theory")]:
+    def theory(self) -> Annotated[str, Quantity("beam theory", help="timoshenko, shear, rayleigh or euler-bernoulli")]:
         """The theory of the beam."""
         return self.found.theory
 
     @property
-    def input(self) -> Annotated[str, Quantity()]:
+    def input(self) -> Annotated[str, Quantity(help="input of the arm")]:
         """The input of the arm."""
         return self.found.arm.input
 
     @property
-    def count(self) -> Annotated[int, Quantity("flexible modes, none missing")]:
+    def count(self) -> Annotated[int, Quantity("flexible modes, none missing", help="number of the last mode")]:
         """The number of the last mode."""
         return int(self.found.index.max())
 
     @property
-    def certainty(self) -> Annotated[str, Quantity("completeness")]:
+    def certainty(self) -> Annotated[str, Quantity("completeness", help="word of certainty for the list of modes")]:
         """The word of certainty for the list of modes."""
         return "converged (counted)" if self.proof is None else "certified"
 
     @property
-    def box(self) -> Annotated[tuple[float, ...] | None, Quantity("box: Re s from, to, Im s from, to")]:
+    def box(
+        self,
+    ) -> Annotated[
+        tuple[float, ...] | None, Quantity("box: Re s from, to, Im s from, to", "1/s", help="searched for eigenvalues")
+    ]:
         """The box of the eigenvalues."""
         return None if self.damped is None else tuple(self.damped.box)
 
     @property
-    def eigenvalues_in_box(self) -> Annotated[int | None, Quantity("eigenvalues in the box, all listed")]:
+    def eigenvalues_in_box(
+        self,
+    ) -> Annotated[int | None, Quantity("eigenvalues in the box, all listed", help="counted with conjugates")]:
         """Their number, with conjugates."""
         return None if self.damped is None else self.damped.count
 
     @property
-    def box_note(self) -> Annotated[str | None, Quantity("beyond the box")]:
+    def box_note(self) -> Annotated[str | None, Quantity("beyond the box", help="eigenvalues that no finite box has")]:
         """The eigenvalues beyond the box, in words."""
         return None if self.damped is None else beyond_the_box(self.found.arm)
 
     @property
-    def hub_locked_note(self) -> Annotated[str | None, Quantity("hub locked")]:
+    def hub_locked_note(self) -> Annotated[str | None, Quantity("hub locked", help="meaning of that column")]:
         """The meaning of the column; None for an arm with a locked hub."""
         return None if self.found.arm.is_locked else LOCKED_NOTE
 
     @property
-    def damped_note(self) -> Annotated[str | None, Quantity("damped modes")]:
-        """The last mode with eigenvalues, where not all have them."""
-        if self.damped is None or not self.damped.left_out:
+    def damped_note(
+        self,
+    ) -> Annotated[str | None, Quantity("damped modes", help="modes without an eigenvalue, and why")]:
+        """The flexible modes without an eigenvalue and the reason, in one line; None where each has one."""
+        if self.damped is None:
             return None
-        return f"eigenvalues up to mode {self.damped.index[-1]} only: the box of more could not be searched"
+        last, notes = int(self.damped.index[-1]), []
+        without = self.damped.index[~self.damped.is_assigned].tolist()
+        if without:
+            notes.append(f"no eigenvalue is assigned for certain to mode {', '.join(map(str, without))}")
+        if self.damped.left_out:
+            why = f"a list has at most {MOST_MODES}" if last == MOST_MODES else "the box of more could not be searched"
+            notes.append(f"eigenvalues up to mode {last} only: {why}")
+        return "; ".join(notes) or None
 
     @property
-    def circuit(self) -> Annotated[list[float], Quantity("of the motor's circuit [1/s]", key="circuit_eigenvalues")]:
+    def circuit(
+        self,
+    ) -> Annotated[
+        list[float],
+        Quantity("of the motor's circuit [1/s]", help="real eigenvalues of no mode", key="circuit_eigenvalues"),
+    ]:
         """Real eigenvalues of the motor's circuit."""
         return [] if self.damped is None else list(self.damped.others)
 

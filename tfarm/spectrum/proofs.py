@@ -55,8 +55,8 @@ class Certificate:
     """Brackets (lower, upper) as decimal strings, and the count below a frequency that proves them complete."""
 
     brackets: tuple[tuple[str, str], ...]
-    count: Annotated[int, Quantity("frequencies in all")]
-    below: Annotated[str, Quantity("below", "rad/s")]
+    count: Annotated[int, Quantity("frequencies in all", help="certified count, with the rigid-body mode")]
+    below: Annotated[str, Quantity("below", "rad/s", help="frequency at which they are counted")]
 
 
 def certify(k: System, omega: NDArray[np.float64], above: float, digits: int, rigid: int) -> Certificate:
@@ -131,9 +131,9 @@ DIGITS_BEYOND = 3  # digits of its convergence beyond those of the disc
 class Disc:
     """A closed disc of the complex plane with exactly one zero, a simple one: middle and radius as decimal strings."""
 
-    re: Annotated[str, Quantity("Re s", "1/s", key="re")]
-    im: Annotated[str, Quantity("Im s", "rad/s", key="im")]
-    radius: Annotated[str, Quantity("radius", "1/s")]
+    re: Annotated[str, Quantity("Re s", "1/s", help="real part of the middle of the disc", key="re")]
+    im: Annotated[str, Quantity("Im s", "rad/s", help="imaginary part of the middle of the disc", key="im")]
+    radius: Annotated[str, Quantity("radius", "1/s", help="of a disc with exactly one eigenvalue")]
 
     @property
     def is_real(self) -> bool:

@@ -133,30 +133,30 @@ class Modes:
     # ------------------------------------------------------------ shapes
 
     def shape(self, x: NDArray[np.float64] | float) -> Real:
-        """Return the displacement w(x) [m for unit modal coordinate] at x [m]: (modes, *x.shape)."""
+        """Return the displacement w(x) [m/sqrt(kg m^2)] at x [m]: (modes, *x.shape)."""
         return self._field(0, x) * float(self._k.length)
 
     def rotation(self, x: NDArray[np.float64] | float) -> Real:
-        """Return the rotation psi(x) [rad] of the cross-section at x [m]: (modes, *x.shape)."""
+        """Return the rotation psi(x) [rad/sqrt(kg m^2)] of the cross-section at x [m]: (modes, *x.shape)."""
         return self._field(1, x)
 
     def moment(self, x: NDArray[np.float64] | float) -> Real:
-        """Return the bending moment E I psi'(x) [N m] at x [m]: (modes, *x.shape)."""
+        """Return the bending moment E I psi'(x) [N m/sqrt(kg m^2)] at x [m]: (modes, *x.shape)."""
         return self._field(2, x) * float(self._k.EI / self._k.length)
 
     def shear(self, x: NDArray[np.float64] | float) -> Real:
-        """Return the shear force kappa G A (w' - psi) [N] at x [m]: (modes, *x.shape)."""
+        """Return the shear force kappa G A (w' - psi) [N/sqrt(kg m^2)] at x [m]: (modes, *x.shape)."""
         return self._field(3, x) * float(self._k.EI / self._k.length**2)
 
     @cached_property
     def hub_participation(self) -> Real:
-        """b = psi(0) of each mode; b^2 is the residue of hub angle/torque in s^2.  Zero if locked."""
+        """b = psi(0) [rad/sqrt(kg m^2)] of each mode; b^2 is the residue of hub angle/torque in s^2.  0 if locked."""
         rigid = 1.0 / math.sqrt(self.arm.total_inertia) if self._rigid else 0.0
         return np.r_[[rigid] * self._rigid, self._shapes.theta() * self._unit]
 
     @cached_property
     def modal_moment(self) -> Real:
-        """Root moment E I psi'(0) [N m] of each mode: (k - I_h w^2) b with the clamp on the axis of a free hub.
+        """Root moment E I psi'(0) [N m/sqrt(kg m^2)] of each mode: (k - I_h w^2) b of a free hub clamped on its axis.
 
         For a hub lighter than the link it is computed so, as the field at the root cancels: 0 for a free pin.
         """
