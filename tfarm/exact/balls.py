@@ -8,13 +8,14 @@ sweeps are those of `sweep`, with the error of every number enclosed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, TypeVar
 
 import flint
 
+from . import waves
 from .compiled import python_of
 from .layout import Layout, Numbers, Reading, constant_of, readings
 from .outputs import Output
@@ -39,6 +40,7 @@ _end_plane, _inside_offset, _inside_spring, _inside_body, _beyond_offset, _beyon
     python_of, (end_plane, inside_offset, inside_spring, inside_body, beyond_offset, beyond_spring, beyond_body)
 )
 _across_rows, _transition_rows, _row_across, _met = map(python_of, (across_rows, transition_rows, row_across, met))
+across_waves, into_own, out_of_own = map(python_of, (waves.across_waves, waves.into_own, waves.out_of_own))
 Ball = Any  # flint.acb or flint.arb, which come without types
 _Found = TypeVar("_Found")
 
@@ -226,16 +228,6 @@ class Sweep:
     def _body(self, body: Any) -> tuple[Any, Any]:
         assert isinstance(body, Body)
         return self.S * body.mass + body.stiffness, self.S * body.inertia + body.rotational_stiffness
-
-
-def into_own(p: Plane, w: Any, m: Any, q: Any) -> Plane:
-    """Return a plane in a segment's own units, the factors of W, M and Q (`Segment.units`)."""
-    return p[0] * w, p[1] * (w * m), p[2] * m, p[3] * q, p[4] * (m * q)
-
-
-def out_of_own(p: Sequence[Any], w: Any, m: Any, q: Any) -> Plane:
-    """Return the plane in the units of the chain."""
-    return p[0] / w, p[1] / (w * m), p[2] / m, p[3] / q, p[4] / (m * q)
 
 
 class State:

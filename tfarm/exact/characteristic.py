@@ -37,14 +37,13 @@ from tfarm.arm import GAINS, Law
 from tfarm.arrays import Complex, Real
 from tfarm.records import read_only
 
-from .balls import Ball, Sweep, into_own, out_of_own, point, rational, summed
-from .compiled import python_of
+from .balls import Ball, Sweep, across_waves, into_own, out_of_own, point, rational, summed
 from .layout import Layout, Readings, laid_out, readings
 from .outputs import OUTPUTS, Output, unit_scale
 from .rationals import polynomials
 from .system import Segment, System
 from .values import free_outputs, free_slopes
-from .waves import Plane, Row, across_waves
+from .waves import Plane, Row
 
 FED = tuple(OUTPUTS[gain.output] for gain in GAINS)
 assert all(each.place != "x" for each in FED)  # a gain is on an output with a place of its own
@@ -122,8 +121,6 @@ def loop_parts(k: System, s: NDArray[Any]) -> LoopParts:
 Polynomial = Any  # flint.fmpq_poly, which comes without types
 Series = Any  # flint.acb_series, which comes without types
 
-_across_waves = python_of(across_waves)
-
 LONG_WAVE = 0.3  # |z| below which a wave is not separated from the others
 TAYLOR_TERMS = 4  # of D over a piece of a contour, the last one over the wide ball
 SLOW_WAVES = 6.0  # |z1| + |z2| below which power series are used
@@ -154,9 +151,9 @@ class WideSweep(Sweep):
         unit = gap * gap * d * S * g
         if unit[0].contains(0):
             raise InseparableError
-        inner = _across_waves(*one[:5], *two[:5], S * g, d, S * (a / d - b), into_own(p, *units))
+        inner = across_waves(one[:5], two[:5], S * g, d, S * (a / d - b), into_own(p, *units))
         self.phase = self.phase + one[5] + two[5]
-        return out_of_own([part / unit for part in inner], *units)
+        return out_of_own(tuple(part / unit for part in inner), *units)
 
     def _is_slow(self, segment: Any) -> bool:
         z_sum, z_product = self._sums(segment)

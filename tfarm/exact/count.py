@@ -44,6 +44,8 @@ from .waves import (
     A,
     B,
     G,
+    Plane,
+    Wave,
     across_rows,
     across_waves,
     dispersion,
@@ -52,6 +54,8 @@ from .waves import (
     inside_body,
     inside_offset,
     inside_spring,
+    into_own,
+    out_of_own,
     tip_conditions,
     transition_rows,
     transition_series,
@@ -74,41 +78,36 @@ def _clamped(number: int, value: float, step: int) -> int:
 
 
 @compiled
-def chain_count(omega: float, rows: Any, ends: Any, plane: Any) -> int:
-    """Return the number of natural frequencies below omega [rad/s], with the rigid body; `plane` (5,) is scratch."""
+def chain_count(omega: float, rows: Any, ends: Any) -> int:
+    """Return the number of natural frequencies below omega [rad/s], with the rigid body."""
     S = -omega * omega
-    plane[0], plane[1], plane[2], plane[3], plane[4] = end_plane(*tip_conditions(ends, S))
+    p = end_plane(*tip_conditions(ends, S))
     number, free = 0, int(ends[FREE_MOTIONS])
     for i in range(len(rows)):
         row = rows[i]
         if row[ROW_KIND] == SEGMENT:
-            number = _joined(number, omega, row, plane, free)
+            number, p = _joined(number, omega, row, p, free)
             free = 2
         elif row[ROW_KIND] == OFFSET:
-            p = inside_offset(row[LENGTH], (plane[0], plane[1], plane[2], plane[3], plane[4]))
-            plane[0], plane[1], plane[2], plane[3], plane[4] = p
+            p = inside_offset(row[LENGTH], p)
         elif row[ROW_KIND] == BODY:
-            p = plane[0], plane[1], plane[2], plane[3], plane[4]
             p = inside_body(row[MASS] * S + row[GROUND], row[INERTIA] * S + row[TURNING_GROUND], p)
-            plane[0], plane[1], plane[2], plane[3], plane[4] = p
         elif row[ROW_KIND] == SPRING:
-            p = inside_spring(row[STIFFNESS], row[COMPLIANCE], (plane[0], plane[1], plane[2], plane[3], plane[4]))
-            plane[0], plane[1], plane[2], plane[3], plane[4] = p
-            number = _clamped(number, plane[0], 1)
+            p = inside_spring(row[STIFFNESS], row[COMPLIANCE], p)
+            number = _clamped(number, p[0], 1)
     if ends[OF_MOMENT] == 0.0:
         return number
-    drive = (ends[OF_ANGLE] + S * ends[OF_ANGLE + 2]) * plane[0] - ends[OF_MOMENT] * plane[1]
+    drive = (ends[OF_ANGLE] + S * ends[OF_ANGLE + 2]) * p[0] - ends[OF_MOMENT] * p[1]
     return _clamped(number, drive, 1)
 
 
 @compiled
-def _joined(outside: int, omega: float, row: Any, plane: Any, free: int) -> int:
-    """Return the count with one more segment, clamped at its inner end; `plane` is carried across it.
+def _joined(outside: int, omega: float, row: Any, plane: Plane, free: int) -> tuple[int, Plane]:
+    """Return the count with one more segment, clamped at its inner end, and the plane carried across it.
 
     `outside` is the count of the outer part clamped at the joint, `free` the number of free motions there.
     """
-    to_w, to_m, to_q = row[TO_W], row[TO_M], row[TO_Q]
-    p = plane[0] * to_w, plane[1] * (to_w * to_m), plane[2] * to_m, plane[3] * to_q, plane[4] * (to_m * to_q)
+    p = into_own(plane, row[TO_W], row[TO_M], row[TO_Q])
     clamped = (0.0, 0.0, 0.0, 0.0, 1.0)  # W = Psi = 0
     s, _, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(complex(0.0, omega), row)
     number = half_waves(z1, t1, dt1) + half_waves(z2, t2, dt2) + (z1.real < 0.0 and z2.real < 0.0)
@@ -118,42 +117,38 @@ def _joined(outside: int, omega: float, row: Any, plane: Any, free: int) -> int:
         W, Psi, M, Q = transition_rows(F0, F1, F2, F3, S, 1.0, row[A], row[B], row[G], row[SIGMA])
         q, r = across_rows(W, Psi, M, Q, p), across_rows(W, Psi, M, Q, clamped)
     else:
-        c1, s1, e1 = real_functions(z1, t1, dt1)
-        c2, s2, e2 = real_functions(z2, t2, dt2)
+        one, two = real_wave(z1, v1.real, t1, dt1), real_wave(z2, v2.real, t2, dt2)
         gS, v_sum = gS.real, S * (row[A] - row[B])
-        q = across_waves(c1, s1, z1, v1.real, e1, c2, s2, z2, v2.real, e2, gS, 1.0, v_sum, p)
-        r = across_waves(c1, s1, z1, v1.real, e1, c2, s2, z2, v2.real, e2, gS, 1.0, v_sum, clamped)
+        q, r = across_waves(one, two, gS, 1.0, v_sum, p), across_waves(one, two, gS, 1.0, v_sum, clamped)
         unit = 1.0 / (gS * (z1 - z2) * (z1 - z2))
         q = q[0] * unit, q[1] * unit, q[2] * unit, q[3] * unit, q[4] * unit
         r = r[0] * unit, r[1] * unit, r[2] * unit, r[3] * unit, r[4] * unit
-    plane[0], plane[1], plane[2] = q[0] / to_w, q[1] / (to_w * to_m), q[2] / to_m
-    plane[3], plane[4] = q[3] / to_q, q[4] / (to_m * to_q)
     number = _clamped(number, r[1], -1)  # r at the outer end is, up to signs, the plane carried inwards (symmetry)
     number = _clamped(number, -r[0], -1) + outside
     if free == 2:
         number = _clamped(number, -r[0] * p[3] - r[3] * p[0], 1)
-    return _clamped(number, q[0], 1) if free else number
+    number = _clamped(number, q[0], 1) if free else number
+    return number, out_of_own(q, row[TO_W], row[TO_M], row[TO_Q])
 
 
 @compiled
 def chain_counts(omega: Any, rows: Any, ends: Any) -> Any:
     """Return `chain_count` at every omega (1-D)."""
-    found, plane = np.empty(omega.size, np.int64), np.empty(5)
+    found = np.empty(omega.size, np.int64)
     for i in range(omega.size):
-        found[i] = chain_count(omega[i], rows, ends, plane)
+        found[i] = chain_count(omega[i], rows, ends)
     return found
 
 
 @compiled
 def bisect_chain(number: Any, rows: Any, ends: Any, low: Any, high: Any) -> None:
     """Move low[i] and high[i] [rad/s] to the neighbouring floats between which the count reaches number[i]."""
-    plane = np.empty(5)
     for i in range(number.size):
         while True:
             middle = 0.5 * (low[i] + high[i])
             if not (low[i] < middle and middle < high[i]):
                 break
-            if chain_count(middle, rows, ends, plane) >= number[i]:
+            if chain_count(middle, rows, ends) >= number[i]:
                 high[i] = middle
             else:
                 low[i] = middle
@@ -166,14 +161,14 @@ def half_waves(z: complex, t: complex, dt: complex) -> int:
 
 
 @inlined
-def real_functions(z: float, t: complex, dt: complex) -> tuple[float, float, float]:
-    """Return c, S, e of `waves.across_waves` for real z, scaled where the wave decays."""
+def real_wave(z: float, v: float, t: complex, dt: complex) -> Wave:
+    """Return a wave of `waves.across_waves` for real z, scaled where it decays."""
     if abs(z) < 1.0:
         c, s = even_functions(z)
-        return c, s, 1.0
+        return c, s, z, v, 1.0
     if z > 0.0:
         e = math.exp(-t.real) * (1.0 - dt.real)
-        return 0.5 * (1.0 + e * e), 0.5 * (1.0 - e * e) / (t.real + dt.real), e
+        return 0.5 * (1.0 + e * e), 0.5 * (1.0 - e * e) / (t.real + dt.real), z, v, e
     k, dk = t.imag, dt.imag
     cosine, sine = math.cos(k), math.sin(k)
-    return cosine - sine * dk, (sine + cosine * dk) / (k + dk), 1.0
+    return cosine - sine * dk, (sine + cosine * dk) / (k + dk), z, v, 1.0

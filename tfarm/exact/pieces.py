@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 from .compiled import compiled, inlined
 from .layout import TO_M, TO_Q, TO_W
 from .waves import (
-    DAMPING,
     PARALLEL,
     SIGMA,
     A,
     B,
     G,
+    Plane,
+    Row,
+    Wave,
     across_rows,
     across_waves,
     dispersion,
@@ -34,6 +36,7 @@ from .waves import (
     transition_rows,
     transition_series,
     wave_functions,
+    wave_sums,
 )
 
 BLOCK = 32  # points of a block: few for single points, many for the overhead of loops
@@ -120,73 +123,111 @@ def take_where(low: Any, source: Any, target: Any) -> None:
                 target[BLOCK * j + i] = source[BLOCK * j + i]
 
 
+@inlined
+def plane_at(buffer: Any, i: int) -> Plane:
+    """Return the plane of a point."""
+    return buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i], buffer[4 * BLOCK + i]
+
+
+@inlined
+def put_plane(buffer: Any, i: int, p: Plane) -> None:
+    """Write the plane of a point."""
+    buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i], buffer[4 * BLOCK + i] = p
+
+
+@inlined
+def row_at(buffer: Any, i: int) -> Row:
+    """Return the condition of a point."""
+    return buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i]
+
+
+@inlined
+def put_row(buffer: Any, i: int, f: Row) -> None:
+    """Write the condition, or the state, of a point."""
+    buffer[i], buffer[BLOCK + i], buffer[2 * BLOCK + i], buffer[3 * BLOCK + i] = f
+
+
+@inlined
+def waves_at(numbers: Any, functions: Any, i: int) -> tuple[Wave, Wave]:
+    """Return both waves of a point."""
+    return (
+        (functions[C1 + i], functions[S1 + i], numbers[Z1 + i], numbers[V1 + i], functions[E1 + i]),
+        (functions[C2 + i], functions[S2 + i], numbers[Z2 + i], numbers[V2 + i], functions[E2 + i]),
+    )
+
+
+@inlined
+def _units(row: Any) -> Plane:
+    """Return the factors of a plane from the chain's units to those of a segment."""
+    return row[TO_W], row[TO_W] * row[TO_M], row[TO_M], row[TO_Q], row[TO_M] * row[TO_Q]
+
+
+@inlined
+def _inverse(units: Plane) -> Plane:
+    """Return the factors back."""
+    return 1.0 / units[0], 1.0 / units[1], 1.0 / units[2], 1.0 / units[3], 1.0 / units[4]
+
+
+@inlined
+def _scaled(p: Plane, units: Plane) -> Plane:
+    """Return a plane in other units."""
+    return (
+        times(p[0], units[0]), times(p[1], units[1]), times(p[2], units[2]), times(p[3], units[3]),
+        times(p[4], units[4]),
+    )  # fmt: skip
+
+
+@inlined
+def _scaled_row(f: Row, units: Plane) -> Row:
+    """Return a condition in other units, of which `units` are those of a plane."""
+    return times(f[0], units[0]), f[1], times(f[2], units[2]), times(f[3], units[3])
+
+
 @compiled
 def _by_waves(row: Any, numbers: Any, functions: Any, plane: Any, inner: Any) -> None:
     """Compute `across_waves` in the segment's own units, at every point of a block."""
-    w, wm, m, q, mq = row[TO_W], row[TO_W] * row[TO_M], row[TO_M], row[TO_Q], row[TO_M] * row[TO_Q]
-    over_w, over_wm, over_m, over_q, over_mq = 1.0 / w, 1.0 / wm, 1.0 / m, 1.0 / q, 1.0 / mq
+    units = _units(row)
+    back = _inverse(units)
     for i in range(BLOCK):
-        p = (
-            times(plane[i], w), times(plane[BLOCK + i], wm), times(plane[2 * BLOCK + i], m),
-            times(plane[3 * BLOCK + i], q), times(plane[4 * BLOCK + i], mq),
-        )  # fmt: skip
         S, d, gS = numbers[S_SQUARED + i], numbers[D + i], numbers[GS + i]
-        z1, z2 = numbers[Z1 + i], numbers[Z2 + i]
-        v_sum = S * (times(reciprocal(d), row[A]) - row[B])
-        p = across_waves(
-            functions[C1 + i], functions[S1 + i], z1, numbers[V1 + i], functions[E1 + i],
-            functions[C2 + i], functions[S2 + i], z2, numbers[V2 + i], functions[E2 + i], gS, d, v_sum, p,
-        )  # fmt: skip
-        unit = reciprocal(gS * d * (z1 - z2) * (z1 - z2))
-        inner[i], inner[BLOCK + i] = times(p[0] * unit, over_w), times(p[1] * unit, over_wm)
-        inner[2 * BLOCK + i], inner[3 * BLOCK + i] = times(p[2] * unit, over_m), times(p[3] * unit, over_q)
-        inner[4 * BLOCK + i] = times(p[4] * unit, over_mq)
+        one, two = waves_at(numbers, functions, i)
+        v_sum, gap = S * (times(reciprocal(d), row[A]) - row[B]), one[2] - two[2]
+        p = across_waves(one, two, gS, d, v_sum, _scaled(plane_at(plane, i), units))
+        unit = reciprocal(gS * d * gap * gap)
+        put_plane(inner, i, _scaled((p[0] * unit, p[1] * unit, p[2] * unit, p[3] * unit, p[4] * unit), back))
 
 
 @compiled
 def _transition(points: Any, row: Any, series: Any) -> None:
     """Compute F0..F3 of a slow segment, at every point of a block."""
     for i in range(BLOCK):
-        S = points[i] * points[i]
-        over_d = reciprocal(1.0 + row[DAMPING] * points[i])
-        z_sum, z_product = S * (row[B] + row[A] * over_d), S * (row[A] * row[B] * S + row[G]) * over_d
+        _, _, z_sum, z_product = wave_sums(points[i], row)
         F0, F1, F2, F3, _, _ = transition_series(z_sum, z_product)
-        series[i], series[BLOCK + i], series[2 * BLOCK + i], series[3 * BLOCK + i] = F0, F1, F2, F3
+        put_row(series, i, (F0, F1, F2, F3))
 
 
 @inlined
-def _rows(i: int, points: Any, row: Any, series: Any) -> Any:
+def _rows(i: int, points: Any, row: Any, series: Any) -> tuple[Row, Row, Row, Row]:
     """Return the transition matrix of a slow segment at a point."""
-    S, over_d = points[i] * points[i], reciprocal(1.0 + row[DAMPING] * points[i])
-    F0, F1, F2, F3 = series[i], series[BLOCK + i], series[2 * BLOCK + i], series[3 * BLOCK + i]
-    return transition_rows(F0, F1, F2, F3, S, over_d, row[A], row[B], row[G], row[SIGMA])
+    S, over_d, _, _ = wave_sums(points[i], row)
+    return transition_rows(*row_at(series, i), S, over_d, row[A], row[B], row[G], row[SIGMA])
 
 
 @compiled
 def _by_series(points: Any, row: Any, series: Any, plane: Any, inner: Any) -> None:
     """Compute `across_rows` in the segment's own units, at every point of a block."""
-    w, wm, m, q, mq = row[TO_W], row[TO_W] * row[TO_M], row[TO_M], row[TO_Q], row[TO_M] * row[TO_Q]
-    over_w, over_wm, over_m, over_q, over_mq = 1.0 / w, 1.0 / wm, 1.0 / m, 1.0 / q, 1.0 / mq
+    units = _units(row)
+    back = _inverse(units)
     for i in range(BLOCK):
-        p = (
-            times(plane[i], w), times(plane[BLOCK + i], wm), times(plane[2 * BLOCK + i], m),
-            times(plane[3 * BLOCK + i], q), times(plane[4 * BLOCK + i], mq),
-        )  # fmt: skip
-        W, Psi, M, Q = _rows(i, points, row, series)
-        p = across_rows(W, Psi, M, Q, p)
-        inner[i], inner[BLOCK + i], inner[2 * BLOCK + i] = (
-            times(p[0], over_w),
-            times(p[1], over_wm),
-            times(p[2], over_m),
-        )
-        inner[3 * BLOCK + i], inner[4 * BLOCK + i] = times(p[3], over_q), times(p[4], over_mq)
+        p = across_rows(*_rows(i, points, row, series), _scaled(plane_at(plane, i), units))
+        put_plane(inner, i, _scaled(p, back))
 
 
 @compiled
 def cross_back(points: Any, row: Any, f: Any, outer: Any, scale: Any, faded: Any, kept: Any, number: int) -> None:
     """Compute the condition at the outer end of a segment (`outer`) from that at its inner one; see `cross`.
 
-    The scales less those of the plane are added to `scale`; `faded` (4 blocks) is scratch.
+    The scales less those of the plane are added to `scale`; `faded` (6 blocks) is scratch.
     """
     low, slow = kept.low[number], 0
     for i in range(BLOCK):
@@ -224,7 +265,7 @@ def _fade(numbers: Any, functions: Any, faded: Any, scale: Any, low: Any) -> Non
             c2, s2 = c2 * ratio, s2 * ratio
         else:
             c1, s1 = c1 * ratio, s1 * ratio
-        faded[i], faded[BLOCK + i], faded[2 * BLOCK + i], faded[3 * BLOCK + i] = c1, s1, c2, s2
+        faded[C1 + i], faded[S1 + i], faded[C2 + i], faded[S2 + i] = c1, s1, c2, s2
         if not low[i]:
             scale[i] -= left
 
@@ -232,28 +273,21 @@ def _fade(numbers: Any, functions: Any, faded: Any, scale: Any, low: Any) -> Non
 @compiled
 def _row_by_waves(row: Any, numbers: Any, faded: Any, f: Any, outer: Any) -> None:
     """Compute `row_across_waves` in the segment's own units, at every point of a block."""
-    w, m, q = row[TO_W], row[TO_M], row[TO_Q]
-    over_w, over_m, over_q = 1.0 / w, 1.0 / m, 1.0 / q
+    units = _units(row)
+    back = _inverse(units)
     for i in range(BLOCK):
-        own = times(f[i], over_w), f[BLOCK + i], times(f[2 * BLOCK + i], over_m), times(f[3 * BLOCK + i], over_q)
-        d, gS, z1, z2 = numbers[D + i], numbers[GS + i], numbers[Z1 + i], numbers[Z2 + i]
-        own = row_across_waves(
-            faded[i], faded[BLOCK + i], z1, numbers[V1 + i],
-            faded[2 * BLOCK + i], faded[3 * BLOCK + i], z2, numbers[V2 + i], gS, d, own,
-        )  # fmt: skip
-        unit = reciprocal(gS * d * (z1 - z2))
-        outer[i], outer[BLOCK + i] = times(own[0] * unit, w), own[1] * unit
-        outer[2 * BLOCK + i], outer[3 * BLOCK + i] = times(own[2] * unit, m), times(own[3] * unit, q)
+        d, gS = numbers[D + i], numbers[GS + i]
+        one, two = waves_at(numbers, faded, i)
+        own = row_across_waves(one, two, gS, d, _scaled_row(row_at(f, i), back))
+        unit = reciprocal(gS * d * (one[2] - two[2]))
+        put_row(outer, i, _scaled_row((own[0] * unit, own[1] * unit, own[2] * unit, own[3] * unit), units))
 
 
 @compiled
 def _row_by_series(points: Any, row: Any, series: Any, f: Any, outer: Any) -> None:
     """Compute `row_across` in the segment's own units, at every point of a block."""
-    w, m, q = row[TO_W], row[TO_M], row[TO_Q]
-    over_w, over_m, over_q = 1.0 / w, 1.0 / m, 1.0 / q
+    units = _units(row)
+    back = _inverse(units)
     for i in range(BLOCK):
-        own = times(f[i], over_w), f[BLOCK + i], times(f[2 * BLOCK + i], over_m), times(f[3 * BLOCK + i], over_q)
-        W, Psi, M, Q = _rows(i, points, row, series)
-        own = row_across(W, Psi, M, Q, own)
-        outer[i], outer[BLOCK + i] = times(own[0], w), own[1]
-        outer[2 * BLOCK + i], outer[3 * BLOCK + i] = times(own[2], m), times(own[3], q)
+        own = row_across(*_rows(i, points, row, series), _scaled_row(row_at(f, i), back))
+        put_row(outer, i, _scaled_row(own, units))

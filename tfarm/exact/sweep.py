@@ -40,9 +40,22 @@ from .layout import (
     TO_W,
     TURNING_GROUND,
 )
-from .pieces import BLOCK, FUNCTIONS_SIZE, NUMBERS_SIZE, PLANE_SIZE, ROW_SIZE, Kept, cross, cross_back, times
+from .pieces import (
+    BLOCK,
+    FUNCTIONS_SIZE,
+    NUMBERS_SIZE,
+    PLANE_SIZE,
+    ROW_SIZE,
+    Kept,
+    cross,
+    cross_back,
+    plane_at,
+    put_plane,
+    put_row,
+    row_at,
+    times,
+)
 from .waves import (
-    DAMPING,
     SIGMA,
     A,
     B,
@@ -60,6 +73,7 @@ from .waves import (
     reciprocal,
     tip_conditions,
     transition_series,
+    wave_sums,
 )
 
 OVERFLOW, UNDERFLOW = 1e80, 1e-80  # a plane beyond is rescaled by a power of two
@@ -120,7 +134,7 @@ def _work(rows: Any) -> Work:
         np.empty((len(rows), BLOCK), np.int64),
         np.empty((marks, PLANE_SIZE), number),
         np.empty((2, ROW_SIZE), number),
-        np.empty(ROW_SIZE, number),
+        np.empty(FUNCTIONS_SIZE, number),
         np.empty((marks, BLOCK), number),
         np.empty((marks, BLOCK), np.int64),
         np.empty(BLOCK, number),
@@ -164,23 +178,21 @@ def _begin(points: Any, ends: Any, plane: Any) -> None:
     for i in range(BLOCK):
         S = points[i] * points[i]
         mass, shear, inertia, moment = tip_conditions(ends, S)
-        p = end_plane(mass, shear + 0.0 * S, inertia, moment + 0.0 * S)
-        plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i] = p
+        put_plane(plane, i, end_plane(mass, shear + 0.0 * S, inertia, moment + 0.0 * S))
 
 
 @compiled
 def _small(points: Any, row: Any, plane: Any) -> None:
     """Compute the plane inside an offset, a spring or a body, in place."""
     for i in range(BLOCK):
-        s, S = points[i], points[i] * points[i]
-        p = plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i]
+        s, S, p = points[i], points[i] * points[i], plane_at(plane, i)
         if row[ROW_KIND] == OFFSET:
             p = inside_offset(row[LENGTH], p)
         elif row[ROW_KIND] == SPRING:
             p = inside_spring(row[STIFFNESS] + row[LOSS] * s, row[COMPLIANCE] + 0.0 * s, p)
         else:
             p = inside_body(row[MASS] * S + row[GROUND], row[INERTIA] * S + row[TURNING_GROUND], p)
-        plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i] = p
+        put_plane(plane, i, p)
 
 
 @compiled
@@ -258,24 +270,21 @@ def _go_back(points: Any, rows: Any, axis: Any, work: Work, differs: bool, lost:
 def _small_back(points: Any, row: Any, f: Any) -> None:
     """Compute the condition beyond an offset, a spring or a body, in place."""
     for i in range(BLOCK):
-        s, S = points[i], points[i] * points[i]
-        own = f[i], f[BLOCK + i], f[2 * BLOCK + i], f[3 * BLOCK + i]
+        s, S, own = points[i], points[i] * points[i], row_at(f, i)
         if row[ROW_KIND] == OFFSET:
             own = beyond_offset(row[LENGTH], own)
         elif row[ROW_KIND] == SPRING:
             own = beyond_spring(row[STIFFNESS] + row[LOSS] * s, row[COMPLIANCE] + 0.0 * s, own)
         else:
             own = beyond_body(row[MASS] * S + row[GROUND], row[INERTIA] * S + row[TURNING_GROUND], own)
-        f[i], f[BLOCK + i], f[2 * BLOCK + i], f[3 * BLOCK + i] = own
+        put_row(f, i, own)
 
 
 @compiled
 def _meet(f: Any, plane: Any) -> None:
     """Compute the state of a plane with a condition, in place of the plane's first four numbers."""
     for i in range(BLOCK):
-        own = f[i], f[BLOCK + i], f[2 * BLOCK + i], f[3 * BLOCK + i]
-        p = plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i]
-        plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i] = met(own, p)
+        put_row(plane, i, met(row_at(f, i), plane_at(plane, i)))
 
 
 @compiled
@@ -291,9 +300,7 @@ def _yield(points: Any, row: Any, f: Any, plane: Any, shift: Any, reach: float, 
         return reach
     for i in range(BLOCK):
         s, theta, lift, turn = points[i], work.theta[i], work.lift[i], work.turn[i]
-        own = f[i], f[BLOCK + i], f[2 * BLOCK + i], f[3 * BLOCK + i]
-        p = plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i]
-        W, _, M, Q = met(own, p)
+        W, _, M, Q = met(row_at(f, i), plane_at(plane, i))
         if row[ROW_KIND] == SPRING:
             work.inside[i] = times(W, math.ldexp(1.0, shift[i]))
         M, Q = times(M, math.ldexp(1.0, shift[i])), times(Q, math.ldexp(1.0, shift[i]))
@@ -319,9 +326,8 @@ def _beyond_slow(
     """
     w, M, Q = row[TO_W], row[TO_M] * M, row[TO_Q] * Q
     lift, W, Psi = w * lift, w * (reach * theta + lift), theta + turn
-    S, over_d = s * s, reciprocal(1.0 + row[DAMPING] * s)
+    S, over_d, z_sum, z_product = wave_sums(s, row)
     aS, bS, gS = row[A] * S, row[B] * S, row[G] * S
-    z_sum, z_product = S * (row[B] + row[A] * over_d), S * (row[A] * row[B] * S + row[G]) * over_d
     F0, F1, F2, _, F2_less_1, F3_less_1 = transition_series(z_sum, z_product)
     lift += turn + F2_less_1 * Psi + (F3_less_1 - aS * over_d * F1) * W + over_d * (F1 * M - F0 * Q)
     turn += (F3_less_1 - bS * F1) * Psi + over_d * ((F2 - bS * F0) * M - F1 * Q - gS * F0 * W)

@@ -17,43 +17,40 @@ from .compiled import compiled, inlined
 from .layout import OF_ANGLE
 from .pieces import (
     BLOCK,
-    C1,
-    C2,
     DT1,
     DT2,
-    E1,
-    E2,
     FUNCTIONS_SIZE,
     GS,
     NUMBERS_SIZE,
-    S1,
-    S2,
     S_SQUARED,
     T1,
     T2,
-    V1,
-    V2,
     Z1,
     Z2,
     D,
     all_wave_functions,
     all_wave_numbers,
+    put_plane,
     take_where,
+    waves_at,
 )
 from .sweep import POLE, drive_at, drive_terms
 from .waves import (
-    DAMPING,
     PARALLEL,
     SIGMA,
     A,
     B,
     G,
     Number,
+    Plane,
+    Row,
+    Wave,
     is_low,
     magnitude,
     reciprocal,
     tip_conditions,
     transition_series,
+    wave_sums,
 )
 
 LIFT = 2.0**100  # factor of W at the tip, which would underflow where s^2 W does not
@@ -62,31 +59,16 @@ DRIVE, SCALE, PARTS = 5, 6, 7  # the indices of drive and scale, and the number 
 
 
 @inlined
-def from_waves(
-    c1: Number,
-    s1: Number,
-    z1: Number,
-    v1: Number,
-    e1: Number,
-    c2: Number,
-    s2: Number,
-    z2: Number,
-    v2: Number,
-    e2: Number,
-    gS: Number,
-    d: Number,
-    tip_mass: Number,
-    shear: Number,
-    tip_inertia: Number,
-    moment: Number,
-) -> tuple[Number, Number, Number, Number]:
+def from_waves(one: Wave, two: Wave, gS: Number, d: Number, tip: Row) -> Row:
     """Return (theta, M0, Q0, W1) of the free response, up to one common factor, from the two waves.
 
     The tip satisfies  tip_mass W + shear Q = 0  and  tip_inertia Psi + moment M = 0,  with (m s^2, 1) for a finite
     inertia and (1, 0) for an infinite one.  c, s are scaled by e = e^{-t}.  In the paper's appendix these are the 3x3
     minors: theta vanishes at the hub-locked frequencies and M0 at those of a pinned root.  There is no product of a
     wave with itself, which would cancel.
-    """  # fmt: skip
+    """
+    (c1, s1, z1, v1, e1), (c2, s2, z2, v2, e2) = one, two
+    tip_mass, shear, tip_inertia, moment = tip
     So1, So2 = tip_mass * z1 * s1 + shear * gS * c1, tip_mass * z2 * s2 + shear * gS * c2
     Se1, Se2 = tip_mass * c1 + shear * gS * s1, tip_mass * c2 + shear * gS * s2
     r1, r2 = tip_inertia * c1 + moment * d * z1 * s1, tip_inertia * c2 + moment * d * z2 * s2
@@ -102,30 +84,17 @@ def from_waves(
 
 
 @inlined
-def from_transition(
-    F0: Number,
-    F1: Number,
-    F2: Number,
-    F3: Number,
-    F2_less_1: Number,
-    S: Number,
-    over_d: Number,
-    a: float,
-    b: float,
-    g: float,
-    sigma: float,
-    tip_mass: Number,
-    shear: Number,
-    tip_inertia: Number,
-    moment: Number,
-) -> tuple[Number, Number, Number, Number, Number]:
+def from_transition(s: complex, row: Any, tip: Row) -> Plane:
     """Return (theta, M0, Q0, W1, W1 - theta) of the free response, up to one factor, without wave numbers.
 
     F0 = (sinh t1 / t1 - sinh t2 / t2)/(z1 - z2) and its derivatives F1, F2, F3 along x at the tip are entire in s^2
     (C = 0) and give the state-transition matrix of (W, Psi, M, Q).  The tip's two conditions are solved by Cramer's
     rule; over_d = 1/(1 + C s).  For small |t|: for large ones products of a wave with itself cancel.
-    """  # fmt: skip
-    bS, gS = b * S, g * S
+    """
+    S, over_d, z_sum, z_product = wave_sums(s, row)
+    F0, F1, F2, F3, F2_less_1, _ = transition_series(z_sum, z_product)
+    a, g, sigma, (tip_mass, shear, tip_inertia, moment) = row[A], row[G], row[SIGMA], tip
+    bS, gS = row[B] * S, g * S
     bend = F2 - bS * F0
     turn = F3 - bS * F1
     lift = sigma * F2 - (1 + sigma * a * S) * over_d * F0
@@ -189,15 +158,12 @@ def fill_ends(s: Any, row: Any, ends: Any, table: Any, per_input: bool, found: A
 def _by_waves(ends: Any, numbers: Any, functions: Any, parts: Any) -> None:
     """Compute theta, M, Q, W and W - theta times e^{-scale}, and scale, by the two waves."""
     for i in range(BLOCK):
-        S, d, gS, z1, z2 = numbers[S_SQUARED + i], numbers[D + i], numbers[GS + i], numbers[Z1 + i], numbers[Z2 + i]
-        theta, M, Q, W = from_waves(
-            functions[C1 + i], functions[S1 + i], z1, numbers[V1 + i], functions[E1 + i],
-            functions[C2 + i], functions[S2 + i], z2, numbers[V2 + i], functions[E2 + i], gS, d,
-            *tip_conditions(ends, S),
-        )  # fmt: skip
-        unit = reciprocal(gS * d * (z1 - z2) * (z1 - z2))
-        parts[i], parts[BLOCK + i], parts[2 * BLOCK + i] = theta * unit, M * unit, Q * unit
-        parts[3 * BLOCK + i], parts[4 * BLOCK + i] = (LIFT * W) * unit, (W - theta) * unit
+        d, gS = numbers[D + i], numbers[GS + i]
+        one, two = waves_at(numbers, functions, i)
+        theta, M, Q, W = from_waves(one, two, gS, d, tip_conditions(ends, numbers[S_SQUARED + i]))
+        gap = one[2] - two[2]
+        unit = reciprocal(gS * d * gap * gap)
+        put_plane(parts, i, (theta * unit, M * unit, Q * unit, (LIFT * W) * unit, (W - theta) * unit))
         parts[SCALE * BLOCK + i] = numbers[T1 + i] + numbers[DT1 + i] + numbers[T2 + i] + numbers[DT2 + i]
 
 
@@ -205,16 +171,8 @@ def _by_waves(ends: Any, numbers: Any, functions: Any, parts: Any) -> None:
 def _by_series(points: Any, row: Any, ends: Any, parts: Any) -> None:
     """Compute the same by the series of the transition functions, at slow points."""
     for i in range(BLOCK):
-        s = points[i]
-        S, over_d = s * s, reciprocal(1.0 + row[DAMPING] * s)
-        z_sum = S * (row[B] + row[A] * over_d)
-        z_product = S * (row[A] * row[B] * S + row[G]) * over_d
-        F0, F1, F2, F3, F2_less_1, _ = transition_series(z_sum, z_product)
-        theta, M, Q, W, Y = from_transition(
-            F0, F1, F2, F3, F2_less_1, S, over_d, row[A], row[B], row[G], row[SIGMA], *tip_conditions(ends, S)
-        )
-        parts[i], parts[BLOCK + i], parts[2 * BLOCK + i] = theta, M, Q
-        parts[3 * BLOCK + i], parts[4 * BLOCK + i] = LIFT * W, Y
+        theta, M, Q, W, Y = from_transition(points[i], row, tip_conditions(ends, points[i] * points[i]))
+        put_plane(parts, i, (theta, M, Q, LIFT * W, Y))
     parts[SCALE * BLOCK : PARTS * BLOCK] = 0.0  # in the loop above it would prevent vectorisation
 
 

@@ -191,11 +191,17 @@ def wave_functions(z: complex, t: complex, dt: complex) -> tuple[complex, comple
 
 
 @inlined
+def wave_sums(s: complex, k: Any) -> tuple[complex, complex, complex, complex]:
+    """Return S = s^2, 1/d, z_1 + z_2 and z_1 z_2 of a segment."""
+    S, over_d = s * s, reciprocal(1.0 + k[DAMPING] * s)
+    return S, over_d, S * (k[B] + k[A] * over_d), S * (k[A] * k[B] * S + k[G]) * over_d
+
+
+@inlined
 def is_low(s: complex, k: Any) -> bool:
     """Whether both |z| are certainly below SERIES_RADIUS."""
-    S, over_d = s * s, reciprocal(1.0 + k[DAMPING] * s)
-    half_sum = 0.5 * magnitude(S * (k[B] + k[A] * over_d))
-    product = magnitude(S * (k[A] * k[B] * S + k[G]) * over_d)
+    _, _, z_sum, z_product = wave_sums(s, k)
+    half_sum, product = 0.5 * magnitude(z_sum), magnitude(z_product)
     return 1.4 * (half_sum + math.sqrt(half_sum * half_sum + 2.0 * product)) < SERIES_RADIUS
 
 
@@ -248,6 +254,7 @@ def impedance(S: float, k: Any) -> float:
     return min(inertia, math.sqrt(math.sqrt(inertia)) + math.sqrt(S * (k[A] + k[B])))
 
 
+Wave = tuple[Number, Number, Number, Number, Number]  # c, s, z, v, e: c and s are scaled by e = e^{-t}
 Plane = tuple[Number, Number, Number, Number, Number]  # p_WPsi, p_WM, p_WQ = -p_PsiM, p_PsiQ, p_MQ
 Row = tuple[Number, Number, Number, Number]  # f_W, f_Psi, f_M, f_Q
 
@@ -256,6 +263,18 @@ Row = tuple[Number, Number, Number, Number]  # f_W, f_Psi, f_M, f_Q
 def end_plane(mass: Number, shear: Number, inertia: Number, moment: Number) -> Plane:
     """Return the plane of states with  mass W + shear Q = 0  and  inertia Psi + moment M = 0, of a body at the end."""
     return shear * moment, -shear * inertia, 0.0 * shear, mass * moment, -mass * inertia
+
+
+@inlined
+def into_own(p: Plane, w: Number, m: Number, q: Number) -> Plane:
+    """Return a plane in a segment's own units, the factors of W, M and Q (`Segment.units`)."""
+    return p[0] * w, p[1] * (w * m), p[2] * m, p[3] * q, p[4] * (m * q)
+
+
+@inlined
+def out_of_own(p: Plane, w: Number, m: Number, q: Number) -> Plane:
+    """Return the plane in the units of the chain."""
+    return p[0] / w, p[1] / (w * m), p[2] / m, p[3] / q, p[4] / (m * q)
 
 
 @inlined
@@ -295,26 +314,12 @@ def inside_body(translation: Number, rotation: Number, p: Plane) -> Plane:
 
 
 @inlined
-def across_waves(
-    c1: Number,
-    s1: Number,
-    z1: Number,
-    v1: Number,
-    e1: Number,
-    c2: Number,
-    s2: Number,
-    z2: Number,
-    v2: Number,
-    e2: Number,
-    gS: Number,
-    d: Number,
-    v_sum: Number,
-    p: Plane,
-) -> Plane:
+def across_waves(one: Wave, two: Wave, gS: Number, d: Number, v_sum: Number, p: Plane) -> Plane:
     """Return the plane at the inner end of a segment from the outer one, times g S d (z1 - z2)^2 e^{-(t1 + t2)}.
 
-    c, s are scaled by e = e^{-t}, v_j = z_j - b S and v1 v2 = g S/d, v_sum = v1 + v2 (see `waves`).
-    """  # fmt: skip
+    v_j = z_j - b S and v1 v2 = g S/d, v_sum = v1 + v2 (see `waves`).
+    """
+    (c1, s1, z1, v1, e1), (c2, s2, z2, v2, e2) = one, two
     WPsi, WM, WQ, PsiQ, MQ = p
     gap = z1 - z2
     turned = d * gS * WPsi
@@ -408,23 +413,12 @@ def beyond_body(translation: Number, rotation: Number, f: Row) -> Row:
 
 
 @inlined
-def row_across_waves(
-    c1: Number,
-    s1: Number,
-    z1: Number,
-    v1: Number,
-    c2: Number,
-    s2: Number,
-    z2: Number,
-    v2: Number,
-    gS: Number,
-    d: Number,
-    f: Row,
-) -> Row:
+def row_across_waves(one: Wave, two: Wave, gS: Number, d: Number, f: Row) -> Row:
     """Return the condition at the outer end of a segment from that at its inner one, times g S d (z1 - z2).
 
     c, s of both waves are scaled by the same factor.
-    """  # fmt: skip
+    """
+    (c1, s1, z1, v1, _), (c2, s2, z2, v2, _) = one, two
     even1, odd1 = f[0] + d * v1 * f[2], v1 * f[1] + gS * f[3]
     even2, odd2 = f[0] + d * v2 * f[2], v2 * f[1] + gS * f[3]
     even1, odd1 = c1 * even1 - s1 * odd1, c1 * odd1 - z1 * s1 * even1

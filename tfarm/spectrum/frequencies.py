@@ -26,12 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
-from tfarm.exact.balls import Ball, Sweep, first_success, into_own, out_of_own, precision, rational
-from tfarm.exact.compiled import python_of
+from tfarm.exact.balls import Ball, Sweep, across_waves, first_success, into_own, out_of_own, precision, rational
 from tfarm.exact.count import bisect_chain, chain_counts, rows_to_count
 from tfarm.exact.layout import Layout, readings
 from tfarm.exact.system import Segment, Spring, System
-from tfarm.exact.waves import Plane, across_waves
+from tfarm.exact.waves import Plane
 
 
 class Counter:
@@ -50,8 +49,6 @@ class Counter:
         bisect_chain(number, self._rows, self._ends, low, high)
         return high
 
-
-_across_waves = python_of(across_waves)
 
 MOST_AXIS_BITS = 40_000  # of working precision: a root that needs more is double
 BITS_A_DIGIT, SPARE_BITS = 3.33, 80  # log2 10, rounded up; and beyond the digits, for cancellation
@@ -123,11 +120,11 @@ class AxisSweep(Sweep):
         own, gS, (one, two) = into_own(p, *units), S * g, real_waves(a, b, g, S)
         gap = one[2] - two[2]
         unit = 1 / (gS * gap * gap)
-        inside = tuple(part * unit for part in _across_waves(*one, *two, gS, flint.arb(1), S * (a - b), own))
+        inside = tuple(part * unit for part in across_waves(one, two, gS, flint.arb(1), S * (a - b), own))
         if self._counting:
             zero = flint.arb(0)
             clamped = (zero, zero, zero, zero, flint.arb(1))
-            r = [part * unit for part in _across_waves(*one, *two, gS, flint.arb(1), S * (a - b), clamped)]
+            r = [part * unit for part in across_waves(one, two, gS, flint.arb(1), S * (a - b), clamped)]
             self._count_segment([one[2], two[2]], own, inside, r)
         self._free = 2
         return out_of_own(inside, *units)
