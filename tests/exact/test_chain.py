@@ -299,7 +299,7 @@ def test_the_fused_kernel_of_one_link_says_what_the_sweep_says(seed):
     those = readings(system_of(arm), wanted, 0.0)
     layout, lost = those.layout, np.empty(s.size, bool)
     fused, swept = np.empty((2, 2 + len(wanted), s.size), complex)
-    fill_ends(s, layout.rows[layout.segment_row], layout.ends, those.ends_table, False, fused, lost)
+    fill_ends(s, layout.rows, layout.ends, those.ends_table, False, fused, lost)
     fill_free(s, layout.rows, layout.ends, AXIS, those.table, swept, lost)
     swept[2:] = swept[2:] * np.exp(swept[1] - fused[1])
     swept[0] = swept[0] * np.exp(swept[1] - fused[1])
@@ -307,7 +307,7 @@ def test_the_fused_kernel_of_one_link_says_what_the_sweep_says(seed):
     condition = 1 + abs(fused[1])  # the phase of all waves, whose last bits the scales have apart
     assert (abs(here - there) <= 1e-14 * condition * (abs(there) + abs(here))).all()
     per_input = np.empty((len(wanted), s.size), complex)
-    fill_ends(s, layout.rows[layout.segment_row], layout.ends, those.ends_table, True, per_input, lost)
+    fill_ends(s, layout.rows, layout.ends, those.ends_table, True, per_input, lost)
     assert (abs(per_input * fused[0] - fused[2:]) <= 16 * EPS * abs(fused[2:])).all()
 
 

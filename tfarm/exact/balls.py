@@ -211,12 +211,16 @@ class Sweep:
 
     def _transition(self, segment: Any) -> tuple[Row, ...]:
         if id(segment) not in self._rows:
-            a, b, g, sigma = segment[:4]
-            S, over_d = self.S, 1 / (self.s * segment.damping + 1)
-            z_sum, z_product = S * (over_d * a + b), S * (S * (a * b) + g) * over_d
+            over_d, z_sum, z_product = self._sums(segment)
             functions = self._functions(z_sum, z_product)
-            self._rows[id(segment)] = _transition_rows(*functions, S, over_d, a, b, g, sigma)
+            self._rows[id(segment)] = _transition_rows(*functions, self.S, over_d, *segment[:4])
         return self._rows[id(segment)]
+
+    def _sums(self, segment: Any) -> tuple[Any, Any, Any]:
+        """Return 1/d, z_1 + z_2 and z_1 z_2 of a segment."""
+        a, b, g = segment[:3]
+        S, over_d = self.S, 1 / (self.s * segment.damping + 1)
+        return over_d, S * (over_d * a + b), S * (S * (a * b) + g) * over_d
 
     def _functions(self, z_sum: Any, z_product: Any) -> tuple[Any, ...]:
         """Return F0..F3 at the segment's end."""
@@ -230,33 +234,17 @@ class Sweep:
         return self.S * body.mass + body.stiffness, self.S * body.inertia + body.rotational_stiffness
 
 
-class State:
-    """The free response of a system at one s in balls, and its outputs."""
+def output_ball(system: System, wanted: Output, s: Ball, x: float = 0.0) -> Ball | None:
+    """Return an output for a unit input at s, in SI units; x is a share of the length.
 
-    def __init__(self, system: System, s: Any) -> None:
-        self.system, self.s = system, s
-
-    @cached_property
-    def input(self) -> Any:
-        """The input of this response: zero at a pole."""
-        return Sweep(readings(self.system, (), 0.0).layout, self.s).input
-
-    def numerator(self, output: Output, x: float = 0.0) -> Any:
-        """Return the output of the free response, in SI units."""
-        those = readings(self.system, (output,), x)
-        return Sweep(those.layout, self.s).output(those.each[0])
-
-    def value(self, output: Output, x: float = 0.0) -> Ball:
-        """Return the output for a unit input, in SI units; x is a share of the length."""
-        constant, drive = constant_of(self.system, output, x), self.system.drive
-        those = readings(self.system, (output,), x)
-        (one,) = those.each
-        if one.is_current and not (drive.back_emf or drive.lag):  # the input in another unit
-            constant = 1
-        if constant is None:
-            return self.numerator(output, x) / self.input
-        return self.s**one.power * constant * rational(one.unit) / (1 + rational(those.gauges[0]) * self.s)
-
-    def determines(self, output: Output, x: float) -> bool:
-        """Whether the output has a value: where the input is certainly not zero, as at a pole."""
-        return constant_of(self.system, output, x) is not None or not self.input.contains(0)
+    None where the input of the free response may be zero, as at a pole.
+    """
+    constant, drive = constant_of(system, wanted, x), system.drive
+    those = readings(system, (wanted,), x)
+    (one,) = those.each
+    if one.is_current and not (drive.back_emf or drive.lag):  # the input in another unit
+        constant = 1
+    if constant is not None:
+        return s**one.power * constant * rational(one.unit) / (1 + rational(those.gauges[0]) * s)
+    sweep = Sweep(those.layout, s)
+    return None if sweep.input.contains(0) else sweep.output(one) / sweep.input

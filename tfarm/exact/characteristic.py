@@ -38,8 +38,8 @@ from tfarm.arrays import Complex, Real
 from tfarm.records import read_only
 
 from .balls import Ball, Sweep, across_waves, into_own, out_of_own, point, rational, summed
-from .layout import Layout, Readings, laid_out, readings
-from .outputs import OUTPUTS, Output, unit_scale
+from .layout import Layout, Readings, laid_out, readings, unit_scale
+from .outputs import OUTPUTS, Output
 from .rationals import polynomials
 from .system import Segment, System
 from .values import free_outputs, free_slopes
@@ -156,13 +156,8 @@ class WideSweep(Sweep):
         return out_of_own(tuple(part / unit for part in inner), *units)
 
     def _is_slow(self, segment: Any) -> bool:
-        z_sum, z_product = self._sums(segment)
+        _, z_sum, z_product = self._sums(segment)
         return bool(abs(z_sum[0]).mid() + 2 * abs(z_product[0]).mid().sqrt() < SLOW_WAVES)
-
-    def _sums(self, segment: Any) -> tuple[Series, Series]:
-        a, b, g = segment[:3]
-        over_d = 1 / (self.s * segment.damping + 1)
-        return self.S * (over_d * a + b), self.S * (self.S * (a * b) + g) * over_d
 
     def _at_mark(self, p: Plane) -> Plane:
         grown = self.phase.exp()

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from tfarm.errors import ParameterError
 from tfarm.records import read_only
 
-from .outputs import Output, unit_scale
-from .system import Body, Element, EndCondition, Mark, Offset, Place, Segment, Spring, System, double_double
+from .outputs import Output
+from .system import Body, Element, Mark, Offset, Place, Segment, Spring, System, double_double, end_condition
 
 SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
 LENGTH, NUMBER = 0, 0  # of an offset's row of the kernel, and of a mark's
@@ -69,11 +69,9 @@ class Layout:
                 each if isinstance(each, Mark) else type(each)._make(n if n is None else exact(n) for n in each)
                 for each in self.elements
             ]
-            ends = [EndCondition.of(inertia) for inertia in (self.chain.tip_mass, self.chain.tip_inertia)]
-            mass, inertia = (tuple(map(exact, (end.rest, end.inertia, end.force))) for end in ends)
-            drive = self.chain.drive
-            angle, moment = tuple(map(exact, drive.of_angle)), tuple(map(exact, drive.of_moment))
-            self._numbers[key] = Numbers(tuple(elements), mass, inertia, angle, moment)
+            chain, drive = self.chain, self.chain.drive
+            ends = end_condition(chain.tip_mass), end_condition(chain.tip_inertia), drive.of_angle, drive.of_moment
+            self._numbers[key] = Numbers(tuple(elements), *(tuple(map(exact, each)) for each in ends))
         return self._numbers[key]
 
     @cached_property
@@ -81,11 +79,6 @@ class Layout:
         """The elements for the kernel (elements, `ROW_WIDTH`)."""
         rows = np.array([kernel_row(each) for each in self.elements]).reshape(-1, ROW_WIDTH)
         return np.asarray(read_only(rows))
-
-    @property
-    def segment_row(self) -> int:
-        """The row of the segment at the hub."""
-        return max(n for n, each in enumerate(self.elements) if isinstance(each, Segment))
 
     @cached_property
     def ends(self) -> NDArray[np.float64]:
@@ -220,6 +213,15 @@ class Readings:
             return None
         rows = [(n, one.power, C, one.unit) for n, one, C in zip(which, self.each, self.gauges, strict=True)]
         return np.asarray(read_only(np.array(rows, dtype=float).reshape(-1, 4)))
+
+
+def unit_scale(wanted: Output, k: System) -> Fraction:
+    """Return the SI value of one dimensionless unit of the output for 1 N m of torque, or 1 rad of a locked hub."""
+    if wanted.quantity in ("W", "Y", "centre"):
+        return k.length / k.input_unit
+    if wanted.quantity in ("M", "Q"):
+        return k.EI / k.length ** (1 if wanted.quantity == "M" else 2) / k.input_unit
+    return 1 / k.input_unit
 
 
 def reading_of(chain: System, wanted: Output, x: float) -> Reading:

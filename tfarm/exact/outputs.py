@@ -10,9 +10,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from types import MappingProxyType
-from typing import Literal, Protocol, get_args
+from typing import Literal, get_args
 
 from tfarm.arm.checks import whole
 from tfarm.errors import ParameterError, did_you_mean, must_be_known
@@ -39,19 +38,6 @@ PLACES_OF: Mapping[str, tuple[Place, ...]] = MappingProxyType({
 })  # fmt: skip
 _METRES, _RADIANS = dict.fromkeys(("W", "Y", "centre"), "m"), dict.fromkeys(("theta", "Phi", "Psi"), "rad")
 QUANTITY_UNITS = MappingProxyType({**_METRES, **_RADIANS, "M": "N m", "Q": "N", "strain": "1", "current": "A"})
-
-
-class Units(Protocol):
-    """The units of a system's dimensionless numbers, and whether the hub is locked."""
-
-    @property
-    def length(self) -> Fraction: ...
-    @property
-    def EI(self) -> Fraction: ...
-    @property
-    def input_unit(self) -> Fraction: ...
-    @property
-    def is_locked(self) -> bool: ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,12 +163,3 @@ def on_side(wanted: str | Output, side: Side) -> Output:
     if side == found.side:
         return found
     return replace(found, side=side, name=f"{found.name}_{side}", label=f"{found.label}, {side} side")
-
-
-def unit_scale(wanted: Output, k: Units) -> Fraction:
-    """Return the SI value of one dimensionless unit of the output for 1 N m of torque, or 1 rad of a locked hub."""
-    if wanted.quantity in ("W", "Y", "centre"):
-        return k.length / k.input_unit
-    if wanted.quantity in ("M", "Q"):
-        return k.EI / k.length ** (1 if wanted.quantity == "M" else 2) / k.input_unit
-    return 1 / k.input_unit

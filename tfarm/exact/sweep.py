@@ -198,15 +198,7 @@ def _small(points: Any, row: Any, plane: Any) -> None:
 @compiled
 def _brought_back(buffer: Any, parts: int, powers: Any) -> None:
     """Divide each point's numbers by a power of two, in place, where they are near over- or underflow."""
-    is_extreme = False
-    for i in range(BLOCK):
-        largest = 0.0
-        for j in range(parts):
-            largest = max(largest, magnitude(buffer[BLOCK * j + i]))
-        is_extreme = is_extreme or not UNDERFLOW <= largest <= OVERFLOW
     powers[:] = 0
-    if not is_extreme:
-        return
     for i in range(BLOCK):
         largest = 0.0
         for j in range(parts):
@@ -376,7 +368,7 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
         for i in range(BLOCK):
             axes[:, i] = axis[:, min(first + min(i, n - 1), axis.shape[1] - 1)]
         _go_back(points, rows, axes, work, differs, lost_here)
-        _drive(points, _innermost(rows), ends, work.planes[0], values[0], lost_here)
+        _drive(points, innermost(rows), ends, work.planes[0], values[0], lost_here)
         for o in range(len(table)):
             _output(points, table[o], work, values[1 + o], lost_here)
         found[0, first : first + n], found[1, first : first + n] = values[0, :n], work.scale[:n]
@@ -385,7 +377,7 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
 
 
 @inlined
-def _innermost(rows: Any) -> Any:
+def innermost(rows: Any) -> Any:
     """Return the row of the segment at the hub."""
     last = rows[0]
     for j in range(len(rows)):

@@ -133,24 +133,15 @@ class Drive(NamedTuple):
         return Fraction(self.turns), self.lag * self.turns
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EndCondition:
-    """An end condition  (rest + inertia s^2) motion + force_weight force = 0, scaled to stay near one.
+@lru_cache(maxsize=64)  # a proof needs the same three at every step of its contour
+def end_condition(inertia: Inertia) -> tuple[Fraction, Fraction, Fraction]:
+    """Return r, n, f of  (r + n s^2) motion + f force = 0  at the end, a body of that dimensionless inertia (0..inf).
 
-    A finite dimensionless inertia n gives (0, n, 1)/(1 + n), an infinite one (1, 0, 0): motion = 0.
+    A finite inertia i gives (0, i, 1)/(1 + i), near one, an infinite one (1, 0, 0): motion = 0.
     """
-
-    rest: Fraction
-    inertia: Fraction
-    force: Fraction
-
-    @classmethod
-    @lru_cache(maxsize=64)  # a proof needs the same three at every step of its contour
-    def of(cls, inertia: Inertia) -> EndCondition:
-        """Return the condition of a body of that dimensionless inertia (0..inf)."""
-        if not isinstance(inertia, Fraction):
-            return cls(rest=Fraction(1), inertia=Fraction(0), force=Fraction(0))
-        return cls(rest=Fraction(0), inertia=inertia / (1 + inertia), force=1 / (1 + inertia))
+    if not isinstance(inertia, Fraction):
+        return Fraction(1), Fraction(0), Fraction(0)
+    return Fraction(0), inertia / (1 + inertia), 1 / (1 + inertia)
 
 
 def double_double(value: Fraction) -> tuple[float, float]:

@@ -34,7 +34,7 @@ from .pieces import (
     take_where,
     waves_at,
 )
-from .sweep import POLE, drive_at, drive_terms
+from .sweep import POLE, drive_at, drive_terms, innermost
 from .waves import (
     PARALLEL,
     SIGMA,
@@ -113,15 +113,16 @@ def from_transition(s: complex, row: Any, tip: Row) -> Plane:
 
 
 @compiled
-def fill_ends(s: Any, row: Any, ends: Any, table: Any, per_input: bool, found: Any, lost: Any) -> None:
+def fill_ends(s: Any, rows: Any, ends: Any, table: Any, per_input: bool, found: Any, lost: Any) -> None:
     """Compute drive, scale and each output of the free response at s (1-D), rows of `found`; mark lost digits.
 
-    `row` and `ends` are those of the layout.  A row of `table` is an output: the index of theta, M, Q, W or W - theta,
+    `rows` and `ends` are those of the layout.  A row of `table` is an output: the index of theta, M, Q, W or W - theta,
     power of s, C of its gauge, factor.  Outputs are those of a unit input with `per_input`, else times e^{-scale}.
     """
     points, low = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_)
     numbers, functions = np.empty(NUMBERS_SIZE, np.complex128), np.empty(FUNCTIONS_SIZE, np.complex128)
     parts, of_slow = np.empty(PARTS * BLOCK, np.complex128), np.empty(PARTS * BLOCK, np.complex128)
+    row = innermost(rows)
     small = 1.0  # against overflow of squares of the drive with a heavy hub
     for j in range(4):
         small = max(small, abs(ends[OF_ANGLE + j]))

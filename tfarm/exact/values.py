@@ -26,7 +26,7 @@ from tfarm.records import record
 from tfarm.schema import Quantity
 
 from . import appendix
-from .balls import Ball, State, first_success, nearest_float, point, rational
+from .balls import Ball, first_success, nearest_float, output_ball, point, rational
 from .layout import Layout, Readings, constant_of, readings
 from .outputs import Output
 from .series import expansions_at_zero
@@ -66,7 +66,7 @@ def _free(those: Readings, s: Complex) -> Free:
     found, lost = np.empty((2 + len(those.each), s.size), complex), np.empty(s.size, bool)
     s, layout, ends = np.ascontiguousarray(s, dtype=complex), those.layout, those.ends_table
     if ends is not None:
-        fill_ends(s, layout.rows[layout.segment_row], layout.ends, ends, False, found, lost)
+        fill_ends(s, layout.rows, layout.ends, ends, False, found, lost)
         return Free(found[0], found[2:], found[1], lost)
     fill_free(s, layout.rows, layout.ends, AXIS, those.table, found, lost)
     drive = those.layout.chain.drive
@@ -139,9 +139,7 @@ def evaluate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float =
     with np.errstate(all="ignore"):
         if those.ends_table is not None:
             values, lost = np.empty((len(wanted), s.size), complex), np.empty(s.size, bool)
-            fill_ends(
-                s, those.layout.rows[those.layout.segment_row], those.layout.ends, those.ends_table, True, values, lost
-            )
+            fill_ends(s, those.layout.rows, those.layout.ends, those.ends_table, True, values, lost)
         else:
             free = _free(those, s)
             values, lost = free.outputs / free.drive, free.lost
@@ -207,8 +205,7 @@ def enclose(k: System, wanted: Output, s: complex, *, bits: int, x: float = 0.0)
     """
 
     def attempt() -> Ball | None:
-        state = State(k, point(s))
-        value = state.value(wanted, x) if state.determines(wanted, x) else None
+        value = output_ball(k, wanted, point(s), x)
         return value if value is not None and (value.rel_accuracy_bits() >= bits or value.is_zero()) else None
 
     return first_success(precisions(bits), attempt, CertificationError(NO_NUMBER.format(f"{bits} bits", s)))
@@ -219,11 +216,10 @@ def slope(k: System, wanted: Output, s: complex, *, bits: int = 60, x: float = 0
     step = rational(Fraction(1, 1 << (2 * bits)))
 
     def attempt() -> Ball | None:
-        here, there = State(k, point(s)), State(k, point(s) * (1 + step))
-        if not (here.determines(wanted, x) and there.determines(wanted, x)):
+        value, beyond = (output_ball(k, wanted, at, x) for at in (point(s), point(s) * (1 + step)))
+        if value is None or beyond is None:
             return None
-        value = here.value(wanted, x)
-        difference = (there.value(wanted, x) - value) / (step * point(s))
+        difference = (beyond - value) / (step * point(s))
         is_known = (difference + value / point(s)).rel_accuracy_bits() >= bits or value.is_zero()
         return difference if is_known else None
 
@@ -241,10 +237,9 @@ def decimals(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0)
         vanish = wanted.power % 2 == 1, wanted.power % 2 == 0
 
     def attempt() -> tuple[str, str] | None:
-        state = State(k, point(s))
-        if not state.determines(wanted, x):
+        value = output_ball(k, wanted, point(s), x)
+        if value is None:
             return None
-        value = state.value(wanted, x)
         parts = zip(vanish, (value.real, value.imag), strict=True)
         known = [flint.arb(0) if is_zero else part for is_zero, part in parts]
         re, im = ("0.0" if each.is_zero() else str(each.mid().str(digits, radius=False)) for each in known)

@@ -242,7 +242,7 @@ def even_functions(z: Number) -> tuple[Number, Number]:
 def tip_conditions(ends: Any, S: Number) -> tuple[Number, Number, Number, Number]:
     """Return tip_mass, shear, tip_inertia and moment of the tip's conditions at S = s^2 from the vector of ends.
 
-    Rest, inertia and force of the mass come first and those of the inertia next (see `system.EndCondition`).
+    Rest, inertia and force of the mass come first and those of the inertia next (see `system.end_condition`).
     """
     return ends[0] + ends[1] * S, ends[2], ends[3] + ends[4] * S, ends[5]
 

@@ -24,8 +24,8 @@ from tfarm.arm import Arm
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.exact.layout import constant_of
-from tfarm.exact.outputs import OUTPUTS, Output, unit_scale
+from tfarm.exact.layout import constant_of, unit_scale
+from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.exact.series import without_slow_pole
 from tfarm.exact.system import System
 from tfarm.exact.values import evaluate_outputs, free_slopes
