@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import Complex, Real, Whole
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.outputs import Output
 from tfarm.exact.rigid import rigid_response
@@ -105,6 +105,8 @@ def extrema(
     `value` is G on the grid, `roots` [1/s] are poles and zeros near it, `infinite` and `vanishing` [rad/s] the
     frequencies of those on the imaginary axis, which are not in the grid.
     """
+    from scipy.signal import find_peaks  # half a second to import
+
     on_axis = np.sort(np.r_[infinite, vanishing])
     between = (on_axis[:-1] + on_axis[1:]) / 2  # two roots may have no point of the grid between them
     at = np.r_[omega, between, infinite, vanishing]
@@ -113,7 +115,8 @@ def extrema(
         height = np.r_[np.log(abs(value)), _height(G, between), limits]
     order = np.argsort(at)
     at, height = _halved(G, at[order], height[order], roots)
-    maxima, minima = _turns(height, _least(at, roots))
+    least = _least(at, roots)
+    maxima, minima = (find_peaks(sign * height, prominence=least)[0] for sign in (1, -1))
     return _refined(G, at, height, maxima), _refined(G, at, height, minima)
 
 
@@ -147,26 +150,9 @@ def _halved(G: Response, omega: Real, height: Real, roots: Complex) -> tuple[Rea
     return omega, height
 
 
-def _turns(height: Real, least: Real) -> tuple[list[int], list[int]]:
-    """Return the indices of maxima and minima, where the height rises and falls by more than `least`."""
-    maxima: list[int] = []
-    minima: list[int] = []
-    rises, high, low = None, 0, 0
-    for i, (here, step) in enumerate(zip(height.tolist(), least.tolist(), strict=True)):
-        high, low = (i if here > height[high] else high), (i if here < height[low] else low)
-        if rises is not False and here < height[high] - step:
-            maxima += [high] if rises else []
-            rises, low = False, i
-        elif rises is not True and here > height[low] + step:
-            minima += [low] if rises is False else []
-            rises, high = True, i
-    return maxima, minima
-
-
-def _refined(G: Response, omega: Real, height: Real, places: list[int]) -> tuple[Extremum, ...]:
+def _refined(G: Response, omega: Real, height: Real, places: Whole) -> tuple[Extremum, ...]:
     """Return the extrema near these indices, finite ones at the vertex of a parabola through three points."""
-    at = np.array(places, int)
-    at = at[np.isfinite(height[at])]
+    at = places[np.isfinite(height[places])]
     middle = (omega[1:] + omega[:-1]) / 2
     with np.errstate(invalid="ignore", divide="ignore"):
         slope = np.diff(height) / np.diff(omega)
@@ -174,7 +160,7 @@ def _refined(G: Response, omega: Real, height: Real, places: list[int]) -> tuple
     vertex = np.where(np.isfinite(vertex), np.clip(vertex, omega[at - 1], omega[at + 1]), omega[at])
     finite = dict(zip(at.tolist(), zip(vertex.tolist(), abs(G(1j * vertex)).tolist(), strict=True), strict=True))
     limit = {np.inf: np.inf, -np.inf: 0.0}
-    return tuple(Extremum(*finite.get(i) or (float(omega[i]), limit[float(height[i])])) for i in places)
+    return tuple(Extremum(*finite.get(i) or (float(omega[i]), limit[float(height[i])])) for i in places.tolist())
 
 
 GRID_RANGE = Quantity("frequency range", "rad/s", help="first and last frequency", key="range_rad_s")

@@ -27,8 +27,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Decimal, localcontext
 from fractions import Fraction
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import Annotated
 
 import flint
@@ -46,6 +47,7 @@ from .box import Box
 from .frequencies import RealAxis, axis_precisions, secant
 
 COUNTED_AT = tuple(Fraction(*share) for share in ((1, 2), (2, 5), (3, 5), (1, 7), (6, 7)))  # of a gap: tried in turn
+MOST_DECIMALS = 20_000  # of an exact decimal: more than any bracket has
 COUNTING_BITS = (128, 512, 4096)  # of working precision there: a count is certain unless it is on a half wave
 
 
@@ -112,10 +114,8 @@ def _count_above(k: System, last: Fraction, above: float) -> tuple[int, str]:
 
 def _text(value: Fraction) -> str:
     """Return a positive number as an exact decimal string."""
-    unit = Fraction(1)
-    while (value / unit).denominator != 1:
-        unit /= 10
-    return _decimal(value, unit)
+    with localcontext(prec=MOST_DECIMALS):
+        return f"{Decimal(value.numerator) / value.denominator:f}"
 
 
 SHORTEST_PIECE = 2.0**-26  # share of a side of the contour: a shorter piece means a zero on it
@@ -195,11 +195,13 @@ def enclosed(k: System, near: complex, digits: int, law: Feedback | None = None)
         middle = _newton(k, law, near, digits)
         if middle is None:
             return None
-        unit = Fraction(10) ** (int(np.floor(np.log10(abs(complex(middle.mid()))))) - digits + 1)
+        exponent = math.floor(math.log10(abs(complex(middle.mid())))) - digits + 1
+        unit = Fraction(10) ** exponent
         exact = (exact_middle(part) for part in (middle.real, middle.imag))
-        re, im = (round(Fraction(int(part.p), int(part.q)) / unit) * unit for part in exact)
-        is_proven = _holds_one(k, law, flint.acb(rational(re), rational(im)), rational(unit))
-        return Disc(_decimal(re, unit), _decimal(im, unit), f"{float(unit):.0e}") if is_proven else None
+        re, im = (round(Fraction(int(part.p), int(part.q)) / unit) for part in exact)
+        is_proven = _holds_one(k, law, flint.acb(rational(re * unit), rational(im * unit)), rational(unit))
+        re_text, im_text = (f"{Decimal(f'{number}E{exponent}'):f}" for number in (re, im))
+        return Disc(re_text, im_text, f"{float(unit):.0e}") if is_proven else None
 
     text = f"no certified disc of {digits} digits around {near:.12g} 1/s: a double zero, or close to one"
     return first_success(axis_precisions(digits), attempt, CertificationError(text))
@@ -229,23 +231,7 @@ def _holds_one(k: System, law: Feedback | None, m: Ball, r: Ball) -> bool:
     return bool(slope * r > value + half_curvature * r * r)
 
 
-def _decimal(value: Fraction, unit: Fraction) -> str:
-    """Return a multiple of a power of ten as a decimal string."""
-    places = max(0, len(str(unit.denominator)) - 1)
-    scaled = value * 10**places
-    sign, digits = "-" if scaled < 0 else "", str(abs(int(scaled))).rjust(places + 1, "0")
-    return f"{sign}{digits[: len(digits) - places]}.{digits[len(digits) - places :]}" if places else f"{sign}{digits}"
-
-
 def disjoint(discs: Sequence[Disc]) -> bool:
     """Whether no two discs touch."""
     parts = [(Fraction(d.re), Fraction(d.im), Fraction(d.radius)) for d in discs]
-    order = sorted(range(len(parts)), key=lambda i: parts[i][0])
-    for n, i in enumerate(order):
-        for j in order[n + 1 :]:
-            if parts[j][0] - parts[i][0] > parts[i][2] + parts[j][2]:
-                break
-            apart = (parts[j][0] - parts[i][0]) ** 2 + (parts[j][1] - parts[i][1]) ** 2
-            if apart <= (parts[i][2] + parts[j][2]) ** 2:
-                return False
-    return True
+    return all((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 > (a[2] + b[2]) ** 2 for a, b in combinations(parts, 2))
