@@ -22,7 +22,7 @@ from tfarm.arm import THEORIES, Attachment, Motor, RotarySpring
 from tfarm.errors import ParameterError
 from tfarm.exact.layout import readings
 from tfarm.exact.outputs import OUTPUTS, Output
-from tfarm.exact.series import expansions_at_zero
+from tfarm.exact.series import expansion_at_zero
 from tfarm.exact.sweep import AXIS, fill_free
 from tfarm.exact.system import Place, system_of
 from tfarm.exact.uniform import fill_ends
@@ -228,7 +228,7 @@ def test_the_expansion_at_rest(name):
         ]
         exact = np.array([[complex(value) for value in row] for row in wanted])
     G = transfer_of(arm, 0.625)
-    found = np.array(expansions_at_zero(system_of(arm), G.rows, 0.625 / arm.length))
+    found = np.array([expansion_at_zero(system_of(arm), row, 0.625 / arm.length) for row in G.rows])
     assert np.array_equal(G.rigid_body, found[:, 0])
     assert np.array_equal(G.static, found[:, 2])
     sizes = np.maximum(abs(exact).max(axis=1)[:, None], 1e-20)

@@ -20,7 +20,7 @@ import numpy as np
 from tfarm.arm.blocks import LawBlock, Rational
 from tfarm.arrays import Complex, Real
 
-from .balls import exact_middle
+from .balls import exact_middle, precision
 
 IntegerMatrix = list[list[int]]
 
@@ -160,12 +160,8 @@ def _of_matched(num: Any, den: Any, T: float) -> Gained:
 def _of_held(block: LawBlock, nums: list[Any], den: Any, T: float) -> list[Gained]:
     """Return gain and zeros of each signal behind a zero-order hold."""
     states = _companion(nums[0], den) if isinstance(block, Rational) else tuple(map(_exact, block.matrices()))
-    prec = flint.ctx.prec
-    try:
-        flint.ctx.prec = BITS_A_STATE * (block.order + SPARE_STATES)
+    with precision(BITS_A_STATE * (block.order + SPARE_STATES)):
         held = [_held_numerator(states, j, num, den, _rational(T)) for j, num in enumerate(nums)]
-    finally:
-        flint.ctx.prec = prec
     return [(_leading(each, flint.fmpq_poly([1])), _roots(each)) for each in held]
 
 

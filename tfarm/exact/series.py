@@ -28,16 +28,9 @@ class SlowSweep(Sweep):
         return tuple(summed(z_sum, z_product, 2 * SERIES_ORDER))
 
 
-def expansions_at_zero(
-    chain: System, wanted: Sequence[Output], x: float = 0.0
-) -> list[tuple[float, float, float, float]]:
-    """Return the coefficients of s^-2, s^-1, 1 and s in each output's expansion at s = 0."""
-    return [_series_at_zero(chain, each, x) for each in wanted]
-
-
 @lru_cache(SERIES_KEPT)  # loops, models and pages need the same few of a rig
-def _series_at_zero(chain: System, output: Output, x: float) -> tuple[float, float, float, float]:
-    """Return those of one output."""
+def expansion_at_zero(chain: System, output: Output, x: float = 0.0) -> tuple[float, float, float, float]:
+    """Return the coefficients of s^-2, s^-1, 1 and s in an output's expansion at s = 0."""
     coefficients = [float(c.mid()) for c in _quotient_at_zero(chain, output, x)]
     padded = [0.0] * (2 - _leading(_drive_at_zero(chain))) + coefficients
     return padded[0], padded[1], padded[2], padded[3]

@@ -217,13 +217,12 @@ def _go_back(points: Any, rows: Any, axis: Any, work: Work, differs: bool, lost:
     """
     f, beyond, plane = work.conditions[0], work.conditions[1], work.planes[0]
     for i in range(BLOCK):
+        put_row(f, i, (axis[0, i], axis[1, i], axis[2, i], axis[3, i]))
         work.theta[i] = axis[0, i] * plane[i] + axis[2, i] * plane[2 * BLOCK + i] - axis[3, i] * plane[3 * BLOCK + i]
     left, number, of_spring = len(work.marked), len(work.kept.low), False
     is_rigid = True
     scale, shift, raised = np.zeros(BLOCK, np.complex128), np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
     work.lift[:], work.turn[:], work.slow[:], reach = 0.0, 0.0, True, 0.0
-    for part in range(4):
-        f[part * BLOCK : (part + 1) * BLOCK] = axis[part]
     for j in range(len(rows) - 1, -1, -1):
         if left == 0:
             return

@@ -29,7 +29,7 @@ from . import appendix
 from .balls import Ball, first_success, nearest_float, output_ball, point, rational
 from .layout import Layout, Readings, constant_of, readings
 from .outputs import Output
-from .series import expansions_at_zero
+from .series import expansion_at_zero
 from .sweep import AXIS, fill_free
 from .system import Place, System
 from .uniform import fill_ends
@@ -165,7 +165,7 @@ def value_with_care(k: System, wanted: Output, s: complex, x: float = 0.0, *, of
     """
     _refuse_pole(k, wanted, s, x)
     if s == 0:
-        return complex(expansions_at_zero(k, [wanted], x)[0][2 + of_slope])
+        return complex(expansion_at_zero(k, wanted, x)[2 + of_slope])
     value = nearest_float(slope(k, wanted, s, x=x) if of_slope else enclose(k, wanted, s, bits=PROVEN_BITS, x=x))
     if not np.isfinite(value):
         raise ParameterError(
@@ -185,7 +185,7 @@ def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
     if constant_of(k, wanted, x) is not None:
         return
     if s == 0:
-        if any(expansions_at_zero(k, [wanted], x)[0][:2]):
+        if any(expansion_at_zero(k, wanted, x)[:2]):
             raise ParameterError(key="s", value=0, remedy="a pole: the arm turns as a rigid body there; choose s != 0")
         return
     with np.errstate(all="ignore"):

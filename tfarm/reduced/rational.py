@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError
-from tfarm.exact.series import expansions_at_zero
+from tfarm.exact.series import expansion_at_zero
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import modes_below
 
@@ -102,7 +102,7 @@ def _remainders(G: TransferFunction, inside: PartialFractions, high: float, freq
     w = w[distance(w, frequencies) > OFF_POLE * w]
     S, power = -(w**2), np.array([[each.power] for each in G.rows])
     bases = [each.base for each in G.rows]
-    at_zero = np.array(expansions_at_zero(G.system, bases, G.share))
+    at_zero = np.array([expansion_at_zero(G.system, base, G.share) for base in bases])
     by_S = ((at_zero[:, 0] != 0) | (power[:, 0] > 0))[:, None]
     square = inside.natural_frequency**2
     p = inside.eigenvalues[:, 0]

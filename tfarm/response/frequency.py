@@ -191,7 +191,6 @@ class Bode:
     """
 
     arm: Arm
-    output: Annotated[str, Quantity("output", help="output of the transfer function")]
     row: Output = field(repr=False)
     x: Annotated[float | None, Quantity(help="place of the output [m]")] = None
     omega: Annotated[Real, Quantity("angular frequency", "rad/s", help="grid refined at poles and zeros", curve=True)]
@@ -211,6 +210,11 @@ class Bode:
     def arm_name(self) -> Annotated[str, Quantity("arm", help="name of the arm", key="arm")]:
         """The name of the arm."""
         return self.arm.name
+
+    @property
+    def output(self) -> Annotated[str, Quantity("output", help="output of the transfer function")]:
+        """The name of the output."""
+        return self.row.name
 
     @property
     def input(self) -> Annotated[str, Quantity("input", help="input of the transfer function")]:
@@ -329,7 +333,6 @@ def bode(
     peaks, dips = extrema(G, omega, value, np.r_[poles, zeros], infinite, vanishing)
     return Bode(
         arm=arm,
-        output=row.name,
         row=row,
         x=G.x,
         omega=omega,
@@ -367,7 +370,7 @@ def _no_motion(arm: Arm, row: Output, x: float | None, band: tuple[float, float]
     omega, none, real = np.array(band), np.empty(0, complex), np.empty(0)
     zero, everywhere = np.zeros(2, complex), (-math.inf, math.inf)
     return Bode(
-        arm=arm, output=row.name, row=row, x=x, omega=omega, value=zero, phase=zero.real, poles=none, zeros=none,
+        arm=arm, row=row, x=x, omega=omega, value=zero, phase=zero.real, poles=none, zeros=none,
         rigid=zero, at_poles=real, at_zeros=real, peaks=(), dips=(), pole_width=everywhere, zero_width=everywhere,
     )  # fmt: skip
 

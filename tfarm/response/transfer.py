@@ -23,7 +23,7 @@ from tfarm.exact.characteristic import Analytic, characteristic, deflated, off_r
 from tfarm.exact.layout import constant_of
 from tfarm.exact.loads import is_load, load_of, loaded_value
 from tfarm.exact.outputs import Output, output
-from tfarm.exact.series import expansions_at_zero, order_at_zero
+from tfarm.exact.series import expansion_at_zero, order_at_zero
 from tfarm.exact.system import System, system_of
 from tfarm.exact.values import (
     ByMethod,
@@ -295,7 +295,7 @@ class TransferFunction:
     def expansion(self) -> NDArray[np.float64]:
         """Coefficients (outputs, 4) of s^-2, s^-1, 1 and s at s = 0."""
         self.must_be_of_the_hub("an expansion at s = 0")
-        return np.array(expansions_at_zero(self.system, self.rows, self.share))
+        return np.array([expansion_at_zero(self.system, row, self.share) for row in self.rows])
 
     @property
     def rigid_body(self) -> Any:

@@ -55,7 +55,7 @@ PANEL_WAVES = 4.0  # rad of the fastest wave in a panel, integrated to the last 
 LEAST_PANELS = 2  # of a segment with slow waves
 DOUBLE = 1e-15  # relative gap under which two frequencies are one, with two modes
 CLOSE_MODES = 1e-5  # relative gap under which rounding would leave two modes not quite orthogonal
-QUADRATURE_BLOCK = 2**17  # modes times points at once, each of 256 bytes: memory alone
+PANELS_AT_ONCE = 2**13  # times modes, each of 4 kB: memory alone
 FIRST_BLOCK = 4  # modes; each next block has twice as many: time alone
 NO_MOTION = 1e-9  # of another motion of the tip or hub: a smaller one is rounding
 AT_HUB, AT_TIP = Place(Fraction(0), "inner"), Place(Fraction(1))
@@ -107,11 +107,11 @@ class Shapes:
         return part
 
     def blocks(self) -> Iterator[Shapes]:
-        """Yield blocks of neighbouring modes with at most `QUADRATURE_BLOCK` points of `panels`."""
+        """Yield blocks of neighbouring modes with at most `PANELS_AT_ONCE` panels."""
         first = 0
         while first < self.omega.size:
             last = min(2 * first + FIRST_BLOCK, self.omega.size)
-            while last > first + 1 and (last - first) * self.part(first, last)._points > QUADRATURE_BLOCK:
+            while last > first + 1 and (last - first) * sum(self.part(first, last)._counts) > PANELS_AT_ONCE:
                 last = (first + last) // 2
             yield self.part(first, last)
             first = last
@@ -167,10 +167,6 @@ class Shapes:
         S = self.omega.max() ** 2
         waves = [(float(each.g) * S) ** 0.25 + math.sqrt(S * float(each.a + each.b)) for each in self._segments]
         return [LEAST_PANELS + math.ceil(each / PANEL_WAVES) for each in waves]
-
-    @property
-    def _points(self) -> int:
-        return GAUSS_POINTS * sum(self._counts)
 
     def _at_axis(self, which: int) -> Real:
         """Return Psi, M and Q (3, modes) on the axis, of the state with a condition at each frequency."""
