@@ -154,7 +154,10 @@ def _work(rows: Any) -> Work:
 def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
     """Compute the plane at the axis, work.planes[0], and at each mark, with its scale; mark lost digits."""
     plane, beyond, scale, number = work.planes[0], work.planes[1], work.scale, 0
-    _begin(points, ends, plane)
+    for i in range(BLOCK):
+        S = points[i] * points[i]
+        mass, shear, inertia, moment = tip_conditions(ends, S)
+        put_plane(plane, i, end_plane(mass, shear + 0.0 * S, inertia, moment + 0.0 * S))
     scale[:], lost[:], work.watched[:] = 0.0, False, False
     for j in range(len(rows)):
         row = rows[j]
@@ -170,15 +173,6 @@ def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
         _brought_back(plane, 5, work.powers[j])
         for i in range(BLOCK):
             scale[i] += work.powers[j, i] * LN_2
-
-
-@compiled
-def _begin(points: Any, ends: Any, plane: Any) -> None:
-    """Compute the plane at the payload."""
-    for i in range(BLOCK):
-        S = points[i] * points[i]
-        mass, shear, inertia, moment = tip_conditions(ends, S)
-        put_plane(plane, i, end_plane(mass, shear + 0.0 * S, inertia, moment + 0.0 * S))
 
 
 @compiled

@@ -174,12 +174,6 @@ def value_with_care(k: System, wanted: Output, s: complex, x: float = 0.0, *, of
     return value
 
 
-def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:
-    """Return real and imaginary part as decimal strings with that many digits.  Raises ParameterError at a pole."""
-    _refuse_pole(k, wanted, s, x)
-    return decimals(k, wanted, s, digits, x)
-
-
 def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
     """Raise ParameterError if s is a pole to the last digit of a float64."""
     if constant_of(k, wanted, x) is not None:
@@ -226,12 +220,13 @@ def slope(k: System, wanted: Output, s: complex, *, bits: int = 60, x: float = 0
     return first_success(precisions(4 * bits), attempt, CertificationError(NO_NUMBER.format("derivative", s)))
 
 
-def decimals(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:
+def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:
     """Return real and imaginary part to `digits` significant right digits each, "0.0" where it is identically zero.
 
     By symmetry G is real for real s, and without dissipation a function of s^2: then one part is exactly zero.
-    Raises CertificationError at a pole or an exact zero.
+    Raises ParameterError at a pole, CertificationError next to one and at an exact zero.
     """
+    _refuse_pole(k, wanted, s, x)
     vanish = False, s.imag == 0  # of the real and of the imaginary part
     if s.real == 0 != s.imag and k.is_real_on_axis:
         vanish = wanted.power % 2 == 1, wanted.power % 2 == 0

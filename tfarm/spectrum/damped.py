@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import loop_parts
 from tfarm.exact.system import System
 from tfarm.records import record
+from tfarm.schema import Quantity
 
 from .box import TOWARD_SINGULAR, Box, complete_box, filled_box, is_among
 from .frequencies import LISTS_KEPT
@@ -51,8 +52,9 @@ PLAIN_SHARE = 0.2  # largest distance of an eigenvalue from its frequency, in di
 class Unassigned(NamedTuple):
     """An eigenvalue [1/s] of no mode, Im >= 0, a complex one with its conjugate; see `origin_of`."""
 
-    eigenvalue: complex
-    origin: str
+    origin: Annotated[str, Quantity("origin", help="part of the drive that determines it")]
+    eigenvalue: Annotated[complex, Quantity("eigenvalue", "1/s", 10, "one of the damped arm, Im >= 0")]
+    discs: Annotated[tuple[Disc, ...] | None, Quantity(help="its certified enclosure")] = None
 
 
 @dataclass(frozen=True)
@@ -255,7 +257,7 @@ def _searched(undamped: Modes, steps: float) -> DampedModes:
     rigid[:, 1] = single[0] if slow else 0.0
     others = tuple(each for each in single[slow:].tolist() if np.isfinite(each))
     upper = sorted(free[np.isfinite(free) & (free.imag >= 0)].tolist(), key=abs)
-    eigenvalues, unassigned = np.concatenate([rigid, pairs]), tuple(Unassigned(s, origin_of(k, s)) for s in upper)
+    eigenvalues, unassigned = np.concatenate([rigid, pairs]), tuple(Unassigned(origin_of(k, s), s) for s in upper)
     return DampedModes(undamped, eigenvalues, box, inside + k.at_rest, others=others, unassigned=unassigned)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.exact.values import Method
 from tfarm.schema import Quantity
 
-from .damped import MOST_MODES, DampedModes, damped_modes
+from .damped import MOST_MODES, DampedModes, Unassigned, damped_modes
 from .proofs import Certificate, Disc
 from .table import Modes, compare_theories, hub_locked
 
@@ -60,14 +60,6 @@ class ListedMode:
     discs: Annotated[tuple[Disc, ...] | None, Quantity(help="certified enclosures of the eigenvalues")] = None
 
 
-class Unlisted(NamedTuple):
-    """An eigenvalue of the box that is assigned to no mode, and the part of the drive that determines it."""
-
-    origin: Annotated[str, Quantity("origin", help="part of the drive that determines it")]
-    eigenvalue: Annotated[complex, Quantity("eigenvalue", "1/s", 10, "one of the damped arm, Im >= 0")]
-    discs: Annotated[tuple[Disc, ...] | None, Quantity(help="its certified enclosure")] = None
-
-
 @dataclass(frozen=True)
 class ModeList:
     """The first flexible modes, none missing.
@@ -79,7 +71,7 @@ class ModeList:
     found: Modes
     damped: DampedModes | None
     modes: Annotated[list[ListedMode], Quantity("modes", help="in ascending order of natural frequency")]
-    unassigned: Annotated[list[Unlisted], Quantity(
+    unassigned: Annotated[list[Unassigned], Quantity(
         "eigenvalues of no mode", help="in the box, assigned to no mode for certain", key="unassigned_eigenvalues"
     )]  # fmt: skip
     method: Annotated[Method, Quantity("method", help="of the natural frequencies: closed-form, balls or appendix")]
@@ -188,7 +180,7 @@ def listed_modes(
     rows = list(_rows(found, digits, method, damped, proof, discs))
     free = () if damped is None else damped.unassigned
     enclosed = [None] * len(free) if discs is None else [tuple(each) for each in discs[len(discs) - len(free) :]]
-    unassigned = [Unlisted(each.origin, each.eigenvalue, disc) for each, disc in zip(free, enclosed, strict=True)]
+    unassigned = [each._replace(discs=disc) for each, disc in zip(free, enclosed, strict=True)]
     return ModeList(
         found=found, damped=damped, modes=rows, unassigned=unassigned, method=method,
         digits=digits, proof=proof, damped_failure=failure,
