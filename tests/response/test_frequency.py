@@ -12,6 +12,7 @@ import tfarm
 from tests.shared import thinned
 from tfarm.arm import Motor
 from tfarm.response.frequency import EVEN_PER_DECADE, bode, refined_grid, resonant_band, without_cancelled
+from tfarm.schema import sections
 
 UNDAMPED = tfarm.load("sasaki2012")
 STOCKY = tfarm.load("stocky-steel")
@@ -118,6 +119,9 @@ def test_from_another_input_it_is_the_ratio_of_two_responses():
     locked = tfarm.modes(rig.having(hub_inertia=math.inf), up_to=2000.0).natural_frequency
     assert data.resonances.imag == pytest.approx(locked, rel=1e-3)
     assert (data.gain_unit, data.input_label) == ("m/s^2/rad", "hub angle")
+    tables = [each.table for each in sections(data) if each.table]
+    assert [next(c.unit for c in each.columns if c.key == "magnitude") for each in tables] == ["m/s^2/rad"] * 4
+    assert all(column.unit for each in tables for column in each.columns if column.key.startswith("frequency"))
 
 
 @pytest.mark.parametrize(

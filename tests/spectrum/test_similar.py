@@ -11,6 +11,8 @@ from tests.rigs import some_rig
 from tests.shared import thinned
 from tests.similar import EITHER, FAST, FREQUENCY, INERTIA, LENGTH, SLOW, TORQUE
 from tfarm.errors import ConvergenceError
+from tfarm.schema import quantities
+from tfarm.spectrum.listing import ListedMode, listed_modes
 from tfarm.spectrum.table import DEFAULT_DIGITS, angle_unit, check_gains, default_gains, gain_unit, most_gain, rate_unit
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -46,6 +48,23 @@ def differing_tables(here, there, units):
         mine, theirs = (getattr(each, name)(places * each.arm.length) for each in (here, there))
         same[name] = close(mine, theirs, unit)
     return [name for name, is_one in same.items() if not is_one]
+
+
+def size_of(unit, units):
+    """How many times larger the number of an SI unit is in other units of mass, length and time."""
+    of = {"rad": 1.0, "m": units.of(LENGTH), "N m": units.of(TORQUE), "kg m^2": units.of(INERTIA)}
+    above, _, below = unit.partition("/sqrt(")
+    return of[above] / math.sqrt(of[below.removesuffix(")")]) if below else of[above]
+
+
+@pytest.mark.parametrize("units", [SLOW, FAST], ids=EITHER)
+def test_columns_of_modes_have_the_units_of_their_numbers(units):
+    """As dimensional analysis has them: a column's numbers change by what its printed unit changes by."""
+    here, there = (listed_modes(tfarm.modes(arm, COUNT)).modes for arm in (LAB.elastic, units.arm(LAB).elastic))
+    for name in ("hub_participation", "modal_moment", "nodes"):
+        unit = size_of(quantities(ListedMode)[name].unit, units)
+        mine, theirs = (np.concatenate([np.ravel(getattr(row, name)) for row in rows]) for rows in (here, there))
+        assert close(mine, theirs, unit), name
 
 
 def differing_damped(here, there, units):
