@@ -139,7 +139,10 @@ class WideSweep(Sweep):
         super().__init__(layout, s)
 
     def _inside(self, element: Any, p: Plane) -> Plane:
-        if not isinstance(element, Segment) or self._is_slow(element):
+        if not isinstance(element, Segment):
+            return super()._inside(element, p)
+        _, z_sum, z_product = self._sums(element)
+        if abs(z_sum[0]).mid() + 2 * abs(z_product[0]).mid().sqrt() < SLOW_WAVES:
             return super()._inside(element, p)
         units, (a, b, g) = element.units, element[:3]
         S, d = self.S, self.s * element.damping + 1
@@ -154,10 +157,6 @@ class WideSweep(Sweep):
         inner = across_waves(one[:5], two[:5], S * g, d, S * (a / d - b), into_own(p, *units))
         self.phase = self.phase + one[5] + two[5]
         return out_of_own(tuple(part / unit for part in inner), *units)
-
-    def _is_slow(self, segment: Any) -> bool:
-        _, z_sum, z_product = self._sums(segment)
-        return bool(abs(z_sum[0]).mid() + 2 * abs(z_product[0]).mid().sqrt() < SLOW_WAVES)
 
     def _at_mark(self, p: Plane) -> Plane:
         grown = self.phase.exp()

@@ -89,14 +89,15 @@ class Layout:
     @cached_property
     def read(self) -> tuple[Segment, ...]:
         """The segment of each place."""
-        return tuple(self._segment_at(number) for number in range(len(self.places)))
-
-    def _segment_at(self, number: int) -> Segment:
-        at = self.elements.index(Mark(number))
-        outer = [each for each in self.elements[:at] if isinstance(each, Segment)]
-        inner = [each for each in self.elements[at:] if isinstance(each, Segment)]
-        is_outer = self.places[number].side != "inner"
-        return (outer[-1] if outer else inner[0]) if is_outer else (inner[0] if inner else outer[-1])
+        found: list[Segment] = []
+        for number, place in enumerate(self.places):
+            at = self.elements.index(Mark(number))
+            outer, inner = (
+                [each for each in part if isinstance(each, Segment)]
+                for part in (self.elements[at::-1], self.elements[at:])
+            )
+            found.append(((inner or outer) if place.side == "inner" else (outer or inner))[0])
+        return tuple(found)
 
 
 def _at_joints(elements: Sequence[Element], places: tuple[Place, ...]) -> tuple[Place, ...]:

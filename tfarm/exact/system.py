@@ -232,11 +232,6 @@ class System:
         return not (springs or self.is_locked) and all(isinstance(end, Fraction) for end in ends)
 
     @property
-    def transit(self) -> float:
-        """The sum over the segments of (rho A l^4/(E I))^(1/4) [s^(1/2)]."""
-        return math.fsum(float(each.g) ** 0.25 for each in self.segments)
-
-    @property
     def at_rest(self) -> int:
         """The order of the drive's zero at s = 0: 2 of a free rig, 1 with friction, 0 without a rigid-body mode."""
         if not self.has_rigid_mode:

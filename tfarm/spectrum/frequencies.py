@@ -243,7 +243,8 @@ def count_below(k: System, omega: float) -> int:
 
 def _upper_bound(count: Counter, k: System, last: int) -> float:
     """Return a frequency above number `last`: the Euler-Bernoulli estimate, doubled until the count reaches it."""
-    omega = unit = ((last + 1) * math.pi) ** 2 / k.transit**2
+    transit = math.fsum(float(each.g) ** 0.25 for each in k.segments)  # [s^(1/2)]
+    omega = unit = ((last + 1) * math.pi) ** 2 / transit**2
     while omega < HIGHEST_BOUND * unit:
         if count(np.array([omega]))[0] >= last:
             return omega
