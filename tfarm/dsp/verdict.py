@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, NamedTuple
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, cancelled
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law, cancelled
 from tfarm.arm.checks import whole
 from tfarm.crossing import Window
 from tfarm.dsp.chain import Chain, Sampling, chain_or_usual
@@ -19,6 +19,7 @@ from tfarm.dsp.edges import (
     DelayMargin,
     Figure,
     Interval,
+    LowerBound,
     delay_margin,
     shown_damping,
     shown_delay,
@@ -39,6 +40,7 @@ LARGEST_LOG = 700.0  # whose exponential is a double
 RADIUS_AGREES = 1e-4  # of ln of the spectral radius: its largest error with fewer modes
 RADIUS_NOISE = 1e-12  # and its rounding error
 MOST_COUNT = 400  # modes that may be asked for
+DEFAULT_PERIOD, LAWS_PERIOD = "tfarm's default period", "the controller's period"  # origins of a sampling period
 PERIOD_SHARES = (0.1, 0.5, 1.0, 2.0, 5.0)  # of the chain's own period
 
 
@@ -214,10 +216,13 @@ class Analysis:
     @property
     def delay_margin_seconds(self) -> Annotated[float, Quantity("delay margin", "s", 4, key="delay_margin_s")]:
         """The further delay in seconds."""
-        return self.delay_margin.samples * self.loop.chain.sampling.period
+        seconds = self.delay_margin.samples * self.loop.chain.sampling.period
+        return LowerBound(seconds) if self.delay_margin.is_bound else seconds
 
     @property
-    def is_lower_bound(self) -> Annotated[bool, Quantity("delay margin or more", key="delay_margin_is_lower_bound")]:
+    def is_lower_bound(
+        self,
+    ) -> Annotated[bool, Quantity("delay margin: lower bound", key="delay_margin_is_lower_bound")]:
         """Whether no further delay up to the margin destabilises the loop."""
         return self.delay_margin.is_bound
 
@@ -276,7 +281,8 @@ class Analysis:
         """The delay margin [samples]; of any law but gains at the hub with the modes of the verdict."""
         if self.loop.is_of_gains:
             return self._delay[1]
-        return Figure(self.delay_margin.samples, LAW_DELAY_DIGITS, None, self.verdict.modes_used)
+        found = self.delay_margin
+        return Figure(found.samples, LAW_DELAY_DIGITS, None, self.verdict.modes_used, found.is_bound)
 
     @cached_property
     def delay_margin(self) -> DelayMargin:
@@ -334,10 +340,11 @@ class SampledBrief:
     """Whether a loop is stable at a chain's sampling, without z = 1 of a free hub angle.
 
     `is_stable` and `log_radius`, ln of the spectral radius, are None where that is not determined; `sentence` then has
-    the reason.
+    the reason.  `period_from` is the origin of the sampling period, "" where that is not known.
     """
 
     sampling: Sampling
+    period_from: str
     is_stable: Annotated[bool | None, Quantity(key="stable")]
     log_radius: float | None
     sentence: str
@@ -349,8 +356,8 @@ class SampledBrief:
 
     @property
     def period_is_default(self) -> Annotated[bool, Quantity()]:
-        """Whether it is tfarm's, not the rig's own."""
-        return self.sampling.period == Sampling().period
+        """Whether it is tfarm's: neither of the law, nor of a file or an option."""
+        return self.period_from == DEFAULT_PERIOD
 
     @property
     def delay_samples(self) -> Annotated[float, Quantity()]:
@@ -365,11 +372,10 @@ class SampledBrief:
 
     @property
     def at(self) -> str:
-        """Sampling period and delay in words, and whether the period is tfarm's default."""
+        """Sampling period and delay in words, and the origin of the period."""
         T, delay = self.sampling.period, self.sampling.delay_samples
         late = f", {delay:g} samples late" if delay else ""
-        default = " (tfarm's default period)" if Sampling().period == T else ""
-        return f"sampled every {1e3 * T:g} ms{late}{default}"
+        return f"sampled every {1e3 * T:g} ms{late}{self.period_from and f' ({self.period_from})'}"
 
     @property
     def short(self) -> str:
@@ -387,20 +393,18 @@ class SampledBrief:
 def sampled_brief(arm: Arm, law: AnyLaw, chain: Chain) -> SampledBrief:
     """Return the verdict on a law at the sampling of a chain.  Raises ParameterError where the arm has no such loop."""
     try:
-        verdict = sampled_verdict(arm, law, chain)
+        return brief_of(sampled_verdict(arm, law, chain), law, chain)
     except ConvergenceError as error:
-        return SampledBrief(sampling=chain.sampling, is_stable=None, log_radius=None, sentence=f"undecided: {error}")
-    return brief_of(verdict, chain)
+        return brief_of(error, law, chain)
 
 
-def brief_of(verdict: Verdict, chain: Chain) -> SampledBrief:
-    """A verdict in short."""
-    return SampledBrief(
-        sampling=chain.sampling,
-        is_stable=verdict.is_stable,
-        log_radius=float(verdict.log_radius),
-        sentence=verdict.sentence,
-    )
+def brief_of(found: Verdict | ConvergenceError, law: AnyLaw, chain: Chain) -> SampledBrief:
+    """A verdict on a law in short, or the reason that there is none."""
+    origin = chain.period_from or (DEFAULT_PERIOD if chain.sampling.period == Sampling().period else "")
+    at = {"sampling": chain.sampling, "period_from": LAWS_PERIOD if as_law(law).is_discrete else origin}
+    if isinstance(found, ConvergenceError):
+        return SampledBrief(**at, is_stable=None, log_radius=None, sentence=f"undecided: {found}")
+    return SampledBrief(**at, is_stable=found.is_stable, log_radius=float(found.log_radius), sentence=found.sentence)
 
 
 class AtPeriod(NamedTuple):
