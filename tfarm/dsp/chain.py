@@ -24,6 +24,8 @@ LEAST_BITS, MOST_BITS = 2, 32  # of a converter: of one bit there are no steps, 
 MOST_DELAY = 100.0  # samples: each whole one is a state more
 TIME_ROUNDING = 1e-12  # of a time: by so little before a sample it is at it, as its quotient with the period is rounded
 PAPER_ANGLE = 1.15  # rad, as tip travel over length: the paper moves the tip of its 1 m by 1.15 m
+PERIOD = Quantity("sampling period", "s", help="time between two samples of the controller")
+DELAY = Quantity("delay in samples", help="time from a sample to the torque computed from it, over the sampling period")
 OF_AN_ARM = (*ArmTable.model_fields, "law")
 
 
@@ -35,8 +37,8 @@ class Sampling:
     (tachometer) hub rate; inf is none.  An encoder is digital and has none.
     """
 
-    period: Annotated[float, Quantity("sampling period", "s")] = 0.01
-    delay_samples: Annotated[float, Quantity("delay in samples")] = 0.0
+    period: Annotated[float, PERIOD] = 0.01
+    delay_samples: Annotated[float, DELAY] = 0.0
     antialias_corner: float = math.inf
 
     def __post_init__(self) -> None:

@@ -177,14 +177,38 @@ class Figure:
     One of `band` and `modes` is None.  `is_bound` where no more than a lower bound is known.
     """
 
-    value: Annotated[float, Quantity("value")]
-    digits: Annotated[int, Quantity("digits")]
-    band: Annotated[float | None, Quantity("certified up to", "rad/s", key="up_to_rad_s")]
-    modes: Annotated[int | None, Quantity("holds for the first modes")]
+    value: Annotated[float, Quantity("value", help="value of the limit")]
+    digits: Annotated[
+        int,
+        Quantity(
+            "digits", help="significant digits of the value that are certified, or confirmed by another number of modes"
+        ),
+    ]
+    band: Annotated[
+        float | None,
+        Quantity(
+            "certified up to",
+            "rad/s",
+            key="up_to_rad_s",
+            help="end of the frequency range in which every mode is taken into account",
+        ),
+    ]
+    modes: Annotated[
+        int | None,
+        Quantity(
+            "holds for the first modes",
+            help="number of modes of the model where the limit is converged and not certified",
+        ),
+    ]
     is_bound: bool = False
 
     @property
-    def is_settled(self) -> Annotated[bool, Quantity("certified", key="certified")]:
+    def is_settled(
+        self,
+    ) -> Annotated[
+        bool,
+        Quantity("certified", key="certified", help="whether the limit is certified for every mode up to a frequency"),
+    ]:
         """Whether it is certified in a band."""
         return self.band is not None
 
@@ -193,7 +217,11 @@ class Figure:
         return self.is_settled and (self.digits >= digits or self.value == 0.0)
 
     @property
-    def text(self) -> Annotated[str, Quantity("in these digits")]:
+    def text(
+        self,
+    ) -> Annotated[
+        str, Quantity("in these digits", help="the value in its significant digits, ? where there are none")
+    ]:
         """The number in these digits; "?" where there are none."""
         if self.value == 0.0 or math.isinf(self.value):
             return f"{self.value:g}"

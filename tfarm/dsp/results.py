@@ -18,8 +18,9 @@ import numpy as np
 from tfarm.arm import AnyLaw, Arm, tracked
 from tfarm.arrays import Real
 from tfarm.columns import Column, Table
-from tfarm.dsp.chain import Chain, chain_or_usual
-from tfarm.dsp.discretise import rule_in_words, with_all_gains
+from tfarm.dsp.chain import PERIOD, Chain, chain_or_usual
+from tfarm.dsp.discretise import RULE, rule_in_words, with_all_gains
+from tfarm.dsp.plant import MODES_USED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario
 from tfarm.dsp.simulate import Simulation, Simulator, Trace
 from tfarm.dsp.traces import resolved
@@ -86,11 +87,46 @@ class LimitCycle:
     "saturation" where a signal is still clipped (an unstable loop within its limits), else "quantisation".
     """
 
-    root_moment: Annotated[float, Quantity("root moment amplitude", "N m", 4, key="root_moment_amplitude")]
-    hub_rate: Annotated[float, Quantity("hub rate amplitude", "rad/s", 4, key="hub_rate_amplitude")]
-    torque: Annotated[float, Quantity("torque amplitude", "N m", 4, key="torque_amplitude")]
-    frequency: Annotated[float, Quantity("frequency", "rad/s", 4)]
-    kept_up_by: Annotated[Literal["quantisation", "saturation"], Quantity("sustained by", key="kept_up_by")]
+    root_moment: Annotated[
+        float,
+        Quantity(
+            "root moment amplitude",
+            "N m",
+            4,
+            key="root_moment_amplitude",
+            help="half of the root moment's range in the last quarter of the record",
+        ),
+    ]
+    hub_rate: Annotated[
+        float,
+        Quantity(
+            "hub rate amplitude",
+            "rad/s",
+            4,
+            key="hub_rate_amplitude",
+            help="half of the hub rate's range in the last quarter of the record",
+        ),
+    ]
+    torque: Annotated[
+        float,
+        Quantity(
+            "torque amplitude",
+            "N m",
+            4,
+            key="torque_amplitude",
+            help="half of the torque's range in the last quarter of the record",
+        ),
+    ]
+    frequency: Annotated[
+        float,
+        Quantity(
+            "frequency", "rad/s", 4, help="frequency of the sampled root moment, from its zero crossings about its mean"
+        ),
+    ]
+    kept_up_by: Annotated[
+        Literal["quantisation", "saturation"],
+        Quantity("sustained by", key="kept_up_by", help="saturation of a signal in an unstable loop, or quantisation"),
+    ]
 
 
 @dataclass(frozen=True)
@@ -101,69 +137,118 @@ class Run:
     law: AnyLaw
     simulation: Simulation
     used: Enough
-    scenario_in_words: Annotated[str, Quantity("scenario", key="scenario_in_words")]
-    limit_cycle: Annotated[LimitCycle | None, Quantity("limit cycle")] = None
+    scenario_in_words: Annotated[
+        str, Quantity("scenario", key="scenario_in_words", help="reference or disturbance with its size")
+    ]
+    limit_cycle: Annotated[
+        LimitCycle | None,
+        Quantity("limit cycle", help="sustained vibration at the end of the record that ideal converters do not have"),
+    ] = None
     tuner: Annotated[dict[str, Any] | None, Quantity("tuner", key="controller", help="that set the moment gain")] = None
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
+    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
         return controller(with_all_gains(self.arm, self.law), self.arm)
 
     @property
-    def references(self) -> Annotated[list[str], Quantity()]:
+    def references(self) -> Annotated[list[str], Quantity(help="signals that follow a reference")]:
         """Signals that follow a reference."""
         return list(with_all_gains(self.arm, self.law).references)
 
     @property
-    def rule(self) -> Annotated[str, Quantity("discretisation")]:
+    def rule(self) -> Annotated[str, RULE]:
         """The discretisation of the law."""
         return rule_in_words(with_all_gains(self.arm, self.law))
 
     @property
-    def scenario(self) -> Annotated[str, Quantity()]:
+    def scenario(self) -> Annotated[str, Quantity(help="name of the scenario")]:
         """The name of the scenario."""
         return self.simulation.scenario.name
 
     @property
-    def reading(self) -> Annotated[str, Quantity()]:
+    def reading(
+        self,
+    ) -> Annotated[
+        str, Quantity(help="vibration: the rigid arm's moment is subtracted from the moment fed back; total: it is not")
+    ]:
         """The moment that is fed back during a slew."""
         return self.simulation.chain.slew.reading
 
     @property
-    def period(self) -> Annotated[float, Quantity("sampling period", "s")]:
+    def period(self) -> Annotated[float, PERIOD]:
         """The sampling period."""
         return self.simulation.scenario.period
 
     @property
-    def modes_used(self) -> Annotated[int, Quantity("flexible modes")]:
+    def modes_used(self) -> Annotated[int, MODES_USED]:
         """The number of flexible modes."""
         return self.used.modes
 
     @property
-    def modes_change(self) -> Annotated[float | None, Quantity("change of signals from half of them", digits=2)]:
+    def modes_change(
+        self,
+    ) -> Annotated[
+        float | None,
+        Quantity(
+            "change of signals from half of them",
+            digits=2,
+            help="largest change of a signal over its largest value when the number of modes was doubled",
+        ),
+    ]:
         """Relative to the largest value of each; None where the number of modes was given."""
         return None if math.isnan(self.used.change) else self.used.change
 
     @property
-    def residual_moment(self) -> Annotated[float | None, Quantity(f"{RESIDUAL} less the rigid arm's", "N m rms",
-                                                                  key="residual_moment_rms")]:  # fmt: skip
+    def residual_moment(
+        self,
+    ) -> Annotated[
+        float | None,
+        Quantity(
+            f"{RESIDUAL} less the rigid arm's",
+            "N m rms",
+            key="residual_moment_rms",
+            help="rms of the vibration from the end of the slew to the end of the record",
+        ),
+    ]:
         """The residual; None where the run stopped, or its record ends before the slew."""
         return residual_moment_rms(self.simulation)
 
     @property
-    def residual_raw(self) -> Annotated[float | None, Quantity(RESIDUAL, "N m rms", key="residual_raw_moment_rms")]:
+    def residual_raw(
+        self,
+    ) -> Annotated[
+        float | None,
+        Quantity(
+            RESIDUAL,
+            "N m rms",
+            key="residual_raw_moment_rms",
+            help="rms of the root moment from the end of the slew to the end of the record",
+        ),
+    ]:
         """The same of the root moment itself."""
         return residual_raw_moment_rms(self.simulation)
 
     @property
-    def settling_time(self) -> Annotated[float | None, Quantity("settling time (5 %)", "s", 4)]:
+    def settling_time(
+        self,
+    ) -> Annotated[
+        float | None,
+        Quantity(
+            "settling time (5 %)", "s", 4, help="time from which on the root moment stays within 5 % of its largest"
+        ),
+    ]:
         """The settling time; None where the moment does not settle within the record."""
         settled = settling_time(self.simulation)
         return settled if math.isfinite(settled) else None
 
     @property
-    def note(self) -> Annotated[str | None, Quantity("not determined", key="note")]:
+    def note(
+        self,
+    ) -> Annotated[
+        str | None,
+        Quantity("not determined", key="note", help="reason for a residual or a settling time without a value"),
+    ]:
         """The reason why there is no residual or no settling time."""
         run, ends = self.simulation, "the record ends before the slew"
         if run.stopped is not None:
@@ -175,39 +260,60 @@ class Run:
         return "; ".join(reason for reason, value in reasons.items() if value is None) or None
 
     @property
-    def saturated(self) -> Annotated[dict[str, int], Quantity("saturated samples", key="saturated_samples")]:
+    def saturated(
+        self,
+    ) -> Annotated[
+        dict[str, int],
+        Quantity(
+            "saturated samples",
+            key="saturated_samples",
+            help="samples at which encoder, strain amplifier and torque were clipped",
+        ),
+    ]:
         """Numbers of samples at which encoder, strain amplifier and torque were clipped."""
         return self.simulation.saturated
 
     @property
-    def energy_error(self) -> Annotated[float | None, Quantity()]:
+    def energy_error(
+        self,
+    ) -> Annotated[
+        float | None, Quantity(help="energy gained less work done, over initial energy and work, without damping")
+    ]:
         """The relative error of energy, of an arm without damping."""
         return self.simulation.energy_error
 
     @property
-    def stopped_at(self) -> Annotated[float | None, Quantity(key="stopped_at_s")]:
+    def stopped_at(
+        self,
+    ) -> Annotated[
+        float | None, Quantity(key="stopped_at_s", help="time at which the simulation of an unstable loop was stopped")
+    ]:
         """The time at which an unstable loop was stopped [s]."""
         stopped = self.simulation.stopped
         return None if stopped is None else stopped.time
 
     @property
-    def growing_mode(self) -> Annotated[int | None, Quantity()]:
+    def growing_mode(
+        self,
+    ) -> Annotated[
+        int | None, Quantity(help="mode with the largest share in the root moment at the stop, 0 for the hub")
+    ]:
         """The unstable mode, 0 for the hub."""
         stopped = self.simulation.stopped
         return None if stopped is None else stopped.mode
 
     @property
-    def units(self) -> Annotated[dict[str, str], Quantity(key="outputs")]:
+    def units(self) -> Annotated[dict[str, str], Quantity(key="outputs", help="SI unit of each further output")]:
         """The SI unit of each further output."""
         return dict(self.simulation.at_samples.units)
 
     @property
-    def torque_unit(self) -> Annotated[str, Quantity()]:
+    def torque_unit(self) -> Annotated[str, Quantity(help="unit of the input of the arm")]:
         """The unit of the input of the arm."""
         return self.arm.input_unit
 
     @property
-    def signals(self) -> Annotated[dict[str, Real], Quantity(flat=True)]:
+    def signals(self) -> Annotated[dict[str, Real], Quantity(flat=True, help="time and signals at the samples")]:
         """Time and signals at the samples, by name."""
         run = self.simulation
         gain = np.empty(0) if run.gain is None else run.gain
@@ -215,7 +321,7 @@ class Run:
         return _signals(run.at_samples) | {"torque": run.torque, "gain": gain} | volts
 
     @property
-    def between(self) -> Annotated[dict[str, Real] | None, Quantity()]:
+    def between(self) -> Annotated[dict[str, Real] | None, Quantity(help="signals at the records between two samples")]:
         """The same between the samples, of the signals that change there."""
         return None if self.simulation.between is None else _signals(self.simulation.between)
 

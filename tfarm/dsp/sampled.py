@@ -49,7 +49,7 @@ MOST_STEPS = 200  # of all roots together: a cluster of nine takes 24
 LAST_STEP = 1e-12  # of the offset: below its rounding
 UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
 MACHINE_EPS = float(np.finfo(float).eps)
-ROUNDINGS = 8  # of each factor and each term of F
+ROUNDINGS = 8  # of each term of F: of its product of n factors they add up as the root of n
 LEAST_SQUARE = -1.0 + 1e-15  # for |z|^2 - 1 of a pole at z = 0, the base of no root
 FADED_RADIUS = 0.2  # a pole nearer to z = 0 is stable and not polished
 OUTPUT_OF = {gain.name: gain.output for gain in GAINS}
@@ -60,13 +60,14 @@ OUTPUT_OF = {gain.name: gain.output for gain in GAINS}
 class SampledPoles:
     """Closed-loop poles `z` and `log_radius` ln|z| of each, without z = 1 of a free hub angle.
 
-    ln|z| is 0 where rounding may be as large.
+    `error` bounds the error of each z; where ln|z| may be no more than that, it is 0.
     `mode` is the flexible mode of the open-loop pole that is nearest (0: none).
     """
 
     z: Complex
     log_radius: Real
     mode: Whole
+    error: Real
 
     @property
     def log_spectral_radius(self) -> float:
@@ -350,7 +351,7 @@ class Sampled:
         z[bright] = (1 + shifts[at]) + offset[bright]
         log_radius[abs(log_radius) * abs(z) <= error] = 0.0
         mode = pulse.mode[abs(z[:, None] - pulse.multipliers).argmin(axis=1)]
-        return SampledPoles(z, log_radius, mode)
+        return SampledPoles(z, log_radius, mode, error)
 
 
 def _nearest(loop: Sampled, delta: Complex) -> Whole:
@@ -422,7 +423,7 @@ def _product_error(start: Complex, roots: Complex, more: Any) -> Real:
     sizes = abs(away + np.reshape(more, (-1, 1)))
     blur = np.where(away == 0, 0.0, MACHINE_EPS * (abs(start)[:, None] + abs(roots)))
     most = (sizes + blur).prod(axis=1)
-    return np.asarray(most - sizes.prod(axis=1) + MACHINE_EPS * ROUNDINGS * (1 + roots.size) * most)
+    return np.asarray(most - sizes.prod(axis=1) + MACHINE_EPS * ROUNDINGS * most)
 
 
 def sampled_loop(
