@@ -349,7 +349,7 @@ class Sampled:
         ratio = offset[bright] / (1 + shifts[at])
         log_radius[bright] = start[at] + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
         z[bright] = (1 + shifts[at]) + offset[bright]
-        log_radius[abs(log_radius) * abs(z) <= error] = 0.0
+        log_radius[abs(log_radius) * abs(z) < error] = 0.0
         mode = pulse.mode[abs(z[:, None] - pulse.multipliers).argmin(axis=1)]
         return SampledPoles(z, log_radius, mode, error)
 
