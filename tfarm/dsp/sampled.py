@@ -373,11 +373,10 @@ def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> None:
         for _ in range(MOST_STEPS):
             o = offset[rows]
             f, slope, apart = _weierstrass(base, offset, rows, loop)
-            W = np.where(np.isfinite(f / slope), f / slope, 0.0)
+            W = np.nan_to_num(f / slope, posinf=0.0, neginf=0.0)
             others = W / apart[:, rows]
             np.fill_diagonal(others, 0.0)
-            step = W / (1 + others.sum(axis=1))
-            step = np.where(np.isfinite(step), step, 0.0)
+            step = np.nan_to_num(W / (1 + others.sum(axis=1)), posinf=0.0, neginf=0.0)
             moving = abs(step) > LAST_STEP * abs(o)
             is_last = (abs(f[moving]) <= loop.rounding(base[rows[moving]], o[moving])).all()
             offset[rows] = np.where(abs(o - step) < UNMOVED, UNMOVED, o - step)
@@ -392,24 +391,22 @@ def _errors(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> Real:
         f, slope, _ = _weierstrass(base, offset, rows, loop)
         radius = offset.size * (abs(f) + loop.rounding(base[rows], offset[rows])) / abs(slope)
     own = np.where(base[rows] < loop.pulse.poles.size, 0.0, MACHINE_EPS * abs(loop.open_loop[base[rows]]))
-    return np.asarray(np.where(np.isfinite(radius), radius, 0.0) + own)
+    return np.asarray(np.nan_to_num(radius, posinf=0.0) + own)  # of a pole that the loop does not move 0/0
 
 
 def _weierstrass(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[Complex, Complex, Complex]:
     """At some roots o F and o F/W, and their distances from all roots, 1 from themselves."""
-    shifts, pulse, n = loop.open_loop, loop.pulse, loop.pulse.poles.size
+    pulse, b = loop.pulse, base[rows]
     known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0)]  # the other poles are at z = 1
-    own = np.r_[np.arange(n - 1), np.full(known.size - n + 1, -1)]
-    lacking = max(0, offset.size - known.size - loop.in_z.poles.size)
-    poles, own = np.r_[known, np.zeros(lacking)], np.r_[own, np.full(lacking, n - 1)[:1], np.full(lacking, -1)[1:]]
-    b, o = base[rows], offset[rows]
-    one = shifts[b]
-    z = 1 + (one + o)
-    apart = (one[:, None] - shifts[base]) + (o[:, None] - offset)
+    poles = np.r_[known, np.zeros(max(0, offset.size - known.size - loop.in_z.poles.size))]
+    one, o = loop.open_loop[b], offset[rows]
+    apart = (one[:, None] - loop.open_loop[base]) + (o[:, None] - offset)
     apart[np.arange(rows.size), rows] = 1.0
-    away = np.where(b[:, None] == own, 1.0, (one[:, None] - poles) + o[:, None])
+    away = (one[:, None] - poles) + o[:, None]
+    of_plant = np.flatnonzero(b < pulse.poles.size)  # there F is times the distance from that pole
+    away[of_plant, np.where(b == pulse.poles.size - 1, known.size, b)[of_plant]] = 1.0
     slope = (apart[:, : poles.size] / away).prod(axis=1) * apart[:, poles.size :].prod(axis=1)
-    return loop.row @ loop.terms(z, b, o), slope, apart
+    return loop.row @ loop.terms(1 + (one + o), b, o), slope, apart
 
 
 def _product(start: Complex, roots: Complex, more: Any = 0.0) -> Complex:
