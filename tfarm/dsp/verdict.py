@@ -566,10 +566,14 @@ def sampled_brief(arm: Arm, law: AnyLaw, chain: Chain) -> SampledBrief:
 def brief_of(found: Verdict | ConvergenceError, law: AnyLaw, chain: Chain) -> SampledBrief:
     """A verdict on a law in short, or the reason that there is none."""
     origin = chain.period_from or (DEFAULT_PERIOD if chain.sampling.period == Sampling().period else "")
-    at = {"sampling": chain.sampling, "period_from": LAWS_PERIOD if as_law(law).is_discrete else origin}
-    if isinstance(found, ConvergenceError):
-        return SampledBrief(**at, is_stable=None, log_radius=None, sentence=f"undecided: {found}")
-    return SampledBrief(**at, is_stable=found.is_stable, log_radius=float(found.log_radius), sentence=found.sentence)
+    verdict = None if isinstance(found, ConvergenceError) else found
+    return SampledBrief(
+        sampling=chain.sampling,
+        period_from=LAWS_PERIOD if as_law(law).is_discrete else origin,
+        is_stable=None if verdict is None else verdict.is_stable,
+        log_radius=None if verdict is None else float(verdict.log_radius),
+        sentence=f"undecided: {found}" if verdict is None else verdict.sentence,
+    )
 
 
 class AtPeriod(NamedTuple):
