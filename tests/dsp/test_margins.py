@@ -56,7 +56,7 @@ def test_where_the_feedback_outweighs_no_fast_modes_damping_all_delays_are_looke
     assert (found.samples, found.is_bound) == (20.0, True)
     assert all(loop.with_delay(delay).poles.is_stable for delay in np.linspace(0.0, 20.0, 9))
     analysis = Analysis(Verdict(loop))
-    vars(analysis)["_delay"] = found, Figure(20.0, 4, None, 12, is_bound=True)
+    vars(analysis)["delay"] = Figure(20.0, 4, None, 12, is_bound=True)
     assert (text(analysis.delay_margin_seconds), text(analysis.delay)) == ("≥ 0.4", "≥ 20 (first 12 modes)")
     assert (analysis.delay_margin_seconds, analysis.is_lower_bound) == (0.4, True)
 

@@ -245,10 +245,8 @@ class GainMap(PlaneOfCounts):
     """
 
     loop: Sampled
-    vary: Annotated[
-        tuple[str, str],
-        Quantity("plane of", help="names of the two numbers of the controller that vary, the first across"),
-    ]
+    vary: Annotated[tuple[str, str], Quantity("plane of",
+            help="names of the two numbers of the controller that vary, the first across")]  # fmt: skip
     x: Annotated[Real, Quantity(curve=True, help="values of the first number, ascending")]
     y: Annotated[Real, Quantity(curve=True, help="values of the second number, ascending")]
     unstable: NDArray[np.int64]
@@ -265,22 +263,14 @@ class GainMap(PlaneOfCounts):
         return controller(self.loop.given, self.loop.plant.arm)
 
     @property
-    def finding(
-        self,
-    ) -> Annotated[str, Quantity("stability region", help="grid points of the plane without unstable poles")]:
+    def finding(self) -> Annotated[str, Quantity("stability region",
+            help="grid points of the plane without unstable poles")]:  # fmt: skip
         """Number of points of the grid at which the loop is stable."""
         return f"stable at {int((self.unstable == 0).sum())} of {self.unstable.size} points"
 
     @property
-    def counts(
-        self,
-    ) -> Annotated[
-        NDArray[np.int64],
-        Quantity(
-            key="unstable_poles",
-            help="closed-loop poles outside the unit circle at each point, z = 1 of a free hub angle left out",
-        ),
-    ]:
+    def counts(self) -> Annotated[NDArray[np.int64], Quantity(key="unstable_poles",
+            help="unstable poles at each point, without z = 1 of a free hub angle")]:  # fmt: skip
         """Unstable poles (len(y), len(x))."""
         return self.unstable.T
 

@@ -178,37 +178,17 @@ class Figure:
     """
 
     value: Annotated[float, Quantity("value", help="value of the limit")]
-    digits: Annotated[
-        int,
-        Quantity(
-            "digits", help="significant digits of the value that are certified, or confirmed by another number of modes"
-        ),
-    ]
-    band: Annotated[
-        float | None,
-        Quantity(
-            "certified up to",
-            "rad/s",
-            key="up_to_rad_s",
-            help="end of the frequency range in which every mode is taken into account",
-        ),
-    ]
-    modes: Annotated[
-        int | None,
-        Quantity(
-            "holds for the first modes",
-            help="number of modes of the model where the limit is converged and not certified",
-        ),
-    ]
+    digits: Annotated[int, Quantity("digits",
+            help="significant digits, certified or confirmed by another number of modes")]  # fmt: skip
+    band: Annotated[float | None, Quantity("certified up to", "rad/s", key="up_to_rad_s",
+            help="end of the frequency range in which every mode is taken into account")]  # fmt: skip
+    modes: Annotated[int | None, Quantity("holds for the first modes",
+            help="number of modes of the model where the limit is converged and not certified")]  # fmt: skip
     is_bound: bool = False
 
     @property
-    def is_settled(
-        self,
-    ) -> Annotated[
-        bool,
-        Quantity("certified", key="certified", help="whether the limit is certified for every mode up to a frequency"),
-    ]:
+    def is_settled(self) -> Annotated[bool, Quantity("certified", key="certified",
+            help="whether the limit is certified for every mode up to a frequency")]:  # fmt: skip
         """Whether it is certified in a band."""
         return self.band is not None
 
@@ -217,11 +197,8 @@ class Figure:
         return self.is_settled and (self.digits >= digits or self.value == 0.0)
 
     @property
-    def text(
-        self,
-    ) -> Annotated[
-        str, Quantity("in these digits", help="the value in its significant digits, ? where there are none")
-    ]:
+    def text(self) -> Annotated[str, Quantity("in these digits",
+            help="the value in its significant digits, ? where there are none")]:  # fmt: skip
         """The number in these digits; "?" where there are none."""
         if self.value == 0.0 or math.isinf(self.value):
             return f"{self.value:g}"
@@ -340,23 +317,23 @@ def _proof_of(loop: Sampled) -> Proof:
     return None if count is None else count == 0, 0.0 if band is None else band.top
 
 
-def shown_delay(loop: Sampled, band: Band | None) -> tuple[DelayMargin, Figure]:
-    """Return the delay margin, and its samples as a figure, with more and more modes until all digits are certified."""
-    found = DelayMargin(0.0, False), Figure(0.0, 0, None, 0)
+def shown_delay(loop: Sampled, band: Band | None) -> Figure:
+    """Return the delay margin [samples] as a figure, with more and more modes until all digits are certified."""
+    found = Figure(0.0, 0, None, 0)
     for each in _sizes(loop, band, MOST_EDGE_MODES // 2):
         found = _delay(each, band)
-        if found[0].is_bound or found[1].is_sharp(OTHER_DIGITS):
+        if found.is_bound or found.is_sharp(OTHER_DIGITS):
             break
     return found
 
 
-def _delay(loop: Sampled, band: Band | None) -> tuple[DelayMargin, Figure]:
+def _delay(loop: Sampled, band: Band | None) -> Figure:
     """The delay margin of a loop with its own number of modes; 0 is as certain as the verdict that it is unstable."""
     margin, now, modes = delay_margin(loop), loop.chain.sampling.delay_samples, loop.plant.count
     if margin.samples == 0.0:
-        return margin, Figure(0.0, OTHER_DIGITS, band.top if band else None, None if band else modes)
+        return Figure(0.0, OTHER_DIGITS, band.top if band else None, None if band else modes)
     if margin.is_bound:
-        return margin, Figure(margin.samples, OTHER_DIGITS, None, modes, is_bound=True)
+        return Figure(margin.samples, OTHER_DIGITS, None, modes, is_bound=True)
     other = _with_others(loop)
 
     def proof(more: float) -> Proof:
@@ -365,7 +342,7 @@ def _delay(loop: Sampled, band: Band | None) -> tuple[DelayMargin, Figure]:
     def holds(more: float) -> Proof:
         return None if more < 0 else other().with_delay(now + more).poles.is_stable, math.inf
 
-    return margin, figure(margin.samples, OTHER_DIGITS, modes, proof, holds, below=True, spare=0.0)
+    return figure(margin.samples, OTHER_DIGITS, modes, proof, holds, below=True, spare=0.0)
 
 
 def shown_damping(loop: Sampled, count: int) -> Figure:

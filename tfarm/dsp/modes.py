@@ -56,68 +56,25 @@ class ModeTable:
     is_table = True
 
     index: Annotated[NDArray[np.int64], Quantity("mode", help="number of the flexible mode")]
-    natural_frequency: Annotated[
-        Real,
-        Quantity("natural frequency", "rad/s", help="undamped natural frequency of the mode without the controller"),
-    ]
-    band: Annotated[
-        NDArray[np.int64],
-        Quantity("Nyquist zone", help="0 from 0 to half the sampling rate, 1 from there to the whole rate"),
-    ]
-    aliased: Annotated[
-        Real,
-        Quantity("aliased to", "rad/s", help="apparent frequency of the sampled mode, below half the sampling rate"),
-    ]
-    by_rate: Annotated[
-        Real,
-        Quantity(
-            "by K1",
-            digits=3,
-            key="first_order_by_K1",
-            help="change of ln|z| per sample by hub-rate feedback, to first order; below 0 damps",
-        ),
-    ]
-    by_moment: Annotated[
-        Real,
-        Quantity(
-            "by K2",
-            digits=3,
-            key="first_order_by_K2",
-            help="change of ln|z| per sample by root-moment feedback, to first order",
-        ),
-    ]
+    natural_frequency: Annotated[Real, Quantity("natural frequency", "rad/s",
+            help="undamped natural frequency of the mode without the controller")]  # fmt: skip
+    band: Annotated[NDArray[np.int64], Quantity("Nyquist zone",
+            help="0 from 0 to half the sampling rate, 1 from there to the whole rate")]  # fmt: skip
+    aliased: Annotated[Real, Quantity("aliased to", "rad/s",
+            help="apparent frequency of the sampled mode, below half the sampling rate")]  # fmt: skip
+    by_rate: Annotated[Real, Quantity("by K1", digits=3, key="first_order_by_K1",
+            help="change of ln|z| per sample by hub-rate feedback, to first order; below 0 damps")]  # fmt: skip
+    by_moment: Annotated[Real, Quantity("by K2", digits=3, key="first_order_by_K2",
+            help="change of ln|z| per sample by root-moment feedback, to first order")]  # fmt: skip
     by_others: Real
-    by_damping: Annotated[
-        Real,
-        Quantity(
-            "open loop",
-            digits=4,
-            key="open_loop_log_radius",
-            help="ln|z| per sample of the mode without the controller, by damping of the arm",
-        ),
-    ]
-    log_radius: Annotated[
-        Real,
-        Quantity(
-            "closed loop",
-            digits=4,
-            key="log_radius_per_sample",
-            help="ln|z| per sample of the closed-loop pole; above 0 it is unstable",
-        ),
-    ]
+    by_damping: Annotated[Real, Quantity("open loop", digits=4, key="open_loop_log_radius",
+            help="ln|z| per sample of the mode without the controller, by damping of the arm")]  # fmt: skip
+    log_radius: Annotated[Real, Quantity("closed loop", digits=4, key="log_radius_per_sample",
+            help="ln|z| per sample of the closed-loop pole; above 0 it is unstable")]  # fmt: skip
 
     @property
-    def first_order(
-        self,
-    ) -> Annotated[
-        Real,
-        Quantity(
-            "first order",
-            digits=3,
-            key="first_order_log_radius",
-            help="change of ln|z| per sample by the whole controller, to first order",
-        ),
-    ]:
+    def first_order(self) -> Annotated[Real, Quantity("first order", digits=3, key="first_order_log_radius",
+            help="change of ln|z| per sample by the whole controller, to first order")]:  # fmt: skip
         """Change of ln|z| per sample by all gains."""
         return self.by_rate + self.by_moment + self.by_others
 

@@ -244,8 +244,8 @@ class Sampled:
     def rounding(self, base: Whole, offset: Complex) -> Real:
         """Bound on the rounding error (n,) of row @ terms at the same points: of the sizes of all terms."""
         start, is_of_law = self.open_loop[base], base >= self.pulse.poles.size
-        at, scale = np.where(is_of_law, -1, base), np.where(is_of_law, 1.0, offset)
-        sizes = self.pulse.sizes(at, scale, start + offset)
+        scale = np.where(is_of_law, 1.0, offset)
+        sizes = self.pulse.sizes(np.where(is_of_law, -1, base), scale, start + offset)
         error = abs(scale) * _product_error(start, self.in_z.poles, offset)
         for part, row, gain, zeros in self.in_z.terms:
             error += abs(self.weights[part] * gain) * _product_error(start, zeros, offset) * sizes[row]
@@ -396,10 +396,11 @@ def _errors(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> Real:
 
 def _weierstrass(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[Complex, Complex, Complex]:
     """At some roots o F and o F/W, and their distances from all roots, 1 from themselves."""
-    pulse, b = loop.pulse, base[rows]
+    pulse = loop.pulse
+    b, o = base[rows], offset[rows]
+    one = loop.open_loop[b]
     known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0)]  # the other poles are at z = 1
     poles = np.r_[known, np.zeros(max(0, offset.size - known.size - loop.in_z.poles.size))]
-    one, o = loop.open_loop[b], offset[rows]
     apart = (one[:, None] - loop.open_loop[base]) + (o[:, None] - offset)
     apart[np.arange(rows.size), rows] = 1.0
     away = (one[:, None] - poles) + o[:, None]

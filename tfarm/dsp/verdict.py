@@ -75,26 +75,14 @@ class Verdict:
         return self.loop.chain.sampling
 
     @property
-    def is_settled(
-        self,
-    ) -> Annotated[
-        bool, Quantity(key="certified", help="whether the verdict is certified for every mode up to a frequency")
-    ]:
+    def is_settled(self) -> Annotated[bool, Quantity(key="certified",
+            help="whether the verdict is certified for every mode up to a frequency")]:  # fmt: skip
         """Whether the verdict is certified for every mode of the band and every slow real pole."""
         return self.band is not None
 
     @property
-    def band_rad_s(
-        self,
-    ) -> Annotated[
-        float | None,
-        Quantity(
-            "certified up to",
-            "rad/s",
-            key="up_to_rad_s",
-            help="end of the frequency range in which the verdict is certified",
-        ),
-    ]:
+    def band_rad_s(self) -> Annotated[float | None, Quantity("certified up to", "rad/s", key="up_to_rad_s",
+            help="end of the frequency range in which the verdict is certified")]:  # fmt: skip
         """End of the range in which the verdict is certified [rad/s]; None without one."""
         return None if self.band is None else self.band.top
 
@@ -104,21 +92,14 @@ class Verdict:
         return self.loop.plant.count
 
     @property
-    def is_stable(
-        self,
-    ) -> Annotated[bool, Quantity(key="stable", help="whether every pole lies inside the unit circle")]:
+    def is_stable(self) -> Annotated[bool, Quantity(key="stable",
+            help="whether every pole lies inside the unit circle")]:  # fmt: skip
         """Whether every pole lies inside the unit circle."""
         return self.loop.poles.is_stable
 
     @property
-    def log_radius(
-        self,
-    ) -> Annotated[
-        float,
-        Quantity(
-            key="log_spectral_radius", help="ln of the largest |z| of the closed-loop poles; below 0 of a stable loop"
-        ),
-    ]:
+    def log_radius(self) -> Annotated[float, Quantity(key="log_spectral_radius",
+            help="ln of the largest |z| of the closed-loop poles; below 0 of a stable loop")]:  # fmt: skip
         """ln of the spectral radius, of every mode of the band, or of the first `modes_used` without a band.
 
         The verdict needs few modes, but not the later digits of this number.
@@ -126,23 +107,14 @@ class Verdict:
         return self.full.poles.log_spectral_radius
 
     @property
-    def spectral_radius(
-        self,
-    ) -> Annotated[
-        float,
-        Quantity(
-            "spectral radius",
-            digits=12,
-            help="largest |z| of the closed-loop poles, z = 1 of a free hub angle left out; below 1 of a stable loop",
-        ),
-    ]:
+    def spectral_radius(self) -> Annotated[float, Quantity("spectral radius", digits=12,
+            help="largest |z| of the closed-loop poles but z = 1 of a free hub angle; below 1 if stable")]:  # fmt: skip
         """Largest |z|."""
         return math.exp(self.log_radius)
 
     @property
-    def unstable_poles(
-        self,
-    ) -> Annotated[int, Quantity("unstable poles", help="closed-loop poles outside the unit circle")]:
+    def unstable_poles(self) -> Annotated[int, Quantity("unstable poles",
+            help="closed-loop poles outside the unit circle")]:  # fmt: skip
         """Number of poles outside the unit circle."""
         return self.loop.poles.unstable
 
@@ -152,46 +124,27 @@ class Verdict:
         return self.loop if self.band is None else self.band.full
 
     @property
-    def word(
-        self,
-    ) -> Annotated[
-        str,
-        Quantity(
-            "stability", key="verdict", help="stable, marginal (largest |z| = 1 within its rounding error) or unstable"
-        ),
-    ]:
+    def word(self) -> Annotated[str, Quantity("stability", key="verdict",
+            help="stable, marginal (largest |z| = 1 within its rounding error) or unstable")]:  # fmt: skip
         """stable, marginal or unstable."""
         growth = self.log_radius
         return "unstable" if growth > 0 else "stable" if growth < 0 else "marginal"
 
     @property
-    def sentence(
-        self,
-    ) -> Annotated[str, Quantity(key="verdict_in_words", help="stability, its certainty and the dominant pole")]:
+    def sentence(self) -> Annotated[str, Quantity(key="verdict_in_words",
+            help="stability, its certainty and the dominant pole")]:  # fmt: skip
         """Stability, its certainty, and the dominant pole."""
         return f"{self.word} ({self.holds_for}); dominant pole: {self.slowest}"
 
     @property
-    def slowest(
-        self,
-    ) -> Annotated[
-        str,
-        Quantity(
-            "dominant pole", key="dominant", help="origin of the pole of largest |z|: a mode, the hub or the controller"
-        ),
-    ]:
+    def slowest(self) -> Annotated[str, Quantity("dominant pole", key="dominant",
+            help="origin of the pole of largest |z|: a mode, the hub or the controller")]:  # fmt: skip
         """Origin of the pole of largest radius: a mode, the hub, or a pole of the law."""
         return dominant(self.loop)
 
     @property
-    def holds_for(
-        self,
-    ) -> Annotated[
-        str,
-        Quantity(
-            "certainty", key="certainty", help="frequency range or number of modes for which the verdict was shown"
-        ),
-    ]:
+    def holds_for(self) -> Annotated[str, Quantity("certainty", key="certainty",
+            help="frequency range or number of modes for which the verdict was shown")]:  # fmt: skip
         """The modes for which the verdict is certified."""
         if self.band is None:
             shown = "converged for" if self.is_converged else "model of"
@@ -199,14 +152,8 @@ class Verdict:
         return f"certified up to {self.band.top:.3g} rad/s, not determined beyond"
 
     @property
-    def time_constant(
-        self,
-    ) -> Annotated[
-        float | None,
-        Quantity(
-            "dominant time constant", "s", help="time constant of the pole of largest |z|, negative of a growing one"
-        ),
-    ]:
+    def time_constant(self) -> Annotated[float | None, Quantity("dominant time constant", "s",
+            help="time constant of the pole of largest |z|, negative of a growing one")]:  # fmt: skip
         """Time constant of the dominant pole, below 0 where it grows."""
         return -self.loop.chain.sampling.period / self.log_radius if self.log_radius else None
 
@@ -246,14 +193,8 @@ class SampledNumber(NamedTuple):
 
     number: Annotated[str, Quantity("gain or coefficient", help="name of a number of the controller")]
     value: Annotated[float, Quantity("value", help="present value of the number")]
-    windows: Annotated[
-        Sequence[Window | Interval],
-        Quantity(
-            "stability intervals",
-            key="intervals",
-            help="all intervals of the number in which the loop is stable, the others constant",
-        ),
-    ]
+    windows: Annotated[Sequence[Window | Interval], Quantity("stability intervals", key="intervals",
+            help="all intervals of the number in which the loop is stable, the others constant")]  # fmt: skip
     interval: Annotated[Window | None, Quantity(help="the interval that contains the present value")]
 
 
@@ -277,78 +218,41 @@ class Analysis:
     damping_modes: int = UNDAMPED_MODES
 
     @property
-    def stability_intervals(
-        self,
-    ) -> Annotated[
-        list[SampledNumber],
-        Quantity(
-            "stability intervals", help="stability intervals of each number of the controller, the others constant"
-        ),
-    ]:
+    def stability_intervals(self) -> Annotated[list[SampledNumber], Quantity("stability intervals",
+            help="stability intervals of each number of the controller, the others constant")]:  # fmt: skip
         """One row for each gain at the hub, or number of another law, the others constant."""
         if not self.loop.is_of_gains:
             return self.numbers
         return [SampledNumber(n, self.loop.number(n), each, self.interval(n)) for n, each in self.shown.items()]
 
     @property
-    def delay_margin_samples(
-        self,
-    ) -> Annotated[
-        float,
-        Quantity(
-            unit="samples",
-            key="delay_margin_samples",
-            help="smallest additional delay that destabilises the loop, in samples",
-        ),
-    ]:
+    def delay_margin_samples(self) -> Annotated[float, Quantity(unit="samples", key="delay_margin_samples",
+            help="smallest additional delay that destabilises the loop, in samples")]:  # fmt: skip
         """The further delay in samples, to the last digit."""
-        return self.delay_margin.samples
+        return self.delay.value
 
     @property
-    def delay_margin_seconds(
-        self,
-    ) -> Annotated[
-        float,
-        Quantity(
-            "delay margin",
-            "s",
-            4,
-            key="delay_margin_s",
-            help="smallest additional loop delay that destabilises the loop; 0 of an unstable loop",
-        ),
-    ]:
+    def delay_margin_seconds(self) -> Annotated[float, Quantity("delay margin", "s", 4, key="delay_margin_s",
+            help="smallest additional loop delay that destabilises the loop; 0 of an unstable loop")]:  # fmt: skip
         """The further delay in seconds."""
-        seconds = self.delay_margin.samples * self.loop.chain.sampling.period
-        return LowerBound(seconds) if self.delay_margin.is_bound else seconds
+        seconds = self.delay.value * self.loop.chain.sampling.period
+        return LowerBound(seconds) if self.delay.is_bound else seconds
 
     @property
-    def is_lower_bound(
-        self,
-    ) -> Annotated[
-        bool,
-        Quantity(
-            "delay margin: lower bound",
-            key="delay_margin_is_lower_bound",
-            help="whether no delay up to the margin destabilises the loop and longer ones were not searched",
-        ),
-    ]:
+    def is_lower_bound(self) -> Annotated[bool, Quantity("delay margin: lower bound", key="delay_margin_is_lower_bound",
+            help="whether the search ended at the margin with the loop still stable")]:  # fmt: skip
         """Whether no further delay up to the margin destabilises the loop."""
-        return self.delay_margin.is_bound
+        return self.delay.is_bound
 
     @property
-    def free_hub_angle(
-        self,
-    ) -> Annotated[
-        str | None,
-        Quantity("free hub angle", help="pole at z = 1 of a hub angle without feedback, which the verdict leaves out"),
-    ]:
+    def free_hub_angle(self) -> Annotated[str | None, Quantity("free hub angle",
+            help="pole at z = 1 of a hub angle without feedback, which the verdict leaves out")]:  # fmt: skip
         """The pole at z = 1 that the verdict leaves out."""
         return "its pole at z = 1 is left out" if self.loop.has_free_angle else None
 
     @property
-    def unfiltered_signals(
-        self,
-    ) -> Annotated[list[str], Quantity(help="signals of the controller without an analog anti-alias filter")]:
+    def unfiltered_signals(self) -> Annotated[list[str], Quantity(
+            help="signals of the controller without an analog anti-alias filter")]:  # fmt: skip
         """Signals without an anti-alias filter."""
         return [name for name, analog in zip(self.loop.in_z.signals, self.loop.analog, strict=True) if not analog]
 
@@ -378,48 +282,31 @@ class Analysis:
         return {name: [(low.value, high.value) for low, high in each] for name, each in self.shown.items()}
 
     @cached_property
-    def modes(
-        self,
-    ) -> Annotated[ModeTable, Quantity("modes", help="effect of the controller on each mode, in ln|z| per sample")]:
+    def modes(self) -> Annotated[ModeTable, Quantity("modes",
+            help="effect of the controller on each mode, in ln|z| per sample")]:  # fmt: skip
         """The modes one by one."""
         return mode_table(self.loop)
 
     @property
-    def first_unstable_mode(
-        self,
-    ) -> Annotated[
-        int | None,
-        Quantity("first unstable mode", help="lowest mode whose closed-loop pole lies outside the unit circle"),
-    ]:
+    def first_unstable_mode(self) -> Annotated[int | None, Quantity("first unstable mode",
+            help="lowest mode whose closed-loop pole lies outside the unit circle")]:  # fmt: skip
         """The lowest unstable mode."""
         grows = self.modes.index[self.modes.log_radius > 0]
         return int(grows[0]) if grows.size else None
 
     @cached_property
-    def _delay(self) -> tuple[DelayMargin, Figure]:
-        return shown_delay(self.loop, self.verdict.band)
-
-    @property
-    def delay(
-        self,
-    ) -> Annotated[
-        Figure,
-        Quantity(
-            "delay margin in samples",
-            key="delay_margin",
-            help="smallest additional delay that destabilises the loop, over the sampling period",
-        ),
-    ]:
+    def delay(self) -> Annotated[Figure, Quantity("delay margin in samples", key="delay_margin",
+            help="smallest additional delay that destabilises the loop, over the sampling period")]:  # fmt: skip
         """The delay margin [samples]; of any law but gains at the hub with the modes of the verdict."""
         if self.loop.is_of_gains:
-            return self._delay[1]
-        found = self.delay_margin
+            return shown_delay(self.loop, self.verdict.band)
+        found = delay_margin(self.loop)
         return Figure(found.samples, LAW_DELAY_DIGITS, None, self.verdict.modes_used, found.is_bound)
 
-    @cached_property
+    @property
     def delay_margin(self) -> DelayMargin:
-        """The delay margin; of any law but gains at the hub with the modes of the verdict."""
-        return self._delay[0] if self.loop.is_of_gains else delay_margin(self.loop)
+        """The delay margin, to the last digit."""
+        return DelayMargin(self.delay.value, self.delay.is_bound)
 
     @cached_property
     def damping(self) -> Figure:
@@ -427,16 +314,8 @@ class Analysis:
         return shown_damping(self.loop, self.damping_modes)
 
     @property
-    def minimum_damping(
-        self,
-    ) -> Annotated[
-        Figure | None,
-        Quantity(
-            "minimum structural damping for stability",
-            "s",
-            help="Kelvin-Voigt damping C of the link from which on the loop is stable",
-        ),
-    ]:
+    def minimum_damping(self) -> Annotated[Figure | None, Quantity("minimum structural damping for stability", "s",
+            help="Kelvin-Voigt damping C of the link from which on the loop is stable")]:  # fmt: skip
         """The same with its digits, for gains at the hub."""
         return self.damping if self.loop.is_of_gains else None
 
@@ -446,37 +325,20 @@ class Analysis:
         return stable_factors(self.loop)
 
     @property
-    def stable_gain_factors(
-        self,
-    ) -> Annotated[
-        list[Window] | None,
-        Quantity(
-            "stable factors on the controller",
-            help="all intervals of a factor on the whole controller in which the loop is stable",
-        ),
-    ]:
+    def stable_gain_factors(self) -> Annotated[list[Window] | None, Quantity("stable factors on the controller",
+            help="all intervals of a factor on the whole controller in which the loop is stable")]:  # fmt: skip
         """All intervals, of a controller that is more than gains at the hub."""
         return None if self.loop.is_of_gains else self.factors
 
     @property
-    def gain_factors(
-        self,
-    ) -> Annotated[
-        Window | None,
-        Quantity(
-            "gain margin, factors down and up",
-            help="interval around 1 of a factor on the whole controller in which the loop is stable",
-        ),
-    ]:
+    def gain_factors(self) -> Annotated[Window | None, Quantity("gain margin, factors down and up",
+            help="interval around 1 of a factor on the whole controller in which the loop is stable")]:  # fmt: skip
         """The stability interval around 1 of a factor on the law; None unless the loop is stable."""
         return around(self.factors, 1.0)
 
     @property
-    def warnings(
-        self,
-    ) -> Annotated[
-        tuple[str, ...], Quantity("warnings", help="unstable poles of the controller that its own zeros cancel")
-    ]:
+    def warnings(self) -> Annotated[tuple[str, ...], Quantity("warnings",
+            help="unstable poles of the controller that its own zeros cancel")]:  # fmt: skip
         """Unstable poles of the law that its own zeros cancel."""
         return cancelled(self.loop.given)
 
@@ -526,11 +388,8 @@ class SampledBrief:
         return self.sampling.delay_samples
 
     @property
-    def spectral_radius(
-        self,
-    ) -> Annotated[
-        float | None, Quantity("spectral radius", help="largest |z| of the closed-loop poles; below 1 of a stable loop")
-    ]:
+    def spectral_radius(self) -> Annotated[float | None, Quantity("spectral radius",
+            help="largest |z| of the closed-loop poles; below 1 of a stable loop")]:  # fmt: skip
         """Largest |z|; infinity where it overflows."""
         size = self.log_radius
         return None if size is None else math.exp(size) if size < LARGEST_LOG else math.inf
