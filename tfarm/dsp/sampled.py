@@ -80,8 +80,13 @@ class SampledPoles:
         return int((self.log_radius > 0).sum())
 
     @property
+    def is_determined(self) -> bool:
+        """Whether none but poles that are exactly 1 may lie on the circle by rounding alone."""
+        return bool((self.z[self.log_radius == 0] == 1).all())
+
+    @property
     def is_stable(self) -> bool:
-        """Whether all lie inside the unit circle, without a tolerance."""
+        """Whether all lie inside the unit circle."""
         return self.log_spectral_radius < 0.0
 
 
@@ -404,9 +409,14 @@ def _weierstrass(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tu
     apart = (one[:, None] - loop.open_loop[base]) + (o[:, None] - offset)
     apart[np.arange(rows.size), rows] = 1.0
     away = (one[:, None] - poles) + o[:, None]
-    of_plant = np.flatnonzero(b < pulse.poles.size)  # there F is times the distance from that pole
-    away[of_plant, np.where(b == pulse.poles.size - 1, known.size, b)[of_plant]] = 1.0
-    slope = (apart[:, : poles.size] / away).prod(axis=1) * apart[:, poles.size :].prod(axis=1)
+    of_plant, own = b < pulse.poles.size, np.where(b == pulse.poles.size - 1, known.size, b)
+    listed = of_plant & (own < poles.size)  # but where a free hub angle has the pole at z = 1
+    away[listed, own[listed]] = 1.0  # F is times the distance from that pole
+    slope = (
+        np.where(of_plant & ~listed, o, 1.0)
+        * (apart[:, : poles.size] / away).prod(axis=1)
+        * apart[:, poles.size :].prod(axis=1)
+    )
     return loop.row @ loop.terms(1 + (one + o), b, o), slope, apart
 
 

@@ -184,7 +184,7 @@ def sampled_verdict(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count:
         if loop is full:
             break
         number *= 2
-    is_proven = proven is not None and (proven == 0) == loop.poles.is_stable
+    is_proven = proven is not None and loop.poles.is_determined and (proven == 0) == (loop.poles.unstable == 0)
     return Verdict(loop, band if is_proven else None, is_converged=loop is not full)
 
 
