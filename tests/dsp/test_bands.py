@@ -39,11 +39,11 @@ def test_the_filters_own_pole_errs_by_what_the_model_is_off_at_its_corner(delay)
 def test_without_a_band_a_delay_margin_has_the_digits_that_twice_the_modes_leave():
     """Less than one sample of it: both ends of what is shown are on their sides of the edge with sixteen modes too."""
     loop = sampled_loop(LAB, replace(GAINS, K2=1.1), Chain(sampling=Sampling(delay_samples=0.5)), count=4)
-    margin, figure = shown_delay(loop, None)
-    assert 0 < margin.samples < 1
+    figure = shown_delay(loop, None)
+    assert 0 < figure.value < 1
     assert (figure.is_settled, figure.modes) == (False, 4)
     assert figure.digits >= 2
-    half, many = 0.5 * 10.0 ** (math.floor(math.log10(margin.samples)) - figure.digits + 1), loop.with_modes(16)
+    half, many = 0.5 * 10.0 ** (math.floor(math.log10(figure.value)) - figure.digits + 1), loop.with_modes(16)
     radii = [abs(many.with_delay(0.5 + float(figure.text) + side * half).eigenvalues).max() for side in (-1, 1)]
     assert radii[0] < 1 < radii[1]
 

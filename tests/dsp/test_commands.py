@@ -14,10 +14,12 @@ import tfarm
 from tests.shared import remember, thinned
 from tests.shell import answer, refused, run
 from tests.synthesis.held_loop import HeldLoop
-from tfarm import HubFeedback
+from tfarm import HubFeedback, Law
+from tfarm.cli.app import load_chain
 from tfarm.dsp import Chain
-from tfarm.dsp.chain import Sampling
-from tfarm.dsp.verdict import sampled_brief
+from tfarm.dsp.chain import Sampling, chain_of_tables
+from tfarm.dsp.verdict import brief_of, sampled_brief
+from tfarm.errors import ConvergenceError
 from tfarm.plots import slew
 from tfarm.report.sampled_section import responses_table
 from tfarm.synthesis import design
@@ -116,6 +118,22 @@ def test_gains_that_fail_when_sampled_are_not_recommended_without_a_word(capsys,
     _, out, _ = run(capsys, "design", "sasaki2012-lab", "--continuous")
     assert "inside bounds that were widened" in out
     assert re.search(r"^sampled loop +UNSTABLE .*\(tfarm's default period\)$", out, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("chain", "law", "origin"),
+    [
+        (Chain(), HubFeedback(K1=0.3), "tfarm's default period"),
+        (Chain(), Law({"hub_rate": 0.3}, period=0.01), "the controller's period"),
+        (load_chain("sasaki2012-lab", 0.01, None), HubFeedback(K1=0.3), "--period"),
+        (chain_of_tables({"sampling": {"period": 0.01}}), HubFeedback(K1=0.3), "the file's period"),
+        (Chain(sampling=Sampling(period=0.02)), HubFeedback(K1=0.3), ""),
+    ],
+)
+def test_the_origin_of_the_period(chain, law, origin):
+    brief = brief_of(ConvergenceError("not tried", None, None), law, chain)
+    assert (brief.period_from, brief.period_is_default) == (origin, origin == "tfarm's default period")
+    assert brief.words.endswith(f"({origin})" if origin else "ms")
 
 
 RIG = "quanser-2dsfl"

@@ -15,9 +15,10 @@ from tfarm import HubFeedback, Law, modes
 from tfarm.arm import as_law
 from tfarm.dsp import Chain, Converters, Sampling, delay_margin, required_damping, sampled_loop, sampled_map
 from tfarm.dsp.crossings import ENDS_AT, around, circle_grid, ends_of_K1, number_crossings, stable_windows
-from tfarm.dsp.verdict import sampled_verdict
+from tfarm.dsp.edges import Figure
+from tfarm.dsp.verdict import Analysis, Verdict, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.schema import to_dict
+from tfarm.schema import text, to_dict
 from tfarm.spectrum.table import default_gains
 
 GAINS = HubFeedback(K1=0.3, K2=0.3)
@@ -54,6 +55,10 @@ def test_where_the_feedback_outweighs_no_fast_modes_damping_all_delays_are_looke
     found = delay_margin(loop)
     assert (found.samples, found.is_bound) == (20.0, True)
     assert all(loop.with_delay(delay).poles.is_stable for delay in np.linspace(0.0, 20.0, 9))
+    analysis = Analysis(Verdict(loop))
+    vars(analysis)["delay"] = Figure(20.0, 4, None, 12, is_bound=True)
+    assert (text(analysis.delay_margin_seconds), text(analysis.delay)) == ("≥ 0.4", "≥ 20 (first 12 modes)")
+    assert (analysis.delay_margin_seconds, analysis.is_lower_bound) == (0.4, True)
 
 
 def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
@@ -146,7 +151,7 @@ def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossl
     assert (undamped.is_settled, undamped.band_rad_s) == (False, None)
     assert (undamped.slowest, undamped.modes_used) == ("mode 13", 20)
     assert undamped.log_radius == pytest.approx(8.62e-9, rel=1e-3)
-    assert undamped.holds_for == "converged for the first 20 modes, not determined beyond"
+    assert undamped.holds_for == "model of the first 20 modes, not determined beyond"
     assert sampled_verdict(lossless, GAINS, count=12).sentence.startswith("stable")
     assert sampled_verdict(lossless, HubFeedback(K1=0, K2=0)).sentence.startswith("marginal")
 

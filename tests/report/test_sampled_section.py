@@ -137,7 +137,7 @@ def test_at_zero_damping_the_verdict_names_its_modes_and_the_damping_that_it_nee
     """The number is where the poles say so: a little more damping is stable."""
     (each,) = Case(PAPER, Chain()).controllers
     first, *_, damping = page.facts_on(each, tfarm.sampled(PAPER, GAINS))
-    assert "converged for the first 20 modes" in first.note
+    assert "model of the first 20 modes" in first.note
     assert "dominant pole: mode 13" in first.note
     assert (damping.value, damping.label) == (
         "1.004e-14 s",

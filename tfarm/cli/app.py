@@ -231,10 +231,9 @@ def load_chain(name: str, period: float | None, delay_samples: float | None) -> 
     """Return the sampled chain of a file, with the period and the delay that are given instead."""
     from tfarm.dsp.chain import load_chain as read
 
-    chain = read(name)
-    period = chain.sampling.period if period is None else period
-    delay_samples = chain.sampling.delay_samples if delay_samples is None else delay_samples
-    return replace(chain, sampling=replace(chain.sampling, period=period, delay_samples=delay_samples))
+    chain, typed = read(name), {"period": period, "delay_samples": delay_samples}
+    sampling = replace(chain.sampling, **{key: value for key, value in typed.items() if value is not None})
+    return replace(chain, sampling=sampling, period_from=chain.period_from if period is None else "--period")
 
 
 def outputs_on(names: Sequence[str], side: str | None) -> list[Any]:

@@ -129,8 +129,7 @@ class ComparedSide:
             in_band = self.margins.in_band
             return None if in_band is None else self.margins.exact_delay or in_band.delay
         assert self.analysis is not None
-        delay = self.analysis.delay_margin.samples * self.analysis.loop.chain.sampling.period
-        return delay if self.analysis.verdict.is_stable else None
+        return self.analysis.delay_margin_seconds if self.analysis.verdict.is_stable else None
 
     @property
     def range_words(self) -> str:
@@ -394,12 +393,12 @@ def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_sampled
     analysis, margins = None, None
     try:
         verdict = sampled_verdict(arm, as_law(law) if is_sampled else law, chain)
-        sampled = brief_of(verdict, chain)
+        sampled = brief_of(verdict, law, chain)
         analysis = Analysis(verdict) if is_sampled else None
     except ConvergenceError as error:
         if is_sampled:
             raise
-        sampled = SampledBrief(sampling=chain.sampling, is_stable=None, log_radius=None, sentence=f"undecided: {error}")
+        sampled = brief_of(error, law, chain)
     if analysis is None:
         margins, poles = margins_of(arm, law), closed_loop_poles(arm, law, most).values
     else:

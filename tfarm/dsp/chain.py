@@ -24,6 +24,8 @@ LEAST_BITS, MOST_BITS = 2, 32  # of a converter: of one bit there are no steps, 
 MOST_DELAY = 100.0  # samples: each whole one is a state more
 TIME_ROUNDING = 1e-12  # of a time: by so little before a sample it is at it, as its quotient with the period is rounded
 PAPER_ANGLE = 1.15  # rad, as tip travel over length: the paper moves the tip of its 1 m by 1.15 m
+PERIOD = Quantity("sampling period", "s", help="time between two samples of the controller")
+DELAY = Quantity("delay in samples", help="time from a sample to the torque computed from it, over the sampling period")
 OF_AN_ARM = (*ArmTable.model_fields, "law")
 
 
@@ -35,8 +37,8 @@ class Sampling:
     (tachometer) hub rate; inf is none.  An encoder is digital and has none.
     """
 
-    period: Annotated[float, Quantity("sampling period", "s")] = 0.01
-    delay_samples: Annotated[float, Quantity("delay in samples")] = 0.0
+    period: Annotated[float, PERIOD] = 0.01
+    delay_samples: Annotated[float, DELAY] = 0.0
     antialias_corner: float = math.inf
 
     def __post_init__(self) -> None:
@@ -150,12 +152,16 @@ class Slew:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chain:
-    """The whole chain: `[sampling]`, `[converters]`, `[actuator]` and `[slew]` of a file."""
+    """The whole chain: `[sampling]`, `[converters]`, `[actuator]` and `[slew]` of a file.
+
+    `period_from` is the origin of its sampling period in words, "the file's period"; "" where none was stated.
+    """
 
     sampling: Sampling = field(default_factory=Sampling)
     converters: Converters = field(default_factory=Converters)
     actuator: Actuator = field(default_factory=Actuator)
     slew: Slew = field(default_factory=Slew)
+    period_from: str = field(default="", compare=False, repr=False)
 
     @property
     def is_linear(self) -> bool:
@@ -238,7 +244,8 @@ def chain_of_tables(tables: Mapping[str, Any]) -> Chain:
         remedy = f"unknown table; {did_you_mean(unknown[0], CHAIN_TABLES)}"
         raise ParameterError(key=unknown[0], value=tables[unknown[0]], remedy=remedy)
     given = {name: table for name, table in CHAIN_TABLES.items() if name in tables}
-    return Chain(**{name: validated(table, tables[name], name).build() for name, table in given.items()})
+    records = {name: validated(table, tables[name], name).build() for name, table in given.items()}
+    return Chain(**records, period_from="the file's period" if "period" in tables.get("sampling", {}) else "")
 
 
 def file_text(arm: Arm, chain: Chain | None = None) -> str:
@@ -247,12 +254,12 @@ def file_text(arm: Arm, chain: Chain | None = None) -> str:
     Python's shortest exact digits are TOML's too, and so is inf; a text needs its quotes.
     """
     lines: list[str] = []
-    for table in () if chain is None else fields(chain):
-        record = getattr(chain, table.name)
+    for table in () if chain is None else CHAIN_TABLES:
+        record = getattr(chain, table)
         default = type(record)()
         given = {f.name: getattr(record, f.name) for f in fields(record)}
         given = {name: value for name, value in given.items() if value != getattr(default, name)}
         texts = (json.dumps(value) if isinstance(value, str) else repr(value) for value in given.values())
         if given:
-            lines += ["", f"[{table.name}]", *map(" = ".join, zip(given, texts, strict=True))]
+            lines += ["", f"[{table}]", *map(" = ".join, zip(given, texts, strict=True))]
     return to_toml(arm) + ("\n".join([*lines, ""]) if lines else "")

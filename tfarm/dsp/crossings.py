@@ -37,6 +37,7 @@ from tfarm.crossing import (
 from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.crossing.turning import loose_columns
 from tfarm.dsp.chain import Sampling
+from tfarm.dsp.plant import MODES_USED
 from tfarm.dsp.sampled import Sampled
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
@@ -244,34 +245,37 @@ class GainMap(PlaneOfCounts):
     """
 
     loop: Sampled
-    vary: Annotated[tuple[str, str], Quantity("plane of")]
-    x: Annotated[Real, Quantity(curve=True)]
-    y: Annotated[Real, Quantity(curve=True)]
+    vary: Annotated[tuple[str, str], Quantity("plane of",
+            help="names of the two numbers of the controller that vary, the first across")]  # fmt: skip
+    x: Annotated[Real, Quantity(curve=True, help="values of the first number, ascending")]
+    y: Annotated[Real, Quantity(curve=True, help="values of the second number, ascending")]
     unstable: NDArray[np.int64]
     crossings: list[Crossings]
 
     @property
-    def sampling(self) -> Annotated[Sampling, Quantity(flat=True)]:
+    def sampling(self) -> Annotated[Sampling, Quantity(flat=True, help="sampling period and delay of the loop")]:
         """Period and delay."""
         return self.loop.chain.sampling
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
+    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
         return controller(self.loop.given, self.loop.plant.arm)
 
     @property
-    def finding(self) -> Annotated[str, Quantity("stability region")]:
+    def finding(self) -> Annotated[str, Quantity("stability region",
+            help="grid points of the plane without unstable poles")]:  # fmt: skip
         """Number of points of the grid at which the loop is stable."""
         return f"stable at {int((self.unstable == 0).sum())} of {self.unstable.size} points"
 
     @property
-    def counts(self) -> Annotated[NDArray[np.int64], Quantity(key="unstable_poles")]:
+    def counts(self) -> Annotated[NDArray[np.int64], Quantity(key="unstable_poles",
+            help="unstable poles at each point, without z = 1 of a free hub angle")]:  # fmt: skip
         """Unstable poles (len(y), len(x))."""
         return self.unstable.T
 
     @property
-    def modes_used(self) -> Annotated[int, Quantity("flexible modes")]:
+    def modes_used(self) -> Annotated[int, MODES_USED]:
         """Number of flexible modes in the loop."""
         return self.loop.plant.count
 

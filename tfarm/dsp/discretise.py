@@ -34,10 +34,12 @@ from tfarm.arrays import Complex, Real
 from tfarm.dsp.chain import MOST_DELAY, Chain
 from tfarm.errors import ParameterError
 from tfarm.records import record
+from tfarm.schema import Quantity
 from tfarm.spectrum.table import check_gains
 
 SAME_PERIOD = 1e-9  # relative: 1/100 s in two files may differ in its last digits
 VANISHED = 1e-12  # of its terms: a sum over several signals that cancel
+RULE = Quantity("discretisation", help="rule by which the continuous-time controller is made discrete")
 NONE = np.empty(0, complex)
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tfarm.arm import AnyLaw, Arm
+from tfarm.digits import general
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.circle import Band, Circle, complete_band
 from tfarm.dsp.crossings import stable_windows
@@ -75,8 +76,7 @@ def delay_margin(loop: Sampled) -> DelayMargin:
 
     def grows(more: float) -> bool:
         later = loop.with_delay(now + more)
-        near = abs(later.eigenvalues) > 1 - CLEARLY
-        return bool(near.any()) and later.polished(near).log_spectral_radius >= 0
+        return bool((abs(later.eigenvalues) > 1 - CLEARLY).any()) and later.poles.log_spectral_radius >= 0
 
     if log_radius(0.0) >= 0:
         return DelayMargin(0.0, False)
@@ -89,7 +89,7 @@ def delay_margin(loop: Sampled) -> DelayMargin:
         if i * step > LONGEST_DELAY_SAMPLES:
             break
         low, high = (i - 1) * step, i * step
-        if grows(high) and log_radius(high) >= 0:  # a pole on the circle but for rounding is on either side
+        if grows(high):
             is_between = log_radius(low) < 0
             return DelayMargin(float(brentq(log_radius, low, high, xtol=DELAY_KNOWN)) if is_between else low, False)
     return DelayMargin(min(MOST_STEPS * step, LONGEST_DELAY_SAMPLES), True)
@@ -174,16 +174,21 @@ def whole_loop(arm: Arm, law: AnyLaw, chain: Chain) -> Sampled:
 class Figure:
     """A number with its significant `digits`: certified up to `band` [rad/s], or converged for the first `modes` modes.
 
-    One of `band` and `modes` is None.
+    One of `band` and `modes` is None.  `is_bound` where no more than a lower bound is known.
     """
 
-    value: Annotated[float, Quantity("value")]
-    digits: Annotated[int, Quantity("digits")]
-    band: Annotated[float | None, Quantity("certified up to", "rad/s", key="up_to_rad_s")]
-    modes: Annotated[int | None, Quantity("holds for the first modes")]
+    value: Annotated[float, Quantity("value", help="value of the limit")]
+    digits: Annotated[int, Quantity("digits",
+            help="significant digits, certified or confirmed by another number of modes")]  # fmt: skip
+    band: Annotated[float | None, Quantity("certified up to", "rad/s", key="up_to_rad_s",
+            help="end of the frequency range in which every mode is taken into account")]  # fmt: skip
+    modes: Annotated[int | None, Quantity("holds for the first modes",
+            help="number of modes of the model where the limit is converged and not certified")]  # fmt: skip
+    is_bound: bool = False
 
     @property
-    def is_settled(self) -> Annotated[bool, Quantity("certified", key="certified")]:
+    def is_settled(self) -> Annotated[bool, Quantity("certified", key="certified",
+            help="whether the limit is certified for every mode up to a frequency")]:  # fmt: skip
         """Whether it is certified in a band."""
         return self.band is not None
 
@@ -192,15 +197,25 @@ class Figure:
         return self.is_settled and (self.digits >= digits or self.value == 0.0)
 
     @property
-    def text(self) -> Annotated[str, Quantity("in these digits")]:
+    def text(self) -> Annotated[str, Quantity("in these digits",
+            help="the value in its significant digits, ? where there are none")]:  # fmt: skip
         """The number in these digits; "?" where there are none."""
         if self.value == 0.0 or math.isinf(self.value):
             return f"{self.value:g}"
         return f"{self.value:.{self.digits}g}" if self.digits else "?"
 
     def as_text(self, _: int) -> str:
-        """The same, for tables."""
-        return self.text if self.modes is None else f"{self.text} (first {self.modes} modes)"
+        """The same, for tables; "≥ 20" of a lower bound."""
+        shown = f"≥ {self.text}" if self.is_bound else self.text
+        return shown if self.modes is None else f"{shown} (first {self.modes} modes)"
+
+
+class LowerBound(float):
+    """A number of which no more than a lower bound is known: "≥ 0.2" in tables, a number in JSON."""
+
+    def as_text(self, digits: int) -> str:
+        """The bound in some digits."""
+        return f"≥ {general(self, digits)}"
 
 
 Interval = tuple[Figure, Figure]  # both edges of a stable interval
@@ -302,23 +317,23 @@ def _proof_of(loop: Sampled) -> Proof:
     return None if count is None else count == 0, 0.0 if band is None else band.top
 
 
-def shown_delay(loop: Sampled, band: Band | None) -> tuple[DelayMargin, Figure]:
-    """Return the delay margin, and its samples as a figure, with more and more modes until all digits are certified."""
-    found = DelayMargin(0.0, False), Figure(0.0, 0, None, 0)
+def shown_delay(loop: Sampled, band: Band | None) -> Figure:
+    """Return the delay margin [samples] as a figure, with more and more modes until all digits are certified."""
+    found = Figure(0.0, 0, None, 0)
     for each in _sizes(loop, band, MOST_EDGE_MODES // 2):
         found = _delay(each, band)
-        if found[0].is_bound or found[1].is_sharp(OTHER_DIGITS):
+        if found.is_bound or found.is_sharp(OTHER_DIGITS):
             break
     return found
 
 
-def _delay(loop: Sampled, band: Band | None) -> tuple[DelayMargin, Figure]:
+def _delay(loop: Sampled, band: Band | None) -> Figure:
     """The delay margin of a loop with its own number of modes; 0 is as certain as the verdict that it is unstable."""
     margin, now, modes = delay_margin(loop), loop.chain.sampling.delay_samples, loop.plant.count
     if margin.samples == 0.0:
-        return margin, Figure(0.0, OTHER_DIGITS, band.top if band else None, None if band else modes)
+        return Figure(0.0, OTHER_DIGITS, band.top if band else None, None if band else modes)
     if margin.is_bound:
-        return margin, Figure(margin.samples, OTHER_DIGITS, None, modes)
+        return Figure(margin.samples, OTHER_DIGITS, None, modes, is_bound=True)
     other = _with_others(loop)
 
     def proof(more: float) -> Proof:
@@ -327,7 +342,7 @@ def _delay(loop: Sampled, band: Band | None) -> tuple[DelayMargin, Figure]:
     def holds(more: float) -> Proof:
         return None if more < 0 else other().with_delay(now + more).poles.is_stable, math.inf
 
-    return margin, figure(margin.samples, OTHER_DIGITS, modes, proof, holds, below=True, spare=0.0)
+    return figure(margin.samples, OTHER_DIGITS, modes, proof, holds, below=True, spare=0.0)
 
 
 def shown_damping(loop: Sampled, count: int) -> Figure:

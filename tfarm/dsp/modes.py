@@ -40,7 +40,6 @@ RIM = 1.12  # radius up to which the z-plane is shown
 DRAWN_RADIUS = 1.2 * RIM  # and up to which a branch is drawn, so that its line runs out of the picture
 RATE_DECADES, STRONGER = 3, 10.0  # of the rate gain: below the end of its locus, and above its own value
 LISTED_DECAY = -20.0  # modes that lose more than this in ln|a| between two samples are not listed
-LOG_RADIUS = "ln|z| per sample, or its change to first order in the gains"
 
 
 @dataclass(frozen=True)
@@ -56,18 +55,26 @@ class ModeTable:
 
     is_table = True
 
-    index: Annotated[NDArray[np.int64], Quantity("mode")]
-    natural_frequency: Annotated[Real, Quantity("natural frequency", "rad/s")]
-    band: Annotated[NDArray[np.int64], Quantity("Nyquist zone", help="0 from 0 to half the sampling rate, and so on")]
-    aliased: Annotated[Real, Quantity("aliased to", "rad/s")]
-    by_rate: Annotated[Real, Quantity("by K1", digits=3, key="first_order_by_K1", help=LOG_RADIUS)]
-    by_moment: Annotated[Real, Quantity("by K2", digits=3, key="first_order_by_K2", help=LOG_RADIUS)]
+    index: Annotated[NDArray[np.int64], Quantity("mode", help="number of the flexible mode")]
+    natural_frequency: Annotated[Real, Quantity("natural frequency", "rad/s",
+            help="undamped natural frequency of the mode without the controller")]  # fmt: skip
+    band: Annotated[NDArray[np.int64], Quantity("Nyquist zone",
+            help="0 from 0 to half the sampling rate, 1 from there to the whole rate")]  # fmt: skip
+    aliased: Annotated[Real, Quantity("aliased to", "rad/s",
+            help="apparent frequency of the sampled mode, below half the sampling rate")]  # fmt: skip
+    by_rate: Annotated[Real, Quantity("by K1", digits=3, key="first_order_by_K1",
+            help="change of ln|z| per sample by hub-rate feedback, to first order; below 0 damps")]  # fmt: skip
+    by_moment: Annotated[Real, Quantity("by K2", digits=3, key="first_order_by_K2",
+            help="change of ln|z| per sample by root-moment feedback, to first order")]  # fmt: skip
     by_others: Real
-    by_damping: Annotated[Real, Quantity("open loop", digits=4, key="open_loop_log_radius", help=LOG_RADIUS)]
-    log_radius: Annotated[Real, Quantity("closed loop", digits=4, key="log_radius_per_sample", help=LOG_RADIUS)]
+    by_damping: Annotated[Real, Quantity("open loop", digits=4, key="open_loop_log_radius",
+            help="ln|z| per sample of the mode without the controller, by damping of the arm")]  # fmt: skip
+    log_radius: Annotated[Real, Quantity("closed loop", digits=4, key="log_radius_per_sample",
+            help="ln|z| per sample of the closed-loop pole; above 0 it is unstable")]  # fmt: skip
 
     @property
-    def first_order(self) -> Annotated[Real, Quantity("first order", digits=3, key="first_order_log_radius")]:
+    def first_order(self) -> Annotated[Real, Quantity("first order", digits=3, key="first_order_log_radius",
+            help="change of ln|z| per sample by the whole controller, to first order")]:  # fmt: skip
         """Change of ln|z| per sample by all gains."""
         return self.by_rate + self.by_moment + self.by_others
 

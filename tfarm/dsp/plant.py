@@ -26,10 +26,12 @@ from tfarm.reduced import ModalModel, modal_model
 from tfarm.reduced.modal import SLOW_POLES_FROM, slow_remainder
 from tfarm.response import transfer
 from tfarm.response.signals import Signals
+from tfarm.schema import Quantity
 from tfarm.spectrum.frequencies import LISTS_KEPT
 
 AMPLIFIED = ("M", "Q", "strain", "current")  # quantities of strain gauges, load cells and shunts
 RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")  # of a simulation, not filtered
+MODES_USED = Quantity("flexible modes", help="number of flexible modes of the arm in the model of the sampled loop")
 USUAL_MODES = 20  # flexible, of a sampled loop or a simulation by default
 
 

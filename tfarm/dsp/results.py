@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -18,8 +19,9 @@ import numpy as np
 from tfarm.arm import AnyLaw, Arm, tracked
 from tfarm.arrays import Real
 from tfarm.columns import Column, Table
-from tfarm.dsp.chain import Chain, chain_or_usual
-from tfarm.dsp.discretise import rule_in_words, with_all_gains
+from tfarm.dsp.chain import PERIOD, Chain, chain_or_usual
+from tfarm.dsp.discretise import RULE, rule_in_words, with_all_gains
+from tfarm.dsp.plant import MODES_USED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario
 from tfarm.dsp.simulate import Simulation, Simulator, Trace
 from tfarm.dsp.traces import resolved
@@ -86,11 +88,16 @@ class LimitCycle:
     "saturation" where a signal is still clipped (an unstable loop within its limits), else "quantisation".
     """
 
-    root_moment: Annotated[float, Quantity("root moment amplitude", "N m", 4, key="root_moment_amplitude")]
-    hub_rate: Annotated[float, Quantity("hub rate amplitude", "rad/s", 4, key="hub_rate_amplitude")]
-    torque: Annotated[float, Quantity("torque amplitude", "N m", 4, key="torque_amplitude")]
-    frequency: Annotated[float, Quantity("frequency", "rad/s", 4)]
-    kept_up_by: Annotated[Literal["quantisation", "saturation"], Quantity("sustained by", key="kept_up_by")]
+    root_moment: Annotated[float, Quantity("root moment amplitude", "N m", 4, key="root_moment_amplitude",
+            help="half of the root moment's range in the last quarter of the record")]  # fmt: skip
+    hub_rate: Annotated[float, Quantity("hub rate amplitude", "rad/s", 4, key="hub_rate_amplitude",
+            help="half of the hub rate's range in the last quarter of the record")]  # fmt: skip
+    torque: Annotated[float, Quantity("torque amplitude", "N m", 4, key="torque_amplitude",
+            help="half of the torque's range in the last quarter of the record")]  # fmt: skip
+    frequency: Annotated[float, Quantity("frequency", "rad/s", 4,
+            help="frequency of the sampled root moment, from its zero crossings about its mean")]  # fmt: skip
+    kept_up_by: Annotated[Literal["quantisation", "saturation"], Quantity("sustained by", key="kept_up_by",
+            help="saturation of a signal in an unstable loop, or quantisation")]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -101,69 +108,75 @@ class Run:
     law: AnyLaw
     simulation: Simulation
     used: Enough
-    scenario_in_words: Annotated[str, Quantity("scenario", key="scenario_in_words")]
-    limit_cycle: Annotated[LimitCycle | None, Quantity("limit cycle")] = None
+    scenario_in_words: Annotated[str, Quantity("scenario", key="scenario_in_words",
+            help="reference or disturbance with its size")]  # fmt: skip
     tuner: Annotated[dict[str, Any] | None, Quantity("tuner", key="controller", help="that set the moment gain")] = None
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
+    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
         return controller(with_all_gains(self.arm, self.law), self.arm)
 
     @property
-    def references(self) -> Annotated[list[str], Quantity()]:
+    def references(self) -> Annotated[list[str], Quantity(help="signals that follow a reference")]:
         """Signals that follow a reference."""
         return list(with_all_gains(self.arm, self.law).references)
 
     @property
-    def rule(self) -> Annotated[str, Quantity("discretisation")]:
+    def rule(self) -> Annotated[str, RULE]:
         """The discretisation of the law."""
         return rule_in_words(with_all_gains(self.arm, self.law))
 
     @property
-    def scenario(self) -> Annotated[str, Quantity()]:
+    def scenario(self) -> Annotated[str, Quantity(help="name of the scenario")]:
         """The name of the scenario."""
         return self.simulation.scenario.name
 
     @property
-    def reading(self) -> Annotated[str, Quantity()]:
+    def reading(self) -> Annotated[str, Quantity(
+            help="moment that is fed back: vibration, without the rigid arm's, or total")]:  # fmt: skip
         """The moment that is fed back during a slew."""
         return self.simulation.chain.slew.reading
 
     @property
-    def period(self) -> Annotated[float, Quantity("sampling period", "s")]:
+    def period(self) -> Annotated[float, PERIOD]:
         """The sampling period."""
         return self.simulation.scenario.period
 
     @property
-    def modes_used(self) -> Annotated[int, Quantity("flexible modes")]:
+    def modes_used(self) -> Annotated[int, MODES_USED]:
         """The number of flexible modes."""
         return self.used.modes
 
     @property
-    def modes_change(self) -> Annotated[float | None, Quantity("change of signals from half of them", digits=2)]:
+    def modes_change(self) -> Annotated[float | None, Quantity("change of signals from half of them", digits=2,
+            help="largest relative change of a signal when the number of modes was doubled")]:  # fmt: skip
         """Relative to the largest value of each; None where the number of modes was given."""
         return None if math.isnan(self.used.change) else self.used.change
 
     @property
-    def residual_moment(self) -> Annotated[float | None, Quantity(f"{RESIDUAL} less the rigid arm's", "N m rms",
-                                                                  key="residual_moment_rms")]:  # fmt: skip
+    def residual_moment(self) -> Annotated[float | None, Quantity(
+            f"{RESIDUAL} less the rigid arm's", "N m rms", key="residual_moment_rms",
+            help="rms of the vibration from the end of the slew to the end of the record")]:  # fmt: skip
         """The residual; None where the run stopped, or its record ends before the slew."""
         return residual_moment_rms(self.simulation)
 
     @property
-    def residual_raw(self) -> Annotated[float | None, Quantity(RESIDUAL, "N m rms", key="residual_raw_moment_rms")]:
+    def residual_raw(self) -> Annotated[float | None, Quantity(RESIDUAL, "N m rms", key="residual_raw_moment_rms",
+            help="rms of the root moment from the end of the slew to the end of the record")]:  # fmt: skip
         """The same of the root moment itself."""
         return residual_raw_moment_rms(self.simulation)
 
     @property
-    def settling_time(self) -> Annotated[float | None, Quantity("settling time (5 %)", "s", 4)]:
+    def settling_time(self) -> Annotated[float | None, Quantity("settling time (5 %)", "s", 4,
+            help="time from which on the root moment stays within 5 % of its largest")]:  # fmt: skip
         """The settling time; None where the moment does not settle within the record."""
         settled = settling_time(self.simulation)
         return settled if math.isfinite(settled) else None
 
     @property
-    def note(self) -> Annotated[str | None, Quantity("not determined", key="note")]:
+    def note(self) -> Annotated[str | None, Quantity("not determined", key="note",
+            help="reason for a residual or a settling time without a value")]:  # fmt: skip
         """The reason why there is no residual or no settling time."""
         run, ends = self.simulation, "the record ends before the slew"
         if run.stopped is not None:
@@ -175,39 +188,54 @@ class Run:
         return "; ".join(reason for reason, value in reasons.items() if value is None) or None
 
     @property
-    def saturated(self) -> Annotated[dict[str, int], Quantity("saturated samples", key="saturated_samples")]:
+    def saturated(self) -> Annotated[dict[str, int], Quantity("saturated samples", key="saturated_samples",
+            help="samples at which encoder, strain amplifier and torque were clipped")]:  # fmt: skip
         """Numbers of samples at which encoder, strain amplifier and torque were clipped."""
         return self.simulation.saturated
 
     @property
-    def energy_error(self) -> Annotated[float | None, Quantity()]:
+    def energy_error(self) -> Annotated[float | None, Quantity(
+            help="energy gained less work done, over initial energy and work, without damping")]:  # fmt: skip
         """The relative error of energy, of an arm without damping."""
         return self.simulation.energy_error
 
     @property
-    def stopped_at(self) -> Annotated[float | None, Quantity(key="stopped_at_s")]:
+    def stopped_at(self) -> Annotated[float | None, Quantity(key="stopped_at_s",
+            help="time at which the simulation of an unstable loop was stopped")]:  # fmt: skip
         """The time at which an unstable loop was stopped [s]."""
         stopped = self.simulation.stopped
         return None if stopped is None else stopped.time
 
     @property
-    def growing_mode(self) -> Annotated[int | None, Quantity()]:
+    def growing_mode(self) -> Annotated[int | None, Quantity(
+            help="mode with the largest share in the root moment at the stop, 0 for the hub")]:  # fmt: skip
         """The unstable mode, 0 for the hub."""
         stopped = self.simulation.stopped
         return None if stopped is None else stopped.mode
 
+    @cached_property
+    def limit_cycle(self) -> Annotated[LimitCycle | None, Quantity("limit cycle",
+            help="sustained vibration at the end of the record that ideal converters do not have")]:  # fmt: skip
+        """The limit cycle, by the same simulation with ideal converters; None under a tuner."""
+        run = self.simulation
+        if run.chain.is_linear or self.tuner is not None:
+            return None
+        law = replace(with_all_gains(self.arm, self.law), delay=0.0)  # that is in the chain of the run
+        ideal = Simulator(self.arm, ideal_chain(run.chain), run.scenario, law, count=self.used.modes)
+        return limit_cycle(run, ideal.run())
+
     @property
-    def units(self) -> Annotated[dict[str, str], Quantity(key="outputs")]:
+    def units(self) -> Annotated[dict[str, str], Quantity(key="outputs", help="SI unit of each further output")]:
         """The SI unit of each further output."""
         return dict(self.simulation.at_samples.units)
 
     @property
-    def torque_unit(self) -> Annotated[str, Quantity()]:
+    def torque_unit(self) -> Annotated[str, Quantity(help="unit of the input of the arm")]:
         """The unit of the input of the arm."""
         return self.arm.input_unit
 
     @property
-    def signals(self) -> Annotated[dict[str, Real], Quantity(flat=True)]:
+    def signals(self) -> Annotated[dict[str, Real], Quantity(flat=True, help="time and signals at the samples")]:
         """Time and signals at the samples, by name."""
         run = self.simulation
         gain = np.empty(0) if run.gain is None else run.gain
@@ -215,7 +243,7 @@ class Run:
         return _signals(run.at_samples) | {"torque": run.torque, "gain": gain} | volts
 
     @property
-    def between(self) -> Annotated[dict[str, Real] | None, Quantity()]:
+    def between(self) -> Annotated[dict[str, Real] | None, Quantity(help="signals at the records between two samples")]:
         """The same between the samples, of the signals that change there."""
         return None if self.simulation.between is None else _signals(self.simulation.between)
 
@@ -351,9 +379,8 @@ def simulate(
     `outputs` are recorded in addition, as "tip_rotation" or "strain@0.05".  Raises ParameterError for a locked hub, an
     algebraic loop, an unknown signal, a law in z whose period is not the chain's, and as `scenario` does.
     """
-    chain = chain_or_usual(chain)
-    arm, law = tracked(arm, law)
-    return simulated(arm, law, chain, scenario(scenario_name, arm, chain, duration), count, between, outputs)[0]
+    how: dict[str, Any] = {"count": count, "between": between, "outputs": outputs}
+    return simulated_run(arm, law, chain_or_usual(chain), scenario_name, duration, **how).simulation
 
 
 def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: float) -> Simulation:
@@ -399,8 +426,6 @@ def simulated_run(
     Raises ParameterError as `simulate` does.
     """
     arm, law = tracked(arm, law)
-    task, cycle = scenario(name, arm, chain, duration), None
+    task = scenario(name, arm, chain, duration)
     simulation, used = simulated(arm, law, chain, task, count, between, outputs)
-    if not chain.is_linear:
-        cycle = limit_cycle(simulation, Simulator(arm, ideal_chain(chain), task, law, count=used.modes).run())
-    return Run(arm, law, simulation, used, described(task, arm, chain), cycle)
+    return Run(arm, law, simulation, used, described(task, arm, chain))

@@ -8,14 +8,17 @@ E I phi'(0) as a strain gauge reads it.  F is affine in the weights of the parts
 
 Matrix eigenvalues have an error of about 1e-14, and a mode may grow by 1e-10 a sample; n poles next to each other, as a
 law of high order has them next to z = 1, have the nth root of that error.  So all are polished together, each as an
-offset o from the nearest open-loop pole, of the plant (e^{pT}) or of the law, by the Ehrlich-Aberth method on
-P(z) = F(z) prod(z - poles of F),
+offset o from the nearest open-loop pole, of the plant (e^{pT}) or of the law, by the Ehrlich-Aberth method on the monic
+polynomial P(z) = F(z) prod(z - poles of F), in Boersch-Supan's form without derivatives,
 
-    step = 1/(P'/P - sum over the other roots of 1/(z - root))
+    step = W/(1 + sum over the other roots of their W/(z - root)),   W = P(z)/prod over the other roots of (z - root)
 
 where o F(e^{pT} + o) is computed without loss; then ln|z| = Re(pT) + ln|1 + o e^{-pT}|.  q and p_i are polynomials,
 kept as factors (`discretise`), so that F has no other poles than the plant.  (Aberth, Mathematics of Computation 27,
-1973.)
+1973; Boersch-Supan, Numerische Mathematik 5, 1963.)
+
+Within n |W| of each value, n the number of poles, there is a root (Smith, Journal of the ACM 17, 1970).  With the
+rounding error of F in W that bounds the error of the root: where |ln|z|| is less it is not known from 0, and is 0.
 """
 
 from __future__ import annotations
@@ -42,11 +45,11 @@ from tfarm.reduced.conversions import closed
 STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes
 SMALLEST_LOG = -745.0  # of the smallest double: for the logarithm of 0
 OFF_POLE = 1e-17  # for an offset of 0: next to 1 that is none
-DIFFERENCE = 1e-7  # of an offset: between two points that give a slope
-MOST_STEPS, SOME_STEPS = 200, 30  # of all roots together, a cluster of twelve takes a hundred; of some of them
+MOST_STEPS = 200  # of all roots together: a cluster of nine takes 24
 LAST_STEP = 1e-12  # of the offset: below its rounding
-SETTLED, EIGENVALUE_ROUNDING = 1e-6, 1e-9  # of the offset, and beyond: one that still steps by more is put back
 UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
+MACHINE_EPS = float(np.finfo(float).eps)
+ROUNDINGS = 8  # of each term of F: of its product of n factors they add up as the root of n
 LEAST_SQUARE = -1.0 + 1e-15  # for |z|^2 - 1 of a pole at z = 0, the base of no root
 FADED_RADIUS = 0.2  # a pole nearer to z = 0 is stable and not polished
 OUTPUT_OF = {gain.name: gain.output for gain in GAINS}
@@ -57,12 +60,14 @@ OUTPUT_OF = {gain.name: gain.output for gain in GAINS}
 class SampledPoles:
     """Closed-loop poles `z` and `log_radius` ln|z| of each, without z = 1 of a free hub angle.
 
+    `error` bounds the error of each z; where ln|z| may be no more than that, it is 0.
     `mode` is the flexible mode of the open-loop pole that is nearest (0: none).
     """
 
     z: Complex
     log_radius: Real
     mode: Whole
+    error: Real
 
     @property
     def log_spectral_radius(self) -> float:
@@ -75,8 +80,13 @@ class SampledPoles:
         return int((self.log_radius > 0).sum())
 
     @property
+    def is_determined(self) -> bool:
+        """Whether none but poles that are exactly 1 may lie on the circle by rounding alone."""
+        return bool((self.z[self.log_radius == 0] == 1).all())
+
+    @property
     def is_stable(self) -> bool:
-        """Whether all lie inside the unit circle, without a tolerance."""
+        """Whether all lie inside the unit circle."""
         return self.log_spectral_radius < 0.0
 
 
@@ -236,14 +246,20 @@ class Sampled:
             rows[1 + part] += gain * _product(start, zeros, more) * measured[row]
         return rows
 
-    def characteristic(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
-        """offset F(z); F(z) where the pole is the law's."""
-        return np.asarray(self.row @ self.terms(z, base, offset))
+    def rounding(self, base: Whole, offset: Complex) -> Real:
+        """Bound on the rounding error (n,) of row @ terms at the same points: of the sizes of all terms."""
+        start, is_of_law = self.open_loop[base], base >= self.pulse.poles.size
+        scale = np.where(is_of_law, 1.0, offset)
+        sizes = self.pulse.sizes(np.where(is_of_law, -1, base), scale, start + offset)
+        error = abs(scale) * _product_error(start, self.in_z.poles, offset)
+        for part, row, gain, zeros in self.in_z.terms:
+            error += abs(self.weights[part] * gain) * _product_error(start, zeros, offset) * sizes[row]
+        return error
 
     def __call__(self, z: Complex) -> Complex:
         """F(z) at an array of z."""
         z = np.asarray(z, dtype=complex)
-        return self.characteristic(z.ravel(), None, np.ones(z.size)).reshape(z.shape)
+        return np.asarray(self.row @ self.terms(z.ravel(), None, np.ones(z.size))).reshape(z.shape)
 
     # ------------------------------------------------------------ poles
 
@@ -314,25 +330,22 @@ class Sampled:
 
     @cached_property
     def poles(self) -> SampledPoles:
-        """The closed-loop poles, polished; `poles_at_one` of them are exactly 1."""
-        return self.polished()
-
-    def polished(self, which: Any = None) -> SampledPoles:
-        """The polished poles, each as an offset from its nearest open-loop pole; of a mask `which` those alone."""
+        """The closed-loop poles, each polished as an offset from its nearest open-loop pole; `poles_at_one` are 1."""
         z, shifts, pulse = self.eigenvalues.copy(), self.open_loop, self.pulse
         z[np.argsort(abs(z - 1), kind="stable")[: self.poles_at_one]] = 1.0
         delta = z - 1
         base = _nearest(self, delta)
         offset = delta - shifts[base]
-        bright = (abs(z) > FADED_RADIUS) & (delta != 0) & (True if which is None else which)
-        rows, steps = np.flatnonzero(bright), MOST_STEPS if which is None else SOME_STEPS
+        bright = (abs(z) > FADED_RADIUS) & (delta != 0)
+        rows, error = np.flatnonzero(bright), np.zeros(z.size)
         if rows.size:
-            _settle(base, offset, rows, self, steps)
+            _settle(base, offset, rows, self)
             moved = _nearest(self, shifts[base] + offset)
-            if (rows := np.flatnonzero(bright & (moved != base))).size:  # then all digits are kept from there
+            if (moved[rows] != base[rows]).any():  # then all digits are kept from there
                 offset[rows] += shifts[base[rows]] - shifts[moved[rows]]
                 base[rows] = moved[rows]
-                _settle(base, offset, rows, self, steps)
+                _settle(base, offset, rows, self)
+            error[rows] = _errors(base, offset, rows, self)
         at = base[bright]
         with np.errstate(divide="ignore"):
             log_radius = np.maximum(np.log(abs(z)), SMALLEST_LOG)
@@ -341,9 +354,9 @@ class Sampled:
         ratio = offset[bright] / (1 + shifts[at])
         log_radius[bright] = start[at] + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
         z[bright] = (1 + shifts[at]) + offset[bright]
+        log_radius[abs(log_radius) * abs(z) < error] = 0.0
         mode = pulse.mode[abs(z[:, None] - pulse.multipliers).argmin(axis=1)]
-        shown = slice(None) if which is None else which
-        return SampledPoles(z[shown], log_radius[shown], mode[shown])
+        return SampledPoles(z, log_radius, mode, error)
 
 
 def _nearest(loop: Sampled, delta: Complex) -> Whole:
@@ -358,38 +371,67 @@ def _nearest(loop: Sampled, delta: Complex) -> Whole:
     return np.asarray(away.argmin(axis=1))
 
 
-def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled, most: int) -> None:
-    """Iterate some roots until they converge, in place: others stay where their step was shortest."""
-    kept, shifts, pulse = offset.copy(), loop.open_loop, loop.pulse
-    known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0)]  # of F; the others are at z = 1
-    poles = np.r_[known, np.zeros(max(0, offset.size - known.size - loop.in_z.poles.size))]
-    last, shortest = np.full((2, offset.size), np.inf)
+def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> None:
+    """Iterate some roots, in place, until they converge or F is 0 but for rounding."""
     offset[rows] = np.where(offset[rows] == 0, OFF_POLE, offset[rows])
     with np.errstate(all="ignore"):  # a root on an open-loop pole, and one that diverges
-        for _ in range(most):
-            b, o = base[rows], offset[rows]
-            both, one = np.r_[o, o * (1 + DIFFERENCE)], shifts[b]
-            f, ahead = loop.characteristic(1 + (np.r_[one, one] + both), np.r_[b, b], both).reshape(2, -1)
-            slope = (ahead - f) / (DIFFERENCE * o * f) - np.where(b < pulse.poles.size, 1 / o, 0.0)
-            apart = (one[:, None] - shifts[base]) + (o[:, None] - offset)
-            slope = slope + (1 / ((one[:, None] - poles) + o[:, None])).sum(axis=1)
-            step = 1 / (slope - np.where(apart == 0, 0.0, 1 / apart).sum(axis=1))
-            step = np.where((f == 0) | ~np.isfinite(step), 0.0, step)
+        for _ in range(MOST_STEPS):
+            o = offset[rows]
+            f, slope, apart = _weierstrass(base, offset, rows, loop)
+            W = np.nan_to_num(f / slope, posinf=0.0, neginf=0.0)
+            others = W / apart[:, rows]
+            np.fill_diagonal(others, 0.0)
+            step = np.nan_to_num(W / (1 + others.sum(axis=1)), posinf=0.0, neginf=0.0)
+            moving = abs(step) > LAST_STEP * abs(o)
+            is_last = (abs(f[moving]) <= loop.rounding(base[rows[moving]], o[moving])).all()
             offset[rows] = np.where(abs(o - step) < UNMOVED, UNMOVED, o - step)
-            last[rows] = abs(step)
-            better = rows[abs(step) < shortest[rows]]
-            kept[better], shortest[better] = offset[better], last[better]
-            rows = rows[abs(step) > LAST_STEP * abs(offset[rows])]
-            if not rows.size:
+            if is_last:
                 break
-    lost = np.isfinite(last) & (last > EIGENVALUE_ROUNDING + SETTLED * abs(offset))
-    offset[lost] = kept[lost]
     offset[abs(offset) <= UNMOVED] = 0.0
+
+
+def _errors(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> Real:
+    """Bounds on the errors of some roots (rows,): the radii of Smith's discs, and the rounding of a pole of the law."""
+    with np.errstate(all="ignore"):
+        f, slope, _ = _weierstrass(base, offset, rows, loop)
+        radius = offset.size * (abs(f) + loop.rounding(base[rows], offset[rows])) / abs(slope)
+    own = np.where(base[rows] < loop.pulse.poles.size, 0.0, MACHINE_EPS * abs(loop.open_loop[base[rows]]))
+    return np.asarray(np.nan_to_num(radius, posinf=0.0) + own)  # of a pole that the loop does not move 0/0
+
+
+def _weierstrass(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[Complex, Complex, Complex]:
+    """At some roots o F and o F/W, and their distances from all roots, 1 from themselves."""
+    pulse = loop.pulse
+    b, o = base[rows], offset[rows]
+    one = loop.open_loop[b]
+    known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0)]  # the other poles are at z = 1
+    poles = np.r_[known, np.zeros(max(0, offset.size - known.size - loop.in_z.poles.size))]
+    apart = (one[:, None] - loop.open_loop[base]) + (o[:, None] - offset)
+    apart[np.arange(rows.size), rows] = 1.0
+    away = (one[:, None] - poles) + o[:, None]
+    of_plant, own = b < pulse.poles.size, np.where(b == pulse.poles.size - 1, known.size, b)
+    listed = of_plant & (own < poles.size)  # but where a free hub angle has the pole at z = 1
+    away[listed, own[listed]] = 1.0  # F is times the distance from that pole
+    slope = (
+        np.where(of_plant & ~listed, o, 1.0)
+        * (apart[:, : poles.size] / away).prod(axis=1)
+        * apart[:, poles.size :].prod(axis=1)
+    )
+    return loop.row @ loop.terms(1 + (one + o), b, o), slope, apart
 
 
 def _product(start: Complex, roots: Complex, more: Any = 0.0) -> Complex:
     """prod(delta - roots) at delta = start + more (n,), without loss where a root is the start."""
     return np.asarray(((start[:, None] - roots) + np.reshape(more, (-1, 1))).prod(axis=1))
+
+
+def _product_error(start: Complex, roots: Complex, more: Any) -> Real:
+    """Bound on the rounding error of that product; a root that is the start is exact."""
+    away = start[:, None] - roots
+    sizes = abs(away + np.reshape(more, (-1, 1)))
+    blur = np.where(away == 0, 0.0, MACHINE_EPS * (abs(start)[:, None] + abs(roots)))
+    most = (sizes + blur).prod(axis=1)
+    return np.asarray(most - sizes.prod(axis=1) + MACHINE_EPS * ROUNDINGS * most)
 
 
 def sampled_loop(

@@ -126,6 +126,23 @@ class PulseTransfer:
             value = value + np.outer(self.plant.rigid[:, 0], twice * offset)
         return value * z ** (-self.sampling.whole_delay)
 
+    def sizes(self, base: NDArray[np.int64], offset: Complex, delta: Complex) -> Real:
+        """Sums (outputs, n) of the sizes of all terms of `scaled`, a bound on its rounding error in units of eps.
+
+        The rounding of z itself is in them: it is |z - 1|/|z - pole| in the term of a pole.
+        """
+        z = abs(1 + delta)
+        gap, own = abs(delta[:, None] - self.shifts), base[:, None] == np.arange(self.poles.size)
+        push = abs(self.early) + abs(self.late) / z[:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            weights = push * np.where(own, 1.0, abs(offset)[:, None] / gap * (1 + abs(delta)[:, None] / gap))
+        value = abs(self.residues) @ weights.T + np.outer(abs(self.plant.static), abs(offset) / z)
+        if self.plant.rigid[:, 0].any():
+            distance = abs(np.where(base == self.poles.size - 1, offset, delta))
+            twice = (self.sampling.period * push[:, -1] / distance + sum(self.ramps) / z) / distance
+            value = value + np.outer(abs(self.plant.rigid[:, 0]), twice * abs(offset))
+        return np.asarray(value * z ** (-self.sampling.whole_delay))
+
     def folded(self) -> PulseTransfer:
         """The same with every pole that decays within a sample as a static share."""
         gone = self.plant.poles.real * (1 - self.sampling.fraction) * self.sampling.period < -FORGOTTEN

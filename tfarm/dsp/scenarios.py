@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import AT_HUB, FED_BACK, Arm, must_turn
-from tfarm.arm.checks import number, positive
+from tfarm.arm.checks import positive
 from tfarm.arrays import Real
 from tfarm.dsp.chain import TIME_ROUNDING, Chain, Reading
 from tfarm.errors import ParameterError, must_be_known
@@ -119,30 +119,24 @@ def trial_weights(arm: Arm, chain: Chain) -> tuple[float, float]:
     return a / torque_unit(arm, chain) ** 2, b / torque_unit(arm, chain) ** 2
 
 
-def step(arm: Arm, chain: Chain, duration: float, torque: float | None = None) -> Scenario:
-    """A step of the reference torque r [N m] at t = 0, by default 0.1 of the arm's unit of torque."""
-    torque = STEP_TORQUE * torque_unit(arm, chain) if torque is None else torque
+def step(arm: Arm, chain: Chain, duration: float) -> Scenario:
+    """A step of the reference torque r at t = 0, of 0.1 of the arm's unit of torque."""
     resting = _rest("step", chain, duration)
-    size = number("torque", torque, "a torque is a finite number of N m")
-    return replace(resting, feedforward=np.full(resting.feedforward.size, size))
+    return replace(resting, feedforward=resting.feedforward + STEP_TORQUE * torque_unit(arm, chain))
 
 
-def decay(arm: Arm, chain: Chain, duration: float, tip_offset: float | None = None) -> Scenario:
-    """Free decay of the first mode from rest with the tip displaced by `tip_offset` [m], by default 0.01 L."""
-    tip_offset = TIP_OFFSET * arm.length if tip_offset is None else tip_offset
-    size = number("tip_offset", tip_offset, "a tip offset is a finite number of metres")
-    return replace(_rest("decay", chain, duration), tip_offset=size)
+def decay(arm: Arm, chain: Chain, duration: float) -> Scenario:
+    """Free decay of the first mode from rest with the tip displaced by 0.01 L."""
+    return replace(_rest("decay", chain, duration), tip_offset=TIP_OFFSET * arm.length)
 
 
-def impulse(arm: Arm, chain: Chain, duration: float, impulse: float | None = None) -> Scenario:
-    """A disturbance impulse [N m s] on the hub just after the sample at t = 0: 0.01 s of the arm's unit of torque.
+def impulse(arm: Arm, chain: Chain, duration: float) -> Scenario:
+    """A disturbance impulse on the hub just after the sample at t = 0: 0.01 s of the arm's unit of torque.
 
     So it is first measured a sample later.  (Just before a sample the moment of a damped arm would be measured where it
     grows as t^-1/2, without bound, and no number of modes converges.)
     """
-    impulse = IMPULSE * torque_unit(arm, chain) if impulse is None else impulse
-    size = number("impulse", impulse, "an impulse is a finite number of N m s")
-    return replace(_rest("impulse", chain, duration), impulse=size)
+    return replace(_rest("impulse", chain, duration), impulse=IMPULSE * torque_unit(arm, chain))
 
 
 SCENARIOS: dict[str, Callable[[Arm, Chain, float], Scenario]] = {

@@ -86,10 +86,6 @@ class Measurement(NamedTuple):
         angle_off, rate_off = self.angle_reference - self.hub_angle, self.rate_reference - self.hub_rate
         return law[ANGLE_GAIN] * angle_off + law[RATE_GAIN] * rate_off
 
-    def command(self, law: HubFeedback, moment_gain: float) -> float:
-        """Feedforward and servo, less the gain at this sample times the vibration."""
-        return self.feedforward + self.servo(law) - moment_gain * self.vibration
-
 
 Controller = Callable[[Measurement], float]
 
@@ -269,7 +265,7 @@ class Simulator:
 
         def torque(m: Measurement) -> tuple[float, float]:
             K = float(gain(m))
-            return m.command(law, K), K
+            return m.feedforward + m.servo(law) - K * m.vibration, K
 
         return self._stepped(torque, np.zeros(self.scenario.feedforward.size))
 

@@ -8,17 +8,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, NamedTuple
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, cancelled
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law, cancelled
 from tfarm.arm.checks import whole
 from tfarm.crossing import Window
 from tfarm.dsp.chain import Chain, Sampling, chain_or_usual
 from tfarm.dsp.circle import Band, complete_band
 from tfarm.dsp.crossings import around, stable_factors, stable_windows
-from tfarm.dsp.discretise import rule_in_words
+from tfarm.dsp.discretise import RULE, rule_in_words
 from tfarm.dsp.edges import (
     DelayMargin,
     Figure,
     Interval,
+    LowerBound,
     delay_margin,
     shown_damping,
     shown_delay,
@@ -26,6 +27,7 @@ from tfarm.dsp.edges import (
     whole_loop,
 )
 from tfarm.dsp.modes import ModeTable, dominant, mode_table
+from tfarm.dsp.plant import MODES_USED
 from tfarm.dsp.sampled import Sampled, resized, sampled_loop
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
@@ -39,6 +41,7 @@ LARGEST_LOG = 700.0  # whose exponential is a double
 RADIUS_AGREES = 1e-4  # of ln of the spectral radius: its largest error with fewer modes
 RADIUS_NOISE = 1e-12  # and its rounding error
 MOST_COUNT = 400  # modes that may be asked for
+DEFAULT_PERIOD, LAWS_PERIOD = "tfarm's default period", "the controller's period"  # origins of a sampling period
 PERIOD_SHARES = (0.1, 0.5, 1.0, 2.0, 5.0)  # of the chain's own period
 
 
@@ -48,49 +51,55 @@ class Verdict:
     """Whether a sampled loop is stable, without z = 1 of a free hub angle.
 
     `band` is the part of the arm for which it is certified (`tfarm.dsp.circle`).  Without one, as at C = 0, the verdict
-    holds for the first `modes_used` modes, those of `loop`, and high ones may grow by 1e-9 a sample.
+    holds for the first `modes_used` modes, those of `loop`, and high ones may grow by 1e-9 a sample.  It `is_converged`
+    where that loop's count of unstable poles and largest radius are those of the loop with every mode searched.
     """
 
     loop: Sampled
     band: Band | None = None
+    is_converged: bool = False
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
+    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
         return controller(self.loop.given, self.loop.plant.arm)
 
     @property
-    def rule(self) -> Annotated[str, Quantity("discretisation")]:
+    def rule(self) -> Annotated[str, RULE]:
         """The discretisation of the law."""
         return rule_in_words(self.loop.given)
 
     @property
-    def sampling(self) -> Annotated[Sampling, Quantity(flat=True)]:
+    def sampling(self) -> Annotated[Sampling, Quantity(flat=True, help="sampling period and delay of the loop")]:
         """Period and delay."""
         return self.loop.chain.sampling
 
     @property
-    def is_settled(self) -> Annotated[bool, Quantity(key="certified")]:
+    def is_settled(self) -> Annotated[bool, Quantity(key="certified",
+            help="whether the verdict is certified for every mode up to a frequency")]:  # fmt: skip
         """Whether the verdict is certified for every mode of the band and every slow real pole."""
         return self.band is not None
 
     @property
-    def band_rad_s(self) -> Annotated[float | None, Quantity("certified up to", "rad/s", key="up_to_rad_s")]:
+    def band_rad_s(self) -> Annotated[float | None, Quantity("certified up to", "rad/s", key="up_to_rad_s",
+            help="end of the frequency range in which the verdict is certified")]:  # fmt: skip
         """End of the range in which the verdict is certified [rad/s]; None without one."""
         return None if self.band is None else self.band.top
 
     @property
-    def modes_used(self) -> Annotated[int, Quantity("flexible modes")]:
+    def modes_used(self) -> Annotated[int, MODES_USED]:
         """Number of flexible modes in the loop."""
         return self.loop.plant.count
 
     @property
-    def is_stable(self) -> Annotated[bool, Quantity(key="stable")]:
+    def is_stable(self) -> Annotated[bool, Quantity(key="stable",
+            help="whether every pole lies inside the unit circle")]:  # fmt: skip
         """Whether every pole lies inside the unit circle."""
         return self.loop.poles.is_stable
 
     @property
-    def log_radius(self) -> Annotated[float, Quantity(key="log_spectral_radius")]:
+    def log_radius(self) -> Annotated[float, Quantity(key="log_spectral_radius",
+            help="ln of the largest |z| of the closed-loop poles; below 0 of a stable loop")]:  # fmt: skip
         """ln of the spectral radius, of every mode of the band, or of the first `modes_used` without a band.
 
         The verdict needs few modes, but not the later digits of this number.
@@ -98,12 +107,14 @@ class Verdict:
         return self.full.poles.log_spectral_radius
 
     @property
-    def spectral_radius(self) -> Annotated[float, Quantity("spectral radius", digits=12)]:
+    def spectral_radius(self) -> Annotated[float, Quantity("spectral radius", digits=12,
+            help="largest |z| of the closed-loop poles but z = 1 of a free hub angle; below 1 if stable")]:  # fmt: skip
         """Largest |z|."""
         return math.exp(self.log_radius)
 
     @property
-    def unstable_poles(self) -> Annotated[int, Quantity("unstable poles")]:
+    def unstable_poles(self) -> Annotated[int, Quantity("unstable poles",
+            help="closed-loop poles outside the unit circle")]:  # fmt: skip
         """Number of poles outside the unit circle."""
         return self.loop.poles.unstable
 
@@ -113,30 +124,36 @@ class Verdict:
         return self.loop if self.band is None else self.band.full
 
     @property
-    def word(self) -> Annotated[str, Quantity("stability", key="verdict")]:
+    def word(self) -> Annotated[str, Quantity("stability", key="verdict",
+            help="stable, marginal (largest |z| = 1 within its rounding error) or unstable")]:  # fmt: skip
         """stable, marginal or unstable."""
         growth = self.log_radius
         return "unstable" if growth > 0 else "stable" if growth < 0 else "marginal"
 
     @property
-    def sentence(self) -> Annotated[str, Quantity(key="verdict_in_words")]:
+    def sentence(self) -> Annotated[str, Quantity(key="verdict_in_words",
+            help="stability, its certainty and the dominant pole")]:  # fmt: skip
         """Stability, its certainty, and the dominant pole."""
         return f"{self.word} ({self.holds_for}); dominant pole: {self.slowest}"
 
     @property
-    def slowest(self) -> Annotated[str, Quantity("dominant pole", key="dominant")]:
+    def slowest(self) -> Annotated[str, Quantity("dominant pole", key="dominant",
+            help="origin of the pole of largest |z|: a mode, the hub or the controller")]:  # fmt: skip
         """Origin of the pole of largest radius: a mode, the hub, or a pole of the law."""
         return dominant(self.loop)
 
     @property
-    def holds_for(self) -> Annotated[str, Quantity("certainty", key="certainty")]:
+    def holds_for(self) -> Annotated[str, Quantity("certainty", key="certainty",
+            help="frequency range or number of modes for which the verdict was shown")]:  # fmt: skip
         """The modes for which the verdict is certified."""
         if self.band is None:
-            return f"converged for the first {self.modes_used} modes, not determined beyond"
+            shown = "converged for" if self.is_converged else "model of"
+            return f"{shown} the first {self.modes_used} modes, not determined beyond"
         return f"certified up to {self.band.top:.3g} rad/s, not determined beyond"
 
     @property
-    def time_constant(self) -> Annotated[float | None, Quantity("dominant time constant", "s")]:
+    def time_constant(self) -> Annotated[float | None, Quantity("dominant time constant", "s",
+            help="time constant of the pole of largest |z|, negative of a growing one")]:  # fmt: skip
         """Time constant of the dominant pole, below 0 where it grows."""
         return -self.loop.chain.sampling.period / self.log_radius if self.log_radius else None
 
@@ -167,17 +184,18 @@ def sampled_verdict(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count:
         if loop is full:
             break
         number *= 2
-    is_proven = proven is not None and (proven == 0) == (loop.poles.unstable == 0)
-    return Verdict(loop, band if is_proven else None)
+    is_proven = proven is not None and loop.poles.is_determined and (proven == 0) == (loop.poles.unstable == 0)
+    return Verdict(loop, band if is_proven else None, is_converged=loop is not full)
 
 
 class SampledNumber(NamedTuple):
     """One number of a law, the gain of a part or a factor on it, and its stability intervals at the samples."""
 
-    number: Annotated[str, Quantity("gain or coefficient")]
-    value: Annotated[float, Quantity("value")]
-    windows: Annotated[Sequence[Window | Interval], Quantity("stability intervals", key="intervals")]
-    interval: Annotated[Window | None, Quantity()]
+    number: Annotated[str, Quantity("gain or coefficient", help="name of a number of the controller")]
+    value: Annotated[float, Quantity("value", help="present value of the number")]
+    windows: Annotated[Sequence[Window | Interval], Quantity("stability intervals", key="intervals",
+            help="all intervals of the number in which the loop is stable, the others constant")]  # fmt: skip
+    interval: Annotated[Window | None, Quantity(help="the interval that contains the present value")]
 
 
 def sampled_numbers(loop: Sampled) -> list[SampledNumber]:
@@ -196,38 +214,45 @@ class Analysis:
     damping is searched with `damping_modes`.
     """
 
-    verdict: Annotated[Verdict, Quantity(flat=True)]
+    verdict: Annotated[Verdict, Quantity(flat=True, help="stability of the loop")]
     damping_modes: int = UNDAMPED_MODES
 
     @property
-    def stability_intervals(self) -> Annotated[list[SampledNumber], Quantity("stability intervals")]:
+    def stability_intervals(self) -> Annotated[list[SampledNumber], Quantity("stability intervals",
+            help="stability intervals of each number of the controller, the others constant")]:  # fmt: skip
         """One row for each gain at the hub, or number of another law, the others constant."""
         if not self.loop.is_of_gains:
             return self.numbers
         return [SampledNumber(n, self.loop.number(n), each, self.interval(n)) for n, each in self.shown.items()]
 
     @property
-    def delay_margin_samples(self) -> Annotated[float, Quantity(unit="samples", key="delay_margin_samples")]:
+    def delay_margin_samples(self) -> Annotated[float, Quantity(unit="samples", key="delay_margin_samples",
+            help="smallest additional delay that destabilises the loop, in samples")]:  # fmt: skip
         """The further delay in samples, to the last digit."""
-        return self.delay_margin.samples
+        return self.delay.value
 
     @property
-    def delay_margin_seconds(self) -> Annotated[float, Quantity("delay margin", "s", 4, key="delay_margin_s")]:
+    def delay_margin_seconds(self) -> Annotated[float, Quantity("delay margin", "s", 4, key="delay_margin_s",
+            help="smallest additional loop delay that destabilises the loop; 0 of an unstable loop")]:  # fmt: skip
         """The further delay in seconds."""
-        return self.delay_margin.samples * self.loop.chain.sampling.period
+        seconds = self.delay.value * self.loop.chain.sampling.period
+        return LowerBound(seconds) if self.delay.is_bound else seconds
 
     @property
-    def is_lower_bound(self) -> Annotated[bool, Quantity("delay margin or more", key="delay_margin_is_lower_bound")]:
+    def is_lower_bound(self) -> Annotated[bool, Quantity("delay margin: lower bound", key="delay_margin_is_lower_bound",
+            help="whether the search ended at the margin with the loop still stable")]:  # fmt: skip
         """Whether no further delay up to the margin destabilises the loop."""
-        return self.delay_margin.is_bound
+        return self.delay.is_bound
 
     @property
-    def free_hub_angle(self) -> Annotated[str | None, Quantity("free hub angle")]:
+    def free_hub_angle(self) -> Annotated[str | None, Quantity("free hub angle",
+            help="pole at z = 1 of a hub angle without feedback, which the verdict leaves out")]:  # fmt: skip
         """The pole at z = 1 that the verdict leaves out."""
         return "its pole at z = 1 is left out" if self.loop.has_free_angle else None
 
     @property
-    def unfiltered_signals(self) -> Annotated[list[str], Quantity()]:
+    def unfiltered_signals(self) -> Annotated[list[str], Quantity(
+            help="signals of the controller without an analog anti-alias filter")]:  # fmt: skip
         """Signals without an anti-alias filter."""
         return [name for name, analog in zip(self.loop.in_z.signals, self.loop.analog, strict=True) if not analog]
 
@@ -257,31 +282,31 @@ class Analysis:
         return {name: [(low.value, high.value) for low, high in each] for name, each in self.shown.items()}
 
     @cached_property
-    def modes(self) -> Annotated[ModeTable, Quantity("modes", help="ln|z| per sample")]:
+    def modes(self) -> Annotated[ModeTable, Quantity("modes",
+            help="effect of the controller on each mode, in ln|z| per sample")]:  # fmt: skip
         """The modes one by one."""
         return mode_table(self.loop)
 
     @property
-    def first_unstable_mode(self) -> Annotated[int | None, Quantity("first unstable mode")]:
+    def first_unstable_mode(self) -> Annotated[int | None, Quantity("first unstable mode",
+            help="lowest mode whose closed-loop pole lies outside the unit circle")]:  # fmt: skip
         """The lowest unstable mode."""
         grows = self.modes.index[self.modes.log_radius > 0]
         return int(grows[0]) if grows.size else None
 
     @cached_property
-    def _delay(self) -> tuple[DelayMargin, Figure]:
-        return shown_delay(self.loop, self.verdict.band)
-
-    @property
-    def delay(self) -> Annotated[Figure, Quantity("delay margin in samples", key="delay_margin")]:
+    def delay(self) -> Annotated[Figure, Quantity("delay margin in samples", key="delay_margin",
+            help="smallest additional delay that destabilises the loop, over the sampling period")]:  # fmt: skip
         """The delay margin [samples]; of any law but gains at the hub with the modes of the verdict."""
         if self.loop.is_of_gains:
-            return self._delay[1]
-        return Figure(self.delay_margin.samples, LAW_DELAY_DIGITS, None, self.verdict.modes_used)
+            return shown_delay(self.loop, self.verdict.band)
+        found = delay_margin(self.loop)
+        return Figure(found.samples, LAW_DELAY_DIGITS, None, self.verdict.modes_used, found.is_bound)
 
-    @cached_property
+    @property
     def delay_margin(self) -> DelayMargin:
-        """The delay margin; of any law but gains at the hub with the modes of the verdict."""
-        return self._delay[0] if self.loop.is_of_gains else delay_margin(self.loop)
+        """The delay margin, to the last digit."""
+        return DelayMargin(self.delay.value, self.delay.is_bound)
 
     @cached_property
     def damping(self) -> Figure:
@@ -289,7 +314,8 @@ class Analysis:
         return shown_damping(self.loop, self.damping_modes)
 
     @property
-    def minimum_damping(self) -> Annotated[Figure | None, Quantity("minimum structural damping for stability", "s")]:
+    def minimum_damping(self) -> Annotated[Figure | None, Quantity("minimum structural damping for stability", "s",
+            help="Kelvin-Voigt damping C of the link from which on the loop is stable")]:  # fmt: skip
         """The same with its digits, for gains at the hub."""
         return self.damping if self.loop.is_of_gains else None
 
@@ -299,17 +325,20 @@ class Analysis:
         return stable_factors(self.loop)
 
     @property
-    def stable_gain_factors(self) -> Annotated[list[Window] | None, Quantity("stable factors on the controller")]:
+    def stable_gain_factors(self) -> Annotated[list[Window] | None, Quantity("stable factors on the controller",
+            help="all intervals of a factor on the whole controller in which the loop is stable")]:  # fmt: skip
         """All intervals, of a controller that is more than gains at the hub."""
         return None if self.loop.is_of_gains else self.factors
 
     @property
-    def gain_factors(self) -> Annotated[Window | None, Quantity("gain margin, factors down and up")]:
+    def gain_factors(self) -> Annotated[Window | None, Quantity("gain margin, factors down and up",
+            help="interval around 1 of a factor on the whole controller in which the loop is stable")]:  # fmt: skip
         """The stability interval around 1 of a factor on the law; None unless the loop is stable."""
         return around(self.factors, 1.0)
 
     @property
-    def warnings(self) -> Annotated[tuple[str, ...], Quantity("warnings")]:
+    def warnings(self) -> Annotated[tuple[str, ...], Quantity("warnings",
+            help="unstable poles of the controller that its own zeros cancel")]:  # fmt: skip
         """Unstable poles of the law that its own zeros cancel."""
         return cancelled(self.loop.given)
 
@@ -334,42 +363,43 @@ class SampledBrief:
     """Whether a loop is stable at a chain's sampling, without z = 1 of a free hub angle.
 
     `is_stable` and `log_radius`, ln of the spectral radius, are None where that is not determined; `sentence` then has
-    the reason.
+    the reason.  `period_from` is the origin of the sampling period, "" where that is not known.
     """
 
     sampling: Sampling
-    is_stable: Annotated[bool | None, Quantity(key="stable")]
+    period_from: str
+    is_stable: Annotated[bool | None, Quantity(key="stable", help="whether every pole lies inside the unit circle")]
     log_radius: float | None
     sentence: str
 
     @property
-    def period(self) -> Annotated[float, Quantity(unit="s")]:
+    def period(self) -> Annotated[float, Quantity(unit="s", help="sampling period of the controller")]:
         """The sampling period."""
         return self.sampling.period
 
     @property
-    def period_is_default(self) -> Annotated[bool, Quantity()]:
-        """Whether it is tfarm's, not the rig's own."""
-        return self.sampling.period == Sampling().period
+    def period_is_default(self) -> Annotated[bool, Quantity(help="whether the sampling period is tfarm's own")]:
+        """Whether it is tfarm's: neither of the law, nor of a file or an option."""
+        return self.period_from == DEFAULT_PERIOD
 
     @property
-    def delay_samples(self) -> Annotated[float, Quantity()]:
+    def delay_samples(self) -> Annotated[float, Quantity(help="delay of the loop in samples")]:
         """The delay of the chain."""
         return self.sampling.delay_samples
 
     @property
-    def spectral_radius(self) -> Annotated[float | None, Quantity("spectral radius")]:
+    def spectral_radius(self) -> Annotated[float | None, Quantity("spectral radius",
+            help="largest |z| of the closed-loop poles; below 1 of a stable loop")]:  # fmt: skip
         """Largest |z|; infinity where it overflows."""
         size = self.log_radius
         return None if size is None else math.exp(size) if size < LARGEST_LOG else math.inf
 
     @property
     def at(self) -> str:
-        """Sampling period and delay in words, and whether the period is tfarm's default."""
+        """Sampling period and delay in words, and the origin of the period."""
         T, delay = self.sampling.period, self.sampling.delay_samples
         late = f", {delay:g} samples late" if delay else ""
-        default = " (tfarm's default period)" if Sampling().period == T else ""
-        return f"sampled every {1e3 * T:g} ms{late}{default}"
+        return f"sampled every {1e3 * T:g} ms{late}{self.period_from and f' ({self.period_from})'}"
 
     @property
     def short(self) -> str:
@@ -378,7 +408,7 @@ class SampledBrief:
         return f"{verdict} when sampled every {1e3 * self.sampling.period:g} ms"
 
     @property
-    def words(self) -> Annotated[str, Quantity("sampled loop", key="in_words")]:
+    def words(self) -> Annotated[str, Quantity("sampled loop", key="in_words", help="verdict at the sampling period")]:
         """Sampling period and verdict, in capitals where the loop is not stable."""
         word, _, rest = self.sentence.partition(" ")
         return f"{word if self.is_stable else word.upper()} {rest}, {self.at}"
@@ -387,19 +417,21 @@ class SampledBrief:
 def sampled_brief(arm: Arm, law: AnyLaw, chain: Chain) -> SampledBrief:
     """Return the verdict on a law at the sampling of a chain.  Raises ParameterError where the arm has no such loop."""
     try:
-        verdict = sampled_verdict(arm, law, chain)
+        return brief_of(sampled_verdict(arm, law, chain), law, chain)
     except ConvergenceError as error:
-        return SampledBrief(sampling=chain.sampling, is_stable=None, log_radius=None, sentence=f"undecided: {error}")
-    return brief_of(verdict, chain)
+        return brief_of(error, law, chain)
 
 
-def brief_of(verdict: Verdict, chain: Chain) -> SampledBrief:
-    """A verdict in short."""
+def brief_of(found: Verdict | ConvergenceError, law: AnyLaw, chain: Chain) -> SampledBrief:
+    """A verdict on a law in short, or the reason that there is none."""
+    origin = chain.period_from or (DEFAULT_PERIOD if chain.sampling.period == Sampling().period else "")
+    verdict = None if isinstance(found, ConvergenceError) else found
     return SampledBrief(
         sampling=chain.sampling,
-        is_stable=verdict.is_stable,
-        log_radius=float(verdict.log_radius),
-        sentence=verdict.sentence,
+        period_from=LAWS_PERIOD if as_law(law).is_discrete else origin,
+        is_stable=None if verdict is None else verdict.is_stable,
+        log_radius=None if verdict is None else float(verdict.log_radius),
+        sentence=f"undecided: {found}" if verdict is None else verdict.sentence,
     )
 
 
