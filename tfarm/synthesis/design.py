@@ -38,29 +38,37 @@ LoopKind = Literal["sampled", "continuous"]
 class OnArm:
     """Value of the objective and both verdicts on one of the arms of a design; `numbers` are those of the box."""
 
-    name: Annotated[str, Quantity("arm", key="name")]
-    numbers: Annotated[dict[str, float], Quantity("numbers of the arm")]
-    value: Annotated[float, Quantity("objective", key="value")]
+    name: Annotated[
+        str, Quantity("arm", key="name", help="the designed arm, a further one, or one with numbers of the ranges")
+    ]
+    numbers: Annotated[
+        dict[str, float], Quantity("numbers of the arm", help="values of the numbers in the ranges, by key")
+    ]
+    value: Annotated[float, Quantity("objective", key="value", help="the objective with this law on this arm")]
     verdict: Stability
     sampled: SampledBrief
 
     @property
-    def stability(self) -> Annotated[str, Quantity("continuous-time loop", key="verdict")]:
+    def stability(
+        self,
+    ) -> Annotated[str, Quantity("continuous-time loop", key="verdict", help="stability without sampling")]:
         """The verdict on the continuous-time loop."""
         return self.verdict.verdict
 
     @property
-    def known_beyond(self) -> Annotated[bool, Quantity()]:
+    def known_beyond(self) -> Annotated[bool, Quantity(help="whether the verdict holds for all higher modes too")]:
         """Whether that holds beyond its frequency range."""
         return self.verdict.is_known_beyond
 
     @property
-    def band(self) -> Annotated[float, Quantity(key="up_to_rad_s")]:
+    def band(
+        self,
+    ) -> Annotated[float, Quantity(key="up_to_rad_s", help="upper end of the frequency range of the verdict [rad/s]")]:
         """The frequency range of that verdict [rad/s]."""
         return self.verdict.band
 
     @property
-    def sampled_loop(self) -> Annotated[str, Quantity("sampled loop", key="sampled")]:
+    def sampled_loop(self) -> Annotated[str, Quantity("sampled loop", key="sampled", help="stability at the samples")]:
         """The verdict on the sampled loop."""
         return self.sampled.short
 
@@ -68,11 +76,18 @@ class OnArm:
 class Coefficient(NamedTuple):
     """A coefficient of a design, the width of the optimum along it, and its bounds."""
 
-    name: Annotated[str, Quantity("coefficient", key="name")]
-    value: Annotated[float, Quantity("value", digits=7)]
-    flat: Annotated[Bounds | None, Quantity("within one per cent", key="within_one_per_cent")]
-    bounds: Annotated[Bounds | None, Quantity("searched")]
-    optimum: Annotated[str, Quantity("optimum")]
+    name: Annotated[str, Quantity("coefficient", key="name", help="a number of the law")]
+    value: Annotated[float, Quantity("value", digits=7, help="its value in the best law found")]
+    flat: Annotated[
+        Bounds | None,
+        Quantity(
+            "within one per cent",
+            key="within_one_per_cent",
+            help="range with an objective within 1 % of the best, others fixed",
+        ),
+    ]
+    bounds: Annotated[Bounds | None, Quantity("searched", help="bounds of the search; none of a fixed coefficient")]
+    optimum: Annotated[str, Quantity("optimum", help="place of the value in its bounds; at a bound it is no optimum")]
 
 
 @dataclass(frozen=True)
@@ -90,28 +105,35 @@ class Design:
     stops the hub, or 2/T of a pole.  Of `starts` strategies `agreed` reached the best score.
     """
 
-    objective: Annotated[str, Quantity("objective")]
-    structure: Annotated[str, Quantity("structure")]
+    objective: Annotated[str, Quantity("objective", help="criterion of the design")]
+    structure: Annotated[str, Quantity("structure", help="form of the law")]
     law: Any
     coefficients: dict[str, float]
-    value: Annotated[float, Quantity("value of the objective", key="value")]
-    verdict: Annotated[Stability, Quantity(flat=True)]
+    value: Annotated[float, Quantity("value of the objective", key="value", help="the worst over the arms")]
+    verdict: Annotated[Stability, Quantity(flat=True, help="stability of the continuous-time loop on the designed arm")]
     bounds: dict[str, Bounds]
     flat: dict[str, Bounds]
-    modes: Annotated[int, Quantity("flexible modes in the objective")]
+    modes: Annotated[int, Quantity("flexible modes in the objective", help="modes whose damping counts")]
     at_bound: tuple[str, ...]
     at_limit: tuple[str, ...]
     widened: tuple[str, ...]
-    loop: Annotated[LoopKind, Quantity("designed for the loop", key="designed_for")]
+    loop: Annotated[LoopKind, Quantity("designed for the loop", key="designed_for", help="sampled or continuous")]
     chain: Chain
-    sampled: Annotated[SampledBrief, Quantity("sampled loop")]
-    arms: Annotated[tuple[OnArm, ...], Quantity("arms")]
-    starts: Annotated[int, Quantity("searches")]
-    agreed: Annotated[int, Quantity("searches within half a per cent of the best", key="starts_agreed")]
+    sampled: Annotated[SampledBrief, Quantity("sampled loop", help="stability at the samples on the designed arm")]
+    arms: Annotated[tuple[OnArm, ...], Quantity("arms", help="all arms that the law was designed for")]
+    starts: Annotated[int, Quantity("searches", help="minimisations from different starts")]
+    agreed: Annotated[
+        int,
+        Quantity(
+            "searches within half a per cent of the best", key="starts_agreed", help="few: the optimum is hard to find"
+        ),
+    ]
     worst_case: WorstCase
 
     @property
-    def rows(self) -> Annotated[list[Coefficient], Quantity("coefficients", key="coefficients")]:
+    def rows(
+        self,
+    ) -> Annotated[list[Coefficient], Quantity("coefficients", key="coefficients", help="numbers of the law")]:
         """One row for each coefficient."""
         optima = dict.fromkeys(self.bounds, "inside") | dict.fromkeys(self.widened, "inside bounds that were widened")
         optima |= dict.fromkeys(self.at_bound, "none: search cut off at the bound")
@@ -122,7 +144,9 @@ class Design:
         ]
 
     @property
-    def slew_duration(self) -> Annotated[float | None, Quantity("record of the slew", "s", 6)]:
+    def slew_duration(
+        self,
+    ) -> Annotated[float | None, Quantity("record of the slew", "s", 6, "duration over which the objective is taken")]:
         """Length of the record of a residual or a cost, for `tfarm simulate --duration`; None of others."""
         arm, chain = self.verdict.loop.arm, self.chain
         if self.loop == "continuous":
@@ -131,17 +155,23 @@ class Design:
         return float(tasks[self.objective]().t[-1]) if self.objective in tasks else None
 
     @property
-    def worst_arm(self) -> Annotated[str, Quantity("worst arm")]:
+    def worst_arm(self) -> Annotated[str, Quantity("worst arm", help="the arm that limits the objective")]:
         """The arm with that value."""
         return next(each.name for each in self.arms if each.value == self.value)
 
     @property
-    def tried(self) -> Annotated[int, Quantity(key="arms_tried_inside")]:
+    def tried(
+        self,
+    ) -> Annotated[int, Quantity(key="arms_tried_inside", help="arms inside the ranges on which the law was tried")]:
         """Number of arms inside the box that were tried."""
         return self.worst_case.tried
 
     @property
-    def worst_case_words(self) -> Annotated[str, Quantity("worst case", key="worst_case_in_words")]:
+    def worst_case_words(
+        self,
+    ) -> Annotated[
+        str, Quantity("worst case", key="worst_case_in_words", help="choice of the arms; no proof between them")
+    ]:
         """Choice of the arms."""
         return self.worst_case.sentence(len(self.arms))
 

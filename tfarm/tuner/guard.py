@@ -227,15 +227,28 @@ class Guard:
     model.
     """
 
-    kind: Annotated[GuardKind, Quantity("kind")]
-    lo: Annotated[float, Quantity("least moment gain", digits=4)]
-    hi: Annotated[float, Quantity("largest moment gain", digits=4)]
-    modes_used: Annotated[int, Quantity("flexible modes", key="modes")]
-    is_settled: Annotated[bool, Quantity("more modes change nothing", key="settled")]
+    kind: Annotated[GuardKind, Quantity("kind", help="time-varying (certified), frozen (constant gains) or none")]
+    lo: Annotated[float, Quantity("least moment gain", digits=4, help="lower end of the guard")]
+    hi: Annotated[float, Quantity("largest moment gain", digits=4, help="upper end of the guard; infinite without one")]
+    modes_used: Annotated[
+        int, Quantity("flexible modes", key="modes", help="modes of the largest model of the certificate")
+    ]
+    is_settled: Annotated[
+        bool, Quantity("more modes change nothing", key="settled", help="converged in the number of modes")
+    ]
     proofs: tuple[CommonLyapunov, ...] = ()
 
     @property
-    def is_proven(self) -> Annotated[bool, Quantity("certified for any K(t)", key="proven")]:
+    def is_proven(
+        self,
+    ) -> Annotated[
+        bool,
+        Quantity(
+            "certified for any K(t)",
+            key="proven",
+            help="a quadratic Lyapunov function decreases for every sequence of gains",
+        ),
+    ]:
         """Whether the loop is certified stable for every K(t) in it, and not that of its first modes alone."""
         return bool(self.proofs) and self.is_settled
 
@@ -245,7 +258,7 @@ class Guard:
         return Limits(self.lo, self.hi)
 
     @property
-    def sentence(self) -> Annotated[str, Quantity("certainty", key="says")]:
+    def sentence(self) -> Annotated[str, Quantity("certainty", key="says", help="scope of the certificate")]:
         """The certificate, in words."""
         if self.kind == "none":
             return "no guard: K >= 0, not certified"
