@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import partial
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial, wraps
+from inspect import Parameter, signature
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -95,61 +97,87 @@ def design(
     emit(found, json, also=(save,))
 
 
-@command(epilog="tune sasaki2012-lab --trials 100 --save tuned.json")
-def tune(
-    arm: ArmName,
-    trials: Annotated[int, typer.Option("--trials", min=1, max=1_000_000, help="slews to learn from")] = 100,
-    mode: Annotated[
-        str,
-        typer.Option("--mode", help="trial: after each slew; online: at every sample", rich_help_panel="Learning"),
-    ] = "trial",
+def panelled(panel: str, name: str, text: str, **limits: Any) -> Any:
+    """Return the option of a name, in a panel of the help."""
+    return typer.Option(f"--{name}", help=text, rich_help_panel=panel, **limits)
+
+
+learning = partial(panelled, "Learning")
+cost = partial(panelled, "Cost")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TunerOptions:
+    """Options of a tuning: trial, servo and network, learning, cost."""
+
+    trials: Annotated[int, typer.Option("--trials", min=1, max=1_000_000, help="slews to learn from")] = 100
+    mode: Annotated[str, learning("mode", "trial: after each slew; online: at every sample")] = "trial"
     signals: Annotated[
         str | None, typer.Option("--signals", help="vibration or total, in x and u; by default that of [slew]")
-    ] = None,
-    seed: Annotated[
-        int, typer.Option("--seed", min=0, max=2**53, help="of the initial weights", rich_help_panel="Learning")
-    ] = 0,
+    ] = None
+    seed: Annotated[int, learning("seed", "of the initial weights", min=0, max=2**53)] = 0
+    guard: Annotated[str, typer.Option("--guard", help="time-varying (proven), frozen or none")] = "time-varying"
+    rule: Annotated[str, learning("rule", "dynamic, clipped or plain: form of (21)")] = "dynamic"
+    sensitivity: Annotated[str, learning("sensitivity", "of the plant, online: one-step (the paper's) or whole")] = (
+        "one-step"
+    )
+    eta: Annotated[float, learning("eta", "learning rate")] = 0.8
+    alpha: Annotated[float, learning("alpha", "momentum, in [0, 1)")] = 0.6
+    a: Annotated[float, cost("a", "weight of the root moment, in the arm's unit")] = 1.0
+    b: Annotated[float, cost("b", "weight of the control signal, likewise")] = 2.6
+    k1: Annotated[
+        float | None,
+        panelled(
+            CONTROLLER, RATE_GAIN,
+            f"hub rate gain [N m s/rad]; by default 0.00642 J w1, 0.71 damping with {ANGLE_GAIN}",
+        ),
+    ] = None  # fmt: skip
+    kp: AngleGain = 0.0
+    duration: Annotated[
+        float | None, typer.Option("--duration", help="duration of a trial [s]; by default three slews")
+    ] = None
+    enough: Annotated[float, learning("enough", "stop once the rms of x is below this [N m]")] = 0.0
+    hidden: Annotated[int, typer.Option("--hidden", min=1, max=1000, help="hidden neurons")] = 6
+    seventh_input: Annotated[bool, typer.Option("--seventh-input", help="feed K(t-1) to the network too")] = False
+    modes: Annotated[int, typer.Option("--modes", min=1, max=48, help="flexible modes")] = 6
+
+    def plan(self, usual: Any, rate: float) -> Any:
+        """Return the plan of these options with this rate gain, and of the usual one what is not given."""
+        from tfarm import tuner
+
+        named: Any = {"mode": self.mode, "rule": self.rule, "sensitivity": self.sensitivity}
+        given = {name: getattr(self, name) for name in ("signals", "duration") if getattr(self, name) is not None}
+        return replace(
+            usual,
+            cost=tuner.Cost(a=self.a, b=self.b),
+            learning=tuner.Learning(**named, eta=self.eta, alpha=self.alpha, enough=self.enough),
+            trials=self.trials, seed=self.seed, count=self.modes, hidden=self.hidden, guard=self.guard,
+            seventh_input=self.seventh_input, **{RATE_GAIN: rate, ANGLE_GAIN: self.kp}, **given,
+        )  # fmt: skip
+
+
+def with_tuner_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of a tuning to a command, whose last parameter has them."""
+    own = signature(command, eval_str=True)
+    added = signature(TunerOptions, eval_str=True).parameters
+    first, *others, _ = own.parameters.values()
+
+    @wraps(command)
+    def called(**given: Any) -> None:
+        command(options=TunerOptions(**{name: given.pop(name) for name in added}), **given)
+
+    kept = [each.replace(kind=Parameter.KEYWORD_ONLY) for each in (first, *added.values(), *others)]
+    called.__signature__ = own.replace(parameters=kept)  # type: ignore[attr-defined]
+    return called
+
+
+@command(epilog="tune sasaki2012-lab --trials 100 --save tuned.json")
+@with_tuner_options
+def tune(
+    arm: ArmName,
     curves: Annotated[
         int, typer.Option("--curves", min=0, max=10_000, help="learning curves over N seeds (the paper's Figure 5)")
     ] = 0,
-    guard: Annotated[str, typer.Option("--guard", help="time-varying (proven), frozen or none")] = "time-varying",
-    rule: Annotated[
-        str,
-        typer.Option("--rule", help="dynamic, clipped or plain: form of (21)", rich_help_panel="Learning"),
-    ] = "dynamic",
-    sensitivity: Annotated[
-        str,
-        typer.Option(
-            "--sensitivity", help="of the plant, online: one-step (the paper's) or whole", rich_help_panel="Learning"
-        ),
-    ] = "one-step",
-    eta: Annotated[float, typer.Option("--eta", help="learning rate", rich_help_panel="Learning")] = 0.8,
-    alpha: Annotated[float, typer.Option("--alpha", help="momentum, in [0, 1)", rich_help_panel="Learning")] = 0.6,
-    a: Annotated[
-        float,
-        typer.Option("--a", help="weight of the root moment, in the arm's unit", rich_help_panel="Cost"),
-    ] = 1.0,
-    b: Annotated[
-        float, typer.Option("--b", help="weight of the control signal, likewise", rich_help_panel="Cost")
-    ] = 2.6,
-    k1: Annotated[
-        float | None,
-        typer.Option(
-            f"--{RATE_GAIN}",
-            help=f"hub rate gain [N m s/rad]; by default 0.00642 J w1, 0.71 damping with {ANGLE_GAIN}",
-            rich_help_panel=CONTROLLER,
-        ),
-    ] = None,
-    kp: AngleGain = 0.0,
-    duration: Annotated[
-        float | None, typer.Option("--duration", help="duration of a trial [s]; by default three slews")
-    ] = None,
-    enough: Annotated[
-        float, typer.Option("--enough", help="stop once the rms of x is below this [N m]", rich_help_panel="Learning")
-    ] = 0.0,
-    hidden: Annotated[int, typer.Option("--hidden", min=1, max=1000, help="hidden neurons")] = 6,
-    seventh_input: Annotated[bool, typer.Option("--seventh-input", help="feed K(t-1) to the network too")] = False,
-    modes: Annotated[int, typer.Option("--modes", min=1, max=48, help="flexible modes")] = 6,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
@@ -159,6 +187,8 @@ def tune(
     ] = None,
     theory: TheoryName = None,
     json: Json = False,
+    *,
+    options: TunerOptions,
 ) -> None:
     """Neural tuner of the moment gain during a slew, compared with simpler baselines."""
     from tfarm import tuner
@@ -166,25 +196,13 @@ def tune(
     from tfarm.tuner.tuning import usual_plan
 
     subject, chain = load_arm(arm, theory), load_chain(dsp or arm, period, delay_samples)
-    law, defaults = load_law(subject, arm, {RATE_GAIN: k1, MOMENT_GAIN: 0.0})
+    law, defaults = load_law(subject, arm, {RATE_GAIN: options.k1, MOMENT_GAIN: 0.0})
     rate = cast("tfarm.HubFeedback", law)[RATE_GAIN]
-    if k1 is None and kp:
-        rate = usual_rate_gain(subject, kp)
-        defaults = {
-            "default_gains": [RATE_GAIN],
-            "default_gains_in_words": f"{RATE_GAIN} = {rate:.4g} (damping ratio 0.71 of the rigid arm under Kp)",
-        }
-    learning: Any = {"mode": mode, "rule": rule, "sensitivity": sensitivity}
-    given: Any = {"signals": signals, "duration": duration}
-    plan = replace(
-        usual_plan(subject, chain),
-        cost=tuner.Cost(a=a, b=b),
-        learning=tuner.Learning(**learning, eta=eta, alpha=alpha, enough=enough),
-        trials=trials, seed=seed, count=modes, hidden=hidden, guard=cast("Any", guard), seventh_input=seventh_input,
-        **cast("Any", {RATE_GAIN: rate, ANGLE_GAIN: kp}),
-        **{name: value for name, value in given.items() if value is not None},
-    )  # fmt: skip
-    tuning = tuner.tune(subject, plan, chain)
+    if options.k1 is None and options.kp:
+        rate = usual_rate_gain(subject, options.kp)
+        words = f"{RATE_GAIN} = {rate:.4g} (damping ratio 0.71 of the rigid arm under Kp)"
+        defaults = {"default_gains": [RATE_GAIN], "default_gains_in_words": words}
+    tuning = tuner.tune(subject, options.plan(usual_plan(subject, chain), rate), chain)
     drawn = tuner.learning_curves(tuning, curves, advance) if curves else None
     compared = tuner.compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard) if compare else None
     if save is not None:

@@ -1,35 +1,34 @@
 """The law of a structure with the best value of an objective, for one arm or for the worst of several.
 
 A search within bounds by a judge of few modes is followed by exact verdicts, which exclude unstable laws.  The record
-has the number of strategies that agreed, the width of the optimum, and whether the bounds cut the search off.
+has the number of searches that agreed, the width of the optimum, and whether the bounds cut the search off.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import zip_longest
 from operator import itemgetter
-from typing import Annotated, Any, Literal, NamedTuple, TypeVar
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, as_law
+from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, as_law, must_turn
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual
+from tfarm.dsp.edges import most_modes
 from tfarm.dsp.verdict import SampledBrief, sampled_brief, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError, must_be_known
 from tfarm.loop.loop import Loop
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import record
 from tfarm.schema import Quantity
-from tfarm.synthesis.judge import LOST, OBJECTIVES, Judge, judges_of
+from tfarm.synthesis.judge import LOST, OBJECTIVES, Judge, judge_of, model_sizes
 from tfarm.synthesis.models import slew_and_after, trial_slew
 from tfarm.synthesis.search import CANDIDATES, Search, Worst, flat_part, search
 from tfarm.synthesis.structures import Bounds, Structure, check_bounds, structure_of
 from tfarm.synthesis.worst_case import ArmBox, NamedArm, Tell, WorstCase, arms_of, for_the_worst, same_input
 
-_One = TypeVar("_One")
 LoopKind = Literal["sampled", "continuous"]
 
 
@@ -38,29 +37,37 @@ LoopKind = Literal["sampled", "continuous"]
 class OnArm:
     """Value of the objective and both verdicts on one of the arms of a design; `numbers` are those of the box."""
 
-    name: Annotated[str, Quantity("arm", key="name")]
-    numbers: Annotated[dict[str, float], Quantity("numbers of the arm")]
-    value: Annotated[float, Quantity("objective", key="value")]
+    name: Annotated[
+        str, Quantity("arm", key="name", help="the designed arm, a further one, or one with numbers of the ranges")
+    ]
+    numbers: Annotated[
+        dict[str, float], Quantity("numbers of the arm", help="values of the numbers in the ranges, by key")
+    ]
+    value: Annotated[float, Quantity("objective", key="value", help="the objective with this law on this arm")]
     verdict: Stability
     sampled: SampledBrief
 
     @property
-    def stability(self) -> Annotated[str, Quantity("continuous-time loop", key="verdict")]:
+    def stability(
+        self,
+    ) -> Annotated[str, Quantity("continuous-time loop", key="verdict", help="stability without sampling")]:
         """The verdict on the continuous-time loop."""
         return self.verdict.verdict
 
     @property
-    def known_beyond(self) -> Annotated[bool, Quantity()]:
+    def known_beyond(self) -> Annotated[bool, Quantity(help="whether the verdict holds for all higher modes too")]:
         """Whether that holds beyond its frequency range."""
         return self.verdict.is_known_beyond
 
     @property
-    def band(self) -> Annotated[float, Quantity(key="up_to_rad_s")]:
+    def band(
+        self,
+    ) -> Annotated[float, Quantity(key="up_to_rad_s", help="upper end of the frequency range of the verdict [rad/s]")]:
         """The frequency range of that verdict [rad/s]."""
         return self.verdict.band
 
     @property
-    def sampled_loop(self) -> Annotated[str, Quantity("sampled loop", key="sampled")]:
+    def sampled_loop(self) -> Annotated[str, Quantity("sampled loop", key="sampled", help="stability at the samples")]:
         """The verdict on the sampled loop."""
         return self.sampled.short
 
@@ -68,11 +75,18 @@ class OnArm:
 class Coefficient(NamedTuple):
     """A coefficient of a design, the width of the optimum along it, and its bounds."""
 
-    name: Annotated[str, Quantity("coefficient", key="name")]
-    value: Annotated[float, Quantity("value", digits=7)]
-    flat: Annotated[Bounds | None, Quantity("within one per cent", key="within_one_per_cent")]
-    bounds: Annotated[Bounds | None, Quantity("searched")]
-    optimum: Annotated[str, Quantity("optimum")]
+    name: Annotated[str, Quantity("coefficient", key="name", help="a number of the law")]
+    value: Annotated[float, Quantity("value", digits=7, help="its value in the best law found")]
+    flat: Annotated[
+        Bounds | None,
+        Quantity(
+            "within one per cent",
+            key="within_one_per_cent",
+            help="range with an objective within 1 % of the best, others fixed",
+        ),
+    ]
+    bounds: Annotated[Bounds | None, Quantity("searched", help="bounds of the search; none of a fixed coefficient")]
+    optimum: Annotated[str, Quantity("optimum", help="place of the value in its bounds; at a bound it is no optimum")]
 
 
 @dataclass(frozen=True)
@@ -87,31 +101,38 @@ class Design:
     those of `widened` are wider than at first.  `flat` are ranges of each coefficient, the others constant, in which
     the value is within one per cent of the best.  `at_bound` names coefficients at an end of their bounds: there the
     search was cut off, and the value is no optimum.  Those in `at_limit` are at a physical end, K1 = 0, the K2 = 1 that
-    stops the hub, or 2/T of a pole.  Of `starts` strategies `agreed` reached the best score.
+    stops the hub, or 2/T of a pole.  Of `starts` searches `agreed` reached the best score.
     """
 
-    objective: Annotated[str, Quantity("objective")]
-    structure: Annotated[str, Quantity("structure")]
+    objective: Annotated[str, Quantity("objective", help="criterion of the design")]
+    structure: Annotated[str, Quantity("structure", help="form of the law")]
     law: Any
     coefficients: dict[str, float]
-    value: Annotated[float, Quantity("value of the objective", key="value")]
-    verdict: Annotated[Stability, Quantity(flat=True)]
+    value: Annotated[float, Quantity("value of the objective", key="value", help="the worst over the arms")]
+    verdict: Annotated[Stability, Quantity(flat=True, help="stability of the continuous-time loop on the designed arm")]
     bounds: dict[str, Bounds]
     flat: dict[str, Bounds]
-    modes: Annotated[int, Quantity("flexible modes in the objective")]
+    modes: Annotated[int, Quantity("flexible modes in the objective", help="modes whose damping counts")]
     at_bound: tuple[str, ...]
     at_limit: tuple[str, ...]
     widened: tuple[str, ...]
-    loop: Annotated[LoopKind, Quantity("designed for the loop", key="designed_for")]
+    loop: Annotated[LoopKind, Quantity("designed for the loop", key="designed_for", help="sampled or continuous")]
     chain: Chain
-    sampled: Annotated[SampledBrief, Quantity("sampled loop")]
-    arms: Annotated[tuple[OnArm, ...], Quantity("arms")]
-    starts: Annotated[int, Quantity("searches")]
-    agreed: Annotated[int, Quantity("searches within half a per cent of the best", key="starts_agreed")]
+    sampled: Annotated[SampledBrief, Quantity("sampled loop", help="stability at the samples on the designed arm")]
+    arms: Annotated[tuple[OnArm, ...], Quantity("arms", help="all arms that the law was designed for")]
+    starts: Annotated[int, Quantity("searches", help="minimisations from different starts")]
+    agreed: Annotated[
+        int,
+        Quantity(
+            "searches within half a per cent of the best", key="starts_agreed", help="few: the optimum is hard to find"
+        ),
+    ]
     worst_case: WorstCase
 
     @property
-    def rows(self) -> Annotated[list[Coefficient], Quantity("coefficients", key="coefficients")]:
+    def rows(
+        self,
+    ) -> Annotated[list[Coefficient], Quantity("coefficients", key="coefficients", help="numbers of the law")]:
         """One row for each coefficient."""
         optima = dict.fromkeys(self.bounds, "inside") | dict.fromkeys(self.widened, "inside bounds that were widened")
         optima |= dict.fromkeys(self.at_bound, "none: search cut off at the bound")
@@ -122,7 +143,9 @@ class Design:
         ]
 
     @property
-    def slew_duration(self) -> Annotated[float | None, Quantity("record of the slew", "s", 6)]:
+    def slew_duration(
+        self,
+    ) -> Annotated[float | None, Quantity("record of the slew", "s", 6, "duration over which the objective is taken")]:
         """Length of the record of a residual or a cost, for `tfarm simulate --duration`; None of others."""
         arm, chain = self.verdict.loop.arm, self.chain
         if self.loop == "continuous":
@@ -131,17 +154,23 @@ class Design:
         return float(tasks[self.objective]().t[-1]) if self.objective in tasks else None
 
     @property
-    def worst_arm(self) -> Annotated[str, Quantity("worst arm")]:
+    def worst_arm(self) -> Annotated[str, Quantity("worst arm", help="the arm that limits the objective")]:
         """The arm with that value."""
         return next(each.name for each in self.arms if each.value == self.value)
 
     @property
-    def tried(self) -> Annotated[int, Quantity(key="arms_tried_inside")]:
+    def tried(
+        self,
+    ) -> Annotated[int, Quantity(key="arms_tried_inside", help="arms inside the ranges on which the law was tried")]:
         """Number of arms inside the box that were tried."""
         return self.worst_case.tried
 
     @property
-    def worst_case_words(self) -> Annotated[str, Quantity("worst case", key="worst_case_in_words")]:
+    def worst_case_words(
+        self,
+    ) -> Annotated[
+        str, Quantity("worst case", key="worst_case_in_words", help="choice of the arms; no proof between them")
+    ]:
         """Choice of the arms."""
         return self.worst_case.sentence(len(self.arms))
 
@@ -180,6 +209,8 @@ def design(
     if objective == "cost" and continuous:
         remedy = "the cost of the tuner's trial is one of samples: design for the sampled loop"
         raise ParameterError(key="objective", value=objective, remedy=remedy)
+    if OBJECTIVES[objective].of_slew:
+        must_turn(arm)
     ends = {key: (float(low), float(high)) for key, (low, high) in (ranges or {}).items()}
     box = ArmBox(arm, ends) if ends else None
     arms, chain = arms_of(arm, also, box), chain_or_usual(chain)
@@ -207,10 +238,14 @@ class _Task:
     loop: LoopKind
     tell: Tell
 
-    def judges(self, on: Arm) -> Iterator[Judge]:
-        """Judges on an arm, of more and more modes."""
-        continuous = self.loop == "continuous"
-        return judges_of(on, self.arm, self.chain, self.objective, self.form, self.modes, continuous=continuous)
+    def sizes(self, on: Arm) -> list[int]:
+        """Numbers of modes of the models of an arm, in turn."""
+        return model_sizes(on, self.chain, self.modes, continuous=self.loop == "continuous")
+
+    def judge(self, on: Arm, count: int) -> Judge:
+        """The judge of laws on an arm, by a model of `count` modes."""
+        return judge_of(on, self.arm, self.chain, self.objective, self.form.signals, self.modes, count,
+                        continuous=self.loop == "continuous")  # fmt: skip
 
     def find(self, named: Sequence[NamedArm]) -> _Choice:
         """Return the best law that is stable on all arms.  Raises ConvergenceError where none is found.
@@ -218,7 +253,11 @@ class _Task:
         If the best law under fewer conditions is stable, it is the best under all: so that one is tried first.
         """
         nearest: tuple[float, Any] | None = None
-        for several in in_step([self.judges(each.arm) for each in named]):
+        sizes = [self.sizes(each.arm) for each in named]
+        for step in range(max(map(len, sizes))):
+            several = tuple(
+                self.judge(each.arm, own[min(step, len(own) - 1)]) for each, own in zip(named, sizes, strict=True)
+            )
             relaxed = tuple(replace(each, is_relaxed=True) for each in several)
             for judges, most in [*([(relaxed, 1)] if self.loop == "sampled" else []), (several, CANDIDATES)]:
                 found = search(Worst(judges), self.form, self.tell)
@@ -227,14 +266,16 @@ class _Task:
                     law = found.form.record_at(x)
                     if score < LOST and all(judge.holds(law) for judge in several):
                         return _Choice(Worst(several), found, score, x, law)
+                if found.found[0][0] >= LOST:  # nothing is stable under fewer conditions
+                    break
         assert nearest is not None  # there is at least one judge
         law = self.form.record_at(nearest[1])
         chain = self.chain if self.loop == "sampled" else None
-        raise ConvergenceError(_why_none(named, self.form, law, chain), law, nearest[0])
+        raise ConvergenceError(_why_none(named, self.form, law, chain, max(map(max, sizes))), law, nearest[0])
 
     def score_on(self, choice: _Choice, on: Arm) -> float:
         """The score of a law on another arm; inf where the loop is unstable."""
-        score = next(self.judges(on)).score(choice.law)
+        score = self.judge(on, self.sizes(on)[0]).score(choice.law)
         return score if score < LOST else np.inf
 
     def design(self, choice: _Choice, named: Sequence[NamedArm], case: WorstCase) -> Design:
@@ -258,8 +299,11 @@ class _Task:
         )  # fmt: skip
 
 
-def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Chain | None) -> str:
-    """The most unstable mode under the law nearest to stability (of a sampled loop), and a remedy."""
+def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Chain | None, size: int) -> str:
+    """The most unstable mode under the law nearest to stability (of a sampled loop), what was searched, and a remedy.
+
+    `size` is the number of modes of the largest model.
+    """
     within = " and ".join(f"{each.name} in ({each.bounds[0]:g}, {each.bounds[1]:g})" for each in form.free)
     text = f"no law {form.name} with {within} was found that is stable"
     if chain is None:
@@ -270,17 +314,11 @@ def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Cha
     text = (
         f"{text} when sampled: under the nearest law {nearest}; widen the bounds, or try another {ANGLE_GAIN} or period"
     )
+    if any(most_modes(each.arm, chain) > size for each in arms if not each.arm.has_elastic_link):
+        text = f"{text}; only models of up to {size} modes were searched"
     if not verdict.loop.plant.arm.has_elastic_link or form.name == TWO_GAINS:
         return text
     return (
         f"{text}; with link.damping = 0 every mode that the law does not damp at its alias is unstable under a held "
         f"input: give link.damping, or take {TWO_GAINS}"
     )
-
-
-def in_step(each: Sequence[Iterable[_One]]) -> Iterator[tuple[_One, ...]]:
-    """The first items of all, the second, ...; an iterable that has ended repeats its last item."""
-    last: list[_One | None] = [None] * len(each)
-    for row in zip_longest(*each):
-        last = [old if new is None else new for old, new in zip(last, row, strict=True)]
-        yield tuple(one for one in last if one is not None)

@@ -1,36 +1,60 @@
-"""Search for the best law: many points of the bounds, strategies from the best of them, and wider bounds.
+"""Search for the best law: differential evolution from several starts, a simplex from the best, and wider bounds.
 
-The points are those of Sobol's sequence, which leaves no large gap (Sobol, 1967).  Evolution strategies start from the
-best of them, at a distance from each other (`evolution`), and then from points near the best.  They may leave bounds
-that are neither given nor physical ends; where the best law is beyond a bound, that of the wider region is returned.
+SciPy's differential evolution (Storn and Price, 1997) uses no slopes, so that it works along edges, where the largest
+of several values has none.  Each run begins with other points of Sobol's sequence, which leaves no large gap; one more
+begins with the best points of all, and of more than two coefficients another near the best.  The simplex of Nelder and
+Mead is the end.  Runs may leave bounds that are neither given nor physical ends; where the best law is beyond a bound,
+that of the wider region is returned.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.optimize import bisect, differential_evolution, minimize
 
+from tfarm.arm import PLANE
 from tfarm.arrays import Real
 from tfarm.records import record
-from tfarm.synthesis.evolution import MOST_ROUNDS, evolved
 from tfarm.synthesis.judge import LOST, Judge
 from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Tell
 
-POINTS_LOG2 = 11  # of the number of points
-STARTS_EACH = 12  # strategies for each coefficient, from the best of them
-HOPS, HOPS_EACH, HOP_POINTS = 1, 8, 1024  # searches near the best of more than two, strategies each, and points
+FEWEST_RUNS, MOST_RUNS = 2, 8  # one more than coefficients within these: some minima are found by one of five alone
+USUAL_WORK = 4 * 20**2  # conditions times squared states of one arm's first model: with twice as much half the runs
+FEWEST_POINTS, POINTS_EACH = 32, 15  # of a run, at least, and for each coefficient: the next power of two
+LAWS_EACH, MOST_LAWS = 800, 4000  # of a run for each coefficient, and at most; twice as many from the best points
+STRATEGIES = (("best1bin", 0.7), ("currenttobest1bin", 0.9))  # in turn, and the share of coefficients changed at once
+AROUND = 0.5  # of x: the spread of the points of the last run, around the best
+CONVERGED = 1e-9  # of the scores: the spread of a run's points at which it ends
+SIMPLEX = 0.005  # of the region: the first edges of the simplex
+STEPS_EACH = 100  # of the simplex, for each coefficient
 CANDIDATES = 4  # laws for the exact verdicts, the best first
 BEYOND = 4.0  # of x: reach of a search beyond its bounds, a factor e^4 of a coefficient far above its unit
-APART = 0.02  # of the range of x: least distance of two starts
+APART = 0.02  # of the range of x: least distance of two candidates
 AS_GOOD = 1e-4  # relative: a coefficient is at its physical end if the score there is worse by less
-SEED = 0  # of the sequence's scrambling, and of points near the best
-AGREES = 5e-3  # relative: a strategy agrees if its score is worse than the best by less
+AGREES = 5e-3  # relative: a run agrees if its score is worse than the best by less
 FLAT_WITHIN = 0.01  # laws whose score is worse by less than this share bound the flat part
-FLAT_STEPS, FLAT_HALVINGS = 60, 30  # of the way to the bounds, each 1.4 times the one before; of an interval
+FLAT_STEPS = 60  # of the way to the bounds, each 1.4 times the one before
 AT_ORIGIN = 1e-9  # of that way: the first step
+
+
+class Points(NamedTuple):
+    """Points x (n, m) and their scores (m,), the lowest first."""
+
+    x: Real
+    scores: Real
+
+    @classmethod
+    def of(cls, parts: Sequence[tuple[Real, Real]]) -> Points:
+        """The points of all parts."""
+        x = np.concatenate([each for each, _ in parts], axis=1)
+        scores = np.concatenate([each for _, each in parts])
+        order = np.argsort(scores, kind="stable")
+        return cls(x[:, order], scores[order])
 
 
 @dataclass(frozen=True)
@@ -38,7 +62,7 @@ AT_ORIGIN = 1e-9  # of that way: the first step
 class Search:
     """Result of a search: points and scores, the lowest first; the structure with the searched bounds.
 
-    Of `starts` strategies `agreed` reached the best score; `widened` names coefficients.
+    Of `starts` runs `agreed` reached the best score; `widened` names coefficients.
     """
 
     form: Structure
@@ -54,6 +78,11 @@ class Worst:
     """The judges of several arms as one: the largest of their scores."""
 
     judges: tuple[Judge, ...]
+
+    @property
+    def work(self) -> float:
+        """The work of a law, relative to that of one arm and its first model."""
+        return sum(len(judge.conditions) * len(judge.model.plant[0]) ** 2 for judge in self.judges) / USUAL_WORK
 
     def scores(self, form: Structure, x: Real) -> Real:
         """The function to be minimised, at points x (n, laws); arms after one with an unstable loop are left out."""
@@ -71,41 +100,85 @@ def search(judge: Worst, form: Structure, tell: Tell) -> Search:
     ends = [(place, end) for place in range(form.size) for end in (0, 1)]
     places = [each for each in ends if not (given[each[0]] or form.is_physical(*each))]
     region = form.wider(places, BEYOND)
-    points = np.c_[form.origin, sobol(*form.box, POINTS_LOG2)]
-
-    def report(number: int, score: float) -> None:
-        tell(f"{form.name}: round {number} of {MOST_ROUNDS}, best so far {score:.6g}")
-
-    def best_from(points: Real, each: int) -> tuple[Real, Real]:
-        first = points[:, _apart(region, points, judge.scores(region, points), each * form.size)]
-        return evolved(lambda at: judge.scores(region, at), first, region.box, report)
-
-    x, scores = best_from(points, STARTS_EACH)
-    rng = np.random.default_rng(SEED)
-    for _ in range(HOPS if form.size > 2 else 0):
-        around = x[:, :1] + rng.standard_normal((form.size, HOP_POINTS))
-        further = best_from(np.c_[x[:, :1], np.clip(around.T, *region.box).T], HOPS_EACH)
-        x, scores = np.c_[x, further[0]], np.r_[scores, further[1]]
-        order = np.argsort(scores, kind="stable")
-        x, scores = x[:, order], scores[order]
+    (x, scores), of_runs = minimised(lambda at: judge.scores(region, at), form, region.box, judge.work, tell)
     for place, end in (each for each in ends if region.is_physical(*each)):  # there if the score is as good
         moved = x[:, :1].copy()
         moved[place] = region.box[end][place]
         if judge.scores(region, moved)[0] <= scores[0] + AS_GOOD * abs(scores[0]):
             x[:, :1] = moved
-    close, best = scores[0] + AGREES * abs(scores[0]), x[:, 0]
+    best = x[:, 0]
     beyond = [each for each in places if (form.box[0] > best, form.box[1] < best)[each[1]][each[0]]]
     widened = tuple(dict.fromkeys(form.names[place] for place, _ in beyond))
     found = [(float(scores[n]), x[:, n]) for n in _apart(region, x, scores, CANDIDATES)]
-    return Search(form.wider(beyond, BEYOND), found, scores.size, int((scores <= close).sum()), widened)
+    agreed = sum(each <= scores[0] + AGREES * abs(scores[0]) for each in of_runs)
+    return Search(form.wider(beyond, BEYOND), found, len(of_runs), agreed, widened)
 
 
-def sobol(low: Real, high: Real, log2: int) -> Real:
-    """Points (n, 2^log2) of Sobol's sequence in a box."""
+def minimised(
+    score: Callable[[Real], Real], form: Structure, box: tuple[Real, Real], work: float, tell: Tell
+) -> tuple[Points, list[float]]:
+    """Return the last points of all runs, and the best score of each.
+
+    `score` takes points (n, k) of the box; `work` is that of a law, relative to the usual one.  Runs begin within the
+    bounds of `form`, the first also with its start; then one with the best points of all, one near the best of those,
+    and a simplex at the best of that.
+    """
+    runs = min(max(int((form.size + 1) / max(1.0, work)), FEWEST_RUNS), MOST_RUNS)
+    number = 1 << (max(FEWEST_POINTS, POINTS_EACH * form.size) - 1).bit_length()
+    rounds = min(LAWS_EACH * form.size, MOST_LAWS) // number
+    ended: list[Points] = []
+
+    def run(points: Real, rounds: int) -> None:
+        ended.append(evolved(score, box, points, rounds, len(ended)))
+        best = min(each.scores[0] for each in ended)
+        tell(f"{form.name}: search {len(ended)}, best so far {best:.6g}")
+
+    for seed in range(runs):
+        points = sobol(*form.box, number, seed)
+        points[:, 0] = points[:, 0] if seed else form.origin
+        run(points, rounds)
+    run(Points.of(ended).x[:, :number], 2 * rounds)
+    if form.size > len(PLANE):
+        best = Points.of(ended).x[:, 0]
+        spread = AROUND * np.random.default_rng(runs).standard_normal((number, form.size))
+        run(np.clip(best + spread, *box).T, rounds)
+    ended.append(simplex(score, box, Points.of(ended).x[:, 0]))
+    found = Points.of(ended)
+    return found, [float(found.scores[0]), *(float(each.scores[0]) for each in ended[:runs])]
+
+
+def evolved(score: Callable[[Real], Real], box: tuple[Real, Real], points: Real, rounds: int, seed: int) -> Points:
+    """The last points of a run of differential evolution that begins with `points` (n, m)."""
+    strategy, recombination = STRATEGIES[seed % len(STRATEGIES)]
+    done = cast("Any", differential_evolution)(
+        lambda x: score(x.reshape(len(points), -1)), list(zip(*box, strict=True)), init=points.T, strategy=strategy,
+        recombination=recombination, maxiter=rounds, tol=CONVERGED, rng=seed, polish=False, vectorized=True,
+        updating="deferred",
+    )  # fmt: skip
+    return Points.of([(done.population.T, done.population_energies)])
+
+
+def simplex(score: Callable[[Real], Real], box: tuple[Real, Real], start: Real) -> Points:
+    """The last point of a simplex of Nelder and Mead that begins at `start` (n,)."""
+    low, high = box
+    step = SIMPLEX * (high - low)
+    corners = start + np.vstack([np.zeros(start.size), np.diag(np.where(start + step > high, -step, step))])
+    options = {
+        "initial_simplex": corners, "maxfev": STEPS_EACH * start.size, "adaptive": start.size > 1,
+        "xatol": CONVERGED * (high - low).max(), "fatol": CONVERGED * abs(score(start[:, None])[0]),
+    }  # fmt: skip
+    bounds = list(zip(low, high, strict=True))
+    done = cast("Any", minimize)(
+        lambda x: float(score(x[:, None])[0]), start, method="Nelder-Mead", bounds=bounds, options=options
+    )
+    return Points(done.x[:, None], np.array([done.fun]))
+
+
+def sobol(low: Real, high: Real, number: int, seed: int) -> Real:
+    """Points (n, number) of Sobol's sequence in a box, scrambled by a seed; a power of two has no gap."""
     from scipy.stats import qmc  # here, because it takes half a second to load
 
-    shares = qmc.Sobol(low.size, seed=SEED).random_base2(log2)
-    return np.asarray((low + shares * (high - low)).T)
+    return np.asarray((low + qmc.Sobol(low.size, rng=seed).random(number) * (high - low)).T)
 
 
 def _apart(form: Structure, points: Real, scores: Real, most: int) -> list[int]:
@@ -125,31 +198,27 @@ def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str,
 
     The search goes outwards in growing steps, then by halving: narrow ranges are found as well as wide ones.
     """
-    limit, ways = score + FLAT_WITHIN * abs(score), np.arange(2 * form.size)
-    along, ends = ways // 2, np.array(form.box).T.ravel()  # of each way the coefficient that changes, and its bound
+    limit = score + FLAT_WITHIN * abs(score)
+    shares = np.geomspace(AT_ORIGIN, 1.0, FLAT_STEPS)
 
-    def good(steps: Real, which: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Whether steps (k, m) along some (k,) of the ways are within the limit."""
-        points = np.repeat(x[:, None], steps.size, axis=1).reshape(-1, *steps.shape)
-        points[along[which], np.arange(which.size)] += steps
-        return np.asarray(judge.scores(form, points.reshape(x.size, -1)) <= limit).reshape(steps.shape)
+    def reach(way: Real) -> float:
+        """The share of a way (n,) from x that is within the limit."""
 
-    reach = ends - x[along]
-    steps = np.geomspace(AT_ORIGIN, 1.0, FLAT_STEPS) * reach[:, None]
-    bad = ~good(steps, ways)
-    (cut,) = np.nonzero(bad.any(axis=1))
-    if cut.size:
-        first = bad[cut].argmax(axis=1)
-        low, high = np.where(first > 0, steps[cut, first - 1], 0.0), steps[cut, first]
-        for _ in range(FLAT_HALVINGS):
-            middle = (low + high) / 2
-            is_good = good(middle[:, None], cut)[:, 0]
-            low, high = np.where(is_good, middle, low), np.where(is_good, high, middle)
-        reach[cut] = low
-    found = form.coefficients((x[along] + reach).reshape(form.size, 2))
-    bounds = [each.bounds for each in form.free]
-    whole = ~np.isin(ways, cut).reshape(form.size, 2)
-    return {
-        name: (low if all_low else float(a), high if all_high else float(b))
-        for name, (a, b), (all_low, all_high), (low, high) in zip(form.names, found, whole, bounds, strict=True)
-    }
+        def excess(share: Any) -> Real:
+            return judge.scores(form, x[:, None] + way[:, None] * np.atleast_1d(share)) - limit
+
+        is_beyond = excess(shares) > 0
+        first = int(is_beyond.argmax())
+        if not is_beyond[first]:
+            return 1.0
+        return float(bisect(lambda share: float(excess(share)[0]), shares[first - 1] if first else 0.0, shares[first]))
+
+    found = {}
+    for place, each in enumerate(form.free):
+        ways = [np.eye(form.size)[place] * (end - x) for end in form.box]
+        low, high = (
+            bound if share == 1.0 else float(form.coefficients(x + share * way)[place])
+            for bound, way, share in zip(each.bounds, ways, map(reach, ways), strict=True)
+        )
+        found[each.name] = (low, high)
+    return found

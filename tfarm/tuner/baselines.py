@@ -188,9 +188,11 @@ class Outcome(NamedTuple):
     `tip_error` [m] is the distance of the tip from its target at the end; None of an unstable loop, and of the bound.
     """
 
-    cost: Annotated[float, Quantity("cost")]
-    residual: Annotated[float | None, Quantity("residual root moment", "N m rms")]
-    tip_error: Annotated[float | None, Quantity(help="tip error [m]")]
+    cost: Annotated[float, Quantity("cost", help="T sum of (a x^2 + b e^2)/2 over the slew; infinite if unstable")]
+    residual: Annotated[
+        float | None, Quantity("residual root moment", "N m rms", help="after the slew, less that of a rigid arm")
+    ]
+    tip_error: Annotated[float | None, Quantity(help="tip error at the end [m]")]
 
     def as_text(self, digits: int) -> str:
         """The cost."""
@@ -206,16 +208,21 @@ class Outcomes:
     unshaped one.  `proven`: whether the tuner's guard is certified for this loop too.
     """
 
-    condition: Annotated[str, Quantity("condition")]
-    without: Annotated[Outcome, Quantity("no moment feedback", digits=4)]
-    best_constant: Annotated[Outcome, Quantity("constant", digits=4)]
-    own_constant: Annotated[Outcome, Quantity("own constant", digits=4)]
-    own_gain: Annotated[float, Quantity()]
-    ZV: Annotated[Outcome, Quantity("ZV", digits=4)]
-    EI: Annotated[Outcome, Quantity("EI", digits=4)]
-    tuner: Annotated[Outcome, Quantity("tuner", digits=4)]
-    bound: Annotated[Outcome, Quantity("LQ bound", digits=4)]
-    proven: Annotated[bool, Quantity("guard certified")]
+    condition: Annotated[str, Quantity("condition", help="arm, converters and delay of the comparison")]
+    without: Annotated[Outcome, Quantity("no moment feedback", digits=4, help="servo alone")]
+    best_constant: Annotated[
+        Outcome, Quantity("constant", digits=4, help="best constant gain of the training condition")
+    ]
+    own_constant: Annotated[Outcome, Quantity("own constant", digits=4, help="best constant gain of this condition")]
+    own_gain: Annotated[float, Quantity(help="best constant moment gain of this condition")]
+    ZV: Annotated[Outcome, Quantity("ZV", digits=4, help="zero-vibration input shaper, without moment feedback")]
+    EI: Annotated[Outcome, Quantity("EI", digits=4, help="extra-insensitive input shaper, without moment feedback")]
+    tuner: Annotated[Outcome, Quantity("tuner", digits=4, help="trained network")]
+    bound: Annotated[
+        Outcome,
+        Quantity("LQ bound", digits=4, help="linear-quadratic optimum with full state and preview: a lower bound"),
+    ]
+    proven: Annotated[bool, Quantity("guard certified", help="whether the guard of the training is certified here too")]
 
 
 @dataclass(frozen=True)

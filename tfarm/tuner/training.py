@@ -296,22 +296,32 @@ class LearningCurves:
     """
 
     costs: Real
-    final: Annotated[Real, Quantity(key="final_cost")]
-    diverged: Annotated[int, Quantity("seeds diverged", key="diverged")]
-    died: Annotated[int, Quantity("seeds died at K = 0", key="died")]
+    final: Annotated[
+        Real, Quantity(key="final_cost", help="cost with the trained network of each seed; infinite if diverged")
+    ]
+    diverged: Annotated[int, Quantity("seeds diverged", key="diverged", help="trainings with an unstable trial")]
+    died: Annotated[int, Quantity("seeds died at K = 0", key="died", help="trainings whose gain went to zero")]
 
     @property
-    def seeds(self) -> Annotated[int, Quantity("seeds")]:
+    def seeds(self) -> Annotated[int, Quantity("seeds", help="trainings from different initial weights")]:
         """Number of seeds."""
         return int(self.final.size)
 
     @property
-    def final_quartiles(self) -> Annotated[list[float], Quantity("final cost, quartiles and median", digits=4)]:
+    def final_quartiles(
+        self,
+    ) -> Annotated[
+        list[float], Quantity("final cost, quartiles and median", digits=4, help="over the seeds: 25 %, 50 % and 75 %")
+    ]:
         """Lower quartile, median and upper quartile of the final costs."""
         return [self.final_quantile(share) for share in QUARTILES]
 
     @property
-    def quartile_curves(self) -> Annotated[dict[str, Real], Quantity(flat=True)]:
+    def quartile_curves(
+        self,
+    ) -> Annotated[
+        dict[str, Real], Quantity(flat=True, help="cost after each trial: 25 %, 50 % and 75 % over the seeds")
+    ]:
         """The same of the cost after each trial."""
         names = ("lower_quartile", "median", "upper_quartile")
         return {name: self.quantile(share) for name, share in zip(names, QUARTILES, strict=True)}

@@ -13,7 +13,7 @@ import numpy as np
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
 from tfarm.arm.checks import whole
 from tfarm.arrays import Real
-from tfarm.dsp import Chain, Simulation, Simulator, scenario
+from tfarm.dsp import Chain, Simulator, scenario
 from tfarm.dsp.chain import Reading, chain_or_usual
 from tfarm.dsp.results import RESIDUAL, Run, enough_modes, ideal_chain, residual_moment_rms, residual_raw_moment_rms
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
@@ -213,9 +213,39 @@ def learning_curves(tuning: Tuning, seeds: int, advance: Advance | None = None) 
 class Baseline(NamedTuple):
     """The cost of a slew with a baseline."""
 
-    name: Annotated[str, Quantity("controller")]
-    cost: Annotated[float, Quantity("cost of a slew", digits=4)]
-    later: Annotated[float | None, Quantity("arrives later", "s", 3)] = None
+    name: Annotated[str, Quantity("controller", help="tuner or baseline")]
+    cost: Annotated[float, Quantity("cost of a slew", digits=4, help="T sum of (a x^2 + b e^2)/2 over its samples")]
+    later: Annotated[float | None, Quantity("arrives later", "s", 3, "delay of the shaped slew")] = None
+
+
+class SlewEnd(NamedTuple):
+    """End of the slew through the converters: with the tuner, with the best constant gain, without moment feedback."""
+
+    residual: Annotated[
+        float | None,
+        Quantity(RESIDUAL, "N m rms", key="residual_moment_rms", help="after the slew, less that of a rigid arm"),
+    ]
+    residual_raw: Annotated[
+        float | None, Quantity(key="residual_raw_moment_rms", help="rms of the root moment after the slew [N m]")
+    ]
+    residual_without: Annotated[float | None, Quantity("without moment feedback", "N m rms", help="its residual")]
+    tip_error: Annotated[float | None, Quantity("tip error at the end", "m", 3, "distance from the target")]
+    tip_error_constant: Annotated[
+        float | None,
+        Quantity("with the best constant gain", "m", 3, "its tip error", key="tip_error_best_constant_m"),
+    ]
+    tip_error_without: Annotated[float | None, Quantity("and without moment feedback", "m", 3, "its tip error")]
+
+    @classmethod
+    def of(cls, tuning: Tuning) -> SlewEnd:
+        """The end of the trial of a tuning."""
+        simulator, gain = tuning.trial.simulator(), tuning.gain()
+        runs = gain.run(simulator), simulator.linear(tuning.constant), simulator.linear(gain.servo)
+        tuned, _, without = runs
+        return cls(
+            residual_moment_rms(tuned), residual_raw_moment_rms(tuned), residual_moment_rms(without),
+            *(tip_off(run, tuning.trial) for run in runs),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -223,16 +253,23 @@ class TuningResult:
     """A tuning with its figures, and optionally its learning curves and a comparison."""
 
     tuning: Tuning
-    curves: Annotated[LearningCurves | None, Quantity("learning curves")] = None
-    comparison: Annotated[list[Outcomes] | None, Quantity("compared in other conditions")] = None
+    curves: Annotated[
+        LearningCurves | None, Quantity("learning curves", help="cost after each trial over several seeds")
+    ] = None
+    comparison: Annotated[
+        list[Outcomes] | None,
+        Quantity("compared in other conditions", help="the same controllers with converters, delay and on other arms"),
+    ] = None
 
     @property
-    def arm(self) -> Annotated[str, Quantity("arm")]:
+    def arm(self) -> Annotated[str, Quantity("arm", help="name of the arm")]:
         """The name of the arm."""
         return self.tuning.trial.arm.name
 
     @property
-    def plan(self) -> Annotated[dict[str, Any], Quantity("plan", flat=True)]:
+    def plan(
+        self,
+    ) -> Annotated[dict[str, Any], Quantity("plan", flat=True, help="options of learning, servo and cost")]:
         """Mode, rule, constants and seed of the learning, gains of the servo, and weights of the cost."""
         plan = self.tuning.plan
         return {
@@ -242,17 +279,19 @@ class TuningResult:
         }  # fmt: skip
 
     @property
-    def trials(self) -> Annotated[int, Quantity("trials")]:
+    def trials(self) -> Annotated[int, Quantity("trials", help="slews of the training")]:
         """Number of trials."""
         return int(self.tuning.training.costs.size)
 
     @property
-    def costs(self) -> Annotated[Real, Quantity("cost", curve=True, key="cost")]:
+    def costs(self) -> Annotated[Real, Quantity("cost", curve=True, key="cost", help="cost of each trial")]:
         """The cost of each trial."""
         return self.tuning.training.costs
 
     @property
-    def baselines(self) -> Annotated[list[Baseline], Quantity("compared with baselines")]:
+    def baselines(
+        self,
+    ) -> Annotated[list[Baseline], Quantity("compared with baselines", help="costs of the same slew")]:
         """The costs with the tuner and with the baselines."""
         tuning, shaped = self.tuning, self.tuning.shaped_costs
         constant = f"best constant gain, K = {tuning.best_constant.gain:.4g}"
@@ -266,7 +305,7 @@ class TuningResult:
         ]
 
     @property
-    def numbers(self) -> Annotated[dict[str, Any], Quantity(flat=True)]:
+    def numbers(self) -> Annotated[dict[str, Any], Quantity(flat=True, help="costs of tuner and baselines")]:
         """The same numbers by name."""
         tuning = self.tuning
         costs, late = tuning.shaped_costs, tuning.shaped_delays
@@ -283,83 +322,49 @@ class TuningResult:
         }
 
     @property
-    def gain(self) -> Annotated[dict[str, Real], Quantity()]:
+    def gain(self) -> Annotated[dict[str, Real], Quantity(help="moment gain K at the times t of the tuned slew")]:
         """The moment gain over time, tuned."""
         return {"t": self.tuning.training.result.t, "K": self.tuning.training.result.K}
 
     @property
-    def gain_range(self) -> Annotated[tuple[float, float], Quantity("moment gain", digits=4)]:
+    def gain_range(
+        self,
+    ) -> Annotated[
+        tuple[float, float], Quantity("moment gain", digits=4, help="least and largest during the tuned slew")
+    ]:
         """The least and the largest moment gain."""
         K = self.tuning.training.result.K
         return float(K.min()), float(K.max())
 
     @cached_property
-    def _runs(self) -> tuple[Simulation, Simulation, Simulation]:
-        return _runs(self.tuning)
+    def end(self) -> Annotated[SlewEnd, Quantity(flat=True, help="residual moment and tip error of the slew")]:
+        """The end of the slew, tuned and not."""
+        return SlewEnd.of(self.tuning)
 
     @property
-    def residual_moment(self) -> Annotated[float | None, Quantity(RESIDUAL, "N m rms", key="residual_moment_rms")]:
-        """The residual with the tuner, less the rigid arm's."""
-        return residual_moment_rms(self._runs[0])
-
-    @property
-    def residual_raw(self) -> Annotated[float | None, Quantity(key="residual_raw_moment_rms")]:
-        """The same of the root moment itself."""
-        return residual_raw_moment_rms(self._runs[0])
-
-    @property
-    def residual_without(self) -> Annotated[float | None, Quantity("without moment feedback", "N m rms")]:
-        """The residual without moment feedback."""
-        return residual_moment_rms(self._runs[2])
-
-    @property
-    def tip_error(self) -> Annotated[float | None, Quantity("tip error at the end", "m", 3)]:
-        """Distance of the tip from its target at the end, tuned."""
-        return tip_off(self._runs[0], self.tuning.trial)
-
-    @property
-    def tip_error_constant(self) -> Annotated[float | None, Quantity("with the best constant gain", "m", 3,
-                                                                     key="tip_error_best_constant_m")]:  # fmt: skip
-        """The same with the best constant gain."""
-        return tip_off(self._runs[1], self.tuning.trial)
-
-    @property
-    def tip_error_without(self) -> Annotated[float | None, Quantity("and without moment feedback", "m", 3)]:
-        """The same without moment feedback."""
-        return tip_off(self._runs[2], self.tuning.trial)
-
-    @property
-    def guard(self) -> Annotated[Guard, Quantity("guard of the gain")]:
+    def guard(self) -> Annotated[Guard, Quantity("guard of the gain", help="interval that the gain cannot leave")]:
         """The interval of the tuner's gain, and its certificate."""
         return self.tuning.training.guard
 
     @property
-    def reached(self) -> Annotated[bool, Quantity(key="reached_preset_error")]:
+    def reached(
+        self,
+    ) -> Annotated[
+        bool, Quantity(key="reached_preset_error", help="whether training ended at the rms error asked for")
+    ]:
         """Whether the preset error was reached."""
         return self.tuning.training.reached
 
     @property
-    def stopped(self) -> Annotated[str | None, Quantity("stopped")]:
+    def stopped(self) -> Annotated[str | None, Quantity("stopped", help="trial and sample where training diverged")]:
         """The reason of an early end of the training."""
         stopped = self.tuning.training.stopped
         return None if stopped is None else str(stopped)
 
     @property
-    def weights(self) -> Annotated[dict[str, Any], Quantity()]:
+    def weights(self) -> Annotated[dict[str, Any], Quantity(help="weights of the network and scales of its inputs")]:
         """Every weight of the network."""
         return weights_of(self.tuning.training.network)
-
-
-def tip_errors(tuning: Tuning) -> dict[str, float | None]:
-    """Distance of the tip from its target [m] at the end: tuned, best constant gain, without moment feedback."""
-    keys = ("tip_error_m", "tip_error_best_constant_m", "tip_error_without_m")
-    return {key: tip_off(run, tuning.trial) for key, run in zip(keys, _runs(tuning), strict=True)}
-
-
-def _runs(tuning: Tuning) -> tuple[Simulation, Simulation, Simulation]:
-    """The trial through the converters: tuned, with the best constant gain, without moment feedback."""
-    simulator, gain = tuning.trial.simulator(), tuning.gain()
-    return gain.run(simulator), simulator.linear(tuning.constant), simulator.linear(gain.servo)
 
 
 def controlled_run(
