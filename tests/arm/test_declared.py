@@ -5,9 +5,12 @@ from dataclasses import dataclass
 import pytest
 from pydantic import ValidationError
 
-from tfarm.arm import schema
-from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES
+from tfarm.arm import load, schema
+from tfarm.arm.law_tables import LawTable, SignalTable
+from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, ArmTable, LinkTable, file_keys
+from tfarm.dsp.chain import CHAIN_TABLES
 from tfarm.errors import ParameterError
+from tfarm.fitting.recording import RunTable
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,3 +85,36 @@ def test_what_a_file_may_say_is_what_it_was_before_records_declared_it():
         "tube": {"shape", "outer_diameter", "inner_diameter", "shear_factor"},
         "general": {"shape", "area", "second_moment", "shear_factor"},
     }  # fmt: skip
+
+
+FILE_TABLES = {
+    "top": [ArmTable], "link": [LinkTable], "link.section": SHAPE_TABLES.values(), "law": [LawTable],
+    "law.SIGNAL": [SignalTable], "measured": [RunTable],
+    **{name: [table] for name, table in (ARM_TABLES | CHAIN_TABLES).items() if name not in ("", "link")},
+}  # fmt: skip
+
+
+def test_each_key_of_a_file_has_one_label_unit_and_meaning():
+    keys = {f"{place}.{key}" for place, tables in FILE_TABLES.items() for table in tables for key in table.model_fields}
+    assert file_keys().keys() == keys | {"sensor.gain", "sensor.delay"}
+    for key, of in file_keys().items():
+        assert of.label
+        assert len(of.help.split()) > 1, key
+    numbers = {key for key in keys if key.startswith("link.") and key.split(".")[-1] not in ("section", "shape")}
+    assert {key for key in numbers if not file_keys()[key].unit} == {"link.poissons_ratio", "link.section.shear_factor"}
+
+
+@pytest.mark.parametrize(
+    ("key", "label", "unit"),
+    [
+        ("link.2.section.width", "width of the section", "m"),
+        ("attachment.1.stiffness", "attached stiffness", "N/m"),
+        ("hub.stiffness", "hub stiffness", "N m/rad"),
+        ("gain:2", "sensor gain", ""),
+        ("theory", "beam theory", ""),
+        ("actuator.torque_limit", "limit of the input", "A"),
+    ],
+)
+def test_a_number_of_a_file_is_found_by_its_place(key, label, unit):
+    found = schema.file_key(key, load("quanser-2dsfl"))  # driven by a current
+    assert (found.label, found.unit) == (label, unit)

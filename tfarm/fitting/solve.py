@@ -30,7 +30,7 @@ import numpy as np
 from scipy.optimize import brentq, least_squares
 from scipy.special import chdtrc, ndtri, stdtrit
 
-from tfarm.arm.writing import number_unit
+from tfarm.arm.schema import file_key
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
@@ -345,8 +345,8 @@ def confidence_intervals(
             low, high = _one_sided(found, n, quantile)
             words[alone[n]] = words[alone[n]] if low is None else ""
         fitted.append(Fitted(
-            key=each.key, unit=number_unit(each.key), value=each.value(point), low=low, high=high, deviation=deviation,
-            identified=low is not None and high is not None, start=each.start,
+            key=each.key, unit=file_key(each.key).unit or "1", value=each.value(point), low=low, high=high,
+            deviation=deviation, identified=low is not None and high is not None, start=each.start,
         ))  # fmt: skip
         if (low is None) != (high is None):
             end = f"at most {high:.4g}" if low is None else f"at least {low:.4g}"
