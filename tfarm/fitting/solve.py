@@ -154,7 +154,7 @@ class Solution:
     residuals: Real
     jacobian: Real
     converged: bool
-    starts: Annotated[int, Quantity()]
+    starts: Annotated[int, Quantity(help="number of starting points that were tried")]
 
     @property
     def chi_squared(self) -> float:
@@ -294,14 +294,22 @@ class Fitted:
     A number that the data do not determine has no interval.
     """
 
-    key: Annotated[str, Quantity("number")]
-    unit: Annotated[str, Quantity("unit")]
-    value: Annotated[float, Quantity("value")]
-    low: Annotated[float | None, Quantity("95 % interval from")]
-    high: Annotated[float | None, Quantity("to")]
-    deviation: Annotated[float | None, Quantity("standard deviation", digits=3, key="std")]
-    identified: Annotated[bool, Quantity("identified")]
-    start: Annotated[float, Quantity()]
+    key: Annotated[str, Quantity("number", help="key of the number in the arm's file, or the sensor's gain or delay")]
+    unit: Annotated[str, Quantity("unit", help="SI unit of the number")]
+    value: Annotated[float, Quantity("value", help="best value")]
+    low: Annotated[
+        float | None,
+        Quantity("95 % interval from", help="lower end of the interval; none where the data set no lower bound"),
+    ]
+    high: Annotated[
+        float | None, Quantity("to", help="upper end of the interval; none where the data set no upper bound")
+    ]
+    deviation: Annotated[
+        float | None,
+        Quantity("standard deviation", digits=3, key="std", help="by the covariance of the linearised residuals"),
+    ]
+    identified: Annotated[bool, Quantity("identified", help="whether the data bound the number on both sides")]
+    start: Annotated[float, Quantity(help="value at which the search began")]
 
 
 class BetterError(Exception):
