@@ -1,4 +1,4 @@
-"""A table of the file is what its record's constructor asks for: keys, types and defaults, each said once."""
+"""A table of the file is what its record's constructor asks for: keys, types and defaults, each declared once."""
 
 from dataclasses import dataclass
 

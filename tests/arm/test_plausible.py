@@ -86,9 +86,9 @@ def test_the_damping_ratio_is_that_of_the_exact_clamped_link():
     """C w/2 by the formula against the exact eigenvalue of the arm with its hub locked."""
     arm = tfarm.Arm(link=beam("steel", slenderness=200.0, damping=0.02), hub=Hub(inertia=math.inf))
     (text,) = implausible(arm)
-    said = float(re.search(r"ratio of ([\d.]+)", text)[1])
+    named = float(re.search(r"ratio of ([\d.]+)", text)[1])
     exact = tfarm.damped_modes(tfarm.modes(arm, count=1)).damping_ratio[0]
-    assert said == pytest.approx(exact, rel=0.05)  # two printed digits; shear and rotary inertia are 1e-4 at L/h = 200
+    assert named == pytest.approx(exact, rel=0.05)  # two printed digits; shear and rotary inertia are 1e-4 at L/h = 200
 
 
 def test_of_the_presets_only_the_misprint_is_named():

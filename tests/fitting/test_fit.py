@@ -1,4 +1,4 @@
-"""Arms fitted to responses of finite elements with noise, and to decays; what the data leave open is message."""
+"""Arms fitted to responses of finite elements with noise, and to decays; what the data leave open is reported."""
 
 import math
 import tomllib
@@ -142,7 +142,7 @@ def test_decays_alone():
 
 
 def test_noise_by_its_coherence_and_by_its_scatter():
-    """Coherence of n averages: sqrt((1 - g)/(2 n g)) of each part; with nothing message, the values' own scatter."""
+    """Coherence of n averages: sqrt((1 - g)/(2 n g)) of each part; with neither known, the values' own scatter."""
     rng, sigma = np.random.default_rng(3), 0.03
     H = 1 / (1 + 1j * OMEGA / 100)
     values = H + sigma * abs(H) * (rng.standard_normal(OMEGA.size) + 1j * rng.standard_normal(OMEGA.size))

@@ -21,7 +21,7 @@ from tfarm.arm.checks import INPUTS, THEORIES
 from tfarm.arm.link import Link, Section
 from tfarm.arm.records import MOST_PARTS, Arm
 from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring
-from tfarm.errors import MISSING, ParameterError, did_you_mean
+from tfarm.errors import MISSING, ParameterError, did_you_mean, require
 from tfarm.schema import Quantity
 
 _Strict = TypeVar("_Strict", bound="StrictTable")
@@ -131,17 +131,11 @@ class LinkTable(TomlTable):
 
     def build(self) -> Link:
         given = {**self.given(), "section": self.section.build()}
-        if self.shear_modulus is None and self.poissons_ratio is None:
-            raise ParameterError(
-                key="link.shear_modulus", value=MISSING, remedy="give it in Pa, or give poissons_ratio"
-            )
-        if self.shear_modulus is not None and self.poissons_ratio is not None:
-            raise ParameterError(
-                key="link.poissons_ratio",
-                value=self.poissons_ratio,
-                remedy="shear_modulus is given too, and one follows from the other; leave one out",
-            )
-        return Link(**given) if self.poissons_ratio is None else Link.isotropic(**given)
+        G, nu = self.shear_modulus, self.poissons_ratio
+        require(G is not None or nu is not None, "link.shear_modulus", MISSING, "give it in Pa, or give poissons_ratio")
+        remedy = "shear_modulus is given too, and one follows from the other; leave one out"
+        require(G is None or nu is None, "link.poissons_ratio", nu, remedy)
+        return Link(**given) if nu is None else Link.isotropic(**given)
 
 
 @of(Hub)

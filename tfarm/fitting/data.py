@@ -33,7 +33,7 @@ from tfarm.arm.reading import decoded
 from tfarm.arrays import Complex, Real
 from tfarm.columns import Column, Table
 from tfarm.digits import general, singly
-from tfarm.errors import MISSING, ParameterError, did_you_mean, naming
+from tfarm.errors import MISSING, ParameterError, did_you_mean, naming, require
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.files import read_file
 from tfarm.records import record
@@ -45,12 +45,6 @@ LEAST_SHARE = 1e-5  # of |H|: no measured response is better known than that, wh
 SCATTER_NEIGHBOURS = 2  # neighbours on each side that a value is compared with
 SIX, NINE = singly(general, 6), singly(general, 9)  # digits of what was measured, and of the frequencies of its lines
 TYPICAL = 1.17741  # the median of |x + i y| of normal x and y of deviation 1: sqrt(2 ln 2)
-
-
-def require(is_met: object, key: str, value: object, remedy: str, file: str | None = None) -> None:
-    """Raise ParameterError unless a condition is met."""
-    if not is_met:
-        raise ParameterError(key=key, value=value, remedy=remedy, file=file)
 
 
 def require_all(key: str, values: Real, is_good: NDArray[np.bool_], remedy: str) -> None:

@@ -27,14 +27,14 @@ from tfarm.arm.schema import file_key
 from tfarm.arm.writing import to_toml
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.digits import listed
-from tfarm.errors import ConvergenceError
+from tfarm.errors import ConvergenceError, require
 from tfarm.files import write_file
 from tfarm.loop.plane import gain_map
 from tfarm.records import record
 from tfarm.response import transfer
 from tfarm.schema import Quantity
 
-from .data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of, require
+from .data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of
 from .model import Parameter, Problem, Response, RingMode, parameters
 from .overlay import ResonanceShift, ratio_of, resonance_shifts
 from .solve import (
@@ -127,7 +127,7 @@ class Fit:
     @property
     def finding(self) -> str:
         """The numbers, and chi-squared."""
-        numbers = ", ".join(f"{each.key} = {each.value:.6g}" for each in self.parameters)
+        numbers = ", ".join(f"{each.label} = {each.value:.6g}" for each in self.parameters)
         return f"{numbers}; chi-squared {self.chi_squared:.4g} of {self.freedom}"
 
     @property
@@ -290,8 +290,8 @@ def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
         labels = [file_key(key).label for key in family.keys if is_named(key, family.value(key), text)]
         mark = f"Before the fit of {listed(labels)}: " if labels else ""
         texts.append(text if text.startswith(mark) else mark + text)
-    numbers = [(file_key(each.key), each.value) for each in fit.parameters if "." in each.key]
-    values = [f"{of.label} = {value:.6g} {of.unit}".rstrip() for of, value in numbers] or ["sensors alone"]
+    numbers = [(each.label, each.value, file_key(each.key).unit) for each in fit.parameters if "." in each.key]
+    values = [f"{label} = {value:.6g} {unit}".rstrip() for label, value, unit in numbers] or ["sensors alone"]
     texts.append(f"Fitted: {listed(values)}, from the arm {fit.before.name}; {fit.in_words}.")
     for each in fit.responses:
         file, digest = Path(each.source).name, each.digest or "none"

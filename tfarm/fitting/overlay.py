@@ -24,7 +24,7 @@ import numpy as np
 from tfarm.arm import INPUTS, Arm, Input, must_be_arm
 from tfarm.arrays import Complex, Real
 from tfarm.columns import Column, Table
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.records import record
 from tfarm.response import TransferFunction, transfer
 from tfarm.response.frequency import HERTZ, refined_grid, without_cancelled
@@ -34,7 +34,7 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum import modes_below
 
-from .data import Measured, Noise, check_signal, must_be_measured, noise_of, require, unit_over
+from .data import Measured, Noise, check_signal, must_be_measured, noise_of, unit_over
 from .resonances import (
     PARTNERS_BEYOND,
     Resonance,

@@ -48,12 +48,12 @@ from tfarm.dsp.chain import TIME_ROUNDING, Chain
 from tfarm.dsp.results import enough_modes
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
-from tfarm.errors import MISSING, did_you_mean, must_be_known, naming
+from tfarm.errors import MISSING, did_you_mean, must_be_known, naming, require
 from tfarm.files import read_mat
 from tfarm.records import record
 from tfarm.schema import Quantity
 
-from .data import MOST_RECORD_BYTES, Measured, check_signal, read_sheet, require
+from .data import MOST_RECORD_BYTES, Measured, check_signal, read_sheet
 
 TIMES = ("t", "time")  # names of the column of times
 JITTER = 0.1  # of the period: a sample further off its place has been dropped or doubled, or the sampling is uneven

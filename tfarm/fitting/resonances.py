@@ -39,12 +39,12 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, stdtrit
 
 from tfarm.arrays import Complex, Real
-from tfarm.errors import ConvergenceError
+from tfarm.errors import ConvergenceError, require
 from tfarm.records import record
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Quantity
 
-from .data import CONFIDENCE, Measured, in_parts, require
+from .data import CONFIDENCE, Measured, in_parts
 
 if TYPE_CHECKING:
     from .recording import Recording

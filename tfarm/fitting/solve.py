@@ -294,7 +294,8 @@ class Fitted:
     A number that the data do not determine has no interval.
     """
 
-    key: Annotated[str, Quantity("number", help="key of the number in the arm's file, or the sensor's gain or delay")]
+    label: Annotated[str, Quantity("number", help="name and symbol of the fitted number")]
+    key: Annotated[str, Quantity("key", help="key of the number in the arm's file, or the sensor's gain or delay")]
     unit: Annotated[str, Quantity("unit", help="SI unit of the number")]
     value: Annotated[float, Quantity("value", help="best value")]
     low: Annotated[
@@ -352,8 +353,9 @@ def confidence_intervals(
         elif n in alone:
             low, high = _one_sided(found, n, quantile)
             words[alone[n]] = words[alone[n]] if low is None else ""
+        of = file_key(each.key)
         fitted.append(Fitted(
-            key=each.key, unit=file_key(each.key).unit or "1", value=each.value(point), low=low, high=high,
+            label=of.label, key=each.key, unit=of.unit or "1", value=each.value(point), low=low, high=high,
             deviation=deviation, identified=low is not None and high is not None, start=each.start,
         ))  # fmt: skip
         if (low is None) != (high is None):
