@@ -28,6 +28,7 @@ _Strict = TypeVar("_Strict", bound="StrictTable")
 _Table = TypeVar("_Table", bound="TomlTable")
 _Part = TypeVar("_Part")
 LOOP_TABLES = ("sampling", "converters", "actuator", "slew", "law")  # of the loop: read by other rooms
+OF_INPUT = "N m, V or A"  # unit of a limit of the input
 AT_THE_TOP = ("name", "assumptions", "theory", "input")  # keys before the first table
 
 
@@ -131,10 +132,15 @@ class LinkTable(TomlTable):
 
     def build(self) -> Link:
         given = {**self.given(), "section": self.section.build()}
-        G, nu = self.shear_modulus, self.poissons_ratio
-        require(G is not None or nu is not None, "link.shear_modulus", MISSING, "give it in Pa, or give poissons_ratio")
+        nu = self.poissons_ratio
+        require(
+            self.shear_modulus is not None or nu is not None,
+            "link.shear_modulus",
+            MISSING,
+            "give it in Pa, or give poissons_ratio",
+        )
         remedy = "shear_modulus is given too, and one follows from the other; leave one out"
-        require(G is None or nu is None, "link.poissons_ratio", nu, remedy)
+        require(self.shear_modulus is None or nu is None, "link.poissons_ratio", nu, remedy)
         return Link(**given) if nu is None else Link.isotropic(**given)
 
 
@@ -214,12 +220,12 @@ def file_keys() -> dict[str, Quantity]:
 def file_key(key: str, arm: Arm | None = None) -> Quantity:
     """Return label, unit and meaning of a number such as "link.2.section.width", or of a sensor's "gain:1".
 
-    The unit "input" is that of the arm's input where the arm is given.
+    A unit that is that of the arm's input is one of `OF_INPUT` where the arm is given, else all three.
     """
     words = [word for word in key.partition(":")[0].split(".") if not word.isdecimal()]
     place = ["top" if words[0] in AT_THE_TOP else "sensor"] if len(words) == 1 else []
     found = file_keys()[".".join((*place, *words))]
-    return replace(found, unit=arm.input_unit) if arm is not None and found.unit == "input" else found
+    return replace(found, unit=arm.input_unit) if arm is not None and found.unit == OF_INPUT else found
 
 
 def _within(place: str, build: Callable[[], _Part]) -> _Part:

@@ -69,9 +69,12 @@ def pumped_text() -> str:
     )
 
 
-V_PRINTED, V = printed("(15)"), formula_of("(15)")
+V_PRINTED = printed("(15)")
+V = formula_of("(15)")
 RATE = formula_of("(16)")
-POWER_FLOW, CONTROL_LAW, DECAY = formula_of("(18)"), formula_of("(19)"), formula_of("(20)")
+POWER_FLOW = formula_of("(18)")
+CONTROL_LAW = formula_of("(19)")
+DECAY = formula_of("(20)")
 a1, a2, a3, u, theta_t = (*symbols("a1 a2 a3 u"), jet("theta", t=1))
 M0 = parsed("E*I*phi_x(0,t)")
 

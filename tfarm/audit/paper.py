@@ -116,7 +116,8 @@ def density_in_numbers() -> str:
     )
 
 
-INCREMENT, UPDATE = formula_of("(21)"), formula_of("(22)")
+INCREMENT = formula_of("(21)")
+UPDATE = formula_of("(22)")
 INPUT_NEURONS = 6  # neurons, section 5
 
 

@@ -285,7 +285,8 @@ def fit(
 
 def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
     """The arm's assumptions, those that name a fitted number marked as of the start, then the fit and its data."""
-    family, texts = fit.solution.problem.family, []
+    family = fit.solution.problem.family
+    texts: list[str] = []
     for text in before:
         labels = [file_key(key).label for key in family.keys if is_named(key, family.value(key), text)]
         mark = f"Before the fit of {listed(labels)}: " if labels else ""
@@ -294,8 +295,8 @@ def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
     values = [f"{label} = {value:.6g} {unit}".rstrip() for label, value, unit in numbers] or ["sensors alone"]
     texts.append(f"Fitted: {listed(values)}, from the arm {fit.before.name}; {fit.in_words}.")
     for each in fit.responses:
-        file, digest = Path(each.source).name, each.digest or "none"
-        texts.append(f"Fitted to {each.label} of {file}, SHA-256 {digest}.")
+        digest = each.digest or "none"
+        texts.append(f"Fitted to {each.label} of {Path(each.source).name}, SHA-256 {digest}.")
     return (*texts, *(f"Of the fit: {words}." for words in fit.not_determined))
 
 
