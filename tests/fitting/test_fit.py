@@ -302,6 +302,8 @@ def test_rad_s_given_as_hz_are_refused(tmp_path, capsys):
         (["--mode", "1=11hz"], "name what is free"),
         (["--free", "hub.inertia,payload.mass", "--mode", "1=11hz"], "1 numbers were measured"),
         (["--free", "hub.inertia", "--mode", "1=11"], "--mode = '1=11'"),
+        (["--free", "hub.inertia", "--mode", "0=11hz"], "--mode = '0=11hz'"),
+        (["--free", "hub.inertia", "--mode", "1=11hz,1.5"], "--mode = '1=11hz,1.5'"),
         (["--free", "hub.inertia", "--start", "hub.inertia=x", "--mode", "1=11hz"], "write KEY=NUMBER"),
         (["--free", "hub.inertia", "--bounds", "hub.inertia=1,2", "--mode", "1=11hz"], "starts at 0.1"),
         (["--free", "hub.inertia", "--prior", "hub.radius=1,2", "--mode", "1=11hz"], "is not free"),

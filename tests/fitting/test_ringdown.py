@@ -119,6 +119,14 @@ def test_a_mode_left_out_and_a_frequency_that_drifts_are_noted():
     assert any("mode 1 rings at" in note and "friction" in note for note in notes)
 
 
+def test_a_half_that_does_not_determine_a_frequency_has_none():
+    """By the middle of the record a decay of 8 1/s is below the noise; one of 0.4 1/s is seen in both halves."""
+    noise = 0.01 * np.random.default_rng(7).standard_normal(t.size)
+    brief, long = (ring(recorded(decay(t, 40.0, zeta) + noise), "y").modes[0] for zeta in (0.2, 0.01))
+    assert (brief.first_half, brief.second_half) == (None, None)
+    assert (long.first_half, long.second_half) == pytest.approx((long.frequency,) * 2, rel=2e-3)
+
+
 def test_white_noise_is_white_with_the_probability_computed():
     rng = np.random.default_rng(4)
     found = np.array([whiteness(rng.standard_normal(200)) for _ in range(400)])

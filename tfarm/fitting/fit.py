@@ -104,7 +104,7 @@ class Fit:
             help="residuals less free numbers; chi-squared is about as large where arm and noise explain the data",
         ),
     ]
-    solution: Annotated[Solution, Quantity(flat=True)]
+    solution: Annotated[Solution, Quantity(help="best point of the search", flat=True)]
     interval_by: Annotated[
         str, Quantity("intervals by", help="profile likelihood, or covariance of the linearised residuals")
     ]
