@@ -65,7 +65,9 @@ class Candidate:
         str,
         Quantity(
             "loop",
-            help="stability of the loop with the default gains of the arm itself; no loop where the hub has no inertia",
+            "",
+            6,
+            "stability of the loop with the default gains of the arm itself; no loop where the hub has no inertia",
         ),
     ] = "no loop"
     K2_below: Annotated[float | None, Quantity(f"stable below {MOMENT_GAIN}", help="of the default loop")] = None
@@ -73,7 +75,9 @@ class Candidate:
         bool,
         Quantity(
             "stability limit there",
-            help="whether a pole reaches the imaginary axis at that gain, or the search ended there",
+            "",
+            6,
+            "whether a pole reaches the imaginary axis at that gain, or the search ended there",
         ),
     ] = False
 
@@ -101,14 +105,16 @@ class Study:
         Real,
         Quantity(
             "locked hub (I_h = inf) [rad/s]",
-            key="locked_rad_s",
-            help="limits of the frequencies for an infinite hub inertia",
+            "",
+            6,
+            "limits of the frequencies for an infinite hub inertia",
+            "locked_rad_s",
         ),
     ]
     pinned: Annotated[
         Real,
         Quantity(
-            "free pin (I_h = 0) [rad/s]", key="pinned_rad_s", help="limits of the frequencies for a hub without inertia"
+            "free pin (I_h = 0) [rad/s]", "", 6, "limits of the frequencies for a hub without inertia", "pinned_rad_s"
         ),
     ]
 

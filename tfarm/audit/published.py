@@ -213,7 +213,7 @@ class Validation:
     ) -> Annotated[
         int,
         Quantity(
-            "differ for the reason given", help="count of printed numbers with another last digit and a known cause"
+            "differ for the reason given", "", 6, "count of printed numbers with another last digit and a known cause"
         ),
     ]:
         """How many do not."""

@@ -165,8 +165,10 @@ class Noise:
         str,
         Quantity(
             "noise by",
-            key="noise",
-            help="origin of the standard deviation: sigma or coherence of the file, or scatter of the values",
+            "",
+            6,
+            "origin of the standard deviation: sigma or coherence of the file, or scatter of the values",
+            "noise",
         ),
     ]
 

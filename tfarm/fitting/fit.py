@@ -101,7 +101,9 @@ class Fit:
         int,
         Quantity(
             "degrees of freedom",
-            help="residuals less free numbers; chi-squared is about as large where arm and noise explain the data",
+            "",
+            6,
+            "residuals less free numbers; chi-squared is about as large where arm and noise explain the data",
         ),
     ]
     solution: Annotated[Solution, Quantity(help="best point of the search", flat=True)]
@@ -168,8 +170,10 @@ class Fit:
         list[float],
         Quantity(
             "peaks far from every pole of the arm [Hz]",
-            key="unexplained_peaks_hz",
-            help="measured peaks that the fitted arm does not have",
+            "",
+            6,
+            "measured peaks that the fitted arm does not have",
+            "unexplained_peaks_hz",
         ),
     ]:
         """Measured peaks that the fitted arm does not have."""
@@ -409,7 +413,9 @@ class Repeats:
         dict[str, float],
         Quantity(
             "times wider than by noise",
-            help="standard deviation over draws of records, over that by the noise within a record",
+            "",
+            6,
+            "standard deviation over draws of records, over that by the noise within a record",
         ),
     ]
 

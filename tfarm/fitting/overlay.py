@@ -65,8 +65,9 @@ class RatioRoots:
         Quantity(
             "poles and zeros up to",
             "rad/s",
-            key="roots_up_to_rad_s",
-            help="imaginary part up to which the lists are complete",
+            6,
+            "imaginary part up to which the lists are complete",
+            "roots_up_to_rad_s",
         ),
     ]
 
@@ -81,8 +82,9 @@ class RatioRoots:
         return _upper(self.zeros)
 
     @property
-    def upper_common(self) -> Annotated[Complex, Quantity("s", "1/s", help="common to both signals: they cancel",
-                                                          key="common")]:  # fmt: skip
+    def upper_common(
+        self,
+    ) -> Annotated[Complex, Quantity("s", "1/s", 6, "common to both signals: they cancel", "common")]:
         """Those with Im s >= 0."""
         return _upper(self.common)
 
@@ -204,16 +206,10 @@ class Counterpart:
         int | None,
         Quantity("mode", help="number of the arm's mode; none where the poles of the response are no modes of the arm"),
     ]
-    exact: Annotated[float, Quantity("exact", "Hz", 7, "natural frequency abs(s) of the pole of the exact response")]
+    exact: Annotated[float, Quantity("exact", "Hz", 7, "natural frequency abs(s) of the exact response's pole")]
     frequency: Annotated[
         float | None,
-        Quantity(
-            "measured",
-            "Hz",
-            7,
-            key="measured_hz",
-            help="natural frequency of the pole fitted to the measured peak, or the peak itself",
-        ),
+        Quantity("measured", "Hz", 7, "abs(s) of the pole fitted to the peak, or the peak itself", "measured_hz"),
     ]
     frequency_std: Annotated[
         float | None,
@@ -221,27 +217,15 @@ class Counterpart:
     ]
     off: Annotated[
         float | None,
-        Quantity(
-            "difference", "%", 3, key="frequency_residual_percent", help="measured over exact frequency, less one"
-        ),
+        Quantity("difference", "%", 3, "measured over exact frequency, less one", "frequency_residual_percent"),
     ]
     measured_damping: Annotated[
         float | None,
-        Quantity(
-            "measured damping ratio",
-            digits=4,
-            key="measured_damping_ratio",
-            help="of the pole fitted to the measured peak",
-        ),
+        Quantity("measured damping ratio", "", 4, "of the pole fitted to the measured peak", "measured_damping_ratio"),
     ]
     damping_std: Annotated[
         float | None,
-        Quantity(
-            "deviation",
-            digits=2,
-            key="measured_damping_ratio_std",
-            help="standard deviation of the measured damping ratio",
-        ),
+        Quantity("deviation", "", 2, "standard deviation of the measured damping ratio", "measured_damping_ratio_std"),
     ]
     level_db: Annotated[
         float | None,
@@ -249,47 +233,13 @@ class Counterpart:
     ]
     level_degrees: Annotated[
         float | None,
-        Quantity(
-            "turned",
-            "deg",
-            3,
-            key="level_degrees",
-            help="phase of the measured residue over the exact one; 180 deg is a reversed sign",
-        ),
+        Quantity("turned", "deg", 3, "phase of the residue; 180 deg is a reversed sign", "level_degrees"),
     ]
     is_peak_only: Annotated[bool, Quantity(help="whether the lines around the peak determine no pole")]
     damping_ratio: Annotated[
         float,
         Quantity("exact damping ratio", digits=4, key="exact_damping_ratio", help="of the pole of the exact response"),
     ]
-
-
-def _counterpart(
-    pole: complex, residue: complex, mode: int | None, peak: float | None, own: Resonance | None
-) -> Counterpart:
-    """A pole with its measured peak [rad/s] and resonance, if there are any."""
-    size = abs(pole)
-    ratio = abs(own.pole) / size if own is not None else None if peak is None else peak / size
-    level = own.residue / residue if own is not None and residue else None
-    return Counterpart(
-        pole=pole,
-        residue=residue,
-        peak=peak,
-        measured=own,
-        frequency_ratio=ratio,
-        level=level,
-        mode=mode,
-        exact=size / HERTZ,
-        frequency=None if ratio is None else ratio * size / HERTZ,
-        frequency_std=None if own is None else float(own.std[1]) / HERTZ,
-        off=None if ratio is None else 100 * (ratio - 1),
-        measured_damping=None if own is None else own.damping_ratio,
-        damping_std=None if own is None else float(own.std[0]) / abs(own.pole),
-        level_db=20 * math.log10(abs(level)) if level else None,
-        level_degrees=math.degrees(np.angle(level)) if level else None,
-        is_peak_only=peak is not None and own is None,
-        damping_ratio=-pole.real / size + 0.0,
-    )
 
 
 class RequiredChange(NamedTuple):
@@ -299,13 +249,7 @@ class RequiredChange(NamedTuple):
     mode: Annotated[int, Quantity("mode", help="number of the mode whose measured frequency is met")]
     change: Annotated[
         float,
-        Quantity(
-            "change",
-            "%",
-            4,
-            key="change_percent",
-            help="relative change of the number that moves the mode to its measured frequency",
-        ),
+        Quantity("change", "%", 4, "relative change that moves the mode to its measured frequency", "change_percent"),
     ]
 
 
@@ -348,8 +292,10 @@ class Overlay:
         list[float],
         Quantity(
             "measured peaks far from every pole of the arm [Hz]",
-            key="unmatched_peaks_hz",
-            help="measured peaks without a pole of the arm near them",
+            "",
+            6,
+            "measured peaks without a pole of the arm near them",
+            "unmatched_peaks_hz",
         ),
     ]:
         """Measured peaks that the arm does not have."""
@@ -388,8 +334,10 @@ class Overlay:
         tuple[RequiredChange, ...],
         Quantity(
             "single changes that explain a mode",
-            key="required_percent",
-            help="change of one number that alone moves a mode to its measured frequency",
+            "",
+            6,
+            "change of one number that alone moves a mode to its measured frequency",
+            "required_percent",
         ),
     ]:
         """A row a parameter of `Modes.sensitivity` and mode: the change of it that alone would explain the mode.
@@ -463,7 +411,31 @@ def _counterparts(
             mode = nearest if away.min() < SAME_MODE and nearest > 0 else None
         peak = None if place is None else float(measured.omega[place])
         own = None if place is None else resonance_at(measured, noise.sigma, place)
-        found.append(_counterpart(pole, ratio.residue(pole, others), mode, peak, own))
+        size = abs(pole)
+        residue = ratio.residue(pole, others)
+        at = abs(own.pole) if own is not None else peak
+        level = own.residue / residue if own is not None and residue else None
+        found.append(
+            Counterpart(
+                pole=pole,
+                residue=residue,
+                peak=peak,
+                measured=own,
+                frequency_ratio=None if at is None else at / size,
+                level=level,
+                mode=mode,
+                exact=size / HERTZ,
+                frequency=None if at is None else at / HERTZ,
+                frequency_std=None if own is None else float(own.std[1]) / HERTZ,
+                off=None if at is None else 100 * (at / size - 1),
+                measured_damping=None if own is None else own.damping_ratio,
+                damping_std=None if own is None else float(own.std[0]) / abs(own.pole),
+                level_db=20 * math.log10(abs(level)) if level else None,
+                level_degrees=math.degrees(np.angle(level)) if level else None,
+                is_peak_only=peak is not None and own is None,
+                damping_ratio=-pole.real / size + 0.0,
+            )
+        )
     return tuple(found)
 
 

@@ -270,10 +270,7 @@ class Estimate:
     independent: Annotated[
         float,
         Quantity(
-            "independent averages",
-            digits=4,
-            key="independent_averages",
-            help="segments that count as independent, by Welch (1967)",
+            "independent averages", "", 4, "segments that count as independent, by Welch (1967)", "independent_averages"
         ),
     ]
     note: Annotated[
