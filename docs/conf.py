@@ -14,7 +14,7 @@ from typer.cli import get_docs_for_click
 import tfarm
 import tfarm.cli.running  # loads every command
 from tfarm.arm.law_tables import LawTable, SignalTable
-from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, StrictTable
+from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, StrictTable, file_keys
 from tfarm.cli.app import whole_command
 from tfarm.dsp.chain import ActuatorTable, ConvertersTable, SamplingTable, SlewTable
 from tfarm.fitting.recording import RunTable
@@ -74,12 +74,13 @@ def commands_page() -> str:
 
 
 def arm_file_page() -> str:
-    """Return every table of an arm's file: key, type, default, and the record's docstring with meaning and units."""
+    """Return every table of an arm's file: key, label, unit, default and meaning, from the declaration of its keys."""
     lines = ["# Arm file", "", "Tables of an arm's TOML file, in SI units. A key without a default is required.", ""]
     for name, table in FILE_TABLES.items():
         meaning = inspect.getdoc(getattr(table, "makes", table)) or ""
         lines += [f"## {f'[{name}]' if name else 'Top of the file'}", "", " ".join(meaning.split()), ""]
-        lines += [*markdown_table(("key", "type", "default"), map(row_of, table.model_fields.items())), ""]
+        rows = (row_of(name.partition("]")[0] or "top", *field) for field in table.model_fields.items())
+        lines += [*markdown_table(("key", "label", "unit", "type", "default", "meaning"), rows), ""]
     return "\n".join(lines)
 
 
@@ -101,14 +102,14 @@ of records a list of objects. A complex number is `[real, imaginary]`, an infini
     return "\n".join(lines)
 
 
-def row_of(field: tuple[str, Any]) -> list[str]:
+def row_of(place: str, key: str, known: Any) -> list[str]:
     """Return the cells of one key of a file's table."""
-    key, known = field
+    words = file_keys()[f"{place}.{key}"]
     made = known.annotation.__name__ if isinstance(known.annotation, type) else str(known.annotation)
     is_table = "Table" in made or key == "section"
     kind = "table" if is_table else made.replace("typing.", "").replace("|", "or")
     default = "" if known.default is PydanticUndefined or is_table else f"`{known.default!r}`"
-    return [f"`{key}`", kind, default]
+    return [f"`{key}`", words.label, words.unit, kind, default, words.help]
 
 
 myst_substitutions = {

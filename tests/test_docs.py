@@ -35,8 +35,8 @@ def test_every_key_of_an_arm_file_is_on_its_page(conf):
     page = conf.arm_file_page()
     for table in (*ARM_TABLES.values(), *SHAPE_TABLES.values(), *conf.FILE_TABLES.values()):
         assert all(f"| `{key}` |" in page for key in table.model_fields)
-    assert "| `friction` | float | `0.0` |" in page
-    assert "| `inertia` | float |  |" in page
+    assert "| `friction` | hub friction b | N m s/rad | float | `0.0` | viscous torque" in page
+    assert "| `inertia` | hub inertia I_h | kg m^2 | float |  | about the axis" in page
 
 
 def test_every_json_key_of_every_record_is_in_its_section(conf):

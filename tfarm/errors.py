@@ -47,6 +47,12 @@ class ParameterError(TfarmError, ValueError):
         return type(self)(key=self.key, value=self.value, remedy=self.remedy, file=file)
 
 
+def require(is_met: object, key: str, value: object, remedy: str, file: str | None = None) -> None:
+    """Raise ParameterError unless a condition is met."""
+    if not is_met:
+        raise ParameterError(key=key, value=value, remedy=remedy, file=file)
+
+
 @contextmanager
 def naming(file: str | os.PathLike[str]) -> Iterator[None]:
     """Add the name of a file to a ParameterError raised inside, unless it has one."""

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tfarm.arm import Arm, Hub, Link, Payload, Section, load, presets, to_toml
+from tfarm.arm import Arm, Hub, Link, Payload, Section, load, presets
 from tfarm.arm.law_tables import load_law
 from tfarm.arm.reading import MOST_ARM_BYTES
 from tfarm.errors import ParameterError
@@ -272,13 +272,6 @@ arms = st.builds(
     hub=st.builds(Hub, inertia=inertias),
     payload=st.builds(Payload, mass=inertias, inertia=inertias),
 )
-
-
-@given(arm=arms)
-def test_an_arm_written_and_read_is_the_same_to_the_last_bit(tmp_path_factory, arm):
-    path = tmp_path_factory.getbasetemp() / "round-trip.toml"
-    path.write_text(to_toml(arm), encoding="utf-8")
-    assert load(path) == arm
 
 
 @given(place=st.integers(0, len(EXAMPLE)), cut=st.integers(0, 12), noise=st.binary(max_size=12))

@@ -81,65 +81,29 @@ def test_a_given_shear_factor_wins_over_cowper():
     assert replace(link, section=Section.rectangle(width=0.1, depth=0.2)).shear_factor == kappa(section, 0.3125)
 
 
-BAD = {
-    "zero width": (lambda: Section.rectangle(width=0, depth=1), "link.section.width = 0", "positive, finite"),
-    "nan diameter": (lambda: Section.round(diameter=math.nan), "link.section.diameter = nan", "nan is none"),
-    "solid tube": (
-        lambda: Section.tube(outer_diameter=0.1, inner_diameter=0.1),
-        "link.section.inner_diameter = 0.1",
-        "less than its outer diameter, 0.1 m",
+rectangle_of, tube_of, general_of = Section.rectangle, Section.tube, Section.general
+BAD = {  # pattern of the message
+    "link.section.width = 0.*positive, finite": lambda: rectangle_of(width=0, depth=1),
+    "link.section.diameter = nan.*nan is none": lambda: Section.round(diameter=math.nan),
+    "inner_diameter = 0.1: .*less than its outer diameter, 0.1 m": lambda: tube_of(
+        outer_diameter=1e-1, inner_diameter=0.1
     ),
-    "no area": (
-        lambda: Section.general(area=0, second_moment=1e-9, shear_factor=0.8),
-        "link.section.area = 0",
-        "positive, finite area in m^2",
-    ),
-    "no second moment": (
-        lambda: Section.general(area=1e-4, second_moment=-1e-9, shear_factor=0.8),
-        "link.section.second_moment = -1e-09",
-        "second moment in m^4",
-    ),
-    "no shear factor": (
-        lambda: Section(shape="general", area=1e-4, second_moment=1e-9),
-        "link.section.shear_factor is missing",
-        "0.8333",
-    ),
-    "form factor": (
-        lambda: Section.rectangle(width=1, depth=1, shear_factor=1.2),
-        "link.section.shear_factor = 1.2",
-        "6/5 is entered as 5/6",
-    ),
-    "zero shear factor": (
-        lambda: Section.rectangle(width=1, depth=1, shear_factor=0.0),
-        "link.section.shear_factor = 0.0",
-        "above 0, up to 1",
-    ),
-    "unknown shape": (
-        lambda: Section(shape="rond", area=1, second_moment=1),
-        "link.section.shape = 'rond'",
-        'did you mean "round"?',
-    ),
-    "no dimensions": (
-        lambda: Section(shape="tube", area=1, second_moment=1),
-        "link.section.dimensions = ()",
-        "outer_diameter and inner_diameter",
-    ),
-    "an area of another section": (
-        lambda: replace(Section.round(diameter=0.1), area=1.0),
-        "link.section.area = 1.0",
-        "Section.general()",
-    ),
-    "an atom": (lambda: Section.round(diameter=1e-12), "second_moment", "check the unit"),
+    "link.section.area = 0.*positive, finite area": lambda: general_of(area=0, second_moment=1e-9, shear_factor=0.8),
+    "second_moment = -1e-09.*in m.4": lambda: general_of(area=1e-4, second_moment=-1e-9, shear_factor=0.8),
+    "shear_factor is missing.*0.8333": lambda: Section(shape="general", area=1e-4, second_moment=1e-9),
+    "shear_factor = 1.2.*6/5 is entered as 5/6": lambda: rectangle_of(width=1, depth=1, shear_factor=1.2),
+    "shear_factor = 0.0.*above 0, up to 1": lambda: rectangle_of(width=1, depth=1, shear_factor=0.0),
+    "shape = 'rond'.*did you mean .round.\\?": lambda: Section(shape="rond", area=1, second_moment=1),
+    "dimensions = ...*outer_diameter and inner_diameter": lambda: Section(shape="tube", area=1, second_moment=1),
+    "link.section.area = 1.0.*Section.general": lambda: replace(Section.round(diameter=0.1), area=1.0),
+    "second_moment.*check the unit": lambda: Section.round(diameter=1e-12),
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_a_bad_section_is_refused_in_words_of_physics(case):
-    build, what, remedy = BAD[case]
-    with pytest.raises(ParameterError) as caught:
-        build()
-    assert what in str(caught.value)
-    assert remedy in str(caught.value)
+@pytest.mark.parametrize("message", BAD)
+def test_a_bad_section_is_refused_in_words_of_physics(message):
+    with pytest.raises(ParameterError, match=message):
+        BAD[message]()
 
 
 GAUSS, WEIGHT = np.polynomial.legendre.leggauss(40)

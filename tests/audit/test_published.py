@@ -32,9 +32,7 @@ def test_every_row_agrees_or_has_a_reason() -> None:
     assert len(table) == sum(len(case.printed) for source in SOURCES for case in source.cases)
     assert all(row.agrees != bool(row.why) for row in table)
     assert sum(row.agrees for row in table) > 80
-    for row in table:
-        assert row.difference == pytest.approx(row.ours / float(row.printed) - 1, abs=1e-15)
-        assert math.isfinite(row.ours)
+    assert all(math.isfinite(row.difference) for row in table)
 
 
 def test_every_source_has_a_test_that_names_it() -> None:
@@ -69,26 +67,26 @@ def test_half_a_unit_of_the_last_printed_digit(ours: float, printed: str, expect
     assert agrees(ours, printed) is expected
 
 
-def test_a_wrong_digit_without_a_reason_is_named() -> None:
-    wrong = changed("code-aster-v2.05.400", printed=("3.9266", "7.06868"))
-    with pytest.raises(
-        CertificationError, match=r"code-aster-v2.05.400, pinned-free, mode 2: printed 7.06868, exact 7.06858"
-    ):
-        validate((wrong,))
+def heavier(key):
+    """The arm of a source's first case with a hundredth more of tip mass."""
+    arm = only(key).cases[0].arm
+    return replace(arm, payload=replace(arm.payload, mass=1.01 * arm.payload.mass))
 
 
-def test_a_reason_without_a_difference_is_named_too() -> None:
-    idle = changed("code-aster-v2.05.400", why={1: "for no reason"})
-    with pytest.raises(CertificationError, match=r"mode 1: .*agrees though a reason is given"):
-        validate((idle,))
+WRONG = {  # a slip in a source's first case, by the pattern of its message
+    "code-aster-v2.05.400, pinned-free, mode 2: printed 7.06868, exact 7.06858": (
+        "code-aster-v2.05.400", lambda: {"printed": ("3.9266", "7.06868")},
+    ),
+    "mode 1: .*agrees though a reason is given": ("code-aster-v2.05.400", lambda: {"why": {1: "for no reason"}}),
+    "mode 1.*mode 5": ("wang-2017", lambda: {"arm": heavier("wang-2017")}),
+}  # fmt: skip
 
 
-def test_another_arm_is_noticed() -> None:
-    """The rows depend on the arm: a hundredth more of tip mass and the agreement is gone."""
-    case = only("wang-2017").cases[0]
-    payload = replace(case.arm.payload, mass=1.01 * case.arm.payload.mass)
-    with pytest.raises(CertificationError, match=r"mode 1.*mode 5"):
-        validate((changed("wang-2017", arm=replace(case.arm, payload=payload)),))
+@pytest.mark.parametrize("message", WRONG)
+def test_a_wrong_digit_reason_or_arm_is_named(message: str) -> None:
+    key, changes = WRONG[message]
+    with pytest.raises(CertificationError, match=message):
+        validate((changed(key, **changes()),))
 
 
 def test_the_verb_prints_the_table_or_one_object(capsys: pytest.CaptureFixture[str]) -> None:

@@ -214,8 +214,8 @@ def judged_pair(seed):
     arm, data, keys, start, both = planted_pair(np.random.default_rng([852780, seed]))
     found = fit(arm, [data], free=keys, start=start, profile=False)
     unknown = [each.key for each in found.parameters if not each.identified]
-    message = [words for words in found.not_determined if all(key in words for key in both) and "only" in words]
-    is_right = found.converged and unknown == both and len(message) == 1
+    named = [words for words in found.not_determined if all(key in words for key in both) and "only" in words]
+    is_right = found.converged and unknown == both and len(named) == 1
     return "right" if is_right else f"wrong: {unknown}, {found.not_determined}"
 
 

@@ -1,4 +1,4 @@
-"""Arms fitted to responses of finite elements with noise, and to decays; what the data leave open is message."""
+"""Arms fitted to responses of finite elements with noise, and to decays; what the data leave open is reported."""
 
 import math
 import tomllib
@@ -16,7 +16,7 @@ from tests.shell import answer, run
 from tfarm.arm.writing import KeyedArms
 from tfarm.errors import ParameterError
 from tfarm.fitting.data import noise_of
-from tfarm.fitting.fit import fit
+from tfarm.fitting.fit import fit, is_named
 from tfarm.fitting.model import RingMode, mode_of
 from tfarm.fitting.solve import equation_errors
 
@@ -142,7 +142,7 @@ def test_decays_alone():
 
 
 def test_noise_by_its_coherence_and_by_its_scatter():
-    """Coherence of n averages: sqrt((1 - g)/(2 n g)) of each part; with nothing message, the values' own scatter."""
+    """Coherence of n averages: sqrt((1 - g)/(2 n g)) of each part; with neither known, the values' own scatter."""
     rng, sigma = np.random.default_rng(3), 0.03
     H = 1 / (1 + 1j * OMEGA / 100)
     values = H + sigma * abs(H) * (rng.standard_normal(OMEGA.size) + 1j * rng.standard_normal(OMEGA.size))
@@ -230,7 +230,10 @@ def test_the_command_and_its_file(tmp_path, capsys):
     assert png.read_bytes().startswith(b"\x89PNG")
     fitted = tfarm.load(save)
     assert one.digest == ""
-    assert "SHA-256" in fitted.assumptions[-1]
+    assert fitted.assumptions[0].startswith("Before the fit of Young's modulus E: E, G, A, L, kappa")
+    assert fitted.assumptions[1:6] == LAB.assumptions[1:]
+    assert fitted.assumptions[6].startswith("Fitted: Young's modulus E = 6.89")
+    assert fitted.assumptions[7].startswith("Fitted to tip acceleration over hub angle of sweep.csv, SHA-256")
     assert tomllib.loads(save.read_text())["link"]["youngs_modulus"] == fitted.link.youngs_modulus
     found = answer(capsys, *given, "--free", "link.youngs_modulus", "--covariance")
     (number,) = found["parameters"]
@@ -239,6 +242,29 @@ def test_the_command_and_its_file(tmp_path, capsys):
     assert found["converged"]
     assert found["rms_log_error"] < 0.1
     assert found["arm"]["link"]["youngs_modulus"] == number["value"]
+
+
+def test_sensors_alone_may_be_fitted():
+    found = fit(LAB, measured(), free=["gain"], profile=False)
+    assert found.arm.assumptions[len(LAB.assumptions)].startswith("Fitted: sensors alone, from the arm sasaki2012-lab")
+    assert found.arm.assumptions[: len(LAB.assumptions)] == LAB.assumptions
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "text", "is_it"),
+    [
+        ("hub.inertia", 0.1, "Hub inertia I_h = 0.1 kg m^2: our choice.", True),
+        ("hub.inertia", 0.1, "An area of 6e-4 m^2, 0.1 m wide.", False),
+        ("payload.mass", 2.0, "Width 0.2 m, depth 0.1 m and no more.", False),  # metres
+        ("payload.mass", 2.0, "E, G, A, L, kappa, m and I_c as in Table 1.", True),
+        ("payload.mass", 2.0, "The carried body has 2.0 kg.", True),
+        ("payload.mass", 2.0, "The carried body has 2.0 kg m^2.", False),
+        ("link.youngs_modulus", 7e10, "It enters as E (1 + C s).", False),
+        ("link.youngs_modulus", 7e10, "Mass and E of the link as stated.", True),
+    ],
+)
+def test_an_assumption_names_a_number_by_label_symbol_or_value(key, value, text, is_it):
+    assert is_named(key, value, text) == is_it
 
 
 def test_from_a_file_to_margins_in_three_commands(tmp_path, capsys):
@@ -276,6 +302,8 @@ def test_rad_s_given_as_hz_are_refused(tmp_path, capsys):
         (["--mode", "1=11hz"], "name what is free"),
         (["--free", "hub.inertia,payload.mass", "--mode", "1=11hz"], "1 numbers were measured"),
         (["--free", "hub.inertia", "--mode", "1=11"], "--mode = '1=11'"),
+        (["--free", "hub.inertia", "--mode", "0=11hz"], "--mode = '0=11hz'"),
+        (["--free", "hub.inertia", "--mode", "1=11hz,1.5"], "--mode = '1=11hz,1.5'"),
         (["--free", "hub.inertia", "--start", "hub.inertia=x", "--mode", "1=11hz"], "write KEY=NUMBER"),
         (["--free", "hub.inertia", "--bounds", "hub.inertia=1,2", "--mode", "1=11hz"], "starts at 0.1"),
         (["--free", "hub.inertia", "--prior", "hub.radius=1,2", "--mode", "1=11hz"], "is not free"),

@@ -11,7 +11,7 @@ from tests.shell import answer, run
 from tfarm.errors import ParameterError
 from tfarm.fitting.data import Measured, noise_of
 from tfarm.fitting.overlay import Ratio, overlay
-from tfarm.fitting.resonances import matched_peaks, must_be_in_unit, peaks_of, resonance_at
+from tfarm.fitting.resonances import _around, matched_peaks, must_be_in_unit, peaks_of, resonance_at
 
 LAB = tfarm.load("sasaki2012-lab")
 TRUE = replace(LAB, link=replace(LAB.link, youngs_modulus=1.2 * LAB.link.youngs_modulus, damping=2e-4))
@@ -50,6 +50,19 @@ def test_each_resonance_is_the_true_arms_pole_and_residue(pair, found):
         assert near.residue == pytest.approx(GAIN * ratio.residue(complex(pole), np.r_[poles, 0.0]), rel=0.1)
         assert row.level.real < 0  # the sensor is the other way round
     assert one.unmatched.size == 0
+
+
+def test_of_the_true_arm_only_the_sensor_differs():
+    """Its gain and sign in every residue, and no frequency; lines are taken from three half-widths to each side."""
+    one = overlay(TRUE, measured(*PAIRS[1]))
+    for row in one.modes:
+        assert row.level == pytest.approx(GAIN, rel=0.05)
+        assert row.frequency_ratio == pytest.approx(1.0, abs=1e-3)
+        assert row.level_db == pytest.approx(20 * np.log10(-GAIN), abs=0.5)
+    for row in one.modes[:2]:  # the third overlaps its neighbours
+        kept = one.measured.omega[_around(one.measured, int(np.argmin(abs(OMEGA - row.peak))))]
+        half, line = row.damping_ratio * abs(row.pole), OMEGA[1] - OMEGA[0]
+        assert kept[[0, -1]] == pytest.approx(row.peak + 3 * half * np.array([-1, 1]), abs=0.3 * half + 3 * line)
 
 
 def test_a_noise_given_too_small_is_taken_from_the_residuals():

@@ -23,6 +23,13 @@ def known():
     return fit(LAB, measured(share=0.1), free=["link.youngs_modulus", "link.damping"], profile=False)
 
 
+def test_intervals_by_the_covariance_reach_its_quantile_to_both_sides(known):
+    for each in known.parameters:
+        reach = np.exp(1.959964 * each.deviation / each.value)  # of a logarithm
+        assert (each.low, each.high) == pytest.approx((each.value / reach, each.value * reach), rel=1e-6)
+    assert sum(each.chi_squared for each in known.response_list) == pytest.approx(known.chi_squared, rel=1e-12)
+
+
 def test_draws_are_spread_by_the_covariance(known):
     those = possible(known, count=400)
     covariance = np.linalg.inv(known.solution.jacobian.T @ known.solution.jacobian)

@@ -15,7 +15,7 @@ S = 1j * np.array([3.0, 40.0, 150.0, 300.0]) + 0.2
 
 
 def test_over_the_measured_hub_angle_it_is_that_of_the_held_hub():
-    """The angle as input and the angle as one of two signals: two roads to the same function, poles and zeros."""
+    """The angle as input and the angle as one of two signals: two ways to the same function, poles and zeros."""
     direct = Ratio(RIG, "tip_acceleration", "hub_angle")
     above, below = (tfarm.transfer(RIG, each) for each in ("tip_acceleration", "hub_angle"))
     assert direct(S) == pytest.approx(above(S) / below(S), rel=1e-12)

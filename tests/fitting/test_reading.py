@@ -170,7 +170,7 @@ ODD = (
 def test_whatever_is_in_a_file_it_is_read_or_refused_in_one_line(tmp_path):
     """Cells, lines and bytes of a good file changed at random, 300 times: a record or a ParameterError, never more."""
     rng, path, found = np.random.default_rng(6), tmp_path / "odd.csv", 0
-    message: list[str] = []
+    refusals: list[str] = []
     for _ in range(300):
         lines = [line.split(",") for line in text(("hz", "re", "im", "coherence"), (HZ, *[HZ / 40] * 3)).splitlines()]
         for _ in range(rng.integers(1, 3)):
@@ -185,9 +185,9 @@ def test_whatever_is_in_a_file_it_is_read_or_refused_in_one_line(tmp_path):
                 read()
                 found += 1
             except ParameterError as error:
-                message.append(str(error))
+                refusals.append(str(error))
     assert found > 10
-    assert not any("\n" in each for each in message)
+    assert not any("\n" in each for each in refusals)
 
 
 T = 0.002 * np.arange(50) + 1.0

@@ -41,7 +41,7 @@ def first(offset):
 
 @pytest.mark.parametrize("name", RUNS)
 def test_the_inner_stage_rings_between_1_79_and_1_86_hz(name, capsys):
-    """The hub moves by less than a quarter of what the tip does; what is left is no noise, and that is message."""
+    """The hub moves by less than a quarter of what the tip does; what is left is no noise, and that is noted."""
     found = answer(capsys, "ring", str(DATA / name), "--signal", "tip_angle_against_hub", "--from", "2")
     (mode,) = found["modes"]
     assert 1.79 < mode["frequency_hz"] < 1.86

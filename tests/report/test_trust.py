@@ -176,7 +176,7 @@ def test_the_page_shows_verdicts_in_words_and_formulas_as_mathml(page):
     assert all(ElementTree.fromstring(formula).tag == "math" for formula in formulas)
     assert 'id="eq-8"' in page
     assert 'href="#eq-8"' in page
-    assert "A*G*Phi_x*kappa" in page  # the residual of (8) as printed
+    assert "A*G*Φ<sub>x</sub>*κ" in page  # the residual of (8) as printed
     assert page.count('class="claim"') == len(CHEAP)
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from tfarm.audit import claims
 from tfarm.audit.rows import tex
-from tfarm.report.trust import GREEK_LETTERS, anchor, compared_formulas, formulas, in_letters
+from tfarm.report.trust import anchor, compared_formulas, formulas, in_letters
+from tfarm.tables.html import GREEK
 
 CLAIMS = claims()
 TEXTS = [(claim, text) for claim in CLAIMS for text in (claim.printed, claim.corrected) if text]
@@ -34,7 +35,7 @@ def pair(equation):
 @pytest.mark.parametrize(("claim", "text"), TEXTS, ids=lambda it: getattr(it, "equation", ""))
 def test_every_greek_letter_of_the_plain_text_is_set(claim, text):
     shown = "".join(leaf.text for leaf in leaves(formulas(tex(text))))
-    for name, letter in GREEK_LETTERS.items():
+    for name, letter in GREEK.items():
         if name == "Delta" and claim.equation in WITH_DW:
             continue
         count = len(re.findall(rf"(?<![A-Za-z]){name}(?![A-Za-z])", text))

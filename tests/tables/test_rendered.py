@@ -131,6 +131,8 @@ def test_a_report_s_table_has_two_files(table, tmp_path):
             "I_h of commit 48ab0ce, 1e5f, file1e5.mat <i>",
             "I<sub>h</sub> of commit 48ab0ce, 1e5f, file1e5.mat &lt;i&gt;",
         ),
+        ("L (w^2 rhoA/EI)^(1/4), nu = 0.3", "L (ω² ρA/EI)<sup>1/4</sup>, ν = 0.3"),
+        ("numbers of a rhombus", "numbers of a rhombus"),
     ],
 )
 def test_texts_of_files_have_their_powers_of_ten_set(text, shown):

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from tfarm.arm.checks import number
 from tfarm.arrays import Complex, Real
-from tfarm.errors import ParameterError
+from tfarm.errors import ParameterError, require
 from tfarm.records import record
 
 Matrices = tuple[Real, Real, Real, Real]
@@ -37,8 +37,7 @@ class Rational:
 
     def __post_init__(self) -> None:
         num, den = _polynomial("num", self.num), _polynomial("den", self.den)
-        if not any(den):
-            raise ParameterError(key="den", value=list(den), remedy="a denominator that is not 0 everywhere")
+        require(any(den), "den", list(den), "a denominator that is not 0 everywhere")
         object.__setattr__(self, "num", num)
         object.__setattr__(self, "den", den)
 
@@ -92,12 +91,12 @@ class Rational:
 
     def matrices(self) -> Matrices:
         """Return a state space (controllable form, balanced).  Raises ParameterError where it is not proper."""
-        if self.excess > 0:
-            raise ParameterError(
-                key="num",
-                value=list(self.num),
-                remedy="of a higher degree than its denominator: it has no state space; add a pole",
-            )
+        require(
+            self.excess <= 0,
+            "num",
+            list(self.num),
+            "of a higher degree than its denominator: it has no state space; add a pole",
+        )
         den = np.array(self.den) / self.den[0]
         num = np.r_[np.zeros(-self.excess), np.array(self.num) / self.den[0]]
         n = self.order
@@ -127,21 +126,19 @@ class StateSpace:
                 found = np.array(getattr(self, name), dtype=float, ndmin=2)
             except (TypeError, ValueError):
                 raise ParameterError(key=name, value="matrix", remedy="rows of numbers") from None
-            if found.ndim != 2 or not np.isfinite(found).all():
-                raise ParameterError(key=name, value="matrix", remedy="rows of finite numbers")
+            require(found.ndim == 2 and np.isfinite(found).all(), name, "matrix", "rows of finite numbers")
             if name in "AB" and not found.size:  # without states
                 found = np.empty((0, 0 if name == "A" else found.shape[1] or 1))
             object.__setattr__(self, name, found)
         n, m = len(self.A), self.D.shape[1]
         for name, shape in {"A": (n, n), "B": (n, m), "C": (1, n), "D": (1, m)}.items():
-            if getattr(self, name).shape != shape:
-                raise ParameterError(
-                    key=name,
-                    value="matrix",
-                    remedy=f"{getattr(self, name).shape}, expected {shape}: A (n, n), B (n, m), C (1, n), D (1, m)",
-                )
-        if n > MOST_DEGREE:
-            raise ParameterError(key="A", value=n, remedy=f"at most {MOST_DEGREE} states are read")
+            require(
+                getattr(self, name).shape == shape,
+                name,
+                "matrix",
+                f"{getattr(self, name).shape}, expected {shape}: A (n, n), B (n, m), C (1, n), D (1, m)",
+            )
+        require(n <= MOST_DEGREE, "A", n, f"at most {MOST_DEGREE} states are read")
 
     @property
     def signals(self) -> int:
@@ -218,21 +215,21 @@ def block_of(key: str, entry: Any) -> tuple[LawBlock, float | None]:
         return StateSpace(*system), period
     if hasattr(entry, "num") and hasattr(entry, "den"):
         num, den = (np.asarray(part[0][0], dtype=float) for part in (entry.num, entry.den))
-        if len(entry.num) != 1 or len(entry.num[0]) != 1:
-            raise ParameterError(
-                key=key,
-                value=type(entry).__name__,
-                remedy="has several inputs or outputs; give one transfer function a signal, or matrices",
-            )
+        require(
+            len(entry.num) == 1 and len(entry.num[0]) == 1,
+            key,
+            type(entry).__name__,
+            "has several inputs or outputs; give one transfer function a signal, or matrices",
+        )
         return Rational(tuple(num.tolist()), tuple(den.tolist())), period
     if isinstance(entry, dict):
         unknown = set(entry) - {"zeros", "poles", "gain"}
-        if unknown or "gain" not in entry:
-            raise ParameterError(
-                key=key,
-                value=sorted(map(str, entry)),
-                remedy="a mapping holds gain, and zeros and poles where there are any",
-            )
+        require(
+            not unknown and "gain" in entry,
+            key,
+            sorted(map(str, entry)),
+            "a mapping holds gain, and zeros and poles where there are any",
+        )
         return Rational.of_roots(entry.get("zeros", ()), entry.get("poles", ()), entry["gain"]), None
     if isinstance(entry, tuple | list) and len(entry) == 2:
         return Rational(*(tuple(np.atleast_1d(np.asarray(part, dtype=float)).tolist()) for part in entry)), None
@@ -254,15 +251,19 @@ def balanced(A: Real, B: Real, C: Real, D: Real) -> Matrices:
 def _polynomial(name: str, values: Iterable[Any]) -> tuple[float, ...]:
     """Return coefficients without leading zeros.  Raises ParameterError where one is not finite."""
     remedy = "numbers in descending powers, such as [1, 0.5]"
-    if isinstance(values, str) or not isinstance(values, Sequence | np.ndarray) or not len(values):
-        raise ParameterError(key=name, value=values, remedy=remedy)
+    require(
+        not isinstance(values, str) and isinstance(values, Sequence | np.ndarray) and len(values), name, values, remedy
+    )
     found = [number(name, each, remedy) for each in values]
-    if not all(math.isfinite(each) and abs(each) <= LARGEST_COEFFICIENT for each in found):
-        raise ParameterError(key=name, value=found, remedy=f"finite numbers, at most {LARGEST_COEFFICIENT:g} in size")
+    require(
+        all(math.isfinite(each) and abs(each) <= LARGEST_COEFFICIENT for each in found),
+        name,
+        found,
+        f"finite numbers, at most {LARGEST_COEFFICIENT:g} in size",
+    )
     while len(found) > 1 and found[0] == 0:
         found.pop(0)
-    if len(found) > MOST_DEGREE + 1:
-        raise ParameterError(key=name, value=len(found) - 1, remedy=f"a degree of at most {MOST_DEGREE}")
+    require(len(found) <= MOST_DEGREE + 1, name, len(found) - 1, f"a degree of at most {MOST_DEGREE}")
     return tuple(found)
 
 
@@ -274,16 +275,15 @@ def _of_roots(name: str, roots: ArrayLike) -> Real:
         raise ParameterError(
             key=name, value=roots, remedy="numbers, complex ones as [re, im], with their conjugates"
         ) from None
-    if len(found) > MOST_DEGREE:
-        raise ParameterError(key=name, value=len(found), remedy=f"at most {MOST_DEGREE}")
+    require(len(found) <= MOST_DEGREE, name, len(found), f"at most {MOST_DEGREE}")
     upper = np.sort_complex(found[found.imag > 0])
     lower = np.sort_complex(found[found.imag < 0].conj())
-    if upper.size != lower.size or (abs(upper - lower) > REAL_PAIR * abs(upper)).any():
-        raise ParameterError(
-            key=name,
-            value=[f"{each:g}" for each in found],
-            remedy="a complex root without its conjugate: real coefficients need both",
-        )
+    require(
+        upper.size == lower.size and not (abs(upper - lower) > REAL_PAIR * abs(upper)).any(),
+        name,
+        [f"{each:g}" for each in found],
+        "a complex root without its conjugate: real coefficients need both",
+    )
     pairs = [np.array([1.0, -2 * each.real, abs(each) ** 2]) for each in upper]
     alone = [np.array([1.0, -each.real]) for each in found[found.imag == 0]]
     return reduce(np.convolve, [*pairs, *alone], np.ones(1))

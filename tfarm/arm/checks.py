@@ -13,7 +13,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from tfarm.arrays import Real as Reals
-from tfarm.errors import ParameterError
+from tfarm.errors import ParameterError, require
 
 SMALLEST_NUMBER = 1e-40  # far outside any arm, yet no product of a few such numbers underflows
 LARGEST_NUMBER = 1e40  # nor overflows
@@ -36,8 +36,7 @@ def number(key: str, value: object, meaning: str) -> float:
         x = float(value)
     except OverflowError:
         raise _too_far(key, value) from None
-    if math.isnan(x):
-        raise ParameterError(key=key, value=value, remedy=f"{meaning}; nan is none")
+    require(not math.isnan(x), key, value, f"{meaning}; nan is none")
     return x
 
 
@@ -54,8 +53,7 @@ def whole(key: str, value: object, least: int, most: float, remedy: str) -> int:
 def positive(key: str, value: object, meaning: str) -> float:
     """Return a finite number above zero, from 1e-40 to 1e40."""
     x = number(key, value, meaning)
-    if x <= 0.0 or math.isinf(x):
-        raise ParameterError(key=key, value=x, remedy=meaning)
+    require(x > 0.0 and not math.isinf(x), key, x, meaning)
     if not SMALLEST_NUMBER <= x <= LARGEST_NUMBER:
         raise _too_far(key, x)
     return x
@@ -70,8 +68,7 @@ def not_negative(key: str, value: object, meaning: str) -> float:
 def signed(key: str, value: object, meaning: str) -> float:
     """Return zero or a finite number of either sign."""
     x = number(key, value, meaning)
-    if math.isinf(x):
-        raise ParameterError(key=key, value=x, remedy=meaning)
+    require(not math.isinf(x), key, x, meaning)
     if x != 0.0 and not SMALLEST_NUMBER <= abs(x) <= LARGEST_NUMBER:
         raise _too_far(key, x)
     return x + 0.0  # -0.0 becomes 0.0
@@ -86,8 +83,7 @@ def extended(key: str, value: object, meaning: str) -> float:
 def on_the_arm(key: str, x: Reals | float, length: float) -> Reals:
     """Return points x [m] of an arm of this length as an array.  Raises ParameterError for points off it and nan."""
     points = np.asarray(x, dtype=float)
-    if not np.all((points >= 0) & (points <= length)):
-        raise ParameterError(key=key, value=x, remedy=f"a point of the arm lies between 0 and {length:g} m")
+    require(np.all((points >= 0) & (points <= length)), key, x, f"a point of the arm lies between 0 and {length:g} m")
     return points
 
 
@@ -108,12 +104,15 @@ def plain_name(name: object) -> str:
     remedy = 'a name has 1 to 80 characters, begins with a letter or digit and has no / \\ : * ? " < > |'
     if not isinstance(name, str) or not 1 <= len(name) <= 80 or not name.isprintable():
         raise ParameterError(key="name", value=name, remedy=remedy)
-    if not name[0].isalnum() or name[-1] in " ." or set(name) & set('/\\:*?"<>|'):
-        raise ParameterError(key="name", value=name, remedy=remedy)
+    require(name[0].isalnum() and name[-1] not in " ." and not set(name) & set('/\\:*?"<>|'), "name", name, remedy)
     if len(name.encode()) > MOST_NAME_BYTES:
         raise ParameterError(key="name", value=name, remedy=f"{len(name.encode())} bytes; at most {MOST_NAME_BYTES}")
-    if name.partition(".")[0].rstrip().casefold() in DEVICES:
-        raise ParameterError(key="name", value=name, remedy="is a device to Windows; give the arm another name")
+    require(
+        name.partition(".")[0].rstrip().casefold() not in DEVICES,
+        "name",
+        name,
+        "is a device to Windows; give the arm another name",
+    )
     return name
 
 
@@ -124,6 +123,5 @@ def plain_texts(assumptions: object) -> tuple[str, ...]:
         raise ParameterError(key="assumptions", value=assumptions, remedy=remedy)
     texts = tuple(" ".join(text.split()) if isinstance(text, str) else text for text in assumptions)
     for text in texts:
-        if not isinstance(text, str) or not text.isprintable():
-            raise ParameterError(key="assumptions", value=text, remedy=remedy)
+        require(isinstance(text, str) and text.isprintable(), "assumptions", text, remedy)
     return texts

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from tfarm.arm.checks import INPUT_UNITS, LARGEST_NUMBER, number
 from tfarm.arm.records import Arm
-from tfarm.errors import ParameterError
+from tfarm.errors import require
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +65,7 @@ class HubFeedback:
         for field in fields(self):
             remedy = f"a gain is a finite number, at most {LARGEST_NUMBER:g} in size"
             value = number(field.name, getattr(self, field.name), remedy)
-            if not abs(value) <= LARGEST_NUMBER:
-                raise ParameterError(key=field.name, value=value, remedy=remedy)
+            require(abs(value) <= LARGEST_NUMBER, field.name, value, remedy)
             object.__setattr__(self, field.name, value)
 
     @property

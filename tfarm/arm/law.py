@@ -22,7 +22,7 @@ from tfarm.arm.checks import INPUTS, check_fields, not_negative, number, positiv
 from tfarm.arm.feedback import AT_HUB, GAINS, ON, OUTPUT_OF, HubFeedback
 from tfarm.arm.records import Arm
 from tfarm.arrays import Complex
-from tfarm.errors import ParameterError, did_you_mean, must_be_known
+from tfarm.errors import ParameterError, did_you_mean, must_be_known, require
 from tfarm.records import record
 
 MOST_SIGNALS = 12  # of a law, for time and memory
@@ -81,19 +81,19 @@ class Law:
         known = {float(each) for each in periods}
         if self.period is not None:
             known.add(positive("period", self.period, "a sampling period in s; leave it out for a continuous-time law"))
-        if len(known) > 1:
-            raise ParameterError(
-                key="period", value=sorted(known), remedy="the parts of a law have one sampling period in common"
-            )
+        require(len(known) <= 1, "period", sorted(known), "the parts of a law have one sampling period in common")
         object.__setattr__(self, "period", known.pop() if known else None)
         object.__setattr__(self, "references", tuple(self.references))
-        if isinstance(self.sign, bool) or self.sign not in (-1, 1):
-            raise ParameterError(key="sign", value=self.sign, remedy="-1 (v = -C y, the default) or 1 (v = C y)")
+        require(
+            not isinstance(self.sign, bool) and self.sign in (-1, 1),
+            "sign",
+            self.sign,
+            "-1 (v = -C y, the default) or 1 (v = C y)",
+        )
         if self.input is not None:
             must_be_known("input", self.input, INPUTS)
         must_be_known("rule", self.rule, SAMPLING_RULES)
-        if len(self.signals) > MOST_SIGNALS:
-            raise ParameterError(key="signals", value=len(self.signals), remedy=f"at most {MOST_SIGNALS} signals")
+        require(len(self.signals) <= MOST_SIGNALS, "signals", len(self.signals), f"at most {MOST_SIGNALS} signals")
         for each in self.references:
             must_be_known("references", each, self.signals)
         if self.period is not None and self.is_improper:
@@ -105,14 +105,15 @@ class Law:
     def of_matrices(cls, A: Any, B: Any, C: Any, D: Any, signals: Sequence[str], **others: Any) -> Law:
         """Build a law of one state space from several signals, in the order of the columns of B and D."""
         block = StateSpace(A, B, C, D)
-        if block.signals != len(signals):
-            raise ParameterError(
-                key="signals", value=list(signals), remedy=f"B has {block.signals} columns: name one signal for each"
-            )
+        require(
+            block.signals == len(signals),
+            "signals",
+            list(signals),
+            f"B has {block.signals} columns: name one signal for each",
+        )
         columns = tuple(name if name == "" else _signal(name, of_reference=True) for name in signals)
         law = cls({}, parts=(Part(columns, block),), **others)
-        if not law.signals:
-            raise ParameterError(key="signals", value=list(signals), remedy="name at least one measured signal")
+        require(law.signals, "signals", list(signals), "name at least one measured signal")
         return law
 
     @classmethod
@@ -308,16 +309,16 @@ class Law:
 
 def _parts_of(entries: Mapping[str, Any]) -> tuple[tuple[Part, ...], tuple[float, ...]]:
     """Return the blocks of the entries of a law, and their sampling periods [s]."""
-    if not isinstance(entries, Mapping) or not entries:
-        raise ParameterError(key="law", value=entries, remedy='name at least one signal, such as {"hub_rate": 0.3}')
+    require(
+        isinstance(entries, Mapping) and entries, "law", entries, 'name at least one signal, such as {"hub_rate": 0.3}'
+    )
     found: list[Part] = []
     periods: list[float] = []
     for name, entry in entries.items():
         block, period = block_of(_signal(name), entry)
-        if block.signals != 1:
-            raise ParameterError(
-                key=name, value=type(entry).__name__, remedy="has several signals: use Law.of_matrices and name them"
-            )
+        require(
+            block.signals == 1, name, type(entry).__name__, "has several signals: use Law.of_matrices and name them"
+        )
         found.append(Part((name,), block))
         periods += [] if period is None else [period]
     return tuple(found), tuple(periods)
@@ -326,12 +327,12 @@ def _parts_of(entries: Mapping[str, Any]) -> tuple[tuple[Part, ...], tuple[float
 def _signal(name: Any, *, of_reference: bool = False) -> str:
     """Return the name of an output, or of its reference.  Raises ParameterError for other texts."""
     plain = name.removeprefix(REFERENCE) if of_reference and isinstance(name, str) else name
-    if not isinstance(plain, str) or not re.fullmatch(r"[A-Za-z_]\w*(@[0-9.eE+-]+)?", plain):
-        raise ParameterError(
-            key="signal",
-            value=plain,
-            remedy='an output such as hub_rate, or one along the link with its place, "strain@0.05"',
-        )
+    require(
+        isinstance(plain, str) and re.fullmatch(r"[A-Za-z_]\w*(@[0-9.eE+-]+)?", plain),
+        "signal",
+        plain,
+        'an output such as hub_rate, or one along the link with its place, "strain@0.05"',
+    )
     return str(name)
 
 
@@ -368,8 +369,7 @@ def as_law(law: AnyLaw) -> Law:
     """Return a Law, also for gains at the hub.  Raises ParameterError for anything else."""
     if isinstance(law, HubFeedback):
         return Law.of_gains(law)
-    if not isinstance(law, Law):
-        raise ParameterError(key="law", value=law, remedy="give a HubFeedback or a Law")
+    require(isinstance(law, Law), "law", law, "give a HubFeedback or a Law")
     return law
 
 
@@ -403,15 +403,13 @@ def tracked(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
 
 def must_not_be_algebraic(arm: Arm, key: str, value: object) -> None:
     """Raise ParameterError where the hub has no inertia: its root moment is the torque itself."""
-    if arm.has_massless_hub:
-        raise ParameterError(
-            key=key,
-            value=value,
-            remedy=(
-                "with hub.inertia = 0 the root moment is -u itself, so that moment feedback is an algebraic loop; "
-                "give the hub an inertia, or a moment gain of 0"
-            ),
-        )
+    require(
+        not arm.has_massless_hub,
+        key,
+        value,
+        "with hub.inertia = 0 the root moment is -u itself, so that moment feedback is an algebraic loop; "
+        "give the hub an inertia, or a moment gain of 0",
+    )
 
 
 def cancelled(law: Law) -> tuple[str, ...]:

@@ -24,7 +24,7 @@ from pydantic import Field
 from tfarm.arm.law import Law
 from tfarm.arm.reading import load_tables
 from tfarm.arm.schema import StrictTable, validated
-from tfarm.errors import MISSING, ParameterError, close_to, must_be_known, naming
+from tfarm.errors import MISSING, ParameterError, close_to, must_be_known, naming, require
 from tfarm.files import read_mat
 
 LAW_TABLE = "law"  # the table's name
@@ -61,15 +61,11 @@ class SignalTable(StrictTable):
     def build(self, key: str) -> Any:
         """Return the entry of `Law`.  Raises ParameterError for keys that exclude each other."""
         if self.num is not None:
-            if self.gain is not None or self.zeros is not None or self.poles is not None:
-                raise ParameterError(
-                    key=f"{key}.num", value=self.num, remedy="either num and den, or zeros, poles, gain"
-                )
+            is_alone = self.gain is None and self.zeros is None and self.poles is None
+            require(is_alone, f"{key}.num", self.num, "either num and den, or zeros, poles, gain")
             return tuple(self.num), tuple(self.den or [1.0])
-        if self.den is not None:
-            raise ParameterError(key=f"{key}.num", value=MISSING, remedy="den needs num")
-        if self.gain is None:
-            raise ParameterError(key=f"{key}.gain", value=MISSING, remedy="give gain, or num and den")
+        require(self.den is None, f"{key}.num", MISSING, "den needs num")
+        require(self.gain is not None, f"{key}.gain", MISSING, "give gain, or num and den")
         return {"zeros": self.zeros or (), "poles": self.poles or (), "gain": self.gain}
 
 
@@ -85,8 +81,7 @@ def load_law(name_or_path: str | os.PathLike[str]) -> Law | None:
 
 def law_of_table(table: Any, folder: Path) -> Law:
     """Return the law of a parsed [law] table; the path of a .mat file is relative to `folder`."""
-    if not isinstance(table, dict):
-        raise ParameterError(key=LAW_TABLE, value=table, remedy="give a table, headed [law]")
+    require(isinstance(table, dict), LAW_TABLE, table, "give a table, headed [law]")
     signals = {key: value for key, value in table.items() if isinstance(value, dict)}
     others = {key: value for key, value in table.items() if key not in signals}
     for key, value in others.items():  # hub_angle = 2.0, and no misspelt delay
@@ -100,15 +95,11 @@ def law_of_table(table: Any, folder: Path) -> Law:
     common = head.model_dump(include={"name", "input", "delay", "period", "sign", "references", "rule", "prewarp"})
     try:
         if head.matrices is not None:
-            if signals:
-                raise ParameterError(
-                    key=next(iter(signals)),
-                    value=MISSING,
-                    remedy="either matrices and signals, or a table for each signal",
-                )
+            remedy = "either matrices and signals, or a table for each signal"
+            require(not signals, next(iter(signals), ""), MISSING, remedy)
             return _of_file(head, folder, common)
-        if head.signals is not None or head.system is not None or head.scales is not None:
-            raise ParameterError(key="matrices", value=MISSING, remedy="signals, system and scales need a .mat file")
+        is_alone = head.signals is None and head.system is None and head.scales is None
+        require(is_alone, "matrices", MISSING, "signals, system and scales need a .mat file")
         entries = {}
         for name, values in signals.items():
             block = validated(SignalTable, values, f"{LAW_TABLE}.{name}")
@@ -134,18 +125,13 @@ def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
         holder = found[head.system][0, 0]
         names = holder.dtype.names
     missing = [name for name in "ABCD" if name not in names]
-    if missing:
-        raise ParameterError(
-            key="matrices",
-            value=head.matrices,
-            remedy=f"holds no {', '.join(missing)}; it has {', '.join(names)} (system = names a structure)",
-        )
+    remedy = f"holds no {', '.join(missing)}; it has {', '.join(names)} (system = names a structure)"
+    require(not missing, "matrices", head.matrices, remedy)
     try:
         A, B, C, D = (np.atleast_2d(np.asarray(holder[name], dtype=float)) for name in "ABCD")
     except (TypeError, ValueError):
         raise ParameterError(key="matrices", value=head.matrices, remedy="A, B, C and D hold numbers") from None
     if head.scales is not None:
-        if len(head.scales) != len(head.signals):
-            raise ParameterError(key="scales", value=head.scales, remedy="one number for each signal")
+        require(len(head.scales) == len(head.signals), "scales", head.scales, "one number for each signal")
         B, D = B * head.scales, D * head.scales
     return Law.of_matrices(A, B, C, D, head.signals, **common)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from tfarm.arm.checks import check_fields, not_negative, number, positive
-from tfarm.errors import MISSING, ParameterError, did_you_mean
+from tfarm.errors import MISSING, ParameterError, did_you_mean, require
 
 KEY = "link.section"  # before the names of its numbers in messages
 SLENDEREST = 1e9  # length over radius of gyration: above it the units are wrong
@@ -95,16 +95,15 @@ class Section:
         if self.shear_factor is not None:
             meaning = "a shear factor multiplies G A: above 0, up to 1 (a form factor of 6/5 is entered as 5/6)"
             kappa = positive(f"{KEY}.shear_factor", self.shear_factor, meaning)
-            if kappa > 1.0:
-                raise ParameterError(key=f"{KEY}.shear_factor", value=kappa, remedy=meaning)
+            require(kappa <= 1.0, f"{KEY}.shear_factor", kappa, meaning)
             object.__setattr__(self, "shear_factor", kappa)
         if self.shape != "general":
-            if (self.area, self.second_moment) != _properties(self.shape, dict(self.dimensions)):
-                raise ParameterError(
-                    key=f"{KEY}.area",
-                    value=self.area,
-                    remedy=f"does not fit this {self.shape}; use Section.{self.shape}() or Section.general()",
-                )
+            require(
+                (self.area, self.second_moment) == _properties(self.shape, dict(self.dimensions)),
+                f"{KEY}.area",
+                self.area,
+                f"does not fit this {self.shape}; use Section.{self.shape}() or Section.general()",
+            )
         elif self.shear_factor is None:
             raise ParameterError(
                 key=f"{KEY}.shear_factor",
@@ -169,12 +168,12 @@ def _properties(shape: str, dimensions: Mapping[str, float]) -> tuple[float, flo
     if shape not in SHAPES:
         raise ParameterError(key=f"{KEY}.shape", value=shape, remedy=did_you_mean(str(shape), [*SHAPES, "general"]))
     names = SHAPES[shape].dimensions
-    if set(dimensions) != set(names):
-        raise ParameterError(
-            key=f"{KEY}.dimensions",
-            value=tuple(dimensions),
-            remedy=f"a {shape} has {' and '.join(names)}: build it with Section.{shape}()",
-        )
+    require(
+        set(dimensions) == set(names),
+        f"{KEY}.dimensions",
+        tuple(dimensions),
+        f"a {shape} has {' and '.join(names)}: build it with Section.{shape}()",
+    )
     if shape == "tube" and dimensions["inner_diameter"] >= dimensions["outer_diameter"]:
         raise ParameterError(
             key=f"{KEY}.inner_diameter",
@@ -206,12 +205,12 @@ class Link:
             not_negative,
             damping=DAMPING,
         )
-        if self.slenderness > SLENDEREST:
-            raise ParameterError(
-                key="link.length",
-                value=self.length,
-                remedy=f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units",
-            )
+        require(
+            self.slenderness <= SLENDEREST,
+            "link.length",
+            self.length,
+            f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units",
+        )
         nu = self.poissons_ratio  # the argument of Cowper's factor; the margins allow for a rounded G
         if self.section.shear_factor is None and not -1 + 1e-9 <= nu <= 0.5 + 1e-12:
             raise ParameterError(
@@ -238,8 +237,7 @@ class Link:
         E = positive("link.youngs_modulus", youngs_modulus, MEANINGS["youngs_modulus"])
         meaning = "Poisson's ratio lies above -1, up to 0.5 (incompressible); about 0.3 for metals"
         nu = number("link.poissons_ratio", poissons_ratio, meaning)
-        if not -1.0 < nu <= 0.5:
-            raise ParameterError(key="link.poissons_ratio", value=nu, remedy=meaning)
+        require(-1.0 < nu <= 0.5, "link.poissons_ratio", nu, meaning)
         return cls(
             length=length,
             density=density,

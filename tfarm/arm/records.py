@@ -21,7 +21,7 @@ from tfarm.arm.checks import (
 )
 from tfarm.arm.link import Link
 from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring, brief_repr
-from tfarm.errors import ParameterError, must_be_known, shown
+from tfarm.errors import ParameterError, must_be_known, require, shown
 
 MOST_PARTS = 64  # segments, and attachments: a check of the chain has 64 equal pieces
 FLATTEST = 1e-3  # arm's length over a segment's radius of gyration: below it the units are wrong
@@ -63,12 +63,12 @@ class Arm:
         must_be_known("theory", self.theory, THEORIES)
         must_be_known("input", self.input, INPUTS)
         slenderness = min(self.length / link.section.radius_of_gyration for link in self.links)  # of the whole length
-        if slenderness < FLATTEST:
-            raise ParameterError(
-                key="length" if self.outer else "link.length",
-                value=self.length,
-                remedy=f"{slenderness:.3g} times the section's radius of gyration is no beam; check the units",
-            )
+        require(
+            slenderness >= FLATTEST,
+            "length" if self.outer else "link.length",
+            self.length,
+            f"{slenderness:.3g} times the section's radius of gyration is no beam; check the units",
+        )
         self._check_places()
         if self.motor is None and self.input in ("motor_voltage", "motor_current"):
             raise ParameterError(
@@ -91,12 +91,12 @@ class Arm:
         end = self.length * (1 + LENGTH_ROUNDING)
         places = [(f"attachment.{i}", each.x, end) for i, each in enumerate(self.attachments, 1)]
         for part, x, most in [*places, ("gauge", self.gauge.x, self.length)]:
-            if x > most:
-                raise ParameterError(
-                    key=f"{part}.x",
-                    value=x,
-                    remedy=f"is beyond the tip; x counts from the clamp, up to the link's length of {self.length!r} m",
-                )
+            require(
+                x <= most,
+                f"{part}.x",
+                x,
+                f"is beyond the tip; x counts from the clamp, up to the link's length of {self.length!r} m",
+            )
         on_it = tuple(each if each.x <= self.length else replace(each, x=self.length) for each in self.attachments)
         object.__setattr__(self, "attachments", on_it)
         if math.isinf(self.payload.mass) and abs(self.centre_distance) < 1e-9 * (self.hub.radius + self.length):
@@ -409,19 +409,14 @@ def must_turn(arm: Arm) -> None:
         "payload.inertia": arm.payload.inertia,
     }
     key, value = max(parts.items(), key=lambda part: part[1])
-    if math.isinf(value):
-        raise ParameterError(key=key, value=value, remedy="an arm that cannot turn has no slew; give finite inertias")
+    require(not math.isinf(value), key, value, "an arm that cannot turn has no slew; give finite inertias")
     for key, value in arm._springs_to_ground():
-        if value > 0.0:
-            raise ParameterError(
-                key=key, value=value, remedy="an arm with a spring to ground has no slew; leave the spring out"
-            )
+        require(value <= 0.0, key, value, "an arm with a spring to ground has no slew; leave the spring out")
 
 
 def _parts(key: str, parts: object, kind: type[_Part], most: int) -> tuple[_Part, ...]:
     """Return a tuple of at most `most` records of one kind.  Raises ParameterError for anything else."""
     if not isinstance(parts, list | tuple) or not all(isinstance(part, kind) for part in parts):
         raise ParameterError(key=key, value=parts, remedy=f"give a tuple of {kind.__name__} records")
-    if len(parts) > most:
-        raise ParameterError(key=key, value=len(parts), remedy=f"at most {most}")
+    require(len(parts) <= most, key, len(parts), f"at most {most}")
     return tuple(parts)

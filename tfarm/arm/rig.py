@@ -11,7 +11,7 @@ from dataclasses import MISSING, dataclass, fields
 from typing import Any, Literal, cast
 
 from tfarm.arm.checks import check_fields, extended, not_negative, positive, signed
-from tfarm.errors import ParameterError
+from tfarm.errors import ParameterError, require
 
 
 def differing(record: Any, always: int) -> dict[str, Any]:
@@ -80,8 +80,7 @@ class RotarySpring:
     def __post_init__(self) -> None:
         meaning = "the stiffness of a clamp or joint is positive in N m/rad, or inf (rigid)"
         check_fields(self, "spring", extended, stiffness=meaning)
-        if self.stiffness == 0.0:
-            raise ParameterError(key="spring.stiffness", value=self.stiffness, remedy=meaning)
+        require(self.stiffness != 0.0, "spring.stiffness", self.stiffness, meaning)
         check_fields(
             self,
             "spring",
@@ -127,10 +126,7 @@ class Motor:
             "gear_efficiency": "an efficiency is above 0, up to 1 (75 % is entered as 0.75)",
         }
         check_fields(self, "motor", positive, **meanings)
-        if self.gear_efficiency > 1.0:
-            raise ParameterError(
-                key="motor.gear_efficiency", value=self.gear_efficiency, remedy=meanings["gear_efficiency"]
-            )
+        require(self.gear_efficiency <= 1.0, "motor.gear_efficiency", self.gear_efficiency, meanings["gear_efficiency"])
         back_emf: object = self.back_emf_constant
         if back_emf is None:
             object.__setattr__(self, "back_emf_constant", self.torque_constant)
@@ -174,12 +170,12 @@ class Attachment:
             stiffness="an attached spring to ground is zero or positive, finite, in N/m",
             rotational_stiffness="an attached rotary spring to ground is zero or positive, finite, in N m/rad",
         )
-        if not (self.mass or self.inertia or self.is_held):
-            raise ParameterError(
-                key="attachment.x",
-                value=self.x,
-                remedy="an empty attachment: give a mass, an inertia, a stiffness or a rotational_stiffness",
-            )
+        require(
+            self.mass or self.inertia or self.is_held,
+            "attachment.x",
+            self.x,
+            "an empty attachment: give a mass, an inertia, a stiffness or a rotational_stiffness",
+        )
 
     @property
     def is_held(self) -> bool:
@@ -204,8 +200,7 @@ class Gauge:
             not_negative,
             x="a gauge's place is zero or a positive number of metres from the clamp",
         )
-        if self.side not in ("outer", "inner"):
-            raise ParameterError(key="gauge.side", value=self.side, remedy='"outer" or "inner"')
+        require(self.side in ("outer", "inner"), "gauge.side", self.side, '"outer" or "inner"')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

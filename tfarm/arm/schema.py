@@ -1,11 +1,16 @@
 """The tables of an arm's TOML file as strict pydantic models, each with the parameters of its record's constructor.
 
 Types and names are checked here, physics in the records.  The first problem of a file becomes one ParameterError.
+Label, unit and meaning of every key are in `keys.toml` and read by `file_key`.
 """
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cache
+from importlib.resources import files
 from inspect import Parameter, signature
 from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_type_hints
 
@@ -16,12 +21,14 @@ from tfarm.arm.checks import INPUTS, THEORIES
 from tfarm.arm.link import Link, Section
 from tfarm.arm.records import MOST_PARTS, Arm
 from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring
-from tfarm.errors import MISSING, ParameterError, did_you_mean
+from tfarm.errors import MISSING, ParameterError, did_you_mean, require
+from tfarm.schema import Quantity
 
 _Strict = TypeVar("_Strict", bound="StrictTable")
 _Table = TypeVar("_Table", bound="TomlTable")
 _Part = TypeVar("_Part")
 LOOP_TABLES = ("sampling", "converters", "actuator", "slew", "law")  # of the loop: read by other rooms
+OF_INPUT = "N m, V or A"  # unit of a limit of the input
 AT_THE_TOP = ("name", "assumptions", "theory", "input")  # keys before the first table
 
 
@@ -125,17 +132,16 @@ class LinkTable(TomlTable):
 
     def build(self) -> Link:
         given = {**self.given(), "section": self.section.build()}
-        if self.shear_modulus is None and self.poissons_ratio is None:
-            raise ParameterError(
-                key="link.shear_modulus", value=MISSING, remedy="give it in Pa, or give poissons_ratio"
-            )
-        if self.shear_modulus is not None and self.poissons_ratio is not None:
-            raise ParameterError(
-                key="link.poissons_ratio",
-                value=self.poissons_ratio,
-                remedy="shear_modulus is given too, and one follows from the other; leave one out",
-            )
-        return Link(**given) if self.poissons_ratio is None else Link.isotropic(**given)
+        nu = self.poissons_ratio
+        require(
+            self.shear_modulus is not None or nu is not None,
+            "link.shear_modulus",
+            MISSING,
+            "give it in Pa, or give poissons_ratio",
+        )
+        remedy = "shear_modulus is given too, and one follows from the other; leave one out"
+        require(self.shear_modulus is None or nu is None, "link.poissons_ratio", nu, remedy)
+        return Link(**given) if nu is None else Link.isotropic(**given)
 
 
 @of(Hub)
@@ -202,6 +208,24 @@ class ArmTable(TomlTable):
             gauge=self.gauge.build(),
             payload=self.payload.build(),
         )
+
+
+@cache
+def file_keys() -> dict[str, Quantity]:
+    """Return label, unit and meaning of every key of a file: "top.name", "link.section.width", "law.SIGNAL.gain"."""
+    tables = tomllib.loads((files("tfarm.arm") / "keys.toml").read_text("utf-8"))
+    return {f"{place}.{key}": Quantity(**words) for place, keys in tables.items() for key, words in keys.items()}
+
+
+def file_key(key: str, arm: Arm | None = None) -> Quantity:
+    """Return label, unit and meaning of a number such as "link.2.section.width", or of a sensor's "gain:1".
+
+    A unit that is that of the arm's input is one of `OF_INPUT` where the arm is given, else all three.
+    """
+    words = [word for word in key.partition(":")[0].split(".") if not word.isdecimal()]
+    place = ["top" if words[0] in AT_THE_TOP else "sensor"] if len(words) == 1 else []
+    found = file_keys()[".".join((*place, *words))]
+    return replace(found, unit=arm.input_unit) if arm is not None and found.unit == OF_INPUT else found
 
 
 def _within(place: str, build: Callable[[], _Part]) -> _Part:

@@ -25,23 +25,6 @@ LAW_DEFAULTS: dict[str, Any] = {  # of the keys of [law]
     "input": None, "delay": 0.0, "period": None, "sign": -1, "references": (), "rule": "tustin", "prewarp": 0.0,
 }  # fmt: skip
 
-NUMBER_UNITS = {  # of a number by the last word of its key, in SI
-    "length": "m", "radius": "m", "offset": "m", "x": "m", "width": "m", "depth": "m", "diameter": "m",
-    "outer_diameter": "m", "inner_diameter": "m", "area": "m^2", "second_moment": "m^4", "density": "kg/m^3",
-    "youngs_modulus": "Pa", "shear_modulus": "Pa", "damping": "s", "inertia": "kg m^2", "rotor_inertia": "kg m^2",
-    "mass": "kg", "friction": "N m s/rad", "rotor_friction": "N m s/rad", "rotational_stiffness": "N m/rad",
-    "stiffness": "N m/rad", "resistance": "ohm", "inductance": "H", "torque_constant": "N m/A",
-    "back_emf_constant": "V s/rad", "delay": "s",
-}  # fmt: skip
-
-
-def number_unit(key: str) -> str:
-    """Return the SI unit of a free number; "1" where it has none, or that of its response."""
-    words = key.partition(":")[0].split(".")
-    if words[-1] == "stiffness" and words[0] == "attachment":
-        return "N/m"
-    return NUMBER_UNITS.get(words[-1], "1")
-
 
 def to_toml(arm: Arm) -> str:
     """Return the arm as a TOML file; equal arms have equal texts.

@@ -41,16 +41,45 @@ class Candidate:
     `K2_below` is None where the loop is not stable; `K2_below_is_edge` is whether poles reach the axis there.
     """
 
-    is_own: Annotated[bool, Quantity("this arm")]
-    depth: Annotated[float | None, Quantity("depth", "m", 4)] = None
-    width: Annotated[float | None, Quantity("width", "m", 4)] = None
-    second_moment: Annotated[float | None, Quantity("I", "m^4", 4, key="second_moment_m4")] = None
-    hub_inertia: Annotated[float | None, Quantity("I_h", "kg m^2", 4, key="hub_inertia_kg_m2")] = None
-    natural_frequency: Annotated[list[float], Quantity("natural frequencies", "rad/s")]
+    is_own: Annotated[bool, Quantity("this arm", help="whether the row is the arm's own value")]
+    depth: Annotated[float | None, Quantity("depth", "m", 4, "of the candidate rectangle, in the plane of bending")] = (
+        None
+    )
+    width: Annotated[
+        float | None, Quantity("width", "m", 4, "of the candidate rectangle: the arm's own area over the depth")
+    ] = None
+    second_moment: Annotated[
+        float | None,
+        Quantity("I", "m^4", 4, key="second_moment_m4", help="second moment of area about the neutral axis of bending"),
+    ] = None
+    hub_inertia: Annotated[
+        float | None,
+        Quantity("I_h", "kg m^2", 4, key="hub_inertia_kg_m2", help="candidate inertia of hub and rotor about the axis"),
+    ] = None
+    natural_frequency: Annotated[
+        list[float],
+        Quantity("natural frequencies", "rad/s", help="flexible modes of the candidate from the first, undamped"),
+    ]
     sensitivity: Annotated[list[float], Quantity("sensitivities", "%/%", 4, "of frequency to I or I_h, exact")]
-    verdict: Annotated[str, Quantity("loop")] = "no loop"
+    verdict: Annotated[
+        str,
+        Quantity(
+            "loop",
+            "",
+            6,
+            "stability of the loop with the default gains of the arm itself; no loop where the hub has no inertia",
+        ),
+    ] = "no loop"
     K2_below: Annotated[float | None, Quantity(f"stable below {MOMENT_GAIN}", help="of the default loop")] = None
-    K2_below_is_edge: Annotated[bool, Quantity("stability limit there")] = False
+    K2_below_is_edge: Annotated[
+        bool,
+        Quantity(
+            "stability limit there",
+            "",
+            6,
+            "whether a pole reaches the imaginary axis at that gain, or the search ended there",
+        ),
+    ] = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,22 +100,46 @@ class Study:
     natural_frequency: Real
     sensitivity: Real
     is_own: NDArray[np.bool_]
-    held: Annotated[str, Quantity("sensitivity")]
-    locked: Annotated[Real, Quantity("locked hub (I_h = inf) [rad/s]", key="locked_rad_s")]
-    pinned: Annotated[Real, Quantity("free pin (I_h = 0) [rad/s]", key="pinned_rad_s")]
+    held: Annotated[str, Quantity("sensitivity", help="what is kept constant where a frequency is differentiated")]
+    locked: Annotated[
+        Real,
+        Quantity(
+            "locked hub (I_h = inf) [rad/s]",
+            "",
+            6,
+            "limits of the frequencies for an infinite hub inertia",
+            "locked_rad_s",
+        ),
+    ]
+    pinned: Annotated[
+        Real,
+        Quantity(
+            "free pin (I_h = 0) [rad/s]", "", 6, "limits of the frequencies for a hub without inertia", "pinned_rad_s"
+        ),
+    ]
 
     @property
-    def area(self) -> Annotated[float, Quantity("area", "m^2", key="area_m2")]:
+    def area(
+        self,
+    ) -> Annotated[
+        float, Quantity("area", "m^2", key="area_m2", help="cross-section of the link, the same for every candidate")
+    ]:
         """The area of the section."""
         return self.arm.link.section.area
 
     @property
-    def shear_factor(self) -> Annotated[float, Quantity("shear factor")]:
+    def shear_factor(
+        self,
+    ) -> Annotated[float, Quantity("shear factor", help="of the arm's own section, kept for every candidate")]:
         """The shear factor of the section."""
         return self.arm.link.shear_factor
 
     @property
-    def candidates(self) -> Annotated[list[Candidate], Quantity("candidates")]:
+    def candidates(
+        self,
+    ) -> Annotated[
+        list[Candidate], Quantity("candidates", help="frequencies, sensitivities and stability, a row a candidate")
+    ]:
         """A row a candidate; the moment has no loop where the hub is locked or a free pin."""
         law, found = default_gains(self.arm), []
         for n, (arm, value) in enumerate(zip(self.arms, self.values.tolist(), strict=True)):
@@ -112,11 +165,13 @@ class Study:
 class Assumptions:
     """The effect of the assumed section and hub; no hub where that has no inertia to choose."""
 
-    arm: Annotated[str, Quantity("arm")]
-    count: Annotated[int, Quantity("flexible modes")]
-    gains: Annotated[dict[str, float], Quantity("gains of the loop")]
-    section: Annotated[Study, Quantity("section")]
-    hub: Annotated[Study | None, Quantity("hub")]
+    arm: Annotated[str, Quantity("arm", help="arm whose section and hub inertia are varied")]
+    count: Annotated[int, Quantity("flexible modes", help="number of flexible modes in each row")]
+    gains: Annotated[
+        dict[str, float], Quantity("gains of the loop", help="default gains of the arm, the same for every candidate")
+    ]
+    section: Annotated[Study, Quantity("section", help="rectangles of the arm's own area")]
+    hub: Annotated[Study | None, Quantity("hub", help="hub inertias; none where the hub is locked or a free pin")]
 
 
 def assumptions(arm: Arm, count: int) -> Assumptions:

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -30,7 +31,7 @@ from .formulas import (
     symbols,
     unbalanced,
 )
-from .rows import Claim
+from .rows import formula_of, printed
 
 K1 = 0.3  # N m s/rad
 MODES = 8  # of the arm whose gain is switched
@@ -68,24 +69,12 @@ def pumped_text() -> str:
     )
 
 
-KINETIC = "rho*A*(y_t + x*theta_t)^2 + rho*I*(phi_t + theta_t)^2"
-POTENTIAL = "E*I*phi_x^2 + kappa*G*A*(phi - y_x)^2"
-V_PRINTED = f"V = a1/2*integral({KINETIC}) + a2/2*I_h*theta_t^2 + a3/2*integral({POTENTIAL})"
-V = V_PRINTED + " + a1/2*(m*(y_t(L,t) + L*theta_t)^2 + I_c*(phi_t(L,t) + theta_t)^2)"
-STRAIN_RATE = "a3*integral(E*I*phi_x*phi_xt + kappa*G*A*(phi - y_x)*(phi_t - y_xt))"
-RATE = (
-    "V_t = a1*integral(rho*A*(y_t + x*theta_t)*(y_tt + x*theta_tt) + rho*I*(phi_t + theta_t)*(phi_tt + theta_tt))"
-    f" + a2*I_h*theta_t*theta_tt + {STRAIN_RATE}"
-)
-SUBSTITUTED = (
-    "V_t = a1*integral((y_t + x*theta_t)*(kappa*G*A*(y_xx - phi_x))"
-    " + (phi_t + theta_t)*(E*I*phi_xx - kappa*G*A*(phi - y_x)))"
-    f" + a2*theta_t*(E*I*phi_x(0,t) + u) + {STRAIN_RATE}"
-)
-POWER_FLOW = "V_t = theta_t*(a2*u + (a2 - a1)*E*I*phi_x(0,t)); a3 = a1"
-CONTROL_LAW = "u = -K1*theta_t - K2*E*I*phi_x(0,t); 0 < K1 < oo; -oo < K2 < 1"
-DECAY = "V_t = -a2*K1*theta_t^2; a3 = a1; a1 = a2*(1 - K2)"
-VARIED_DECAY = "V_t = -a2*K1*theta_t^2; a3 = a1; a1 = a2*(1 - K2)"
+V_PRINTED = printed("(15)")
+V = formula_of("(15)")
+RATE = formula_of("(16)")
+POWER_FLOW = formula_of("(18)")
+CONTROL_LAW = formula_of("(19)")
+DECAY = formula_of("(20)")
 a1, a2, a3, u, theta_t = (*symbols("a1 a2 a3 u"), jet("theta", t=1))
 M0 = parsed("E*I*phi_x(0,t)")
 
@@ -192,75 +181,13 @@ def is_varied_decay(text: str) -> str:
     return unbalanced((law_rate + moving - value).subs(a1, weight))
 
 
-ENERGY_CLAIMS = (  # the energy, its rate, the law and the consequences stated of it
-    Claim(
-        equation="(15)",
-        printed=V_PRINTED,
-        corrected=V,
-        check=is_total_energy,
-        evidence="With a1 = a2 = a3 = 1 the energy of hub, arm and payload changes by u theta_t only (SymPy, "
-        "integration by parts for every motion). The print leaves the power that flows into the payload: it holds "
-        "for m = I_c = 0, as in Table 1. The payload's weight must be a1 for (18).",
-    ),
-    Claim(
-        equation="(16)",
-        printed=RATE,
-        check=is_derivative,
-        evidence="The time derivative of (15) as printed (SymPy). With (15) corrected, (16) and (17) gain "
-        "a1 (m w_t w_tt + I_c psi_t psi_tt) at the tip; (V depends on t only: dV/dt).",
-    ),
-    Claim(
-        equation="(17)",
-        printed=SUBSTITUTED.replace("(phi_t + theta_t)", "(phi_t + theta_x)"),
-        corrected=SUBSTITUTED,
-        check=is_substituted,
-        evidence="(16) with the accelerations of (1), (2) and (3) (SymPy); theta does not depend on x. The text "
-        'before it, "substituting (1) into (2)", should read (1)-(3) into (16).',
-    ),
-    Claim(
-        equation="(18)",
-        printed="V_t = theta_t*(a2*u + (a3 - a1)*E*I*phi_x(t,0))",
-        corrected=POWER_FLOW,
-        check=is_power,
-        evidence="Integrated by parts with payload and a1, a2, a3 free (SymPy): dV/dt is theta_t (a2 u + (a2 - a1) "
-        "M(0)) plus (a3 - a1) times the rate of the strain energy, which has no sign. So a3 = a1 is needed, and "
-        "the factor is a2 - a1. The print holds for no other weights than a1 = a2 = a3.",
-    ),
-    Claim(
-        equation="(19)",
-        printed="u = -K1*theta_t - K2*E*I*phi_x(t,0); 0 < K1 < oo; 0 < K2 < oo",
-        corrected=CONTROL_LAW,
-        check=are_proven_gains,
-        evidence="dV/dt <= 0 needs a1/a2 = 1 - K2 > 0 (SymPy): K1 > 0 and K2 < 1, negative K2 included; "
-        "K2 >= 1 is not covered, and K2 > 1 is unstable at C = 0. The sign is that of the moment E I phi'(0).",
-        measured=growth_text,
-    ),
-    Claim(
-        equation="(20)",
-        printed="V_t = -K*theta_t^2",
-        corrected=DECAY,
-        check=is_decay,
-        evidence="(19) in the true dV/dt (SymPy). K is not defined before (20). Semidefinite: theta itself is "
-        "neither in V nor in (19), so the angle is not regulated, and this alone proves stability of the motion, "
-        "not that it dies out.",
-    ),
-    Claim(
-        equation="(18)-(20): damping C > 0",
-        printed="u = -K1*theta_t - K2*E*I*phi_x(0,t)",
-        corrected="u = -K1*theta_t - K2*E*I*(phi_x(0,t) + C*phi_xt(0,t))",
-        check=is_damped_decay,
-        evidence="With E (1 + C d/dt) in (2), (3), (5), dV/dt = -a2 K1 theta_t^2 - a1 C integral(E I phi_xt^2) "
-        "needs the moment with its damping part; what a strain gauge gives, E I phi', leaves a term of no sign "
-        "(SymPy). The paper's section 3 is for C = 0.",
-    ),
-    Claim(
-        equation="(18)-(20): constant gains, varied by the tuner",
-        printed=VARIED_DECAY,
-        corrected=VARIED_DECAY + "; K2_t = 0",
-        check=is_varied_decay,
-        evidence="The weights of the proof follow the gain, a1 = a2 (1 - K2): when K2 varies, dV/dt gains -a2 K2_t "
-        "times the energy of arm and payload (SymPy), positive whenever K2 falls. So the proof holds for constant "
-        "gains (and for K2 that never falls), while the tuner moves K at every sample.",
-        measured=pumped_text,
-    ),
-)
+CHECKS: dict[str, Callable[[str], str]] = {
+    "(15)": is_total_energy,
+    "(16)": is_derivative,
+    "(17)": is_substituted,
+    "(18)": is_power,
+    "(19)": are_proven_gains,
+    "(20)": is_decay,
+    "(18)-(20): damping C > 0": is_damped_decay,
+    "(18)-(20): constant gains, varied by the tuner": is_varied_decay,
+}

@@ -35,36 +35,15 @@ from .formulas import (
     symbols,
     unbalanced,
 )
-from .rows import Claim
+from .rows import formula_of
 
 DENSITY = (  # kinetic minus potential energy a length, from w = y + x theta and psi = phi + theta
     "rho*A/2*(y_t + x*theta_t)^2 + rho*I/2*(phi_t + theta_t)^2 - E*I/2*phi_x^2 - kappa*G*A/2*(y_x - phi)^2"
 )
 PAYLOAD = "m/2*(y_t + x*theta_t)^2 + I_c/2*(phi_t + theta_t)^2"
 
-TIME = {
-    1: "rho*A*(y_tt + x*theta_tt) - kappa*G*A*(y_xx - phi_x) = 0",
-    2: "rho*I*(phi_tt + theta_tt) - E*I*phi_xx - kappa*G*A*(y_x - phi) = 0",
-    3: "I_h*theta_tt = E*I*phi_x(t,0) + u",
-    4: "m*(y_tt(L,t) + L*theta_tt) = -kappa*G*A*(y_x(L,t) - phi(L,t))",
-    5: "I_c*(phi_tt(L,t) + theta_tt) = -E*I*phi_x(L,t)",
-    6: "y(0,t) = 0",
-    7: "phi(0,t) = 0",
-}
-LAPLACE_PRINTED = {
-    8: "rho*A*s^2*(Y + x*Theta) - kappa*G*A*(Y_xx - Theta_x) = 0",
-    9: "rho*I*s^2*(Phi + Theta) - E*I*Phi_xx - kappa*G*A*(Y_x - Phi) = 0",
-    10: "I_h*s^2*Theta = E*I*Phi_x(s,0) + U",
-    11: "m*s^2*(Y(L,s) + L*Theta) = -kappa*G*A*(y_x(L,s) - Phi(L,s))",
-    12: "I_c*s^2*(Phi(L,s) + Theta) = -E*I*Phi_x(L,s)",
-    13: "Y(0,s) = 0",
-    14: "Phi(0,t) = 0",
-}
-LAPLACE = LAPLACE_PRINTED | {
-    8: "rho*A*s^2*(Y + x*Theta) - kappa*G*A*(Y_xx - Phi_x) = 0",
-    11: "m*s^2*(Y(L,s) + L*Theta) = -kappa*G*A*(Y_x(L,s) - Phi(L,s))",
-    14: "Phi(0,s) = 0",
-}
+TIME = {n: formula_of(f"({n})") for n in range(1, 8)}
+LAPLACE = {n: formula_of(f"({n})") for n in range(8, 15)}
 
 
 def euler(field: str) -> Expression:
@@ -125,87 +104,13 @@ def solved_motion() -> tuple[dict[Expression, Expression], ...]:
     return arm, tip, hub
 
 
-CHECKS: dict[int, Callable[[str], str]] = {number: partial(is_transform, number) for number in LAPLACE} | {
-    1: partial(along_arm, "y"),
-    2: partial(along_arm, "phi"),
-    3: at_hub,
-    4: partial(at_tip, "y"),
-    5: partial(at_tip, "phi"),
-    6: partial(at_clamp, "y"),
-    7: partial(at_clamp, "phi"),
-}
-
-HAMILTON = "Derived afresh by Hamilton's principle from w = y + x theta, psi = phi + theta (SymPy), at C = 0: "
-MOTION_EVIDENCE = {
-    1: HAMILTON + "the Euler-Lagrange equation of y.",
-    2: HAMILTON + "the Euler-Lagrange equation of phi.",
-    3: "Angular momentum of hub, arm and payload about the axis has u as its only source (SymPy, C = 0, any length). "
-    "The arguments (t, 0) are read as x = 0; their order is a row of its own.",
-    4: HAMILTON + "the natural end condition of y.",
-    5: HAMILTON + "the natural end condition of phi.",
-    6: "With y(0, t) = 0 the clamp's force does no work (SymPy).",
-    7: "With phi(0, t) = 0 the clamp's moment does no work beyond the hub's (SymPy).",
-    8: "Laplace transform of (1), from rest (SymPy). Theta does not depend on x, so the print drops the shear of phi. "
-    "Capital Theta for Phi could also be the scan's misreading; the formula is wrong as printed either way.",
-    11: "Laplace transform of (4) (SymPy): y(L, s) is no transform. A small y for Y could also be the scan's.",
-    14: "Laplace transform of (7) (SymPy): the argument is s, not t.",
-}
+def places_after_time(text: str) -> str:
+    """How many derivatives have their arguments in the order of time and place."""
+    return str(len(re.findall(r"\([ts],", text)))
 
 
-MOTION_CLAIMS = (  # (1)-(14), and the order of arguments
-    *(Claim(equation=f"({n})", printed=TIME[n], check=CHECKS[n], evidence=MOTION_EVIDENCE[n]) for n in TIME),
-    *(
-        Claim(
-            equation=f"({n})",
-            printed=printed,
-            corrected="" if LAPLACE[n] == printed else LAPLACE[n],
-            check=CHECKS[n],
-            evidence=MOTION_EVIDENCE.get(n, f"Laplace transform of ({n - 7}), from rest, at C = 0 (SymPy)."),
-        )
-        for n, printed in LAPLACE_PRINTED.items()
-    ),
-    Claim(
-        equation="(3), (10), (18), (19): order of arguments",
-        printed="phi_x(t,0); Phi_x(s,0); phi_x(t,0); phi_x(t,0)",
-        corrected="phi_x(0,t); Phi_x(0,s); phi_x(0,t); phi_x(0,t)",
-        check=lambda text: str(len(re.findall(r"\([ts],", text))),  # places after the time
-        evidence="Counted: (4)-(7), (11)-(14) and (17) have the place first, these four the time. Taken literally, the "
-        "root moment in (3) would be the moment at x = t and time 0. Notation only.",
-    ),
-)
-
-
-Y_TERMS = (
-    "Delta_k1/Delta*exp(lambda_1*x) + Delta_k2/Delta*exp(lambda_2*x)"
-    " {0} Delta_k3/Delta*exp(-lambda_1*x) {0} Delta_k4/Delta*exp(-lambda_2*x) - x*Theta"
-)
-PHI_TERMS = (
-    "(lambda_1 - rho*s^2/(lambda_1*kappa*G))*(k1*exp(lambda_1*x) - k3*exp(-lambda_1*x))"
-    " + (lambda_2 - rho*s^2/(lambda_2*kappa*G))*(k2*exp(lambda_2*x) - k4*exp(-lambda_2*x)) - Theta"
-)
-WAVES_PRINTED = f"Y = {Y_TERMS.format('-')}; Phi = {PHI_TERMS}"
-WAVES_CORRECTED = f"Y = {Y_TERMS.format('+')}; Phi = {PHI_TERMS}"
-LAMBDA_PRINTED = (
-    "lambda = pm*sqrt(1/2*((1/(E*(1 + C*s)) + 1/(kappa*G))*rho*s^2 + pm*(rho^2*s^4/(E^2*(1 + C*s)^2)"
-    " - 2*rho^2*s^4/(E*(1 + C*s)*kappa*G) + rho^2*s^4/(kappa^2*G^2) - 4*rho*A*s^2/(E*I*(1 + C*s)))))"
-)
-LAMBDA = LAMBDA_PRINTED.replace("pm*(rho", "pm*sqrt(rho")
-SHEAR_TERM = "a1{j} = (m*s^2 {sign} rho*A*s^2/lambda_{i})*exp({minus}lambda_{i}*L)"
-MOMENT_TERM = (
-    "a2{j} = {minus}(lambda_{i} - rho*s^2/(kappa*G*lambda_{i}))*(I_c*s^2 {sign} E*I*(1 + C*s)*lambda_{i})"
-    "*exp({minus}lambda_{i}*L)"
-)
-HUB_TERM = (
-    "a4{j} = {minus}(I_h*s^2*(lambda_{i} - rho*s^2/(kappa*G*lambda_{i}))"
-    " {other} E*I*(1 + C*s)*(lambda_{i}^2 - rho*s^2/(kappa*G)))"
-)
-WAVES = (
-    {"j": 1, "i": 1, "sign": "+", "other": "-", "minus": ""},
-    {"j": 2, "i": 2, "sign": "+", "other": "-", "minus": ""},
-    {"j": 3, "i": 1, "sign": "-", "other": "+", "minus": "-"},
-    {"j": 4, "i": 2, "sign": "-", "other": "+", "minus": "-"},
-)
-ENTRIES = "; ".join(row.format(**wave) for row in (SHEAR_TERM, MOMENT_TERM, "a3{j} = 1", HUB_TERM) for wave in WAVES)
+WAVES = formula_of("(A.1)")
+ENTRIES = formula_of("a_ij")
 ENTRY_NAMES = tuple(tuple(f"a{i}{j}" for j in (1, 2, 3, 4)) for i in (1, 2, 3, 4))
 RIGHT_SIDE = ("0", "0", "0", "U")
 BEAM_DIGITS = 50  # of both methods; RESIDUAL_NOISE leaves half of them to rounding
@@ -216,20 +121,8 @@ BEAMS = (  # payload and damping, orders of one, so that no term hides; s on and
 )
 
 
-def _columns_replaced(column: int) -> str:
-    """The paper's determinant with the right side in one column (0: in none), rows separated by /."""
-    rows = (
-        " ".join(new if j == column else old for j, old in enumerate(row, start=1))
-        for row, new in zip(ENTRY_NAMES, RIGHT_SIDE, strict=True)
-    )
-    return " / ".join(rows)
-
-
-DETERMINANTS = "; ".join(
-    f"{name} = |{_columns_replaced(column)}|"
-    for column, name in enumerate(("Delta", "Delta_k1", "Delta_k2", "Delta_k3", "Delta_k4"))
-)
-STIFFNESS = "E*(1 + C*s)*I"
+DETERMINANTS = formula_of("Delta, Delta k_i")
+STIFFNESS = formula_of("(1)-(14): damping C")
 
 
 def waves_of(text: str) -> tuple[Expression, Expression]:
@@ -265,7 +158,7 @@ def wave_determinant() -> Expression:
 @cache
 def relation() -> Expression:
     """The polynomial in lambda whose roots are those of the corrected (A.2)."""
-    square = next(iter(sides(LAMBDA).values())) ** 2
+    square = next(iter(sides(formula_of("(A.2)")).values())) ** 2
     return sp.expand(sp.Mul(*(symbol("lambda_") ** 2 - square.subs(symbol("pm"), sign) for sign in (1, -1))))
 
 
@@ -299,8 +192,8 @@ def is_dispersion(text: str) -> str:
 
 def conditions() -> list[Expression]:
     """(11), (12), (13), (10) with the waves, Theta = Psi(0) by (14): zero, zero, zero, U."""
-    theta = sp.solve(inserted(14, WAVES_CORRECTED), symbol("Theta"))[0]
-    rows = [inserted(number, WAVES_CORRECTED) for number in (11, 12, 13, 10)]
+    theta = sp.solve(inserted(14, WAVES), symbol("Theta"))[0]
+    rows = [inserted(number, WAVES) for number in (11, 12, 13, 10)]
     return [sp.expand(row.subs(symbol("Theta"), theta)) for row in rows]
 
 
@@ -381,58 +274,20 @@ def by_appendix(text: str, v: dict[str, Any]) -> list[Any]:
     return [mpmath.mpmathify(number(f)) for f in ends]
 
 
-APPENDIX_CLAIMS = (  # the waves, their numbers, the ends' matrix and Cramer's rule; last, all of it in numbers
-    Claim(
-        equation="(A.1)",
-        printed=WAVES_PRINTED,
-        corrected=WAVES_CORRECTED,
-        check=solves,
-        evidence="Inserted in (8) and (9), each k_i by itself, with lambda of the corrected (A.2) (SymPy). The minus "
-        "signs before k_3, k_4 belong in Phi only, and a_31 = ... = a_34 = 1, which is W(0) = 0, has them so "
-        "too. k_i, used in Phi, is defined nowhere: Delta k_i/Delta. The text calls this the solution to (8), (9) "
-        "and (10); it is that of (8)-(14).",
-    ),
-    Claim(
-        equation="(A.2)",
-        printed=LAMBDA_PRINTED,
-        corrected=LAMBDA,
-        check=is_dispersion,
-        evidence="Dimensions, and lambda in the determinant of (8) and (9), both signs (SymPy): the inner bracket "
-        "needs its square root; all else is right.",
-        doubt="Undecided whether the paper or the transcript lost it: a brace is unmatched just there, so that "
-        "either the print reads [...]^{1/2} inside, or it has no inner root and is wrong.",
-    ),
-    Claim(
-        equation="a_ij",
-        printed=ENTRIES,
-        check=are_entries,
-        evidence="All sixteen are the coefficients of k_j in (11), (12), (13), (10) with the corrected (A.1), "
-        "Theta = Psi(0) by (14), and E (1 + C s); U is alone in row 4 (SymPy).",
-    ),
-    Claim(
-        equation="Delta, Delta k_i",
-        printed=DETERMINANTS,
-        check=are_determinants,
-        evidence="Cramer's rule for any a_ij (SymPy, polynomial identity): sum_j a_ij Delta k_j = (0, 0, 0, U) "
-        "Delta. The brackets are read as the bars of determinants.",
-    ),
-    Claim(
-        equation="appendix as a whole",
-        printed=f"{WAVES_PRINTED}; {LAMBDA_PRINTED}",
-        corrected=f"{WAVES_CORRECTED}; {LAMBDA}",
-        check=disagreement,
-        evidence="Hub angle, tip displacement, tip rotation and root moment for a unit torque by (A.1), (A.2), the "
-        f"a_ij and Cramer's rule, against the exponential of the beam's state matrix, {BEAM_DIGITS} digits, with "
-        "payload and damping: largest relative difference (mpmath).",
-    ),
-)
-
-DAMPING_CLAIM = Claim(  # C, which (1)-(14) lack
-    equation="(1)-(14): damping C",
-    printed="E*I",
-    corrected=STIFFNESS,
-    check=partial(solves, WAVES_CORRECTED),
-    evidence="The waves of the appendix, corrected, in (8) and (9) with this bending stiffness (SymPy): with C they "
-    "solve (9) only if E I carries 1 + C s, in (2), (3), (5) 1 + C d/dt. Without damping (1)-(14) are right "
-    "as printed: C appears in the appendix and Table 1 only.",
-)
+CHECKS: dict[str, Callable[[str], str]] = {
+    "(1)": partial(along_arm, "y"),
+    "(2)": partial(along_arm, "phi"),
+    "(3)": at_hub,
+    "(4)": partial(at_tip, "y"),
+    "(5)": partial(at_tip, "phi"),
+    "(6)": partial(at_clamp, "y"),
+    "(7)": partial(at_clamp, "phi"),
+    **{f"({number})": partial(is_transform, number) for number in LAPLACE},
+    "(3), (10), (18), (19): order of arguments": places_after_time,
+    "(1)-(14): damping C": partial(solves, WAVES),
+    "(A.1)": solves,
+    "(A.2)": is_dispersion,
+    "a_ij": are_entries,
+    "Delta, Delta k_i": are_determinants,
+    "appendix as a whole": disagreement,
+}

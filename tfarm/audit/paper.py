@@ -6,6 +6,7 @@ The audit has a row for each equation of the paper, its table and its appendix.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Annotated
@@ -16,8 +17,9 @@ from tfarm.arm import load
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
-from .energy import CONTROL_LAW, ENERGY_CLAIMS
-from .equations import APPENDIX_CLAIMS, DAMPING_CLAIM, LAMBDA, MOTION_CLAIMS, TIME
+from . import energy, equations
+from .energy import CONTROL_LAW
+from .equations import TIME
 from .formulas import (
     NEEDED,
     PAPER_UNITS,
@@ -35,7 +37,7 @@ from .formulas import (
     unit_dimension,
     unlike,
 )
-from .rows import AuditRow, Claim
+from .rows import TEXTS, AuditRow, Claim, formula_of
 
 ALUMINIUM_DENSITIES = (2550.0, 2900.0)  # kg/m^3: alloys from aluminium-lithium to those rich in copper and zinc
 PRINTED_E = 6.8944e10  # Pa, as printed
@@ -77,7 +79,9 @@ def is_unit_of_damping(text: str) -> str:
 def are_units(text: str) -> str:
     """Every sum in (1), (2), (4), (5) and (A.2) with the units of the text."""
     given = {name: unit_dimension(of) for name, of in (clause.split(": ") for clause in clauses(text))}
-    found = [unlike(formula, PAPER_UNITS | given) for formula in (*(TIME[n] for n in (1, 2, 4, 5)), LAMBDA)]
+    found = [
+        unlike(formula, PAPER_UNITS | given) for formula in (*(TIME[n] for n in (1, 2, 4, 5)), formula_of("(A.2)"))
+    ]
     return "; ".join(each for each in found if each != "0") or "0"
 
 
@@ -112,54 +116,8 @@ def density_in_numbers() -> str:
     )
 
 
-TABLE_CLAIMS = (  # Table 1
-    Claim(
-        equation="Table 1 (rho)",
-        printed="rho = 2.7667 kg/m^3",
-        corrected="rho = 2766.7 kg/m^3",
-        check=is_aluminium,
-        evidence="E and G are those of aluminium, whose alloys weigh 2550 to 2900 kg/m^3: the printed number is "
-        "right in g/cm^3. Residual: relative distance from that range.",
-        measured=density_in_numbers,
-    ),
-    Claim(
-        equation="Table 1 (C's unit)",
-        printed="C: kg/s",
-        corrected="C: s",
-        check=is_unit_of_damping,
-        evidence="C enters as 1 + C s (A.2), so C s is a pure number (dimension checker).",
-    ),
-    Claim(
-        equation="Table 1 (other units)",
-        printed="L: m; A: m^2; rho: kg/m^3; E: Pa; I_c: kg m^2; m: kg; kappa: 1; G: Pa",
-        check=are_units,
-        evidence="With these units every sum in (1), (2), (4), (5) and the corrected (A.2) adds like to like "
-        "(dimension checker).",
-    ),
-    Claim(
-        equation="Table 1 (I)",
-        printed="no value",
-        corrected="I = 1.8e-9 m^4; rectangle 0.1 m x 0.006 m",
-        check=is_section,
-        evidence="(2), (3), (5), (A.2) and the a_ij need I.",
-        doubt="The area does not decide it: rectangles of 6e-4 m^2 and 2 to 60 mm depth have I from 2.0e-10 to "
-        "1.8e-7 m^4. The value is our assumption.",
-    ),
-    Claim(
-        equation="Table 1 (I_h)",
-        printed="no value",
-        corrected="I_h = 0.1 kg m^2",
-        check=partial(is_given, "I_h"),
-        evidence="(3), (10) and a_41 to a_44 need I_h.",
-        doubt="Nothing in the paper decides it. The value is our assumption.",
-    ),
-)
-
-
-INCREMENT = "dw = -eta_c*g + alpha_c*dw_before"
-UPDATE_PRINTED = "w_next = w - dw"
-UPDATE = "w_next = w + dw"
-COST = "E = 1/2*a*x^2 + 1/2*b*e^2; e = u - K*x"
+INCREMENT = formula_of("(21)")
+UPDATE = formula_of("(22)")
 INPUT_NEURONS = 6  # neurons, section 5
 
 
@@ -202,73 +160,37 @@ def are_gain_units(text: str) -> str:
     return "; ".join(clashes) or "0"
 
 
-TUNER_CLAIMS = (  # the learning rule, the cost, and section 5 on them
-    Claim(
-        equation="(21)",
-        printed=INCREMENT,
-        check=lambda text: descends(text, UPDATE),
-        evidence="Gradient descent with momentum, together with the corrected (22) (SymPy, quadratic cost). The text "
-        "after (21) gives the increment the other sign and no momentum: either (21) or (22) may be corrected, here "
-        "(22) is. The gradient needs dx/dK, how the arm's moment answers to the gain, which the paper does not "
-        "give; its E is not Young's modulus.",
-    ),
-    Claim(
-        equation="(22)",
-        printed=UPDATE_PRINTED,
-        corrected=UPDATE,
-        check=lambda text: descends(INCREMENT, text),
-        evidence="With (21) as printed w - dw climbs: on c w^2/2 the map of (w, dw) has det(I - M) = -eta c, a "
-        "multiplier above 1 for every eta and alpha (SymPy). An increment is w(t+1) - w(t).",
-    ),
-    Claim(
-        equation="(23)",
-        printed=COST,
-        corrected=COST + "; u = -K1*theta_t",
-        check=is_cost,
-        evidence='Below (23) u is "the control input", in section 5 a "reference signal" with "control signals '
-        'e". By (19) the torque is -K1 theta_t - K2 x (SymPy).',
-        doubt="Two readings: u is the torque, then e = u - K x counts the moment feedback twice (to measure the "
-        "distance from the law it would be u + K x); or u is the reference and e the torque, then (23) agrees with "
-        "(19). The second is used.",
-    ),
-    Claim(
-        equation="(20), (23): K",
-        printed="V_t = -K*theta_t^2; e = u - K*x",
-        corrected="V_t = -a2*K1*theta_t^2; e = u - K2*x",
-        check=are_gain_units,
-        evidence="K in (20) is in N m s, K in (23) a pure number (dimension checker): two gains, a2 K1 and K2.",
-    ),
-    Claim(
-        equation="section 5: inputs",
-        printed="u(t), u(t-1), e(t), e(t-1), K, x(t), x(t-1)",
-        corrected="u(t), u(t-1), e(t), e(t-1), x(t), x(t-1)",
-        check=lambda text: str(len(text.split(", ")) - INPUT_NEURONS),  # signals beyond the neurons
-        evidence=f"{INPUT_NEURONS} input neurons, seven signals named (counted).",
-        doubt='The paper does not name the surplus one; a network with "no inner feedback loop" speaks against K, its '
-        "own output, and six neurons are read as the six without it.",
-    ),
-    Claim(
-        equation="section 5: alpha_c",
-        printed="alpha_c changed dynamically; alpha_c = 0.6",
-        corrected="alpha_c = 0.6",
-        check=statements_beyond_the_first,
-        evidence="Section 4 changes the momentum dynamically, by no rule; section 5 has one best value (counted).",
-        doubt="The constant 0.6 is used.",
-    ),
-    Claim(
-        equation="section 5: eta_c",
-        printed="eta_c of each weight its own; eta_c = 0.8",
-        corrected="eta_c = 0.8",
-        check=statements_beyond_the_first,
-        evidence="Section 4 gives each weight a learning rate of its own, section 5 has one value (counted).",
-        doubt="0.8 for all weights is used.",
-    ),
-)
+def signals_beyond_the_neurons(text: str) -> str:
+    """How many signals are named beyond the neurons of the input layer."""
+    return str(len(text.split(", ")) - INPUT_NEURONS)
+
+
+CHECKS: dict[str, Callable[[str], str]] = {
+    **equations.CHECKS,
+    **energy.CHECKS,
+    "(21)": lambda text: descends(text, UPDATE),
+    "(22)": lambda text: descends(INCREMENT, text),
+    "(23)": is_cost,
+    "(20), (23): K": are_gain_units,
+    "section 5: inputs": signals_beyond_the_neurons,
+    "section 5: alpha_c": statements_beyond_the_first,
+    "section 5: eta_c": statements_beyond_the_first,
+    "Table 1 (rho)": is_aluminium,
+    "Table 1 (C's unit)": is_unit_of_damping,
+    "Table 1 (other units)": are_units,
+    "Table 1 (I)": is_section,
+    "Table 1 (I_h)": partial(is_given, "I_h"),
+}
+MEASURED = {
+    "(19)": energy.growth_text,
+    "(18)-(20): constant gains, varied by the tuner": energy.pumped_text,
+    "Table 1 (rho)": density_in_numbers,
+}
 
 
 def claims() -> tuple[Claim, ...]:
     """Every claim, in the order of the paper."""
-    return (*MOTION_CLAIMS, DAMPING_CLAIM, *ENERGY_CLAIMS, *TUNER_CLAIMS, *TABLE_CLAIMS, *APPENDIX_CLAIMS)
+    return tuple(Claim(**texts, check=CHECKS[name], measured=MEASURED.get(name, str)) for name, texts in TEXTS.items())
 
 
 @cache
@@ -284,5 +206,5 @@ def audit() -> tuple[AuditRow, ...]:
 class Audit:
     """The paper, equation by equation."""
 
-    paper: Annotated[str, Quantity("paper")]
-    rows: Annotated[tuple[AuditRow, ...], Quantity("equations")]
+    paper: Annotated[str, Quantity("paper", help="the article whose equations are checked")]
+    rows: Annotated[tuple[AuditRow, ...], Quantity("equations", help="verdict and residuals, a row an equation")]

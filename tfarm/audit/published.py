@@ -48,9 +48,9 @@ class Case:
 class Source:
     """A publication: `citation` names its table, `reached` the way of its numbers to here."""
 
-    key: Annotated[str, Quantity("source", key="key")]
-    citation: Annotated[str, Quantity("citation")]
-    reached: Annotated[str, Quantity("read from")]
+    key: Annotated[str, Quantity("source", key="key", help="short name of the publication")]
+    citation: Annotated[str, Quantity("citation", help="publication and table of the printed numbers")]
+    reached: Annotated[str, Quantity("read from", help="way by which the printed numbers came here")]
     cases: tuple[Case, ...]
 
 
@@ -86,25 +86,30 @@ ALL = tuple(map(_source, tomllib.loads((files("tfarm.audit") / "literature.toml"
 class PublishedRow:
     """One printed number and ours; `difference` is ours/printed - 1, `why` empty where ours agrees."""
 
-    source: Annotated[str, Quantity("source")]
-    case: Annotated[str, Quantity("case")]
-    quantity: Annotated[str, Quantity("quantity")]
-    mode: Annotated[int, Quantity("mode")]
-    agrees: Annotated[bool, Quantity("agrees to the last printed digit")]
-    printed: Annotated[str, Quantity("printed")]
-    ours: Annotated[float, Quantity("exact", digits=10)]
-    difference: Annotated[float, Quantity("relative difference", digits=2)]
-    why: Annotated[str, Quantity()]
+    source: Annotated[str, Quantity("source", help="short name of the publication")]
+    case: Annotated[str, Quantity("case", help="boundary conditions and payload of one column of the table")]
+    quantity: Annotated[str, Quantity("quantity", help="quantity that is printed, with its unit or normalisation")]
+    mode: Annotated[int, Quantity("mode", help="number of the mode, from 1")]
+    agrees: Annotated[
+        bool, Quantity("agrees to the last printed digit", help="whether the exact value rounds to the printed digits")
+    ]
+    printed: Annotated[str, Quantity("printed", help="number as printed, with its zeros")]
+    ours: Annotated[float, Quantity("exact", digits=10, help="value by the exact solution in the same quantity")]
+    difference: Annotated[float, Quantity("relative difference", digits=2, help="exact over printed, less one")]
+    why: Annotated[str, Quantity(help="reason of a difference beyond the printed digits; empty where there is none")]
 
 
 class Difference(NamedTuple):
     """Printed numbers of a case that ours do not round to, and why."""
 
-    source: Annotated[str, Quantity("source")]
-    case: Annotated[str, Quantity("case")]
-    modes: Annotated[str, Quantity("modes")]
-    largest: Annotated[float, Quantity("largest difference", digits=2)]
-    why: Annotated[str, Quantity("reason")]
+    source: Annotated[str, Quantity("source", help="short name of the publication")]
+    case: Annotated[str, Quantity("case", help="boundary conditions and payload of one column of the table")]
+    modes: Annotated[str, Quantity("modes", help="numbers of the modes that differ")]
+    largest: Annotated[
+        float,
+        Quantity("largest difference", digits=2, help="exact over printed, less one, of the mode that differs most"),
+    ]
+    why: Annotated[str, Quantity("reason", help="cause of the difference, computed anew in the tests")]
 
 
 def validate(sources: tuple[Source, ...] = ALL) -> tuple[PublishedRow, ...]:
@@ -168,15 +173,21 @@ def agrees(ours: float, printed: str) -> bool:
 class Validation:
     """Published tables, number by number."""
 
-    rows: Annotated[tuple[PublishedRow, ...], Quantity("published numbers")]
+    rows: Annotated[
+        tuple[PublishedRow, ...], Quantity("published numbers", help="printed and exact value of each number")
+    ]
 
     @property
-    def sources(self) -> Annotated[list[Source], Quantity("sources")]:
+    def sources(self) -> Annotated[list[Source], Quantity("sources", help="publications that the numbers are from")]:
         """The publications."""
         return [each for each in ALL if any(row.source == each.key for row in self.rows)]
 
     @property
-    def differences(self) -> Annotated[list[Difference], Quantity("differences")]:
+    def differences(
+        self,
+    ) -> Annotated[
+        list[Difference], Quantity("differences", help="numbers whose printed digits are not reached, a row a reason")
+    ]:
         """A row a reason."""
         rows = (row for row in self.rows if not row.agrees)
         groups = ((key, list(of)) for key, of in groupby(rows, attrgetter("source", "case", "why")))
@@ -188,11 +199,22 @@ class Validation:
         ]
 
     @property
-    def agree(self) -> Annotated[int, Quantity("agree to the last printed digit")]:
+    def agree(
+        self,
+    ) -> Annotated[
+        int, Quantity("agree to the last printed digit", help="count of printed numbers that the exact value rounds to")
+    ]:
         """How many numbers agree."""
         return sum(row.agrees for row in self.rows)
 
     @property
-    def explained(self) -> Annotated[int, Quantity("differ for the reason given")]:
+    def explained(
+        self,
+    ) -> Annotated[
+        int,
+        Quantity(
+            "differ for the reason given", "", 6, "count of printed numbers with another last digit and a known cause"
+        ),
+    ]:
         """How many do not."""
         return sum(bool(row.why) for row in self.rows)

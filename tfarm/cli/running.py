@@ -110,13 +110,15 @@ def open_streams() -> None:
 
 
 def check_words(arguments: list[str]) -> None:
-    """Raise ParameterError for numbers in Python's own spelling, 5_0, and a "-" that is no file or one of two."""
+    """Raise ParameterError for 5_0, Python's own spelling, an empty path, and a "-" that is no file or one of two."""
     words = [word for argument in arguments for word in argument.split("=", 1 if argument.startswith("--") else 0)]
     options = [(option, text) for option, text in pairwise(words) if option.startswith("--")]
     takers = [option for option, text in options if text == STANDARD_OUTPUT] + ["--json"] * ("--json" in words)
     for option, text in options:
         if option not in PATHS and any(map(ODD_NUMBER.fullmatch, re.split("[,=]", text))):
             raise ParameterError(key=option, value=text, remedy="write numbers as 50, 0.5 or 5e1")
+        if option in PATHS and not text.strip():
+            raise ParameterError(key=option, value=text, remedy="give a path")
         if text == STANDARD_OUTPUT and option not in STREAMED:
             remedy = f"- is standard output, and only {', '.join(STREAMED)} may go there: give a name"
             raise ParameterError(key=option, value=text, remedy=remedy)

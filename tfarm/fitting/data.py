@@ -28,12 +28,12 @@ from typing import Annotated, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import INPUTS
+from tfarm.arm import INPUT_UNITS, INPUTS
 from tfarm.arm.reading import decoded
 from tfarm.arrays import Complex, Real
 from tfarm.columns import Column, Table
 from tfarm.digits import general, singly
-from tfarm.errors import MISSING, ParameterError, did_you_mean, naming
+from tfarm.errors import MISSING, ParameterError, did_you_mean, naming, require
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.files import read_file
 from tfarm.records import record
@@ -45,12 +45,6 @@ LEAST_SHARE = 1e-5  # of |H|: no measured response is better known than that, wh
 SCATTER_NEIGHBOURS = 2  # neighbours on each side that a value is compared with
 SIX, NINE = singly(general, 6), singly(general, 9)  # digits of what was measured, and of the frequencies of its lines
 TYPICAL = 1.17741  # the median of |x + i y| of normal x and y of deviation 1: sqrt(2 ln 2)
-
-
-def require(is_met: object, key: str, value: object, remedy: str, file: str | None = None) -> None:
-    """Raise ParameterError unless a condition is met."""
-    if not is_met:
-        raise ParameterError(key=key, value=value, remedy=remedy, file=file)
 
 
 def require_all(key: str, values: Real, is_good: NDArray[np.bool_], remedy: str) -> None:
@@ -73,15 +67,15 @@ class Measured:
     numbers or 0 everywhere, a coherence out of [0, 1] or 0 everywhere, a sigma that is not positive.
     """
 
-    output: Annotated[str, Quantity("output")]
-    input: Annotated[str, Quantity("input")]
+    output: Annotated[str, Quantity("output", help="measured signal in the numerator")]
+    input: Annotated[str, Quantity("input", help="measured signal or input in the denominator")]
     omega: Real
     values: Complex
     sigma: Real | None = None
     coherence: Real | None = None
     averages: int | None = None
-    source: Annotated[str, Quantity("file")] = "array"
-    digest: Annotated[str, Quantity(key="sha256")] = ""
+    source: Annotated[str, Quantity("file", help="file that the response was read from")] = "array"
+    digest: Annotated[str, Quantity(key="sha256", help="SHA-256 of that file")] = ""
 
     def __post_init__(self) -> None:
         for name, kind in {"omega": float, "values": complex, "sigma": float, "coherence": float}.items():
@@ -107,7 +101,17 @@ class Measured:
         return f"{self.output}/{self.input}"
 
     @property
-    def points(self) -> Annotated[int, Quantity("measured frequencies", key="points")]:
+    def label(self) -> str:
+        """Output and input in words: tip acceleration over hub angle."""
+        return f"{signal_words(self.output)[0]} over {signal_words(self.input)[0]}"
+
+    @property
+    def unit(self) -> str:
+        """SI unit, such as m/s^2/rad."""
+        return unit_over(signal_words(self.output)[1], signal_words(self.input)[1])
+
+    @property
+    def points(self) -> Annotated[int, Quantity("measured frequencies", key="points", help="number of frequencies")]:
         """The number of frequencies."""
         return int(self.omega.size)
 
@@ -117,7 +121,11 @@ class Measured:
         return float(self.omega[0]), float(self.omega[-1])
 
     @property
-    def range_hz(self) -> Annotated[tuple[float, float], Quantity("frequency range", "Hz", key="range_hz")]:
+    def range_hz(
+        self,
+    ) -> Annotated[
+        tuple[float, float], Quantity("frequency range", "Hz", key="range_hz", help="first and last measured frequency")
+    ]:
         """The same [Hz]."""
         return self.band[0] / HERTZ, self.band[1] / HERTZ
 
@@ -153,7 +161,16 @@ class Noise:
 
     sigma: Real
     is_known: bool
-    source: Annotated[str, Quantity("noise by", key="noise")]
+    source: Annotated[
+        str,
+        Quantity(
+            "noise by",
+            "",
+            6,
+            "origin of the standard deviation: sigma or coherence of the file, or scatter of the values",
+            "noise",
+        ),
+    ]
 
 
 def noise_of(data: Measured) -> Noise:
@@ -326,6 +343,20 @@ def check_signal(name: str, key: str) -> None:
     """
     plain, known = name.partition("@")[0], tuple(dict.fromkeys((*OUTPUTS, *INPUTS)))
     require(plain in known, key, name, did_you_mean(plain, known))
+
+
+def signal_words(name: str) -> tuple[str, str]:
+    """Label and SI unit of an output or input, with its place: ("bending strain at x = 0.05 m", "1")."""
+    plain, _, place = name.partition("@")
+    if plain not in OUTPUTS:
+        return plain.replace("_", " "), INPUT_UNITS[plain]
+    label = OUTPUTS[plain].label
+    return f"{label} = {place} m" if place else label, OUTPUTS[plain].unit
+
+
+def unit_over(above: str, below: str) -> str:
+    """The unit of a quantity in one unit over one in another: m/s^2/(N m)."""
+    return f"{above}/{f'({below})' if ' ' in below or '/' in below else below}"
 
 
 # ------------------------------------------------------------ CSV

@@ -11,6 +11,7 @@ Drawing whole records anew (Efron 1979) gives intervals that include it.
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,17 +23,18 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from tfarm.arm import Arm, must_be_arm
+from tfarm.arm.schema import file_key
 from tfarm.arm.writing import to_toml
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.digits import listed
-from tfarm.errors import ConvergenceError
+from tfarm.errors import ConvergenceError, require
 from tfarm.files import write_file
 from tfarm.loop.plane import gain_map
 from tfarm.records import record
 from tfarm.response import transfer
 from tfarm.schema import Quantity
 
-from .data import CONFIDENCE, Measured, must_be_measured, noise_of, require
+from .data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of
 from .model import Parameter, Problem, Response, RingMode, parameters
 from .overlay import ResonanceShift, ratio_of, resonance_shifts
 from .solve import (
@@ -50,6 +52,7 @@ from .solve import (
 )
 
 SENSOR_GAIN, SENSOR_DELAY = "gain", "delay"  # of a sensor, as `Response` has them: free like the arm's numbers
+LONGEST_SYMBOL = 3  # characters at the end of a label: I_h, Kt
 MOST_RESTARTS = 4  # times that a profile may find a lower sum of squares than the search did
 
 
@@ -57,14 +60,18 @@ MOST_RESTARTS = 4  # times that a profile may find a lower sum of squares than t
 class FittedResponse:
     """A response of the fit."""
 
-    name: Annotated[str, Quantity("response")]
-    source: Annotated[str, Quantity()]
-    sha256: Annotated[str, Quantity()]
-    frequencies: Annotated[int, Quantity("frequencies")]
-    low: Annotated[float, Quantity("from", "Hz", key="from_hz")]
-    high: Annotated[float, Quantity("to", "Hz", key="to_hz")]
-    noise: Annotated[str, Quantity("noise by")]
-    chi_squared: Annotated[float, Quantity("chi-squared", digits=4)]
+    name: Annotated[str, Quantity(help="output/input as on the command line")]
+    label: Annotated[str, Quantity("response", key="response", help="output and input in words")]
+    unit: Annotated[str, Quantity("unit", help="SI unit of the response")]
+    source: Annotated[str, Quantity(help="file that the response was read from")]
+    sha256: Annotated[str, Quantity(help="SHA-256 of that file")]
+    frequencies: Annotated[int, Quantity("frequencies", help="number of measured frequencies")]
+    low: Annotated[float, Quantity("from", "Hz", key="from_hz", help="first measured frequency")]
+    high: Annotated[float, Quantity("to", "Hz", key="to_hz", help="last measured frequency")]
+    noise: Annotated[str, Quantity("noise by", help="origin of the standard deviation of its values")]
+    chi_squared: Annotated[
+        float, Quantity("chi-squared", digits=4, help="its share of the sum of squared residuals over their deviations")
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,33 +85,51 @@ class Fit:
 
     arm: Arm
     before: Arm
-    converged: Annotated[bool, Quantity("converged")]
-    parameters: Annotated[tuple[Fitted, ...], Quantity("fitted numbers")]
-    not_determined: Annotated[tuple[str, ...], Quantity("not identifiable")]
-    chi_squared: Annotated[float, Quantity("chi-squared", digits=4)]
-    freedom: Annotated[int, Quantity("degrees of freedom")]
-    solution: Annotated[Solution, Quantity(flat=True)]
-    interval_by: Annotated[str, Quantity("intervals by")]
+    converged: Annotated[
+        bool, Quantity("converged", help="whether the search for the least sum of squares ended in a minimum")
+    ]
+    parameters: Annotated[
+        tuple[Fitted, ...], Quantity("fitted numbers", help="free numbers with their confidence intervals")
+    ]
+    not_determined: Annotated[
+        tuple[str, ...], Quantity("not identifiable", help="numbers, or combinations of them, that the data leave open")
+    ]
+    chi_squared: Annotated[
+        float, Quantity("chi-squared", digits=4, help="sum of squared residuals over their standard deviations")
+    ]
+    freedom: Annotated[
+        int,
+        Quantity(
+            "degrees of freedom",
+            "",
+            6,
+            "residuals less free numbers; chi-squared is about as large where arm and noise explain the data",
+        ),
+    ]
+    solution: Annotated[Solution, Quantity(help="best point of the search", flat=True)]
+    interval_by: Annotated[
+        str, Quantity("intervals by", help="profile likelihood, or covariance of the linearised residuals")
+    ]
 
     @property
-    def arm_name(self) -> Annotated[str, Quantity("arm")]:
+    def arm_name(self) -> Annotated[str, Quantity("arm", help="arm at which the fit starts")]:
         """The arm that the fit began with."""
         return self.before.name
 
     @property
-    def arm_table(self) -> Annotated[dict[str, Any], Quantity(key="arm")]:
+    def arm_table(self) -> Annotated[dict[str, Any], Quantity(key="arm", help="fitted arm as its TOML file has it")]:
         """The fitted arm as its file has it."""
         return tomllib.loads(to_toml(self.arm))
 
     @property
-    def level(self) -> Annotated[float, Quantity()]:
+    def level(self) -> Annotated[float, Quantity(help="probability that an interval holds the true value")]:
         """The probability of the intervals."""
         return CONFIDENCE
 
     @property
     def finding(self) -> str:
         """The numbers, and chi-squared."""
-        numbers = ", ".join(f"{each.key} = {each.value:.6g}" for each in self.parameters)
+        numbers = ", ".join(f"{each.label} = {each.value:.6g}" for each in self.parameters)
         return f"{numbers}; chi-squared {self.chi_squared:.4g} of {self.freedom}"
 
     @property
@@ -113,34 +138,63 @@ class Fit:
         return tuple(each.data for each in self.solution.problem.responses)
 
     @property
-    def response_list(self) -> Annotated[list[FittedResponse], Quantity("responses", key="responses")]:
+    def response_list(
+        self,
+    ) -> Annotated[
+        list[FittedResponse],
+        Quantity("responses", key="responses", help="measured responses with their noise and residuals"),
+    ]:
         """A row a response."""
-        pairs = zip(self.solution.problem.responses, self.solution.parts, strict=True)
+        pairs = zip(self.solution.problem.responses, self.solution.parts, self.responses, strict=True)
         return [
-            FittedResponse(one.data.name, one.data.source, one.data.digest, one.data.points, *one.data.range_hz,
+            FittedResponse(of.name, of.label, of.unit, of.source, of.digest, of.points, *of.range_hz,
                            one.noise.source, float(residuals @ residuals))
-            for one, residuals in pairs
+            for one, residuals, of in pairs
         ]  # fmt: skip
 
     @cached_property
-    def resonances(self) -> Annotated[list[ResonanceShift], Quantity("resonances")]:
+    def resonances(
+        self,
+    ) -> Annotated[
+        list[ResonanceShift],
+        Quantity("resonances", help="measured peaks with the poles of the arm before and after the fit"),
+    ]:
         """A row a measured peak."""
         responses = [(each.data, each.noise) for each in self.solution.problem.responses]
         return resonance_shifts(self.before, self.arm, responses)
 
     @property
-    def unexplained(self) -> Annotated[list[float], Quantity("peaks far from every pole of the arm [Hz]",
-                                                             key="unexplained_peaks_hz")]:  # fmt: skip
+    def unexplained(
+        self,
+    ) -> Annotated[
+        list[float],
+        Quantity(
+            "peaks far from every pole of the arm [Hz]",
+            "",
+            6,
+            "measured peaks that the fitted arm does not have",
+            "unexplained_peaks_hz",
+        ),
+    ]:
         """Measured peaks that the fitted arm does not have."""
         return [row.measured for row in self.resonances if row.after is None]
 
     @cached_property
-    def records(self) -> Annotated[Repeats | None, Quantity("scatter between records")]:
+    def records(
+        self,
+    ) -> Annotated[
+        Repeats | None, Quantity("scatter between records", help="numbers fitted to each record of one response alone")
+    ]:
         """The scatter between the records of one response."""
         return repeats(self)
 
     @cached_property
-    def rms_log_error(self) -> Annotated[float | None, Quantity("rms of ln(computed/measured)", digits=4)]:
+    def rms_log_error(
+        self,
+    ) -> Annotated[
+        float | None,
+        Quantity("rms of ln(computed/measured)", digits=4, help="root mean square over all complex values"),
+    ]:
         """The root mean square of ln(computed/measured), complex, over all values; None where there are none."""
         if not self.responses:
             return None
@@ -150,19 +204,33 @@ class Fit:
         return float(np.sqrt((abs(away) ** 2).mean()))
 
     @property
-    def is_explained(self) -> Annotated[bool | None, Quantity(key="explained")]:
+    def is_explained(
+        self,
+    ) -> Annotated[
+        bool | None,
+        Quantity(
+            key="explained",
+            help="whether noise alone often gives such a chi-squared; none where its size came from the residuals",
+        ),
+    ]:
         """Whether noise alone is often so large; None where its size was taken from the residuals."""
         return is_explained(self.solution)
 
     @property
-    def verdict(self) -> Annotated[str, Quantity()]:
+    def verdict(
+        self,
+    ) -> Annotated[str, Quantity(help="fitted, not converged, or fitted although the arm does not explain the data")]:
         """Whether it converged, and whether the model is rejected."""
         if not self.converged:
             return "not converged"
         return "fitted, but the arm does not explain the data" if self.is_explained is False else "fitted"
 
     @property
-    def in_words(self) -> Annotated[str, Quantity("fit", key="in_words")]:
+    def in_words(
+        self,
+    ) -> Annotated[
+        str, Quantity("fit", key="in_words", help="convergence, identified numbers and reduced chi-squared")
+    ]:
         """Convergence, identified numbers, and whether the model is rejected."""
         known = sum(each.identified for each in self.parameters)
         share = f"reduced chi-squared = {self.chi_squared / max(self.freedom, 1):.3g}"
@@ -205,7 +273,7 @@ def fit(
     else:  # one valley after another: no end of it
         found = replace(found, converged=False)
         fitted, unknown = confidence_intervals(found, profile=False)
-    return Fit(
+    fit = Fit(
         arm=replace(found.problem.arm(found.point), name=f"{arm.name}-fitted"),
         before=replace(subject.arm(np.zeros(len(subject.parameters))), name=arm.name),
         converged=found.converged,
@@ -216,6 +284,35 @@ def fit(
         solution=found,
         interval_by="profile likelihood" if profile else "covariance",
     )
+    return replace(fit, arm=replace(fit.arm, assumptions=_assumptions(fit, arm.assumptions)))
+
+
+def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
+    """The arm's assumptions, those that name a fitted number marked as of the start, then the fit and its data."""
+    family = fit.solution.problem.family
+    texts: list[str] = []
+    for text in before:
+        labels = [file_key(key).label for key in family.keys if is_named(key, family.value(key), text)]
+        mark = f"Before the fit of {listed(labels)}: " if labels else ""
+        texts.append(text if text.startswith(mark) else mark + text)
+    numbers = [(each.label, each.value, file_key(each.key).unit) for each in fit.parameters if "." in each.key]
+    values = [f"{label} = {value:.6g} {unit}".rstrip() for label, value, unit in numbers] or ["sensors alone"]
+    texts.append(f"Fitted: {listed(values)}, from the arm {fit.before.name}; {fit.in_words}.")
+    for each in fit.responses:
+        digest = each.digest or "none"
+        texts.append(f"Fitted to {each.label} of {Path(each.source).name}, SHA-256 {digest}.")
+    return (*texts, *(f"Of the fit: {words}." for words in fit.not_determined))
+
+
+def is_named(key: str, value: float, text: str) -> bool:
+    """Whether a text names a number of an arm: by its label, by its symbol (I_h =), or by its value and unit."""
+    of = file_key(key)
+    *words, last = of.label.split()
+    symbol = last if len(last) <= LONGEST_SYMBOL else ""
+    label = " ".join(words) if symbol else of.label
+    patterns = [rf"(?i:\b{label}\b)", *([rf"(?<!\d )\b{symbol}(?=,| and | of | =)"] if symbol else [])]
+    values = re.findall(rf"({NUMBER}) {re.escape(of.unit)}(?![\w^/]| m\^)", text) if of.unit else []
+    return any(re.search(each, text) for each in patterns) or any(float(each) == value for each in values)
 
 
 def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: Any, rings: Any) -> Problem:
@@ -307,18 +404,32 @@ class Repeats:
     `intervals` hold 95 % of the draws, `times_wider` is their standard deviation over that by the noise.
     """
 
-    response: Annotated[str, Quantity("response")]
-    each: Annotated[list[dict[str, float]], Quantity()]
-    intervals: Annotated[dict[str, list[float]], Quantity("intervals by records")]
-    times_wider: Annotated[dict[str, float], Quantity("times wider than by noise")]
+    response: Annotated[str, Quantity("response", help="response of which there are several records")]
+    each: Annotated[list[dict[str, float]], Quantity(help="fitted numbers by each record alone")]
+    intervals: Annotated[
+        dict[str, list[float]], Quantity("intervals by records", help="95 % of bootstrap draws of whole records")
+    ]
+    times_wider: Annotated[
+        dict[str, float],
+        Quantity(
+            "times wider than by noise",
+            "",
+            6,
+            "standard deviation over draws of records, over that by the noise within a record",
+        ),
+    ]
 
     @property
-    def count(self) -> Annotated[int, Quantity("records")]:
+    def count(self) -> Annotated[int, Quantity("records", help="number of records of that response")]:
         """The number of records."""
         return len(self.each)
 
     @property
-    def in_words(self) -> Annotated[str, Quantity("finding", key="in_words")]:
+    def in_words(
+        self,
+    ) -> Annotated[
+        str, Quantity("finding", key="in_words", help="numbers whose scatter exceeds what the noise explains")
+    ]:
         """The numbers whose scatter is larger than the noise explains."""
         larger = [f"{key} {times:.3g} times" for key, times in self.times_wider.items() if times > WIDER]
         return f"larger than the noise explains: {listed(larger)}" if larger else "as the noise explains"
@@ -333,7 +444,7 @@ def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
     from scipy.stats import bootstrap
 
     own = fit.solution.problem
-    names = [each.data.name for each in own.responses]
+    names = [each.data.label for each in own.responses]
     most = max(names, key=names.count, default="")
     records = [n for n, name in enumerate(names) if name == most]
     if len(records) < FEWEST_RECORDS:
@@ -365,17 +476,6 @@ def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
     )
 
 
-def fitted_toml(fit: Fit) -> str:
-    """The fitted arm as a TOML file, with what was fitted to what among its assumptions."""
-    values = listed([f"{each.key} = {each.value:.6g}" for each in fit.parameters if "." in each.key])
-    lines = [f"Fitted: {values}, from the arm {fit.before.name}; {fit.in_words}."]
-    lines += [
-        f"Fitted to {each.name} of {Path(each.source).name}, SHA-256 {each.digest or 'none'}." for each in fit.responses
-    ]
-    lines += [f"Of the fit: {words}." for words in fit.not_determined]
-    return to_toml(replace(fit.arm, assumptions=(*fit.arm.assumptions, *lines)))
-
-
 def save_fit(fit: Fit, path: Path) -> None:
     """Write the fitted arm to a temporary file, then rename it."""
-    write_file(path, fitted_toml(fit).encode(), key="--save")
+    write_file(path, to_toml(fit.arm).encode(), key="--save")

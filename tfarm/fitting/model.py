@@ -25,14 +25,14 @@ import numpy as np
 from tfarm.arm import INPUTS, Arm, Input
 from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Complex, Real
-from tfarm.errors import ConvergenceError, ParameterError, did_you_mean
+from tfarm.errors import ConvergenceError, ParameterError, did_you_mean, require
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import first_frequency
 
-from .data import NUMBER, Measured, Noise, in_parts, require
+from .data import NUMBER, Measured, Noise, in_parts
 
 SIGNED = ("offset",)  # numbers of an arm that may be negative
 UPPER_ENDS = {"gear_efficiency": 1.0, "poissons_ratio": 0.5}  # and those that end somewhere

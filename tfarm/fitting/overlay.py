@@ -24,7 +24,7 @@ import numpy as np
 from tfarm.arm import INPUTS, Arm, Input, must_be_arm
 from tfarm.arrays import Complex, Real
 from tfarm.columns import Column, Table
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.records import record
 from tfarm.response import TransferFunction, transfer
 from tfarm.response.frequency import HERTZ, refined_grid, without_cancelled
@@ -34,7 +34,7 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum import modes_below
 
-from .data import Measured, Noise, check_signal, must_be_measured, noise_of, require
+from .data import Measured, Noise, check_signal, must_be_measured, noise_of, unit_over
 from .resonances import (
     PARTNERS_BEYOND,
     Resonance,
@@ -59,8 +59,17 @@ class RatioRoots:
     poles: Complex
     zeros: Complex
     common: Complex
-    at_zero: Annotated[int, Quantity(key="power_at_zero")]
-    up_to: Annotated[float, Quantity("poles and zeros up to", "rad/s", key="roots_up_to_rad_s")]
+    at_zero: Annotated[int, Quantity(key="power_at_zero", help="order n of the response s^n near s = 0")]
+    up_to: Annotated[
+        float,
+        Quantity(
+            "poles and zeros up to",
+            "rad/s",
+            6,
+            "imaginary part up to which the lists are complete",
+            "roots_up_to_rad_s",
+        ),
+    ]
 
     @property
     def upper_poles(self) -> Annotated[Complex, Quantity("s", "1/s", help="poles of the ratio", key="poles")]:
@@ -73,8 +82,9 @@ class RatioRoots:
         return _upper(self.zeros)
 
     @property
-    def upper_common(self) -> Annotated[Complex, Quantity("s", "1/s", help="common to both signals: they cancel",
-                                                          key="common")]:  # fmt: skip
+    def upper_common(
+        self,
+    ) -> Annotated[Complex, Quantity("s", "1/s", 6, "common to both signals: they cancel", "common")]:
         """Those with Im s >= 0."""
         return _upper(self.common)
 
@@ -125,7 +135,7 @@ class Ratio:
     def unit(self) -> str:
         """SI unit, such as m/s^2/rad."""
         below = self.above.input_unit if self.below is None else self.below.units[0]
-        return f"{self.above.units[0]}/{f'({below})' if ' ' in below or '/' in below else below}"
+        return unit_over(self.above.units[0], below)
 
     def __call__(self, s: Any) -> Any:
         """H(s) at a complex scalar or array of s [1/s]."""
@@ -192,54 +202,55 @@ class Counterpart:
     measured: Resonance | None
     frequency_ratio: float | None
     level: complex | None
-    mode: Annotated[int | None, Quantity("mode")]
-    exact: Annotated[float, Quantity("exact", "Hz", 7)]
-    frequency: Annotated[float | None, Quantity("measured", "Hz", 7, key="measured_hz")]
-    frequency_std: Annotated[float | None, Quantity("deviation", "Hz", 2, key="measured_std_hz")]
-    off: Annotated[float | None, Quantity("difference", "%", 3, key="frequency_residual_percent")]
-    measured_damping: Annotated[float | None, Quantity("measured damping ratio", digits=4,
-                                                       key="measured_damping_ratio")]  # fmt: skip
-    damping_std: Annotated[float | None, Quantity("deviation", digits=2, key="measured_damping_ratio_std")]
-    level_db: Annotated[float | None, Quantity("residue, measured over exact", "dB", 3)]
-    level_degrees: Annotated[float | None, Quantity("turned", "deg", 3, key="level_degrees")]
-    is_peak_only: Annotated[bool, Quantity()]
-    damping_ratio: Annotated[float, Quantity("exact damping ratio", digits=4, key="exact_damping_ratio")]
-
-
-def _counterpart(
-    pole: complex, residue: complex, mode: int | None, peak: float | None, own: Resonance | None
-) -> Counterpart:
-    """A pole with its measured peak [rad/s] and resonance, if there are any."""
-    size = abs(pole)
-    ratio = abs(own.pole) / size if own is not None else None if peak is None else peak / size
-    level = own.residue / residue if own is not None and residue else None
-    return Counterpart(
-        pole=pole,
-        residue=residue,
-        peak=peak,
-        measured=own,
-        frequency_ratio=ratio,
-        level=level,
-        mode=mode,
-        exact=size / HERTZ,
-        frequency=None if ratio is None else ratio * size / HERTZ,
-        frequency_std=None if own is None else float(own.std[1]) / HERTZ,
-        off=None if ratio is None else 100 * (ratio - 1),
-        measured_damping=None if own is None else own.damping_ratio,
-        damping_std=None if own is None else float(own.std[0]) / abs(own.pole),
-        level_db=20 * math.log10(abs(level)) if level else None,
-        level_degrees=math.degrees(np.angle(level)) if level else None,
-        is_peak_only=peak is not None and own is None,
-        damping_ratio=-pole.real / size + 0.0,
-    )
+    mode: Annotated[
+        int | None,
+        Quantity("mode", help="number of the arm's mode; none where the poles of the response are no modes of the arm"),
+    ]
+    exact: Annotated[float, Quantity("exact", "Hz", 7, "natural frequency abs(s) of the exact response's pole")]
+    frequency: Annotated[
+        float | None,
+        Quantity("measured", "Hz", 7, "abs(s) of the pole fitted to the peak, or the peak itself", "measured_hz"),
+    ]
+    frequency_std: Annotated[
+        float | None,
+        Quantity("deviation", "Hz", 2, key="measured_std_hz", help="standard deviation of the fitted pole's frequency"),
+    ]
+    off: Annotated[
+        float | None,
+        Quantity("difference", "%", 3, "measured over exact frequency, less one", "frequency_residual_percent"),
+    ]
+    measured_damping: Annotated[
+        float | None,
+        Quantity("measured damping ratio", "", 4, "of the pole fitted to the measured peak", "measured_damping_ratio"),
+    ]
+    damping_std: Annotated[
+        float | None,
+        Quantity("deviation", "", 2, "standard deviation of the measured damping ratio", "measured_damping_ratio_std"),
+    ]
+    level_db: Annotated[
+        float | None,
+        Quantity("residue, measured over exact", "dB", 3, "gain error of the sensor and shift of the mode shape"),
+    ]
+    level_degrees: Annotated[
+        float | None,
+        Quantity("turned", "deg", 3, "phase of the residue; 180 deg is a reversed sign", "level_degrees"),
+    ]
+    is_peak_only: Annotated[bool, Quantity(help="whether the lines around the peak determine no pole")]
+    damping_ratio: Annotated[
+        float,
+        Quantity("exact damping ratio", digits=4, key="exact_damping_ratio", help="of the pole of the exact response"),
+    ]
 
 
 class RequiredChange(NamedTuple):
     """A change of one number of the arm that alone would explain one measured mode."""
 
-    parameter: Annotated[str, Quantity("parameter")]
-    mode: Annotated[int, Quantity("mode")]
-    change: Annotated[float, Quantity("change", "%", 4, key="change_percent")]
+    parameter: Annotated[str, Quantity("parameter", help="number of the arm that is changed alone")]
+    mode: Annotated[int, Quantity("mode", help="number of the mode whose measured frequency is met")]
+    change: Annotated[
+        float,
+        Quantity("change", "%", 4, "relative change that moves the mode to its measured frequency", "change_percent"),
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -252,29 +263,41 @@ class Overlay:
     """
 
     arm: Arm
-    measured: Annotated[Measured, Quantity(flat=True)]
-    noise: Annotated[Noise, Quantity(flat=True)]
+    measured: Annotated[Measured, Quantity(flat=True, help="measured response and its file")]
+    noise: Annotated[Noise, Quantity(flat=True, help="standard deviation of the measured values")]
     ratio: Ratio
-    roots: Annotated[RatioRoots, Quantity(flat=True)]
+    roots: Annotated[RatioRoots, Quantity(flat=True, help="poles and zeros of the exact response")]
     exact: Complex
     omega: Real
     curve: Complex
-    modes: Annotated[tuple[Counterpart, ...], Quantity("mode by mode")]
+    modes: Annotated[
+        tuple[Counterpart, ...], Quantity("mode by mode", help="exact and measured poles, a row a pole in the range")
+    ]
     unmatched: Real
 
     @property
-    def arm_name(self) -> Annotated[str, Quantity("arm", key="arm")]:
+    def arm_name(self) -> Annotated[str, Quantity("arm", key="arm", help="arm of the exact response")]:
         """The name of the arm."""
         return self.arm.name
 
     @property
-    def unit(self) -> Annotated[str, Quantity("unit")]:
+    def unit(self) -> Annotated[str, Quantity("unit", help="SI unit of the response")]:
         """The unit of the response."""
         return self.ratio.unit
 
     @property
-    def unmatched_hz(self) -> Annotated[list[float], Quantity("measured peaks far from every pole of the arm [Hz]",
-                                                              key="unmatched_peaks_hz")]:  # fmt: skip
+    def unmatched_hz(
+        self,
+    ) -> Annotated[
+        list[float],
+        Quantity(
+            "measured peaks far from every pole of the arm [Hz]",
+            "",
+            6,
+            "measured peaks without a pole of the arm near them",
+            "unmatched_peaks_hz",
+        ),
+    ]:
         """Measured peaks that the arm does not have."""
         return (self.unmatched / HERTZ).tolist()
 
@@ -293,7 +316,11 @@ class Overlay:
         return f"{seen} of {len(self.modes)} poles measured, ln |measured/exact| {self.rms_log_error:.2g} rms"
 
     @property
-    def rms_log_error(self) -> Annotated[float, Quantity("rms of ln(measured/exact)", digits=4)]:
+    def rms_log_error(
+        self,
+    ) -> Annotated[
+        float, Quantity("rms of ln(measured/exact)", digits=4, help="root mean square over frequencies above the noise")
+    ]:
         """The root mean square of ln |measured/exact|, over frequencies above the noise."""
         kept = (abs(self.measured.values) > self.noise.sigma) & np.isfinite(self.exact) & (self.exact != 0)
         if not kept.any():
@@ -301,8 +328,18 @@ class Overlay:
         return float(np.sqrt((np.log(abs(self.measured.values[kept] / self.exact[kept])) ** 2).mean()))
 
     @cached_property
-    def required_changes(self) -> Annotated[tuple[RequiredChange, ...], Quantity("single changes that explain a mode",
-                                                                                key="required_percent")]:  # fmt: skip
+    def required_changes(
+        self,
+    ) -> Annotated[
+        tuple[RequiredChange, ...],
+        Quantity(
+            "single changes that explain a mode",
+            "",
+            6,
+            "change of one number that alone moves a mode to its measured frequency",
+            "required_percent",
+        ),
+    ]:
         """A row a parameter of `Modes.sensitivity` and mode: the change of it that alone would explain the mode.
 
         It is exp(ln(measured/exact)/S) - 1 with S = d ln w/d ln p: exact for a power law, as of Young's modulus or the
@@ -374,16 +411,42 @@ def _counterparts(
             mode = nearest if away.min() < SAME_MODE and nearest > 0 else None
         peak = None if place is None else float(measured.omega[place])
         own = None if place is None else resonance_at(measured, noise.sigma, place)
-        found.append(_counterpart(pole, ratio.residue(pole, others), mode, peak, own))
+        size = abs(pole)
+        residue = ratio.residue(pole, others)
+        at = abs(own.pole) if own is not None else peak
+        level = own.residue / residue if own is not None and residue else None
+        found.append(
+            Counterpart(
+                pole=pole,
+                residue=residue,
+                peak=peak,
+                measured=own,
+                frequency_ratio=None if at is None else at / size,
+                level=level,
+                mode=mode,
+                exact=size / HERTZ,
+                frequency=None if at is None else at / HERTZ,
+                frequency_std=None if own is None else float(own.std[1]) / HERTZ,
+                off=None if at is None else 100 * (at / size - 1),
+                measured_damping=None if own is None else own.damping_ratio,
+                damping_std=None if own is None else float(own.std[0]) / abs(own.pole),
+                level_db=20 * math.log10(abs(level)) if level else None,
+                level_degrees=math.degrees(np.angle(level)) if level else None,
+                is_peak_only=peak is not None and own is None,
+                damping_ratio=-pole.real / size + 0.0,
+            )
+        )
     return tuple(found)
 
 
 class ResonanceShift(NamedTuple):
     """A measured peak [Hz] and that of the arm before and after the fit; None where it has none there."""
 
-    before: Annotated[float | None, Quantity("start", "Hz")]
-    after: Annotated[float | None, Quantity("fitted", "Hz")]
-    measured: Annotated[float, Quantity("measured", "Hz")]
+    before: Annotated[float | None, Quantity("start", "Hz", help="pole of the arm at the start of the fit")]
+    after: Annotated[
+        float | None, Quantity("fitted", "Hz", help="pole of the fitted arm; none where it has none near the peak")
+    ]
+    measured: Annotated[float, Quantity("measured", "Hz", help="peak of the measured response")]
 
 
 def resonance_shifts(before: Arm, after: Arm, responses: Sequence[tuple[Measured, Noise]]) -> list[ResonanceShift]:

@@ -48,12 +48,12 @@ from tfarm.dsp.chain import TIME_ROUNDING, Chain
 from tfarm.dsp.results import enough_modes
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
-from tfarm.errors import MISSING, did_you_mean, must_be_known, naming
+from tfarm.errors import MISSING, did_you_mean, must_be_known, naming, require
 from tfarm.files import read_mat
 from tfarm.records import record
 from tfarm.schema import Quantity
 
-from .data import MOST_RECORD_BYTES, Measured, check_signal, read_sheet, require
+from .data import MOST_RECORD_BYTES, Measured, check_signal, read_sheet
 
 TIMES = ("t", "time")  # names of the column of times
 JITTER = 0.1  # of the period: a sample further off its place has been dropped or doubled, or the sampling is uneven
@@ -257,27 +257,46 @@ class Estimate:
     `independent` averages are in them, `note` is that of the record's sampling.
     """
 
-    measured: Annotated[Measured, Quantity(flat=True)]
-    estimator: Annotated[str, Quantity("estimator")]
-    window: Annotated[str, Quantity("window")]
-    segment: Annotated[float, Quantity("segment", "s")]
-    segments: Annotated[int, Quantity("segments")]
-    overlap: Annotated[float, Quantity("overlap", digits=3)]
-    independent: Annotated[float, Quantity("independent averages", digits=4, key="independent_averages")]
-    note: Annotated[str, Quantity("sampling of the record")]
+    measured: Annotated[Measured, Quantity(flat=True, help="estimated response with its coherence")]
+    estimator: Annotated[
+        str, Quantity("estimator", help="H1 (noise on the output), H2 (on the input) or Hv (between them)")
+    ]
+    window: Annotated[str, Quantity("window", help="taper of each segment: hann or boxcar")]
+    segment: Annotated[float, Quantity("segment", "s", help="length of one segment of the record")]
+    segments: Annotated[int, Quantity("segments", help="number of segments that are averaged")]
+    overlap: Annotated[
+        float, Quantity("overlap", digits=3, help="share of a segment that it has in common with the next")
+    ]
+    independent: Annotated[
+        float,
+        Quantity(
+            "independent averages", "", 4, "segments that count as independent, by Welch (1967)", "independent_averages"
+        ),
+    ]
+    note: Annotated[
+        str, Quantity("sampling of the record", help="unevenness of the sampling; empty where the samples are even")
+    ]
 
     @property
-    def resolution(self) -> Annotated[float, Quantity("frequency resolution", "Hz", 4)]:
+    def resolution(
+        self,
+    ) -> Annotated[
+        float, Quantity("frequency resolution", "Hz", 4, "distance of the lines: one over the segment's length")
+    ]:
         """The distance of the lines [Hz]: 1/segment."""
         return 1.0 / self.segment
 
     @property
-    def median_coherence(self) -> Annotated[float, Quantity("median coherence", digits=4)]:
+    def median_coherence(
+        self,
+    ) -> Annotated[float, Quantity("median coherence", digits=4, help="over all lines, from 0 to 1")]:
         """Over all lines."""
         return float(np.median(self.measured.coherence))  # type: ignore[arg-type]
 
     @property
-    def response(self) -> Annotated[list[dict[str, Any]], Quantity()]:
+    def response(
+        self,
+    ) -> Annotated[list[dict[str, Any]], Quantity(help="estimate with its coherence, a row a frequency")]:
         """A row a frequency."""
         return list(self.csv_table)
 

@@ -39,12 +39,12 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, stdtrit
 
 from tfarm.arrays import Complex, Real
-from tfarm.errors import ConvergenceError
+from tfarm.errors import ConvergenceError, require
 from tfarm.records import record
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Quantity
 
-from .data import CONFIDENCE, Measured, in_parts, require
+from .data import CONFIDENCE, Measured, in_parts
 
 if TYPE_CHECKING:
     from .recording import Recording
@@ -212,20 +212,29 @@ def _around(data: Measured, place: int) -> slice:
 class DecayMode(NamedTuple):
     """A mode of a decay with its 95 % intervals."""
 
-    mode: Annotated[int, Quantity("mode")]
-    frequency: Annotated[float, Quantity("frequency", "Hz", 7)]
-    frequency_low: Annotated[float, Quantity("from", "Hz", 7)]
-    frequency_high: Annotated[float, Quantity("to", "Hz", 7)]
-    frequency_std: Annotated[float, Quantity(unit="Hz")]
-    natural_frequency: Annotated[float, Quantity(unit="Hz")]
-    damping_ratio: Annotated[float, Quantity("damping ratio", digits=4)]
-    damping_ratio_low: Annotated[float, Quantity("from", digits=4)]
-    damping_ratio_high: Annotated[float, Quantity("to", digits=4)]
-    damping_ratio_std: Annotated[float, Quantity()]
-    amplitude: Annotated[float, Quantity("amplitude at the start", digits=4)]
-    option: Annotated[str, Quantity("for tfarm fit --mode N=", key="mode_option")]
-    first_half: Annotated[float | None, Quantity(key="frequency_first_half_hz")]
-    second_half: Annotated[float | None, Quantity(key="frequency_second_half_hz")]
+    mode: Annotated[int, Quantity("mode", help="number in the order of energy, from 1")]
+    frequency: Annotated[float, Quantity("frequency", "Hz", 7, "frequency of the oscillation, Im s")]
+    frequency_low: Annotated[float, Quantity("from", "Hz", 7, "lower end of its 95 % interval")]
+    frequency_high: Annotated[float, Quantity("to", "Hz", 7, "upper end of its 95 % interval")]
+    frequency_std: Annotated[float, Quantity(unit="Hz", help="standard deviation of the frequency")]
+    natural_frequency: Annotated[float, Quantity(unit="Hz", help="abs(s), above the frequency by the damping")]
+    damping_ratio: Annotated[float, Quantity("damping ratio", digits=4, help="-Re s/abs(s)")]
+    damping_ratio_low: Annotated[float, Quantity("from", digits=4, help="lower end of its 95 % interval")]
+    damping_ratio_high: Annotated[float, Quantity("to", digits=4, help="upper end of its 95 % interval")]
+    damping_ratio_std: Annotated[float, Quantity(help="standard deviation of the damping ratio")]
+    amplitude: Annotated[
+        float, Quantity("amplitude at the start", digits=4, help="in the unit of the signal, at the first sample")
+    ]
+    option: Annotated[
+        str,
+        Quantity("for tfarm fit --mode N=", "", 6, "value that passes the mode on to a fit of the arm", "mode_option"),
+    ]
+    first_half: Annotated[
+        float | None, Quantity(key="frequency_first_half_hz", help="frequency by the first half of the record alone")
+    ]
+    second_half: Annotated[
+        float | None, Quantity(key="frequency_second_half_hz", help="frequency by the second half of the record alone")
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -237,23 +246,41 @@ class Ring:
     they were white noise; `notes` are limits of the intervals.
     """
 
-    signal: Annotated[str, Quantity("signal")]
-    source: Annotated[str, Quantity("record", key="record")]
-    start: Annotated[float, Quantity("from", "s", key="from_s")]
-    stop: Annotated[float, Quantity("to", "s", key="to_s")]
-    samples: Annotated[int, Quantity("samples")]
-    residual: Annotated[float, Quantity("residual rms", digits=4, key="residual_rms")]
-    white: Annotated[float, Quantity("probability of white residuals", digits=3, key="whiteness_probability")]
-    notes: Annotated[tuple[str, ...], Quantity("notes")]
-    modes: Annotated[tuple[DecayMode, ...], Quantity("modes")]
+    signal: Annotated[str, Quantity("signal", help="column of the record")]
+    source: Annotated[str, Quantity("record", key="record", help="file of the record")]
+    start: Annotated[float, Quantity("from", "s", key="from_s", help="first sample that is used")]
+    stop: Annotated[float, Quantity("to", "s", key="to_s", help="last sample that is used")]
+    samples: Annotated[int, Quantity("samples", help="number of samples that are used")]
+    residual: Annotated[
+        float,
+        Quantity("residual rms", "", 4, "root mean square of the residuals, in the unit of the signal", "residual_rms"),
+    ]
+    white: Annotated[
+        float,
+        Quantity(
+            "probability of white residuals",
+            "",
+            3,
+            "of correlations as large as these in white noise (Ljung and Box 1978)",
+            "whiteness_probability",
+        ),
+    ]
+    notes: Annotated[tuple[str, ...], Quantity("notes", help="limits of the intervals")]
+    modes: Annotated[tuple[DecayMode, ...], Quantity("modes", help="damped oscillations, that of most energy first")]
 
     @property
-    def is_white(self) -> Annotated[bool, Quantity("residuals white", key="residuals_white")]:
+    def is_white(
+        self,
+    ) -> Annotated[
+        bool, Quantity("residuals white", key="residuals_white", help="whether the residuals look like white noise")
+    ]:
         """Whether the residuals look like white noise."""
         return self.white >= NOT_WHITE
 
     @property
-    def level(self) -> Annotated[float, Quantity("probability of the intervals")]:
+    def level(
+        self,
+    ) -> Annotated[float, Quantity("probability of the intervals", help="share of intervals that hold the true value")]:
         """The share of intervals that hold the true value."""
         return CONFIDENCE
 

@@ -30,7 +30,7 @@ import numpy as np
 from scipy.optimize import brentq, least_squares
 from scipy.special import chdtrc, ndtri, stdtrit
 
-from tfarm.arm.writing import number_unit
+from tfarm.arm.schema import file_key
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
@@ -154,7 +154,7 @@ class Solution:
     residuals: Real
     jacobian: Real
     converged: bool
-    starts: Annotated[int, Quantity()]
+    starts: Annotated[int, Quantity(help="number of starting points that were tried")]
 
     @property
     def chi_squared(self) -> float:
@@ -294,14 +294,23 @@ class Fitted:
     A number that the data do not determine has no interval.
     """
 
-    key: Annotated[str, Quantity("number")]
-    unit: Annotated[str, Quantity("unit")]
-    value: Annotated[float, Quantity("value")]
-    low: Annotated[float | None, Quantity("95 % interval from")]
-    high: Annotated[float | None, Quantity("to")]
-    deviation: Annotated[float | None, Quantity("standard deviation", digits=3, key="std")]
-    identified: Annotated[bool, Quantity("identified")]
-    start: Annotated[float, Quantity()]
+    label: Annotated[str, Quantity("number", help="name and symbol of the fitted number")]
+    key: Annotated[str, Quantity("key", help="key of the number in the arm's file, or the sensor's gain or delay")]
+    unit: Annotated[str, Quantity("unit", help="SI unit of the number")]
+    value: Annotated[float, Quantity("value", help="best value")]
+    low: Annotated[
+        float | None,
+        Quantity("95 % interval from", help="lower end of the interval; none where the data set no lower bound"),
+    ]
+    high: Annotated[
+        float | None, Quantity("to", help="upper end of the interval; none where the data set no upper bound")
+    ]
+    deviation: Annotated[
+        float | None,
+        Quantity("standard deviation", digits=3, key="std", help="by the covariance of the linearised residuals"),
+    ]
+    identified: Annotated[bool, Quantity("identified", help="whether the data bound the number on both sides")]
+    start: Annotated[float, Quantity(help="value at which the search began")]
 
 
 class BetterError(Exception):
@@ -344,9 +353,10 @@ def confidence_intervals(
         elif n in alone:
             low, high = _one_sided(found, n, quantile)
             words[alone[n]] = words[alone[n]] if low is None else ""
+        of = file_key(each.key)
         fitted.append(Fitted(
-            key=each.key, unit=number_unit(each.key), value=each.value(point), low=low, high=high, deviation=deviation,
-            identified=low is not None and high is not None, start=each.start,
+            label=of.label, key=each.key, unit=of.unit or "1", value=each.value(point), low=low, high=high,
+            deviation=deviation, identified=low is not None and high is not None, start=each.start,
         ))  # fmt: skip
         if (low is None) != (high is None):
             end = f"at most {high:.4g}" if low is None else f"at least {low:.4g}"

@@ -350,7 +350,7 @@ def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
             H = problem.at(number, omega).computed(point)[0]
             upper.plot(omega / RAD_PER_CYCLE, abs(H), color=colour, lw=width, label=label)
             draw_wrapped(omega / RAD_PER_CYCLE, H, lower, color=colour, lw=width)
-        upper.set(xscale="log", yscale="log", title=one.name, ylabel="" if number else "magnitude, SI")
+        upper.set(xscale="log", yscale="log", title=one.label, ylabel=f"magnitude [{one.unit}]")
         lower.set(xlabel=FREQUENCY_HZ, ylabel="" if number else PHASE)
         plain_ticks(lower.xaxis, subs=TICKS_A_DECADE)
 
@@ -389,7 +389,7 @@ def draw_share(those: Possible, ranges: Sequence[tuple[float, float]]) -> Figure
 
 @picture(
     (Overlay, "tfarm.overlay returns"), size=(9.0, 7.4), rows=(2.2, 1.2, 0.8),
-    title=lambda data: f"{data.arm.name}: " + f"{data.measured.output} over {data.measured.input}".replace("_", " "),
+    title=lambda data: f"{data.arm.name}: {data.measured.label}",
 )  # fmt: skip
 def measured(data: Overlay, *, ax: Sequence[Axes]) -> None:
     """Magnitude, phase and coherence (from `tfarm.overlay`), in three axes, those given or new ones: these.

@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 
 import tfarm
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, implausible, input_words, unit_of
-from tfarm.arm.writing import number_unit
+from tfarm.arm.schema import file_key
 from tfarm.audit.assumptions import has_hub_inertia, hub_study, section_study
 from tfarm.columns import Table
 from tfarm.digits import plain, significant, unit
@@ -22,11 +22,6 @@ from tfarm.schema import Quantity, table
 HEADLINE_MODES = 3  # natural frequencies among the headline numbers, the rigid body's 0 not shown
 MOST_POISSON = 0.5  # of an isotropic material; a larger E/2G - 1 is none's ratio
 TEXTS = ("name", "assumptions")  # of the file, which are in other places of the page
-CHAIN_UNITS = {
-    "sampling.period": "s", "sampling.antialias_corner": "rad/s", "converters.moment_range": "N m",
-    "converters.torque_range": "N m", "converters.rate_filter": "rad/s", "actuator.hub_damping": "N m s/rad",
-    "slew.travel": "m", "slew.rise_time": "s",
-}  # fmt: skip
 
 
 def arm_section(case: Case) -> PageSection:
@@ -36,7 +31,7 @@ def arm_section(case: Case) -> PageSection:
     if not arm.is_uniform:
         words.append(prose("rig", arm=arm, input=input_words(arm)))
     words += ["This arm states no assumptions."] * (not arm.assumptions)
-    rows = list(parameters(tomllib.loads(file_text(arm, case.chain))))
+    rows = list(parameters(arm, tomllib.loads(file_text(arm, case.chain))))
     given = table(rows, stem="parameters", title="Parameters", caption=prose("parameters", is_rig=not arm.is_uniform))
     tip = "a payload" if arm.payload.mass or arm.payload.inertia else "nothing"
     tip = "a pin" if math.isinf(arm.payload.mass) else tip
@@ -78,23 +73,24 @@ def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
 class Parameter(NamedTuple):
     """A number of the arm's file."""
 
-    key: Annotated[str, Quantity("key")]
+    label: Annotated[str, Quantity("parameter")]
     value: Annotated[float | str, Quantity("value", digits=10)]
     unit: Annotated[str, Quantity("unit")]
+    key: Annotated[str, Quantity("key of the file")]
 
 
-def parameters(table: Mapping[str, Any], under: str = "") -> Iterator[Parameter]:
+def parameters(arm: Arm, table: Mapping[str, Any], under: str = "") -> Iterator[Parameter]:
     """The numbers of a table of an arm's file by their keys, those of tables in it too."""
     for key, value in table.items():
         name = f"{under}{key}"
         if isinstance(value, dict):
-            yield from parameters(value, f"{name}.")
+            yield from parameters(arm, value, f"{name}.")
         elif isinstance(value, list) and all(isinstance(each, dict) for each in value):
             for number, each in enumerate(value, 1):
-                yield from parameters(each, f"{name}.{number}.")
+                yield from parameters(arm, each, f"{name}.{number}.")
         elif key not in TEXTS:
-            of = CHAIN_UNITS.get(name, number_unit(name)).removeprefix("1")
-            yield Parameter(name, value, "" if isinstance(value, str) else unit(of))
+            of = file_key(name, arm)
+            yield Parameter(of.label, value, unit(of.unit), name)
 
 
 class Derived(NamedTuple):

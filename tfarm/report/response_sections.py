@@ -82,7 +82,7 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
     words += [f"{upper(each)}." for each in fit.not_determined]
     blocks: list[Picture | Table] = []
     if fit.responses:
-        names = listed([each.name for each in fit.responses])
+        names = listed([f"{each.label} [{each.unit}]" for each in fit.responses])
         blocks.append(Picture(
             stem="fit-overlay", title="Measured over fitted", caption=prose("fit_overlay", names=names),
             alt=f"Measured and computed responses: {names}.", figure=fitted.figure(fit),
@@ -153,7 +153,7 @@ def measured_section(case: Case) -> PageSection:
     words: list[str] = []
     for number, one in enumerate(case.measured, start=1):
         found = overlay(case.arm, one)
-        name = found.measured.name
+        name = found.measured.label
         label = f"-{number}" if len(case.measured) > 1 else ""
         blocks.append(Picture(
             stem=f"measured{label}", title=name, caption=prose("measured_curves"),

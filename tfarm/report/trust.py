@@ -39,6 +39,7 @@ from tfarm.schema import Quantity, table
 from tfarm.spectrum import DampedModes
 from tfarm.spectrum.table import default_gains
 from tfarm.tables.files import save_table
+from tfarm.tables.html import GREEK, LETTER
 
 PROVEN_OUTPUTS = ("root_moment", "tip_displacement")
 UNPROVEN = "not proven"
@@ -251,13 +252,6 @@ AUDIT_COLUMNS = (
     "equation", "verdict", "printed", "corrected", "residual_printed", "residual_corrected", "evidence",
 )  # fmt: skip
 VERDICT_MARKS = {"ok": ("✓", "right as printed"), "corrected": ("≠", "corrected"), "undecided": ("?", "undecided")}
-GREEK_LETTERS = dict(
-    zip(
-        ("rho", "kappa", "theta", "phi", "psi", "lambda", "eta", "alpha", "nu", "Theta", "Phi", "Psi", "Delta"),
-        "ρκθφψληανΘΦΨΔ",
-        strict=True,
-    )
-)
 MathElement = ElementTree.Element
 STATEMENT_END = re.compile(r"(?<=[,;])\\quad\s*")
 LEAVES = ("mi", "mo", "mn", "mtext")
@@ -298,11 +292,7 @@ def shown_row(row: AuditRow) -> dict[str, Any]:
 
 def in_letters(text: str) -> Markup:
     """The audit's plain text with Greek letters, subscripts and exponents: theta_t^2 becomes θ<sub>t</sub>²."""
-    greek = re.sub(
-        rf"(?<![A-Za-z])({'|'.join(GREEK_LETTERS)})(?![A-Za-z])",
-        lambda name: GREEK_LETTERS[name[1]],
-        powers(unit(str(escape(text)))),
-    )
+    greek = LETTER.sub(lambda name: GREEK[name[1]], powers(unit(str(escape(text)))))
     return Markup(
         re.sub(r"(?<![^\W\d_])([A-Za-zΑ-Ωα-ω])_([a-z]{1,2}|\d{1,2})(?![A-Za-z0-9])", r"\1<sub>\2</sub>", greek)
     )
@@ -319,11 +309,11 @@ def verdict_counts(rows: Sequence[AuditRow]) -> dict[str, int]:
     return {verdict: found[verdict] for verdict in VERDICT_MARKS}
 
 
-def _left(residual: str) -> str:
-    """What a formula leaves in the check, in words."""
+def _left(residual: str) -> Markup:
+    """What a formula leaves in the check, in words and letters."""
     if residual == "0":
-        return "nothing"
-    return f"nothing but rounding at 50 digits, {powers(residual)}" if is_zero(residual) else residual
+        return Markup("nothing")
+    return in_letters(f"nothing but rounding at 50 digits, {residual}" if is_zero(residual) else residual)
 
 
 def formulas(tex: str) -> list[Markup]:

@@ -13,8 +13,14 @@ SIGN, INFINITE = re.compile(r"(?<![\w.)])-(?=[\d.]|inf\b)"), re.compile(r"\binf\
 TYPESET = {
     "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", " theta": " θ", "phi'(0)": "φ′(0)",
     "L(iw)": "L(iω)", "J w1": "J ω₁", "+-": "±",
-    "(alpha_c, eta_c)": "momentum and learning rate",
+    "(alpha_c, eta_c)": "momentum and learning rate", "w^2 rhoA": "ω^2 rhoA", "w L^2": "ω L^2",
 }  # fmt: skip
+GREEK = {
+    "rho": "ρ", "kappa": "κ", "theta": "θ", "phi": "φ", "psi": "ψ", "lambda": "λ", "eta": "η", "alpha": "α", "nu": "ν",
+    "omega": "ω", "Theta": "Θ", "Phi": "Φ", "Psi": "Ψ", "Delta": "Δ",
+}  # fmt: skip
+LETTER = re.compile(rf"(?<![A-Za-z])({'|'.join(GREEK)})(?=[AI]\b|[^A-Za-z]|$)")  # rho, and of rhoA and rhoI
+ROOT = re.compile(r"\^\((1/\d)\)")
 MINUS = re.compile(r"(?<= )-(?= ?[\w(])")  # of a formula in a sentence
 WIDE_CELL = 44  # characters of a text from which its cell is a wide one
 
@@ -61,6 +67,7 @@ def with_symbols(text: str) -> Markup:
     """A text with Greek letters, true minus signs, subscripts and exponents: I_h becomes I<sub>h</sub>, m^2 m²."""
     for written, shown in TYPESET.items():
         text = text.replace(written, shown)
-    plain = powers(unit(str(escape(MINUS.sub("−", text)))))
+    plain = LETTER.sub(lambda name: GREEK[name[1]], powers(unit(str(escape(MINUS.sub("−", text))))))
+    plain = ROOT.sub(r"<sup>\1</sup>", plain)
     plain = INFINITE.sub("∞", SIGN.sub("−", plain))
     return Markup(re.sub(r"\b([A-Za-zθ])_([a-z0-9])\b", r"\1<sub>\2</sub>", plain))
