@@ -63,6 +63,13 @@ def quantities(kind: Any) -> dict[str, Quantity]:
     return _quantities(kind)
 
 
+def quantities_of(record: Any) -> dict[str, Quantity]:
+    """The quantities of a record: its class's, under the labels and units of `titles` where these depend on it."""
+    declared = quantities(type(record))
+    titles: Mapping[str, tuple[str, str]] = getattr(record, "titles", {})
+    return declared | {name: replace(declared[name], label=title, unit=unit) for name, (title, unit) in titles.items()}
+
+
 @cache
 def _quantities(kind: Any) -> dict[str, Quantity]:
     hints = get_type_hints(kind, include_extras=True)
@@ -143,7 +150,7 @@ def table(rows: Any, names: Sequence[str] = (), *, stem: str = "", title: str = 
     """
     if not (_is_table(rows) or rows):
         return Table(columns=(), stem=stem, title=title, caption=caption)
-    declared = quantities(type(rows if _is_table(rows) else rows[0]))
+    declared = quantities_of(rows if _is_table(rows) else rows[0])
     wanted = names or [name for name, of in declared.items() if of.label]
     found = ((declared[name], _values(rows, name)) for name in wanted)
     columns = (
@@ -185,7 +192,7 @@ def across(
 
 def entries(record: Any, under: str = "") -> Iterator[tuple[str, Quantity, Any]]:
     """Label, quantity and value of what has one value, in records inside the record too."""
-    for name, of in quantities(type(record)).items():
+    for name, of in quantities_of(record).items():
         value, label = getattr(record, name), f"{under}{of.label}"
         if hasattr(value, "as_text"):
             if of.label:
@@ -236,7 +243,7 @@ def curve_table(record: Any, *, stem: str = "", title: str = "") -> Table:
 
 def _with_flat(record: Any) -> Iterator[tuple[Any, Quantity]]:
     """Values and quantities of a record, those of records that are flat in their place."""
-    for name, of in quantities(type(record)).items():
+    for name, of in quantities_of(record).items():
         value = getattr(record, name)
         if of.flat and is_declared(value):
             yield from _with_flat(value)
@@ -266,7 +273,7 @@ class Section:
 def sections(record: Any, title: str = "") -> list[Section]:
     """A record as a person reads it: its single values first, then its tables and the records inside it."""
     own, later = Section(title), []
-    for name, of in quantities(type(record)).items():
+    for name, of in quantities_of(record).items():
         value = getattr(record, name)
         if of.flat and is_declared(value):
             first, *rest = sections(value)

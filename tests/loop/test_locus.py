@@ -2,6 +2,8 @@
 
 import json
 import math
+import re
+import shlex
 from dataclasses import replace
 from itertools import product
 
@@ -18,9 +20,10 @@ from tfarm import Arm, Hub, HubFeedback, Law, Link, ParameterError, Payload, Sec
 from tfarm.arm import Attachment, Motor
 from tfarm.loop.lines import line_crossings
 from tfarm.loop.loci import damping_ratios, held_branches, loci, most_damped, reduced_locus
-from tfarm.loop.locus import frame, locus, rounded
+from tfarm.loop.locus import frame, locus, origin_name, rounded
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
+from tfarm.schema import curve_table
 from tfarm.spectrum.damped import damped_modes
 from tfarm.spectrum.proofs import enclosed
 from tfarm.spectrum.table import default_gains, rate_unit
@@ -132,6 +135,25 @@ def test_a_mode_that_is_real_between_two_values_alone_has_its_branch():
     """At gain 0 mode 1 swings at 54 rad/s; at the next value it has met the hub's pole, and is a mirror image there."""
     found = locus(PLASTIC, HubFeedback(K1=10.9, K2=-0.39), "all", 0.0, 2.0, 60, 6)
     assert found.mode.tolist() == [0, 0, 1, 2, 3, 4]
+
+
+def test_a_table_is_titled_by_what_varies_and_each_branch_has_its_origin(capsys):
+    """A filtered law through a motor with a circuit: two poles at rest, the circuit's, two modes, the filter's own."""
+    law = Law({"hub_angle": ([2.0], [0.004, 1.0]), "hub_rate": 0.4})
+    found = locus(RIGS["back-EMF"], law, "hub_angle", 0.0, 1.0, 5, 2)
+    names = dict(zip(found.branches[:, 0].tolist(), map(origin_name, found.origin.tolist()), strict=True))
+    assert names[min(names, key=lambda s: abs(s + 250.0))] == "controller"  # 1/T, uncoupled at a factor of 0
+    assert names[min(names, key=abs)] == "rigid body"
+    assert [origin_name(n) for n in sorted(found.mode[found.mode > 0].tolist())] == ["mode 1", "mode 2"]
+    _, out, _ = run(capsys, *shlex.split("locus sasaki2012-lab --vary K2 --from 0.9 --to 1.1 --points 3 --branches 3"))
+    crossings, branches, best = out.split("\n\n")[1:4]
+    assert crossings.splitlines()[1].split()[:2] == ["K2", "frequency"]
+    assert re.search(r" unstable +mode 1 ", crossings)
+    assert re.match(r"branch +origin +pole at K2 = 0.9 \[1/s\] +pole at K2 = 1.1 \[1/s\]", branches.splitlines()[1])
+    assert re.search(r"^ +0 +rigid body +0 ", branches, re.MULTILINE)
+    assert best.splitlines()[1].split()[0] == "K2"
+    assert "unit" not in out
+    assert curve_table(locus(LAB, HUB, "K1", 0.0, 1.0, 2, 2)).columns[0].unit == "N m s/rad"
 
 
 def test_zeros_at_the_origin_stay_exactly_there():

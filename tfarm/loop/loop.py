@@ -93,7 +93,9 @@ class Loop:
         return controller(self.law if self.gains is None else as_law(self.gains), self.arm)
 
     @cached_property
-    def warnings(self) -> Annotated[tuple[str, ...], Quantity("warnings")]:
+    def warnings(
+        self,
+    ) -> Annotated[tuple[str, ...], Quantity("warnings", help="unstable controller poles that its zeros cancel")]:
         """Poles of the law right of the axis that its own zeros cancel."""
         return cancelled(self.law)
 

@@ -51,6 +51,8 @@ from .loop import Loop, grid
 from .stability import band_of_family, verdict_on
 from .windows import static_edge, theorem_edges, theorem_windows
 
+COUNTS = Quantity(key="unstable_roots", help="unstable poles at each point, rows upwards; inf where infinitely many")
+BOUNDARY = Quantity(key="boundary", help="both gains and the frequency [rad/s] with poles on the imaginary axis")
 INFINITE = -1  # count of infinitely many unstable poles
 MOST_GRID_VALUES, MOST_LAW_VALUES = 2000, 400  # of a map, along one gain, and along one number of another law
 SHOWN_K1, SHOWN_K2 = (-1.0, 3.0), (-2.0, 2.0)  # of a map, by default: the stable region of the paper's arm, and around
@@ -83,13 +85,18 @@ class Plane(PlaneOfCounts):
 
     arm: Arm
     law: Law
-    vary: Annotated[tuple[str, str], Quantity("plane of")]
-    x: Annotated[Real, Quantity(curve=True)]
-    y: Annotated[Real, Quantity(curve=True)]
+    vary: Annotated[tuple[str, str], Quantity("plane of", help="the two numbers that vary, across and up")]
+    x: Annotated[Real, Quantity(curve=True, help="values of the first number")]
+    y: Annotated[Real, Quantity(curve=True, help="values of the second number")]
     unstable: NDArray[np.int64]
     boundary: Real
-    band: Annotated[float, Quantity("frequency range, up to", "rad/s", key="up_to_rad_s")]
+    band: Annotated[float, Quantity(key="up_to_rad_s", help="end of the range; 0 where a theorem decides every mode")]
     crossings: list[Crossings]
+
+    @property
+    def reach(self) -> Annotated[str, Quantity("frequency range", help="poles in it are counted completely")]:
+        """The frequency range in words."""
+        return f"up to {self.band:.6g} rad/s" if self.band else "every mode, by a theorem"
 
     @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
@@ -97,19 +104,19 @@ class Plane(PlaneOfCounts):
         return controller(self.law, self.arm)
 
     @property
-    def counts(self) -> Annotated[list[list[int | float]], Quantity(key="unstable_roots")]:
+    def counts(self) -> Annotated[list[list[int | float]], COUNTS]:
         """Unstable poles over the grid, rows upwards, infinity where they are infinitely many."""
         return [[math.inf if count == INFINITE else count for count in row] for row in self.unstable.tolist()]
 
     @property
-    def boundary_inside(self) -> Annotated[list[list[float]], Quantity(key="boundary")]:
+    def boundary_inside(self) -> Annotated[list[list[float]], BOUNDARY]:
         """The points of `boundary` inside the plane."""
         return [point for point in self.boundary.tolist() if all(
             values[0] <= value <= values[-1] for value, values in zip(point, self.axes, strict=False)
         )]  # fmt: skip
 
     @property
-    def finding(self) -> Annotated[str, Quantity("stability region", key="finding")]:
+    def finding(self) -> Annotated[str, Quantity("stability region", help="points of the grid without unstable pole")]:
         """Number of points of the grid at which the loop is stable."""
         return f"stable at {int(self.stable.sum())} of {self.stable.size} points"
 

@@ -59,6 +59,11 @@ MODES_ABOVE_BOX, MOST_MODEL_MODES = 4, 40  # modes of the model above the box, a
 SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)  # of a box that may not reach above the shear cut-off
 
 
+ENDS_AT_SHEAR = Quantity(
+    "ends at the shear cut-off, sqrt(kGA/rhoI)", help="no more bending modes lie below it: the list is whole"
+)
+
+
 def count_with_mirrors(zeros: Complex) -> int:
     """Number of zeros with their conjugates, from those with Im s >= 0."""
     return int(np.where(zeros.imag > 0, 2, 1).sum())
@@ -76,21 +81,21 @@ class Poles:
     loop: Annotated[Loop, Quantity(flat=True)]
     values: Annotated[Complex, Quantity("s", "1/s", 12, "closed-loop poles with Im s >= 0", key="poles")]
     box: Annotated[Box, Quantity("box: Re s from, to, Im s from, to", help="searched, and complete")]
-    ends_at_shear_cutoff: Annotated[bool, Quantity("ends at the shear cut-off, sqrt(kGA/rhoI)")] = False
+    ends_at_shear_cutoff: Annotated[bool, ENDS_AT_SHEAR] = False
     discs: Annotated[tuple[Disc, ...] | None, Quantity(help="enclosures of the poles apart from 0, certified")] = None
 
     @property
-    def completeness(self) -> Annotated[str, Quantity("completeness")]:
+    def completeness(self) -> Annotated[str, Quantity("completeness", help="word of certainty for the list of poles")]:
         """The word of certainty for the list of poles in the box."""
         return "converged (winding number)" if self.discs is None else "certified"
 
     @property
-    def shear_cutoff(self) -> Annotated[float, Quantity(unit="rad/s")]:
+    def shear_cutoff(self) -> Annotated[float, Quantity(unit="rad/s", help="sqrt(kGA/rhoI): shear modes lie above")]:
         """sqrt(kGA/rhoI) [rad/s], above which lightly damped shear modes lie."""
         return self.loop.arm.shear_cutoff
 
     @property
-    def unstable(self) -> Annotated[int, Quantity("unstable poles")]:
+    def unstable(self) -> Annotated[int, Quantity("unstable poles", help="of the box, conjugates counted")]:
         """Number of poles of the box, conjugates counted, right of the axis.
 
         A real part below working precision decides nothing; without damping a theorem decides (`theorem_of`).

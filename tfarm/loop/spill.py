@@ -30,12 +30,18 @@ REST_SHARE = 1e-7  # of w1: poles at 0 come out as small
 UNDAMPED_SHARE = 1e-9  # of its size: largest real part of a pole that no model damps
 
 
+FIRST_MODE = Quantity("lowest destabilised mode", help="of the exact loop; 0: a pole below the first mode")
+SHOWN_FROM = Quantity(
+    "design models unstable from", "modes", key="shown_from_modes", help="all models of at least so many modes are"
+)
+
+
 class SpillModel(NamedTuple):
     """A design model under the law: flexible modes, unstable poles, rightmost pole."""
 
-    modes: Annotated[int, Quantity("modes")]
-    unstable: Annotated[int, Quantity("unstable poles")]
-    rightmost: Annotated[complex, Quantity("rightmost pole", "1/s")]
+    modes: Annotated[int, Quantity("modes", help="flexible modes of the design model")]
+    unstable: Annotated[int, Quantity("unstable poles", help="of the design model under the controller")]
+    rightmost: Annotated[complex, Quantity("rightmost pole", "1/s", help="apart from poles at 0")]
 
 
 @dataclass(frozen=True)
@@ -61,7 +67,7 @@ class Spill:
         return moving[moving.real > UNDAMPED_SHARE * abs(moving)]
 
     @property
-    def first_mode(self) -> Annotated[int | None, Quantity("first mode that is destabilised")]:
+    def first_mode(self) -> Annotated[int | None, FIRST_MODE]:
         """The lowest destabilised mode; None where the exact loop is stable in its band."""
         if not self.driven.size:
             return None
@@ -73,7 +79,7 @@ class Spill:
         return int(np.argmin(abs(flexible - lowest))) + 1
 
     @property
-    def shown_from(self) -> Annotated[int | None, Quantity("modes of a model that shows it", key="shown_from_modes")]:
+    def shown_from(self) -> Annotated[int | None, SHOWN_FROM]:
         """Number of modes from which on the models are unstable too."""
         content = np.flatnonzero(self.unstable == 0)
         if content.size == 0:
@@ -81,7 +87,7 @@ class Spill:
         return None if content[-1] == self.modes.size - 1 else int(self.modes[content[-1] + 1])
 
     @property
-    def models(self) -> Annotated[list[SpillModel], Quantity("design models")]:
+    def models(self) -> Annotated[list[SpillModel], Quantity("design models", help="bare modes, without remainder")]:
         """One row for each model."""
         poles = (complex(s.real, abs(s.imag)) for s in self.rightmost)
         return list(map(SpillModel, self.modes.tolist(), self.unstable.tolist(), poles))
@@ -92,21 +98,24 @@ class Spill:
         return self.modes[self.unstable == 0]
 
     @property
-    def in_words(self) -> Annotated[str, Quantity("spillover")]:
-        """The finding: the exact loop, and the models that do not show it."""
-        exact = f"the exact rig is {self.verdict.verdict}"
+    def in_words(self) -> Annotated[str, Quantity("spillover", help="exact loop, compared with the design models")]:
+        """The exact loop, and the models that are stable where it is not."""
         if not self.driven.size:
-            return exact + (" in the frequency range" if not self.verdict.is_known_beyond else "")
+            where = "" if self.verdict.is_known_beyond else " in the frequency range"
+            return f"none: the exact loop is {self.verdict.verdict}{where}"
         which = f"mode {self.first_mode}" if self.first_mode else "a pole below the first mode"
-        words = f"{exact}: {which} is unstable, at {abs(self.driven[0]):.6g} rad/s"
+        words = f"{which} is unstable in the exact loop, at {abs(self.driven[0]):.6g} rad/s"
         if not self.content.size:
-            return f"{words}; every model shows it"
+            return f"{words}, and every model is unstable"
         first, last = int(self.content[0]), int(self.content[-1])
-        models = f"{first} to {last} modes" if first != last else f"{first} mode{'s' * (first > 1)}"
-        if last - first + 1 != self.content.size:
-            models = f"{self.content.size} orders up to {last}"
-        end = f"from {self.shown_from} modes on they show it" if self.shown_from else "the largest model is stable too"
-        return f"{words}; models of {models} are stable, {end}"
+        models = f"models of {first} to {last} modes"
+        if first == last:
+            models = f"the model of {first} mode{'s' * (first > 1)}"
+        elif last - first + 1 != self.content.size:
+            models = f"{self.content.size} of the models up to {last} modes"
+        end = f"unstable from {self.shown_from} modes on" if self.shown_from else "the largest among them"
+        verb = "is" if first == last else "are"
+        return f"{words}; {models} {verb} stable, {end}"
 
 
 def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:

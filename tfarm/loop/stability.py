@@ -44,9 +44,13 @@ BEYOND_LAW_POLES = 1.3  # of the fastest pole of the law that rings: a band reac
 DULL = 0.7  # damping ratio from which on a pole of the law makes no peak
 NEAREST_TO_AXIS = 1e-4  # of a band: first distance from the axis at which L is evaluated on the upper edge of the box
 UNCONTROLLABLE = 1e-9  # a hub participation below this share of an ordinary one is none
-DELAYED = "without any damping a delayed law destabilises infinitely many modes beyond the frequency range"
-SMALL_GAIN = f"beyond the frequency range |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)"
+DELAYED = "a delay without any damping destabilises infinitely many modes"
+SMALL_GAIN = f"|L(iw)| < {QUIET:g} and falling: no unstable pole (small gain)"
 UNKNOWN_ABOVE = "converged up to {band:.4g} rad/s, not determined beyond, neither by small gain nor by a theorem"
+BAND = Quantity("frequency range, up to", "rad/s", key="up_to_rad_s", help="poles below it are counted completely")
+KNOWN_BEYOND = Quantity(
+    "stability known beyond the range", key="known_beyond", help="no: the verdict is that of the frequency range alone"
+)
 
 
 @dataclass(frozen=True)
@@ -58,13 +62,13 @@ class Stability:
     """
 
     loop: Annotated[Loop, Quantity(flat=True)]
-    verdict: Annotated[str, Quantity("stability")]
+    verdict: Annotated[str, Quantity("stability", help="stable, marginal or unstable; the pole of a free hub left out")]
     unstable_roots: Annotated[int, Quantity("unstable poles", help="in the frequency range")]
     unstable_roots_infinite: Annotated[bool, Quantity(help="infinitely many poles beyond the range are unstable")]
-    band: Annotated[float, Quantity("frequency range, up to", "rad/s", key="up_to_rad_s")]
-    tail: Annotated[str, Quantity("beyond that", key="beyond")]
+    band: Annotated[float, BAND]
+    tail: Annotated[str, Quantity("beyond the range", key="beyond", help="what decides the poles of higher frequency")]
     poles: Poles
-    is_known_beyond: Annotated[bool, Quantity("stability known beyond that", key="known_beyond")] = True
+    is_known_beyond: Annotated[bool, KNOWN_BEYOND] = True
 
     @property
     def spectral_abscissa(self) -> Annotated[float, Quantity("spectral abscissa", "1/s", 6, "largest Re s in range")]:
@@ -72,12 +76,12 @@ class Stability:
         return self.poles.spectral_abscissa
 
     @property
-    def free_pole(self) -> Annotated[str | None, Quantity("free hub angle")]:
+    def free_pole(self) -> Annotated[str | None, Quantity("free hub angle", help="pole at 0 that verdicts leave out")]:
         """The pole at 0 that the verdict leaves out."""
         return "its pole at s = 0 is left out" if self.poles.moving.size < self.poles.values.size else None
 
     @property
-    def is_stable(self) -> Annotated[bool, Quantity(key="stable")]:
+    def is_stable(self) -> Annotated[bool, Quantity(key="stable", help="whether the verdict is stable")]:
         """Whether every pole but that of the free hub angle lies left of the axis."""
         return self.verdict == "stable"
 

@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     Poly = Any  # of sympy, over the rationals: it comes without types, and is imported where it is used
 
 MOST_EXACT_DEGREE = 40  # degree: exact arithmetic with such polynomials takes a moment
+KIND = Quantity("kind", help="from the hub's angle or rate to its torque; none where no sign is shown")
 TAKES, CONSERVES, GIVES = 1, 0, -1  # energy that a law takes from every mode with motion of the hub: its sign
 
 
@@ -68,8 +69,8 @@ class Signs:
     `energy` of each mode: the law TAKES, CONSERVES or GIVES it; None where that is not shown.
     """
 
-    kind: Annotated[Literal["strictly passive", "passive", "negative imaginary", ""], Quantity("kind")]
-    reason: Annotated[str, Quantity("reason")]
+    kind: Annotated[Literal["strictly passive", "passive", "negative imaginary", ""], KIND]
+    reason: Annotated[str, Quantity("reason", help="property of the controller that decides the kind")]
     at_rest: float = 0.0
     energy: int | None = None
 
@@ -214,10 +215,10 @@ class Lyapunov:
     """
 
     loop: Loop
-    proven: Annotated[bool, Quantity("stability proven")]
-    a1_over_a2: Annotated[float | None, Quantity("weights a1/a2")]
+    proven: Annotated[bool, Quantity("stability proven", help="no pole in the right half-plane, as V never grows")]
+    a1_over_a2: Annotated[float | None, Quantity("weights a1/a2", help="1 - K2, of the energies in V")]
     kind: Literal["dissipated", "conserved", "unproven"]
-    reason: Annotated[str, Quantity("reason")]
+    reason: Annotated[str, Quantity("reason", help="sign of V_t, or the term of V or V_t that has no sign")]
 
 
 def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:

@@ -14,10 +14,11 @@ from functools import cached_property
 
 import numpy as np
 
-from tfarm.arm import LISTED, RATE_GAIN, AnyLaw, Arm, Law, arm_and_law, full_law
+from tfarm.arm import LISTED, NAMES, RATE_GAIN, AnyLaw, Arm, Law, arm_and_law, full_law, unit_of
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.characteristic import Analytic
+from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum.box import Box, winding_number, zeros_in_box
@@ -36,6 +37,8 @@ SETTLED = 1e-10  # of its size: one step more is taken where Newton's method sti
 SERIES_RADIUS, SERIES_POINTS = 0.2, 16  # of the first frequency: where a power series next to 0 is read off
 NO_PART = 1e-9  # of a pole's size: a smaller imaginary part is rounding
 EMPTY = Box(0.0, 0.0, 0.0, 0.0)
+FACTORS = {"all": "factor on all gains", "gain": "factor on the controller"}  # labels of these numbers
+Title = tuple[str, str]  # label and unit
 ARMS_KEPT = 200  # at values needed again: memory against time, of no effect on a result
 
 
@@ -80,6 +83,20 @@ class Varied:
     def is_of_arm(self) -> bool:
         """Whether the number is one of the arm."""
         return self.vary in ARM_PARAMETERS
+
+    @property
+    def unit(self) -> str:
+        """The SI unit of the number, "1" of a pure one."""
+        of_other = ARM_PARAMETERS | {"delay": "s"}
+        return unit_of(self.vary, self.arm) if self.vary in NAMES else of_other.get(self.vary, "1")
+
+    @property
+    def title(self) -> Title:
+        """Label and unit of the number, for a heading; a pure one has no unit."""
+        name = self.vary.removesuffix(".gain")
+        plain = name.replace("_", " ") if self.is_of_arm else name
+        is_factor = name.partition("@")[0] in OUTPUTS
+        return FACTORS.get(name, f"factor on {plain}" if is_factor else plain), self.unit.replace("1", "")
 
     @property
     def is_reactive(self) -> bool:

@@ -40,10 +40,14 @@ STATIC_AT = 1e-9  # of the lowest frequency: L there is that of an arm at rest
 class Interval(NamedTuple):
     """A stability interval of one number, and the kind of each end."""
 
-    low: Annotated[float, Quantity("from")]
-    high: Annotated[float, Quantity("to")]
-    low_is: Annotated[End, Quantity()] = "edge"
-    high_is: Annotated[End, Quantity()] = "edge"
+    low: Annotated[float, Quantity("from", help="lower end")]
+    high: Annotated[float, Quantity("to", help="upper end")]
+    low_is: Annotated[End, Quantity(help="kind of the lower end: poles on the axis, search range, or no limit")] = (
+        "edge"
+    )
+    high_is: Annotated[End, Quantity(help="kind of the upper end: poles on the axis, search range, or no limit")] = (
+        "edge"
+    )
 
     def as_text(self, digits: int) -> str:
         """The interval; < or > marks an end that is only that of the search."""
@@ -55,12 +59,14 @@ class Interval(NamedTuple):
 class NumberInterval(NamedTuple):
     """A number of a law and its stability intervals, the others constant."""
 
-    name: Annotated[str, Quantity("gain or coefficient", key="number")]
-    value: Annotated[float, Quantity("value")]
-    unit: Annotated[str, Quantity("unit")]
+    name: Annotated[str, Quantity("gain or coefficient", key="number", help="number of the controller that varies")]
+    value: Annotated[float, Quantity("value", help="its value in the controller")]
+    unit: Annotated[str, Quantity("unit", help="of a gain at the hub; empty of a pure number and of coefficients")]
     interval: Annotated[Interval | None, Quantity("stable around it", digits=8, help=ENDS)]
     intervals: Annotated[list[Interval], Quantity("all stability intervals", digits=8, help=ENDS)]
-    search_range: Annotated[Window, Quantity("search range", digits=5)]
+    search_range: Annotated[
+        Window, Quantity("search range", digits=5, help="values between which limits were searched")
+    ]
     band: Annotated[float, Quantity(key="up_to_rad_s", help="frequency up to which crossings were searched")]
 
 
