@@ -15,11 +15,10 @@ from tfarm import ConvergenceError, Hub, Law, Link, Payload, RotarySpring, Secti
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
 from tfarm.loop import windows as windows_module
-from tfarm.loop.lines import unstable_below
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import windows_of
+from tfarm.loop.windows import unstable_below, windows_of
 from tfarm.response.signals import Signals
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")

@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 from importlib import import_module
 from itertools import pairwise
+from types import SimpleNamespace
 
 import control
 import numpy as np
@@ -16,13 +17,13 @@ from tests.loop.law_counts import judge, some_delay, some_law
 from tests.shared import remember, sized, thinned
 from tests.shell import run
 from tfarm import ConvergenceError, Law, ParameterError
-from tfarm.loop.lines import through_infinity, unstable_below
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import loop_margins
 from tfarm.loop.plane import between, plane
 from tfarm.loop.poles import poles_below
-from tfarm.loop.stability import stability
+from tfarm.loop.stability import Spill, stability
 from tfarm.loop.theorem import definite, is_hurwitz, on_axis, polynomial, signs_of
+from tfarm.loop.windows import through_infinity, unstable_below
 from tfarm.reduced.conversions import sensed_model
 from tfarm.response.signals import Signals
 
@@ -228,6 +229,32 @@ def test_a_law_that_two_modes_bear_drives_the_third():
     third = tfarm.modes(BARE, 3).natural_frequency[-1]
     assert abs(found.driven[0].imag - third) < 0.01 * third
     assert "models of 1 to 2 modes are stable" in found.in_words
+
+
+FOUND = {  # unstable poles of each model; driven poles of the exact loop; what is said
+    "some": ([0, 0, 2], [-0.1 + 9j, 1 + 204j], "mode 2 is unstable in the exact loop, at 204.002 rad/s; "
+             "models of 1 to 2 modes are stable, unstable from 3 modes on"),
+    "one": ([0, 2, 2], [1 + 204j], "the model of 1 mode is stable, unstable from 2 modes on"),
+    "all": ([0, 0, 0], [1 + 204j], "models of 1 to 3 modes are stable, the largest among them"),
+    "none": ([1, 1, 2], [2.0], "a pole below the first mode is unstable in the exact loop, at 2 rad/s, "
+             "and every model is unstable"),
+    "scattered": ([0, 2, 0], [1 + 204j], "2 of the models up to 3 modes are stable, the largest among them"),
+    "stable": ([0, 0, 0], [-1 + 2j], "none: the exact loop is stable in the frequency range"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_spillover_in_words(name):
+    unstable, poles, words = FOUND[name]
+    loop = SimpleNamespace(arm=LAB)
+    verdict = SimpleNamespace(
+        poles=SimpleNamespace(moving=np.array(poles, complex)), loop=loop, band=300.0, verdict="stable",
+        is_known_beyond=False,
+    )  # fmt: skip
+    found = Spill(verdict, np.arange(1, 4), np.array(unstable), np.array([-1.0, 1 - 2j, 2.0]))
+    assert found.in_words.endswith(words)
+    assert found.shown_from == {"some": 3, "one": 2, "none": 1}.get(name)
+    assert [each.rightmost.imag for each in found.models] == [0.0, 2.0, 0.0]
 
 
 UNSTABLE = {"hub_angle": {"zeros": [-3.0], "poles": [4.0, -60.0], "gain": 900.0}, "hub_rate": 0.5}

@@ -11,10 +11,10 @@ from tests.loop.agreement import some_free_arm, some_gains
 from tests.loop.arms import held, held_stiffness, some_loop, window_arm
 from tests.loop.ritz_loop import RitzLoop
 from tfarm import Hub, HubFeedback, ParameterError
-from tfarm.loop.lines import line_crossings
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import band_of_loop
+from tfarm.loop.windows import line_crossings
 
 LAB = tfarm.load("sasaki2012-lab")
 

@@ -12,12 +12,11 @@ from tests.loop.agreement import some_free_arm, some_gains
 from tests.loop.arms import held, held_stiffness, window_arm
 from tests.loop.ritz_loop import RitzLoop
 from tfarm import Hub, HubFeedback, Payload
-from tfarm.loop.lines import line_crossings
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import margins
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import windows_of
+from tfarm.loop.windows import line_crossings, windows_of
 from tfarm.spectrum.table import default_gains, most_gain
 
 LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))

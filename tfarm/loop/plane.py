@@ -28,7 +28,7 @@ from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, Hu
 from tfarm.arm.feedback import ON
 from tfarm.arrays import Real
 from tfarm.crossing import Crossings, Window, ascending, counts_over, intervals
-from tfarm.crossing.shown import PlaneOfCounts
+from tfarm.crossing.turning import PlaneOfCounts
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.response.controller import Controller, controller
@@ -36,20 +36,22 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import PAPER_GAINS, default_gains, hub_locked, rate_unit
 
-from .lines import (
+from .loop import Loop, grid
+from .stability import band_of_family, verdict_on
+from .windows import (
     ROUNDED,
     columns,
     critical,
     crossed,
     line_crossings,
     rows,
+    static_edge,
+    theorem_edges,
+    theorem_windows,
     turns_over,
     unstable_below,
     with_numbers,
 )
-from .loop import Loop, grid
-from .stability import band_of_family, verdict_on
-from .windows import static_edge, theorem_edges, theorem_windows
 
 COUNTS = Quantity(key="unstable_roots", help="unstable poles at each point, rows upwards; inf where infinitely many")
 BOUNDARY = Quantity(key="boundary", help="both gains and the frequency [rad/s] with poles on the imaginary axis")
@@ -218,7 +220,7 @@ def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real, band: float | Non
     omega = np.asarray(grid(loop.arm, band))
     members = [lambda value=value: loop.having(vary[0], value) for value in x.tolist()]
     lines = columns(loop, vary, x, (max(map(abs, across)), max(map(abs, up))))
-    found = crossed(loop, lines, [(vary[1], up)] * x.size, omega, members)
+    found = crossed(loop, lines, vary[1], up, omega, members)
     crossing = np.concatenate([y[:0], *(each.gain for each in found)])
     at = 0.0 if vary == PLANE else float(y[_farthest(y, crossing)])  # at K2 = 0 the hub is passive
     there = _counts_across(loop.having(vary[1], at), vary[0], x, band, one_by_one=is_counted)
