@@ -22,7 +22,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import AnyLaw, Arm, shown_unit
+from tfarm.arm import AnyLaw, Arm
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.crossing import brackets, crossed, zeros_between
 from tfarm.records import record
@@ -32,7 +32,7 @@ from tfarm.spectrum.table import first_frequency
 from .loop import Loop, grid
 from .stability import BAND, Stability, is_quiet, stability
 from .theorem import Lyapunov, Signs, lyapunov, signs_of_loop, theorem_of
-from .windows import NumberInterval, Windows, reach_words, windows_of
+from .windows import Windows, reach_words, windows_of
 
 MARGIN_DIGITS, PLACE_DIGITS = 9, 7  # of a margin, at most, and of the frequency of a dip, where its depth is flat
 CROSSOVER_DIGITS = 12  # of the value at each crossover, at most: more than any table rounds to
@@ -203,11 +203,9 @@ class Margins:
         return signs_of_loop(loop) if loop.gains is None else None
 
     @property
-    def stability_intervals(self) -> Annotated[list[NumberInterval], INTERVALS]:
+    def stability_intervals(self) -> Annotated[list[Windows], INTERVALS]:
         """One row for each number of the law, the others constant; without K2 on a free pin, where it has no loop."""
-        loop = self.stability.loop
-        units = {} if loop.gains is None else {name: shown_unit(name, loop.arm) for name in loop.numbers}
-        return [each.about(loop.numbers[name], units.get(name, "")) for name, each in self.windows.items()]
+        return list(self.windows.values())
 
     @property
     def intervals_note(self) -> Annotated[str | None, INTERVALS_NOTE]:

@@ -24,7 +24,7 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, RATE_GAIN, HubFeedback, Law
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, HubFeedback, Law, shown_unit
 from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossing, Crossings, Family, Window, counts_over, crossings, family_of, joined
 from tfarm.errors import ConvergenceError, ParameterError
@@ -39,6 +39,7 @@ from .stability import MARGIN_OF_ZERO, Stability, band_of_family, is_known_witho
 from .theorem import TAKES, absorbed, theorem_of
 
 End = Literal["edge", "search bound", "no limit"]
+SEARCH_RANGE = Quantity("search range", digits=5, key="search_range", help="values between which limits were searched")
 ENDS = "an end with < or > is that of the search range: no limit was found up to there"
 
 WINDOW_REACH, FARTHER_REACH = 20.0, {MOMENT_GAIN: 50.0}  # of the search range, times `gain_unit`
@@ -75,46 +76,41 @@ class Interval(NamedTuple):
         return f"({low}, {high})"
 
 
-class NumberInterval(NamedTuple):
-    """A number of a law and its stability intervals, the others constant."""
+@dataclass(frozen=True)
+@record
+class Windows:
+    """Stability intervals of one number of a law, the others constant, at its `value` in the law.
+
+    `around` is that with the value inside (None if that is unstable), `all` are those in `looked_at`.  `end` gives the
+    kind of an end: poles on the axis ("edge"), an end of the search range `looked_at` without a limit ("search bound"),
+    or infinity by a theorem ("no limit").  Crossings are those up to `band` [rad/s], inf where no pole crosses beyond.
+    """
 
     name: Annotated[str, Quantity("gain or coefficient", key="number", help="number of the controller that varies")]
     value: Annotated[float, Quantity("value", help="its value in the controller")]
     unit: Annotated[str, Quantity("unit", help="of a gain at the hub; empty of a pure number and of coefficients")]
-    interval: Annotated[Interval | None, Quantity("stable around it", digits=8, help=ENDS)]
-    intervals: Annotated[list[Interval], Quantity("all stability intervals", digits=8, help=ENDS)]
-    search_range: Annotated[
-        Window, Quantity("search range", digits=5, help="values between which limits were searched")
-    ]
-    band: Annotated[float, Quantity(key="up_to_rad_s", help="frequency up to which crossings were searched")]
-
-
-@dataclass(frozen=True)
-@record
-class Windows:
-    """Stability intervals of one number of a law: that around its value (None if that is unstable), all in `looked_at`.
-
-    `end` gives the kind of an end: poles on the axis ("edge"), an end of the search range `looked_at` without a limit
-    ("search bound"), or infinity by a theorem ("no limit").  Crossings are those up to `band` [rad/s], inf where no
-    pole crosses beyond any.
-    """
-
-    name: str
     around: Window | None
     all: tuple[Window, ...]
-    looked_at: Window
+    looked_at: Annotated[Window, SEARCH_RANGE]
     crossings: Crossings
-    band: float = math.inf
+    band: Annotated[float, Quantity(key="up_to_rad_s", help="frequency up to which crossings were searched")] = math.inf
+
+    @property
+    def interval(self) -> Annotated[Interval | None, Quantity("stable around it", digits=8, help=ENDS)]:
+        """The interval around the value, with the kinds of its ends."""
+        return None if self.around is None else self._shown(self.around)
+
+    @property
+    def intervals(self) -> Annotated[list[Interval], Quantity("all stability intervals", digits=8, help=ENDS)]:
+        """All intervals, with the kinds of their ends."""
+        return list(map(self._shown, self.all))
+
+    def _shown(self, pair: Window) -> Interval:
+        return Interval(*pair, *map(self.end, pair))
 
     def end(self, value: float) -> End:
         """The kind of an end of one of the intervals."""
         return "no limit" if math.isinf(value) else "search bound" if value in self.looked_at else "edge"
-
-    def about(self, value: float, unit: str = "") -> NumberInterval:
-        """The intervals as a row of results, around the value of the number."""
-        pairs = [Interval(low, high, self.end(low), self.end(high)) for low, high in self.all]
-        here = None if self.around is None else Interval(*self.around, *map(self.end, self.around))
-        return NumberInterval(self.name, value, unit, here, pairs, self.looked_at, self.band)
 
 
 # ------------------------------------------------------------ the loops along one or two numbers
@@ -323,8 +319,9 @@ def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[s
     found, band = _crossings(verdict, solved)
     done: dict[str, Windows] = {}
     for name, limits in ranges.items():
+        value, unit = numbers[name], "" if loop.gains is None else shown_unit(name, loop.arm)
         if limits[0] == limits[1]:
-            done[name] = Windows(name, None, (), limits, Crossings.of([]))  # an algebraic loop but for 0
+            done[name] = Windows(name, value, unit, None, (), limits, Crossings.of([]))  # an algebraic loop but for 0
             continue
         if name not in found and name in solved:
             continue  # `Margins.intervals_note` names it
@@ -336,11 +333,12 @@ def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[s
                 stable = theorem_windows(loop, name, limits, crossings)
         except ConvergenceError:
             continue
-        stable, value = [_with_proven_ends(loop, name, pair, limits) for pair in stable], numbers[name]
+        stable = [_with_proven_ends(loop, name, pair, limits) for pair in stable]
         # Kp = 0 is an end of its own interval: that is the pole at 0 which the verdict leaves out
         inside = (pair for pair in stable if pair[0] < value < pair[1] or (name == "Kp" and pair[0] == value == 0))
         around = next(inside, None) if verdict.is_stable else None
-        done[name] = Windows(name, around, tuple(stable), limits, crossings, band if name in found else math.inf)
+        reach = band if name in found else math.inf
+        done[name] = Windows(name, value, unit, around, tuple(stable), limits, crossings, reach)
     return done
 
 
