@@ -76,14 +76,14 @@ def test_a_law_that_differentiates_may_be_late(delay):
 
 
 def test_a_number_whose_poles_cannot_be_counted_is_named(monkeypatch):
-    crossed = windows_module.crossed
+    line_crossings = windows_module.line_crossings
 
-    def lost(loop, lines, ranges, *others):
-        if "hub_angle.num.1" in dict(ranges):
+    def lost(loop, name, *others):
+        if name == "hub_angle.num.1":
             raise ConvergenceError("a zero lies on the contour", 0.0, 0.0)
-        return crossed(loop, lines, ranges, *others)
+        return line_crossings(loop, name, *others)
 
-    monkeypatch.setattr(windows_module, "crossed", lost)
+    monkeypatch.setattr(windows_module, "line_crossings", lost)
     found = tfarm.margins(LAB, LAW)
     assert LAW.numbers.keys() - found.windows.keys() == {"hub_angle.num.1"}
     assert found.intervals_note.endswith("poles not counted along hub_angle.num.1")

@@ -397,12 +397,12 @@ def ratio_at(value):
 def test_where_the_first_mode_is_damped_most_does_not_depend_on_the_values():
     stop, law = 2 * rate_unit(LAB), default_gains(LAB)
     coarse, fine = (most_damped(locus(LAB, law, "K1", 0.0, stop, points, 4)) for points in (30, 200))
-    assert (coarse.gain, coarse.swings_on, coarse.falls) == (pytest.approx(fine.gain, rel=1e-6), True, True)
+    assert coarse.gain == pytest.approx(fine.gain, rel=1e-6)
     assert coarse.damping_ratio == pytest.approx(fine.damping_ratio, rel=1e-10)
     assert ratio_at(coarse.gain) == pytest.approx(coarse.damping_ratio, rel=1e-9)
     assert max(ratio_at(0.999 * coarse.gain), ratio_at(1.001 * coarse.gain)) < coarse.damping_ratio
     short = most_damped(locus(LAB, law, "K1", 0.0, 2.0, 20, 4))
-    assert (short.gain, short.falls, short.damping_ratio) == (2.0, False, pytest.approx(ratio_at(2.0), rel=1e-9))
+    assert (short.gain, short.damping_ratio) == (2.0, pytest.approx(ratio_at(2.0), rel=1e-9))
     assert most_damped(locus(LAB, law, "payload_mass", 0.0, 0.1, 10, 4)) is None
 
 

@@ -178,19 +178,24 @@ def locus(
     family = Varied(arm, law, vary, start, stop).boxed(number)
     gain = np.linspace(start, stop, points)
     rows, origin = followed(family, gain, number)
-    is_mirrored = ~(rows.imag == 0).any(axis=1) & ~(rows.imag > 0).any(axis=1)
-    listed = np.flatnonzero(~np.isnan(rows).all(axis=1) & ~is_mirrored)
-    shown = np.where(family.box.holds(rows), rows, np.nan) if in_box else rows
-    listed = listed[~np.isnan(shown[listed]).all(axis=1)][: len(rows) if in_box else branches - family.pinned]
+    is_shown = family.box.holds(rows) if in_box else ~np.isnan(rows)
+    is_upper = (rows.imag >= 0).any(axis=1)  # others are mirror images throughout
+    listed = np.flatnonzero(is_shown.any(axis=1) & is_upper)[: None if in_box else branches - family.pinned]
     pinned = min(family.pinned, branches)
-    found = np.concatenate([np.zeros((pinned, points), complex), shown[listed]])
-    found += 0.0  # no -0
+    found = shown(rows, listed, pinned, family.box if in_box else None)
     if len(found) < branches and not in_box:
         raise ConvergenceError(f"only {len(found)} branches could be followed: ask for fewer", found, branches)
     origin = np.r_[at_origin(family.first)[:pinned], origin[listed]]
     top = family.box.im_max if in_box else float(np.fmax.reduce(found.imag).min()) or family.frequency
     crossings = branch_crossings(family, gain, found, origin, top)
     return Locus(family.first.arm, law, vary, gain, found, origin, family.box, crossings, rows, listed, in_box)
+
+
+def shown(rows: Complex, listed: Whole, pinned: int, box: Box | None) -> Complex:
+    """The branches listed after the poles pinned at 0, NaN outside the box where there is one."""
+    found: Complex = np.concatenate([np.zeros((pinned, rows.shape[1]), complex), rows[listed]])
+    found += 0.0  # no -0
+    return found if box is None else np.where(box.holds(found), found, np.nan)
 
 
 def followed(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
@@ -282,21 +287,20 @@ def rounded(found: Locus) -> Locus:
 
     Each is drawn in a picture of its own and in one of all, down to pieces of a pixel.
     """
-    family, gain, rows, shown = found.varied, found.gain, found.followed, found.branches
-    way, pinned = int(np.sign(gain[-1] - gain[0])), len(shown) - found.listed.size
+    family, gain, rows, branches = found.varied, found.gain, found.followed, found.branches
+    way, pinned, box = int(np.sign(gain[-1] - gain[0])), len(branches) - found.listed.size, found.box
     for _ in range(HALVING_ROUNDS):
-        frames = np.array([[*map(frame, shown)], [frame(shown)] * len(shown)])  # (2, b, 4)
+        frames = np.array([[*map(frame, branches)], [frame(branches)] * len(branches)])  # (2, b, 4)
         width, height = frames[..., 1] - frames[..., 0], frames[..., 3] - frames[..., 2]
-        own, every = (loose(shown, width[n, :, None], height[n, :, None]) for n in (0, 1))
+        own, every = (loose(branches, width[n, :, None], height[n, :, None]) for n in (0, 1))
         more = (gain[:-1] + gain[1:])[own | every] / 2
         if not more.size or more.size + gain.size > MOST_LOCUS_POINTS:
             break
         order = np.argsort(way * np.r_[gain, more], kind="stable")
         added = between(family, gain[::way], rows[:, ::way].T, more).T
         gain, rows = np.r_[gain, more][order], np.hstack([rows, added])[:, order]
-        shown = np.concatenate([np.zeros((pinned, gain.size)), rows[found.listed]])
-        shown = np.where(family.box.holds(shown), shown, np.nan) if found.in_box else shown
-    return replace(found, gain=gain, branches=shown, followed=rows)
+        branches = shown(rows, found.listed, pinned, box if found.in_box else None)
+    return replace(found, gain=gain, branches=branches, followed=rows)
 
 
 def frame(branches: Complex) -> tuple[float, float, float, float]:

@@ -245,9 +245,8 @@ def _is_known_everywhere(arm: Arm) -> bool:
 def _known_counts(loop: Loop, K1: Real, K2: Real) -> NDArray[np.int64]:
     """Unstable poles without damping: one count for each side of each line on which modes meet the axis."""
     limits = float(K2[0]), float(K2[-1])
-    edges = theorem_edges(loop.having(RATE_GAIN, default_gains(loop.arm).K1), MOMENT_GAIN, limits)
-    static = [each.t for each in edges if each.at == 0]
-    side = static[0] < K2 if static else np.zeros(K2.size, bool)
+    static = static_edge(loop.having(RATE_GAIN, default_gains(loop.arm).K1), MOMENT_GAIN, limits)
+    side = np.zeros(K2.size, bool) if static is None else static.t < K2
     unstable = np.zeros((K2.size, K1.size), dtype=np.int64)
     of_K1, of_K2 = np.sign(K1 + loop.arm.rate_loss), np.sign(K2 - loop.arm.input_per_torque)
     for of_column, of_row, each in itertools.product((-1, 0, 1), (-1, 0, 1), (True, False)):

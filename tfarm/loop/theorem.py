@@ -65,13 +65,12 @@ class Signs:
     """The `kind` of a law in s on hub angle and hub rate, and the `reason`.
 
     "strictly passive": Re of the law on the rate is above 0 at all frequencies; "passive": nowhere below;
-    "negative imaginary": -C strictly so on the angle, with C(0) = `at_rest` [N m/rad]; "" where none of these is shown.
-    `energy` of each mode: the law TAKES, CONSERVES or GIVES it; None where that is not shown.
+    "negative imaginary": -C strictly so on the angle; "" where none of these is shown.  `energy` of each mode: the law
+    TAKES, CONSERVES or GIVES it; None where that is not shown.
     """
 
     kind: Annotated[Literal["strictly passive", "passive", "negative imaginary", ""], KIND]
     reason: Annotated[str, Quantity("reason", help="property of the controller that decides the kind")]
-    at_rest: float = 0.0
     energy: int | None = None
 
 
@@ -166,7 +165,7 @@ def signs_of(law: Law, friction: float = 0.0) -> Signs:
         return passive
     if is_hurwitz(den) and num.degree() <= den.degree() and definite(on_axis(num, den)[1]) == "above":
         words = "the law on the hub's angle, with its sign changed, is strictly negative imaginary"
-        return Signs("negative imaginary", words, float(num.eval(0) / den.eval(0)), TAKES)
+        return Signs("negative imaginary", words, TAKES)
     return passive or Signs("", "neither passive nor negative imaginary")
 
 
@@ -174,14 +173,14 @@ def _of_signs(rate: float, at_rest: float) -> Signs:
     """The signs of a law without poles right of the axis, by that of Re on the rate and by its value at rest."""
     if rate > 0 and at_rest >= 0:
         words = "the law on the hub's rate dissipates energy at every frequency (strictly positive real)"
-        return Signs("strictly passive", words, at_rest, TAKES)
+        return Signs("strictly passive", words, TAKES)
     if rate == 0 and at_rest >= 0:
         words = "the law on the hub's rate supplies energy at no frequency (positive real)"
-        return Signs("passive", words, at_rest, CONSERVES)
+        return Signs("passive", words, CONSERVES)
     if rate < 0:
         return Signs("", "neither passive nor negative imaginary")
     # Re > 0 on the whole axis but 0: a pole crosses that at s = 0 alone, and only real poles are unstable
-    return Signs("", "the static stiffness of the law is negative", at_rest, TAKES if rate else CONSERVES)
+    return Signs("", "the static stiffness of the law is negative", TAKES if rate else CONSERVES)
 
 
 def _positive_real(num: Poly, den: Poly) -> Signs | None:
