@@ -26,7 +26,7 @@ import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, HubFeedback, Law, shown_unit
 from tfarm.arrays import Complex, Real
-from tfarm.crossing import Crossing, Crossings, Family, Window, counts_over, crossings, family_of, joined
+from tfarm.crossing import Crossing, Crossings, Family, Window, counts_over, crossings, family_of, intervals, joined
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -378,6 +378,12 @@ def _crossings(verdict: Stability, ranges: dict[str, Window]) -> tuple[dict[str,
     return found, band
 
 
+def spans(found: Crossings, limits: Window) -> list[Window]:
+    """The intervals from each crossing between the limits to the next."""
+    edges = np.unique([limits[0], *found.within(*limits).gain.tolist(), limits[1]])
+    return list(itertools.pairwise(edges.tolist()))
+
+
 def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, band: float) -> list[Window]:
     """The stability intervals, from the verdict's count.
 
@@ -387,19 +393,16 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
     loop, value = verdict.loop, verdict.loop.numbers[name]
     if loop.gains is not None and loop.arm.loses_at_hub_alone:
         found = _without_rounding(loop, loop.gains, name, found)
-    edges = np.unique([limits[0], *found.within(*limits).gain.tolist(), limits[1]])
-    pairs = [(float(low), float(high)) for low, high in itertools.pairwise(edges)]
-    middles = np.array([(low + high) / 2 for low, high in pairs])
-    count, at = verdict.unstable_roots, value
+    pairs, count, at = spans(found, limits), verdict.unstable_roots, value
     resting = [each.change for each in found if each.t == value and each.at == 0]
     is_known = verdict.verdict != "marginal"
     if is_known and resting in ([1], [-1]):  # the verdict leaves that pole out
         count += resting[0] > 0
     elif not (is_known and any(low < value < high for low, high in pairs)):
-        at = float(middles[middles.size // 2])
+        at = sum(pairs[len(pairs) // 2]) / 2
         there = verdict_on(loop.having(name, at), band)
         count = 0 if there.is_stable else max(1, there.unstable_roots)
-    (counts,) = counts_over(middles, [found], at, np.array([count]))
+    stable = intervals(found, *limits, at, count)
     if loop.gains is None and not verdict.is_known_beyond:
 
         def unstable_at(number: float) -> int:
@@ -407,8 +410,7 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
 
         (carried,) = counts_over(np.array(limits), [found], at, np.array([count]))
         if carried.tolist() != [unstable_at(end) for end in limits]:
-            counts = np.array([unstable_at(float(middle)) for middle in middles])
-    stable = joined([pair for pair, number in zip(pairs, counts.tolist(), strict=True) if number == 0])
+            stable = joined([pair for pair in pairs if unstable_at(sum(pair) / 2) == 0])
     if name == RATE_GAIN and loop.gains is not None and not loop.arm.hub_side_inertia:
         least = 0.0 - loop.arm.rate_loss  # where friction is cancelled a pole of such a hub passes through infinity
         stable = [(max(start, least), end) for start, end in stable if end > least]
@@ -456,9 +458,7 @@ def static_edge(loop: Loop, name: str, limits: Window) -> Crossing | None:
 
 def theorem_windows(loop: Loop, name: str, limits: Window, edges: Crossings) -> list[Window]:
     """The stability intervals of such a gain: there every mode is damped, and the static stiffness is positive."""
-    ends = np.unique([limits[0], *edges.within(*limits).gain.tolist(), limits[1]])
-    pairs = [(float(low), float(high)) for low, high in itertools.pairwise(ends)]
-    return joined([pair for pair in pairs if is_held(loop.having(name, (pair[0] + pair[1]) / 2))])
+    return joined([pair for pair in spans(edges, limits) if is_held(loop.having(name, sum(pair) / 2))])
 
 
 def is_held(loop: Loop) -> bool:
