@@ -105,6 +105,15 @@ def test_a_window_has_no_unstable_stretch_inside(law, name, values):
         assert is_inside == stability(LAB, law.having(name, value)).is_stable
 
 
+@pytest.mark.parametrize("name", ["gain", "hub_angle.gain"])
+def test_below_a_band_through_whose_top_poles_pass_each_interval_is_counted(name):
+    """Crossings below 150 rad/s do not carry the count from one end of the range to the other."""
+    found = windows_of(stability(LAB, LAW, 150.0), [name])[name]
+    for value in np.linspace(*found.looked_at, 8)[1:-1].tolist():
+        is_inside = any(low < value < high for low, high in found.all)
+        assert is_inside == (unstable_below(Loop(LAB, LAW.having(name, value)), found.band) == 0)
+
+
 def test_no_number_of_a_signal_in_two_parts_has_a_window():
     """`having` would not know which; of the rest each has its own."""
     parts = [Part(("hub_angle",), Rational((3.0,), (0.1, 1.0))), Part(("hub_angle",), Rational((-0.5,), (0.1, 1.0)))]

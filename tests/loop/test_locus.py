@@ -19,7 +19,7 @@ from tests.shell import run
 from tfarm import Arm, Hub, HubFeedback, Law, Link, ParameterError, Payload, Section
 from tfarm.arm import Attachment, Motor
 from tfarm.loop.loci import damping_ratios, held_branches, loci, most_damped, reduced_locus
-from tfarm.loop.locus import frame, locus, origin_name, rounded
+from tfarm.loop.locus import CONTROLLER, RIGID, frame, locus, origin_name, rounded
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.windows import line_crossings
@@ -141,6 +141,10 @@ def test_a_table_is_titled_by_what_varies_and_each_branch_has_its_origin(capsys)
     """A filtered law through a motor with a circuit: two poles at rest, the circuit's, two modes, the filter's own."""
     law = Law({"hub_angle": ([2.0], [0.004, 1.0]), "hub_rate": 0.4})
     found = locus(RIGS["back-EMF"], law, "hub_angle", 0.0, 1.0, 5, 2)
+    integral = Law({"hub_angle": ([1.0, 5.0], [1.0, 0.0]), "hub_rate": 0.4})
+    rests = locus(LAB, integral, "gain", 0.0, 1.0, 5, 2)
+    assert rests.origin[rests.branches[:, 0] == 0].tolist() == [RIGID, RIGID, CONTROLLER]
+    assert (found.varied.title, found.titles["gain"]) == (("factor on hub_angle", ""), ("factor on hub_angle", ""))
     names = dict(zip(found.branches[:, 0].tolist(), map(origin_name, found.origin.tolist()), strict=True))
     assert names[min(names, key=lambda s: abs(s + 250.0))] == "controller"  # 1/T, uncoupled at a factor of 0
     assert names[min(names, key=abs)] == "rigid body"
@@ -229,6 +233,7 @@ def test_a_branch_that_comes_to_the_accumulation_point_ends_there_and_the_others
     assert answer["gap_to_reduced"] < 1e-3
     (back,) = [each for each in locus(LAB, HubFeedback(), "K1", 2000.0, -3.0, 60, 5).crossings if each.branch is None]
     assert (back.gain, back.omega, back.direction) == (0.0, 0.0, "unstable")  # of the pole that comes out of -1/C
+    assert back.origin is None
 
 
 def test_modes_that_meet_on_the_axis_and_leave_it_as_a_quadruple_are_followed_around_that():

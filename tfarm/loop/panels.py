@@ -156,7 +156,6 @@ def positions(arm: Arm, sensor: Sensor, x: Real, count: int) -> Positions:
     zeros = []
     for place in x.tolist():
         every = transfer(arm, sensor, x=place).zeros(up_to=band).values
-        limits = (every.imag > 0) | ((every.imag == 0) & (every.real > 0) & (every.real <= band))
-        zeros.append(every[limits])
+        zeros.append(every[(every.imag > 0) | ((every.imag == 0) & (every.real > 0))])
     participation = field / abs(field).max(axis=1, keepdims=True)
     return Positions(x, band, found.natural_frequency[found.index > 0], participation, tuple(zeros))
