@@ -76,9 +76,9 @@ class Locus:
 
     `gain` (n,) are the values of what `vary` names: a number of the law, "all" (a factor on it) or of the arm;
     `branches` (b, n) [1/s] are poles followed: those at s = 0, then in the order of the modes they continue from
-    (`origin` (b,), or one of `ORIGINS`).  The mirror image of a branch is left
-    out, unless the two meet on the real axis and part there: then it is a branch of its own, with Im s < 0 where they
-    are a pair.  A branch is NaN where it is not followed (`ends`).  `box` holds no other pole at its nodes.
+    (`origin` (b,): its number, or one of `ORIGINS`).  The mirror image of a branch is left out, unless the two meet on
+    the real axis and part there: then it is a branch of its own, with Im s < 0 where they are a pair.  A branch is NaN
+    where it is not followed (`ends`).  `box` holds no other pole at its nodes.
     `followed` are all poles but those at 0 all the way, mirror images too, `listed` the numbers of those in
     `branches`, which with `in_box` are NaN outside the box.
     `crossings` are those of the imaginary axis, ascending along the way.
@@ -361,21 +361,22 @@ def branch_crossings(
         else:
             gains, places, changed = crossed(np.asarray(grid(loop.arm, band)), family.on_axis)
             known = [*map(Crossing, _corrected(family, gains, places), places, changed)]
-    found: list[tuple[float, float, int | None, bool]] = []  # value, frequency, branch, and whether Re s grows
+
+    def crossing(at: float, omega: float, branch: int | None, *, grows: bool) -> BranchCrossing:
+        of = None if branch is None else origin_name(int(origin[branch]))
+        return BranchCrossing(at, omega, branch, "unstable" if grows else "stable", of, family.title)
+
+    found = []
     for number, low, high in changes:
         ends, points = gain[[low, high]], branches[number, [low, high]]
-        found.append((*_crossed(family, ends, points, known, top), number, bool(points[1].real > points[0].real)))
-    seen = {each[:2] for each in found}
+        at, omega = _crossed(family, ends, points, known, top)
+        found.append(crossing(at, omega, number, grows=points[1].real > points[0].real))
+    seen = {(own.gain, own.omega) for own in found}
     for each in known if is_damped else ():
         is_between = AT_END * span < sign * (each.t - float(gain[0])) < (1 - AT_END) * span
         if is_between and not top < each.at < math.inf and (each.t, each.at) not in seen:
-            found.append((each.t, each.at, None, sign * each.change > 0))
-    names = list(map(origin_name, origin.tolist()))
-    crossings = []
-    for at, omega, branch, grows in found:
-        way, of = "unstable" if grows else "stable", None if branch is None else names[branch]
-        crossings.append(BranchCrossing(at, omega, branch, way, of, family.title))
-    return tuple(sorted(crossings, key=lambda own: (sign * own.gain, own.omega)))
+            found.append(crossing(each.t, each.at, None, grows=sign * each.change > 0))
+    return tuple(sorted(found, key=lambda own: (sign * own.gain, own.omega)))
 
 
 def _corrected(family: Varied, t: Real, at: Real) -> Real:
