@@ -50,9 +50,7 @@ LATE = 2.0  # of 1/delay: further left a delayed loop has ever more poles, and a
 BEYOND_OWN = 1.1  # times the rightmost pole of a law, where L is infinite: the nearest right edge that is tried
 # Starts of Newton's method affect the time alone: the winding number counts the zeros that they missed.
 STARTS_REACH = 1.3  # heights of the box: modes of the arm up to there, as a law may draw their poles down into it
-DAMPED_BY_LAW = (0.0, 0.02, 0.3)  # of its frequency: starts left of a mode's own pole, where a law may have moved it
 REAL_STARTS, REAL_SPAN, REAL_REACH = 25, 300, 1.4  # on the real axis: their number, from height/300 to 1.4 heights
-FARTHER_OWN, NEARER_OWN, ASIDE_OWN = 1.01, 0.9, 0.1j  # of a law's pole: starts near it, as on it D is infinite
 LEAST_START = 1e-100  # 1/s: zeros at 0 are divided out
 PADE = 8  # order of the approximation of a delay in the model that starts are taken from
 MODES_ABOVE_BOX, MOST_MODEL_MODES = 4, 40  # modes of the model above the box, and at most
@@ -246,15 +244,12 @@ def slow_poles(loop: Loop, below: float) -> Complex:
 
 
 def starting_points(loop: Loop, up_to: float) -> Complex:
-    """Starts of Newton's method: at and left of the arm's own poles, near the law's, and poles of a modal model."""
-    omega, C, own = np.asarray(steep_places(loop.arm, up_to)), loop.arm.damping, loop.law.poles
-    shift, damped = np.array(DAMPED_BY_LAW)[:, None], np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))
-    near = (-(C * omega**2 / 2) - shift * omega + 1j * omega * damped).ravel()
+    """Starts of Newton's method: the arm's own poles, some real ones, and under a law with states a modal model's."""
+    omega, C = np.asarray(steep_places(loop.arm, up_to)), loop.arm.damping
+    damped = np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))
+    near = -(C * omega**2 / 2) + 1j * omega * damped
     real = np.geomspace(up_to / REAL_SPAN, REAL_REACH * up_to, REAL_STARTS)  # for poles of unknown place
-    slow, of_model = np.empty(0, complex), np.empty(0, complex)
-    if loop.at_rest is not None:
-        c, b, _ = loop.at_rest
-        slow = np.roots([loop.arm.turned_inertia, b, c]).astype(complex)
+    of_model = np.empty(0, complex)
     if not (loop.law.is_static or loop.law.is_improper):  # which has no states
         count = min(modes_below(loop.arm, up_to) + MODES_ABOVE_BOX, MOST_MODEL_MODES)
         with suppress(ParameterError, ConvergenceError):  # the winding number shows whether a pole is missing
@@ -265,8 +260,7 @@ def starting_points(loop: Loop, up_to: float) -> Complex:
             model[pair + 1, pair + 1] -= C * w[pair] ** 2
             model = model - loop.arm.rate_loss * drive @ read[-1:]
             of_model = poles_of_model(loop, (model, drive, read[:-1], direct[:-1]))
-    near_own = [own * FARTHER_OWN, own * NEARER_OWN + ASIDE_OWN * abs(own)]
-    starts = np.concatenate([near, near.conj(), slow, real, -real, *near_own, of_model])
+    starts = np.concatenate([near, near.conj(), real, -real, of_model])
     return starts[abs(starts) > LEAST_START]
 
 
