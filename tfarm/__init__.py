@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from tfarm.loop.nyquist import nyquist
     from tfarm.loop.plane import gain_map as map
     from tfarm.loop.poles import closed_loop_poles
-    from tfarm.loop.spill import spill
+    from tfarm.loop.stability import spill
     from tfarm.reduced import reduce
     from tfarm.response import bode, transfer
     from tfarm.spectrum import damped_modes, modes
@@ -118,7 +118,7 @@ _ROOMS = {  # the module of a name; after a colon another name there
     "reduce": "reduced",
     "sampled": "dsp.verdict",
     "simulate": "dsp.results",
-    "spill": "loop.spill",
+    "spill": "loop.stability",
     "transfer": "response",
     "tune": "tuner",
 }

@@ -82,11 +82,17 @@ def _quantities(kind: Any) -> dict[str, Quantity]:
 
 
 def declared(record: Any, parent: Any = None) -> dict[str, Quantity]:
-    """The quantities of a record, each with its unit; `parent` is the record that has it as a row."""
-    return {
-        name: replace(of, unit=getattr(record, of.unit_of, getattr(parent, of.unit_of, ""))) if of.unit_of else of
-        for name, of in quantities(type(record)).items()
+    """The quantities of a record: its class's, under the labels and units of `titles` where these depend on it.
+
+    `parent` is the record that has it as a row: a unit may depend on either (`unit_of`).
+    """
+    found = quantities(type(record))
+    titles: Mapping[str, tuple[str, str]] = getattr(record, "titles", {})
+    units = {
+        name: getattr(record, of.unit_of, getattr(parent, of.unit_of, "")) for name, of in found.items() if of.unit_of
     }
+    found = found | {name: replace(found[name], unit=unit) for name, unit in units.items()}
+    return found | {name: replace(found[name], label=label, unit=unit) for name, (label, unit) in titles.items()}
 
 
 def _completed(name: str, kind: Any, of: Quantity) -> Quantity:

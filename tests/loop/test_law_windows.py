@@ -15,11 +15,10 @@ from tfarm import ConvergenceError, Hub, Law, Link, Payload, RotarySpring, Secti
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
 from tfarm.loop import windows as windows_module
-from tfarm.loop.lines import unstable_below
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import windows_of
+from tfarm.loop.windows import unstable_below, windows_of
 from tfarm.response.signals import Signals
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -77,14 +76,14 @@ def test_a_law_that_differentiates_may_be_late(delay):
 
 
 def test_a_number_whose_poles_cannot_be_counted_is_named(monkeypatch):
-    crossed = windows_module.crossed
+    line_crossings = windows_module.line_crossings
 
-    def lost(loop, lines, ranges, *others):
-        if "hub_angle.num.1" in dict(ranges):
+    def lost(loop, name, *others):
+        if name == "hub_angle.num.1":
             raise ConvergenceError("a zero lies on the contour", 0.0, 0.0)
-        return crossed(loop, lines, ranges, *others)
+        return line_crossings(loop, name, *others)
 
-    monkeypatch.setattr(windows_module, "crossed", lost)
+    monkeypatch.setattr(windows_module, "line_crossings", lost)
     found = tfarm.margins(LAB, LAW)
     assert LAW.numbers.keys() - found.windows.keys() == {"hub_angle.num.1"}
     assert found.intervals_note.endswith("poles not counted along hub_angle.num.1")
@@ -104,6 +103,16 @@ def test_a_window_has_no_unstable_stretch_inside(law, name, values):
     for value in values:
         is_inside = any(low < value < high for low, high in window.all)
         assert is_inside == stability(LAB, law.having(name, value)).is_stable
+
+
+@pytest.mark.parametrize(("name", "band"), [("hub_angle.gain", 90.0), ("tip_acceleration.den.0", 150.0)])
+def test_below_a_band_through_whose_top_poles_pass_each_interval_is_counted(name, band):
+    """Crossings below it do not carry the count from one end of the range to the other."""
+    law = LAW.having("gain", 7.0)
+    found = windows_of(stability(LAB, law, band), [name])[name]
+    for value in np.linspace(*found.looked_at, 8)[1:-1].tolist():
+        is_inside = any(low < value < high for low, high in found.all)
+        assert is_inside == (unstable_below(Loop(LAB, law.having(name, value)), found.band) == 0)
 
 
 def test_no_number_of_a_signal_in_two_parts_has_a_window():

@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 from importlib import import_module
 from itertools import pairwise
+from types import SimpleNamespace
 
 import control
 import numpy as np
@@ -15,14 +16,14 @@ from tests.loop.arms import some_loop
 from tests.loop.law_counts import judge, some_delay, some_law
 from tests.shared import remember, sized, thinned
 from tests.shell import run
-from tfarm import ConvergenceError, Law, ParameterError
-from tfarm.loop.lines import through_infinity, unstable_below
+from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import loop_margins
 from tfarm.loop.plane import between, plane
 from tfarm.loop.poles import poles_below
-from tfarm.loop.stability import stability
+from tfarm.loop.stability import Spill, stability
 from tfarm.loop.theorem import definite, is_hurwitz, on_axis, polynomial, signs_of
+from tfarm.loop.windows import through_infinity, unstable_below
 from tfarm.reduced.conversions import sensed_model
 from tfarm.response.signals import Signals
 
@@ -146,7 +147,7 @@ def test_positive_position_feedback_needs_a_spring_that_is_stiffer():
         held = Law.of_matrices([[-2.0, -5.0], [1.0, 0.0]], [[1.0], [0.0]], [[0.0, -3.0]], [[Kp]], ["hub_angle"])
         num = np.polyadd(Kp * np.array([1.0, 2.0, 5.0]), [-3.0])
         fraction = Law({"hub_angle": (num.tolist(), [1.0, 2.0, 5.0])})
-        assert signs_of(fraction).at_rest == pytest.approx(Kp - 0.6, abs=1e-15)
+
         assert stability(LAB, held).is_stable == stability(LAB, fraction).is_stable == stable
         assert stability(BARE, fraction).is_known_beyond  # a pole crosses the axis at s = 0 alone: no mode is driven
 
@@ -228,6 +229,32 @@ def test_a_law_that_two_modes_bear_drives_the_third():
     third = tfarm.modes(BARE, 3).natural_frequency[-1]
     assert abs(found.driven[0].imag - third) < 0.01 * third
     assert "models of 1 to 2 modes are stable" in found.in_words
+
+
+FOUND = {  # unstable poles of each model; driven poles of the exact loop; what is said
+    "some": ([0, 0, 2], [-0.1 + 9j, 1 + 204j], "mode 2 is unstable in the exact loop, at 204.002 rad/s; "
+             "models of 1 to 2 modes are stable, unstable from 3 modes on"),
+    "one": ([0, 2, 2], [1 + 204j], "the model of 1 mode is stable, unstable from 2 modes on"),
+    "all": ([0, 0, 0], [1 + 204j], "models of 1 to 3 modes are stable, the largest among them"),
+    "none": ([1, 1, 2], [2.0], "a pole below the first mode is unstable in the exact loop, at 2 rad/s, "
+             "and every model is unstable"),
+    "scattered": ([0, 2, 0], [1 + 204j], "2 of the models up to 3 modes are stable, the largest among them"),
+    "stable": ([0, 0, 0], [-1 + 2j], "none: the exact loop is stable in the frequency range"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_spillover_in_words(name):
+    unstable, poles, words = FOUND[name]
+    loop = SimpleNamespace(arm=LAB)
+    verdict = SimpleNamespace(
+        poles=SimpleNamespace(moving=np.array(poles, complex)), loop=loop, band=300.0, verdict="stable",
+        is_known_beyond=False,
+    )  # fmt: skip
+    found = Spill(verdict, np.arange(1, 4), np.array(unstable), np.array([-1.0, 1 - 2j, 2.0]))
+    assert found.in_words.endswith(words)
+    assert found.shown_from == {"some": 3, "one": 2, "none": 1}.get(name)
+    assert [each.rightmost.imag for each in found.models] == [0.0, 2.0, 0.0]
 
 
 UNSTABLE = {"hub_angle": {"zeros": [-3.0], "poles": [4.0, -60.0], "gain": 900.0}, "hub_rate": 0.5}
@@ -358,3 +385,63 @@ def test_where_two_poles_meet_at_rest_their_count_goes_on_as_the_lag_says():
     law, gains = Law({"hub_angle": ([-0.1, 1.0], [1e-3, 1.0])}), np.array([-0.02, 0.02])
     found = tfarm.map(LAB, np.array([1e-3, 2e-3]), gains, law=law, vary=("hub_angle.den.0", "gain"))
     assert found.unstable.tolist() == [[1, 1], [2, 2]]
+
+
+GAINS = HubFeedback(K1=0.3, K2=0.3, Kp=2.0)
+ACROSS, UP = np.array([0.5, 2.0, 6.0]), np.array([0.001, 0.01, 0.03])
+
+
+PATHS = {
+    "closed_loop_poles": lambda law: tfarm.closed_loop_poles(LAB, law, 3),
+    "compare": lambda law: tfarm.compare(LAB, [law, law]),
+    "locus": lambda law: tfarm.locus(LAB, law, "K2", 0.0, 1.0, 5, 2),
+    "locus of all": lambda law: tfarm.locus(LAB, law, "all", 0.0, 1.0, 5, 2),
+    "map": lambda law: tfarm.map(LAB, ACROSS, UP, law=law or 0, vary=("gain", "delay")),
+    "margins": lambda law: tfarm.margins(LAB, law),
+    "nyquist": lambda law: tfarm.nyquist(LAB, law),
+    "sampled": lambda law: tfarm.sampled(LAB, law),
+    "simulate": lambda law: tfarm.simulate(LAB, law, duration=0.1),
+    "spill": lambda law: tfarm.spill(LAB, law, 2),
+}
+
+
+@pytest.mark.parametrize("name", PATHS)
+@pytest.mark.parametrize("law", [None, 3, "law.toml", LAB], ids=["none", "number", "path", "arm"])
+def test_what_is_no_law_is_refused_everywhere(name, law):
+    with pytest.raises(ParameterError, match="give a HubFeedback or a Law"):
+        PATHS[name](law)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: tfarm.tune(LAB, 3), "give a tfarm.tuner.Plan"),
+        (lambda: tfarm.tune(LAB, GAINS), "give a tfarm.tuner.Plan"),
+        (lambda: tfarm.tune("sasaki2012"), "give tfarm.load"),
+        (lambda: tfarm.tune(LAB, None, 0.01), "give a tfarm.dsp.Chain"),
+        (lambda: tfarm.sampled(LAB, GAINS, 0.01), "give a tfarm.dsp.Chain"),
+        (lambda: tfarm.sampled(LAB, LAW, "lab.toml"), "give a tfarm.dsp.Chain"),
+        (lambda: tfarm.simulate(LAB, GAINS, 0.01, duration=0.1), "give a tfarm.dsp.Chain"),
+        (lambda: tfarm.compare(LAB, [GAINS, GAINS], chain=0.01), "give a tfarm.dsp.Chain"),
+        (lambda: tfarm.map(LAB, LAW, UP), "give the law as law="),
+        (lambda: tfarm.map(LAB, "K1", UP), "an ascending range"),
+        (lambda: tfarm.map(LAB, ACROSS, UP, law=LAW), "two numbers of the law"),
+        (lambda: tfarm.map(LAB, ACROSS, UP, law=LAW, vary="gain"), "two numbers of the law"),
+        (lambda: tfarm.map(LAB, ACROSS, UP, vary=("gain", "delay")), "whose numbers vary names"),
+        (lambda: tfarm.map(LAB, ACROSS, UP, 1.0, law=LAW, vary=("gain", "delay")), "give Kp in the law"),
+        (lambda: tfarm.locus(LAB, GAINS, "K3", 0.0, 1.0), "known are: K1, K2"),
+        (lambda: tfarm.locus(LAB, GAINS, 2, 0.0, 1.0), "the name of what varies, such as K2"),
+        (lambda: tfarm.locus(LAB, LAW, "K2", 0.0, 1.0), "known are: gain, delay, hub_angle"),
+        (lambda: tfarm.default_gains("sasaki2012"), "give tfarm.load"),
+        (lambda: tfarm.damped_modes(LAB), "give what tfarm.modes returns"),
+        (lambda: tfarm.overlay(LAB, "sweep.csv"), "give what tfarm.read_measured returns"),
+        (lambda: tfarm.fit(LAB, "sweep.csv", ["hub.inertia"]), "give what tfarm.read_measured returns"),
+        (lambda: tfarm.transfer(LAB, 3), "the name of an output"),
+        (lambda: tfarm.reduce(LAB, GAINS, order=4), "the name of an output"),
+        (lambda: tfarm.plots.locus(LAB), "what tfarm.locus returns"),
+        (lambda: tfarm.plots.gain_map(LAB), "what tfarm.map returns"),
+    ],
+)
+def test_what_a_function_cannot_take_it_says_how_to_give(call, words):
+    with pytest.raises(ParameterError, match=words):
+        call()

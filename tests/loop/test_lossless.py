@@ -16,13 +16,13 @@ from tests.rigs import some_rig
 from tests.shared import thinned
 from tfarm import Hub, HubFeedback, Payload
 from tfarm.arm import Gauge, Motor
-from tfarm.loop.lines import line_crossings
 from tfarm.loop.loop import Loop, band_of
 from tfarm.loop.margins import margins
 from tfarm.loop.nyquist import nyquist_of
 from tfarm.loop.plane import gain_map
 from tfarm.loop.stability import stability
 from tfarm.loop.theorem import lyapunov
+from tfarm.loop.windows import line_crossings
 from tfarm.spectrum.table import default_gains
 
 ARM = tfarm.load("sasaki2012")

@@ -152,6 +152,11 @@ def test_without_damping_the_intervals_of_a_held_arm_end_where_it_falls_statical
     assert 0 < (plane.unstable[:, 1] == 0).sum() < 41
 
 
+@pytest.mark.parametrize(("arm", "reach"), [(BARE, "every mode, by a theorem"), (LAB, "up to 12196.9 rad/s")])
+def test_a_map_says_of_which_poles_it_is(arm, reach) -> None:
+    assert gain_map(arm, np.array([0.1, 0.3]), np.array([0.0, 0.5])).reach == reach
+
+
 def test_unless_asked_otherwise_a_map_is_around_the_papers_gains_in_the_rigs_own_units() -> None:
     """The paper's 0.3 and 0 lie in -1 ... 3 and -2 ... 2; of a rig the first as its own K1, the second as its input."""
     assert ranges_of(LAB) == ((-1.0, 3.0), (-2.0, 2.0))

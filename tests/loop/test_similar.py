@@ -13,8 +13,6 @@ from tests.rigs import some_rig
 from tests.shared import thinned
 from tests.similar import EITHER
 from tfarm import HubFeedback, Law
-from tfarm.errors import ConvergenceError
-from tfarm.loop import panels
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import dense, margins
 from tfarm.loop.plane import gain_map
@@ -129,27 +127,6 @@ def test_a_locus_has_the_same_branches(vary, units):
 
 
 BARE = tfarm.load("sasaki2012")
-
-
-class Scaled:
-    """The moment at the middle of the arm, so many times as large."""
-
-    def __init__(self, size):
-        self.G, self.size = tfarm.transfer(LAB, "moment", x=0.5 * LAB.length), size
-        self.outputs = self.G.outputs
-
-    def __call__(self, s):
-        return self.size * self.G(s)
-
-
-@pytest.mark.parametrize("size", [1e-12, 1e12])
-def test_zeros_of_a_sensor_are_the_same_in_any_unit_or_refused_in_any(size, monkeypatch):
-    line = panels._Panels.of(LAB, "moment", 1j, 300.0)
-    np.testing.assert_allclose(line.zeros(Scaled(size)), line.zeros(Scaled(1.0)), rtol=1e-9)
-    monkeypatch.setattr(panels, "STEEP_A_SENSOR_PANEL", 400)  # panels too wide for their polynomials
-    wide = panels._Panels.of(LAB, "moment", 1j, 2e4)
-    with pytest.raises(ConvergenceError, match="do not follow the numerator of moment"):
-        wide.zeros(Scaled(size))
 
 
 def test_a_slow_pair_is_no_real_pole_to_a_locus():

@@ -25,8 +25,8 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.following import between
 
-from .locus import Locus, locus
-from .varied import OF_THE_LAW
+from .locus import ORIGIN, Locus, locus, origin_name
+from .varied import OF_THE_LAW, Title
 
 if TYPE_CHECKING:
     import control
@@ -36,6 +36,9 @@ POLE_DIGITS = 10  # digits of |s| that are drawn and written: poles differ from 
 GAPS_HELD = 3  # digits of a gap, 1e-5 of |s| or less: a reduced pole has an error of 1e-12 of that
 GAP_NOTE = (
     "largest distance of a branch from the reduced one, over |s| or the arm's first flexible frequency, the larger"
+)
+BEST = Quantity(
+    "first mode most damped", key="first_mode_most_damped", help="largest damping ratio of mode 1 along a gain"
 )
 BRANCHES_NOTE = (
     "poles followed: those at s = 0, then one a mode with Im s > 0; its mirror image only where the two part on the "
@@ -60,7 +63,7 @@ class ReducedLocus:
     flexible frequency.
     """
 
-    order: Annotated[int, Quantity("order of the reduced model", key="reduced_order")]
+    order: Annotated[int, Quantity("order of the reduced model", key="reduced_order", help="states")]
     gain: Real
     branches: Complex
     gap: Real
@@ -138,15 +141,16 @@ def _closed(arm: Arm, fixed: Real, count: int, moving: Real) -> tuple[Matrices, 
 @dataclass(frozen=True)
 @record
 class MostDamped:
-    """The `gain` at which mode 1 has its largest `damping_ratio`.
+    """The `gain` at which mode 1 has its largest `damping_ratio`."""
 
-    `swings_on`: it oscillates from there to the end of the range.  `falls`: it is damped less beyond.
-    """
+    gain: Annotated[float, Quantity("value", help="value of the gain at which mode 1 is damped most")]
+    damping_ratio: Annotated[float, Quantity("damping ratio", help="-Re s/|s| of mode 1 there")]
+    title: Title
 
-    gain: Annotated[float, Quantity("value")]
-    damping_ratio: Annotated[float, Quantity("damping ratio")]
-    swings_on: bool
-    falls: bool
+    @property
+    def titles(self) -> dict[str, Title]:
+        """That of the gain."""
+        return {"gain": self.title}
 
 
 def most_damped(found: Locus) -> MostDamped | None:
@@ -172,7 +176,7 @@ def most_damped(found: Locus) -> MostDamped | None:
             break
         gain, branch = grid[top - 1 : top + 2], found_there[top - 1 : top + 2]
         best = float(gain[1]), float(damping_ratios(branch[1:2])[0])
-    return MostDamped(*best, bool((rows[0][at:].imag > 0).all()), at < ratios.size - 1)
+    return MostDamped(*best, found.varied.title)
 
 
 def damping_ratios(s: Complex) -> Real:
@@ -183,12 +187,14 @@ def damping_ratios(s: Complex) -> Real:
 class Branch(NamedTuple):
     """A branch of a locus: its poles at both ends of the range, and its distance from the reduced model's."""
 
-    branch: Annotated[int, Quantity("branch")]
-    mode: Annotated[int, Quantity("mode")]
-    first: Annotated[complex, Quantity("first pole", "1/s", 10)]
-    last: Annotated[complex, Quantity("last pole", "1/s", 10)]
+    branch: Annotated[int, Quantity("branch", help="its number among the poles of the CSV file and the picture")]
+    origin: Annotated[str, ORIGIN]
+    mode: Annotated[int, Quantity(help="flexible mode that the branch continues from; 0 of another origin")]
+    first: Annotated[complex, Quantity("first pole", "1/s", 10, "pole at the first value of the number that varies")]
+    last: Annotated[complex, Quantity("last pole", "1/s", 10, "pole at the last value of the number that varies")]
     gap: Annotated[float | None, Quantity("gap to reduced", digits=2, help=GAP_NOTE)]
-    ends_at: Annotated[float | None, Quantity("followed up to", digits=10)]
+    ends_at: Annotated[float | None, Quantity("followed up to", digits=10, help="last value at which it is followed")]
+    titles: dict[str, Title]
 
 
 @dataclass(frozen=True)
@@ -202,13 +208,20 @@ class Loci:
     @property
     def rows(self) -> Annotated[list[Branch], Quantity("branches", key="branch_list", help=BRANCHES_NOTE)]:
         """One row for each branch."""
-        branches, ends = self.exact.branches.tolist(), dict(self.exact.ends)
+        exact, ends, (_, unit) = self.exact, dict(self.exact.ends), self.exact.varied.title
+        branches, modes = exact.branches.tolist(), exact.mode.tolist()
         gaps = [None] * len(branches) if self.reduced is None else self.reduced.gap.tolist()
-        rows = enumerate(zip(self.exact.mode.tolist(), branches, gaps, strict=True))
-        return [Branch(n, mode, row[0], row[-1], gap, ends.get(n)) for n, (mode, row, gap) in rows]
+        values = zip(("first", "last"), exact.gain[[0, -1]].tolist(), strict=True)
+        titles = {
+            end: (f"pole at {exact.vary} = {value:.6g}{f' {unit}' if unit else ''}", "1/s") for end, value in values
+        }
+        return [
+            Branch(n, origin_name(int(exact.origin[n])), modes[n], row[0], row[-1], gaps[n], ends.get(n), titles)
+            for n, row in enumerate(branches)
+        ]
 
     @property
-    def best(self) -> Annotated[MostDamped | None, Quantity("first mode most damped", key="first_mode_most_damped")]:
+    def best(self) -> Annotated[MostDamped | None, BEST]:
         """The gain at which the first mode has its largest damping ratio."""
         return most_damped(self.exact)
 

@@ -20,7 +20,7 @@ from typing import Annotated, cast
 import numpy as np
 from scipy.optimize import brentq
 
-from tfarm.arm import FED_BACK, NAMES, PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law, unit_of
+from tfarm.arm import FED_BACK, NAMES, PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing import Crossing, crossed
@@ -35,9 +35,9 @@ from tfarm.spectrum.box import Box
 from tfarm.spectrum.following import assigned, between, follow
 from tfarm.spectrum.naming import single_zeros
 
-from .lines import line_crossings
-from .loop import grid
-from .varied import ARM_PARAMETERS, OF_THE_LAW, Varied
+from .loop import Loop, grid
+from .varied import ARM_PARAMETERS, OF_THE_LAW, Title, Varied
+from .windows import line_crossings
 
 LOCUS_VALUES, LAW_LOCUS_VALUES = 500, 100  # values of a locus by default: of gains, of any other law
 MOST_LOCUS_POINTS = 100_000  # values, those between that make it round among them
@@ -54,6 +54,19 @@ GAIN_KNOWN = 1e-15  # of the larger end of a step: the value at which a branch c
 JUST_ABOVE = 1.01  # times the highest frequency of a branch: between two values it may be higher
 STEP = 1e-6  # of a frequency, for a difference
 CROSSINGS_SHOWN = 3  # of a locus, in its finding
+RIGID, CONTROLLER, OTHER = 0, -1, -2  # origin of a branch of no flexible mode
+ORIGINS = {RIGID: "rigid body", CONTROLLER: "controller", OTHER: "other"}
+
+CROSSINGS = Quantity("crossings of the imaginary axis", help="solved for, not interpolated; in the order of the range")
+ORIGIN = Quantity(
+    "origin",
+    help="open-loop pole that the branch continues from; other: the motor's circuit, a delay, a fast real pole",
+)
+
+
+def origin_name(origin: int) -> str:
+    """The flexible mode of that number, or another origin of a branch."""
+    return ORIGINS.get(origin, f"mode {origin}")
 
 
 @dataclass(frozen=True)
@@ -63,9 +76,9 @@ class Locus:
 
     `gain` (n,) are the values of what `vary` names: a number of the law, "all" (a factor on it) or of the arm;
     `branches` (b, n) [1/s] are poles followed: those at s = 0, then in the order of the modes they continue from
-    (`mode` (b,), 0 for the rigid body, a motor's circuit, a filter, a delay).  The mirror image of a branch is left
-    out, unless the two meet on the real axis and part there: then it is a branch of its own, with Im s < 0 where they
-    are a pair.  A branch is NaN where it is not followed (`ends`).  `box` holds no other pole at its nodes.
+    (`origin` (b,): its number, or one of `ORIGINS`).  The mirror image of a branch is left out, unless the two meet on
+    the real axis and part there: then it is a branch of its own, with Im s < 0 where they are a pair.  A branch is NaN
+    where it is not followed (`ends`).  `box` holds no other pole at its nodes.
     `followed` are all poles but those at 0 all the way, mirror images too, `listed` the numbers of those in
     `branches`, which with `in_box` are NaN outside the box.
     `crossings` are those of the imaginary axis, ascending along the way.
@@ -73,12 +86,12 @@ class Locus:
 
     arm: Arm
     law: AnyLaw
-    vary: Annotated[str, Quantity("varied")]
-    gain: Annotated[Real, Quantity("value", curve=True)]
-    branches: Annotated[Complex, Quantity("branch", "1/s", curve=True)]
-    mode: Whole
+    vary: Annotated[str, Quantity("varied", help="number of the controller or the arm along which poles are followed")]
+    gain: Annotated[Real, Quantity("value", curve=True, help="values of the number that varies")]
+    branches: Annotated[Complex, Quantity("branch", "1/s", curve=True, help="closed-loop poles, a branch each")]
+    origin: Whole
     box: Annotated[Box, Quantity("box: Re s from, to, Im s from, to", help="poles are complete in it at a few values")]
-    crossings: Annotated[tuple[BranchCrossing, ...], Quantity("crossings of the imaginary axis")]
+    crossings: Annotated[tuple[BranchCrossing, ...], CROSSINGS]
     followed: Complex = field(repr=False, compare=False)
     listed: Whole = field(repr=False, compare=False)
     in_box: bool = False
@@ -98,10 +111,19 @@ class Locus:
         return controller(as_law(self.law), self.arm)
 
     @property
-    def unit(self) -> Annotated[str, Quantity("unit")]:
+    def mode(self) -> Whole:
+        """Flexible mode of each branch (b,), 0 of those that continue from none."""
+        return np.maximum(self.origin, 0)
+
+    @property
+    def unit(self) -> Annotated[str, Quantity(help="SI unit of the number that varies; 1 of a pure one")]:
         """The SI unit of the varied number, "1" of a pure one."""
-        of_other = ARM_PARAMETERS | {"delay": "s"}
-        return unit_of(self.vary, self.arm) if self.vary in NAMES else of_other.get(self.vary, "1")
+        return self.varied.unit
+
+    @property
+    def titles(self) -> dict[str, Title]:
+        """The title of the curve of its values."""
+        return {"gain": self.varied.title}
 
     @property
     def varied(self) -> Varied:
@@ -155,25 +177,30 @@ def locus(
     number = branches if in_box else max(1, branches - 2 * arm.has_rigid_mode)
     family = Varied(arm, law, vary, start, stop).boxed(number)
     gain = np.linspace(start, stop, points)
-    rows, mode = followed(family, gain, number)
-    is_mirrored = ~(rows.imag == 0).any(axis=1) & ~(rows.imag > 0).any(axis=1)
-    listed = np.flatnonzero(~np.isnan(rows).all(axis=1) & ~is_mirrored)
-    shown = np.where(family.box.holds(rows), rows, np.nan) if in_box else rows
-    listed = listed[~np.isnan(shown[listed]).all(axis=1)][: len(rows) if in_box else branches - family.pinned]
+    rows, origin = followed(family, gain, number)
+    is_shown = family.box.holds(rows) if in_box else ~np.isnan(rows)
+    is_upper = (rows.imag >= 0).any(axis=1)  # others are mirror images throughout
+    listed = np.flatnonzero(is_shown.any(axis=1) & is_upper)[: None if in_box else branches - family.pinned]
     pinned = min(family.pinned, branches)
-    found = np.concatenate([np.zeros((pinned, points), complex), shown[listed]])
-    found += 0.0  # no -0
+    found = shown(rows, listed, pinned, family.box if in_box else None)
     if len(found) < branches and not in_box:
         raise ConvergenceError(f"only {len(found)} branches could be followed: ask for fewer", found, branches)
-    mode = np.r_[np.zeros(pinned, np.int64), mode[listed]]
+    origin = np.r_[at_origin(family.first)[:pinned], origin[listed]]
     top = family.box.im_max if in_box else float(np.fmax.reduce(found.imag).min()) or family.frequency
-    crossings = branch_crossings(family, gain, found, top)
-    return Locus(family.first.arm, law, vary, gain, found, mode, family.box, crossings, rows, listed, in_box)
+    crossings = branch_crossings(family, gain, found, origin, top)
+    return Locus(family.first.arm, law, vary, gain, found, origin, family.box, crossings, rows, listed, in_box)
+
+
+def shown(rows: Complex, listed: Whole, pinned: int, box: Box | None) -> Complex:
+    """The branches listed after the poles pinned at 0, NaN outside the box where there is one."""
+    found: Complex = np.concatenate([np.zeros((pinned, rows.shape[1]), complex), rows[listed]])
+    found += 0.0  # no -0
+    return found if box is None else np.where(box.holds(found), found, np.nan)
 
 
 def followed(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
-    """All poles (b, n) but those at 0 at every value, mirror images included, and the mode of each."""
-    row, mode = named(family, modes + COMPANY)
+    """All poles (b, n) but those at 0 at every value, mirror images included, and the origin of each."""
+    row, origin = named(family, modes + COMPANY)
     row = np.r_[row, missing(family, family.start, row)]
     rows, low = row[:, None], 0
     nodes = np.unique(np.linspace(0, gain.size - 1, NODES + 1).round().astype(int)).tolist()[1:]
@@ -192,7 +219,7 @@ def followed(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
             part = np.hstack([part, back[::-1, part.shape[1] :]])
             rows = np.vstack([rows, np.full((new.size, rows.shape[1]), np.nan)])
         rows, low = np.hstack([rows, part[1:].T]), nodes.pop(0)
-    return rows, np.r_[mode, np.zeros(len(rows) - mode.size, np.int64)]
+    return rows, np.r_[origin, np.full(len(rows) - origin.size, OTHER)]
 
 
 def missing(family: Varied, value: float, row: Complex) -> Complex:
@@ -213,46 +240,46 @@ def missing(family: Varied, value: float, row: Complex) -> Complex:
 
 
 def named(family: Varied, number: int) -> tuple[Complex, Whole]:
-    """Poles at the first value (b,) that continue from the open rig's, and their modes; without those pinned at 0.
+    """Poles at the first value (b,) that continue from the open rig's, and their origins; without those pinned at 0.
 
     In the order of the modes, `number` flexible ones; poles of a law come last.
     """
     loop = family.first
     law = family.law_at(family.start)
     grown = Varied(loop.arm, law, "gain", 0.0, 1.0, family.box)
-    row, mode = open_poles(loop.arm, number)
-    rests = grown.at(0.0).zeros_at_origin - grown.pinned
-    row, mode = np.r_[np.zeros(rests, complex), row, law.poles[law.poles != 0]], np.r_[np.zeros(rests, np.int64), mode]
-    mode = np.r_[mode, np.zeros(row.size - mode.size, np.int64)]
+    row, origin = open_poles(loop.arm, number)
+    own, resting = law.poles[law.poles != 0], at_origin(grown.at(0.0))
+    row = np.r_[np.zeros(resting.size - grown.pinned, complex), row, own]
+    origin = np.r_[resting[grown.pinned :], origin, np.full(own.size, CONTROLLER)]
     if loop.feeds_back:
         try:
             row = follow(grown, np.array([0.0, 1.0]), row)[1]
         except ConvergenceError:  # of poles that come in from afar, as under a delay
             row = assigned(grown, 1.0, row)
-    more = max(0, grown.pinned - family.pinned)  # at 0 at the first value alone
-    row, mode = np.r_[np.zeros(more, complex), row], np.r_[np.zeros(more, np.int64), mode]
-    return row[~np.isnan(row)], mode[~np.isnan(row)]
+    of_first = resting[family.pinned : grown.pinned]  # at 0 at the first value alone
+    row, origin = np.r_[np.zeros(of_first.size, complex), row], np.r_[of_first, origin]
+    return row[~np.isnan(row)], origin[~np.isnan(row)]
+
+
+def at_origin(loop: Loop) -> Whole:
+    """Origins of the poles at s = 0 of a loop: those of the rig first."""
+    return np.where(np.arange(loop.zeros_at_origin) < loop.k.at_rest, RIGID, CONTROLLER)
 
 
 def open_poles(arm: Arm, number: int) -> tuple[Complex, Whole]:
-    """Poles of the rig without feedback, both of each pair, and their modes: of at least `number` flexible ones."""
+    """Poles of the rig without feedback, both of each pair, and their origins: of at least `number` flexible modes."""
     table = modes(arm, number)
     if arm.is_undamped:
-        omega = table.natural_frequency[table.index > 0]
-        pairs, index, singles = (
-            np.stack([1j * omega, -1j * omega], axis=1),
-            table.index[table.index > 0],
-            single_zeros(table),
-        )
+        omega, index = table.natural_frequency[table.index > 0], table.index[table.index > 0]
+        pairs, rigid, others = np.stack([1j * omega, -1j * omega], axis=1), [], single_zeros(table)
     else:
         found = damped_modes(table)
-        rigid = found.eigenvalues[found.index == 0].ravel()
-        singles = [*rigid, *found.others, *found.unassigned_pairs.ravel()]
+        rigid, others = found.eigenvalues[found.index == 0].ravel(), [*found.others, *found.unassigned_pairs.ravel()]
         pairs, index = found.eigenvalues[found.index > 0], found.index[found.index > 0]
-    row = np.r_[np.array(singles, complex), pairs.ravel()]
-    mode = np.r_[np.zeros(len(singles), np.int64), np.repeat(index, 2)]
+    row = np.r_[np.array([*rigid, *others], complex), pairs.ravel()]
+    origin = np.r_[np.full(len(rigid), RIGID), np.full(len(others), OTHER), np.repeat(index, 2)]
     alive = np.isfinite(row) & (row != 0)
-    return row[alive], mode[alive]
+    return row[alive], origin[alive]
 
 
 def rounded(found: Locus) -> Locus:
@@ -260,21 +287,20 @@ def rounded(found: Locus) -> Locus:
 
     Each is drawn in a picture of its own and in one of all, down to pieces of a pixel.
     """
-    family, gain, rows, shown = found.varied, found.gain, found.followed, found.branches
-    way, pinned = int(np.sign(gain[-1] - gain[0])), len(shown) - found.listed.size
+    family, gain, rows, branches = found.varied, found.gain, found.followed, found.branches
+    way, pinned, box = int(np.sign(gain[-1] - gain[0])), len(branches) - found.listed.size, found.box
     for _ in range(HALVING_ROUNDS):
-        frames = np.array([[*map(frame, shown)], [frame(shown)] * len(shown)])  # (2, b, 4)
+        frames = np.array([[*map(frame, branches)], [frame(branches)] * len(branches)])  # (2, b, 4)
         width, height = frames[..., 1] - frames[..., 0], frames[..., 3] - frames[..., 2]
-        own, every = (loose(shown, width[n, :, None], height[n, :, None]) for n in (0, 1))
+        own, every = (loose(branches, width[n, :, None], height[n, :, None]) for n in (0, 1))
         more = (gain[:-1] + gain[1:])[own | every] / 2
         if not more.size or more.size + gain.size > MOST_LOCUS_POINTS:
             break
         order = np.argsort(way * np.r_[gain, more], kind="stable")
         added = between(family, gain[::way], rows[:, ::way].T, more).T
         gain, rows = np.r_[gain, more][order], np.hstack([rows, added])[:, order]
-        shown = np.concatenate([np.zeros((pinned, gain.size)), rows[found.listed]])
-        shown = np.where(family.box.holds(shown), shown, np.nan) if found.in_box else shown
-    return replace(found, gain=gain, branches=shown, followed=rows)
+        branches = shown(rows, found.listed, pinned, box if found.in_box else None)
+    return replace(found, gain=gain, branches=branches, followed=rows)
 
 
 def frame(branches: Complex) -> tuple[float, float, float, float]:
@@ -289,27 +315,36 @@ def frame(branches: Complex) -> tuple[float, float, float, float]:
     return left, left + wide, low, low + tall
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class BranchCrossing:
     """Crossing of the imaginary axis by a branch of a locus, at s = i `omega` [rad/s] and the value `gain`.
 
     `omega` is 0 or infinite where a real pole goes through the origin or through infinity.  `branch` is its number in
     the locus, None for a pole on none of them, or between two points; `direction` is "unstable" where the real part
-    becomes positive as the locus runs, and "stable" where it becomes negative.
+    becomes positive as the locus runs, and "stable" where it becomes negative.  `title` is that of the varied number.
     """
 
-    gain: Annotated[float, Quantity("value", digits=10)]
-    omega: Annotated[float, Quantity("frequency", "rad/s", 10)]
+    gain: Annotated[float, Quantity("value", digits=10, help="value of the number that varies, at the crossing")]
+    omega: Annotated[float, Quantity("frequency", "rad/s", 10, "imaginary part there; 0 or infinite of a real pole")]
     branch: Annotated[int | None, Quantity("branch", help="- : a pole on no branch")]
-    direction: Annotated[str, Quantity("becomes")]
+    direction: Annotated[str, Quantity("becomes", help="side of the axis to which the pole goes as the locus runs")]
+    origin: Annotated[str | None, ORIGIN] = None
+    title: Title = ("value", "")
 
     @property
-    def frequency(self) -> Annotated[float, Quantity("frequency", "Hz")]:
+    def titles(self) -> dict[str, Title]:
+        """That of the number that varies."""
+        return {"gain": self.title}
+
+    @property
+    def frequency(self) -> Annotated[float, Quantity("frequency", "Hz", help="the same over 2 pi")]:
         """omega in Hz."""
         return self.omega / (2 * math.pi)
 
 
-def branch_crossings(family: Varied, gain: Real, branches: Complex, top: float) -> tuple[BranchCrossing, ...]:
+def branch_crossings(
+    family: Varied, gain: Real, branches: Complex, origin: Whole, top: float
+) -> tuple[BranchCrossing, ...]:
     """Return the crossings of the imaginary axis in the order of the way.
 
     Of a damped rig along a number of its law those of poles on no branch too, up to `top` [rad/s].  Where D is linear
@@ -326,18 +361,21 @@ def branch_crossings(family: Varied, gain: Real, branches: Complex, top: float) 
         else:
             gains, places, changed = crossed(np.asarray(grid(loop.arm, band)), family.on_axis)
             known = [*map(Crossing, _corrected(family, gains, places), places, changed)]
-    found: list[BranchCrossing] = []
+
+    def crossing(at: float, omega: float, branch: int | None, *, grows: bool) -> BranchCrossing:
+        of = None if branch is None else origin_name(int(origin[branch]))
+        return BranchCrossing(at, omega, branch, "unstable" if grows else "stable", of, family.title)
+
+    found = []
     for number, low, high in changes:
         ends, points = gain[[low, high]], branches[number, [low, high]]
         at, omega = _crossed(family, ends, points, known, top)
-        direction = "unstable" if points[1].real > points[0].real else "stable"
-        found.append(BranchCrossing(gain=at, omega=omega, branch=number, direction=direction))
+        found.append(crossing(at, omega, number, grows=points[1].real > points[0].real))
     seen = {(own.gain, own.omega) for own in found}
     for each in known if is_damped else ():
         is_between = AT_END * span < sign * (each.t - float(gain[0])) < (1 - AT_END) * span
         if is_between and not top < each.at < math.inf and (each.t, each.at) not in seen:
-            direction = "unstable" if sign * each.change > 0 else "stable"
-            found.append(BranchCrossing(gain=each.t, omega=each.at, branch=None, direction=direction))
+            found.append(crossing(each.t, each.at, None, grows=sign * each.change > 0))
     return tuple(sorted(found, key=lambda own: (sign * own.gain, own.omega)))
 
 

@@ -93,7 +93,9 @@ class Loop:
         return controller(self.law if self.gains is None else as_law(self.gains), self.arm)
 
     @cached_property
-    def warnings(self) -> Annotated[tuple[str, ...], Quantity("warnings")]:
+    def warnings(
+        self,
+    ) -> Annotated[tuple[str, ...], Quantity("warnings", help="unstable controller poles that its zeros cancel")]:
         """Poles of the law right of the axis that its own zeros cancel."""
         return cancelled(self.law)
 
@@ -156,9 +158,12 @@ class Loop:
     def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
         """Denominator and numerator of L at s, up to one factor: finite at poles too."""
         s = np.asarray(s, dtype=complex)
-        drive, numerators, _ = self.signals.kept(s)
+        return self._parts(s, self.signals.kept(s))
+
+    def _parts(self, s: Complex, of_rig: LoopParts) -> tuple[Complex, Complex]:
+        """The same from those of the signals."""
         entries, whole = self.law.polynomials(s)
-        return drive * whole, np.exp(-s * self.law.delay) * (entries * numerators).sum(axis=0)
+        return of_rig.drive * whole, np.exp(-s * self.law.delay) * (entries * of_rig.numerators).sum(axis=0)
 
     def loop_function(self, s: NDArray[Any]) -> Complex:
         """L(s): closed-loop poles are at L = -1.  Infinite at poles of the rig or of the law."""
@@ -197,7 +202,8 @@ class Loop:
 
         def characteristic(at: Complex) -> tuple[Complex, Complex]:
             of_rig = self.signals.parts(at)
-            return self.characteristic(at, of_rig), of_rig.scale - self.delay_of_waves * at
+            drive, fed_back = self._parts(at, of_rig)
+            return drive + fed_back, of_rig.scale - self.delay_of_waves * at
 
         return by_differences(self.k, characteristic, s, self.zeros_at_origin)
 
@@ -207,12 +213,6 @@ class Loop:
         far = UNDISPERSED * first_frequency(self.arm)
         scale = self.signals.parts(np.array([far, 2 * far], complex)).scale.real
         return float(max(0.0, scale[1] - scale[0]) / far)
-
-    def characteristic(self, s: Complex, of_rig: LoopParts) -> Complex:
-        """D(s) up to a factor independent of the law, so that laws may be added; `of_rig` are the signals' parts."""
-        entries, whole = self.law.polynomials(s)
-        late = np.exp(-s * self.law.delay)
-        return np.asarray(of_rig.drive * whole + late * (entries * of_rig.numerators).sum(axis=0))
 
 
 def by_differences(

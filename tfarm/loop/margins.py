@@ -22,7 +22,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import AnyLaw, Arm, shown_unit
+from tfarm.arm import AnyLaw, Arm
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.crossing import brackets, crossed, zeros_between
 from tfarm.records import record
@@ -30,9 +30,9 @@ from tfarm.schema import At, Quantity
 from tfarm.spectrum.table import first_frequency
 
 from .loop import Loop, grid
-from .stability import Stability, is_quiet, stability
+from .stability import BAND, Stability, is_quiet, stability
 from .theorem import Lyapunov, Signs, lyapunov, signs_of_loop, theorem_of
-from .windows import NumberInterval, Windows, reach_words, windows_of
+from .windows import Windows, reach_words, windows_of
 
 MARGIN_DIGITS, PLACE_DIGITS = 9, 7  # of a margin, at most, and of the frequency of a dip, where its depth is flat
 CROSSOVER_DIGITS = 12  # of the value at each crossover, at most: more than any table rounds to
@@ -53,11 +53,19 @@ NO_WINDOWS = "no stability intervals: with an undamped link all modes meet on th
 
 GAIN_MARGIN = Quantity("gain margin, factors down and up", help="factors on L between which the loop stays stable")
 PHASE_MARGIN = Quantity("phase margin", "deg", help="of least size where |L| = 1; above 0 for lag, below for lead")
-PHASE_LAG = Quantity("phase margin for lag", "deg", key="phase_lag_deg")
-PHASE_LEAD = Quantity("phase margin for lead", "deg", key="phase_lead_deg")
+LAG = "least phase lag of L that destabilises the loop; inf without a limit"
+PHASE_LAG = Quantity("phase margin for lag", "deg", key="phase_lag_deg", help=LAG)
+PHASE_LEAD = Quantity("phase margin for lead", "deg", key="phase_lead_deg", help=LAG.replace("lag", "lead"))
 DELAY_MARGIN = Quantity("delay margin", "s", help="smallest further loop delay that destabilises the loop")
 DISK_MARGIN = Quantity("disk margin", help="gain and phase together: factors (2 + d)/(2 - d), |d| < margin")
 PEAK_SENSITIVITY = Quantity("peak sensitivity Ms", key="peak_sensitivity", help="largest |1/(1 + L)|")
+IN_RANGE = Quantity("margins in the frequency range", help="of L(iw) up to the end of the verdict's frequency range")
+LYAPUNOV = Quantity("Lyapunov function of the paper", help="energy argument for constant gains at the hub")
+PASSIVITY = Quantity("passivity of the controller", help="sign of the controller from hub angle or rate to torque")
+INTERVALS = Quantity("stability intervals", help="of each gain or coefficient alone, the others constant")
+INTERVALS_NOTE = Quantity("limits of the intervals", help="frequency range in which the intervals are known")
+GAIN_CROSSOVERS = Quantity("gain crossovers, abs(L) = 1", help="all in the frequency range, ascending")
+PHASE_CROSSOVERS = replace(GAIN_CROSSOVERS, label="phase crossovers, L < 0")
 COMPLEMENTARY = "peak_complementary_sensitivity"
 PEAK_COMPLEMENTARY = Quantity("peak complementary sensitivity Mt", key=COMPLEMENTARY, help="largest |L/(1 + L)|")
 EXACT_DELAY, EXACT_DISK, EXACT_PEAK, EXACT_COMPLEMENTARY = (  # of the infinite-dimensional loop
@@ -80,7 +88,7 @@ class LoopMargins:
     L < 0 and the factor -1/L on it that puts a pole there, both ascending.
     """
 
-    band: Annotated[float, Quantity("up to", "rad/s", key="up_to_rad_s")]
+    band: Annotated[float, replace(BAND, help="end of the frequency range of these margins")]
     gain: tuple[float, float]
     phase: float
     phase_lag: float
@@ -138,14 +146,14 @@ class LoopMargins:
 class GainCrossover(NamedTuple):
     """A frequency with |L| = 1."""
 
-    omega: Annotated[float, Quantity("frequency", "rad/s", 7)]
-    phase_margin: Annotated[float, Quantity("phase margin", "deg")]
+    omega: Annotated[float, Quantity("frequency", "rad/s", 7, "gain crossover frequency, |L| = 1")]
+    phase_margin: Annotated[float, Quantity("phase margin", "deg", help="angle from -1 to L; above 0 for lag")]
 
 
 class PhaseCrossover(NamedTuple):
     """A frequency with L < 0."""
 
-    omega: Annotated[float, Quantity("frequency", "rad/s", 7)]
+    omega: Annotated[float, Quantity("frequency", "rad/s", 7, "phase crossover frequency, L real and negative")]
     factor: Annotated[float, Quantity("gain margin (factor)", help="-1/L: this factor on L puts a pole there")]
 
 
@@ -178,31 +186,29 @@ class Margins:
         return None if self.in_band is None else self.in_band.gain
 
     @property
-    def in_range(self) -> Annotated[LoopMargins | None, Quantity("margins in the frequency range")]:
+    def in_range(self) -> Annotated[LoopMargins | None, IN_RANGE]:
         """The margins of L(i w) in the range of the verdict."""
         return self.in_band
 
     @property
-    def lyapunov(self) -> Annotated[Lyapunov | None, Quantity("Lyapunov function of the paper")]:
+    def lyapunov(self) -> Annotated[Lyapunov | None, LYAPUNOV]:
         """The proof by energy, for gains at the hub."""
         loop = self.stability.loop
         return None if loop.gains is None else lyapunov(loop.arm, loop.gains)
 
     @property
-    def passivity(self) -> Annotated[Signs | None, Quantity("passivity of the controller")]:
+    def passivity(self) -> Annotated[Signs | None, PASSIVITY]:
         """The sign of a law that is more than gains at the hub."""
         loop = self.stability.loop
         return signs_of_loop(loop) if loop.gains is None else None
 
     @property
-    def stability_intervals(self) -> Annotated[list[NumberInterval], Quantity("stability intervals")]:
+    def stability_intervals(self) -> Annotated[list[Windows], INTERVALS]:
         """One row for each number of the law, the others constant; without K2 on a free pin, where it has no loop."""
-        loop = self.stability.loop
-        units = {} if loop.gains is None else {name: shown_unit(name, loop.arm) for name in loop.numbers}
-        return [each.about(loop.numbers[name], units.get(name, "")) for name, each in self.windows.items()]
+        return list(self.windows.values())
 
     @property
-    def intervals_note(self) -> Annotated[str | None, Quantity("limits of the intervals")]:
+    def intervals_note(self) -> Annotated[str | None, INTERVALS_NOTE]:
         """Frequency range of the intervals where nothing is known beyond it.
 
         A theorem on the sign of a law, and small gain, hold for that law, not for one with another number.
@@ -216,12 +222,12 @@ class Margins:
         return words + (f"; poles not counted along {', '.join(uncounted)}" if uncounted else "") or None
 
     @property
-    def gain_crossovers(self) -> Annotated[list[GainCrossover], Quantity("gain crossovers, abs(L) = 1")]:
+    def gain_crossovers(self) -> Annotated[list[GainCrossover], GAIN_CROSSOVERS]:
         """All in the frequency range, ascending; empty unless the loop is stable."""
         return [] if self.in_band is None else [GainCrossover(*pair) for pair in self.in_band.gain_crossovers]
 
     @property
-    def phase_crossovers(self) -> Annotated[list[PhaseCrossover], Quantity("phase crossovers, L < 0")]:
+    def phase_crossovers(self) -> Annotated[list[PhaseCrossover], PHASE_CROSSOVERS]:
         """All in the frequency range, ascending; empty unless the loop is stable."""
         return [] if self.in_band is None else [PhaseCrossover(*pair) for pair in self.in_band.phase_crossovers]
 

@@ -39,6 +39,8 @@ RESIDUE_AT = 1e-6  # of a pole's frequency: so near to it L is the pole's share 
 WIDEST_INDENT = 1e-3  # of the same: the radius of an arc at most, so that it reaches no neighbour
 LONGEST_PIECE = 0.02  # of the rim's radius: the longest straight piece of a drawn curve
 TURN_ROUNDS = 24  # of halving where they are longer
+ON_AXIS = Quantity("poles on the axis to working precision", help="closed-loop poles with |Re s| < 1e-12 |s|, not at 0")
+BY_NYQUIST = Quantity("unstable poles by Nyquist's criterion", help="unstable poles of L less the encirclements of -1")
 
 
 @dataclass(frozen=True)
@@ -51,16 +53,16 @@ class Nyquist:
     contour: those of a law that is not stable by itself.
     """
 
-    s: Annotated[Complex, Quantity("s", "1/s", curve=True)]
-    L: Annotated[Complex, Quantity("L", curve=True)]
+    s: Annotated[Complex, Quantity("s", "1/s", curve=True, help="points of the contour with Im s >= 0")]
+    L: Annotated[Complex, Quantity("L", curve=True, help="loop function at these points")]
     is_arc: NDArray[np.bool_]
     poles: Real
     encirclements: Annotated[int, Quantity("encirclements of -1", help="counter-clockwise positive")]
     verdict: Annotated[Stability, Quantity(flat=True)]
-    unstable_open: Annotated[int, Quantity("unstable poles of L")] = 0
+    unstable_open: Annotated[int, Quantity("unstable poles of L", help="controller's poles inside the contour")] = 0
 
     @property
-    def on_axis(self) -> Annotated[int, Quantity("poles on the axis to working precision")]:
+    def on_axis(self) -> Annotated[int, ON_AXIS]:
         """Number of poles of the box on the axis to working precision, apart from that at 0."""
         moving = self.verdict.poles.moving
         near = abs(moving.real) <= AXIS_SHARE * abs(moving)
@@ -73,7 +75,7 @@ class Nyquist:
         return count_with_mirrors(moving[moving.real > AXIS_SHARE * abs(moving)])
 
     @property
-    def unstable_by_nyquist(self) -> Annotated[int, Quantity("unstable poles by Nyquist's criterion")]:
+    def unstable_by_nyquist(self) -> Annotated[int, BY_NYQUIST]:
         """Unstable closed-loop poles by Nyquist's criterion."""
         return self.unstable_open - self.encirclements
 

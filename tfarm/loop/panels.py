@@ -9,9 +9,7 @@ in the gains: the samples give the loop for any gains, without the arm.
 
 The powers of s are taken out so that slow gains lose no digits next to s = 0.
 
-From the hub's input to a sensor at x the numerator N = G drive is a function along s = i w like those, without poles or
-branches (but for s = -1/C).  So its zeros near the axis are those of polynomials through exact samples of it, and so
-are those near the positive real axis, which limit the bandwidth of every law.  A law at the hub does not move them: it
+The zeros from the hub's input to a sensor are listed for each place of it: a law at the hub does not move them, as it
 changes the drive alone.
 """
 
@@ -22,7 +20,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from tfarm.arm import AT_HUB, FED_BACK, Arm, must_turn
 from tfarm.arrays import Complex, Real
@@ -30,7 +27,7 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.characteristic import float_units, loop_parts
 from tfarm.exact.system import system_of
 from tfarm.records import record
-from tfarm.response import TransferFunction, transfer
+from tfarm.response import transfer
 from tfarm.spectrum import Modes, modes
 
 from .loop import band_of, steep_places
@@ -45,19 +42,8 @@ CHEBYSHEV = np.cos(_ANGLES)  # points of the first kind, where the samples are: 
 BARYCENTRIC = (-1.0) ** np.arange(PANEL_SAMPLES) * np.sin(_ANGLES)  # weights of the polynomial through them
 Sensor = Literal["displacement", "moment"]
 
-MOST_SENSOR_MISS = 1e-8  # of the numerator on a panel, between samples: zeros are shown to five digits
+SENSOR_ZERO_ERROR = 1e-8  # of the size of a zero: a smaller real or imaginary part of it is rounding
 NOT_SENSED = 1e-9  # of a mode's largest: a reading no larger of any mode is none
-SERIES_END = 1e-13  # of the largest coefficient: a series ends where it is that
-OFF_LINE = 1.0  # of a panel's half width: largest distance of a zero from the axis
-PAST_EDGE = 1e-7  # of a panel's half width: panels end at modes, where a sensor at a node has its zero
-BEHIND_ORIGIN = 1e-9  # of a panel's outer end: a zero at s = 0 may come out so far on the wrong side
-SAME_SENSOR_ZERO = 1e-5  # relative: a zero near both lines is found from both
-POWERS_AT_REST = {"displacement": 0, "moment": 2}  # powers of s that a sensor's numerator has at s = 0
-AS_SERIES = np.cos(np.outer(np.arange(PANEL_SAMPLES), np.arccos(CHEBYSHEV))) * 2 / PANEL_SAMPLES  # samples to a series
-AS_SERIES[0] /= 2
-STEEP_A_SENSOR_PANEL = 4  # steep places a panel
-ROOM_TO_SINGULAR = 0.7  # of its middle's way to -1/C: the half width of a panel at most, so that 24 samples leave 1e-9
-GRADING_HALVINGS = 40  # of a panel next to -1/C
 
 
 @dataclass(frozen=True)
@@ -129,7 +115,7 @@ class Positions:
     """Sensor positions `x` (n,) [m] from the clamp, and `participation` (modes, n) of the first flexible modes there.
 
     The largest of a mode is 1 in size; `natural_frequency` (modes,) is in rad/s.  `zeros` [1/s] of each position are
-    those near the imaginary and the positive real axis up to `band` [rad/s], with Im s >= 0.
+    those with 0 < Im s < `band` [rad/s], and the real ones from 0 to it, which limit the bandwidth of every law.
     """
 
     x: Real
@@ -141,7 +127,7 @@ class Positions:
     @property
     def known_zeros(self) -> tuple[Complex, ...]:
         """The same, with 0 for a real or imaginary part below the error of a zero."""
-        parts = ((s, MOST_SENSOR_MISS * abs(s)) for s in self.zeros)
+        parts = ((s, SENSOR_ZERO_ERROR * abs(s)) for s in self.zeros)
         return tuple(
             np.where(abs(s.real) > least, s.real, 0.0) + 1j * np.where(abs(s.imag) > least, s.imag, 0.0)
             for s, least in parts
@@ -162,74 +148,14 @@ def _fields(found: Modes, sensor: Sensor, x: Real) -> Real:
 def positions(arm: Arm, sensor: Sensor, x: Real, count: int) -> Positions:
     """Return participation of the first `count` modes, and zeros below the next, of a sensor at each x [m].
 
-    Raises ParameterError for an arm that cannot turn, ConvergenceError where the numerator is not resolved.
+    Raises ParameterError for an arm that cannot turn, ConvergenceError where the zeros are not complete.
     """
     must_turn(arm)
     found = modes(arm, count)
-    field = _fields(found, sensor, x)
-    band, zeros = band_of(arm, count), []
-    lines = [_Panels.of(arm, sensor, unit, band) for unit in (1j, 1.0 + 0j)]
+    field, band = _fields(found, sensor, x), band_of(arm, count)
+    zeros = []
     for place in x.tolist():
-        G = transfer(arm, sensor, x=place)
-        known: list[complex] = []
-        for s in (s for line in lines for s in line.zeros(G)):
-            is_real = abs(s.imag) < SAME_SENSOR_ZERO * abs(s)
-            is_new = all(abs(s - each) > SAME_SENSOR_ZERO * abs(s) for each in known)
-            if is_new and (s.real > 0 if is_real else s.imag > 0):
-                known.append(complex(s.real, 0.0) if is_real else s)
-        zeros.append(np.array(sorted(known, key=lambda s: (s.imag, s.real)), dtype=complex))
+        every = transfer(arm, sensor, x=place).zeros(up_to=band).values
+        zeros.append(every[(every.imag > 0) | ((every.imag == 0) & (every.real > 0))])
     participation = field / abs(field).max(axis=1, keepdims=True)
     return Positions(x, band, found.natural_frequency[found.index > 0], participation, tuple(zeros))
-
-
-@dataclass(frozen=True)
-class _Panels:
-    """Panels of a line through s = 0 in the direction of `unit`, from `low` to `high` (n,) [rad/s].
-
-    `s` (n, points) are the samples and the places between, `factor` (n, points) is numerator/G of a sensor there.
-    """
-
-    unit: complex
-    low: Real
-    high: Real
-    s: Complex
-    factor: Complex
-    is_real: bool
-
-    @classmethod
-    def of(cls, arm: Arm, sensor: Sensor, unit: complex, band: float) -> _Panels:
-        """Panels of the line up to the band: along the imaginary axis the first begins at -`high`, as all is even."""
-        places = np.asarray(steep_places(arm, band))[STEEP_A_SENSOR_PANEL - 1 :: STEEP_A_SENSOR_PANEL]
-        edges, C = np.r_[0.0, places[places < band], band], arm.damping
-        for _ in range(GRADING_HALVINGS if C else 0):  # where a panel is too near to -1/C for a polynomial
-            middle, half = (edges[1:] + edges[:-1]) / 2, np.diff(edges) / 2
-            if unit == 1j:
-                middle[0], half[0] = 0.0, edges[1]
-            near = half > ROOM_TO_SINGULAR * abs(unit * middle + 1 / C)
-            if not near.any():
-                break
-            edges = np.sort(np.r_[edges, ((edges[1:] + edges[:-1]) / 2)[near]])
-        low, high = edges[:-1].copy(), edges[1:]
-        low[0] = -high[0] if unit == 1j else 0.0
-        s = unit * ((low + high)[:, None] / 2 + (high - low)[:, None] / 2 * np.r_[CHEBYSHEV, BETWEEN_SAMPLES])
-        parts = loop_parts(system_of(arm), s.ravel())
-        drive, scale = parts.drive.reshape(s.shape), parts.scale.reshape(s.shape)
-        factor = drive / s ** POWERS_AT_REST[sensor] * np.exp(scale - scale.real.max(axis=1, keepdims=True))
-        return cls(unit, low, high, s, factor, arm.is_reactive)
-
-    def zeros(self, G: TransferFunction) -> list[complex]:
-        """The zeros of a sensor along the line and near it.  Raises ConvergenceError where they are not resolved."""
-        values = G(self.s.ravel()).reshape(self.s.shape) * self.factor
-        values = values.real + 0j if self.is_real else values
-        found: list[complex] = []
-        for low, high, both in zip(self.low, self.high, values, strict=True):
-            series = AS_SERIES @ both[:PANEL_SAMPLES]
-            missed = abs(chebyshev.chebval(BETWEEN_SAMPLES, series) - both[PANEL_SAMPLES:]).max() / abs(both).max()
-            if missed > MOST_SENSOR_MISS:
-                raise ConvergenceError(f"polynomials do not follow the numerator of {G.outputs[0]}", high, missed)
-            last = int(np.nonzero(abs(series) > SERIES_END * abs(series).max())[0].max())
-            roots = np.asarray(chebyshev.chebroots(series[: last + 1]), dtype=complex)
-            roots = roots[(abs(roots.real) <= 1 + PAST_EDGE) & (abs(roots.imag) <= OFF_LINE)]
-            roots = (low + high) / 2 + (high - low) / 2 * roots
-            found += [self.unit * z for z in roots if z.real > -BEHIND_ORIGIN * high]
-        return found

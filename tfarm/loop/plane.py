@@ -28,7 +28,7 @@ from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, Hu
 from tfarm.arm.feedback import ON
 from tfarm.arrays import Real
 from tfarm.crossing import Crossings, Window, ascending, counts_over, intervals
-from tfarm.crossing.shown import PlaneOfCounts
+from tfarm.crossing.turning import PlaneOfCounts
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.response.controller import Controller, controller
@@ -36,21 +36,25 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import PAPER_GAINS, default_gains, hub_locked, rate_unit
 
-from .lines import (
+from .loop import Loop, grid
+from .stability import band_of_family, verdict_on
+from .windows import (
     ROUNDED,
     columns,
     critical,
     crossed,
     line_crossings,
     rows,
+    static_edge,
+    theorem_edges,
+    theorem_windows,
     turns_over,
     unstable_below,
     with_numbers,
 )
-from .loop import Loop, grid
-from .stability import band_of_family, verdict_on
-from .windows import static_edge, theorem_edges, theorem_windows
 
+COUNTS = Quantity(key="unstable_roots", help="unstable poles at each point, rows upwards; inf where infinitely many")
+BOUNDARY = Quantity(key="boundary", help="both gains and the frequency [rad/s] with poles on the imaginary axis")
 INFINITE = -1  # count of infinitely many unstable poles
 MOST_GRID_VALUES, MOST_LAW_VALUES = 2000, 400  # of a map, along one gain, and along one number of another law
 SHOWN_K1, SHOWN_K2 = (-1.0, 3.0), (-2.0, 2.0)  # of a map, by default: the stable region of the paper's arm, and around
@@ -83,13 +87,18 @@ class Plane(PlaneOfCounts):
 
     arm: Arm
     law: Law
-    vary: Annotated[tuple[str, str], Quantity("plane of")]
-    x: Annotated[Real, Quantity(curve=True)]
-    y: Annotated[Real, Quantity(curve=True)]
+    vary: Annotated[tuple[str, str], Quantity("plane of", help="the two numbers that vary, across and up")]
+    x: Annotated[Real, Quantity(curve=True, help="values of the first number")]
+    y: Annotated[Real, Quantity(curve=True, help="values of the second number")]
     unstable: NDArray[np.int64]
     boundary: Real
-    band: Annotated[float, Quantity("frequency range, up to", "rad/s", key="up_to_rad_s")]
+    band: Annotated[float, Quantity(key="up_to_rad_s", help="end of the range; 0 where a theorem decides every mode")]
     crossings: list[Crossings]
+
+    @property
+    def reach(self) -> Annotated[str, Quantity("frequency range", help="poles in it are counted completely")]:
+        """The frequency range in words."""
+        return f"up to {self.band:.6g} rad/s" if self.band else "every mode, by a theorem"
 
     @property
     def controller(self) -> Annotated[Controller, Quantity(flat=True)]:
@@ -97,19 +106,19 @@ class Plane(PlaneOfCounts):
         return controller(self.law, self.arm)
 
     @property
-    def counts(self) -> Annotated[list[list[int | float]], Quantity(key="unstable_roots")]:
+    def counts(self) -> Annotated[list[list[int | float]], COUNTS]:
         """Unstable poles over the grid, rows upwards, infinity where they are infinitely many."""
         return [[math.inf if count == INFINITE else count for count in row] for row in self.unstable.tolist()]
 
     @property
-    def boundary_inside(self) -> Annotated[list[list[float]], Quantity(key="boundary")]:
+    def boundary_inside(self) -> Annotated[list[list[float]], BOUNDARY]:
         """The points of `boundary` inside the plane."""
         return [point for point in self.boundary.tolist() if all(
             values[0] <= value <= values[-1] for value, values in zip(point, self.axes, strict=False)
         )]  # fmt: skip
 
     @property
-    def finding(self) -> Annotated[str, Quantity("stability region", key="finding")]:
+    def finding(self) -> Annotated[str, Quantity("stability region", help="points of the grid without unstable pole")]:
         """Number of points of the grid at which the loop is stable."""
         return f"stable at {int(self.stable.sum())} of {self.stable.size} points"
 
@@ -211,7 +220,7 @@ def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real, band: float | Non
     omega = np.asarray(grid(loop.arm, band))
     members = [lambda value=value: loop.having(vary[0], value) for value in x.tolist()]
     lines = columns(loop, vary, x, (max(map(abs, across)), max(map(abs, up))))
-    found = crossed(loop, lines, [(vary[1], up)] * x.size, omega, members)
+    found = crossed(loop, lines, vary[1], up, omega, members)
     crossing = np.concatenate([y[:0], *(each.gain for each in found)])
     at = 0.0 if vary == PLANE else float(y[_farthest(y, crossing)])  # at K2 = 0 the hub is passive
     there = _counts_across(loop.having(vary[1], at), vary[0], x, band, one_by_one=is_counted)
@@ -236,9 +245,8 @@ def _is_known_everywhere(arm: Arm) -> bool:
 def _known_counts(loop: Loop, K1: Real, K2: Real) -> NDArray[np.int64]:
     """Unstable poles without damping: one count for each side of each line on which modes meet the axis."""
     limits = float(K2[0]), float(K2[-1])
-    edges = theorem_edges(loop.having(RATE_GAIN, default_gains(loop.arm).K1), MOMENT_GAIN, limits)
-    static = [each.t for each in edges if each.at == 0]
-    side = static[0] < K2 if static else np.zeros(K2.size, bool)
+    static = static_edge(loop.having(RATE_GAIN, default_gains(loop.arm).K1), MOMENT_GAIN, limits)
+    side = np.zeros(K2.size, bool) if static is None else static.t < K2
     unstable = np.zeros((K2.size, K1.size), dtype=np.int64)
     of_K1, of_K2 = np.sign(K1 + loop.arm.rate_loss), np.sign(K2 - loop.arm.input_per_torque)
     for of_column, of_row, each in itertools.product((-1, 0, 1), (-1, 0, 1), (True, False)):

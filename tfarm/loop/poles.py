@@ -50,13 +50,16 @@ LATE = 2.0  # of 1/delay: further left a delayed loop has ever more poles, and a
 BEYOND_OWN = 1.1  # times the rightmost pole of a law, where L is infinite: the nearest right edge that is tried
 # Starts of Newton's method affect the time alone: the winding number counts the zeros that they missed.
 STARTS_REACH = 1.3  # heights of the box: modes of the arm up to there, as a law may draw their poles down into it
-DAMPED_BY_LAW = (0.0, 0.02, 0.3)  # of its frequency: starts left of a mode's own pole, where a law may have moved it
 REAL_STARTS, REAL_SPAN, REAL_REACH = 25, 300, 1.4  # on the real axis: their number, from height/300 to 1.4 heights
-FARTHER_OWN, NEARER_OWN, ASIDE_OWN = 1.01, 0.9, 0.1j  # of a law's pole: starts near it, as on it D is infinite
 LEAST_START = 1e-100  # 1/s: zeros at 0 are divided out
 PADE = 8  # order of the approximation of a delay in the model that starts are taken from
 MODES_ABOVE_BOX, MOST_MODEL_MODES = 4, 40  # modes of the model above the box, and at most
 SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)  # of a box that may not reach above the shear cut-off
+
+
+ENDS_AT_SHEAR = Quantity(
+    "ends at the shear cut-off, sqrt(kGA/rhoI)", help="no more bending modes lie below it: the list is whole"
+)
 
 
 def count_with_mirrors(zeros: Complex) -> int:
@@ -76,21 +79,21 @@ class Poles:
     loop: Annotated[Loop, Quantity(flat=True)]
     values: Annotated[Complex, Quantity("s", "1/s", 12, "closed-loop poles with Im s >= 0", key="poles")]
     box: Annotated[Box, Quantity("box: Re s from, to, Im s from, to", help="searched, and complete")]
-    ends_at_shear_cutoff: Annotated[bool, Quantity("ends at the shear cut-off, sqrt(kGA/rhoI)")] = False
+    ends_at_shear_cutoff: Annotated[bool, ENDS_AT_SHEAR] = False
     discs: Annotated[tuple[Disc, ...] | None, Quantity(help="enclosures of the poles apart from 0, certified")] = None
 
     @property
-    def completeness(self) -> Annotated[str, Quantity("completeness")]:
+    def completeness(self) -> Annotated[str, Quantity("completeness", help="word of certainty for the list of poles")]:
         """The word of certainty for the list of poles in the box."""
         return "converged (winding number)" if self.discs is None else "certified"
 
     @property
-    def shear_cutoff(self) -> Annotated[float, Quantity(unit="rad/s")]:
+    def shear_cutoff(self) -> Annotated[float, Quantity(unit="rad/s", help="sqrt(kGA/rhoI): shear modes lie above")]:
         """sqrt(kGA/rhoI) [rad/s], above which lightly damped shear modes lie."""
         return self.loop.arm.shear_cutoff
 
     @property
-    def unstable(self) -> Annotated[int, Quantity("unstable poles")]:
+    def unstable(self) -> Annotated[int, Quantity("unstable poles", help="of the box, conjugates counted")]:
         """Number of poles of the box, conjugates counted, right of the axis.
 
         A real part below working precision decides nothing; without damping a theorem decides (`theorem_of`).
@@ -241,15 +244,12 @@ def slow_poles(loop: Loop, below: float) -> Complex:
 
 
 def starting_points(loop: Loop, up_to: float) -> Complex:
-    """Starts of Newton's method: at and left of the arm's own poles, near the law's, and poles of a modal model."""
-    omega, C, own = np.asarray(steep_places(loop.arm, up_to)), loop.arm.damping, loop.law.poles
-    shift, damped = np.array(DAMPED_BY_LAW)[:, None], np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))
-    near = (-(C * omega**2 / 2) - shift * omega + 1j * omega * damped).ravel()
+    """Starts of Newton's method: the arm's own poles, some real ones, and under a law with states a modal model's."""
+    omega, C = np.asarray(steep_places(loop.arm, up_to)), loop.arm.damping
+    damped = np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))
+    near = -(C * omega**2 / 2) + 1j * omega * damped
     real = np.geomspace(up_to / REAL_SPAN, REAL_REACH * up_to, REAL_STARTS)  # for poles of unknown place
-    slow, of_model = np.empty(0, complex), np.empty(0, complex)
-    if loop.at_rest is not None:
-        c, b, _ = loop.at_rest
-        slow = np.roots([loop.arm.turned_inertia, b, c]).astype(complex)
+    of_model = np.empty(0, complex)
     if not (loop.law.is_static or loop.law.is_improper):  # which has no states
         count = min(modes_below(loop.arm, up_to) + MODES_ABOVE_BOX, MOST_MODEL_MODES)
         with suppress(ParameterError, ConvergenceError):  # the winding number shows whether a pole is missing
@@ -260,8 +260,7 @@ def starting_points(loop: Loop, up_to: float) -> Complex:
             model[pair + 1, pair + 1] -= C * w[pair] ** 2
             model = model - loop.arm.rate_loss * drive @ read[-1:]
             of_model = poles_of_model(loop, (model, drive, read[:-1], direct[:-1]))
-    near_own = [own * FARTHER_OWN, own * NEARER_OWN + ASIDE_OWN * abs(own)]
-    starts = np.concatenate([near, near.conj(), slow, real, -real, *near_own, of_model])
+    starts = np.concatenate([near, near.conj(), real, -real, of_model])
     return starts[abs(starts) > LEAST_START]
 
 

@@ -12,6 +12,9 @@ Poles are computed, completely, up to a band; what lies beyond is known by
 
 Else it is not determined, and the verdict is that of the band.  A pole at 0 remains where the hub angle is free:
 verdicts leave it out.
+
+Spillover: a law is designed on a model of a few modes, and may destabilise a mode of the rig that the model omits
+(Balas 1978).  The verdict of the exact loop, which has all modes, is compared with those of ever larger models.
 """
 
 from __future__ import annotations
@@ -19,19 +22,22 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tfarm.arm import AnyLaw, Arm, as_law
-from tfarm.arrays import Real
+from tfarm.arm import AnyLaw, Arm, arm_and_law, as_law
+from tfarm.arm.checks import whole
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
+from tfarm.reduced.conversions import sensed_model
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes, modes_below
 
 from .loop import MOST_BAND_MODES, QUIET_REACH, Loop, band_of, quiet_places
-from .poles import Poles, box_of, poles_below
+from .poles import Poles, box_of, poles_below, poles_of_model
 from .theorem import GIVES, TAKES, Theorem, theorem_of
 
 LEAST_BAND_MODES = 12  # flexible modes in the band at C = 0, and at least
@@ -44,9 +50,23 @@ BEYOND_LAW_POLES = 1.3  # of the fastest pole of the law that rings: a band reac
 DULL = 0.7  # damping ratio from which on a pole of the law makes no peak
 NEAREST_TO_AXIS = 1e-4  # of a band: first distance from the axis at which L is evaluated on the upper edge of the box
 UNCONTROLLABLE = 1e-9  # a hub participation below this share of an ordinary one is none
-DELAYED = "without any damping a delayed law destabilises infinitely many modes beyond the frequency range"
-SMALL_GAIN = f"beyond the frequency range |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)"
+MOST_SPILL_MODES = 60  # modes of a model
+USUAL_SPILL_MODES = 20  # of the largest model by default
+REST_SHARE = 1e-7  # of w1: poles at 0 come out as small
+UNDAMPED_SHARE = 1e-9  # of its size: largest real part of a pole that no model damps
+
+
+FIRST_MODE = Quantity("lowest destabilised mode", help="of the exact loop; 0: a pole below the first mode")
+SHOWN_FROM = Quantity(
+    "design models unstable from", "modes", key="shown_from_modes", help="all models of at least so many modes are"
+)
+DELAYED = "a delay without any damping destabilises infinitely many modes"
+SMALL_GAIN = f"|L(iw)| < {QUIET:g} and falling: no unstable pole (small gain)"
 UNKNOWN_ABOVE = "converged up to {band:.4g} rad/s, not determined beyond, neither by small gain nor by a theorem"
+BAND = Quantity("frequency range, up to", "rad/s", key="up_to_rad_s", help="poles below it are counted completely")
+KNOWN_BEYOND = Quantity(
+    "stability known beyond the range", key="known_beyond", help="no: the verdict is that of the frequency range alone"
+)
 
 
 @dataclass(frozen=True)
@@ -58,13 +78,13 @@ class Stability:
     """
 
     loop: Annotated[Loop, Quantity(flat=True)]
-    verdict: Annotated[str, Quantity("stability")]
+    verdict: Annotated[str, Quantity("stability", help="stable, marginal or unstable; the pole of a free hub left out")]
     unstable_roots: Annotated[int, Quantity("unstable poles", help="in the frequency range")]
     unstable_roots_infinite: Annotated[bool, Quantity(help="infinitely many poles beyond the range are unstable")]
-    band: Annotated[float, Quantity("frequency range, up to", "rad/s", key="up_to_rad_s")]
-    tail: Annotated[str, Quantity("beyond that", key="beyond")]
+    band: Annotated[float, BAND]
+    tail: Annotated[str, Quantity("beyond the range", key="beyond", help="what decides the poles of higher frequency")]
     poles: Poles
-    is_known_beyond: Annotated[bool, Quantity("stability known beyond that", key="known_beyond")] = True
+    is_known_beyond: Annotated[bool, KNOWN_BEYOND] = True
 
     @property
     def spectral_abscissa(self) -> Annotated[float, Quantity("spectral abscissa", "1/s", 6, "largest Re s in range")]:
@@ -72,12 +92,12 @@ class Stability:
         return self.poles.spectral_abscissa
 
     @property
-    def free_pole(self) -> Annotated[str | None, Quantity("free hub angle")]:
+    def free_pole(self) -> Annotated[str | None, Quantity("free hub angle", help="pole at 0 that verdicts leave out")]:
         """The pole at 0 that the verdict leaves out."""
         return "its pole at s = 0 is left out" if self.poles.moving.size < self.poles.values.size else None
 
     @property
-    def is_stable(self) -> Annotated[bool, Quantity(key="stable")]:
+    def is_stable(self) -> Annotated[bool, Quantity(key="stable", help="whether the verdict is stable")]:
         """Whether every pole but that of the free hub angle lies left of the axis."""
         return self.verdict == "stable"
 
@@ -207,3 +227,112 @@ def is_known_without(loop: Loop, name: str) -> bool:
         return theorem_of(without).energy in (TAKES, 0) or band_of_loop(without)[1]
     except (ParameterError, ConvergenceError):
         return False
+
+
+# ------------------------------------------------------------ spillover
+
+
+class SpillModel(NamedTuple):
+    """A design model under the law: flexible modes, unstable poles, rightmost pole."""
+
+    modes: Annotated[int, Quantity("modes", help="flexible modes of the design model")]
+    unstable: Annotated[int, Quantity("unstable poles", help="of the design model under the controller")]
+    rightmost: Annotated[complex, Quantity("rightmost pole", "1/s", help="apart from poles at 0")]
+
+
+@dataclass(frozen=True)
+@record
+class Spill:
+    """The verdict on the exact loop, and models of `modes` (n,) flexible modes: `unstable` (n,) and `rightmost` (n,).
+
+    `rightmost` [1/s] is the rightmost pole of each, apart from those at 0.  `driven` [1/s] are the exact loop's
+    unstable poles with Im >= 0.  `first_mode` is the flexible mode whose frequency is next to the lowest of those, 0
+    where that is real or below half the first.  From `shown_from` modes on every model is unstable too; None where the
+    last is not.
+    """
+
+    verdict: Annotated[Stability, Quantity(flat=True)]
+    modes: NDArray[np.int64]
+    unstable: NDArray[np.int64]
+    rightmost: Complex
+
+    @property
+    def driven(self) -> Annotated[Complex, Quantity("s", "1/s", help="unstable poles of the exact loop")]:
+        """The exact loop's unstable poles, ascending in Im s."""
+        moving = self.verdict.poles.moving
+        return moving[moving.real > UNDAMPED_SHARE * abs(moving)]
+
+    @property
+    def first_mode(self) -> Annotated[int | None, FIRST_MODE]:
+        """The lowest destabilised mode; None where the exact loop is stable in its band."""
+        if not self.driven.size:
+            return None
+        lowest = float(self.driven[0].imag)
+        table = modes(self.verdict.loop.arm, up_to=2.0 * max(lowest, 1.0) + self.verdict.band)
+        flexible = table.natural_frequency[table.index > 0]
+        if lowest < flexible[0] / 2:
+            return 0
+        return int(np.argmin(abs(flexible - lowest))) + 1
+
+    @property
+    def shown_from(self) -> Annotated[int | None, SHOWN_FROM]:
+        """Number of modes from which on the models are unstable too."""
+        content = np.flatnonzero(self.unstable == 0)
+        if content.size == 0:
+            return int(self.modes[0])
+        return None if content[-1] == self.modes.size - 1 else int(self.modes[content[-1] + 1])
+
+    @property
+    def models(self) -> Annotated[list[SpillModel], Quantity("design models", help="bare modes, without remainder")]:
+        """One row for each model."""
+        poles = (complex(s.real, abs(s.imag)) for s in self.rightmost)
+        return list(map(SpillModel, self.modes.tolist(), self.unstable.tolist(), poles))
+
+    @property
+    def content(self) -> NDArray[np.int64]:
+        """The numbers of modes of the models that are stable."""
+        return self.modes[self.unstable == 0]
+
+    @property
+    def in_words(self) -> Annotated[str, Quantity("spillover", help="exact loop, compared with the design models")]:
+        """The exact loop, and the models that are stable where it is not."""
+        if not self.driven.size:
+            where = "" if self.verdict.is_known_beyond else " in the frequency range"
+            return f"none: the exact loop is {self.verdict.verdict}{where}"
+        which = f"mode {self.first_mode}" if self.first_mode else "a pole below the first mode"
+        words = f"{which} is unstable in the exact loop, at {abs(self.driven[0]):.6g} rad/s"
+        if not self.content.size:
+            return f"{words}, and every model is unstable"
+        first, last = int(self.content[0]), int(self.content[-1])
+        models = f"models of {first} to {last} modes"
+        if first == last:
+            models = f"the model of {first} mode{'s' * (first > 1)}"
+        elif last - first + 1 != self.content.size:
+            models = f"{self.content.size} of the models up to {last} modes"
+        end = f"unstable from {self.shown_from} modes on" if self.shown_from else "the largest among them"
+        verb = "is" if first == last else "are"
+        return f"{words}; {models} {verb} stable, {end}"
+
+
+def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
+    """Return the verdict on the exact loop, and models of 1 to `most` flexible modes without their static remainder.
+
+    Such models are used for design: bare modes.  A delay is in them as a Pade approximation.
+    Raises ParameterError for an invalid law, where there is no loop, or none of finite order; ConvergenceError as
+    `stability` does.
+    """
+    (arm, _), law = arm_and_law(arm, law), as_law(law)
+    most = whole("modes", most, 1, MOST_SPILL_MODES, f"a whole number of modes, 1 to {MOST_SPILL_MODES}")
+    if law.is_improper:
+        remedy = "differentiates, and has no states; add a fast pole to den"
+        raise ParameterError(key="law", value=law.name, remedy=remedy)
+    verdict = stability(arm, law)
+    loop, numbers, unstable, rightmost = verdict.loop, np.arange(1, most + 1), [], []
+    slowest = REST_SHARE * float(modes(loop.arm, 1).natural_frequency[-1])
+    for number in numbers.tolist():
+        A, B, C, D = sensed_model(loop.arm, loop.law.signals, number)
+        poles = poles_of_model(loop, (A, B, C, 0 * D))
+        moving = poles[abs(poles) > slowest]
+        unstable.append(int((moving.real > UNDAMPED_SHARE * abs(moving)).sum()))
+        rightmost.append(moving[np.argmax(moving.real)])
+    return Spill(verdict, numbers, np.array(unstable), np.array(rightmost))

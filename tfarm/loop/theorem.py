@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     Poly = Any  # of sympy, over the rationals: it comes without types, and is imported where it is used
 
 MOST_EXACT_DEGREE = 40  # degree: exact arithmetic with such polynomials takes a moment
+KIND = Quantity("kind", help="from the hub's angle or rate to its torque; none where no sign is shown")
 TAKES, CONSERVES, GIVES = 1, 0, -1  # energy that a law takes from every mode with motion of the hub: its sign
 
 
@@ -64,13 +65,12 @@ class Signs:
     """The `kind` of a law in s on hub angle and hub rate, and the `reason`.
 
     "strictly passive": Re of the law on the rate is above 0 at all frequencies; "passive": nowhere below;
-    "negative imaginary": -C strictly so on the angle, with C(0) = `at_rest` [N m/rad]; "" where none of these is shown.
-    `energy` of each mode: the law TAKES, CONSERVES or GIVES it; None where that is not shown.
+    "negative imaginary": -C strictly so on the angle; "" where none of these is shown.  `energy` of each mode: the law
+    TAKES, CONSERVES or GIVES it; None where that is not shown.
     """
 
-    kind: Annotated[Literal["strictly passive", "passive", "negative imaginary", ""], Quantity("kind")]
-    reason: Annotated[str, Quantity("reason")]
-    at_rest: float = 0.0
+    kind: Annotated[Literal["strictly passive", "passive", "negative imaginary", ""], KIND]
+    reason: Annotated[str, Quantity("reason", help="property of the controller that decides the kind")]
     energy: int | None = None
 
 
@@ -165,7 +165,7 @@ def signs_of(law: Law, friction: float = 0.0) -> Signs:
         return passive
     if is_hurwitz(den) and num.degree() <= den.degree() and definite(on_axis(num, den)[1]) == "above":
         words = "the law on the hub's angle, with its sign changed, is strictly negative imaginary"
-        return Signs("negative imaginary", words, float(num.eval(0) / den.eval(0)), TAKES)
+        return Signs("negative imaginary", words, TAKES)
     return passive or Signs("", "neither passive nor negative imaginary")
 
 
@@ -173,14 +173,14 @@ def _of_signs(rate: float, at_rest: float) -> Signs:
     """The signs of a law without poles right of the axis, by that of Re on the rate and by its value at rest."""
     if rate > 0 and at_rest >= 0:
         words = "the law on the hub's rate dissipates energy at every frequency (strictly positive real)"
-        return Signs("strictly passive", words, at_rest, TAKES)
+        return Signs("strictly passive", words, TAKES)
     if rate == 0 and at_rest >= 0:
         words = "the law on the hub's rate supplies energy at no frequency (positive real)"
-        return Signs("passive", words, at_rest, CONSERVES)
+        return Signs("passive", words, CONSERVES)
     if rate < 0:
         return Signs("", "neither passive nor negative imaginary")
     # Re > 0 on the whole axis but 0: a pole crosses that at s = 0 alone, and only real poles are unstable
-    return Signs("", "the static stiffness of the law is negative", at_rest, TAKES if rate else CONSERVES)
+    return Signs("", "the static stiffness of the law is negative", TAKES if rate else CONSERVES)
 
 
 def _positive_real(num: Poly, den: Poly) -> Signs | None:
@@ -214,10 +214,10 @@ class Lyapunov:
     """
 
     loop: Loop
-    proven: Annotated[bool, Quantity("stability proven")]
-    a1_over_a2: Annotated[float | None, Quantity("weights a1/a2")]
+    proven: Annotated[bool, Quantity("stability proven", help="no pole in the right half-plane, as V never grows")]
+    a1_over_a2: Annotated[float | None, Quantity("weights a1/a2", help="1 - K2, of the energies in V")]
     kind: Literal["dissipated", "conserved", "unproven"]
-    reason: Annotated[str, Quantity("reason")]
+    reason: Annotated[str, Quantity("reason", help="sign of V_t, or the term of V or V_t that has no sign")]
 
 
 def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:

@@ -14,13 +14,15 @@ from functools import cached_property
 
 import numpy as np
 
-from tfarm.arm import LISTED, RATE_GAIN, AnyLaw, Arm, Law, arm_and_law, full_law
+from tfarm.arm import LISTED, NAMES, RATE_GAIN, AnyLaw, Arm, Law, arm_and_law, full_law, unit_of
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.characteristic import Analytic
+from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum.box import Box, winding_number, zeros_in_box
+from tfarm.spectrum.naming import settled
 from tfarm.spectrum.table import first_frequency
 
 from .loop import NEAREST_TO_ORIGIN, ORDER_READ_AT, Loop, band_of, by_differences
@@ -31,11 +33,12 @@ ARM_PARAMETERS = {
     "payload_mass": "kg", "payload_inertia": "kg m^2", "hub_inertia": "kg m^2", "length": "m", "damping": "s"
 }  # fmt: skip
 HEIGHTS = (1.0, 1.013, 1.031, 1.057, 0.985, 1.09)  # of the box, until no pole is on its edge at the first value
-NEWTON_STEPS = 6  # from a guess of some digits: a pole that has not settled then is followed in shorter steps
-SETTLED = 1e-10  # of its size: one step more is taken where Newton's method still moves a pole by this
+
 SERIES_RADIUS, SERIES_POINTS = 0.2, 16  # of the first frequency: where a power series next to 0 is read off
 NO_PART = 1e-9  # of a pole's size: a smaller imaginary part is rounding
 EMPTY = Box(0.0, 0.0, 0.0, 0.0)
+FACTORS = {"all": "factor on all gains", "gain": "factor on the controller"}  # labels of these numbers
+Title = tuple[str, str]  # label and unit
 ARMS_KEPT = 200  # at values needed again: memory against time, of no effect on a result
 
 
@@ -80,6 +83,20 @@ class Varied:
     def is_of_arm(self) -> bool:
         """Whether the number is one of the arm."""
         return self.vary in ARM_PARAMETERS
+
+    @property
+    def unit(self) -> str:
+        """The SI unit of the number, "1" of a pure one."""
+        of_other = ARM_PARAMETERS | {"delay": "s"}
+        return unit_of(self.vary, self.arm) if self.vary in NAMES else of_other.get(self.vary, "1")
+
+    @property
+    def title(self) -> Title:
+        """Label and unit of the number, for a heading; a pure one has no unit."""
+        name = self.vary.removesuffix(".gain")
+        plain = name.replace("_", " ") if self.is_of_arm else name
+        is_factor = name.partition("@")[0] in OUTPUTS
+        return FACTORS.get(name, f"factor on {plain}" if is_factor else plain), self.unit.replace("1", "")
 
     @property
     def is_reactive(self) -> bool:
@@ -209,18 +226,8 @@ class Varied:
         for n in np.flatnonzero((wanted & (guess == 0)).any(axis=1)):
             leaving = wanted[n] & (guess[n] == 0)
             found[n, leaving] = self.slow(float(values[n]), int(leaving.sum()))
-        s, at = found[wanted], np.broadcast_to(values[:, None], guess.shape)[wanted]
-        still = np.ones(s.size, bool)
-        with np.errstate(all="ignore"):
-            for _ in range(NEWTON_STEPS):
-                there = self.function(s[still], at[still])
-                move = there.value / there.slope
-                s[still] -= np.where(s[still].imag == 0, move.real, move)
-                still[still] = ~(abs(move) <= SETTLED * abs(s[still]))
-                if not still.any():
-                    break
-        s[still | ~np.isfinite(s)] = np.nan
-        found[wanted], found[rests] = s, 0.0
+        found[wanted] = settled(self.function, found[wanted], np.broadcast_to(values[:, None], guess.shape)[wanted])
+        found[rests] = 0.0
         return found
 
     def slow(self, value: float, count: int) -> Complex:

@@ -17,7 +17,7 @@ from tfarm.errors import TfarmError
 from tfarm.loop.margins import Margins, loop_curve
 from tfarm.loop.nyquist import nyquist_of
 from tfarm.loop.poles import Poles, closed_loop_poles
-from tfarm.loop.spill import spill
+from tfarm.loop.stability import spill
 from tfarm.plots.frequency import draw_loop, draw_nyquist
 from tfarm.report.cases import Case, Controller, brief_on, margins_of, why_no_loop
 from tfarm.report.sections import Fact, PageSection, Picture, prose, upper

@@ -8,13 +8,14 @@ meets the fast zero of the overdamped mode, and the two oscillate again, in shea
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
-from tfarm.exact.characteristic import quick_characteristics
+from tfarm.exact.characteristic import Analytic, quick_characteristics
 from tfarm.exact.system import System
 
 from .box import REAL_SHARE, Function, newton
@@ -37,14 +38,17 @@ def function_of(k: System) -> Function:
     return lambda s: quick_characteristics(k, s, k.at_rest)
 
 
-def settled(function: Function, guess: Complex) -> Complex:
-    """Return the zero next to each guess (n,) by Newton's method, a real one for a real guess, or NaN."""
+def settled(function: Callable[..., Analytic], guess: Complex, *values: Real) -> Complex:
+    """Return the zero next to each guess (n,) by Newton's method, a real one for a real guess, or NaN.
+
+    The function is of s and, where these are given, of `values` (n,).
+    """
     s, still = guess.copy(), ~np.isnan(guess)
     with np.errstate(all="ignore"):
         for _ in range(NEWTON_STEPS):
             if not still.any():
                 break
-            there = function(s[still])
+            there = function(s[still], *(each[still] for each in values))
             move = there.value / there.slope
             s[still] -= np.where(s[still].imag == 0, move.real, move)
             still[still] = ~(abs(move) <= SETTLED * abs(s[still]))
