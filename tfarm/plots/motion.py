@@ -118,7 +118,7 @@ def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     ax.axhline(best, color=PURPLE, lw=1.2, ls=LONG_DASHED, label=f"best constant gain, {significant(best, 3)}")
     ax.axvline(found.trial.task.busy_until, color=INK, lw=0.8, ls=DOTTED)
     ax.axhline(0.0, color=GREY, lw=0.7)
-    ax.set(xlim=(0.0, float(result.t[-1])), xlabel=TIME, ylabel=f"gain on the root moment, {MOMENT_GAIN} [-]")
+    ax.set(xlim=(0.0, float(result.t[-1])), xlabel=TIME, ylabel=f"gain on the root moment, {MOMENT_GAIN} [−]")
 
 
 def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap]) -> Figure:
@@ -156,5 +156,5 @@ def draw_curves(curves: LearningCurves, tuning: Tuning) -> Figure:
             (tuning.bound.cost, INK, "linear-quadratic optimum: lower bound"),
         ):
             ax.axhline(cost, color=colour, lw=1.2, ls=LONG_DASHED, zorder=2.5, label=f"{label}, {significant(cost, 3)}")
-        ax.set(xlim=(1, max(2, trial[-1])), xlabel="trial", ylim=(0.0, top), ylabel="cost of a trial")
+        ax.set(xlim=(1, max(2, trial[-1])), xlabel="trial", ylim=(0.0, top), ylabel="cost of a trial [−]")
     return figure

@@ -17,7 +17,7 @@ from scipy import ndimage
 from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback
 from tfarm.arrays import Real
 from tfarm.crossing import Window, pieces
-from tfarm.digits import plain, significant
+from tfarm.digits import how_many, plain, significant
 from tfarm.dsp import GainMap
 from tfarm.loop.plane import (
     INFINITE,
@@ -30,15 +30,18 @@ from tfarm.loop.plane import (
     static_edges,
 )
 
-from .style import BLUE, GREY, INK, LYAPUNOV, ORANGE, PURPLE, name_axes, picture, plain_ticks, safe
+from .style import BLUE, GREY, INK, LYAPUNOV, ORANGE, PURPLE, law_words, name_axes, picture, plain_ticks, safe
 
 STABLE_COLOUR, FEWEST_COLOUR, MOST_COLOUR, BOUNDLESS_COLOUR = "#dcefe6", "#fbeadd", "#eebd95", "#f3d9c6"
 CONTOUR_STEPS, MOST_CONTOURS = (1.0, 2.0, 5.0), 7  # of the contours
 LEAST_NAMED = 12  # points of a contour with a number, on a grid of about 50 by 60
+LABEL_SHARES = (0.5, 0.35, 0.65, 0.2, 0.8)  # of a contour's length: where its number may stand, the best first
+NUMBER_ROOM = (0.08, 0.045)  # of the picture's width and height, from one number on a contour to the next
 LEAST_ROOM = 0.028  # of the picture's width or height: the count of a region with less around its middle is not written
 NEAR_MIDDLE = 0.9  # of the most room in a region: as good a place
 RESTING_NAMED = 3  # frequencies of the hub at rest in the legend, at their common edge
 NUMBERS_UP, NUMBERS_ACROSS = 0.05, 0.14  # shares of the picture between two frequencies up it, and across it
+MOST_PATCHES = 6  # counts of unstable poles with an entry of the legend each
 DIAMOND, STAR = "D", "*"  # of controllers
 HALO: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]  # around numbers on a line
 
@@ -49,7 +52,7 @@ def _title(found: Plane | GainMap) -> str:
         return f"{found.loop.plant.arm.name}: unstable poles when sampled every {ms} ms, first {found.modes_used} modes"
     if found.is_of_gains:
         return f"{found.arm.name}: unstable poles over the plane of both gains"
-    return f"{found.arm.name}: unstable poles below {significant(found.band, 5)} rad/s under {found.law.name}"
+    return f"{found.arm.name}: unstable poles below {significant(found.band, 5)} rad/s under {law_words(found.law)}"
 
 
 @picture((Plane | GainMap, "tfarm.map returns"), title=_title)
@@ -62,6 +65,7 @@ def gain_map(found: Plane | GainMap, *, ax: Axes) -> None:
     x, y = map(Axis.of, found.axes)
     if isinstance(found, GainMap):
         _counts(found, found.counts, ax)
+        name_axes(found.vary, found.loop.plant.arm, found.loop.law, ax)
     else:
         ground(found, x, y, ax)
         if found.is_of_gains:
@@ -81,30 +85,33 @@ def ground(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
             plain_ticks(name)
     _counts(found, found.unstable, ax)
     ax.set(xlim=(x.low, x.high), ylim=(y.low, y.high))
-    if found.is_of_gains:
-        name_axes(found.arm, ax)
+    name_axes(found.vary, found.arm, found.law, ax)
     if not x.is_linear and x.low < x.linear:
         ax.set_xlabel(f"{ax.get_xlabel()}; linear up to {plain(x.linear)}, logarithmic beyond")
 
 
 def _counts(found: Plane | GainMap, counts: NDArray[np.int64], ax: Axes) -> None:
-    """The colours of the counts (rows, columns), and each where it has most room."""
-    ax.pcolormesh(found.x, found.y, colours(counts), shading="nearest", rasterized=True, zorder=0.1)
+    """The colours of the counts (rows, columns), and in each region, where it has most room, its count."""
+    image = colours(counts)
+    ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True, zorder=0.1)
     ax.grid(False)
-    ax.set(xlabel=safe(found.vary[0]), ylabel=safe(found.vary[1]))
+    number = 0
     for count in np.unique(counts).tolist():
-        if count == 0:
-            ax.fill_between([], [], [], color=STABLE_COLOUR, label="stable")
-            continue
-        ax.fill_between([], [], [], color=FEWEST_COLOUR, label="number of unstable poles")
-        room = ndimage.distance_transform_edt(np.pad(counts == count, 1), np.divide(1, counts.shape))[1:-1, 1:-1]
-        if room.max() > LEAST_ROOM:
-            middles = np.argwhere(room > NEAR_MIDDLE * room.max())
-            row, column = min(middles, key=lambda at: abs(at - middles.mean(axis=0)).sum())
-            ax.text(
-                found.x[column], found.y[row], "∞" if count == INFINITE else str(count), fontsize=9.0, ha="center",
-                va="center", clip_on=True,
-            )  # fmt: skip
+        inside, text = counts == count, "∞" if count == INFINITE else str(count)
+        label = "infinitely many unstable poles (∞)" if count == INFINITE else how_many(count, "unstable pole")
+        number += count > 0
+        if number <= MOST_PATCHES:
+            ax.fill_between([], [], [], color=image[inside][0], label=label if count else "stable")
+        elif count == counts.max():
+            ax.fill_between([], [], [], color=MOST_COLOUR, label=f"more unstable poles, at most {count}")
+        regions, last = ndimage.label(inside)
+        room = ndimage.distance_transform_edt(np.pad(inside, 1), np.divide(1, counts.shape))[1:-1, 1:-1]
+        for region in range(1, last + 1) if count else ():
+            own = np.where(regions == region, room, 0.0)
+            if own.max() > LEAST_ROOM:
+                middles = np.argwhere(own > NEAR_MIDDLE * own.max())
+                row, column = min(middles, key=lambda at: abs(at - middles.mean(axis=0)).sum())
+                ax.text(found.x[column], found.y[row], text, fontsize=9.0, ha="center", va="center", clip_on=True)
 
 
 def colours(unstable: NDArray[np.int64]) -> Real:
@@ -128,10 +135,20 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
         across, up, logarithm, np.log(levels[-MOST_CONTOURS:]), colors=BLUE, linewidths=0.9, linestyles="-", zorder=2.5
     )
     longest = (max(pieces, key=len) for pieces in lines.allsegs if pieces)
-    middles = [piece[len(piece) // 2] for piece in longest if len(piece) > LEAST_NAMED]
-    for text in ax.clabel(lines, fontsize=8.0, fmt=lambda log: f"{plain(100 * math.exp(log), 3)} %", manual=middles):
+    places: list[Real] = []
+    for piece in longest:
+        along = (piece[int(share * len(piece))] for share in LABEL_SHARES if len(piece) > LEAST_NAMED)
+        places += next(([at] for at in along if _is_free(at, places, ax)), [])
+    for text in ax.clabel(lines, fontsize=8.0, fmt=lambda log: f"{plain(100 * math.exp(log), 3)} %", manual=places):
         text.set(path_effects=HALO, zorder=6)
     ax.plot([], [], color=BLUE, lw=0.9, label="least damping ratio of the first two modes")
+
+
+def _is_free(at: Real, places: Sequence[Real], ax: Axes) -> bool:
+    """Whether a number there touches none of those at the other places."""
+    frame = ax.transData - ax.transAxes
+    away = (abs(frame.transform(place) - frame.transform(at)) > NUMBER_ROOM for place in places)
+    return all(each.any() for each in away)
 
 
 def draw_boundary(found: Plane, points: Real, x: Axis, y: Axis, ax: Axes) -> None:

@@ -123,7 +123,7 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
     plain_ticks(ax.xaxis)
     ax.grid(False)
     ax.axhline(0.0, color=GREY, lw=0.7, zorder=3.5)
-    name_axes(continuous.arm, ax)
+    name_axes(PLANE, continuous.arm, continuous.law, ax)
     ax.set_title(CONVENTION, loc="right", fontsize=8.5, color=GREY)
     draw_region(
         continuous.x, continuous.stable_intervals, ORANGE, "stable, continuous: every mode", ax, width=0.9,
@@ -161,8 +161,8 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
     """Magnitude, phase and map of both (from `tfarm.compare`), in three axes, those given or new ones: these.
 
     Of two arms the exact responses, of two laws the loop functions L; the map is that of both gains, with exact edges,
-    or, where a law is more than these gains, or one in z, of a factor on each law and its further delay.  With a law
-    in z all is of the loops at their samples.
+    or, where a law is more than these gains, or one in z, of a factor on each controller and its further delay.  With
+    a law in z all is of the loops at their samples.
     """
     upper, lower, right = ax
     names = [side.name for side in data.sides]
@@ -170,7 +170,7 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
         bode(dict(zip(names, data.responses, strict=True)), ax=(upper, lower))
     else:
         draw_loops(dict(zip(names, (side.loop_function for side in data.sides), strict=True)), upper, lower)
-        upper.set_ylabel("|L| at the samples" if data.is_sampled else "|L|, loop opened at the input")
+        upper.set_ylabel("|L| at the samples [−]" if data.is_sampled else "|L|, loop opened at the input [−]")
     upper.set_xlabel("")
     right.grid(False)
     if data.is_sampled or data.regions is None:
@@ -183,14 +183,16 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
         assert side.gains is not None
         right.plot(*side.gains.point, "o", mfc=colour, mec="white", ms=7.5, zorder=7)
     right.set(xlim=(first.x[0], first.x[-1]), ylim=(first.y[0], first.y[-1]))
-    name_axes(data.one.arm, right)
+    name_axes(PLANE, first.arm, first.law, right)
 
 
 def _factors(data: Comparison, ax: Axes) -> None:
-    """Factors that keep each loop stable, over the further delay of its law."""
+    """Factors that keep each loop stable, over the further delay of its controller."""
     for found, side, colour in zip(data.reaches, data.sides, COLOURS, strict=False):
         draw_region(1e3 * found.delay, found.stable_intervals, colour, f"{side.name}: stable", ax)
-    ax.plot([0.0], [1.0], "o", mfc=INK, mec="white", ms=7.5, zorder=7, clip_on=False, label="the laws as they are")
+    ax.plot(
+        [0.0], [1.0], "o", mfc=INK, mec="white", ms=7.5, zorder=7, clip_on=False, label="the controllers as they are"
+    )
     ax.axhline(1.0, color=INK, lw=0.6)
     limits = {"xlim": (0.0, 1e3 * data.reaches[0].delay[-1]), "ylim": (0.0, min(ax.get_ylim()[1], MOST_DRAWN))}
-    ax.set(xlabel="further delay [ms]", ylabel="factor on the law", **limits)
+    ax.set(xlabel="further delay [ms]", ylabel="factor on the controller [−]", **limits)

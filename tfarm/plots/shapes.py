@@ -21,10 +21,10 @@ from tfarm.spectrum import Modes
 from .style import BLUE, FAINT, GREEN, GREY, INK, ORANGE, PURPLE, page, picture, plain_ticks
 
 SHAPE_POINTS = 401  # of a drawn mode: about one to a pixel of its picture
-ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [-]"
+ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [−]"
 HUB_RADIUS = 0.055  # radius of the drawn hub, and half the payload's side, as shares of the length
 SEGMENT_COLOURS = ("#cfe0ee", "#e3ecd5")  # colours of neighbours
-LEFT, RIGHT, HALF_HEIGHT = -0.2, 0.2, 0.16  # room left of the hub, right of the tip, and above and below at least
+LEFT, RIGHT, HALF_HEIGHT = -0.2, 0.2, 0.15  # room left of the hub, right of the tip, and above and below at least
 HUB_WIDTH = 0.06  # width of the drawn hub, as a share of the length
 
 
@@ -69,8 +69,9 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
             one.plot(length, w[-1], "s", ms=8.0, mfc=GREY, mec="none", zorder=3)
         one.plot(found.nodes[row], 0 * found.nodes[row], "o", ms=5.5, mfc="white", mec=ORANGE, mew=1.3, zorder=4)
         one.set(xlim=(-0.085 * length, 1.11 * length), ylim=(-1.28, 1.28), yticks=[-1, 0, 1])
+        one.xaxis.set_major_locator(MaxNLocator(5))
         omega, hertz = (significant(float(of[row]), 7) for of in (found.natural_frequency, found.natural_frequency_hz))
-        places = ", ".join(plain(round(float(node), 4), 3) for node in found.nodes[row]) or "none"
+        places = ", ".join(plain(float(node), 3) for node in found.nodes[row]) or "none"
         one.set_title(f"Mode {number}:  {omega} rad/s  ({hertz} Hz)\nnodes [m]: {places}", fontsize=9.5)
         if not one.figure.get_supylabel():
             one.set(xlabel=ALONG, ylabel=DISPLACEMENT)
@@ -90,7 +91,7 @@ def draw_differences(name: str, differences: Mapping[str, Real]) -> Figure:
             ax.set_yscale("log")
             plain_ticks(ax.yaxis)
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-        ax.set(xlabel="mode", ylabel="frequency above Timoshenko's [%]")
+        ax.set(xlabel="mode number", ylabel="frequency above Timoshenko's [%]")
     return figure
 
 
@@ -118,7 +119,7 @@ def _depth(link: Link) -> float:
 
 @picture(
     (Arm, "tfarm.load returns"),
-    size=lambda arm: (9.0, 0.2 + 9.0 * np.ptp(_ends(arm)[2:]) / np.ptp(_ends(arm)[:2])),
+    size=lambda arm: (9.0, 0.55 + 9.0 * np.ptp(_ends(arm)[2:]) / np.ptp(_ends(arm)[:2])),
     title=lambda _: "",
 )
 def sketch(arm: Arm, *, ax: Axes) -> None:
@@ -128,7 +129,6 @@ def sketch(arm: Arm, *, ax: Axes) -> None:
     ax.set_axis_off()
     ax.axhline(0, color=FAINT, lw=0.8, ls=(0, (6, 3, 1, 3)), zorder=0)
     _link(arm, ax)
-    _payload(arm, ax)
     ax.add_patch(Circle((0, 0), HUB_RADIUS, fc="#e9e9e9" if arm.hub.inertia else "white", ec=INK, lw=1.2, zorder=3))
     ax.plot(0, 0, "o", ms=3.5, color=INK, zorder=4)
     turn: dict[str, Any] = {
@@ -140,11 +140,11 @@ def sketch(arm: Arm, *, ax: Axes) -> None:
     }
     ax.add_patch(FancyArrowPatch((0.085, -0.055), (-0.055, 0.085), zorder=4, **turn))
     ax.text(-0.07, 0.08, "θ" if arm.is_locked else "u", color=ORANGE, ha="right", va="bottom", fontsize=11)
-    text = (
+    hub = (
         f"hub  $I_h$ = {plain(arm.hub.inertia, 6)} {unit('kg m^2')}" if arm.hub.inertia else "free pin, no hub inertia"
     )
-    text = "hub locked: driven by its angle" if arm.is_locked else text
-    ax.text(0.13, high - 0.04, text, fontsize=9.0, color=INK)
+    lines = ("hub locked: driven by its angle" if arm.is_locked else hub, _payload(arm, ax))
+    ax.set_title("\n".join(lines), fontsize=9.0, color=INK)
 
 
 def _link(arm: Arm, ax: Axes) -> None:
@@ -172,18 +172,15 @@ def _link(arm: Arm, ax: Axes) -> None:
     ax.text(root + 0.5, below - 0.012, text, ha="center", va="top", fontsize=9.0, color=INK)
 
 
-def _payload(arm: Arm, ax: Axes) -> None:
-    """The mass at the tip, or beyond it, with its numbers; a triangle below one that is pinned."""
+def _payload(arm: Arm, ax: Axes) -> str:
+    """The mass at the tip, or beyond it: its numbers in words."""
     mass, inertia, offset = arm.payload.mass, arm.payload.inertia, arm.payload.offset
+    if not (mass or inertia):
+        return "free tip, no payload"
     tip = 1 + arm.hub.radius / arm.length
-    at = tip + offset / arm.length
-    text = "free tip, no payload"
-    if mass or inertia:
-        masses = "tip pinned" if math.isinf(mass) else f"m = {plain(mass, 6)} kg"
-        turns = "tip cannot rotate" if math.isinf(inertia) else f"$I_c$ = {plain(inertia, 6)} {unit('kg m^2')}"
-        text = f"payload  {masses},  {turns}" + (f",  e = {plain(offset, 6)} m" if offset else "")
-        side = max(0.03, min(HUB_RADIUS, max(map(_depth, arm.links)) / arm.length * 0.75))
-        ax.plot([tip, at], [0, 0], color=INK, lw=2.0, zorder=2.5)
-        ax.add_patch(Rectangle((at - side, -side), 2 * side, 2 * side, fc="#8c8c8c", ec=INK, lw=1.0, zorder=3))
-    _, right, _, high = _ends(arm)
-    ax.text(right - 0.15, high - 0.04, text, ha="right", fontsize=9.0, color=INK)
+    at, side = tip + offset / arm.length, max(0.03, min(HUB_RADIUS, max(map(_depth, arm.links)) / arm.length * 0.75))
+    ax.plot([tip, at], [0, 0], color=INK, lw=2.0, zorder=2.5)
+    ax.add_patch(Rectangle((at - side, -side), 2 * side, 2 * side, fc="#8c8c8c", ec=INK, lw=1.0, zorder=3))
+    masses = "tip pinned" if math.isinf(mass) else f"m = {plain(mass, 6)} kg"
+    turns = "tip cannot rotate" if math.isinf(inertia) else f"$I_c$ = {plain(inertia, 6)} {unit('kg m^2')}"
+    return f"payload  {masses},  {turns}" + (f",  e = {plain(offset, 6)} m" if offset else "")

@@ -27,7 +27,9 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from tfarm.arm import GAINS, LISTED, PLANE, AnyLaw, Arm, as_law, shown_unit
 from tfarm.digits import plain
 from tfarm.errors import ParameterError
+from tfarm.exact.outputs import OUTPUTS
 from tfarm.files import write_file
+from tfarm.loop.varied import ARM_PARAMETERS
 from tfarm.schema import quantities
 
 INK, GREY, FAINT = "#1a1a1a", "#6b6b6b", "#d4d4d4"
@@ -73,6 +75,10 @@ LETTERS_PER_INCH = 11.5  # of a headline
 
 LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)  # proven by the argument of the paper at C = 0
 NOT_THE_PAPERS = ("hub_angle",)  # outputs whose gain is an extension of the paper's law: named where it is used
+UNNAMED = "law"  # of a law without a name
+FACTORS = ("gain", "all")  # on a whole controller
+OTHER_UNITS = ARM_PARAMETERS | {"delay": "s"}  # of numbers that vary
+NUMBER_OF_LAW = re.compile(r"(.*?)(?:\.(gain|num|den)(?:\.(\d+))?)?")  # signal, what of it, and a coefficient's place
 
 METADATA: dict[str, dict[str, str | None]] = {
     "svg": {"Date": None, "Creator": "tfarm"},
@@ -228,20 +234,58 @@ def plain_ticks(axis: Axis, digits: int = 3, subs: Sequence[float] = (1.0,)) -> 
     axis.set_minor_formatter(NullFormatter())
 
 
+def law_words(law: AnyLaw) -> str:
+    """A controller by its name, where it has one of its own."""
+    name = as_law(law).name
+    return "the controller" if name == UNNAMED else name
+
+
 def gains_words(law: AnyLaw, digits: int = 4, but: str = "") -> str:
     """Each gain with its value, for reading; `but` names one that varies and is left out.  Another law by its name."""
     any_law = as_law(law)
     if any_law.gains is None:
-        return f"{any_law.name}, of {', '.join(any_law.signals)}"
+        return f"{law_words(law)}, of {', '.join(any_law.signals)}"
     gains = any_law.gains
     named = [gain.name for gain in LISTED if gains[gain.name] or gain.output not in NOT_THE_PAPERS]
     return ", ".join(f"{name} = {plain(gains[name], digits)}" for name in named if name != but)
 
 
-def name_axes(arm: Arm, ax: Axes) -> None:
-    """Along the axes of the plane of gains: their names, their signals and their units."""
-    outputs = {gain.name: gain.output.replace("_", " ") for gain in GAINS}
-    across, up = (f"{name}, gain on the {outputs[name]} [{shown_unit(name, arm) or '−'}]" for name in PLANE)
+def signal_label(name: str) -> str:
+    """A signal in words: the label of that output, with its place along the link, or an input of the hub."""
+    output, _, x = name.partition("@")
+    label = OUTPUTS[output].label if output in OUTPUTS else output.replace("_", " ")
+    return label.replace("at x", f"at x = {x} m")
+
+
+def number_label(name: str, arm: Arm, law: AnyLaw) -> str:
+    """A number of a controller or of the arm with its SI unit, for an axis.
+
+    The coefficient of s^k in the denominator counts as s^k, in the numerator as the unit of a gain times s^k.
+    """
+    for gain in GAINS:
+        if gain.name == name:
+            return f"{name}, gain on the {signal_label(gain.output)} [{shown_unit(name, arm) or '−'}]"
+    if name in OTHER_UNITS:
+        return f"{name.replace('_', ' ')} [{OTHER_UNITS[name]}]"
+    signal, of, place = NUMBER_OF_LAW.fullmatch(name).groups("")  # type: ignore[union-attr]
+    any_law = as_law(law)
+    if not place and signal not in any_law.part_gains:
+        return f"{name}, factor on the {'controller' if signal in FACTORS else signal_label(signal)} [−]"
+    (block,) = (part.block for part in any_law.parts if part.signals == (signal,))
+    power = len(getattr(block, of)) - 1 - int(place) if place and not any_law.is_discrete else 0
+    unit = "" if of == "den" else ratio(arm.input_unit, OUTPUTS[signal.partition("@")[0]].unit)
+    time = {0: "", 1: "s"}.get(power, f"s^{power}")
+    return f"{name} [{f'({unit}) {time}' if unit and time else unit or time or '−'}]"
+
+
+def ratio(above: str, below: str) -> str:
+    """One unit over another, such as m/s^2/(N m)."""
+    return f"{above}/{f'({below})' if ' ' in below or '/' in below else below}"
+
+
+def name_axes(vary: Sequence[str], arm: Arm, law: AnyLaw, ax: Axes) -> None:
+    """Along the axes of a plane of two numbers: their names and units."""
+    across, up = (safe(number_label(name, arm, law)) for name in vary)
     ax.set(xlabel=across, ylabel=up)
 
 
