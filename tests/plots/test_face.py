@@ -3,6 +3,7 @@
 import importlib
 import inspect
 import pkgutil
+import re
 
 import matplotlib as mpl
 import numpy as np
@@ -20,6 +21,7 @@ from tfarm.fitting.data import Measured
 from tfarm.loop.loci import reduced_locus
 from tfarm.loop.nyquist import compressed
 from tfarm.plots.plane import colours
+from tfarm.plots.style import number_label
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner import Plan
 
@@ -84,6 +86,9 @@ def test_axes_given_are_the_axes_returned_and_nothing_else_is_opened(name, recor
     returned = getattr(tfarm.plots, name)(*record, ax=given)
     assert as_tuple(returned) == as_tuple(given)
     assert all(ax.lines or ax.images or ax.collections for ax in as_tuple(returned))
+    axes = [axis for ax in as_tuple(given) if ax.axison for axis in (ax.xaxis, ax.yaxis)]
+    named = [axis for axis in axes if axis.get_ticklocs().size and axis.get_tick_params().get("labelbottom", True)]
+    assert [axis for axis in named if not re.search(r"\w.* \[.+\]", axis.get_label_text())] == []  # quantity, unit
     assert pyplot.get_fignums() == []
 
 
@@ -132,6 +137,28 @@ def test_words_overlap_nothing_without_damping_or_torque(name):
     told = {name: complaints(each.get_figure()) for name, each in axes.items()}
     pyplot.close("all")
     assert told == {name: [] for name in axes}
+
+
+@pytest.mark.parametrize(
+    ("number", "label"),
+    [
+        ("K2", "K2, gain on the root moment [−]"),
+        ("delay", "delay [s]"),
+        ("payload_mass", "payload mass [kg]"),
+        ("gain", "gain, factor on the controller [−]"),
+        ("hub_angle.gain", "hub_angle.gain, factor on the hub angle [−]"),
+        ("hub_rate", "hub_rate [N m/(rad/s)]"),
+        ("hub_angle.num.0", "hub_angle.num.0 [(N m/rad) s]"),
+        ("hub_angle.num.1", "hub_angle.num.1 [N m/rad]"),
+        ("hub_angle.den.0", "hub_angle.den.0 [s]"),
+        ("strain@0.05.den.0", "strain@0.05.den.0 [s^2]"),
+        ("strain@0.05.den.2", "strain@0.05.den.2 [−]"),
+    ],
+)
+def test_a_number_of_a_law_has_its_unit(number, label):
+    """Of num.0 s + num.1 over den.0 s + 1, from an angle to a torque; checked by hand."""
+    law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "hub_rate": 0.4, "strain@0.05": ([1.0], [1e-4, 0.02, 1.0])})
+    assert number_label(number, LAB, law) == label
 
 
 LEAD = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_deflection": ([0.5], [0.02, 1.0])})

@@ -95,7 +95,7 @@ def draw_card(data: Bode) -> Figure:
     with page(4.4, 2.5, "") as (figure, ax):
         draw_magnitude(data, ax=ax)
         ax.set_ylabel(f"|{data.label}| [{data.gain_unit}]", fontsize=8.5)
-        for each in (ax.get_legend(), *ax.texts, *ax.child_axes):
+        for each in (ax.legend(), *ax.texts, *ax.child_axes):
             each.set_visible(False)
     return figure
 
@@ -128,8 +128,6 @@ def draw_magnitude(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
     if first.is_zero:
         ax.text(0.5, 0.5, "zero at every frequency", ha="center", va="center", transform=ax.transAxes)
     hertz_axis(ax, 1.0 + NUMBER_STRIP)
-    starts_low = abs(first.value[0]) < math.sqrt(low * high)
-    ax.legend(loc="upper left" if starts_low else "lower left")
 
 
 def draw_phase(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
@@ -349,9 +347,8 @@ def _over_measured(
     margin = 0.15 + (SPAN - 1) / 2 * np.ptp(within)
     upper.set(yscale="log", ylim=10 ** np.array([within.min() - margin, within.max() + margin]))
     upper.yaxis.set_minor_formatter(NullFormatter())
-    lower.set_xlabel(FREQUENCY_HZ)
     for ax in (upper, lower):
-        ax.set(xscale="log" if hertz[-1] > 5 * hertz[0] else "linear", xlim=hertz[[0, -1]])
+        ax.set(xscale="log" if hertz[-1] > 5 * hertz[0] else "linear", xlim=hertz[[0, -1]], xlabel=FREQUENCY_HZ)
         plain_ticks(ax.xaxis, 4, TICKS_A_DECADE)
 
 
@@ -382,7 +379,7 @@ def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
         curves = [(omega, problem.at(number, omega).computed(point)[0], looks) for point, looks in arms]
         _over_measured(one, curves, upper, lower)
         unit = Ratio(fit.arm, one.output, one.input).unit
-        upper.set(title=_ratio_label(one.output, one.input), ylabel=f"magnitude [{unit}]")
+        upper.set(title=_ratio_label(one.output, one.input), xlabel="", ylabel=f"magnitude [{unit}]")
 
 
 def draw_band(those: Possible, output: str) -> Figure:

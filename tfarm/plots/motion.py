@@ -66,8 +66,7 @@ def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", 
     for axes, label in zip(ax, labels, strict=True):
         axes.axvline(scenario.busy_until, color=INK, lw=0.8, ls=DOTTED)
         axes.axhline(0.0, color=GREY, lw=0.6)
-        axes.set(xlim=(0.0, float(scenario.t[-1])), ylabel=label)
-    motor.set_xlabel(TIME)
+        axes.set(xlim=(0.0, float(scenario.t[-1])), xlabel=TIME, ylabel=label)
     points, finer = min(traces.points_a_period(arm, run) for run in each.values())
     coarse = f"{plain(points, 2)} points a period of the fastest mode shown; between={finer} gives {POINTS_A_PERIOD}"
     moment.set_title(coarse if points < POINTS_A_PERIOD else "", loc="right", fontsize=8.0, color=GREY)

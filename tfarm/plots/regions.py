@@ -172,6 +172,7 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
         draw_loops(dict(zip(names, (side.loop_function for side in data.sides), strict=True)), upper, lower)
         upper.set_ylabel("|L| at the samples [−]" if data.is_sampled else "|L|, loop opened at the input [−]")
     upper.set_xlabel("")
+    upper.tick_params(labelbottom=False)  # the frequencies of the phase below
     right.grid(False)
     if data.is_sampled or data.regions is None:
         _factors(data, right)

@@ -1,4 +1,4 @@
-"""The common style of all pictures, whatever the user's own matplotlib settings are, figures to draw on, and files.
+"""The style of all pictures (tfarm.mplstyle), whatever the user's matplotlib settings are; figures, and files.
 
 The figure of a page does not touch pyplot: nothing global, nothing on a screen.  A picture drawn without `ax` is a
 figure of pyplot, so that a notebook shows it.  The same figure gives the same bytes on every run: fixed fonts, a fixed
@@ -36,39 +36,6 @@ INK, GREY, FAINT = "#1a1a1a", "#6b6b6b", "#d4d4d4"
 BLUE, ORANGE, GREEN, PURPLE = "#0060a8", "#c4500a", "#00795a", "#8a3b8f"  # distinct for the colour-blind too
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)  # of several records in one picture
 
-STYLE = {
-    "font.family": "DejaVu Sans",
-    "font.size": 10.0,
-    "mathtext.fontset": "dejavusans",
-    "axes.labelsize": 10.0,
-    "axes.titlesize": 10.5,
-    "axes.titlelocation": "left",
-    "axes.titlecolor": INK,
-    "axes.edgecolor": GREY,
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.8,
-    "axes.grid": True,
-    "axes.formatter.useoffset": False,  # full numbers at the ticks, with no "+3.322e4" to add
-    "axes.axisbelow": True,
-    "grid.color": "#e6e6e6",
-    "grid.linewidth": 0.6,
-    "xtick.color": GREY,
-    "ytick.color": GREY,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "xtick.labelsize": 9.0,
-    "ytick.labelsize": 9.0,
-    "lines.linewidth": 1.5,
-    "legend.fontsize": 9.0,
-    "legend.frameon": False,
-    "figure.constrained_layout.w_pad": 0.08,
-    "figure.constrained_layout.h_pad": 0.08,
-    "savefig.facecolor": "white",
-    "svg.hashsalt": "tfarm",
-    "svg.fonttype": "path",
-    "pdf.fonttype": 42,
-    "path.simplify": True,  # where a line strays less than a ninth of a pixel
-}
 
 WIDEST_LEGEND = 0.95  # of a figure's width: letters are a little wider or narrower in a file of other dots an inch
 LETTERS_PER_INCH = 11.5  # of a headline
@@ -90,6 +57,7 @@ COORDINATES, LONG_NUMBER, PATH_LETTER = (  # in an SVG
 )
 
 
+STYLE = Path(__file__).with_name("tfarm.mplstyle")
 style = partial(matplotlib.style.context, ["default", STYLE])  # whatever the user's own settings are
 
 
