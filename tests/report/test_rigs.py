@@ -8,6 +8,7 @@ import pytest
 from matplotlib.patches import Rectangle
 
 import tfarm
+from tests.plots.labels import complaints
 from tfarm import plots
 from tfarm.arm import Gauge, written_unit
 from tfarm.dsp import Chain
@@ -58,11 +59,10 @@ def test_the_sketch_has_each_segment_where_it_is_and_the_payload_at_its_centre()
     arm = RIGS["bench-rig"]
     ax = sketch(arm)
     boxes = [each for each in ax.patches if isinstance(each, Rectangle)]
-    starts = [each.get_x() * arm.length for each in boxes[:2]]
-    np.testing.assert_allclose(starts, [arm.hub.radius, arm.hub.radius + arm.link.length])
-    centre = (boxes[2].get_x() + boxes[2].get_width() / 2) * arm.length
-    assert centre == pytest.approx(arm.centre_distance)
-    assert ax.get_xlim()[1] * arm.length > arm.centre_distance
+    np.testing.assert_allclose([each.get_x() for each in boxes[:2]], [arm.hub.radius, arm.hub.radius + arm.link.length])
+    assert boxes[2].get_x() + boxes[2].get_width() / 2 == pytest.approx(arm.centre_distance)
+    assert ax.get_xlim()[1] > arm.centre_distance
+    assert complaints(ax.get_figure()) == []
 
 
 def test_free_lossy_and_locked_frequencies_are_those_of_the_commands():

@@ -22,7 +22,7 @@ from .style import BLUE, FIGURES, GREEN, GREY, INK, ORANGE, PURPLE, gains_words,
 
 ZOOMED = 4  # modes drawn on their own
 MODE_COLOURS = (INK, BLUE, GREEN, PURPLE, "#7a5a00", "#d81b60", "#1a9ec0", "#6d9b1f")  # one a mode, none twice
-HIGHER_COLOUR = "#9a9a9a"  # of all higher modes, which are not told apart
+HIGHER_COLOUR = "#9a9a9a"  # of all higher modes alike
 ROOM_AROUND = 0.12  # around a branch, as a share of its extent
 CROSS_AT_ZERO: dict[str, Any] = {"ls": "none", "marker": "x", "ms": 6, "mew": 1.4}  # without the varying feedback
 CIRCLE_AT_FIRST: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6, "mfc": "white", "mew": 1.2}  # at the start
