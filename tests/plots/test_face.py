@@ -22,7 +22,7 @@ from tfarm.dsp import sampled_map
 from tfarm.fitting.data import Measured
 from tfarm.loop.loci import reduced_locus
 from tfarm.loop.nyquist import compressed
-from tfarm.plots.plane import colours
+from tfarm.plots.regions import colours
 from tfarm.plots.style import number_label
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner import Plan

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import tfarm
 from tests.plots.labels import complaints
 from tfarm.plots.frequency import broken, draw_magnitude, draw_phase, magnitude_limits
 from tfarm.plots.shapes import scaled
-from tfarm.plots.style import blank, style
+from tfarm.plots.style import style
 from tfarm.response.frequency import bode, resonant_band
 
 
@@ -20,7 +21,7 @@ def data():
 @pytest.fixture
 def ax():
     with style():
-        yield blank(6, 4).subplots()
+        yield Figure().subplots()
 
 
 def line(ax, label):

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 import tfarm
@@ -14,7 +15,6 @@ from tfarm.arm import Gauge, written_unit
 from tfarm.dsp import Chain
 from tfarm.dsp.crossings import sampled_map
 from tfarm.plots.shapes import sketch
-from tfarm.plots.style import blank
 from tfarm.report.arm_section import arm_section, assumptions_section
 from tfarm.report.cases import Case, has_loop, sign_words
 from tfarm.report.modes_section import locked_table
@@ -97,7 +97,7 @@ def test_no_line_of_energy_where_it_is_no_argument(name):
     law = tfarm.default_gains(arm)
     K1, K2 = law.K1 * np.geomspace(0.5, 2.0, 3), np.linspace(-1.0, 2.0, 4)
     sampled = sampled_map(tfarm.sampled(arm, law).verdict.loop, K1, K2)
-    (ax,) = blank(6, 4).subplots(1, 1, squeeze=False).ravel()
+    ax = Figure().subplots()
     plots.overlay(tfarm.map(arm, K1, K2), sampled, ax=ax)
     words = " ".join(ax.get_legend_handles_labels()[1])
     assert ("proven by energy" in words) == arm.is_uniform

@@ -84,7 +84,7 @@ def _draw_curve(curve: TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, 
 def draw_measured_runs(title: str, each: Mapping[str, RunComparison]) -> Figure:
     """A column a controller: hub angle above, root moment below where it was measured."""
     moment = any(found.measured.root_moment.size for found in each.values())
-    grid = {"nrows": 1 + moment, "ncols": len(each), "sharex": "col", "sharey": "row", "squeeze": False}
+    grid: dict[str, Any] = {"nrows": 1 + moment, "ncols": len(each), "sharex": "col", "sharey": "row", "squeeze": False}
     with page(max(4.7 * len(each), 6.0), 6.0 if moment else 3.6, title, **grid) as (figure, axes):
         for column, (name, found) in zip(axes.T, each.items(), strict=True):
             measured, run = found.measured, found.run

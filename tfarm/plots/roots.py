@@ -43,7 +43,8 @@ def zoomed(exact: Locus) -> list[int]:
 def draw_loci(data: Loci) -> Figure:
     """All branches in one panel, and each mode enlarged in one of its own."""
     exact, fine, chosen = data.exact, rounded(data.exact), zoomed(data.exact)
-    with page(9.0, 5.8, _title(exact), mosaic="AABC;AADE", width_ratios=[1.7, 1.7, 1.3, 1.3]) as (figure, axes):
+    grid: dict[str, Any] = {"mosaic": "AABC;AADE", "width_ratios": [1.7, 1.7, 1.3, 1.3]}
+    with page(9.0, 5.8, _title(exact), make=Figure.subplot_mosaic, **grid) as (figure, axes):
         whole, *panels = axes.values()
         _panel(fine, exact, data.reduced, range(len(exact.branches)), whole)
         whole.set_title("all branches", fontsize=9.0)

@@ -61,17 +61,15 @@ STYLE = Path(__file__).with_name("tfarm.mplstyle")
 style = partial(matplotlib.style.context, ["default", STYLE])  # whatever the user's own settings are
 
 
-def blank(width: float, height: float, new: Callable[..., Figure] = Figure) -> Figure:
-    """An empty figure of that size [inches], its parts laid out so that no label is clipped."""
-    return new(figsize=(width, height), layout="constrained")
-
-
 @contextmanager
-def page(width: float, height: float, title: str, **grid: Any) -> Iterator[tuple[Figure, Any]]:
-    """A figure of that size [inches] with axes as `subplots` makes them of `grid`; after drawing, legend and title."""
+def page(
+    width: float, height: float, title: str, new: Callable[..., Figure] = Figure,
+    make: Callable[..., Any] = Figure.subplots, **grid: Any,
+) -> Iterator[tuple[Figure, Any]]:  # fmt: skip
+    """A figure of that size [inches] with the axes that `make` makes of `grid`; after drawing, legend and title."""
     with style():
-        figure = blank(width, height)
-        yield figure, figure.subplot_mosaic(**grid) if "mosaic" in grid else figure.subplots(**grid)
+        figure = new(figsize=(width, height), layout="constrained")  # so that no label is clipped
+        yield figure, make(figure, **grid)
         legend_below(figure)
         headline(figure, title)
 
@@ -92,9 +90,9 @@ def check_records(of: Sequence[tuple[Any, str]], found: Sequence[Any]) -> None:
     """Raise ParameterError where a record, or one of several in a list or by name, is not of its class."""
     for (kind, origin), value in zip(of, found, strict=False):
         values = list(value.values()) if isinstance(value, Mapping) else value
-        for each in (values or [None]) if isinstance(values, list | tuple) else [values]:
-            if not isinstance(each, kind):
-                raise ParameterError(key="plot", value=each, remedy=f"give what {origin}")
+        values = values if isinstance(values, list | tuple) else [values]
+        if not values or not all(isinstance(each, kind) for each in values):
+            raise ParameterError(key="plot", value=value, remedy=f"give what {origin}")
 
 
 def picture(
@@ -120,18 +118,14 @@ def picture(
         is_one = grid is None and len(rows) == 1
 
         def figure(*found: Any, new: Callable[..., Figure] = Figure, **how: Any) -> Figure:
-            with style():
-                width, height = size(*found) if callable(size) else size
-                drawn = blank(width, height, new)
-                if grid is None:
-                    drawn.subplots(len(rows), 1, sharex=True, height_ratios=rows)
-                else:
-                    grid(drawn, *found)
+            width, height = size(*found) if callable(size) else size
+            made: dict[str, Any] = {"nrows": len(rows), "sharex": True, "height_ratios": rows}
+            if grid is not None:
+                made = {"make": lambda figure: grid(figure, *found)}
+            with page(width, height, title(*found), new, **made) as (drawn, _):
                 draw(*found, ax=drawn.axes[0] if is_one else drawn.axes, **how)
                 for ax in drawn.axes[:-1] if grid is None else []:
                     ax.set_xlabel("")
-                legend_below(drawn)
-                headline(drawn, title(*found))
             return drawn
 
         @wraps(draw)
