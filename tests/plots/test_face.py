@@ -34,7 +34,7 @@ MICRO = Path(__file__).parents[1] / "data" / "reproductions" / "micro2.toml"
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
 LEAD = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_deflection": ([0.5], [0.02, 1.0])})
 AXES = {"comparison": 3, "bode": 2, "measured": 3, "modes": 3, "slew": 3}  # of a plot that has several
-OTHERS = [f"{name} of a rig" for name in ("bode", "nyquist", "locus", "gain_map")]
+OTHERS = [f"{name} of a rig" for name in ("gain_map", "nyquist", "bode", "locus")]
 OTHERS += ["locus of a law", "gain_map of a law"]
 
 
