@@ -22,7 +22,7 @@ from tfarm.dsp import sampled_map
 from tfarm.fitting.data import Measured
 from tfarm.loop.loci import reduced_locus
 from tfarm.loop.nyquist import compressed
-from tfarm.plots.regions import colours
+from tfarm.plots.regions import colours, contours
 from tfarm.plots.style import number_label
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner import Plan
@@ -229,6 +229,16 @@ def test_gain_map_draws_the_boundary_and_the_counts(records):
         if (here := found.unstable == count).any():
             assert drawn[label].get_facecolor()[0, :3] == pytest.approx(mesh.get_array()[here][0])
     assert {"stable", "2 unstable poles"} <= set(drawn)
+
+
+def test_numbers_of_crowded_contours_do_not_touch():
+    """Level lines, ever closer towards the upper edge."""
+    figure, place = Figure(), np.linspace(0.0, 1.0, 50)
+    ax = figure.subplots()
+    ax.set(xlim=(0, 1), ylim=(0, 1))
+    contours(place, place, np.tile(0.1 * (1.02 - place[:, None]) ** 1.2, 50), ax)
+    assert len(ax.texts) > 4
+    assert [each for each in complaints(figure) if " on '" in each] == []
 
 
 def test_locus_draws_the_branches_and_their_crossings(records):
