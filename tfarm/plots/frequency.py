@@ -100,13 +100,6 @@ def draw_card(data: Bode) -> Figure:
     return figure
 
 
-def draw_compared(main: Bode, other: Bode, labels: tuple[str, str]) -> Figure:
-    """Two responses of one output in one magnitude plot; the roots marked are those of the first."""
-    with page(9.0, 5.0, "") as (figure, ax):
-        draw_magnitude(dict(zip(labels, (main, other), strict=True)), ax=ax)
-    return figure
-
-
 def draw_magnitude(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
     """|G| on log scales: rad/s below, Hz above; roots on the axis, modes and cut-off are those of the first."""
     each = by_name(data, EXACT)
