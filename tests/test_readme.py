@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -21,14 +22,12 @@ ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def blocks(language: str) -> list[str]:
+def blocks(language):
     return re.findall(rf"^```{language}\n(.*?)^```", TEXT, flags=re.DOTALL | re.MULTILINE)
 
 
-def test_python_examples_run_one_after_the_other(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    names: dict[str, object] = {}
+def test_python_examples_run_one_after_the_other(capsys, monkeypatch, tmp_path):
+    names = {}
     monkeypatch.chdir(tmp_path)
     for block in blocks("python"):
         exec(compile(block, "README.md", "exec"), names)
@@ -39,16 +38,14 @@ def test_python_examples_run_one_after_the_other(
     shown = re.findall(r"# ((?:Simulation|Locus)\(finding='[^']*')", TEXT)
     assert len(shown) == 2
     assert all(each in out for each in shown)
-    assert names["shapes"].shape == (11, 201)  # type: ignore[attr-defined]
+    assert names["shapes"].shape == (11, 201)
 
 
 SHELL = [line.split("#")[0].strip() for block in blocks("sh") for line in block.splitlines() if line.strip()]
-
-
 COMMANDS = [line for line in SHELL if line.startswith("tfarm ")]
 
 
-def by_a_shell(line: str, folder: Path) -> tuple[int, str, str]:
+def by_a_shell(line, folder):
     command = line.replace("tfarm", f"{sys.executable} -c 'from tfarm.cli import main; main()'", 1)
     done = subprocess.run(
         ["bash", "-c", command], cwd=folder, env=os.environ, capture_output=True, text=True, check=False
@@ -68,7 +65,7 @@ QUICK = [
 
 
 @pytest.mark.parametrize("line", COMMANDS)
-def test_shell_examples_are_understood(line: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_shell_examples_are_understood(line, monkeypatch, tmp_path):
     """Verb, options and their values, of those too that only `make survey` runs."""
     monkeypatch.chdir(tmp_path)
     verb, *words = shlex.split(line)[1:]
@@ -79,13 +76,7 @@ def test_shell_examples_are_understood(line: str, monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize("line", QUICK)
-def test_shell_examples_run(
-    line: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    request: pytest.FixtureRequest,
-) -> None:
+def test_shell_examples_run(line, tmp_path, capsys, monkeypatch, request):
     """Without a process each, which are a second or two of imports, but for the first."""
     monkeypatch.chdir(tmp_path)
     if line == "tfarm audit":
@@ -100,9 +91,7 @@ def test_shell_examples_run(
 
 
 @pytest.mark.usefixtures("audited")
-def test_the_example_of_a_report_runs(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_example_of_a_report_runs(tmp_path, capsys, monkeypatch):
     """With two of its sections, no proof, no live page and empty scripts; the whole is the report of tests/report."""
     monkeypatch.chdir(tmp_path)
     for dear in ("save_proof", "save_live"):
@@ -118,14 +107,14 @@ def test_the_example_of_a_report_runs(
     assert (tmp_path / "pages" / "sasaki2012-lab" / "index.html").exists()
 
 
-def test_make_has_the_verbs_of_the_readme() -> None:
+def test_make_has_the_verbs_of_the_readme():
     done = subprocess.run(["make"], cwd=ROOT, capture_output=True, text=True, check=True)
     verbs = {line.split()[1] for line in done.stdout.splitlines()}
     assert {line.split()[1] for line in SHELL if line.startswith("make ")} <= verbs
     assert {"install", "reports", "modes", "bode", "test", "survey", "lint", "bench", "clean"} <= verbs
 
 
-def test_the_examples_of_an_arm_and_of_a_rig_are_arms(tmp_path: Path) -> None:
+def test_the_examples_of_an_arm_and_of_a_rig_are_arms(tmp_path):
     for name, toml in zip(("my-arm", "bench"), blocks("toml"), strict=True):
         file = tmp_path / f"{name}.toml"
         file.write_text(toml, encoding="utf-8")
@@ -135,11 +124,9 @@ def test_the_examples_of_an_arm_and_of_a_rig_are_arms(tmp_path: Path) -> None:
         assert tfarm.modes(arm, 1).natural_frequency[1] > 0
 
 
-def test_every_dependency_has_its_line() -> None:
-    import tomllib
-
+def test_every_dependency_has_its_line():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"]
     for requirement in [*project["dependencies"], *extras["dev"]]:
-        name = re.match(r"[A-Za-z0-9-]+", requirement).group()  # type: ignore[union-attr]
+        name = re.match(r"[A-Za-z0-9-]+", requirement).group()
         assert re.search(rf"\b{name}\b", TEXT), name

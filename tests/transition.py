@@ -43,7 +43,7 @@ def response(arm, s, outputs, digits=60, input=None):
     """
     with mpmath.workdps(digits + _growth(arm, s)):
         chain = _Chain(arm, mpmath.mpc(s), outputs, input)
-        root = _solved(*chain.equations())
+        root = list(mpmath.lu_solve(*map(mpmath.matrix, chain.equations())))
         return {wanted: chain.value(wanted, root) for wanted in outputs}
 
 
@@ -51,7 +51,7 @@ def determinant(arm, s, digits=60, input=None):
     """Zero at the eigenvalues of the arm whose input is held at zero; real on both axes where nothing is damped."""
     with mpmath.workdps(digits + _growth(arm, s)):
         matrix, _ = _Chain(arm, mpmath.mpc(s), (), input).equations()
-        return _eliminated(matrix, [mpf(0)] * len(matrix))[1]
+        return mpmath.det(mpmath.matrix(matrix))
 
 
 def transition(link, s, length, theory="timoshenko"):
@@ -289,35 +289,6 @@ def _series(p, q, x):
 def _product(A, B):
     columns = list(zip(*B, strict=True))
     return [[mpmath.fdot(zip(row, column, strict=True)) for column in columns] for row in A]
-
-
-def _eliminated(matrix, right):
-    """Gauss with the largest pivot of rows made equally large: upper rows with the right side, and the determinant."""
-    rows = [[*row, value] for row, value in zip(matrix, right, strict=True)]
-    n, determinant = len(rows), mpf(1)
-    for i, row in enumerate(rows):
-        scale = max(map(abs, row[:n])) or mpf(1)
-        rows[i] = [entry / scale for entry in row]
-        determinant *= scale
-    for i in range(n):
-        best = max(range(i, n), key=lambda k: abs(rows[k][i]))
-        if best != i:
-            rows[i], rows[best] = rows[best], rows[i]
-            determinant = -determinant
-        determinant *= rows[i][i]
-        for k in range(i + 1, n if rows[i][i] != 0 else i):
-            share = rows[k][i] / rows[i][i]
-            rows[k] = [a - share * b for a, b in zip(rows[k], rows[i], strict=True)]
-    return rows, determinant
-
-
-def _solved(matrix, right):
-    rows, _ = _eliminated(matrix, right)
-    n = len(rows)
-    x = [mpf(0)] * n
-    for i in reversed(range(n)):
-        x[i] = (rows[i][n] - mpmath.fdot(zip(rows[i][i + 1 : n], x[i + 1 :], strict=True))) / rows[i][i]
-    return x
 
 
 def _growth(arm, s):

@@ -16,27 +16,18 @@ PLACES = (
     ("peak_complementary", "peak_complementary_sensitivity"),
 )
 ENDS = (("0", "low"), ("1", "high"))
+INTERVALS = (
+    (rf"{GAIN}_interval%s", r"[\2].interval"),
+    (rf"{GAIN}_windows%s\[(\d+)\]", r"[\2].intervals[\3]"),
+    (r"windows\[(.+?)\].interval%s", r"[\2].interval"),
+    (r"windows\[(.+?)\].windows%s\[(\d+)\]", r"[\2].intervals[\3]"),
+)
 RENAMED = (
     # stability intervals, of gains at the hub and of the numbers of a law
-    *(("margins|compare", rf"{LOOP}{GAIN}_interval\[{n}\]", rf"\1stability_intervals[\2].interval.{end}")
-      for n, end in ENDS),
-    *(("margins|compare", rf"{LOOP}{GAIN}_interval_ends\[{n}\]", rf"\1stability_intervals[\2].interval.{end}_is")
-      for n, end in ENDS),
-    *(("margins|compare", rf"{LOOP}{GAIN}_windows\[(\d+)\]\[{n}\]", rf"\1stability_intervals[\2].intervals[\3].{end}")
-      for n, end in ENDS),
-    *(("margins|compare", rf"{LOOP}{GAIN}_windows_ends\[(\d+)\]\[{n}\]",
-       rf"\1stability_intervals[\2].intervals[\3].{end}_is")
-      for n, end in ENDS),
+    *(("margins|compare", rf"{LOOP}{old % ends}\[{n}\]", rf"\1stability_intervals{new}.{end}{kind}")
+      for old, new in INTERVALS for ends, kind in (("", ""), ("_ends", "_is")) for n, end in ENDS),
     ("margins|compare", rf"{LOOP}{GAIN}_looked_at(.*)", r"\1stability_intervals[\2].search_range\3"),
     ("margins|compare", rf"{LOOP}{GAIN}_band_rad_s", r"\1stability_intervals[\2].up_to_rad_s"),
-    *(("margins|compare", rf"{LOOP}windows\[(.+?)\].interval\[{n}\]", rf"\1stability_intervals[\2].interval.{end}")
-      for n, end in ENDS),
-    *(("margins|compare", rf"{LOOP}windows\[(.+?)\].interval_ends\[{n}\]",
-       rf"\1stability_intervals[\2].interval.{end}_is") for n, end in ENDS),
-    *(("margins|compare", rf"{LOOP}windows\[(.+?)\].windows\[(\d+)\]\[{n}\]",
-       rf"\1stability_intervals[\2].intervals[\3].{end}") for n, end in ENDS),
-    *(("margins|compare", rf"{LOOP}windows\[(.+?)\].windows_ends\[(\d+)\]\[{n}\]",
-       rf"\1stability_intervals[\2].intervals[\3].{end}_is") for n, end in ENDS),
     ("margins|compare", rf"{LOOP}windows\[(.+?)\].looked_at(.*)", r"\1stability_intervals[\2].search_range\3"),
     ("margins|compare", rf"{LOOP}windows\[(.+?)\].band_rad_s", r"\1stability_intervals[\2].up_to_rad_s"),
     ("margins|compare", rf"{LOOP}windows\[(.+?)\].(number|value)", r"\1stability_intervals[\2].\3"),
@@ -89,8 +80,7 @@ RENAMED = (
     ("tune", r"guard_(\w+)", r"guard.\1"),
     ("tune", r"guard\[\d\]", None),
     ("bode|reduce", r"band_rad_s(.*)", r"range_rad_s\1"),
-    ("bode", r"((poles|zeros)\[\d+\])\.re", r"\1.s[0]"),
-    ("bode", r"((poles|zeros)\[\d+\])\.im", r"\1.s[1]"),
+    *(("bode", rf"((poles|zeros)\[\d+\])\.{part}", rf"\1.s[{n}]") for n, part in enumerate(("re", "im"))),
     ("reduce", r"errors\.(\w+)", r"channels[\1].error"),
     ("reduce", r"worst_at_rad_s\.(\w+)", r"channels[\1].worst_at_rad_s"),
     ("reduce", r"(first_mode_lacking_hz|input_unit|inputs|outputs|units)\b.*", None),
@@ -112,11 +102,9 @@ RENAMED = (
     ("locus", r"(branches_note|gap_note|ends|reduced_points)", None),
     ("map", r"K1(.*)", r"x\1"),
     ("map", r"K2(.*)", r"y\1"),
-    ("spill", r"models\[(\d+)\]\.re", r"models[\1].rightmost[0]"),
-    ("spill", r"models\[(\d+)\]\.im", r"models[\1].rightmost[1]"),
+    *(("spill", rf"models\[(\d+)\]\.{part}", rf"models[\1].rightmost[{n}]") for n, part in enumerate(("re", "im"))),
     # comparisons
-    ("compare", r"names\[0\]", r"sides[0].name"),
-    ("compare", r"names\[1\]", r"sides[1].name"),
+    ("compare", r"names\[(\d)\]", r"sides[\1].name"),
     ("compare", r"verdicts\[(\d)\]", r"sides[\1].verdict"),
     ("compare", r"sampled\[\d\]\..*", None),  # a line of text each
     ("compare .*--law .*--law.*", r"modes.*", None),  # the same arm twice

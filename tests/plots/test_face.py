@@ -3,6 +3,8 @@
 import importlib
 import inspect
 import pkgutil
+import re
+from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
@@ -15,18 +17,25 @@ import tfarm
 from tests.plots.labels import complaints, drawn
 from tests.shared import thinned
 from tfarm import Law
+from tfarm.digits import plain
 from tfarm.dsp import sampled_map
 from tfarm.fitting.data import Measured
 from tfarm.loop.loci import reduced_locus
 from tfarm.loop.nyquist import compressed
-from tfarm.plots.plane import colours
+from tfarm.plots.regions import colours, contours
+from tfarm.plots.style import number_label
 from tfarm.spectrum.table import default_gains
 from tfarm.tuner import Plan
 
 mpl.use("Agg")
 
 LAB = tfarm.load("sasaki2012-lab")
+MICRO = Path(__file__).parents[1] / "data" / "reproductions" / "micro2.toml"
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
+LEAD = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_deflection": ([0.5], [0.02, 1.0])})
+AXES = {"comparison": 3, "bode": 2, "measured": 3, "modes": 3, "slew": 3}  # of a plot that has several
+OTHERS = [f"{name} of a rig" for name in ("gain_map", "nyquist", "bode", "locus")]
+OTHERS += ["locus of a law", "gain_map of a law"]
 
 
 @pytest.fixture(autouse=True)
@@ -41,21 +50,30 @@ def no_figure_left_open():
 
 @pytest.fixture(scope="module")
 def records():
-    """By the name of the plot: what it takes, and how many axes it draws in (0: one that is no sequence)."""
+    """What a plot takes, by its name and further words: of any law, and of a rig without damping, driven by voltage."""
     K1, K2 = np.linspace(0.05, 2.0, 40), np.linspace(-1.0, 1.5, 41)
     plane, analysis = tfarm.map(LAB, K1, K2), tfarm.sampled(LAB, LAW, count=8)
+    rig = tfarm.load("quanser-flexlink")
+    law, unit = default_gains(rig), rig.input_per_torque
+    factors, delays = np.linspace(0.1, 3.0, 8), np.linspace(0.0, 0.03, 9)
     return {
-        "comparison": ([tfarm.compare([LAB, LAB.having(hub_inertia=0.2)], modes=2)], 3),
-        "bode": ([tfarm.bode(LAB, "root_moment", (1.0, 300.0))], 2),
-        "gain_map": ([plane], 0),
-        "locus": ([tfarm.locus(LAB, LAW, "K2", -1.0, 1.6, points=60, branches=3)], 0),
-        "measured": ([tfarm.overlay(LAB, sweep())], 3),
-        "modes": ([tfarm.modes(LAB, count=3)], 3),
-        "nyquist": ([tfarm.nyquist(LAB, LAW)], 0),
-        "overlay": ([plane, sampled_map(analysis.verdict.loop, K1, K2)], 0),
-        "sketch": ([LAB], 0),
-        "tuned_gain": ([tfarm.tune(LAB, Plan(trials=1))], 0),
-        "slew": ([LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)], 3),
+        "comparison": [tfarm.compare([LAB, LAB.having(hub_inertia=0.2)], modes=2)],
+        "bode": [tfarm.bode(LAB, "root_moment", (1.0, 300.0))],
+        "gain_map": [plane],
+        "locus": [tfarm.locus(LAB, LAW, "K2", -1.0, 1.6, points=60, branches=3)],
+        "measured": [tfarm.overlay(LAB, sweep())],
+        "modes": [tfarm.modes(LAB, count=3)],
+        "nyquist": [tfarm.nyquist(LAB, LAW)],
+        "overlay": [plane, sampled_map(analysis.verdict.loop, K1, K2)],
+        "sketch": [LAB],
+        "tuned_gain": [tfarm.tune(LAB, Plan(trials=1))],
+        "slew": [LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)],
+        "locus of a law": [tfarm.locus(LAB, LEAD, "gain", 0.0, 2.0, 10, 3)],
+        "gain_map of a law": [tfarm.map(LAB, factors, delays, law=LEAD, vary=("gain", "delay"))],
+        "bode of a rig": [tfarm.bode(rig, "root_moment", (1.0, 1000.0))],
+        "nyquist of a rig": [tfarm.nyquist(rig, law)],
+        "locus of a rig": [tfarm.locus(rig, law, "K2", -unit, 1.6 * unit, points=40, branches=4)],
+        "gain_map of a rig": [tfarm.map(rig, np.linspace(-1, 4, 40) * law.K1, np.linspace(-1, 1.5, 41) * unit)],
     }
 
 
@@ -77,86 +95,61 @@ def as_tuple(axes):
     return tuple(np.ravel(np.asarray(axes, dtype=object)))
 
 
-@pytest.mark.parametrize("name", thinned(tfarm.plots.__all__, 2))
-def test_axes_given_are_the_axes_returned_and_nothing_else_is_opened(name, records):
-    record, count = records[name]
+@pytest.mark.parametrize("name", [*thinned(tfarm.plots.__all__, 2), *thinned(OTHERS, 2)])
+def test_a_picture_in_given_axes_and_on_its_own(name, records):
+    """Nothing else is opened for the first; the other has the look of the pages, whatever the user's settings are.
+
+    Both show the same.  Every axis has its quantity and unit; no words overlap, nor lie on a frame or a curve.
+    """
+    plot, count = getattr(tfarm.plots, name.split()[0]), AXES.get(name.split()[0], 0)
     given = axes_for(count)
-    returned = getattr(tfarm.plots, name)(*record, ax=given)
-    assert as_tuple(returned) == as_tuple(given)
-    assert all(ax.lines or ax.images or ax.collections for ax in as_tuple(returned))
+    assert as_tuple(plot(*records[name], ax=given)) == as_tuple(given)
     assert pyplot.get_fignums() == []
-
-
-@pytest.mark.parametrize("name", thinned(tfarm.plots.__all__[2:] + tfarm.plots.__all__[:2], 3))
-def test_without_axes_a_figure_is_made_in_the_look_of_the_pages(name, records):
-    """Whatever the user's settings are, and though matplotlib makes ticks only when it draws."""
-    record, count = records[name]
+    axes = [axis for ax in as_tuple(given) if ax.axison for axis in (ax.xaxis, ax.yaxis)]
+    named = [axis for axis in axes if axis.get_ticklocs().size and axis.get_tick_params().get("labelbottom", True)]
+    assert [axis for axis in named if not re.search(r"\w.* \[.+\]", axis.get_label_text())] == []
     theirs = ("xtick.labelsize", "ytick.labelsize", "axes.labelsize", "font.size")
     with mpl.rc_context(dict.fromkeys(theirs, 31.0)):
-        axes = as_tuple(getattr(tfarm.plots, name)(*record))
-        (number,) = pyplot.get_fignums()
-        figure = pyplot.figure(number)
-        assert {ax.get_figure() for ax in axes} == {figure}
-        assert len(axes) == max(1, count)
-        figure.draw_without_rendering()
-        each = [axis for ax in axes for axis in (ax.xaxis, ax.yaxis)]
-        sizes = {
-            tick.label1.get_fontsize() for axis in each for tick in axis.get_major_ticks() + axis.get_minor_ticks()
-        }
-        sizes |= {axis.label.get_fontsize() for axis in each}
-    assert max(sizes) < 12
-    pyplot.close(figure)
-
-
-@pytest.mark.parametrize("name", thinned(tfarm.plots.__all__[1:] + tfarm.plots.__all__[:1], 3))
-def test_words_overlap_nothing(name, records):
-    """Neither each other, nor a frame or the edge of the picture, nor a curve."""
-    figure = as_tuple(getattr(tfarm.plots, name)(*records[name][0]))[0].get_figure()
+        own = as_tuple(plot(*records[name]))
+        (figure,) = map(pyplot.figure, pyplot.get_fignums())
+        assert [ax.get_figure() for ax in own] == [figure] * max(1, count)
+        words = drawn(figure)  # matplotlib makes ticks only when it draws
+    assert max(text.get_fontsize() for text, _ in words) < 12
+    assert len(words) > 2
     assert complaints(figure) == []
-    assert len(drawn(figure)) > 3
+    for here, there in zip(as_tuple(given), own, strict=True):
+        assert here.lines or here.images or here.collections
+        for mine, other in zip(here.lines, there.lines, strict=True):
+            np.testing.assert_array_equal(mine.get_xydata(), other.get_xydata())
     pyplot.close(figure)
 
 
-@pytest.mark.parametrize("name", thinned(["quanser-flexlink", "sasaki2012"], 2))
-def test_words_overlap_nothing_without_damping_or_torque(name):
-    """Curves that run to infinity, poles on the axis, a rig driven by voltage."""
-    arm = tfarm.load(name)
-    law, unit = default_gains(arm), arm.input_per_torque
-    found = tfarm.locus(arm, law, "K2", -unit, 1.6 * unit, points=40, branches=4)
-    axes = {
-        "bode": tfarm.plots.bode(tfarm.bode(arm, "root_moment", (1.0, 1000.0)))[0],
-        "nyquist": tfarm.plots.nyquist(tfarm.nyquist(arm, law)),
-        "locus": tfarm.plots.locus(found),
-        "map": tfarm.plots.gain_map(tfarm.map(arm, np.linspace(-1, 4, 40) * law.K1, np.linspace(-1, 1.5, 41) * unit)),
-    }
-    told = {name: complaints(each.get_figure()) for name, each in axes.items()}
-    pyplot.close("all")
-    assert told == {name: [] for name in axes}
-
-
-LEAD = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_deflection": ([0.5], [0.02, 1.0])})
-
-
-@pytest.mark.parametrize("plot", ["locus", "gain_map"])
-def test_what_is_found_of_any_law_has_the_same_face(plot):
-    """In axes that are given there is what the picture of its own has, and no words overlap there."""
-    if plot == "locus":
-        found = tfarm.locus(LAB, LEAD, "gain", 0.0, 2.0, 10, 3)
-    else:
-        found = tfarm.map(LAB, np.linspace(0.1, 3.0, 8), np.linspace(0.0, 0.03, 9), law=LEAD, vary=("gain", "delay"))
-    own, given = getattr(tfarm.plots, plot)(found), axes_for(0)
-    assert getattr(tfarm.plots, plot)(found, ax=given) is given
-    for mine, theirs in zip(given.lines, own.lines, strict=True):
-        np.testing.assert_array_equal(mine.get_xydata(), theirs.get_xydata())
-    assert (own.get_xlabel(), own.get_ylabel()) == (given.get_xlabel(), given.get_ylabel())
-    assert complaints(own.get_figure()) == []
-    pyplot.close(own.get_figure())
+@pytest.mark.parametrize(
+    ("number", "label"),
+    [
+        ("K2", "K2, gain on the root moment [−]"),
+        ("delay", "delay [s]"),
+        ("payload_mass", "payload mass [kg]"),
+        ("gain", "gain, factor on the controller [−]"),
+        ("hub_angle.gain", "hub_angle.gain, factor on the hub angle [−]"),
+        ("hub_rate", "hub_rate [N m/(rad/s)]"),
+        ("hub_angle.num.0", "hub_angle.num.0 [(N m/rad) s]"),
+        ("hub_angle.num.1", "hub_angle.num.1 [N m/rad]"),
+        ("hub_angle.den.0", "hub_angle.den.0 [s]"),
+        ("strain@0.05.den.0", "strain@0.05.den.0 [s^2]"),
+        ("strain@0.05.den.2", "strain@0.05.den.2 [−]"),
+    ],
+)
+def test_a_number_of_a_law_has_its_unit(number, label):
+    """Of num.0 s + num.1 over den.0 s + 1, from an angle to a torque; checked by hand."""
+    law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "hub_rate": 0.4, "strain@0.05": ([1.0], [1e-4, 0.02, 1.0])})
+    assert number_label(number, LAB, law) == label
 
 
 @pytest.mark.parametrize("name", tfarm.plots.__all__)
 def test_what_is_no_record_of_it_is_refused_by_the_name_of_what_returns_one(name, records):
     """The first and the last argument of each picture, one at a time; what is drawn beside is left alone."""
-    right, _ = records[name]
+    right = records[name]
     for place in {0, len(right) - 1}:
         for wrong in (3, LAW, tfarm.transfer(LAB, "root_moment")):
             given = [wrong if n == place else each for n, each in enumerate(right)]
@@ -179,7 +172,7 @@ def test_words_that_do_overlap_are_told():
 
 
 def test_bode_draws_the_response(records):
-    (data,), _ = records["bode"]
+    (data,) = records["bode"]
     upper, lower = tfarm.plots.bode(data, ax=axes_for(2))
     (curve,) = (line for line in upper.lines if line.get_label() == "flexible arm, exact")
     assert curve.get_xdata().tolist() == data.omega.tolist()
@@ -191,7 +184,7 @@ def test_bode_draws_the_response(records):
 
 def test_nyquist_draws_the_loop_function_with_its_verdict(records):
     """Off the arcs past poles every point of the contour is on a line, at r/(1 + r) for its size r."""
-    (data,), _ = records["nyquist"]
+    (data,) = records["nyquist"]
     ax = tfarm.plots.nyquist(data, ax=axes_for(0), name="mine")
     drawn = {complex(x, y) for line in ax.lines for x, y in zip(*line.get_data(), strict=True)}
     upper = compressed(data.L)[~data.is_arc]
@@ -204,7 +197,7 @@ def test_nyquist_draws_the_loop_function_with_its_verdict(records):
 
 
 def test_modes_draws_the_shapes_with_their_nodes(records):
-    (found,), _ = records["modes"]
+    (found,) = records["modes"]
     axes = tfarm.plots.modes(found, ax=axes_for(3))
     shapes = found.shape(axes[0].lines[1].get_xdata())
     for ax, index in zip(axes, (1, 2, 3), strict=True):
@@ -214,12 +207,12 @@ def test_modes_draws_the_shapes_with_their_nodes(records):
         (nodes,) = (line.get_xdata() for line in ax.lines if line.get_marker() == "o")
         assert nodes.tolist() == found.nodes[at].tolist()
         assert f"{found.natural_frequency[at]:.7g} rad/s" in ax.get_title("left")
-        assert ("[m]" in ax.get_xlabel(), ax.get_ylabel()[-3:]) == (True, "[-]")
+        assert ("[m]" in ax.get_xlabel(), ax.get_ylabel()[-3:]) == (True, "[−]")
 
 
 def test_gain_map_draws_the_boundary_and_the_counts(records):
     """Every point of the record's boundary that is in the picture is on the line, and each pixel is a count."""
-    (found,), _ = records["gain_map"]
+    (found,) = records["gain_map"]
     ax = tfarm.plots.gain_map(found, ax=axes_for(0))
     (line,) = (line for line in ax.lines if "exact" in str(line.get_label()))
     K1, K2, _ = found.boundary.T
@@ -230,13 +223,27 @@ def test_gain_map_draws_the_boundary_and_the_counts(records):
     mesh = next(each for each in ax.collections if isinstance(each, QuadMesh))
     assert np.array_equal(mesh.get_array(), colours(found.unstable))
     assert ("[N m s/rad]" in ax.get_xlabel(), ax.get_ylabel()[-3:]) == (True, "[−]")
-    assert "2" in {text.get_text() for text in ax.texts}
-    assert {"stable", "number of unstable poles"} <= set(ax.get_legend_handles_labels()[1])
+    labels = {"stable": 0, "1 unstable pole": 1, "2 unstable poles": 2}
+    drawn = dict(zip(*ax.get_legend_handles_labels()[::-1], strict=True))
+    for label, count in labels.items():
+        if (here := found.unstable == count).any():
+            assert drawn[label].get_facecolor()[0, :3] == pytest.approx(mesh.get_array()[here][0])
+    assert {"stable", "2 unstable poles"} <= set(drawn)
+
+
+def test_numbers_of_crowded_contours_do_not_touch():
+    """Level lines, ever closer towards the upper edge."""
+    figure, place = Figure(), np.linspace(0.0, 1.0, 50)
+    ax = figure.subplots()
+    ax.set(xlim=(0, 1), ylim=(0, 1))
+    contours(place, place, np.tile(0.1 * (1.02 - place[:, None]) ** 1.2, 50), ax)
+    assert len(ax.texts) > 4
+    assert [each for each in complaints(figure) if " on '" in each] == []
 
 
 def test_locus_draws_the_branches_and_their_crossings(records):
     """To the ten digits of |s| that hold on every processor."""
-    (found,), _ = records["locus"]
+    (found,) = records["locus"]
     ax = tfarm.plots.locus(found, ax=axes_for(0))
     drawn = [line.get_xdata() + 1j * line.get_ydata() for line in ax.lines if line.get_linewidth() == 2.6]
     for line, branch in zip(drawn, found.branches, strict=True):  # with more points between those of the record
@@ -255,13 +262,14 @@ def test_a_reduced_locus_lies_beside_the_exact_one(vary, stop):
     found = tfarm.locus(LAB, LAW, vary, 0.01, stop, points=30, branches=3)
     reduced = reduced_locus(found)
     ax = tfarm.plots.locus(found, reduced=reduced, ax=axes_for(0))
-    drawn = [line.get_xdata() + 1j * line.get_ydata() for line in ax.lines if line.get_linestyle() == "--"]
+    dashed = (line for line in ax.lines if line.get_linestyle() == "--" and len(line.get_xdata()))
+    drawn = [line.get_xdata() + 1j * line.get_ydata() for line in dashed]
     assert np.array(drawn) == pytest.approx(reduced.branches, rel=1e-9, abs=0)
     assert reduced.gain.size == 30 if vary == "K1" else reduced.gain.size < 30
 
 
 def test_measured_draws_both_curves_and_the_coherence(records):
-    (found,), _ = records["measured"]
+    (found,) = records["measured"]
     upper, middle, lower = tfarm.plots.measured(found, ax=axes_for(3))
     drawn = {line.get_label(): line.get_data() for line in upper.lines}
     data = found.measured
@@ -270,12 +278,12 @@ def test_measured_draws_both_curves_and_the_coherence(records):
     assert drawn["exact"][1].tolist() == abs(found.curve).tolist()
     assert middle.lines[0].get_ydata().tolist() == np.degrees(np.angle(data.values)).tolist()
     assert lower.lines[0].get_ydata().tolist() == data.coherence.tolist()
-    assert [ax.get_ylabel() for ax in (middle, lower)] == ["phase [deg]", "coherence [-]"]
+    assert [ax.get_ylabel() for ax in (middle, lower)] == ["phase [deg]", "coherence [−]"]
     assert ("[Hz]" in lower.get_xlabel(), upper.get_ylabel()) == (True, "magnitude [N m/(N m)]")
 
 
 def test_a_comparison_draws_both_responses_and_both_regions(records):
-    (found,), _ = records["comparison"]
+    (found,) = records["comparison"]
     upper, lower, plane = tfarm.plots.comparison(found, ax=axes_for(3))
     for data, above, below in zip(found.responses, upper.lines, lower.lines, strict=False):
         assert above.get_xdata().tolist() == data.omega.tolist()
@@ -289,7 +297,7 @@ def test_a_comparison_draws_both_responses_and_both_regions(records):
 
 
 def test_overlay_draws_both_regions_edges(records):
-    (plane, sampled), _ = records["overlay"]
+    plane, sampled = records["overlay"]
     ax = tfarm.plots.overlay(plane, sampled, ax=axes_for(0))
     drawn = {(float(x), float(y)) for line in ax.lines for x, y in zip(*line.get_data(), strict=True)}
     for region in (plane, sampled):
@@ -303,7 +311,7 @@ def test_overlay_draws_both_regions_edges(records):
 
 
 def test_slew_draws_the_records_at_the_samples_and_between(records):
-    (arm, run), _ = records["slew"]
+    arm, run = records["slew"]
     moment, tip, torque = tfarm.plots.slew(arm, run, ax=axes_for(3))
     (drawn,) = (line for line in moment.lines if line.get_linewidth() == 1.3)
     t, y = (x.tolist() for x in drawn.get_data())
@@ -320,14 +328,14 @@ def test_slew_draws_the_records_at_the_samples_and_between(records):
 
 
 def test_tuned_gain_draws_the_gain_in_its_guard(records):
-    (found,), _ = records["tuned_gain"]
+    (found,) = records["tuned_gain"]
     ax = tfarm.plots.tuned_gain(found, ax=axes_for(0))
     (line,) = (line for line in ax.lines if "K(t)" in str(line.get_label()))
     assert line.get_xdata().tolist() == found.training.result.t.tolist()
     assert line.get_ydata().tolist() == found.training.result.K.tolist()
     (guard,) = ax.patches
     assert (guard.get_y(), guard.get_y() + guard.get_height()) == (found.training.guard.lo, found.training.guard.hi)
-    assert ("[s]" in ax.get_xlabel(), ax.get_ylabel()[-3:]) == (True, "[-]")
+    assert ("[s]" in ax.get_xlabel(), ax.get_ylabel()[-3:]) == (True, "[−]")
 
 
 def test_several_slews_are_told_apart_by_their_names():
@@ -340,15 +348,20 @@ def test_several_slews_are_told_apart_by_their_names():
         assert lines[name].get_ydata().tolist() == run.at_samples.root_moment.tolist()
 
 
-def test_of_more_modes_than_axes_the_first_are_drawn():
-    axes = axes_for(2)
-    assert tfarm.plots.modes(tfarm.modes(LAB, count=5), ax=axes) == tuple(axes)
+def test_of_more_modes_than_axes_the_first_are_drawn_with_the_digits_of_their_nodes():
+    """Of an arm of 5 cm a node lies less than 0.1 mm from the hub."""
+    axes, small = axes_for(4), tfarm.modes(tfarm.load(MICRO), count=5)
+    assert tfarm.plots.modes(small, ax=axes) == tuple(axes)
+    assert small.nodes[4].min() < 1e-4
+    assert [ax.get_title("left").split("[m]: ")[1] for ax in axes] == [
+        ", ".join(plain(node, 3) for node in nodes) for nodes in small.nodes[1:5]
+    ]
 
 
 @pytest.mark.parametrize(("name", "number"), [("bode", 2), ("slew", 3)])
 def test_too_few_axes_are_refused_with_how_many_it_takes(name, number, records):
     with pytest.raises(tfarm.ParameterError, match=rf"ax = 1: {number} axes, as figure.subplots\({number}\)"):
-        getattr(tfarm.plots, name)(*records[name][0], ax=axes_for(0))
+        getattr(tfarm.plots, name)(*records[name], ax=axes_for(0))
 
 
 def test_no_file_takes_the_name_of_a_picture_away():

@@ -37,19 +37,36 @@ def seen_turns(line):
     return turn[np.isfinite(turn) & seen & ~corner & ~along], int((parted & np.isfinite(pieces)).sum())
 
 
+LEAD = tfarm.Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
+
+
+def of_gains(arm, vary, start, stop):
+    return locus_plot.figure(locus(arm, default_gains(arm), vary, start, stop, points=60, branches=5))
+
+
+def sampled():
+    return draw_sampled_loci(sampled_loci(sampled_loop(LAB, default_gains(LAB), count=3), 25.0, (-0.5, 1.5)))
+
+
 @pytest.mark.parametrize(
-    ("arm", "vary", "start", "stop", "corners"),
-    [(LAB, "K2", -1.0, 1.6, 2), (STOCKY, "K1", 0.0, 2 * rate_unit(STOCKY), 0)],
-    ids=["through a breakaway", "without"],
+    ("make", "width", "corners"),
+    [
+        (lambda: of_gains(LAB, "K2", -1.0, 1.6), 2.6, 2),  # through a breakaway
+        (lambda: of_gains(STOCKY, "K1", 0.0, 2 * rate_unit(STOCKY)), 2.6, 0),
+        (lambda: locus_plot.figure(locus(LAB, LEAD, "gain", 1.0, 8.0, points=8, branches=1)), 2.6, None),
+        (sampled, 1.4, None),
+    ],
+    ids=["through a breakaway", "without", "of any law", "sampled"],
 )
-def test_no_branch_turns_by_more_than_five_degrees(arm, vary, start, stop, corners):
+def test_no_branch_turns_by_more_than_five_degrees(make, width, corners):
     """Two roots that meet on the real axis part at a right angle: a true corner, once on either branch."""
-    found = locus(arm, default_gains(arm), vary, start, stop, points=60, branches=5)
-    figure = locus_plot.figure(found)
+    figure = make()
     figure.draw_without_rendering()
-    told = [seen_turns(line) for line in figure.axes[0].lines if line.get_linewidth() == 2.6]
-    assert sum(count for _, count in told) == corners
-    assert max(turn.max(initial=0.0) for turn, _ in told) <= MOST
+    for ax in figure.axes:
+        turns = [seen_turns(line) for line in ax.lines if line.get_linewidth() == width and len(line.get_xdata()) > 1]
+        assert corners is None or sum(count for _, count in turns) == corners
+        assert corners == 0 or sum(turn.size for turn, _ in turns) > 5
+        assert max(turn.max(initial=0.0) for turn, _ in turns) <= MOST
 
 
 def test_the_values_between_are_poles_too():
@@ -63,16 +80,6 @@ def test_the_values_between_are_poles_too():
         branch = fine.branches[2, n]
         poles = poles_below(fine.varied.at(fine.gain[n]), 150.0).values
         assert abs(poles - branch).min() <= 1e-9 * abs(branch)
-
-
-def test_the_sampled_locus_is_round_too():
-    loop = sampled_loop(LAB, default_gains(LAB), count=3)
-    figure = draw_sampled_loci(sampled_loci(loop, 25.0, (-0.5, 1.5)))
-    figure.draw_without_rendering()
-    for ax in figure.axes:
-        told = [seen_turns(line)[0] for line in ax.lines if line.get_linewidth() == 1.4 and len(line.get_xdata()) > 1]
-        assert sum(turn.size for turn in told) > 5
-        assert max(turn.max(initial=0.0) for turn in told) <= MOST
 
 
 def test_the_outline_of_a_sampled_region_is_that_of_its_poles():
@@ -114,10 +121,9 @@ def _near_a_corner(line, n):
     return away.min() < 0.02
 
 
-def test_a_locus_under_any_law_is_round_too():
-    """No turn beyond 5 degrees but at a corner; the poles of the record stay, those between are zeros of 1 + L."""
-    law = tfarm.Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
-    found = locus(LAB, law, "gain", 1.0, 8.0, points=8, branches=1)
+def test_a_locus_under_any_law_keeps_its_poles():
+    """The poles of the record stay, those between are zeros of 1 + L."""
+    found = locus(LAB, LEAD, "gain", 1.0, 8.0, points=8, branches=1)
     fine = rounded(found)
     more = np.nonzero(~np.isin(fine.gain, found.gain))[0]
     assert more.size
@@ -125,10 +131,5 @@ def test_a_locus_under_any_law_is_round_too():
         kept = fine.branches[:, fine.gain == value]
         assert set(poles[np.isfinite(poles)]) == set(kept[np.isfinite(kept)])
     for n in more[::3]:
-        loop = Loop(LAB, law.having("gain", float(fine.gain[n])))
-        told = fine.branches[np.isfinite(fine.branches[:, n]), n]
-        assert abs(1 + loop.loop_function(told)).max() < 1e-6
-    figure = locus_plot.figure(found)
-    figure.draw_without_rendering()
-    told = [seen_turns(line)[0] for line in figure.axes[0].lines if line.get_linewidth() == 2.6]
-    assert max(turn.max(initial=0.0) for turn in told) <= MOST
+        branches = fine.branches[np.isfinite(fine.branches[:, n]), n]
+        assert abs(1 + Loop(LAB, LEAD.having("gain", float(fine.gain[n]))).loop_function(branches)).max() < 1e-6

@@ -19,8 +19,11 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
+from tfarm.arm import PLANE, HubFeedback
 from tfarm.arrays import Complex, Real
 from tfarm.digits import plain, significant
+from tfarm.exact.outputs import OUTPUTS
+from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit, Possible, response_band, share_stable
 from tfarm.fitting.overlay import Overlay
 from tfarm.loop.margins import LoopMargins, Margins, loop_curve
@@ -43,7 +46,9 @@ from .style import (
     page,
     picture,
     plain_ticks,
+    ratio,
     safe,
+    signal_label,
 )
 
 RAD_PER_CYCLE = 2 * math.pi  # rad/s of 1 Hz
@@ -62,6 +67,7 @@ POINTS_OF_BAND = 800  # of a band of responses, about one to a pixel: each is co
 MAP_MESH = 60  # gains of each axis of a map, each pair counted for every possible arm
 SPAN = 1.25  # of the decades that are measured: an infinite peak of the exact curve leaves the picture
 TICKS_A_DECADE = (1.0, 2.0, 5.0)  # where a measurement covers few of them
+NOISE_ROOM = 2.5  # factor above and below the noise: two ticks a picture at least
 FREQUENCY_HZ = "frequency [Hz]"
 POINTS: dict[str, Any] = {"ls": "none", "marker": ".", "ms": 3.5, "color": ORANGE, "zorder": 3}
 EXACT = "flexible arm, exact"
@@ -89,15 +95,8 @@ def draw_card(data: Bode) -> Figure:
     with page(4.4, 2.5, "") as (figure, ax):
         draw_magnitude(data, ax=ax)
         ax.set_ylabel(f"|{data.label}| [{data.gain_unit}]", fontsize=8.5)
-        for each in (ax.get_legend(), *ax.texts, *ax.child_axes):
+        for each in (ax.legend(), *ax.texts, *ax.child_axes):
             each.set_visible(False)
-    return figure
-
-
-def draw_compared(main: Bode, other: Bode, labels: tuple[str, str]) -> Figure:
-    """Two responses of one output in one magnitude plot; the roots marked are those of the first."""
-    with page(9.0, 5.0, "") as (figure, ax):
-        draw_magnitude(dict(zip(labels, (main, other), strict=True)), ax=ax)
     return figure
 
 
@@ -122,8 +121,6 @@ def draw_magnitude(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
     if first.is_zero:
         ax.text(0.5, 0.5, "zero at every frequency", ha="center", va="center", transform=ax.transAxes)
     hertz_axis(ax, 1.0 + NUMBER_STRIP)
-    starts_low = abs(first.value[0]) < math.sqrt(low * high)
-    ax.legend(loc="upper left" if starts_low else "lower left")
 
 
 def draw_phase(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
@@ -142,7 +139,7 @@ def hertz_axis(ax: Axes, height: float) -> None:
     """A second frequency axis in Hz, at that height above the axes."""
     ratios = (partial(np.multiply, 1 / RAD_PER_CYCLE), partial(np.multiply, RAD_PER_CYCLE))
     upper = ax.secondary_xaxis(height, functions=ratios)
-    upper.set_xlabel("frequency [Hz]", labelpad=5.0)
+    upper.set_xlabel(FREQUENCY_HZ, labelpad=5.0)
     plain_ticks(upper.xaxis)
 
 
@@ -204,7 +201,7 @@ def draw_loops(each: Mapping[str, tuple[Real, Complex]], upper: Axes, lower: Axe
     upper.axhline(1.0, color=GREY, lw=0.9)
     for edge in (-180, 180):
         lower.axhline(edge, color=GREY, lw=0.9)
-    upper.set(xscale="log", yscale="log", ylabel="|L|")
+    upper.set(xscale="log", yscale="log", ylabel="|L| [−]")
     upper.margins(x=0)
     low, high = upper.get_ylim()
     upper.set_ylim(max(low, LEAST_DRAWN * min(1.0, high)), min(high, MOST_DRAWN * max(1.0, low)))
@@ -264,7 +261,7 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     _curve(data, ax)
     ax.plot([-0.5], [0], "+", color=ORANGE, ms=11, mew=2.2, zorder=6, ls="none", label="the point −1")
     ax.set(aspect="equal", yticks=[], xlim=(-REACH, REACH), ylim=(-REACH, REACH), frame_on=False)
-    ax.set_xlabel("|L| at the rings", loc="right")
+    ax.set_xlabel("|L| at the rings [−]", loc="right")
     ax.set_xticks(radii, [plain(size).replace("inf", "∞") for size in RING_SIZES], fontsize=7.5)
     ax.grid(False)
     verdict = data.verdict
@@ -326,6 +323,28 @@ def _arrows(z: Complex, way: Complex, at: NDArray[np.int64], ax: Axes) -> None:
 # ------------------------------------------------------------ measured responses
 
 
+def _over_measured(
+    one: Measured, curves: Sequence[tuple[Real, Complex, dict[str, Any]]], upper: Axes, lower: Axes
+) -> None:
+    """Magnitude over phase [Hz, deg]: measured points, and curves (omega [rad/s], values, looks).
+
+    An infinite peak of a curve leaves the picture.
+    """
+    hertz, size = one.omega / RAD_PER_CYCLE, abs(one.values)
+    upper.plot(hertz, size, label="measured", **POINTS)
+    lower.plot(hertz, np.degrees(np.angle(one.values)), **POINTS)
+    for omega, values, looks in curves:
+        upper.plot(omega / RAD_PER_CYCLE, abs(values), **looks)
+        draw_wrapped(omega / RAD_PER_CYCLE, values, lower, **looks)
+    within = np.log10([each for each in (*size, *(np.median(abs(values)) for _, values, _ in curves)) if each > 0])
+    margin = 0.15 + (SPAN - 1) / 2 * np.ptp(within)
+    upper.set(yscale="log", ylim=10 ** np.array([within.min() - margin, within.max() + margin]))
+    upper.yaxis.set_minor_formatter(NullFormatter())
+    for ax in (upper, lower):
+        ax.set(xscale="log" if hertz[-1] > 5 * hertz[0] else "linear", xlim=hertz[[0, -1]], xlabel=FREQUENCY_HZ)
+        plain_ticks(ax.xaxis, 4, TICKS_A_DECADE)
+
+
 def _fit_grid(figure: Figure, fit: Fit) -> Any:
     return figure.subplots(2, max(1, len(fit.responses)), sharex="col", height_ratios=[1.75, 1.0], squeeze=False)
 
@@ -340,19 +359,15 @@ def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
     Phases are broken where they wrap.
     """
     count, problem = len(fit.responses), fit.solution.problem
-    curves = ((fit.solution.point * 0, GREY, "start", 1.0), (fit.solution.point, BLUE, "fitted, exact", 1.4))
+    arms: tuple[tuple[Real, dict[str, Any]], ...] = (
+        (fit.solution.point * 0, {"color": GREY, "lw": 1.0, "label": "start"}),
+        (fit.solution.point, {"color": BLUE, "lw": 1.4, "label": "fitted, exact"}),
+    )
     for number, (one, upper, lower) in enumerate(zip(fit.responses, ax[:count], ax[count:], strict=False)):
-        hertz = one.omega / RAD_PER_CYCLE
         omega = np.unique(np.r_[np.geomspace(one.omega[0], one.omega[-1], FITTED_POINTS), one.omega])
-        upper.plot(hertz, abs(one.values), label="measured", **POINTS)
-        lower.plot(hertz, np.degrees(np.angle(one.values)), **POINTS)
-        for point, colour, label, width in curves:
-            H = problem.at(number, omega).computed(point)[0]
-            upper.plot(omega / RAD_PER_CYCLE, abs(H), color=colour, lw=width, label=label)
-            draw_wrapped(omega / RAD_PER_CYCLE, H, lower, color=colour, lw=width)
-        upper.set(xscale="log", yscale="log", title=one.label, ylabel=f"magnitude [{one.unit}]")
-        lower.set(xlabel=FREQUENCY_HZ, ylabel="" if number else PHASE)
-        plain_ticks(lower.xaxis, subs=TICKS_A_DECADE)
+        curves = [(omega, problem.at(number, omega).computed(point)[0], looks) for point, looks in arms]
+        _over_measured(one, curves, upper, lower)
+        upper.set(title=one.label, xlabel="", ylabel=f"magnitude [{one.unit}]")
 
 
 def draw_band(those: Possible, output: str) -> Figure:
@@ -360,14 +375,12 @@ def draw_band(those: Possible, output: str) -> Figure:
     ends = [end for each in those.fit.responses for end in each.omega[[0, -1]]]
     omega = np.geomspace(min(ends), max(ends), POINTS_OF_BAND)
     least, most, best = response_band(those, output, omega)
-    name = output.replace("_", " ")
+    name, unit = signal_label(output), ratio(OUTPUTS[output].unit, those.fit.arm.input_unit)
     with page(9.0, 4.6, f"{those.fit.before.name}: {name} of the arms that the data leave possible") as (figure, ax):
-        ax.fill_between(
-            omega / RAD_PER_CYCLE, least, most, color=BLUE, alpha=0.3, lw=0,
-            label=f"all of {len(those.arms)} arms that the data leave possible",
-        )  # fmt: skip
+        label = f"all of {len(those.arms)} arms that the data leave possible"
+        ax.fill_between(omega / RAD_PER_CYCLE, least, most, color=BLUE, alpha=0.3, lw=0, label=label)
         ax.plot(omega / RAD_PER_CYCLE, best, color=BLUE, lw=1.3, label="the arm that fits best")
-        ax.set(xscale="log", yscale="log", xlabel=FREQUENCY_HZ, ylabel=f"|{name}|, SI")
+        ax.set(xscale="log", yscale="log", xlabel=FREQUENCY_HZ, ylabel=f"|{name}| [{unit}]")
         plain_ticks(ax.xaxis, subs=TICKS_A_DECADE)
     return figure
 
@@ -381,8 +394,8 @@ def draw_share(those: Possible, ranges: Sequence[tuple[float, float]]) -> Figure
             across, up, share_stable(those, across, up), cmap="Blues", vmin=0.0, vmax=1.0, shading="nearest",
             rasterized=True,
         )  # fmt: skip
-        figure.colorbar(mesh, ax=ax).set_label("share of the arms with a stable loop")
-        name_axes(those.fit.arm, ax)
+        figure.colorbar(mesh, ax=ax).set_label("share of the arms with a stable loop [−]")
+        name_axes(PLANE, those.fit.arm, HubFeedback(), ax)
         ax.grid(False)
     return figure
 
@@ -400,14 +413,9 @@ def measured(data: Overlay, *, ax: Sequence[Axes]) -> None:
     """
     upper, middle, lower = ax
     one, hertz, size = data.measured, data.measured.omega / RAD_PER_CYCLE, abs(data.measured.values)
-    upper.plot(hertz, size, label="measured", **POINTS)
-    upper.plot(data.omega / RAD_PER_CYCLE, abs(data.curve), color=BLUE, label="exact")
-    within = np.log10([each for each in (*size, np.median(abs(data.curve))) if each > 0])
-    margin = 0.15 + (SPAN - 1) / 2 * np.ptp(within)
-    limits = 10 ** np.array([within.min() - margin, within.max() + margin])
-    upper.yaxis.set_minor_formatter(NullFormatter())
+    _over_measured(one, [(data.omega, data.curve, {"color": BLUE, "label": "exact"})], upper, middle)
     paired = [(abs(row.pole) / RAD_PER_CYCLE, row.frequency_ratio) for row in data.modes]
-    upper.set(yscale="log", ylim=limits, ylabel=f"magnitude [{data.ratio.unit}]")
+    upper.set_ylabel(f"magnitude [{data.ratio.unit}]")
     guides: tuple[tuple[Any, dict[str, Any]], ...] = (
         ([pole for pole, _ in paired], {"color": FAINT, "lw": 0.8, "label": "pole of the arm"}),
         ([pole * ratio for pole, ratio in paired if ratio is not None],
@@ -417,16 +425,14 @@ def measured(data: Overlay, *, ax: Sequence[Axes]) -> None:
     for at, looks in guides:
         for frequency in at:
             upper.axvline(frequency, zorder=0.6, **looks)
-    middle.plot(hertz, np.degrees(np.angle(one.values)), **POINTS)
-    draw_wrapped(data.omega / RAD_PER_CYCLE, data.curve, middle, color=BLUE)
     if one.coherence is not None:
         lower.plot(hertz, one.coherence, color=GREY, lw=1.0)
-        lower.set(ylim=(-0.05, 1.05), ylabel="coherence [-]")
+        lower.set(ylim=(-0.05, 1.05), ylabel="coherence [−]")
     else:
         known = (size > 0) & np.isfinite(data.noise.sigma)
-        lower.plot(hertz[known], data.noise.sigma[known] / size[known], color=GREY, lw=1.0)
-        lower.set(yscale="log", ylabel="noise/value [-]")
-    for each in ax:
-        each.set(xlabel=FREQUENCY_HZ, xscale="log" if hertz[-1] > 5 * hertz[0] else "linear")
-        each.margins(x=0)
-        plain_ticks(each.xaxis, 4, TICKS_A_DECADE)
+        share = data.noise.sigma[known] / size[known]
+        lower.plot(hertz[known], share, color=GREY, lw=1.0)
+        lower.set(yscale="log", ylim=(share.min() / NOISE_ROOM, share.max() * NOISE_ROOM), ylabel="noise/value [−]")
+        plain_ticks(lower.yaxis, 1, TICKS_A_DECADE if np.ptp(np.log10(share)) < 1 else (1.0,))
+    lower.set(xscale=upper.get_xscale(), xlim=upper.get_xlim(), xlabel=FREQUENCY_HZ)
+    plain_ticks(lower.xaxis, 4, TICKS_A_DECADE)

@@ -66,8 +66,7 @@ def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", 
     for axes, label in zip(ax, labels, strict=True):
         axes.axvline(scenario.busy_until, color=INK, lw=0.8, ls=DOTTED)
         axes.axhline(0.0, color=GREY, lw=0.6)
-        axes.set(xlim=(0.0, float(scenario.t[-1])), ylabel=label)
-    motor.set_xlabel(TIME)
+        axes.set(xlim=(0.0, float(scenario.t[-1])), xlabel=TIME, ylabel=label)
     points, finer = min(traces.points_a_period(arm, run) for run in each.values())
     coarse = f"{plain(points, 2)} points a period of the fastest mode shown; between={finer} gives {POINTS_A_PERIOD}"
     moment.set_title(coarse if points < POINTS_A_PERIOD else "", loc="right", fontsize=8.0, color=GREY)
@@ -85,7 +84,7 @@ def _draw_curve(curve: TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, 
 def draw_measured_runs(title: str, each: Mapping[str, RunComparison]) -> Figure:
     """A column a controller: hub angle above, root moment below where it was measured."""
     moment = any(found.measured.root_moment.size for found in each.values())
-    grid = {"nrows": 1 + moment, "ncols": len(each), "sharex": "col", "sharey": "row", "squeeze": False}
+    grid: dict[str, Any] = {"nrows": 1 + moment, "ncols": len(each), "sharex": "col", "sharey": "row", "squeeze": False}
     with page(max(4.7 * len(each), 6.0), 6.0 if moment else 3.6, title, **grid) as (figure, axes):
         for column, (name, found) in zip(axes.T, each.items(), strict=True):
             measured, run = found.measured, found.run
@@ -118,7 +117,7 @@ def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     ax.axhline(best, color=PURPLE, lw=1.2, ls=LONG_DASHED, label=f"best constant gain, {significant(best, 3)}")
     ax.axvline(found.trial.task.busy_until, color=INK, lw=0.8, ls=DOTTED)
     ax.axhline(0.0, color=GREY, lw=0.7)
-    ax.set(xlim=(0.0, float(result.t[-1])), xlabel=TIME, ylabel=f"gain on the root moment, {MOMENT_GAIN} [-]")
+    ax.set(xlim=(0.0, float(result.t[-1])), xlabel=TIME, ylabel=f"gain on the root moment, {MOMENT_GAIN} [−]")
 
 
 def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap]) -> Figure:
@@ -156,5 +155,5 @@ def draw_curves(curves: LearningCurves, tuning: Tuning) -> Figure:
             (tuning.bound.cost, INK, "linear-quadratic optimum: lower bound"),
         ):
             ax.axhline(cost, color=colour, lw=1.2, ls=LONG_DASHED, zorder=2.5, label=f"{label}, {significant(cost, 3)}")
-        ax.set(xlim=(1, max(2, trial[-1])), xlabel="trial", ylim=(0.0, top), ylabel="cost of a trial")
+        ax.set(xlim=(1, max(2, trial[-1])), xlabel="trial", ylim=(0.0, top), ylabel="cost of a trial [−]")
     return figure

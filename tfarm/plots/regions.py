@@ -1,4 +1,4 @@
-"""Where gains keep a loop stable, continuous and sampled, over the plane of both, and the picture of that.
+"""The plane of two gains: colours for the exact count of unstable poles, stability regions, contours of least damping.
 
 Each region is a list of intervals of one gain at each value of the other, with exact edges (D-decomposition in `loop`
 and in `dsp`); nothing is read off a raster.  Edges are rounded as they are seen in a picture of that plane.
@@ -6,32 +6,74 @@ and in `dsp`); nothing is read off a raster.  Edges are rounded as they are seen
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.patheffects import AbstractPathEffect, withStroke
+from matplotlib.ticker import LogLocator
+from numpy.typing import NDArray
+from scipy import ndimage
 
-from tfarm.arm import PLANE, Arm, HubFeedback, shown_unit
+from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback, shown_unit
+from tfarm.arrays import Real
 from tfarm.columns import Column, Table
 from tfarm.comparing import Comparison
-from tfarm.digits import plain, scientific
+from tfarm.crossing import Window, pieces
+from tfarm.digits import how_many, plain, scientific, significant
 from tfarm.dsp import Chain, GainMap, sampled_map, sampled_verdict
 from tfarm.dsp.crossings import ends_of_K1, rounded_map, with_both_sides, with_more
 from tfarm.errors import ConvergenceError
-from tfarm.loop.plane import Axis, Plane, gain_map, rate_columns
+from tfarm.loop.plane import (
+    INFINITE,
+    LINEAR_SCALE,
+    Axis,
+    Plane,
+    edge,
+    rate_columns,
+    resting_frequencies,
+    stable_edge,
+    static_edges,
+)
+from tfarm.loop.plane import gain_map as counted
 from tfarm.spectrum.table import default_gains
 
 from .frequency import MOST_DRAWN, bode, draw_loops
-from .plane import draw_region
-from .style import BLUE, COLOURS, GREEN, GREY, INK, LYAPUNOV, ORANGE, gains_words, name_axes, picture, plain_ticks
+from .style import (
+    BLUE,
+    COLOURS,
+    GREEN,
+    GREY,
+    INK,
+    LYAPUNOV,
+    ORANGE,
+    PURPLE,
+    gains_words,
+    law_words,
+    name_axes,
+    picture,
+    plain_ticks,
+    safe,
+)
 
-K2_RANGE = (
-    -1.0,
-    1.5,
-)  # of the gain that balances a torque: 1 where the input is one, less where it is a motor's current
+STABLE_COLOUR, FEWEST_COLOUR, MOST_COLOUR, BOUNDLESS_COLOUR = "#dcefe6", "#fbeadd", "#eebd95", "#f3d9c6"
+CONTOUR_STEPS, MOST_CONTOURS = (1.0, 2.0, 5.0), 7  # of the contours
+LEAST_NAMED = 12  # points of a contour with a number, on a grid of about 50 by 60
+LABEL_SHARES = (0.5, 0.35, 0.65, 0.2, 0.8)  # of a contour's length: where its number may stand, the best first
+NUMBER_ROOM = (0.08, 0.045)  # of the picture's width and height, from one number on a contour to the next
+LEAST_ROOM = 0.028  # of the picture's width or height: the count of a region with less around its middle is not written
+NEAR_MIDDLE = 0.9  # of the most room in a region: as good a place
+RESTING_NAMED = 3  # frequencies of the hub at rest in the legend, at their common edge
+NUMBERS_UP, NUMBERS_ACROSS = 0.05, 0.14  # shares of the picture between two frequencies up it, and across it
+MOST_PATCHES = 6  # counts of unstable poles with an entry of the legend each
+DIAMOND, STAR = "D", "*"  # of controllers
+HALO: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]  # around numbers on a line
+K2_RANGE = (-1.0, 1.5)  # of the gain that balances a torque: 1 where the input is one, less for a motor's current
 CUT_RANGE = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
 OVERLAY_COLUMNS = 72  # values of the gain across, and either side of upright edges
 LITTLE_DAMPINGS = (1e-4, 1e-6)  # s: drawn too at C = 0
@@ -42,6 +84,218 @@ BELOW_GAIN = 15.0  # divisor of the gain across of the controller: where the pic
 SAMPLED_COLUMNS = 120  # values of the gain across at which the sampled region is cut, besides its exact ends
 MAP_ASPECT = 1.5  # times as wide as high the picture is, about
 BEYOND_PICTURE = 0.1  # of the gain up the plane, beyond the picture: an edge there is none of the region
+SAND = "#f6dfcb"
+DAMPING_BLUES = ("#c9dcef", "#7fb0da", "#2f7cbc")  # lightest: most damping
+CONVENTION = "u = −{} dθ/dt − {} M;  a positive root moment M accelerates the hub".format(*PLANE)
+
+
+def _title(found: Plane | GainMap) -> str:
+    if isinstance(found, GainMap):
+        ms = significant(1e3 * found.loop.chain.sampling.period, 4)
+        return f"{found.loop.plant.arm.name}: unstable poles when sampled every {ms} ms, first {found.modes_used} modes"
+    if found.is_of_gains:
+        return f"{found.arm.name}: unstable poles over the plane of both gains"
+    return f"{found.arm.name}: unstable poles below {significant(found.band, 5)} rad/s under {law_words(found.law)}"
+
+
+@picture((Plane | GainMap, "tfarm.map returns"), title=_title)
+def gain_map(found: Plane | GainMap, *, ax: Axes) -> None:
+    """The plane of both gains, or of two numbers of a law (from `tfarm.map`), in the axes given or in new ones.
+
+    Colours for the number of unstable poles; a black line for the exact boundary with frequencies [rad/s] along it, of
+    a law or a sampled loop dots where a pole is on the axis or the unit circle.  Returns the axes.
+    """
+    x, y = map(Axis.of, found.axes)
+    if isinstance(found, GainMap):
+        _counts(found, found.counts, ax)
+        name_axes(found.vary, found.loop.plant.arm, found.loop.law, ax)
+    else:
+        ground(found, x, y, ax)
+        if found.is_of_gains:
+            draw_boundary(found, edge(found, x, y), x, y, ax)
+            return
+    there = zip(found.x, found.crossings, strict=False)
+    points = [(at, t) for at, each in there for t in each.within(y.low, y.high).gain]
+    if points:
+        ax.plot(*np.transpose(points), ".", color=INK, ms=2.0, label="a pole on the stability limit, exact")
+
+
+def ground(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
+    """Both axes, the colours of the count, and the count in every region that is large enough."""
+    for axis, setter, name in ((x, ax.set_xscale, ax.xaxis), (y, ax.set_yscale, ax.yaxis)):
+        if not axis.is_linear:
+            setter("symlog", linthresh=axis.linear, linscale=LINEAR_SCALE)
+            plain_ticks(name)
+    _counts(found, found.unstable, ax)
+    ax.set(xlim=(x.low, x.high), ylim=(y.low, y.high))
+    name_axes(found.vary, found.arm, found.law, ax)
+    if not x.is_linear and x.low < x.linear:
+        ax.set_xlabel(f"{ax.get_xlabel()}; linear up to {plain(x.linear)}, logarithmic beyond")
+
+
+def _counts(found: Plane | GainMap, counts: NDArray[np.int64], ax: Axes) -> None:
+    """The colours of the counts (rows, columns), and in each region, where it has most room, its count."""
+    image = colours(counts)
+    ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True, zorder=0.1)
+    ax.grid(False)
+    number = 0
+    for count in np.unique(counts).tolist():
+        inside, text = counts == count, "∞" if count == INFINITE else str(count)
+        label = "infinitely many unstable poles (∞)" if count == INFINITE else how_many(count, "unstable pole")
+        number += count > 0
+        if number <= MOST_PATCHES:
+            ax.fill_between([], [], [], color=image[inside][0], label=label if count else "stable")
+        elif count == counts.max():
+            ax.fill_between([], [], [], color=MOST_COLOUR, label=f"more unstable poles, at most {count}")
+        regions, last = ndimage.label(inside)
+        room = ndimage.distance_transform_edt(np.pad(inside, 1), np.divide(1, counts.shape))[1:-1, 1:-1]
+        for region in range(1, last + 1) if count else ():
+            own = np.where(regions == region, room, 0.0)
+            if own.max() > LEAST_ROOM:
+                middles = np.argwhere(own > NEAR_MIDDLE * own.max())
+                row, column = min(middles, key=lambda at: abs(at - middles.mean(axis=0)).sum())
+                ax.text(found.x[column], found.y[row], text, fontsize=9.0, ha="center", va="center", clip_on=True)
+
+
+def colours(unstable: NDArray[np.int64]) -> Real:
+    """Green where stable, orange the stronger the more poles are unstable."""
+    share = np.clip((unstable - 1) / max(1, unstable.max() - 1), 0, 1)[..., None]
+    image = np.array(to_rgb(FEWEST_COLOUR)) * (1 - share) + np.array(to_rgb(MOST_COLOUR)) * share
+    image[unstable == INFINITE] = to_rgb(BOUNDLESS_COLOUR)
+    image[unstable == 0] = to_rgb(STABLE_COLOUR)
+    return np.asarray(image)
+
+
+def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
+    """Of the least damping ratio (up, across), where it is a number: inside the stable region."""
+    ends = np.nanmin(damping, initial=math.inf), np.nanmax(damping, initial=0.0)
+    levels = [level for level in LogLocator(subs=CONTOUR_STEPS).tick_values(*ends) if ends[0] < level < ends[1]]
+    if not levels:
+        return
+    with np.errstate(invalid="ignore", divide="ignore"):  # by its logarithm, which is straighter
+        logarithm = np.ma.masked_invalid(np.log(damping))
+    lines = ax.contour(
+        across, up, logarithm, np.log(levels[-MOST_CONTOURS:]), colors=BLUE, linewidths=0.9, linestyles="-", zorder=2.5
+    )
+    longest = (max(pieces, key=len) for pieces in lines.allsegs if pieces)
+    places: list[Real] = []
+    for piece in longest:
+        along = (piece[int(share * len(piece))] for share in LABEL_SHARES if len(piece) > LEAST_NAMED)
+        places += next(([at] for at in along if _is_free(at, places, ax)), [])
+    for text in ax.clabel(lines, fontsize=8.0, fmt=lambda log: f"{plain(100 * math.exp(log), 3)} %", manual=places):
+        text.set(path_effects=HALO, zorder=6)
+    ax.plot([], [], color=BLUE, lw=0.9, label="least damping ratio of the first two modes")
+
+
+def _is_free(at: Real, places: Sequence[Real], ax: Axes) -> bool:
+    """Whether a number there touches none of those at the other places."""
+    frame = ax.transData - ax.transAxes
+    away = (abs(frame.transform(place) - frame.transform(at)) > NUMBER_ROOM for place in places)
+    return all(each.any() for each in away)
+
+
+def draw_boundary(found: Plane, points: Real, x: Axis, y: Axis, ax: Axes) -> None:
+    """The exact edge (n, 3) with its frequencies; without damping an upright line and a level one."""
+    if found.arm.loses_at_hub_alone:
+        _undamped_boundary(found, x, y, ax)
+        return
+    label = "poles on the axis at iω, exact, with ω in rad/s"
+    ax.plot(points[:, 0], points[:, 1], color=INK, lw=1.6, label=label)
+    for line, at in zip((ax.axvline, ax.axhline), static_edges(found), strict=True):
+        if at is not None:
+            line(at, color=INK, lw=1.6)
+    along = stable_edge(found, points, x, y)
+    last = max(0.0, float(x.place(np.array(0.0))))
+    for place, (across, up, omega) in sorted(zip(x.place(along[:, 0]).tolist(), along.tolist(), strict=True)):
+        if last + NUMBERS_ACROSS / 2 < place < 1 - NUMBERS_ACROSS / 2 and y.low < up < y.high:
+            last = place + NUMBERS_ACROSS / 2
+            ax.text(
+                across, up, significant(omega, 3), fontsize=8.0, ha="center", va="center", path_effects=HALO, zorder=5
+            )
+
+
+def _undamped_boundary(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
+    """Strong around what is stable, thin where the number of unstable poles changes.
+
+    That is at the edge of each mode of the locked hub, with its frequency at the right; of a uniform arm all these
+    edges are one line.
+    """
+    for low, high in found.stable_intervals[-1]:
+        edges = [end for end in (low, high) if found.y[0] < end < found.y[-1]]  # another end is that of the map
+        ax.vlines(found.upright, max(low, y.low), min(high, y.high), color=INK, lw=1.8)
+        ax.hlines(edges, found.upright, x.high, color=INK, lw=1.8, label="stability boundary, exact")
+    if found.is_known:
+        whole = found.arm.input_per_torque
+        omega = ", ".join(significant(float(w), 4) for w in resting_frequencies(found, RESTING_NAMED))
+        ax.hlines(whole, x.low, x.high, color=INK, lw=0.8, label=f"every mode with the hub at rest: {omega} … rad/s")
+        ax.vlines(found.upright, whole, y.high, color=INK, lw=0.8)
+        return
+    resting = sorted((each.t, each.at) for each in found.crossings[-1].within(y.low, y.high))
+    levels = np.array([t for t, _ in resting])
+    label = "a mode with the hub at rest, ω in rad/s at the right"
+    ax.hlines(levels, found.upright, x.high, color=INK, lw=0.5, label=label)
+    last = -math.inf
+    for (t, w), place in zip(resting, y.place(levels), strict=True):
+        if place > last + NUMBERS_UP:
+            last = place
+            ax.annotate(
+                significant(w, 4), (1.0, t), xytext=(4, 0), va="center", fontsize=7.5, textcoords="offset points",
+                xycoords=ax.get_yaxis_transform(),
+            )  # fmt: skip
+
+
+def draw_sampled(plane: GainMap | None, ax: Axes) -> None:
+    """Where the sampled loop is stable: hatched, its edge exact.  Nothing where it could not be settled."""
+    if plane is not None:
+        ms = plain(1e3 * plane.loop.chain.sampling.period)
+        label = f"stable when sampled every {ms} ms (first {plane.modes_used} modes)"
+        looks: dict[str, Any] = {"facecolor": "none", "hatch": "////", "edgecolor": (*to_rgb(ORANGE), 0.45)}
+        draw_region(plane.x, plane.stable_intervals, ORANGE, label, ax, width=1.2, zorder=4.5, **looks)
+
+
+def draw_region(
+    across: Real, stable: Sequence[Sequence[Window]], edge: str, label: str, ax: Axes, *, width: float = 1.4,
+    zorder: float = 2.5, **looks: Any,
+) -> None:  # fmt: skip
+    """The intervals up at each value across, filled, with edges of that colour.
+
+    Edges are upright where the region itself begins or ends.
+    """
+    looks = {"facecolor": edge, "alpha": 0.22, "lw": 0} if not looks else {"lw": 0, **looks}
+    parts = pieces(across, stable)
+    for piece in parts:
+        x, low, high = np.array(piece.points).T
+        ax.fill_between(x, low, high, zorder=1, **looks)
+        ax.plot(x, np.transpose([low, high]), color=edge, lw=width, zorder=zorder)
+        ends = np.nonzero([piece.begins and x[0] > across[0], piece.ends])[0]
+        ax.vlines(x[-ends], low[-ends], high[-ends], color=edge, lw=width, zorder=zorder)
+    ax.fill_between([], [], [], **looks, label=safe(label) + ("" if parts else ": nowhere in this picture"))
+
+
+def draw_proven(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
+    """The quarter of the plane that is proven at C = 0; at C > 0 only the line without moment feedback is."""
+    dashes, kind = ("-", "proven") if arm.is_undamped else ((0, (5, 3)), "not a proof here")
+    label = f"Lyapunov ({LYAPUNOV}): {kind}"
+    ax.plot([0, 0, x.high], [y.low, 1, 1], color=PURPLE, lw=1.6, ls=dashes, label=label)
+    if not arm.is_undamped:
+        ax.plot([0, x.high], [0, 0], color=PURPLE, lw=1.6, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven")
+
+
+def law_mark(law: HubFeedback, marker: str, label: str, ax: Axes) -> None:
+    """One controller, as a point."""
+    ax.plot(
+        *law.point, marker, ms=13.0 if marker == STAR else 8.0, mfc=ORANGE, mec="white", mew=1.0, zorder=7,
+        ls="none", label=label,
+    )  # fmt: skip
+
+
+def search_frame(bounds: Mapping[str, tuple[float, float]], ax: Axes) -> None:
+    """Bounds of the search of a design."""
+    (a, b), (c, d) = (bounds[name] for name in PLANE)
+    ax.plot([a, b, b, a, a], [c, c, d, d, c], color=GREY, lw=0.8, ls=(0, (1, 2)), label="bounds of its search")
+
+
+# ------------------------------------------------------------ continuous and sampled regions
 
 
 class StableRegions(NamedTuple):
@@ -69,7 +323,7 @@ def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
         for loop in loops
     ]
     every = np.unique(np.concatenate([plane.axes[0] for plane in planes]))
-    return StableRegions(gain_map(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
+    return StableRegions(counted(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
 
 
 def regions_table(data: StableRegions, stem: str) -> Table:
@@ -101,11 +355,6 @@ def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> GainMap | None:
         return None
 
 
-SAND = "#f6dfcb"
-DAMPING_BLUES = ("#c9dcef", "#7fb0da", "#2f7cbc")  # lightest: most damping
-CONVENTION = "u = −{} dθ/dt − {} M;  a positive root moment M accelerates the hub".format(*PLANE)
-
-
 @picture(
     (Plane, "tfarm.map returns of gains at the hub"), (GainMap, "tfarm.dsp.sampled_map returns"), size=(9.0, 5.7),
     title=lambda continuous, _: f"{continuous.arm.name}: gains that keep the loop stable, continuous and sampled",
@@ -123,7 +372,7 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
     plain_ticks(ax.xaxis)
     ax.grid(False)
     ax.axhline(0.0, color=GREY, lw=0.7, zorder=3.5)
-    name_axes(continuous.arm, ax)
+    name_axes(PLANE, continuous.arm, continuous.law, ax)
     ax.set_title(CONVENTION, loc="right", fontsize=8.5, color=GREY)
     draw_region(
         continuous.x, continuous.stable_intervals, ORANGE, "stable, continuous: every mode", ax, width=0.9,
@@ -161,8 +410,8 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
     """Magnitude, phase and map of both (from `tfarm.compare`), in three axes, those given or new ones: these.
 
     Of two arms the exact responses, of two laws the loop functions L; the map is that of both gains, with exact edges,
-    or, where a law is more than these gains, or one in z, of a factor on each law and its further delay.  With a law
-    in z all is of the loops at their samples.
+    or, where a law is more than these gains, or one in z, of a factor on each controller and its further delay.  With
+    a law in z all is of the loops at their samples.
     """
     upper, lower, right = ax
     names = [side.name for side in data.sides]
@@ -170,8 +419,9 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
         bode(dict(zip(names, data.responses, strict=True)), ax=(upper, lower))
     else:
         draw_loops(dict(zip(names, (side.loop_function for side in data.sides), strict=True)), upper, lower)
-        upper.set_ylabel("|L| at the samples" if data.is_sampled else "|L|, loop opened at the input")
+        upper.set_ylabel("|L| at the samples [−]" if data.is_sampled else "|L|, loop opened at the input [−]")
     upper.set_xlabel("")
+    upper.tick_params(labelbottom=False)  # the frequencies of the phase below
     right.grid(False)
     if data.is_sampled or data.regions is None:
         _factors(data, right)
@@ -183,14 +433,16 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
         assert side.gains is not None
         right.plot(*side.gains.point, "o", mfc=colour, mec="white", ms=7.5, zorder=7)
     right.set(xlim=(first.x[0], first.x[-1]), ylim=(first.y[0], first.y[-1]))
-    name_axes(data.one.arm, right)
+    name_axes(PLANE, first.arm, first.law, right)
 
 
 def _factors(data: Comparison, ax: Axes) -> None:
-    """Factors that keep each loop stable, over the further delay of its law."""
+    """Factors that keep each loop stable, over the further delay of its controller."""
     for found, side, colour in zip(data.reaches, data.sides, COLOURS, strict=False):
         draw_region(1e3 * found.delay, found.stable_intervals, colour, f"{side.name}: stable", ax)
-    ax.plot([0.0], [1.0], "o", mfc=INK, mec="white", ms=7.5, zorder=7, clip_on=False, label="the laws as they are")
+    ax.plot(
+        [0.0], [1.0], "o", mfc=INK, mec="white", ms=7.5, zorder=7, clip_on=False, label="the controllers as they are"
+    )
     ax.axhline(1.0, color=INK, lw=0.6)
     limits = {"xlim": (0.0, 1e3 * data.reaches[0].delay[-1]), "ylim": (0.0, min(ax.get_ylim()[1], MOST_DRAWN))}
-    ax.set(xlabel="further delay [ms]", ylabel="factor on the law", **limits)
+    ax.set(xlabel="further delay [ms]", ylabel="factor on the controller [−]", **limits)

@@ -15,15 +15,19 @@ from tfarm.digits import kept_digits, plain, significant
 from tfarm.dsp.modes import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
 from tfarm.errors import one_line
 from tfarm.loop.loci import POLE_DIGITS, Loci, ReducedLocus, held_branches
-from tfarm.loop.locus import Locus, frame, origin_name, rounded
+from tfarm.loop.locus import CONTROLLER, OTHER, Locus, frame, origin_name, rounded
 
 from .style import BLUE, FIGURES, GREEN, GREY, INK, ORANGE, PURPLE, gains_words, page, picture
 
 ZOOMED = 4  # modes drawn on their own
-MODE_COLOURS = (INK, BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # by mode
+MODE_COLOURS = (INK, BLUE, GREEN, PURPLE, "#7a5a00", "#d81b60", "#1a9ec0", "#6d9b1f")  # one a mode, none twice
+OTHER_COLOURS = {CONTROLLER: "#5b7083", OTHER: "#c48a9a"}
+HIGHER_COLOUR = "#9a9a9a"  # of all higher modes alike
 ROOM_AROUND = 0.12  # around a branch, as a share of its extent
-CROSS_AT_ZERO: dict[str, Any] = {"marker": "x", "ms": 6, "mew": 1.4}  # poles without the feedback that varies
-CIRCLE_AT_FIRST: dict[str, Any] = {"marker": "o", "ms": 6, "mfc": "white", "mew": 1.2}  # at the start
+CROSS_AT_ZERO: dict[str, Any] = {"ls": "none", "marker": "x", "ms": 6, "mew": 1.4}  # without the varying feedback
+CIRCLE_AT_FIRST: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6, "mfc": "white", "mew": 1.2}  # at the start
+DOT: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 3.2}
+THIN: dict[str, Any] = {"lw": 0.9, "ls": (0, (2, 1.5)), "zorder": 3}  # of the reduced model
 LONGEST_LAW = 40  # characters of the controller in a title
 PARTS = 4  # of the range of the varied number: at their ends dots are on each branch
 MOST_NAMED = 6  # crossings in a legend
@@ -39,15 +43,17 @@ def zoomed(exact: Locus) -> list[int]:
 def draw_loci(data: Loci) -> Figure:
     """All branches in one panel, and each mode enlarged in one of its own."""
     exact, fine, chosen = data.exact, rounded(data.exact), zoomed(data.exact)
-    with page(9.0, 5.8, _title(exact), mosaic="AABC;AADE", width_ratios=[1.7, 1.7, 1.3, 1.3]) as (figure, axes):
+    grid: dict[str, Any] = {"mosaic": "AABC;AADE", "width_ratios": [1.7, 1.7, 1.3, 1.3]}
+    with page(9.0, 5.8, _title(exact), make=Figure.subplot_mosaic, **grid) as (figure, axes):
         whole, *panels = axes.values()
         _panel(fine, exact, data.reduced, range(len(exact.branches)), whole)
         whole.set_title("all branches", fontsize=9.0)
         for n, ax in zip(chosen, panels, strict=False):
             _panel(fine, exact, data.reduced, [n], ax)
-            ax.set_title(_mode_name(exact, n), fontsize=9.0)
+            ax.set_title(_mode_looks(exact, n)["label"], fontsize=9.0)
             ax.tick_params(labelsize=7.0)
-            ax.set(xlabel="", ylabel="")
+            ax.xaxis.label.set_size(8.0)
+            ax.yaxis.label.set_size(8.0)
         for ax in panels[len(chosen) :]:
             ax.remove()
     return figure
@@ -56,11 +62,18 @@ def draw_loci(data: Loci) -> Figure:
 def _title(exact: Locus, *_: object) -> str:
     first, last = (plain(float(exact.gain[i]), 4) for i in (0, -1))
     law = one_line(gains_words(exact.law, but=exact.vary).partition(", of ")[0], LONGEST_LAW)
-    return f"{exact.arm.name}: closed-loop poles as {exact.vary} goes from {first} to {last} with {law}"
+    values = f"{exact.vary} goes from {first} to {last} {exact.unit.replace('1', '')}".rstrip()
+    return f"{exact.arm.name}: closed-loop poles as {values} with {law}"
 
 
-def _mode_name(exact: Locus, branch: int) -> str:
-    return origin_name(int(exact.origin[branch]))
+def _mode_looks(exact: Locus, branch: int) -> dict[str, Any]:
+    """Colour and name of a branch: of the mode that it starts from, or of none."""
+    origin = int(exact.origin[branch])
+    if origin in OTHER_COLOURS:
+        return {"color": OTHER_COLOURS[origin], "label": origin_name(origin)}
+    if origin >= len(MODE_COLOURS):
+        return {"color": HIGHER_COLOUR, "label": f"modes {len(MODE_COLOURS)} and higher"}
+    return {"color": MODE_COLOURS[origin], "label": origin_name(origin)}
 
 
 def _panel(fine: Locus, exact: Locus, reduced: ReducedLocus | None, numbers: Sequence[int], ax: Axes) -> None:
@@ -75,22 +88,21 @@ def _panel(fine: Locus, exact: Locus, reduced: ReducedLocus | None, numbers: Seq
     first, *others = (plain(value, 3) for value in values)
     way = np.sign(last - gain[0])
     ax.axvline(0, color=INK, lw=0.9, zorder=1)
+    mark = CROSS_AT_ZERO if begins == 0 else CIRCLE_AT_FIRST
     for n in numbers:
-        s, colour = branches[n], MODE_COLOURS[int(exact.mode[n]) % len(MODE_COLOURS)]
-        looks: dict[str, Any] = {"color": colour, "ls": "none", "zorder": 4}
-        ax.plot(
-            s.real, s.imag, color=colour, lw=2.6, alpha=0.4, zorder=2, solid_capstyle="round",
-            label=_mode_name(exact, n),
-        )  # fmt: skip
+        s, colour = branches[n], _mode_looks(exact, n)["color"]
+        ax.plot(s.real, s.imag, lw=2.6, alpha=0.4, zorder=2, solid_capstyle="round", **_mode_looks(exact, n))
         if reduced is not None:
             r = held_branches(reduced.branches[n])
             meets = np.flatnonzero(np.diff((r.imag == 0).astype(int))) + 1  # between two values: no corner is cut off
-            ax.plot(*(np.insert(part, meets, np.nan) for part in (r.real, r.imag)), color=colour, lw=0.9,
-                    ls=(0, (2, 1.5)), zorder=3, label=f"python-control, order {reduced.order}")  # fmt: skip
+            ax.plot(*(np.insert(part, meets, np.nan) for part in (r.real, r.imag)), color=colour, **THIN)
         start, *dots = np.interp(way * np.array(values), way * gain, held_branches(exact.branches[n]))
-        mark = CROSS_AT_ZERO if begins == 0 else CIRCLE_AT_FIRST
-        ax.plot(start.real, start.imag, label=f"{exact.vary} = {first}", **looks, **mark)
-        ax.plot(np.real(dots), np.imag(dots), ms=3.2, marker="o", label=f"{exact.vary} = {', '.join(others)}", **looks)
+        ax.plot(start.real, start.imag, color=colour, zorder=4, **mark)
+        ax.plot(np.real(dots), np.imag(dots), color=colour, zorder=4, **DOT)
+    entries = [(mark, f"{exact.vary} = {first}"), (DOT, f"{exact.vary} = {', '.join(others)}")]
+    entries += [] if reduced is None else [(THIN, f"python-control, order {reduced.order}")]
+    for which, name in entries:  # of the legend, in no mode's colour
+        ax.plot([], [], color=GREY, label=name, **which)
     everything = len(numbers) == len(branches)
     seen = [each for each in exact.crossings if each.branch in numbers or (each.branch is None and everything)]
     for number, each in enumerate(seen):
@@ -135,6 +147,7 @@ def _z_plane(data: SampledLoci, along: SampledLocus, ax: Axes) -> None:
     ax.add_patch(Circle((0, 0), 1.0, fc="white", ec=INK, lw=0.9, zorder=0.5))
     here = int(abs(along.values - data.loop.number(along.gain)).argmin())
     z = np.where((along.z.imag >= -1e-12) & (abs(along.z) < DRAWN_RADIUS), along.z, np.nan)
+    looks: dict[str, Any] = {"mew": 1.1, "ms": 4.5, "zorder": 4}
     is_aliased = np.array([bool(mode) and data.is_aliased(int(mode)) for mode in along.mode])
     for columns, colour, label in (
         (along.mode == 0, GREY, "rigid body"),
@@ -143,12 +156,13 @@ def _z_plane(data: SampledLoci, along: SampledLocus, ax: Axes) -> None:
     ):
         each = z[:, columns]
         ax.plot(each.real, each.imag, color=colour, lw=1.4, zorder=3, label=label)
-        for at, face, mark in ((0, "white", "start"), (here, colour, "gains of the loop")):
-            looks: dict[str, Any] = {"mfc": face, "mec": colour, "mew": 1.1, "ms": 4.5, "zorder": 4, "label": mark}
-            ax.plot(each[[at]].real, each[[at]].imag, "o", **looks)
+        for at, face in ((0, "white"), (here, colour)):
+            ax.plot(each[[at]].real, each[[at]].imag, "o", mfc=face, mec=colour, **looks)
+    for face, name in (("white", "start"), (GREY, "gains of the loop")):  # in no mode's colour
+        ax.plot([], [], "o", mfc=face, mec=GREY, label=name, **looks)
     span = f"{plain(along.values[0], 2)} to {plain(along.values[-1], 3)}"
     held = gains_words(data.loop.gains, 10, but=along.gain)
     ax.set(xlim=(-RIM, RIM), xticks=[-1.0, -0.5, 0.0, 0.5, 1.0], ylim=(0.0, RIM), aspect="equal")
-    ax.set(xlabel="Re z", ylabel="Im z")
+    ax.set(xlabel="Re z [−]", ylabel="Im z [−]")
     ax.grid(False)
     ax.set_title(f"z-plane, {along.gain} from {span} ({held})", fontsize=9.5)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import cycle
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,10 +20,11 @@ from tfarm.spectrum import Modes
 from .style import BLUE, FAINT, GREEN, GREY, INK, ORANGE, PURPLE, page, picture, plain_ticks
 
 SHAPE_POINTS = 401  # of a drawn mode: about one to a pixel of its picture
-ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [-]"
+ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [−]"
 HUB_RADIUS = 0.055  # radius of the drawn hub, and half the payload's side, as shares of the length
 SEGMENT_COLOURS = ("#cfe0ee", "#e3ecd5")  # colours of neighbours
-LEFT, RIGHT, HALF_HEIGHT = -0.2, 0.2, 0.16  # room left of the hub, right of the tip, and above and below at least
+BESIDE_ARM, HALF_HEIGHT = 0.2, 0.12  # shares of the length left of the hub and right of the tip; above, at least
+AROUND_SKETCH = 1.15  # inches above and below it: three lines, and the axis
 HUB_WIDTH = 0.06  # width of the drawn hub, as a share of the length
 
 
@@ -69,8 +69,9 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
             one.plot(length, w[-1], "s", ms=8.0, mfc=GREY, mec="none", zorder=3)
         one.plot(found.nodes[row], 0 * found.nodes[row], "o", ms=5.5, mfc="white", mec=ORANGE, mew=1.3, zorder=4)
         one.set(xlim=(-0.085 * length, 1.11 * length), ylim=(-1.28, 1.28), yticks=[-1, 0, 1])
+        one.xaxis.set_major_locator(MaxNLocator(5))
         omega, hertz = (significant(float(of[row]), 7) for of in (found.natural_frequency, found.natural_frequency_hz))
-        places = ", ".join(plain(round(float(node), 4), 3) for node in found.nodes[row]) or "none"
+        places = ", ".join(plain(float(node), 3) for node in found.nodes[row]) or "none"
         one.set_title(f"Mode {number}:  {omega} rad/s  ({hertz} Hz)\nnodes [m]: {places}", fontsize=9.5)
         if not one.figure.get_supylabel():
             one.set(xlabel=ALONG, ylabel=DISPLACEMENT)
@@ -90,7 +91,7 @@ def draw_differences(name: str, differences: Mapping[str, Real]) -> Figure:
             ax.set_yscale("log")
             plain_ticks(ax.yaxis)
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-        ax.set(xlabel="mode", ylabel="frequency above Timoshenko's [%]")
+        ax.set(xlabel="mode number", ylabel="frequency above Timoshenko's [%]")
     return figure
 
 
@@ -102,13 +103,6 @@ def theory_name(theory: str) -> str:
 # ------------------------------------------------------------ the arm
 
 
-def _ends(arm: Arm) -> tuple[float, float, float, float]:
-    """Left, right, bottom and top of the picture, in lengths of the link."""
-    tip = 1 + (arm.hub.radius + max(0.0, arm.payload.offset)) / arm.length
-    half = max(HALF_HEIGHT, max(map(_depth, arm.links)) / arm.length / 2 + 0.09)
-    return LEFT, tip + RIGHT, -half, half
-
-
 def _depth(link: Link) -> float:
     """The depth [m] of one segment: that of its shape, or sqrt(12) times the radius of gyration, as of a rectangle."""
     sizes = dict(link.section.dimensions)
@@ -116,74 +110,64 @@ def _depth(link: Link) -> float:
     return own or math.sqrt(12) / link.slenderness * link.length
 
 
-@picture(
-    (Arm, "tfarm.load returns"),
-    size=lambda arm: (9.0, 0.2 + 9.0 * np.ptp(_ends(arm)[2:]) / np.ptp(_ends(arm)[:2])),
-    title=lambda _: "",
-)
+def _frame(arm: Arm) -> tuple[float, float, float]:
+    """Left end, right end and half the height [m] of the picture."""
+    tip = arm.length + arm.hub.radius + max(0.0, arm.payload.offset)
+    return -BESIDE_ARM * arm.length, tip + BESIDE_ARM * arm.length, max(HALF_HEIGHT * arm.length, 0.6 * _deepest(arm))
+
+
+def _deepest(arm: Arm) -> float:
+    return max(map(_depth, arm.links))
+
+
+def _sketch_size(arm: Arm) -> tuple[float, float]:
+    left, right, half = _frame(arm)
+    return 9.0, AROUND_SKETCH + 8.6 * 2 * half / (right - left)
+
+
+@picture((Arm, "tfarm.load returns"), size=_sketch_size, title=lambda _: "")
 def sketch(arm: Arm, *, ax: Axes) -> None:
-    """Hub, link and payload from the side, lengths in shares of the link's, in the axes given or new ones; the axes."""
-    left, right, low, high = _ends(arm)
-    ax.set(aspect="equal", xlim=(left, right), ylim=(low, high))
-    ax.set_axis_off()
+    """Hub, link and payload from the side, to scale [m], in the axes given or in new ones; the axes."""
+    left, right, half = _frame(arm)
+    root, bore = arm.hub.radius, HUB_RADIUS * arm.length
+    ax.set(aspect="equal", xlim=(left, right), ylim=(-half, half), yticks=[], xlabel="distance from the hub's axis [m]")
+    ax.spines[["left", "right", "top"]].set_visible(False)
     ax.axhline(0, color=FAINT, lw=0.8, ls=(0, (6, 3, 1, 3)), zorder=0)
-    _link(arm, ax)
-    _payload(arm, ax)
-    ax.add_patch(Circle((0, 0), HUB_RADIUS, fc="#e9e9e9" if arm.hub.inertia else "white", ec=INK, lw=1.2, zorder=3))
-    ax.plot(0, 0, "o", ms=3.5, color=INK, zorder=4)
-    turn: dict[str, Any] = {
-        "connectionstyle": "arc3,rad=0.75",
-        "arrowstyle": "-|>",
-        "mutation_scale": 11,
-        "color": ORANGE,
-        "lw": 1.3,
-    }
-    ax.add_patch(FancyArrowPatch((0.085, -0.055), (-0.055, 0.085), zorder=4, **turn))
-    ax.text(-0.07, 0.08, "θ" if arm.is_locked else "u", color=ORANGE, ha="right", va="bottom", fontsize=11)
-    text = (
-        f"hub  $I_h$ = {plain(arm.hub.inertia, 6)} {unit('kg m^2')}" if arm.hub.inertia else "free pin, no hub inertia"
-    )
-    text = "hub locked: driven by its angle" if arm.is_locked else text
-    ax.text(0.13, high - 0.04, text, fontsize=9.0, color=INK)
-
-
-def _link(arm: Arm, ax: Axes) -> None:
-    """The segments with everything mounted on them, and their length below."""
-    root = start = arm.hub.radius / arm.length
+    start = root
     for link, colour in zip(arm.links, cycle(SEGMENT_COLOURS), strict=False):
-        share, height = (link.length / arm.length if arm.outer else 1.0), _depth(link) / arm.length
-        ax.add_patch(Rectangle((start, -height / 2), share, height, fc=colour, ec=BLUE, lw=1.0, zorder=2))
-        start += share
+        deep = _depth(link)
+        ax.add_patch(Rectangle((start, -deep / 2), link.length, deep, fc=colour, ec=BLUE, lw=1.0, zorder=2))
+        start += link.length
     ax.plot([0, root], [0, 0], color=INK, lw=4.0, solid_capstyle="butt", zorder=1.5)
     if not arm.clamp.is_rigid:
-        ax.plot([root], [0], "o", ms=7.0, mfc="white", mec=ORANGE, mew=1.4, zorder=5)
-    ax.plot([root + each.x / arm.length for each in arm.attachments], [0] * len(arm.attachments), "o", ms=5.0,
-            color=INK, zorder=5)  # fmt: skip
-    deepest = max(map(_depth, arm.links))
-    below = -max(deepest / arm.length / 2, HUB_RADIUS) - 0.035
-    ax.annotate("", (root, below), (root + 1, below), arrowprops={"arrowstyle": "<->", "color": GREY, "lw": 0.8})
-    depths = (
-        f"{len(arm.links)} segments, at most {plain(deepest, 4)} m deep"
-        if arm.outer
-        else f"depth {plain(deepest, 4)} m"
-    )
-    radius = f",  r = {plain(arm.hub.radius, 6)} m" if root else ""
-    text = f"L = {plain(arm.length, 6)} m,  {depths} (to scale){radius}"
-    ax.text(root + 0.5, below - 0.012, text, ha="center", va="top", fontsize=9.0, color=INK)
-
-
-def _payload(arm: Arm, ax: Axes) -> None:
-    """The mass at the tip, or beyond it, with its numbers; a triangle below one that is pinned."""
-    mass, inertia, offset = arm.payload.mass, arm.payload.inertia, arm.payload.offset
-    tip = 1 + arm.hub.radius / arm.length
-    at = tip + offset / arm.length
-    text = "free tip, no payload"
-    if mass or inertia:
-        masses = "tip pinned" if math.isinf(mass) else f"m = {plain(mass, 6)} kg"
-        turns = "tip cannot rotate" if math.isinf(inertia) else f"$I_c$ = {plain(inertia, 6)} {unit('kg m^2')}"
-        text = f"payload  {masses},  {turns}" + (f",  e = {plain(offset, 6)} m" if offset else "")
-        side = max(0.03, min(HUB_RADIUS, max(map(_depth, arm.links)) / arm.length * 0.75))
-        ax.plot([tip, at], [0, 0], color=INK, lw=2.0, zorder=2.5)
+        ax.plot(root, 0, "o", ms=7.0, mfc="white", mec=ORANGE, mew=1.4, zorder=5)
+    for each in arm.attachments:
+        ax.plot(root + each.x, 0, "o", ms=5.0, color=INK, zorder=5)
+    payload, at = arm.payload, root + arm.length + arm.payload.offset
+    if payload.mass or payload.inertia:
+        side = max(0.03 * arm.length, min(bore, 0.75 * _deepest(arm)))
+        ax.plot([root + arm.length, at], [0, 0], color=INK, lw=2.0, zorder=2.5)
         ax.add_patch(Rectangle((at - side, -side), 2 * side, 2 * side, fc="#8c8c8c", ec=INK, lw=1.0, zorder=3))
-    _, right, _, high = _ends(arm)
-    ax.text(right - 0.15, high - 0.04, text, ha="right", fontsize=9.0, color=INK)
+    ax.add_patch(Circle((0, 0), bore, fc="#e9e9e9" if arm.hub.inertia else "white", ec=INK, lw=1.2, zorder=3))
+    ax.plot(0, 0, "o", ms=3.5, color=INK, zorder=4)
+    ends = np.array([[1.5, -1.0], [-1.0, 1.5]]) * bore
+    ax.add_patch(FancyArrowPatch(*ends, zorder=4, connectionstyle="arc3,rad=0.75", arrowstyle="-|>", mutation_scale=11,
+                                 color=ORANGE, lw=1.3))  # fmt: skip
+    ax.text(ends[1, 0], ends[1, 1], "θ" if arm.is_locked else "u", color=ORANGE, ha="right", va="bottom", fontsize=11)
+    ax.set_title("\n".join(_numbers(arm)), fontsize=9.0, color=INK)
+
+
+def _numbers(arm: Arm) -> Iterator[str]:
+    """Hub, link and payload in numbers, a line each."""
+    payload, inertia = arm.payload, unit("kg m^2")
+    free = f"hub  $I_h$ = {plain(arm.hub.inertia, 6)} {inertia}" if arm.hub.inertia else "free pin, no hub inertia"
+    hub = "hub locked: driven by its angle" if arm.is_locked else free
+    yield hub + (f",  r = {plain(arm.hub.radius, 6)} m" if arm.hub.radius else "")
+    depths = f"{len(arm.links)} segments, at most" if arm.outer else "depth"
+    yield f"link  L = {plain(arm.length, 6)} m,  {depths} {plain(_deepest(arm), 4)} m{' deep' if arm.outer else ''}"
+    if not (payload.mass or payload.inertia):
+        yield "free tip, no payload"
+        return
+    masses = "tip pinned" if math.isinf(payload.mass) else f"m = {plain(payload.mass, 6)} kg"
+    turns = "tip cannot rotate" if math.isinf(payload.inertia) else f"$I_c$ = {plain(payload.inertia, 6)} {inertia}"
+    yield f"payload  {masses},  {turns}" + (f",  e = {plain(payload.offset, 6)} m" if payload.offset else "")

@@ -1,4 +1,4 @@
-"""The common style of all pictures, whatever the user's own matplotlib settings are, figures to draw on, and files.
+"""The style of all pictures (tfarm.mplstyle), whatever the user's matplotlib settings are; figures, and files.
 
 The figure of a page does not touch pyplot: nothing global, nothing on a screen.  A picture drawn without `ax` is a
 figure of pyplot, so that a notebook shows it.  The same figure gives the same bytes on every run: fixed fonts, a fixed
@@ -27,52 +27,25 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from tfarm.arm import GAINS, LISTED, PLANE, AnyLaw, Arm, as_law, shown_unit
 from tfarm.digits import plain
 from tfarm.errors import ParameterError
+from tfarm.exact.outputs import OUTPUTS
 from tfarm.files import write_file
+from tfarm.loop.varied import ARM_PARAMETERS
 from tfarm.schema import quantities
 
 INK, GREY, FAINT = "#1a1a1a", "#6b6b6b", "#d4d4d4"
 BLUE, ORANGE, GREEN, PURPLE = "#0060a8", "#c4500a", "#00795a", "#8a3b8f"  # distinct for the colour-blind too
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)  # of several records in one picture
 
-STYLE = {
-    "font.family": "DejaVu Sans",
-    "font.size": 10.0,
-    "mathtext.fontset": "dejavusans",
-    "axes.labelsize": 10.0,
-    "axes.titlesize": 10.5,
-    "axes.titlelocation": "left",
-    "axes.titlecolor": INK,
-    "axes.edgecolor": GREY,
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.8,
-    "axes.grid": True,
-    "axes.formatter.useoffset": False,  # full numbers at the ticks, with no "+3.322e4" to add
-    "axes.axisbelow": True,
-    "grid.color": "#e6e6e6",
-    "grid.linewidth": 0.6,
-    "xtick.color": GREY,
-    "ytick.color": GREY,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "xtick.labelsize": 9.0,
-    "ytick.labelsize": 9.0,
-    "lines.linewidth": 1.5,
-    "legend.fontsize": 9.0,
-    "legend.frameon": False,
-    "figure.constrained_layout.w_pad": 0.08,
-    "figure.constrained_layout.h_pad": 0.08,
-    "savefig.facecolor": "white",
-    "svg.hashsalt": "tfarm",
-    "svg.fonttype": "path",
-    "pdf.fonttype": 42,
-    "path.simplify": True,  # where a line strays less than a ninth of a pixel
-}
 
 WIDEST_LEGEND = 0.95  # of a figure's width: letters are a little wider or narrower in a file of other dots an inch
 LETTERS_PER_INCH = 11.5  # of a headline
 
 LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)  # proven by the argument of the paper at C = 0
 NOT_THE_PAPERS = ("hub_angle",)  # outputs whose gain is an extension of the paper's law: named where it is used
+UNNAMED = "law"  # of a law without a name
+FACTORS = ("gain", "all")  # on a whole controller
+OTHER_UNITS = ARM_PARAMETERS | {"delay": "s"}  # of numbers that vary
+NUMBER_OF_LAW = re.compile(r"(.*?)(?:\.(gain|num|den)(?:\.(\d+))?)?")  # signal, what of it, and a coefficient's place
 
 METADATA: dict[str, dict[str, str | None]] = {
     "svg": {"Date": None, "Creator": "tfarm"},
@@ -84,20 +57,19 @@ COORDINATES, LONG_NUMBER, PATH_LETTER = (  # in an SVG
 )
 
 
+STYLE = Path(__file__).with_name("tfarm.mplstyle")
 style = partial(matplotlib.style.context, ["default", STYLE])  # whatever the user's own settings are
 
 
-def blank(width: float, height: float, new: Callable[..., Figure] = Figure) -> Figure:
-    """An empty figure of that size [inches], its parts laid out so that no label is clipped."""
-    return new(figsize=(width, height), layout="constrained")
-
-
 @contextmanager
-def page(width: float, height: float, title: str, **grid: Any) -> Iterator[tuple[Figure, Any]]:
-    """A figure of that size [inches] with axes as `subplots` makes them of `grid`; after drawing, legend and title."""
+def page(
+    width: float, height: float, title: str, new: Callable[..., Figure] = Figure,
+    make: Callable[..., Any] = Figure.subplots, **grid: Any,
+) -> Iterator[tuple[Figure, Any]]:  # fmt: skip
+    """A figure of that size [inches] with the axes that `make` makes of `grid`; after drawing, legend and title."""
     with style():
-        figure = blank(width, height)
-        yield figure, figure.subplot_mosaic(**grid) if "mosaic" in grid else figure.subplots(**grid)
+        figure = new(figsize=(width, height), layout="constrained")  # so that no label is clipped
+        yield figure, make(figure, **grid)
         legend_below(figure)
         headline(figure, title)
 
@@ -118,9 +90,9 @@ def check_records(of: Sequence[tuple[Any, str]], found: Sequence[Any]) -> None:
     """Raise ParameterError where a record, or one of several in a list or by name, is not of its class."""
     for (kind, origin), value in zip(of, found, strict=False):
         values = list(value.values()) if isinstance(value, Mapping) else value
-        for each in (values or [None]) if isinstance(values, list | tuple) else [values]:
-            if not isinstance(each, kind):
-                raise ParameterError(key="plot", value=each, remedy=f"give what {origin}")
+        values = values if isinstance(values, list | tuple) else [values]
+        if not values or not all(isinstance(each, kind) for each in values):
+            raise ParameterError(key="plot", value=value, remedy=f"give what {origin}")
 
 
 def picture(
@@ -146,18 +118,14 @@ def picture(
         is_one = grid is None and len(rows) == 1
 
         def figure(*found: Any, new: Callable[..., Figure] = Figure, **how: Any) -> Figure:
-            with style():
-                width, height = size(*found) if callable(size) else size
-                drawn = blank(width, height, new)
-                if grid is None:
-                    drawn.subplots(len(rows), 1, sharex=True, height_ratios=rows)
-                else:
-                    grid(drawn, *found)
+            width, height = size(*found) if callable(size) else size
+            made: dict[str, Any] = {"nrows": len(rows), "sharex": True, "height_ratios": rows}
+            if grid is not None:
+                made = {"make": lambda figure: grid(figure, *found)}
+            with page(width, height, title(*found), new, **made) as (drawn, _):
                 draw(*found, ax=drawn.axes[0] if is_one else drawn.axes, **how)
                 for ax in drawn.axes[:-1] if grid is None else []:
                     ax.set_xlabel("")
-                legend_below(drawn)
-                headline(drawn, title(*found))
             return drawn
 
         @wraps(draw)
@@ -228,20 +196,58 @@ def plain_ticks(axis: Axis, digits: int = 3, subs: Sequence[float] = (1.0,)) -> 
     axis.set_minor_formatter(NullFormatter())
 
 
+def law_words(law: AnyLaw) -> str:
+    """A controller by its name, where it has one of its own."""
+    name = as_law(law).name
+    return "the controller" if name == UNNAMED else name
+
+
 def gains_words(law: AnyLaw, digits: int = 4, but: str = "") -> str:
     """Each gain with its value, for reading; `but` names one that varies and is left out.  Another law by its name."""
     any_law = as_law(law)
     if any_law.gains is None:
-        return f"{any_law.name}, of {', '.join(any_law.signals)}"
+        return f"{law_words(law)}, of {', '.join(any_law.signals)}"
     gains = any_law.gains
     named = [gain.name for gain in LISTED if gains[gain.name] or gain.output not in NOT_THE_PAPERS]
     return ", ".join(f"{name} = {plain(gains[name], digits)}" for name in named if name != but)
 
 
-def name_axes(arm: Arm, ax: Axes) -> None:
-    """Along the axes of the plane of gains: their names, their signals and their units."""
-    outputs = {gain.name: gain.output.replace("_", " ") for gain in GAINS}
-    across, up = (f"{name}, gain on the {outputs[name]} [{shown_unit(name, arm) or '−'}]" for name in PLANE)
+def signal_label(name: str) -> str:
+    """A signal in words: the label of that output, with its place along the link, or an input of the hub."""
+    output, _, x = name.partition("@")
+    label = OUTPUTS[output].label if output in OUTPUTS else output.replace("_", " ")
+    return label.replace("at x", f"at x = {x} m")
+
+
+def number_label(name: str, arm: Arm, law: AnyLaw) -> str:
+    """A number of a controller or of the arm with its SI unit, for an axis.
+
+    The coefficient of s^k in the denominator counts as s^k, in the numerator as the unit of a gain times s^k.
+    """
+    for gain in GAINS:
+        if gain.name == name:
+            return f"{name}, gain on the {signal_label(gain.output)} [{shown_unit(name, arm) or '−'}]"
+    if name in OTHER_UNITS:
+        return f"{name.replace('_', ' ')} [{OTHER_UNITS[name]}]"
+    signal, of, place = NUMBER_OF_LAW.fullmatch(name).groups("")  # type: ignore[union-attr]
+    any_law = as_law(law)
+    if not place and signal not in any_law.part_gains:
+        return f"{name}, factor on the {'controller' if signal in FACTORS else signal_label(signal)} [−]"
+    (block,) = (part.block for part in any_law.parts if part.signals == (signal,))
+    power = len(getattr(block, of)) - 1 - int(place) if place and not any_law.is_discrete else 0
+    unit = "" if of == "den" else ratio(arm.input_unit, OUTPUTS[signal.partition("@")[0]].unit)
+    time = {0: "", 1: "s"}.get(power, f"s^{power}")
+    return f"{name} [{f'({unit}) {time}' if unit and time else unit or time or '−'}]"
+
+
+def ratio(above: str, below: str) -> str:
+    """One unit over another, such as m/s^2/(N m)."""
+    return f"{above}/{f'({below})' if ' ' in below or '/' in below else below}"
+
+
+def name_axes(vary: Sequence[str], arm: Arm, law: AnyLaw, ax: Axes) -> None:
+    """Along the axes of a plane of two numbers: their names and units."""
+    across, up = (safe(number_label(name, arm, law)) for name in vary)
     ax.set(xlabel=across, ylabel=up)
 
 

@@ -23,10 +23,10 @@ from tfarm.loop.loci import Loci, held_branches, loci
 from tfarm.loop.loop import band_of
 from tfarm.loop.plane import DEEPEST_MOMENT_GAIN, Axis, Plane, edge, gain_map, moment_axis, rate_axis
 from tfarm.loop.stability import MARGIN_OF_ZERO, stability
-from tfarm.plots import plane
+from tfarm.plots import regions as plane
 from tfarm.plots.regions import sampled_region
 from tfarm.plots.roots import draw_loci
-from tfarm.plots.style import blank, headline, legend_below, style
+from tfarm.plots.style import page
 from tfarm.records import record
 from tfarm.report.cases import DESIGNED_MODES, Case, Controller, best, brief_on, has_loop, margins_of
 from tfarm.report.loop_section import poles_tables
@@ -116,9 +116,7 @@ def map_of_arm(arm: Arm, chain: Chain) -> MapOfArm:
 def draw_map_of_arm(data: MapOfArm) -> Figure:
     """Both gains: the count, its boundary, the damping, the sampled region, Lyapunov's frame, and the laws."""
     found, x, y = data.region, data.x, data.y
-    with style():
-        figure = blank(9.0, 6.2)
-        ax = figure.subplots()
+    with page(9.0, 6.2, f"{data.arm.name}: stability region of both gains") as (figure, ax):
         plane.ground(found, x, y, ax)
         plane.contours(*data.axes, np.where(data.counts == 0, data.damping, np.nan), ax)
         plane.draw_boundary(found, data.edge, x, y, ax)
@@ -130,8 +128,6 @@ def draw_map_of_arm(data: MapOfArm) -> Figure:
             plane.law_mark(gains, MARKERS[law.key], f"{law.title};\n{brief.short}", ax)
         if data.design is not None:
             plane.search_frame(data.design.bounds, ax)
-        legend_below(figure)
-        headline(figure, f"{data.arm.name}: stability region of both gains")
     return figure
 
 

@@ -19,7 +19,7 @@ from tfarm.errors import ParameterError, TfarmError, must_be_known
 from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
-from tfarm.plots.frequency import draw_compared
+from tfarm.plots.frequency import bode as bode_plot
 from tfarm.plots.regions import comparison, draw_overlay, stable_regions
 from tfarm.plots.shapes import modes
 from tfarm.plots.style import save_figure
@@ -365,9 +365,9 @@ def readme_pictures(out: Path) -> tuple[Path, ...]:
     out.mkdir(parents=True, exist_ok=True)
     lab, undamped = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
     band, labels = resonant_band(lab, 6), ("exact, no damping", f"exact, damping C = {plain(lab.damping)} s")
-    main, other = (bode(arm, "root_moment", band) for arm in (undamped, lab))
+    both = {label: bode(arm, "root_moment", band) for label, arm in zip(labels, (undamped, lab), strict=True)}
     figures = {
-        "bode-root-moment": draw_compared(main, other, labels),
+        "bode-root-moment": bode_plot.figure(both),
         "gains": draw_overlay(stable_regions(lab, default_gains(lab), load_chain(lab.name))),
         "mode-shapes": modes.figure(tfarm.modes(lab, count=README_MODES)),
     }
