@@ -111,8 +111,8 @@ def test_differences_are_in_the_unit_and_rows_are_paired_by_their_first_quantity
     assert found["limit"].difference == pytest.approx(-0.25)
     assert (found["stability"].one, found["stability"].other) == ("stable", "marginal")
     assert found["stability"].difference is None
-    assert found["modes 2: frequency"].difference == pytest.approx(1.0)
-    assert "modes 1: frequency" not in found
+    assert found["mode 2: frequency"].difference == pytest.approx(1.0)
+    assert "mode 1: frequency" not in found
     assert "nested: limit" not in found  # of neither
     assert found["twice"].difference == 0.0
 

@@ -11,7 +11,7 @@ meaning from here.  `to_dict` and `sections` read a record, `table` records of o
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass, replace
 from functools import cache, cached_property
 from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
@@ -144,10 +144,13 @@ def table(rows: Any, names: Sequence[str] = (), *, stem: str = "", title: str = 
     if not (_is_table(rows) or rows):
         return Table(columns=(), stem=stem, title=title, caption=caption)
     declared = quantities(type(rows if _is_table(rows) else rows[0]))
+    titles: dict[str, str] = getattr(rows, "titles", {})
     wanted = names or [name for name, of in declared.items() if of.label]
-    found = ((declared[name], _values(rows, name)) for name in wanted)
+    found = ((replace(of := declared[name], label=titles.get(name, of.label)), _values(rows, name)) for name in wanted)
     columns = (
-        _column(of, values) for of, values in found if names or not values or any(value is not None for value in values)
+        _column(of, values)
+        for of, values in found
+        if names or not values or any(value is not None and str(value) for value in values)
     )
     return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
 
@@ -187,7 +190,7 @@ def entries(record: Any, under: str = "") -> Iterator[tuple[str, Quantity, Any]]
     """Label, quantity and value of what has one value, in records inside the record too."""
     for name, of in quantities(type(record)).items():
         value, label = getattr(record, name), f"{under}{of.label}"
-        if hasattr(value, "as_text"):
+        if hasattr(value, "as_text") and not isinstance(value, Percent):
             if of.label:
                 yield label, of, value.as_text(of.digits)
         elif is_declared(value) and not isinstance(value, At) and (of.flat or of.label):
@@ -340,45 +343,90 @@ def _parts(value: complex, digits: int) -> tuple[str, str]:
 # ------------------------------------------------------------------------------------------------------- comparison
 
 
+class Percent(float):
+    """A ratio that a person reads in per cent."""
+
+    unit = "%"
+
+    def as_text(self, digits: int) -> str:
+        """The number with its unit."""
+        return f"{general(100 * self, digits)} {self.unit}"
+
+
+class PercentagePoints(Percent):
+    """The difference of two of these."""
+
+    unit = "percentage points"
+
+
 class Difference(NamedTuple):
     """One quantity of two records."""
 
-    quantity: Annotated[str, Quantity("quantity")]
-    unit: Annotated[str, Quantity("unit")]
-    one: Annotated[Any, Quantity("first", digits=8)]
-    other: Annotated[Any, Quantity("second", digits=8)]
+    quantity: Annotated[str, Quantity("quantity", help="quantity of both records, in a table after its row")]
+    unit: Annotated[str, Quantity("unit", help="unit of both values and of their difference")]
+    one: Annotated[Any, Quantity("first", digits=8, help="value of the first record")]
+    other: Annotated[Any, Quantity("second", digits=8, help="value of the second record")]
 
     @property
-    def difference(self) -> Annotated[float | None, Quantity("difference", digits=4)]:
+    def difference(self) -> Annotated[float | None, Quantity("difference", digits=4, help="second less first")]:
         """Second less first, in the unit; what rounding may leave is 0, and what is no number has none."""
         one, other = self.one, self.other
         if one is None or other is None or not (_is_number(one) and _is_number(other)):
             return None
-        if one == other:
-            return 0.0
-        gap = float(other - one)
-        return None if not math.isfinite(gap) else 0.0 if abs(gap) <= SAME * abs(one) else gap
+        gap = 0.0 if one == other else float(other - one)
+        if not math.isfinite(gap):
+            return None
+        gap = 0.0 if abs(gap) <= SAME * abs(one) else gap
+        return PercentagePoints(gap) if isinstance(one, Percent) else gap
 
 
-def compare(one: Any, other: Any, under: str = "") -> list[Difference]:
+NAMES = ("first", "second")  # of two records that have none
+
+
+class Differences(list[Difference]):
+    """Quantities of two records, which are named in the table."""
+
+    def __init__(self, rows: Iterable[Difference], names: tuple[str, str]) -> None:
+        super().__init__(rows)
+        self.titles = dict(zip(("one", "other"), names, strict=True))
+
+
+def compare(one: Any, other: Any, names: tuple[str, str] = NAMES) -> Differences:
     """The quantities that both records have, row by row; rows of a table are paired by their first quantity."""
-    others = {label: value for label, _, value in entries(other, under)}
-    found = [
-        Difference(label, of.unit, *(each.value if isinstance(each, At) else each for each in (a, others[label])))
-        for label, of, a in entries(one, under)
-        if label in others
-        and (of.is_number or len(str(a)) < LONGEST_COMPARED)
-        and not {str(a), str(others[label])} <= EMPTY
-    ]
-    for (a, of), (b, _) in zip(_with_flat(one), _with_flat(other), strict=False):
-        if of.label and _is_list_of_records(a) and _is_list_of_records(b):
-            key = next(iter(quantities(type(a[0]))))
-            rows = {getattr(row, key): row for row in b}
-            paired = [(row, rows[at]) for row in a if (at := getattr(row, key)) in rows]
-            found += [
-                each for row, match in paired for each in compare(row, match, f"{of.label} {getattr(row, key)}: ")
-            ]
-    return found
+    return Differences(_differences(one, other), names)
+
+
+def compare_rows(
+    some: Sequence[Any], others: Sequence[Any], names: tuple[str, str] = ("first", "second")
+) -> Differences:
+    """The quantities of records in two lists, paired by their first one, a name or a number."""
+    return Differences(_differences_of_rows(some, others), names)
+
+
+def _differences(one: Any, other: Any) -> Iterator[Difference]:
+    others = {label: value for label, _, value in entries(other)}
+    for label, of, value in entries(one):
+        both = [each.value if isinstance(each, At) else each for each in (value, others.get(label))]
+        is_short = of.is_number or len(str(value)) < LONGEST_COMPARED
+        if label in others and is_short and not set(map(str, both)) <= EMPTY:
+            yield Difference(label, of.unit, *both)
+    for (value, of), (match, _) in zip(_with_flat(one), _with_flat(other), strict=False):
+        if of.label and _is_list_of_records(value) and _is_list_of_records(match):
+            yield from _differences_of_rows(value, match)
+
+
+def _differences_of_rows(some: Sequence[Any], others: Sequence[Any]) -> Iterator[Difference]:
+    """Differences of rows; a text that is the same in both rows is none."""
+    if not some:
+        return
+    key, of = next(iter(quantities(type(some[0])).items()))
+    by_key = {getattr(row, key): row for row in others}
+    for row in some:
+        at = getattr(row, key)
+        for each in _differences(row, by_key[at]) if at in by_key else ():
+            if each.quantity != of.label and not (isinstance(each.one, str) and each.one == each.other):
+                row_name = at if isinstance(at, str) else f"{of.label} {text(at)}"
+                yield each._replace(quantity=f"{row_name}: {each.quantity}")
 
 
 def _is_number(value: Any) -> bool:

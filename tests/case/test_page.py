@@ -55,6 +55,11 @@ def test_the_page_sets_its_numbers_and_every_column_has_a_key(folder):
     heads = re.findall(r'<th scope="col"[^>]*data-key="([^"]*)"[^>]*>([^<]*)', page)
     assert ("quantity", "quantity") in heads
     assert all(key and title for key, title in heads)
+    assert ("one", "lab") in heads  # a column is named after its side
+    assert "reach" not in dict(heads)  # both verdicts hold at every frequency
+    headings = re.findall(r"<h\d>([^<]*)", page)
+    assert len(headings) == len(set(headings)) >= 5
+    assert re.search(r">[^<]* percentage points<", page)
 
 
 def test_names_are_text_and_every_file_is_there(folder):
