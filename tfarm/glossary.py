@@ -21,17 +21,17 @@ from tfarm.schema import Quantity, quantities
 class Term:
     """A term and its meaning; of a word of certainty what has to be shown for it."""
 
-    name: Annotated[str, Quantity("term", key="term")]
-    meaning: Annotated[str, Quantity("meaning")]
+    name: Annotated[str, Quantity("term", key="term", help="word of certainty, or term of the results")]
+    meaning: Annotated[str, Quantity("meaning", help="definition; of a word of certainty also its condition")]
 
 
 @dataclass(frozen=True, slots=True)
 class Declared:
     """A quantity of the results."""
 
-    label: Annotated[str, Quantity("quantity", key="quantity")]
-    unit: Annotated[str, Quantity("unit")]
-    meaning: Annotated[str, Quantity("meaning")]
+    label: Annotated[str, Quantity("quantity", key="quantity", help="label of the quantity in text, tables and pages")]
+    unit: Annotated[str, Quantity("unit", help="SI unit; none of a ratio or a word")]
+    meaning: Annotated[str, Quantity("meaning", help="definition, with its sign or limit convention")]
 
 
 CERTAINTY = (
@@ -154,8 +154,13 @@ def declared_records() -> Iterator[tuple[type, dict[str, Quantity]]]:
 class Glossary:
     """The words of certainty and terms, and the quantities that have a meaning of their own."""
 
-    terms: Annotated[tuple[Term, ...], Quantity("terms")]
-    quantities: Annotated[tuple[Declared, ...], Quantity("quantities of the results")]
+    terms: Annotated[
+        tuple[Term, ...], Quantity("terms", help="words of certainty and other terms, in alphabetical order")
+    ]
+    quantities: Annotated[
+        tuple[Declared, ...],
+        Quantity("quantities of the results", help="labelled entries of all records, in alphabetical order"),
+    ]
 
 
 def glossary(words: str | None = None) -> Glossary:

@@ -217,7 +217,7 @@ def test_a_law_in_z_of_another_period_is_one_line(capsys, files, tmp_path):
 def test_a_difference_is_a_number_or_none(one, other, shown, read):
     found = Difference("a", "", one, other)
     assert found.difference == shown
-    assert table([found]).columns[-1].cells == [read]
+    assert table([found], ["difference"]).columns[0].cells == [read]
 
 
 @pytest.mark.parametrize(

@@ -225,7 +225,11 @@ class Comparison:
         return self.one.analysis is not None
 
     @property
-    def rows(self) -> Annotated[list[SideRow], Quantity("stability of both loops", key="sides")]:
+    def rows(
+        self,
+    ) -> Annotated[
+        list[SideRow], Quantity("stability of both loops", key="sides", help="verdicts of both loops, a row each")
+    ]:
         """A row a side."""
         return [
             SideRow(which, side.name, side.verdict, side.range_words, side.sampled.words)
@@ -233,18 +237,34 @@ class Comparison:
         ]
 
     @property
-    def mode_differences(self) -> Annotated[list[Difference], Quantity("modes of the arms", key="modes")]:
+    def mode_differences(
+        self,
+    ) -> Annotated[
+        list[Difference], Quantity("modes of the arms", key="modes", help="flexible modes by number; none of one arm")
+    ]:
         """Natural frequencies and damping ratios of both arms, by mode; of one arm none."""
         return compare_rows(self.one.arm_modes, self.other.arm_modes, self.names) if self.is_of_arms else []
 
     @property
-    def pole_differences(self) -> Annotated[list[Difference], Quantity("oscillating closed-loop poles", key="poles")]:
+    def pole_differences(
+        self,
+    ) -> Annotated[
+        list[Difference],
+        Quantity("oscillating closed-loop poles", key="poles", help="pole pairs of both loops, by the nearest mode"),
+    ]:
         """Those that both sides have, paired by mode."""
         one, other = ([row for row in side.named_poles if row.mode != "none"] for side in self.sides)
         return compare_rows(one, other, self.names)
 
     @property
-    def unpaired_poles(self) -> Annotated[list[LonePole], Quantity("unpaired closed-loop poles")]:
+    def unpaired_poles(
+        self,
+    ) -> Annotated[
+        list[LonePole],
+        Quantity(
+            "unpaired closed-loop poles", help="pole pairs of a mode that the other loop has none of, or of no mode"
+        ),
+    ]:
         """The other oscillating poles."""
         pairs = (("first", self.one, self.other), ("second", self.other, self.one))
         return [
@@ -255,7 +275,14 @@ class Comparison:
         ]
 
     @property
-    def margin_differences(self) -> Annotated[list[Difference], Quantity("stability and margins", key="margins")]:
+    def margin_differences(
+        self,
+    ) -> Annotated[
+        list[Difference],
+        Quantity(
+            "stability and margins", key="margins", help="every quantity that both loops have, an interval as text"
+        ),
+    ]:
         """Every quantity that both loops have."""
         return compare_records(self.one.loop, self.other.loop, self.names)
 

@@ -51,20 +51,31 @@ MOST_SLOW = 2000  # points by balls or by the appendix, at some milliseconds eac
 class Preset:
     """An arm that comes with tfarm."""
 
-    name: Annotated[str, Quantity("name")]
-    length: Annotated[float, Quantity("length [m]")]
-    damping: Annotated[float, Quantity("damping C [s]")]
-    hub_inertia: Annotated[float, Quantity("hub inertia", "kg m^2")]
-    payload_mass: Annotated[float, Quantity("payload mass", "kg")]
-    payload_inertia: Annotated[float, Quantity("payload inertia", "kg m^2")]
-    assumptions: Annotated[tuple[str, ...], Quantity("assumptions")]
+    name: Annotated[str, Quantity("name", help="argument ARM of every command")]
+    length: Annotated[float, Quantity("length", "m", help="of all elastic links together", key="length")]
+    damping: Annotated[
+        float,
+        Quantity(
+            "damping C",
+            "s",
+            help="Kelvin-Voigt, the largest of all links: stress E (strain + C strain rate)",
+            key="damping",
+        ),
+    ]
+    hub_inertia: Annotated[float, Quantity("hub inertia", "kg m^2", help="about the axis of rotation, without a motor")]
+    payload_mass: Annotated[float, Quantity("payload mass", "kg", help="at the tip")]
+    payload_inertia: Annotated[float, Quantity("payload inertia", "kg m^2", help="about the tip")]
+    assumptions: Annotated[
+        tuple[str, ...],
+        Quantity("assumptions", help="numbers that the source of the arm does not give, and their origin"),
+    ]
 
 
 @dataclass(frozen=True)
 class Presets:
     """All of them."""
 
-    presets: Annotated[list[Preset], Quantity("arms")]
+    presets: Annotated[list[Preset], Quantity("arms", help="arms that come with tfarm")]
 
 
 @command(epilog="presets")
