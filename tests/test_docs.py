@@ -8,10 +8,10 @@ import pytest
 
 from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES
 from tfarm.cli.app import whole_command
-from tfarm.glossary import declared_records
+from tfarm.schema.glossary import declared_records
 
 DOCS = Path(__file__).parent.parent / "docs"
-EXPLAINED = ("case", "cli", "glossary", "schema")  # rooms whose labelled quantities all have a help
+EXPLAINED = ("case", "cli", "schema")  # rooms whose labelled quantities all have a help
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,7 @@ from tfarm.dsp import Chain
 from tfarm.errors import one_line
 from tfarm.report.cases import Case
 from tfarm.report.writing import _write_pages, write_comparison
-from tfarm.schema import to_dict
-from tfarm.tables.files import json_value
+from tfarm.schema import json_value, to_dict
 
 LAB = tfarm.load("sasaki2012-lab")
 HOSTILE = f"{TEXT} {LONG}"

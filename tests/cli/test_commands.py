@@ -62,7 +62,7 @@ def test_csv_is_the_same_table(capsys: pytest.CaptureFixture[str], tmp_path: Pat
 
 
 def test_infinities_are_strings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    from tfarm.tables.files import to_json
+    from tfarm.schema import to_json
 
     assert to_json({"a": [float("inf"), {"b": -float("inf")}]}) == '{"a": ["inf", {"b": "-inf"}]}'
     with pytest.raises(ValueError, match="NaN"):

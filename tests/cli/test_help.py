@@ -12,7 +12,7 @@ import tfarm
 from tests.shell import answer, run
 from tfarm.cli.app import GROUPS
 from tfarm.cli.running import whole_command
-from tfarm.glossary import CERTAINTY, GLOSSARY_TERMS
+from tfarm.schema.glossary import CERTAINTY, GLOSSARY_TERMS
 
 VERBS = whole_command().commands
 

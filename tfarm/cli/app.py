@@ -21,7 +21,7 @@ import tfarm
 from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm, Theory, implausible
 from tfarm.errors import ParameterError, one_line
 from tfarm.files import is_standard_output
-from tfarm.tables.files import to_json, write_csv
+from tfarm.schema import to_json, write_csv
 
 app = typer.Typer(name="tfarm", rich_markup_mode="rich", pretty_exceptions_enable=False)
 GROUPS = ("Arm", "Loop", "Sampled loop", "Design", "Measurement", "Report")  # of commands in the help, in its order
@@ -268,7 +268,7 @@ def emit(
     `defaults` is what JSON has of default gains; `also` are files that are written already.  Nothing is printed where
     standard output is one of the files.
     """
-    from tfarm.schema import curve_table, sections, to_dict
+    from tfarm.schema import curve_table, to_dict
 
     if csv is not None:
         write_csv(curve_table(record), csv)
@@ -285,18 +285,9 @@ def emit(
     if json:
         print(to_json({**to_dict(record), **(defaults or {})}))
         return
-    from tfarm.tables.terminal import show, show_pairs
+    from tfarm.schema.terminal import show
 
-    for number, each in enumerate(sections(record)):
-        if number and (each.pairs or each.table or each.drawing):
-            print(f"\n{each.title}" if each.title else "")
-        show_pairs(each.pairs)
-        if each.table is not None:
-            show(each.table)
-        if each.drawing:
-            print(each.drawing)
-    if defaults and defaults["default_gains"]:
-        print(f"by default {defaults['default_gains_in_words']}")
+    show(record, f"by default {defaults['default_gains_in_words']}" if defaults and defaults["default_gains"] else "")
 
 
 _state = ["running"]  # of the command, for the lines of progress

@@ -179,7 +179,7 @@ def response(
     refuse({"--png": png}, "a picture needs --measured; tfarm bode draws the exact response")
     refuse({"--omega": omega if s else None}, "give --s or --omega, not both")
     from tfarm.response import points as results
-    from tfarm.tables.terminal import show
+    from tfarm.schema.terminal import show_table
 
     (wanted,) = outputs_on(["root_moment" if output is None else output], side)
     G = tfarm.transfer(load_arm(arm, theory, driven), wanted, x=x, method=cast("Any", method), input=driven)
@@ -196,7 +196,7 @@ def response(
     found = results.points(G, at, digits)
     emit(found, json, csv=csv)
     if csv is None and not json:
-        show(found.csv_table)
+        show_table(found.csv_table)
 
 
 def check_method(method: str, number: int, digits: int | None, compare: bool) -> None:
@@ -382,7 +382,7 @@ def frf(
 ) -> None:
     """Frequency response of a record over time, by averaged cross-spectra, with coherence."""
     from tfarm.fitting import recording
-    from tfarm.tables.terminal import show
+    from tfarm.schema.terminal import show_table
 
     refuse(
         {"signal": next((text for text in (output, input) if text.endswith("=")), None)},
@@ -395,7 +395,7 @@ def frf(
     )  # fmt: skip
     emit(found, json, csv=csv)
     if csv is None and not json:
-        show(found.csv_table)
+        show_table(found.csv_table)
     if found.note:
         print_line(found.note)
 

@@ -119,7 +119,7 @@ def glossary(
     json: Json = False,
 ) -> None:
     """Words of certainty, terms, and the quantities of all results with their units."""
-    from tfarm.glossary import glossary as find
+    from tfarm.schema.glossary import glossary as find
 
     emit(find(words), json)
 

@@ -16,12 +16,12 @@ from matplotlib.figure import Figure
 
 from tfarm.arm import PLANE, Arm, HubFeedback, shown_unit
 from tfarm.case import Comparison
-from tfarm.columns import Column, Table
 from tfarm.digits import plain, scientific
 from tfarm.dsp import Chain, GainMap, sampled_map, sampled_verdict
 from tfarm.dsp.crossings import ends_of_K1, rounded_map, with_both_sides, with_more
 from tfarm.errors import ConvergenceError
 from tfarm.loop.plane import Axis, Plane, gain_map, rate_columns
+from tfarm.schema import Column, Table
 from tfarm.spectrum.table import default_gains
 
 from .frequency import MOST_DRAWN, bode, draw_loops

@@ -15,6 +15,7 @@ from tfarm.schema import (
     At,
     Quantity,
     across,
+    as_csv,
     compare,
     curve_table,
     entries,
@@ -24,10 +25,10 @@ from tfarm.schema import (
     table,
     text,
     to_dict,
+    to_json,
 )
-from tfarm.tables.files import as_csv, to_json
-from tfarm.tables.html import as_html
-from tfarm.tables.terminal import table_lines
+from tfarm.schema.html import as_html
+from tfarm.schema.terminal import table_lines
 
 LAB = tfarm.load("sasaki2012-lab")
 PAPER_GAINS = tfarm.HubFeedback(K1=0.3, K2=0.3)

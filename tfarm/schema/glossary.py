@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Annotated
 
 from tfarm.errors import ParameterError, did_you_mean
-from tfarm.schema import Quantity, quantities
+
+from .quantities import Quantity, quantities
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +142,7 @@ GLOSSARY_TERMS = tuple(sorted((*CERTAINTY, *TERMS), key=lambda term: term.name.c
 
 def declared_records() -> Iterator[tuple[type, dict[str, Quantity]]]:
     """Return every class of records with its quantities by attribute; imports the whole package."""
-    for module in pkgutil.walk_packages([str(Path(__file__).parent)], "tfarm."):
+    for module in pkgutil.walk_packages([str(Path(__file__).parents[1])], "tfarm."):
         if module.name in ("tfarm.__main__", "tfarm.grouped"):  # these act when they are imported
             continue
         for kind in vars(import_module(module.name)).values():
