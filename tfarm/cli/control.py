@@ -17,13 +17,14 @@ from tfarm.cli.app import (
     Csv,
     Delay,
     DspFile,
+    File,
     Gains,
     Json,
     LawFile,
     Period,
     Png,
     TheoryName,
-    app,
+    add_command,
     emit,
     interval,
     load_arm,
@@ -33,12 +34,11 @@ from tfarm.cli.app import (
     named,
     print_line,
     refuse,
-    with_gains,
 )
 from tfarm.files import write_mat
 
-command = partial(app.command, rich_help_panel="Loop")
-sampled_command = partial(app.command, rich_help_panel="Sampled loop")
+command = partial(add_command, "Loop")
+sampled_command = partial(add_command, "Sampled loop")
 ModeCount = Annotated[
     int | None, typer.Option("--modes", min=1, max=400, help="flexible modes; by default as many as the result takes")
 ]
@@ -46,30 +46,28 @@ NUMBERS = "gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or SIGNAL.den
 
 
 @command(epilog="poles sasaki2012-lab --K1 0.3 --K2 0.3 --count 8")
-@with_gains
 def poles(
     arm: ArmName,
-    count: Annotated[
-        int | None,
-        typer.Option(
-            "--count", min=1, max=1000, help="poles with Im s >= 0; by default ten, or those below the shear cut-off"
-        ),
-    ] = None,
-    certify: Annotated[bool, typer.Option("--certify", help="prove each, and that none is missing")] = False,
+    count: Annotated[int | None, typer.Option(min=1, max=1000)] = None,
+    certify: bool = False,
     law: LawFile = None,
     theory: TheoryName = None,
     json: Json = False,
     *,
     gains: Gains,
 ) -> None:
-    """Closed-loop poles of the exact arm, complete in a printed box."""
+    """Closed-loop poles of the exact arm, complete in a printed box.
+
+    Options:
+    count: poles with Im s >= 0; by default ten, or those below the shear cut-off
+    certify: prove each, and that none is missing
+    """
     subject, controller, defaults = load_loop(arm, theory, gains, law)
     found = tfarm.closed_loop_poles(subject, controller, count)
     emit(found.certified() if certify else found, json, defaults)
 
 
 @command(epilog="margins sasaki2012-lab --K1 0.3 --K2 0.3")
-@with_gains
 def margins(arm: ArmName, law: LawFile = None, theory: TheoryName = None, json: Json = False, *, gains: Gains) -> None:
     """Stability, the stability interval of each gain, and the margins of the exact loop function."""
     subject, controller, defaults = load_loop(arm, theory, gains, law)
@@ -77,7 +75,6 @@ def margins(arm: ArmName, law: LawFile = None, theory: TheoryName = None, json: 
 
 
 @command(epilog="nyquist sasaki2012-lab --K1 0.3 --K2 0.3 --png nyquist.png")
-@with_gains
 def nyquist(
     arm: ArmName,
     png: Png = None,
@@ -94,23 +91,25 @@ def nyquist(
 
 
 @command(epilog="spill sasaki2012-lab --K1 0.3 --K2 -2")
-@with_gains
 def spill(
     arm: ArmName,
-    modes: Annotated[int, typer.Option("--modes", min=1, max=60, help="modes of the largest model")] = 20,
+    modes: Annotated[int, typer.Option(min=1, max=60)] = 20,
     law: LawFile = None,
     theory: TheoryName = None,
     json: Json = False,
     *,
     gains: Gains,
 ) -> None:
-    """Spillover into modes that a design model leaves out: the exact loop and models of 1, 2, 3 ... modes."""
+    """Spillover into modes that a design model leaves out: the exact loop and models of 1, 2, 3 ... modes.
+
+    Options:
+    modes: modes of the largest model
+    """
     subject, controller, defaults = load_loop(arm, theory, gains, law)
     emit(tfarm.spill(subject, controller, modes), json, defaults)
 
 
 @command(epilog="locus sasaki2012-lab --vary K2 --from 0 --to 2 --png locus.png")
-@with_gains
 def locus(
     arm: ArmName,
     vary: Annotated[
@@ -121,17 +120,10 @@ def locus(
             f"hub_inertia, length or damping; or {NUMBERS}",
         ),
     ],
-    start: Annotated[float, typer.Option("--from", help="first value")],
-    stop: Annotated[float, typer.Option("--to", help="last value")],
-    points: Annotated[
-        int | None,
-        typer.Option(
-            "--points", min=2, max=100_000, help="values, equally spaced; by default 500, of a number of a law 100"
-        ),
-    ] = None,
-    branches: Annotated[
-        int, typer.Option("--branches", min=1, max=200, help="branches; all flexible modes below the last are listed")
-    ] = 10,
+    start: Annotated[float, typer.Option("--from")],
+    stop: Annotated[float, typer.Option("--to")],
+    points: Annotated[int | None, typer.Option(min=2, max=100_000)] = None,
+    branches: Annotated[int, typer.Option(min=1, max=200)] = 10,
     png: Png = None,
     csv: Csv = None,
     law: LawFile = None,
@@ -140,7 +132,14 @@ def locus(
     *,
     gains: Gains,
 ) -> None:
-    """Root locus of the exact arm along a gain or a parameter, with its crossings of the imaginary axis."""
+    """Root locus of the exact arm along a gain or a parameter, with its crossings of the imaginary axis.
+
+    Options:
+    start: first value
+    stop: last value
+    points: values, equally spaced; by default 500, of a number of a law 100
+    branches: branches; all flexible modes below the last are listed
+    """
     from tfarm.loop.loci import Loci, reduced_of
 
     subject, controller, defaults = load_loop(arm, theory, gains, law)
@@ -170,10 +169,7 @@ def gain_map(
         ),
     ] = None,
     kp: AngleGain = 0.0,
-    points: Annotated[
-        int | None,
-        typer.Option("--points", min=2, max=2000, help="grid points along each; by default 101, of a law 60"),
-    ] = None,
+    points: Annotated[int | None, typer.Option(min=2, max=2000)] = None,
     csv: Csv = None,
     png: Png = None,
     law: LawFile = None,
@@ -195,6 +191,9 @@ def gain_map(
     """Number of unstable poles over the plane of two gains, or of two numbers of a law, with the exact boundary.
 
     With --period, --delay-samples or --dsp of the sampled loop.
+
+    Options:
+    points: grid points along each; by default 101, of a law 60
     """
     from tfarm.dsp import crossings, verdict
     from tfarm.loop.plane import between, ranges_of
@@ -227,7 +226,6 @@ def gain_map(
 
 
 @sampled_command(epilog="sampled sasaki2012-lab --K1 0.3 --K2 0.3 --period 0.01")
-@with_gains
 def sampled(
     arm: ArmName,
     period: Period = None,
@@ -250,24 +248,18 @@ def sampled(
 
 
 @sampled_command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")
-@with_gains
 def simulate(
     arm: ArmName,
-    scenario: Annotated[str, typer.Option("--scenario", help="slew, step, decay or impulse")] = "slew",
-    duration: Annotated[float, typer.Option("--duration", help="duration [s]")] = 3.0,
+    scenario: str = "slew",
+    duration: float = 3.0,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
     modes: ModeCount = None,
-    output: Annotated[
-        list[str] | None,
-        typer.Option("--output", metavar="NAME", help="further signal, as strain@0.05; may be repeated"),
-    ] = None,
-    between: Annotated[int, typer.Option("--between", min=0, max=1000, help="records between two samples")] = 0,
+    output: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
+    between: Annotated[int, typer.Option(min=0, max=1000)] = 0,
     csv: Csv = None,
-    mat: Annotated[
-        Path | None, typer.Option("--mat", metavar="FILE", help="write the signals to a MATLAB file")
-    ] = None,
+    mat: File = None,
     controller: Annotated[
         Path | None,
         typer.Option(
@@ -283,7 +275,15 @@ def simulate(
     *,
     gains: Gains,
 ) -> None:
-    """Time response of the sampled loop: hub angle, tip, root moment and torque, exact between the samples."""
+    """Time response of the sampled loop: hub angle, tip, root moment and torque, exact between the samples.
+
+    Options:
+    scenario: slew, step, decay or impulse
+    duration: duration [s]
+    output: further signal, as strain@0.05; may be repeated
+    between: records between two samples
+    mat: write the signals to a MATLAB file
+    """
     how: Any = {"count": modes, "between": between, "outputs": output or ()}
     chain, defaults = load_chain(dsp or arm, period, delay_samples), None
     if controller is None:

@@ -76,8 +76,9 @@ class Column:
 
     @property
     def is_text(self) -> bool:
-        """Whether a page sets it flush left."""
-        return any(isinstance(value, str | tuple) for value in self.of)
+        """Whether it is set flush left: words, or lists of words."""
+        first = [value[0] if isinstance(value, list) and value else value for value in self.of]
+        return any(isinstance(value, str | tuple) for value in first)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,16 +17,16 @@ from rich.console import Console, RenderableType
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from .tables import Column, Table, sections
+from .tables import Column, Section, Table, sections
 
 COLUMN_GAP = 2  # spaces between two columns
 LEAST_FOLDED = 20  # characters to which a text may be folded
 PIPE_WIDTH = 10**6  # columns of a pipe: more than any row has
 
 
-def show(record: Any, last: str = "") -> None:
-    """Print a record as a person reads it, and a last line of text."""
-    for number, each in enumerate(sections(record)):
+def show(record: Any, rows: Table | None = None, last: str = "") -> None:
+    """Print a record as a person reads it, then a table of rows and a last line of text, if there are any."""
+    for number, each in enumerate([*sections(record), Section(table=rows)]):
         if number and (each.pairs or each.table or each.drawing):
             print()
             show_text(each.title)
