@@ -186,3 +186,21 @@ def test_a_record_with_flat_records_has_its_own_curves():
     assert [column.key for column in curve_table(found).columns] == ["re_s", "im_s", "re_L", "im_L"]
     assert len(curve_table(found).columns[0].values) == found.s.size
     assert "encirclements" in quantities(Nyquist)
+
+
+def test_labels_and_units_may_depend_on_the_record():
+    class Sample(NamedTuple):
+        size: Annotated[float, Quantity("magnitude", unit_of="gain_unit")]
+
+    @dataclass(frozen=True)
+    class Response:
+        gain_unit: str
+        titles: dict[str, tuple[str, str]]
+        value: Annotated[float, Quantity("value")]
+        samples: Annotated[list[Sample], Quantity("samples")]
+
+    found = Response("m/N", {"value": ("K1", "N m s/rad")}, 0.3, [Sample(2.0)])
+    first, rows = sections(found)
+    assert first.pairs == [("K1", "0.3 N m s/rad")]
+    assert [(label, of.unit) for label, of, _ in entries(found)] == [("K1", "N m s/rad")]
+    assert [(column.title, column.unit) for column in rows.table.columns] == [("magnitude", "m/N")]

@@ -24,7 +24,8 @@ class Quantity:
     `key` is its name in JSON and CSV, by default that of the attribute with its unit.  An entry without a label is in
     JSON alone.  A record (or dictionary) that is `flat` has its entries in the place of its own; the arrays that are a
     `curve` are of one length: columns in CSV, and not printed.  Where a number (`is_number`, by its type) has no value
-    a person reads "-", and nothing where a text or a record has none.
+    a person reads "-", and nothing where a text or a record has none.  `unit_of` is the attribute with the unit where
+    that depends on the record, or on the one whose row it is.
     """
 
     label: str = ""
@@ -35,6 +36,7 @@ class Quantity:
     flat: bool = False
     curve: bool = False
     is_number: bool = False
+    unit_of: str = ""
 
 
 class At(NamedTuple):
@@ -79,6 +81,20 @@ def _quantities(kind: Any) -> dict[str, Quantity]:
     }
 
 
+def quantities_of(record: Any, parent: Any = None) -> dict[str, Quantity]:
+    """The quantities of a record with labels and units of its own: its `titles` by attribute, and each `unit_of`.
+
+    `parent` is the record that has it as a row.
+    """
+    titles: Mapping[str, tuple[str, str]] = getattr(record, "titles", {})
+    found = dict(quantities(type(record)))
+    for name, of in found.items():
+        if name in titles or of.unit_of:
+            label, unit = titles.get(name, (of.label, getattr(record, of.unit_of, getattr(parent, of.unit_of, ""))))
+            found[name] = replace(of, label=label, unit=unit)
+    return found
+
+
 def is_declared(value: Any) -> bool:
     """Whether a value is a record with quantities of its own."""
     return (is_dataclass(value) or hasattr(value, "_fields")) and bool(quantities(type(value)))
@@ -97,7 +113,7 @@ def is_list_of_records(value: Any) -> bool:
 
 def with_flat(record: Any) -> Iterator[tuple[Any, Quantity]]:
     """Values and quantities of a record, those of records that are flat in their place."""
-    for name, of in quantities(type(record)).items():
+    for name, of in quantities_of(record).items():
         value = getattr(record, name)
         if of.flat and is_declared(value):
             yield from with_flat(value)

@@ -30,7 +30,7 @@ from .quantities import (
     is_list_of_records,
     is_table,
     parts,
-    quantities,
+    quantities_of,
     text,
     to_json_value,
     with_flat,
@@ -109,13 +109,16 @@ class Table:
         return {column.key: column.of[row] for column in self.columns}
 
 
-def table(rows: Any, names: Sequence[str] = (), *, stem: str = "", title: str = "", caption: str = "") -> Table:
+def table(
+    rows: Any, names: Sequence[str] = (), *, parent: Any = None, stem: str = "", title: str = "", caption: str = ""
+) -> Table:
     """A row a record (or an entry of a record of columns), a column a quantity: those with a label, or these.
 
-    A column without any value is left out unless it is named.  Rows may have `titles` of columns by attribute.
+    A column without any value is left out unless it is named.  `parent` is the record that has these rows; a list of
+    them may have `titles` of columns by attribute.
     """
     columns: list[Column] = []
-    declared = quantities(type(rows if is_table(rows) else rows[0])) if is_table(rows) or rows else {}
+    declared = quantities_of(rows if is_table(rows) else rows[0], parent) if is_table(rows) or rows else {}
     for name in (names or [name for name, of in declared.items() if of.label]) if declared else ():
         values = list(getattr(rows, name)) if is_table(rows) else [getattr(row, name) for row in rows]
         if names or not values or any(value is not None and str(value) for value in values):
@@ -201,7 +204,7 @@ class Section:
 def sections(record: Any, title: str = "") -> list[Section]:
     """A record as a person reads it: its single values first, then its tables and the records inside it."""
     own, later = Section(title), []
-    for name, of in quantities(type(record)).items():
+    for name, of in quantities_of(record).items():
         value = getattr(record, name)
         if of.flat and is_declared(value):
             first, *rest = sections(value)
@@ -212,7 +215,7 @@ def sections(record: Any, title: str = "") -> list[Section]:
         elif value is None or of.curve:
             own.pairs.append((of.label, NO_VALUE))
         elif is_table(value) or is_list_of_records(value):
-            later.append(Section(of.label, table=table(value)))
+            later.append(Section(of.label, table=table(value, parent=record)))
         elif is_declared(value) and not isinstance(value, At) and not hasattr(value, "as_text"):
             later += sections(value, of.label)
         elif isinstance(value, np.ndarray) and np.iscomplexobj(value) and value.size:
