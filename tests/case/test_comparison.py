@@ -220,24 +220,6 @@ def test_a_difference_is_a_number_or_none(one, other, shown, read):
     assert table([found], ["difference"]).columns[0].cells == [read]
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["sasaki2012"], "give a second arm, or --law FILE twice"),
-        (["sasaki2012", "sasaki2012-lab", "stocky-steel"], "two at most"),
-        (["sasaki2012", "--law", "a.toml"], "does not exist"),
-        (["sasaki2012", "sasaki2021"], 'did you mean "sasaki2012"'),
-        (["sasaki2012", "sasaki2012-lab", "--modes", "31"], "1 to 30"),
-        (["sasaki2012", "quanser-2dsfl"], "gains of sasaki2012 are in another unit"),
-    ],
-)
-def test_bad_input_is_one_line(capsys, words, said):
-    code, out, err = run(capsys, "compare", *words)
-    assert (code, out) == (2, "")
-    assert said in err
-    assert err.count("\n") == 1
-
-
 def test_python_refuses_what_are_not_two():
     for arms, laws in ((LAB, None), (LAB, LAW), ([LAB] * 3, None), (LAB, [LAW] * 3)):
         with pytest.raises(tfarm.ParameterError, match="two arms, or one arm and two laws"):

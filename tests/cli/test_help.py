@@ -69,12 +69,6 @@ def test_the_script_of_a_shell_is_one_of_its_own(capsys, shell):
         subprocess.run([there, "-n"], input=script, text=True, check=True)
 
 
-def test_an_unknown_shell_is_one_line(capsys):
-    code, out, err = run(capsys, "completion", "fsh")
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "'fish'" in err
-
-
 @pytest.mark.parametrize("name", VERBS)
 def test_help_is_whole_and_has_an_example_that_is_understood(capsys, monkeypatch, tmp_path, name):
     """At 80 columns: no text is cut, a unit in brackets is no markup, and the example parses."""

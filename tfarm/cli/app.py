@@ -254,8 +254,8 @@ def load_chain(name: str, period: float | None, delay_samples: float | None) -> 
     """Return the sampled chain of a file, with the period and the delay that are given instead."""
     from tfarm.dsp.chain import load_chain as read
 
-    chain, given = read(name), {"period": period, "delay_samples": delay_samples}
-    sampling = replace(chain.sampling, **{key: value for key, value in given.items() if value is not None})
+    chain, typed = read(name), {"period": period, "delay_samples": delay_samples}
+    sampling = replace(chain.sampling, **{key: value for key, value in typed.items() if value is not None})
     return replace(chain, sampling=sampling)
 
 

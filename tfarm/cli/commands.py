@@ -45,6 +45,19 @@ Compare = Annotated[bool, typer.Option("--compare", help="all three methods and 
 DigitCount = Annotated[
     int | None, typer.Option("--digits", min=1, max=1000, help="certified digits; texts in JSON above 15")
 ]
+ComplexPoints = Annotated[
+    Any,
+    typer.Option(
+        metavar="S,S",
+        parser=numbers("numbers in 1/s such as 0.3+57.1j,10j", kind=lambda text: complex(text.replace("i", "j"))),
+    ),
+]
+Frequencies = Annotated[Any, typer.Option(metavar="W,W", parser=numbers("frequencies in rad/s such as 1,10,100"))]
+FirstValues = Annotated[list[Any] | None, typer.Option(metavar="KEY=VALUE", parser=named(numbers("KEY=NUMBER", 1)))]
+Bounds = Annotated[list[Any] | None, typer.Option(metavar="KEY=LO,HI", parser=named(numbers("KEY=NUMBER,NUMBER", 2)))]
+Priors = Annotated[
+    list[Any] | None, typer.Option(metavar="KEY=MEAN,STD", parser=named(numbers("KEY=NUMBER,NUMBER", 2)))
+]
 MOST_SLOW = 2000  # points by balls or by the appendix, at some milliseconds each
 
 
@@ -82,14 +95,11 @@ class Presets:
 @command(epilog="presets")
 def presets(json: Json = False) -> None:
     """List the arms that come with tfarm, with their assumptions."""
-    rows = [
-        Preset(
-            *(arm.name, arm.length, arm.damping, arm.hub.inertia, arm.payload.mass, arm.payload.inertia),
-            arm.assumptions,
-        )
+    emit(Presets([
+        Preset(arm.name, arm.length, arm.damping, arm.hub.inertia, arm.payload.mass, arm.payload.inertia,
+               arm.assumptions)
         for arm in map(tfarm.load, tfarm.presets())
-    ]
-    emit(Presets(rows), json)
+    ]), json)  # fmt: skip
 
 
 @command(epilog="modes sasaki2012-lab --count 5")
@@ -129,14 +139,8 @@ def modes(
 def response(
     arm: ArmName,
     output: str | None = None,
-    s: Annotated[
-        Any,
-        typer.Option(
-            parser=numbers("numbers in 1/s such as 0.3+57.1j,10j", kind=lambda text: complex(text.replace("i", "j"))),
-            metavar="S,S",
-        ),
-    ] = None,
-    omega: Annotated[Any, typer.Option(parser=numbers("frequencies in rad/s such as 1,10,100"), metavar="W,W")] = None,
+    s: ComplexPoints = None,
+    omega: Frequencies = None,
     start: Annotated[float, typer.Option("--from")] = 0.1,
     stop: Annotated[float, typer.Option("--to")] = 1000.0,
     points: Annotated[int, typer.Option(min=2, max=1_000_000)] = 500,
@@ -187,8 +191,10 @@ def response(
     at = np.array(s) if s else 1j * np.array(omega)
     check_method(method, at.size, digits, compare)
     if compare:
-        load = driven if G.load else None
-        refuse({"--csv": csv, "--input": load}, "--compare prints a table of its own: ask for one of them")
+        refuse(
+            {"--csv": csv, "--input": driven if G.load else None},
+            "--compare prints a table of its own: ask for one of them",
+        )
         emit(results.ByMethods(G.arm.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)), json)
         return
     emit(results.points(G, at, digits), json, csv=csv, rows=True)
@@ -266,10 +272,10 @@ def reduce(
     """
     from tfarm.reduced import save_mat
 
-    wanted = outputs_on([name.strip() for name in outputs.split(",")], side)
     reduced = tfarm.reduce(
-        load_arm(arm, theory), wanted, order=order, error=error, method=cast("Any", method), band=band, x=x
-    )
+        load_arm(arm, theory), outputs_on([name.strip() for name in outputs.split(",")], side),
+        order=order, error=error, method=cast("Any", method), band=band, x=x,
+    )  # fmt: skip
     emit(reduced, json, also=() if mat is None else save_mat(reduced, mat, key="--mat"))
 
 
@@ -280,15 +286,9 @@ def fit(
     arm: ArmName,
     data: Annotated[list[str] | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
     free: Annotated[str, typer.Option(metavar="KEY,KEY")] = "",
-    start: Annotated[
-        list[Any] | None, typer.Option(parser=named(numbers("KEY=NUMBER", 1)), metavar="KEY=VALUE")
-    ] = None,
-    bounds: Annotated[
-        list[Any] | None, typer.Option(parser=named(numbers("KEY=NUMBER,NUMBER", 2)), metavar="KEY=LO,HI")
-    ] = None,
-    prior: Annotated[
-        list[Any] | None, typer.Option(parser=named(numbers("KEY=NUMBER,NUMBER", 2)), metavar="KEY=MEAN,STD")
-    ] = None,
+    start: FirstValues = None,
+    bounds: Bounds = None,
+    prior: Priors = None,
     mode: Annotated[list[str] | None, typer.Option(metavar="N=HZ,RATIO")] = None,
     covariance: bool = False,
     save: File = None,

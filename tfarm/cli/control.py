@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 import tfarm
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, PLANE, RATE_GAIN
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN
 from tfarm.cli.app import (
     AngleGain,
     ArmName,
@@ -42,7 +42,6 @@ sampled_command = partial(add_command, "Sampled loop")
 ModeCount = Annotated[
     int | None, typer.Option("--modes", min=1, max=400, help="flexible modes; by default as many as the result takes")
 ]
-NUMBERS = "gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N"  # of a law
 
 
 @command(epilog="poles sasaki2012-lab --K1 0.3 --K2 0.3 --count 8")
@@ -112,14 +111,7 @@ def spill(
 @command(epilog="locus sasaki2012-lab --vary K2 --from 0 --to 2 --png locus.png")
 def locus(
     arm: ArmName,
-    vary: Annotated[
-        str,
-        typer.Option(
-            "--vary",
-            help=f"{', '.join(NAMES)}, all (a factor on these), payload_mass, payload_inertia, "
-            f"hub_inertia, length or damping; or {NUMBERS}",
-        ),
-    ],
+    vary: str,
     start: Annotated[float, typer.Option("--from")],
     stop: Annotated[float, typer.Option("--to")],
     points: Annotated[int | None, typer.Option(min=2, max=100_000)] = None,
@@ -135,6 +127,8 @@ def locus(
     """Root locus of the exact arm along a gain or a parameter, with its crossings of the imaginary axis.
 
     Options:
+    vary: K1, K2, Kp, all (a factor on these), payload_mass, payload_inertia, hub_inertia, length or damping; or gain (a
+        factor on the law), delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N
     start: first value
     stop: last value
     points: values, equally spaced; by default 500, of a number of a law 100
@@ -150,38 +144,14 @@ def locus(
 @command(epilog="map sasaki2012-lab --K1 -1,3 --K2 -2,2 --png map.png", name="map")
 def gain_map(
     arm: ArmName,
-    k1: Annotated[
-        Any,
-        typer.Option(
-            f"--{RATE_GAIN}",
-            parser=interval,
-            metavar="LO,HI",
-            help=f"range of {RATE_GAIN}; by default -1,3 on the paper's arm, -3.33 to 10 times the default on a rig",
-        ),
-    ] = None,
-    k2: Annotated[
-        Any,
-        typer.Option(
-            f"--{MOMENT_GAIN}",
-            parser=interval,
-            metavar="LO,HI",
-            help=f"range of {MOMENT_GAIN}; by default -2,2, on a rig times its input of 1 N m",
-        ),
-    ] = None,
+    k1: Annotated[Any, typer.Option(f"--{RATE_GAIN}", parser=interval, metavar="LO,HI")] = None,
+    k2: Annotated[Any, typer.Option(f"--{MOMENT_GAIN}", parser=interval, metavar="LO,HI")] = None,
     kp: AngleGain = 0.0,
     points: Annotated[int | None, typer.Option(min=2, max=2000)] = None,
     csv: Csv = None,
     png: Png = None,
     law: LawFile = None,
-    vary: Annotated[
-        list[Any] | None,
-        typer.Option(
-            "--vary",
-            parser=named(interval),
-            metavar="NAME=LO,HI",
-            help=f"twice: two numbers of a law and their ranges; {NUMBERS}",
-        ),
-    ] = None,
+    vary: Annotated[list[Any] | None, typer.Option(parser=named(interval), metavar="NAME=LO,HI")] = None,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
@@ -193,7 +163,11 @@ def gain_map(
     With --period, --delay-samples or --dsp of the sampled loop.
 
     Options:
+    k1: range of K1; by default -1,3 on the paper's arm, -3.33 to 10 times the default on a rig
+    k2: range of K2; by default -2,2, on a rig times its input of 1 N m
     points: grid points along each; by default 101, of a law 60
+    vary: twice: two numbers of a law and their ranges; gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or
+        SIGNAL.den.N
     """
     from tfarm.dsp import crossings, verdict
     from tfarm.loop.plane import between, ranges_of
@@ -260,15 +234,7 @@ def simulate(
     between: Annotated[int, typer.Option(min=0, max=1000)] = 0,
     csv: Csv = None,
     mat: File = None,
-    controller: Annotated[
-        Path | None,
-        typer.Option(
-            "--controller",
-            metavar="FILE",
-            exists=True,
-            help=f"tuner of `tfarm tune --save`: it sets {MOMENT_GAIN}, with its own {RATE_GAIN}",
-        ),
-    ] = None,
+    controller: Annotated[Path | None, typer.Option(metavar="FILE", exists=True)] = None,
     law: LawFile = None,
     theory: TheoryName = None,
     json: Json = False,
@@ -283,6 +249,7 @@ def simulate(
     output: further signal, as strain@0.05; may be repeated
     between: records between two samples
     mat: write the signals to a MATLAB file
+    controller: tuner of `tfarm tune --save`: it sets K2, with its own K1
     """
     how: Any = {"count": modes, "between": between, "outputs": output or ()}
     chain, defaults = load_chain(dsp or arm, period, delay_samples), None
