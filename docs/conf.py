@@ -18,7 +18,7 @@ from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, StrictTable, file_keys
 from tfarm.cli.app import whole_command
 from tfarm.dsp.chain import ActuatorTable, ConvertersTable, SamplingTable, SlewTable
 from tfarm.fitting.recording import RunTable
-from tfarm.glossary import CERTAINTY, declared_records
+from tfarm.schema.glossary import CERTAINTY, declared_records
 
 HERE = Path(__file__).parent
 

@@ -8,9 +8,10 @@ import pytest
 
 from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES
 from tfarm.cli.app import whole_command
-from tfarm.glossary import declared_records
+from tfarm.schema.glossary import declared_records
 
 DOCS = Path(__file__).parent.parent / "docs"
+EXPLAINED = ("case", "cli", "schema")  # rooms whose labelled quantities all have a help
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +48,17 @@ def test_every_json_key_of_every_record_is_in_its_section(conf):
     for kind, declared in records:
         section = sections[f"{kind.__name__} ({kind.__module__.split('.')[1]})"]
         assert all(f"| `{of.key}` | {of.label} |" in section.replace(r"\|", "|") for of in declared.values()), kind
+
+
+def test_every_labelled_quantity_has_a_help_that_is_not_its_label():
+    rooms = {kind.__module__.split(".")[1] for kind, _ in declared_records()}
+    assert rooms >= set(EXPLAINED)
+    for kind, declared in declared_records():
+        if kind.__module__.split(".")[1] in EXPLAINED:
+            bare = [
+                name for name, of in declared.items() if of.label and of.help.casefold() in ("", of.label.casefold())
+            ]
+            assert bare == [], kind
 
 
 def test_the_page_of_words_has_the_five_words_with_their_conditions(conf):

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
         load,
         presets,
     )
-    from tfarm.comparing import compare
+    from tfarm.case import compare
     from tfarm.dsp.results import simulate
     from tfarm.dsp.verdict import sampled
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
@@ -103,7 +103,7 @@ _ROOMS = {  # the module of a name; after a colon another name there
     "locus": "loop.locus",
     "nyquist": "loop.nyquist",
     "closed_loop_poles": "loop.poles",
-    "compare": "comparing",
+    "compare": "case",
     "damped_modes": "spectrum",
     "default_gains": "spectrum.table",
     "map": "loop.plane:gain_map",

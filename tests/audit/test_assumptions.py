@@ -16,9 +16,8 @@ from tfarm.audit.assumptions import (
     own_depth,
     section_study,
 )
-from tfarm.schema import to_dict
+from tfarm.schema import to_dict, to_json
 from tfarm.spectrum.table import PAPER_GAINS
-from tfarm.tables.files import to_json
 
 PAPER = tfarm.load("sasaki2012")
 STOCKY = tfarm.load("stocky-steel")

@@ -8,8 +8,7 @@ from mpmath import findroot, mpc, mpf, workdps
 import tfarm
 from tfarm import audit
 from tfarm.audit.equations import BEAM_NAMES, by_transition
-from tfarm.schema import to_dict
-from tfarm.tables.files import to_json
+from tfarm.schema import to_dict, to_json
 
 VERDICTS = {
     **dict.fromkeys([f"({n})" for n in (*range(1, 8), 9, 10, 12, 13, 16, 21)], "ok"),

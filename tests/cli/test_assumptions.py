@@ -37,13 +37,6 @@ def test_a_locked_hub_has_none_to_choose(capsys, tmp_path):
     assert "hub inertias" not in out
 
 
-@pytest.mark.parametrize("count", ["0", "101", "many"])
-def test_a_bad_count_is_refused_in_one_line(capsys, count):
-    code, out, err = run(capsys, "sasaki2012", "--count", count)
-    assert (code, out) == (2, "")
-    assert err.startswith(f"tfarm: --count = {count!r}: should be ")
-
-
 @pytest.mark.survey
 def test_it_loads_neither_matplotlib_nor_control():
     code = (

@@ -62,7 +62,7 @@ def test_csv_is_the_same_table(capsys: pytest.CaptureFixture[str], tmp_path: Pat
 
 
 def test_infinities_are_strings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    from tfarm.tables.files import to_json
+    from tfarm.schema import to_json
 
     assert to_json({"a": [float("inf"), {"b": -float("inf")}]}) == '{"a": ["inf", {"b": "-inf"}]}'
     with pytest.raises(ValueError, match="NaN"):
@@ -85,6 +85,7 @@ def test_tables_for_people(capsys: pytest.CaptureFixture[str]) -> None:
     assert "rad/s / N m" in out
 
 
+BENCH = str(Path(__file__).parents[1] / "rigs" / "bench-rig.toml")
 BAD = [
     (["modes", "sasaki2021"], 'did you mean "sasaki2012"'),
     (["modes", "sasaki2012", "--count", "0"], "--count = '0'"),
@@ -125,6 +126,45 @@ BAD = [
     (["response", "sasaki2012", "--output", "hub_angle", "--s", "-1e300", "--digits", "20"], "at most 1e+20 1/s"),
     (["response", "sasaki2012", "--output", "root_moment", "--s", "71.50568246689015j"], "a natural frequency"),
     (["response", "sasaki2012", "--output", "root_moment", "--csv", "/no/such/folder/a.csv"], "--csv"),
+    (["bode", "sasaki2012-lab", "--output", "root_momnt"], 'did you mean "root_moment"'),
+    (["bode", "sasaki2012-lab", "--from", "-1"], "--from = -1.0: a positive frequency"),
+    (["bode", "sasaki2012-lab", "--from", "10", "--to", "1"], "--to = 1.0: a frequency above --from"),
+    (["bode", "sasaki2012-lab", "--to", "nan"], "--to = nan"),
+    (["bode", "sasaki2012-lab", "--to", "100", "--png", "no/such/folder/b.png"], "--png"),
+    (["nyquist", "sasaki2012-lab", "--K1", "nan"], "K1"),
+    (["nyquist", "sasaki2012-lab", "--law", "no-such.toml"], "no-such.toml"),
+    (["margins", "sasaki2012", "--K1", "nan"], "K1 = nan"),
+    (["margins", "sasaki2012", "--K2", "inf"], "K2 = inf"),
+    (["margins", "sasaki2012", "--Kp", "1e30"], "Kp = 1e+30"),
+    (["margins", "sasaki2012", "--K1", "much"], "--K1 = 'much'"),
+    (["poles", "sasaki2012", "--count", "0"], "--count = '0'"),
+    (["poles", "sasaki2012", "--K1", "-inf"], "K1 = -inf"),
+    (["map", "sasaki2012", "--K1", "1,1"], "'1,1': write LOW,HIGH"),
+    (["map", "sasaki2012", "--K1", "3,-1"], "'3,-1': write LOW,HIGH"),
+    (["map", "sasaki2012", "--K2", "0,inf"], "'0,inf': write LOW,HIGH"),
+    (["map", "sasaki2012", "--K2", "-inf,0"], "'-inf,0': write LOW,HIGH"),
+    (["map", "sasaki2012", "--K2", "nan,1"], "'nan,1': write LOW,HIGH"),
+    (["map", "sasaki2012", "--K2", "1"], "'1': write LOW,HIGH"),
+    (["map", "sasaki2012", "--K1", "-1e300,1e300"], "at most 1e+150"),
+    (["map", "sasaki2012", "--points", "1"], "--points = '1'"),
+    (["map", "sasaki2012", "--Kp", "nan"], "Kp = nan"),
+    (["design", "sasaki2012", "--objective", "beauty"], "'beauty'"),
+    (["design", "sasaki2012", "--K1", "0,1e300"], "K1"),
+    (["design", "sasaki2012", "--K2", "2"], "'2': write LOW,HIGH"),
+    (["design", "sasaki2012", "--modes", "0"], "--modes = '0'"),
+    (["assumptions", "sasaki2012", "--count", "0"], "--count = '0': should be "),
+    (["assumptions", "sasaki2012", "--count", "101"], "--count = '101': should be "),
+    (["assumptions", "sasaki2012", "--count", "many"], "--count = 'many': should be "),
+    (["assumptions", BENCH], "one Timoshenko beam on a hub"),
+    (["modes", BENCH, "--method", "appendix"], "one Timoshenko beam on a hub"),
+    (["response", "sasaki2012-lab", "--s", "1j", "--theory", "shear", "--method", "appendix"], "Timoshenko"),
+    (["completion", "fsh"], "'fish'"),
+    (["compare", "sasaki2012"], "give a second arm, or --law FILE twice"),
+    (["compare", "sasaki2012", "sasaki2012-lab", "stocky-steel"], "two at most"),
+    (["compare", "sasaki2012", "--law", "a.toml"], "does not exist"),
+    (["compare", "sasaki2012", "sasaki2021"], 'did you mean "sasaki2012"'),
+    (["compare", "sasaki2012", "sasaki2012-lab", "--modes", "31"], "1 to 30"),
+    (["compare", "sasaki2012", "quanser-2dsfl"], "gains of sasaki2012 are in another unit"),
 ]
 
 

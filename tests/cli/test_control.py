@@ -85,37 +85,6 @@ def test_the_verdict_sets_a_pole_at_0_apart_where_there_is_one(capsys, Kp) -> No
     assert ("its pole at s = 0 is left out" in out) is at_rest is (Kp == "0")
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["margins", "sasaki2012", "--K1", "nan"],
-        ["margins", "sasaki2012", "--K2", "inf"],
-        ["margins", "sasaki2012", "--Kp", "1e30"],
-        ["margins", "sasaki2012", "--K1", "much"],
-        ["poles", "sasaki2012", "--count", "0"],
-        ["poles", "sasaki2012", "--K1", "-inf"],
-        ["map", "sasaki2012", "--K1", "1,1"],
-        ["map", "sasaki2012", "--K1", "3,-1"],
-        ["map", "sasaki2012", "--K2", "0,inf"],
-        ["map", "sasaki2012", "--K2", "-inf,0"],
-        ["map", "sasaki2012", "--K2", "nan,1"],
-        ["map", "sasaki2012", "--K2", "1"],
-        ["map", "sasaki2012", "--K1", "-1e300,1e300"],
-        ["map", "sasaki2012", "--points", "1"],
-        ["map", "sasaki2012", "--Kp", "nan"],
-        ["design", "sasaki2012", "--objective", "beauty"],
-        ["design", "sasaki2012", "--K1", "0,1e300"],
-        ["design", "sasaki2012", "--K2", "2"],
-        ["design", "sasaki2012", "--modes", "0"],
-    ],
-)
-def test_bad_input_is_one_line_and_exit_2(capsys, arguments) -> None:
-    code, out, err = run(capsys, *arguments)
-    assert (code, out) == (2, "")
-    assert err.count("\n") == 1
-    assert "Traceback" not in err
-
-
 def test_what_cannot_be_decided_is_exit_3_with_its_reason(capsys) -> None:
     code, out, err = run(capsys, "margins", "sasaki2012-lab", "--K2", "1.0305375542174282")
     assert (code, out) == (3, "")

@@ -12,7 +12,7 @@ import tfarm
 from tests.shell import answer, run
 from tfarm.cli.app import GROUPS
 from tfarm.cli.running import whole_command
-from tfarm.glossary import CERTAINTY, GLOSSARY_TERMS
+from tfarm.schema.glossary import CERTAINTY, GLOSSARY_TERMS
 
 VERBS = whole_command().commands
 
@@ -67,12 +67,6 @@ def test_the_script_of_a_shell_is_one_of_its_own(capsys, shell):
     assert f"_TFARM_COMPLETE=complete_{shell}" in script
     if (there := shutil.which(shell)) is not None:
         subprocess.run([there, "-n"], input=script, text=True, check=True)
-
-
-def test_an_unknown_shell_is_one_line(capsys):
-    code, out, err = run(capsys, "completion", "fsh")
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "'fish'" in err
 
 
 @pytest.mark.parametrize("name", VERBS)

@@ -116,22 +116,3 @@ def test_nyquist_counts_what_the_map_counts(capsys, K2, unstable):
     _, out, _ = run(capsys, "nyquist", LAB, "--K1", "0.3", "--K2", K2)
     lines = [re.split("  +", line) for line in out.splitlines()]
     assert all([label, str(unstable)] in lines for label in ("unstable poles by Nyquist's criterion", "unstable poles"))
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["bode", LAB, "--output", "root_momnt"], 'did you mean "root_moment"'),
-        (["bode", LAB, "--from", "-1"], "--from = -1.0: a positive frequency"),
-        (["bode", LAB, "--from", "10", "--to", "1"], "--to = 1.0: a frequency above --from"),
-        (["bode", LAB, "--to", "nan"], "--to = nan"),
-        (["bode", LAB, "--to", "100", "--png", "no/such/folder/b.png"], "--png"),
-        (["nyquist", LAB, "--K1", "nan"], "K1"),
-        (["nyquist", LAB, "--law", "no-such.toml"], "no-such.toml"),
-    ],
-)
-def test_bad_input_is_one_line(capsys, words, message):
-    code, out, err = run(capsys, *words)
-    assert (code, out) == (2, "")
-    assert message in err
-    assert err.count("\n") == 1

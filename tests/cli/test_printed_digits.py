@@ -11,7 +11,7 @@ from tests.shell import run
 from tfarm.arm.writing import to_toml
 from tfarm.digits import within
 from tfarm.loop.poles import closed_loop_poles
-from tfarm.schema import COMPLEX_ERROR
+from tfarm.schema.quantities import COMPLEX_ERROR
 
 
 @pytest.mark.parametrize(

@@ -100,11 +100,3 @@ def test_a_response_is_of_the_input_of_the_option(capsys):
     code, _, err = run(capsys, "response", "sasaki2012", "--output", "hub_rate", "--input", "motor_voltage", "--s", "1")
     assert code == 2
     assert "there is no motor" in err
-
-
-@pytest.mark.parametrize("arguments", [["modes", "--method", "appendix"], ["assumptions"]])
-def test_commands_of_the_papers_arm_refuse_a_rig_in_one_line(capsys, arguments):
-    verb, *rest = arguments
-    code, _, err = run(capsys, verb, RIGS["bench-rig"], *rest)
-    assert (code, err.count("\n")) == (2, 1)
-    assert "one Timoshenko beam on a hub" in err

@@ -49,14 +49,6 @@ def test_the_option_does_what_the_files_key_does(verb, slender, capsys):
     assert given != answer(capsys, verb, ARM, *VERBS[verb])
 
 
-def test_the_papers_determinants_are_of_one_theory(capsys):
-    code, _, error = run(
-        capsys, "response", ARM, "--output", "root_moment", "--s", "1j", "--theory", "shear", "--method", "appendix"
-    )
-    assert code == 2
-    assert "Timoshenko" in error
-
-
 @pytest.fixture(scope="module")
 def stepped(tmp_path_factory):
     """Two segments of different E I and a mass at their joint."""

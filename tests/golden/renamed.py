@@ -108,12 +108,12 @@ RENAMED = (
     ("compare", r"verdicts\[(\d)\]", r"sides[\1].verdict"),
     ("compare", r"sampled\[\d\]\..*", None),  # a line of text each
     ("compare .*--law .*--law.*", r"modes.*", None),  # the same arm twice
-    ("compare", r"modes\[(\d+)\]\.natural_frequency_rad_s_(one|other)", r"modes[frequency of mode \1].\2"),
-    ("compare", r"modes\[(\d+)\]\.damping_ratio_(one|other)", r"modes[damping ratio of mode \1].\2"),
-    ("compare", r"poles\[0\]\.size_rad_s_(one|other)", r"poles[abs(s) of the hub].\1"),
-    ("compare", r"poles\[0\]\.damping_ratio_(one|other)", r"poles[damping ratio of the hub].\1"),
-    ("compare", r"poles\[(\d+)\]\.size_rad_s_(one|other)", r"poles[abs(s) of mode \1].\2"),
-    ("compare", r"poles\[(\d+)\]\.damping_ratio_(one|other)", r"poles[damping ratio of mode \1].\2"),
+    ("compare", r"modes\[(\d+)\]\.natural_frequency_rad_s_(one|other)", r"modes[mode \1: natural frequency].\2"),
+    ("compare", r"modes\[(\d+)\]\.damping_ratio_(one|other)", r"modes[mode \1: damping ratio].\2"),
+    ("compare", r"poles\[0\]\.size_rad_s_(one|other)", r"poles[the hub: abs(s)].\1"),
+    ("compare", r"poles\[0\]\.damping_ratio_(one|other)", r"poles[the hub: damping ratio].\1"),
+    ("compare", r"poles\[(\d+)\]\.size_rad_s_(one|other)", r"poles[mode \1: abs(s)].\2"),
+    ("compare", r"poles\[(\d+)\]\.damping_ratio_(one|other)", r"poles[mode \1: damping ratio].\2"),
     ("compare", r"(modes|poles|unpaired_poles|margins)\b.*", None),  # now quantity by quantity
 )  # fmt: skip
 

@@ -22,9 +22,8 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.margins import margins
 from tfarm.reduced.conversions import closed, sensed_model
 from tfarm.response.signals import Signals
-from tfarm.schema import to_dict
+from tfarm.schema import to_dict, to_json
 from tfarm.spectrum.table import first_frequency
-from tfarm.tables.files import to_json
 
 SIGNALS = ("hub_angle", "hub_rate", "hub_angle", "hub_rate", "root_moment", "tip_displacement", "tip_acceleration",
            "moment@")  # fmt: skip

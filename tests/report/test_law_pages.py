@@ -27,7 +27,7 @@ from tfarm.report.cases import Case, GivenLaw
 from tfarm.report.loop_section import law_section, margins_section
 from tfarm.report.page import PIECES, file_of, pieces_of
 from tfarm.report.sampled_section import measured_step, sampled_section
-from tfarm.tables.files import to_json
+from tfarm.schema import to_json
 
 LAB, BARE, PRESET = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))
 DATA = Path(__file__).parent.parent / "data" / "quanser-2dsfl"

@@ -33,8 +33,8 @@ from tfarm.report import gains_section as map_room
 from tfarm.report.cases import Case, has_loop, margins_of, on_hub
 from tfarm.report.gains_section import beyond_table, draw_map_of_arm, map_data, map_of_arm, map_section
 from tfarm.report.loop_section import margin_table, margins_section, verdict_fact
+from tfarm.schema import as_json
 from tfarm.spectrum.table import PAPER_GAINS, default_gains
-from tfarm.tables.files import as_json
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 EPS = np.finfo(float).eps

@@ -8,7 +8,7 @@ import pytest
 from tfarm.audit import claims
 from tfarm.audit.rows import tex
 from tfarm.report.trust import anchor, compared_formulas, formulas, in_letters
-from tfarm.tables.html import GREEK
+from tfarm.schema.html import GREEK
 
 CLAIMS = claims()
 TEXTS = [(claim, text) for claim in CLAIMS for text in (claim.printed, claim.corrected) if text]

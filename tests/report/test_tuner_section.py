@@ -21,7 +21,7 @@ from tfarm.report.cases import Case
 from tfarm.report.sections import save_section
 from tfarm.report.tuner_section import section_of, tuner_section
 from tfarm.report.writing import _write_pages
-from tfarm.tables.html import with_symbols
+from tfarm.schema.html import with_symbols
 from tfarm.tuner import Learning, LearningCurves, Plan, initial_network, train, tune
 from tfarm.tuner import tuning as tuning_room
 

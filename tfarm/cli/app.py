@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import time
 from cmath import inf, isnan
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from copy import copy
 from dataclasses import replace
 from functools import cache, wraps
-from inspect import Parameter, signature
+from inspect import Parameter, Signature, getdoc, signature
 from pathlib import Path
 from threading import Event, Thread
-from typing import IO, Annotated, Any, cast
+from typing import IO, Annotated, Any, cast, get_args, get_origin
 
 import typer
 
@@ -21,7 +23,7 @@ import tfarm
 from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm, Theory, implausible
 from tfarm.errors import ParameterError, one_line
 from tfarm.files import is_standard_output
-from tfarm.tables.files import to_json, write_csv
+from tfarm.schema import to_json, write_csv
 
 app = typer.Typer(name="tfarm", rich_markup_mode="rich", pretty_exceptions_enable=False)
 GROUPS = ("Arm", "Loop", "Sampled loop", "Design", "Measurement", "Report")  # of commands in the help, in its order
@@ -106,6 +108,7 @@ TheoryName = Annotated[Theory | None, typer.Option("--theory", help="beam theory
 Json = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")]
 Csv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="write the table to this file")]
 Png = Annotated[Path | None, typer.Option("--png", metavar="FILE", help="draw the picture into this file")]
+File = Annotated[Path | None, typer.Option(metavar="FILE")]  # to be written
 Place = Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")]
 SideName = Annotated[
     str | None, typer.Option("--side", help="outer (default) or inner side of a joint, for outputs along the arm")
@@ -150,29 +153,49 @@ def gain_option(name: str, text: str, kind: Any = float | None) -> Any:
     return Annotated[kind, typer.Option(f"--{name}", help=text, rich_help_panel=CONTROLLER)]
 
 
-GAIN_OPTIONS = {
-    gain.name: gain_option(
-        gain.name, DEFAULT_GAINS.get(gain.name, f"{gain.output.replace('_', ' ')} gain [{gain.unit}]; by default 0")
-    )
-    for gain in LISTED
-}
 AngleGain = gain_option(ANGLE_GAIN, "hub angle gain", float)
+GAIN_OPTIONS = [
+    Parameter(gain.name, Parameter.KEYWORD_ONLY, default=None, annotation=gain_option(
+        gain.name, DEFAULT_GAINS.get(gain.name, f"{gain.output.replace('_', ' ')} gain [{gain.unit}]; by default 0")
+    ))
+    for gain in LISTED
+]  # fmt: skip
 
 
-def with_gains(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of the gains to a command, whose last parameter has their values by name."""
-    own = signature(command, eval_str=True)
-    *kept, _ = (each.replace(kind=Parameter.KEYWORD_ONLY) for each in own.parameters.values())
-    added = [
-        Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=kind) for name, kind in GAIN_OPTIONS.items()
-    ]
+def add_command(group: str, **how: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return the decorator that adds a command to a group of the help; `how` are its name and its example.
 
-    @wraps(command)
-    def called(**options: Any) -> None:
-        command(gains={name: options.pop(name) for name in GAIN_OPTIONS}, **options)
+    Its parameters are its arguments and options.  "name: text" below "Options:" in its docstring is the help of one; a
+    last parameter `gains` is the values of the options of the gains by name.
+    """
 
-    called.__signature__ = own.replace(parameters=[*kept, *added])  # type: ignore[attr-defined]
-    return called
+    def add(command: Callable[..., None]) -> Callable[..., None]:
+        words, _, lines = (getdoc(command) or "").partition("\n\nOptions:\n")
+        helps = dict(line.split(": ", 1) for line in re.split(r"\n(?=\w)", lines) if lines)
+        own = dict(signature(command, eval_str=True).parameters)
+        gains = GAIN_OPTIONS if own.pop("gains", None) else []
+
+        @wraps(command)
+        def called(**options: Any) -> None:
+            if gains:
+                options["gains"] = {each.name: options.pop(each.name) for each in gains}
+            command(**options)
+
+        parameters = [*(_with_help(each, helps.get(each.name, "")) for each in own.values()), *gains]
+        called.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+        called.__doc__ = words
+        app.command(rich_help_panel=group, **how)(called)
+        return command
+
+    return add
+
+
+def _with_help(option: Parameter, text: str) -> Parameter:
+    """Return the parameter of a command with that help; a plain one becomes the option --NAME."""
+    kind, *infos = get_args(option.annotation) if get_origin(option.annotation) is Annotated else [option.annotation]
+    info = copy(infos[0]) if infos else typer.Option(f"--{option.name.replace('_', '-')}")
+    info.help = " ".join(text.split()) or info.help
+    return option.replace(kind=Parameter.KEYWORD_ONLY, annotation=Annotated[kind, info])
 
 
 # ------------------------------------------------------------------------------------------------------------ inputs
@@ -261,13 +284,15 @@ def emit(
     csv: Path | None = None,
     png: Path | None = None,
     also: Sequence[Path | None] = (),
+    rows: bool = False,
 ) -> None:
     """Write the curves or rows of a record to CSV and its picture to PNG, then print it as JSON or as text.
 
-    `defaults` is what JSON has of default gains; `also` are files that are written already.  Nothing is printed where
-    standard output is one of the files.
+    `defaults` is what JSON has of default gains; `also` are files that are written already.  The text ends with the
+    `rows` of the CSV file where they are wanted and not written.  Nothing is printed where standard output is one of
+    the files.
     """
-    from tfarm.schema import curve_table, sections, to_dict
+    from tfarm.schema import curve_table, to_dict
 
     if csv is not None:
         write_csv(curve_table(record), csv)
@@ -284,18 +309,14 @@ def emit(
     if json:
         print(to_json({**to_dict(record), **(defaults or {})}))
         return
-    from tfarm.tables.terminal import show, show_pairs
+    from tfarm.schema.terminal import show
 
-    for number, each in enumerate(sections(record)):
-        if number and (each.pairs or each.table or each.drawing):
-            print(f"\n{each.title}" if each.title else "")
-        show_pairs(each.pairs)
-        if each.table is not None:
-            show(each.table)
-        if each.drawing:
-            print(each.drawing)
-    if defaults and defaults["default_gains"]:
-        print(f"by default {defaults['default_gains_in_words']}")
+    table = curve_table(record) if rows and csv is None else None
+    show(
+        record,
+        table,
+        f"by default {defaults['default_gains_in_words']}" if defaults and defaults["default_gains"] else "",
+    )
 
 
 _state = ["running"]  # of the command, for the lines of progress

@@ -15,14 +15,15 @@ import tfarm
 from tfarm.cli.app import (
     ArmName,
     Csv,
+    File,
     InputName,
     Json,
     Place,
     Png,
     SideName,
     TheoryName,
+    add_command,
     advance,
-    app,
     emit,
     interval,
     load_arm,
@@ -34,8 +35,8 @@ from tfarm.cli.app import (
 )
 from tfarm.schema import Quantity
 
-command = partial(app.command, rich_help_panel="Arm")
-measuring_command = partial(app.command, rich_help_panel="Measurement")
+command = partial(add_command, "Arm")
+measuring_command = partial(add_command, "Measurement")
 RecordName = Annotated[
     Path, typer.Argument(metavar="RECORD", exists=True, help="CSV or .mat file: t [s] and signals", show_default=False)
 ]
@@ -44,6 +45,19 @@ Compare = Annotated[bool, typer.Option("--compare", help="all three methods and 
 DigitCount = Annotated[
     int | None, typer.Option("--digits", min=1, max=1000, help="certified digits; texts in JSON above 15")
 ]
+ComplexPoints = Annotated[
+    Any,
+    typer.Option(
+        metavar="S,S",
+        parser=numbers("numbers in 1/s such as 0.3+57.1j,10j", kind=lambda text: complex(text.replace("i", "j"))),
+    ),
+]
+Frequencies = Annotated[Any, typer.Option(metavar="W,W", parser=numbers("frequencies in rad/s such as 1,10,100"))]
+FirstValues = Annotated[list[Any] | None, typer.Option(metavar="KEY=VALUE", parser=named(numbers("KEY=NUMBER", 1)))]
+Bounds = Annotated[list[Any] | None, typer.Option(metavar="KEY=LO,HI", parser=named(numbers("KEY=NUMBER,NUMBER", 2)))]
+Priors = Annotated[
+    list[Any] | None, typer.Option(metavar="KEY=MEAN,STD", parser=named(numbers("KEY=NUMBER,NUMBER", 2)))
+]
 MOST_SLOW = 2000  # points by balls or by the appendix, at some milliseconds each
 
 
@@ -51,47 +65,60 @@ MOST_SLOW = 2000  # points by balls or by the appendix, at some milliseconds eac
 class Preset:
     """An arm that comes with tfarm."""
 
-    name: Annotated[str, Quantity("name")]
-    length: Annotated[float, Quantity("length [m]")]
-    damping: Annotated[float, Quantity("damping C [s]")]
-    hub_inertia: Annotated[float, Quantity("hub inertia", "kg m^2")]
-    payload_mass: Annotated[float, Quantity("payload mass", "kg")]
-    payload_inertia: Annotated[float, Quantity("payload inertia", "kg m^2")]
-    assumptions: Annotated[tuple[str, ...], Quantity("assumptions")]
+    name: Annotated[str, Quantity("name", help="argument ARM of every command")]
+    length: Annotated[float, Quantity("length", "m", help="of all elastic links together", key="length")]
+    damping: Annotated[
+        float,
+        Quantity(
+            "damping C",
+            "s",
+            help="Kelvin-Voigt, the largest of all links: stress E (strain + C strain rate)",
+            key="damping",
+        ),
+    ]
+    hub_inertia: Annotated[float, Quantity("hub inertia", "kg m^2", help="about the axis of rotation, without a motor")]
+    payload_mass: Annotated[float, Quantity("payload mass", "kg", help="at the tip")]
+    payload_inertia: Annotated[float, Quantity("payload inertia", "kg m^2", help="about the tip")]
+    assumptions: Annotated[
+        tuple[str, ...],
+        Quantity("assumptions", help="numbers that the source of the arm does not give, and their origin"),
+    ]
 
 
 @dataclass(frozen=True)
 class Presets:
     """All of them."""
 
-    presets: Annotated[list[Preset], Quantity("arms")]
+    presets: Annotated[list[Preset], Quantity("arms", help="arms that come with tfarm")]
 
 
 @command(epilog="presets")
 def presets(json: Json = False) -> None:
     """List the arms that come with tfarm, with their assumptions."""
-    rows = [
-        Preset(
-            *(arm.name, arm.length, arm.damping, arm.hub.inertia, arm.payload.mass, arm.payload.inertia),
-            arm.assumptions,
-        )
+    emit(Presets([
+        Preset(arm.name, arm.length, arm.damping, arm.hub.inertia, arm.payload.mass, arm.payload.inertia,
+               arm.assumptions)
         for arm in map(tfarm.load, tfarm.presets())
-    ]
-    emit(Presets(rows), json)
+    ]), json)  # fmt: skip
 
 
 @command(epilog="modes sasaki2012-lab --count 5")
 def modes(
     arm: ArmName,
-    count: Annotated[int, typer.Option("--count", min=1, max=1000, help="flexible modes")] = 10,
+    count: Annotated[int, typer.Option(min=1, max=1000)] = 10,
     digits: DigitCount = None,
-    certify: Annotated[bool, typer.Option("--certify", help="prove each bracket, and that no mode is missing")] = False,
+    certify: bool = False,
     method: MethodName = "closed-form",
     compare: Compare = False,
     theory: TheoryName = None,
     json: Json = False,
 ) -> None:
-    """Natural frequencies, damping ratios and modes, complete by construction."""
+    """Natural frequencies, damping ratios and modes, complete by construction.
+
+    Options:
+    count: flexible modes
+    certify: prove each bracket, and that no mode is missing
+    """
     from tfarm.response.points import ByMethods
     from tfarm.spectrum.listing import listed_modes
 
@@ -111,32 +138,12 @@ def modes(
 @command(epilog="response sasaki2012-lab --from 1 --to 100 --csv root.csv")
 def response(
     arm: ArmName,
-    output: Annotated[
-        str | None, typer.Option("--output", help="output, such as tip_displacement; by default root_moment")
-    ] = None,
-    s: Annotated[
-        Any,
-        typer.Option(
-            "--s",
-            parser=numbers("numbers in 1/s such as 0.3+57.1j,10j", kind=lambda text: complex(text.replace("i", "j"))),
-            metavar="S,S",
-            help="points s [1/s]: 0.3+57.1j,10j",
-        ),
-    ] = None,
-    omega: Annotated[
-        Any,
-        typer.Option(
-            "--omega",
-            parser=numbers("frequencies in rad/s such as 1,10,100"),
-            metavar="W,W",
-            help="frequencies [rad/s]: 1,10,100",
-        ),
-    ] = None,
-    start: Annotated[float, typer.Option("--from", help="lowest frequency [rad/s]")] = 0.1,
-    stop: Annotated[float, typer.Option("--to", help="highest frequency [rad/s]")] = 1000.0,
-    points: Annotated[
-        int, typer.Option("--points", min=2, max=1_000_000, help="number of frequencies, logarithmically spaced")
-    ] = 500,
+    output: str | None = None,
+    s: ComplexPoints = None,
+    omega: Frequencies = None,
+    start: Annotated[float, typer.Option("--from")] = 0.1,
+    stop: Annotated[float, typer.Option("--to")] = 1000.0,
+    points: Annotated[int, typer.Option(min=2, max=1_000_000)] = 500,
     x: Place = None,
     side: SideName = None,
     driven: InputName = None,
@@ -144,9 +151,7 @@ def response(
     method: MethodName = "closed-form",
     compare: Compare = False,
     csv: Csv = None,
-    measured: Annotated[
-        str | None, typer.Option("--measured", metavar="OUTPUT/INPUT=FILE", help="compare with a measured response")
-    ] = None,
+    measured: Annotated[str | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
     png: Png = None,
     theory: TheoryName = None,
     json: Json = False,
@@ -155,6 +160,15 @@ def response(
 
     The input is the hub torque unless the arm's file names another, and the hub angle of a locked hub.
     With --measured tip_acceleration/hub_angle=sweep.csv it is compared with that response.
+
+    Options:
+    output: output, such as tip_displacement; by default root_moment
+    s: points s [1/s]: 0.3+57.1j,10j
+    omega: frequencies [rad/s]: 1,10,100
+    start: lowest frequency [rad/s]
+    stop: highest frequency [rad/s]
+    points: number of frequencies, logarithmically spaced
+    measured: compare with a measured response
     """
     if measured is not None:
         from tfarm.fitting.data import data_of
@@ -168,7 +182,6 @@ def response(
     refuse({"--png": png}, "a picture needs --measured; tfarm bode draws the exact response")
     refuse({"--omega": omega if s else None}, "give --s or --omega, not both")
     from tfarm.response import points as results
-    from tfarm.tables.terminal import show
 
     (wanted,) = outputs_on(["root_moment" if output is None else output], side)
     G = tfarm.transfer(load_arm(arm, theory, driven), wanted, x=x, method=cast("Any", method), input=driven)
@@ -178,14 +191,13 @@ def response(
     at = np.array(s) if s else 1j * np.array(omega)
     check_method(method, at.size, digits, compare)
     if compare:
-        load = driven if G.load else None
-        refuse({"--csv": csv, "--input": load}, "--compare prints a table of its own: ask for one of them")
+        refuse(
+            {"--csv": csv, "--input": driven if G.load else None},
+            "--compare prints a table of its own: ask for one of them",
+        )
         emit(results.ByMethods(G.arm.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)), json)
         return
-    found = results.points(G, at, digits)
-    emit(found, json, csv=csv)
-    if csv is None and not json:
-        show(found.csv_table)
+    emit(results.points(G, at, digits), json, csv=csv, rows=True)
 
 
 def check_method(method: str, number: int, digits: int | None, compare: bool) -> None:
@@ -207,11 +219,9 @@ def check_range(start: float, stop: float) -> None:
 @command(epilog="bode sasaki2012-lab --output tip_displacement --png bode.png")
 def bode(
     arm: ArmName,
-    output: Annotated[str, typer.Option("--output", help="output, such as tip_displacement")] = "root_moment",
-    start: Annotated[float | None, typer.Option("--from", help="lowest frequency [rad/s]")] = None,
-    stop: Annotated[
-        float | None, typer.Option("--to", help="highest frequency [rad/s]; by default above ten flexible modes")
-    ] = None,
+    output: str = "root_moment",
+    start: Annotated[float | None, typer.Option("--from")] = None,
+    stop: Annotated[float | None, typer.Option("--to")] = None,
     x: Place = None,
     side: SideName = None,
     driven: InputName = None,
@@ -220,7 +230,13 @@ def bode(
     theory: TheoryName = None,
     json: Json = False,
 ) -> None:
-    """Bode plot of the exact response to the arm's input, with the poles and zeros of that output."""
+    """Bode plot of the exact response to the arm's input, with the poles and zeros of that output.
+
+    Options:
+    output: output, such as tip_displacement
+    start: lowest frequency [rad/s]
+    stop: highest frequency [rad/s]; by default above ten flexible modes
+    """
     from tfarm.response.frequency import resonant_band
 
     subject, (wanted,) = load_arm(arm, theory, driven), outputs_on([output], side)
@@ -233,30 +249,33 @@ def bode(
 @command(epilog="reduce sasaki2012 --outputs root_moment,hub_rate --order 14")
 def reduce(
     arm: ArmName,
-    outputs: Annotated[str, typer.Option("--outputs", help="names separated by commas")] = "root_moment,hub_rate",
-    order: Annotated[int | None, typer.Option("--order", min=0, help="number of states; even where C = 0")] = None,
-    error: Annotated[float | None, typer.Option("--error", help="or the largest error allowed, such as 1e-6")] = None,
-    band: Annotated[
-        Any, typer.Option("--band", parser=interval, metavar="LOW,HIGH", help="frequency range [rad/s]")
-    ] = "0.1,1000",
-    method: Annotated[
-        str | None, typer.Option("--method", help="modal or aaa; by default that of the smaller error")
-    ] = None,
+    outputs: str = "root_moment,hub_rate",
+    order: Annotated[int | None, typer.Option(min=0)] = None,
+    error: float | None = None,
+    band: Annotated[Any, typer.Option(parser=interval, metavar="LOW,HIGH")] = "0.1,1000",
+    method: str | None = None,
     x: Place = None,
     side: SideName = None,
-    mat: Annotated[
-        Path | None, typer.Option("--mat", metavar="FILE", help="write a MATLAB file, and a script of that name")
-    ] = None,
+    mat: File = None,
     theory: TheoryName = None,
     json: Json = False,
 ) -> None:
-    """Reduced state-space model, with its largest error against the exact arm over a frequency range."""
+    """Reduced state-space model, with its largest error against the exact arm over a frequency range.
+
+    Options:
+    outputs: names separated by commas
+    order: number of states; even where C = 0
+    error: or the largest error allowed, such as 1e-6
+    band: frequency range [rad/s]
+    method: modal or aaa; by default that of the smaller error
+    mat: write a MATLAB file, and a script of that name
+    """
     from tfarm.reduced import save_mat
 
-    wanted = outputs_on([name.strip() for name in outputs.split(",")], side)
     reduced = tfarm.reduce(
-        load_arm(arm, theory), wanted, order=order, error=error, method=cast("Any", method), band=band, x=x
-    )
+        load_arm(arm, theory), outputs_on([name.strip() for name in outputs.split(",")], side),
+        order=order, error=error, method=cast("Any", method), band=band, x=x,
+    )  # fmt: skip
     emit(reduced, json, also=() if mat is None else save_mat(reduced, mat, key="--mat"))
 
 
@@ -265,64 +284,34 @@ def reduce(
 )
 def fit(
     arm: ArmName,
-    data: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--data",
-            metavar="OUTPUT/INPUT=FILE",
-            help="measured response; may be repeated",
-        ),
-    ] = None,
-    free: Annotated[
-        str,
-        typer.Option(
-            "--free",
-            metavar="KEY,KEY",
-            help="free numbers: keys of the arm's file, such as link.youngs_modulus, and gain, delay of each sensor",
-        ),
-    ] = "",
-    start: Annotated[
-        list[Any] | None,
-        typer.Option(
-            "--start", parser=named(numbers("KEY=NUMBER", 1)), metavar="KEY=VALUE", help="first value, if not the arm's"
-        ),
-    ] = None,
-    bounds: Annotated[
-        list[Any] | None,
-        typer.Option(
-            "--bounds", parser=named(numbers("KEY=NUMBER,NUMBER", 2)), metavar="KEY=LO,HI", help="bounds of a number"
-        ),
-    ] = None,
-    prior: Annotated[
-        list[Any] | None,
-        typer.Option(
-            "--prior",
-            parser=named(numbers("KEY=NUMBER,NUMBER", 2)),
-            metavar="KEY=MEAN,STD",
-            help="prior mean and deviation",
-        ),
-    ] = None,
-    mode: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--mode",
-            metavar="N=HZ,RATIO",
-            help="mode of a ring-down: 1=2.52hz,0.006, with standard deviations 1=2.52hz~0.01,0.006~0.001",
-        ),
-    ] = None,
-    covariance: Annotated[
-        bool, typer.Option("--covariance", help="intervals by the covariance alone, without profiles")
-    ] = False,
-    save: Annotated[
-        Path | None, typer.Option("--save", metavar="FILE", help="write the fitted arm to this TOML file")
-    ] = None,
+    data: Annotated[list[str] | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
+    free: Annotated[str, typer.Option(metavar="KEY,KEY")] = "",
+    start: FirstValues = None,
+    bounds: Bounds = None,
+    prior: Priors = None,
+    mode: Annotated[list[str] | None, typer.Option(metavar="N=HZ,RATIO")] = None,
+    covariance: bool = False,
+    save: File = None,
     png: Png = None,
-    report: Annotated[bool, typer.Option("--report", help="write the pages of the fitted arm")] = False,
-    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="the folder of the pages")] = Path("reports"),
+    report: bool = False,
+    out: Annotated[Path, typer.Option(metavar="FOLDER")] = Path("reports"),
     theory: TheoryName = None,
     json: Json = False,
 ) -> None:
-    """Fit of an arm's numbers to measured responses and ring-downs, with confidence intervals."""
+    """Fit of an arm's numbers to measured responses and ring-downs, with confidence intervals.
+
+    Options:
+    data: measured response; may be repeated
+    free: free numbers: keys of the arm's file, such as link.youngs_modulus, and gain, delay of each sensor
+    start: first value, if not the arm's
+    bounds: bounds of a number
+    prior: prior mean and deviation
+    mode: mode of a ring-down: 1=2.52hz,0.006, with standard deviations 1=2.52hz~0.01,0.006~0.001
+    covariance: intervals by the covariance alone, without profiles
+    save: write the fitted arm to this TOML file
+    report: write the pages of the fitted arm
+    out: the folder of the pages
+    """
     from tfarm.fitting import model, overlay
     from tfarm.fitting.data import data_of
     from tfarm.fitting.fit import save_fit
@@ -349,29 +338,27 @@ def fit(
 @measuring_command(epilog="frf record.csv --input hub_torque --output tip_acceleration=acc1 --save measured.csv")
 def frf(
     record: RecordName,
-    input: Annotated[str, typer.Option("--input", help="such as hub_torque; or hub_torque=COLUMN of the record")],
-    output: Annotated[str, typer.Option("--output", help="such as tip_acceleration; or tip_acceleration=COLUMN")],
-    estimator: Annotated[
-        str, typer.Option("--estimator", help="H1 (noise on the output), H2 (on the input) or Hv")
-    ] = "H1",
-    window: Annotated[
-        str, typer.Option("--window", help="hann for random excitation, boxcar for whole sweeps")
-    ] = "hann",
-    segment: Annotated[
-        float | None, typer.Option("--segment", help="length of a segment [s]; by default an eighth of the record")
-    ] = None,
-    overlap: Annotated[
-        float | None, typer.Option("--overlap", help="share of a segment; by default 0.5, or 0 with boxcar")
-    ] = None,
-    csv: Annotated[
-        Path | None,
-        typer.Option("--save", "--csv", metavar="FILE", help="write the response, for --measured and --data"),
-    ] = None,
+    input: str,
+    output: str,
+    estimator: str = "H1",
+    window: str = "hann",
+    segment: float | None = None,
+    overlap: float | None = None,
+    csv: Annotated[Path | None, typer.Option("--save", "--csv", metavar="FILE")] = None,
     json: Json = False,
 ) -> None:
-    """Frequency response of a record over time, by averaged cross-spectra, with coherence."""
+    """Frequency response of a record over time, by averaged cross-spectra, with coherence.
+
+    Options:
+    input: such as hub_torque; or hub_torque=COLUMN of the record
+    output: such as tip_acceleration; or tip_acceleration=COLUMN
+    estimator: H1 (noise on the output), H2 (on the input) or Hv
+    window: hann for random excitation, boxcar for whole sweeps
+    segment: length of a segment [s]; by default an eighth of the record
+    overlap: share of a segment; by default 0.5, or 0 with boxcar
+    csv: write the response, for --measured and --data
+    """
     from tfarm.fitting import recording
-    from tfarm.tables.terminal import show
 
     refuse(
         {"signal": next((text for text in (output, input) if text.endswith("=")), None)},
@@ -382,9 +369,7 @@ def frf(
         recording.read_recording(record), signal, driven, columns=(column or signal, driven_column or driven),
         estimator=cast("Any", estimator), window=cast("Any", window), segment=segment, overlap=overlap,
     )  # fmt: skip
-    emit(found, json, csv=csv)
-    if csv is None and not json:
-        show(found.csv_table)
+    emit(found, json, csv=csv, rows=True)
     if found.note:
         print_line(found.note)
 
@@ -392,14 +377,21 @@ def frf(
 @measuring_command(epilog="ring record.csv --signal root_strain --from 2.5")
 def ring(
     record: RecordName,
-    signal: Annotated[str, typer.Option("--signal", help="column of the record that decays")],
-    start: Annotated[float | None, typer.Option("--from", help="time [s] at which the excitation ends")] = None,
-    stop: Annotated[float | None, typer.Option("--to", help="last time [s]")] = None,
-    modes: Annotated[int, typer.Option("--modes", min=1, help="number of oscillations")] = 1,
+    signal: str,
+    start: Annotated[float | None, typer.Option("--from")] = None,
+    stop: Annotated[float | None, typer.Option("--to")] = None,
+    modes: Annotated[int, typer.Option(min=1)] = 1,
     json: Json = False,
 ) -> None:
-    """Frequencies and damping ratios of a decay, with confidence intervals."""
+    """Frequencies and damping ratios of a decay, with confidence intervals.
+
+    Options:
+    signal: column of the record that decays
+    start: time [s] at which the excitation ends
+    stop: last time [s]
+    modes: number of oscillations
+    """
     from tfarm.fitting import recording, resonances
 
-    found = resonances.ring(recording.read_recording(record), signal, start=start, stop=stop, modes=modes)
-    emit(found, json)
+    decay = recording.read_recording(record)
+    emit(resonances.ring(decay, signal, start=start, stop=stop, modes=modes), json)

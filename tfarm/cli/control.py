@@ -10,20 +10,21 @@ from typing import Annotated, Any
 import typer
 
 import tfarm
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, NAMES, PLANE, RATE_GAIN
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN
 from tfarm.cli.app import (
     AngleGain,
     ArmName,
     Csv,
     Delay,
     DspFile,
+    File,
     Gains,
     Json,
     LawFile,
     Period,
     Png,
     TheoryName,
-    app,
+    add_command,
     emit,
     interval,
     load_arm,
@@ -33,43 +34,39 @@ from tfarm.cli.app import (
     named,
     print_line,
     refuse,
-    with_gains,
 )
 from tfarm.files import write_mat
 
-command = partial(app.command, rich_help_panel="Loop")
-sampled_command = partial(app.command, rich_help_panel="Sampled loop")
+command = partial(add_command, "Loop")
+sampled_command = partial(add_command, "Sampled loop")
 ModeCount = Annotated[
     int | None, typer.Option("--modes", min=1, max=400, help="flexible modes; by default as many as the result takes")
 ]
-NUMBERS = "gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N"  # of a law
 
 
 @command(epilog="poles sasaki2012-lab --K1 0.3 --K2 0.3 --count 8")
-@with_gains
 def poles(
     arm: ArmName,
-    count: Annotated[
-        int | None,
-        typer.Option(
-            "--count", min=1, max=1000, help="poles with Im s >= 0; by default ten, or those below the shear cut-off"
-        ),
-    ] = None,
-    certify: Annotated[bool, typer.Option("--certify", help="prove each, and that none is missing")] = False,
+    count: Annotated[int | None, typer.Option(min=1, max=1000)] = None,
+    certify: bool = False,
     law: LawFile = None,
     theory: TheoryName = None,
     json: Json = False,
     *,
     gains: Gains,
 ) -> None:
-    """Closed-loop poles of the exact arm, complete in a printed box."""
+    """Closed-loop poles of the exact arm, complete in a printed box.
+
+    Options:
+    count: poles with Im s >= 0; by default ten, or those below the shear cut-off
+    certify: prove each, and that none is missing
+    """
     subject, controller, defaults = load_loop(arm, theory, gains, law)
     found = tfarm.closed_loop_poles(subject, controller, count)
     emit(found.certified() if certify else found, json, defaults)
 
 
 @command(epilog="margins sasaki2012-lab --K1 0.3 --K2 0.3")
-@with_gains
 def margins(arm: ArmName, law: LawFile = None, theory: TheoryName = None, json: Json = False, *, gains: Gains) -> None:
     """Stability, the stability interval of each gain, and the margins of the exact loop function."""
     subject, controller, defaults = load_loop(arm, theory, gains, law)
@@ -77,7 +74,6 @@ def margins(arm: ArmName, law: LawFile = None, theory: TheoryName = None, json: 
 
 
 @command(epilog="nyquist sasaki2012-lab --K1 0.3 --K2 0.3 --png nyquist.png")
-@with_gains
 def nyquist(
     arm: ArmName,
     png: Png = None,
@@ -94,44 +90,32 @@ def nyquist(
 
 
 @command(epilog="spill sasaki2012-lab --K1 0.3 --K2 -2")
-@with_gains
 def spill(
     arm: ArmName,
-    modes: Annotated[int, typer.Option("--modes", min=1, max=60, help="modes of the largest model")] = 20,
+    modes: Annotated[int, typer.Option(min=1, max=60)] = 20,
     law: LawFile = None,
     theory: TheoryName = None,
     json: Json = False,
     *,
     gains: Gains,
 ) -> None:
-    """Spillover into modes that a design model leaves out: the exact loop and models of 1, 2, 3 ... modes."""
+    """Spillover into modes that a design model leaves out: the exact loop and models of 1, 2, 3 ... modes.
+
+    Options:
+    modes: modes of the largest model
+    """
     subject, controller, defaults = load_loop(arm, theory, gains, law)
     emit(tfarm.spill(subject, controller, modes), json, defaults)
 
 
 @command(epilog="locus sasaki2012-lab --vary K2 --from 0 --to 2 --png locus.png")
-@with_gains
 def locus(
     arm: ArmName,
-    vary: Annotated[
-        str,
-        typer.Option(
-            "--vary",
-            help=f"{', '.join(NAMES)}, all (a factor on these), payload_mass, payload_inertia, "
-            f"hub_inertia, length or damping; or {NUMBERS}",
-        ),
-    ],
-    start: Annotated[float, typer.Option("--from", help="first value")],
-    stop: Annotated[float, typer.Option("--to", help="last value")],
-    points: Annotated[
-        int | None,
-        typer.Option(
-            "--points", min=2, max=100_000, help="values, equally spaced; by default 500, of a number of a law 100"
-        ),
-    ] = None,
-    branches: Annotated[
-        int, typer.Option("--branches", min=1, max=200, help="branches; all flexible modes below the last are listed")
-    ] = 10,
+    vary: str,
+    start: Annotated[float, typer.Option("--from")],
+    stop: Annotated[float, typer.Option("--to")],
+    points: Annotated[int | None, typer.Option(min=2, max=100_000)] = None,
+    branches: Annotated[int, typer.Option(min=1, max=200)] = 10,
     png: Png = None,
     csv: Csv = None,
     law: LawFile = None,
@@ -140,7 +124,16 @@ def locus(
     *,
     gains: Gains,
 ) -> None:
-    """Root locus of the exact arm along a gain or a parameter, with its crossings of the imaginary axis."""
+    """Root locus of the exact arm along a gain or a parameter, with its crossings of the imaginary axis.
+
+    Options:
+    vary: K1, K2, Kp, all (a factor on these), payload_mass, payload_inertia, hub_inertia, length or damping; or gain (a
+        factor on the law), delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N
+    start: first value
+    stop: last value
+    points: values, equally spaced; by default 500, of a number of a law 100
+    branches: branches; all flexible modes below the last are listed
+    """
     from tfarm.loop.loci import Loci, reduced_of
 
     subject, controller, defaults = load_loop(arm, theory, gains, law)
@@ -151,41 +144,14 @@ def locus(
 @command(epilog="map sasaki2012-lab --K1 -1,3 --K2 -2,2 --png map.png", name="map")
 def gain_map(
     arm: ArmName,
-    k1: Annotated[
-        Any,
-        typer.Option(
-            f"--{RATE_GAIN}",
-            parser=interval,
-            metavar="LO,HI",
-            help=f"range of {RATE_GAIN}; by default -1,3 on the paper's arm, -3.33 to 10 times the default on a rig",
-        ),
-    ] = None,
-    k2: Annotated[
-        Any,
-        typer.Option(
-            f"--{MOMENT_GAIN}",
-            parser=interval,
-            metavar="LO,HI",
-            help=f"range of {MOMENT_GAIN}; by default -2,2, on a rig times its input of 1 N m",
-        ),
-    ] = None,
+    k1: Annotated[Any, typer.Option(f"--{RATE_GAIN}", parser=interval, metavar="LO,HI")] = None,
+    k2: Annotated[Any, typer.Option(f"--{MOMENT_GAIN}", parser=interval, metavar="LO,HI")] = None,
     kp: AngleGain = 0.0,
-    points: Annotated[
-        int | None,
-        typer.Option("--points", min=2, max=2000, help="grid points along each; by default 101, of a law 60"),
-    ] = None,
+    points: Annotated[int | None, typer.Option(min=2, max=2000)] = None,
     csv: Csv = None,
     png: Png = None,
     law: LawFile = None,
-    vary: Annotated[
-        list[Any] | None,
-        typer.Option(
-            "--vary",
-            parser=named(interval),
-            metavar="NAME=LO,HI",
-            help=f"twice: two numbers of a law and their ranges; {NUMBERS}",
-        ),
-    ] = None,
+    vary: Annotated[list[Any] | None, typer.Option(parser=named(interval), metavar="NAME=LO,HI")] = None,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
@@ -195,6 +161,13 @@ def gain_map(
     """Number of unstable poles over the plane of two gains, or of two numbers of a law, with the exact boundary.
 
     With --period, --delay-samples or --dsp of the sampled loop.
+
+    Options:
+    k1: range of K1; by default -1,3 on the paper's arm, -3.33 to 10 times the default on a rig
+    k2: range of K2; by default -2,2, on a rig times its input of 1 N m
+    points: grid points along each; by default 101, of a law 60
+    vary: twice: two numbers of a law and their ranges; gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or
+        SIGNAL.den.N
     """
     from tfarm.dsp import crossings, verdict
     from tfarm.loop.plane import between, ranges_of
@@ -227,7 +200,6 @@ def gain_map(
 
 
 @sampled_command(epilog="sampled sasaki2012-lab --K1 0.3 --K2 0.3 --period 0.01")
-@with_gains
 def sampled(
     arm: ArmName,
     period: Period = None,
@@ -250,40 +222,35 @@ def sampled(
 
 
 @sampled_command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")
-@with_gains
 def simulate(
     arm: ArmName,
-    scenario: Annotated[str, typer.Option("--scenario", help="slew, step, decay or impulse")] = "slew",
-    duration: Annotated[float, typer.Option("--duration", help="duration [s]")] = 3.0,
+    scenario: str = "slew",
+    duration: float = 3.0,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
     modes: ModeCount = None,
-    output: Annotated[
-        list[str] | None,
-        typer.Option("--output", metavar="NAME", help="further signal, as strain@0.05; may be repeated"),
-    ] = None,
-    between: Annotated[int, typer.Option("--between", min=0, max=1000, help="records between two samples")] = 0,
+    output: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
+    between: Annotated[int, typer.Option(min=0, max=1000)] = 0,
     csv: Csv = None,
-    mat: Annotated[
-        Path | None, typer.Option("--mat", metavar="FILE", help="write the signals to a MATLAB file")
-    ] = None,
-    controller: Annotated[
-        Path | None,
-        typer.Option(
-            "--controller",
-            metavar="FILE",
-            exists=True,
-            help=f"tuner of `tfarm tune --save`: it sets {MOMENT_GAIN}, with its own {RATE_GAIN}",
-        ),
-    ] = None,
+    mat: File = None,
+    controller: Annotated[Path | None, typer.Option(metavar="FILE", exists=True)] = None,
     law: LawFile = None,
     theory: TheoryName = None,
     json: Json = False,
     *,
     gains: Gains,
 ) -> None:
-    """Time response of the sampled loop: hub angle, tip, root moment and torque, exact between the samples."""
+    """Time response of the sampled loop: hub angle, tip, root moment and torque, exact between the samples.
+
+    Options:
+    scenario: slew, step, decay or impulse
+    duration: duration [s]
+    output: further signal, as strain@0.05; may be repeated
+    between: records between two samples
+    mat: write the signals to a MATLAB file
+    controller: tuner of `tfarm tune --save`: it sets K2, with its own K1
+    """
     how: Any = {"count": modes, "between": between, "outputs": output or ()}
     chain, defaults = load_chain(dsp or arm, period, delay_samples), None
     if controller is None:

@@ -19,6 +19,7 @@ from tfarm.cli.app import (
     ArmName,
     Delay,
     DspFile,
+    File,
     Gains,
     Json,
     LawFiles,
@@ -26,8 +27,8 @@ from tfarm.cli.app import (
     Period,
     Png,
     TheoryName,
+    add_command,
     advance,
-    app,
     emit,
     interval,
     load_arm,
@@ -37,18 +38,15 @@ from tfarm.cli.app import (
     preset_names,
     print_line,
     refuse,
-    with_gains,
 )
 
-command = partial(app.command, rich_help_panel="Design")
+command = partial(add_command, "Design")
 
 
 @command(epilog="design sasaki2012-lab --structure PD+notch --save notch.toml")
 def design(
     arm: ArmName,
-    objective: Annotated[
-        str, typer.Option("--objective", help="damping, margin, sensitivity, delay, residual or cost (of the tuner)")
-    ] = "damping",
+    objective: str = "damping",
     structure: Annotated[
         str, typer.Option("--structure", help=f"{TWO_GAINS}, PD, PD+notch, lead, PPF or strain-rate")
     ] = TWO_GAINS,
@@ -60,30 +58,25 @@ def design(
     ] = None,
     kp: AngleGain = 0.0,
     modes: ModeCount = 2,
-    continuous: Annotated[bool, typer.Option("--continuous", help="for the continuous-time loop")] = False,
+    continuous: bool = False,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
-    also: Annotated[
-        list[str] | None,
-        typer.Option("--also", metavar="ARM", help="further arm; the objective is the worst of all; may be repeated"),
-    ] = None,
-    over: Annotated[
-        list[Any] | None,
-        typer.Option(
-            "--range",
-            parser=named(interval),
-            metavar="KEY=LO,HI",
-            help="range of a number of the arm, such as payload.mass=0.1,0.5; up to four: corners, and a search inside",
-        ),
-    ] = None,
-    save: Annotated[
-        Path | None, typer.Option("--save", metavar="FILE", help="write the law to this TOML file, for --law")
-    ] = None,
+    also: Annotated[list[str] | None, typer.Option(metavar="ARM")] = None,
+    over: Annotated[list[Any] | None, typer.Option("--range", parser=named(interval), metavar="KEY=LO,HI")] = None,
+    save: File = None,
     theory: TheoryName = None,
     json: Json = False,
 ) -> None:
-    """Law of a structure with the best objective in the sampled loop, at the file's period or else 10 ms."""
+    """Law of a structure with the best objective in the sampled loop, at the file's period or else 10 ms.
+
+    Options:
+    objective: damping, margin, sensitivity, delay, residual or cost (of the tuner)
+    continuous: for the continuous-time loop
+    also: further arm; the objective is the worst of all; may be repeated
+    over: range of a number of the arm, such as payload.mass=0.1,0.5; up to four: corners, and a search inside
+    save: write the law to this TOML file, for --law
+    """
     from tfarm.arm.writing import save_law
 
     bounds: Any = {RATE_GAIN: k1, MOMENT_GAIN: k2, ANGLE_GAIN: kp}
@@ -214,7 +207,6 @@ def tune(
 
 
 @command(epilog="compare sasaki2012 sasaki2012-lab --png both.png")
-@with_gains
 def compare(
     arms: Annotated[
         list[str],
@@ -224,15 +216,13 @@ def compare(
     ],
     law: LawFiles = None,
     modes: ModeCount = 10,
-    output: Annotated[str, typer.Option("--output", help="output of the Bode plot of two arms")] = "root_moment",
+    output: str = "root_moment",
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
     theory: TheoryName = None,
     png: Png = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="FOLDER", help="write a page, compare.html, to this folder")
-    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FOLDER")] = None,
     json: Json = False,
     *,
     gains: Gains,
@@ -240,6 +230,10 @@ def compare(
     """Comparison of two arms, or of two laws on one arm: modes, poles, verdicts, margins.
 
     Of one arm give --law twice; of two arms once for both, or once for each.
+
+    Options:
+    output: output of the Bode plot of two arms
+    out: write a page, compare.html, to this folder
     """
     files, page = law or [], None
     refuse({"ARM": arms[2:] or None, "--law": [*map(str, files[2:])] or None}, "two at most can be compared")

@@ -5,50 +5,19 @@ from __future__ import annotations
 import os
 import re
 import sys
+import tomllib
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import typer
 from typer.exceptions import TyperException
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
 from tfarm.cli import commands, control, designing, trust  # noqa: F401  each adds its commands
 from tfarm.cli.app import discard, print_line, progress, whole_command
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError
 from tfarm.files import STANDARD_OUTPUT
 
-OF_OTHER_TOOLS = {
-    "rlocus": "locus",
-    "eig": "modes",
-    "eigenvalues": "modes",
-    "frequencies": "modes",
-    "zeros": "bode",
-    "step": "simulate ARM --scenario step",
-    "impulse": "simulate ARM --scenario impulse",
-    "slew": "simulate ARM --scenario slew",
-    "stability": "margins",
-    "gains": "design",
-    "transfer": "response",
-    "train": "tune",
-    "list": "presets",
-    "version": "--version",
-    "help": "--help",
-}
-OPTIONS: dict[str, tuple[str, ...]] = {
-    "--period": ("--Ts", "--ts", "--dt", "--T", "--sample-time", "--sampling-time", "--sample", "-T"),
-    "--count": ("--n", "--num", "--number", "--modes", "-n", "-N"),
-    "--modes": ("--n", "--num", "--number", "--count", "-n", "-N"),
-    "--omega": ("--w", "--freq", "--frequency", "--frequencies", "-w"),
-    "--delay-samples": ("--tau", "--delay", "--latency"),
-    "--csv": ("--out", "--file", "--save", "-o"),
-    "--out": ("--output", "--folder", "--dir", "-o"),
-    "--duration": ("--time", "--tend", "--tmax", "-t"),
-    f"--{ANGLE_GAIN}": ("--K0", "--kp"),
-    f"--{RATE_GAIN}": ("--Kd", "--k1"),
-    f"--{MOMENT_GAIN}": ("--Km", "--k2"),
-    "--from": ("--start", "--wmin", "--min"),
-    "--to": ("--stop", "--end", "--wmax", "--max"),
-}
 STREAMED = ("--csv", "--png", "--mat", "--save")  # of files that may go to standard output instead, called "-"
 PATHS = (*STREAMED, "--out", "--dsp", "--law", "--controller")  # may be called 1_0
 ODD_NUMBER = re.compile(r"(?=.*(_|[^\x00-\x7f]))[-+.\d_eEij]*\d[-+.\d_eEij]*")  # to Python alone: 5_0, or other digits
@@ -133,9 +102,10 @@ def usage(error: Any) -> str:
     if not hasattr(error, "format_message"):
         return str(error)
     text, name = error.format_message(), getattr(error, "option_name", "")
+    hints = tomllib.loads((Path(__file__).parent / "hints.toml").read_text(encoding="utf-8"))
     if text.startswith("No such option"):
         known = [option for each in error.ctx.command.params for option in each.opts]
-        meant = [option for option, others in OPTIONS.items() if name in others and option in known]
+        meant = [option for option, others in hints["options"].items() if name in others and option in known]
         return f"No such option: {name}. Did you mean {' or '.join(meant)}?" if meant else text
     for problem in getattr(error.__cause__, "errors", list)():  # of pydantic, which converts for Typer
         low, high = error.param.min, error.param.max
@@ -143,6 +113,6 @@ def usage(error: Any) -> str:
         remedy = problem["msg"].removeprefix("Value error, ").replace("Input should", "should") + within
         return str(ParameterError(key=error.param.opts[0], value=problem["input"], remedy=remedy))
     word = (*text.split("'"), "")[1].lower()
-    if text.startswith("No such command") and word in OF_OTHER_TOOLS:
-        return f"No such command '{word}'. Did you mean \"{OF_OTHER_TOOLS[word]}\"?"
+    if text.startswith("No such command") and word in hints["commands"]:
+        return f"No such command '{word}'. Did you mean \"{hints['commands'][word]}\"?"
     return text.removeprefix("Invalid value for ").replace("'", "", 2) if "param" in vars(error) else text

@@ -19,44 +19,44 @@ from tfarm.cli.app import (
     LawFiles,
     Period,
     TheoryName,
+    add_command,
     advance,
-    app,
     emit,
     load_arm,
     load_chain,
     load_law,
     preset_names,
     print_line,
-    with_gains,
 )
 
-command = partial(app.command, rich_help_panel="Report")
+command = partial(add_command, "Report")
 
 
 @command(epilog="report sasaki2012-lab --out pages")
-@with_gains
 def report(
     arms: Annotated[
         list[str] | None,
         typer.Argument(metavar="[ARM ...]", help="presets or files; by default all", autocompletion=preset_names),
     ] = None,
-    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="the folder to write to")] = Path("reports"),
-    only: Annotated[str | None, typer.Option("--only", help="one page: bode, modes, margins, locus ...")] = None,
+    out: Annotated[Path, typer.Option(metavar="FOLDER")] = Path("reports"),
+    only: str | None = None,
     law: LawFiles = None,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
     theory: TheoryName = None,
-    measured: Annotated[
-        list[str] | None,
-        typer.Option("--measured", metavar="OUTPUT/INPUT=FILE", help="measured response; may be repeated"),
-    ] = None,
+    measured: Annotated[list[str] | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
     *,
     gains: Gains,
 ) -> None:
     """Pages with pictures, tables and data: open index.html in a browser.
 
     The pages are about the gains or the laws that are given, or the [law] of an arm's file, or the default gains.
+
+    Options:
+    out: the folder to write to
+    only: one page: bode, modes, margins, locus ...
+    measured: measured response; may be repeated
     """
     from tfarm.arm import law_tables
     from tfarm.fitting import data, recording
@@ -76,12 +76,11 @@ def report(
         ]
         for arm, name in zip(subjects, names, strict=True)
     ]
-    page = write(
+    print(write(
         subjects, out, laws=laws, only=None if only is None else (only,), progress=advance, notice=print_line,
         chains=[load_chain(dsp or name, period, delay_samples) for name in names],
         measured=[data.data_of(text, "--measured") for text in measured or []],
-    )  # fmt: skip
-    print(page)
+    ))  # fmt: skip
 
 
 @command(epilog="audit")
@@ -95,11 +94,15 @@ def audit(json: Json = False) -> None:
 @command(epilog="assumptions sasaki2012")
 def assumptions(
     arm: ArmName,
-    count: Annotated[int, typer.Option("--count", min=1, max=100, help="flexible modes")] = 4,
+    count: Annotated[int, typer.Option(min=1, max=100)] = 4,
     theory: TheoryName = None,
     json: Json = False,
 ) -> None:
-    """Effect of the assumed section and hub inertia: frequencies over the candidates, with exact sensitivities."""
+    """Effect of the assumed section and hub inertia: frequencies over the candidates, with exact sensitivities.
+
+    Options:
+    count: flexible modes
+    """
     from tfarm.audit.assumptions import assumptions as find
 
     emit(find(load_arm(arm, theory), count), json)
@@ -119,7 +122,7 @@ def glossary(
     json: Json = False,
 ) -> None:
     """Words of certainty, terms, and the quantities of all results with their units."""
-    from tfarm.glossary import glossary as find
+    from tfarm.schema.glossary import glossary as find
 
     emit(find(words), json)
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real
-from tfarm.columns import Column, Table
+from tfarm.schema import Column, Table
 
 from .line import Window
 

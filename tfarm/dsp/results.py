@@ -18,7 +18,6 @@ import numpy as np
 
 from tfarm.arm import AnyLaw, Arm, tracked
 from tfarm.arrays import Real
-from tfarm.columns import Column, Table
 from tfarm.dsp.chain import PERIOD, Chain, chain_or_usual
 from tfarm.dsp.discretise import RULE, rule_in_words, with_all_gains
 from tfarm.dsp.plant import MODES_USED
@@ -28,7 +27,7 @@ from tfarm.dsp.traces import resolved
 from tfarm.errors import ConvergenceError
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.response.controller import Controller, controller
-from tfarm.schema import Quantity
+from tfarm.schema import Column, Quantity, Table
 
 RESIDUAL = "residual root moment after the slew"
 MODE_COUNTS = (10, 20, 40)  # flexible modes; 80 would take a heavily damped arm 8 s of CPU time

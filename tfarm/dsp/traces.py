@@ -19,12 +19,12 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.arrays import Real
-from tfarm.columns import Column
 from tfarm.dsp.chain import TIME_ROUNDING
 from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.records import record
+from tfarm.schema import Column
 
 POINTS_A_PERIOD = 20  # of a curve in each period of the fastest visible mode
 VISIBLE = 1 / 300  # of the height of a curve: a pixel of a picture

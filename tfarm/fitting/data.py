@@ -31,14 +31,13 @@ from numpy.typing import NDArray
 from tfarm.arm import INPUT_UNITS, INPUTS
 from tfarm.arm.reading import decoded
 from tfarm.arrays import Complex, Real
-from tfarm.columns import Column, Table
 from tfarm.digits import general, singly
 from tfarm.errors import MISSING, ParameterError, did_you_mean, naming, require
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.files import read_file
 from tfarm.records import record
 from tfarm.response.frequency import HERTZ
-from tfarm.schema import Quantity
+from tfarm.schema import Column, Quantity, Table
 
 CONFIDENCE = 0.95  # of every interval of a fit: the usual one
 LEAST_SHARE = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence

@@ -23,14 +23,13 @@ import numpy as np
 
 from tfarm.arm import INPUTS, Arm, Input, must_be_arm
 from tfarm.arrays import Complex, Real
-from tfarm.columns import Column, Table
 from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.records import record
 from tfarm.response import TransferFunction, transfer
 from tfarm.response.frequency import HERTZ, refined_grid, without_cancelled
 from tfarm.response.signals import Signals
 from tfarm.response.transfer import Roots
-from tfarm.schema import Quantity
+from tfarm.schema import Column, Quantity, Table
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum import modes_below
 

@@ -43,7 +43,6 @@ from tfarm.arm import AnyLaw, Arm, tracked
 from tfarm.arm.reading import load_tables
 from tfarm.arm.schema import StrictTable, validated
 from tfarm.arrays import Complex, Real
-from tfarm.columns import Table
 from tfarm.dsp.chain import TIME_ROUNDING, Chain
 from tfarm.dsp.results import enough_modes
 from tfarm.dsp.scenarios import Scenario
@@ -51,7 +50,7 @@ from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.errors import MISSING, did_you_mean, must_be_known, naming, require
 from tfarm.files import read_mat
 from tfarm.records import record
-from tfarm.schema import Quantity
+from tfarm.schema import Quantity, Table
 
 from .data import MOST_RECORD_BYTES, Measured, check_signal, read_sheet
 

@@ -22,8 +22,7 @@ from scipy import ndimage
 
 from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback, shown_unit
 from tfarm.arrays import Real
-from tfarm.columns import Column, Table
-from tfarm.comparing import Comparison
+from tfarm.case import Comparison
 from tfarm.crossing import Window, pieces
 from tfarm.digits import how_many, plain, scientific, significant
 from tfarm.dsp import Chain, GainMap, sampled_map, sampled_verdict
@@ -41,6 +40,7 @@ from tfarm.loop.plane import (
     static_edges,
 )
 from tfarm.loop.plane import gain_map as counted
+from tfarm.schema import Column, Table
 from tfarm.spectrum.table import default_gains
 
 from .frequency import MOST_DRAWN, bode, draw_loops

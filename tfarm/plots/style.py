@@ -167,9 +167,10 @@ def legend_below(figure: Figure) -> None:
 
 
 def headline(figure: Figure, text: str) -> None:
-    """Text above everything, at the left, in lines that fit."""
-    text = textwrap.fill(text.replace(" = ", "\u00a0=\u00a0"), round(LETTERS_PER_INCH * figure.get_figwidth()))
-    figure.suptitle(safe(text), x=0.012, ha="left", fontsize=10.5, color=INK)
+    """Text above everything, at the left, its lines folded where they do not fit."""
+    width = round(LETTERS_PER_INCH * figure.get_figwidth())
+    lines = [textwrap.fill(line, width) for line in text.replace(" = ", "\u00a0=\u00a0").splitlines()]
+    figure.suptitle(safe("\n".join(lines)), x=0.012, ha="left", fontsize=10.5, color=INK)
 
 
 def by_name(records: Any, name: str = "") -> Mapping[str, Any]:

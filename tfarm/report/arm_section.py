@@ -11,13 +11,12 @@ import tfarm
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, implausible, input_words, unit_of
 from tfarm.arm.schema import file_key
 from tfarm.audit.assumptions import has_hub_inertia, hub_study, section_study
-from tfarm.columns import Table
 from tfarm.digits import plain, significant, unit
 from tfarm.dsp.chain import file_text
 from tfarm.plots.shapes import sketch
 from tfarm.report.cases import Case
 from tfarm.report.sections import Fact, PageSection, Picture, prose
-from tfarm.schema import Quantity, table
+from tfarm.schema import Quantity, Table, table
 
 HEADLINE_MODES = 3  # natural frequencies among the headline numbers, the rigid body's 0 not shown
 MOST_POISSON = 0.5  # of an isotropic material; a larger E/2G - 1 is none's ratio

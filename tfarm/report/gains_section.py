@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit, unit_of
 from tfarm.arrays import Real
-from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
@@ -31,7 +30,7 @@ from tfarm.records import record
 from tfarm.report.cases import DESIGNED_MODES, Case, Controller, best, brief_on, has_loop, margins_of
 from tfarm.report.loop_section import poles_tables
 from tfarm.report.sections import Fact, PageSection, Picture, prose
-from tfarm.schema import Quantity, across, table, text
+from tfarm.schema import Column, Quantity, Table, across, table, text
 from tfarm.spectrum.table import default_gains, default_words, first_frequency, rate_unit
 from tfarm.synthesis.design import Design
 from tfarm.synthesis.judge import least_damping

@@ -10,7 +10,6 @@ import numpy as np
 from tfarm.arm import PLANE, cancelled
 from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.arm.law import REFERENCE, is_measured
-from tfarm.columns import Column, Table
 from tfarm.digits import plain, singly
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import TfarmError
@@ -23,7 +22,7 @@ from tfarm.report.cases import Case, Controller, brief_on, margins_of, why_no_lo
 from tfarm.report.sections import Fact, PageSection, Picture, prose, upper
 from tfarm.response.controller import sign_convention
 from tfarm.response.signals import Signals
-from tfarm.schema import Quantity, across, curve_table, quantities, roots_table, table
+from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table
 
 MOST_SPILLED = 12  # flexible modes of the largest model that is compared with the exact loop
 NOT_LED = "open"  # a column of a law's matrices without a signal

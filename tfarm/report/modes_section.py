@@ -14,14 +14,13 @@ import numpy as np
 import tfarm
 from tfarm.arm import Arm, Theory
 from tfarm.arrays import Real
-from tfarm.columns import Column, Table
 from tfarm.digits import fixed, kept_digits, lined, plain, significant
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.plots.shapes import SHAPE_POINTS, draw_differences, scaled, theory_name
 from tfarm.plots.shapes import modes as shapes_plot
 from tfarm.report.cases import Case
 from tfarm.report.sections import PageSection, Picture, prose
-from tfarm.schema import Quantity, table
+from tfarm.schema import Column, Quantity, Table, table
 from tfarm.spectrum import DampedModes, Modes, damped_modes, modes
 from tfarm.spectrum.damped import damped_at_hub
 from tfarm.spectrum.listing import SHAPE_DIGITS, ListedMode, beyond_the_box, listed_modes

@@ -21,7 +21,6 @@ from tfarm.digits import plain
 from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.chain import file_text
 from tfarm.errors import ParameterError, TfarmError
-from tfarm.glossary import GLOSSARY_TERMS
 from tfarm.plots.frequency import draw_card
 from tfarm.plots.style import save_figure
 from tfarm.report.arm_section import arm_section, assumptions_section, headline_numbers, is_from_paper, paper_section
@@ -34,7 +33,8 @@ from tfarm.report.sampled_section import sampled_section
 from tfarm.report.sections import PICTURES, Fact, PageSection, SavedSection, prose, render
 from tfarm.report.tuner_section import tuner_section
 from tfarm.response.frequency import bode
-from tfarm.tables.html import with_symbols
+from tfarm.schema.glossary import GLOSSARY_TERMS
+from tfarm.schema.html import with_symbols
 
 SHORTEST = 40  # characters of an answer; one that is shorter takes the next sentence too
 BADGES = {"stable": "ok", "yes": "ok", "unstable": "corrected", "no": "corrected", "marginal": "undecided",

@@ -8,7 +8,6 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN
-from tfarm.columns import Table
 from tfarm.digits import listed, plain
 from tfarm.errors import ConvergenceError
 from tfarm.fitting.fit import ARMS, Possible, possible
@@ -22,7 +21,7 @@ from tfarm.plots.style import gains_words
 from tfarm.report.cases import Case, has_loop
 from tfarm.report.sections import PageSection, Picture, prose, upper
 from tfarm.response.frequency import AXIS_SHARE, Bode, bode
-from tfarm.schema import Quantity, curve_table, table
+from tfarm.schema import Quantity, Table, curve_table, table
 from tfarm.spectrum.table import default_gains
 
 SPANS_ON_ALL = (  # title, unit and name of a margin in the frequency range

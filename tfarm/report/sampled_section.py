@@ -13,7 +13,6 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit
-from tfarm.columns import Column, Table
 from tfarm.digits import how_many, kept_digits, plain, singly
 from tfarm.dsp import Analysis, Chain, Simulation, Verdict, sampled_verdict, traces
 from tfarm.dsp.chain import MOST_DELAY
@@ -31,7 +30,7 @@ from tfarm.plots.roots import draw_sampled_loci
 from tfarm.plots.style import safe
 from tfarm.report.cases import Case, Controller, on_hub, what_holds
 from tfarm.report.sections import Fact, PageSection, Picture, facts_of, prose
-from tfarm.schema import Quantity, across, table, text
+from tfarm.schema import Column, Quantity, Table, across, table, text
 
 MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict is given
 PAST_HUB = 1.25  # times the rate gain at which sampling alone makes the hub unstable: the end of its locus

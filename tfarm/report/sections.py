@@ -16,12 +16,10 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 import tfarm
-from tfarm.columns import Table
 from tfarm.digits import how_many, listed, plain, scientific, significant
 from tfarm.plots.style import save_figure
-from tfarm.schema import entries, text, with_unit
-from tfarm.tables.files import save_table
-from tfarm.tables.html import as_html, with_symbols
+from tfarm.schema import Table, entries, save_table, text, with_unit
+from tfarm.schema.html import as_html, with_symbols
 
 if TYPE_CHECKING:
     from tfarm.plots.style import Figure

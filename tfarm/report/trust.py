@@ -23,7 +23,6 @@ from tfarm import audit
 from tfarm.arm import Arm, HubFeedback, load, presets
 from tfarm.audit import AuditRow, published
 from tfarm.audit.rows import is_zero
-from tfarm.columns import Column, Table
 from tfarm.digits import powers, scientific, significant, unit
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import file_text
@@ -35,11 +34,10 @@ from tfarm.report.modes_section import BRACKET_DIGITS, PROVEN_DIGITS, PROVEN_MOD
 from tfarm.report.page import command_for_all, keep, kept
 from tfarm.report.sections import DATA, PageSection, prose, render, save_section
 from tfarm.response.frequency import BAND_POINTS, worst_error
-from tfarm.schema import Quantity, table
+from tfarm.schema import Column, Quantity, Table, save_table, table
+from tfarm.schema.html import GREEK, LETTER
 from tfarm.spectrum import DampedModes
 from tfarm.spectrum.table import default_gains
-from tfarm.tables.files import save_table
-from tfarm.tables.html import GREEK, LETTER
 
 PROVEN_OUTPUTS = ("root_moment", "tip_displacement")
 UNPROVEN = "not proven"

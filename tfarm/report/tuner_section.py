@@ -12,7 +12,6 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, Arm
-from tfarm.columns import Column, Table
 from tfarm.digits import how_many, lined, plain, significant
 from tfarm.dsp import Chain, Simulation
 from tfarm.dsp.results import ideal_chain
@@ -24,7 +23,7 @@ from tfarm.records import record
 from tfarm.report.cases import Case, has_loop, what_holds, why_no_loop
 from tfarm.report.sampled_section import chain_words, piece_of_bands, responses_table
 from tfarm.report.sections import Fact, PageSection, Picture, prose
-from tfarm.schema import Quantity, table
+from tfarm.schema import Column, Quantity, Table, table
 from tfarm.spectrum.table import first_frequency
 from tfarm.tuner import LearningCurves, Plan, Tuning, compare_controllers, learning_curves, tried_loops, tune
 from tfarm.tuner.baselines import CONSTANT_GAINS, Outcomes, quantised_chain, tried_gains

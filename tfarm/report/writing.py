@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import tfarm
 from tfarm.arm import Arm
-from tfarm.comparing import Comparison
+from tfarm.case import Comparison
 from tfarm.digits import plain
 from tfarm.dsp import Chain, load_chain
 from tfarm.errors import ParameterError, TfarmError, must_be_known
@@ -338,9 +338,10 @@ def write_comparison(found: Comparison, out: Path) -> Path:
 
 
 def _comparison_section(found: Comparison) -> PageSection:
-    """The picture of a comparison, and its tables."""
+    """The verdicts and the picture of a comparison, then its tables of differences."""
     picture = Picture(
-        stem="comparison", title="Frequency response and stability region", alt=f"{found.verdict}.",
+        stem="comparison", title="Frequency response and stability region",
+        alt=f"{found.verdict.replace(chr(10), '; ')}.",
         caption=prose("compared_picture", found=found), figure=comparison.figure(found),
     )  # fmt: skip
     quantities_of = quantities(type(found)).items()

@@ -9,11 +9,10 @@ from typing import Annotated, Any
 import numpy as np
 
 from tfarm.arrays import Complex
-from tfarm.columns import Column, Table
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.exact.values import ByMethod, MethodRow
 from tfarm.records import record
-from tfarm.schema import Quantity, roots_table
+from tfarm.schema import Column, Quantity, Table, roots_table
 
 from .transfer import TransferFunction
 

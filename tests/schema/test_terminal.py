@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import pytest
 
-from tfarm.columns import Column, Table
 from tfarm.digits import general, singly
-from tfarm.tables.terminal import table_lines
+from tfarm.schema import Column, Table
+from tfarm.schema.terminal import table_lines
 
 COLUMNS = (
     Column("mode", "mode", of=["1", "2"]),

@@ -12,8 +12,7 @@ from tfarm.dsp import Chain
 from tfarm.errors import one_line
 from tfarm.report.cases import Case
 from tfarm.report.writing import _write_pages, write_comparison
-from tfarm.schema import to_dict
-from tfarm.tables.files import json_value
+from tfarm.schema import json_value, to_dict
 
 LAB = tfarm.load("sasaki2012-lab")
 HOSTILE = f"{TEXT} {LONG}"
@@ -55,6 +54,11 @@ def test_the_page_sets_its_numbers_and_every_column_has_a_key(folder):
     heads = re.findall(r'<th scope="col"[^>]*data-key="([^"]*)"[^>]*>([^<]*)', page)
     assert ("quantity", "quantity") in heads
     assert all(key and title for key, title in heads)
+    assert ("one", "lab") in heads  # a column is named after its side
+    assert "reach" not in dict(heads)  # both verdicts hold at every frequency
+    headings = re.findall(r"<h\d>([^<]*)", page)
+    assert len(headings) == len(set(headings)) >= 5
+    assert re.search(r">[^<]* percentage points<", page)
 
 
 def test_names_are_text_and_every_file_is_there(folder):

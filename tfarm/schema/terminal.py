@@ -1,4 +1,4 @@
-"""Tables for a terminal, by rich: in a pipe every row is one line; on a terminal no number is broken or cut.
+"""Records and tables on a terminal, by rich: no number is broken or cut there, and in a pipe every row is one line.
 
 Where the terminal is too narrow, titles and long texts are folded.  If that is not enough, the columns that do not fit
 follow in a block below, after the first column again.
@@ -13,23 +13,38 @@ from collections.abc import Sequence
 from typing import Any, cast
 
 from rich.cells import cell_len, set_cell_size
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from tfarm.columns import Column, Table
+from .tables import Column, Section, Table, sections
 
 COLUMN_GAP = 2  # spaces between two columns
 LEAST_FOLDED = 20  # characters to which a text may be folded
 PIPE_WIDTH = 10**6  # columns of a pipe: more than any row has
 
 
-def terminal_width() -> int:
-    """Return the columns of the terminal, or more than any row has where standard output is none."""
-    return shutil.get_terminal_size().columns if sys.stdout.isatty() else PIPE_WIDTH
+def show(record: Any, rows: Table | None = None, last: str = "") -> None:
+    """Print a record as a person reads it, then a table of rows and a last line of text, if there are any."""
+    for number, each in enumerate([*sections(record), Section(table=rows)]):
+        if number and (each.pairs or each.table or each.drawing):
+            print()
+            show_text(each.title)
+        show_pairs(each.pairs)
+        if each.table is not None:
+            show_table(each.table)
+        if each.drawing:
+            print(each.drawing)
+    show_text(last)
 
 
-def show(table: Table) -> None:
+def show_text(text: str) -> None:
+    """Print a text, folded in the width of the terminal."""
+    if text:
+        print("\n".join(rendered(Text(text), terminal_width())))
+
+
+def show_table(table: Table) -> None:
     """Print a table in the width of the terminal."""
     print("\n".join(table_lines(table, terminal_width())))
 
@@ -43,6 +58,11 @@ def show_pairs(pairs: Sequence[tuple[str, str]]) -> None:
         grid.add_row(Text(label), Text(value))
     if pairs:
         print("\n".join(rendered(grid, terminal_width())))
+
+
+def terminal_width() -> int:
+    """Return the columns of the terminal, or more than any row has where standard output is none."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else PIPE_WIDTH
 
 
 def table_lines(table: Table, width: int) -> list[str]:
@@ -74,11 +94,11 @@ def table_lines(table: Table, width: int) -> list[str]:
     return lines
 
 
-def rendered(grid: RichTable, width: int) -> list[str]:
-    """Return the lines of a rich table in that width."""
+def rendered(shown: RenderableType, width: int) -> list[str]:
+    """Return the lines of a text or of a table of rich in that width."""
     console = Console(file=io.StringIO(), width=width, color_system=None, legacy_windows=False)
     with console.capture() as captured:
-        console.print(grid, crop=False)
+        console.print(shown, crop=False)
     return [line.rstrip() for line in captured.get().splitlines()]
 
 

@@ -12,12 +12,10 @@ import pytest
 from markupsafe import escape
 
 import tfarm
-from tfarm.columns import Column, Table
 from tfarm.digits import lined, significant, singly
 from tfarm.loop.margins import LoopMargins
-from tfarm.schema import across, quantities
-from tfarm.tables.files import as_csv, as_json, save_table, to_json
-from tfarm.tables.html import as_html, with_symbols
+from tfarm.schema import Column, Table, across, as_csv, as_json, quantities, save_table, to_json
+from tfarm.schema.html import as_html, with_symbols
 
 
 @dataclass

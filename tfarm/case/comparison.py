@@ -1,4 +1,4 @@
-"""Two loops compared; each is computed by the functions for one."""
+"""Two loops compared; each is computed by the functions for one, and `tfarm.schema.compare` finds the differences."""
 
 from __future__ import annotations
 
@@ -27,54 +27,68 @@ from tfarm.loop.plane import Plane, between, gain_map, plane, ranges_of
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.records import record
 from tfarm.response.frequency import Bode, bode, resonant_band
-from tfarm.schema import Difference, Quantity
+from tfarm.schema import Difference, Percent, Quantity, compare_rows
 from tfarm.schema import compare as compare_records
-from tfarm.spectrum import Modes, damped_modes
+from tfarm.spectrum import damped_modes
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum.table import default_gains
 
-MOST_COMPARED = 30  # flexible modes of a table that is read side by side
+MOST_COMPARED = 30  # flexible modes of a table that a person reads
 LONGEST_SIDE_NAME = 60  # characters of a name: of two in one legend
-POLES_BEYOND_MODES = 6  # poles with Im s >= 0 beyond the modes: real ones, those of the hub, the motor and a law
+POLES_BEYOND_MODES = 6  # poles with Im s >= 0 beyond the modes: real ones, those of the hub, the motor and a controller
 REGION_COLUMNS, REGION_ROWS = 80, 40  # of the plane of both gains; its edges upwards are exact
 FIRST_COLUMN = 1e-6  # of the largest rate gain: where the first column beyond 0 is, from which most regions begin
-BEYOND_LAWS = 1.5  # how far the plane reaches beyond the laws' own gains
-FURTHER_DELAYS = 25  # of which the plane of a factor on each law and its further delay consists
-MOST_FACTOR, FACTORS = 4.0, 40  # of a continuous-time law: where that plane ends, and values at which it is counted
-LONGEST_WAIT, BORNE = 2.0, 1.2  # samples up to which these go, or times the larger delay margin
+BEYOND_LAWS = 1.5  # how far the plane reaches beyond the controllers' own gains
+FURTHER_DELAYS = 25  # columns of the plane of further delay and a factor on each controller
+MOST_FACTOR, FACTORS = 4.0, 40  # of a continuous-time controller: where that plane ends, and values that are counted
+LONGEST_WAIT, BORNE = 2.0, 1.2  # samples up to which the delay goes, or times the larger delay margin
 MOST_DELAYED = 10.0  # samples at most
 CURVE_FROM = 0.05  # of the first mode: where the curve of a loop begins
-FARTHEST = 1.0  # |ln s - ln p|: by more a law moves no mode here, a factor e of its frequency or 57 deg of its angle
+FARTHEST = 1.0  # |ln s - ln p|: by more no controller moves a mode here, a factor e of its frequency or 57 deg
 HUB = 0  # the number of the pole below the first mode that no mode of the link is near
 GONE_AFTER_SAMPLE = 1e-3  # |z| of a pole that leaves this much of itself after a sample: of those nothing is compared
 REAL_Z = 1e-12  # imaginary part of a real z: rounding
 
 
-@dataclass(frozen=True)
-@record
-class Reach:
-    """The intervals of a factor on a law in which its loop is stable, at each further delay [s]."""
+class ArmMode(NamedTuple):
+    """A flexible mode of an arm by itself."""
+
+    mode: Annotated[int, Quantity("mode", help="number of the flexible mode, ascending in frequency")]
+    frequency: Annotated[float, Quantity("natural frequency", "rad/s", help="without damping and without controller")]
+    damping_ratio: Annotated[Percent | None, Quantity("damping ratio", help="share of critical damping, no controller")]
+
+
+class PoleOfMode(NamedTuple):
+    """An oscillating closed-loop pole, the upper one of its pair, and the mode that it comes from."""
+
+    mode: Annotated[str, Quantity("mode", help="mode whose open-loop pole is nearest; the hub, or none")]
+    size: Annotated[float, Quantity("abs(s)", "rad/s", help="natural frequency of the closed-loop pole pair")]
+    damping_ratio: Annotated[Percent, Quantity("damping ratio", help="-Re s / |s|, below 0 where it grows")]
+    pole: complex
+
+
+class Reach(NamedTuple):
+    """The intervals of a factor on a controller in which its loop is stable, at each further delay [s]."""
 
     delay: Real
-    stable_intervals: tuple[tuple[Window, ...], ...]
+    stable_intervals: list[Sequence[Window]]
 
 
 @dataclass(frozen=True, kw_only=True)
 @record
 class ComparedSide:
-    """One of the two: what it is called, its arm and law, the modes of the arm, and what the loop is worth.
+    """One of the two: its name, arm and law, the modes of the arm, and poles, verdicts and margins of the loop.
 
-    `damping_ratio` is that of each flexible mode of the arm by itself, None where a mode could not be followed; `poles`
-    are closed-loop poles with Im s >= 0, complete in their box; `open_loop` those of the arm with Im s > 0 by flexible
-    mode; `sampled` is the verdict at the chain's period.  Where one of the laws compared is a law in z there is no
-    continuous-time loop on either side: no `margins`, and `analysis` is of the sampled loop, with poles s = ln(z)/T.
+    `poles` are closed-loop poles with Im s >= 0, complete in their box; `open_loop` those of the arm with Im s > 0 by
+    flexible mode; `sampled` is the verdict at the chain's period.  Where one of the laws compared is a law in z there
+    is no continuous-time loop on either side: no `margins`, and `analysis` is of the sampled loop, with poles
+    s = ln(z)/T.
     """
 
     name: str
     arm: Arm
     law: AnyLaw
-    modes: Modes
-    damping_ratio: tuple[float | None, ...]
+    arm_modes: list[ArmMode]
     poles: Complex
     open_loop: dict[int, complex]
     margins: Margins | None
@@ -87,11 +101,16 @@ class ComparedSide:
         return as_law(self.law).gains
 
     @property
+    def loop(self) -> Margins | Analysis:
+        """Verdict and margins of the loop that is compared."""
+        found = self.analysis or self.margins
+        assert found is not None
+        return found
+
+    @property
     def verdict(self) -> str:
         """Of the continuous-time loop, or of the sampled one where there is no other."""
-        if self.analysis is not None:
-            return self.analysis.verdict.word
-        return "undecided" if self.margins is None else self.margins.stability.verdict
+        return self.loop.verdict.word if isinstance(self.loop, Analysis) else self.loop.stability.verdict
 
     @property
     def oscillating(self) -> Complex:
@@ -99,9 +118,12 @@ class ComparedSide:
         return self.poles[self.poles.imag > 0]
 
     @cached_property
-    def by_mode(self) -> dict[int, complex]:
-        """The oscillating pole of each mode, 0 the hub's; those of no mode are left out."""
-        return poles_by_mode(self.oscillating, self.open_loop)
+    def named_poles(self) -> list[PoleOfMode]:
+        """The oscillating poles by mode, then those of none, ascending in Im s."""
+        found = poles_by_mode(self.oscillating, self.open_loop)
+        names = {s: f"mode {mode}" if mode != HUB else "the hub" for mode, s in found.items()}
+        names |= {s: "none" for s in self.oscillating.tolist() if s not in names}
+        return [PoleOfMode(name, abs(s), Percent(-s.real / abs(s) + 0.0), s) for s, name in names.items()]
 
     @property
     def loop_function(self) -> tuple[Real, Complex]:
@@ -109,27 +131,24 @@ class ComparedSide:
 
         L(e^{iwT}), up to half the sample rate, of a sampled loop.
         """
-        if self.analysis is not None:
-            loop, grid = self.analysis.loop, circle_grid(self.analysis.loop)
+        if isinstance(self.loop, Analysis):
+            loop, grid = self.loop.loop, circle_grid(self.loop.loop)
             omega = grid.q / loop.chain.sampling.period
             with np.errstate(all="ignore"):
                 L = np.asarray(loop.weights @ grid.terms[1:] / grid.terms[0], dtype=np.complex128)
         else:
-            assert self.margins is not None
-            omega = dense(self.margins.stability)
-            L = np.asarray(self.margins.stability.loop.loop_function(1j * omega), dtype=np.complex128)
-        flexible = self.modes.natural_frequency[self.modes.index > 0]
-        shown = np.isfinite(L) & (L != 0) & (omega > CURVE_FROM * flexible[0])
+            omega = dense(self.loop.stability)
+            L = np.asarray(self.loop.stability.loop.loop_function(1j * omega), dtype=np.complex128)
+        shown = np.isfinite(L) & (L != 0) & (omega > CURVE_FROM * self.arm_modes[0].frequency)
         return omega[shown], L[shown]
 
     @property
     def delay_margin(self) -> float | None:
-        """How much later its law may act [s]; of the continuous-time loop as far as that is known."""
-        if self.margins is not None:
-            in_band = self.margins.in_band
-            return None if in_band is None else self.margins.exact_delay or in_band.delay
-        assert self.analysis is not None
-        return self.analysis.delay_margin_seconds if self.analysis.verdict.is_stable else None
+        """The smallest further delay [s] that destabilises the loop, as far as it is known."""
+        if isinstance(self.loop, Analysis):
+            return self.loop.delay_margin_seconds if self.loop.verdict.is_stable else None
+        in_band = self.loop.in_band
+        return None if in_band is None else self.loop.exact_delay or in_band.delay
 
     @property
     def range_words(self) -> str:
@@ -139,22 +158,14 @@ class ComparedSide:
             return ""
         return f"up to {verdict.band:.4g} rad/s, not determined beyond"
 
-    @property
-    def sampled_margins(self) -> tuple[float | None, float | None, float | None]:
-        """Of a sampled loop: the largest and the least stable factor on its law, and its delay margin [s]."""
-        assert self.analysis is not None
-        low, high = self.analysis.gain_factors or (None, None)
-        return high, low, self.delay_margin
-
     def reach(self, delay: Real) -> Reach:
         """The stable factors on the law with so much further delay each [s]."""
-        if self.analysis is None:
-            loop, factors = Loop(self.arm, as_law(self.law)), between(0.0, MOST_FACTOR, FACTORS)
-            found = plane(loop, ("delay", "gain"), loop.law.delay + delay, factors)
-            return Reach(delay, tuple(map(tuple, found.stable_intervals)))
-        sampling, late = self.analysis.loop.chain.sampling, self.analysis.loop.with_delay
-        now = [late(sampling.delay_samples + more) for more in (delay / sampling.period).tolist()]
-        return Reach(delay, tuple(tuple(stable_factors(each)) for each in now))
+        if isinstance(self.loop, Analysis):
+            sampling, late = self.loop.loop.chain.sampling, self.loop.loop.with_delay
+            now = [late(sampling.delay_samples + more) for more in (delay / sampling.period).tolist()]
+            return Reach(delay, [stable_factors(each) for each in now])
+        loop, factors = Loop(self.arm, as_law(self.law)), between(0.0, MOST_FACTOR, FACTORS)
+        return Reach(delay, [*plane(loop, ("delay", "gain"), loop.law.delay + delay, factors).stable_intervals])
 
 
 def poles_by_mode(poles: Complex, open_loop: Mapping[int, complex]) -> dict[int, complex]:
@@ -175,37 +186,30 @@ def poles_by_mode(poles: Complex, open_loop: Mapping[int, complex]) -> dict[int,
 class SideRow(NamedTuple):
     """One side in a line."""
 
-    side: Annotated[str, Quantity("side")]
-    name: Annotated[str, Quantity("name")]
-    verdict: Annotated[str, Quantity("stability")]
-    reach: Annotated[str, Quantity("frequency range")]
-    sampled: Annotated[str, Quantity("sampled loop")]
+    side: Annotated[str, Quantity()]
+    name: Annotated[str, Quantity("name", help="arm, controller, or file of the controller")]
+    verdict: Annotated[str, Quantity("stability", help="of the continuous-time loop; of a law in z at its samples")]
+    reach: Annotated[str, Quantity("frequency range", help="range of the verdict where nothing is known beyond it")]
+    sampled: Annotated[str, Quantity("sampled loop", help="verdict at the sampling period of the chain")]
 
 
 class LonePole(NamedTuple):
     """An oscillating closed-loop pole that one side alone has, of a mode or of none."""
 
-    side: Annotated[str, Quantity("side")]
-    mode: Annotated[str, Quantity("mode")]
-    pole: Annotated[complex, Quantity("pole", "1/s", 8)]
+    side: Annotated[str, Quantity()]
+    name: Annotated[str, Quantity("of", help="side that has this pole")]
+    mode: Annotated[str, Quantity("mode", help="mode whose open-loop pole is nearest, or none")]
+    pole: Annotated[complex, Quantity("pole", "1/s", 8, "closed-loop pole with Im s > 0")]
 
 
 @dataclass(frozen=True)
 @record
 class Comparison:
-    """Two sides, the first the one that differences are from.  `output` is what the Bode plot of two arms shows."""
+    """Two sides, the first the one that differences are from.  `output` is that of the Bode plot of two arms."""
 
     one: ComparedSide
     other: ComparedSide
     output: str
-
-    @property
-    def rows(self) -> Annotated[list[SideRow], Quantity("compared", key="sides")]:
-        """A row a side."""
-        return [
-            SideRow(which, side.name, side.verdict, side.range_words, side.sampled.words)
-            for which, side in zip(("first", "second"), self.sides, strict=True)
-        ]
 
     @property
     def of(self) -> Annotated[str, Quantity()]:
@@ -215,57 +219,77 @@ class Comparison:
     @property
     def is_sampled(
         self,
-    ) -> Annotated[bool, Quantity("loops compared at their samples, s = ln(z)/T", key="at_samples")]:
+    ) -> Annotated[bool, Quantity("discrete-time comparison", key="at_samples",
+                                  help="where a law is in z: both loops at their samples, s = ln(z)/T")]:  # fmt: skip
         """Whether the loops are compared at their samples, one of the laws being a law in z."""
         return self.one.analysis is not None
 
     @property
-    def mode_differences(self) -> Annotated[list[Difference], Quantity("modes", key="modes")]:
+    def rows(
+        self,
+    ) -> Annotated[
+        list[SideRow], Quantity("stability of both loops", key="sides", help="verdicts of both loops, a row each")
+    ]:
+        """A row a side."""
+        return [
+            SideRow(which, side.name, side.verdict, side.range_words, side.sampled.words)
+            for which, side in zip(("first", "second"), self.sides, strict=True)
+        ]
+
+    @property
+    def mode_differences(
+        self,
+    ) -> Annotated[
+        list[Difference], Quantity("modes of the arms", key="modes", help="flexible modes by number; none of one arm")
+    ]:
         """Natural frequencies and damping ratios of both arms, by mode; of one arm none."""
-        if not self.is_of_arms:
-            return []
-        frequencies = (side.modes.natural_frequency[side.modes.index > 0].tolist() for side in self.sides)
-        ratios = (side.damping_ratio for side in self.sides)
-        return [
-            Difference(f"{what} of mode {n}", unit, *pair)
-            for what, unit, both in (("frequency", "rad/s", frequencies), ("damping ratio", "", ratios))
-            for n, pair in enumerate(zip(*both, strict=True), 1)
-        ]
+        return compare_rows(self.one.arm_modes, self.other.arm_modes, self.names) if self.is_of_arms else []
 
     @property
-    def pole_differences(self) -> Annotated[list[Difference], Quantity("oscillating closed-loop poles", key="poles")]:
+    def pole_differences(
+        self,
+    ) -> Annotated[
+        list[Difference],
+        Quantity("oscillating closed-loop poles", key="poles", help="pole pairs of both loops, by the nearest mode"),
+    ]:
         """Those that both sides have, paired by mode."""
-        pairs = [(m, self.one.by_mode[m], self.other.by_mode[m]) for m in self.one.by_mode if m in self.other.by_mode]
-        sizes = [Difference(f"abs(s) of {_mode(m)}", "rad/s", abs(a), abs(b)) for m, a, b in pairs]
-        ratio = [Difference(f"damping ratio of {_mode(m)}", "", _ratio(a), _ratio(b)) for m, a, b in pairs]
-        return [*sizes, *ratio]
+        one, other = ([row for row in side.named_poles if row.mode != "none"] for side in self.sides)
+        return compare_rows(one, other, self.names)
 
     @property
-    def unpaired_poles(self) -> Annotated[list[LonePole], Quantity("poles of one side alone")]:
+    def unpaired_poles(
+        self,
+    ) -> Annotated[
+        list[LonePole],
+        Quantity(
+            "unpaired closed-loop poles", help="pole pairs of a mode that the other loop has none of, or of no mode"
+        ),
+    ]:
         """The other oscillating poles."""
-        rows = [
-            (which, next((n for n, s in side.by_mode.items() if s == pole), None), pole, other)
-            for which, side, other in (("first", self.one, self.other), ("second", self.other, self.one))
-            for pole in side.oscillating.tolist()
-        ]
+        pairs = (("first", self.one, self.other), ("second", self.other, self.one))
         return [
-            LonePole(which, "none" if mode is None else _mode(mode), pole)
-            for which, mode, pole, other in rows if mode not in other.by_mode
-        ]  # fmt: skip
+            LonePole(which, side.name, row.mode, row.pole)
+            for which, side, partner in pairs
+            for row in side.named_poles
+            if row.mode == "none" or row.mode not in {each.mode for each in partner.named_poles}
+        ]
 
     @property
-    def margin_differences(self) -> Annotated[list[Difference], Quantity("stability and margins", key="margins")]:
+    def margin_differences(
+        self,
+    ) -> Annotated[
+        list[Difference],
+        Quantity(
+            "stability and margins", key="margins", help="every quantity that both loops have, an interval as text"
+        ),
+    ]:
         """Every quantity that both loops have."""
-        if self.one.margins is not None and self.other.margins is not None:
-            return compare_records(self.one.margins, self.other.margins)
-        names = (("largest stable factor on the law", ""), ("least stable factor", ""), ("delay margin", "s"))
-        both = zip(names, self.one.sampled_margins, self.other.sampled_margins, strict=True)
-        return [Difference(label, unit, one, other) for (label, unit), one, other in both]
+        return compare_records(self.one.loop, self.other.loop, self.names)
 
     @property
     def loops(self) -> Annotated[list[Any], Quantity()]:
         """Both loops with all that is known of them."""
-        return [side.analysis or side.margins for side in self.sides]
+        return [side.loop for side in self.sides]
 
     @property
     def sides(self) -> tuple[ComparedSide, ComparedSide]:
@@ -273,10 +297,15 @@ class Comparison:
         return self.one, self.other
 
     @property
+    def names(self) -> tuple[str, str]:
+        """The names of both sides."""
+        return self.one.name, self.other.name
+
+    @property
     def verdict(self) -> str:
-        """Both verdicts in a line."""
+        """Both verdicts, a line each."""
         each = ("" if self.is_sampled else f"{side.verdict}, " for side in self.sides)
-        return "; ".join(f"{s.name}: {verdict}{s.sampled.short}" for s, verdict in zip(self.sides, each, strict=True))
+        return "\n".join(f"{s.name}: {verdict}{s.sampled.short}" for s, verdict in zip(self.sides, each, strict=True))
 
     @property
     def is_of_arms(self) -> bool:
@@ -320,21 +349,13 @@ class Comparison:
         return self.one.reach(delay), self.other.reach(delay)
 
 
-def _mode(mode: int) -> str:
-    return f"mode {mode}" if mode else "the hub"
-
-
-def _ratio(s: complex) -> float:
-    return -s.real / abs(s) + 0.0
-
-
 def compare(
     arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None = None, *, names: Sequence[str] = (),
     modes: int = 10, output: str = "root_moment", chain: Chain | None = None,
 ) -> Comparison:  # fmt: skip
     """Two arms under one law, or each under its own, or one arm under two laws.
 
-    Without a law each arm has its default gains.  `names` are what the two are called, if not by their arms or laws;
+    Without a law each arm has its default gains.  `names` are those of the two, if not those of their arms or laws;
     the sampled verdicts are those at the period of `chain`, 10 ms unless given.  Where a law is one in z both loops are
     compared at their samples.  Raises ParameterError where there are not two, or where their laws close through
     different inputs, and what `tfarm.margins`, or then `tfarm.sampled`, raises for either.
@@ -380,16 +401,9 @@ def _called(law: Law) -> str:
 
 
 def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_sampled: bool) -> ComparedSide:
-    """All that is compared of one arm under its law; a verdict or a damping that cannot be settled is left open."""
+    """All that is compared of one arm under its law; a sampled verdict that cannot be settled is left open."""
     most = count + POLES_BEYOND_MODES
-    found, more = modes_of(arm, count), modes_of(arm, most)
-    open_loop = dict(zip(more.index.tolist(), (1j * more.natural_frequency).tolist(), strict=True))
-    ratio: dict[int, float] = {}
-    with suppress(ConvergenceError):
-        for damped in map(damped_modes, [] if arm.is_undamped else [found, more]):
-            known, ratios = damped.is_assigned, damped.damping_ratio
-            ratio = dict(zip(damped.index[known].tolist(), ratios[known].tolist(), strict=True)) | ratio
-            open_loop |= dict(zip(damped.index[known].tolist(), damped.eigenvalues[known, 0].tolist(), strict=True))
+    rows, open_loop = _modes_of_arm(arm, count, most)
     analysis, margins = None, None
     try:
         verdict = sampled_verdict(arm, as_law(law) if is_sampled else law, chain)
@@ -407,14 +421,31 @@ def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_sampled
         name=name,
         arm=arm,
         law=law,
-        modes=found,
-        damping_ratio=tuple(0.0 if arm.is_undamped else ratio.get(n) for n in range(1, count + 1)),
+        arm_modes=rows,
         poles=poles[:most] if is_sampled else poles,
         open_loop={n: s for n, s in open_loop.items() if n and s.imag > 0},
         margins=margins,
         sampled=sampled,
         analysis=analysis,
     )
+
+
+def _modes_of_arm(arm: Arm, count: int, most: int) -> tuple[list[ArmMode], dict[int, complex]]:
+    """The first `count` flexible modes of an arm, and its poles [1/s] by mode, of `most` flexible ones.
+
+    Damping ratios that could not be found, or not for one mode, are None; the poles are then the undamped ones.
+    """
+    found, more = modes_of(arm, count), modes_of(arm, most)
+    poles = dict(zip(more.index.tolist(), (1j * more.natural_frequency).tolist(), strict=True))
+    ratio: dict[int, float] = dict.fromkeys(range(1, count + 1), 0.0) if arm.is_undamped else {}
+    with suppress(ConvergenceError):
+        for damped in map(damped_modes, [] if arm.is_undamped else [found, more]):
+            known, ratios = damped.is_assigned, damped.damping_ratio
+            ratio = dict(zip(damped.index[known].tolist(), ratios[known].tolist(), strict=True)) | ratio
+            poles |= dict(zip(damped.index[known].tolist(), damped.eigenvalues[known, 0].tolist(), strict=True))
+    flexible = zip(found.index.tolist(), found.natural_frequency.tolist(), strict=True)
+    rows = [ArmMode(n, omega, Percent(ratio[n]) if n in ratio else None) for n, omega in flexible if n > 0]
+    return rows, poles
 
 
 def _sampled_poles(found: Analysis) -> tuple[Complex, dict[int, complex]]:

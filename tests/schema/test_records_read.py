@@ -15,6 +15,7 @@ from tfarm.schema import (
     At,
     Quantity,
     across,
+    as_csv,
     compare,
     curve_table,
     entries,
@@ -24,10 +25,10 @@ from tfarm.schema import (
     table,
     text,
     to_dict,
+    to_json,
 )
-from tfarm.tables.files import as_csv, to_json
-from tfarm.tables.html import as_html
-from tfarm.tables.terminal import table_lines
+from tfarm.schema.html import as_html
+from tfarm.schema.terminal import table_lines
 
 LAB = tfarm.load("sasaki2012-lab")
 PAPER_GAINS = tfarm.HubFeedback(K1=0.3, K2=0.3)
@@ -111,8 +112,8 @@ def test_differences_are_in_the_unit_and_rows_are_paired_by_their_first_quantity
     assert found["limit"].difference == pytest.approx(-0.25)
     assert (found["stability"].one, found["stability"].other) == ("stable", "marginal")
     assert found["stability"].difference is None
-    assert found["modes 2: frequency"].difference == pytest.approx(1.0)
-    assert "modes 1: frequency" not in found
+    assert found["mode 2: frequency"].difference == pytest.approx(1.0)
+    assert "mode 1: frequency" not in found
     assert "nested: limit" not in found  # of neither
     assert found["twice"].difference == 0.0
 
@@ -185,3 +186,21 @@ def test_a_record_with_flat_records_has_its_own_curves():
     assert [column.key for column in curve_table(found).columns] == ["re_s", "im_s", "re_L", "im_L"]
     assert len(curve_table(found).columns[0].values) == found.s.size
     assert "encirclements" in quantities(Nyquist)
+
+
+def test_labels_and_units_may_depend_on_the_record():
+    class Sample(NamedTuple):
+        size: Annotated[float, Quantity("magnitude", unit_of="gain_unit")]
+
+    @dataclass(frozen=True)
+    class Response:
+        gain_unit: str
+        titles: dict[str, tuple[str, str]]
+        value: Annotated[float, Quantity("value")]
+        samples: Annotated[list[Sample], Quantity("samples")]
+
+    found = Response("m/N", {"value": ("K1", "N m s/rad")}, 0.3, [Sample(2.0)])
+    first, rows = sections(found)
+    assert first.pairs == [("K1", "0.3 N m s/rad")]
+    assert [(label, of.unit) for label, of, _ in entries(found)] == [("K1", "N m s/rad")]
+    assert [(column.title, column.unit) for column in rows.table.columns] == [("magnitude", "m/N")]

@@ -6,8 +6,9 @@ import re
 
 from markupsafe import Markup, escape
 
-from tfarm.columns import Column, Table
 from tfarm.digits import powers, unit
+
+from .tables import Column, Table
 
 SIGN, INFINITE = re.compile(r"(?<![\w.)])-(?=[\d.]|inf\b)"), re.compile(r"\binf\b")  # of a number in a cell
 TYPESET = {

@@ -1,0 +1,58 @@
+"""A quantity of a record is declared once, on its field or property, and every output reads it there.
+
+    @dataclass(frozen=True)
+    class Margins:
+        delay: Annotated[float, Quantity("delay margin", "s", 4, "smallest further delay that destabilises the loop")]
+
+JSON, CSV, terminals, pages, axes, the documentation and the comparison of two records have its name, unit, digits and
+meaning from here.  `to_dict` and `sections` read a record, `table` records of one class, `compare` two of them;
+`schema.terminal` and `schema.html` render tables, `schema.glossary` has every declared quantity.
+"""
+
+from .differences import Difference, Differences, compare, compare_rows
+from .quantities import At, Percent, Quantity, entries, quantities, text, to_dict, with_unit
+from .tables import (
+    Column,
+    Section,
+    Table,
+    across,
+    as_csv,
+    as_json,
+    curve_table,
+    json_value,
+    roots_table,
+    save_table,
+    sections,
+    table,
+    to_json,
+    write_csv,
+)
+
+__all__ = [
+    "At",
+    "Column",
+    "Difference",
+    "Differences",
+    "Percent",
+    "Quantity",
+    "Section",
+    "Table",
+    "across",
+    "as_csv",
+    "as_json",
+    "compare",
+    "compare_rows",
+    "curve_table",
+    "entries",
+    "json_value",
+    "quantities",
+    "roots_table",
+    "save_table",
+    "sections",
+    "table",
+    "text",
+    "to_dict",
+    "to_json",
+    "with_unit",
+    "write_csv",
+]

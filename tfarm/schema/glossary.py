@@ -1,0 +1,82 @@
+"""The five words of certainty and the terms of the results, for `tfarm glossary`, the pages and the documentation.
+
+The quantities of all results, with label, unit and meaning, are read where each record declares them.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+import tomllib
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated
+
+from tfarm.errors import ParameterError, did_you_mean
+
+from .quantities import Quantity, quantities
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """A term and its meaning; of a word of certainty what has to be shown for it."""
+
+    name: Annotated[str, Quantity("term", key="term", help="word of certainty, or term of the results")]
+    meaning: Annotated[str, Quantity("meaning", help="definition; of a word of certainty also its condition")]
+
+
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """A quantity of the results."""
+
+    label: Annotated[str, Quantity("quantity", key="quantity", help="label of the quantity in text, tables and pages")]
+    unit: Annotated[str, Quantity("unit", help="SI unit; none of a ratio or a word")]
+    meaning: Annotated[str, Quantity("meaning", help="definition, with its sign or limit convention")]
+
+
+_FILE = tomllib.loads((Path(__file__).parent / "terms.toml").read_text(encoding="utf-8"))
+CERTAINTY, TERMS = (tuple(Term(**entry) for entry in _FILE[kind]) for kind in ("certainty", "terms"))
+GLOSSARY_TERMS = tuple(sorted((*CERTAINTY, *TERMS), key=lambda term: term.name.casefold()))
+
+
+def declared_records() -> Iterator[tuple[type, dict[str, Quantity]]]:
+    """Return every class of records with its quantities by attribute; imports the whole package."""
+    for module in pkgutil.walk_packages([str(Path(__file__).parents[1])], "tfarm."):
+        if module.name in ("tfarm.__main__", "tfarm.grouped"):  # these act when they are imported
+            continue
+        for kind in vars(import_module(module.name)).values():
+            with suppress(NameError):  # of a class whose annotations are for type checkers alone
+                if isinstance(kind, type) and kind.__module__ == module.name and quantities(kind):
+                    yield kind, quantities(kind)
+
+
+@dataclass(frozen=True)
+class Glossary:
+    """The words of certainty and terms, and the quantities that have a meaning of their own."""
+
+    terms: Annotated[
+        tuple[Term, ...], Quantity("terms", help="words of certainty and other terms, in alphabetical order")
+    ]
+    quantities: Annotated[
+        tuple[Declared, ...],
+        Quantity("quantities of the results", help="labelled entries of all records, in alphabetical order"),
+    ]
+
+
+def glossary(words: str | None = None) -> Glossary:
+    """Return every term and quantity, or those whose name contains the words.
+
+    Raises ParameterError where there is none.
+    """
+    every = {Declared(of.label, of.unit, of.help) for _, all_of in declared_records() for of in all_of.values()
+             if of.label and of.help}  # fmt: skip
+    part = (words or "").casefold()
+    terms = tuple(each for each in GLOSSARY_TERMS if part in each.name.casefold())
+    known = sorted(every, key=lambda each: (each.label.casefold(), each.unit, each.meaning))
+    found = tuple(each for each in known if part in each.label.casefold())
+    if not (terms or found):
+        remedy = did_you_mean(part, [each.name for each in GLOSSARY_TERMS])
+        raise ParameterError(key="term", value=words, remedy=remedy)
+    return Glossary(terms, found)

@@ -1,0 +1,298 @@
+"""Tables of declared quantities, the sections that a person reads of a record, and both as JSON and CSV.
+
+Files have every digit of a double, infinities as "inf" and "-inf"; NaN does not occur.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tfarm.digits import TEXTS, CellsOf, within
+from tfarm.files import write_file
+
+from .differences import EMPTY
+from .quantities import (
+    COMPLEX_ERROR,
+    NO_VALUE,
+    At,
+    Quantity,
+    entries,
+    is_declared,
+    is_list_of_records,
+    is_table,
+    parts,
+    quantities_of,
+    text,
+    to_json_value,
+    with_flat,
+    with_unit,
+)
+
+RATIO_DIGITS = 6  # of the damping ratio of a listed pole
+LONGEST_LINE = 40  # characters of a cell from which on it may be folded on a narrow terminal
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One quantity: `key` in JSON and files (with the unit, as omega_rad_s), `title` and `unit` where a person reads.
+
+    `of` are its values, `digits` makes cells of them; where that is not enough, `shown` are the cells.  `tint` is a
+    background colour a cell; on a narrow terminal a column that `folds` is folded.  `help` is the meaning of the
+    quantity, `helps` one a cell: tooltips of a page.
+    """
+
+    key: str
+    title: str = ""
+    unit: str = ""
+    of: Any = ()
+    digits: CellsOf = TEXTS
+    shown: Sequence[str] | None = None
+    tint: Sequence[str] = ()
+    folds: bool = False
+    help: str = ""
+    helps: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "of", self.of.tolist() if hasattr(self.of, "tolist") else list(self.of))
+
+    @property
+    def values(self) -> Sequence[Any]:
+        """The values."""
+        return self.of
+
+    @property
+    def cells(self) -> Sequence[str]:
+        """The same as a page shows them."""
+        return self.digits(self.of) if self.shown is None else self.shown
+
+    @property
+    def is_text(self) -> bool:
+        """Whether it is set flush left: words, or lists of words."""
+        first = [value[0] if isinstance(value, list) and value else value for value in self.of]
+        return any(isinstance(value, str | tuple) for value in first)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """Columns of one length; a sequence of their rows as JSON has them.
+
+    `stem` names its files; `title` and `caption` are those of the page.
+    """
+
+    columns: tuple[Column, ...]
+    stem: str = ""
+    title: str = ""
+    caption: str = ""
+
+    def __post_init__(self) -> None:
+        keys = [column.key for column in self.columns]
+        assert len(set(keys)) == len(keys), f"{self.stem}: two columns of one key in {keys}"
+        assert len({len(column.of) for column in self.columns}) <= 1, f"{self.stem}: columns of different lengths"
+
+    def __len__(self) -> int:
+        return len(self.columns[0].of)
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        return map(self.__getitem__, range(len(self)))
+
+    def __getitem__(self, row: int) -> dict[str, Any]:
+        """A row by its keys."""
+        return {column.key: column.of[row] for column in self.columns}
+
+
+def table(
+    rows: Any, names: Sequence[str] = (), *, parent: Any = None, stem: str = "", title: str = "", caption: str = ""
+) -> Table:
+    """A row a record (or an entry of a record of columns), a column a quantity: those with a label, or these.
+
+    A column without any value is left out unless it is named.  `parent` is the record that has these rows; a list of
+    them may have `titles` of columns by attribute.
+    """
+    columns: list[Column] = []
+    declared = quantities_of(rows if is_table(rows) else rows[0], parent) if is_table(rows) or rows else {}
+    for name in (names or [name for name, of in declared.items() if of.label]) if declared else ():
+        values = list(getattr(rows, name)) if is_table(rows) else [getattr(row, name) for row in rows]
+        if names or not values or any(value is not None and str(value) for value in values):
+            of = declared[name]
+            cells = [
+                NO_VALUE if isinstance(each, list | tuple) and not each else text(each, of.digits) for each in values
+            ]
+            label = getattr(rows, "titles", {}).get(name, of.label)
+            folds = max(map(len, cells), default=0) > LONGEST_LINE
+            columns.append(Column(of.key, label, of.unit, of=list(map(to_json_value, values)), shown=cells,
+                                  folds=folds, help=of.help))  # fmt: skip
+    return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
+
+
+def across(
+    records: Mapping[str, Any], *, keys: Sequence[str] = (), stem: str = "", title: str = "", caption: str = ""
+) -> Table:
+    """A row a quantity that has one value, a column a record; the records are named, `keys` are those of columns."""
+    found = [{label: (of, value) for label, of, value in entries(each)} for each in records.values()]
+    known = {label: of for each in found for label, (of, _) in each.items()}
+    labels = [label for label in known if any(str(each[label][1]) not in EMPTY for each in found if label in each)]
+    columns = [
+        Column("quantity", "quantity", of=labels, helps=[known[label].help for label in labels]),
+        Column("unit", "unit", of=[known[label].unit for label in labels]),
+    ]
+    for key, name, each in zip(keys or records, records, found, strict=True):
+        pairs = [each.get(label, (Quantity(), None)) for label in labels]
+        values = [to_json_value(value.value if isinstance(value, At) and value.omega is None else value)
+                  for _, value in pairs]  # fmt: skip
+        columns.append(
+            Column(key, name, of=values, shown=[with_unit(value, replace(of, unit="")) for of, value in pairs])
+        )
+    return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
+
+
+def roots_table(values: Any, of: Quantity, *, stem: str = "", title: str = "", caption: str = "") -> Table:
+    """A row a complex number: its real and imaginary part, and of a pole or zero in 1/s its damping ratio."""
+    roots = list(map(complex, values))
+    columns = []
+    for n, (key, unit) in enumerate({"re": of.unit, "im": of.unit.replace("1/s", "rad/s")}.items()):
+        cells = [parts(root, of.digits)[n] for root in roots]
+        columns.append(Column(key, f"{key.title()} {of.label}", unit, of=[(root.real, root.imag)[n] for root in roots],
+                              shown=cells))  # fmt: skip
+    if of.unit == "1/s":
+        ratios = [within(-s.real / abs(s), COMPLEX_ERROR, RATIO_DIGITS) if s.imag else NO_VALUE for s in roots]
+        columns.append(Column("damping_ratio", "damping ratio", of=ratios))
+    return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
+
+
+def curve_table(record: Any, *, stem: str = "", title: str = "") -> Table:
+    """The curves of a record, a row a point; complex ones in two columns.  Without any, the first list of records."""
+    if hasattr(record, "csv_table"):
+        own: Table = record.csv_table
+        return own
+    columns: list[Column] = []
+    for value, of in with_flat(record):
+        if of.curve and np.iscomplexobj(value):
+            for number, values in enumerate(np.atleast_2d(value)):
+                after = f"_{number}" if np.ndim(value) > 1 else ""
+                for part, numbers in (("re", values.real), ("im", values.imag)):
+                    cells = ["" if math.isnan(each) else each for each in numbers.tolist()]
+                    columns.append(Column(f"{part}_{of.key}{after}", f"{part} {of.label}{after}", of.unit, of=cells))
+        elif of.curve:
+            columns.append(Column(of.key, of.label, of.unit, of=value))
+        elif not columns and is_list_of_records(value):
+            return table(value)
+    return Table(columns=tuple(columns), stem=stem, title=title)
+
+
+# --------------------------------------------------------------------------------------------------------- sections
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """What is read of a record one below the other: pairs of label and text, or a table, under a title."""
+
+    title: str = ""
+    pairs: list[tuple[str, str]] = field(default_factory=list)
+    table: Table | None = None
+    drawing: str = ""
+
+
+def sections(record: Any, title: str = "") -> list[Section]:
+    """A record as a person reads it: its single values first, then its tables and the records inside it."""
+    own, later = Section(title), []
+    for name, of in quantities_of(record).items():
+        value = getattr(record, name)
+        if of.flat and is_declared(value):
+            first, *rest = sections(value)
+            own.pairs.extend(first.pairs)
+            later += rest
+        elif not of.label or ((value is None or of.curve) and not of.is_number):
+            continue
+        elif value is None or of.curve:
+            own.pairs.append((of.label, NO_VALUE))
+        elif is_table(value) or is_list_of_records(value):
+            later.append(Section(of.label, table=table(value, parent=record)))
+        elif is_declared(value) and not isinstance(value, At) and not hasattr(value, "as_text"):
+            later += sections(value, of.label)
+        elif isinstance(value, np.ndarray) and np.iscomplexobj(value) and value.size:
+            later.append(Section(of.help or of.label, table=roots_table(value, of)))
+        elif shown := with_unit(value, of):
+            own.pairs.append((of.label, shown))
+    if hasattr(record, "drawing"):
+        later.append(Section(drawing=record.drawing))
+    return [own, *later]
+
+
+# ------------------------------------------------------------------------------------------------------------ files
+
+
+def to_json(answer: Any) -> str:
+    """One JSON object in ASCII, which every pipe takes; a table in it is a list of its rows.  NaN raises ValueError."""
+    return json.dumps(json_value(answer), allow_nan=False)
+
+
+def json_value(value: Any) -> Any:
+    """A value as JSON has it: a table as its rows, a tuple as a list, an infinity as a text."""
+    if isinstance(value, float):
+        if math.isnan(value):
+            raise ValueError("an answer or a table holds a NaN")
+        return float(value) if not math.isinf(value) else "inf" if value > 0 else "-inf"
+    if isinstance(value, dict):
+        return {key: json_value(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple | Table):
+        return [json_value(entry) for entry in value]
+    return value
+
+
+def as_json(table: Table) -> str:
+    """{"table", "units", "rows": [{key: value}, ...]}, a line a row."""
+    units = {column.key: column.unit for column in table.columns if column.unit}
+    head, *rows = (
+        json.dumps(json_value(each), ensure_ascii=False, allow_nan=False)
+        for each in ({"table": table.title, "units": units}, *(table if table.columns else ()))
+    )
+    lines = ",\n  ".join(rows)
+    return f'{head[:-1]}, "rows": [\n  {lines}\n]}}\n'
+
+
+def as_csv(table: Table, *, units: bool = False) -> str:
+    """Comma-separated values, shortest exact digits; several values in a cell are separated by a space.
+
+    With `units` these stand in brackets behind the keys.
+    """
+    stream, columns = io.StringIO(), table.columns
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow([f"{column.key} [{column.unit}]" if units and column.unit else column.key for column in columns])
+    writer.writerows(zip(*map(_csv_cells, columns), strict=True))
+    return stream.getvalue()
+
+
+def _csv_cells(column: Column) -> Sequence[str]:
+    """The cells of a column; those of records, such as intervals, are texts, and JSON has their numbers."""
+    if any(map(_holds_records, column.of)):
+        return [cell if value else "" for cell, value in zip(column.cells, column.of, strict=True)]
+    found = ("" if value is None else json_value(value) for value in column.of)
+    return [" ".join(map(str, each)) if isinstance(each, list) else str(each) for each in found]
+
+
+def _holds_records(value: Any) -> bool:
+    return isinstance(value, dict) or (isinstance(value, list) and any(map(_holds_records, value)))
+
+
+def write_csv(table: Table, path: Path) -> None:
+    """A command's table to the file asked for, in one step."""
+    write_file(path, as_csv(table, units=True).encode(), key="--csv")
+
+
+RENDERERS = {"csv": as_csv, "json": as_json}
+
+
+def save_table(table: Table, folder: Path, kinds: Sequence[str] = tuple(RENDERERS)) -> tuple[str, ...]:
+    """A report's table as CSV and JSON, or one of these: the names of the files."""
+    for kind in kinds:
+        (folder / f"{table.stem}.{kind}").write_text(RENDERERS[kind](table), encoding="utf-8", newline="")
+    return tuple(f"{table.stem}.{kind}" for kind in kinds)
