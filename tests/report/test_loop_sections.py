@@ -273,7 +273,7 @@ def test_the_star_is_stable_at_the_period_of_its_page(lab, section):
     assert [brief.is_stable for brief in lab.briefs] == [True, True]
     labels = [text.get_text() for text in draw_map_of_arm(lab).legends[0].get_texts()]
     assert any(label.startswith("best damping") and "stable when sampled every 10 ms" in label for label in labels)
-    assert "stable when sampled every 10 ms" in section.words[1]
+    assert "stable when sampled every 10 ms" in section.answer
     facts = margins_section(Case(LAB, Chain())).facts
     assert all(fact.note.endswith("; stable when sampled every 10 ms") for fact in facts)
     quick = Chain(sampling=Sampling(period=2e-3))

@@ -110,8 +110,8 @@ def test_the_table_of_comparison_is_the_rows(small):
 def test_the_words_begin_with_the_answer_and_the_facts_carry_the_numbers(small):
     data, section = small
     below = int((data.curves.final < data.tuning.best_constant.cost).sum())
-    assert section.words[0].startswith(f"A little. The median cost over {SEEDS} seeds is ")
-    assert f"; {below} of {SEEDS} seeds end below that." in section.words[0]
+    assert section.answer.startswith(f"The median cost with the tuner over {SEEDS} seeds is ")
+    assert f"; {below} of {SEEDS} seeds end below that." in section.answer
     facts = {fact.label: fact.value for fact in section.facts}
     assert facts["cost without moment feedback"] == "2.692"
     assert facts["best constant gain"] == "0.9531"
@@ -161,8 +161,8 @@ def test_the_angle_that_a_moving_gain_leaves_is_its_integral_over_K1(small):
 )
 def test_other_arms_have_the_reason_why_there_is_no_tuner(arm, word):
     section = tuner_section(Case(arm, Chain()))
-    assert len(section.words) == 1
-    assert word in section.words[0]
+    assert not section.words
+    assert word in section.answer
     assert not section.blocks
 
 
@@ -170,13 +170,13 @@ def test_a_slew_that_runs_away_and_a_guard_that_fails_are_a_sentence(monkeypatch
     """Random arms met both: a traceback out of matplotlib, and 3.21e+06 in the middle of a sentence."""
     runs_away = SimpleNamespace(tuning=SimpleNamespace(without=SimpleNamespace(cost=math.inf)))
     monkeypatch.setattr(tuner_section_room, "tuner_numbers", lambda *_: runs_away)
-    assert "is unstable" in tuner_section(Case(LAB, Chain())).words[0]
+    assert "is unstable" in tuner_section(Case(LAB, Chain())).answer
 
     def unproven(*_):
         raise CertificationError("no sector at K1 = 3.21e+06, C = 6.94e-05 s")
 
     monkeypatch.setattr(tuner_section_room, "tuner_numbers", unproven)
-    (words,) = tuner_section(Case(LAB, Chain())).words
+    words = tuner_section(Case(LAB, Chain())).answer
     assert "K1 = 3.21 × 10⁶, C = 6.94 × 10⁻⁵ s" in with_symbols(words)
 
 
@@ -209,7 +209,7 @@ def test_a_slew_of_too_many_samples_has_no_study_but_its_number(monkeypatch):
     """600,001 samples of a slew of 3 s at 5 us, and nothing begun."""
     monkeypatch.setattr(tuner_section_room, "tuner_numbers", lambda *_: pytest.fail("begun"))
     chain = Chain(sampling=Sampling(period=5e-6))
-    (words,) = tuner_section(Case(LAB, chain)).words
+    words = tuner_section(Case(LAB, chain)).answer
     assert "600,001 samples" in words
     assert "tfarm tune" in words
 

@@ -30,7 +30,7 @@ from tfarm.plots.style import blank, headline, legend_below, style
 from tfarm.records import record
 from tfarm.report.cases import DESIGNED_MODES, Case, Controller, best, brief_on, has_loop, margins_of
 from tfarm.report.loop_section import poles_tables
-from tfarm.report.sections import Fact, PageSection, Picture, prose
+from tfarm.report.sections import PageSection, Picture, prose
 from tfarm.schema import Quantity, across, table, text
 from tfarm.spectrum.table import default_gains, default_words, first_frequency, rate_unit
 from tfarm.synthesis.design import Design
@@ -172,11 +172,12 @@ def map_section(case: Case) -> PageSection:
         figure=draw_map_of_arm(data),
         data=map_data(data),
     )
-    words = [intervals(arm)]
+    answer = intervals(arm)
     if found is not None:
         gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), arm) for name in PLANE)
-        words.append(prose("best_gains", data=data, found=found, modes=DESIGNED_MODES, gains=gains))
-    return PageSection(anchor="margins-map", title="Stability region of both gains", words=words, blocks=(picture,))
+        answer += " " + prose("best_gains", data=data, found=found, modes=DESIGNED_MODES, gains=gains)
+    title = "Stability region of both gains"
+    return PageSection(anchor="margins-map", title=title, answer=answer, blocks=(picture,))
 
 
 def intervals(arm: Arm) -> str:
@@ -221,15 +222,9 @@ def locus_section(case: Case) -> PageSection:
         blocks.append(across(keys, keys=list(found), stem="loci", title=title, caption=caption))
     if has_loop(arm):
         blocks.append(beyond_table(arm, gains))
-    facts = [_first_unstable(name, each) for name, each in found.items()]
-    return PageSection(anchor="locus", title="Root loci", facts=facts, words=words, blocks=[*blocks, *tables])
-
-
-def _first_unstable(name: str, data: Loci) -> Fact:
-    """The value at which the first branch becomes unstable."""
-    values = [each.gain for each in data.exact.crossings if each.direction == "unstable"]
-    value = significant(min(values), 6) if values else "none in the range"
-    return Fact(label=f"first instability along {name}", value=value, unit=data.unit * bool(values))
+    others = {name: gains.gain_text(other, shortly, arm) for name, other in zip(PLANE, reversed(PLANE), strict=True)}
+    answer = prose("locus_lead", found=found, gains=others)
+    return PageSection(anchor="locus", title="Root loci", answer=answer, words=words, blocks=[*blocks, *tables])
 
 
 def locus_blocks(data: Loci) -> Iterator[Picture | Table]:

@@ -31,7 +31,7 @@ NOT_LED = "open"  # a column of a law's matrices without a signal
 
 def no_loop_section(case: Case) -> PageSection:
     """One sentence for an arm that has no loop."""
-    return PageSection(anchor="no-loop", title="The loop", words=(why_no_loop(case.arm),))
+    return PageSection(anchor="no-loop", title="The loop", answer=why_no_loop(case.arm))
 
 
 # ------------------------------------------------------------ margins
@@ -40,6 +40,7 @@ def no_loop_section(case: Case) -> PageSection:
 def margins_section(case: Case) -> PageSection:
     """Verdict, margins, crossings and spillover of each controller, with the verdict on its sampled loop."""
     found = [(each, margins_of(each.arm, each.law)) for each in case.in_s]
+    sampled = [brief_on(each.arm, each.law, case.chain).short for each, _ in found]
     words: list[str] = []
     blocks: list[Picture | Table] = [*(_bode_picture(*pair) for pair in found), margin_table(found)]
     for each, it in found:
@@ -60,7 +61,8 @@ def margins_section(case: Case) -> PageSection:
     return PageSection(
         anchor="margins",
         title="Stability and stability margins",
-        facts=[verdict_fact(each, it, brief_on(each.arm, each.law, case.chain).short) for each, it in found],
+        answer=prose("margins_lead", found=[(*pair, brief) for pair, brief in zip(found, sampled, strict=True)]),
+        facts=[verdict_fact(*pair, brief) for pair, brief in zip(found, sampled, strict=True)],
         words=words,
         blocks=[block for block in blocks if not isinstance(block, Table) or block.columns],
     )
@@ -113,13 +115,13 @@ def _bode_picture(each: Controller, found: Margins) -> Picture:
 
 def crossings_tables(each: Controller, found: Margins) -> list[Table]:
     """Every crossing of |L| = 1 and of L < 0 in the range, ascending."""
-    kinds, caption = {"gain": found.gain_crossovers, "phase": found.phase_crossovers}, prose("crossovers")
+    kinds = {"gain": found.gain_crossovers, "phase": found.phase_crossovers}
     return [
         table(
             rows,
             stem=each.stem(f"{kind}-crossovers"),
             title=f"{upper(kind)} crossovers of {each.name}",
-            caption=caption,
+            caption=prose(f"{kind}_crossovers"),
         )
         for kind, rows in kinds.items()
     ]
@@ -189,9 +191,8 @@ def law_section(case: Case) -> PageSection:
     entries = [entry for each in named for entry in entries_of(each)]
     blocks = [table(entries, stem="law-entries", title="Transfer function from each signal", caption=prose("entries"))]
     blocks += [matrices for each in named for matrices in matrices_tables(each)]
-    return PageSection(
-        anchor="law", title="The controller" if len(named) == 1 else "The controllers", words=words, blocks=blocks
-    )
+    title = "The controller" if len(named) == 1 else "The controllers"
+    return PageSection(anchor="law", title=title, answer=prose("laws", each=named), words=words, blocks=blocks)
 
 
 class Entry(NamedTuple):

@@ -77,8 +77,7 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
     """Measurements, the fitted numbers with their intervals, and the share of possible arms on which a loop holds."""
     fit = case.fit
     assert fit is not None
-    words = [prose("fit", verdict=fit.verdict, found=fit.in_words)]
-    words += [f"{upper(each)}." for each in fit.not_determined]
+    words = [f"{upper(each)}." for each in fit.not_determined]
     blocks: list[Picture | Table] = []
     if fit.responses:
         names = listed([each.name for each in fit.responses])
@@ -97,7 +96,8 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
         notes, more = _onwards(those)
         words += notes
         blocks += more
-    return PageSection(anchor="fit", title="Fitted to measurements", words=words, blocks=blocks)
+    answer = prose("fit", verdict=fit.verdict, found=fit.in_words)
+    return PageSection(anchor="fit", title="Fitted to measurements", answer=answer, words=words, blocks=blocks)
 
 
 class MarginSpan(NamedTuple):

@@ -37,6 +37,7 @@ MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict i
 PAST_HUB = 1.25  # times the rate gain at which sampling alone makes the hub unstable: the end of its locus
 LOCUS_K2 = (-0.5, 1.5)  # of its locus: the stability interval of most arms, and a little to either side
 VERDICT_COLUMNS = ("word", "spectral_radius", "time_constant", "slowest", "holds_for")
+WHOLE_LAW_COLUMNS = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
 DELAY, DAMPING = "delay margin", "minimum structural damping for stability"  # headline numbers of an analysis
 CURVE_DIGITS = 7  # digits of a curve in its file: a hundredth of the width of a line is four
 Analysed = Sequence[tuple[Controller, Analysis]]
@@ -69,9 +70,10 @@ def sampled_section(case: Case) -> PageSection:
     return PageSection(
         anchor="sampled",
         title=f"The sampled loop, {plain(1e3 * chain.sampling.period)} ms",
+        answer=prose("sampled_lead", found=found, period=chain.sampling.period),
         facts=facts,
         words=words,
-        blocks=blocks,
+        blocks=[block for block in blocks if not isinstance(block, Table) or block.columns],
     )
 
 
@@ -107,17 +109,23 @@ def numbers_table(each: Controller, found: Analysis) -> Table:
         found.stability_intervals,
         stem=_stem("numbers", each),
         title=f"Stability intervals, {each.name}",
-        caption=prose("sampled_numbers", modes=found.verdict.modes_used),
+        caption=prose("sampled_numbers", modes=found.verdict.modes_used, is_of_gains=found.loop.is_of_gains),
     )
 
 
 def modes_table(each: Controller, found: Analysis) -> Table:
-    """The modes of the sampled loop one by one."""
+    """The modes of the sampled loop one by one; the parts of K1 and K2 are those of gains at the hub."""
+    is_of_gains = found.loop.is_of_gains
     return table(
         found.modes,
+        () if is_of_gains else WHOLE_LAW_COLUMNS,
         stem=_stem("modes", each),
         title=f"Modes of the sampled loop, {each.name}",
-        caption=prose("sampled_modes", period=found.loop.chain.sampling.period, plane=PLANE),
+        caption=prose(
+            "sampled_modes",
+            period=found.loop.chain.sampling.period,
+            first=" and ".join(f"by {name}" for name in PLANE) if is_of_gains else "first order",
+        ),
     )
 
 
@@ -296,9 +304,9 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
 
 
 class MeasuredStep(NamedTuple):
-    """A step under one law in numbers, measured and computed."""
+    """A step under one controller in numbers, measured and computed."""
 
-    law: Annotated[str, Quantity("law")]
+    law: Annotated[str, Quantity("controller")]
     step: Annotated[float, Quantity("step", "deg", 4)]
     overshoot_measured: Annotated[float, Quantity("overshoot, measured", "%", 3, key="overshoot_measured_percent")]
     overshoot_computed: Annotated[float, Quantity("overshoot, computed", "%", 3, key="overshoot_computed_percent")]

@@ -106,13 +106,15 @@ class Picture:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PageSection:
-    """A part of a page.  `words` are paragraphs, `items` a list; `blocks` pictures and tables.
+    """A part of a page.  `answer` is its result in a sentence or two, at the top of the full page too.
 
+    `words` are paragraphs, `items` a list; `blocks` pictures and tables.
     `failure` is the reason why the section could not be made, which its words have too; empty otherwise.
     """
 
     anchor: str
     title: str
+    answer: str = ""
     words: Sequence[str] = ()
     items: Sequence[str] = ()
     facts: Sequence[Fact] = ()

@@ -196,13 +196,13 @@ def tuner_section(case: Case) -> PageSection:
             reason = prose("tuner_unstable", rate=RATE_GAIN)
         except CertificationError as error:
             reason = prose("tuner_unproven", error=error)
-    return PageSection(anchor="tune", title=TUNER_TITLE, words=(reason,))
+    return PageSection(anchor="tune", title=TUNER_TITLE, answer=reason)
 
 
 def section_of(data: TunerNumbers) -> PageSection:
     """The section on numbers that were computed already."""
     guard, n = data.tuning.training.guard.sentence, data.tuning.trial.n
-    words = [tuner_in_short(data), prose("tuner", rate=RATE_GAIN, angle=ANGLE_GAIN, guard=guard)]
+    words = [prose("tuner", rate=RATE_GAIN, angle=ANGLE_GAIN, guard=guard)]
     if limits := limits_of(data):
         words.append(f"A trial has {n:,} samples. {'. '.join(limits)}.")
     tables = [comparison_table(data), residual_table(data)]
@@ -210,7 +210,10 @@ def section_of(data: TunerNumbers) -> PageSection:
         tables.append(servo_table(data, data.servo))
     pictures = _gain_picture(data), _slew_picture(data), _coarse_picture(data)
     blocks: list[Picture | Table] = [*pictures, *tables, _curves_picture(data)]
-    return PageSection(anchor="tune", title=TUNER_TITLE, facts=tuner_facts(data), words=words, blocks=blocks)
+    return PageSection(
+        anchor="tune", title=TUNER_TITLE, answer=tuner_in_short(data), facts=tuner_facts(data), words=words,
+        blocks=blocks,
+    )  # fmt: skip
 
 
 def why_not(arm: Arm, chain: Chain) -> str:

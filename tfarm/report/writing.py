@@ -83,7 +83,6 @@ def make_all(
         if progress is not None:
             progress(len(done), len(work), ", ".join(running))
 
-    begun(())
     if len(work) < WORTH_A_PROCESS or MOST_WORKERS == 1 or not may_start_processes():
         for task, call in work.items():
             begun([task])
@@ -91,7 +90,7 @@ def make_all(
     else:
         for task, result in shared(work, MOST_WORKERS, [__name__], begun):
             done[task] = result  # noqa: PERF403  `begun` counts them meanwhile
-    begun(())
+    begun(["pages"])
     made = [
         [done[task_name(case, piece)][piece.anchor] for piece in pieces]
         for case, pieces in zip(cases, pages, strict=True)

@@ -9,6 +9,7 @@ from markupsafe import Markup, escape
 from tfarm.columns import Column, Table
 from tfarm.digits import powers, unit
 
+COMPLEX = re.compile(r"(?<=[\d)])([+-])(\d[\d.]*(?:e[+-]?\d+)?)i\b")  # the imaginary part of a number
 SIGN, INFINITE = re.compile(r"(?<![\w.)])-(?=[\d.]|inf\b)"), re.compile(r"\binf\b")  # of a number in a cell
 TYPESET = {
     "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", " theta": " θ", "phi'(0)": "φ′(0)",
@@ -61,6 +62,7 @@ def with_symbols(text: str) -> Markup:
     """A text with Greek letters, true minus signs, subscripts and exponents: I_h becomes I<sub>h</sub>, m^2 m²."""
     for written, shown in TYPESET.items():
         text = text.replace(written, shown)
+    text = COMPLEX.sub(lambda part: f"\u00a0{part[1].replace('-', '−')}\u00a0{part[2]}\u00a0i", text)
     plain = powers(unit(str(escape(MINUS.sub("−", text)))))
     plain = INFINITE.sub("∞", SIGN.sub("−", plain))
     return Markup(re.sub(r"\b([A-Za-zθ])_([a-z0-9])\b", r"\1<sub>\2</sub>", plain))
