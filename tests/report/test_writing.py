@@ -17,13 +17,13 @@ from tests.hostile import LONG, NAME, PRINTED, check_drawing, check_page
 from tests.report.coarse import coarsen, plain_cards
 from tests.report.full import ARM
 from tests.report.written import HELD, Links, files_of, ids_of, links_of, validated
-from tfarm.tables.html import with_symbols
 from tfarm.dsp import Chain
 from tfarm.report import readme_pictures, write, writing
 from tfarm.report.cases import Case
 from tfarm.report.page import PIECES, index_page, pieces_of, written_cards
 from tfarm.report.trust import Evidence, write_trust, written_proofs
 from tfarm.spectrum.table import default_gains
+from tfarm.tables.html import with_symbols
 
 # ------------------------------------------------------------ the same bytes
 
