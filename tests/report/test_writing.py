@@ -16,9 +16,10 @@ import tfarm
 from tests.hostile import LONG, NAME, PRINTED, check_drawing, check_page
 from tests.report.coarse import coarsen, plain_cards
 from tests.report.full import ARM
+from tests.report.readme import PICTURES, write_pictures
 from tests.report.written import HELD, Links, files_of, ids_of, links_of, validated
 from tfarm.dsp import Chain
-from tfarm.report import readme_pictures, write, writing
+from tfarm.report import write, writing
 from tfarm.report.cases import Case
 from tfarm.report.page import PIECES, index_page, pieces_of, written_cards
 from tfarm.report.trust import Evidence, write_trust, written_proofs
@@ -210,10 +211,8 @@ def test_an_arm_that_cannot_turn_nor_move_its_tip_is_reported_on_too(tmp_path, m
 
 def test_the_pictures_of_the_readme(tmp_path, monkeypatch):
     coarsen(monkeypatch.setattr)
-    paths = readme_pictures(tmp_path)
-    assert [path.name for path in paths] == ["bode-root-moment.png", "gains.png", "mode-shapes.png"]
-    kept = Path(__file__).parents[2] / "reports" / "pictures"
-    assert {path.name for path in kept.iterdir()} == {path.name for path in paths}
+    write_pictures(tmp_path)
+    assert {path.name for path in PICTURES.iterdir()} == set(files_of(tmp_path))
 
 
 POOL = """
