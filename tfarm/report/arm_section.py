@@ -105,10 +105,10 @@ def parameters(table: Mapping[str, Any], under: str = "") -> Iterator[Parameter]
 class Derived(NamedTuple):
     """A number that follows from the parameters."""
 
-    quantity: Annotated[str, Quantity("quantity")]
-    symbol: Annotated[str, Quantity("symbol")]
-    value: Annotated[float, Quantity("value", digits=8)]
-    unit: Annotated[str, Quantity("unit")]
+    quantity: Annotated[str, Quantity("quantity", help="number that the parameters determine")]
+    symbol: Annotated[str, Quantity("symbol", help="letter or formula of the quantity")]
+    value: Annotated[float, Quantity("value", digits=8, help="from the parameters alone")]
+    unit: Annotated[str, Quantity("unit", help="SI unit of the value")]
 
 
 def derived_table(arm: Arm) -> Table:
@@ -152,15 +152,17 @@ def derived_table(arm: Arm) -> Table:
 class PaperValue(NamedTuple):
     """A row of Table 1: its value, None where the table has none, and unit, as printed; and those used here."""
 
-    quantity: Annotated[str, Quantity("quantity")]
-    symbol: Annotated[str, Quantity("symbol")]
-    printed: Annotated[float | None, Quantity("printed in Table 1")]
-    printed_unit: Annotated[str, Quantity("unit, as printed")]
-    used: Annotated[float, Quantity("used here")]
-    unit: Annotated[str, Quantity("unit")]
+    quantity: Annotated[str, Quantity("quantity", help="entry of the paper's Table 1")]
+    symbol: Annotated[str, Quantity("symbol", help="letter of the quantity in the paper")]
+    printed: Annotated[
+        float | None, Quantity("printed in Table 1", help="value as printed; none where the table has no such entry")
+    ]
+    printed_unit: Annotated[str, Quantity("unit, as printed", help="unit as printed")]
+    used: Annotated[float, Quantity("used here", help="value of this arm, in the unit of the next column")]
+    unit: Annotated[str, Quantity("unit", help="SI unit of the value used here")]
 
     @property
-    def remark(self) -> Annotated[str, Quantity("remark")]:
+    def remark(self) -> Annotated[str, Quantity("remark", help="reason where the value used is not the printed one")]:
         """The reason why the value used is not the printed one, or is an odd one; empty of any other."""
         if self.symbol == "C":
             return prose("paper_damping", used=self.used)

@@ -193,11 +193,22 @@ def intervals(arm: Arm) -> str:
 class AtGain(NamedTuple):
     """The exact loop at one value of a gain; its verdict may be undecided on the axis."""
 
-    value: Annotated[float, Quantity("value", digits=4)]
-    verdict: Annotated[str, Quantity("stability")]
-    unstable_poles: Annotated[int | str | None, Quantity("unstable poles")]
-    spectral_abscissa: Annotated[float | None, Quantity("spectral abscissa", "1/s", 4)]
-    first_pairs: Annotated[str, Quantity("first pairs of poles", "1/s")]
+    value: Annotated[float, Quantity("value", digits=4, help="value of the gain that varies, the other one fixed")]
+    verdict: Annotated[str, Quantity("stability", help="verdict on the exact loop with that gain")]
+    unstable_poles: Annotated[
+        int | str | None,
+        Quantity("unstable poles", help="closed-loop poles right of the imaginary axis, conjugates counted"),
+    ]
+    spectral_abscissa: Annotated[
+        float | None,
+        Quantity(
+            "spectral abscissa",
+            "1/s",
+            4,
+            help="largest real part of the poles in the box; 0 where it is on the axis to working precision",
+        ),
+    ]
+    first_pairs: Annotated[str, Quantity("first pairs of poles", "1/s", help="poles with Im s > 0 of least frequency")]
 
 
 def locus_section(case: Case) -> PageSection:

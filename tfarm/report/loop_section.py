@@ -198,16 +198,16 @@ def law_section(case: Case) -> PageSection:
 class Entry(NamedTuple):
     """A signal of a law: how it enters, and its numerator and denominator in descending powers."""
 
-    law: Annotated[str, Quantity("controller")]
-    signal: Annotated[str, Quantity("signal")]
-    unit: Annotated[str, Quantity("unit")]
-    enters: Annotated[str, Quantity("enters")]
-    sign: Annotated[str, Quantity("sign in the input")]
-    variable: Annotated[str, Quantity("in powers of")]
-    numerator: Annotated[list[float] | str, Quantity("numerator")]
-    denominator: Annotated[list[float] | str, Quantity("denominator")]
-    delay: Annotated[float, Quantity("delay", "s")]
-    period: Annotated[float | None, Quantity("period", "s")]
+    law: Annotated[str, Quantity("controller", help="controller that reads the signal")]
+    signal: Annotated[str, Quantity("signal", help="output of the arm that the controller reads")]
+    unit: Annotated[str, Quantity("unit", help="unit of the signal")]
+    enters: Annotated[str, Quantity("enters", help="whether the reference is subtracted from the signal")]
+    sign: Annotated[str, Quantity("sign in the input", help="sign of the signal's part in the control law")]
+    variable: Annotated[str, Quantity("in powers of", help="s in continuous time, z at the samples")]
+    numerator: Annotated[list[float] | str, Quantity("numerator", help="coefficients in descending powers")]
+    denominator: Annotated[list[float] | str, Quantity("denominator", help="coefficients in descending powers")]
+    delay: Annotated[float, Quantity("delay", "s", help="delay of the controller itself")]
+    period: Annotated[float | None, Quantity("period", "s", help="sampling period of a discrete-time controller")]
 
 
 def entries_of(each: Controller) -> Iterator[Entry]:

@@ -103,10 +103,10 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
 class MarginSpan(NamedTuple):
     """A margin over the possible arms."""
 
-    margin: Annotated[str, Quantity("of the loop")]
-    unit: Annotated[str, Quantity("unit")]
-    lowest: Annotated[float, Quantity("lowest", digits=4)]
-    highest: Annotated[float, Quantity("highest", digits=4)]
+    margin: Annotated[str, Quantity("of the loop", help="stability margin of the default loop")]
+    unit: Annotated[str, Quantity("unit", help="unit of the margin")]
+    lowest: Annotated[float, Quantity("lowest", digits=4, help="least over the arms on which the loop is stable")]
+    highest: Annotated[float, Quantity("highest", digits=4, help="largest over the arms on which the loop is stable")]
 
 
 def _onwards(those: Possible) -> tuple[list[str], list[Picture | Table]]:

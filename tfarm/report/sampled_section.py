@@ -223,11 +223,33 @@ def loci_table(data: SampledLoci, stem: str) -> Table:
 class SlewRow(NamedTuple):
     """A slew under one controller in numbers; what is not reached in the record, or of an unstable loop, is None."""
 
-    law: Annotated[str, Quantity("controller")]
-    residual: Annotated[float | None, Quantity("residual root moment", "N m rms", 3, key="residual_moment_rms")]
-    settling_time: Annotated[float | None, Quantity("settling time (5 %)", "s", 3)]
-    hub_error: Annotated[float | None, Quantity("hub error at the end", "deg", 3)]
-    stopped: Annotated[float | None, Quantity("unstable, stopped at", "s", 3)]
+    law: Annotated[str, Quantity("controller", help="controller of the slew")]
+    residual: Annotated[
+        float | None,
+        Quantity(
+            "residual root moment",
+            "N m rms",
+            3,
+            key="residual_moment_rms",
+            help="rms of root moment less the rigid arm's, from the end of the slew on",
+        ),
+    ]
+    settling_time: Annotated[
+        float | None,
+        Quantity(
+            "settling time (5 %)",
+            "s",
+            3,
+            help="time from which on the root moment stays within 5 % of its largest value",
+        ),
+    ]
+    hub_error: Annotated[
+        float | None, Quantity("hub error at the end", "deg", 3, help="hub angle less reference at the last sample")
+    ]
+    stopped: Annotated[
+        float | None,
+        Quantity("unstable, stopped at", "s", 3, help="time at which the simulation of an unstable loop was stopped"),
+    ]
 
 
 def slew_row(name: str, run: Simulation) -> SlewRow:
@@ -306,15 +328,46 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
 class MeasuredStep(NamedTuple):
     """A step under one controller in numbers, measured and computed."""
 
-    law: Annotated[str, Quantity("controller")]
-    step: Annotated[float, Quantity("step", "deg", 4)]
-    overshoot_measured: Annotated[float, Quantity("overshoot, measured", "%", 3, key="overshoot_measured_percent")]
-    overshoot_computed: Annotated[float, Quantity("overshoot, computed", "%", 3, key="overshoot_computed_percent")]
-    end_measured: Annotated[float, Quantity("error at the end, measured", "deg", 3)]
-    end_computed: Annotated[float, Quantity("error at the end, computed", "deg", 3)]
-    moment_measured: Annotated[float | None, Quantity("largest |moment|, measured", "N m", 3)]
-    moment_computed: Annotated[float, Quantity("largest |moment|, computed", "N m", 3)]
-    difference: Annotated[float, Quantity("difference, rms", "deg", 3, key="apart_rms_deg")]
+    law: Annotated[str, Quantity("controller", help="controller under which the step was measured")]
+    step: Annotated[float, Quantity("step", "deg", 4, help="change of the reference")]
+    overshoot_measured: Annotated[
+        float,
+        Quantity(
+            "overshoot, measured",
+            "%",
+            3,
+            key="overshoot_measured_percent",
+            help="beyond the last reference, as a share of the step; below 0 it is not reached",
+        ),
+    ]
+    overshoot_computed: Annotated[
+        float,
+        Quantity(
+            "overshoot, computed",
+            "%",
+            3,
+            key="overshoot_computed_percent",
+            help="beyond the last reference, as a share of the step; below 0 it is not reached",
+        ),
+    ]
+    end_measured: Annotated[
+        float, Quantity("error at the end, measured", "deg", 3, help="hub angle less reference at the last sample")
+    ]
+    end_computed: Annotated[
+        float, Quantity("error at the end, computed", "deg", 3, help="hub angle less reference at the last sample")
+    ]
+    moment_measured: Annotated[
+        float | None,
+        Quantity("largest |moment|, measured", "N m", 3, help="largest size of the root moment in the record"),
+    ]
+    moment_computed: Annotated[
+        float,
+        Quantity("largest |moment|, computed", "N m", 3, help="largest size of the root moment in the simulation"),
+    ]
+    difference: Annotated[
+        float,
+        Quantity("difference, rms", "deg", 3, key="apart_rms_deg", help="rms of computed less measured hub angle"),
+    ]
 
 
 def measured_step(name: str, found: RunComparison) -> MeasuredStep:

@@ -48,14 +48,21 @@ UNPROVEN = "not proven"
 class Boxed:
     """Eigenvalues proven complete in a box: each in a disc, `count` in all.  `failure`: what could not be proven."""
 
-    arm: Annotated[str, Quantity("arm")]
-    what: Annotated[str, Quantity("eigenvalues")]
-    count: Annotated[int, Quantity("counted")] = 0
-    box: Annotated[list[float], Quantity("box: Re s from, to, Im s from, to", "1/s", 4)] = field(default_factory=list)
+    arm: Annotated[str, Quantity("arm", help="name of the arm")]
+    what: Annotated[str, Quantity("eigenvalues", help="damped modes of the arm, or poles of its default loop")]
+    count: Annotated[
+        int, Quantity("counted", help="eigenvalues in the box by the argument principle, conjugates counted")
+    ] = 0
+    box: Annotated[
+        list[float],
+        Quantity(
+            "box: Re s from, to, Im s from, to", "1/s", 4, help="rectangle of the s-plane in which none is missing"
+        ),
+    ] = field(default_factory=list)
     failure: str = ""
 
     @property
-    def verdict(self) -> Annotated[str, Quantity("verdict")]:
+    def verdict(self) -> Annotated[str, Quantity("verdict", help="whether as many are enclosed as counted")]:
         """Whether they are complete."""
         return self.failure or "complete, proven"
 
@@ -70,12 +77,16 @@ class ArmProof:
     that of the arm's file.
     """
 
-    name: Annotated[str, Quantity("arm")]
-    sha256: Annotated[str, Quantity("SHA-256 of arm.toml")]
-    has_rigid_mode: Annotated[bool, Quantity("rigid body")]
+    name: Annotated[str, Quantity("arm", help="name of the arm")]
+    sha256: Annotated[str, Quantity("SHA-256 of arm.toml", help="hash of the arm's file, on which its page depends")]
+    has_rigid_mode: Annotated[
+        bool, Quantity("rigid body", help="whether the arm turns freely as a rigid body, with natural frequency 0")
+    ]
     digits: int = BRACKET_DIGITS
     brackets: tuple[tuple[str, str], ...] = ()
-    count: Annotated[int, Quantity("counted")] = 0
+    count: Annotated[
+        int, Quantity("counted", help="natural frequencies below the next column's, by the proven count")
+    ] = 0
     below: str = ""
     failure: str = ""
     points: int = BAND_POINTS
@@ -84,22 +95,26 @@ class ArmProof:
     boxes: tuple[Boxed, ...] = ()
 
     @property
-    def enclosed(self) -> Annotated[int, Quantity("flexible modes enclosed")]:
+    def enclosed(
+        self,
+    ) -> Annotated[int, Quantity("flexible modes enclosed", help="natural frequencies between two proven bounds each")]:
         """The number of brackets."""
         return len(self.brackets)
 
     @property
-    def count_below(self) -> Annotated[float | None, Quantity("below", "rad/s", 9)]:
+    def count_below(
+        self,
+    ) -> Annotated[float | None, Quantity("below", "rad/s", 9, help="frequency at which the count is made")]:
         """The frequency of the count."""
         return float(self.below) if self.below else None
 
     @property
-    def verdict(self) -> Annotated[str, Quantity("verdict")]:
+    def verdict(self) -> Annotated[str, Quantity("verdict", help="whether as many are enclosed as counted")]:
         """Whether the list is complete."""
         return f"{UNPROVEN}: {self.failure}" if self.failure else "complete, proven"
 
     @property
-    def source(self) -> Annotated[str, Quantity("source")]:
+    def source(self) -> Annotated[str, Quantity("source", help="preset, where the file is that of one byte for byte")]:
         """Whether the arm's file is, byte for byte, that of a preset."""
         return "preset" if self.is_preset else "file"
 

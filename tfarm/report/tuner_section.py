@@ -137,8 +137,8 @@ def off_target(data: TunerNumbers, error: float) -> str:
 class Cost(NamedTuple):
     """The cost of the slew under one controller."""
 
-    controller: Annotated[str, Quantity("controller")]
-    cost: Annotated[float, Quantity("cost", digits=4)]
+    controller: Annotated[str, Quantity("controller", help="what sets the moment gain")]
+    cost: Annotated[float, Quantity("cost", digits=4, help="cost of the slew, the integral that the tuner minimises")]
 
 
 def servo_table(data: TunerNumbers, servo: Tuning) -> Table:
