@@ -33,6 +33,7 @@ from tfarm.report import gains_section as map_room
 from tfarm.report.cases import Case, has_loop, margins_of, on_hub
 from tfarm.report.gains_section import beyond_table, draw_map_of_arm, map_data, map_of_arm, map_section
 from tfarm.report.loop_section import margin_table, margins_section, verdict_fact
+from tfarm.report.sections import prose
 from tfarm.spectrum.table import PAPER_GAINS, default_gains
 from tfarm.tables.files import as_json
 
@@ -194,7 +195,7 @@ def test_the_loci_are_exact_and_the_gap_is_that_of_what_is_drawn():
     size = np.maximum(abs(data.exact.branches).max(axis=1), tfarm.modes(LAB, 1).natural_frequency[-1])
     assert (apart <= data.reduced.gap * size * (1 + 1e-12)).all()
     assert [round(each.gain, 4) for each in data.exact.crossings] == [1.0305]
-    assert map_room._first_unstable("K2", data).value == "1.03054"
+    assert "unstable from K2 = 1.0305; mode 1" in prose("locus_lead", found={"K2": data}, gains={"K2": "K1 = 0.3"})
 
 
 def test_beyond_one_infinitely_many_poles_are_unstable_without_damping():

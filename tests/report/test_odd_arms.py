@@ -222,7 +222,7 @@ def test_a_free_pin_has_its_rate_loop(monkeypatch):
     assert (stable["K2"], [len(stable[name]) for name in ("K1", "Kp")]) == ([], [1, 1])
     pieces = pieces_of(Case(arm, Chain()))
     names = [each.name for each in pieces if any(map(each.is_on, ("margins", "locus", "sampled", "tune")))]
-    assert names == ["the arm", "no loop", "margins", "root loci", "Nyquist"]
+    assert names == ["the arm", "the loop", "stability margins", "root loci", "Nyquist plot"]
 
 
 def test_a_free_pin_has_its_nyquist_plot():
