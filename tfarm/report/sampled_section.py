@@ -14,7 +14,7 @@ import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit
 from tfarm.columns import Column, Table
-from tfarm.digits import how_many, kept_digits, plain, singly
+from tfarm.digits import how_many, kept_digits, plain, significant, singly
 from tfarm.dsp import Analysis, Chain, Simulation, Verdict, sampled_verdict, traces
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.dsp.crossings import around
@@ -38,7 +38,6 @@ PAST_HUB = 1.25  # times the rate gain at which sampling alone makes the hub uns
 LOCUS_K2 = (-0.5, 1.5)  # of its locus: the stability interval of most arms, and a little to either side
 VERDICT_COLUMNS = ("word", "spectral_radius", "time_constant", "slowest", "holds_for")
 WHOLE_LAW_COLUMNS = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
-DELAY, DAMPING = "delay margin", "minimum structural damping for stability"  # headline numbers of an analysis
 CURVE_DIGITS = 7  # digits of a curve in its file: a hundredth of the width of a line is four
 Analysed = Sequence[tuple[Controller, Analysis]]
 
@@ -88,9 +87,14 @@ def without_moment(arm: Arm, gains: HubFeedback) -> Controller:
 def facts_on(each: Controller, found: Analysis) -> list[Fact]:
     """Verdict, delay margin and minimum structural damping of a sampled loop."""
     verdict = found.verdict
-    labels = [DELAY] * verdict.is_stable + [DAMPING] * (each.arm.has_elastic_link or not verdict.is_stable)
-    note = prose("dominant", it=verdict)
-    return [Fact(label=each.title, value=verdict.word.upper(), note=note), *facts_of(each.name, found, labels)]
+    facts = [Fact(label=each.title, value=verdict.word.upper(), note=prose("dominant", it=verdict))]
+    if verdict.is_stable:
+        value = "> " * found.is_lower_bound + significant(found.delay_margin_seconds, 3)
+        note = f"{significant(found.delay_margin_samples, 3)} samples"
+        facts.append(Fact(label=f"{each.name}: delay margin", value=value, unit="s", note=note))
+    if each.arm.has_elastic_link or not verdict.is_stable:
+        facts += facts_of(each.name, found, ["minimum structural damping for stability"])
+    return facts
 
 
 def chain_words(arm: Arm, chain: Chain) -> str:
