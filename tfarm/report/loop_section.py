@@ -44,7 +44,7 @@ def margins_section(case: Case) -> PageSection:
     words: list[str] = []
     blocks: list[Picture | Table] = [*(_bode_picture(*pair) for pair in found), margin_table(found)]
     for each, it in found:
-        blocks += [*crossings_tables(each, it), interval_table(each, it)]
+        blocks += tables_of(each, it)
         try:
             spilled = spill(each.arm, each.law, MOST_SPILLED)
         except TfarmError as error:
@@ -84,17 +84,6 @@ def margin_table(found: Sequence[tuple[Controller, Margins]]) -> Table:
     )  # fmt: skip
 
 
-def interval_table(each: Controller, found: Margins) -> Table:
-    """A row a gain or number of a controller: its stability intervals, the others fixed."""
-    note = upper(found.intervals_note or "")
-    return table(
-        found.stability_intervals,
-        stem=each.stem("windows"),
-        title=f"Stability intervals of {each.name}",
-        caption=prose("intervals", note=note),
-    )
-
-
 def _bode_picture(each: Controller, found: Margins) -> Picture:
     omega, L = loop_curve(found)
     title, stem = f"The loop function of {each.name}", each.stem("bode")
@@ -113,18 +102,13 @@ def _bode_picture(each: Controller, found: Margins) -> Picture:
     )
 
 
-def crossings_tables(each: Controller, found: Margins) -> list[Table]:
-    """Every crossing of |L| = 1 and of L < 0 in the range, ascending."""
-    kinds = {"gain": found.gain_crossovers, "phase": found.phase_crossovers}
-    return [
-        table(
-            rows,
-            stem=each.stem(f"{kind}-crossovers"),
-            title=f"{upper(kind)} crossovers of {each.name}",
-            caption=prose(f"{kind}_crossovers"),
-        )
-        for kind, rows in kinds.items()
-    ]
+def tables_of(each: Controller, found: Margins) -> Iterator[Table]:
+    """Every crossing of |L| = 1 and of L < 0 in the range, ascending, and the stability interval of each number."""
+    for kind, rows in {"gain": found.gain_crossovers, "phase": found.phase_crossovers}.items():
+        title, caption = f"{upper(kind)} crossovers of {each.name}", prose(f"{kind}_crossovers")
+        yield table(rows, stem=each.stem(f"{kind}-crossovers"), title=title, caption=caption)
+    title, caption = f"Stability intervals of {each.name}", prose("intervals", note=upper(found.intervals_note or ""))
+    yield table(found.stability_intervals, stem=each.stem("windows"), title=title, caption=caption)
 
 
 # ------------------------------------------------------------ Nyquist

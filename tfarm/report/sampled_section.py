@@ -30,8 +30,8 @@ from tfarm.plots.regions import StableRegions, draw_overlay, regions_table, stab
 from tfarm.plots.roots import draw_sampled_loci
 from tfarm.plots.style import safe
 from tfarm.report.cases import Case, Controller, on_hub, what_holds
-from tfarm.report.sections import Fact, PageSection, Picture, facts_of, prose
-from tfarm.schema import Quantity, across, table, text
+from tfarm.report.sections import Fact, PageSection, Picture, prose
+from tfarm.schema import Quantity, across, quantities, table, text, with_unit
 
 MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict is given
 PAST_HUB = 1.25  # times the rate gain at which sampling alone makes the hub unstable: the end of its locus
@@ -92,8 +92,9 @@ def facts_on(each: Controller, found: Analysis) -> list[Fact]:
         value = "> " * found.is_lower_bound + significant(found.delay_margin_seconds, 3)
         note = f"{significant(found.delay_margin_samples, 3)} samples"
         facts.append(Fact(label=f"{each.name}: delay margin", value=value, unit="s", note=note))
-    if each.arm.has_elastic_link or not verdict.is_stable:
-        facts += facts_of(each.name, found, ["minimum structural damping for stability"])
+    if found.minimum_damping is not None and (each.arm.has_elastic_link or not verdict.is_stable):
+        of = quantities(type(found))["minimum_damping"]
+        facts.append(Fact(label=f"{each.name}: {of.label}", value=with_unit(found.minimum_damping, of)))
     return facts
 
 

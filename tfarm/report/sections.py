@@ -6,7 +6,7 @@ Texts are in templates/prose.txt, pages in the other templates; here is how both
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -19,7 +19,7 @@ import tfarm
 from tfarm.columns import Table
 from tfarm.digits import how_many, listed, plain, scientific, significant
 from tfarm.plots.style import save_figure
-from tfarm.schema import entries, text, with_unit
+from tfarm.schema import text
 from tfarm.tables.files import save_table
 from tfarm.tables.html import as_html, with_symbols
 
@@ -78,12 +78,6 @@ class Fact:
     value: str
     unit: str = ""
     note: str = ""
-
-
-def facts_of(name: str, record: Any, labels: Iterable[str]) -> list[Fact]:
-    """The quantities of a record with these labels, under a name."""
-    found = {label: with_unit(value, of) for label, of, value in entries(record) if value is not None}
-    return [Fact(label=f"{name}: {label}", value=found[label]) for label in labels if label in found]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
