@@ -132,8 +132,8 @@ TERMS = (
     ),
     Term(
         "window",
-        "A stability interval of one gain, the others fixed. A * marks an end of the search range, at which no "
-        "limit was found.",
+        "A stability interval of one gain, the others fixed. An end with < or > is that of the search range: no limit "
+        "was found up to there.",
     ),
 )
 GLOSSARY_TERMS = tuple(sorted((*CERTAINTY, *TERMS), key=lambda term: term.name.casefold()))

@@ -151,7 +151,7 @@
   }
   // What the margins up to the band say of the whole infinite-dimensional loop: `tfarm.loop.margins.margins`
   function whole() {
-    if (loop.kind === "quiet") return "Beyond the band nothing comes nearer to −1: these margins are those of the whole loop.";
+    if (loop.kind === "quiet") return "Beyond the frequency range L is no nearer to −1: these margins are those of the whole loop.";
     if (loop.kind !== "reactive" || !loop.by_sign) return "Of the whole loop they are not known.";
     return law.K2 ? "Of the whole loop, whose undamped modes have no end, delay and disk margin are 0 and the peaks infinite." : "Of the whole loop, whose undamped modes have no end, the delay margin is 0; the others hold.";
   }
