@@ -38,8 +38,10 @@ from tfarm.tables.html import with_symbols
 BADGES = {"stable": "ok", "yes": "ok", "unstable": "corrected", "no": "corrected", "marginal": "undecided",
             "undecided": "undecided"}  # fmt: skip
 OPEN_PICTURES = 2  # of a section: those that answer its question; the rest is a click away
-PROMISES = ("certified", "converged", "complete", "enclosed", "Lyapunov region", "proven", "not determined", "small gain",
-            "winding number", "default gains")  # fmt: skip
+PROMISES = (
+    "certified", "complete", "converged", "default gains", "enclosed", "Lyapunov region", "not determined", "proven",
+    "small gain", "winding number",
+)  # fmt: skip
 PROMISE = re.compile(rf"\b(?:{'|'.join(PROMISES)})\b", re.IGNORECASE)
 
 
