@@ -9,8 +9,9 @@ import pytest
 
 import tfarm
 from tests.odd_arms import odd_arms
+from tests.report.written import blocks_of, values_of
 from tfarm.arm import HubFeedback
-from tfarm.digits import kept_digits, plain
+from tfarm.digits import kept_digits, plain, significant
 from tfarm.dsp import Chain, Simulator, sampled_loop, sampled_verdict, scenario, stable_windows
 from tfarm.dsp.chain import Converters, Sampling
 from tfarm.dsp.modes import dominant, mode_table
@@ -39,14 +40,6 @@ def section():
 
 def windows(arm, gains=GAINS):
     return windows_of(stability(arm, gains), ["K2"])["K2"]
-
-
-def blocks_of(section):
-    return {block.stem: block for block in section.blocks}
-
-
-def values_of(table):
-    return {column.key: list(column.values) for column in table.columns}
 
 
 # ------------------------------------------------------------ the overlay
@@ -111,7 +104,7 @@ def test_facts_words_and_tables_are_the_analysis(section):
     name = "default gains: "
     assert [(fact.label.removeprefix(name), fact.value) for fact in section.facts] == [
         ("K1 = 0.3, K2 = 0.3", "STABLE"),
-        ("delay margin", f"{analysis.delay_margin_seconds:.4g} s"),
+        ("delay margin", significant(analysis.delay_margin_seconds, 3)),
     ]
     assert f"|z| = {plain(math.exp(analysis.verdict.log_radius), 10)}" in section.facts[0].note
     of = values_of(blocks_of(section)["sampled"])
