@@ -26,7 +26,6 @@ from tfarm.response.signals import Signals
 from tfarm.schema import Quantity, across, curve_table, quantities, roots_table, table
 
 MOST_SPILLED = 12  # flexible modes of the largest model that is compared with the exact loop
-NOT_LED = "open"  # a column of a law's matrices without a signal
 
 
 def no_loop_section(case: Case) -> PageSection:
@@ -211,14 +210,15 @@ def entries_of(each: Controller) -> Iterator[Entry]:
 
 
 def matrices_tables(each: Controller) -> Iterator[Table]:
-    """A, B, C and D of each part of a law that has matrices, as one block [A B; C D]; its columns by their signals."""
+    """A, B, C and D of each part of a law that has matrices, as [A B; C D]; columns without a signal are left out."""
     for number, part in enumerate(each.law.parts, 1):
         if not isinstance(part.block, StateSpace):
             continue
         A, B, C, D = part.block.matrices()
-        states, whole = [f"x{i}" for i in range(1, len(A) + 1)], np.block([[A, B], [C, D]])
-        signals = {f"{i}_{name or NOT_LED}": name or NOT_LED for i, name in enumerate(part.signals, 1)}
-        titles = {**dict(zip(states, states, strict=True)), **signals}
+        led = [i for i, name in enumerate(part.signals) if name]
+        whole = np.block([[A, B[:, led]], [C, D[:, led]]])
+        states = [f"x{i}" for i in range(1, len(A) + 1)]
+        titles = {x: x for x in states} | {f"{i + 1}_{part.signals[i]}": part.signals[i] for i in led}
         step = "next " if each.law.is_discrete else "d/dt "
         columns = [Column("row", "", of=[*(step + x for x in states), "input"])]
         columns += [
