@@ -106,7 +106,7 @@ def test_a_slip_of_units_is_named_on_the_page():
     link = ARMS["boom"].link
     slip = replace(ARMS["boom"], link=replace(link, density=1.6, length=800.0))
     words = arm_section(Case(slip, Chain())).words
-    assert words[0].startswith("Check the units: ")
+    assert words[0].startswith("Check the units, ")
     assert all(key in words[0] for key in ("link.density = 1.6", "link.length = 800.0"))
     for arm in ARMS.values():
         assert len(arm_section(Case(arm, Chain())).words) == (0 if arm.assumptions else 1) + bool(implausible(arm))

@@ -150,7 +150,8 @@ def untraced_cells(sheet, rows, law):
         for key, cell in zip(sheet.keys, cells, strict=True):
             values = numbers_of(row[key]) if key in row else numbers_of(list(row.values()))
             values += law if ", not " in cell else []
-            shown = shown_in(re.sub(r"\(±[^)]*\)", "", cell))  # without the error that rounding leaves
+            bare = re.sub(r"\(±[^)]*\)", "", cell)  # without the error that rounding leaves
+            shown = shown_in(re.sub(r"− (?=\S+(?: × \S+)? i\b)", "−", bare))  # of an imaginary part
             left += [(key, cell, each.value) for each in shown if not each.is_rounding_of(values)]
     return left
 
