@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, NamedTuple
@@ -205,11 +205,14 @@ def section_of(data: TunerNumbers) -> PageSection:
     words = [prose("tuner", rate=RATE_GAIN, angle=ANGLE_GAIN, guard=guard)]
     if limits := limits_of(data):
         words.append(f"A trial has {n:,} samples. {'. '.join(limits)}.")
-    tables = [comparison_table(data), residual_table(data)]
-    if data.servo is not None:
-        tables.append(servo_table(data, data.servo))
-    pictures = _gain_picture(data), _slew_picture(data), _coarse_picture(data)
-    blocks: list[Picture | Table] = [*pictures, *tables, _curves_picture(data)]
+    servo = [] if data.servo is None else [servo_table(data, data.servo)]
+    blocks: list[Picture | Table] = [
+        _gain_picture(data),
+        *slew_pictures(data),
+        *cost_tables(data),
+        *servo,
+        _curves_picture(data),
+    ]
     return PageSection(
         anchor="tune", title=TUNER_TITLE, answer=tuner_in_short(data), facts=tuner_facts(data), words=words,
         blocks=blocks,
@@ -262,32 +265,24 @@ def _gain_picture(data: TunerNumbers) -> Picture:
     )  # fmt: skip
 
 
-def _slew_picture(data: TunerNumbers) -> Picture:
-    return Picture(
-        stem="tune-slew",
-        title="The slew without and with the tuner",
-        caption=prose("tuner_slew", piece=piece_of_bands(data.slews)),
-        alt="Root moment, tip and motor torque of the slew, without and with the tuner.",
-        figure=slew.figure(data.arm, data.slews, "the slew, ideal converters"),
-        data=_signals(data.slews, data.arm, "tune-slew-data"),
-    )
-
-
-def _coarse_picture(data: TunerNumbers) -> Picture:
-    """The slew with the converters and the delay of its chain."""
+def slew_pictures(data: TunerNumbers) -> Iterator[Picture]:
+    """The slew without and with the tuner: through ideal converters, then with those and the delay of its chain."""
     chain = chain_words(data.arm, next(iter(data.coarse.values())).chain)
-    return Picture(
-        stem="tune-dsp",
-        title="The same with the DSP's effects on",
-        caption=prose("tuner_dsp", chain=chain, angle=ANGLE_GAIN, runs=data.coarse, piece=piece_of_bands(data.coarse)),
-        alt="Root moment, tip and motor torque of the slew with converters and delay, without and with the tuner.",
-        figure=slew.figure(data.arm, data.coarse, "the slew, with converters and delay"),
-        data=_signals(data.coarse, data.arm, "tune-dsp-data"),
-    )
-
-
-def _signals(runs: Mapping[str, Simulation], arm: Arm, stem: str) -> Table:
-    return responses_table(stem, "The slew", arm, dict(zip(("without", "tuner"), runs.values(), strict=True)))
+    coarse = prose("tuner_dsp", chain=chain, angle=ANGLE_GAIN, runs=data.coarse, piece=piece_of_bands(data.coarse))
+    for stem, title, runs, how, caption in (
+        ("tune-slew", "The slew without and with the tuner", data.slews, "ideal converters",
+         prose("tuner_slew", piece=piece_of_bands(data.slews))),
+        ("tune-dsp", "The same with converters and delay", data.coarse, "with converters and delay", coarse),
+    ):  # fmt: skip
+        yield Picture(
+            stem=stem,
+            title=title,
+            caption=caption,
+            alt=f"Root moment, tip and motor torque of the slew, {how}, without and with the tuner.",
+            figure=slew.figure(data.arm, runs, f"the slew, {how}"),
+            data=responses_table(f"{stem}-data", "The slew", data.arm,
+                                 dict(zip(("without", "tuner"), runs.values(), strict=True))),
+        )  # fmt: skip
 
 
 def _curves_picture(data: TunerNumbers) -> Picture:
@@ -307,19 +302,17 @@ def _curves_picture(data: TunerNumbers) -> Picture:
     )
 
 
-def comparison_table(data: TunerNumbers) -> Table:
-    """Cost of a slew, a row a condition, a column a controller, and whether the guard is proven there too."""
-    caption = prose("tuner_comparison", data=data, moment=MOMENT_GAIN)
+def cost_tables(data: TunerNumbers) -> list[Table]:
+    """Cost of a slew and root moment after it: a row a condition, a column a controller, and where the guard holds."""
     proven = Column("guard_proven", "guard proven", of=["yes" if row.proven else "no" for row in data.rows])
-    columns, title = (*_of_each(data.rows, "cost", 4), proven), "Cost of the slew, compared with baselines"
-    return Table(stem="tune-comparison", title=title, caption=caption, columns=columns)
-
-
-def residual_table(data: TunerNumbers) -> Table:
-    """The root moment after the slew."""
-    caption = prose("tuner_residual", is_unstable=any(row.tuner.residual is None for row in data.rows))
-    title, columns = "Root moment left after the slew", _of_each(data.rows, "residual", 3)
-    return Table(stem="tune-residual", title=title, caption=caption, columns=columns)
+    caption = prose("tuner_comparison", data=data, moment=MOMENT_GAIN)
+    after = prose("tuner_residual", is_unstable=any(row.tuner.residual is None for row in data.rows))
+    return [
+        Table(stem="tune-comparison", title="Cost of the slew, compared with baselines", caption=caption,
+              columns=(*_of_each(data.rows, "cost", 4), proven)),
+        Table(stem="tune-residual", title="Root moment left after the slew", caption=after,
+              columns=_of_each(data.rows, "residual", 3)),
+    ]  # fmt: skip
 
 
 def _of_each(rows: Sequence[Outcomes], name: str, digits: int) -> tuple[Column, ...]:
