@@ -156,7 +156,7 @@ def map_data(data: MapOfArm) -> Table:
         ("least_damping_ratio", "least damping ratio", ""), ("omega_rad_s", "frequency", "rad/s"),
     )  # fmt: skip
     columns = [Column(*title, of=cells) for title, cells in zip(titles, zip(*rows, strict=True), strict=True)]
-    return Table(stem="map-data", title=f"The map of {' and '.join(PLANE)}", columns=tuple(columns))
+    return Table(stem="map-data", title="The map of both gains", columns=tuple(columns))
 
 
 def map_section(case: Case) -> PageSection:

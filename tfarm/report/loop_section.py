@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import PLANE, cancelled
+from tfarm.arm import cancelled
 from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.columns import Column, Table
@@ -169,8 +169,7 @@ def law_section(case: Case) -> PageSection:
               rule=rule_in_words(each.law), period=case.chain.sampling.period)
         for each in named
     ]  # fmt: skip
-    words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete],
-                       plane=" and ".join(PLANE)))  # fmt: skip
+    words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete]))
     entries = [entry for each in named for entry in entries_of(each)]
     blocks = [table(entries, stem="law-entries", title="Transfer function from each signal", caption=prose("entries"))]
     blocks += [matrices for each in named for matrices in matrices_tables(each)]

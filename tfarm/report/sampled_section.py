@@ -185,8 +185,8 @@ def overlay_picture(regions: StableRegions) -> Picture:
     return Picture(
         stem="sampled-overlay",
         title="Stability regions, continuous and sampled",
-        caption=prose("overlay", arm=arm, rate=RATE_GAIN, low=float(low), nested=len(regions.sampled) > 1),
-        alt=f"Map of {' and '.join(PLANE)}: stability regions of the continuous and of the sampled loop.",
+        caption=prose("overlay", arm=arm, low=float(low), nested=len(regions.sampled) > 1),
+        alt="Map of both gains: stability regions of the continuous and of the sampled loop.",
         figure=draw_overlay(regions),
         data=regions_table(regions, "sampled-overlay-data"),
     )

@@ -16,6 +16,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 import tfarm
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN
 from tfarm.columns import Table
 from tfarm.digits import how_many, listed, plain, scientific, significant
 from tfarm.plots.style import save_figure
@@ -46,7 +47,8 @@ def templates() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.globals["inf"] = math.inf
+    environment.globals |= {"inf": math.inf, "rate": RATE_GAIN, "moment": MOMENT_GAIN, "angle": ANGLE_GAIN,
+                            "plane": " and ".join(PLANE)}  # fmt: skip
     environment.filters.update(
         symbol=with_symbols, text=text, plain=plain, significant=significant, scientific=scientific, upper_first=upper,
         listed=listed, how_many=how_many,

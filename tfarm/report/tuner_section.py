@@ -11,7 +11,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, Arm
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
 from tfarm.columns import Column, Table
 from tfarm.digits import how_many, lined, plain, significant
 from tfarm.dsp import Chain, Simulation
@@ -152,7 +152,7 @@ def servo_table(data: TunerNumbers, servo: Tuning) -> Table:
         Cost("bound", servo.bound.cost),
     ]
     gains = ", ".join(law.gain_text(name, partial(significant, digits=3), data.arm) for name in (ANGLE_GAIN, RATE_GAIN))
-    caption = prose("tuner_servo", gains=gains, guard=servo.training.guard, moment=MOMENT_GAIN,
+    caption = prose("tuner_servo", gains=gains, guard=servo.training.guard,
                     error=None if error is None else off_target(data, error))  # fmt: skip
     return table(rows, stem="tune-servo", title="Cost of the slew with the angle regulated", caption=caption)
 
@@ -193,7 +193,7 @@ def tuner_section(case: Case) -> PageSection:
             data = tuner_numbers(case.arm, case.chain)
             if math.isfinite(data.tuning.without.cost):
                 return section_of(data)
-            reason = prose("tuner_unstable", rate=RATE_GAIN)
+            reason = prose("tuner_unstable")
         except CertificationError as error:
             reason = prose("tuner_unproven", error=error)
     return PageSection(anchor="tune", title=TUNER_TITLE, answer=reason)
@@ -202,7 +202,7 @@ def tuner_section(case: Case) -> PageSection:
 def section_of(data: TunerNumbers) -> PageSection:
     """The section on numbers that were computed already."""
     guard, n = data.tuning.training.guard.sentence, data.tuning.trial.n
-    words = [prose("tuner", rate=RATE_GAIN, angle=ANGLE_GAIN, guard=guard)]
+    words = [prose("tuner", guard=guard)]
     if limits := limits_of(data):
         words.append(f"A trial has {n:,} samples. {'. '.join(limits)}.")
     servo = [] if data.servo is None else [servo_table(data, data.servo)]
@@ -258,8 +258,8 @@ def _gain_picture(data: TunerNumbers) -> Picture:
         stem="tune-gain",
         title="The tuner's path and its guard on the map",
         caption=prose("tuner_gain", guard=tuning.training.guard, low=float(result.K.min()), high=float(result.K.max()),
-                      rate=tuning.constant.gain_text(RATE_GAIN, plain), moment=MOMENT_GAIN, seed=tuning.plan.seed),
-        alt=f"Map of {' and '.join(PLANE)} with the tuner's guard, and its gain over time.",
+                      gain=tuning.constant.gain_text(RATE_GAIN, plain), seed=tuning.plan.seed),
+        alt="Map of both gains with the tuner's guard, and its gain over time.",
         figure=draw_gain(tuning, *plane),
         data=Table(stem="tune-gain-data", title="The tuner's gain", columns=columns),
     )  # fmt: skip
@@ -268,7 +268,7 @@ def _gain_picture(data: TunerNumbers) -> Picture:
 def slew_pictures(data: TunerNumbers) -> Iterator[Picture]:
     """The slew without and with the tuner: through ideal converters, then with those and the delay of its chain."""
     chain = chain_words(data.arm, next(iter(data.coarse.values())).chain)
-    coarse = prose("tuner_dsp", chain=chain, angle=ANGLE_GAIN, runs=data.coarse, piece=piece_of_bands(data.coarse))
+    coarse = prose("tuner_dsp", chain=chain, runs=data.coarse, piece=piece_of_bands(data.coarse))
     for stem, title, runs, how, caption in (
         ("tune-slew", "The slew without and with the tuner", data.slews, "ideal converters",
          prose("tuner_slew", piece=piece_of_bands(data.slews))),
@@ -295,7 +295,7 @@ def _curves_picture(data: TunerNumbers) -> Picture:
     return Picture(
         stem="tune-curves",
         title="Learning",
-        caption=prose("tuner_curves", seeds=seeds, curves=curves, moment=MOMENT_GAIN),
+        caption=prose("tuner_curves", seeds=seeds, curves=curves),
         alt=f"Learning curves of {how_many(seeds, 'seed')}, the best constant gain and the bound.",
         figure=draw_curves(curves, data.tuning),
         data=Table(stem="tune-curves-data", title="Learning curves", columns=tuple(columns)),
@@ -305,7 +305,7 @@ def _curves_picture(data: TunerNumbers) -> Picture:
 def cost_tables(data: TunerNumbers) -> list[Table]:
     """Cost of a slew and root moment after it: a row a condition, a column a controller, and where the guard holds."""
     proven = Column("guard_proven", "guard proven", of=["yes" if row.proven else "no" for row in data.rows])
-    caption = prose("tuner_comparison", data=data, moment=MOMENT_GAIN)
+    caption = prose("tuner_comparison", data=data)
     after = prose("tuner_residual", is_unstable=any(row.tuner.residual is None for row in data.rows))
     return [
         Table(stem="tune-comparison", title="Cost of the slew, compared with baselines", caption=caption,
