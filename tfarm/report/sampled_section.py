@@ -61,7 +61,8 @@ def sampled_section(case: Case) -> PageSection:
     if not arm.has_rigid_mode:
         words.append(f"{what_holds(arm)}: no slew is simulated.")
     elif any(each.given.measured is None for each in case.controllers):
-        without = [] if case.laws else [without_moment(arm, first.loop.gains)]
+        bare = [] if case.laws else [first.loop.gains.having(MOMENT_GAIN, 0.0)]
+        without = [on_hub(arm, gains, f"{MOMENT_GAIN} = 0", "without") for gains in bare]
         slewed, refused = slew(case, [*without, *case.controllers])
         blocks += slewed
         words += refused
@@ -74,11 +75,6 @@ def sampled_section(case: Case) -> PageSection:
         words=words,
         blocks=[block for block in blocks if not isinstance(block, Table) or block.columns],
     )
-
-
-def without_moment(arm: Arm, gains: HubFeedback) -> Controller:
-    """The gains without the feedback of the root moment."""
-    return on_hub(arm, gains.having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
 
 
 # ------------------------------------------------------------ verdict

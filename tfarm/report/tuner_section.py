@@ -95,11 +95,6 @@ def curve_seeds(samples: int) -> int:
     return min(CURVE_SEEDS, max(1, CURVE_SAMPLES // samples))
 
 
-def trial_samples(arm: Arm, chain: Chain) -> int:
-    """Number of samples of each trial."""
-    return 1 + round(usual_plan(arm, chain).duration / chain.sampling.period)
-
-
 def _servo_tuning(arm: Arm, plan: Plan, chain: Chain) -> Tuning | None:
     """The same tuning with an angle loop a twentieth as fast as the first mode, or slower at a long period."""
     speed = min(SERVO_SPEED * first_frequency(arm), SERVO_TURN / chain.sampling.period)
@@ -227,7 +222,7 @@ def why_not(arm: Arm, chain: Chain) -> str:
         return f"{what_holds(arm)}: it makes no slew, and there is nothing for the tuner to learn from."
     if arm.has_elastic_link:
         return prose("tuner_undamped", arm=arm)
-    samples = trial_samples(arm, chain)
+    samples = 1 + round(usual_plan(arm, chain).duration / chain.sampling.period)  # of each trial
     return "" if samples <= LONGEST_TRIAL else prose("tuner_too_long", samples=samples, period=chain.sampling.period)
 
 

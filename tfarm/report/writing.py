@@ -254,22 +254,15 @@ def _write_pages(
     These lead to each other, and to what is in the `earlier` folder of the arm.
     """
     (folder / "arm.toml").write_text(file_of(case), encoding="utf-8", newline="")
+    title, compared = kept_comparison(earlier.parent)
     for question in only or (None,):
         anchors = {piece.anchor for piece in pieces_of(case) if question and piece.is_on(question)}
         wanted = [each for each in sections if question is None or each.section.anchor in anchors]
         live = (folder / LIVE_PAGE).is_file()
-        others = [
-            *other_pages(earlier, only or ("index",), question or "index"),
-            *_compared(earlier.parent, case.arm),
-        ]
+        others = list(other_pages(earlier, only or ("index",), question or "index"))
+        others += [(f"../{COMPARISON_PAGE}", title)] if case.arm.name in compared else []
         page = arm_page(case, wanted, question, trust=f"../{trust}" if trust else "", live=live, others=others)
         (folder / f"{question or 'index'}.html").write_text(page, encoding="utf-8", newline="")
-
-
-def _compared(out: Path, arm: Arm) -> list[tuple[str, str]]:
-    """(file, title) of the comparison in the folder of reports, as seen from an arm's page, if it is one of the arm."""
-    title, arms = kept_comparison(out)
-    return [(f"../{COMPARISON_PAGE}", title)] if arm.name in arms else []
 
 
 def move_into(made: Path, folder: Path) -> None:
