@@ -29,7 +29,7 @@ from tfarm.plots.motion import slew as slew_plot
 from tfarm.plots.regions import StableRegions, draw_overlay, regions_table, stable_regions
 from tfarm.plots.roots import draw_sampled_loci
 from tfarm.plots.style import safe
-from tfarm.report.cases import Case, Controller, on_hub, what_holds
+from tfarm.report.cases import Case, Controller, margins_of, on_hub, what_holds
 from tfarm.report.sections import Fact, PageSection, Picture, prose
 from tfarm.schema import Quantity, across, quantities, table, text, with_unit
 
@@ -49,7 +49,7 @@ def sampled_section(case: Case) -> PageSection:
     words, blocks = [chain_words(arm, chain)], list[Picture | Table]()
     first = found[0][1]
     if not case.laws:
-        blocks.append(overlay_picture(stable_regions(arm, first.loop.gains, chain)))
+        blocks.append(overlay_picture(stable_regions(arm, first.loop.gains, chain), first))
     numbers = {each.title: it for each, it in found}
     blocks.append(across(numbers, keys=[each.key for each, _ in found], stem="sampled",
                          title="Verdict and margins of the sampled loop", caption=prose("sampled")))  # fmt: skip
@@ -175,13 +175,25 @@ def periods_table(arm: Arm, gains: HubFeedback, chain: Chain) -> Table:
 # ------------------------------------------------------------ pictures of gains
 
 
-def overlay_picture(regions: StableRegions) -> Picture:
-    """Stability regions of the continuous and of the sampled loop in one plane."""
+def overlay_picture(regions: StableRegions, found: Analysis) -> Picture:
+    """Stability regions of the continuous and of the sampled loop in one plane, with the intervals of K2 below it."""
     arm, (low, *_) = regions.continuous.arm, regions.continuous.axes[0]
+    gains = found.loop.gains
+    rows = [row for row in margins_of(arm, gains).stability_intervals if row.name == MOMENT_GAIN]
+    continuous = text([each for row in rows for each in row.intervals], 4) or "no value"
+    sampled_at = text(list(found.shown[MOMENT_GAIN]), 4) or "no value"
     return Picture(
         stem="sampled-overlay",
         title="Stability regions, continuous and sampled",
-        caption=prose("overlay", arm=arm, low=float(low), nested=len(regions.sampled) > 1),
+        caption=prose(
+            "overlay",
+            arm=arm,
+            low=float(low),
+            nested=len(regions.sampled) > 1,
+            continuous=continuous,
+            sampled=sampled_at,
+            at=gains.gain_text(RATE_GAIN, plain, arm),
+        ),
         alt="Map of both gains: stability regions of the continuous and of the sampled loop.",
         figure=draw_overlay(regions),
         data=regions_table(regions, "sampled-overlay-data"),
