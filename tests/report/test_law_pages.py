@@ -82,16 +82,6 @@ def test_radii_on_the_page_are_those_of_the_command_at_each_delay(capsys, file, 
     assert "Tustin" in law_section(Case(LAB, Chain(), given)).words[0]
 
 
-def test_gains_that_are_typed_have_their_windows_and_their_proof():
-    gains = HubFeedback(K1=0.5, K2=0.3, Kp=2.0)
-    section, found = margins_section(Case(BARE, Chain(), (GivenLaw(gains),))), tfarm.margins(BARE, gains)
-    shown = table(section, "margins")
-    values = dict(zip(shown["quantity"], shown["law"], strict=True))
-    assert values["margins in the frequency range: delay margin"][0] == found.in_band.delay
-    assert table(section, "law-windows")["value"] == [0.5, 0.3, 2.0]
-    assert values["Lyapunov function of the paper: stability proven"]
-
-
 def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
     law = Law({"hub_angle": -5.0, "hub_rate": ([1.0], [0.01, 1.0])}, name="backwards")
     section = margins_section(Case(LAB, Chain(), (GivenLaw(law),)))

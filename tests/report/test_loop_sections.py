@@ -1,6 +1,5 @@
 """The loop on an arm's page: what is drawn is what the loop room computes, by another road where there is one."""
 
-import json
 import math
 from dataclasses import replace
 
@@ -35,7 +34,6 @@ from tfarm.report.gains_section import beyond_table, draw_map_of_arm, map_data, 
 from tfarm.report.loop_section import margin_table, margins_section, verdict_fact
 from tfarm.report.sections import prose
 from tfarm.spectrum.table import PAPER_GAINS, default_gains
-from tfarm.tables.files import as_json
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 EPS = np.finfo(float).eps
@@ -135,19 +133,6 @@ def test_the_contours_are_the_damping_of_the_poles(lab):
         poles = poles[(poles.imag > 0) & (poles.imag < lab.band)]
         expected = (-poles.real / abs(poles)).min()
         assert lab.damping[row, column] == pytest.approx(expected, rel=1e-3, abs=0)  # of a model of eight modes
-
-
-def test_the_data_behind_the_map_is_what_is_drawn(lab):
-    """The files hold the grid, its counts and damping, then the edge with its frequencies."""
-    rows = json.loads(as_json(map_data(lab)))["rows"]
-    grid = [row for row in rows if row["what"] == "grid"]
-    edge = [row for row in rows if row["what"] == "boundary"]
-    assert len(grid) == lab.damping.size
-    assert len(edge) == int((~np.isnan(lab.edge[:, 0])).sum())
-    at = grid[7 * lab.axes[0].size + 31]
-    assert (at["K1_N_m_s_rad"], at["K2"]) == (lab.axes[0][31], lab.axes[1][7])
-    assert at["unstable_poles"] == lab.counts[7, 31]
-    assert at["least_damping_ratio"] == lab.damping[7, 31]
 
 
 def test_the_ranges_show_what_there_is():
