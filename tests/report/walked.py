@@ -129,7 +129,7 @@ def numbers_of(answer):
     if isinstance(answer, int | float):
         return [float(answer)] * math.isfinite(answer)
     if isinstance(answer, str):
-        return [each.value for each in shown_in(answer)]
+        return [each.value for each in shown_in(re.sub(r"(?<=\d)i\b", " i", answer))]
     if isinstance(answer, dict):
         return [number for each in answer.values() for number in numbers_of(each)]
     parts = [numbers_of(each) for each in answer]
