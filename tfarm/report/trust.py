@@ -268,10 +268,13 @@ AUDIT_COLUMNS = (
     "equation", "verdict", "printed", "corrected", "residual_printed", "residual_corrected", "evidence",
 )  # fmt: skip
 VERDICT_MARKS = {"ok": ("✓", "right as printed"), "corrected": ("≠", "corrected"), "undecided": ("?", "undecided")}
-GREEK_LETTERS = {
-    "rho": "ρ", "kappa": "κ", "theta": "θ", "phi": "φ", "psi": "ψ", "lambda": "λ", "eta": "η", "alpha": "α",
-    "nu": "ν", "Theta": "Θ", "Phi": "Φ", "Psi": "Ψ", "Delta": "Δ",
-}  # fmt: skip
+GREEK_LETTERS = dict(
+    zip(
+        ("rho", "kappa", "theta", "phi", "psi", "lambda", "eta", "alpha", "nu", "Theta", "Phi", "Psi", "Delta"),
+        "ρκθφψληανΘΦΨΔ",
+        strict=True,
+    )
+)
 MathElement = ElementTree.Element
 STATEMENT_END = re.compile(r"(?<=[,;])\\quad\s*")
 LEAVES = ("mi", "mo", "mn", "mtext")

@@ -60,9 +60,9 @@ def _tooltip(meaning: str) -> Markup:
 
 def with_symbols(text: str) -> Markup:
     """A text with Greek letters, true minus signs, subscripts and exponents: I_h becomes I<sub>h</sub>, m^2 m²."""
+    text = COMPLEX.sub(lambda part: f"\u00a0{part[1].replace('-', '−')}\u00a0{part[2]}\u00a0i", text)
     for written, shown in TYPESET.items():
         text = text.replace(written, shown)
-    text = COMPLEX.sub(lambda part: f"\u00a0{part[1].replace('-', '−')}\u00a0{part[2]}\u00a0i", text)
     plain = powers(unit(str(escape(MINUS.sub("−", text)))))
     plain = INFINITE.sub("∞", SIGN.sub("−", plain))
     return Markup(re.sub(r"\b([A-Za-zθ])_([a-z0-9])\b", r"\1<sub>\2</sub>", plain))
