@@ -103,31 +103,36 @@ def task_name(case: Case, piece: Piece) -> str:
 
 
 def tasks_of(case: Case, folder: Path, pieces: Sequence[Piece], *, is_whole: bool) -> Iterator[Task]:
-    """The tasks of one arm: its sections, its card and proof, and of a full report its live page."""
+    """The tasks of one arm: its sections, its card and proof, and of a full report its live page.
+
+    Proof and live page are made by the process of the section that has computed most of them: the proof certifies the
+    modes that are listed, the live page has the regions of the map.
+    """
     of = f"{case.arm.name}: "
-    proof = partial(save_proof, case.arm, folder, case.chain) if is_whole or not case.laws else None
+    more: dict[str, Task] = {}
+    if is_whole or not case.laws:
+        more["modes"] = Task(f"{of}proof", partial(save_proof, case.arm, folder, case.chain))
+    if is_whole and is_live(case):
+        more["margins-map"] = Task(f"{of}live loop", partial(save_live, case, folder))
     for name in dict.fromkeys(task_name(case, piece) for piece in pieces):
         parts = [piece for piece in pieces if task_name(case, piece) == name]
         makers = [(piece.name, piece.anchor, piece.make) for piece in parts]
-        also = proof if any(piece.anchor == "modes" for piece in parts) else None  # which certifies the same modes
+        also = [more.pop(piece.anchor).call for piece in parts if piece.anchor in more]
         yield Task(name, partial(make_sections, makers, case, folder, also), sum(piece.seconds for piece in parts))
-    if is_whole and is_live(case):
-        yield Task(f"{of}live loop", partial(save_live, case, folder))
     yield Task(f"{of}card", partial(save_card, case, folder))
-    if proof is not None and all(piece.anchor != "modes" for piece in pieces):
-        yield Task(f"{of}proof", proof)
+    yield from more.values()
 
 
 def make_sections(
-    makers: Sequence[tuple[str, str, Any]], case: Case, folder: Path, also: Callable[[], None] | None = None
+    makers: Sequence[tuple[str, str, Any]], case: Case, folder: Path, also: Sequence[Callable[[], None]]
 ) -> dict[str, SavedSection]:
     """Sections by anchor, made one after the other, and what is `also` made in the same process.
 
     Each section is given by its name, its anchor and how to make it of a case.
     """
     sections = {anchor: make_section(name, anchor, make, case, folder) for name, anchor, make in makers}
-    if also is not None:
-        also()
+    for call in also:
+        call()
     return sections
 
 
