@@ -92,7 +92,7 @@ def _of_gains(case: Case) -> bool:
 
 PIECES = (
     Piece("fit to measurements", "fit", fit_section, lambda case: case.fit),
-    Piece("stability region of both gains", "margins-map", map_section, _of_gains, seconds=2.0, task=LOOP_TASK),
+    Piece("stability region of both gains", "margins-map", map_section, _of_gains, seconds=5.0, task=LOOP_TASK),
     Piece("the arm", "arm", arm_section, is_also_on=lambda page: True),
     Piece("the paper's values", "paper", paper_section, lambda case: is_from_paper(case.arm)),
     Piece("response of the root moment", "bode-root-moment", partial(bode_section, output="root_moment"),
@@ -104,7 +104,7 @@ PIECES = (
     Piece("stability margins", "margins", margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
     Piece("root loci", "locus", locus_section, _in_s, "Root loci", seconds=7.0, task=LOOP_TASK),
     Piece("Nyquist plot", "margins-nyquist", nyquist_section, _in_s, task=LOOP_TASK),
-    Piece("sampled loop", "sampled", sampled_section, lambda case: case.has_loop, "The sampled loop", seconds=8.0),
+    Piece("sampled loop", "sampled", sampled_section, lambda case: case.has_loop, "The sampled loop", seconds=9.0),
     Piece("controllers", "law", law_section, lambda case: case.laws and not case.arm.is_locked,
            is_also_on=LOOP_PAGES.__contains__),
     Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", seconds=10.0),
