@@ -3,8 +3,6 @@
 import json
 import math
 from dataclasses import replace
-from functools import cache
-from importlib import import_module
 from pathlib import Path
 
 import control
@@ -14,6 +12,7 @@ import pytest
 import tfarm
 from tests.hostile import check_page
 from tests.report.coarse import plain_cards
+from tests.report.written import blocks_of, values_of
 from tests.shared import sized
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
@@ -64,29 +63,10 @@ def given(file):
 
 
 def table(section, stem):
-    (found,) = (block for block in section.blocks if block.stem == stem)
-    return {column.key: list(column.values) for column in found.columns}
+    return values_of(blocks_of(section)[stem])
 
 
 # ------------------------------------------------------------ numbers
-
-
-def test_margins_on_the_page_are_those_of_the_command(capsys, file, given, monkeypatch):
-    room = import_module("tfarm.loop.margins")
-    monkeypatch.setattr(room, "windows_of", cache(room.windows_of))  # of the same loop both times
-    section, found = margins_section(Case(LAB, Chain(), given)), answer(capsys, "margins", LAB.name, "--law", str(file))
-    shown = table(section, "margins")
-    values = dict(zip(shown["quantity"], shown["law"], strict=True))
-    assert (values["stability"], values["unstable poles"]) == (found["verdict"], found["unstable_roots"])
-    assert values["delay margin, exact"] == found["delay_margin_s"]
-    gain = table(section, "law-gain-crossovers")
-    assert gain["omega_rad_s"] == [row["omega_rad_s"] for row in found["gain_crossovers"]]
-    assert min(gain["phase_margin_deg"]) < 0
-    assert table(section, "law-phase-crossovers")["factor"] == [row["factor"] for row in found["phase_crossovers"]]
-    spilled = answer(capsys, "spill", LAB.name, "--law", str(file), "--modes", "12")
-    assert table(section, "law-spill")["unstable"] == [row["unstable"] for row in spilled["models"]]
-    assert "small gain" in found["beyond"]
-    assert "small gain" in values["beyond the range"]
 
 
 @pytest.mark.parametrize("rows", sized([1], [0, 1, 2]), ids=str)
@@ -102,29 +82,12 @@ def test_radii_on_the_page_are_those_of_the_command_at_each_delay(capsys, file, 
     assert "Tustin" in law_section(Case(LAB, Chain(), given)).words[0]
 
 
-def test_gains_that_are_typed_have_their_windows_and_their_proof():
-    gains = HubFeedback(K1=0.5, K2=0.3, Kp=2.0)
-    section, found = margins_section(Case(BARE, Chain(), (GivenLaw(gains),))), tfarm.margins(BARE, gains)
-    shown = table(section, "margins")
-    values = dict(zip(shown["quantity"], shown["law"], strict=True))
-    assert values["margins in the frequency range: delay margin"][0] == found.in_band.delay
-    assert table(section, "law-windows")["value"] == [0.5, 0.3, 2.0]
-    assert values["Lyapunov function of the paper: stability proven"]
-
-
 def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
     law = Law({"hub_angle": -5.0, "hub_rate": ([1.0], [0.01, 1.0])}, name="backwards")
     section = margins_section(Case(LAB, Chain(), (GivenLaw(law),)))
     assert section.facts[0].value == "UNSTABLE"
     assert {block.stem for block in section.blocks} == {"law-bode", "margins", "law-spill", "law-windows"}
     assert "interval" not in table(section, "law-windows")
-
-
-def test_every_entry_is_in_the_table_with_every_digit(given):
-    (entries,) = law_section(Case(LAB, Chain(), given)).blocks
-    (each,) = Case(LAB, Chain(), given).controllers
-    for row, part in zip(entries, each.law.parts, strict=True):
-        assert (tuple(row["numerator"]), tuple(row["denominator"])) == (part.block.num, part.block.den)
 
 
 # ------------------------------------------------------------ pages
@@ -244,15 +207,15 @@ def test_a_measured_run_is_put_in_the_place_of_the_slew():
     section = sampled_section(Case(tfarm.load(DATA / "rig.toml"), load_chain(DATA / "rig.toml"), laws))
     stems = [block.stem for block in section.blocks]
     assert stems == [
-        "sampled", "sampled-numbers-law-1", "sampled-numbers-law-2", "sampled-delays", "sampled-modes-law-1",
-        "sampled-modes-law-2", "sampled-measured", "sampled-overshoot",
+        "sampled", "sampled-delays", "sampled-modes-law-1", "sampled-modes-law-2", "sampled-measured",
+        "sampled-overshoot",
     ]  # fmt: skip
     shown = table(section, "sampled-delays")
     assert shown["verdict"] == ["unstable"] * 3 + ["stable"] * 3
     assert shown["further_delay_ms"] == [0.0, 5.0, 10.0] * 2
-    verdicts = [fact.value for fact in section.facts if fact.note]
+    verdicts = [fact.value for fact in section.facts if fact.value.isupper()]
     assert verdicts == ["UNSTABLE", "STABLE"]
-    assert "MIT" in section.blocks[6].caption
+    assert "MIT" in section.blocks[4].caption
 
 
 def _with_run(name):

@@ -106,7 +106,7 @@ def test_a_slip_of_units_is_named_on_the_page():
     link = ARMS["boom"].link
     slip = replace(ARMS["boom"], link=replace(link, density=1.6, length=800.0))
     words = arm_section(Case(slip, Chain())).words
-    assert words[0].startswith("Check the units: ")
+    assert words[0].startswith("Check the units, ")
     assert all(key in words[0] for key in ("link.density = 1.6", "link.length = 800.0"))
     for arm in ARMS.values():
         assert len(arm_section(Case(arm, Chain())).words) == (0 if arm.assumptions else 1) + bool(implausible(arm))
@@ -222,7 +222,7 @@ def test_a_free_pin_has_its_rate_loop(monkeypatch):
     assert (stable["K2"], [len(stable[name]) for name in ("K1", "Kp")]) == ([], [1, 1])
     pieces = pieces_of(Case(arm, Chain()))
     names = [each.name for each in pieces if any(map(each.is_on, ("margins", "locus", "sampled", "tune")))]
-    assert names == ["the arm", "no loop", "margins", "root loci", "Nyquist"]
+    assert names == ["the arm", "the loop", "stability margins", "root loci", "Nyquist plot"]
 
 
 def test_a_free_pin_has_its_nyquist_plot():
@@ -262,3 +262,16 @@ def test_a_margin_without_end_has_no_frequency(monkeypatch):
 def test_what_the_paper_leaves_open_is_what_the_arm_has(hub, words):
     arm = replace(tfarm.load("sasaki2012"), hub=tfarm.Hub(inertia=hub))
     assert words in assumptions_section(Case(arm, Chain())).words[0]
+
+
+def test_frequencies_over_the_hub_inertia_are_those_of_arms_that_have_it():
+    """A column a mode, its heading that of the curve in the picture; the arm's own value once."""
+    arm = tfarm.load("sasaki2012-lab")
+    picture, table = assumptions_section(Case(arm, Chain())).blocks[2:]
+    assert sum(column(table, "is_own").values) == 1
+    for inertia, omega in zip(
+        *(column(table, key).values for key in ("hub_inertia_kg_m2", "mode_2_rad_s")), strict=True
+    ):
+        assert omega == tfarm.modes(arm.having(hub_inertia=inertia), 2).natural_frequency[-1]
+    (curve,) = (line for line in picture.figure.axes[0].lines if line.get_label() == "mode 2")
+    assert list(curve.get_ydata()) == list(column(table, "mode_2_rad_s").values)

@@ -12,7 +12,7 @@ SHARED = {"clipped", "bands", "extrema", "beyond_left"}  # which other texts hav
 def test_every_text_has_one_place_that_asks_for_it():
     code = "\n".join(file.read_text(encoding="utf-8") for file in TEMPLATES.parent.glob("*.py"))
     asked = set(re.findall(r'prose\(\s*["\'](\w+)', code)) | {"measured_modes", "measured_required"}
-    asked |= {f"trust_{name}" for name in ("proofs", "accuracy", "published")}
+    asked |= {f"trust_{name}" for name in ("proofs", "accuracy", "published")} | {"gain_crossovers", "phase_crossovers"}
     assert asked == NAMES - SHARED
     assert all(TEXTS.count(f"{name}(") > 1 for name in SHARED)
 

@@ -19,11 +19,11 @@ from tfarm.report import write, writing
 from tfarm.report.modes_section import how_proven, modal_table, rounds_to
 from tfarm.report.trust import (
     Evidence,
-    boxes_tables,
+    proof_tables,
     prove,
+    published_tables,
     save_proof,
     shared_digits,
-    sources_table,
     write_trust,
     written_proofs,
 )
@@ -205,7 +205,7 @@ def test_every_source_of_a_number_is_named():
     """Tables of arms and of rigs: the numbers of the sources are all numbers that are compared."""
     first = [(source.key, source.cases[0]) for source in published.ALL]
     rows = [row for key, case in first for row in published.case_rows(key, case)]
-    table = sources_table(published.Validation(tuple(rows)))
+    table = published_tables(published.Validation(tuple(rows)))[0]
     columns = {column.key: column for column in table.columns}
     assert len(columns["numbers"].values) == len(published.ALL)
     assert sum(columns["numbers"].values) == len(rows)
@@ -257,9 +257,9 @@ def test_damped_modes_and_closed_loop_poles_are_counted_and_kept(tmp_path, monke
     monkeypatch.setattr(trust_proofs, "prove", lambda arm, chain: {(lab, None): proof}[arm, chain])
     save_proof(lab, tmp_path / lab.name)
     assert written_proofs(tmp_path)[0].boxes == proof.boxes
-    (table,) = boxes_tables([proof])
+    table = proof_tables([proof])[2]
     assert table.columns[1].values[0] == "damped modes, C = 0.0001 s"
-    (small,) = boxes_tables([replace(proof, boxes=(replace(loop, what="closed loop, K1 = 1.66e-05, K2 = 0.3"),))])
+    small = proof_tables([replace(proof, boxes=(replace(loop, what="closed loop, K1 = 1.66e-05, K2 = 0.3"),))])[2]
     assert small.columns[1].cells[0] == "closed loop, K1 = 1.66e-05, K2 = 0.3"
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from tfarm.audit import claims
 from tfarm.audit.rows import tex
-from tfarm.report.trust import anchor, compared_formulas, formulas, in_letters
+from tfarm.report.trust import anchor, compared_formulas, in_letters
 from tfarm.schema.html import GREEK
 
 CLAIMS = claims()
@@ -17,6 +17,11 @@ WITH_DW = {"(21)", "(22)"}  # their plain text says dw for the increment
 
 def leaves(markup):
     return [leaf for line in markup for leaf in ElementTree.fromstring(str(line)).iter() if leaf.text]
+
+
+def formulas(text):
+    """A formula as MathML, a line each."""
+    return compared_formulas(text, text)[0]
 
 
 def changed(markup):

@@ -16,13 +16,14 @@ import tfarm
 from tests.hostile import LONG, NAME, PRINTED, check_drawing, check_page
 from tests.report.coarse import coarsen, plain_cards
 from tests.report.full import ARM
+from tests.report.readme import PICTURES, write_pictures
 from tests.report.written import HELD, Links, files_of, ids_of, links_of, validated
-from tfarm.digits import plain
 from tfarm.dsp import Chain
-from tfarm.report import readme_pictures, write, writing
+from tfarm.report import write, writing
 from tfarm.report.cases import Case
-from tfarm.report.page import PIECES, first_sentence, index_page, pieces_of, written_cards
+from tfarm.report.page import PIECES, index_page, pieces_of, written_cards
 from tfarm.report.trust import Evidence, write_trust, written_proofs
+from tfarm.schema.html import with_symbols
 from tfarm.spectrum.table import default_gains
 
 # ------------------------------------------------------------ the same bytes
@@ -67,8 +68,8 @@ def test_two_processes_write_what_one_does(pages, tmp_path):
     assert {"other/modes.html", "other/pictures/card.svg"} <= set(Links(tmp_path / "index.html").targets)
     dones = [done for done, _, _ in told]
     assert dones == sorted(dones)
-    assert told[-1] == (told[0][1], told[0][1], "")
-    running = [names.split(", ") for _, _, names in told[1:-1]]
+    assert told[-1] == (told[0][1], told[0][1], "pages")
+    running = [names.split(", ") for _, _, names in told[:-1]]
     assert max(map(len, running)) == 2
     assert {name for names in running for name in names} >= {f"{NAME}: modes", "other: modes", "other: card"}
 
@@ -180,28 +181,12 @@ def test_the_pages_of_an_arm_lead_to_each_other(tmp_path, monkeypatch):
 
 
 def test_the_index_compares_the_arms(pages):
-    """The cells are those of `tfarm margins`: verdict and windows of the default gains."""
-    law = default_gains(ARM)
-    windows = tfarm.margins(ARM, law).windows
+    """The cells are those of `tfarm margins`: verdict and stability intervals of the default gains, with units."""
+    rows = {row.name: row for row in tfarm.margins(ARM, default_gains(ARM)).stability_intervals}
     table = (pages / "index.html").read_text(encoding="utf-8").partition('id="compared"')[2].partition("</section>")[0]
     assert '<span class="verdict ok">stable</span>' in table
-    for name in ("K1", "K2"):
-        ends = [f"{plain(end, 5)}{'*' * (windows[name].end(end) == 'search bound')}" for end in windows[name].around]
-        assert f">{' … '.join(ends)}</td>" in table
-
-
-@pytest.mark.parametrize(
-    ("text", "first"),
-    [
-        ("A little. A constant K2 of 0.336 takes 65 % off the cost. And more.",
-         "A little. A constant K2 of 0.336 takes 65 % off the cost."),
-        ("One sentence alone", "One sentence alone"),
-        ("Stable up to 12.5 rad/s, and no further than that at all (see below). Next.",
-         "Stable up to 12.5 rad/s, and no further than that at all (see below)."),
-    ],
-)  # fmt: skip
-def test_a_short_answer_ends_where_a_sentence_does(text, first):
-    assert first_sentence(text) == first
+    for name, unit in (("K1", " N m s/rad"), ("K2", "")):
+        assert f">{with_symbols(rows[name].interval.as_text(5) + unit)}</td>" in table
 
 
 # ------------------------------------------------------------ odd arms, the README
@@ -226,10 +211,8 @@ def test_an_arm_that_cannot_turn_nor_move_its_tip_is_reported_on_too(tmp_path, m
 
 def test_the_pictures_of_the_readme(tmp_path, monkeypatch):
     coarsen(monkeypatch.setattr)
-    paths = readme_pictures(tmp_path)
-    assert [path.name for path in paths] == ["bode-root-moment.png", "gains.png", "mode-shapes.png"]
-    kept = Path(__file__).parents[2] / "reports" / "pictures"
-    assert {path.name for path in kept.iterdir()} == {path.name for path in paths}
+    write_pictures(tmp_path)
+    assert {path.name for path in PICTURES.iterdir()} == set(files_of(tmp_path))
 
 
 POOL = """

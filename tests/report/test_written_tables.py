@@ -63,34 +63,6 @@ def test_the_modal_table_is_the_api_to_the_digits_that_hold_everywhere(pages):
         assert record["nodes_m"] == pytest.approx(nodes, rel=0, abs=1e-9 * ARM.link.length)
 
 
-def test_the_theories_and_sensitivities_are_the_api_too(pages):
-    _, records = tables(pages, "theories")
-    for theory in ("shear", "rayleigh", "euler-bernoulli"):
-        key = theory.replace("-", "_")
-        omega = tfarm.modes(ARM, count=10, theory=theory).natural_frequency[1:]
-        assert [r[f"{key}_rad_s"] for r in records] == omega.tolist()
-        percent = [100 * (r[f"{key}_rad_s"] / r["timoshenko_rad_s"] - 1) for r in records]
-        assert [r[f"{key}_difference_percent"] for r in records] == pytest.approx(percent, rel=1e-12)
-    _, records = tables(pages, "sensitivities")
-    sensitivity = tfarm.modes(ARM, count=10).sensitivity
-    named = {r["parameter"].replace("'", "").replace(" ", "_").lower(): r for r in records}
-    assert set(named) == set(sensitivity)
-    for name, record in named.items():
-        assert [record[f"mode_{i}"] for i in range(1, 11)] == pytest.approx(sensitivity[name][1:], rel=0, abs=5.1e-10)
-
-
-def test_the_responses_are_the_api_too(pages):
-    for output in ("root_moment", "tip_displacement"):
-        file = pages / NAME / "data" / f"bode-{output.replace('_', '-')}-data.csv"
-        records = list(csv.DictReader(file.read_text(encoding="utf-8").splitlines()))
-        s = [1j * float(r["omega_rad_s"]) for r in records]
-        values = tfarm.transfer(ARM, output)(s)
-        assert [float(r["re_value"]) for r in records] == values.real.tolist()
-        assert [float(r["im_value"]) for r in records] == values.imag.tolist()
-    _, roots = tables(pages, "bode-root-moment-roots")
-    assert {r["magnitude"] for r in roots if r["kind"] == "pole"} == {"inf"}
-
-
 def test_parameters_that_change_nothing_are_left_out_with_a_word():
     from tfarm.report.modes_section import sensitivity_table
 

@@ -129,7 +129,7 @@ def numbers_of(answer):
     if isinstance(answer, int | float):
         return [float(answer)] * math.isfinite(answer)
     if isinstance(answer, str):
-        return [each.value for each in shown_in(answer)]
+        return [each.value for each in shown_in(re.sub(r"(?<=\d)i\b", " i", answer))]
     if isinstance(answer, dict):
         return [number for each in answer.values() for number in numbers_of(each)]
     parts = [numbers_of(each) for each in answer]
@@ -150,7 +150,8 @@ def untraced_cells(sheet, rows, law):
         for key, cell in zip(sheet.keys, cells, strict=True):
             values = numbers_of(row[key]) if key in row else numbers_of(list(row.values()))
             values += law if ", not " in cell else []
-            shown = shown_in(re.sub(r"\(±[^)]*\)", "", cell))  # without the error that rounding leaves
+            bare = re.sub(r"\(±[^)]*\)", "", cell)  # without the error that rounding leaves
+            shown = shown_in(re.sub(r"− (?=\S+(?: × \S+)? i\b)", "−", bare))  # of an imaginary part
             left += [(key, cell, each.value) for each in shown if not each.is_rounding_of(values)]
     return left
 

@@ -15,6 +15,16 @@ HELD = replace(ARM, hub=tfarm.Hub(inertia=math.inf))  # no loop: its proofs are 
 validated = cache(lambda: tuple(validate()))  # as this process has it
 
 
+def blocks_of(section):
+    """Pictures and tables of a section by their stems."""
+    return {block.stem: block for block in section.blocks}
+
+
+def values_of(table):
+    """The values of a table by the keys of its columns."""
+    return {column.key: list(column.values) for column in table.columns}
+
+
 def files_of(folder):
     return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 

@@ -124,6 +124,10 @@ def test_a_report_s_table_has_two_files(table, tmp_path):
 @pytest.mark.parametrize(
     ("text", "shown"),
     [
+        (
+            "-3.59743-75.9066i, 1e-07+5.3e+06i",
+            "−3.59743\u00a0−\u00a075.9066\u00a0i, 1 × 10⁻⁷\u00a0+\u00a05.3 × 10⁶\u00a0i",
+        ),
         ("I = 1.8e-9 m^4, E = 2.07e11 Pa.", "I = 1.8 × 10⁻⁹ m⁴, E = 2.07 × 10¹¹ Pa."),
         (
             "I_h of commit 48ab0ce, 1e5f, file1e5.mat <i>",

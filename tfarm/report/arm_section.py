@@ -5,18 +5,23 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import tfarm
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, implausible, input_words, unit_of
 from tfarm.arm.schema import file_key
-from tfarm.audit.assumptions import has_hub_inertia, hub_study, section_study
-from tfarm.digits import plain, significant, unit
+from tfarm.audit.assumptions import Study, has_hub_inertia, hub_study, section_study
+from tfarm.digits import fixed, plain, significant, singly, unit
 from tfarm.dsp.chain import file_text
 from tfarm.plots.shapes import sketch
+from tfarm.plots.style import COLOURS, GREY, page
 from tfarm.report.cases import Case
 from tfarm.report.sections import Fact, PageSection, Picture, prose
-from tfarm.schema import Quantity, Table, table
+from tfarm.schema import Column, Quantity, Table, table
+
+if TYPE_CHECKING:
+    from tfarm.plots.style import Figure
 
 HEADLINE_MODES = 3  # natural frequencies among the headline numbers, the rigid body's 0 not shown
 MOST_POISSON = 0.5  # of an isotropic material; a larger E/2G - 1 is none's ratio
@@ -26,7 +31,7 @@ TEXTS = ("name", "assumptions")  # of the file, which are in other places of the
 def arm_section(case: Case) -> PageSection:
     """The first part of every page: headline numbers, slips of units, the theory, and the parameters."""
     arm = case.arm
-    words = [prose("units", odd=odd) for odd in ["; and on ".join(implausible(arm))] if odd]
+    words = [prose("units", odd=odd) for odd in ["; ".join(implausible(arm))] if odd]
     if not arm.is_uniform:
         words.append(prose("rig", arm=arm, input=input_words(arm)))
     words += ["This arm states no assumptions."] * (not arm.assumptions)
@@ -95,10 +100,10 @@ def parameters(arm: Arm, table: Mapping[str, Any], under: str = "") -> Iterator[
 class Derived(NamedTuple):
     """A number that follows from the parameters."""
 
-    quantity: Annotated[str, Quantity("quantity")]
-    symbol: Annotated[str, Quantity("symbol")]
-    value: Annotated[float, Quantity("value", digits=8)]
-    unit: Annotated[str, Quantity("unit")]
+    quantity: Annotated[str, Quantity("quantity", help="number that the parameters determine")]
+    symbol: Annotated[str, Quantity("symbol", help="letter or formula of the quantity")]
+    value: Annotated[float, Quantity("value", digits=8, help="from the parameters alone")]
+    unit: Annotated[str, Quantity("unit", help="SI unit of the value")]
 
 
 def derived_table(arm: Arm) -> Table:
@@ -142,15 +147,17 @@ def derived_table(arm: Arm) -> Table:
 class PaperValue(NamedTuple):
     """A row of Table 1: its value, None where the table has none, and unit, as printed; and those used here."""
 
-    quantity: Annotated[str, Quantity("quantity")]
-    symbol: Annotated[str, Quantity("symbol")]
-    printed: Annotated[float | None, Quantity("printed in Table 1")]
-    printed_unit: Annotated[str, Quantity("unit, as printed")]
-    used: Annotated[float, Quantity("used here")]
-    unit: Annotated[str, Quantity("unit")]
+    quantity: Annotated[str, Quantity("quantity", help="entry of the paper's Table 1")]
+    symbol: Annotated[str, Quantity("symbol", help="letter of the quantity in the paper")]
+    printed: Annotated[
+        float | None, Quantity("printed in Table 1", help="value as printed; none where the table has no such entry")
+    ]
+    printed_unit: Annotated[str, Quantity("unit, as printed", help="unit as printed")]
+    used: Annotated[float, Quantity("used here", help="value of this arm, in the unit of the next column")]
+    unit: Annotated[str, Quantity("unit", help="SI unit of the value used here")]
 
     @property
-    def remark(self) -> Annotated[str, Quantity("remark")]:
+    def remark(self) -> Annotated[str, Quantity("remark", help="reason where the value used is not the printed one")]:
         """The reason why the value used is not the printed one, or is an odd one; empty of any other."""
         if self.symbol == "C":
             return prose("paper_damping", used=self.used)
@@ -198,22 +205,59 @@ def paper_section(case: Case) -> PageSection:
 # ------------------------------------------------------------ assumptions
 
 
+CANDIDATE_COLUMNS = ("is_own", "depth", "width", "second_moment", "hub_inertia")
+LOOP_COLUMNS = ("verdict", "K2_below", "K2_below_is_edge")
+
+
 def assumptions_section(case: Case) -> PageSection:
     """Frequencies over the sections and the hub inertias that could be chosen, with sensitivities."""
-    arm, title, blocks = case.arm, "What the assumptions do", list[Table]()
+    arm, title, blocks = case.arm, "What the assumptions do", list[Picture | Table]()
     if not arm.is_uniform:
         return PageSection(anchor="assumptions", title=title, words=(prose("assumptions_rig"),))
+    blocks += candidate_blocks(
+        section_study(arm), "section", "Candidate sections: rectangles of this area", "depth of the section [m]",
+        prose("assumed_section"),
+    )  # fmt: skip
     if has_hub := has_hub_inertia(arm):
         hub = hub_study(arm)
-        blocks.append(
-            table(
-                hub.candidates,
-                stem="assumptions-hub",
-                title="Candidate hub inertias",
-                caption=prose("assumed_hub", locked=float(hub.locked[0]), pinned=float(hub.pinned[0])),
-            )
-        )
-    of_section = {"stem": "assumptions-section", "title": "Candidate sections: rectangles of this area"}
-    blocks.insert(0, table(section_study(arm).candidates, caption=prose("assumed_section"), **of_section))
+        blocks += candidate_blocks(
+            hub, "hub", "Candidate hub inertias", "hub inertia [kg m²]",
+            prose("assumed_hub", locked=float(hub.locked[0]), pinned=float(hub.pinned[0])),
+        )  # fmt: skip
     words = (prose("assumptions", arm=arm, is_from_paper=is_from_paper(arm), has_hub=has_hub),)
     return PageSection(anchor="assumptions", title=title, words=words, blocks=blocks)
+
+
+def candidate_blocks(study: Study, stem: str, title: str, label: str, caption: str) -> Iterator[Picture | Table]:
+    """Natural frequencies over the candidates as a picture, and with the sensitivities, a column a mode, as a table."""
+    low, high = (significant(float(omega), 5) for omega in study.natural_frequency[[0, -1], 0])
+    yield Picture(
+        stem=f"assumptions-{stem}-frequencies",
+        title=f"Natural frequencies over the {label.partition(' [')[0]}",
+        caption=prose("assumed_frequencies"),
+        alt=f"Natural frequencies over the {label}; the first goes from {low} to {high} rad/s.",
+        figure=draw_candidates(study, label),
+    )
+    rows, columns = study.candidates, list[Column]()
+    columns += table(rows, [name for name in CANDIDATE_COLUMNS if getattr(rows[0], name) is not None]).columns
+    for number, omega in enumerate(study.natural_frequency.T, 1):
+        columns.append(
+            Column(f"mode_{number}_rad_s", f"mode {number}", "rad/s", of=omega, digits=singly(significant, 6))
+        )
+    for number, slope in enumerate(study.sensitivity.T, 1):
+        key, title = f"sensitivity_{number}", f"sensitivity of mode {number}"
+        columns.append(Column(key, title, "%/%", of=slope, digits=partial(fixed, decimals=3)))
+    columns += table(rows, LOOP_COLUMNS).columns
+    yield Table(stem=f"assumptions-{stem}", title=title, caption=caption, columns=tuple(columns))
+
+
+def draw_candidates(study: Study, label: str) -> Figure:
+    """Natural frequencies over the candidates of an assumed parameter, both axes logarithmic; the arm's own filled."""
+    own = study.is_own
+    with page(9.0, 4.6, f"{study.arm.name}: natural frequencies over the {label.partition(' [')[0]}") as (figure, ax):
+        ax.axvline(study.values[own][0], color=GREY, lw=1.0, ls=(0, (4, 3)))
+        for number, (colour, omega) in enumerate(zip(COLOURS, study.natural_frequency.T, strict=False), 1):
+            ax.plot(study.values, omega, "o-", color=colour, mfc="white", label=f"mode {number}")
+            ax.plot(study.values[own], omega[own], "o", color=colour, ms=7.0, zorder=4)
+        ax.set(xscale="log", yscale="log", xlabel=label, ylabel="natural frequency [rad/s]")
+    return figure

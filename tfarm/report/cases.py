@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law
+from tfarm.arm import AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import discretised, with_all_gains
 from tfarm.dsp.verdict import sampled_brief
@@ -141,12 +141,12 @@ def has_loop(arm: Arm) -> bool:
 
 def why_no_loop(arm: Arm) -> str:
     """The reason why the gains of an arm cannot both be closed."""
-    return prose("no_loop", arm=arm, rate=RATE_GAIN, moment=MOMENT_GAIN, plane=" and ".join(PLANE))
+    return prose("no_loop", arm=arm)
 
 
 def sign_words(arm: Arm) -> str:
     """The law, and the sign of its moment gain."""
-    return prose("signs", law=sign_of(arm), moment=MOMENT_GAIN)
+    return prose("signs", law=sign_of(arm))
 
 
 def what_holds(arm: Arm) -> str:

@@ -29,7 +29,7 @@ from tfarm.plots.style import page
 from tfarm.records import record
 from tfarm.report.cases import DESIGNED_MODES, Case, Controller, best, brief_on, has_loop, margins_of
 from tfarm.report.loop_section import poles_tables
-from tfarm.report.sections import Fact, PageSection, Picture, prose
+from tfarm.report.sections import PageSection, Picture, prose
 from tfarm.schema import Column, Quantity, Table, across, table, text
 from tfarm.spectrum.table import default_gains, default_words, first_frequency, rate_unit
 from tfarm.synthesis.design import Design
@@ -151,7 +151,7 @@ def map_data(data: MapOfArm) -> Table:
         ("least_damping_ratio", "least damping ratio", ""), ("omega_rad_s", "frequency", "rad/s"),
     )  # fmt: skip
     columns = [Column(*title, of=cells) for title, cells in zip(titles, zip(*rows, strict=True), strict=True)]
-    return Table(stem="map-data", title=f"The map of {' and '.join(PLANE)}", columns=tuple(columns))
+    return Table(stem="map-data", title="The map of both gains", columns=tuple(columns))
 
 
 def map_section(case: Case) -> PageSection:
@@ -167,11 +167,12 @@ def map_section(case: Case) -> PageSection:
         figure=draw_map_of_arm(data),
         data=map_data(data),
     )
-    words = [intervals(arm)]
+    answer = intervals(arm)
     if found is not None:
         gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), arm) for name in PLANE)
-        words.append(prose("best_gains", data=data, found=found, modes=DESIGNED_MODES, gains=gains))
-    return PageSection(anchor="margins-map", title="Stability region of both gains", words=words, blocks=(picture,))
+        answer += " " + prose("best_gains", data=data, found=found, modes=DESIGNED_MODES, gains=gains)
+    title = "Stability region of both gains"
+    return PageSection(anchor="margins-map", title=title, answer=answer, blocks=(picture,))
 
 
 def intervals(arm: Arm) -> str:
@@ -187,11 +188,22 @@ def intervals(arm: Arm) -> str:
 class AtGain(NamedTuple):
     """The exact loop at one value of a gain; its verdict may be undecided on the axis."""
 
-    value: Annotated[float, Quantity("value", digits=4)]
-    verdict: Annotated[str, Quantity("stability")]
-    unstable_poles: Annotated[int | str | None, Quantity("unstable poles")]
-    spectral_abscissa: Annotated[float | None, Quantity("spectral abscissa", "1/s", 4)]
-    first_pairs: Annotated[str, Quantity("first pairs of poles", "1/s")]
+    value: Annotated[float, Quantity("value", digits=4, help="value of the gain that varies, the other one fixed")]
+    verdict: Annotated[str, Quantity("stability", help="verdict on the exact loop with that gain")]
+    unstable_poles: Annotated[
+        int | str | None,
+        Quantity("unstable poles", help="closed-loop poles right of the imaginary axis, conjugates counted"),
+    ]
+    spectral_abscissa: Annotated[
+        float | None,
+        Quantity(
+            "spectral abscissa",
+            "1/s",
+            4,
+            help="largest real part of the poles in the box; 0 where it is on the axis to working precision",
+        ),
+    ]
+    first_pairs: Annotated[str, Quantity("first pairs of poles", "1/s", help="poles with Im s > 0 of least frequency")]
 
 
 def locus_section(case: Case) -> PageSection:
@@ -216,15 +228,9 @@ def locus_section(case: Case) -> PageSection:
         blocks.append(across(keys, keys=list(found), stem="loci", title=title, caption=caption))
     if has_loop(arm):
         blocks.append(beyond_table(arm, gains))
-    facts = [_first_unstable(name, each) for name, each in found.items()]
-    return PageSection(anchor="locus", title="Root loci", facts=facts, words=words, blocks=[*blocks, *tables])
-
-
-def _first_unstable(name: str, data: Loci) -> Fact:
-    """The value at which the first branch becomes unstable."""
-    values = [each.gain for each in data.exact.crossings if each.direction == "unstable"]
-    value = significant(min(values), 6) if values else "none in the range"
-    return Fact(label=f"first instability along {name}", value=value, unit=data.unit * bool(values))
+    others = {name: gains.gain_text(other, shortly, arm) for name, other in zip(PLANE, reversed(PLANE), strict=True)}
+    answer = prose("locus_lead", found=found, gains=others)
+    return PageSection(anchor="locus", title="Root loci", answer=answer, words=words, blocks=[*blocks, *tables])
 
 
 def locus_blocks(data: Loci) -> Iterator[Picture | Table]:

@@ -199,12 +199,12 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
 
 
 def _known(arm: Arm, is_quiet: bool) -> dict[str, Any]:
-    """What a verdict on any gains rests on: theorems and bounds beyond the band, and the static balance."""
+    """Theorems and bounds beyond the frequency range, and the static balance, on which verdicts rest."""
     kind = "reactive" if arm.is_reactive else "quiet" if is_quiet else "band"
-    by_energy = "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"
-    beyond = "beyond the band |L| stays below one half at all gains of this page: no unstable pole there (small gain)"
+    by_energy = "C = 0: every mode beyond the frequency range is damped (Lyapunov), with a decay rate that tends to 0"
+    beyond = "|L| < 0.5 beyond the frequency range at all gains of this page: no unstable pole there (small gain)"
     if arm.is_reactive and not arm.has_lyapunov_theorem:
-        by_energy = "C = 0: none of the modes looked at is driven; no theorem on the others"
+        by_energy = "C = 0: no mode of the frequency range is driven; not determined beyond"
     moments = _stable_moments(arm) if arm.is_reactive else (-math.inf, math.inf)
     return {
         "kind": kind,

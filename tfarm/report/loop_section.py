@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import PLANE, cancelled
+from tfarm.arm import cancelled
 from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.digits import plain, singly
@@ -25,12 +25,11 @@ from tfarm.response.signals import Signals
 from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table
 
 MOST_SPILLED = 12  # flexible modes of the largest model that is compared with the exact loop
-NOT_LED = "open"  # a column of a law's matrices without a signal
 
 
 def no_loop_section(case: Case) -> PageSection:
     """One sentence for an arm that has no loop."""
-    return PageSection(anchor="no-loop", title="The loop", words=(why_no_loop(case.arm),))
+    return PageSection(anchor="no-loop", title="The loop", answer=why_no_loop(case.arm))
 
 
 # ------------------------------------------------------------ margins
@@ -39,10 +38,11 @@ def no_loop_section(case: Case) -> PageSection:
 def margins_section(case: Case) -> PageSection:
     """Verdict, margins, crossings and spillover of each controller, with the verdict on its sampled loop."""
     found = [(each, margins_of(each.arm, each.law)) for each in case.in_s]
+    sampled = [brief_on(each.arm, each.law, case.chain).short for each, _ in found]
     words: list[str] = []
     blocks: list[Picture | Table] = [*(_bode_picture(*pair) for pair in found), margin_table(found)]
     for each, it in found:
-        blocks += [*crossings_tables(each, it), interval_table(each, it)]
+        blocks += tables_of(each, it)
         try:
             spilled = spill(each.arm, each.law, MOST_SPILLED)
         except TfarmError as error:
@@ -59,7 +59,8 @@ def margins_section(case: Case) -> PageSection:
     return PageSection(
         anchor="margins",
         title="Stability and stability margins",
-        facts=[verdict_fact(each, it, brief_on(each.arm, each.law, case.chain).short) for each, it in found],
+        answer=prose("margins_lead", found=[(*pair, brief) for pair, brief in zip(found, sampled, strict=True)]),
+        facts=[verdict_fact(*pair, brief) for pair, brief in zip(found, sampled, strict=True)],
         words=words,
         blocks=[block for block in blocks if not isinstance(block, Table) or block.columns],
     )
@@ -81,17 +82,6 @@ def margin_table(found: Sequence[tuple[Controller, Margins]]) -> Table:
     )  # fmt: skip
 
 
-def interval_table(each: Controller, found: Margins) -> Table:
-    """A row a gain or number of a controller: its stability intervals, the others fixed."""
-    note = upper(found.intervals_note or "")
-    return table(
-        found.stability_intervals,
-        stem=each.stem("windows"),
-        title=f"Stability intervals of {each.name}",
-        caption=prose("intervals", note=note),
-    )
-
-
 def _bode_picture(each: Controller, found: Margins) -> Picture:
     omega, L = loop_curve(found)
     title, stem = f"The loop function of {each.name}", each.stem("bode")
@@ -110,18 +100,13 @@ def _bode_picture(each: Controller, found: Margins) -> Picture:
     )
 
 
-def crossings_tables(each: Controller, found: Margins) -> list[Table]:
-    """Every crossing of |L| = 1 and of L < 0 in the range, ascending."""
-    kinds, caption = {"gain": found.gain_crossovers, "phase": found.phase_crossovers}, prose("crossovers")
-    return [
-        table(
-            rows,
-            stem=each.stem(f"{kind}-crossovers"),
-            title=f"{upper(kind)} crossovers of {each.name}",
-            caption=caption,
-        )
-        for kind, rows in kinds.items()
-    ]
+def tables_of(each: Controller, found: Margins) -> Iterator[Table]:
+    """Every crossing of |L| = 1 and of L < 0 in the range, ascending, and the stability interval of each number."""
+    for kind, rows in {"gain": found.gain_crossovers, "phase": found.phase_crossovers}.items():
+        title, caption = f"{upper(kind)} crossovers of {each.name}", prose(f"{kind}_crossovers")
+        yield table(rows, stem=each.stem(f"{kind}-crossovers"), title=title, caption=caption)
+    title, caption = f"Stability intervals of {each.name}", prose("intervals", note=upper(found.intervals_note or ""))
+    yield table(found.stability_intervals, stem=each.stem("windows"), title=title, caption=caption)
 
 
 # ------------------------------------------------------------ Nyquist
@@ -183,29 +168,27 @@ def law_section(case: Case) -> PageSection:
               rule=rule_in_words(each.law), period=case.chain.sampling.period)
         for each in named
     ]  # fmt: skip
-    words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete],
-                       plane=" and ".join(PLANE)))  # fmt: skip
+    words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete]))
     entries = [entry for each in named for entry in entries_of(each)]
     blocks = [table(entries, stem="law-entries", title="Transfer function from each signal", caption=prose("entries"))]
     blocks += [matrices for each in named for matrices in matrices_tables(each)]
-    return PageSection(
-        anchor="law", title="The controller" if len(named) == 1 else "The controllers", words=words, blocks=blocks
-    )
+    title = "The controller" if len(named) == 1 else "The controllers"
+    return PageSection(anchor="law", title=title, answer=prose("laws", each=named), words=words, blocks=blocks)
 
 
 class Entry(NamedTuple):
     """A signal of a law: how it enters, and its numerator and denominator in descending powers."""
 
-    law: Annotated[str, Quantity("controller")]
-    signal: Annotated[str, Quantity("signal")]
-    unit: Annotated[str, Quantity("unit")]
-    enters: Annotated[str, Quantity("enters")]
-    sign: Annotated[str, Quantity("sign in the input")]
-    variable: Annotated[str, Quantity("in powers of")]
-    numerator: Annotated[list[float] | str, Quantity("numerator")]
-    denominator: Annotated[list[float] | str, Quantity("denominator")]
-    delay: Annotated[float, Quantity("delay", "s")]
-    period: Annotated[float | None, Quantity("period", "s")]
+    law: Annotated[str, Quantity("controller", help="controller that reads the signal")]
+    signal: Annotated[str, Quantity("signal", help="output of the arm that the controller reads")]
+    unit: Annotated[str, Quantity("unit", help="unit of the signal")]
+    enters: Annotated[str, Quantity("enters", help="whether the reference is subtracted from the signal")]
+    sign: Annotated[str, Quantity("sign in the input", help="sign of the signal's part in the control law")]
+    variable: Annotated[str, Quantity("in powers of", help="s in continuous time, z at the samples")]
+    numerator: Annotated[list[float] | str, Quantity("numerator", help="coefficients in descending powers")]
+    denominator: Annotated[list[float] | str, Quantity("denominator", help="coefficients in descending powers")]
+    delay: Annotated[float, Quantity("delay", "s", help="delay of the controller itself")]
+    period: Annotated[float | None, Quantity("period", "s", help="sampling period of a discrete-time controller")]
 
 
 def entries_of(each: Controller) -> Iterator[Entry]:
@@ -225,14 +208,15 @@ def entries_of(each: Controller) -> Iterator[Entry]:
 
 
 def matrices_tables(each: Controller) -> Iterator[Table]:
-    """A, B, C and D of each part of a law that has matrices, as one block [A B; C D]; its columns by their signals."""
+    """A, B, C and D of each part of a law that has matrices, as [A B; C D]; columns without a signal are left out."""
     for number, part in enumerate(each.law.parts, 1):
         if not isinstance(part.block, StateSpace):
             continue
         A, B, C, D = part.block.matrices()
-        states, whole = [f"x{i}" for i in range(1, len(A) + 1)], np.block([[A, B], [C, D]])
-        signals = {f"{i}_{name or NOT_LED}": name or NOT_LED for i, name in enumerate(part.signals, 1)}
-        titles = {**dict(zip(states, states, strict=True)), **signals}
+        led = [i for i, name in enumerate(part.signals) if name]
+        whole = np.block([[A, B[:, led]], [C, D[:, led]]])
+        states = [f"x{i}" for i in range(1, len(A) + 1)]
+        titles = {x: x for x in states} | {f"{i + 1}_{part.signals[i]}": part.signals[i] for i in led}
         step = "next " if each.law.is_discrete else "d/dt "
         columns = [Column("row", "", of=[*(step + x for x in states), "input"])]
         columns += [

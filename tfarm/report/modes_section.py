@@ -191,13 +191,45 @@ def tint(x: float) -> str:
 class LockedMode(NamedTuple):
     """A mode with the hub free, with the losses of the hub where it has any, and with the hub locked."""
 
-    mode: Annotated[int, Quantity("mode")]
-    free: Annotated[float, Quantity("hub free", "rad/s", 8, key="hub_free_rad_s")]
-    free_hz: Annotated[float, Quantity("hub free", "Hz", 8, key="hub_free_hz")]
-    with_losses: Annotated[float | None, Quantity("with its own losses, Im s", "rad/s", 8)]
-    damping: Annotated[float | None, Quantity("damping ratio", "%", 4, key="with_losses_damping_percent")]
-    locked: Annotated[float, Quantity("hub locked", "rad/s", 8, key="hub_locked_rad_s")]
-    locked_hz: Annotated[float, Quantity("hub locked", "Hz", 8, key="hub_locked_hz")]
+    mode: Annotated[int, Quantity("mode", help="number of the flexible mode")]
+    free: Annotated[
+        float,
+        Quantity(
+            "hub free",
+            "rad/s",
+            8,
+            key="hub_free_rad_s",
+            help="natural frequency, the hub free to turn and without losses",
+        ),
+    ]
+    free_hz: Annotated[
+        float,
+        Quantity(
+            "hub free", "Hz", 8, key="hub_free_hz", help="natural frequency, the hub free to turn and without losses"
+        ),
+    ]
+    with_losses: Annotated[
+        float | None,
+        Quantity(
+            "with its own losses, Im s", "rad/s", 8, help="frequency of the free hub with its own friction and back-EMF"
+        ),
+    ]
+    damping: Annotated[
+        float | None,
+        Quantity(
+            "damping ratio",
+            "%",
+            4,
+            key="with_losses_damping_percent",
+            help="share of critical damping by the losses of the hub alone",
+        ),
+    ]
+    locked: Annotated[
+        float, Quantity("hub locked", "rad/s", 8, key="hub_locked_rad_s", help="natural frequency, the hub fixed")
+    ]
+    locked_hz: Annotated[
+        float, Quantity("hub locked", "Hz", 8, key="hub_locked_hz", help="natural frequency, the hub fixed")
+    ]
 
 
 def locked_table(found: Modes) -> Table:

@@ -17,7 +17,6 @@ from markupsafe import Markup
 
 from tfarm.arm import PLANE, Arm, as_law, load, presets
 from tfarm.arm.writing import law_toml
-from tfarm.digits import plain
 from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.chain import file_text
 from tfarm.errors import ParameterError, TfarmError
@@ -36,15 +35,14 @@ from tfarm.response.frequency import bode
 from tfarm.schema.glossary import GLOSSARY_TERMS
 from tfarm.schema.html import with_symbols
 
-SHORTEST = 40  # characters of an answer; one that is shorter takes the next sentence too
 BADGES = {"stable": "ok", "yes": "ok", "unstable": "corrected", "no": "corrected", "marginal": "undecided",
             "undecided": "undecided"}  # fmt: skip
 OPEN_PICTURES = 2  # of a section: those that answer its question; the rest is a click away
-ANSWERING_FACTS = 2  # headline numbers that answer for a section at the top of the page
-PROMISES = ("certified", "complete", "enclosed", "Lyapunov region", "proven", "settled", "small gain", "winding number",
-        "band", "window", "default gains")  # fmt: skip
-PLAIN_WORDS = ("band", "window")  # of these: too common in another sense to lead to their meaning wherever they occur
-PROMISE = re.compile(rf"\b(?:{'|'.join(name for name in PROMISES if name not in PLAIN_WORDS)})\b", re.IGNORECASE)
+PROMISES = (
+    "certified", "complete", "converged", "default gains", "enclosed", "Lyapunov region", "not determined", "proven",
+    "small gain", "winding number",
+)  # fmt: skip
+PROMISE = re.compile(rf"\b(?:{'|'.join(PROMISES)})\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +51,7 @@ class Piece:
 
     A page that it does not suit has no such section.  The page that `report --only` asks for is called by the first
     word of its sections' anchors; its `title` is that of one of them, and `is_also_on` picks the other pages of that
-    kind that have the section.  The full page has all, and at its top the answers of those that have one (`is_answer`).
+    kind that have the section.  The full page has all, and at its top the answers of those that have one.
     `seconds` is about how long a section takes to make, where that is long: the longest are begun first.  Sections of
     one `task` are made one after the other in one process, as they share a design.
     """
@@ -64,7 +62,6 @@ class Piece:
     suits: Callable[[Case], Any] = lambda case: True
     title: str = ""
     is_also_on: Callable[[str], bool] = lambda page: False
-    is_answer: bool = False
     seconds: float = 0.0
     task: str = ""
 
@@ -78,7 +75,6 @@ class Piece:
         return page == self.page or self.is_also_on(page)
 
 
-Answer = partial(Piece, is_answer=True)
 LOOP_TASK = "continuous loop"  # of the sections that have the gains of best damping
 LOOP_PAGES = ("margins", "locus", "sampled", "tune")  # on which an arm without a loop has nothing but that it has none
 OF_LAWS = (*LOOP_PAGES, "law", "no")  # first words of the sections that a page about laws begins with
@@ -95,40 +91,32 @@ def _of_gains(case: Case) -> bool:
 
 
 PIECES = (
-    Answer("the fit", "fit", fit_section, lambda case: case.fit),
-    Answer("map of the gains", "margins-map", map_section, _of_gains, seconds=2.0, task=LOOP_TASK),
+    Piece("fit to measurements", "fit", fit_section, lambda case: case.fit),
+    Piece("stability region of both gains", "margins-map", map_section, _of_gains, seconds=5.0, task=LOOP_TASK),
     Piece("the arm", "arm", arm_section, is_also_on=lambda page: True),
     Piece("the paper's values", "paper", paper_section, lambda case: is_from_paper(case.arm)),
-    Piece("root moment", "bode-root-moment", partial(bode_section, output="root_moment"), title="Bode plots"),
-    Piece("tip displacement", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
+    Piece("response of the root moment", "bode-root-moment", partial(bode_section, output="root_moment"),
+          title="Bode plots"),
+    Piece("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
     Piece("measured responses", "bode-measured", measured_section, lambda case: case.measured),
     Piece("modes", "modes", modes_section, title="Modes", seconds=1.0),
-    Answer("no loop", "no-loop", no_loop_section, lambda case: not case.has_loop, is_also_on=LOOP_PAGES.__contains__),
-    Answer("margins", "margins", margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
-    Answer("root loci", "locus", locus_section, _in_s, "Root loci", seconds=7.0, task=LOOP_TASK),
-    Piece("Nyquist", "margins-nyquist", nyquist_section, _in_s, task=LOOP_TASK),
-    Answer("sampled loop", "sampled", sampled_section, lambda case: case.has_loop, "The sampled loop", seconds=8.0),
-    Answer("the law", "law", law_section, lambda case: case.laws and not case.arm.is_locked,
+    Piece("the loop", "no-loop", no_loop_section, lambda case: not case.has_loop, is_also_on=LOOP_PAGES.__contains__),
+    Piece("stability margins", "margins", margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
+    Piece("root loci", "locus", locus_section, _in_s, "Root loci", seconds=7.0, task=LOOP_TASK),
+    Piece("Nyquist plot", "margins-nyquist", nyquist_section, _in_s, task=LOOP_TASK),
+    Piece("sampled loop", "sampled", sampled_section, lambda case: case.has_loop, "The sampled loop", seconds=9.0),
+    Piece("controllers", "law", law_section, lambda case: case.laws and not case.arm.is_locked,
            is_also_on=LOOP_PAGES.__contains__),
-    Answer("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", seconds=10.0),
+    Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", seconds=10.0),
     Piece("assumptions", "assumptions", assumptions_section, title="What the assumptions do"),
 )  # fmt: skip
 QUESTIONS = {piece.page: piece.title for piece in PIECES if piece.title}  # pages that may be asked for alone
-ANSWERS = {piece.anchor for piece in PIECES if piece.is_answer}
 
 
 def pieces_of(case: Case) -> list[Piece]:
     """The sections of a page, in their order; a page about laws begins with its loops."""
     suited = [piece for piece in PIECES if piece.suits(case)]
     return sorted(suited, key=lambda piece: bool(case.laws) and piece.page not in OF_LAWS)
-
-
-def answer_of(section: PageSection) -> str:
-    """The first headline numbers of a section, or its first sentence where it has none; empty of one without answer."""
-    if section.anchor not in ANSWERS:
-        return ""
-    facts = [f"{fact.label}: {fact.value} {fact.unit}".rstrip() for fact in section.facts[:ANSWERING_FACTS]]
-    return f"{'; '.join(facts)}." if facts else first_sentence("".join(section.words[:1]))
 
 
 def explained(text: str) -> Markup:
@@ -148,12 +136,6 @@ def explained(text: str) -> Markup:
 def word_id(name: str) -> str:
     """The anchor of a word of the glossary on a page."""
     return f"word-{name.lower().replace(' ', '-')}"
-
-
-def first_sentence(text: str) -> str:
-    """A text up to the end of its first sentence of some length, its full stop included."""
-    ends = [found.end() for found in re.finditer(r"(?<=[\w%)])\.(?= [A-Z])", text)]
-    return next((text[:end] for end in ends if end >= SHORTEST), text)
 
 
 def other_pages(folder: Path, writing: Sequence[str], page: str) -> Sequence[tuple[str, str]]:
@@ -178,12 +160,10 @@ def arm_page(
     `live`: whether there is a live page in the folder.  `others` are the file and title of each other page of this arm.
     """
     arm = case.arm
-    answers = {each.section.anchor: answer for each in sections if (answer := answer_of(each.section))}
     return render(
         "arm.html",
-        title=f"{arm.name}: {QUESTIONS[only].lower()}" if only else arm.name,
+        title=f"{arm.name}: {QUESTIONS[only]}" if only else arm.name,
         sections=sections,
-        answers=answers,
         looks=BADGES,
         open_pictures=OPEN_PICTURES,
         only=only,
@@ -319,10 +299,9 @@ def loop_cells(each: Controller, chain: Chain) -> dict[str, str]:
         if not each.law.is_discrete:
             found = margins_of(each.arm, each.law)
             cells["verdict"] = found.stability.verdict
-            for name in found.windows.keys() & PLANE:  # a star at an end where no limit was found
-                windows = found.windows[name]
-                ends = (plain(end, 5) + "*" * (windows.end(end) == "search bound") for end in windows.around or ())
-                cells[name] = " … ".join(ends) or "none"
+            for row in found.stability_intervals:
+                if row.name in PLANE:
+                    cells[row.name] = f"{row.interval.as_text(5)} {row.unit}".rstrip() if row.interval else "none"
     with suppress(TfarmError):
         cells["sampled"] = brief_on(each.arm, each.law, chain).short
     return cells

@@ -77,8 +77,7 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
     """Measurements, the fitted numbers with their intervals, and the share of possible arms on which a loop holds."""
     fit = case.fit
     assert fit is not None
-    words = [prose("fit", verdict=fit.verdict, found=fit.in_words)]
-    words += [f"{upper(each)}." for each in fit.not_determined]
+    words = [f"{upper(each)}." for each in fit.not_determined]
     blocks: list[Picture | Table] = []
     if fit.responses:
         names = listed([f"{each.label} [{each.unit}]" for each in fit.responses])
@@ -97,16 +96,17 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
         notes, more = _onwards(those)
         words += notes
         blocks += more
-    return PageSection(anchor="fit", title="Fitted to measurements", words=words, blocks=blocks)
+    answer = prose("fit", verdict=fit.verdict, found=fit.in_words)
+    return PageSection(anchor="fit", title="Fitted to measurements", answer=answer, words=words, blocks=blocks)
 
 
 class MarginSpan(NamedTuple):
     """A margin over the possible arms."""
 
-    margin: Annotated[str, Quantity("of the loop")]
-    unit: Annotated[str, Quantity("unit")]
-    lowest: Annotated[float, Quantity("lowest", digits=4)]
-    highest: Annotated[float, Quantity("highest", digits=4)]
+    margin: Annotated[str, Quantity("of the loop", help="stability margin of the default loop")]
+    unit: Annotated[str, Quantity("unit", help="unit of the margin")]
+    lowest: Annotated[float, Quantity("lowest", digits=4, help="least over the arms on which the loop is stable")]
+    highest: Annotated[float, Quantity("highest", digits=4, help="largest over the arms on which the loop is stable")]
 
 
 def _onwards(those: Possible) -> tuple[list[str], list[Picture | Table]]:

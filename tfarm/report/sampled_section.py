@@ -13,7 +13,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit
-from tfarm.digits import how_many, kept_digits, plain, singly
+from tfarm.digits import how_many, kept_digits, plain, significant, singly
 from tfarm.dsp import Analysis, Chain, Simulation, Verdict, sampled_verdict, traces
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.dsp.crossings import around
@@ -28,15 +28,15 @@ from tfarm.plots.motion import slew as slew_plot
 from tfarm.plots.regions import StableRegions, draw_overlay, regions_table, stable_regions
 from tfarm.plots.roots import draw_sampled_loci
 from tfarm.plots.style import safe
-from tfarm.report.cases import Case, Controller, on_hub, what_holds
-from tfarm.report.sections import Fact, PageSection, Picture, facts_of, prose
-from tfarm.schema import Column, Quantity, Table, across, table, text
+from tfarm.report.cases import Case, Controller, margins_of, on_hub, what_holds
+from tfarm.report.sections import Fact, PageSection, Picture, prose
+from tfarm.schema import Column, Quantity, Table, across, quantities, table, text, with_unit
 
 MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict is given
 PAST_HUB = 1.25  # times the rate gain at which sampling alone makes the hub unstable: the end of its locus
 LOCUS_K2 = (-0.5, 1.5)  # of its locus: the stability interval of most arms, and a little to either side
 VERDICT_COLUMNS = ("word", "spectral_radius", "time_constant", "slowest", "holds_for")
-DELAY, DAMPING = "delay margin", "minimum structural damping for stability"  # headline numbers of an analysis
+WHOLE_LAW_COLUMNS = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
 CURVE_DIGITS = 7  # digits of a curve in its file: a hundredth of the width of a line is four
 Analysed = Sequence[tuple[Controller, Analysis]]
 
@@ -48,7 +48,7 @@ def sampled_section(case: Case) -> PageSection:
     words, blocks = [chain_words(arm, chain)], list[Picture | Table]()
     first = found[0][1]
     if not case.laws:
-        blocks.append(overlay_picture(stable_regions(arm, first.loop.gains, chain)))
+        blocks.append(overlay_picture(stable_regions(arm, first.loop.gains, chain), first))
     numbers = {each.title: it for each, it in found}
     blocks.append(across(numbers, keys=[each.key for each, _ in found], stem="sampled",
                          title="Verdict and margins of the sampled loop", caption=prose("sampled")))  # fmt: skip
@@ -60,7 +60,8 @@ def sampled_section(case: Case) -> PageSection:
     if not arm.has_rigid_mode:
         words.append(f"{what_holds(arm)}: no slew is simulated.")
     elif any(each.given.measured is None for each in case.controllers):
-        without = [] if case.laws else [without_moment(arm, first.loop.gains)]
+        bare = [] if case.laws else [first.loop.gains.having(MOMENT_GAIN, 0.0)]
+        without = [on_hub(arm, gains, f"{MOMENT_GAIN} = 0", "without") for gains in bare]
         slewed, refused = slew(case, [*without, *case.controllers])
         blocks += slewed
         words += refused
@@ -68,15 +69,11 @@ def sampled_section(case: Case) -> PageSection:
     return PageSection(
         anchor="sampled",
         title=f"The sampled loop, {plain(1e3 * chain.sampling.period)} ms",
+        answer=prose("sampled_lead", found=found, period=chain.sampling.period),
         facts=facts,
         words=words,
-        blocks=blocks,
+        blocks=[block for block in blocks if not isinstance(block, Table) or block.columns],
     )
-
-
-def without_moment(arm: Arm, gains: HubFeedback) -> Controller:
-    """The gains without the feedback of the root moment."""
-    return on_hub(arm, gains.having(MOMENT_GAIN, 0.0), f"{MOMENT_GAIN} = 0", "without")
 
 
 # ------------------------------------------------------------ verdict
@@ -85,9 +82,15 @@ def without_moment(arm: Arm, gains: HubFeedback) -> Controller:
 def facts_on(each: Controller, found: Analysis) -> list[Fact]:
     """Verdict, delay margin and minimum structural damping of a sampled loop."""
     verdict = found.verdict
-    labels = [DELAY] * verdict.is_stable + [DAMPING] * (each.arm.has_elastic_link or not verdict.is_stable)
-    note = prose("dominant", it=verdict)
-    return [Fact(label=each.title, value=verdict.word.upper(), note=note), *facts_of(each.name, found, labels)]
+    facts = [Fact(label=each.title, value=verdict.word.upper(), note=prose("dominant", it=verdict))]
+    if verdict.is_stable:
+        value = "> " * found.is_lower_bound + significant(found.delay_margin_seconds, 3)
+        note = f"{significant(found.delay_margin_samples, 3)} samples"
+        facts.append(Fact(label=f"{each.name}: delay margin", value=value, unit="s", note=note))
+    if found.minimum_damping is not None and (each.arm.has_elastic_link or not verdict.is_stable):
+        of = quantities(type(found))["minimum_damping"]
+        facts.append(Fact(label=f"{each.name}: {of.label}", value=with_unit(found.minimum_damping, of)))
+    return facts
 
 
 def chain_words(arm: Arm, chain: Chain) -> str:
@@ -106,17 +109,23 @@ def numbers_table(each: Controller, found: Analysis) -> Table:
         found.stability_intervals,
         stem=_stem("numbers", each),
         title=f"Stability intervals, {each.name}",
-        caption=prose("sampled_numbers", modes=found.verdict.modes_used),
+        caption=prose("sampled_numbers", modes=found.verdict.modes_used, is_of_gains=found.loop.is_of_gains),
     )
 
 
 def modes_table(each: Controller, found: Analysis) -> Table:
-    """The modes of the sampled loop one by one."""
+    """The modes of the sampled loop one by one; the parts of K1 and K2 are those of gains at the hub."""
+    is_of_gains = found.loop.is_of_gains
     return table(
         found.modes,
+        () if is_of_gains else WHOLE_LAW_COLUMNS,
         stem=_stem("modes", each),
         title=f"Modes of the sampled loop, {each.name}",
-        caption=prose("sampled_modes", period=found.loop.chain.sampling.period, plane=PLANE),
+        caption=prose(
+            "sampled_modes",
+            period=found.loop.chain.sampling.period,
+            first=" and ".join(f"by {name}" for name in PLANE) if is_of_gains else "first order",
+        ),
     )
 
 
@@ -165,14 +174,26 @@ def periods_table(arm: Arm, gains: HubFeedback, chain: Chain) -> Table:
 # ------------------------------------------------------------ pictures of gains
 
 
-def overlay_picture(regions: StableRegions) -> Picture:
-    """Stability regions of the continuous and of the sampled loop in one plane."""
+def overlay_picture(regions: StableRegions, found: Analysis) -> Picture:
+    """Stability regions of the continuous and of the sampled loop in one plane, with the intervals of K2 below it."""
     arm, (low, *_) = regions.continuous.arm, regions.continuous.axes[0]
+    gains = found.loop.gains
+    rows = [row for row in margins_of(arm, gains).stability_intervals if row.name == MOMENT_GAIN]
+    continuous = text([each for row in rows for each in row.intervals], 4) or "no value"
+    sampled_at = text(list(found.shown[MOMENT_GAIN]), 4) or "no value"
     return Picture(
         stem="sampled-overlay",
         title="Stability regions, continuous and sampled",
-        caption=prose("overlay", arm=arm, rate=RATE_GAIN, low=float(low), nested=len(regions.sampled) > 1),
-        alt=f"Map of {' and '.join(PLANE)}: stability regions of the continuous and of the sampled loop.",
+        caption=prose(
+            "overlay",
+            arm=arm,
+            low=float(low),
+            nested=len(regions.sampled) > 1,
+            continuous=continuous,
+            sampled=sampled_at,
+            at=gains.gain_text(RATE_GAIN, plain, arm),
+        ),
+        alt="Map of both gains: stability regions of the continuous and of the sampled loop.",
         figure=draw_overlay(regions),
         data=regions_table(regions, "sampled-overlay-data"),
     )
@@ -214,11 +235,33 @@ def loci_table(data: SampledLoci, stem: str) -> Table:
 class SlewRow(NamedTuple):
     """A slew under one controller in numbers; what is not reached in the record, or of an unstable loop, is None."""
 
-    law: Annotated[str, Quantity("controller")]
-    residual: Annotated[float | None, Quantity("residual root moment", "N m rms", 3, key="residual_moment_rms")]
-    settling_time: Annotated[float | None, Quantity("settling time (5 %)", "s", 3)]
-    hub_error: Annotated[float | None, Quantity("hub error at the end", "deg", 3)]
-    stopped: Annotated[float | None, Quantity("unstable, stopped at", "s", 3)]
+    law: Annotated[str, Quantity("controller", help="controller of the slew")]
+    residual: Annotated[
+        float | None,
+        Quantity(
+            "residual root moment",
+            "N m rms",
+            3,
+            key="residual_moment_rms",
+            help="rms of root moment less the rigid arm's, from the end of the slew on",
+        ),
+    ]
+    settling_time: Annotated[
+        float | None,
+        Quantity(
+            "settling time (5 %)",
+            "s",
+            3,
+            help="time from which on the root moment stays within 5 % of its largest value",
+        ),
+    ]
+    hub_error: Annotated[
+        float | None, Quantity("hub error at the end", "deg", 3, help="hub angle less reference at the last sample")
+    ]
+    stopped: Annotated[
+        float | None,
+        Quantity("unstable, stopped at", "s", 3, help="time at which the simulation of an unstable loop was stopped"),
+    ]
 
 
 def slew_row(name: str, run: Simulation) -> SlewRow:
@@ -295,17 +338,48 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
 
 
 class MeasuredStep(NamedTuple):
-    """A step under one law in numbers, measured and computed."""
+    """A step under one controller in numbers, measured and computed."""
 
-    law: Annotated[str, Quantity("law")]
-    step: Annotated[float, Quantity("step", "deg", 4)]
-    overshoot_measured: Annotated[float, Quantity("overshoot, measured", "%", 3, key="overshoot_measured_percent")]
-    overshoot_computed: Annotated[float, Quantity("overshoot, computed", "%", 3, key="overshoot_computed_percent")]
-    end_measured: Annotated[float, Quantity("error at the end, measured", "deg", 3)]
-    end_computed: Annotated[float, Quantity("error at the end, computed", "deg", 3)]
-    moment_measured: Annotated[float | None, Quantity("largest |moment|, measured", "N m", 3)]
-    moment_computed: Annotated[float, Quantity("largest |moment|, computed", "N m", 3)]
-    difference: Annotated[float, Quantity("difference, rms", "deg", 3, key="apart_rms_deg")]
+    law: Annotated[str, Quantity("controller", help="controller under which the step was measured")]
+    step: Annotated[float, Quantity("step", "deg", 4, help="change of the reference")]
+    overshoot_measured: Annotated[
+        float,
+        Quantity(
+            "overshoot, measured",
+            "%",
+            3,
+            key="overshoot_measured_percent",
+            help="beyond the last reference, as a share of the step; below 0 it is not reached",
+        ),
+    ]
+    overshoot_computed: Annotated[
+        float,
+        Quantity(
+            "overshoot, computed",
+            "%",
+            3,
+            key="overshoot_computed_percent",
+            help="beyond the last reference, as a share of the step; below 0 it is not reached",
+        ),
+    ]
+    end_measured: Annotated[
+        float, Quantity("error at the end, measured", "deg", 3, help="hub angle less reference at the last sample")
+    ]
+    end_computed: Annotated[
+        float, Quantity("error at the end, computed", "deg", 3, help="hub angle less reference at the last sample")
+    ]
+    moment_measured: Annotated[
+        float | None,
+        Quantity("largest |moment|, measured", "N m", 3, help="largest size of the root moment in the record"),
+    ]
+    moment_computed: Annotated[
+        float,
+        Quantity("largest |moment|, computed", "N m", 3, help="largest size of the root moment in the simulation"),
+    ]
+    difference: Annotated[
+        float,
+        Quantity("difference, rms", "deg", 3, key="apart_rms_deg", help="rms of computed less measured hub angle"),
+    ]
 
 
 def measured_step(name: str, found: RunComparison) -> MeasuredStep:

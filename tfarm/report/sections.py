@@ -6,7 +6,7 @@ Texts are in templates/prose.txt, pages in the other templates; here is how both
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -16,9 +16,10 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 import tfarm
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN
 from tfarm.digits import how_many, listed, plain, scientific, significant
 from tfarm.plots.style import save_figure
-from tfarm.schema import Table, entries, save_table, text, with_unit
+from tfarm.schema import Table, save_table, text
 from tfarm.schema.html import as_html, with_symbols
 
 if TYPE_CHECKING:
@@ -44,7 +45,8 @@ def templates() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.globals["inf"] = math.inf
+    environment.globals |= {"inf": math.inf, "rate": RATE_GAIN, "moment": MOMENT_GAIN, "angle": ANGLE_GAIN,
+                            "plane": " and ".join(PLANE)}  # fmt: skip
     environment.filters.update(
         symbol=with_symbols, text=text, plain=plain, significant=significant, scientific=scientific, upper_first=upper,
         listed=listed, how_many=how_many,
@@ -78,12 +80,6 @@ class Fact:
     note: str = ""
 
 
-def facts_of(name: str, record: Any, labels: Iterable[str]) -> list[Fact]:
-    """The quantities of a record with these labels, under a name."""
-    found = {label: with_unit(value, of) for label, of, value in entries(record) if value is not None}
-    return [Fact(label=f"{name}: {label}", value=found[label]) for label in labels if label in found]
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Picture:
     """A finished figure with its words.  `stem` names its files; `data` are the numbers that it draws."""
@@ -104,13 +100,15 @@ class Picture:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PageSection:
-    """A part of a page.  `words` are paragraphs, `items` a list; `blocks` pictures and tables.
+    """A part of a page.  `answer` is its result in a sentence or two, at the top of the full page too.
 
+    `words` are paragraphs, `items` a list; `blocks` pictures and tables.
     `failure` is the reason why the section could not be made, which its words have too; empty otherwise.
     """
 
     anchor: str
     title: str
+    answer: str = ""
     words: Sequence[str] = ()
     items: Sequence[str] = ()
     facts: Sequence[Fact] = ()

@@ -47,14 +47,21 @@ UNPROVEN = "not proven"
 class Boxed:
     """Eigenvalues proven complete in a box: each in a disc, `count` in all.  `failure`: what could not be proven."""
 
-    arm: Annotated[str, Quantity("arm")]
-    what: Annotated[str, Quantity("eigenvalues")]
-    count: Annotated[int, Quantity("counted")] = 0
-    box: Annotated[list[float], Quantity("box: Re s from, to, Im s from, to", "1/s", 4)] = field(default_factory=list)
+    arm: Annotated[str, Quantity("arm", help="name of the arm")]
+    what: Annotated[str, Quantity("eigenvalues", help="damped modes of the arm, or poles of its default loop")]
+    count: Annotated[
+        int, Quantity("counted", help="eigenvalues in the box by the argument principle, conjugates counted")
+    ] = 0
+    box: Annotated[
+        list[float],
+        Quantity(
+            "box: Re s from, to, Im s from, to", "1/s", 4, help="rectangle of the s-plane in which none is missing"
+        ),
+    ] = field(default_factory=list)
     failure: str = ""
 
     @property
-    def verdict(self) -> Annotated[str, Quantity("verdict")]:
+    def verdict(self) -> Annotated[str, Quantity("verdict", help="whether as many are enclosed as counted")]:
         """Whether they are complete."""
         return self.failure or "complete, proven"
 
@@ -69,12 +76,16 @@ class ArmProof:
     that of the arm's file.
     """
 
-    name: Annotated[str, Quantity("arm")]
-    sha256: Annotated[str, Quantity("SHA-256 of arm.toml")]
-    has_rigid_mode: Annotated[bool, Quantity("rigid body")]
+    name: Annotated[str, Quantity("arm", help="name of the arm")]
+    sha256: Annotated[str, Quantity("SHA-256 of arm.toml", help="hash of the arm's file, on which its page depends")]
+    has_rigid_mode: Annotated[
+        bool, Quantity("rigid body", help="whether the arm turns freely as a rigid body, with natural frequency 0")
+    ]
     digits: int = BRACKET_DIGITS
     brackets: tuple[tuple[str, str], ...] = ()
-    count: Annotated[int, Quantity("counted")] = 0
+    count: Annotated[
+        int, Quantity("counted", help="natural frequencies below the next column's, by the proven count")
+    ] = 0
     below: str = ""
     failure: str = ""
     points: int = BAND_POINTS
@@ -83,22 +94,26 @@ class ArmProof:
     boxes: tuple[Boxed, ...] = ()
 
     @property
-    def enclosed(self) -> Annotated[int, Quantity("flexible modes enclosed")]:
+    def enclosed(
+        self,
+    ) -> Annotated[int, Quantity("flexible modes enclosed", help="natural frequencies between two proven bounds each")]:
         """The number of brackets."""
         return len(self.brackets)
 
     @property
-    def count_below(self) -> Annotated[float | None, Quantity("below", "rad/s", 9)]:
+    def count_below(
+        self,
+    ) -> Annotated[float | None, Quantity("below", "rad/s", 9, help="frequency at which the count is made")]:
         """The frequency of the count."""
         return float(self.below) if self.below else None
 
     @property
-    def verdict(self) -> Annotated[str, Quantity("verdict")]:
+    def verdict(self) -> Annotated[str, Quantity("verdict", help="whether as many are enclosed as counted")]:
         """Whether the list is complete."""
         return f"{UNPROVEN}: {self.failure}" if self.failure else "complete, proven"
 
     @property
-    def source(self) -> Annotated[str, Quantity("source")]:
+    def source(self) -> Annotated[str, Quantity("source", help="preset, where the file is that of one byte for byte")]:
         """Whether the arm's file is, byte for byte, that of a preset."""
         return "preset" if self.is_preset else "file"
 
@@ -185,42 +200,23 @@ def shared_digits(bracket: tuple[str, str], digits: int) -> str:
         return f"{lower.quantize(Decimal(1).scaleb(lower.adjusted() - digits + 1)):f}"
 
 
-def digits_table(proofs: Sequence[ArmProof]) -> Table:
-    """A row a mode, a column an arm: every digit that is proven."""
+def proof_tables(proofs: Sequence[ArmProof]) -> list[Table]:
+    """The counts of natural frequencies, all proven digits of these, and the boxes of other eigenvalues, if any."""
+    names = ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict")
     columns = [Column("mode", "mode", of=range(1, PROVEN_MODES + 1))]
     for proof in proofs:
         digits = [shared_digits(bracket, proof.digits) for bracket in proof.brackets] or [""] * PROVEN_MODES
         cells = [f"{text}…" if text else UNPROVEN for text in digits]
         columns.append(Column(f"{proof.name}_rad_s", proof.name, "rad/s", of=digits, shown=cells))
-    return Table(
-        stem="digits",
-        title=f"Natural frequencies, {BRACKET_DIGITS} digits",
-        caption=prose("digits", modes=PROVEN_MODES, digits=BRACKET_DIGITS),
-        columns=tuple(columns),
-    )
-
-
-def counts_table(proofs: Sequence[ArmProof]) -> Table:
-    """The number of frequencies below one, and of those enclosed."""
-    names = ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict")
-    return table(proofs, names, stem="counts", title="None missing", caption=prose("counts"))
-
-
-def boxes_tables(proofs: Sequence[ArmProof]) -> list[Table]:
-    """Damped modes and closed-loop poles, a row a box; no table where there is none."""
-    rows = [each for proof in proofs for each in proof.boxes]
-    return (
-        [
-            table(
-                rows,
-                stem="boxes",
-                title="Damped modes and closed-loop poles",
-                caption=prose("boxes", digits=PROVEN_DIGITS),
-            )
-        ]
-        if rows
-        else []
-    )
+    title = f"Natural frequencies, {BRACKET_DIGITS} digits"
+    caption = prose("digits", modes=PROVEN_MODES, digits=BRACKET_DIGITS)
+    boxes = [each for proof in proofs for each in proof.boxes]
+    of_boxes = {"title": "Damped modes and closed-loop poles", "caption": prose("boxes", digits=PROVEN_DIGITS)}
+    return [
+        table(proofs, names, stem="counts", title="None missing", caption=prose("counts")),
+        Table(stem="digits", title=title, caption=caption, columns=tuple(columns)),
+        *([table(boxes, stem="boxes", **of_boxes)] if boxes else []),
+    ]
 
 
 def accuracy_table(proofs: Sequence[ArmProof]) -> Table:
@@ -241,11 +237,32 @@ def accuracy_table(proofs: Sequence[ArmProof]) -> Table:
     )
 
 
-def inputs_table(proofs: Sequence[ArmProof]) -> Table:
-    """The hash of each arm's file."""
-    return table(proofs, ("name", "source", "sha256"), stem="inputs", title="Inputs", caption=prose("inputs"))
+def published_tables(found: published.Validation) -> list[Table]:
+    """The sources of printed numbers and how many of each agree; the numbers that differ, by reason; all of them."""
+    agrees = [[row.agrees for row in found.rows if row.source == source.key] for source in found.sources]
+    counts = Column("numbers", "numbers", of=map(len, agrees)), Column("agree", "agree", of=map(sum, agrees))
+    columns = (*table(found.sources).columns, *counts)
+    return [
+        Table(stem="sources", title="Sources", caption=prose("sources"), columns=columns),
+        table(found.differences, stem="differences", title="Differences, with the reason", caption=prose("differing")),
+        table(found.rows, stem="published", title="All printed numbers, and ours", caption=prose("printed")),
+    ]
 
 
+def again_tables(proofs: Sequence[ArmProof]) -> list[Table]:
+    """The hashes of the arms' files, and the versions that computed this."""
+    found = {"tfarm": tfarm.__version__, "python": platform.python_version()}
+    found |= {package: version(package) for package in PACKAGES}
+    columns = Column("package", "package", of=list(found)), Column("version", "version", of=list(found.values()))
+    return [
+        table(proofs, ("name", "source", "sha256"), stem="inputs", title="Inputs", caption=prose("inputs")),
+        Table(stem="versions", title="Versions", caption=prose("versions"), columns=columns),
+    ]
+
+
+TITLES = {
+    "proofs": "Proofs", "accuracy": "Measured accuracy", "published": "Published numbers", "again": "Make it again",
+}  # fmt: skip
 AUDIT_COLUMNS = (
     "equation", "verdict", "printed", "corrected", "residual_printed", "residual_corrected", "evidence",
 )  # fmt: skip
@@ -271,9 +288,7 @@ PACKAGES = (
 
 def shown_row(row: AuditRow) -> dict[str, Any]:
     """A row of the audit, typeset; `corrected` is empty where the print is right."""
-    is_right = row.printed == row.corrected
-    both = (row.printed_tex, row.corrected_tex)
-    printed, corrected = (formulas(both[0]), []) if is_right else compared_formulas(*both)
+    printed, corrected = compared_formulas(row.printed_tex, row.corrected_tex)
     return {
         "anchor": anchor(row.equation),
         "equation": in_letters(row.equation),
@@ -281,7 +296,7 @@ def shown_row(row: AuditRow) -> dict[str, Any]:
         "mark": VERDICT_MARKS[row.verdict][0],
         "words": VERDICT_MARKS[row.verdict][1],
         "printed": printed,
-        "corrected": corrected,
+        "corrected": [] if row.printed == row.corrected else corrected,
         "left_printed": _left(row.residual_printed),
         "left_corrected": _left(row.residual_corrected),
         "evidence": in_letters(row.evidence),
@@ -301,12 +316,6 @@ def anchor(equation: str) -> str:
     return "eq-" + re.sub(r"[^a-z0-9]+", "-", equation.lower()).strip("-")
 
 
-def verdict_counts(rows: Sequence[AuditRow]) -> dict[str, int]:
-    """How many rows have each verdict, in the order of VERDICTS."""
-    found = Counter(row.verdict for row in rows)
-    return {verdict: found[verdict] for verdict in VERDICT_MARKS}
-
-
 def _left(residual: str) -> Markup:
     """What a formula leaves in the check, in words and letters."""
     if residual == "0":
@@ -314,21 +323,16 @@ def _left(residual: str) -> Markup:
     return in_letters(f"nothing but rounding at 50 digits, {residual}" if is_zero(residual) else residual)
 
 
-def formulas(tex: str) -> list[Markup]:
-    """The TeX as MathML, a line each."""
-    return [_text(line) for line in _set(tex)]
-
-
 def compared_formulas(printed: str, corrected: str) -> tuple[list[Markup], list[Markup]]:
     """Both as MathML, a line each, the symbols in which they differ of the class "changed"."""
     both = _set(printed), _set(corrected)
-    left, right = ([leaf for line in each for leaf in line.iter() if leaf.tag in LEAVES] for each in both)
-    matcher = SequenceMatcher(a=[leaf.text for leaf in left], b=[leaf.text for leaf in right], autojunk=False)
+    a, b = ([leaf for line in each for leaf in line.iter() if leaf.tag in LEAVES] for each in both)
+    matcher = SequenceMatcher(a=[leaf.text for leaf in a], b=[leaf.text for leaf in b], autojunk=False)
     for what, i, j, k, m in matcher.get_opcodes():
-        if what != "equal":
-            for leaf in (*left[i:j], *right[k:m]):
-                leaf.set("class", "changed")
-    return [_text(line) for line in both[0]], [_text(line) for line in both[1]]
+        for leaf in (*a[i:j], *b[k:m]) if what != "equal" else ():
+            leaf.set("class", "changed")
+    left, right = ([Markup(ElementTree.tostring(line, encoding="unicode")) for line in each] for each in both)
+    return left, right
 
 
 def _set(tex: str) -> list[MathElement]:
@@ -360,10 +364,6 @@ def _corrected(root: MathElement) -> None:
             before = leaf
 
 
-def _text(line: MathElement) -> Markup:
-    return Markup(ElementTree.tostring(line, encoding="unicode"))
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
     """What the whole package shows for itself: the audit of the paper, and the tables of others."""
@@ -384,19 +384,16 @@ def write_trust(evidence: Evidence, proofs: Sequence[ArmProof], folder: Path) ->
     """index.html and its tables, into a folder of their own."""
     folder.mkdir()
     found = published.Validation(evidence.published)
-    contents: dict[str, tuple[str, Sequence[Table]]] = {
-        "proofs": ("Proofs", (counts_table(proofs), digits_table(proofs), *boxes_tables(proofs))),
-        "accuracy": ("Measured accuracy", (accuracy_table(proofs),)),
-        "published": ("Published numbers", (sources_table(found), differences_table(found), published_table(found))),
-        "again": ("Make it again", (inputs_table(proofs), versions_table())),
-    }
+    tables = {"proofs": proof_tables(proofs), "accuracy": [accuracy_table(proofs)],
+              "published": published_tables(found), "again": again_tables(proofs)}  # fmt: skip
     sections = {
-        anchor: save_section(PageSection(anchor=anchor, title=title, blocks=blocks), folder)
-        for anchor, (title, blocks) in contents.items()
+        anchor: save_section(PageSection(anchor=anchor, title=TITLES[anchor], blocks=blocks), folder)
+        for anchor, blocks in tables.items()
     }
     plain = table(evidence.audit, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation")
     save_table(plain, folder / DATA)
     errors = [error for proof in proofs for _, error in proof.errors]
+    verdicts = Counter(row.verdict for row in evidence.audit)
     page = render(
         "trust.html",
         title="Why trust this",
@@ -406,54 +403,9 @@ def write_trust(evidence: Evidence, proofs: Sequence[ArmProof], folder: Path) ->
         points=BAND_POINTS,
         worst=scientific(max(errors), 2) if errors else "",
         found=found,
-        verdicts=verdict_counts(evidence.audit),
+        verdicts={verdict: verdicts[verdict] for verdict in VERDICT_MARKS},
         marks=VERDICT_MARKS,
         equations=[shown_row(row) for row in evidence.audit],
         command=command_for_all([(proof.name, proof.is_preset) for proof in proofs]),
     )
     (folder / "index.html").write_text(page, encoding="utf-8", newline="")
-
-
-# ------------------------------------------------------------ published tables
-
-
-def sources_table(found: published.Validation) -> Table:
-    """The origin of the numbers, and how many agree."""
-    agrees = [[row.agrees for row in found.rows if row.source == source.key] for source in found.sources]
-    columns = (
-        *table(found.sources).columns,
-        Column("numbers", "numbers", of=map(len, agrees)),
-        Column("agree", "agree", of=map(sum, agrees)),
-    )
-    return Table(stem="sources", title="Sources", caption=prose("sources"), columns=columns)
-
-
-def differences_table(found: published.Validation) -> Table:
-    """The printed numbers that ours does not round to, a row a reason."""
-    return table(
-        found.differences,
-        stem="differences",
-        title="Where ours differs, and why",
-        caption="Largest difference: ours over printed, less one, of the modes named. All other numbers agree.",
-    )
-
-
-def published_table(found: published.Validation) -> Table:
-    """Every printed number and ours."""
-    return table(
-        found.rows,
-        stem="published",
-        title="All printed numbers, and ours",
-        caption="Relative difference: ours over printed, less one; the reasons are given above.",
-    )
-
-
-def versions_table() -> Table:
-    """The versions that computed this."""
-    found = {"tfarm": tfarm.__version__, "python": platform.python_version()}
-    found |= {package: version(package) for package in PACKAGES}
-    columns = (
-        Column("package", "package", of=list(found)),
-        Column("version", "version", of=list(found.values())),
-    )
-    return Table(stem="versions", title="Versions", caption=prose("versions"), columns=columns)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, Arm
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
 from tfarm.digits import how_many, lined, plain, significant
 from tfarm.dsp import Chain, Simulation
 from tfarm.dsp.results import ideal_chain
@@ -94,11 +94,6 @@ def curve_seeds(samples: int) -> int:
     return min(CURVE_SEEDS, max(1, CURVE_SAMPLES // samples))
 
 
-def trial_samples(arm: Arm, chain: Chain) -> int:
-    """Number of samples of each trial."""
-    return 1 + round(usual_plan(arm, chain).duration / chain.sampling.period)
-
-
 def _servo_tuning(arm: Arm, plan: Plan, chain: Chain) -> Tuning | None:
     """The same tuning with an angle loop a twentieth as fast as the first mode, or slower at a long period."""
     speed = min(SERVO_SPEED * first_frequency(arm), SERVO_TURN / chain.sampling.period)
@@ -136,8 +131,8 @@ def off_target(data: TunerNumbers, error: float) -> str:
 class Cost(NamedTuple):
     """The cost of the slew under one controller."""
 
-    controller: Annotated[str, Quantity("controller")]
-    cost: Annotated[float, Quantity("cost", digits=4)]
+    controller: Annotated[str, Quantity("controller", help="what sets the moment gain")]
+    cost: Annotated[float, Quantity("cost", digits=4, help="cost of the slew, the integral that the tuner minimises")]
 
 
 def servo_table(data: TunerNumbers, servo: Tuning) -> Table:
@@ -151,7 +146,7 @@ def servo_table(data: TunerNumbers, servo: Tuning) -> Table:
         Cost("bound", servo.bound.cost),
     ]
     gains = ", ".join(law.gain_text(name, partial(significant, digits=3), data.arm) for name in (ANGLE_GAIN, RATE_GAIN))
-    caption = prose("tuner_servo", gains=gains, guard=servo.training.guard, moment=MOMENT_GAIN,
+    caption = prose("tuner_servo", gains=gains, guard=servo.training.guard,
                     error=None if error is None else off_target(data, error))  # fmt: skip
     return table(rows, stem="tune-servo", title="Cost of the slew with the angle regulated", caption=caption)
 
@@ -192,24 +187,30 @@ def tuner_section(case: Case) -> PageSection:
             data = tuner_numbers(case.arm, case.chain)
             if math.isfinite(data.tuning.without.cost):
                 return section_of(data)
-            reason = prose("tuner_unstable", rate=RATE_GAIN)
+            reason = prose("tuner_unstable")
         except CertificationError as error:
             reason = prose("tuner_unproven", error=error)
-    return PageSection(anchor="tune", title=TUNER_TITLE, words=(reason,))
+    return PageSection(anchor="tune", title=TUNER_TITLE, answer=reason)
 
 
 def section_of(data: TunerNumbers) -> PageSection:
     """The section on numbers that were computed already."""
     guard, n = data.tuning.training.guard.sentence, data.tuning.trial.n
-    words = [tuner_in_short(data), prose("tuner", rate=RATE_GAIN, angle=ANGLE_GAIN, guard=guard)]
+    words = [prose("tuner", guard=guard)]
     if limits := limits_of(data):
         words.append(f"A trial has {n:,} samples. {'. '.join(limits)}.")
-    tables = [comparison_table(data), residual_table(data)]
-    if data.servo is not None:
-        tables.append(servo_table(data, data.servo))
-    pictures = _gain_picture(data), _slew_picture(data), _coarse_picture(data)
-    blocks: list[Picture | Table] = [*pictures, *tables, _curves_picture(data)]
-    return PageSection(anchor="tune", title=TUNER_TITLE, facts=tuner_facts(data), words=words, blocks=blocks)
+    servo = [] if data.servo is None else [servo_table(data, data.servo)]
+    blocks: list[Picture | Table] = [
+        _gain_picture(data),
+        *slew_pictures(data),
+        *cost_tables(data),
+        *servo,
+        _curves_picture(data),
+    ]
+    return PageSection(
+        anchor="tune", title=TUNER_TITLE, answer=tuner_in_short(data), facts=tuner_facts(data), words=words,
+        blocks=blocks,
+    )  # fmt: skip
 
 
 def why_not(arm: Arm, chain: Chain) -> str:
@@ -220,7 +221,7 @@ def why_not(arm: Arm, chain: Chain) -> str:
         return f"{what_holds(arm)}: it makes no slew, and there is nothing for the tuner to learn from."
     if arm.has_elastic_link:
         return prose("tuner_undamped", arm=arm)
-    samples = trial_samples(arm, chain)
+    samples = 1 + round(usual_plan(arm, chain).duration / chain.sampling.period)  # of each trial
     return "" if samples <= LONGEST_TRIAL else prose("tuner_too_long", samples=samples, period=chain.sampling.period)
 
 
@@ -251,39 +252,31 @@ def _gain_picture(data: TunerNumbers) -> Picture:
         stem="tune-gain",
         title="The tuner's path and its guard on the map",
         caption=prose("tuner_gain", guard=tuning.training.guard, low=float(result.K.min()), high=float(result.K.max()),
-                      rate=tuning.constant.gain_text(RATE_GAIN, plain), moment=MOMENT_GAIN, seed=tuning.plan.seed),
-        alt=f"Map of {' and '.join(PLANE)} with the tuner's guard, and its gain over time.",
+                      gain=tuning.constant.gain_text(RATE_GAIN, plain), seed=tuning.plan.seed),
+        alt="Map of both gains with the tuner's guard, and its gain over time.",
         figure=draw_gain(tuning, *plane),
         data=Table(stem="tune-gain-data", title="The tuner's gain", columns=columns),
     )  # fmt: skip
 
 
-def _slew_picture(data: TunerNumbers) -> Picture:
-    return Picture(
-        stem="tune-slew",
-        title="The slew without and with the tuner",
-        caption=prose("tuner_slew", piece=piece_of_bands(data.slews)),
-        alt="Root moment, tip and motor torque of the slew, without and with the tuner.",
-        figure=slew.figure(data.arm, data.slews, "the slew, ideal converters"),
-        data=_signals(data.slews, data.arm, "tune-slew-data"),
-    )
-
-
-def _coarse_picture(data: TunerNumbers) -> Picture:
-    """The slew with the converters and the delay of its chain."""
+def slew_pictures(data: TunerNumbers) -> Iterator[Picture]:
+    """The slew without and with the tuner: through ideal converters, then with those and the delay of its chain."""
     chain = chain_words(data.arm, next(iter(data.coarse.values())).chain)
-    return Picture(
-        stem="tune-dsp",
-        title="The same with the DSP's effects on",
-        caption=prose("tuner_dsp", chain=chain, angle=ANGLE_GAIN, runs=data.coarse, piece=piece_of_bands(data.coarse)),
-        alt="Root moment, tip and motor torque of the slew with converters and delay, without and with the tuner.",
-        figure=slew.figure(data.arm, data.coarse, "the slew, with converters and delay"),
-        data=_signals(data.coarse, data.arm, "tune-dsp-data"),
-    )
-
-
-def _signals(runs: Mapping[str, Simulation], arm: Arm, stem: str) -> Table:
-    return responses_table(stem, "The slew", arm, dict(zip(("without", "tuner"), runs.values(), strict=True)))
+    coarse = prose("tuner_dsp", chain=chain, runs=data.coarse, piece=piece_of_bands(data.coarse))
+    for stem, title, runs, how, caption in (
+        ("tune-slew", "The slew without and with the tuner", data.slews, "ideal converters",
+         prose("tuner_slew", piece=piece_of_bands(data.slews))),
+        ("tune-dsp", "The same with converters and delay", data.coarse, "with converters and delay", coarse),
+    ):  # fmt: skip
+        yield Picture(
+            stem=stem,
+            title=title,
+            caption=caption,
+            alt=f"Root moment, tip and motor torque of the slew, {how}, without and with the tuner.",
+            figure=slew.figure(data.arm, runs, f"the slew, {how}"),
+            data=responses_table(f"{stem}-data", "The slew", data.arm,
+                                 dict(zip(("without", "tuner"), runs.values(), strict=True))),
+        )  # fmt: skip
 
 
 def _curves_picture(data: TunerNumbers) -> Picture:
@@ -296,26 +289,24 @@ def _curves_picture(data: TunerNumbers) -> Picture:
     return Picture(
         stem="tune-curves",
         title="Learning",
-        caption=prose("tuner_curves", seeds=seeds, curves=curves, moment=MOMENT_GAIN),
+        caption=prose("tuner_curves", seeds=seeds, curves=curves),
         alt=f"Learning curves of {how_many(seeds, 'seed')}, the best constant gain and the bound.",
         figure=draw_curves(curves, data.tuning),
         data=Table(stem="tune-curves-data", title="Learning curves", columns=tuple(columns)),
     )
 
 
-def comparison_table(data: TunerNumbers) -> Table:
-    """Cost of a slew, a row a condition, a column a controller, and whether the guard is proven there too."""
-    caption = prose("tuner_comparison", data=data, moment=MOMENT_GAIN)
+def cost_tables(data: TunerNumbers) -> list[Table]:
+    """Cost of a slew and root moment after it: a row a condition, a column a controller, and where the guard holds."""
     proven = Column("guard_proven", "guard proven", of=["yes" if row.proven else "no" for row in data.rows])
-    columns, title = (*_of_each(data.rows, "cost", 4), proven), "Cost of the slew, compared with baselines"
-    return Table(stem="tune-comparison", title=title, caption=caption, columns=columns)
-
-
-def residual_table(data: TunerNumbers) -> Table:
-    """The root moment after the slew."""
-    caption = prose("tuner_residual", is_unstable=any(row.tuner.residual is None for row in data.rows))
-    title, columns = "Root moment left after the slew", _of_each(data.rows, "residual", 3)
-    return Table(stem="tune-residual", title=title, caption=caption, columns=columns)
+    caption = prose("tuner_comparison", data=data)
+    after = prose("tuner_residual", is_unstable=any(row.tuner.residual is None for row in data.rows))
+    return [
+        Table(stem="tune-comparison", title="Cost of the slew, compared with baselines", caption=caption,
+              columns=(*_of_each(data.rows, "cost", 4), proven)),
+        Table(stem="tune-residual", title="Root moment left after the slew", caption=after,
+              columns=_of_each(data.rows, "residual", 3)),
+    ]  # fmt: skip
 
 
 def _of_each(rows: Sequence[Outcomes], name: str, digits: int) -> tuple[Column, ...]:

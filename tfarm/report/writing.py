@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -10,19 +9,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import tfarm
 from tfarm.arm import Arm
 from tfarm.case import Comparison
-from tfarm.digits import plain
-from tfarm.dsp import Chain, load_chain
+from tfarm.dsp import Chain
 from tfarm.errors import ParameterError, TfarmError, must_be_known
 from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
-from tfarm.plots.frequency import bode as bode_plot
-from tfarm.plots.regions import comparison, draw_overlay, stable_regions
-from tfarm.plots.shapes import modes
-from tfarm.plots.style import save_figure
+from tfarm.plots.regions import comparison
 from tfarm.processes import may_start_processes, shared
 from tfarm.report.cases import Case, GivenLaw, check_laws
 from tfarm.report.live import ASSETS, LIVE_PAGE, is_live, save_live, write_assets
@@ -43,9 +37,7 @@ from tfarm.report.page import (
 )
 from tfarm.report.sections import PageSection, Picture, SavedSection, prose, render, save_section, upper
 from tfarm.report.trust import TRUST_FOLDER, Evidence, gather, save_proof, write_trust, written_proofs
-from tfarm.response.frequency import bode, resonant_band
 from tfarm.schema import quantities, table
-from tfarm.spectrum.table import default_gains
 from tfarm.stopping import undone_if_stopped
 
 ReportProgress = Callable[[int, int, str], object]
@@ -57,6 +49,14 @@ RESERVED_NAMES = {  # of folders that no arm may have
     "index.html", "readme.md", "pictures", "bench.json", "trust", "data", "compare.html", "compare.json", ASSETS,
 }  # fmt: skip
 TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
+
+
+class Task(NamedTuple):
+    """What one process makes at a time, and about how long that takes [s] where it is long."""
+
+    name: str
+    call: Callable[[], Any]
+    seconds: float = 0.0
 
 
 def make_all(
@@ -71,40 +71,30 @@ def make_all(
     `scripts` is the folder that the live pages' scripts are made in.
     """
     tasks = [] if only else [Task(EVIDENCE, gather)]
-    if scripts is not None:
-        tasks.append(Task(SCRIPTS, partial(write_assets, scripts)))
+    tasks += [] if scripts is None else [Task(SCRIPTS, partial(write_assets, scripts))]
     pages = [[piece for piece in pieces_of(case) if not only or any(map(piece.is_on, only))] for case in cases]
     for case, folder, pieces in zip(cases, folders, pages, strict=True):
         tasks += tasks_of(case, folder, pieces, is_whole=not only)
-    work = {task.name: task.call for task in sorted(tasks, key=lambda task: -task.seconds)}  # the longest first
+    tasks.sort(key=lambda task: -task.seconds)  # the longest first
     done: dict[str, Any] = {}
 
     def begun(running: Sequence[str]) -> None:
         if progress is not None:
-            progress(len(done), len(work), ", ".join(running))
+            progress(len(done), len(tasks), ", ".join(running))
 
-    begun(())
-    if len(work) < WORTH_A_PROCESS or MOST_WORKERS == 1 or not may_start_processes():
-        for task, call in work.items():
-            begun([task])
-            done[task] = call()
+    if len(tasks) < WORTH_A_PROCESS or MOST_WORKERS == 1 or not may_start_processes():
+        for task in tasks:
+            begun([task.name])
+            done[task.name] = task.call()
     else:
-        for task, result in shared(work, MOST_WORKERS, [__name__], begun):
-            done[task] = result  # noqa: PERF403  `begun` counts them meanwhile
-    begun(())
-    made = [
+        for name, result in shared({task.name: task.call for task in tasks}, MOST_WORKERS, [__name__], begun):
+            done[name] = result  # noqa: PERF403  `begun` counts them meanwhile
+    begun(["pages"])
+    sections = [
         [done[task_name(case, piece)][piece.anchor] for piece in pieces]
         for case, pieces in zip(cases, pages, strict=True)
     ]
-    return made, done.get(EVIDENCE)
-
-
-class Task(NamedTuple):
-    """What one process makes at a time, and about how long that takes [s] where it is long."""
-
-    name: str
-    call: Callable[[], Any]
-    seconds: float = 0.0
+    return sections, done.get(EVIDENCE)
 
 
 def task_name(case: Case, piece: Piece) -> str:
@@ -112,30 +102,38 @@ def task_name(case: Case, piece: Piece) -> str:
     return f"{case.arm.name}: {piece.task or piece.name}"
 
 
-def tasks_of(case: Case, folder: Path, pieces: Sequence[Piece], *, is_whole: bool) -> list[Task]:
-    """The tasks of one arm: its sections, its card and proof, and of a full report its live page."""
-    of, tasks = f"{case.arm.name}: ", []
-    together: dict[str, list[Piece]] = {}
-    for piece in pieces:
-        together.setdefault(task_name(case, piece), []).append(piece)
-    for name, parts in together.items():
-        makers = [(piece.name, piece.anchor, piece.make) for piece in parts]
-        seconds = sum(piece.seconds for piece in parts)
-        tasks.append(Task(name, partial(make_sections, makers, case, folder), seconds))
-    if is_whole and is_live(case):
-        tasks.append(Task(f"{of}live loop", partial(save_live, case, folder)))
-    tasks.append(Task(f"{of}card", partial(save_card, case, folder)))
+def tasks_of(case: Case, folder: Path, pieces: Sequence[Piece], *, is_whole: bool) -> Iterator[Task]:
+    """The tasks of one arm: its sections, its card and proof, and of a full report its live page.
+
+    Proof and live page are made by the process of the section that has computed most of them: the proof certifies the
+    modes that are listed, the live page has the regions of the map.
+    """
+    of = f"{case.arm.name}: "
+    more: dict[str, Task] = {}
     if is_whole or not case.laws:
-        tasks.append(Task(f"{of}proof", partial(save_proof, case.arm, folder, case.chain)))
-    return tasks
+        more["modes"] = Task(f"{of}proof", partial(save_proof, case.arm, folder, case.chain))
+    if is_whole and is_live(case):
+        more["margins-map"] = Task(f"{of}live loop", partial(save_live, case, folder))
+    for name in dict.fromkeys(task_name(case, piece) for piece in pieces):
+        parts = [piece for piece in pieces if task_name(case, piece) == name]
+        makers = [(piece.name, piece.anchor, piece.make) for piece in parts]
+        also = [more.pop(piece.anchor).call for piece in parts if piece.anchor in more]
+        yield Task(name, partial(make_sections, makers, case, folder, also), sum(piece.seconds for piece in parts))
+    yield Task(f"{of}card", partial(save_card, case, folder))
+    yield from more.values()
 
 
-Maker = tuple[str, str, Callable[[Case], PageSection]]  # a section's name, its anchor, and how to make it of a case
+def make_sections(
+    makers: Sequence[tuple[str, str, Any]], case: Case, folder: Path, also: Sequence[Callable[[], None]]
+) -> dict[str, SavedSection]:
+    """Sections by anchor, made one after the other, and what is `also` made in the same process.
 
-
-def make_sections(makers: Sequence[Maker], case: Case, folder: Path) -> dict[str, SavedSection]:
-    """Sections by anchor, made one after the other."""
-    return {maker[1]: make_section(*maker, case, folder) for maker in makers}
+    Each section is given by its name, its anchor and how to make it of a case.
+    """
+    sections = {anchor: make_section(name, anchor, make, case, folder) for name, anchor, make in makers}
+    for call in also:
+        call()
+    return sections
 
 
 def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], case: Case, folder: Path) -> SavedSection:
@@ -143,8 +141,8 @@ def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], ca
     try:
         section = make(case)
     except TfarmError as error:
-        words = (f"This section could not be made for this arm: {error}.",)
-        section = PageSection(anchor=anchor, title=upper(name), words=words, failure=str(error))
+        answer = f"This section could not be made for this arm: {error}."
+        section = PageSection(anchor=anchor, title=upper(name), answer=answer, failure=str(error))
     return save_section(section, folder)
 
 
@@ -235,40 +233,27 @@ def _check(names: Sequence[str], only: tuple[str, ...]) -> None:
 @contextmanager
 def _temporary(out: Path, names: Sequence[str]) -> Iterator[Path]:
     """A temporary folder in `out`, gone afterwards; what was made for it goes too if the work fails."""
-    made: list[Path] = []
-    why = "cannot be written ({}); give a folder that can"
+    folders = [out, *(out / name for name in names)]
+    missing = [part for folder in folders for part in (*reversed(folder.parents), folder) if not part.exists()]
+
+    def remove_empty() -> None:
+        for folder in reversed(missing):
+            with suppress(OSError):
+                folder.rmdir()
+
     try:
-        with undone_if_stopped(partial(_remove_empty, made)):
-            _make_folders(out, made)
+        with undone_if_stopped(remove_empty):
+            for folder in folders:
+                folder.mkdir(parents=True, exist_ok=True)
+                with temporary_folder(folder):  # which fails where it cannot be written to
+                    pass
             with temporary_folder(out) as place:
-                for name in names:
-                    _make_folders(out / name, made)
-                why = "could not be written to ({}); free some space, or give another folder"
                 yield place
     except OSError as error:
-        remedy = why.format(error.strerror or error)
+        remedy = f"cannot be written to ({error.strerror or error}); give a folder that can"
         raise ParameterError(key="out", value=str(out), remedy=remedy) from None
     finally:
-        _remove_empty(made)
-
-
-def _remove_empty(folders: Sequence[Path]) -> None:
-    """Remove those with nothing in them, the last first."""
-    for folder in reversed(folders):
-        with suppress(OSError):
-            folder.rmdir()
-
-
-def _make_folders(folder: Path, made: list[Path]) -> None:
-    """Make a folder and its parents, noting each that was not there.  Raises OSError if it cannot be written."""
-    missing = [part for part in (folder, *folder.parents) if not part.exists()]
-    for part in reversed(missing):
-        made.append(part)
-        part.mkdir(exist_ok=True)
-    if not folder.is_dir():
-        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        remove_empty()
 
 
 def _write_pages(
@@ -284,22 +269,15 @@ def _write_pages(
     These lead to each other, and to what is in the `earlier` folder of the arm.
     """
     (folder / "arm.toml").write_text(file_of(case), encoding="utf-8", newline="")
+    title, compared = kept_comparison(earlier.parent)
     for question in only or (None,):
         anchors = {piece.anchor for piece in pieces_of(case) if question and piece.is_on(question)}
         wanted = [each for each in sections if question is None or each.section.anchor in anchors]
         live = (folder / LIVE_PAGE).is_file()
-        others = [
-            *other_pages(earlier, only or ("index",), question or "index"),
-            *_compared(earlier.parent, case.arm),
-        ]
+        others = list(other_pages(earlier, only or ("index",), question or "index"))
+        others += [(f"../{COMPARISON_PAGE}", title)] if case.arm.name in compared else []
         page = arm_page(case, wanted, question, trust=f"../{trust}" if trust else "", live=live, others=others)
         (folder / f"{question or 'index'}.html").write_text(page, encoding="utf-8", newline="")
-
-
-def _compared(out: Path, arm: Arm) -> list[tuple[str, str]]:
-    """(file, title) of the comparison in the folder of reports, as seen from an arm's page, if it is one of the arm."""
-    title, arms = kept_comparison(out)
-    return [(f"../{COMPARISON_PAGE}", title)] if arm.name in arms else []
 
 
 def move_into(made: Path, folder: Path) -> None:
@@ -352,26 +330,3 @@ def _comparison_section(found: Comparison) -> PageSection:
     ]  # fmt: skip
     return PageSection(anchor="compared", title="Compared", words=[prose("comparison", found=found)],
                        blocks=[tables[0], picture, *tables[1:]])  # fmt: skip
-
-
-README_DOTS = 100  # an inch: pictures of a README are shown at their own size
-README_MODES = 4  # shapes: two rows
-
-
-def readme_pictures(out: Path) -> tuple[Path, ...]:
-    """Write bode-root-moment.png, gains.png and mode-shapes.png to the folder `out`; their paths.
-
-    Torque to root moment with and without damping, the gains that keep the loop stable, and the first mode shapes.
-    """
-    out.mkdir(parents=True, exist_ok=True)
-    lab, undamped = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
-    band, labels = resonant_band(lab, 6), ("exact, no damping", f"exact, damping C = {plain(lab.damping)} s")
-    both = {label: bode(arm, "root_moment", band) for label, arm in zip(labels, (undamped, lab), strict=True)}
-    figures = {
-        "bode-root-moment": bode_plot.figure(both),
-        "gains": draw_overlay(stable_regions(lab, default_gains(lab), load_chain(lab.name))),
-        "mode-shapes": modes.figure(tfarm.modes(lab, count=README_MODES)),
-    }
-    for stem, figure in figures.items():
-        save_figure(figure, out, stem, formats=("png",), dpi=README_DOTS)
-    return tuple(out / f"{stem}.png" for stem in figures)

@@ -10,6 +10,7 @@ from tfarm.digits import powers, unit
 
 from .tables import Column, Table
 
+COMPLEX = re.compile(r"(?<=[\d)])([+-])(\d[\d.]*(?:e[+-]?\d+)?)i\b")  # the imaginary part of a number
 SIGN, INFINITE = re.compile(r"(?<![\w.)])-(?=[\d.]|inf\b)"), re.compile(r"\binf\b")  # of a number in a cell
 TYPESET = {
     "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", " theta": " θ", "phi'(0)": "φ′(0)",
@@ -66,6 +67,7 @@ def _tooltip(meaning: str) -> Markup:
 
 def with_symbols(text: str) -> Markup:
     """A text with Greek letters, true minus signs, subscripts and exponents: I_h becomes I<sub>h</sub>, m^2 m²."""
+    text = COMPLEX.sub(lambda part: f"\u00a0{part[1].replace('-', '−')}\u00a0{part[2]}\u00a0i", text)
     for written, shown in TYPESET.items():
         text = text.replace(written, shown)
     plain = LETTER.sub(lambda name: GREEK[name[1]], powers(unit(str(escape(MINUS.sub("−", text))))))

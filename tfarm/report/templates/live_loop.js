@@ -133,8 +133,8 @@ class LiveLoop {
     if (n > 0) return ["unstable", `${n} unstable pole${n > 1 ? "s" : ""} up to ${band}`];
     if (this.kind === "quiet") return ["stable", this.beyond];
     const takes = this.by_sign ? Math.sign(K1 + this.rate_loss) * Math.sign(1 - K2 / this.whole) : 0;
-    if (takes < 0 && this.hub_alone) return ["unstable", "C = 0: every mode beyond the band is driven"];
-    return takes > 0 ? ["stable", this.beyond] : ["stable in the band", `no unstable pole up to ${band}; beyond it nothing is known`];
+    if (takes < 0 && this.hub_alone) return ["unstable", "C = 0: every mode beyond the frequency range is driven"];
+    return takes > 0 ? ["stable", this.beyond] : ["stable in the frequency range", `no unstable pole up to ${band}; not determined beyond`];
   }
 
   // The base points and more about each oscillating pole, as close as it is to the axis: `tfarm.loop.margins.dense`

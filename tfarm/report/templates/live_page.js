@@ -109,11 +109,11 @@
     if (slew) showSlew(gains);
   }
   function showSampled(gains) {
-    const most = now.z && Math.max(...now.z.map(each => each.growth)), change = now.z && general(Math.abs(Math.expm1(most)), 3);
+    const most = now.z && Math.max(...now.z.map(each => each.growth));
     const word = most > 0 ? "unstable" : most < 0 ? "stable" : "marginal";
     text("sampled", now.z ? word : "not computed");
     $("sampled").className = `verdict ${now.z && most < 0 ? "ok" : "corrected"}`;
-    text("sampled-note", now.z ? `${most > 0 ? `grows by ${change} a sample` : `the slowest pole decays by ${change} a sample`}; spectral radius ${general(Math.exp(most), 12)}, of the first ${discrete.modes} mode${discrete.modes > 1 ? "s" : ""}` : "the sampled poles of these gains are not all found");
+    text("sampled-note", now.z ? `dominant pole: ln|z| = ${general(most, 3)} per sample; spectral radius ${general(Math.exp(most), 12)}, of the first ${discrete.modes} mode${discrete.modes > 1 ? "s" : ""}` : "not all sampled poles of these gains were found: not determined");
     text("sampled-command", discrete ? `tfarm sampled ${gains}` : "");
     rows("z-rows", (now.z || []).filter(({ z }) => z[1] > -1e-14).sort((a, b) => b.growth - a.growth).slice(0, 8).map(({ z, growth }) => [general(z[0], 5), general(Math.abs(z[1]) > 1e-14 ? z[1] : 0, 5), general(Math.exp(growth), 7), general(growth, 4)]));
   }
@@ -123,7 +123,7 @@
     text("slew-moment", general(moment, 5));
     text("slew-residual", residual === null ? "not computed" : general(residual, 5));
     text("slew-settled", Number.isFinite(settled) ? general(settled, 5) : `not settled within ${general((slew.n - 1) * slew.period, 5)} s`);
-    text("slew-stopped", stopped === null ? "" : `The arm is folded up after ${general(stopped, 4)} s.`);
+    text("slew-stopped", stopped === null ? "" : `Unstable: simulation stopped at ${general(stopped, 4)} s (deflection limit).`);
     text("slew-command", `tfarm simulate ${gains} --duration ${general(slew.n * slew.period - slew.period, 6)} --modes ${slew.modes}`);
   }
   function table(margins) {
@@ -151,7 +151,7 @@
   }
   // What the margins up to the band say of the whole infinite-dimensional loop: `tfarm.loop.margins.margins`
   function whole() {
-    if (loop.kind === "quiet") return "Beyond the band nothing comes nearer to −1: these margins are those of the whole loop.";
+    if (loop.kind === "quiet") return "Beyond the frequency range L is no nearer to −1: these margins are those of the whole loop.";
     if (loop.kind !== "reactive" || !loop.by_sign) return "Of the whole loop they are not known.";
     return law.K2 ? "Of the whole loop, whose undamped modes have no end, delay and disk margin are 0 and the peaks infinite." : "Of the whole loop, whose undamped modes have no end, the delay margin is 0; the others hold.";
   }

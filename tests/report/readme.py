@@ -1,0 +1,35 @@
+"""Write the pictures of the README: python -m tests.report.readme [FOLDER]."""
+
+import sys
+from pathlib import Path
+
+import tfarm
+from tfarm.digits import plain
+from tfarm.dsp import load_chain
+from tfarm.plots.frequency import draw_compared
+from tfarm.plots.regions import draw_overlay, stable_regions
+from tfarm.plots.shapes import modes
+from tfarm.plots.style import save_figure
+from tfarm.response.frequency import bode, resonant_band
+from tfarm.spectrum.table import default_gains
+
+PICTURES = Path(__file__).parents[2] / "reports" / "pictures"
+DOTS = 100  # an inch: pictures of a README are shown at their own size
+
+
+def write_pictures(out: Path) -> None:
+    """Write bode-root-moment.png, gains.png and mode-shapes.png to a folder."""
+    lab, undamped = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
+    band, labels = resonant_band(lab, 6), ("exact, no damping", f"exact, damping C = {plain(lab.damping)} s")
+    main, other = (bode(arm, "root_moment", band) for arm in (undamped, lab))
+    figures = {
+        "bode-root-moment": draw_compared(main, other, labels),
+        "gains": draw_overlay(stable_regions(lab, default_gains(lab), load_chain(lab.name))),
+        "mode-shapes": modes.figure(tfarm.modes(lab, count=4)),  # two rows
+    }
+    for stem, figure in figures.items():
+        save_figure(figure, out, stem, formats=("png",), dpi=DOTS)
+
+
+if __name__ == "__main__":
+    write_pictures(Path(*sys.argv[1:2]) if sys.argv[1:] else PICTURES)
