@@ -57,9 +57,7 @@ UNDAMPED_SHARE = 1e-9  # of its size: largest real part of a pole that no model 
 
 
 FIRST_MODE = Quantity("lowest destabilised mode", help="of the exact loop; 0: a pole below the first mode")
-SHOWN_FROM = Quantity(
-    "design models unstable from (modes)", key="shown_from_modes", help="all models of at least so many modes are"
-)
+SHOWN_FROM = Quantity("design models unstable from (modes)", key="shown_from_modes", help="as are all larger ones")
 DELAYED = "a delay without any damping destabilises infinitely many modes"
 SMALL_GAIN = f"|L(iw)| < {QUIET:g} and falling: no unstable pole (small gain)"
 UNKNOWN_ABOVE = "converged up to {band:.4g} rad/s, not determined beyond, neither by small gain nor by a theorem"
