@@ -233,8 +233,8 @@ def test_a_law_that_two_modes_bear_drives_the_third():
 
 FOUND = {  # unstable poles of each model; driven poles of the exact loop; what is said
     "some": ([0, 0, 2], [-0.1 + 9j, 1 + 204j], "mode 2 is unstable in the exact loop, at 204.002 rad/s; "
-             "models of 1 to 2 modes are stable, unstable from 3 modes on"),
-    "one": ([0, 2, 2], [1 + 204j], "the model of 1 mode is stable, unstable from 2 modes on"),
+             "models of 1 to 2 modes are stable, those from 3 modes on are not"),
+    "one": ([0, 2, 2], [1 + 204j], "the model of 1 mode is stable, those from 2 modes on are not"),
     "all": ([0, 0, 0], [1 + 204j], "models of 1 to 3 modes are stable, the largest among them"),
     "none": ([1, 1, 2], [2.0], "a pole below the first mode is unstable in the exact loop, at 2 rad/s, "
              "and every model is unstable"),

@@ -57,9 +57,7 @@ UNDAMPED_SHARE = 1e-9  # of its size: largest real part of a pole that no model 
 
 
 FIRST_MODE = Quantity("lowest destabilised mode", help="of the exact loop; 0: a pole below the first mode")
-SHOWN_FROM = Quantity(
-    "design models unstable from", "modes", key="shown_from_modes", help="all models of at least so many modes are"
-)
+SHOWN_FROM = Quantity("design models unstable from (modes)", key="shown_from_modes", help="as are all larger ones")
 DELAYED = "a delay without any damping destabilises infinitely many modes"
 SMALL_GAIN = f"|L(iw)| < {QUIET:g} and falling: no unstable pole (small gain)"
 UNKNOWN_ABOVE = "converged up to {band:.4g} rad/s, not determined beyond, neither by small gain nor by a theorem"
@@ -309,7 +307,7 @@ class Spill:
             models = f"the model of {first} mode{'s' * (first > 1)}"
         elif last - first + 1 != self.content.size:
             models = f"{self.content.size} of the models up to {last} modes"
-        end = f"unstable from {self.shown_from} modes on" if self.shown_from else "the largest among them"
+        end = f"those from {self.shown_from} modes on are not" if self.shown_from else "the largest among them"
         verb = "is" if first == last else "are"
         return f"{words}; {models} {verb} stable, {end}"
 
