@@ -53,7 +53,7 @@ def test_csv_is_the_same_table(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert err == f"written: {file}\n"
     largest = abs(tfarm.transfer(tfarm.load("sasaki2012"), "root_moment")(2j))
     assert code == 0
-    assert re.search(rf"^largest magnitude +{largest:.6g}\nat s +0\+2i 1/s$", out, re.MULTILINE)
+    assert re.search(rf"^largest magnitude +{largest:.6g} N m / N m\nat s +0\+2i 1/s$", out, re.MULTILINE)
     header, *rows = csv.reader(file.read_text().splitlines())
     assert header == ["re_s [1/s]", "im_s [1/s]", "re_root_moment [N m / N m]", "im_root_moment [N m / N m]"]
     value = tfarm.transfer(tfarm.load("sasaki2012"), "root_moment")(2j)

@@ -194,7 +194,7 @@ class Bode:
     row: Output = field(repr=False)
     x: Annotated[float | None, Quantity(help="place of the output [m]")] = None
     omega: Annotated[Real, Quantity("angular frequency", "rad/s", help="grid refined at poles and zeros", curve=True)]
-    value: Annotated[Complex, Quantity("value", help="G(i omega), output over input", curve=True, unit_of="gain_unit")]
+    value: Annotated[Complex, Quantity("value", help="G(i omega), output over input", curve=True)]
     phase: Annotated[Real, Quantity("phase", "deg", help="continuous; -180 deg at a pole on the axis", curve=True)]
     poles: Complex
     zeros: Complex
@@ -222,7 +222,7 @@ class Bode:
         return "hub_angle" if self.arm.is_locked else self.arm.input
 
     @property
-    def magnitude(self) -> Annotated[Real, Quantity("magnitude", help="|G(i omega)|", curve=True, unit_of="gain_unit")]:
+    def magnitude(self) -> Annotated[Real, Quantity("magnitude", help="|G(i omega)|", curve=True)]:
         """|G|."""
         return np.abs(self.value)
 

@@ -108,7 +108,7 @@ def single_zeros(undamped: Modes, share: float = 1.0) -> list[float]:
 def named(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
     """Return the eigenvalues of `single_zeros` (m,) and of the first `count` flexible modes (count, 2), NaN if lost.
 
-    A mode has a conjugate pair, Im > 0 first, or two real ones, the slower first.  After so many steps those that are
+    A mode has a conjugate pair, Im > 0 first, or two real ones, the slower first.  After `steps` steps those that are
     not plain are lost.
     """
     k = undamped.system
