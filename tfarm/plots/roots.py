@@ -15,7 +15,7 @@ from tfarm.digits import kept_digits, plain, significant
 from tfarm.dsp.modes import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
 from tfarm.errors import one_line
 from tfarm.loop.loci import POLE_DIGITS, Loci, ReducedLocus, held_branches
-from tfarm.loop.locus import Locus, frame, origin_name, rounded
+from tfarm.loop.locus import Locus, frame, rounded
 
 from .style import BLUE, FIGURES, GREEN, GREY, INK, ORANGE, PURPLE, gains_words, page, picture
 
@@ -60,7 +60,7 @@ def _title(exact: Locus, *_: object) -> str:
 
 
 def _mode_name(exact: Locus, branch: int) -> str:
-    return origin_name(int(exact.origin[branch]))
+    return f"mode {exact.mode[branch]}" if exact.mode[branch] else "rigid body"
 
 
 def _panel(fine: Locus, exact: Locus, reduced: ReducedLocus | None, numbers: Sequence[int], ax: Axes) -> None:
