@@ -62,7 +62,7 @@ def test_a_notch_that_a_model_is_content_with_drives_a_mode(example):
     names, out = example(3)
     poles = tfarm.closed_loop_poles(names["arm"], names["law"], 8).values
     driven = poles[poles.real > 1e-9 * abs(poles)][0]  # the slowest: others are driven too
-    assert f"mode 3 is unstable, at {abs(driven.imag):.6g} rad/s" in out
+    assert f"mode 3 is unstable in the exact loop, at {abs(driven.imag):.6g} rad/s" in out
     assert out.endswith("with damping: stable\n")
 
 

@@ -3,24 +3,20 @@
 A curve through few points has corners where the zeros have none.  Where two of them meet on the real axis and separate
 at a right angle, the corner is true: it is approached to less than a pixel.
 
-A region, given as intervals column by column, is cut into parts that can be filled.  A plane of two numbers of a law
-has its counts of unstable poles as files and terminals show them.
+A region, given as intervals column by column, is cut into parts that can be filled.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real
-from tfarm.schema import Column, Table
 
 from .line import Window
 
@@ -29,7 +25,6 @@ MOST_TURN = math.radians(5.0) / STRETCH  # from one piece of a curve to the next
 PIXEL = 2e-3  # of the picture, a pixel: corners of shorter pieces are invisible
 ASIDE = 0.45  # of the way from one column to the next: half way may be the very edge that both were laid around
 DISTINCT = 1e-11  # of a gain: columns nearer to each other are in the rounding of the end of a region
-MOST_LINES, MOST_CHARACTERS = 24, 60  # of a coarse picture
 Slice = tuple[float, float, float]  # a value of the gain across, and an interval of the other there
 
 
@@ -138,48 +133,3 @@ def _shares(whole: Slice, parts: Sequence[Slice]) -> list[Slice]:
 
 def _overlap(a: Slice, b: Slice) -> bool:
     return a[1] < b[2] and b[1] < a[2]
-
-
-class PlaneOfCounts(ABC):
-    """Counts of unstable poles over the plane of two numbers: `vary` names them, `x` and `y` are their values."""
-
-    vary: tuple[str, str]
-    x: Real
-    y: Real
-
-    @property
-    @abstractmethod
-    def counts(self) -> Any:
-        """Unstable poles (len(y), len(x)); infinity where they are infinitely many."""
-
-    @property
-    def axes(self) -> tuple[Real, Real]:
-        """The values of both numbers: across the plane, and up it."""
-        return self.x, self.y
-
-    @property
-    def K1(self) -> Real:
-        """The values across, of the plane of K1 and K2."""
-        return self.x
-
-    @property
-    def K2(self) -> Real:
-        """The values up, of the plane of K1 and K2."""
-        return self.y
-
-    @property
-    def csv_table(self) -> Table:
-        """One row for each point of the grid: both numbers, and the count."""
-        pairs = zip(self.vary, np.meshgrid(self.x, self.y), strict=True)
-        columns = [Column(name.replace(".", "_").replace("@", "_at_"), of=values.ravel()) for name, values in pairs]
-        return Table(columns=(*columns, Column("unstable_roots", of=[count for row in self.counts for count in row])))
-
-    @property
-    def drawing(self) -> str:
-        """A coarse picture for a terminal: a dot where the loop is stable."""
-        step = max(1, self.y.size // MOST_LINES), max(1, self.x.size // MOST_CHARACTERS)
-        rows = list(zip(self.y, self.counts, strict=True))[:: -step[0]]
-        lines = [f"{value:9.3g} " + "".join("#" if count else "." for count in row[:: step[1]]) for value, row in rows]
-        across, up = self.vary
-        legend = f"{up} up, {across} from {self.x[0]:g} to {self.x[-1]:g} to the right; . stable, # unstable"
-        return "\n".join([*lines, legend])

@@ -34,7 +34,8 @@ from tfarm.crossing import (
     pieces,
     solved,
 )
-from tfarm.crossing.turning import PlaneOfCounts, loose_columns
+from tfarm.crossing.shown import PlaneOfCounts
+from tfarm.crossing.turning import loose_columns
 from tfarm.dsp.chain import Sampling
 from tfarm.dsp.plant import MODES_USED
 from tfarm.dsp.sampled import Sampled

@@ -28,7 +28,7 @@ from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm, Hu
 from tfarm.arm.feedback import ON
 from tfarm.arrays import Real
 from tfarm.crossing import Crossings, Window, ascending, counts_over, intervals
-from tfarm.crossing.turning import PlaneOfCounts
+from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.response.controller import Controller, controller
