@@ -379,7 +379,8 @@ def draw_band(those: Possible, output: str) -> Figure:
     ends = [end for each in those.fit.responses for end in each.omega[[0, -1]]]
     omega = np.geomspace(min(ends), max(ends), POINTS_OF_BAND)
     least, most, best = response_band(those, output, omega)
-    name, unit = signal_label(output), ratio(OUTPUTS[output].unit, those.fit.arm.input_unit)
+    name = signal_label(output)
+    unit = ratio(OUTPUTS[output].unit, those.fit.arm.input_unit)
     with page(9.0, 4.6, f"{those.fit.before.name}: {name} of the arms that the data leave possible") as (figure, ax):
         label = f"all of {len(those.arms)} arms that the data leave possible"
         ax.fill_between(omega / RAD_PER_CYCLE, least, most, color=BLUE, alpha=0.3, lw=0, label=label)
