@@ -287,23 +287,22 @@ def _curve(data: Nyquist, ax: Axes) -> None:
     along = np.where(data.is_arc, np.nan, z)
     ax.plot(along.real, along.imag, color=BLUE, lw=1.3, zorder=3, label="ω > 0, arrows as it rises")
     ax.plot(along.real, -along.imag, color=BLUE, lw=0.6, alpha=0.55, zorder=2, label="ω < 0")
-    alike: dict[tuple[int, ...], list[NDArray[np.int64]]] = {}
+    alike: dict[tuple[int, int], list[tuple[NDArray[np.int64], float, float]]] = {}
     for piece in np.split(np.arange(z.size), np.flatnonzero(np.diff(data.is_arc.astype(int))) + 1):
         if data.is_arc[piece[0]]:
-            ends = np.unwrap(np.angle(data.L[piece]))[[0, -1]] / ARCS_ALIKE
-            alike.setdefault(tuple(ends.round().astype(int)), []).append(piece)
+            first, *_, last = np.unwrap(np.angle(data.L[piece])).tolist()
+            alike.setdefault((round(first / ARCS_ALIKE), round(last / ARCS_ALIKE)), []).append((piece, first, last))
     step = min(RADIUS_STEP, (LAST_RADIUS - ARC_RADIUS) / max(1, len(alike) - 1))
-    for number, pieces in enumerate(alike.values()):
-        piece = pieces[0]
-        angle = np.unwrap(np.angle(data.L[piece]))
-        turn = np.exp(1j * np.interp(np.linspace(0, 1, 61), np.linspace(0, 1, angle.size), angle))
+    for number, same in enumerate(alike.values()):
+        piece, first, last = same[0]
+        turn: Complex = np.exp(1j * np.linspace(first, last, 61))
         ring = (ARC_RADIUS + step * number) * turn
         whole = np.r_[z[piece[0] - 1 : piece[0]], ring, z[piece[-1] + 1 : piece[-1] + 2]]
         ax.plot(whole.real, whole.imag, color=BLUE, lw=0.8, ls=(0, (3, 1.5)), zorder=3, label="past poles on the axis")
         _arrows(ring[1:], np.diff(ring), np.array([30]), ax)
-        if len(pieces) > 1:
-            place = complex(ARC_COUNT * turn[30])
-            ax.text(place.real, place.imag, f"{len(pieces)} ×", fontsize=8.0, color=BLUE, ha="center", va="center")
+        if len(same) > 1:
+            place = ARC_COUNT * turn[30]
+            ax.text(place.real, place.imag, f"{len(same)} ×", fontsize=8.0, color=BLUE, ha="center", va="center")
     drawn = z[~data.is_arc]
     way = np.diff(drawn)
     length = np.cumsum(abs(way))
@@ -375,7 +374,8 @@ def draw_band(those: Possible, output: str) -> Figure:
     ends = [end for each in those.fit.responses for end in each.omega[[0, -1]]]
     omega = np.geomspace(min(ends), max(ends), POINTS_OF_BAND)
     least, most, best = response_band(those, output, omega)
-    name, unit = signal_label(output), ratio(OUTPUTS[output].unit, those.fit.arm.input_unit)
+    name = signal_label(output)
+    unit = ratio(OUTPUTS[output].unit, those.fit.arm.input_unit)
     with page(9.0, 4.6, f"{those.fit.before.name}: {name} of the arms that the data leave possible") as (figure, ax):
         label = f"all of {len(those.arms)} arms that the data leave possible"
         ax.fill_between(omega / RAD_PER_CYCLE, least, most, color=BLUE, alpha=0.3, lw=0, label=label)

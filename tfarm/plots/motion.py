@@ -155,5 +155,5 @@ def draw_curves(curves: LearningCurves, tuning: Tuning) -> Figure:
             (tuning.bound.cost, INK, "linear-quadratic optimum: lower bound"),
         ):
             ax.axhline(cost, color=colour, lw=1.2, ls=LONG_DASHED, zorder=2.5, label=f"{label}, {significant(cost, 3)}")
-        ax.set(xlim=(1, max(2, trial[-1])), xlabel="trial", ylim=(0.0, top), ylabel="cost of a trial [−]")
+        ax.set(xlim=(1, max(2, trial[-1])), xlabel="trial number", ylim=(0.0, top), ylabel="cost of a trial [−]")
     return figure

@@ -140,7 +140,7 @@ def _counts(found: Plane | GainMap, counts: NDArray[np.int64], ax: Axes) -> None
     ax.grid(False)
     number = 0
     for count in np.unique(counts).tolist():
-        inside, text = counts == count, "∞" if count == INFINITE else str(count)
+        inside = counts == count
         label = "infinitely many unstable poles (∞)" if count == INFINITE else how_many(count, "unstable pole")
         number += count > 0
         if number <= MOST_PATCHES:
@@ -154,6 +154,7 @@ def _counts(found: Plane | GainMap, counts: NDArray[np.int64], ax: Axes) -> None
             if own.max() > LEAST_ROOM:
                 middles = np.argwhere(own > NEAR_MIDDLE * own.max())
                 row, column = min(middles, key=lambda at: abs(at - middles.mean(axis=0)).sum())
+                text = "∞" if count == INFINITE else str(count)
                 ax.text(found.x[column], found.y[row], text, fontsize=9.0, ha="center", va="center", clip_on=True)
 
 

@@ -129,7 +129,8 @@ def _sketch_size(arm: Arm) -> tuple[float, float]:
 def sketch(arm: Arm, *, ax: Axes) -> None:
     """Hub, link and payload from the side, to scale [m], in the axes given or in new ones; the axes."""
     left, right, half = _frame(arm)
-    root, bore = arm.hub.radius, HUB_RADIUS * arm.length
+    root = arm.hub.radius
+    bore = HUB_RADIUS * arm.length
     ax.set(aspect="equal", xlim=(left, right), ylim=(-half, half), yticks=[], xlabel="distance from the hub's axis [m]")
     ax.spines[["left", "right", "top"]].set_visible(False)
     ax.axhline(0, color=FAINT, lw=0.8, ls=(0, (6, 3, 1, 3)), zorder=0)
@@ -143,8 +144,8 @@ def sketch(arm: Arm, *, ax: Axes) -> None:
         ax.plot(root, 0, "o", ms=7.0, mfc="white", mec=ORANGE, mew=1.4, zorder=5)
     for each in arm.attachments:
         ax.plot(root + each.x, 0, "o", ms=5.0, color=INK, zorder=5)
-    payload, at = arm.payload, root + arm.length + arm.payload.offset
-    if payload.mass or payload.inertia:
+    if arm.payload.mass or arm.payload.inertia:
+        at = root + arm.length + arm.payload.offset
         side = max(0.03 * arm.length, min(bore, 0.75 * _deepest(arm)))
         ax.plot([root + arm.length, at], [0, 0], color=INK, lw=2.0, zorder=2.5)
         ax.add_patch(Rectangle((at - side, -side), 2 * side, 2 * side, fc="#8c8c8c", ec=INK, lw=1.0, zorder=3))
