@@ -159,7 +159,10 @@ def test_a_law_of_other_signals_is_mapped_over_factor_and_delay():
         ends = [end for window in at.stable_intervals[1] for end in window]
         assert min(abs(end - 1.0) for end in ends) < 1e-6
         assert 0 < delay < reach.delay[-1]
-    right = tfarm.plots.comparison.figure(found).axes[2]
+    figure = tfarm.plots.comparison.figure(found)
+    lines = figure.get_suptitle().replace("\u00a0", " ").splitlines()
+    assert [line.partition(":")[0] for line in lines] == [each.name for each in found.sides]
+    right = figure.axes[2]
     drawn = {(float(x), float(y)) for line in right.lines for x, y in zip(*line.get_data(), strict=True)}
     for reach in found.reaches:
         columns = zip((1e3 * reach.delay).tolist(), reach.stable_intervals, strict=True)

@@ -190,9 +190,7 @@ def _factors(data: Comparison, ax: Axes) -> None:
     """Factors that keep each loop stable, over the further delay of its law."""
     for found, side, colour in zip(data.reaches, data.sides, COLOURS, strict=False):
         draw_region(1e3 * found.delay, found.stable_intervals, colour, f"{side.name}: stable", ax)
-    ax.plot(
-        [0.0], [1.0], "o", mfc=INK, mec="white", ms=7.5, zorder=7, clip_on=False, label="the controllers as they are"
-    )
+    ax.plot([0.0], [1.0], "o", mfc=INK, mec="white", ms=7.5, zorder=7, clip_on=False, label="the laws as they are")
     ax.axhline(1.0, color=INK, lw=0.6)
     limits = {"xlim": (0.0, 1e3 * data.reaches[0].delay[-1]), "ylim": (0.0, min(ax.get_ylim()[1], MOST_DRAWN))}
-    ax.set(xlabel="further delay [ms]", ylabel="factor on the controller", **limits)
+    ax.set(xlabel="further delay [ms]", ylabel="factor on the law", **limits)
