@@ -20,6 +20,7 @@ SHOWN_FIRST = ("verdict", "word", "text", "finding", "unstable", "worst_error") 
 LONGEST_REPR = 200  # characters of a repr: a line or two of a terminal
 LONGEST_ENTRY, LONGEST_FINDING = 60, 100  # characters of an entry, and of the finding
 PLAIN = (float, int, str, bool, type(None))  # types without arrays
+LONGEST_INSIDE = 80  # of a record inside another one
 SHOWN_SINGLY = 3  # numbers of an array or a list that are shown
 
 
@@ -160,7 +161,7 @@ def _found(self: Any) -> list[str]:
 
 
 def _shown(value: Any, longest: int = LONGEST_ENTRY) -> str:
-    """Return an entry in a few characters: six digits of a number, a record's finding or name, an array's shape."""
+    """Return an entry in a few characters: six digits of a number, an array's shape; a record's finding or name."""
     if isinstance(value, np.ndarray):
         small = value.ndim == 1 and value.size <= SHOWN_SINGLY
         return f"[{', '.join(map(_shown, value.tolist()))}]" if small else f"<array {value.shape}>"
@@ -173,15 +174,9 @@ def _shown(value: Any, longest: int = LONGEST_ENTRY) -> str:
         shown = ", ".join(map(_shown, value)) if len(value) <= SHOWN_SINGLY else f"{len(value)} entries"
         return f"({shown})"
     if is_dataclass(value) and not isinstance(value, type):
-        return _named(value)
+        named = [each.name for each in fields(value) if each.name == "name" and not _is_default(value, each)]
+        known = _found(value) or named
+        text = _shown(getattr(value, known[0])) if known else repr(value)
+        return text if len(text) <= LONGEST_INSIDE else f"{type(value).__name__}(...)"
     text = repr(value)
     return text if len(text) <= longest else f"{text[: longest - 4]} ..."
-
-
-def _named(value: Any) -> str:
-    """Return the text of a record inside another: its finding or its name, or all of it where that is short."""
-    known = _found(value) or [
-        each.name for each in fields(value) if each.name == "name" and not _is_default(value, each)
-    ]
-    text = _shown(getattr(value, known[0])) if known else repr(value)
-    return text if len(text) <= 80 else f"{type(value).__name__}(...)"

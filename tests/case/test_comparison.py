@@ -62,8 +62,8 @@ def test_each_side_is_what_it_is_alone():
     other = tfarm.HubFeedback(K1=2.0, K2=-0.2)
     found = tfarm.compare(LAB, [LAW, other], modes=3)
     for side, law, loop in zip(found.sides, (LAW, other), to_dict(found)["loops"], strict=True):
-        assert side.margins == tfarm.margins(LAB, law)
-        assert loop == to_dict(side.margins)
+        assert side.loop == tfarm.margins(LAB, law)
+        assert loop == to_dict(side.loop)
         assert side.sampled.is_stable == sampled_verdict(LAB, law).is_stable
         alone = tfarm.closed_loop_poles(LAB, law, 6).values
         assert side.oscillating[:3] == pytest.approx(alone[alone.imag > 0][:3], rel=1e-12)
@@ -153,13 +153,16 @@ def test_a_law_of_other_signals_is_mapped_over_factor_and_delay():
     assert found.regions is None
     for side, reach in zip(found.sides, found.reaches, strict=True):
         (around,) = (each for each in reach.stable_intervals[0] if each[0] < 1 < each[1])
-        factors = [factor for factor in side.margins.in_band.gain if 0.1 < factor < 3.9]
+        factors = [factor for factor in side.loop.in_band.gain if 0.1 < factor < 3.9]
         assert [end for end in around if 0.1 < end < 3.9] == pytest.approx(factors, rel=1e-6)
-        at, delay = side.reach(np.array([0.0, 1.0]) * side.margins.exact_delay), side.margins.exact_delay
+        at, delay = side.reach(np.array([0.0, 1.0]) * side.loop.exact_delay), side.loop.exact_delay
         ends = [end for window in at.stable_intervals[1] for end in window]
         assert min(abs(end - 1.0) for end in ends) < 1e-6
         assert 0 < delay < reach.delay[-1]
-    right = tfarm.plots.comparison.figure(found).axes[2]
+    figure = tfarm.plots.comparison.figure(found)
+    lines = figure.get_suptitle().replace("\u00a0", " ").splitlines()
+    assert [line.partition(":")[0] for line in lines] == [each.name for each in found.sides]
+    right = figure.axes[2]
     drawn = {(float(x), float(y)) for line in right.lines for x, y in zip(*line.get_data(), strict=True)}
     for reach in found.reaches:
         columns = zip((1e3 * reach.delay).tolist(), reach.stable_intervals, strict=True)
@@ -175,7 +178,7 @@ def test_gains_as_a_law_in_z_are_the_same_loop_at_the_samples():
     assert {"mode 1: abs(s)", "delay margin", "spectral radius"} <= {row.quantity for row in rows}
     for row in rows:
         assert row.difference == pytest.approx(0.0, abs=1e-8 * abs(row.one or 1.0))
-    assert [side.margins for side in found.sides] == [None, None]
+    assert all(isinstance(side.loop, Analysis) for side in found.sides)
 
 
 def test_a_law_in_z_and_gains_are_compared_at_the_samples_of_both():

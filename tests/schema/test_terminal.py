@@ -10,7 +10,7 @@ import pytest
 
 from tfarm.digits import general, singly
 from tfarm.schema import Column, Table
-from tfarm.schema.terminal import table_lines
+from tfarm.schema.terminal import show_text, table_lines
 
 COLUMNS = (
     Column("mode", "mode", of=["1", "2"]),
@@ -97,3 +97,15 @@ def test_modes_and_audit_answer_within_80_columns(audit_file):
         assert number in text
     assert "…" not in rows
     assert len(re.findall(r"^ *\S.*  (confirmed|corrected|contradictory|\w+)", rows, flags=re.MULTILINE)) >= 23
+
+
+def test_a_long_line_of_text_is_folded_on_a_terminal_and_whole_in_a_pipe(monkeypatch, capsys):
+    line = (
+        "by default K1 = 0.0106 V s/rad (0.00642 J w1 of this arm) and K2 = 2.34 V/(N m), through the motor's voltage"
+    )
+    show_text(line)
+    assert capsys.readouterr().out == f"{line}\n"
+    monkeypatch.setattr("tfarm.schema.terminal.terminal_width", lambda: 80)
+    show_text(line)
+    first, second = capsys.readouterr().out.splitlines()
+    assert (f"{first} {second}", max(len(first), len(second)) <= 80) == (line, True)

@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law, must_be_arm
+from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, arm_and_law, as_law, must_be_arm
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.crossing import Window
@@ -27,7 +27,7 @@ from tfarm.loop.plane import Plane, between, gain_map, plane, ranges_of
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.records import record
 from tfarm.response.frequency import Bode, bode, resonant_band
-from tfarm.schema import Difference, Percent, Quantity, compare_rows
+from tfarm.schema import Difference, Percent, Quantity
 from tfarm.schema import compare as compare_records
 from tfarm.spectrum import damped_modes
 from tfarm.spectrum import modes as modes_of
@@ -80,8 +80,8 @@ class ComparedSide:
     """One of the two: its name, arm and law, the modes of the arm, and poles, verdicts and margins of the loop.
 
     `poles` are closed-loop poles with Im s >= 0, complete in their box; `open_loop` those of the arm with Im s > 0 by
-    flexible mode; `sampled` is the verdict at the chain's period.  Where one of the laws compared is a law in z there
-    is no continuous-time loop on either side: no `margins`, and `analysis` is of the sampled loop, with poles
+    flexible mode; `sampled` is the verdict at the chain's period; `loop` has verdict and margins.  Where one of the
+    laws compared is a law in z there is no continuous-time loop on either side: `loop` is the sampled one, with poles
     s = ln(z)/T.
     """
 
@@ -91,21 +91,13 @@ class ComparedSide:
     arm_modes: list[ArmMode]
     poles: Complex
     open_loop: dict[int, complex]
-    margins: Margins | None
+    loop: Margins | Analysis
     sampled: SampledBrief
-    analysis: Analysis | None = None
 
     @property
     def gains(self) -> HubFeedback | None:
         """The law as gains at the hub; None where it is more than these."""
         return as_law(self.law).gains
-
-    @property
-    def loop(self) -> Margins | Analysis:
-        """Verdict and margins of the loop that is compared."""
-        found = self.analysis or self.margins
-        assert found is not None
-        return found
 
     @property
     def verdict(self) -> str:
@@ -153,10 +145,11 @@ class ComparedSide:
     @property
     def range_words(self) -> str:
         """The frequency range of the continuous-time verdict where nothing is known beyond it."""
-        verdict = None if self.margins is None else self.margins.stability
-        if verdict is None or verdict.verdict == "unstable" or verdict.is_known_beyond:
+        if isinstance(self.loop, Analysis):
             return ""
-        return f"up to {verdict.band:.4g} rad/s, not determined beyond"
+        verdict = self.loop.stability
+        is_open = verdict.verdict != "unstable" and not verdict.is_known_beyond
+        return f"up to {verdict.band:.4g} rad/s, not determined beyond" if is_open else ""
 
     def reach(self, delay: Real) -> Reach:
         """The stable factors on the law with so much further delay each [s]."""
@@ -222,7 +215,7 @@ class Comparison:
     ) -> Annotated[bool, Quantity("discrete-time comparison", key="at_samples",
                                   help="where a law is in z: both loops at their samples, s = ln(z)/T")]:  # fmt: skip
         """Whether the loops are compared at their samples, one of the laws being a law in z."""
-        return self.one.analysis is not None
+        return isinstance(self.one.loop, Analysis)
 
     @property
     def rows(
@@ -243,7 +236,7 @@ class Comparison:
         list[Difference], Quantity("modes of the arms", key="modes", help="flexible modes by number; none of one arm")
     ]:
         """Natural frequencies and damping ratios of both arms, by mode; of one arm none."""
-        return compare_rows(self.one.arm_modes, self.other.arm_modes, self.names) if self.is_of_arms else []
+        return compare_records(self.one.arm_modes, self.other.arm_modes, self.names) if self.is_of_arms else []
 
     @property
     def pole_differences(
@@ -254,7 +247,7 @@ class Comparison:
     ]:
         """Those that both sides have, paired by mode."""
         one, other = ([row for row in side.named_poles if row.mode != "none"] for side in self.sides)
-        return compare_rows(one, other, self.names)
+        return compare_records(one, other, self.names)
 
     @property
     def unpaired_poles(
@@ -313,15 +306,14 @@ class Comparison:
         return self.one.arm != self.other.arm
 
     @cached_property
-    def responses(self) -> tuple[Bode, Bode]:
+    def responses(self) -> list[Bode]:
         """The exact response of both arms over one band, which holds ten flexible modes of each."""
         bands = [resonant_band(side.arm) for side in self.sides]
         band = min(low for low, _ in bands), max(high for _, high in bands)
-        first, second = (bode(side.arm, self.output, band) for side in self.sides)
-        return first, second
+        return [bode(side.arm, self.output, band) for side in self.sides]
 
     @cached_property
-    def regions(self) -> tuple[Plane, Plane] | None:
+    def regions(self) -> list[Plane] | None:
         """The plane of both gains for each, on one grid that holds both laws; None where a law is not these gains."""
         laws = [side.gains for side in self.sides if side.gains is not None]
         if len(laws) < 2:
@@ -336,15 +328,13 @@ class Comparison:
             for n, (name, number) in enumerate(zip(PLANE, (REGION_COLUMNS, REGION_ROWS), strict=True))
         )
         x = np.union1d(x, [FIRST_COLUMN * x[-1]])
-        first, second = (gain_map(side.arm, x, y, law.Kp) for side, law in zip(self.sides, laws, strict=True))
-        return first, second
+        return [gain_map(side.arm, x, y, law.Kp) for side, law in zip(self.sides, laws, strict=True)]
 
     @cached_property
     def reaches(self) -> tuple[Reach, Reach]:
         """Of each loop the factors on its law that keep it stable, over further delays."""
         T = self.one.sampled.sampling.period
-        borne = [each.delay_margin for each in self.sides]
-        longest = max([LONGEST_WAIT * T, *(BORNE * each for each in borne if each is not None)])
+        longest = max([LONGEST_WAIT * T, *(BORNE * (each.delay_margin or 0.0) for each in self.sides)])
         delay = np.linspace(0.0, min(longest, MOST_DELAYED * T), FURTHER_DELAYS)
         return self.one.reach(delay), self.other.reach(delay)
 
@@ -391,32 +381,30 @@ def _pairs(arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None) ->
 def _names(pairs: list[tuple[Arm, AnyLaw]]) -> tuple[str, ...]:
     """The arms' names where they differ, else the laws', else their numbers."""
     arms = [one_line(arm.name, LONGEST_SIDE_NAME) for arm, _ in pairs]
-    laws = [one_line(_called(as_law(law)), LONGEST_SIDE_NAME) for _, law in pairs]
+    laws = [
+        one_line(", ".join(law.gains.gain_text(n, "{:.4g}".format) for n in PLANE) if law.gains else law.name,
+                 LONGEST_SIDE_NAME)
+        for law in (as_law(each) for _, each in pairs)
+    ]  # fmt: skip
     return tuple(next((names for names in (arms, laws) if names[0] != names[1]), ["first", "second"]))
-
-
-def _called(law: Law) -> str:
-    gains = law.gains
-    return law.name if gains is None else ", ".join(gains.gain_text(name, "{:.4g}".format) for name in PLANE)
 
 
 def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_sampled: bool) -> ComparedSide:
     """All that is compared of one arm under its law; a sampled verdict that cannot be settled is left open."""
     most = count + POLES_BEYOND_MODES
     rows, open_loop = _modes_of_arm(arm, count, most)
-    analysis, margins = None, None
     try:
         verdict = sampled_verdict(arm, as_law(law) if is_sampled else law, chain)
         sampled = brief_of(verdict, law, chain)
-        analysis = Analysis(verdict) if is_sampled else None
     except ConvergenceError as error:
         if is_sampled:
             raise
         sampled = brief_of(error, law, chain)
-    if analysis is None:
-        margins, poles = margins_of(arm, law), closed_loop_poles(arm, law, most).values
+    loop = Analysis(verdict) if is_sampled else margins_of(arm, law)
+    if isinstance(loop, Analysis):
+        poles, open_loop = _sampled_poles(loop)
     else:
-        poles, open_loop = _sampled_poles(analysis)
+        poles = closed_loop_poles(arm, law, most).values
     return ComparedSide(
         name=name,
         arm=arm,
@@ -424,9 +412,8 @@ def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_sampled
         arm_modes=rows,
         poles=poles[:most] if is_sampled else poles,
         open_loop={n: s for n, s in open_loop.items() if n and s.imag > 0},
-        margins=margins,
+        loop=loop,
         sampled=sampled,
-        analysis=analysis,
     )
 
 

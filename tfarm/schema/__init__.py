@@ -9,7 +9,7 @@ meaning from here.  `to_dict` and `sections` read a record, `table` records of o
 `schema.terminal` and `schema.html` render tables, `schema.glossary` has every declared quantity.
 """
 
-from .differences import Difference, Differences, compare, compare_rows
+from .differences import Difference, Differences, compare
 from .quantities import At, Percent, Quantity, entries, quantities, text, to_dict, with_unit
 from .tables import (
     Column,
@@ -41,7 +41,6 @@ __all__ = [
     "as_csv",
     "as_json",
     "compare",
-    "compare_rows",
     "curve_table",
     "entries",
     "json_value",

@@ -50,13 +50,11 @@ class Differences(list[Difference]):
 
 
 def compare(one: Any, other: Any, names: tuple[str, str] = NAMES) -> Differences:
-    """The quantities that both records have, row by row; rows of a table are paired by their first quantity."""
-    return Differences(_of_records(one, other), names)
+    """The quantities that two records have, or the records in two lists, row by row.
 
-
-def compare_rows(some: Sequence[Any], others: Sequence[Any], names: tuple[str, str] = NAMES) -> Differences:
-    """The quantities of records in two lists, paired by their first one, a name or a number."""
-    return Differences(_of_rows(some, others), names)
+    Records in lists, and rows of tables, are paired by their first quantity, a name or a number.
+    """
+    return Differences((_of_rows if isinstance(one, list) else _of_records)(one, other), names)
 
 
 def _of_records(one: Any, other: Any) -> Iterator[Difference]:

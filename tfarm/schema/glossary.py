@@ -74,8 +74,8 @@ def glossary(words: str | None = None) -> Glossary:
              if of.label and of.help}  # fmt: skip
     part = (words or "").casefold()
     terms = tuple(each for each in GLOSSARY_TERMS if part in each.name.casefold())
-    known = sorted(every, key=lambda each: (each.label.casefold(), each.unit, each.meaning))
-    found = tuple(each for each in known if part in each.label.casefold())
+    in_order = sorted(every, key=lambda each: (each.label.casefold(), each.unit, each.meaning))
+    found = tuple(each for each in in_order if part in each.label.casefold())
     if not (terms or found):
         remedy = did_you_mean(part, [each.name for each in GLOSSARY_TERMS])
         raise ParameterError(key="term", value=words, remedy=remedy)

@@ -32,7 +32,7 @@ def show(record: Any, rows: Table | None = None, last: str = "") -> None:
             show_text(each.title)
         show_pairs(each.pairs)
         if each.table is not None:
-            show_table(each.table)
+            print("\n".join(table_lines(each.table, terminal_width())))
         if each.drawing:
             print(each.drawing)
     show_text(last)
@@ -42,11 +42,6 @@ def show_text(text: str) -> None:
     """Print a text, folded in the width of the terminal."""
     if text:
         print("\n".join(rendered(Text(text), terminal_width())))
-
-
-def show_table(table: Table) -> None:
-    """Print a table in the width of the terminal."""
-    print("\n".join(table_lines(table, terminal_width())))
 
 
 def show_pairs(pairs: Sequence[tuple[str, str]]) -> None:
