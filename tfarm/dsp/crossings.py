@@ -36,12 +36,9 @@ from tfarm.crossing import (
 )
 from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.crossing.turning import loose_columns
-from tfarm.dsp.chain import Sampling
-from tfarm.dsp.plant import MODES_USED
-from tfarm.dsp.sampled import Sampled
+from tfarm.dsp.sampled import OfLoop, Sampled
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
-from tfarm.response.controller import Controller, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import most_gain
 
@@ -237,7 +234,7 @@ def around(windows: list[Window], gain: float) -> Window | None:
 
 @dataclass(frozen=True)
 @record
-class GainMap(PlaneOfCounts):
+class GainMap(OfLoop, PlaneOfCounts):
     """`unstable` (len(x), len(y)): number of unstable poles, without z = 1 of a free hub angle; stable where it is 0.
 
     `vary` names both numbers of the law, `x` and `y` are their values: K1 and K2, by default.  `crossings[i]` are the y
@@ -253,16 +250,6 @@ class GainMap(PlaneOfCounts):
     crossings: list[Crossings]
 
     @property
-    def sampling(self) -> Annotated[Sampling, Quantity(flat=True, help="sampling period and delay of the loop")]:
-        """Period and delay."""
-        return self.loop.chain.sampling
-
-    @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
-        """Names of the arm and the controller."""
-        return controller(self.loop.given, self.loop.plant.arm)
-
-    @property
     def finding(self) -> Annotated[str, Quantity("stability region",
             help="grid points of the plane without unstable poles")]:  # fmt: skip
         """Number of points of the grid at which the loop is stable."""
@@ -273,11 +260,6 @@ class GainMap(PlaneOfCounts):
             help="unstable poles at each point, without z = 1 of a free hub angle")]:  # fmt: skip
         """Unstable poles (len(y), len(x))."""
         return self.unstable.T
-
-    @property
-    def modes_used(self) -> Annotated[int, MODES_USED]:
-        """Number of flexible modes in the loop."""
-        return self.loop.plant.count
 
     @property
     def stable_intervals(self) -> list[list[Window]]:

@@ -26,7 +26,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -34,13 +34,15 @@ from tfarm.arm import FED_BACK, GAINS, AnyLaw, Arm, HubFeedback
 from tfarm.arm.feedback import law_of
 from tfarm.arm.law import Law
 from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
-from tfarm.dsp.chain import Chain, chain_or_usual
+from tfarm.dsp.chain import Chain, Sampling, chain_or_usual
 from tfarm.dsp.discretise import LawInZ, acting_law, law_in_z, lowest_power, with_all_gains
-from tfarm.dsp.plant import USUAL_MODES, Plant, SensedPlant, is_analog, sensed_plant
+from tfarm.dsp.plant import MODES_USED, USUAL_MODES, Plant, SensedPlant, is_analog, sensed_plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ConvergenceError, ParameterError, did_you_mean
 from tfarm.records import record
 from tfarm.reduced.conversions import closed
+from tfarm.response.controller import Controller, controller
+from tfarm.schema import Quantity
 
 STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes
 SMALLEST_LOG = -745.0  # of the smallest double: for the logarithm of 0
@@ -357,6 +359,27 @@ class Sampled:
         log_radius[abs(log_radius) * abs(z) < error] = 0.0
         mode = pulse.mode[abs(z[:, None] - pulse.multipliers).argmin(axis=1)]
         return SampledPoles(z, log_radius, mode, error)
+
+
+class OfLoop:
+    """What a record of a sampled loop has of that loop."""
+
+    loop: Sampled
+
+    @property
+    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
+        """Names of the arm and the controller."""
+        return controller(self.loop.given, self.loop.plant.arm)
+
+    @property
+    def sampling(self) -> Annotated[Sampling, Quantity(flat=True, help="sampling period and delay of the loop")]:
+        """Period and delay."""
+        return self.loop.chain.sampling
+
+    @property
+    def modes_used(self) -> Annotated[int, MODES_USED]:
+        """Number of flexible modes in the loop."""
+        return self.loop.plant.count
 
 
 def _nearest(loop: Sampled, delta: Complex) -> Whole:

@@ -27,11 +27,9 @@ from tfarm.dsp.edges import (
     whole_loop,
 )
 from tfarm.dsp.modes import ModeTable, dominant, mode_table
-from tfarm.dsp.plant import MODES_USED
-from tfarm.dsp.sampled import Sampled, resized, sampled_loop
+from tfarm.dsp.sampled import OfLoop, Sampled, resized, sampled_loop
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
-from tfarm.response.controller import Controller, controller
 from tfarm.schema import Quantity
 
 LAW_DELAY_DIGITS = 4  # of the delay margin of a law that is more than gains at the hub
@@ -47,7 +45,7 @@ PERIOD_SHARES = (0.1, 0.5, 1.0, 2.0, 5.0)  # of the chain's own period
 
 @dataclass(frozen=True)
 @record
-class Verdict:
+class Verdict(OfLoop):
     """Whether a sampled loop is stable, without z = 1 of a free hub angle.
 
     `band` is the part of the arm for which it is certified (`tfarm.dsp.circle`).  Without one, as at C = 0, the verdict
@@ -60,19 +58,9 @@ class Verdict:
     is_converged: bool = False
 
     @property
-    def controller(self) -> Annotated[Controller, Quantity(flat=True, help="arm and controller of the loop")]:
-        """Names of the arm and the controller."""
-        return controller(self.loop.given, self.loop.plant.arm)
-
-    @property
     def rule(self) -> Annotated[str, RULE]:
         """The discretisation of the law."""
         return rule_in_words(self.loop.given)
-
-    @property
-    def sampling(self) -> Annotated[Sampling, Quantity(flat=True, help="sampling period and delay of the loop")]:
-        """Period and delay."""
-        return self.loop.chain.sampling
 
     @property
     def is_settled(self) -> Annotated[bool, Quantity(key="certified",
@@ -85,11 +73,6 @@ class Verdict:
             help="end of the frequency range in which the verdict is certified")]:  # fmt: skip
         """End of the range in which the verdict is certified [rad/s]; None without one."""
         return None if self.band is None else self.band.top
-
-    @property
-    def modes_used(self) -> Annotated[int, MODES_USED]:
-        """Number of flexible modes in the loop."""
-        return self.loop.plant.count
 
     @property
     def is_stable(self) -> Annotated[bool, Quantity(key="stable",
