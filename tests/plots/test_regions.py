@@ -59,7 +59,7 @@ def test_a_free_hub_that_loses_nothing_has_no_column_below_0_and_a_held_one_has(
 def test_nothing_is_stable_below_the_rate_gain_that_the_words_name(friction):
     """Just below it and far below, at every K2: poles of the exact loop, and eigenvalues of the sampled one."""
     arm = replace(LAB, hub=replace(LAB.hub, friction=friction))
-    assert prose("beyond_left", arm=arm, rate="K1").split("< ")[1].startswith("−0.02," if friction else "0")
+    assert prose("beyond_left", arm=arm).split("< ")[1].startswith("−0.02," if friction else "0")
     loop = region_of(arm).loop
     for K1 in (-friction - 1e-5, -friction - 0.3, -friction - 20.0):
         for K2 in K2S:
