@@ -57,6 +57,8 @@ def test_coherence_and_sigma_are_read(tmp_path):
     assert found.averages == 12
     path.write_text(text(("hz", "re", "im", "sigma"), (HZ, *[HZ / 40] * 3)))
     assert read_measured(path, *NAMES).sigma.tolist() == (HZ / 40).tolist()
+    path.write_text("hz,re,im,coherence,averages\n1,2,3,0.9,5")
+    assert read_measured(path, *NAMES).averages == 5
 
 
 BAD = {
