@@ -99,7 +99,7 @@ def slewed(arm, law, chain):
 
 @pytest.mark.parametrize("Kp", thinned([4.0, 0.0], 2))
 def test_the_residual_is_that_of_the_simulated_slew(Kp, monkeypatch) -> None:
-    monkeypatch.setattr(search, "STARTS_EACH", 2)  # of the minima found: what the best leaves is asked, not which
+    monkeypatch.setattr(search, "MOST_RUNS", 1)  # of the minima found: what the best leaves is asked, not which
     chain = Chain(sampling=Sampling(period=0.008, delay_samples=0.5), slew=Slew(rise_time=0.5, travel=0.4))
     found = design(LAB, "residual", Kp=Kp, chain=chain, K1=(0.1, 5.0), K2=(-0.5, 0.8))
     assert found.value == pytest.approx(slewed(LAB, found.law, chain), rel=1e-3)  # of 8 modes beside 20

@@ -1,6 +1,7 @@
 """Laws of a structure: their loops by a Galerkin model under a hold with SciPy's Tustin rule, files, and bad input."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,6 @@ from tfarm.dsp import Chain
 from tfarm.dsp.chain import Converters
 from tfarm.synthesis import search
 from tfarm.synthesis.design import design
-from tfarm.synthesis.evolution import evolved
 from tfarm.synthesis.judge import LOST, RESERVE, entries_of
 from tfarm.synthesis.structures import STRUCTURES, structure_of
 from tfarm.tuner.trial import slew_trial
@@ -68,7 +68,7 @@ def test_the_delay_is_what_the_loop_bears():
 def found():
     """From one start of six: what is found has to hold, and to be better than any start."""
     with pytest.MonkeyPatch.context() as fewer:
-        fewer.setattr(search, "STARTS_EACH", 2)
+        fewer.setattr(search, "MOST_RUNS", 1)
         return design(LAB, "damping", structure="strain-rate")
 
 
@@ -89,7 +89,7 @@ def test_it_damps_better_than_where_the_search_began(found):
 
 
 def test_a_design_is_saved_and_read_back(capsys, monkeypatch, tmp_path):
-    monkeypatch.setattr(search, "STARTS_EACH", 2)  # any law that holds will do
+    monkeypatch.setattr(search, "MOST_RUNS", 1)  # any law that holds will do
     file = tmp_path / "lead.toml"
     found = answer(capsys, "design", "sasaki2012-lab", "--structure", "lead", "--save", str(file))
     law = load_law(file)
@@ -122,7 +122,7 @@ def test_an_undamped_link_has_a_mode_that_no_lead_law_damps(capsys, monkeypatch)
     where p is above a right angle.
     """
     bare = tfarm.load("sasaki2012")
-    monkeypatch.setattr(search, "STARTS_EACH", 2)  # of a search that finds nothing
+    monkeypatch.setattr(search, "MOST_RUNS", 1)  # of a search that finds nothing
     err = refused(capsys, "design", "sasaki2012", "--structure", "lead", code=3)
     (mode,) = re.findall(r"mode ([0-9]+) grows", err)
     assert "link.damping = 0" in err
@@ -146,39 +146,55 @@ def curved_edge(x):
     return value if x.sum() > 0.5 else LOST + 0.5 - x.sum()
 
 
+def least_of(function, low, high):
+    """The lowest point that a search finds between bounds, its score, and the lines of progress."""
+    low, high = np.array(low, dtype=float), np.array(high, dtype=float)
+    form = SimpleNamespace(name="test", size=low.size, box=(low, high), origin=low)
+    lines = []
+    found, of_runs = search.minimised(
+        lambda points: np.array([function(each) for each in points.T]), form, form.box, lines.append
+    )
+    assert list(found.scores) == sorted(found.scores)
+    assert found.scores[0] == min(of_runs)
+    assert ((low[:, None] <= found.x) & (found.x <= high[:, None])).all()
+    return found.x[:, 0], found.scores[0], lines
+
+
 @pytest.mark.parametrize(
     ("function", "top", "least", "at"),
     [
         (three_circles, 9.0, 1.0, [0.0, 0.0]),
         (curved_edge, 9.0, 0.0, [1.0, 1.0]),
-        (curved_edge, [0.5, 9.0], 0.25, [0.5, 0.25]),  # with a limit on x
+        (curved_edge, 0.5, 0.25, [0.5, 0.25]),  # with a limit on x
     ],
 )
 def test_the_least_of_a_function_with_edges_is_found(function, top, least, at):
-    """From starts of which one is lost: the lowest score comes first, and points are in the box."""
-    starts, box = np.array([[-0.5, 0.3, -3.0], [0.0, -2.0, 4.0]]), (np.full(2, -9.0), np.broadcast_to(top, 2))
-    rounds = []
-    x, scores = evolved(
-        lambda points: np.array([function(each) for each in points.T]), starts, box, lambda *each: rounds.append(each)
-    )
-    assert scores[0] == pytest.approx(least, abs=1e-3)
-    assert x[:, 0] == pytest.approx(at, abs=0.02)
-    assert (x.shape, list(scores)) == ((2, 3), sorted(scores))
-    assert (box[0] <= x.T).all()
-    assert (box[1] >= x.T).all()
-    assert [best for _, best in rounds] == sorted((best for _, best in rounds), reverse=True)
+    """Also where some points are lost: and each line of progress says less than the one before."""
+    x, score, lines = least_of(function, [-9.0, -9.0], [top, 9.0])
+    assert score == pytest.approx(least, abs=1e-6)
+    assert x == pytest.approx(at, abs=1e-4)
+    best = [float(line.rpartition(" ")[2]) for line in lines]
+    assert best == sorted(best, reverse=True)
 
 
 def test_coordinates_that_hang_together_are_learnt():
-    """An ellipsoid whose axes are 1 : 100 and turned: strategies of one step for all coordinates do not get there."""
+    """An ellipsoid whose axes are 1 : 100 and turned: steps along one coordinate after the other do not get there."""
     turn, _ = np.linalg.qr(np.random.default_rng(1).standard_normal((5, 5)))
     sizes = 10 ** np.linspace(0, 4, 5)
-    box = np.full(5, -5.0), np.full(5, 5.0)
-    x, scores = evolved(
-        lambda points: sizes @ (turn @ (points - 0.7)) ** 2, np.array([[-2.0, 3.0, 1.0, 0.0, 4.0]]).T, box, lambda *_: 0
+    x, score, _ = least_of(lambda x: sizes @ (turn @ (x - 0.7)) ** 2, np.full(5, -5.0), np.full(5, 5.0))
+    assert x == pytest.approx(0.7, abs=1e-3)
+    assert score < 1e-5
+
+
+def test_the_lowest_of_many_valleys_is_found():
+    """Rastrigin's function of five coordinates: 10^5 valleys in the box, the lowest at 0.3."""
+    x, score, _ = least_of(
+        lambda x: 10 * x.size + ((x - 0.3) ** 2 - 10 * np.cos(2 * np.pi * (x - 0.3))).sum(),
+        np.full(5, -5.0),
+        np.full(5, 5.0),
     )
-    assert x[:, 0] == pytest.approx(0.7, abs=1e-3)
-    assert scores[0] < 1e-5
+    assert x == pytest.approx(0.3, abs=1e-3)
+    assert score == pytest.approx(0.0, abs=1e-5)
 
 
 def test_poles_of_a_rate_that_is_a_difference_are_those_of_the_sampled_loop():

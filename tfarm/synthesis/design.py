@@ -1,35 +1,34 @@
 """The law of a structure with the best value of an objective, for one arm or for the worst of several.
 
 A search within bounds by a judge of few modes is followed by exact verdicts, which exclude unstable laws.  The record
-has the number of strategies that agreed, the width of the optimum, and whether the bounds cut the search off.
+has the number of searches that agreed, the width of the optimum, and whether the bounds cut the search off.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import zip_longest
 from operator import itemgetter
-from typing import Annotated, Any, Literal, NamedTuple, TypeVar
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, as_law
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual
+from tfarm.dsp.edges import most_modes
 from tfarm.dsp.verdict import SampledBrief, sampled_brief, sampled_verdict
 from tfarm.errors import ConvergenceError, ParameterError, must_be_known
 from tfarm.loop.loop import Loop
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import record
 from tfarm.schema import Quantity
-from tfarm.synthesis.judge import LOST, OBJECTIVES, Judge, judges_of
+from tfarm.synthesis.judge import LOST, OBJECTIVES, Judge, judge_of, model_sizes
 from tfarm.synthesis.models import slew_and_after, trial_slew
 from tfarm.synthesis.search import CANDIDATES, Search, Worst, flat_part, search
 from tfarm.synthesis.structures import Bounds, Structure, check_bounds, structure_of
 from tfarm.synthesis.worst_case import ArmBox, NamedArm, Tell, WorstCase, arms_of, for_the_worst, same_input
 
-_One = TypeVar("_One")
 LoopKind = Literal["sampled", "continuous"]
 
 
@@ -102,7 +101,7 @@ class Design:
     those of `widened` are wider than at first.  `flat` are ranges of each coefficient, the others constant, in which
     the value is within one per cent of the best.  `at_bound` names coefficients at an end of their bounds: there the
     search was cut off, and the value is no optimum.  Those in `at_limit` are at a physical end, K1 = 0, the K2 = 1 that
-    stops the hub, or 2/T of a pole.  Of `starts` strategies `agreed` reached the best score.
+    stops the hub, or 2/T of a pole.  Of `starts` searches `agreed` reached the best score.
     """
 
     objective: Annotated[str, Quantity("objective", help="criterion of the design")]
@@ -237,10 +236,14 @@ class _Task:
     loop: LoopKind
     tell: Tell
 
-    def judges(self, on: Arm) -> Iterator[Judge]:
-        """Judges on an arm, of more and more modes."""
-        continuous = self.loop == "continuous"
-        return judges_of(on, self.arm, self.chain, self.objective, self.form, self.modes, continuous=continuous)
+    def sizes(self, on: Arm) -> list[int]:
+        """Numbers of modes of the models of an arm, in turn."""
+        return model_sizes(on, self.chain, self.modes, continuous=self.loop == "continuous")
+
+    def judge(self, on: Arm, count: int) -> Judge:
+        """The judge of laws on an arm, by a model of `count` modes."""
+        return judge_of(on, self.arm, self.chain, self.objective, self.form.signals, self.modes, count,
+                        continuous=self.loop == "continuous")  # fmt: skip
 
     def find(self, named: Sequence[NamedArm]) -> _Choice:
         """Return the best law that is stable on all arms.  Raises ConvergenceError where none is found.
@@ -248,7 +251,11 @@ class _Task:
         If the best law under fewer conditions is stable, it is the best under all: so that one is tried first.
         """
         nearest: tuple[float, Any] | None = None
-        for several in in_step([self.judges(each.arm) for each in named]):
+        sizes = [self.sizes(each.arm) for each in named]
+        for step in range(max(map(len, sizes))):
+            several = tuple(
+                self.judge(each.arm, own[min(step, len(own) - 1)]) for each, own in zip(named, sizes, strict=True)
+            )
             relaxed = tuple(replace(each, is_relaxed=True) for each in several)
             for judges, most in [*([(relaxed, 1)] if self.loop == "sampled" else []), (several, CANDIDATES)]:
                 found = search(Worst(judges), self.form, self.tell)
@@ -260,11 +267,11 @@ class _Task:
         assert nearest is not None  # there is at least one judge
         law = self.form.record_at(nearest[1])
         chain = self.chain if self.loop == "sampled" else None
-        raise ConvergenceError(_why_none(named, self.form, law, chain), law, nearest[0])
+        raise ConvergenceError(_why_none(named, self.form, law, chain, max(map(max, sizes))), law, nearest[0])
 
     def score_on(self, choice: _Choice, on: Arm) -> float:
         """The score of a law on another arm; inf where the loop is unstable."""
-        score = next(self.judges(on)).score(choice.law)
+        score = self.judge(on, self.sizes(on)[0]).score(choice.law)
         return score if score < LOST else np.inf
 
     def design(self, choice: _Choice, named: Sequence[NamedArm], case: WorstCase) -> Design:
@@ -288,8 +295,11 @@ class _Task:
         )  # fmt: skip
 
 
-def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Chain | None) -> str:
-    """The most unstable mode under the law nearest to stability (of a sampled loop), and a remedy."""
+def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Chain | None, size: int) -> str:
+    """The most unstable mode under the law nearest to stability (of a sampled loop), what was searched, and a remedy.
+
+    `size` is the number of modes of the largest model.
+    """
     within = " and ".join(f"{each.name} in ({each.bounds[0]:g}, {each.bounds[1]:g})" for each in form.free)
     text = f"no law {form.name} with {within} was found that is stable"
     if chain is None:
@@ -300,17 +310,11 @@ def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Cha
     text = (
         f"{text} when sampled: under the nearest law {nearest}; widen the bounds, or try another {ANGLE_GAIN} or period"
     )
+    if any(most_modes(each.arm, chain) > size for each in arms if not each.arm.has_elastic_link):
+        text = f"{text}; only models of up to {size} modes were searched"
     if not verdict.loop.plant.arm.has_elastic_link or form.name == TWO_GAINS:
         return text
     return (
         f"{text}; with link.damping = 0 every mode that the law does not damp at its alias is unstable under a held "
         f"input: give link.damping, or take {TWO_GAINS}"
     )
-
-
-def in_step(each: Sequence[Iterable[_One]]) -> Iterator[tuple[_One, ...]]:
-    """The first items of all, the second, ...; an iterable that has ended repeats its last item."""
-    last: list[_One | None] = [None] * len(each)
-    for row in zip_longest(*each):
-        last = [old if new is None else new for old, new in zip(last, row, strict=True)]
-        yield tuple(one for one in last if one is not None)

@@ -18,7 +18,7 @@ instability of a higher one.  The result is checked by the exact verdicts; a mod
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -141,9 +141,12 @@ OBJECTIVES = {
 RESERVE = 1.25  # factor on all gains with which the loop is stable, up and down: the error of a gauge or motor
 SEARCH_RESERVE = 1.002 * RESERVE  # in the search: edges of the model's few modes have a smaller error
 FEWEST_MODES = 8  # of the first model; more where its best laws are unstable
+SEARCHED_MODES = 32  # of the largest: with twice as many a law takes eight times as long
 CONTINUOUS_TIMES = 2  # times the modes where the continuous-time loop is designed
 LAWS_AT_ONCE = 256  # a limit of memory
-LOST = 1e3  # score where a condition of stability is not met, and as much for each later one
+LOST = (
+    1e30  # score where a condition of stability is not met, and as much for each later one: no value in SI is so large
+)
 
 
 @dataclass(frozen=True)
@@ -255,22 +258,19 @@ class Judge:
             return False
 
 
-def judges_of(
-    arm: Arm, known: Arm, chain: Chain, objective: str, form: Structure, modes: int, *, continuous: bool
-) -> Iterator[Judge]:
-    """Judges of the laws of a structure on an arm, of more and more modes until the best law is stable.
+def model_sizes(arm: Arm, chain: Chain, modes: int, *, continuous: bool) -> list[int]:
+    """Numbers of flexible modes of the models of a search, in turn until the best law is stable.
 
-    Without damping there is one, of the number of modes of the sampled verdict.
+    Without damping there is one, that of the sampled verdict.
     """
     fewest = modes + FEWEST_MODES // 2
-    counts = [max(UNDAMPED_MODES if arm.has_elastic_link and not continuous else FEWEST_MODES, fewest)]
-    if not (continuous or arm.has_elastic_link):
-        most = most_modes(arm, chain)
-        while counts[-1] < most:
-            counts.append(2 * counts[-1])
-        counts = [*counts[:-1], most]
-    for count in counts:
-        yield judge_of(arm, known, chain, objective, form.signals, modes, count, continuous=continuous)
+    if continuous or arm.has_elastic_link:
+        return [max(FEWEST_MODES if continuous else UNDAMPED_MODES, fewest)]
+    most = min(most_modes(arm, chain), SEARCHED_MODES)
+    sizes = [max(FEWEST_MODES, fewest)]
+    while sizes[-1] < most:
+        sizes.append(2 * sizes[-1])
+    return [*sizes[:-1], most]
 
 
 def judge_of(

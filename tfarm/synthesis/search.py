@@ -1,36 +1,60 @@
-"""Search for the best law: many points of the bounds, strategies from the best of them, and wider bounds.
+"""Search for the best law: differential evolution from several starts, simplices from the best, and wider bounds.
 
-The points are those of Sobol's sequence, which leaves no large gap (Sobol, 1967).  Evolution strategies start from the
-best of them, at a distance from each other (`evolution`), and then from points near the best.  They may leave bounds
-that are neither given nor physical ends; where the best law is beyond a bound, that of the wider region is returned.
+SciPy's differential evolution (Storn and Price, 1997) uses no slopes, so that it works along edges, where the largest
+of several values has none.  Each run begins with other points of Sobol's sequence, which leaves no large gap; the last
+begins with the best points of all.  Where an edge is slow the simplex of Nelder and Mead goes on.  A run may leave
+bounds that are neither given nor physical ends; where the best law is beyond a bound, that of the wider region is
+returned.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import differential_evolution, minimize
 
+from tfarm.arm import PLANE
 from tfarm.arrays import Real
 from tfarm.records import record
-from tfarm.synthesis.evolution import MOST_ROUNDS, evolved
 from tfarm.synthesis.judge import LOST, Judge
 from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Tell
 
-POINTS_LOG2 = 11  # of the number of points
-STARTS_EACH = 12  # strategies for each coefficient, from the best of them
-HOPS, HOPS_EACH, HOP_POINTS = 1, 8, 1024  # searches near the best of more than two, strategies each, and points
+MOST_RUNS = 8  # one more than coefficients, and at most so many: some minima are found by one of five alone
+FEWEST_POINTS, POINTS_EACH = 32, 15  # of a run, at least, and for each coefficient: the next power of two
+LAWS_EACH, MOST_LAWS = 1000, 5000  # of a run for each coefficient, and at most; twice as many from the best points
+STRATEGIES = (("best1bin", 0.7), ("currenttobest1bin", 0.9))  # in turn, and the share of coefficients changed at once
+AROUND = 0.5  # of x: the spread of the points of the last run, around the best
+CONVERGED = 1e-9  # of the scores: the spread of a run's points at which it ends
+SIMPLEX = 0.005  # of the region: the first edges of the simplex
+STEPS_EACH = 100  # of the simplex, for each coefficient
 CANDIDATES = 4  # laws for the exact verdicts, the best first
 BEYOND = 4.0  # of x: reach of a search beyond its bounds, a factor e^4 of a coefficient far above its unit
-APART = 0.02  # of the range of x: least distance of two starts
+APART = 0.02  # of the range of x: least distance of two candidates
 AS_GOOD = 1e-4  # relative: a coefficient is at its physical end if the score there is worse by less
-SEED = 0  # of the sequence's scrambling, and of points near the best
-AGREES = 5e-3  # relative: a strategy agrees if its score is worse than the best by less
+AGREES = 5e-3  # relative: a run agrees if its score is worse than the best by less
 FLAT_WITHIN = 0.01  # laws whose score is worse by less than this share bound the flat part
 FLAT_STEPS, FLAT_HALVINGS = 60, 30  # of the way to the bounds, each 1.4 times the one before; of an interval
 AT_ORIGIN = 1e-9  # of that way: the first step
+
+
+class Points(NamedTuple):
+    """Points x (n, m) and their scores (m,), the lowest first."""
+
+    x: Real
+    scores: Real
+
+    @classmethod
+    def of(cls, parts: Sequence[tuple[Real, Real]]) -> Points:
+        """The points of all parts."""
+        x = np.concatenate([each for each, _ in parts], axis=1)
+        scores = np.concatenate([each for _, each in parts])
+        order = np.argsort(scores, kind="stable")
+        return cls(x[:, order], scores[order])
 
 
 @dataclass(frozen=True)
@@ -38,7 +62,7 @@ AT_ORIGIN = 1e-9  # of that way: the first step
 class Search:
     """Result of a search: points and scores, the lowest first; the structure with the searched bounds.
 
-    Of `starts` strategies `agreed` reached the best score; `widened` names coefficients.
+    Of `starts` runs `agreed` reached the best score; `widened` names coefficients.
     """
 
     form: Structure
@@ -71,41 +95,84 @@ def search(judge: Worst, form: Structure, tell: Tell) -> Search:
     ends = [(place, end) for place in range(form.size) for end in (0, 1)]
     places = [each for each in ends if not (given[each[0]] or form.is_physical(*each))]
     region = form.wider(places, BEYOND)
-    points = np.c_[form.origin, sobol(*form.box, POINTS_LOG2)]
-
-    def report(number: int, score: float) -> None:
-        tell(f"{form.name}: round {number} of {MOST_ROUNDS}, best so far {score:.6g}")
-
-    def best_from(points: Real, each: int) -> tuple[Real, Real]:
-        first = points[:, _apart(region, points, judge.scores(region, points), each * form.size)]
-        return evolved(lambda at: judge.scores(region, at), first, region.box, report)
-
-    x, scores = best_from(points, STARTS_EACH)
-    rng = np.random.default_rng(SEED)
-    for _ in range(HOPS if form.size > 2 else 0):
-        around = x[:, :1] + rng.standard_normal((form.size, HOP_POINTS))
-        further = best_from(np.c_[x[:, :1], np.clip(around.T, *region.box).T], HOPS_EACH)
-        x, scores = np.c_[x, further[0]], np.r_[scores, further[1]]
-        order = np.argsort(scores, kind="stable")
-        x, scores = x[:, order], scores[order]
+    (x, scores), of_runs = minimised(lambda at: judge.scores(region, at), form, region.box, tell)
     for place, end in (each for each in ends if region.is_physical(*each)):  # there if the score is as good
         moved = x[:, :1].copy()
         moved[place] = region.box[end][place]
         if judge.scores(region, moved)[0] <= scores[0] + AS_GOOD * abs(scores[0]):
             x[:, :1] = moved
-    close, best = scores[0] + AGREES * abs(scores[0]), x[:, 0]
+    best = x[:, 0]
     beyond = [each for each in places if (form.box[0] > best, form.box[1] < best)[each[1]][each[0]]]
     widened = tuple(dict.fromkeys(form.names[place] for place, _ in beyond))
     found = [(float(scores[n]), x[:, n]) for n in _apart(region, x, scores, CANDIDATES)]
-    return Search(form.wider(beyond, BEYOND), found, scores.size, int((scores <= close).sum()), widened)
+    agreed = sum(each <= scores[0] + AGREES * abs(scores[0]) for each in of_runs)
+    return Search(form.wider(beyond, BEYOND), found, len(of_runs), agreed, widened)
 
 
-def sobol(low: Real, high: Real, log2: int) -> Real:
-    """Points (n, 2^log2) of Sobol's sequence in a box."""
+def minimised(
+    score: Callable[[Real], Real], form: Structure, box: tuple[Real, Real], tell: Tell
+) -> tuple[Points, list[float]]:
+    """Return the last points of all runs, and the best score of each.
+
+    `score` takes points (n, k) of the box.  Runs begin within the bounds of `form`, the first also with its start; then
+    one with the best points of all, one near the best of those, and a simplex at the best of that.
+    """
+    runs = min(form.size + 1, MOST_RUNS)
+    number = 1 << (max(FEWEST_POINTS, POINTS_EACH * form.size) - 1).bit_length()
+    rounds = min(LAWS_EACH * form.size, MOST_LAWS) // number
+    ended: list[Points] = []
+
+    def run(points: Real, rounds: int) -> None:
+        ended.append(evolved(score, box, points, rounds, len(ended)))
+        best = min(each.scores[0] for each in ended)
+        tell(f"{form.name}: search {len(ended)}, best so far {best:.6g}")
+
+    for seed in range(runs):
+        points = sobol(*form.box, number, seed)
+        points[:, 0] = points[:, 0] if seed else form.origin
+        run(points, rounds)
+    run(Points.of(ended).x[:, :number], 2 * rounds)
+    if form.size > len(PLANE):
+        best = Points.of(ended).x[:, 0]
+        spread = AROUND * np.random.default_rng(runs).standard_normal((number, form.size))
+        run(np.clip(best + spread, *box).T, rounds)
+    ended.append(simplex(score, box, Points.of(ended).x[:, 0]))
+    found = Points.of(ended)
+    return found, [float(found.scores[0]), *(float(each.scores[0]) for each in ended[:runs])]
+
+
+def evolved(score: Callable[[Real], Real], box: tuple[Real, Real], points: Real, rounds: int, seed: int) -> Points:
+    """The last points of a run of differential evolution that begins with `points` (n, m)."""
+    strategy, recombination = STRATEGIES[seed % len(STRATEGIES)]
+    done = cast("Any", differential_evolution)(
+        lambda x: score(x.reshape(len(points), -1)), list(zip(*box, strict=True)), init=points.T, strategy=strategy,
+        recombination=recombination, maxiter=rounds, tol=CONVERGED, rng=seed, polish=False, vectorized=True,
+        updating="deferred",
+    )  # fmt: skip
+    return Points.of([(done.population.T, done.population_energies)])
+
+
+def simplex(score: Callable[[Real], Real], box: tuple[Real, Real], start: Real) -> Points:
+    """The last point of a simplex of Nelder and Mead that begins at `start` (n,)."""
+    low, high = box
+    step = SIMPLEX * (high - low)
+    corners = start + np.vstack([np.zeros(start.size), np.diag(np.where(start + step > high, -step, step))])
+    options = {
+        "initial_simplex": corners, "maxfev": STEPS_EACH * start.size, "adaptive": start.size > 1,
+        "xatol": CONVERGED * (high - low).max(), "fatol": CONVERGED * abs(score(start[:, None])[0]),
+    }  # fmt: skip
+    bounds = list(zip(low, high, strict=True))
+    done = cast("Any", minimize)(
+        lambda x: float(score(x[:, None])[0]), start, method="Nelder-Mead", bounds=bounds, options=options
+    )
+    return Points(done.x[:, None], np.array([done.fun]))
+
+
+def sobol(low: Real, high: Real, number: int, seed: int) -> Real:
+    """Points (n, number) of Sobol's sequence in a box, scrambled by a seed; a power of two has no gap."""
     from scipy.stats import qmc  # here, because it takes half a second to load
 
-    shares = qmc.Sobol(low.size, seed=SEED).random_base2(log2)
-    return np.asarray((low + shares * (high - low)).T)
+    return np.asarray((low + qmc.Sobol(low.size, rng=seed).random(number) * (high - low)).T)
 
 
 def _apart(form: Structure, points: Real, scores: Real, most: int) -> list[int]:
