@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, as_law
+from tfarm.arm.records import must_turn
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.edges import most_modes
@@ -209,6 +210,8 @@ def design(
     if objective == "cost" and continuous:
         remedy = "the cost of the tuner's trial is one of samples: design for the sampled loop"
         raise ParameterError(key="objective", value=objective, remedy=remedy)
+    if OBJECTIVES[objective].of_slew:
+        must_turn(arm)
     ends = {key: (float(low), float(high)) for key, (low, high) in (ranges or {}).items()}
     box = ArmBox(arm, ends) if ends else None
     arms, chain = arms_of(arm, also, box), chain_or_usual(chain)
@@ -264,6 +267,8 @@ class _Task:
                     law = found.form.record_at(x)
                     if score < LOST and all(judge.holds(law) for judge in several):
                         return _Choice(Worst(several), found, score, x, law)
+                if found.found[0][0] >= LOST:  # nothing is stable under fewer conditions
+                    break
         assert nearest is not None  # there is at least one judge
         law = self.form.record_at(nearest[1])
         chain = self.chain if self.loop == "sampled" else None

@@ -144,19 +144,13 @@ class Model:
         """L (laws, m) at the model's own angles, or at others."""
         q = self.angles if angles is None else np.asarray(angles)
         response, total = self.responses if angles is None else self.response(q), 0.0
-        p, z = 1j * q / self.speed, np.exp(1j * q)  # s/c
+        s, z = 1j * q, np.exp(1j * q)
         if self.period is not None:
-            p = (z - 1) / np.where(abs(z + 1) < AT_NYQUIST, AT_NYQUIST, z + 1)
+            s = self.speed * (z - 1) / np.where(abs(z + 1) < AT_NYQUIST, AT_NYQUIST, z + 1)
         for signal, num, den in entries:
-            total = total + self._at(num, p) / self._at(den, p) * response[self.signals.index(signal)]
+            through = np.polyval(num[:, :, None], s) / np.polyval(den[:, :, None], s)  # (laws, m)
+            total = total + through * response[self.signals.index(signal)]
         return np.asarray(total)
-
-    def _at(self, rows: Real, p: Complex) -> Complex:
-        """Polynomials (degree + 1, laws) in s at p: (laws, m)."""
-        found = np.zeros((rows.shape[1], p.size), complex)
-        for row in rows:
-            found = found * (self.speed * p) + row[:, None]
-        return found
 
 
 def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int, speed: float) -> Model:
