@@ -1,6 +1,7 @@
 """Laws of a structure: their loops by a Galerkin model under a hold with SciPy's Tustin rule, files, and bad input."""
 
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,6 +22,7 @@ from tfarm.synthesis.design import design
 from tfarm.synthesis.judge import LOST, RESERVE, entries_of
 from tfarm.synthesis.structures import STRUCTURES, structure_of
 from tfarm.tuner.trial import slew_trial
+from tfarm.tuner.tuning import usual_plan
 
 LAB = tfarm.load("sasaki2012-lab")
 T = 0.01
@@ -205,12 +207,16 @@ def test_poles_of_a_rate_that_is_a_difference_are_those_of_the_sampled_loop():
         assert np.log(z) == pytest.approx(tfarm.sampled(LAB, law, chain).verdict.log_radius, rel=1e-6)
 
 
-@pytest.mark.parametrize("gain", [0.0, 0.2])
-def test_the_cost_is_that_of_the_tuners_trial_with_a_constant_gain(gain):
+SMALL = tfarm.load(Path(__file__).parents[1] / "data" / "reproductions" / "r3.toml")  # its unit of torque is 0.3 N m
+
+
+@pytest.mark.parametrize(("arm", "gain"), [(LAB, 0.0), (LAB, 0.2), (SMALL, 0.2)])
+def test_the_cost_is_that_of_the_tuners_trial_with_a_constant_gain(arm, gain):
     """Its trial has six modes and ideal converters, as the judge here."""
     law = Law(
         {"hub_angle": 4.0, "hub_rate": 2.0, "root_moment": gain}, references=("hub_angle", "hub_rate", "root_moment")
     )
-    trial = slew_trial(LAB, K1=2.0, Kp=4.0)
-    score = judge_of(LAB, law, "cost", count=6).score(law)
+    plan = usual_plan(arm)
+    trial = slew_trial(arm, K1=2.0, Kp=4.0, cost=plan.cost.in_units_of(plan.scale), duration=plan.duration)
+    score = judge_of(arm, law, "cost", count=6).score(law)
     assert score == pytest.approx(trial.with_constant(gain).cost, rel=1e-9)

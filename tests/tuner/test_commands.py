@@ -11,7 +11,6 @@ import pytest
 
 import tfarm
 from tests.shell import answer, refused, run
-from tests.synthesis.judged import judge_of
 from tfarm.dsp import Chain
 from tfarm.dsp.results import simulated_run
 from tfarm.report import tuner_section
@@ -20,7 +19,6 @@ from tfarm.schema import to_dict
 from tfarm.tuner import Plan, compare_controllers, shaped_trial, slew_trial, tune
 from tfarm.tuner.baselines import tried_loops
 from tfarm.tuner.guard import Guard
-from tfarm.tuner.tuning import trial_of, usual_plan
 
 
 def test_tune_lab(capsys, tmp_path):
@@ -205,17 +203,6 @@ def test_text_json_page_and_file_have_one_cost(capsys, saved, page):
     assert found["cost_without"] == pytest.approx(cost_by_hand(law), rel=1e-9)
     law = tfarm.HubFeedback(K1=found["K1"], K2=found["best_constant_gain"])
     assert found["cost_best_constant"] == pytest.approx(cost_by_hand(law), rel=1e-9)
-
-
-def test_a_design_counts_the_same_cost():
-    """Compared with a trial of as many modes."""
-    plan = usual_plan(ARM)
-    trial = trial_of(ARM, plan, Chain())
-    alike = tfarm.tuner.slew_trial(ARM, K1=0.8, Kp=1.0, cost=trial.cost, duration=plan.duration, count=8).with_constant(
-        0.2
-    )
-    law = tfarm.HubFeedback(Kp=1.0, K1=0.8, K2=0.2)
-    assert judge_of(ARM, law, "cost").score(law) == pytest.approx(alike.cost, rel=1e-9)
 
 
 def test_the_reading_of_the_chain_is_that_of_a_trial(capsys, tmp_path):

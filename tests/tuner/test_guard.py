@@ -82,23 +82,6 @@ def test_what_the_criterion_allows_is_proven_and_nothing_beyond(lab, m, servo):
     assert loop.proof(m - 1.01 * loop.radius(m), m + 1.01 * loop.radius(m)) is None
 
 
-def growth(loop, *gains):
-    """A sample, of a periodic sequence of gains: spectral radius of the product of its matrices."""
-    product_ = np.eye(loop.drive.size)
-    for K in gains:
-        product_ = loop.at(K) @ product_
-    return abs(np.linalg.eigvals(product_)).max() ** (1 / len(gains))
-
-
-def test_switching_between_stable_gains_can_destabilise(loop):
-    """0.1 and 0.6 each for 3 and 2 samples, and 0 and 1.1: each stable when frozen, unstable when switched."""
-    for K in (0.0, 0.1, 0.6, 1.1):
-        assert growth(loop, K) < 1
-    assert growth(loop, 0.1, 0.1, 0.1, 0.6, 0.6) == pytest.approx(1.0023, abs=1e-4)
-    patterns = [p for n in range(2, 8) for p in product((0.0, 1.1), repeat=n)]
-    assert max(growth(loop, *p) for p in patterns) > 1.06
-
-
 def test_positive_definite_in_whole_numbers():
     rng = np.random.default_rng(0)
     for n in range(1, 9):

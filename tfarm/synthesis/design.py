@@ -13,8 +13,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, as_law
-from tfarm.arm.records import must_turn
+from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, as_law, must_turn
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.edges import most_modes

@@ -24,7 +24,7 @@ from tfarm.synthesis.judge import LOST, Judge
 from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Tell
 
-MOST_RUNS = 8  # one more than coefficients, and at most so many: some minima are found by one of five alone
+MOST_RUNS = 8  # one more than coefficients, and at most eight: some minima are found by one of five alone
 FEWEST_POINTS, POINTS_EACH = 32, 15  # of a run, at least, and for each coefficient: the next power of two
 LAWS_EACH, MOST_LAWS = 1000, 5000  # of a run for each coefficient, and at most; twice as many from the best points
 STRATEGIES = (("best1bin", 0.7), ("currenttobest1bin", 0.9))  # in turn, and the share of coefficients changed at once

@@ -53,6 +53,7 @@ from tfarm.dsp.crossings import around
 from tfarm.dsp.sampling import held_amplitude
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.exact.rationals import as_integers, falls, is_positive_definite
+from tfarm.loop.margins import lowest
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.tuner.kernel import Limits
@@ -64,7 +65,6 @@ RADIUS_SHARE = 0.99  # of the radius that the criterion allows: room for the mod
 POLE_WIDTHS = np.r_[-np.geomspace(100.0, 0.01, 30), 0.0, np.geomspace(0.01, 100.0, 30)]  # around a pole's angle
 NARROWEST_PEAK = 1e-12  # of a pole next to the circle: its distance from the circle has that error
 EVEN_POINTS = 1001  # of half the circle, in addition to those around poles
-PEAK_ROUNDS, PEAKS_REFINED, PEAK_POINTS = 4, 5, 41  # rounds, highest points in each, points near them: 20 times finer
 
 
 @dataclass(frozen=True)
@@ -190,16 +190,10 @@ def _peak(residues: NDArray[np.complexfloating], poles: NDArray[np.complexfloati
     dense = (angle[:, None] + width[:, None] * POLE_WIDTHS).ravel()
     theta = np.unique(np.clip(np.r_[np.linspace(0, np.pi, EVEN_POINTS), dense], 0, np.pi))
 
-    def size(theta: Real) -> Real:
-        return np.asarray(abs((residues / (np.exp(1j * theta)[:, None] - poles)).sum(axis=1)))
+    def negative(theta: Real) -> Real:
+        return -np.asarray(abs((residues / (np.exp(1j * theta)[:, None] - poles)).sum(axis=1)))
 
-    values = size(theta)
-    for _ in range(PEAK_ROUNDS):
-        best = np.argsort(values)[-PEAKS_REFINED:]
-        low, high = theta[np.maximum(best - 1, 0)], theta[np.minimum(best + 1, theta.size - 1)]
-        theta = np.unique((low[:, None] + (high - low)[:, None] * np.linspace(0, 1, PEAK_POINTS)).ravel())
-        values = size(theta)
-    return float(values.max())
+    return -lowest(negative, theta)[0]
 
 
 GuardKind = Literal["time-varying", "frozen", "none"]
