@@ -29,7 +29,7 @@ from tfarm.spectrum.table import first_frequency
 from tfarm.tuner import LearningCurves, Plan, Tuning, compare_controllers, learning_curves, tried_loops, tune
 from tfarm.tuner.baselines import CONSTANT_GAINS, Outcomes, quantised_chain, tried_gains
 from tfarm.tuner.training import QUARTILES
-from tfarm.tuner.tuning import tip_errors, usual_plan
+from tfarm.tuner.tuning import SlewEnd, usual_plan
 
 WITHOUT = f"without moment feedback, {MOMENT_GAIN} = 0"
 CURVE_SEEDS = 20  # of the learning curves
@@ -143,7 +143,7 @@ class Cost(NamedTuple):
 
 def servo_table(data: TunerNumbers, servo: Tuning) -> Table:
     """The costs of the slew with the angle regulated too."""
-    law, error = servo.plan.servo, tip_errors(servo)["tip_error_m"]
+    law, error = servo.plan.servo, SlewEnd.of(servo).tip_error
     rows = [
         Cost("no moment feedback", servo.without.cost),
         Cost("best constant gain", servo.best_constant.cost),

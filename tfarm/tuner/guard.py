@@ -233,16 +233,7 @@ class Guard:
     proofs: tuple[CommonLyapunov, ...] = ()
 
     @property
-    def is_proven(
-        self,
-    ) -> Annotated[
-        bool,
-        Quantity(
-            "certified for any K(t)",
-            key="proven",
-            help="a quadratic Lyapunov function decreases for every sequence of gains",
-        ),
-    ]:
+    def is_proven(self) -> Annotated[bool, Quantity("certified for any K(t)", key="proven", help="Lyapunov function")]:
         """Whether the loop is certified stable for every K(t) in it, and not that of its first modes alone."""
         return bool(self.proofs) and self.is_settled
 

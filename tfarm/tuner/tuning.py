@@ -13,7 +13,7 @@ import numpy as np
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
 from tfarm.arm.checks import whole
 from tfarm.arrays import Real
-from tfarm.dsp import Chain, Simulation, Simulator, scenario
+from tfarm.dsp import Chain, Simulator, scenario
 from tfarm.dsp.chain import Reading, chain_or_usual
 from tfarm.dsp.results import RESIDUAL, Run, enough_modes, ideal_chain, residual_moment_rms, residual_raw_moment_rms
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
@@ -218,6 +218,36 @@ class Baseline(NamedTuple):
     later: Annotated[float | None, Quantity("arrives later", "s", 3, "delay of the shaped slew")] = None
 
 
+class SlewEnd(NamedTuple):
+    """End of the slew through the converters: with the tuner, with the best constant gain, without moment feedback."""
+
+    residual: Annotated[
+        float | None,
+        Quantity(RESIDUAL, "N m rms", key="residual_moment_rms", help="after the slew, less that of a rigid arm"),
+    ]
+    residual_raw: Annotated[
+        float | None, Quantity(key="residual_raw_moment_rms", help="rms of the root moment after the slew [N m]")
+    ]
+    residual_without: Annotated[float | None, Quantity("without moment feedback", "N m rms", help="its residual")]
+    tip_error: Annotated[float | None, Quantity("tip error at the end", "m", 3, "distance from the target")]
+    tip_error_constant: Annotated[
+        float | None,
+        Quantity("with the best constant gain", "m", 3, "its tip error", key="tip_error_best_constant_m"),
+    ]
+    tip_error_without: Annotated[float | None, Quantity("and without moment feedback", "m", 3, "its tip error")]
+
+    @classmethod
+    def of(cls, tuning: Tuning) -> SlewEnd:
+        """The end of the trial of a tuning."""
+        simulator, gain = tuning.trial.simulator(), tuning.gain()
+        runs = gain.run(simulator), simulator.linear(tuning.constant), simulator.linear(gain.servo)
+        tuned, _, without = runs
+        return cls(
+            residual_moment_rms(tuned), residual_raw_moment_rms(tuned), residual_moment_rms(without),
+            *(tip_off(run, tuning.trial) for run in runs),
+        )  # fmt: skip
+
+
 @dataclass(frozen=True)
 class TuningResult:
     """A tuning with its figures, and optionally its learning curves and a comparison."""
@@ -307,58 +337,9 @@ class TuningResult:
         return float(K.min()), float(K.max())
 
     @cached_property
-    def _runs(self) -> tuple[Simulation, Simulation, Simulation]:
-        return _runs(self.tuning)
-
-    @property
-    def residual_moment(
-        self,
-    ) -> Annotated[
-        float | None,
-        Quantity(RESIDUAL, "N m rms", key="residual_moment_rms", help="after the slew, less that of a rigid arm"),
-    ]:
-        """The residual with the tuner, less the rigid arm's."""
-        return residual_moment_rms(self._runs[0])
-
-    @property
-    def residual_raw(
-        self,
-    ) -> Annotated[
-        float | None, Quantity(key="residual_raw_moment_rms", help="rms of the root moment after the slew [N m]")
-    ]:
-        """The same of the root moment itself."""
-        return residual_raw_moment_rms(self._runs[0])
-
-    @property
-    def residual_without(
-        self,
-    ) -> Annotated[float | None, Quantity("without moment feedback", "N m rms", help="its residual")]:
-        """The residual without moment feedback."""
-        return residual_moment_rms(self._runs[2])
-
-    @property
-    def tip_error(
-        self,
-    ) -> Annotated[float | None, Quantity("tip error at the end", "m", 3, "distance from the target")]:
-        """Distance of the tip from its target at the end, tuned."""
-        return tip_off(self._runs[0], self.tuning.trial)
-
-    @property
-    def tip_error_constant(
-        self,
-    ) -> Annotated[
-        float | None,
-        Quantity("with the best constant gain", "m", 3, "its tip error", key="tip_error_best_constant_m"),
-    ]:
-        """The same with the best constant gain."""
-        return tip_off(self._runs[1], self.tuning.trial)
-
-    @property
-    def tip_error_without(
-        self,
-    ) -> Annotated[float | None, Quantity("and without moment feedback", "m", 3, "its tip error")]:
-        """The same without moment feedback."""
-        return tip_off(self._runs[2], self.tuning.trial)
+    def end(self) -> Annotated[SlewEnd, Quantity(flat=True, help="residual moment and tip error of the slew")]:
+        """The end of the slew, tuned and not."""
+        return SlewEnd.of(self.tuning)
 
     @property
     def guard(self) -> Annotated[Guard, Quantity("guard of the gain", help="interval that the gain cannot leave")]:
@@ -384,18 +365,6 @@ class TuningResult:
     def weights(self) -> Annotated[dict[str, Any], Quantity(help="weights of the network and scales of its inputs")]:
         """Every weight of the network."""
         return weights_of(self.tuning.training.network)
-
-
-def tip_errors(tuning: Tuning) -> dict[str, float | None]:
-    """Distance of the tip from its target [m] at the end: tuned, best constant gain, without moment feedback."""
-    keys = ("tip_error_m", "tip_error_best_constant_m", "tip_error_without_m")
-    return {key: tip_off(run, tuning.trial) for key, run in zip(keys, _runs(tuning), strict=True)}
-
-
-def _runs(tuning: Tuning) -> tuple[Simulation, Simulation, Simulation]:
-    """The trial through the converters: tuned, with the best constant gain, without moment feedback."""
-    simulator, gain = tuning.trial.simulator(), tuning.gain()
-    return gain.run(simulator), simulator.linear(tuning.constant), simulator.linear(gain.servo)
 
 
 def controlled_run(
