@@ -201,11 +201,6 @@ def test_without_damping_a_proof_is_of_the_first_modes_and_no_proof_of_the_loop(
     assert "certified for the first 20 modes" in guard.sentence
 
 
-def test_an_empty_guard_names_the_damping_that_would_have_one():
-    with pytest.raises(CertificationError, match=r"with a damping of C = .* s there is one"):
-        find_guard(slew_trial(tfarm.load("sasaki2012")).loop, "time-varying", 0.3)
-
-
 def test_a_loop_that_no_damping_saves(lab):
     with pytest.raises(CertificationError, match="nor with any damping"):
         find_guard(slew_trial(lab, K1=500.0).loop, "frozen", 0.3)

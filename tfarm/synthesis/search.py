@@ -1,10 +1,10 @@
-"""Search for the best law: differential evolution from several starts, simplices from the best, and wider bounds.
+"""Search for the best law: differential evolution from several starts, a simplex from the best, and wider bounds.
 
 SciPy's differential evolution (Storn and Price, 1997) uses no slopes, so that it works along edges, where the largest
-of several values has none.  Each run begins with other points of Sobol's sequence, which leaves no large gap; the last
-begins with the best points of all.  Where an edge is slow the simplex of Nelder and Mead goes on.  A run may leave
-bounds that are neither given nor physical ends; where the best law is beyond a bound, that of the wider region is
-returned.
+of several values has none.  Each run begins with other points of Sobol's sequence, which leaves no large gap; one more
+begins with the best points of all, and of more than two coefficients another near the best.  The simplex of Nelder and
+Mead is the end.  Runs may leave bounds that are neither given nor physical ends; where the best law is beyond a bound,
+that of the wider region is returned.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import differential_evolution, minimize
+from scipy.optimize import bisect, differential_evolution, minimize
 
 from tfarm.arm import PLANE
 from tfarm.arrays import Real
@@ -24,9 +23,9 @@ from tfarm.synthesis.judge import LOST, Judge
 from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Tell
 
-MOST_RUNS = 8  # one more than coefficients, and at most eight: some minima are found by one of five alone
+FEWEST_RUNS, MOST_RUNS = 3, 8  # one more than coefficients within these: some minima are found by one of five alone
 FEWEST_POINTS, POINTS_EACH = 32, 15  # of a run, at least, and for each coefficient: the next power of two
-LAWS_EACH, MOST_LAWS = 1000, 5000  # of a run for each coefficient, and at most; twice as many from the best points
+LAWS_EACH, MOST_LAWS = 800, 4000  # of a run for each coefficient, and at most; twice as many from the best points
 STRATEGIES = (("best1bin", 0.7), ("currenttobest1bin", 0.9))  # in turn, and the share of coefficients changed at once
 AROUND = 0.5  # of x: the spread of the points of the last run, around the best
 CONVERGED = 1e-9  # of the scores: the spread of a run's points at which it ends
@@ -38,7 +37,7 @@ APART = 0.02  # of the range of x: least distance of two candidates
 AS_GOOD = 1e-4  # relative: a coefficient is at its physical end if the score there is worse by less
 AGREES = 5e-3  # relative: a run agrees if its score is worse than the best by less
 FLAT_WITHIN = 0.01  # laws whose score is worse by less than this share bound the flat part
-FLAT_STEPS, FLAT_HALVINGS = 60, 30  # of the way to the bounds, each 1.4 times the one before; of an interval
+FLAT_STEPS = 60  # of the way to the bounds, each 1.4 times the one before
 AT_ORIGIN = 1e-9  # of that way: the first step
 
 
@@ -117,7 +116,7 @@ def minimised(
     `score` takes points (n, k) of the box.  Runs begin within the bounds of `form`, the first also with its start; then
     one with the best points of all, one near the best of those, and a simplex at the best of that.
     """
-    runs = min(form.size + 1, MOST_RUNS)
+    runs = min(max(form.size + 1, FEWEST_RUNS), MOST_RUNS)
     number = 1 << (max(FEWEST_POINTS, POINTS_EACH * form.size) - 1).bit_length()
     rounds = min(LAWS_EACH * form.size, MOST_LAWS) // number
     ended: list[Points] = []
@@ -192,31 +191,27 @@ def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str,
 
     The search goes outwards in growing steps, then by halving: narrow ranges are found as well as wide ones.
     """
-    limit, ways = score + FLAT_WITHIN * abs(score), np.arange(2 * form.size)
-    along, ends = ways // 2, np.array(form.box).T.ravel()  # of each way the coefficient that changes, and its bound
+    limit = score + FLAT_WITHIN * abs(score)
+    shares = np.geomspace(AT_ORIGIN, 1.0, FLAT_STEPS)
 
-    def good(steps: Real, which: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Whether steps (k, m) along some (k,) of the ways are within the limit."""
-        points = np.repeat(x[:, None], steps.size, axis=1).reshape(-1, *steps.shape)
-        points[along[which], np.arange(which.size)] += steps
-        return np.asarray(judge.scores(form, points.reshape(x.size, -1)) <= limit).reshape(steps.shape)
+    def reach(way: Real) -> float:
+        """The share of a way (n,) from x that is within the limit."""
 
-    reach = ends - x[along]
-    steps = np.geomspace(AT_ORIGIN, 1.0, FLAT_STEPS) * reach[:, None]
-    bad = ~good(steps, ways)
-    (cut,) = np.nonzero(bad.any(axis=1))
-    if cut.size:
-        first = bad[cut].argmax(axis=1)
-        low, high = np.where(first > 0, steps[cut, first - 1], 0.0), steps[cut, first]
-        for _ in range(FLAT_HALVINGS):
-            middle = (low + high) / 2
-            is_good = good(middle[:, None], cut)[:, 0]
-            low, high = np.where(is_good, middle, low), np.where(is_good, high, middle)
-        reach[cut] = low
-    found = form.coefficients((x[along] + reach).reshape(form.size, 2))
-    bounds = [each.bounds for each in form.free]
-    whole = ~np.isin(ways, cut).reshape(form.size, 2)
-    return {
-        name: (low if all_low else float(a), high if all_high else float(b))
-        for name, (a, b), (all_low, all_high), (low, high) in zip(form.names, found, whole, bounds, strict=True)
-    }
+        def excess(share: Any) -> Real:
+            return judge.scores(form, x[:, None] + way[:, None] * np.atleast_1d(share)) - limit
+
+        is_beyond = excess(shares) > 0
+        first = int(is_beyond.argmax())
+        if not is_beyond[first]:
+            return 1.0
+        return float(bisect(lambda share: float(excess(share)[0]), shares[first - 1] if first else 0.0, shares[first]))
+
+    found = {}
+    for place, each in enumerate(form.free):
+        ways = [np.eye(form.size)[place] * (end - x) for end in form.box]
+        low, high = (
+            bound if share == 1.0 else float(form.coefficients(x + share * way)[place])
+            for bound, way, share in zip(each.bounds, ways, map(reach, ways), strict=True)
+        )
+        found[each.name] = (low, high)
+    return found

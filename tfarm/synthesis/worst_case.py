@@ -156,9 +156,6 @@ class WorstCase:
         )
 
 
-WITHOUT_BOX = WorstCase({}, 0)  # of a list, or of one arm
-
-
 def for_the_worst(
     arms: Sequence[NamedArm], box: ArmBox | None, find: Callable[[Sequence[NamedArm]], _Found],
     score_on: Callable[[_Found, Arm], float], tell: Tell,
@@ -178,7 +175,7 @@ def for_the_worst(
             text = f"{error.message}; for {len(named)} arms at once: {'; '.join(each.name for each in named)}"
             raise ConvergenceError(text, error.best, error.residual) from None
         if box is None:
-            return found, named, WITHOUT_BOX
+            return found, named, WorstCase({}, 0)
         limit = max(score_on(found, each.arm) for each in named)
         worst, score, number = worst_inside(box, partial(score_on, found))
         tried += number
