@@ -182,6 +182,16 @@ class Judge:
         """The slews of the model."""
         return Slews(self.model, self.arm, self.known, self.chain)
 
+    @cached_property
+    def conditions(self) -> list[tuple[Model, float]]:
+        """The models that have to be stable, each with a factor on the law: most unstable laws fail the first."""
+        own = [(self.model, 1.0)]
+        if not self.is_sampled:
+            return own
+        fewer = [(self.model, SEARCH_RESERVE)]
+        more = [(self.model, 1 / SEARCH_RESERVE), *((each, 1.0) for each in self.also)]
+        return [*fewer, *([] if self.is_relaxed else more), *own]
+
     # ------------------------------------------------------------ in the model
 
     def scores(self, form: Structure, x: Real) -> Real:
@@ -194,15 +204,8 @@ class Judge:
         return float(self.scores_of(entries_of(law), 1)[0])
 
     def scores_of(self, entries: Sequence[Entry], number: int) -> Real:
-        """The same of the entries of `number` laws.
-
-        The models that have to be stable, each with a factor on the law: most unstable laws fail the first.
-        """
-        conditions = [(self.model, 1.0)]
-        if self.is_sampled and not self.is_relaxed:
-            conditions = [(self.model, 1 / SEARCH_RESERVE), *((each, 1.0) for each in self.also), *conditions]
-        if self.is_sampled:
-            conditions = [(self.model, SEARCH_RESERVE), *conditions]
+        """The same of the entries of `number` laws."""
+        conditions = self.conditions
         scores, alive, poles = np.empty(number), np.arange(number), np.empty(0, complex)
         for left, (model, share) in zip(range(len(conditions), 0, -1), conditions, strict=True):
             poles = model.poles(entries, share)

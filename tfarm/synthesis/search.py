@@ -23,7 +23,8 @@ from tfarm.synthesis.judge import LOST, Judge
 from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Tell
 
-FEWEST_RUNS, MOST_RUNS = 3, 8  # one more than coefficients within these: some minima are found by one of five alone
+FEWEST_RUNS, MOST_RUNS = 2, 8  # one more than coefficients within these: some minima are found by one of five alone
+USUAL_WORK = 4 * 20**2  # conditions times squared states of one arm's first model: with twice as much half the runs
 FEWEST_POINTS, POINTS_EACH = 32, 15  # of a run, at least, and for each coefficient: the next power of two
 LAWS_EACH, MOST_LAWS = 800, 4000  # of a run for each coefficient, and at most; twice as many from the best points
 STRATEGIES = (("best1bin", 0.7), ("currenttobest1bin", 0.9))  # in turn, and the share of coefficients changed at once
@@ -78,6 +79,11 @@ class Worst:
 
     judges: tuple[Judge, ...]
 
+    @property
+    def work(self) -> float:
+        """The work of a law, relative to that of one arm and its first model."""
+        return sum(len(judge.conditions) * len(judge.model.plant[0]) ** 2 for judge in self.judges) / USUAL_WORK
+
     def scores(self, form: Structure, x: Real) -> Real:
         """The function to be minimised, at points x (n, laws); arms after one with an unstable loop are left out."""
         worst = self.judges[0].scores(form, x)
@@ -94,7 +100,7 @@ def search(judge: Worst, form: Structure, tell: Tell) -> Search:
     ends = [(place, end) for place in range(form.size) for end in (0, 1)]
     places = [each for each in ends if not (given[each[0]] or form.is_physical(*each))]
     region = form.wider(places, BEYOND)
-    (x, scores), of_runs = minimised(lambda at: judge.scores(region, at), form, region.box, tell)
+    (x, scores), of_runs = minimised(lambda at: judge.scores(region, at), form, region.box, judge.work, tell)
     for place, end in (each for each in ends if region.is_physical(*each)):  # there if the score is as good
         moved = x[:, :1].copy()
         moved[place] = region.box[end][place]
@@ -109,14 +115,15 @@ def search(judge: Worst, form: Structure, tell: Tell) -> Search:
 
 
 def minimised(
-    score: Callable[[Real], Real], form: Structure, box: tuple[Real, Real], tell: Tell
+    score: Callable[[Real], Real], form: Structure, box: tuple[Real, Real], work: float, tell: Tell
 ) -> tuple[Points, list[float]]:
     """Return the last points of all runs, and the best score of each.
 
-    `score` takes points (n, k) of the box.  Runs begin within the bounds of `form`, the first also with its start; then
-    one with the best points of all, one near the best of those, and a simplex at the best of that.
+    `score` takes points (n, k) of the box; `work` is that of a law, relative to the usual one.  Runs begin within the
+    bounds of `form`, the first also with its start; then one with the best points of all, one near the best of those,
+    and a simplex at the best of that.
     """
-    runs = min(max(form.size + 1, FEWEST_RUNS), MOST_RUNS)
+    runs = min(max(int((form.size + 1) / max(1.0, work)), FEWEST_RUNS), MOST_RUNS)
     number = 1 << (max(FEWEST_POINTS, POINTS_EACH * form.size) - 1).bit_length()
     rounds = min(LAWS_EACH * form.size, MOST_LAWS) // number
     ended: list[Points] = []
