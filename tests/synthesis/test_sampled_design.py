@@ -119,6 +119,18 @@ def test_the_cost_is_that_of_the_tuners_trial_and_no_gains_cost_less() -> None:
         design(LAB, "cost", continuous=True)
 
 
+def test_of_a_similar_arm_of_ten_thousand_times_the_mass_as_many_times_the_moment_is_left() -> None:
+    """Density, stiffnesses and hub times 1e4: all torques are, and K1; 4 kN m of a stable law are no instability."""
+    own = LAB.link
+    link = replace(own, density=1e4 * own.density, youngs_modulus=1e4 * own.youngs_modulus,
+                   shear_modulus=1e4 * own.shear_modulus)  # fmt: skip
+    large = replace(LAB, link=link, hub=replace(LAB.hub, inertia=1e4 * LAB.hub.inertia))
+    small, found = (design(arm, "residual") for arm in (LAB, large))
+    assert found.value == pytest.approx(1e4 * small.value, rel=1e-3)
+    assert found.value > 4e3
+    np.testing.assert_allclose([found.law.K1, found.law.K2], [1e4 * small.law.K1, small.law.K2], rtol=0.05)
+
+
 def test_where_nothing_holds_nothing_is_recommended() -> None:
     late = Chain(sampling=Sampling(delay_samples=3.0))
     with pytest.raises(ConvergenceError, match="widen the bounds"):

@@ -14,7 +14,7 @@ from tests.shell import answer, refused, run
 from tfarm.dsp import Chain
 from tfarm.dsp.results import simulated_run
 from tfarm.report import tuner_section
-from tfarm.report.tuner_section import comparison_table
+from tfarm.report.tuner_section import cost_tables
 from tfarm.schema import to_dict
 from tfarm.tuner import Plan, compare_controllers, shaped_trial, slew_trial, tune
 from tfarm.tuner.baselines import tried_loops
@@ -191,12 +191,12 @@ def test_text_json_page_and_file_have_one_cost(capsys, saved, page):
     assert f"cost_unit_N_m {UNIT:g}" in out
     assert (found["a"], found["b"], found["cost_unit_N_m"]) == (1.0, 2.6, UNIT)
     costs = {"without": "cost_without", "best_constant": "cost_best_constant", "tuner": "cost_tuned"}
-    row = comparison_table(page)[0]
+    row = cost_tables(page)[0][0]
     for name, key in costs.items():
         assert f"{found[key]:.4g}" in out
         assert row[f"{name}_cost"] == pytest.approx(found[key], rel=1e-9)
     assert page.tuning.training.costs.tolist() == found["cost"]
-    assert f"units of {UNIT:g} N m" in comparison_table(page).caption
+    assert f"units of {UNIT:g} N m" in cost_tables(page)[0].caption
     kept = json.loads(saved.read_text())
     assert (kept["a"], kept["b"], kept["scales"]) == (1.0, 2.6, [UNIT] * 6)
     law = tfarm.HubFeedback(K1=found["K1"])

@@ -144,9 +144,7 @@ FEWEST_MODES = 8  # of the first model; more where its best laws are unstable
 SEARCHED_MODES = 32  # of the largest: with twice as many a law takes eight times as long
 CONTINUOUS_TIMES = 2  # times the modes where the continuous-time loop is designed
 LAWS_AT_ONCE = 256  # a limit of memory
-LOST = (
-    1e30  # score where a condition of stability is not met, and as much for each later one: no value in SI is so large
-)
+LOST = 1e30  # score where a loop is unstable, and as much for each later condition: above any value in SI units
 
 
 @dataclass(frozen=True)

@@ -120,8 +120,8 @@ def minimised(
     """Return the last points of all runs, and the best score of each.
 
     `score` takes points (n, k) of the box; `work` is that of a law, relative to the usual one.  Runs begin within the
-    bounds of `form`, the first also with its start; then one with the best points of all, one near the best of those,
-    and a simplex at the best of that.
+    bounds of `form`, the first also with its start, and are more where no loop is stable yet; then follow one with the
+    best points of all, one near the best of those, and a simplex at the best of that.
     """
     runs = min(max(int((form.size + 1) / max(1.0, work)), FEWEST_RUNS), MOST_RUNS)
     number = 1 << (max(FEWEST_POINTS, POINTS_EACH * form.size) - 1).bit_length()
@@ -133,10 +133,13 @@ def minimised(
         best = min(each.scores[0] for each in ended)
         tell(f"{form.name}: search {len(ended)}, best so far {best:.6g}")
 
-    for seed in range(runs):
+    for seed in range(MOST_RUNS):
+        if seed >= runs and min(each.scores[0] for each in ended) < LOST:
+            break
         points = sobol(*form.box, number, seed)
         points[:, 0] = points[:, 0] if seed else form.origin
         run(points, rounds)
+    runs = len(ended)
     run(Points.of(ended).x[:, :number], 2 * rounds)
     if form.size > len(PLANE):
         best = Points.of(ended).x[:, 0]

@@ -210,6 +210,9 @@ TIMES_THE_MODES = (4, 3, 2)  # of a larger loop: the first number at which dampe
 GUARD_MODES_UNDAMPED = 20  # of the larger loop at C = 0
 MOST_GUARD_MODES = 48  # of that at C > 0
 REMEDY_DAMPINGS = np.geomspace(1e-12, 1e-2, 11)  # s, tried for the remedy
+PROVEN = Quantity(
+    "certified for any K(t)", key="proven", help="one quadratic Lyapunov function decreases under every gain in it"
+)
 
 
 @dataclass(frozen=True)
@@ -233,7 +236,7 @@ class Guard:
     proofs: tuple[CommonLyapunov, ...] = ()
 
     @property
-    def is_proven(self) -> Annotated[bool, Quantity("certified for any K(t)", key="proven", help="Lyapunov function")]:
+    def is_proven(self) -> Annotated[bool, PROVEN]:
         """Whether the loop is certified stable for every K(t) in it, and not that of its first modes alone."""
         return bool(self.proofs) and self.is_settled
 
