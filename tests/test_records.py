@@ -166,7 +166,7 @@ def test_a_measurement_says_how_well_it_is_explained() -> None:
     begins = f"Overlay(finding='{within} of {within} poles measured, ln |measured/exact| {np.log(1.1):.2g} rms', "
     assert repr(tfarm.overlay(LAB, data)).startswith(begins)
     found = tfarm.fit(LAB, data, ["gain"], profile=False)
-    assert repr(found).startswith("Fit(verdict='fitted', finding='gain = 1.1; chi-squared ")
+    assert repr(found).startswith("Fit(verdict='fitted', finding='sensor gain = 1.1; chi-squared ")
 
 
 def test_a_few_numbers_by_name_are_shown() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import tfarm
 from tfarm.digits import plain
 from tfarm.dsp import load_chain
-from tfarm.plots.frequency import draw_compared
+from tfarm.plots.frequency import bode as bode_plot
 from tfarm.plots.regions import draw_overlay, stable_regions
 from tfarm.plots.shapes import modes
 from tfarm.plots.style import save_figure
@@ -21,9 +21,9 @@ def write_pictures(out: Path) -> None:
     """Write bode-root-moment.png, gains.png and mode-shapes.png to a folder."""
     lab, undamped = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
     band, labels = resonant_band(lab, 6), ("exact, no damping", f"exact, damping C = {plain(lab.damping)} s")
-    main, other = (bode(arm, "root_moment", band) for arm in (undamped, lab))
+    both = {label: bode(arm, "root_moment", band) for label, arm in zip(labels, (undamped, lab), strict=True)}
     figures = {
-        "bode-root-moment": draw_compared(main, other, labels),
+        "bode-root-moment": bode_plot.figure(both),
         "gains": draw_overlay(stable_regions(lab, default_gains(lab), load_chain(lab.name))),
         "mode-shapes": modes.figure(tfarm.modes(lab, count=4)),  # two rows
     }

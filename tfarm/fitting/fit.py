@@ -27,7 +27,7 @@ from tfarm.arm.schema import file_key
 from tfarm.arm.writing import to_toml
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.digits import listed
-from tfarm.errors import ConvergenceError, require
+from tfarm.errors import ConvergenceError, one_line, require
 from tfarm.files import write_file
 from tfarm.loop.plane import gain_map
 from tfarm.records import record
@@ -52,6 +52,7 @@ from .solve import (
 )
 
 SENSOR_GAIN, SENSOR_DELAY = "gain", "delay"  # of a sensor, as `Response` has them: free like the arm's numbers
+LONGEST_NAME = 200  # characters of a file in an assumption
 LONGEST_SYMBOL = 3  # characters at the end of a label: I_h, Kt
 MOST_RESTARTS = 4  # times that a profile may find a lower sum of squares than the search did
 
@@ -300,7 +301,7 @@ def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
     texts.append(f"Fitted: {listed(values)}, from the arm {fit.before.name}; {fit.in_words}.")
     for each in fit.responses:
         digest = each.digest or "none"
-        texts.append(f"Fitted to {each.label} of {Path(each.source).name}, SHA-256 {digest}.")
+        texts.append(f"Fitted to {each.label} of {one_line(Path(each.source).name, LONGEST_NAME)}, SHA-256 {digest}.")
     return (*texts, *(f"Of the fit: {words}." for words in fit.not_determined))
 
 

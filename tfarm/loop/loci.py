@@ -141,10 +141,11 @@ def _closed(arm: Arm, fixed: Real, count: int, moving: Real) -> tuple[Matrices, 
 @dataclass(frozen=True)
 @record
 class MostDamped:
-    """The `gain` at which mode 1 has its largest `damping_ratio`."""
+    """The `gain` at which mode 1 has its largest `damping_ratio`; from there on it oscillates (`swings_on`) or not."""
 
     gain: Annotated[float, Quantity("value", help="value of the gain at which mode 1 is damped most")]
     damping_ratio: Annotated[float, Quantity("damping ratio", help="-Re s/|s| of mode 1 there")]
+    swings_on: bool
     title: Title
 
     @property
@@ -176,7 +177,7 @@ def most_damped(found: Locus) -> MostDamped | None:
             break
         gain, branch = grid[top - 1 : top + 2], found_there[top - 1 : top + 2]
         best = float(gain[1]), float(damping_ratios(branch[1:2])[0])
-    return MostDamped(*best, found.varied.title)
+    return MostDamped(*best, bool((rows[0][at:].imag > 0).all()), found.varied.title)
 
 
 def damping_ratios(s: Complex) -> Real:
