@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tfarm.arrays import Real
-from tfarm.columns import Column, Table
+from tfarm.schema import Column, Table
 
 MOST_LINES, MOST_CHARACTERS = 24, 60  # of a coarse picture
 
