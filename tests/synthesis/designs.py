@@ -52,8 +52,8 @@ def designed(arm, chain, structure, objective, kind, rng):
     """The design, and the judges and the structure with its bounds that it was searched with at last."""
     last, search = [], room.search
 
-    def kept(worst, form, tell):
-        found = search(worst, form, tell)
+    def kept(worst, form, tell, near=None):
+        found = search(worst, form, tell, near)
         last[:] = worst, found.form
         return found
 

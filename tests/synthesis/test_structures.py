@@ -154,7 +154,7 @@ def least_of(function, low, high):
     form = SimpleNamespace(name="test", size=low.size, box=(low, high), origin=low)
     lines = []
     found, of_runs = search.minimised(
-        lambda points: np.array([function(each) for each in points.T]), form, form.box, 1.0, lines.append
+        lambda points: np.array([function(each) for each in points.T]), form, form.box, 1.0, lines.append, None
     )
     assert list(found.scores) == sorted(found.scores)
     assert found.scores[0] == min(of_runs)

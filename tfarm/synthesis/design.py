@@ -247,20 +247,22 @@ class _Task:
         return judge_of(on, self.arm, self.chain, self.objective, self.form.signals, self.modes, count,
                         continuous=self.loop == "continuous")  # fmt: skip
 
-    def find(self, named: Sequence[NamedArm]) -> _Choice:
-        """Return the best law that is stable on all arms.  Raises ConvergenceError where none is found.
+    def find(self, named: Sequence[NamedArm], before: _Choice | None) -> _Choice:
+        """Return the best law that is stable on all arms, near the one `before` the last of them was added, if any.
 
+        Raises ConvergenceError where none is found.
         If the best law under fewer conditions is stable, it is the best under all: so that one is tried first.
         """
         nearest: tuple[float, Any] | None = None
         sizes = [self.sizes(each.arm) for each in named]
+        near = None if before is None else before.x
         for step in range(max(map(len, sizes))):
             several = tuple(
                 self.judge(each.arm, own[min(step, len(own) - 1)]) for each, own in zip(named, sizes, strict=True)
             )
             relaxed = tuple(replace(each, is_relaxed=True) for each in several)
             for judges, most in [*([(relaxed, 1)] if self.loop == "sampled" else []), (several, CANDIDATES)]:
-                found = search(Worst(judges), self.form, self.tell)
+                found = search(Worst(judges), self.form, self.tell, near)
                 nearest = min([*([nearest] if nearest else []), found.found[0]], key=itemgetter(0))
                 for score, x in found.found[:most]:
                     law = found.form.record_at(x)

@@ -94,13 +94,16 @@ class Worst:
         return worst
 
 
-def search(judge: Worst, form: Structure, tell: Tell) -> Search:
-    """Return the best laws of a structure near its bounds, which are widened where the best lies beyond."""
+def search(judge: Worst, form: Structure, tell: Tell, near: Real | None = None) -> Search:
+    """Return the best laws of a structure near its bounds, which are widened where the best lies beyond.
+
+    `near` (n,) is the best point of a judge with fewer arms: then one run begins there instead of several.
+    """
     given = [each.name in form.given for each in form.free]
     ends = [(place, end) for place in range(form.size) for end in (0, 1)]
     places = [each for each in ends if not (given[each[0]] or form.is_physical(*each))]
     region = form.wider(places, BEYOND)
-    (x, scores), of_runs = minimised(lambda at: judge.scores(region, at), form, region.box, judge.work, tell)
+    (x, scores), of_runs = minimised(lambda at: judge.scores(region, at), form, region.box, judge.work, tell, near)
     for place, end in (each for each in ends if region.is_physical(*each)):  # there if the score is as good
         moved = x[:, :1].copy()
         moved[place] = region.box[end][place]
@@ -115,15 +118,16 @@ def search(judge: Worst, form: Structure, tell: Tell) -> Search:
 
 
 def minimised(
-    score: Callable[[Real], Real], form: Structure, box: tuple[Real, Real], work: float, tell: Tell
+    score: Callable[[Real], Real], form: Structure, box: tuple[Real, Real], work: float, tell: Tell, near: Real | None
 ) -> tuple[Points, list[float]]:
     """Return the last points of all runs, and the best score of each.
 
     `score` takes points (n, k) of the box; `work` is that of a law, relative to the usual one.  Runs begin within the
     bounds of `form`, the first also with its start, and are more where no loop is stable yet; then follow one with the
-    best points of all, one near the best of those, and a simplex at the best of that.
+    best points of all, one near the best of those, and a simplex at the best of that.  With a point `near` the best one
+    run begins with it, and the next near the best.
     """
-    runs = min(max(int((form.size + 1) / max(1.0, work)), FEWEST_RUNS), MOST_RUNS)
+    runs = 1 if near is not None else min(max(int((form.size + 1) / max(1.0, work)), FEWEST_RUNS), MOST_RUNS)
     number = 1 << (max(FEWEST_POINTS, POINTS_EACH * form.size) - 1).bit_length()
     rounds = min(LAWS_EACH * form.size, MOST_LAWS) // number
     ended: list[Points] = []
@@ -137,10 +141,11 @@ def minimised(
         if seed >= runs and min(each.scores[0] for each in ended) < LOST:
             break
         points = sobol(*form.box, number, seed)
-        points[:, 0] = points[:, 0] if seed else form.origin
+        points[:, 0] = points[:, 0] if seed else form.origin if near is None else near
         run(points, rounds)
     runs = len(ended)
-    run(Points.of(ended).x[:, :number], 2 * rounds)
+    if near is None:
+        run(Points.of(ended).x[:, :number], 2 * rounds)
     if form.size > len(PLANE):
         best = Points.of(ended).x[:, 0]
         spread = AROUND * np.random.default_rng(runs).standard_normal((number, form.size))

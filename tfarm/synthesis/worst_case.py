@@ -157,18 +157,19 @@ class WorstCase:
 
 
 def for_the_worst(
-    arms: Sequence[NamedArm], box: ArmBox | None, find: Callable[[Sequence[NamedArm]], _Found],
+    arms: Sequence[NamedArm], box: ArmBox | None, find: Callable[[Sequence[NamedArm], _Found | None], _Found],
     score_on: Callable[[_Found, Arm], float], tell: Tell,
 ) -> tuple[_Found, list[NamedArm], WorstCase]:  # fmt: skip
     """Return the result of `find` for the arms and for worse ones inside the box, with all of these arms.
 
+    `find` is given the arms and what it found for all but the last of them, near which it may begin.
     `score_on` is the score of one arm, inf where the law is unstable.  Raises ConvergenceError where no law is found
     that is stable on all arms, or where it stays unstable on one inside the box.
     """
-    named, tried = list(arms), 0
+    named, tried, found = list(arms), 0, None
     while True:
         try:
-            found = find(named)
+            found = find(named, found)
         except ConvergenceError as error:
             if len(named) == 1:
                 raise
