@@ -108,8 +108,8 @@ def slew_words(arm: Arm, law: HubFeedback, chain: Chain, modes: int) -> dict[str
     answer = to_dict(simulated_run(arm, law, chain, "slew", 3 * chain.slew.rise_time, count=modes))
     settled = answer["settling_time_s"]
     largest = {name: max(map(abs, answer[key])) for name, key in (("torque", "torque"), ("moment", "root_moment"))}
-    figures = largest | {"residual": answer["residual_moment_rms"]}
-    return {f"slew-{name}": f"{value:.5g}" for name, value in figures.items()} | {
+    figures = largest | {"residual": answer["residual_moment_rms"]}  # none of a run that stopped
+    return {f"slew-{name}": "not computed" if value is None else f"{value:.5g}" for name, value in figures.items()} | {
         "slew-settled": f"not settled within {answer['t'][-1]:.5g} s" if settled is None else f"{settled:.5g}"
     }
 
@@ -246,7 +246,7 @@ def test_the_region_of_a_hub_that_is_held_is_the_librarys(browser, folder, name)
         areas, Kp = page.evaluate("[live.now.areas, live.now.law.Kp]")
         assert {row["what"] for row in areas} == {"stable, continuous"}
         columns = sorted({row["K1"] for row in areas})[3 :: len(areas) // 5]
-        known = gain_map(arm, np.array(columns), np.array([axes["K2"]["low"], axes["K2"]["high"]]), HubFeedback(Kp=Kp))
+        known = gain_map(arm, np.array(columns), np.array([axes["K2"]["low"], axes["K2"]["high"]]), Kp=Kp)
         for gain, intervals in zip(columns, known.stable_intervals, strict=True):
             here = [(row["low"], row["high"]) for row in areas if row["K1"] == gain]
             cut = [(max(row[0], axes["K2"]["low"]), row[1]) for row in here]

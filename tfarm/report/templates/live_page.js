@@ -122,7 +122,7 @@
     text("slew-torque", general(torque, 5));
     text("slew-moment", general(moment, 5));
     text("slew-residual", residual === null ? "not computed" : general(residual, 5));
-    text("slew-settled", Number.isFinite(settled) ? general(settled, 5) : `not settled within ${general((slew.n - 1) * slew.period, 5)} s`);
+    text("slew-settled", Number.isFinite(settled) ? general(settled, 5) : `not settled within ${general((now.run.n - 1) * slew.period, 5)} s`);
     text("slew-stopped", stopped === null ? "" : `Unstable: simulation stopped at ${general(stopped, 4)} s (deflection limit).`);
     text("slew-command", `tfarm simulate ${gains} --duration ${general(slew.n * slew.period - slew.period, 6)} --modes ${slew.modes}`);
   }
