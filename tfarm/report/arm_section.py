@@ -77,10 +77,10 @@ def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
 class Parameter(NamedTuple):
     """A number of the arm's file."""
 
-    label: Annotated[str, Quantity("parameter")]
-    value: Annotated[float | str, Quantity("value", digits=10)]
-    unit: Annotated[str, Quantity("unit")]
-    key: Annotated[str, Quantity("key of the file")]
+    label: Annotated[str, Quantity("parameter", help="what the number is in the model")]
+    value: Annotated[float | str, Quantity("value", digits=10, help="as the file has it")]
+    unit: Annotated[str, Quantity("unit", help="SI unit of the value")]
+    key: Annotated[str, Quantity("key of the file", help="table and key of the TOML file")]
 
 
 def parameters(arm: Arm, table: Mapping[str, Any], under: str = "") -> Iterator[Parameter]:
