@@ -148,13 +148,13 @@ def curved_edge(x):
     return value if x.sum() > 0.5 else LOST + 0.5 - x.sum()
 
 
-def least_of(function, low, high):
+def least_of(function, low, high, near=None):
     """The lowest point that a search finds between bounds, its score, and the lines of progress."""
     low, high = np.array(low, dtype=float), np.array(high, dtype=float)
     form = SimpleNamespace(name="test", size=low.size, box=(low, high), origin=low)
     lines = []
     found, of_runs = search.minimised(
-        lambda points: np.array([function(each) for each in points.T]), form, form.box, 1.0, lines.append, None
+        lambda points: np.array([function(each) for each in points.T]), form, form.box, 1.0, lines.append, near
     )
     assert list(found.scores) == sorted(found.scores)
     assert found.scores[0] == min(of_runs)
@@ -186,6 +186,18 @@ def test_coordinates_that_hang_together_are_learnt():
     x, score, _ = least_of(lambda x: sizes @ (turn @ (x - 0.7)) ** 2, np.full(5, -5.0), np.full(5, 5.0))
     assert x == pytest.approx(0.7, abs=1e-3)
     assert score < 1e-5
+
+
+def test_a_search_near_a_known_point_keeps_it_and_is_shorter():
+    """A hole of 1e-4 in a bowl, which no run finds by itself."""
+    known = np.array([0.7, -0.3, 0.2])
+
+    def bowl(x):
+        return -1.0 if abs(x - known).max() < 1e-4 else x @ x
+
+    (_, alone, runs), (_, warm, fewer) = (least_of(bowl, -np.ones(3), np.ones(3), near) for near in (None, known))
+    assert (alone > -1e-9, warm) == (True, -1.0)
+    assert len(fewer) < len(runs)
 
 
 def test_the_lowest_of_many_valleys_is_found():

@@ -13,7 +13,7 @@ from tfarm.arm import Hub
 from tfarm.synthesis import worst_case
 from tfarm.synthesis.design import design
 from tfarm.synthesis.judge import RESERVE
-from tfarm.synthesis.worst_case import MUCH_WORSE, ArmBox, varied, worst_inside
+from tfarm.synthesis.worst_case import MUCH_WORSE, ArmBox, arms_of, for_the_worst, varied, worst_inside
 
 LAB, T = tfarm.load("sasaki2012-lab"), 0.01
 SHORT = replace(LAB, link=replace(LAB.link, length=0.8 * LAB.length), name="short")
@@ -26,6 +26,21 @@ def found():
     with pytest.MonkeyPatch.context() as fewer:
         fewer.setattr(worst_case, "ARMS_TRIED", 6)
         return design(LAB, K1=(0.1, 30.0), K2=(-0.6, 0.95), also=[SHORT], ranges={"payload.mass": MASSES})
+
+
+def test_a_further_search_is_given_what_the_one_before_found():
+    """Score 1 at masses between the ends, 0 at these, until an arm inside is among the arms: then 1 everywhere."""
+    given, box = [], ArmBox(LAB, {"payload.mass": MASSES})
+
+    def find(arms, before):
+        given.append((len(arms), before))
+        return len(arms)
+
+    def score_on(count, arm):
+        return 1.0 if count > 3 or arm.payload.mass not in (0.0, *MASSES) else 0.0
+
+    found, named, _ = for_the_worst(arms_of(LAB, (), box), box, find, score_on, lambda _: None)
+    assert (given, found, len(named)) == ([(3, None), (4, 3)], 4, 4)
 
 
 def test_every_arm_is_held_and_damped_as_by_another_model(found):

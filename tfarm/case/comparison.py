@@ -400,17 +400,20 @@ def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_sampled
         if is_sampled:
             raise
         sampled = brief_of(error, law, chain)
-    loop = Analysis(verdict) if is_sampled else margins_of(arm, law)
-    if isinstance(loop, Analysis):
+    loop: Margins | Analysis
+    if is_sampled:
+        loop = Analysis(verdict)
         poles, open_loop = _sampled_poles(loop)
+        poles = poles[:most]
     else:
+        loop = margins_of(arm, law)
         poles = closed_loop_poles(arm, law, most).values
     return ComparedSide(
         name=name,
         arm=arm,
         law=law,
         arm_modes=rows,
-        poles=poles[:most] if is_sampled else poles,
+        poles=poles,
         open_loop={n: s for n, s in open_loop.items() if n and s.imag > 0},
         loop=loop,
         sampled=sampled,

@@ -58,6 +58,7 @@ Bounds = Annotated[list[Any] | None, typer.Option(metavar="KEY=LO,HI", parser=na
 Priors = Annotated[
     list[Any] | None, typer.Option(metavar="KEY=MEAN,STD", parser=named(numbers("KEY=NUMBER,NUMBER", 2)))
 ]
+OWN_TABLE = "--compare prints a table of its own: ask for one of them"
 MOST_SLOW = 2000  # points by balls or by the appendix, at some milliseconds each
 
 
@@ -125,7 +126,7 @@ def modes(
     found = tfarm.modes(load_arm(arm, theory), count)
     check_method(method, len(found), digits, compare)
     if compare:
-        refuse({"--certify": certify}, "--compare prints a table of its own: ask for one of them")
+        refuse({"--certify": certify}, OWN_TABLE)
         emit(ByMethods(found.arm.name, "natural_frequency", "rad/s", found.index.tolist(), found.by_methods()), json)
         return
     listed = listed_modes(found, digits, certify, cast("Any", method))
@@ -173,31 +174,33 @@ def response(
     if measured is not None:
         from tfarm.fitting.data import data_of
 
-        refuse(
-            {"--s": s, "--omega": omega, "--output": output, "--x": x, "--side": side, "--digits": digits},
-            "a measured response has its own outputs and frequencies; leave this out",
-        )
+        own = {"--s": s, "--omega": omega, "--output": output, "--x": x, "--side": side, "--digits": digits}
+        refuse(own, "a measured response has its own outputs and frequencies; leave this out")
         emit(tfarm.overlay(load_arm(arm, theory), data_of(measured, "--measured")), json, csv=csv, png=png)
         return
     refuse({"--png": png}, "a picture needs --measured; tfarm bode draws the exact response")
-    refuse({"--omega": omega if s else None}, "give --s or --omega, not both")
     from tfarm.response import points as results
 
     (wanted,) = outputs_on(["root_moment" if output is None else output], side)
     G = tfarm.transfer(load_arm(arm, theory, driven), wanted, x=x, method=cast("Any", method), input=driven)
-    if s is None and omega is None:
-        check_range(start, stop)
-        omega = np.geomspace(start, stop, points)
-    at = np.array(s) if s else 1j * np.array(omega)
+    at = places_of(s, omega, (start, stop), points)
     check_method(method, at.size, digits, compare)
     if compare:
-        refuse(
-            {"--csv": csv, "--input": driven if G.load else None},
-            "--compare prints a table of its own: ask for one of them",
-        )
+        refuse({"--csv": csv, "--input": driven if G.load else None}, OWN_TABLE)
         emit(results.ByMethods(G.arm.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)), json)
         return
     emit(results.points(G, at, digits), json, csv=csv, rows=True)
+
+
+def places_of(s: Any, omega: Any, limits: tuple[float, float], points: int) -> Any:
+    """Return the points s [1/s] that are given, or those at frequencies given or between limits [rad/s]."""
+    refuse({"--omega": omega if s else None}, "give --s or --omega, not both")
+    if s:
+        return np.array(s)
+    if omega is None:
+        check_range(*limits)
+        omega = np.geomspace(*limits, points)
+    return 1j * np.array(omega)
 
 
 def check_method(method: str, number: int, digits: int | None, compare: bool) -> None:

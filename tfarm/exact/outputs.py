@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal, get_args
 
-from tfarm.arm.checks import whole
+from tfarm.arm.checks import INPUT_UNITS, whole
 from tfarm.errors import ParameterError, did_you_mean, must_be_known
 
 # theta, M, Q, W, W - (r + x) theta, Psi - theta: hub angle, moment, shear force, displacement, deflection, rotation;
@@ -163,3 +163,17 @@ def on_side(wanted: str | Output, side: Side) -> Output:
     if side == found.side:
         return found
     return replace(found, side=side, name=f"{found.name}_{side}", label=f"{found.label}, {side} side")
+
+
+def signal_words(name: str) -> tuple[str, str]:
+    """Label and SI unit of an output or input, with its place: ("bending strain at x = 0.05 m", "1")."""
+    plain, _, place = name.partition("@")
+    if plain not in OUTPUTS:
+        return plain.replace("_", " "), INPUT_UNITS[plain]
+    label = OUTPUTS[plain].label
+    return f"{label} = {place} m" if place else label, OUTPUTS[plain].unit
+
+
+def unit_over(above: str, below: str) -> str:
+    """The unit of a quantity in one unit over one in another: m/s^2/(N m)."""
+    return f"{above}/{f'({below})' if ' ' in below or '/' in below else below}"

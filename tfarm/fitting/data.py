@@ -28,12 +28,12 @@ from typing import Annotated, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import INPUT_UNITS, INPUTS
+from tfarm.arm import INPUTS
 from tfarm.arm.reading import decoded
 from tfarm.arrays import Complex, Real
 from tfarm.digits import general, singly
 from tfarm.errors import MISSING, ParameterError, did_you_mean, naming, require
-from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.outputs import OUTPUTS, signal_words, unit_over
 from tfarm.files import read_file
 from tfarm.records import record
 from tfarm.response.frequency import HERTZ
@@ -342,20 +342,6 @@ def check_signal(name: str, key: str) -> None:
     """
     plain, known = name.partition("@")[0], tuple(dict.fromkeys((*OUTPUTS, *INPUTS)))
     require(plain in known, key, name, did_you_mean(plain, known))
-
-
-def signal_words(name: str) -> tuple[str, str]:
-    """Label and SI unit of an output or input, with its place: ("bending strain at x = 0.05 m", "1")."""
-    plain, _, place = name.partition("@")
-    if plain not in OUTPUTS:
-        return plain.replace("_", " "), INPUT_UNITS[plain]
-    label = OUTPUTS[plain].label
-    return f"{label} = {place} m" if place else label, OUTPUTS[plain].unit
-
-
-def unit_over(above: str, below: str) -> str:
-    """The unit of a quantity in one unit over one in another: m/s^2/(N m)."""
-    return f"{above}/{f'({below})' if ' ' in below or '/' in below else below}"
 
 
 # ------------------------------------------------------------ CSV

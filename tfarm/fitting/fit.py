@@ -311,7 +311,7 @@ def is_named(key: str, value: float, text: str) -> bool:
     *words, last = of.label.split()
     symbol = last if len(last) <= LONGEST_SYMBOL else ""
     label = " ".join(words) if symbol else of.label
-    patterns = [rf"(?i:\b{label}\b)", *([rf"(?<!\d )\b{symbol}(?=,| and | of | =)"] if symbol else [])]
+    patterns = [rf"(?i:\b{re.escape(label)}\b)", *([rf"(?<!\d )\b{symbol}(?=,| and | of | =)"] if symbol else [])]
     values = re.findall(rf"({NUMBER}) {re.escape(of.unit)}(?![\w^/]| m\^)", text) if of.unit else []
     return any(re.search(each, text) for each in patterns) or any(float(each) == value for each in values)
 

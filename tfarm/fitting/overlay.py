@@ -24,6 +24,7 @@ import numpy as np
 from tfarm.arm import INPUTS, Arm, Input, must_be_arm
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError, require
+from tfarm.exact.outputs import unit_over
 from tfarm.records import record
 from tfarm.response import TransferFunction, transfer
 from tfarm.response.frequency import HERTZ, refined_grid, without_cancelled
@@ -33,7 +34,7 @@ from tfarm.schema import Column, Quantity, Table
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum import modes_below
 
-from .data import Measured, Noise, check_signal, must_be_measured, noise_of, unit_over
+from .data import Measured, Noise, check_signal, must_be_measured, noise_of
 from .resonances import (
     PARTNERS_BEYOND,
     Resonance,

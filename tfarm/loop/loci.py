@@ -234,7 +234,7 @@ class Loci:
     @property
     def unit(self) -> str:
         """The unit of that number; empty of a pure one."""
-        return self.exact.unit.replace("1", "")
+        return self.exact.varied.title[1]
 
 
 def held_branches(branches: Complex) -> Complex:

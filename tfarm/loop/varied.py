@@ -96,7 +96,7 @@ class Varied:
         name = self.vary.removesuffix(".gain")
         plain = name.replace("_", " ") if self.is_of_arm else name
         is_factor = name.partition("@")[0] in OUTPUTS
-        return FACTORS.get(name, f"factor on {plain}" if is_factor else plain), self.unit.replace("1", "")
+        return FACTORS.get(name, f"factor on {plain}" if is_factor else plain), "" if self.unit == "1" else self.unit
 
     @property
     def is_reactive(self) -> bool:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from tfarm.arm import PLANE, HubFeedback
 from tfarm.arrays import Complex, Real
 from tfarm.digits import plain, significant
-from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit, Possible, response_band, share_stable
 from tfarm.fitting.overlay import Overlay
@@ -46,9 +46,7 @@ from .style import (
     page,
     picture,
     plain_ticks,
-    ratio,
     safe,
-    signal_label,
 )
 
 RAD_PER_CYCLE = 2 * math.pi  # rad/s of 1 Hz
@@ -374,8 +372,8 @@ def draw_band(those: Possible, output: str) -> Figure:
     ends = [end for each in those.fit.responses for end in each.omega[[0, -1]]]
     omega = np.geomspace(min(ends), max(ends), POINTS_OF_BAND)
     least, most, best = response_band(those, output, omega)
-    name = signal_label(output)
-    unit = ratio(OUTPUTS[output].unit, those.fit.arm.input_unit)
+    name, unit = signal_words(output)
+    unit = unit_over(unit, those.fit.arm.input_unit)
     with page(9.0, 4.6, f"{those.fit.before.name}: {name} of the arms that the data leave possible") as (figure, ax):
         label = f"all of {len(those.arms)} arms that the data leave possible"
         ax.fill_between(omega / RAD_PER_CYCLE, least, most, color=BLUE, alpha=0.3, lw=0, label=label)

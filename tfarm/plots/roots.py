@@ -62,7 +62,7 @@ def draw_loci(data: Loci) -> Figure:
 def _title(exact: Locus, *_: object) -> str:
     first, last = (plain(float(exact.gain[i]), 4) for i in (0, -1))
     law = one_line(gains_words(exact.law, but=exact.vary).partition(", of ")[0], LONGEST_LAW)
-    values = f"{exact.vary} goes from {first} to {last} {exact.unit.replace('1', '')}".rstrip()
+    values = f"{exact.vary} goes from {first} to {last} {exact.varied.title[1]}".rstrip()
     return f"{exact.arm.name}: closed-loop poles as {values} with {law}"
 
 

@@ -27,7 +27,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from tfarm.arm import GAINS, LISTED, PLANE, AnyLaw, Arm, as_law, shown_unit
 from tfarm.digits import plain
 from tfarm.errors import ParameterError
-from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.files import write_file
 from tfarm.loop.varied import ARM_PARAMETERS
 from tfarm.schema import quantities
@@ -213,13 +213,6 @@ def gains_words(law: AnyLaw, digits: int = 4, but: str = "") -> str:
     return ", ".join(f"{name} = {plain(gains[name], digits)}" for name in named if name != but)
 
 
-def signal_label(name: str) -> str:
-    """A signal in words: the label of that output, with its place along the link, or an input of the hub."""
-    output, _, x = name.partition("@")
-    label = OUTPUTS[output].label if output in OUTPUTS else output.replace("_", " ")
-    return label.replace("at x", f"at x = {x} m")
-
-
 def number_label(name: str, arm: Arm, law: AnyLaw) -> str:
     """A number of a controller or of the arm with its SI unit, for an axis.
 
@@ -227,23 +220,18 @@ def number_label(name: str, arm: Arm, law: AnyLaw) -> str:
     """
     for gain in GAINS:
         if gain.name == name:
-            return f"{name}, gain on the {signal_label(gain.output)} [{shown_unit(name, arm) or '−'}]"
+            return f"{name}, gain on the {signal_words(gain.output)[0]} [{shown_unit(name, arm) or '−'}]"
     if name in OTHER_UNITS:
         return f"{name.replace('_', ' ')} [{OTHER_UNITS[name]}]"
     signal, of, place = NUMBER_OF_LAW.fullmatch(name).groups("")  # type: ignore[union-attr]
     any_law = as_law(law)
     if not place and signal not in any_law.part_gains:
-        return f"{name}, factor on the {'controller' if signal in FACTORS else signal_label(signal)} [−]"
+        return f"{name}, factor on the {'controller' if signal in FACTORS else signal_words(signal)[0]} [−]"
     (block,) = (part.block for part in any_law.parts if part.signals == (signal,))
     power = len(getattr(block, of)) - 1 - int(place) if place and not any_law.is_discrete else 0
-    unit = "" if of == "den" else ratio(arm.input_unit, OUTPUTS[signal.partition("@")[0]].unit)
+    unit = "" if of == "den" else unit_over(arm.input_unit, signal_words(signal)[1])
     time = {0: "", 1: "s"}.get(power, f"s^{power}")
     return f"{name} [{f'({unit}) {time}' if unit and time else unit or time or '−'}]"
-
-
-def ratio(above: str, below: str) -> str:
-    """One unit over another, such as m/s^2/(N m)."""
-    return f"{above}/{f'({below})' if ' ' in below or '/' in below else below}"
 
 
 def name_axes(vary: Sequence[str], arm: Arm, law: AnyLaw, ax: Axes) -> None:

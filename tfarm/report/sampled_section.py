@@ -84,7 +84,7 @@ def facts_on(each: Controller, found: Analysis) -> list[Fact]:
     verdict = found.verdict
     facts = [Fact(label=each.title, value=verdict.word.upper(), note=prose("dominant", it=verdict))]
     if verdict.is_stable:
-        value = "> " * found.is_lower_bound + significant(found.delay_margin_seconds, 3)
+        value = text(found.delay_margin_seconds, 3)
         note = f"{significant(found.delay_margin_samples, 3)} samples"
         facts.append(Fact(label=f"{each.name}: delay margin", value=value, unit="s", note=note))
     if found.minimum_damping is not None and (each.arm.has_elastic_link or not verdict.is_stable):

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
-from tfarm.exact.outputs import Output
+from tfarm.exact.outputs import Output, unit_over
 from tfarm.exact.rigid import rigid_response
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -280,8 +280,7 @@ class Bode:
     @property
     def gain_unit(self) -> Annotated[str, Quantity("unit", help="SI unit of G, output over input", key="unit")]:
         """SI unit of the response, e.g. N m/(N m)."""
-        unit = self.arm.input_unit
-        return f"{self.row.unit}/{f'({unit})' if ' ' in unit else unit}"
+        return unit_over(self.row.unit, self.arm.input_unit)
 
     @property
     def input_label(self) -> str:
@@ -301,13 +300,9 @@ def resonant_band(arm: Arm, resonances: int = RESONANCES_SHOWN) -> tuple[float, 
 
 
 def bode(
-    arm: Arm,
-    output: str | Output,
-    band: tuple[float, float] | None = None,
-    *,
-    x: float | None = None,
+    arm: Arm, output: str | Output, band: tuple[float, float] | None = None, *, x: float | None = None,
     input: str | None = None,
-) -> Bode:
+) -> Bode:  # fmt: skip
     """Return the exact frequency response of one output over a range `band` [rad/s], refined at every pole and zero.
 
     `x` [m] is the place of an output along the arm, `input` another input at the hub (see `tfarm.transfer`).  By
