@@ -1,6 +1,8 @@
 """Edges of the gains, the map, the delay margin and the damping that cures: each against poles on both of its sides."""
 
+import re
 from dataclasses import replace
+from importlib import import_module
 from itertools import product
 
 import numpy as np
@@ -22,6 +24,7 @@ from tfarm.schema import text, to_dict
 from tfarm.spectrum.table import default_gains
 
 GAINS = HubFeedback(K1=0.3, K2=0.3)
+room = import_module("tfarm.dsp.verdict")
 
 
 def growing(loop):
@@ -154,6 +157,15 @@ def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossl
     assert undamped.holds_for == "model of the first 20 modes, not determined beyond"
     assert sampled_verdict(lossless, GAINS, count=12).sentence.startswith("stable")
     assert sampled_verdict(lossless, HubFeedback(K1=0, K2=0)).sentence.startswith("marginal")
+
+
+def test_converged_is_said_where_fewer_modes_agree_alone(lab, monkeypatch):
+    monkeypatch.setattr(room, "complete_band", lambda loop: None)
+    assert re.fullmatch(
+        r"converged for the first \d+ modes, not determined beyond", sampled_verdict(lab, GAINS).holds_for
+    )
+    monkeypatch.setattr(room, "RADIUS_AGREES", -1.0)
+    assert re.fullmatch(r"model of the first \d+ modes, not determined beyond", sampled_verdict(lab, GAINS).holds_for)
 
 
 def test_margins_of_a_certified_loop_have_the_digits_that_are_shown(lab):
