@@ -268,6 +268,7 @@ def test_frequencies_over_the_hub_inertia_are_those_of_arms_that_have_it():
     """A column a mode, its heading that of the curve in the picture; the arm's own value once."""
     arm = tfarm.load("sasaki2012-lab")
     picture, table = assumptions_section(Case(arm, Chain())).blocks[2:]
+    assert table.title == "Candidate hub inertias"
     assert sum(column(table, "is_own").values) == 1
     for inertia, omega in zip(
         *(column(table, key).values for key in ("hub_inertia_kg_m2", "mode_2_rad_s")), strict=True

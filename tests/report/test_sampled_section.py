@@ -21,6 +21,7 @@ from tfarm.plots.regions import CUT_RANGE, K2_RANGE, draw_overlay, stable_region
 from tfarm.report import sampled_section as page
 from tfarm.report.cases import Case, what_holds
 from tfarm.report.sampled_section import CURVE_DIGITS, sampled_section
+from tfarm.report.sections import prose
 from tfarm.spectrum.table import default_gains
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -120,6 +121,16 @@ def test_the_table_of_periods_is_each_period_by_itself(section):
     verdict = sampled_verdict(LAB, GAINS, Chain(sampling=Sampling(period=0.05)))
     assert table["time_constant_s"][-1] == -0.05 / verdict.log_radius
     assert table["stable_K2"][-1] in stable_windows(verdict.full, "K2")
+
+
+def test_a_delay_margin_that_is_a_lower_bound_is_shown_so():
+    """That of the 2-DOF rig, which the search of its first 20 modes does not reach."""
+    rig = tfarm.load("quanser-2dsfl")
+    (each, *_), found = Case(rig, Chain()).controllers, tfarm.sampled(rig, default_gains(rig))
+    margin = page.facts_on(each, found)[1]
+    assert found.is_lower_bound
+    assert margin.value == f"≥ {plain(found.delay_margin_seconds, 3)}"
+    assert "delay margin at least" in prose("sampled_lead", found=[(each, found)], period=0.01)
 
 
 def test_at_zero_damping_the_verdict_names_its_modes_and_the_damping_that_it_needs():

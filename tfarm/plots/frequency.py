@@ -173,8 +173,8 @@ def _mark_roots(data: Bode, ax: Axes) -> None:
     for root in (*data.infinite, *data.vanishing, *data.resonances.imag):
         ax.axvline(root, color=FAINT, lw=0.8, zorder=0.5)
     for roots, height, marker, label in (
-        (data.infinite, 1.0, "^", "infinite: pole on the imaginary axis"),
-        (data.vanishing, 0.0, "v", "zero: zero on the imaginary axis"),
+        (data.infinite, 1.0, "^", "pole on the imaginary axis: infinite"),
+        (data.vanishing, 0.0, "v", "zero on the imaginary axis: 0"),
     ):
         if roots.size:
             ax.plot(

@@ -245,8 +245,8 @@ def candidate_blocks(study: Study, stem: str, title: str, label: str, caption: s
             Column(f"mode_{number}_rad_s", f"mode {number}", "rad/s", of=omega, digits=singly(significant, 6))
         )
     for number, slope in enumerate(study.sensitivity.T, 1):
-        key, title = f"sensitivity_{number}", f"sensitivity of mode {number}"
-        columns.append(Column(key, title, "%/%", of=slope, digits=partial(fixed, decimals=3)))
+        name = f"sensitivity of mode {number}"
+        columns.append(Column(f"sensitivity_{number}", name, "%/%", of=slope, digits=partial(fixed, decimals=3)))
     columns += table(rows, LOOP_COLUMNS).columns
     yield Table(stem=f"assumptions-{stem}", title=title, caption=caption, columns=tuple(columns))
 
