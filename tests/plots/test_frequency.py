@@ -45,7 +45,10 @@ def test_the_curve_is_broken_at_every_infinity_and_runs_off_the_picture(data, ax
 
 def test_open_triangles_sit_on_the_edges(data, ax):
     draw_magnitude(data, ax=ax)
-    for label, roots, height in (("infinite", data.infinite, 1.0), ("zero", data.vanishing, 0.0)):
+    for label, roots, height in (
+        ("pole on the imaginary axis", data.infinite, 1.0),
+        ("zero on the imaginary axis", data.vanishing, 0.0),
+    ):
         marks = next(line for line in ax.get_lines() if str(line.get_label()).startswith(label))
         assert np.array_equal(marks.get_xdata(), roots)
         assert set(marks.get_ydata()) == {height}
