@@ -19,28 +19,19 @@ from . import waves
 from .compiled import python_of
 from .layout import Layout, Numbers, Reading, constant_of, readings
 from .outputs import Output
-from .system import Body, Mark, Offset, Segment, Spring, System
-from .waves import (
-    Plane,
-    Row,
-    across_rows,
-    beyond_body,
-    beyond_offset,
-    beyond_spring,
-    end_plane,
-    inside_body,
-    inside_offset,
-    inside_spring,
-    met,
-    row_across,
-    transition_rows,
-)
+from .system import Body, Mark, Offset, Place, Segment, Spring, System
+from .waves import Plane, Row
 
-_end_plane, _inside_offset, _inside_spring, _inside_body, _beyond_offset, _beyond_spring, _beyond_body = map(
-    python_of, (end_plane, inside_offset, inside_spring, inside_body, beyond_offset, beyond_spring, beyond_body)
+_end_plane, _met, _across_rows, _row_across = map(
+    python_of, (waves.end_plane, waves.met, waves.across_rows, waves.row_across)
 )
-_across_rows, _transition_rows, _row_across, _met = map(python_of, (across_rows, transition_rows, row_across, met))
-across_waves, into_own, out_of_own = map(python_of, (waves.across_waves, waves.into_own, waves.out_of_own))
+_inside_offset, _inside_spring, _inside_body = map(
+    python_of, (waves.inside_offset, waves.inside_spring, waves.inside_body)
+)
+_beyond_offset, _beyond_spring, _beyond_body = map(
+    python_of, (waves.beyond_offset, waves.beyond_spring, waves.beyond_body)
+)
+_transition_rows, across_waves, in_chain = map(python_of, (waves.transition_rows, waves.across_waves, waves.in_chain))
 Ball = Any  # flint.acb or flint.arb, which come without types
 _Found = TypeVar("_Found")
 
@@ -122,11 +113,11 @@ class Sweep:
         self.layout, self.s, self.S = layout, s, s * s if S is None else S
         self.numbers = self.numbers_of(layout)
         self._rows: dict[int, tuple[Row, ...]] = {}
-        self.planes: dict[int, Plane] = {}
+        self.planes: dict[Place, Plane] = {}
         p = _end_plane(*self._end(self.numbers.tip_mass), *self._end(self.numbers.tip_inertia))
         for each in self.numbers.elements:
             if isinstance(each, Mark):
-                self.planes[each.number] = self._at_mark(p)
+                self.planes[each.place] = self._at_mark(p)
             else:
                 p = self._inside(each, p)
         self.theta, self.M, self.Q = p[:3]
@@ -142,40 +133,52 @@ class Sweep:
     @cached_property
     def input(self) -> Any:
         """The input of this response: zero at a pole."""
-        return self.drive_of(self.theta, self.M)
+        return self.of_angle * self.theta - self.of_moment * self.M
 
-    def drive_of(self, theta: Any, M: Any) -> Any:
-        """Return the input of a response with that hub angle and moment on the hub."""
-        s, (A0, A1, A2, A3), (B0, B1) = self.s, self.numbers.of_angle, self.numbers.of_moment
-        return (((s * A3 + A2) * s + A1) * s + A0) * theta - (s * B1 + B0) * M
+    @property
+    def of_angle(self) -> Any:
+        """The sum of A_n s^n (see `system`)."""
+        s, (A0, A1, A2, A3) = self.s, self.numbers.of_angle
+        return ((s * A3 + A2) * s + A1) * s + A0
+
+    @property
+    def of_moment(self) -> Any:
+        """The sum of B_n s^n."""
+        B0, B1 = self.numbers.of_moment
+        return self.s * B1 + B0
 
     @cached_property
-    def states(self) -> dict[int, Row]:
+    def states(self) -> dict[Place, Row]:
         """W, Psi, M and Q at each mark."""
         one, none = self.exact(1) + 0 * self.s, 0 * self.s
-        f: Row = (one, none, none, none)
-        found: dict[int, Row] = {}
+        conditions = self.carried_out((one, none, none, none))
+        return {place: _met(f, self.planes[place]) for place, f in conditions.items()}
+
+    def carried_out(self, f: Row) -> dict[Place, Row]:
+        """Return the condition f z = 0 of the axis at each mark."""
+        found: dict[Place, Row] = {}
         for each in reversed(self.numbers.elements):
             if len(found) == len(self.planes):
                 break
             if isinstance(each, Mark):
-                found[each.number] = _met(f, self.planes[each.number])
+                found[each.place] = f
             else:
                 f = self._beyond(each, f)
         return found
 
     def output(self, one: Reading) -> Any:
         """Return an output of this response, in SI units."""
-        value, exact = self.theta * self.exact(one.theta), self.exact
-        if one.is_current:  # the input less back-EMF, through the lag
-            drive = self.layout.chain.drive
-            value = (self.input - self.s * exact(drive.back_emf) * value) / (self.s * exact(drive.lag) + 1)
+        value = self.numerator(one)
+        return value / (self.s * self.exact(one.C) + 1) if one.C else value
+
+    def numerator(self, one: Reading) -> Any:
+        """Return an output times 1 + C s."""
+        exact = self.exact
+        value = self.theta * exact(one.theta)
+        if one.input:
+            value = value + self.input * one.input + self.s * self.theta * exact(one.rate)
         if one.place is not None:
-            mark = self.layout.places.index(one.place)
-            for weight, part in zip(one.state, self.states[mark], strict=True):
-                value = value + part * exact(weight) if weight else value
-            if one.gauge:
-                value = value / (self.s * exact(self.layout.read[mark].damping) + 1)
+            value = value + self.states[one.place][one.field]
         for _ in range(one.power):
             value = value * self.s
         return value * exact(one.unit)
@@ -190,7 +193,7 @@ class Sweep:
     def _inside(self, element: Any, p: Plane) -> Plane:
         match element:
             case Segment():
-                return out_of_own(_across_rows(*self._transition(element), into_own(p, *element.units)), *element.units)
+                return _across_rows(*self._transition(element), p)
             case Offset():
                 return _inside_offset(element.length, p)
             case Spring():
@@ -200,9 +203,7 @@ class Sweep:
     def _beyond(self, element: Any, f: Row) -> Row:
         match element:
             case Segment():
-                w, m, q = element.units
-                own = _row_across(*self._transition(element), (f[0] / w, f[1], f[2] / m, f[3] / q))
-                return own[0] * w, own[1], own[2] * m, own[3] * q
+                return _row_across(*self._transition(element), f)
             case Offset():
                 return _beyond_offset(element.length, f)
             case Spring():
@@ -211,9 +212,11 @@ class Sweep:
 
     def _transition(self, segment: Any) -> tuple[Row, ...]:
         if id(segment) not in self._rows:
-            over_d, z_sum, z_product = self._sums(segment)
-            functions = self._functions(z_sum, z_product)
-            self._rows[id(segment)] = _transition_rows(*functions, self.S, over_d, *segment[:4])
+            l, (over_d, z_sum, z_product) = segment.length, self._sums(segment)
+            F0, F1, F2, F3 = self._functions(z_sum, z_product)
+            functions = F0 * (l * l * l), F1 * (l * l), F2 * l, F3
+            rows = _transition_rows(*functions, self.S, over_d / segment.stiffness, *segment.of_chain)
+            self._rows[id(segment)] = rows
         return self._rows[id(segment)]
 
     def _sums(self, segment: Any) -> tuple[Any, Any, Any]:
@@ -239,12 +242,9 @@ def output_ball(system: System, wanted: Output, s: Ball, x: float = 0.0) -> Ball
 
     None where the input of the free response may be zero, as at a pole.
     """
-    constant, drive = constant_of(system, wanted, x), system.drive
-    those = readings(system, (wanted,), x)
+    those, constant = readings(system, (wanted,), x), constant_of(system, wanted, x)
     (one,) = those.each
-    if one.is_current and not (drive.back_emf or drive.lag):  # the input in another unit
-        constant = 1
     if constant is not None:
-        return s**one.power * constant * rational(one.unit) / (1 + rational(those.gauges[0]) * s)
+        return s**one.power * constant * rational(one.unit) / (1 + rational(one.C) * s)
     sweep = Sweep(those.layout, s)
     return None if sweep.input.contains(0) else sweep.output(one) / sweep.input

@@ -37,11 +37,11 @@ from tfarm.arm import GAINS, Law
 from tfarm.arrays import Complex, Real
 from tfarm.records import read_only
 
-from .balls import Ball, Sweep, across_waves, into_own, out_of_own, point, rational, summed
+from .balls import Ball, Sweep, across_waves, in_chain, point, rational, summed
 from .layout import Layout, Readings, laid_out, readings, unit_scale
 from .outputs import OUTPUTS, Output
 from .rationals import polynomials
-from .system import Segment, System
+from .system import Place, Segment, System
 from .values import free_outputs, free_slopes
 from .waves import Plane, Row
 
@@ -144,26 +144,25 @@ class WideSweep(Sweep):
         _, z_sum, z_product = self._sums(element)
         if abs(z_sum[0]).mid() + 2 * abs(z_product[0]).mid().sqrt() < SLOW_WAVES:
             return super()._inside(element, p)
-        units, (a, b, g) = element.units, element[:3]
-        S, d = self.S, self.s * element.damping + 1
+        S, d, (a, b, g, _) = self.S, self.s * element.damping + 1, element[:4]
         pair = _waves(a, b, g, S, d, self._shortest)
         if pair is None:
             raise InseparableError
-        one, two = pair
-        gap = one[2] - two[2]
+        one, two = (in_chain(wave[:5], element.length) for wave in pair)
+        d, gap, (a, b, g, _) = d * element.stiffness, one[2] - two[2], element.of_chain
         unit = gap * gap * d * S * g
         if unit[0].contains(0):
             raise InseparableError
-        inner = across_waves(one[:5], two[:5], S * g, d, S * (a / d - b), into_own(p, *units))
-        self.phase = self.phase + one[5] + two[5]
-        return out_of_own(tuple(part / unit for part in inner), *units)
+        inner = across_waves(one, two, S * g, d, S * (a / d - b), p)
+        self.phase = self.phase + pair[0][5] + pair[1][5]
+        return tuple(part / unit for part in inner)
 
     def _at_mark(self, p: Plane) -> Plane:
         grown = self.phase.exp()
         return p[0] * grown, p[1] * grown, p[2] * grown, p[3] * grown, p[4] * grown
 
     @cached_property
-    def states(self) -> dict[int, Row]:
+    def states(self) -> dict[Place, Row]:
         """W, Psi, M and Q at each mark, in the scale of the plane at the axis."""
         shrunk, full = (-self.phase).exp(), super().states
         return {n: (W * shrunk, Psi * shrunk, M * shrunk, Q * shrunk) for n, (W, Psi, M, Q) in full.items()}

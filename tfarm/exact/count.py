@@ -19,31 +19,22 @@ from numpy.typing import NDArray
 
 from .compiled import compiled, inlined
 from .layout import (
-    BODY,
-    COMPLIANCE,
-    GROUND,
-    INERTIA,
+    BENDING,
+    CHAIN_A,
+    CHAIN_B,
+    CHAIN_G,
+    CHAIN_SIGMA,
     LENGTH,
-    MASS,
     OF_ANGLE,
     OF_MOMENT,
-    OFFSET,
     ROW_KIND,
     SEGMENT,
     SPRING,
-    STIFFNESS,
-    TO_M,
-    TO_Q,
-    TO_W,
-    TURNING_GROUND,
     Layout,
 )
+from .sweep import inside
 from .waves import (
     SERIES_RADIUS,
-    SIGMA,
-    A,
-    B,
-    G,
     Plane,
     Wave,
     across_rows,
@@ -51,11 +42,7 @@ from .waves import (
     dispersion,
     end_plane,
     even_functions,
-    inside_body,
-    inside_offset,
-    inside_spring,
-    into_own,
-    out_of_own,
+    in_chain,
     tip_conditions,
     transition_rows,
     transition_series,
@@ -88,12 +75,9 @@ def chain_count(omega: float, rows: Any, ends: Any) -> int:
         if row[ROW_KIND] == SEGMENT:
             number, p = _joined(number, omega, row, p, free)
             free = 2
-        elif row[ROW_KIND] == OFFSET:
-            p = inside_offset(row[LENGTH], p)
-        elif row[ROW_KIND] == BODY:
-            p = inside_body(row[MASS] * S + row[GROUND], row[INERTIA] * S + row[TURNING_GROUND], p)
-        elif row[ROW_KIND] == SPRING:
-            p = inside_spring(row[STIFFNESS], row[COMPLIANCE], p)
+        else:
+            p = inside(row, 0.0, S, p)
+        if row[ROW_KIND] == SPRING:
             number = _clamped(number, p[0], 1)
     if ends[OF_MOMENT] == 0.0:
         return number
@@ -107,28 +91,27 @@ def _joined(outside: int, omega: float, row: Any, plane: Plane, free: int) -> tu
 
     `outside` is the count of the outer part clamped at the joint, `free` the number of free motions there.
     """
-    p = into_own(plane, row[TO_W], row[TO_M], row[TO_Q])
     clamped = (0.0, 0.0, 0.0, 0.0, 1.0)  # W = Psi = 0
     s, _, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(complex(0.0, omega), row)
     number = half_waves(z1, t1, dt1) + half_waves(z2, t2, dt2) + (z1.real < 0.0 and z2.real < 0.0)
-    S, z1, z2 = s.real, z1.real, z2.real
+    S, z1, z2, l, EI = s.real, z1.real, z2.real, row[LENGTH], row[BENDING]
+    a, b, g, sigma = row[CHAIN_A], row[CHAIN_B], row[CHAIN_G], row[CHAIN_SIGMA]
     if max(abs(z1), abs(z2)) < SERIES_RADIUS:
         F0, F1, F2, F3, _, _ = transition_series(z1 + z2, z1 * z2)
-        W, Psi, M, Q = transition_rows(F0, F1, F2, F3, S, 1.0, row[A], row[B], row[G], row[SIGMA])
-        q, r = across_rows(W, Psi, M, Q, p), across_rows(W, Psi, M, Q, clamped)
+        rows = transition_rows(F0 * (l * l * l), F1 * (l * l), F2 * l, F3, S, 1.0 / EI, a, b, g, sigma)
+        q, r = across_rows(*rows, plane), across_rows(*rows, clamped)
     else:
-        one, two = real_wave(z1, v1.real, t1, dt1), real_wave(z2, v2.real, t2, dt2)
-        gS, v_sum = gS.real, S * (row[A] - row[B])
-        q, r = across_waves(one, two, gS, 1.0, v_sum, p), across_waves(one, two, gS, 1.0, v_sum, clamped)
-        unit = 1.0 / (gS * (z1 - z2) * (z1 - z2))
+        one, two = in_chain(real_wave(z1, v1.real, t1, dt1), l), in_chain(real_wave(z2, v2.real, t2, dt2), l)
+        gS, v_sum, gap = g * S, S * (a / EI - b), one[2] - two[2]
+        unit = 1.0 / (gS * EI * gap * gap)
+        q, r = across_waves(one, two, gS, EI, v_sum, plane), across_waves(one, two, gS, EI, v_sum, clamped)
         q = q[0] * unit, q[1] * unit, q[2] * unit, q[3] * unit, q[4] * unit
         r = r[0] * unit, r[1] * unit, r[2] * unit, r[3] * unit, r[4] * unit
     number = _clamped(number, r[1], -1)  # r at the outer end is, up to signs, the plane carried inwards (symmetry)
     number = _clamped(number, -r[0], -1) + outside
     if free == 2:
-        number = _clamped(number, -r[0] * p[3] - r[3] * p[0], 1)
-    number = _clamped(number, q[0], 1) if free else number
-    return number, out_of_own(q, row[TO_W], row[TO_M], row[TO_Q])
+        number = _clamped(number, -r[0] * plane[3] - r[3] * plane[0], 1)
+    return (_clamped(number, q[0], 1) if free else number), q
 
 
 @compiled

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,26 +15,37 @@ from tfarm.errors import ParameterError
 from tfarm.records import read_only
 
 from .outputs import Output
-from .system import Body, Element, Mark, Offset, Place, Segment, Spring, System, double_double, end_condition
+from .system import (
+    INNER,
+    OUTER,
+    PAYLOAD,
+    Element,
+    Mark,
+    Offset,
+    Place,
+    Segment,
+    Spring,
+    System,
+    cut,
+    double_double,
+    end_condition,
+    placed,
+)
 
 SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
-LENGTH, NUMBER = 0, 0  # of an offset's row of the kernel, and of a mark's
+REACH = 0  # of an offset's row of the kernel: its length
 STIFFNESS, COMPLIANCE, LOSS = range(3)  # of a spring's row, the last the stiffness times the damping
 MASS, INERTIA, GROUND, TURNING_GROUND = range(4)  # of a body's row, in the order of `Body`
 AT_JOINT = 2.0**-50  # of the length: rounding of a place at a joint, a quotient of float64 numbers
-ROW_KIND, ROW_WIDTH = 8, 12  # the kind in a row of the kernel, after the numbers of a segment (`waves`), and its width
-TO_W, TO_M, TO_Q = 9, 10, 11  # from the chain's units to the segment's own
+ROW_KIND, ROW_WIDTH = 8, 15  # the kind in a row of the kernel, after the numbers of a segment (`waves`), and its width
+LENGTH, BENDING, CHAIN_A, CHAIN_B, CHAIN_G, CHAIN_SIGMA = range(9, 15)  # of a segment, in the chain's units
 OF_ANGLE, OF_MOMENT = 6, 10  # in the vector of ends: after six numbers of the payload A_0..A_3, then B_0 and B_1
 LAYOUTS_KEPT = 256  # of one system: more places than those of a page
 
+W, PSI, M, Q = range(4)  # the fields of a state
+FIELDS = {"W": W, "Y": W, "centre": W, "Psi": PSI, "Phi": PSI, "M": M, "strain": M, "Q": Q}  # of each quantity
 # The outputs of `uniform`, of a uniform link: theta, M and Q at the root, W and W - theta at the tip.
-AT_ENDS: Mapping[Any, int] = {
-    ((0, 0, 0, 0), 1): 0,
-    (0, (0, 0, 1, 0), 0): 1,
-    (0, (0, 0, 0, 1), 0): 2,
-    (1, (1, 0, 0, 0), 0): 3,
-    (1, (1, 0, 0, 0), -1): 4,
-}
+AT_ENDS: Mapping[Any, int] = {(None, -1, 1): 0, (0, M, 0): 1, (0, Q, 0): 2, (1, W, 0): 3, (1, W, -1): 4}
 
 
 class Numbers(NamedTuple):
@@ -59,7 +69,16 @@ class Layout:
 
     def __init__(self, chain: System, places: tuple[Place, ...] = ()) -> None:
         self.chain, self.places = chain, places
-        self.elements = _marked(chain.elements, _at_joints(chain.elements, places))
+        elements = list(placed(chain.elements))
+        joints = [position for position, _, each in elements if isinstance(each, Segment)] + [Fraction(0)]
+        ends = np.array([float(joint) for joint in joints])
+        order = {"payload": PAYLOAD, "outer": OUTER, "inner": INNER}
+        marks = []
+        for place in places:
+            joint = joints[abs(ends - float(place.share)).argmin()]
+            share = joint if abs(place.share - joint) <= AT_JOINT else place.share
+            marks.append((share, order[place.side], Mark(place)))
+        self.elements = cut([*marks, *elements])
         self._numbers: dict[Any, Numbers] = {}
 
     def numbers(self, key: Any, exact: Callable[[Any], Any]) -> Numbers:
@@ -87,94 +106,53 @@ class Layout:
         return np.asarray(read_only(np.concatenate(numbers)))
 
     @cached_property
-    def read(self) -> tuple[Segment, ...]:
-        """The segment of each place."""
-        found: list[Segment] = []
-        for number, place in enumerate(self.places):
-            at = self.elements.index(Mark(number))
-            outer, inner = (
-                [each for each in part if isinstance(each, Segment)]
-                for part in (self.elements[at::-1], self.elements[at:])
-            )
-            found.append(((inner or outer) if place.side == "inner" else (outer or inner))[0])
-        return tuple(found)
-
-
-def _at_joints(elements: Sequence[Element], places: tuple[Place, ...]) -> tuple[Place, ...]:
-    """Return the places, those next to a joint at it."""
-    lengths = [each.length for each in elements if isinstance(each, Segment)]
-    joints = list(accumulate(lengths, lambda position, length: position - length, initial=Fraction(1)))
-    ends = np.array([float(joint) for joint in joints])
-    found = []
-    for place in places:
-        near = int(abs(ends - float(place.share)).argmin())
-        found.append(place._replace(share=joints[near]) if abs(place.share - joints[near]) <= AT_JOINT else place)
-    return tuple(found)
-
-
-def _marked(elements: Sequence[Element], places: tuple[Place, ...]) -> tuple[Element, ...]:
-    """Return the elements with a mark for each place; segments are cut at places inside."""
-    order = sorted(range(len(places)), key=lambda n: (-places[n].share, places[n].side != "outer"))
-    marks, position = [n for n in order if places[n].side != "payload"], Fraction(1)
-    result: list[Element] = [Mark(n) for n in order if places[n].side == "payload"]
-    is_beyond = True  # outside the link: the payload's offset
-    for each in elements:
-        if is_beyond and isinstance(each, Offset):
-            result.append(each)
-            continue
-        is_beyond = False
-        inner_end = position - each.length if isinstance(each, Segment) else position
-        while (
-            marks
-            and places[marks[0]].share >= position
-            and (places[marks[0]].side == "outer" or not isinstance(each, Body))
-        ):
-            result.append(Mark(marks.pop(0)))
-        rest = each
-        while marks and isinstance(each, Segment) and places[marks[0]].share > inner_end:
-            here = places[marks[0]].share
-            if here < position:
-                result.append(each.piece((position - here) / each.length))
-                rest, position = each.piece((here - inner_end) / each.length), here
-            result.append(Mark(marks.pop(0)))
-        result.append(rest)
-        position = inner_end
-    return (*result, *map(Mark, marks))
+    def marks(self) -> dict[Place | None, int]:
+        """The index of each place's mark."""
+        return {each.place: n for n, each in enumerate(self.elements) if isinstance(each, Mark)}
 
 
 def kernel_row(element: Element) -> list[float]:
     """Return an element as a row of the kernel."""
+    numbers: Sequence[Fraction] = ()
     match element:
         case Segment():
             split = [part for value in element[:3] for part in double_double(value)]
-            return [*split, float(element.sigma), element.damping, SEGMENT, *map(float, element.units)]
-        case Offset():
-            numbers = [float(element.length)]
+            of_chain = map(float, (element.length, element.stiffness, *element.of_chain))
+            return [*split, float(element.sigma), element.damping, SEGMENT, *of_chain]
         case Spring():
-            numbers = [*map(float, element[:2]), float(element.stiffness * Fraction(element.damping))]
-        case Body():
-            numbers = [float(number) for number in element]
+            kind, numbers = SPRING, (*element[:2], element.stiffness * Fraction(element.damping))
         case Mark():
-            numbers = [float(element.number)]
-    kind = {Offset: OFFSET, Spring: SPRING, Body: BODY, Mark: MARK}[type(element)]
-    return [*numbers, *[0.0] * (ROW_KIND - len(numbers)), kind, 0.0, 0.0, 0.0]
+            kind = MARK
+        case _:
+            kind, numbers = OFFSET if isinstance(element, Offset) else BODY, tuple(element)
+    rest = [0.0] * (ROW_KIND - len(numbers)), [0.0] * (ROW_WIDTH - ROW_KIND - 1)
+    return [*map(float, numbers), *rest[0], kind, *rest[1]]
+
+
+def segment_at(chain: System, place: Place) -> Segment:
+    """Return the segment of a place, at a joint that of its side."""
+    inner_end = Fraction(1)
+    for each in chain.segments:
+        inner_end -= each.length
+        if place.share > inner_end + AT_JOINT or (place.side == "outer" and place.share >= inner_end - AT_JOINT):
+            break
+    return each
 
 
 class Reading(NamedTuple):
-    """The weights of an output, of W, Psi, M and Q at a place and of theta; its power of s, gauge and SI unit."""
+    """An output:  unit s^power (field at the place + theta theta + rate s theta + input u)/(1 + C s),  in SI units.
+
+    The field is one of W, Psi, M and Q, u the input and C [s] the damping at a gauge, or the lag of a motor.
+    """
 
     place: Place | None
-    state: tuple[Fraction | int, ...]
+    field: int
     theta: Fraction
     power: int
-    gauge: bool
     unit: Fraction
-    is_current: bool = False
-
-    @property
-    def at(self) -> tuple[Fraction, ...]:
-        """The place as a share of the length; none of the hub angle."""
-        return () if self.place is None else (self.place.share,)
+    C: Fraction | float = 0.0
+    rate: Fraction = Fraction(0)
+    input: int = 0
 
 
 @dataclass(frozen=True)
@@ -184,35 +162,21 @@ class Readings:
     layout: Layout = field(repr=False)
     each: tuple[Reading, ...] = field(repr=False)
 
-    @property
-    def gauges(self) -> list[float]:
-        """C [s] of each output's gauge, 0 for other outputs."""
-        places = self.layout.places
-        return [
-            self.layout.read[places.index(one.place)].damping if one.gauge and one.place is not None else 0.0
-            for one in self.each
-        ]
-
     @cached_property
     def table(self) -> NDArray[np.float64]:
-        """Rows for `sweep.fill_free`."""
-        places = self.layout.places
-        table = np.array([
-            [-1 if one.place is None else places.index(one.place), *one.state, one.theta, one.power, C, one.unit]
-            for one, C in zip(self.each, self.gauges, strict=True)
-        ], dtype=float).reshape(-1, 9)  # fmt: skip
-        return np.asarray(read_only(table))
+        """Rows for `sweep.fill_free`: the numbers of `Reading` in their order, the row of the place first."""
+        rows = [(self.layout.marks.get(one.place, -1), *one[1:]) for one in self.each]
+        return np.asarray(read_only(np.array(rows, dtype=float).reshape(-1, len(Reading._fields))))
 
     @cached_property
     def ends_table(self) -> NDArray[np.float64] | None:
-        """Rows for `uniform.fill_ends`: number, power of s, C of the gauge, factor; None if one is not at the ends."""
-        chain = self.layout.chain
-        if not chain.is_uniform or chain.drive.friction or chain.drive.stiffness or chain.drive.lag:
+        """Rows for `uniform.fill_ends`: number, power of s, unit, C; None if an output is not one at the ends."""
+        drive = self.layout.chain.drive
+        shares = [one.place and one.place.share for one in self.each]
+        which = [AT_ENDS.get((at, one.field, one.theta)) for at, one in zip(shares, self.each, strict=True)]
+        if not self.layout.chain.is_uniform or drive.friction or drive.stiffness or drive.lag or None in which:
             return None
-        which = [None if one.is_current else AT_ENDS.get((*one.at, one.state, one.theta)) for one in self.each]
-        if None in which:
-            return None
-        rows = [(n, one.power, C, one.unit) for n, one, C in zip(which, self.each, self.gauges, strict=True)]
+        rows = [(n, one.power, one.unit, one.C) for n, one in zip(which, self.each, strict=True)]
         return np.asarray(read_only(np.array(rows, dtype=float).reshape(-1, 4)))
 
 
@@ -226,30 +190,24 @@ def unit_scale(wanted: Output, k: System) -> Fraction:
 
 
 def reading_of(chain: System, wanted: Output, x: float) -> Reading:
-    """Return an output as weights; x is the share of the length for one along the link."""
-    share = Fraction(wanted.share(x))
-    weights: dict[str, tuple[Fraction | int, ...]] = {
-        **dict.fromkeys(("W", "Y", "centre"), (1, 0, 0, 0)),
-        **dict.fromkeys(("Psi", "Phi"), (0, 1, 0, 0)),
-        **dict.fromkeys(("M", "strain"), (0, 0, 1, 0)),
-    }
-    theta = {"Y": -(chain.radius + share), "Phi": Fraction(-1), "theta": Fraction(1)}
-    if wanted.quantity == "current":
-        if not chain.drive.per_ampere or not chain.drive.turns:
+    """Return an output as a reading; x is the share of the length for one along the link."""
+    share, drive, unit = Fraction(wanted.share(x)), chain.drive, unit_scale(wanted, chain)
+    if wanted.quantity == "current":  # the torque, which is the input less back-EMF, through the lag
+        if not drive.per_ampere or not drive.turns:
             raise ParameterError(
                 key="output", value="motor_current", remedy="needs a [motor] and another input than hub_angle"
             )
-        amperes = chain.EI / chain.length / chain.drive.per_ampere / chain.input_unit  # per dimensionless torque
-        return Reading(None, (0, 0, 0, 0), Fraction(1), wanted.power, False, amperes, True)
-    place = None if wanted.quantity == "theta" else Place(share, wanted.side)
-    if wanted.place == "root" and wanted.gauge:
-        place = chain.gauge
+        amperes = chain.EI / chain.length / drive.per_ampere / chain.input_unit  # per dimensionless torque
+        return Reading(None, -1, Fraction(0), wanted.power, amperes, drive.lag, -drive.back_emf, 1)
+    if wanted.quantity == "theta":
+        return Reading(None, -1, Fraction(1), wanted.power, unit)
+    place = Place(share, wanted.side)
     if wanted.quantity == "centre":
         place = Place(Fraction(1), "payload")
-    state = weights.get(wanted.quantity, (0, 0, 0, 1)) if place else (0, 0, 0, 0)
-    unit = unit_scale(wanted, chain)
-    if wanted.quantity == "strain" and place:  # at the surface: half the depth over E I/L
-        (segment,) = Layout(chain, (place,)).read
+    elif wanted.place == "root" and wanted.gauge:
+        place = chain.gauge
+    segment = segment_at(chain, place)
+    if wanted.quantity == "strain":  # at the surface: half the depth over E I/L
         if segment.half_depth is None:
             raise ParameterError(
                 key="link.section.shape",
@@ -257,7 +215,8 @@ def reading_of(chain: System, wanted: Output, x: float) -> Reading:
                 remedy='a "general" section has no depth: give rectangle, round or tube',
             )
         unit = Fraction(segment.half_depth) / chain.length / segment.stiffness / chain.input_unit
-    return Reading(place, state, theta.get(wanted.quantity, Fraction(0)), wanted.power, wanted.gauge, unit)
+    theta = {"Y": -(chain.radius + share), "Phi": Fraction(-1)}.get(wanted.quantity, Fraction(0))
+    return Reading(place, FIELDS[wanted.quantity], theta, wanted.power, unit, segment.damping if wanted.gauge else 0.0)
 
 
 def readings(chain: System, wanted: tuple[Output, ...], x: float) -> Readings:
@@ -286,6 +245,8 @@ def constant_of(k: System, wanted: Output, x: float) -> int | None:
     at, locked = wanted.share(x), k.is_locked
     if wanted.quantity == "theta":
         return 1 if locked else None
+    if wanted.quantity == "current":
+        return 1 if k.drive.per_ampere and not (k.drive.back_emf or k.drive.lag) else None
     if not k.is_uniform:
         return None
     pinned, clamped = (not isinstance(end, Fraction) for end in (k.tip_mass, k.tip_inertia))

@@ -1,13 +1,14 @@
 """The response to loads on the link: a force, or a pair of moments of a piezo patch.
 
 The input of the hub is zero.  At a load e (1 in Q or in M) the states on both sides satisfy z- = z+ + e.  The
-conditions W = 0 at the axis and the hub's balance, carried out to the load, are f z = 0 and g z = 0.  With the plane of
-the payload's states there (`waves`) the outer state is
+conditions W = 0 at the axis and the hub's balance, carried out to any place, are f z = 0 and g z = 0 there.  With the
+plane of the payload's states (`waves`), F = met(f) and G = met(g), the states
 
-    z+ = -((g e) F - (f e) G)/(g F),     F = met(f), G = met(g),
+    z+ = -((g e) F - (f e) G)/(g F)                  beyond the load,
+    z- = (w(G, e) f* - w(F, e) g*)/(g F)             inside of it
 
-which is met(h) for the condition h = (g e) f - (f e) g, carried outwards.  All numbers are balls, as f and g become
-nearly parallel far out.
+satisfy all of them: w is the symplectic form of two states,  W Q' - Q W' + Psi M' - M Psi',  which is 0 for two states
+of a plane, and f* the state with  w(f*, z) = f z.  All numbers are balls, as f and g become nearly parallel far out.
 """
 
 from __future__ import annotations
@@ -20,14 +21,14 @@ from tfarm.errors import CertificationError, ParameterError
 
 from .balls import Ball, Sweep, first_success, point, rational
 from .compiled import python_of
-from .layout import Layout, Reading, reading_of
+from .layout import Layout, M, Q, Reading, reading_of
 from .outputs import Output
-from .system import Body, Mark, Offset, Place, Segment, Spring, System
+from .system import Place, Spring, System
 from .values import NO_NUMBER, PROVEN_BITS, precisions
-from .waves import Plane, Row, met
+from .waves import Row, met
 
 _met = python_of(met)
-LOAD_KINDS = {"force": ("N", 3), "moment_pair": ("N m", 2)}  # unit, and the entry of (W, Psi, M, Q) that jumps
+LOAD_KINDS = {"force": ("N", Q), "moment_pair": ("N m", M)}  # unit, and the entry of (W, Psi, M, Q) that jumps
 LOAD_PATTERN = re.compile(r"(force|moment_pair)@([^,]+)(?:,([^,]+))?")
 
 
@@ -70,97 +71,52 @@ def load_of(text: str, length: float) -> Load:
 
 def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float) -> Ball:
     """Return the output for unit load at s, SI, to `PROVEN_BITS`.  Raises CertificationError at a pole or zero."""
-    one, jumps = reading_of(chain, wanted, x), LOAD_KINDS[load.kind][1]
-    if one.is_current:
+    one, jump = reading_of(chain, wanted, x), LOAD_KINDS[load.kind][1]
+    if one.input:
         raise ParameterError(key="output", value=wanted.name, remedy="needs an input at the hub instead of a load")
     signs = (1,) if load.kind == "force" else (-1, 1)
     unit = (chain.length / chain.EI) * (chain.length if load.kind == "force" else 1)  # of the dimensionless load
+    loads = [Place(Fraction(share)) for share in load.shares]
+    layouts = [Layout(chain, tuple(dict.fromkeys((at, one.place or at)))) for at in loads]
 
     def attempt() -> Ball | None:
-        states = [_Loaded(chain, point(s), Place(Fraction(share)), one.place) for share in load.shares]
-        if any(state.balance.contains(0) for state in states):
-            return None
-        total = sum(sign * state.read(one, jumps) for sign, state in zip(signs, states, strict=True))
-        value = total * rational(one.unit * chain.input_unit * unit)
-        return value if value.rel_accuracy_bits() >= PROVEN_BITS or value.is_zero() else None
+        sweeps = [_Loaded(layout, point(s)) for layout in layouts]
+        found = [sweep.quantity(one, at, jump) for sweep, at in zip(sweeps, loads, strict=True)]
+        value = sum(sign * part for sign, part in zip(signs, found, strict=True))
+        value = value * point(s) ** one.power / (1 + rational(one.C) * point(s))
+        value = value * rational(one.unit * chain.input_unit * unit)
+        is_known = value.is_finite() and (value.rel_accuracy_bits() >= PROVEN_BITS or value.is_zero())
+        return value if is_known else None
 
     failure = CertificationError(NO_NUMBER.format(f"{PROVEN_BITS} bits", s))
     return first_success(precisions(PROVEN_BITS), attempt, failure)
 
 
 class _Loaded(Sweep):
-    """The sweep with a mark at the load, and one at the place of an output on the link."""
+    """The sweep with marks at a load and at the place of an output."""
 
-    def __init__(self, chain: System, s: Ball, at: Place, read: Place | None) -> None:
-        self.places = (at,) if read is None or read == at else (at, read)
-        super().__init__(Layout(chain, self.places), s)
-        zero, one = 0 * s, 1 + 0 * s
-        self.f: Row = (one, zero, zero, zero)
-        self.g: Row = (zero, self.drive_of(one, zero), self.drive_of(zero, one), zero)
-        for each in reversed(self.numbers.elements):
-            if each == Mark(0):
-                break
-            if not isinstance(each, Mark):
-                self.f, self.g = self._beyond(each, self.f), self._beyond(each, self.g)
+    def _beyond(self, element: Any, f: Row) -> Row:
+        """Return the condition beyond an element, beyond a spring not times its stiffness."""
+        f = super()._beyond(element, f)
+        if isinstance(element, Spring):
+            stiffness, _ = self._spring(element)
+            return f[0] / stiffness, f[1] / stiffness, f[2] / stiffness, f[3] / stiffness
+        return f
 
-    @property
-    def plane(self) -> Plane:
-        """The plane of the payload's states at the load."""
-        return self.planes[0]
-
-    @property
-    def balance(self) -> Ball:
-        """g F: zero at an eigenvalue."""
-        return sum(a * b for a, b in zip(self.g, _met(self.f, self.plane), strict=True))
-
-    def read(self, one: Reading, jumps: int) -> Ball:
-        """Return the reading, without its unit, for a unit jump of that entry of the state."""
-        h = tuple(self.g[jumps] * a - self.f[jumps] * b for a, b in zip(self.f, self.g, strict=True))
-        outer = tuple(-part / self.balance for part in _met(h, self.plane))
-        inner = [part + (1 if n == jumps else 0) for n, part in enumerate(outer)]
-        theta, at_place = self._inwards(inner)
-        state = at_place or (self._outwards(h) if one.place is not None and len(self.places) > 1 else outer)
-        value = theta * rational(one.theta)
-        if one.place is not None:
-            value = sum((part * rational(weight) for weight, part in zip(one.state, state, strict=True)), value)
-        C = 0.0 if not one.gauge or one.place is None else self.layout.read[self.places.index(one.place)].damping
-        return value * self.s**one.power / (1 + rational(C) * self.s)
-
-    def _inwards(self, state: Any) -> tuple[Ball, Any]:
-        """Return the hub angle, and the state at the place of the output if that is inside of the load."""
-        found, elements = None, self.numbers.elements
-        for each in elements[elements.index(Mark(0)) + 1 :]:
-            if isinstance(each, Mark):
-                found = state
-            else:
-                state = self._state_inside(each, state)
-        return state[1], found
-
-    def _outwards(self, h: Any) -> Any:
-        """Return the state at a place beyond the load."""
-        elements = self.numbers.elements
-        for each in reversed(elements[: elements.index(Mark(0))]):
-            if isinstance(each, Mark):
-                return tuple(-part / self.balance for part in _met(h, self.planes[each.number]))
-            h = self._beyond(each, h)
-        raise AssertionError("the place is on neither side of the load")
-
-    def _state_inside(self, element: Any, z: Any) -> Any:
-        """Return the state at the inner end of an element from that at its outer one."""
-        W, Psi, M, Q = z
-        match element:
-            case Segment():
-                w, m, q = element.units
-                own = W * w, Psi, M * m, Q * q
-                rows = self._transition(element)
-                W, Psi, M, Q = (sum(a * b for a, b in zip(row, own, strict=True)) for row in rows)
-                return W / w, Psi, M / m, Q / q
-            case Offset():
-                a = element.length
-                return W - a * Psi, Psi, M + a * Q, Q
-            case Spring():
-                stiffness, compliance = self._spring(element)
-                return W, Psi - compliance / stiffness * M, M, Q
-        assert isinstance(element, Body)
-        translation, rotation = self._body(element)
-        return W, Psi, M - rotation * Psi, Q - translation * W
+    def quantity(self, one: Reading, load: Place, jump: int) -> Ball:
+        """Return theta and field of a reading for a unit jump of an entry of the state at the load."""
+        none, whole = 0 * self.s, 1 + 0 * self.s
+        f, g = (
+            self.carried_out(at) for at in ((whole, none, none, none), (none, self.of_angle, -self.of_moment, none))
+        )
+        F, G = ({at: _met(row, self.planes[at]) for at, row in rows.items()} for rows in (f, g))
+        balance = {at: sum(a * b for a, b in zip(g[at], F[at], strict=True)) for at in f}  # 0 at an eigenvalue
+        by_F, by_G = F[load][Q - jump] / balance[load], G[load][Q - jump] / balance[load]  # w(F, e) and w(G, e)
+        value = by_F * self.of_moment * rational(one.theta)
+        if one.place is None:
+            return value
+        at, n = one.place, one.field
+        if self.layout.marks[at] > self.layout.marks[load]:
+            dual = by_G * f[at][Q - n] - by_F * g[at][Q - n]
+            return value + (dual if n < M else -dual)
+        return value - (g[load][jump] * F[at][n] - f[load][jump] * G[at][n]) / balance[at]

@@ -15,19 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiled import compiled, inlined
-from .layout import TO_M, TO_Q, TO_W
+from .layout import BENDING, CHAIN_A, CHAIN_B, CHAIN_G, CHAIN_SIGMA, LENGTH
 from .waves import (
+    DAMPING,
     PARALLEL,
-    SIGMA,
-    A,
-    B,
-    G,
     Plane,
     Row,
     Wave,
     across_rows,
     across_waves,
     dispersion,
+    in_chain,
     is_low,
     magnitude,
     reciprocal,
@@ -42,19 +40,40 @@ from .waves import (
 BLOCK = 32  # points of a block: few for single points, many for the overhead of loops
 S_SQUARED, D, GS, Z1, V1, T1, DT1, Z2, V2, T2, DT2 = (BLOCK * j for j in range(11))
 C1, S1, E1, C2, S2, E2 = (BLOCK * j for j in range(6))
+F2_LESS_1, F3_LESS_1 = 4 * BLOCK, 5 * BLOCK  # of the transition functions, after F0..F3
+LIFT, TURN = 4 * BLOCK, 5 * BLOCK  # of a mark, after its state
 
-PLANE_SIZE, ROW_SIZE, NUMBERS_SIZE, FUNCTIONS_SIZE = (BLOCK * parts for parts in (5, 4, 11, 6))  # of the flat buffers
+PLANE_SIZE, ROW_SIZE, NUMBERS_SIZE, FUNCTIONS_SIZE = (BLOCK * parts for parts in (6, 4, 11, 6))  # of the flat buffers
 SLOW_WAVE = 1.0  # |z_2| below which a wave has little phase along a segment: next to its shear cut-off
 FADED = 1e-140  # |e^{-t}| below which its reciprocal would overflow
 
 
-class Kept(NamedTuple):
-    """The data of each segment (rows) and point for the way back: waves, or transition functions where `low`."""
+class Work(NamedTuple):
+    """Scratch arrays of a block, many by the row j of an element.
 
+    `planes` j + 1 is inside of the element, 0 at the tip's end; that of a mark becomes its state on the way back, and
+    W - r theta and Psi - theta there.  It was divided by 2^`powers` after the element; a mark's state times e^`scales`
+    2^`shifts` has the scale of the plane at the axis.  Of a segment `low` are the slow points, the others have waves
+    (`numbers`, `functions`) and those a `series`.  `condition` is the row on the way back; `lift` and `turn` are
+    W - r theta and Psi - theta there, r the distance from the axis, nan beyond a segment that is not slow.  `watched`
+    are points next to a segment's shear cut-off.
+    """
+
+    planes: NDArray[np.complex128]
+    powers: NDArray[np.int64]
+    scales: NDArray[np.complex128]
+    shifts: NDArray[np.int64]
     low: NDArray[np.bool_]
     numbers: NDArray[np.complex128]
     functions: NDArray[np.complex128]
     series: NDArray[np.complex128]
+    condition: NDArray[np.complex128]
+    faded: NDArray[np.complex128]
+    scale: NDArray[np.complex128]
+    theta: NDArray[np.complex128]
+    lift: NDArray[np.complex128]
+    turn: NDArray[np.complex128]
+    watched: NDArray[np.bool_]
 
 
 @inlined
@@ -64,34 +83,46 @@ def times(z: complex, factor: float) -> complex:
 
 
 @compiled
-def cross(
-    points: Any, row: Any, plane: Any, inner: Any, scale: Any, lost: Any, watched: Any, kept: Any, number: int
-) -> None:
-    """Compute the plane at the inner end of a segment (`inner`) from that at its outer one, at the points of a block.
+def cross(points: Any, row: Any, j: int, work: Work, lost: Any) -> None:
+    """Compute the plane at the inner end of a segment, row j, from that at its outer one, at the points of a block.
 
-    Scales are added to `scale`, lost digits and points next to the shear cut-off are marked.  Data for the way back are
-    in `kept` (`Kept`) under its number.
+    Scales are added to `work.scale`, lost digits and points next to the shear cut-off are marked.
     """
-    low, numbers, series, slow = kept.low[number], kept.numbers[number], kept.series[number], 0
+    plane, inner, numbers = work.planes[j], work.planes[j + 1], work.numbers[j]
+    slow = mark_slow(points, row, work.low[j])
+    if slow < BLOCK:
+        all_wave_numbers(points, row, numbers)
+        all_wave_functions(numbers, work.functions[j])
+        _by_waves(row, numbers, work.functions[j], plane, inner)
+        mark_parallel(numbers, work.low[j], lost)
+        for i in range(BLOCK):
+            if not work.low[j, i]:
+                work.scale[i] += numbers[T1 + i] + numbers[DT1 + i] + numbers[T2 + i] + numbers[DT2 + i]
+                work.watched[i] = work.watched[i] or magnitude(numbers[Z2 + i]) < SLOW_WAVE
+    if slow:
+        other = inner.copy() if slow < BLOCK else inner
+        _by_series(points, row, work.series[j], plane, other)
+        if slow < BLOCK:
+            take_where(work.low[j], other, inner)
+
+
+@compiled
+def mark_slow(points: Any, row: Any, low: Any) -> int:
+    """Mark the points with slow waves (`is_low`), and return their number."""
+    slow = 0
     for i in range(BLOCK):
         low[i] = is_low(points[i], row)
         slow += low[i]
-    if slow < BLOCK:
-        all_wave_numbers(points, row, numbers)
-        all_wave_functions(numbers, kept.functions[number])
-        _by_waves(row, numbers, kept.functions[number], plane, inner)
-        for i in range(BLOCK):
-            if not low[i]:
-                z1, z2 = numbers[Z1 + i], numbers[Z2 + i]
-                scale[i] += numbers[T1 + i] + numbers[DT1 + i] + numbers[T2 + i] + numbers[DT2 + i]
-                lost[i] = lost[i] or magnitude(z1 - z2) < PARALLEL * (magnitude(z1) + magnitude(z2))
-                watched[i] = watched[i] or magnitude(z2) < SLOW_WAVE
-    if slow:
-        _transition(points, row, series)
-        other = inner.copy() if slow < BLOCK else inner
-        _by_series(points, row, series, plane, other)
-        if slow < BLOCK:
-            take_where(low, other, inner)
+    return slow
+
+
+@compiled
+def mark_parallel(numbers: Any, low: Any, lost: Any) -> None:
+    """Mark the points where both waves are nearly one (`PARALLEL`)."""
+    for i in range(lost.size):
+        if not low[i]:
+            z1, z2 = numbers[Z1 + i], numbers[Z2 + i]
+            lost[i] = lost[i] or magnitude(z1 - z2) < PARALLEL * (magnitude(z1) + magnitude(z2))
 
 
 @compiled
@@ -157,89 +188,64 @@ def waves_at(numbers: Any, functions: Any, i: int) -> tuple[Wave, Wave]:
 
 
 @inlined
-def _units(row: Any) -> Plane:
-    """Return the factors of a plane from the chain's units to those of a segment."""
-    return row[TO_W], row[TO_W] * row[TO_M], row[TO_M], row[TO_Q], row[TO_M] * row[TO_Q]
-
-
-@inlined
-def _inverse(units: Plane) -> Plane:
-    """Return the factors back."""
-    return 1.0 / units[0], 1.0 / units[1], 1.0 / units[2], 1.0 / units[3], 1.0 / units[4]
-
-
-@inlined
-def _scaled(p: Plane, units: Plane) -> Plane:
-    """Return a plane in other units."""
-    return (
-        times(p[0], units[0]), times(p[1], units[1]), times(p[2], units[2]), times(p[3], units[3]),
-        times(p[4], units[4]),
-    )  # fmt: skip
-
-
-@inlined
-def _scaled_row(f: Row, units: Plane) -> Row:
-    """Return a condition in other units, of which `units` are those of a plane."""
-    return times(f[0], units[0]), f[1], times(f[2], units[2]), times(f[3], units[3])
+def _chain_waves(row: Any, numbers: Any, functions: Any, i: int) -> tuple[Wave, Wave, complex, complex]:
+    """Return both waves of a point, g S and d in the chain's units."""
+    one, two = waves_at(numbers, functions, i)
+    l, EI = row[LENGTH], row[BENDING]
+    gS, d = times(numbers[GS + i], EI / (l * l * l * l)), times(numbers[D + i], EI)
+    return in_chain(one, l), in_chain(two, l), gS, d
 
 
 @compiled
 def _by_waves(row: Any, numbers: Any, functions: Any, plane: Any, inner: Any) -> None:
-    """Compute `across_waves` in the segment's own units, at every point of a block."""
-    units = _units(row)
-    back = _inverse(units)
+    """Compute `across_waves` at every point of a block."""
     for i in range(BLOCK):
-        S, d, gS = numbers[S_SQUARED + i], numbers[D + i], numbers[GS + i]
-        one, two = waves_at(numbers, functions, i)
-        v_sum, gap = S * (times(reciprocal(d), row[A]) - row[B]), one[2] - two[2]
-        p = across_waves(one, two, gS, d, v_sum, _scaled(plane_at(plane, i), units))
+        one, two, gS, d = _chain_waves(row, numbers, functions, i)
+        v_sum, gap = numbers[S_SQUARED + i] * (times(reciprocal(d), row[CHAIN_A]) - row[CHAIN_B]), one[2] - two[2]
+        p = across_waves(one, two, gS, d, v_sum, plane_at(plane, i))
         unit = reciprocal(gS * d * gap * gap)
-        put_plane(inner, i, _scaled((p[0] * unit, p[1] * unit, p[2] * unit, p[3] * unit, p[4] * unit), back))
-
-
-@compiled
-def _transition(points: Any, row: Any, series: Any) -> None:
-    """Compute F0..F3 of a slow segment, at every point of a block."""
-    for i in range(BLOCK):
-        _, _, z_sum, z_product = wave_sums(points[i], row)
-        F0, F1, F2, F3, _, _ = transition_series(z_sum, z_product)
-        put_row(series, i, (F0, F1, F2, F3))
+        put_plane(inner, i, (p[0] * unit, p[1] * unit, p[2] * unit, p[3] * unit, p[4] * unit))
 
 
 @inlined
-def _rows(i: int, points: Any, row: Any, series: Any) -> tuple[Row, Row, Row, Row]:
-    """Return the transition matrix of a slow segment at a point."""
-    S, over_d, _, _ = wave_sums(points[i], row)
-    return transition_rows(*row_at(series, i), S, over_d, row[A], row[B], row[G], row[SIGMA])
+def rows_at(s: complex, row: Any, series: Any, i: int) -> tuple[Row, Row, Row, Row]:
+    """Return the transition matrix of a slow segment at a point from F0..F3 in the chain's units."""
+    over_d = times(reciprocal(1.0 + row[DAMPING] * s), 1.0 / row[BENDING])
+    return transition_rows(
+        *row_at(series, i), s * s, over_d, row[CHAIN_A], row[CHAIN_B], row[CHAIN_G], row[CHAIN_SIGMA]
+    )
 
 
 @compiled
 def _by_series(points: Any, row: Any, series: Any, plane: Any, inner: Any) -> None:
-    """Compute `across_rows` in the segment's own units, at every point of a block."""
-    units = _units(row)
-    back = _inverse(units)
+    """Compute F0..F3, F2 - 1 and F3 - 1 of a slow segment in the chain's units, and `across_rows`, in a block."""
+    l = row[LENGTH]
     for i in range(BLOCK):
-        p = across_rows(*_rows(i, points, row, series), _scaled(plane_at(plane, i), units))
-        put_plane(inner, i, _scaled(p, back))
+        _, _, z_sum, z_product = wave_sums(points[i], row)
+        F0, F1, F2, F3, F2_less_1, F3_less_1 = transition_series(z_sum, z_product)
+        put_row(series, i, (times(F0, l * l * l), times(F1, l * l), times(F2, l), F3))
+        series[F2_LESS_1 + i], series[F3_LESS_1 + i] = times(F2_less_1, l), F3_less_1
+    for i in range(BLOCK):
+        put_plane(inner, i, across_rows(*rows_at(points[i], row, series, i), plane_at(plane, i)))
 
 
 @compiled
-def cross_back(points: Any, row: Any, f: Any, outer: Any, scale: Any, faded: Any, kept: Any, number: int) -> None:
-    """Compute the condition at the outer end of a segment (`outer`) from that at its inner one; see `cross`.
+def cross_back(points: Any, row: Any, j: int, work: Work, scale: Any) -> None:
+    """Compute the condition at the outer end of a segment, row j, from that at its inner one, in place; see `cross`.
 
-    The scales less those of the plane are added to `scale`; `faded` (6 blocks) is scratch.
+    The scales less those of the plane are added to `scale`.
     """
-    low, slow = kept.low[number], 0
+    f, low, slow = work.condition, work.low[j], 0
     for i in range(BLOCK):
         slow += low[i]
-    if slow < BLOCK:
-        _fade(kept.numbers[number], kept.functions[number], faded, scale, low)
-        _row_by_waves(row, kept.numbers[number], faded, f, outer)
+    other = f.copy() if 0 < slow < BLOCK else f
     if slow:
-        other = outer.copy() if slow < BLOCK else outer
-        _row_by_series(points, row, kept.series[number], f, other)
-        if slow < BLOCK:
-            take_where(low, other, outer)
+        _row_by_series(points, row, work.series[j], other)
+    if slow < BLOCK:
+        _fade(work.numbers[j], work.functions[j], work.faded, scale, low)
+        _row_by_waves(row, work.numbers[j], work.faded, f)
+        if slow:
+            take_where(low, other, f)
 
 
 @inlined
@@ -271,23 +277,17 @@ def _fade(numbers: Any, functions: Any, faded: Any, scale: Any, low: Any) -> Non
 
 
 @compiled
-def _row_by_waves(row: Any, numbers: Any, faded: Any, f: Any, outer: Any) -> None:
-    """Compute `row_across_waves` in the segment's own units, at every point of a block."""
-    units = _units(row)
-    back = _inverse(units)
+def _row_by_waves(row: Any, numbers: Any, faded: Any, f: Any) -> None:
+    """Compute `row_across_waves` in place, at every point of a block."""
     for i in range(BLOCK):
-        d, gS = numbers[D + i], numbers[GS + i]
-        one, two = waves_at(numbers, faded, i)
-        own = row_across_waves(one, two, gS, d, _scaled_row(row_at(f, i), back))
+        one, two, gS, d = _chain_waves(row, numbers, faded, i)
+        own = row_across_waves(one, two, gS, d, row_at(f, i))
         unit = reciprocal(gS * d * (one[2] - two[2]))
-        put_row(outer, i, _scaled_row((own[0] * unit, own[1] * unit, own[2] * unit, own[3] * unit), units))
+        put_row(f, i, (own[0] * unit, own[1] * unit, own[2] * unit, own[3] * unit))
 
 
 @compiled
-def _row_by_series(points: Any, row: Any, series: Any, f: Any, outer: Any) -> None:
-    """Compute `row_across` in the segment's own units, at every point of a block."""
-    units = _units(row)
-    back = _inverse(units)
+def _row_by_series(points: Any, row: Any, series: Any, f: Any) -> None:
+    """Compute `row_across` in place, at every point of a block."""
     for i in range(BLOCK):
-        own = row_across(*_rows(i, points, row, series), _scaled_row(row_at(f, i), back))
-        put_row(outer, i, _scaled_row(own, units))
+        put_row(f, i, row_across(*rows_at(points[i], row, series, i), row_at(f, i)))

@@ -14,6 +14,7 @@ voltage and a prescribed hub angle see `Drive`.  One uniform link is a chain of 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
@@ -59,6 +60,12 @@ class Segment(NamedTuple):
         """The factors of W, M and Q from the chain's units to those of the segment."""
         return 1 / self.length, self.length / self.stiffness, self.length * self.length / self.stiffness
 
+    @property
+    def of_chain(self) -> tuple[Fraction, Fraction, Fraction, Fraction]:
+        """The numbers a, b, g and sigma in the chain's units."""
+        l, EI = self.length, self.stiffness
+        return self.a * EI / (l * l), self.b / (l * l), self.g * EI / (l * l * l * l), self.sigma * (l * l) / EI
+
 
 class Offset(NamedTuple):
     """A rigid massless piece of that length in L, of either sign."""
@@ -83,12 +90,6 @@ class Body(NamedTuple):
     rotational_stiffness: Fraction
 
 
-class Mark(NamedTuple):
-    """A place of an output: its number in the list of places."""
-
-    number: int
-
-
 class Place(NamedTuple):
     """A point of the link, as a share of its length (0..1), and a side where a body or a joint is at it.
 
@@ -97,6 +98,12 @@ class Place(NamedTuple):
 
     share: Fraction
     side: Side | Literal["payload"] = "outer"
+
+
+class Mark(NamedTuple):
+    """The place of an output, as an element."""
+
+    place: Place
 
 
 Element = Segment | Offset | Spring | Body | Mark
@@ -142,6 +149,34 @@ def end_condition(inertia: Inertia) -> tuple[Fraction, Fraction, Fraction]:
     if not isinstance(inertia, Fraction):
         return Fraction(1), Fraction(0), Fraction(0)
     return Fraction(0), inertia / (1 + inertia), 1 / (1 + inertia)
+
+
+PAYLOAD, OUTER, BODY, INNER, NEXT = range(5)  # the order at one point, from the payload inwards
+
+Placed = tuple[Fraction, int, Element]  # distance from the clamp (of a segment's outer end), order there, and element
+
+
+def placed(elements: Iterable[Element]) -> Iterator[Placed]:
+    """Yield the elements of a chain, from the payload inwards, with their places."""
+    position, is_beyond = Fraction(1), True
+    for each in elements:
+        is_beyond = is_beyond and isinstance(each, Offset)
+        yield position, PAYLOAD if is_beyond else BODY if isinstance(each, Body) else NEXT, each
+        position -= each.length if isinstance(each, Segment) else 0
+
+
+def cut(elements: Sequence[Placed]) -> tuple[Element, ...]:
+    """Return elements in their order from the payload inwards, each segment cut where there is another one on it."""
+    ordered = sorted(elements, key=lambda each: (-each[0], each[1]))
+    found: list[Element] = []
+    for (position, _, each), inner_end in zip(ordered, [*(at for at, _, _ in ordered[1:]), Fraction(0)], strict=True):
+        if isinstance(each, Segment):
+            segment = each
+        else:
+            found.append(each)
+        if inner_end < position:
+            found.append(segment.piece((position - inner_end) / segment.length))
+    return tuple(found)
 
 
 def double_double(value: Fraction) -> tuple[float, float]:
@@ -283,28 +318,18 @@ def system_of(arm: Arm, theory: Theory | None = None) -> System:
         length, stiffness = Fraction(link.length) / unit_length, stiffness_of(link) / EI
         return Segment(*numbers, link.damping, length, stiffness, link.section.half_depth)
 
-    pieces: list[Element] = [Offset(Fraction(arm.payload.offset) / unit_length)] if arm.payload.offset else []
-    waiting = sorted(arm.attachments, key=lambda each: each.x)
-    position = unit_length
-    for link in reversed(arm.links):
-        start, own = position - Fraction(link.length), segment(link)
-        while waiting and Fraction(waiting[-1].x) > start:
-            each = waiting.pop()
-            if gap := position - min(Fraction(each.x), position):
-                pieces.append(own.piece(gap / Fraction(link.length)))
-                position -= gap
-            pieces.append(_body(each, translation, rotation))
-        pieces.append(own.piece((position - start) / Fraction(link.length)))
-        position = start
-    at_clamp = [_body(each, translation, rotation) for each in reversed(waiting)]
-    if not arm.hub.radius:  # on the axis, which is fixed, a spring has no effect
-        at_clamp = [each._replace(stiffness=Fraction(0)) for each in at_clamp]
-    pieces += at_clamp
-    pieces += _springs(arm.clamp, rotation)
-    pieces += [Offset(Fraction(arm.hub.radius) / unit_length)] if arm.hub.radius else []
-    pieces += _springs(arm.joint, rotation)
+    at_tip: list[Element] = [Offset(Fraction(arm.payload.offset) / unit_length)] if arm.payload.offset else []
+    at_clamp = _springs(arm.clamp, rotation)
+    at_clamp += [Offset(Fraction(arm.hub.radius) / unit_length)] if arm.hub.radius else []
+    at_clamp += _springs(arm.joint, rotation)
+    bodies = []
+    for each in reversed(arm.attachments):
+        body = _body(each, translation, rotation)
+        if not (each.x or arm.hub.radius):  # on the axis, which is fixed, a spring has no effect
+            body = body._replace(stiffness=Fraction(0))
+        bodies.append((min(Fraction(each.x) / unit_length, Fraction(1)), BODY, body))
     return System(
-        elements=tuple(pieces),
+        elements=cut([*placed([*at_tip, *map(segment, reversed(arm.links)), *at_clamp]), *bodies]),
         tip_mass=scaled_inertia(arm.payload.mass, translation),
         tip_inertia=scaled_inertia(arm.payload.inertia, rotation),
         drive=hub_drive(arm, rotation),

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .compiled import compiled, inlined
-from .layout import OF_ANGLE
+from .layout import OF_ANGLE, OF_MOMENT
 from .pieces import (
     BLOCK,
     DT1,
@@ -25,18 +25,18 @@ from .pieces import (
     S_SQUARED,
     T1,
     T2,
-    Z1,
-    Z2,
     D,
     all_wave_functions,
     all_wave_numbers,
+    mark_parallel,
+    mark_slow,
     put_plane,
     take_where,
+    times,
     waves_at,
 )
 from .sweep import POLE, drive_at, drive_terms, innermost
 from .waves import (
-    PARALLEL,
     SIGMA,
     A,
     B,
@@ -45,10 +45,14 @@ from .waves import (
     Plane,
     Row,
     Wave,
-    is_low,
+    across_rows,
+    across_waves,
+    end_plane,
     magnitude,
+    met,
     reciprocal,
     tip_conditions,
+    transition_rows,
     transition_series,
     wave_sums,
 )
@@ -59,57 +63,31 @@ DRIVE, SCALE, PARTS = 5, 6, 7  # the indices of drive and scale, and the number 
 
 
 @inlined
-def from_waves(one: Wave, two: Wave, gS: Number, d: Number, tip: Row) -> Row:
-    """Return (theta, M0, Q0, W1) of the free response, up to one common factor, from the two waves.
+def from_waves(one: Wave, two: Wave, gS: Number, d: Number, v_sum: Number, tip: Row) -> Row:
+    """Return (theta, M0, Q0, W1) of the free response times g S d (z1 - z2)^2 e^{-(t1 + t2)}, from the two waves.
 
     The tip satisfies  tip_mass W + shear Q = 0  and  tip_inertia Psi + moment M = 0,  with (m s^2, 1) for a finite
-    inertia and (1, 0) for an infinite one.  c, s are scaled by e = e^{-t}.  In the paper's appendix these are the 3x3
-    minors: theta vanishes at the hub-locked frequencies and M0 at those of a pinned root.  There is no product of a
-    wave with itself, which would cancel.
+    inertia and (1, 0) for an infinite one.  In the paper's appendix these are the 3x3 minors: theta vanishes at the
+    hub-locked frequencies and M0 at those of a pinned root.
     """
-    (c1, s1, z1, v1, e1), (c2, s2, z2, v2, e2) = one, two
-    tip_mass, shear, tip_inertia, moment = tip
-    So1, So2 = tip_mass * z1 * s1 + shear * gS * c1, tip_mass * z2 * s2 + shear * gS * c2
-    Se1, Se2 = tip_mass * c1 + shear * gS * s1, tip_mass * c2 + shear * gS * s2
-    r1, r2 = tip_inertia * c1 + moment * d * z1 * s1, tip_inertia * c2 + moment * d * z2 * s2
-    Me1, Me2 = v1 * (tip_inertia * s1 + moment * d * c1), v2 * (tip_inertia * s2 + moment * d * c2)
-    bare = (tip_mass * tip_inertia - shear * moment * d * gS) * (e1 * e2)
-    N1 = So2 * Me1 - v2 * r2 * Se1 + v2 * bare
-    N2 = So1 * Me2 - v1 * r1 * Se2 + v1 * bare
-    theta = N1 * v1 + N2 * v2
-    M0 = d * (z1 - z2) * (So1 * r2 * v2 - So2 * r1 * v1)
-    Q0 = gS * (N1 + N2)
-    W1 = shear * gS * (z1 - z2) * (r1 * e2 - r2 * e1)
-    return theta, M0, Q0, W1
+    (c1, s1, z1, _, e1), (c2, s2, z2, _, e2), (_, shear, inertia, moment) = one, two, tip
+    theta, M0, Q0, _, _ = across_waves(one, two, gS, d, v_sum, end_plane(*tip))
+    r1, r2 = inertia * c1 + moment * d * z1 * s1, inertia * c2 + moment * d * z2 * s2
+    return theta, M0, Q0, shear * gS * (z1 - z2) * (r1 * e2 - r2 * e1)
 
 
 @inlined
 def from_transition(s: complex, row: Any, tip: Row) -> Plane:
     """Return (theta, M0, Q0, W1, W1 - theta) of the free response, up to one factor, without wave numbers.
 
-    F0 = (sinh t1 / t1 - sinh t2 / t2)/(z1 - z2) and its derivatives F1, F2, F3 along x at the tip are entire in s^2
-    (C = 0) and give the state-transition matrix of (W, Psi, M, Q).  The tip's two conditions are solved by Cramer's
-    rule; over_d = 1/(1 + C s).  For small |t|: for large ones products of a wave with itself cancel.
+    For small |t|: for large ones products of a wave with itself cancel.
     """
     S, over_d, z_sum, z_product = wave_sums(s, row)
     F0, F1, F2, F3, F2_less_1, _ = transition_series(z_sum, z_product)
-    a, g, sigma, (tip_mass, shear, tip_inertia, moment) = row[A], row[G], row[SIGMA], tip
-    bS, gS = row[B] * S, g * S
-    bend = F2 - bS * F0
-    turn = F3 - bS * F1
-    lift = sigma * F2 - (1 + sigma * a * S) * over_d * F0
-    row1_theta = shear * gS * F1 + tip_mass * F2
-    row1_M0 = (shear * gS * F0 + tip_mass * F1) * over_d
-    row1_Q0 = shear * (F3 - a * S * over_d * F1) + tip_mass * lift
-    row2_theta = moment * S * (a * bend - g * F0) + tip_inertia * turn
-    row2_M0 = moment * turn + tip_inertia * over_d * bend
-    row2_Q0 = -moment * F2 - tip_inertia * over_d * F1
-    theta = row1_Q0 * row2_M0 - row1_M0 * row2_Q0
-    M0 = row1_theta * row2_Q0 - row1_Q0 * row2_theta
-    Q0 = row1_M0 * row2_theta - row1_theta * row2_M0
-    rest = M0 * F1 * over_d + Q0 * lift
-    W1 = shear * (moment * F2 + tip_inertia * over_d * F1)  # not theta F2 + rest: that cancels for a heavy payload
-    return theta, M0, Q0, W1, theta * F2_less_1 + rest
+    of_W, of_Psi, of_M, of_Q = transition_rows(F0, F1, F2, F3, S, over_d, row[A], row[B], row[G], row[SIGMA])
+    theta, M0, Q0, _, _ = across_rows(of_W, of_Psi, of_M, of_Q, end_plane(*tip))
+    W1, _, _, _ = met(of_W, end_plane(*tip))  # not theta F2 + rest: that cancels for a heavy payload
+    return theta, M0, Q0, W1, theta * F2_less_1 + of_W[2] * M0 - of_W[3] * Q0
 
 
 @compiled
@@ -117,51 +95,44 @@ def fill_ends(s: Any, rows: Any, ends: Any, table: Any, per_input: bool, found: 
     """Compute drive, scale and each output of the free response at s (1-D), rows of `found`; mark lost digits.
 
     `rows` and `ends` are those of the layout.  A row of `table` is an output: the index of theta, M, Q, W or W - theta,
-    power of s, C of its gauge, factor.  Outputs are those of a unit input with `per_input`, else times e^{-scale}.
+    power of s, unit, C of its gauge.  Outputs are those of a unit input with `per_input`, else times e^{-scale}.
     """
     points, low = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_)
     numbers, functions = np.empty(NUMBERS_SIZE, np.complex128), np.empty(FUNCTIONS_SIZE, np.complex128)
     parts, of_slow = np.empty(PARTS * BLOCK, np.complex128), np.empty(PARTS * BLOCK, np.complex128)
     row = innermost(rows)
-    small = 1.0  # against overflow of squares of the drive with a heavy hub
-    for j in range(4):
-        small = max(small, abs(ends[OF_ANGLE + j]))
-    small = 1.0 / small
+    small = 1.0 / max(1.0, np.abs(ends[OF_ANGLE:OF_MOMENT]).max())  # against overflow of squares of a heavy hub's drive
     for first in range(0, s.size, BLOCK):
-        n, slow = min(BLOCK, s.size - first), 0
+        n = min(BLOCK, s.size - first)
         points[:n], points[n:] = s[first : first + n], s[first]
-        for i in range(BLOCK):
-            low[i] = is_low(points[i], row)
-            slow += low[i]
+        slow = mark_slow(points, row, low)
         if slow < BLOCK:
             all_wave_numbers(points, row, numbers)
             all_wave_functions(numbers, functions)
-            _by_waves(ends, numbers, functions, parts)
+            _by_waves(row, ends, numbers, functions, parts)
         if slow:
             other = parts if slow == BLOCK else of_slow
             _by_series(points, row, ends, other)
             if slow < BLOCK:
                 take_where(low, other, parts)
         _driven(points, row, ends, small, per_input, parts, lost[first : first + n])
-        for i in range(n):
-            at = first + i
-            if not low[i]:
-                z1, z2 = numbers[Z1 + i], numbers[Z2 + i]
-                lost[at] = lost[at] or magnitude(z1 - z2) < PARALLEL * (magnitude(z1) + magnitude(z2))
+        if slow < BLOCK:
+            mark_parallel(numbers, low, lost[first : first + n])
         if not per_input:
-            for i in range(n):
-                found[0, first + i], found[1, first + i] = parts[DRIVE * BLOCK + i], parts[SCALE * BLOCK + i]
+            found[0, first : first + n] = parts[DRIVE * BLOCK : DRIVE * BLOCK + n]
+            found[1, first : first + n] = parts[SCALE * BLOCK : SCALE * BLOCK + n]
         for o in range(len(table)):
             _output(points, table[o], parts, n, found[o + 2 * (not per_input), first : first + n])
 
 
 @compiled
-def _by_waves(ends: Any, numbers: Any, functions: Any, parts: Any) -> None:
+def _by_waves(row: Any, ends: Any, numbers: Any, functions: Any, parts: Any) -> None:
     """Compute theta, M, Q, W and W - theta times e^{-scale}, and scale, by the two waves."""
     for i in range(BLOCK):
-        d, gS = numbers[D + i], numbers[GS + i]
+        S, d, gS = numbers[S_SQUARED + i], numbers[D + i], numbers[GS + i]
         one, two = waves_at(numbers, functions, i)
-        theta, M, Q, W = from_waves(one, two, gS, d, tip_conditions(ends, numbers[S_SQUARED + i]))
+        v_sum = S * (times(reciprocal(d), row[A]) - row[B])
+        theta, M, Q, W = from_waves(one, two, gS, d, v_sum, tip_conditions(ends, S))
         gap = one[2] - two[2]
         unit = reciprocal(gS * d * gap * gap)
         put_plane(parts, i, (theta * unit, M * unit, Q * unit, (LIFT * W) * unit, (W - theta) * unit))
@@ -196,8 +167,8 @@ def _driven(points: Any, row: Any, ends: Any, small: float, per_input: bool, par
 @inlined
 def _output(points: Any, want: Any, parts: Any, n: int, value: Any) -> None:
     """Compute an output of the table at n points of a block."""
-    start, power, C = BLOCK * int(want[0]), int(want[1]), want[2]
-    factor = want[3] / LIFT if want[0] == TIP else want[3]
+    start, power, C = BLOCK * int(want[0]), int(want[1]), want[3]
+    factor = want[2] / LIFT if want[0] == TIP else want[2]
     for i in range(n):
         found = parts[start + i]
         found = found * points[i] if power == 1 else found

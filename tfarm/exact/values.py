@@ -65,15 +65,10 @@ def _free(those: Readings, s: Complex) -> Free:
     """Return the free response of a layout, by the fast path where it applies."""
     found, lost = np.empty((2 + len(those.each), s.size), complex), np.empty(s.size, bool)
     s, layout, ends = np.ascontiguousarray(s, dtype=complex), those.layout, those.ends_table
-    if ends is not None:
+    if ends is None:
+        fill_free(s, layout.rows, layout.ends, AXIS, those.table, found, lost)
+    else:
         fill_ends(s, layout.rows, layout.ends, ends, False, found, lost)
-        return Free(found[0], found[2:], found[1], lost)
-    fill_free(s, layout.rows, layout.ends, AXIS, those.table, found, lost)
-    drive = those.layout.chain.drive
-    for row, one in enumerate(those.each):
-        if one.is_current:  # the row has theta: the input less back-EMF, through the lag
-            unit, back = float(one.unit) * s**one.power, float(drive.back_emf) * s
-            found[2 + row] = (unit * found[0] - back * found[2 + row]) / (1.0 + float(drive.lag) * s)
     return Free(found[0], found[2:], found[1], lost)
 
 
@@ -116,11 +111,8 @@ def free_fields(
         chain.kept[different] = Layout(chain, different)
     layout = chain.kept[different]
     order = [layout.places.index(place) for place in places]
-    table = np.zeros((4 * len(layout.places) + 1, 9))
-    table[:, 8], table[-1, 0], table[-1, 5] = 1.0, -1.0, 1.0
-    for number in range(len(layout.places)):
-        rows = slice(4 * number, 4 * (number + 1))
-        table[rows, 0], table[rows, 1:5] = number, np.eye(4)
+    rows = [(layout.marks[place], field, 0, 0, 1, 0, 0, 0) for place in layout.places for field in range(4)]
+    table = np.array([*rows, (-1, -1, 1, 0, 1, 0, 0, 0)], dtype=float)  # the last is the hub angle
     found, lost = np.empty((2 + len(table), s.size), complex), np.empty(s.size, bool)
     fill_free(np.ascontiguousarray(s, dtype=complex), layout.rows, layout.ends, axis, table, found, lost)
     fields = found[2:-1].reshape(len(layout.places), 4, s.size).transpose(1, 2, 0)[:, :, order]

@@ -1,8 +1,8 @@
 """The waves of a uniform segment: their numbers, and the functions that carry a state from one end to the other.
 
-All is dimensionless in the segment's length l and bending stiffness EI: deflection W/l, rotation Psi, moment M l/EI,
-shear force Q l^2/EI; s is in 1/s.  With S = s^2 and d = 1 + C s, two pairs of waves e^{+-t_j x}, z_j = t_j^2, solve the
-dispersion relation
+The waves are dimensionless in the segment's length l and bending stiffness EI: deflection W/l, rotation Psi, moment
+M l/EI, shear force Q l^2/EI; s is in 1/s.  With S = s^2 and d = 1 + C s, two pairs of waves e^{+-t_j x}, z_j = t_j^2,
+solve the dispersion relation
 
     (d z - a S)(z - b S) + g S = 0      a = rho l^2/E   b = rho l^2/(kappa G)   g = rho A l^4/(E I)
 
@@ -31,7 +31,8 @@ so p_WQ = -p_PsiM, and there are five numbers,
 
 A condition f z = 0 at the other end, a row f = (f_W, f_Psi, f_M, f_Q) carried outwards, determines one state of the
 plane, z_j = sum over i of f_i p_ij: the free response.  For one segment with W = 0 at its root it is theta = p_WPsi,
-M(0) = p_WM and Q(0) = p_WQ.
+M(0) = p_WM and Q(0) = p_WQ.  The formulas that carry a plane or a condition hold in any units, of which one is that of
+the whole chain: its length, and the stiffness at the hub.
 
 A uniform segment has two pairs of waves, W = cosh(t_j x) and sinh(t_j x)/t_j with z_j = t_j^2.  Their weights
 (alpha_j, beta_j) become (c alpha - z s beta, c beta - s alpha) for an origin moved inwards by the length, with
@@ -249,7 +250,7 @@ def tip_conditions(ends: Any, S: Number) -> tuple[Number, Number, Number, Number
 
 @inlined
 def impedance(S: float, k: Any) -> float:
-    """Return the scale of M0/theta for a free tip, dimensionless: its inertia if slow, one wave number if fast."""
+    """Return the scale of M0/theta for a free tip, in the segment's units: inertia if slow, one wave number if fast."""
     inertia = k[G] * S
     return min(inertia, math.sqrt(math.sqrt(inertia)) + math.sqrt(S * (k[A] + k[B])))
 
@@ -262,26 +263,22 @@ Row = tuple[Number, Number, Number, Number]  # f_W, f_Psi, f_M, f_Q
 @inlined
 def end_plane(mass: Number, shear: Number, inertia: Number, moment: Number) -> Plane:
     """Return the plane of states with  mass W + shear Q = 0  and  inertia Psi + moment M = 0, of a body at the end."""
-    return shear * moment, -shear * inertia, 0.0 * shear, mass * moment, -mass * inertia
+    return shear * moment, -shear * inertia, 0 * shear, mass * moment, -mass * inertia
 
 
 @inlined
-def into_own(p: Plane, w: Number, m: Number, q: Number) -> Plane:
-    """Return a plane in a segment's own units, the factors of W, M and Q (`Segment.units`)."""
-    return p[0] * w, p[1] * (w * m), p[2] * m, p[3] * q, p[4] * (m * q)
-
-
-@inlined
-def out_of_own(p: Plane, w: Number, m: Number, q: Number) -> Plane:
-    """Return the plane in the units of the chain."""
-    return p[0] / w, p[1] / (w * m), p[2] / m, p[3] / q, p[4] / (m * q)
+def in_chain(wave: Wave, length: Number) -> Wave:
+    """Return a wave in the chain's unit of length, of a segment of that length."""
+    c, s, z, v, e = wave
+    unit = 1.0 / (length * length)
+    return c, s * length, z * unit, v * unit, e
 
 
 @inlined
 def inside_offset(a: Number, p: Plane) -> Plane:
     """Return the plane inside a rigid massless offset: W + a Psi and M - a Q are its outer W and M."""
     WPsi, WM, WQ, PsiQ, MQ = p
-    return WPsi, WM + a * (2.0 * WQ - a * PsiQ), WQ - a * PsiQ, PsiQ, MQ
+    return WPsi, WM + a * (2 * WQ - a * PsiQ), WQ - a * PsiQ, PsiQ, MQ
 
 
 @inlined
@@ -328,13 +325,12 @@ def across_waves(one: Wave, two: Wave, gS: Number, d: Number, v_sum: Number, p: 
     kept = (d * WQ * v_sum - MQ - turned) * (e1 * e2)  # v1 alpha_1 ^ beta_1 d/(g S)
     A, C, B, D = c1 * A - z1 * s1 * C, c1 * C - s1 * A, c1 * B - z1 * s1 * D, c1 * D - s1 * B
     A, B, C, D = c2 * A - z2 * s2 * B, c2 * B - s2 * A, c2 * C - z2 * s2 * D, c2 * D - s2 * C
-    kept2 = 2.0 * gS * kept
     return (
-        kept2 / d + v2 * B - v1 * C,
+        2.0 * v1 * v2 * kept + v2 * B - v1 * C,
         -d * gap * A,
         gS * (v_sum * kept + B - C),
         gS * gap * D,
-        gS * (kept2 + d * (v1 * B - v2 * C)),
+        gS * (2.0 * gS * kept + d * (v1 * B - v2 * C)),
     )
 
 

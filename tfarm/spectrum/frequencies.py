@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
-from tfarm.exact.balls import Ball, Sweep, across_waves, first_success, into_own, out_of_own, precision, rational
+from tfarm.exact.balls import Ball, Sweep, across_waves, first_success, in_chain, precision, rational
 from tfarm.exact.count import bisect_chain, chain_counts, rows_to_count
 from tfarm.exact.layout import Layout, readings
 from tfarm.exact.system import Segment, Spring, System
@@ -116,18 +116,20 @@ class AxisSweep(Sweep):
         return p
 
     def _joined(self, element: Any, p: Plane) -> Plane:
-        units, (a, b, g), S = element.units, element[:3], self.S
-        own, gS, (one, two) = into_own(p, *units), S * g, real_waves(a, b, g, S)
-        gap = one[2] - two[2]
-        unit = 1 / (gS * gap * gap)
-        inside = tuple(part * unit for part in across_waves(one, two, gS, flint.arb(1), S * (a - b), own))
+        a, b, g, *_ = element
+        S, EI, own = self.S, element.stiffness, real_waves(a, b, g, self.S)
+        one, two = (in_chain(wave, element.length) for wave in own)
+        (a, b, g, _), gap = element.of_chain, one[2] - two[2]
+        gS, v_sum = S * g, S * (a / EI - b)
+        unit = 1 / (gS * EI * gap * gap)
+        inside = tuple(part * unit for part in across_waves(one, two, gS, EI, v_sum, p))
         if self._counting:
             zero = flint.arb(0)
             clamped = (zero, zero, zero, zero, flint.arb(1))
-            r = [part * unit for part in across_waves(one, two, gS, flint.arb(1), S * (a - b), clamped)]
-            self._count_segment([one[2], two[2]], own, inside, r)
+            r = [part * unit for part in across_waves(one, two, gS, EI, v_sum, clamped)]
+            self._count_segment([wave[2] for wave in own], p, inside, r)
         self._free = 2
-        return out_of_own(inside, *units)
+        return inside
 
     def _count_segment(self, z: Sequence[Ball], p: Plane, q: Plane, r: Sequence[Ball]) -> None:
         outside, pinned = self.number, pinned_count(z)

@@ -43,7 +43,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import characteristic
 from tfarm.exact.compiled import python_of
-from tfarm.exact.layout import Layout, kernel_row
+from tfarm.exact.layout import kernel_row, segment_at
 from tfarm.exact.system import Body, Place, Segment, System
 from tfarm.exact.values import free_fields
 from tfarm.exact.waves import SERIES_RADIUS, even_functions, fill_wave_numbers, transition_rows, transition_series
@@ -325,8 +325,7 @@ def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> 
         raise ConvergenceError(f"the mode at {s:.6g} 1/s is double, or the hub is at a node of it", s, slope)
     values = fields[("W", "Psi", "M").index(quantity), 0, :-1]
     if quantity == "M":
-        layout = Layout(k, tuple(dict.fromkeys(places)))
-        damping = [layout.read[layout.places.index(each)].damping for each in places]
+        damping = [segment_at(k, each).damping for each in places]
         values = values / (1.0 + s * np.array(damping))
     unit = np.sqrt(2 * s / product * float(k.length / k.EI))
     tip = fields[0 if isinstance(k.tip_mass, Fraction) else 1, 0, -2]
@@ -438,7 +437,7 @@ def _attachment(arm: Arm, shapes: Shapes, number: int) -> Iterator[tuple[str, Re
     per_motion, per_rotation = float(chain.length**3 / chain.EI), float(chain.length / chain.EI)
     joints = list(accumulate((Fraction(link.length) for link in arm.links), initial=Fraction(0)))
     if Fraction(each.x) not in joints and sum(other.x == each.x for other in arm.attachments) == 1:
-        pieces = Layout(chain, sides).read
+        pieces = [segment_at(chain, side) for side in sides]
         beyond, within = (
             _of_link(*_densities(piece, shapes.omega, *state))["length"]
             for piece, state in zip(pieces[::-1], (outer, inner), strict=True)
