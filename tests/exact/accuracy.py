@@ -97,7 +97,7 @@ def right_bits(value):
 def outputs_at(k, s, x, wanted):
     """Outputs at the ball s from one sweep."""
     those = readings(k, tuple(wanted.values()), x)
-    sweep = Sweep(those.layout, s)
+    sweep = Sweep(those, s)
     return {name: sweep.output(one) / sweep.input for name, one in zip(wanted, those.each, strict=True)}
 
 

@@ -296,19 +296,17 @@ def test_the_fused_kernel_of_one_link_says_what_the_sweep_says(seed):
     arm = some_arm(rng)
     wanted = tuple(OF_ONE_LINK[name] for name in ENDS if name in OF_ONE_LINK)
     s = np.array([some_point(rng, arm) * 10 ** rng.uniform(-4, 0) for _ in range(40)])
-    those = readings(system_of(arm), wanted, 0.0)
-    layout, lost = those.layout, np.empty(s.size, bool)
-    fused, swept = np.empty((2, 2 + len(wanted), s.size), complex)
-    fill_ends(s, layout.rows, layout.ends, those.ends_table, False, fused, lost)
-    fill_free(s, layout.rows, layout.ends, AXIS, those.table, swept, lost)
+    layout, lost = readings(system_of(arm), wanted, 0.0), np.empty(s.size, bool)
+    fused, swept, per_input = np.empty((3, 2 + len(wanted), s.size), complex)
+    fill_ends(s, layout.rows, layout.ends, layout.ends_table, False, fused, lost)
+    fill_free(s, layout.rows, layout.ends, AXIS, layout.table, swept, lost)
     swept[2:] = swept[2:] * np.exp(swept[1] - fused[1])
     swept[0] = swept[0] * np.exp(swept[1] - fused[1])
     here, there = fused[[0, *range(2, len(fused))]], swept[[0, *range(2, len(fused))]]
     condition = 1 + abs(fused[1])  # the phase of all waves, whose last bits the scales have apart
     assert (abs(here - there) <= 1e-14 * condition * (abs(there) + abs(here))).all()
-    per_input = np.empty((len(wanted), s.size), complex)
-    fill_ends(s, layout.rows, layout.ends, those.ends_table, True, per_input, lost)
-    assert (abs(per_input * fused[0] - fused[2:]) <= 16 * EPS * abs(fused[2:])).all()
+    fill_ends(s, layout.rows, layout.ends, layout.ends_table, True, per_input, lost)
+    assert (abs(per_input[2:] * fused[0] - fused[2:]) <= 16 * EPS * abs(fused[2:])).all()
 
 
 @pytest.mark.parametrize("theory", THEORIES)

@@ -22,7 +22,9 @@ from mpmath import mp, mpc, mpf
 from tfarm.arm import Arm
 from tfarm.errors import ConvergenceError, ParameterError
 
+from .layout import constant_of
 from .outputs import Output, output
+from .system import system_of
 
 Number = Any  # mpmath.mpf or mpmath.mpc, which come without types
 
@@ -138,11 +140,12 @@ def response(arm: Arm, name: str | Output, s: complex, digits: int, x: float | N
     place = {"root": 0.0, "tip": arm.link.length, "x": x}[wanted.place]
     if place is None or not 0.0 <= place <= arm.link.length:
         raise ParameterError(key="x", value=x, remedy=f"a point of the arm lies between 0 and {arm.link.length} m")
-    zero = {"W": math.isinf(arm.payload.mass), "Q": arm.payload.mass == 0, "M": arm.payload.inertia == 0}
-    at_tip = place == arm.link.length and zero.get(wanted.quantity, False)
-    if at_tip or (place == 0 and wanted.quantity in ("Y", "Phi")):  # by an end condition: no digits would agree
+    constant = constant_of(system_of(arm), wanted, place / arm.link.length)
+    if constant == 0:  # by an end condition: no digits would agree
         return mpf(0)
-    is_real = _is_real(arm, wanted, s, place)
+    is_damped = wanted.gauge and arm.link.damping
+    on_axis = s.real == 0 and arm.link.damping == 0  # there the output over s^power is real, as for real s
+    is_real = s.imag == 0 or on_axis or (constant is not None and not is_damped)
 
     def parts() -> list[Number]:
         at = mpc(s)
@@ -215,14 +218,3 @@ def _determinant(a: list[list[Number]]) -> Number:
     pairs = list(combinations(range(4), 2))
     upper, lower = ([row[i] * next_[j] - row[j] * next_[i] for i, j in pairs] for row, next_ in (a[:2], a[2:]))
     return sum(sign * m * n for sign, m, n in zip((1, -1, 1, 1, -1, 1), upper, reversed(lower), strict=True))
-
-
-def _is_real(arm: Arm, wanted: Output, s: complex, x: float) -> bool:
-    """Whether the output over s^power is real: for real s or (C = 0) s^2, or because it is the input itself."""
-    if s.imag == 0 or (s.real == 0 and arm.link.damping == 0):
-        return True
-    if arm.is_locked:
-        fixed = {"Y": math.isinf(arm.payload.mass), "Phi": math.isinf(arm.payload.inertia)}
-        return wanted.quantity == "theta" or (x == arm.link.length and fixed.get(wanted.quantity, False))
-    is_undamped = not wanted.gauge or arm.link.damping == 0
-    return arm.hub.inertia == 0 and wanted.quantity == "M" and x == 0 and is_undamped

@@ -8,6 +8,7 @@ sweeps are those of `sweep`, with the error of every number enclosed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 from functools import cached_property
@@ -17,7 +18,7 @@ import flint
 
 from . import waves
 from .compiled import python_of
-from .layout import Layout, Numbers, Reading, constant_of, readings
+from .layout import Layout, Reading, constant_of, readings
 from .outputs import Output
 from .system import Body, Mark, Offset, Place, Segment, Spring, System
 from .waves import Plane, Row
@@ -25,13 +26,10 @@ from .waves import Plane, Row
 _end_plane, _met, _across_rows, _row_across = map(
     python_of, (waves.end_plane, waves.met, waves.across_rows, waves.row_across)
 )
-_inside_offset, _inside_spring, _inside_body = map(
-    python_of, (waves.inside_offset, waves.inside_spring, waves.inside_body)
-)
-_beyond_offset, _beyond_spring, _beyond_body = map(
-    python_of, (waves.beyond_offset, waves.beyond_spring, waves.beyond_body)
-)
 _transition_rows, across_waves, in_chain = map(python_of, (waves.transition_rows, waves.across_waves, waves.in_chain))
+_KINDS = (Offset, Spring, Body)
+_INSIDE = dict(zip(_KINDS, map(python_of, (waves.inside_offset, waves.inside_spring, waves.inside_body)), strict=True))
+_BEYOND = dict(zip(_KINDS, map(python_of, (waves.beyond_offset, waves.beyond_spring, waves.beyond_body)), strict=True))
 Ball = Any  # flint.acb or flint.arb, which come without types
 _Found = TypeVar("_Found")
 
@@ -48,9 +46,14 @@ def first_success(bits: Iterable[int], attempt: Callable[[], _Found | None], fai
     raise failure
 
 
+def fraction(value: Fraction | float) -> Any:
+    """Return a fraction or float as a rational number (`flint.fmpq`)."""
+    return flint.fmpq(*value.as_integer_ratio())
+
+
 def rational(value: Fraction | float) -> Ball:
     """Return the ball of a fraction or float, at the working precision."""
-    return flint.arb(flint.fmpq(*value.as_integer_ratio()))
+    return flint.arb(fraction(value))
 
 
 def point(s: complex) -> Ball:
@@ -63,7 +66,7 @@ def root(z: Ball) -> Ball:
     return z.sqrt() if z.real.mid() >= 0 else (-z).sqrt() * flint.acb(0, 1)
 
 
-def transition(z_sum: Ball, z_product: Ball) -> tuple[Ball, Ball, Ball, Ball]:
+def transition(z_sum: Ball, z_product: Ball) -> tuple[Ball, ...]:
     """Return F0..F3, by the two waves where they certainly differ, else by the matrix exponential.
 
     That is of F'''' = (z1 + z2) F'' - z1 z2 F as a first-order system, with F'''(0) = 1.
@@ -71,10 +74,8 @@ def transition(z_sum: Ball, z_product: Ball) -> tuple[Ball, Ball, Ball, Ball]:
     spread = root(z_sum * z_sum / 4 - z_product)
     z1, z2 = z_sum / 2 + spread, z_sum / 2 - spread
     if (z1 - z2).contains(0) or z1.contains(0) or z2.contains(0):
-        zero, one = flint.acb(0), flint.acb(1)
-        rows = [[zero, one, zero, zero], [zero, zero, one, zero], [zero, zero, zero, one]]
-        exponential = flint.acb_mat([*rows, [-z_product, zero, z_sum, zero]]).exp()
-        return exponential[0, 3], exponential[1, 3], exponential[2, 3], exponential[3, 3]
+        companion = flint.acb_mat([[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [-z_product, 0, z_sum, 0]])
+        return tuple(row[3] for row in companion.exp().tolist())
     t1, t2 = root(z1), root(z2)
     (h1, c1), (h2, c2) = t1.sinh_cosh(), t2.sinh_cosh()
     over = 1 / (z1 - z2)
@@ -95,13 +96,9 @@ def exact_middle(ball: Ball) -> Any:
 def summed(z_sum: Any, z_product: Any, count: int) -> list[Any]:
     """Return F0..F3 at a segment's end by `count` terms of their series in z1 + z2 and z1 z2, series of flint."""
     h, before, sums = 0 * z_sum + 1, 0 * z_sum, [0 * z_sum] * 4
-    factorial = Fraction(1)
     for n in range(count):
-        factorial = factorial / max(1, (2 * n) * (2 * n - 1))  # 1/(2 n)!
-        terms = [factorial]
-        for shift in (1, 2, 3):
-            terms.append(terms[-1] / (2 * n + shift))
-        sums = [total + h * rational(term) for total, term in zip(sums, reversed(terms), strict=True)]
+        terms = (Fraction(1, math.factorial(2 * n + shift)) for shift in (3, 2, 1, 0))
+        sums = [total + h * rational(term) for total, term in zip(sums, terms, strict=True)]
         h, before = z_sum * h - z_product * before, h
     return sums
 
@@ -111,18 +108,18 @@ class Sweep:
 
     def __init__(self, layout: Layout, s: Any, S: Any = None) -> None:
         self.layout, self.s, self.S = layout, s, s * s if S is None else S
-        self.numbers = self.numbers_of(layout)
+        self.elements, tip_mass, tip_inertia, self.A, self.B = self.numbers_of(layout)
         self._rows: dict[int, tuple[Row, ...]] = {}
         self.planes: dict[Place, Plane] = {}
-        p = _end_plane(*self._end(self.numbers.tip_mass), *self._end(self.numbers.tip_inertia))
-        for each in self.numbers.elements:
+        p = _end_plane(*self._end(tip_mass), *self._end(tip_inertia))
+        for each in self.elements:
             if isinstance(each, Mark):
                 self.planes[each.place] = self._at_mark(p)
             else:
                 p = self._inside(each, p)
         self.theta, self.M, self.Q = p[:3]
 
-    def numbers_of(self, layout: Layout) -> Numbers:
+    def numbers_of(self, layout: Layout) -> list[Any]:
         """Return the layout's numbers in the arithmetic of s."""
         return layout.numbers(flint.ctx.prec, rational)
 
@@ -138,14 +135,13 @@ class Sweep:
     @property
     def of_angle(self) -> Any:
         """The sum of A_n s^n (see `system`)."""
-        s, (A0, A1, A2, A3) = self.s, self.numbers.of_angle
-        return ((s * A3 + A2) * s + A1) * s + A0
+        s, A = self.s, self.A
+        return ((s * A[3] + A[2]) * s + A[1]) * s + A[0]
 
     @property
     def of_moment(self) -> Any:
         """The sum of B_n s^n."""
-        B0, B1 = self.numbers.of_moment
-        return self.s * B1 + B0
+        return self.s * self.B[1] + self.B[0]
 
     @cached_property
     def states(self) -> dict[Place, Row]:
@@ -157,7 +153,7 @@ class Sweep:
     def carried_out(self, f: Row) -> dict[Place, Row]:
         """Return the condition f z = 0 of the axis at each mark."""
         found: dict[Place, Row] = {}
-        for each in reversed(self.numbers.elements):
+        for each in reversed(self.elements):
             if len(found) == len(self.planes):
                 break
             if isinstance(each, Mark):
@@ -191,24 +187,24 @@ class Sweep:
         return p
 
     def _inside(self, element: Any, p: Plane) -> Plane:
-        match element:
-            case Segment():
-                return _across_rows(*self._transition(element), p)
-            case Offset():
-                return _inside_offset(element.length, p)
-            case Spring():
-                return _inside_spring(*self._spring(element), p)
-        return _inside_body(*self._body(element), p)
+        if isinstance(element, Segment):
+            return _across_rows(*self._transition(element), p)
+        return _INSIDE[type(element)](*self._parameters(element), p)
 
     def _beyond(self, element: Any, f: Row) -> Row:
+        if isinstance(element, Segment):
+            return _row_across(*self._transition(element), f)
+        return _BEYOND[type(element)](*self._parameters(element), f)
+
+    def _parameters(self, element: Any) -> tuple[Any, ...]:
+        """Return the length of an offset, stiffness and compliance of a spring, or both conditions of a body."""
         match element:
-            case Segment():
-                return _row_across(*self._transition(element), f)
             case Offset():
-                return _beyond_offset(element.length, f)
+                return (element.length,)
             case Spring():
-                return _beyond_spring(*self._spring(element), f)
-        return _beyond_body(*self._body(element), f)
+                return self.s * (element.stiffness * element.damping) + element.stiffness, element.compliance
+        mass, inertia, stiffness, rotational_stiffness = element
+        return self.S * mass + stiffness, self.S * inertia + rotational_stiffness
 
     def _transition(self, segment: Any) -> tuple[Row, ...]:
         if id(segment) not in self._rows:
@@ -229,22 +225,15 @@ class Sweep:
         """Return F0..F3 at the segment's end."""
         return transition(z_sum, z_product)
 
-    def _spring(self, spring: Any) -> tuple[Any, Any]:
-        return self.s * (spring.stiffness * spring.damping) + spring.stiffness, spring.compliance
-
-    def _body(self, body: Any) -> tuple[Any, Any]:
-        assert isinstance(body, Body)
-        return self.S * body.mass + body.stiffness, self.S * body.inertia + body.rotational_stiffness
-
 
 def output_ball(system: System, wanted: Output, s: Ball, x: float = 0.0) -> Ball | None:
     """Return an output for a unit input at s, in SI units; x is a share of the length.
 
     None where the input of the free response may be zero, as at a pole.
     """
-    those, constant = readings(system, (wanted,), x), constant_of(system, wanted, x)
-    (one,) = those.each
+    layout, constant = readings(system, (wanted,), x), constant_of(system, wanted, x)
+    (one,) = layout.each
     if constant is not None:
         return s**one.power * constant * rational(one.unit) / (1 + rational(one.C) * s)
-    sweep = Sweep(those.layout, s)
+    sweep = Sweep(layout, s)
     return None if sweep.input.contains(0) else sweep.output(one) / sweep.input

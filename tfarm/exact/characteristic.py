@@ -27,7 +27,7 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from functools import cached_property, reduce
 from operator import add, mul
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import flint
 import numpy as np
@@ -35,10 +35,9 @@ from numpy.typing import NDArray
 
 from tfarm.arm import GAINS, Law
 from tfarm.arrays import Complex, Real
-from tfarm.records import read_only
 
 from .balls import Ball, Sweep, across_waves, in_chain, point, rational, summed
-from .layout import Layout, Readings, laid_out, readings, unit_scale
+from .layout import UNIT, Layout, laid_out, readings
 from .outputs import OUTPUTS, Output
 from .rationals import polynomials
 from .system import Place, Segment, System
@@ -100,9 +99,7 @@ def quick_characteristics(k: System, s: Complex, at_zero: int = 0) -> Analytic:
 
 def float_units(k: System) -> Real:
     """Return the SI value of each numerator of 1, as a column of doubles."""
-    if "float units" not in k.kept:
-        k.kept["float units"] = read_only(np.array([[float(unit_scale(output, k))] for output in FED]))
-    return cast("Real", k.kept["float units"])
+    return readings(k, FED, 0.0).table[:, UNIT, None]
 
 
 def difference_steps(k: System, s: Complex) -> Real:
@@ -144,18 +141,13 @@ class WideSweep(Sweep):
         _, z_sum, z_product = self._sums(element)
         if abs(z_sum[0]).mid() + 2 * abs(z_product[0]).mid().sqrt() < SLOW_WAVES:
             return super()._inside(element, p)
-        S, d, (a, b, g, _) = self.S, self.s * element.damping + 1, element[:4]
-        pair = _waves(a, b, g, S, d, self._shortest)
-        if pair is None:
-            raise InseparableError
+        S, d = self.S, self.s * element.damping + 1
+        pair = _waves(*element[:3], S, d, self._shortest)
         one, two = (in_chain(wave[:5], element.length) for wave in pair)
-        d, gap, (a, b, g, _) = d * element.stiffness, one[2] - two[2], element.of_chain
-        unit = gap * gap * d * S * g
-        if unit[0].contains(0):
-            raise InseparableError
-        inner = across_waves(one, two, S * g, d, S * (a / d - b), p)
+        d, gS, gap = d * element.stiffness, S * element.of_chain[2], one[2] - two[2]
+        unit = _nonzero(gap * gap * d * gS)
         self.phase = self.phase + pair[0][5] + pair[1][5]
-        return tuple(part / unit for part in inner)
+        return tuple(part / unit for part in across_waves(one, two, gS, d, p))
 
     def _at_mark(self, p: Plane) -> Plane:
         grown = self.phase.exp()
@@ -186,16 +178,13 @@ class WideSweep(Sweep):
 
 def _size(series: Series) -> Ball:
     """Return the sum of the magnitudes of a series' coefficients."""
-    total = flint.arb(0)
-    for coefficient in series.coeffs():
-        total += abs(coefficient)
-    return total.upper() if hasattr(total, "upper") else total
+    return sum((abs(each) for each in series.coeffs()), flint.arb(0)).upper()
 
 
 class Feedback(NamedTuple):
     """A law in s, exactly: e^{-s tau} p_i/q times each output `read`; `whole` is q, `entries` p_i, `delay` tau [s]."""
 
-    read: Readings
+    read: Layout
     whole: Polynomial
     entries: tuple[Polynomial, ...]
     delay: float
@@ -208,46 +197,43 @@ def characteristic_ball(k: System, s: Ball, law: Feedback | None = None) -> Ball
 
 def characteristic_over(k: System, s: Ball, law: Feedback | None = None) -> Ball:
     """Return D enclosed over the wide ball s, up to a positive factor that depends on its middle alone."""
-    middle, is_point = s.mid(), s.real.is_exact() and s.imag.is_exact()
-    here = _by_waves(k, middle, law, None, LONG_WAVE, 1 if is_point else TAYLOR_TERMS - 1)
-    if here is not None and is_point:
-        return here[0][0] * flint.acb(0, here[1].imag).exp()
-    there = None if here is None else _by_waves(k, s, law, here[1], LONG_WAVE, TAYLOR_TERMS)
-    if here is None or there is None:
+    middle, last = s.mid(), 0 if s.real.is_exact() and s.imag.is_exact() else TAYLOR_TERMS - 1
+    try:
+        here, scale = _by_waves(k, middle, law, None, LONG_WAVE, max(last, 1))
+        value = _by_waves(k, s, law, scale, LONG_WAVE, last + 1)[0][last] if last else here[0]
+    except InseparableError:
         return characteristic_ball(k, s, law)
-    away, value = s - middle, flint.acb(0)
-    for order in range(TAYLOR_TERMS - 1, -1, -1):
-        value = value * away + (there if order == TAYLOR_TERMS - 1 else here)[0][order]
-    return value * flint.acb(0, here[1].imag).exp()
+    for order in reversed(range(last)):
+        value = value * (s - middle) + here[order]
+    return value * flint.acb(0, scale.imag).exp()
 
 
 def tangent(k: System, m: Ball, r: Ball, law: Feedback | None = None) -> tuple[Ball, Ball, Ball] | None:
     """Return D(m), D'(m) and D''/2 over the disc of radius r around m, up to a factor; None where waves may be one."""
-    here = _by_waves(k, m, law, None, 0.0, 2)
     disc = flint.acb(flint.arb(m.real.mid(), r), flint.arb(m.imag.mid(), r))
-    there = None if here is None else _by_waves(k, disc, law, here[1], 0.0, 3)
-    return None if here is None or there is None else (here[0][0], here[0][1], there[0][2])
+    try:
+        here, scale = _by_waves(k, m, law, None, 0.0, 2)
+        there, _ = _by_waves(k, disc, law, scale, 0.0, 3)
+    except InseparableError:
+        return None
+    return here[0], here[1], there[2]
 
 
 def _by_waves(
     k: System, at: Ball, law: Feedback | None, scale: Ball | None, shortest: float, terms: int
-) -> tuple[Series, Ball] | None:
+) -> tuple[Series, Ball]:
     """Return D e^{-scale} as a series of `terms` terms around `at`, and scale, by default t1 + t2 there.
 
-    None where waves may be one.
+    Raises InseparableError where waves may be one.
     """
-    try:
-        sweep = WideSweep(_layout(k, law), flint.acb_series([at, 1], prec=terms), shortest)
-        value = _fed_back(sweep, law)
-    except InseparableError:
-        return None
+    sweep = WideSweep(_layout(k, law), flint.acb_series([at, 1], prec=terms), shortest)
     scale = sweep.phase[0] if scale is None else scale
-    return value * (sweep.phase - scale).exp(), scale
+    return _fed_back(sweep, law) * (sweep.phase - scale).exp(), scale
 
 
 def _layout(k: System, law: Feedback | None) -> Layout:
     """Return the layout of a system with the signals of a law."""
-    return readings(k, (), 0.0).layout if law is None else law.read.layout
+    return readings(k, (), 0.0) if law is None else law.read
 
 
 def _fed_back(sweep: Sweep, law: Feedback | None) -> Any:
@@ -285,31 +271,31 @@ def _product(factors: Iterable[Polynomial]) -> Polynomial:
 
 def _waves(
     a: Ball, b: Ball, g: Ball, S: Series, d: Series, shortest: float
-) -> tuple[tuple[Series, ...], tuple[Series, ...]] | None:
-    """Return both waves of a uniform piece (see `_wave`); None where they may be one, or one is too long."""
-    if S[0].contains(0) or d[0].contains(0):
-        return None
-    half = (S * b + S * a / d) / 2
-    spread = _root(half * half - S * (S * (a * b) + g) / d)
-    if spread is None:
-        return None
-    one, two = (_wave(half + sign * spread, S, d, a, b, g, shortest) for sign in (1, -1))
-    return None if one is None or two is None else (one, two)
+) -> tuple[tuple[Series, ...], tuple[Series, ...]]:
+    """Return both waves of a uniform piece (see `_wave`).  Raises InseparableError where they may be one."""
+    half = (S * b + S * a / _nonzero(d)) / 2
+    spread = _root(half * half - _nonzero(S) * (S * (a * b) + g) / d)
+    return _wave(half + spread, S, d, a, b, g, shortest), _wave(half - spread, S, d, a, b, g, shortest)
 
 
-def _root(z: Series) -> Series | None:
-    """Return a square root with its cut away from the ball, of either sign; None if it may vanish."""
-    if z[0].contains(0):
-        return None
-    root = z.sqrt() if z[0].real.mid() >= 0 else (-z).sqrt() * point(1j)
+def _nonzero(series: Series) -> Series:
+    """Return the series.  Raises InseparableError where its first term may vanish."""
+    if series[0].contains(0):
+        raise InseparableError
+    return series
+
+
+def _root(z: Series) -> Series:
+    """Return a square root with its cut away from the ball, of either sign.  Raises InseparableError."""
+    root = _nonzero(z).sqrt() if z[0].real.mid() >= 0 else (-_nonzero(z)).sqrt() * point(1j)
     return root if root[0].real.mid() >= 0 else -root
 
 
-def _wave(z: Series, S: Series, d: Series, a: Ball, b: Ball, g: Ball, shortest: float) -> tuple[Series, ...] | None:
-    """Return c, s, z, v, e and t of one wave for `across_waves`, scaled by e^{-t}, or None."""
-    t = _root(z) if abs(z[0]).mid() > shortest else None
-    if t is None or t[0].contains(0):
-        return None
+def _wave(z: Series, S: Series, d: Series, a: Ball, b: Ball, g: Ball, shortest: float) -> tuple[Series, ...]:
+    """Return c, s, z, v, e and t of one wave for `across_waves`, scaled by e^{-t}.  Raises InseparableError."""
+    if not abs(z[0]).mid() > shortest:  # too long
+        raise InseparableError
+    t = _nonzero(_root(z))
     e = (-t).exp()
     v, inverse = z - S * b, d * z - S * a
     if not inverse[0].contains(0):

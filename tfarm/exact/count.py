@@ -15,7 +15,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tfarm.arrays import Real
 
 from .compiled import compiled, inlined
 from .layout import (
@@ -43,6 +44,7 @@ from .waves import (
     end_plane,
     even_functions,
     in_chain,
+    scaled,
     tip_conditions,
     transition_rows,
     transition_series,
@@ -51,7 +53,7 @@ from .waves import (
 FREE_MOTIONS = 12  # in the vector of ends: the number of free motions of the tip
 
 
-def rows_to_count(layout: Layout) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def rows_to_count(layout: Layout) -> tuple[Real, Real]:
     """Return rows and ends of a layout without damping, for `chain_count` and `bisect_chain`."""
     chain = layout.chain
     free = sum(not isinstance(end, float) for end in (chain.tip_mass, chain.tip_inertia))
@@ -92,7 +94,7 @@ def _joined(outside: int, omega: float, row: Any, plane: Plane, free: int) -> tu
     `outside` is the count of the outer part clamped at the joint, `free` the number of free motions there.
     """
     clamped = (0.0, 0.0, 0.0, 0.0, 1.0)  # W = Psi = 0
-    s, _, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(complex(0.0, omega), row)
+    s, _, _, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(complex(0.0, omega), row)
     number = half_waves(z1, t1, dt1) + half_waves(z2, t2, dt2) + (z1.real < 0.0 and z2.real < 0.0)
     S, z1, z2, l, EI = s.real, z1.real, z2.real, row[LENGTH], row[BENDING]
     a, b, g, sigma = row[CHAIN_A], row[CHAIN_B], row[CHAIN_G], row[CHAIN_SIGMA]
@@ -102,11 +104,10 @@ def _joined(outside: int, omega: float, row: Any, plane: Plane, free: int) -> tu
         q, r = across_rows(*rows, plane), across_rows(*rows, clamped)
     else:
         one, two = in_chain(real_wave(z1, v1.real, t1, dt1), l), in_chain(real_wave(z2, v2.real, t2, dt2), l)
-        gS, v_sum, gap = g * S, S * (a / EI - b), one[2] - two[2]
+        gS, gap = g * S, one[2] - two[2]
         unit = 1.0 / (gS * EI * gap * gap)
-        q, r = across_waves(one, two, gS, EI, v_sum, plane), across_waves(one, two, gS, EI, v_sum, clamped)
-        q = q[0] * unit, q[1] * unit, q[2] * unit, q[3] * unit, q[4] * unit
-        r = r[0] * unit, r[1] * unit, r[2] * unit, r[3] * unit, r[4] * unit
+        q = scaled(across_waves(one, two, gS, EI, plane), unit)
+        r = scaled(across_waves(one, two, gS, EI, clamped), unit)
     number = _clamped(number, r[1], -1)  # r at the outer end is, up to signs, the plane carried inwards (symmetry)
     number = _clamped(number, -r[0], -1) + outside
     if free == 2:

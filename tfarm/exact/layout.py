@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tfarm.errors import ParameterError
+from tfarm.arrays import Real
+from tfarm.errors import require
 from tfarm.records import read_only
 
 from .outputs import Output
 from .system import (
     INNER,
+    ONE,
     OUTER,
     PAYLOAD,
+    ZERO,
+    Body,
     Element,
     Mark,
     Offset,
@@ -27,7 +29,6 @@ from .system import (
     Spring,
     System,
     cut,
-    double_double,
     end_condition,
     placed,
 )
@@ -48,97 +49,6 @@ FIELDS = {"W": W, "Y": W, "centre": W, "Psi": PSI, "Phi": PSI, "M": M, "strain":
 AT_ENDS: Mapping[Any, int] = {(None, -1, 1): 0, (0, M, 0): 1, (0, Q, 0): 2, (1, W, 0): 3, (1, W, -1): 4}
 
 
-class Numbers(NamedTuple):
-    """A layout's numbers in one arithmetic: elements; rest, inertia and force of both tip conditions; drive.
-
-    `of_angle` are A_0..A_3, `of_moment` B_0 and B_1 (see `system`).
-    """
-
-    elements: tuple[Any, ...]
-    tip_mass: tuple[Any, ...]
-    tip_inertia: tuple[Any, ...]
-    of_angle: tuple[Any, ...]
-    of_moment: tuple[Any, ...]
-
-
-class Layout:
-    """A chain cut and marked at places, as rows of the compiled sweeps (`sweep`), and as elements for balls.
-
-    `elements` run from the payload inwards.
-    """
-
-    def __init__(self, chain: System, places: tuple[Place, ...] = ()) -> None:
-        self.chain, self.places = chain, places
-        elements = list(placed(chain.elements))
-        joints = [position for position, _, each in elements if isinstance(each, Segment)] + [Fraction(0)]
-        ends = np.array([float(joint) for joint in joints])
-        order = {"payload": PAYLOAD, "outer": OUTER, "inner": INNER}
-        marks = []
-        for place in places:
-            joint = joints[abs(ends - float(place.share)).argmin()]
-            share = joint if abs(place.share - joint) <= AT_JOINT else place.share
-            marks.append((share, order[place.side], Mark(place)))
-        self.elements = cut([*marks, *elements])
-        self._numbers: dict[Any, Numbers] = {}
-
-    def numbers(self, key: Any, exact: Callable[[Any], Any]) -> Numbers:
-        """Return its numbers converted by `exact`, cached for each `key`."""
-        if key not in self._numbers:
-            elements = [
-                each if isinstance(each, Mark) else type(each)._make(n if n is None else exact(n) for n in each)
-                for each in self.elements
-            ]
-            chain, drive = self.chain, self.chain.drive
-            ends = end_condition(chain.tip_mass), end_condition(chain.tip_inertia), drive.of_angle, drive.of_moment
-            self._numbers[key] = Numbers(tuple(elements), *(tuple(map(exact, each)) for each in ends))
-        return self._numbers[key]
-
-    @cached_property
-    def rows(self) -> NDArray[np.float64]:
-        """The elements for the kernel (elements, `ROW_WIDTH`)."""
-        rows = np.array([kernel_row(each) for each in self.elements]).reshape(-1, ROW_WIDTH)
-        return np.asarray(read_only(rows))
-
-    @cached_property
-    def ends(self) -> NDArray[np.float64]:
-        """Payload and drive (12,)."""
-        _, *numbers = self.numbers("float64", float)
-        return np.asarray(read_only(np.concatenate(numbers)))
-
-    @cached_property
-    def marks(self) -> dict[Place | None, int]:
-        """The index of each place's mark."""
-        return {each.place: n for n, each in enumerate(self.elements) if isinstance(each, Mark)}
-
-
-def kernel_row(element: Element) -> list[float]:
-    """Return an element as a row of the kernel."""
-    numbers: Sequence[Fraction] = ()
-    match element:
-        case Segment():
-            split = [part for value in element[:3] for part in double_double(value)]
-            of_chain = map(float, (element.length, element.stiffness, *element.of_chain))
-            return [*split, float(element.sigma), element.damping, SEGMENT, *of_chain]
-        case Spring():
-            kind, numbers = SPRING, (*element[:2], element.stiffness * Fraction(element.damping))
-        case Mark():
-            kind = MARK
-        case _:
-            kind, numbers = OFFSET if isinstance(element, Offset) else BODY, tuple(element)
-    rest = [0.0] * (ROW_KIND - len(numbers)), [0.0] * (ROW_WIDTH - ROW_KIND - 1)
-    return [*map(float, numbers), *rest[0], kind, *rest[1]]
-
-
-def segment_at(chain: System, place: Place) -> Segment:
-    """Return the segment of a place, at a joint that of its side."""
-    inner_end = Fraction(1)
-    for each in chain.segments:
-        inner_end -= each.length
-        if place.share > inner_end + AT_JOINT or (place.side == "outer" and place.share >= inner_end - AT_JOINT):
-            break
-    return each
-
-
 class Reading(NamedTuple):
     """An output:  unit s^power (field at the place + theta theta + rate s theta + input u)/(1 + C s),  in SI units.
 
@@ -151,75 +61,140 @@ class Reading(NamedTuple):
     power: int
     unit: Fraction
     C: Fraction | float = 0.0
-    rate: Fraction = Fraction(0)
+    rate: Fraction = ZERO
     input: int = 0
 
 
-@dataclass(frozen=True)
-class Readings:
-    """Several outputs of one chain: layout, readings, and tables for the compiled sweeps."""
+UNIT = Reading._fields.index("unit")  # its column in a table
 
-    layout: Layout = field(repr=False)
-    each: tuple[Reading, ...] = field(repr=False)
+
+class Layout:
+    """A chain cut and marked at places, with the readings `each` there: rows of the compiled sweeps, and elements.
+
+    `elements` run from the payload inwards.
+    """
+
+    def __init__(self, chain: System, places: tuple[Place, ...] = (), each: tuple[Reading, ...] = ()) -> None:
+        self.chain, self.places, self.each = chain, places, each
+        elements = list(placed(chain.elements))
+        joints = [position for position, _, each in elements if isinstance(each, Segment)] + [ZERO]
+        ends = np.array([float(joint) for joint in joints])
+        order = {"payload": PAYLOAD, "outer": OUTER, "inner": INNER}
+        marks = []
+        for place in places:
+            joint = joints[abs(ends - float(place.share)).argmin()]
+            share = joint if abs(place.share - joint) <= AT_JOINT else place.share
+            marks.append((share, order[place.side], Mark(place)))
+        self.elements = cut([*marks, *elements])
+        self._numbers: dict[Any, list[Any]] = {}
+
+    def numbers(self, key: Any, exact: Callable[[Any], Any]) -> list[Any]:
+        """Return elements, both tip conditions (rest, inertia, force), A_0..A_3 and B_0, B_1, converted by `exact`.
+
+        They are cached for each `key`.
+        """
+        if key not in self._numbers:
+            chain, drive = self.chain, self.chain.drive
+            ends = end_condition(chain.tip_mass), end_condition(chain.tip_inertia), drive.of_angle, drive.of_moment
+            elements = [
+                each if isinstance(each, Mark) else type(each)._make(n if n is None else exact(n) for n in each)
+                for each in self.elements
+            ]
+            self._numbers[key] = [elements, *(tuple(map(exact, each)) for each in ends)]
+        return self._numbers[key]
 
     @cached_property
-    def table(self) -> NDArray[np.float64]:
+    def rows(self) -> Real:
+        """The elements for the kernel (elements, `ROW_WIDTH`)."""
+        rows = np.array([kernel_row(each) for each in self.elements]).reshape(-1, ROW_WIDTH)
+        return np.asarray(read_only(rows))
+
+    @cached_property
+    def ends(self) -> Real:
+        """Payload and drive (12,)."""
+        _, *numbers = self.numbers("float64", float)
+        return np.asarray(read_only(np.concatenate(numbers)))
+
+    @cached_property
+    def marks(self) -> dict[Place | None, int]:
+        """The index of each place's mark."""
+        return {each.place: n for n, each in enumerate(self.elements) if isinstance(each, Mark)}
+
+    @cached_property
+    def table(self) -> Real:
         """Rows for `sweep.fill_free`: the numbers of `Reading` in their order, the row of the place first."""
-        rows = [(self.layout.marks.get(one.place, -1), *one[1:]) for one in self.each]
+        rows = [(self.marks.get(one.place, -1), *one[1:]) for one in self.each]
         return np.asarray(read_only(np.array(rows, dtype=float).reshape(-1, len(Reading._fields))))
 
     @cached_property
-    def ends_table(self) -> NDArray[np.float64] | None:
+    def ends_table(self) -> Real | None:
         """Rows for `uniform.fill_ends`: number, power of s, unit, C; None if an output is not one at the ends."""
-        drive = self.layout.chain.drive
-        shares = [one.place and one.place.share for one in self.each]
+        shares, drive = [one.place and one.place.share for one in self.each], self.chain.drive
         which = [AT_ENDS.get((at, one.field, one.theta)) for at, one in zip(shares, self.each, strict=True)]
-        if not self.layout.chain.is_uniform or drive.friction or drive.stiffness or drive.lag or None in which:
+        if not self.chain.is_uniform or drive.friction or drive.stiffness or drive.lag or None in which:
             return None
         rows = [(n, one.power, one.unit, one.C) for n, one in zip(which, self.each, strict=True)]
         return np.asarray(read_only(np.array(rows, dtype=float).reshape(-1, 4)))
 
 
+def kernel_row(element: Element) -> Real:
+    """Return an element as a row of the kernel."""
+    row = np.zeros(ROW_WIDTH)
+    row[ROW_KIND] = {Segment: SEGMENT, Offset: OFFSET, Spring: SPRING, Body: BODY, Mark: MARK}[type(element)]
+    match element:
+        case Segment():
+            row[:6:2] = element[:3]
+            row[1:6:2] = [value - Fraction(float(value)) for value in element[:3]]
+            row[6:ROW_KIND] = element.sigma, element.damping
+            row[LENGTH:] = element.length, element.stiffness, *element.of_chain
+        case Spring():
+            row[:3] = *element[:2], element.stiffness * Fraction(element.damping)
+        case Offset() | Body():
+            row[: len(element)] = element
+    return row
+
+
+def segment_at(chain: System, place: Place) -> Segment:
+    """Return the segment of a place, at a joint that of its side."""
+    inner_end = ONE
+    for each in chain.segments:
+        inner_end -= each.length
+        if place.share > inner_end + AT_JOINT or (place.side == "outer" and place.share >= inner_end - AT_JOINT):
+            break
+    return each
+
+
 def unit_scale(wanted: Output, k: System) -> Fraction:
     """Return the SI value of one dimensionless unit of the output for 1 N m of torque, or 1 rad of a locked hub."""
-    if wanted.quantity in ("W", "Y", "centre"):
-        return k.length / k.input_unit
-    if wanted.quantity in ("M", "Q"):
-        return k.EI / k.length ** (1 if wanted.quantity == "M" else 2) / k.input_unit
-    return 1 / k.input_unit
+    units = {**dict.fromkeys(("W", "Y", "centre"), k.length), "M": k.EI / k.length, "Q": k.EI / k.length**2}
+    return units.get(wanted.quantity, ONE) / k.drive.unit
 
 
 def reading_of(chain: System, wanted: Output, x: float) -> Reading:
     """Return an output as a reading; x is the share of the length for one along the link."""
     share, drive, unit = Fraction(wanted.share(x)), chain.drive, unit_scale(wanted, chain)
     if wanted.quantity == "current":  # the torque, which is the input less back-EMF, through the lag
-        if not drive.per_ampere or not drive.turns:
-            raise ParameterError(
-                key="output", value="motor_current", remedy="needs a [motor] and another input than hub_angle"
-            )
-        amperes = chain.EI / chain.length / drive.per_ampere / chain.input_unit  # per dimensionless torque
-        return Reading(None, -1, Fraction(0), wanted.power, amperes, drive.lag, -drive.back_emf, 1)
+        is_driven = drive.per_ampere and drive.turns
+        require(is_driven, "output", "motor_current", "needs a [motor] and another input than hub_angle")
+        amperes = chain.EI / chain.length / drive.per_ampere / drive.unit  # per dimensionless torque
+        return Reading(None, -1, ZERO, wanted.power, amperes, drive.lag, -drive.back_emf, 1)
     if wanted.quantity == "theta":
-        return Reading(None, -1, Fraction(1), wanted.power, unit)
+        return Reading(None, -1, ONE, wanted.power, unit)
     place = Place(share, wanted.side)
     if wanted.quantity == "centre":
-        place = Place(Fraction(1), "payload")
+        place = Place(ONE, "payload")
     elif wanted.place == "root" and wanted.gauge:
         place = chain.gauge
     segment = segment_at(chain, place)
     if wanted.quantity == "strain":  # at the surface: half the depth over E I/L
-        if segment.half_depth is None:
-            raise ParameterError(
-                key="link.section.shape",
-                value="general",
-                remedy='a "general" section has no depth: give rectangle, round or tube',
-            )
-        unit = Fraction(segment.half_depth) / chain.length / segment.stiffness / chain.input_unit
-    theta = {"Y": -(chain.radius + share), "Phi": Fraction(-1)}.get(wanted.quantity, Fraction(0))
+        remedy = 'a "general" section has no depth: give rectangle, round or tube'
+        require(segment.half_depth is not None, "link.section.shape", "general", remedy)
+        unit = Fraction(segment.half_depth or 0) / chain.length / segment.stiffness / drive.unit
+    theta = {"Y": -(chain.radius + share), "Phi": Fraction(-1)}.get(wanted.quantity, ZERO)
     return Reading(place, FIELDS[wanted.quantity], theta, wanted.power, unit, segment.damping if wanted.gauge else 0.0)
 
 
-def readings(chain: System, wanted: tuple[Output, ...], x: float) -> Readings:
+def readings(chain: System, wanted: tuple[Output, ...], x: float) -> Layout:
     """Return the outputs of a chain, laid out and cached with it."""
     key = wanted, x
     if key not in chain.kept:
@@ -229,11 +204,11 @@ def readings(chain: System, wanted: tuple[Output, ...], x: float) -> Readings:
     return chain.kept[key]
 
 
-def laid_out(chain: System, wanted: Sequence[Output], shares: Sequence[float]) -> Readings:
+def laid_out(chain: System, wanted: Sequence[Output], shares: Sequence[float]) -> Layout:
     """Return outputs of a chain, each with its share of the length, laid out."""
     each = tuple(reading_of(chain, one, x) for one, x in zip(wanted, shares, strict=True))
     places = tuple(dict.fromkeys(one.place for one in each if one.place is not None))
-    return Readings(Layout(chain, places), each)
+    return Layout(chain, places, each)
 
 
 def constant_of(k: System, wanted: Output, x: float) -> int | None:

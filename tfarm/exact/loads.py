@@ -17,18 +17,18 @@ import re
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-from tfarm.errors import CertificationError, ParameterError
+from tfarm.errors import ParameterError, require
 
-from .balls import Ball, Sweep, first_success, point, rational
+from .balls import Ball, Sweep, point, rational
 from .compiled import python_of
 from .layout import Layout, M, Q, Reading, reading_of
 from .outputs import Output
 from .system import Place, Spring, System
-from .values import NO_NUMBER, PROVEN_BITS, precisions
+from .values import PROVEN_BITS, certified
 from .waves import Row, met
 
 _met = python_of(met)
-LOAD_KINDS = {"force": ("N", Q), "moment_pair": ("N m", M)}  # unit, and the entry of (W, Psi, M, Q) that jumps
+LOAD_KINDS = {"force": ("N", Q, (1,)), "moment_pair": ("N m", M, (-1, 1))}  # unit, entry of the state, its jumps
 LOAD_PATTERN = re.compile(r"(force|moment_pair)@([^,]+)(?:,([^,]+))?")
 
 
@@ -56,26 +56,23 @@ def load_of(text: str, length: float) -> Load:
     """Return the load of force@X or moment_pair@X1,X2, X [m] from the clamp.  Raises ParameterError for others."""
     found = LOAD_PATTERN.fullmatch(text.replace(" ", ""))
     remedy = "force@X or moment_pair@X1,X2, with X in m from the clamp, such as force@0.3"
-    if not found or (found[1] == "force") == bool(found[3]):
-        raise ParameterError(key="input", value=text, remedy=remedy)
     try:
-        places = [float(each) for each in found.groups()[1:] if each]
+        places = [float(each) for each in found.groups()[1:] if each] if found else []
     except ValueError:
-        raise ParameterError(key="input", value=text, remedy=remedy) from None
-    if not all(0 <= x <= length for x in places):
-        raise ParameterError(key="input", value=text, remedy=f"a place on the link lies between 0 and {length:g} m")
-    if len(set(places)) < len(places):
-        raise ParameterError(key="input", value=text, remedy="two moments at one place cancel; give two places")
+        places = []
+    if not found or len(places) != len(LOAD_KINDS[found[1]][2]):
+        raise ParameterError(key="input", value=text, remedy=remedy)
+    is_inside = all(0 <= x <= length for x in places)
+    require(is_inside, "input", text, f"a place on the link lies between 0 and {length:g} m")
+    require(len({*places}) == len(places), "input", text, "two moments at one place cancel; give two places")
     return Load(found[1], tuple(x / length for x in places))
 
 
 def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float) -> Ball:
     """Return the output for unit load at s, SI, to `PROVEN_BITS`.  Raises CertificationError at a pole or zero."""
-    one, jump = reading_of(chain, wanted, x), LOAD_KINDS[load.kind][1]
-    if one.input:
-        raise ParameterError(key="output", value=wanted.name, remedy="needs an input at the hub instead of a load")
-    signs = (1,) if load.kind == "force" else (-1, 1)
-    unit = (chain.length / chain.EI) * (chain.length if load.kind == "force" else 1)  # of the dimensionless load
+    one, (_, jump, signs) = reading_of(chain, wanted, x), LOAD_KINDS[load.kind]
+    require(not one.input, "output", wanted.name, "needs an input at the hub instead of a load")
+    unit = (chain.length / chain.EI) * (chain.length if jump == Q else 1)  # of the dimensionless load
     loads = [Place(Fraction(share)) for share in load.shares]
     layouts = [Layout(chain, tuple(dict.fromkeys((at, one.place or at)))) for at in loads]
 
@@ -84,12 +81,11 @@ def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float
         found = [sweep.quantity(one, at, jump) for sweep, at in zip(sweeps, loads, strict=True)]
         value = sum(sign * part for sign, part in zip(signs, found, strict=True))
         value = value * point(s) ** one.power / (1 + rational(one.C) * point(s))
-        value = value * rational(one.unit * chain.input_unit * unit)
+        value = value * rational(one.unit * chain.drive.unit * unit)
         is_known = value.is_finite() and (value.rel_accuracy_bits() >= PROVEN_BITS or value.is_zero())
         return value if is_known else None
 
-    failure = CertificationError(NO_NUMBER.format(f"{PROVEN_BITS} bits", s))
-    return first_success(precisions(PROVEN_BITS), attempt, failure)
+    return certified(PROVEN_BITS, attempt, f"{PROVEN_BITS} bits", s)
 
 
 class _Loaded(Sweep):
@@ -99,7 +95,7 @@ class _Loaded(Sweep):
         """Return the condition beyond an element, beyond a spring not times its stiffness."""
         f = super()._beyond(element, f)
         if isinstance(element, Spring):
-            stiffness, _ = self._spring(element)
+            stiffness, _ = self._parameters(element)
             return f[0] / stiffness, f[1] / stiffness, f[2] / stiffness, f[3] / stiffness
         return f
 

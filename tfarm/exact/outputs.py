@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import Literal, get_args
 
 from tfarm.arm.checks import INPUT_UNITS, whole
-from tfarm.errors import ParameterError, did_you_mean, must_be_known
+from tfarm.errors import must_be_known, require
 
 # theta, M, Q, W, W - (r + x) theta, Psi - theta: hub angle, moment, shear force, displacement, deflection, rotation;
 # Psi: rotation in space;
@@ -25,16 +25,11 @@ Side = Literal["outer", "inner"]  # of a joint of two segments, or of an attachm
 
 MOST_POWER = 4  # of s: rate, acceleration, jerk and its rate
 PLACES_OF: Mapping[str, tuple[Place, ...]] = MappingProxyType({
-    "theta": ("root",),
-    "M": ("root", "tip", "x"),
-    "Q": ("root", "tip", "x"),
-    "W": ("tip", "x"),
-    "Y": ("tip", "x"),
-    "Phi": ("tip", "x"),
-    "Psi": ("tip", "x"),
+    **dict.fromkeys(("theta", "current"), ("root",)),
+    **dict.fromkeys(("M", "Q"), ("root", "tip", "x")),
+    **dict.fromkeys(("W", "Y", "Phi", "Psi"), ("tip", "x")),
     "strain": ("x",),
     "centre": ("tip",),
-    "current": ("root",),
 })  # fmt: skip
 _METRES, _RADIANS = dict.fromkeys(("W", "Y", "centre"), "m"), dict.fromkeys(("theta", "Phi", "Psi"), "rad")
 QUANTITY_UNITS = MappingProxyType({**_METRES, **_RADIANS, "M": "N m", "Q": "N", "strain": "1", "current": "A"})
@@ -58,35 +53,21 @@ class Output:
     name: str = ""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.label, str) or not re.search(r"\w", self.label):
-            raise ParameterError(key="output.label", value=self.label, remedy="a text with a word")
+        has_word = isinstance(self.label, str) and re.search(r"\w", self.label)
+        require(has_word, "output.label", self.label, "a text with a word")
         if not self.name:
             object.__setattr__(self, "name", "_".join(re.findall(r"\w+", self.label)))
-        if not isinstance(self.name, str) or not re.fullmatch(r"\w+", self.name):
-            raise ParameterError(key="output.name", value=self.name, remedy="letters, digits and underscores")
-        if self.quantity not in get_args(Quantity):
-            raise ParameterError(
-                key="output.quantity", value=self.quantity, remedy=did_you_mean(str(self.quantity), get_args(Quantity))
-            )
-        if self.place not in PLACES_OF[self.quantity]:
-            raise ParameterError(
-                key="output.place",
-                value=self.place,
-                remedy=f"{self.quantity} is known at: {', '.join(PLACES_OF[self.quantity])}",
-            )
+        is_name = isinstance(self.name, str) and re.fullmatch(r"\w+", self.name)
+        require(is_name, "output.name", self.name, "letters, digits and underscores")
+        must_be_known("output.quantity", self.quantity, get_args(Quantity))
+        places = PLACES_OF[self.quantity]
+        require(self.place in places, "output.place", self.place, f"{self.quantity} is known at: {', '.join(places)}")
         whole("output.power", self.power, 0, MOST_POWER, f"a power of s: a whole number from 0 to {MOST_POWER}")
-        if not isinstance(self.gauge, bool) or (self.gauge and self.quantity not in ("M", "strain")):
-            raise ParameterError(
-                key="output.gauge",
-                value=self.gauge,
-                remedy="true or false, true for a moment only: a strain gauge measures E I phi' without its damping",
-            )
-        if self.unit != _unit(self.quantity, self.power):
-            raise ParameterError(
-                key="output.unit",
-                value=self.unit,
-                remedy=f'values are in SI units, here "{_unit(self.quantity, self.power)}"',
-            )
+        is_gauge = isinstance(self.gauge, bool) and (not self.gauge or self.quantity in ("M", "strain"))
+        remedy = "true or false, true for a moment only: a strain gauge measures E I phi' without its damping"
+        require(is_gauge, "output.gauge", self.gauge, remedy)
+        unit = _unit(self.quantity, self.power)
+        require(self.unit == unit, "output.unit", self.unit, f'values are in SI units, here "{unit}"')
 
     @property
     def is_in_appendix(self) -> bool:
@@ -106,9 +87,8 @@ class Output:
 
 def _unit(quantity: Quantity, power: int) -> str:
     """Return the SI unit of a quantity times s^power."""
-    if power and QUANTITY_UNITS[quantity] == "1":
-        return "1/s" if power == 1 else f"1/s^{power}"
-    return QUANTITY_UNITS[quantity] + ("" if power == 0 else "/s" if power == 1 else f"/s^{power}")
+    per_time = "" if power == 0 else "/s" if power == 1 else f"/s^{power}"
+    return QUANTITY_UNITS[quantity] + per_time
 
 
 OUTPUTS: Mapping[str, Output] = MappingProxyType({each.name: each for each in (
@@ -138,11 +118,10 @@ OUTPUTS: Mapping[str, Output] = MappingProxyType({each.name: each for each in (
 def output(wanted: str | Output) -> Output:
     """Return the output of a name, or the output itself.  Raises ParameterError with the nearest name."""
     if isinstance(wanted, Output):
-        if OUTPUTS.get(wanted.name, wanted) != wanted:
-            raise ParameterError(key="output.name", value=wanted.name, remedy="the name of another output; choose one")
+        is_free = OUTPUTS.get(wanted.name, wanted) == wanted
+        require(is_free, "output.name", wanted.name, "the name of another output; choose one")
         return wanted
-    if not isinstance(wanted, str):
-        raise ParameterError(key="output", value=wanted, remedy="the name of an output, or an Output")
+    require(isinstance(wanted, str), "output", wanted, "the name of an output, or an Output")
     must_be_known("output", wanted, OUTPUTS)
     return OUTPUTS[wanted]
 
@@ -154,12 +133,8 @@ def on_side(wanted: str | Output, side: Side) -> Output:
     """
     found = output(wanted)
     must_be_known("side", side, get_args(Side))
-    if found.place != "x":
-        raise ParameterError(
-            key="side",
-            value=side,
-            remedy=f"{found.name} has a fixed place; give an output along the arm, such as moment with its x",
-        )
+    remedy = f"{found.name} has a fixed place; give an output along the arm, such as moment with its x"
+    require(found.place == "x", "side", side, remedy)
     if side == found.side:
         return found
     return replace(found, side=side, name=f"{found.name}_{side}", label=f"{found.label}, {side} side")

@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex
+
 from .compiled import compiled, inlined
 from .layout import BENDING, CHAIN_A, CHAIN_B, CHAIN_G, CHAIN_SIGMA, LENGTH
 from .waves import (
@@ -31,6 +33,7 @@ from .waves import (
     reciprocal,
     row_across,
     row_across_waves,
+    scaled,
     transition_rows,
     transition_series,
     wave_functions,
@@ -59,20 +62,20 @@ class Work(NamedTuple):
     are points next to a segment's shear cut-off.
     """
 
-    planes: NDArray[np.complex128]
+    planes: Complex
     powers: NDArray[np.int64]
-    scales: NDArray[np.complex128]
+    scales: Complex
     shifts: NDArray[np.int64]
     low: NDArray[np.bool_]
-    numbers: NDArray[np.complex128]
-    functions: NDArray[np.complex128]
-    series: NDArray[np.complex128]
-    condition: NDArray[np.complex128]
-    faded: NDArray[np.complex128]
-    scale: NDArray[np.complex128]
-    theta: NDArray[np.complex128]
-    lift: NDArray[np.complex128]
-    turn: NDArray[np.complex128]
+    numbers: Complex
+    functions: Complex
+    series: Complex
+    condition: Complex
+    faded: Complex
+    scale: Complex
+    theta: Complex
+    lift: Complex
+    turn: Complex
     watched: NDArray[np.bool_]
 
 
@@ -97,7 +100,8 @@ def cross(points: Any, row: Any, j: int, work: Work, lost: Any) -> None:
         mark_parallel(numbers, work.low[j], lost)
         for i in range(BLOCK):
             if not work.low[j, i]:
-                work.scale[i] += numbers[T1 + i] + numbers[DT1 + i] + numbers[T2 + i] + numbers[DT2 + i]
+                t1, t2 = phases(numbers, i)
+                work.scale[i] += t1 + t2
                 work.watched[i] = work.watched[i] or magnitude(numbers[Z2 + i]) < SLOW_WAVE
     if slow:
         other = inner.copy() if slow < BLOCK else inner
@@ -129,7 +133,7 @@ def mark_parallel(numbers: Any, low: Any, lost: Any) -> None:
 def all_wave_numbers(points: Any, row: Any, numbers: Any) -> None:
     """Compute `dispersion` at every point of a block."""
     for i in range(BLOCK):
-        S, d, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(points[i], row)
+        S, d, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(points[i], row)
         numbers[S_SQUARED + i], numbers[D + i], numbers[GS + i] = S, d, gS
         numbers[Z1 + i], numbers[V1 + i], numbers[T1 + i], numbers[DT1 + i] = z1, v1, t1, dt1
         numbers[Z2 + i], numbers[V2 + i], numbers[T2 + i], numbers[DT2 + i] = z2, v2, t2, dt2
@@ -188,6 +192,12 @@ def waves_at(numbers: Any, functions: Any, i: int) -> tuple[Wave, Wave]:
 
 
 @inlined
+def phases(numbers: Any, i: int) -> tuple[complex, complex]:
+    """Return t of both waves of a point."""
+    return numbers[T1 + i] + numbers[DT1 + i], numbers[T2 + i] + numbers[DT2 + i]
+
+
+@inlined
 def _chain_waves(row: Any, numbers: Any, functions: Any, i: int) -> tuple[Wave, Wave, complex, complex]:
     """Return both waves of a point, g S and d in the chain's units."""
     one, two = waves_at(numbers, functions, i)
@@ -201,10 +211,8 @@ def _by_waves(row: Any, numbers: Any, functions: Any, plane: Any, inner: Any) ->
     """Compute `across_waves` at every point of a block."""
     for i in range(BLOCK):
         one, two, gS, d = _chain_waves(row, numbers, functions, i)
-        v_sum, gap = numbers[S_SQUARED + i] * (times(reciprocal(d), row[CHAIN_A]) - row[CHAIN_B]), one[2] - two[2]
-        p = across_waves(one, two, gS, d, v_sum, plane_at(plane, i))
-        unit = reciprocal(gS * d * gap * gap)
-        put_plane(inner, i, (p[0] * unit, p[1] * unit, p[2] * unit, p[3] * unit, p[4] * unit))
+        p, gap = across_waves(one, two, gS, d, plane_at(plane, i)), one[2] - two[2]
+        put_plane(inner, i, scaled(p, reciprocal(gS * d * gap * gap)))
 
 
 @inlined
@@ -264,7 +272,7 @@ def _fade(numbers: Any, functions: Any, faded: Any, scale: Any, low: Any) -> Non
     """Compute c and s of both waves in the scale of the faster one."""
     for i in range(BLOCK):
         c1, s1, c2, s2 = functions[C1 + i], functions[S1 + i], functions[C2 + i], functions[S2 + i]
-        t1, t2 = numbers[T1 + i] + numbers[DT1 + i], numbers[T2 + i] + numbers[DT2 + i]
+        t1, t2 = phases(numbers, i)
         left = t2 if t1.real >= t2.real else t1
         ratio = _ratio(functions[E1 + i], functions[E2 + i], t1, t2)
         if t1.real >= t2.real:
@@ -291,3 +299,13 @@ def _row_by_series(points: Any, row: Any, series: Any, f: Any) -> None:
     """Compute `row_across` in place, at every point of a block."""
     for i in range(BLOCK):
         put_row(f, i, row_across(*rows_at(points[i], row, series, i), row_at(f, i)))
+
+
+@inlined
+def finish(points: Any, power: int, unit: float, C: float, value: Any) -> None:
+    """Compute the values of an output times  unit s^power/(1 + C s),  in place."""
+    for _ in range(power):
+        for i in range(value.size):
+            value[i] *= points[i]
+    for i in range(value.size):
+        value[i] = times(value[i] * reciprocal(1.0 + C * points[i]), unit) if C else times(value[i], unit)

@@ -20,7 +20,7 @@ import numpy as np
 from tfarm.arm.blocks import LawBlock, Rational
 from tfarm.arrays import Complex, Real
 
-from .balls import exact_middle, precision
+from .balls import exact_middle, fraction, precision
 
 IntegerMatrix = list[list[int]]
 
@@ -83,7 +83,7 @@ def block_factors(block: LawBlock, rule: str, T: float, c: float) -> tuple[Compl
         return poles, [_of_tustin(num, den, c, most) for num in nums]
     if rule == "matched" or not block.order:
         return np.expm1(s * T), [_of_matched(num, den, T) for num in nums]
-    return np.expm1(s * T), _of_held(block, nums, den, T)
+    return np.expm1(s * T), _of_held(nums, den, T)
 
 
 # ------------------------------------------------------------ polynomials over the rationals
@@ -95,11 +95,10 @@ def polynomials(block: LawBlock) -> tuple[list[Any], Any]:
     Those of matrices are det(s - A + B_j C) + (D_j - 1) det(s - A) and det(s - A).
     """
     if isinstance(block, Rational):
-        num, den = (flint.fmpq_poly([_rational(each) for each in reversed(of)]) for of in (block.num, block.den))
+        num, den = (flint.fmpq_poly([fraction(each) for each in reversed(of)]) for of in (block.num, block.den))
         return [num], den
-    A, B, C, D = (_exact(each) for each in block.matrices())
-    den = A.charpoly()
-    columns = (flint.fmpq_mat(block.order, 1, [B[i, j] for i in range(block.order)]) for j in range(block.signals))
+    A, _, C, D = map(_exact, block.matrices())
+    columns, den = [_exact(column[:, None]) for column in block.matrices()[1].T], A.charpoly()
     return [(A - each * C).charpoly() + (D[0, j] - 1) * den for j, each in enumerate(columns)], den
 
 
@@ -108,15 +107,10 @@ def _zeros_at_0(polynomial: Any) -> int:
     return next(n for n, each in enumerate(polynomial.coeffs()) if each)
 
 
-def _rational(x: float) -> Any:
-    """Return a double as a rational number."""
-    return flint.fmpq(*float(x).as_integer_ratio())
-
-
 def _exact(matrix: Real) -> Any:
     """Return a matrix of doubles over the rationals."""
     rows, columns = matrix.shape
-    return flint.fmpq_mat(rows, columns, [_rational(each) for each in matrix.ravel().tolist()])
+    return flint.fmpq_mat(rows, columns, [fraction(each) for each in matrix.ravel().tolist()])
 
 
 def _roots(polynomial: Any) -> Complex:
@@ -157,44 +151,36 @@ def _of_matched(num: Any, den: Any, T: float) -> Gained:
     return float(gain.real), np.expm1(zeros * T)
 
 
-def _of_held(block: LawBlock, nums: list[Any], den: Any, T: float) -> list[Gained]:
+def _of_held(nums: list[Any], den: Any, T: float) -> list[Gained]:
     """Return gain and zeros of each signal behind a zero-order hold."""
-    states = _companion(nums[0], den) if isinstance(block, Rational) else tuple(map(_exact, block.matrices()))
-    with precision(BITS_A_STATE * (block.order + SPARE_STATES)):
-        held = [_held_numerator(states, j, num, den, _rational(T)) for j, num in enumerate(nums)]
+    with precision(BITS_A_STATE * (den.degree() + SPARE_STATES)):
+        held = [_held_numerator(num, den, fraction(T)) for num in nums]
     return [(_leading(each, flint.fmpq_poly([1])), _roots(each)) for each in held]
 
 
-def _companion(num: Any, den: Any) -> tuple[Any, Any, Any, Any]:
-    """Return the state space of num/den in controllable form, exactly."""
-    n, first = den.degree(), den.leading_coefficient()
-    D = num[n] / first
-    A = flint.fmpq_mat([[-den[n - 1 - k] / first if i == 0 else int(k == i - 1) for k in range(n)] for i in range(n)])
-    C = flint.fmpq_mat([[(num[n - 1 - k] - D * den[n - 1 - k]) / first for k in range(n)]])
-    return A, flint.fmpq_mat(n, 1, [1] + [0] * (n - 1)), C, flint.fmpq_mat([[D]])
-
-
-def _held_numerator(states: Any, j: int, num: Any, den: Any, T: Any) -> Any:
-    """Return the polynomial in delta of signal j, over the rationals, with coefficients of `ENOUGH_BITS`.
+def _held_numerator(num: Any, den: Any, T: Any) -> Any:
+    """Return the polynomial in delta of a signal, over the rationals, with coefficients of `ENOUGH_BITS`.
 
     For a block without a value at rest it has a simple zero at delta = 0.
     """
-    D, known = states[3][0, j], min(_zeros_at_0(num), _zeros_at_0(den) + 1) if num else 0
+    known = min(_zeros_at_0(num), _zeros_at_0(den) + 1) if num else 0
     for _ in range(MOST_DOUBLINGS):
-        balls = _held_coefficients(states, j, T)[known:]
+        balls = _held_coefficients(num, den, T)[known:]
         if not num or all(each.rel_accuracy_bits() >= ENOUGH_BITS for each in balls):
             break
         flint.ctx.prec *= 2
     middles = [flint.fmpq(0) if each.contains(0) else exact_middle(each) for each in balls]
-    return flint.fmpq_poly([0] * known + middles + [D])
+    return flint.fmpq_poly([0] * known + middles + [num[den.degree()] / den.leading_coefficient()])
 
 
-def _held_coefficients(states: Any, j: int, T: Any) -> list[Any]:
-    """Return those of delta^0 to delta^(n - 1), n the order of the block, as balls."""
-    A, B, C, D = states
-    n = A.nrows()
-    both = flint.arb_mat([*([A[i, k] * T for k in range(n)] + [B[i, j] * T] for i in range(n)), [0] * (n + 1)]).exp()
-    less = flint.arb_mat(n, n, [both[i, k] - int(i == k) for i in range(n) for k in range(n)])
-    fed = flint.arb_mat(n, n, [both[i, n] * C[0, k] for i in range(n) for k in range(n)])
+def _held_coefficients(num: Any, den: Any, T: Any) -> list[Any]:
+    """Return those of delta^0 to delta^(n - 1), n the order, as balls, from num/den in controllable form."""
+    n, first = den.degree(), den.leading_coefficient()
+    D, down = num[n] / first, range(n - 1, -1, -1)
+    C = [(num[k] - D * den[k]) / first for k in down]
+    chain = [[T if k == i else 0 for k in range(n + 1)] for i in range(n - 1)]
+    both = flint.arb_mat([[*(-den[k] * T / first for k in down), T], *chain, [0] * (n + 1)]).exp().tolist()
+    less = flint.arb_mat([[both[i][k] - int(i == k) for k in range(n)] for i in range(n)])
+    fed = flint.arb_mat([[both[i][n] * c for c in C] for i in range(n)])
     p, q = (less - fed).charpoly(), less.charpoly()
-    return [p[k] + (flint.arb(D[0, j]) - 1) * q[k] for k in range(n)]
+    return [p[k] + (flint.arb(D) - 1) * q[k] for k in range(n)]

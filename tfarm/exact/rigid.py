@@ -16,8 +16,8 @@ import numpy as np
 from tfarm.arm import Arm
 from tfarm.arrays import Complex
 
-from .balls import Sweep
-from .layout import Layout, Numbers, readings
+from .balls import Sweep, fraction
+from .layout import Layout, readings
 from .outputs import Output
 from .system import Body, Offset, Segment, system_of
 from .waves import Plane, Row
@@ -31,8 +31,8 @@ def rigid_response(arm: Arm, wanted: Output, s: Complex, x: float = 0.0) -> Comp
     """
     if wanted.quantity == "strain":
         return np.zeros(s.size, complex)
-    those = readings(system_of(arm), (wanted,), x)
-    sweep, one = RigidSweep(those.layout), those.each[0]
+    layout = readings(system_of(arm), (wanted,), x)
+    sweep, one = RigidSweep(layout), layout.each[0]
     above, below = sweep.numerator(one), sweep.input
     if not below:
         return np.zeros(s.size, complex)
@@ -55,9 +55,9 @@ class RigidSweep(Sweep):
 
     def exact(self, number: Any) -> Any:
         """Return the rational number."""
-        return flint.fmpq(*number.as_integer_ratio())
+        return fraction(number)
 
-    def numbers_of(self, layout: Layout) -> Numbers:
+    def numbers_of(self, layout: Layout) -> list[Any]:
         """Return the layout's numbers as rational ones."""
         return layout.numbers("rational", self.exact)
 

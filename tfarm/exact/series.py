@@ -32,16 +32,16 @@ class SlowSweep(Sweep):
 def expansion_at_zero(chain: System, output: Output, x: float = 0.0) -> tuple[float, float, float, float]:
     """Return the coefficients of s^-2, s^-1, 1 and s in an output's expansion at s = 0."""
     coefficients = [float(c.mid()) for c in _quotient_at_zero(chain, output, x)]
-    padded = [0.0] * (2 - _leading(_drive_at_zero(chain))) + coefficients
+    padded = [0.0] * (2 - _leading(_at_zero(chain))) + coefficients
     return padded[0], padded[1], padded[2], padded[3]
 
 
 def _quotient_at_zero(chain: System, output: Output, x: float) -> list[Ball]:
     """Return the output's expansion from s^-n on, n the order of the drive's zero."""
-    drive = _drive_at_zero(chain)
+    drive = _at_zero(chain)
     kept = SERIES_ORDER - _leading(drive)
     with precision(SERIES_BITS):
-        of_output = flint.arb_series(_numerator_at_zero(chain, output, x)[:kept], prec=kept)
+        of_output = flint.arb_series(_at_zero(chain, output, x)[:kept], prec=kept)
         found = of_output / flint.arb_series(drive[-kept:], prec=kept)
         return [found[n] for n in range(kept)]
 
@@ -52,14 +52,13 @@ def without_slow_pole(chain: System, wanted: Sequence[Output], x: float) -> list
     Those of r/(s - p) are c_k = -r/p^(k+1), and dominate from some n on.  So the rest is c_k - p^(n-k) c_n, with an
     error of (p/w)^(n-k), w the next pole.  In float64 it would be lost in -r/p.
     """
-    drive = _drive_at_zero(chain)
+    drive = _at_zero(chain)
     first = _leading(drive)
     with precision(SERIES_BITS):
-        p = rational(0)
+        p: Ball = rational(0)
+        D: Any = flint.arb_poly(drive[first:])
         for _ in range(SLOW_POLE_STEPS):  # Newton's method on a power series that is nearly a line there
-            p = p - sum(c * p**k for k, c in enumerate(drive[first:])) / sum(
-                k * c * p ** (k - 1) for k, c in enumerate(drive[first:]) if k
-            )
+            p = p - D(p) / D.derivative()(p)
         found = []
         for each in wanted:
             constant, slope, *others, last = _quotient_at_zero(chain, each, x)[first:]
@@ -68,24 +67,22 @@ def without_slow_pole(chain: System, wanted: Sequence[Output], x: float) -> list
     return found
 
 
-@lru_cache(SERIES_KEPT)
 def order_at_zero(chain: System, wanted: Output, x: float = 0.0) -> int:
     """Return the order of the zero of an output of the free response at s = 0."""
-    with precision(SERIES_BITS):
-        return _leading(_numerator_at_zero(chain, wanted, x))
+    return _leading(_at_zero(chain, wanted, x))
 
 
 @lru_cache(SERIES_KEPT)
-def _drive_at_zero(chain: System) -> list[Ball]:
-    """Return the coefficients of the drive as a power series in s at 0, with exact zeros."""
+def _at_zero(chain: System, wanted: Output | None = None, x: float = 0.0) -> list[Ball]:
+    """Return the power series at s = 0 of an output of the free response, else of the drive, with exact zeros."""
+    layout = readings(chain, () if wanted is None else (wanted,), x)
     with precision(SERIES_BITS):
-        return _cleared(_swept(chain, ()).input)
-
-
-def _numerator_at_zero(chain: System, output: Output, x: float) -> list[Ball]:
-    """Return those of an output of the free response."""
-    those = readings(chain, (output,), x)
-    return _cleared(_swept(chain, those.layout.places).output(those.each[0]))
+        sweep = _swept(chain, layout.places)
+        series = sweep.input if wanted is None else sweep.output(layout.each[0])
+        coefficients = [series[n] for n in range(SERIES_ORDER)]
+        sizes = [abs(float(c.mid())) for c in coefficients]
+        small = KNOWN_ZERO * max(sizes)
+        return [rational(0) if size < small else c for size, c in zip(sizes, coefficients, strict=True)]
 
 
 @lru_cache(SERIES_KEPT)  # one sweep has angle, rate and drive
@@ -97,10 +94,3 @@ def _swept(chain: System, places: tuple[Place, ...]) -> SlowSweep:
 def _leading(coefficients: Sequence[Ball]) -> int:
     """Return the index of the first one that is not 0, or their number."""
     return next((n for n, coefficient in enumerate(coefficients) if coefficient != 0), len(coefficients))
-
-
-def _cleared(series: Any) -> list[Ball]:
-    """Return the coefficients, with exact zeros in place of rounding."""
-    coefficients = [series[n] for n in range(SERIES_ORDER)]
-    sizes = [abs(float(c.mid())) for c in coefficients]
-    return [rational(0) if size < KNOWN_ZERO * max(sizes) else c for size, c in zip(sizes, coefficients, strict=True)]

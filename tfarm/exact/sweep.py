@@ -52,6 +52,7 @@ from .pieces import (
     Work,
     cross,
     cross_back,
+    finish,
     plane_at,
     put_plane,
     put_row,
@@ -85,7 +86,7 @@ AXIS = read_only(np.array([[1.0], [0.0], [0.0], [0.0]]))  # the condition W = 0 
 
 @compiled
 def _work(rows: int) -> Work:
-    """Return the scratch arrays of a chain with so many rows."""
+    """Return the scratch arrays of a chain of that number of rows."""
     number = np.complex128
     return Work(
         np.empty((rows + 1, PLANE_SIZE), number),
@@ -153,15 +154,13 @@ def _brought_back(buffer: Any, parts: int, powers: Any) -> None:
 
 
 @compiled
-def _go_back(points: Any, rows: Any, work: Work, differs: bool, lost: Any) -> None:
+def _go_back(points: Any, rows: Any, outermost: int, work: Work, differs: bool, lost: Any) -> None:
     """Compute the state at each mark, in place of its plane, from the condition of the axis carried outwards."""
-    axis, outermost, reach, is_root = work.planes[len(rows)], len(rows), 0.0, True
-    for j in range(len(rows) - 1, -1, -1):
-        outermost = j if rows[j, ROW_KIND] == MARK else outermost
+    axis, reach, is_root = work.planes[len(rows)], 0.0, True
     scale, shift = np.zeros(BLOCK, np.complex128), np.zeros(BLOCK, np.int64)
     for i in range(BLOCK):
-        work.lift[i], work.theta[i], _, _ = met(row_at(work.condition, i), plane_at(axis, i))
-        work.turn[i] = 0.0
+        _, work.theta[i], _, _ = met(row_at(work.condition, i), plane_at(axis, i))
+    work.lift[:], work.turn[:] = 0.0, 0.0  # W = 0 on the axis, of a mode also where another condition determines it
     for j in range(len(rows) - 1, outermost - 1, -1):
         row = rows[j]
         if row[ROW_KIND] == MARK:
@@ -237,22 +236,17 @@ def _beyond_segment(points: Any, row: Any, j: int, work: Work, reach: float, shi
 
 
 @inlined
-def drive_at(s: complex, ends: Any, theta: complex, M: complex) -> complex:
-    """Return the input of a response with that hub angle and moment on the hub."""
+def drive_at(s: complex, segment: Any, ends: Any, theta: complex, M: complex) -> tuple[complex, float]:
+    """Return the input of a response with that hub angle and moment on the hub, and its scale away from a pole.
+
+    The scale is that of its two terms, and of each with the motion of the other.
+    """
     A0, B0 = OF_ANGLE, OF_MOMENT
     of_angle = ends[A0] + s * (ends[A0 + 1] + s * (ends[A0 + 2] + s * ends[A0 + 3]))
-    return of_angle * theta - (ends[B0] + s * ends[B0 + 1]) * M
-
-
-@inlined
-def drive_terms(s: complex, segment: Any, ends: Any, theta: complex, M: complex) -> float:
-    """Return the scale of the drive away from a pole: its two terms, and each with the motion of the other."""
-    A0, B0 = OF_ANGLE, OF_MOMENT
-    of_angle = magnitude(ends[A0] + s * (ends[A0 + 1] + s * (ends[A0 + 2] + s * ends[A0 + 3])))
-    of_moment = magnitude(ends[B0] + s * ends[B0 + 1])
+    of_moment = ends[B0] + s * ends[B0 + 1]
     waves = impedance(magnitude(s * s), segment) * segment[BENDING] / segment[LENGTH]
-    crossed = of_angle * magnitude(M) / max(waves, 1.0) + of_moment * magnitude(theta) * waves
-    return of_angle * magnitude(theta) + of_moment * magnitude(M) + crossed
+    turned, bent = magnitude(theta) + magnitude(M) / max(waves, 1.0), magnitude(M) + magnitude(theta) * waves
+    return of_angle * theta - of_moment * M, magnitude(of_angle) * turned + magnitude(of_moment) * bent
 
 
 @compiled
@@ -264,53 +258,45 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
     theta, power of s, unit, C, weights of s theta and of the drive.  Digits are lost where two waves of a segment are
     nearly one, where an output is a small difference of fast waves, and where the drive is one, near a pole.
     """
-    differs = False
-    for o in range(len(table)):
-        differs = differs or (table[o, 0] >= 0.0 and table[o, 2] != 0.0)
+    differs = bool(np.any((table[:, 0] >= 0.0) & (table[:, 2] != 0.0)))
+    segment, marks = innermost(rows), np.nonzero(rows[:, ROW_KIND] == MARK)[0]
+    outermost = marks[0] if marks.size else len(rows)
     work, values = _work(len(rows)), np.empty((1 + len(table), BLOCK), np.complex128)
     points, lost_here = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_)
     for first in range(0, s.size, BLOCK):
         n = min(BLOCK, s.size - first)
-        points[:n] = s[first : first + n]
-        points[n:] = points[0]
+        here = slice(first, first + n)
+        points[:n], points[n:] = s[here], s[first]
         _sweep(points, rows, ends, work, lost_here)
         for i in range(BLOCK):
             at = min(first + min(i, n - 1), axis.shape[1] - 1)
             put_row(work.condition, i, (axis[0, at], axis[1, at], axis[2, at], axis[3, at]))
-        _drive(points, innermost(rows), ends, work.planes[len(rows)], values[0], lost_here)
-        _go_back(points, rows, work, differs, lost_here)
+        _drive(points, segment, ends, work.planes[len(rows)], values[0], lost_here)
+        _go_back(points, rows, outermost, work, differs, lost_here)
         for o in range(len(table)):
             _output(points, table[o], work, values[0], values[1 + o], lost_here)
-        found[0, first : first + n], found[1, first : first + n] = values[0, :n], work.scale[:n]
-        found[2:, first : first + n] = values[1:, :n]
-        lost[first : first + n] = lost_here[:n]
+        found[0, here], found[1, here], found[2:, here] = values[0, :n], work.scale[:n], values[1:, :n]
+        lost[here] = lost_here[:n]
 
 
 @inlined
 def innermost(rows: Any) -> Any:
     """Return the row of the segment at the hub."""
-    last = rows[0]
-    for j in range(len(rows)):
-        if rows[j, ROW_KIND] == SEGMENT:
-            last = rows[j]
-    return last
+    return rows[np.nonzero(rows[:, ROW_KIND] == SEGMENT)[0][-1]]
 
 
 @compiled
 def _drive(points: Any, segment: Any, ends: Any, plane: Any, drive: Any, lost: Any) -> None:
     """Compute the drive at every point of a block; digits are lost where it is small."""
     for i in range(BLOCK):
-        drive[i] = drive_at(points[i], ends, plane[i], plane[BLOCK + i])
-    for i in range(BLOCK):
-        terms = drive_terms(points[i], segment, ends, plane[i], plane[BLOCK + i])
+        drive[i], terms = drive_at(points[i], segment, ends, plane[i], plane[BLOCK + i])
         lost[i] = lost[i] or magnitude(drive[i]) < POLE * terms
 
 
 @compiled
 def _output(points: Any, want: Any, work: Work, drive: Any, value: Any, lost: Any) -> None:
     """Compute an output of the table at every point of a block; digits are lost where it is a small difference."""
-    j, field, of_theta, power = int(want[0]), BLOCK * int(want[1]), want[2], int(want[3])
-    unit, C, of_rate, of_drive = want[4], want[5], want[6], want[7]
+    j, field, of_theta, of_rate, of_drive = int(want[0]), BLOCK * int(want[1]), want[2], want[6], want[7]
     for i in range(BLOCK):
         value[i] = times(work.theta[i], of_theta)
     if of_drive != 0.0:
@@ -330,8 +316,4 @@ def _output(points: Any, want: Any, work: Work, drive: Any, value: Any, lost: An
                     value[i] = states[LIFT + field + i]
                 else:
                     lost[i] = lost[i] or magnitude(value[i]) < SMALL_DIFFERENCE * size
-    for _ in range(power):
-        for i in range(BLOCK):
-            value[i] *= points[i]
-    for i in range(BLOCK):
-        value[i] = times(value[i] * reciprocal(1.0 + C * points[i]), unit) if C else times(value[i], unit)
+    finish(points, int(want[3]), want[4], want[5], value)

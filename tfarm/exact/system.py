@@ -22,19 +22,20 @@ from itertools import takewhile
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Arm, Attachment, Link, RotarySpring, Theory
+from tfarm.arrays import Real
 from tfarm.errors import must_be_known
 from tfarm.records import record
 
 from .outputs import Side
 
+ZERO, ONE = Fraction(0), Fraction(1)
 Inertia = Fraction | float  # a fraction, or math.inf
 
 
 class Segment(NamedTuple):
-    """A uniform piece: a, b, g [s^2], sigma, C [s] (see `waves`), length/L, EI/EI of the first, depth/2 [m]."""
+    """A uniform piece: a, b, g [s^2], sigma, C [s] (see `waves`), length/L, EI/EI at the hub, depth/2 [m]."""
 
     a: Fraction
     b: Fraction
@@ -118,21 +119,21 @@ class Drive(NamedTuple):
     """
 
     turns: bool
-    inertia: Fraction
-    friction: Fraction
-    stiffness: Fraction
-    back_emf: Fraction
-    lag: Fraction
-    unit: Fraction
-    per_ampere: Fraction = Fraction(0)
+    inertia: Fraction = ZERO
+    friction: Fraction = ZERO
+    stiffness: Fraction = ZERO
+    back_emf: Fraction = ZERO
+    lag: Fraction = ZERO
+    unit: Fraction = ONE
+    per_ampere: Fraction = ZERO
 
     @property
     def of_angle(self) -> tuple[Fraction, ...]:
         """A_0..A_3."""
         if not self.turns:
-            return Fraction(1), Fraction(0), Fraction(0), Fraction(0)
-        Z = self.stiffness, self.friction, self.inertia
-        return Z[0], Z[1] + self.lag * Z[0] + self.back_emf, Z[2] + self.lag * Z[1], self.lag * Z[2]
+            return ONE, ZERO, ZERO, ZERO
+        k, b, J, lag = self.stiffness, self.friction, self.inertia, self.lag
+        return k, b + lag * k + self.back_emf, J + lag * b, lag * J
 
     @property
     def of_moment(self) -> tuple[Fraction, Fraction]:
@@ -147,8 +148,8 @@ def end_condition(inertia: Inertia) -> tuple[Fraction, Fraction, Fraction]:
     A finite inertia i gives (0, i, 1)/(1 + i), near one, an infinite one (1, 0, 0): motion = 0.
     """
     if not isinstance(inertia, Fraction):
-        return Fraction(1), Fraction(0), Fraction(0)
-    return Fraction(0), inertia / (1 + inertia), 1 / (1 + inertia)
+        return ONE, ZERO, ZERO
+    return ZERO, inertia / (1 + inertia), 1 / (1 + inertia)
 
 
 PAYLOAD, OUTER, BODY, INNER, NEXT = range(5)  # the order at one point, from the payload inwards
@@ -158,7 +159,7 @@ Placed = tuple[Fraction, int, Element]  # distance from the clamp (of a segment'
 
 def placed(elements: Iterable[Element]) -> Iterator[Placed]:
     """Yield the elements of a chain, from the payload inwards, with their places."""
-    position, is_beyond = Fraction(1), True
+    position, is_beyond = ONE, True
     for each in elements:
         is_beyond = is_beyond and isinstance(each, Offset)
         yield position, PAYLOAD if is_beyond else BODY if isinstance(each, Body) else NEXT, each
@@ -169,7 +170,7 @@ def cut(elements: Sequence[Placed]) -> tuple[Element, ...]:
     """Return elements in their order from the payload inwards, each segment cut where there is another one on it."""
     ordered = sorted(elements, key=lambda each: (-each[0], each[1]))
     found: list[Element] = []
-    for (position, _, each), inner_end in zip(ordered, [*(at for at, _, _ in ordered[1:]), Fraction(0)], strict=True):
+    for (position, _, each), inner_end in zip(ordered, [*(at for at, _, _ in ordered[1:]), ZERO], strict=True):
         if isinstance(each, Segment):
             segment = each
         else:
@@ -177,23 +178,6 @@ def cut(elements: Sequence[Placed]) -> tuple[Element, ...]:
         if inner_end < position:
             found.append(segment.piece((position - inner_end) / segment.length))
     return tuple(found)
-
-
-def double_double(value: Fraction) -> tuple[float, float]:
-    """Return the two floats whose sum is nearest to the fraction."""
-    high = float(value)
-    return high, float(value - Fraction(high))
-
-
-def uniform(link: Link, theory: Theory) -> tuple[Fraction, Fraction, Fraction, Fraction]:
-    """Return a, b, g [s^2] and sigma of a link under one of `THEORIES`.  Raises ParameterError for others."""
-    must_be_known("theory", theory, THEORIES)
-    length, density, E = Fraction(link.length), Fraction(link.density), Fraction(link.youngs_modulus)
-    kG = Fraction(link.shear_factor) * Fraction(link.shear_modulus)
-    area, EI = Fraction(link.section.area), stiffness_of(link)
-    a = density * length**2 / E * (theory in WITH_ROTARY_INERTIA)
-    b, sigma = (number * (theory in WITH_SHEAR) for number in (density * length**2 / kG, EI / (kG * area * length**2)))
-    return a, b, density * area * length**4 / EI, sigma
 
 
 def stiffness_of(link: Link) -> Fraction:
@@ -289,14 +273,9 @@ class System:
         """Whether drive and outputs are real at s = i w, up to odd powers of s: no dissipation and no lag."""
         return self.is_undamped and not self.drive.lag
 
-    @property
-    def input_unit(self) -> Fraction:
-        """The SI value of one unit of the input."""
-        return self.drive.unit
-
     def with_damping(self, share: float) -> System:
         """Return the chain with a share of all damping: C, dashpots, friction and back-EMF."""
-        parts: list[Element] = [
+        parts = [
             each._replace(damping=each.damping * share) if isinstance(each, Segment | Spring) else each
             for each in self.elements
         ]
@@ -310,13 +289,23 @@ class System:
 def system_of(arm: Arm, theory: Theory | None = None) -> System:
     """Return the system of an arm under its own theory, or another.  Raises ParameterError for an unknown one."""
     theory = theory or arm.theory
-    unit_length, EI = sum((Fraction(link.length) for link in arm.links), Fraction(0)), stiffness_of(arm.link)
+    must_be_known("theory", theory, THEORIES)
+    unit_length, EI = sum((Fraction(link.length) for link in arm.links), ZERO), stiffness_of(arm.link)
     translation, rotation = unit_length**3 / EI, unit_length / EI
 
     def segment(link: Link) -> Segment:
-        numbers = uniform(link, theory)
-        length, stiffness = Fraction(link.length) / unit_length, stiffness_of(link) / EI
-        return Segment(*numbers, link.damping, length, stiffness, link.section.half_depth)
+        length, area, bending = Fraction(link.length), Fraction(link.section.area), stiffness_of(link)
+        density, kG = Fraction(link.density) * length**2, Fraction(link.shear_factor) * Fraction(link.shear_modulus)
+        return Segment(
+            a=density / Fraction(link.youngs_modulus) * (theory in WITH_ROTARY_INERTIA),
+            b=density / kG * (theory in WITH_SHEAR),
+            g=density * area * length**2 / bending,
+            sigma=bending / (kG * area * length**2) * (theory in WITH_SHEAR),
+            damping=link.damping,
+            length=length / unit_length,
+            stiffness=bending / EI,
+            half_depth=link.section.half_depth,
+        )
 
     at_tip: list[Element] = [Offset(Fraction(arm.payload.offset) / unit_length)] if arm.payload.offset else []
     at_clamp = _springs(arm.clamp, rotation)
@@ -326,8 +315,8 @@ def system_of(arm: Arm, theory: Theory | None = None) -> System:
     for each in reversed(arm.attachments):
         body = _body(each, translation, rotation)
         if not (each.x or arm.hub.radius):  # on the axis, which is fixed, a spring has no effect
-            body = body._replace(stiffness=Fraction(0))
-        bodies.append((min(Fraction(each.x) / unit_length, Fraction(1)), BODY, body))
+            body = body._replace(stiffness=ZERO)
+        bodies.append((min(Fraction(each.x) / unit_length, ONE), BODY, body))
     return System(
         elements=cut([*placed([*at_tip, *map(segment, reversed(arm.links)), *at_clamp]), *bodies]),
         tip_mass=scaled_inertia(arm.payload.mass, translation),
@@ -335,7 +324,7 @@ def system_of(arm: Arm, theory: Theory | None = None) -> System:
         drive=hub_drive(arm, rotation),
         radius=Fraction(arm.hub.radius) / unit_length,
         offset=Fraction(arm.payload.offset) / unit_length,
-        gauge=Place(min(Fraction(arm.gauge.x) / unit_length, Fraction(1)), arm.gauge.side),
+        gauge=Place(min(Fraction(arm.gauge.x) / unit_length, ONE), arm.gauge.side),
         length=unit_length,
         EI=EI,
     )
@@ -343,25 +332,28 @@ def system_of(arm: Arm, theory: Theory | None = None) -> System:
 
 def hub_drive(arm: Arm, rotation: Fraction) -> Drive:
     """Return the drive of an arm's input; `rotation` is L/EI."""
-    hub, motor, none = arm.hub, arm.motor, Fraction(0)
+    hub, motor = arm.hub, arm.motor
     if arm.is_locked:
-        return Drive(False, none, none, none, none, none, Fraction(1))
-    inertia, friction, per_ampere = Fraction(hub.inertia), Fraction(hub.friction), Fraction(1)
-    lag = back_emf = none
-    if motor is not None:
-        N = Fraction(motor.gear_ratio)
-        inertia += N**2 * Fraction(motor.rotor_inertia)
-        friction += N**2 * Fraction(motor.rotor_friction)
-        per_ampere = Fraction(motor.gear_efficiency) * N * Fraction(motor.torque_constant)
-        back_emf = per_ampere * N * Fraction(motor.back_emf_constant) / Fraction(motor.resistance) * rotation
-        lag = Fraction(motor.inductance) / Fraction(motor.resistance)
-    per_torque = {"motor_current": 1 / per_ampere}.get(arm.input, Fraction(1))
-    if motor is not None and arm.input == "motor_voltage":
-        per_torque = Fraction(motor.resistance) / per_ampere
-    else:
-        lag = back_emf = none
-    own = inertia * rotation, friction * rotation, Fraction(hub.stiffness) * rotation
-    return Drive(True, *own, back_emf, lag, per_torque / rotation, per_ampere if motor is not None else none)
+        return Drive(turns=False)
+    inertia, friction, stiffness = (Fraction(each) * rotation for each in (hub.inertia, hub.friction, hub.stiffness))
+    drive = Drive(True, inertia, friction, stiffness, unit=1 / rotation)
+    if motor is None:
+        return drive
+    N, resistance = Fraction(motor.gear_ratio), Fraction(motor.resistance)
+    drive = drive._replace(
+        inertia=inertia + N**2 * Fraction(motor.rotor_inertia) * rotation,
+        friction=friction + N**2 * Fraction(motor.rotor_friction) * rotation,
+        per_ampere=Fraction(motor.gear_efficiency) * N * Fraction(motor.torque_constant),
+    )
+    if arm.input == "motor_current":
+        return drive._replace(unit=drive.unit / drive.per_ampere)
+    if arm.input == "motor_voltage":
+        return drive._replace(
+            back_emf=drive.per_ampere * N * Fraction(motor.back_emf_constant) / resistance * rotation,
+            lag=Fraction(motor.inductance) / resistance,
+            unit=drive.unit * resistance / drive.per_ampere,
+        )
+    return drive
 
 
 def _body(each: Attachment, translation: Fraction, rotation: Fraction) -> Body:
@@ -382,9 +374,9 @@ def _springs(spring: RotarySpring, rotation: Fraction) -> list[Element]:
     return [Spring(k / (1 + k), 1 / (1 + k), spring.damping)]
 
 
-def shear_flexibility(k: System, x: NDArray[np.float64]) -> NDArray[np.float64]:
+def shear_flexibility(k: System, x: Real) -> Real:
     """Return E I/(kappa G A L^2) at the shares x (1-D), E I and L those of the chain: W' = Psi + that Q."""
     inner = list(reversed(k.segments))
     edges = np.cumsum([float(each.length) for each in inner])[:-1]
-    own = np.array([float(each.sigma * each.length**2 / each.stiffness) for each in inner])
+    own = np.array([float(each.of_chain[3]) for each in inner])
     return np.asarray(own[np.searchsorted(edges, x, side="right")])

@@ -17,25 +17,22 @@ from .compiled import compiled, inlined
 from .layout import OF_ANGLE, OF_MOMENT
 from .pieces import (
     BLOCK,
-    DT1,
-    DT2,
     FUNCTIONS_SIZE,
     GS,
     NUMBERS_SIZE,
     S_SQUARED,
-    T1,
-    T2,
     D,
     all_wave_functions,
     all_wave_numbers,
+    finish,
     mark_parallel,
     mark_slow,
+    phases,
     put_plane,
     take_where,
-    times,
     waves_at,
 )
-from .sweep import POLE, drive_at, drive_terms, innermost
+from .sweep import POLE, drive_at, innermost
 from .waves import (
     SIGMA,
     A,
@@ -45,11 +42,9 @@ from .waves import (
     Plane,
     Row,
     Wave,
-    across_rows,
     across_waves,
     end_plane,
     magnitude,
-    met,
     reciprocal,
     tip_conditions,
     transition_rows,
@@ -63,7 +58,7 @@ DRIVE, SCALE, PARTS = 5, 6, 7  # the indices of drive and scale, and the number 
 
 
 @inlined
-def from_waves(one: Wave, two: Wave, gS: Number, d: Number, v_sum: Number, tip: Row) -> Row:
+def from_waves(one: Wave, two: Wave, gS: Number, d: Number, tip: Row) -> Row:
     """Return (theta, M0, Q0, W1) of the free response times g S d (z1 - z2)^2 e^{-(t1 + t2)}, from the two waves.
 
     The tip satisfies  tip_mass W + shear Q = 0  and  tip_inertia Psi + moment M = 0,  with (m s^2, 1) for a finite
@@ -71,9 +66,16 @@ def from_waves(one: Wave, two: Wave, gS: Number, d: Number, v_sum: Number, tip: 
     hub-locked frequencies and M0 at those of a pinned root.
     """
     (c1, s1, z1, _, e1), (c2, s2, z2, _, e2), (_, shear, inertia, moment) = one, two, tip
-    theta, M0, Q0, _, _ = across_waves(one, two, gS, d, v_sum, end_plane(*tip))
+    theta, M0, Q0, _, _ = across_waves(one, two, gS, d, end_plane(*tip))
     r1, r2 = inertia * c1 + moment * d * z1 * s1, inertia * c2 + moment * d * z2 * s2
     return theta, M0, Q0, shear * gS * (z1 - z2) * (r1 * e2 - r2 * e1)
+
+
+@inlined
+def _of_tip(row: Row, tip: Row) -> tuple[Number, Number]:
+    """Return a row of the transition matrix times two states of the tip's conditions, one with W and Q alone."""
+    mass, shear, inertia, moment = tip
+    return shear * row[0] - mass * row[3], moment * row[1] - inertia * row[2]
 
 
 @inlined
@@ -85,9 +87,11 @@ def from_transition(s: complex, row: Any, tip: Row) -> Plane:
     S, over_d, z_sum, z_product = wave_sums(s, row)
     F0, F1, F2, F3, F2_less_1, _ = transition_series(z_sum, z_product)
     of_W, of_Psi, of_M, of_Q = transition_rows(F0, F1, F2, F3, S, over_d, row[A], row[B], row[G], row[SIGMA])
-    theta, M0, Q0, _, _ = across_rows(of_W, of_Psi, of_M, of_Q, end_plane(*tip))
-    W1, _, _, _ = met(of_W, end_plane(*tip))  # not theta F2 + rest: that cancels for a heavy payload
-    return theta, M0, Q0, W1, theta * F2_less_1 + of_W[2] * M0 - of_W[3] * Q0
+    (W1, W2), (Psi1, Psi2) = _of_tip(of_W, tip), _of_tip(of_Psi, tip)
+    (M1, M2), (Q1, Q2) = _of_tip(of_M, tip), _of_tip(of_Q, tip)
+    theta, M, Q = W1 * Psi2 - W2 * Psi1, W1 * M2 - W2 * M1, W1 * Q2 - W2 * Q1  # of that sum with W = 0 at the root
+    at_tip = -tip[1] * W2  # not theta F2 + rest: that cancels for a heavy payload
+    return theta, M, Q, at_tip, theta * F2_less_1 + of_W[2] * M - of_W[3] * Q
 
 
 @compiled
@@ -97,46 +101,49 @@ def fill_ends(s: Any, rows: Any, ends: Any, table: Any, per_input: bool, found: 
     `rows` and `ends` are those of the layout.  A row of `table` is an output: the index of theta, M, Q, W or W - theta,
     power of s, unit, C of its gauge.  Outputs are those of a unit input with `per_input`, else times e^{-scale}.
     """
-    points, low = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_)
+    points, low, flags = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_), np.empty(BLOCK, np.bool_)
     numbers, functions = np.empty(NUMBERS_SIZE, np.complex128), np.empty(FUNCTIONS_SIZE, np.complex128)
     parts, of_slow = np.empty(PARTS * BLOCK, np.complex128), np.empty(PARTS * BLOCK, np.complex128)
     row = innermost(rows)
     small = 1.0 / max(1.0, np.abs(ends[OF_ANGLE:OF_MOMENT]).max())  # against overflow of squares of a heavy hub's drive
     for first in range(0, s.size, BLOCK):
         n = min(BLOCK, s.size - first)
-        points[:n], points[n:] = s[first : first + n], s[first]
+        here = slice(first, first + n)
+        points[:n], points[n:] = s[here], s[first]
         slow = mark_slow(points, row, low)
         if slow < BLOCK:
             all_wave_numbers(points, row, numbers)
             all_wave_functions(numbers, functions)
-            _by_waves(row, ends, numbers, functions, parts)
+            _by_waves(ends, numbers, functions, parts)
         if slow:
             other = parts if slow == BLOCK else of_slow
             _by_series(points, row, ends, other)
             if slow < BLOCK:
                 take_where(low, other, parts)
-        _driven(points, row, ends, small, per_input, parts, lost[first : first + n])
+        _driven(points, row, ends, small, per_input, parts, flags)
         if slow < BLOCK:
-            mark_parallel(numbers, low, lost[first : first + n])
-        if not per_input:
-            found[0, first : first + n] = parts[DRIVE * BLOCK : DRIVE * BLOCK + n]
-            found[1, first : first + n] = parts[SCALE * BLOCK : SCALE * BLOCK + n]
+            mark_parallel(numbers, low, flags)
+        lost[here] = flags[:n]
+        found[0, here], found[1, here] = parts[DRIVE * BLOCK :][:n], parts[SCALE * BLOCK :][:n]
         for o in range(len(table)):
-            _output(points, table[o], parts, n, found[o + 2 * (not per_input), first : first + n])
+            value = found[2 + o, here]
+            value[:] = parts[BLOCK * int(table[o, 0]) :][:n]
+            unit = table[o, 2] / LIFT if table[o, 0] == TIP else table[o, 2]
+            finish(points, int(table[o, 1]), unit, table[o, 3], value)
 
 
 @compiled
-def _by_waves(row: Any, ends: Any, numbers: Any, functions: Any, parts: Any) -> None:
+def _by_waves(ends: Any, numbers: Any, functions: Any, parts: Any) -> None:
     """Compute theta, M, Q, W and W - theta times e^{-scale}, and scale, by the two waves."""
     for i in range(BLOCK):
         S, d, gS = numbers[S_SQUARED + i], numbers[D + i], numbers[GS + i]
         one, two = waves_at(numbers, functions, i)
-        v_sum = S * (times(reciprocal(d), row[A]) - row[B])
-        theta, M, Q, W = from_waves(one, two, gS, d, v_sum, tip_conditions(ends, S))
+        theta, M, Q, W = from_waves(one, two, gS, d, tip_conditions(ends, S))
         gap = one[2] - two[2]
         unit = reciprocal(gS * d * gap * gap)
         put_plane(parts, i, (theta * unit, M * unit, Q * unit, (LIFT * W) * unit, (W - theta) * unit))
-        parts[SCALE * BLOCK + i] = numbers[T1 + i] + numbers[DT1 + i] + numbers[T2 + i] + numbers[DT2 + i]
+        t1, t2 = phases(numbers, i)
+        parts[SCALE * BLOCK + i] = t1 + t2
 
 
 @compiled
@@ -152,29 +159,10 @@ def _by_series(points: Any, row: Any, ends: Any, parts: Any) -> None:
 def _driven(points: Any, row: Any, ends: Any, small: float, per_input: bool, parts: Any, lost: Any) -> None:
     """Compute the drive of all points, mark lost digits, and with `per_input` divide all numbers by it."""
     for i in range(BLOCK):
-        drive = drive_at(points[i], ends, parts[i], parts[BLOCK + i])
+        drive, terms = drive_at(points[i], row, ends, parts[i], parts[BLOCK + i])
         parts[DRIVE * BLOCK + i] = drive
+        lost[i] = not magnitude(drive) > POLE * terms
         if per_input:
             over = small * reciprocal(small * drive)
             for j in range(DRIVE):
                 parts[j * BLOCK + i] *= over
-    for i in range(lost.size):
-        terms = drive_terms(points[i], row, ends, parts[i], parts[BLOCK + i])
-        drive = complex(1.0, 0.0) if per_input else parts[DRIVE * BLOCK + i]
-        lost[i] = not magnitude(drive) > POLE * terms
-
-
-@inlined
-def _output(points: Any, want: Any, parts: Any, n: int, value: Any) -> None:
-    """Compute an output of the table at n points of a block."""
-    start, power, C = BLOCK * int(want[0]), int(want[1]), want[3]
-    factor = want[2] / LIFT if want[0] == TIP else want[2]
-    for i in range(n):
-        found = parts[start + i]
-        found = found * points[i] if power == 1 else found
-        found = found * (points[i] * points[i]) if power == 2 else found
-        found = found * reciprocal(1.0 + C * points[i]) if C else found
-        value[i] = factor * found
-    for _ in range(power if power > 2 else 0):
-        for i in range(n):
-            value[i] *= points[i]

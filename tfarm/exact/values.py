@@ -10,10 +10,11 @@ appendix      the paper's 4x4 determinant and Cramer's rule with mpmath, at a pr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Annotated, Any, Literal, NamedTuple, cast
+from itertools import count, takewhile
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, cast, get_args
 
 import flint
 import numpy as np
@@ -21,13 +22,13 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, Theory
 from tfarm.arrays import Complex, Real
-from tfarm.errors import CertificationError, ParameterError, must_be_known
+from tfarm.errors import CertificationError, ParameterError, must_be_known, require
 from tfarm.records import record
 from tfarm.schema import Quantity
 
 from . import appendix
 from .balls import Ball, first_success, nearest_float, output_ball, point, rational
-from .layout import Layout, Readings, constant_of, readings
+from .layout import Layout, Reading, constant_of, readings
 from .outputs import Output
 from .series import expansion_at_zero
 from .sweep import AXIS, fill_free
@@ -35,8 +36,9 @@ from .system import Place, System
 from .uniform import fill_ends
 
 AT_A_POLE = 4 * float(np.finfo(float).eps)  # of |s|: the distance of a pole within which no digit is right
+_Found = TypeVar("_Found")
+
 PROVEN_BITS = 60  # more than a float64 has
-NO_NUMBER = "no {} at s = {:g} 1/s: it is a pole or a zero, or too close to one"
 MOST_ENCLOSURE_BITS = 1 << 18  # of working precision: at a pole no number of them is enough
 _UPPER_HALF = np.exp(1j * np.pi * np.arange(1, 8) / 8)
 SLOPE_CIRCLE = np.r_[1.0, _UPPER_HALF, -1.0, _UPPER_HALF[::-1].conj()]  # in conjugate pairs
@@ -61,25 +63,25 @@ def free_outputs(chain: System, wanted: Sequence[Output], s: Complex, x: float) 
     return _free(readings(chain, tuple(wanted), x), s)
 
 
-def _free(those: Readings, s: Complex) -> Free:
-    """Return the free response of a layout, by the fast path where it applies."""
-    found, lost = np.empty((2 + len(those.each), s.size), complex), np.empty(s.size, bool)
-    s, layout, ends = np.ascontiguousarray(s, dtype=complex), those.layout, those.ends_table
-    if ends is None:
-        fill_free(s, layout.rows, layout.ends, AXIS, those.table, found, lost)
-    else:
-        fill_ends(s, layout.rows, layout.ends, ends, False, found, lost)
-    return Free(found[0], found[2:], found[1], lost)
+def _free(layout: Layout, s: Complex, *, per_input: bool = False) -> Free:
+    """Return the free response, by the fast path where it applies, with outputs for a unit input if `per_input`."""
+    found, lost = np.empty((2 + len(layout.each), s.size), complex), np.empty(s.size, bool)
+    s = np.ascontiguousarray(s, dtype=complex)
+    if layout.ends_table is not None:
+        fill_ends(s, layout.rows, layout.ends, layout.ends_table, per_input, found, lost)
+        return Free(found[0], found[2:], found[1], lost)
+    fill_free(s, layout.rows, layout.ends, AXIS, layout.table, found, lost)
+    return Free(found[0], found[2:] / found[0] if per_input else found[2:], found[1], lost)
 
 
 def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -> tuple[Free, Free]:
     """Return the free response and its derivative at s (1-D), by Cauchy's integral on a circle, to rounding."""
-    those = readings(chain, tuple(wanted), x)
-    here = _free(those, s)
+    layout = readings(chain, tuple(wanted), x)
+    here = _free(layout, s)
     radius = SLOPE_RADIUS * np.maximum(abs(s), 1e-150) / np.maximum(1.0, abs(here.scale))
     for C in {each.damping for each in chain.segments if each.damping}:
         radius = np.minimum(radius, CLEAR_OF_SINGULAR * abs(s + 1.0 / C))
-    circle = _free(those, (s[:, None] + radius[:, None] * SLOPE_CIRCLE).ravel())
+    circle = _free(layout, (s[:, None] + radius[:, None] * SLOPE_CIRCLE).ravel())
     scales = circle.scale.reshape(-1, SLOPE_CIRCLE.size)
     here = here._replace(scale=np.where(np.isfinite(here.scale), here.scale, scales[:, 0]))
     values, slope = np.exp(scales - here.scale[:, None]), 1.0 / SLOPE_CIRCLE / radius[:, None]
@@ -106,16 +108,16 @@ def free_fields(
 
     The states satisfy axis . (W, Psi, M, Q) = 0 on the hub's axis, by default W = 0.
     """
-    different = tuple(dict.fromkeys(places))
-    if different not in chain.kept:
-        chain.kept[different] = Layout(chain, different)
-    layout = chain.kept[different]
-    order = [layout.places.index(place) for place in places]
-    rows = [(layout.marks[place], field, 0, 0, 1, 0, 0, 0) for place in layout.places for field in range(4)]
-    table = np.array([*rows, (-1, -1, 1, 0, 1, 0, 0, 0)], dtype=float)  # the last is the hub angle
-    found, lost = np.empty((2 + len(table), s.size), complex), np.empty(s.size, bool)
-    fill_free(np.ascontiguousarray(s, dtype=complex), layout.rows, layout.ends, axis, table, found, lost)
-    fields = found[2:-1].reshape(len(layout.places), 4, s.size).transpose(1, 2, 0)[:, :, order]
+    places = tuple(places)
+    if places not in chain.kept:
+        unit = 0, Fraction(1)  # power of s, and factor
+        each = [Reading(place, field, Fraction(0), *unit) for place in places for field in range(4)]
+        angle = Reading(None, -1, Fraction(1), *unit)
+        chain.kept[places] = Layout(chain, tuple(dict.fromkeys(places)), (*each, angle))
+    layout = chain.kept[places]
+    found, lost = np.empty((2 + len(layout.each), s.size), complex), np.empty(s.size, bool)
+    fill_free(np.ascontiguousarray(s, dtype=complex), layout.rows, layout.ends, axis, layout.table, found, lost)
+    fields = found[2:-1].reshape(len(places), 4, s.size).transpose(1, 2, 0)
     return fields, found[-1], found[1]
 
 
@@ -127,17 +129,9 @@ def evaluate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float =
 
     Raises ParameterError at a pole, naming it.
     """
-    s, those = np.ascontiguousarray(s, dtype=complex), readings(k, tuple(wanted), x)
     with np.errstate(all="ignore"):
-        if those.ends_table is not None:
-            values, lost = np.empty((len(wanted), s.size), complex), np.empty(s.size, bool)
-            fill_ends(s, those.layout.rows, those.layout.ends, those.ends_table, True, values, lost)
-        else:
-            free = _free(those, s)
-            values, lost = free.outputs / free.drive, free.lost
-    for i in np.flatnonzero(lost | ~np.isfinite(values).all(axis=0)):
-        values[:, i] = [value_with_care(k, each, complex(s[i]), x) for each in wanted]
-    return values
+        free = _free(readings(k, tuple(wanted), x), s, per_input=True)
+    return _with_care(k, wanted, s, x, free.outputs, free.lost, of_slope=False)
 
 
 def differentiate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float = 0.0) -> Complex:
@@ -145,8 +139,15 @@ def differentiate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: fl
     with np.errstate(all="ignore"):
         free, slopes = free_slopes(k, wanted, s, x)
         values: Complex = (slopes.outputs - free.outputs * slopes.drive / free.drive) / free.drive
-    for i in np.flatnonzero(free.lost | (s == 0) | ~np.isfinite(values).all(axis=0)):
-        values[:, i] = [value_with_care(k, each, complex(s[i]), x, of_slope=True) for each in wanted]
+    return _with_care(k, wanted, s, x, values, free.lost | (s == 0), of_slope=True)
+
+
+def _with_care(
+    k: System, wanted: Sequence[Output], s: Complex, x: float, values: Complex, lost: NDArray[np.bool_], of_slope: bool
+) -> Complex:
+    """Return values, those with lost digits by `value_with_care`."""
+    for i in np.flatnonzero(lost | ~np.isfinite(values).all(axis=0)):
+        values[:, i] = [value_with_care(k, each, complex(s[i]), x, of_slope=of_slope) for each in wanted]
     return values
 
 
@@ -159,10 +160,7 @@ def value_with_care(k: System, wanted: Output, s: complex, x: float = 0.0, *, of
     if s == 0:
         return complex(expansion_at_zero(k, wanted, x)[2 + of_slope])
     value = nearest_float(slope(k, wanted, s, x=x) if of_slope else enclose(k, wanted, s, bits=PROVEN_BITS, x=x))
-    if not np.isfinite(value):
-        raise ParameterError(
-            key="s", value=s, remedy=f"{wanted.name} is larger than any float64 there; choose another s"
-        )
+    require(np.isfinite(value), "s", s, f"{wanted.name} is larger than any float64 there; choose another s")
     return value
 
 
@@ -171,8 +169,8 @@ def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
     if constant_of(k, wanted, x) is not None:
         return
     if s == 0:
-        if any(expansion_at_zero(k, wanted, x)[:2]):
-            raise ParameterError(key="s", value=0, remedy="a pole: the arm turns as a rigid body there; choose s != 0")
+        is_finite = not any(expansion_at_zero(k, wanted, x)[:2])
+        require(is_finite, "s", 0, "a pole: the arm turns as a rigid body there; choose s != 0")
         return
     with np.errstate(all="ignore"):
         here, slopes = free_slopes(k, (), np.array([s]), 0.0)
@@ -194,7 +192,7 @@ def enclose(k: System, wanted: Output, s: complex, *, bits: int, x: float = 0.0)
         value = output_ball(k, wanted, point(s), x)
         return value if value is not None and (value.rel_accuracy_bits() >= bits or value.is_zero()) else None
 
-    return first_success(precisions(bits), attempt, CertificationError(NO_NUMBER.format(f"{bits} bits", s)))
+    return certified(bits, attempt, f"{bits} bits", s)
 
 
 def slope(k: System, wanted: Output, s: complex, *, bits: int = 60, x: float = 0.0) -> Ball:
@@ -209,7 +207,7 @@ def slope(k: System, wanted: Output, s: complex, *, bits: int = 60, x: float = 0
         is_known = (difference + value / point(s)).rel_accuracy_bits() >= bits or value.is_zero()
         return difference if is_known else None
 
-    return first_success(precisions(4 * bits), attempt, CertificationError(NO_NUMBER.format("derivative", s)))
+    return certified(4 * bits, attempt, "derivative", s)
 
 
 def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:
@@ -233,19 +231,21 @@ def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0
         enough = 3.33 * digits + 8
         return (re, im) if all(each.is_zero() or each.rel_accuracy_bits() >= enough for each in known) else None
 
-    return first_success(precisions(4 * digits), attempt, CertificationError(NO_NUMBER.format(f"{digits} digits", s)))
+    return certified(4 * digits, attempt, f"{digits} digits", s)
 
 
-def precisions(bits: int) -> Iterator[int]:
-    """Yield working precisions for a number of right bits, each twice the one before."""
-    working = 2 * bits + 64
-    while working < MOST_ENCLOSURE_BITS:
-        yield working
-        working *= 2
+def certified(bits: int, attempt: Callable[[], _Found | None], number: str, s: complex) -> _Found:
+    """Return the first result other than None at working precisions for that many right bits, each twice the last.
+
+    Raises CertificationError, naming the number and s, where none has one.
+    """
+    precisions = takewhile(lambda working: working < MOST_ENCLOSURE_BITS, ((2 * bits + 64) << n for n in count()))
+    failure = CertificationError(f"no {number} at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
+    return first_success(precisions, attempt, failure)
 
 
 Method = Literal["closed-form", "balls", "appendix"]
-METHODS: tuple[Method, ...] = ("closed-form", "balls", "appendix")
+METHODS: tuple[Method, ...] = get_args(Method)
 
 APPENDIX_DIGITS = 17  # of the appendix: more than a float64 holds
 METHODS_AGREE = 1e-14  # relative: some tens of roundings of a float64
@@ -332,8 +332,8 @@ def why_no_appendix(arm: Arm, theory: Theory, wanted: Sequence[Output] = ()) -> 
 
 def must_be_of_appendix(arm: Arm, theory: Theory, wanted: Sequence[Output] = ()) -> None:
     """Raise ParameterError where the appendix has no value."""
-    if words := why_no_appendix(arm, theory, wanted):
-        raise ParameterError(key="method", value="appendix", remedy=words)
+    words = why_no_appendix(arm, theory, wanted)
+    require(not words, "method", "appendix", words)
 
 
 def slow_values(method: Method, arm: Arm, k: System, wanted: Sequence[Output], s: Complex, x: float) -> Complex:

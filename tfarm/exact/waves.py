@@ -115,7 +115,7 @@ def magnitude(z: complex) -> float:
 
 @inlined
 def dispersion(s: complex, k: Any) -> tuple[complex, ...]:
-    """Return S, d, b S, g S and for both waves z, v = z - b S, t with its correction dt:  e^{-t_j} = e^{-t} (1 - dt).
+    """Return S, d, g S and for both waves z, v = z - b S, t with its correction dt:  e^{-t_j} = e^{-t} (1 - dt).
 
     `k` is the row of a segment: a, b, g as double-doubles, then sigma and C.
     """
@@ -137,7 +137,7 @@ def dispersion(s: complex, k: Any) -> tuple[complex, ...]:
 
     z1, v1, t1, dt1 = _corrected(z1, d, d_low, aS, aS_low, bS, bS_low, gS, gS_low)
     z2, v2, t2, dt2 = _corrected(z2, d, d_low, aS, aS_low, bS, bS_low, gS, gS_low)
-    return S, d, bS, gS, z1, v1, t1, dt1, z2, v2, t2, dt2
+    return S, d, gS, z1, v1, t1, dt1, z2, v2, t2, dt2
 
 
 @inlined
@@ -173,7 +173,7 @@ def _corrected(
 def fill_wave_numbers(s: Any, k: Any, found: Any) -> None:
     """Compute z, v and t of both waves at s (1-D), the larger z first: rows of `found` (6, n)."""
     for i in range(s.size):
-        _, _, _, _, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(s[i], k)
+        _, _, _, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(s[i], k)
         found[0, i], found[1, i], found[2, i] = z1, v1, t1 + dt1
         found[3, i], found[4, i], found[5, i] = z2, v2, t2 + dt2
 
@@ -275,6 +275,12 @@ def in_chain(wave: Wave, length: Number) -> Wave:
 
 
 @inlined
+def scaled(p: Plane, unit: Number) -> Plane:
+    """Return the plane times a number."""
+    return p[0] * unit, p[1] * unit, p[2] * unit, p[3] * unit, p[4] * unit
+
+
+@inlined
 def inside_offset(a: Number, p: Plane) -> Plane:
     """Return the plane inside a rigid massless offset: W + a Psi and M - a Q are its outer W and M."""
     WPsi, WM, WQ, PsiQ, MQ = p
@@ -311,10 +317,10 @@ def inside_body(translation: Number, rotation: Number, p: Plane) -> Plane:
 
 
 @inlined
-def across_waves(one: Wave, two: Wave, gS: Number, d: Number, v_sum: Number, p: Plane) -> Plane:
+def across_waves(one: Wave, two: Wave, gS: Number, d: Number, p: Plane) -> Plane:
     """Return the plane at the inner end of a segment from the outer one, times g S d (z1 - z2)^2 e^{-(t1 + t2)}.
 
-    v_j = z_j - b S and v1 v2 = g S/d, v_sum = v1 + v2 (see `waves`).
+    v_j = z_j - b S and v1 v2 = g S/d.
     """
     (c1, s1, z1, v1, e1), (c2, s2, z2, v2, e2) = one, two
     WPsi, WM, WQ, PsiQ, MQ = p
@@ -322,6 +328,7 @@ def across_waves(one: Wave, two: Wave, gS: Number, d: Number, v_sum: Number, p: 
     turned = d * gS * WPsi
     A, D = -gS * gap * WM, d * gap * PsiQ  # alpha_1 ^ alpha_2 and beta_1 ^ beta_2
     B, C = v1 * MQ - 2.0 * gS * WQ + v2 * turned, 2.0 * gS * WQ - v1 * turned - v2 * MQ  # a1 ^ b2, b1 ^ a2
+    v_sum = v1 + v2
     kept = (d * WQ * v_sum - MQ - turned) * (e1 * e2)  # v1 alpha_1 ^ beta_1 d/(g S)
     A, C, B, D = c1 * A - z1 * s1 * C, c1 * C - s1 * A, c1 * B - z1 * s1 * D, c1 * D - s1 * B
     A, B, C, D = c2 * A - z2 * s2 * B, c2 * B - s2 * A, c2 * C - z2 * s2 * D, c2 * D - s2 * C
@@ -363,12 +370,14 @@ def transition_rows(
 def _minor(i: Row, j: Row, p: Plane) -> Number:
     """Return q_ij of the carried plane: the minors of rows i and j times p."""
     WPsi, WM, WQ, PsiQ, MQ = p
+    i0, i1, i2, i3 = i
+    j0, j1, j2, j3 = j
     return (
-        (i[0] * j[1] - i[1] * j[0]) * WPsi
-        + (i[0] * j[2] - i[2] * j[0]) * WM
-        + (i[0] * j[3] - i[3] * j[0] - i[1] * j[2] + i[2] * j[1]) * WQ
-        + (i[1] * j[3] - i[3] * j[1]) * PsiQ
-        + (i[2] * j[3] - i[3] * j[2]) * MQ
+        (i0 * j1 - i1 * j0) * WPsi
+        + (i0 * j2 - i2 * j0) * WM
+        + (i0 * j3 - i3 * j0 - i1 * j2 + i2 * j1) * WQ
+        + (i1 * j3 - i3 * j1) * PsiQ
+        + (i2 * j3 - i3 * j2) * MQ
     )
 
 
@@ -382,11 +391,12 @@ def across_rows(W: Row, Psi: Row, M: Row, Q: Row, p: Plane) -> Plane:
 def met(f: Row, p: Plane) -> Row:
     """Return the state (W, Psi, M, Q) of the plane p with f z = 0, up to one factor."""
     WPsi, WM, WQ, PsiQ, MQ = p
+    W, Psi, M, Q = f
     return (
-        -f[1] * WPsi - f[2] * WM - f[3] * WQ,
-        f[0] * WPsi + f[2] * WQ - f[3] * PsiQ,
-        f[0] * WM - f[1] * WQ - f[3] * MQ,
-        f[0] * WQ + f[1] * PsiQ + f[2] * MQ,
+        -Psi * WPsi - M * WM - Q * WQ,
+        W * WPsi + M * WQ - Q * PsiQ,
+        W * WM - Psi * WQ - Q * MQ,
+        W * WQ + Psi * PsiQ + M * MQ,
     )
 
 
@@ -415,8 +425,9 @@ def row_across_waves(one: Wave, two: Wave, gS: Number, d: Number, f: Row) -> Row
     c, s of both waves are scaled by the same factor.
     """
     (c1, s1, z1, v1, _), (c2, s2, z2, v2, _) = one, two
-    even1, odd1 = f[0] + d * v1 * f[2], v1 * f[1] + gS * f[3]
-    even2, odd2 = f[0] + d * v2 * f[2], v2 * f[1] + gS * f[3]
+    W, Psi, M, Q = f
+    even1, odd1 = W + d * v1 * M, v1 * Psi + gS * Q
+    even2, odd2 = W + d * v2 * M, v2 * Psi + gS * Q
     even1, odd1 = c1 * even1 - s1 * odd1, c1 * odd1 - z1 * s1 * even1
     even2, odd2 = c2 * even2 - s2 * odd2, c2 * odd2 - z2 * s2 * even2
     return (
@@ -430,9 +441,10 @@ def row_across_waves(one: Wave, two: Wave, gS: Number, d: Number, f: Row) -> Row
 @inlined
 def row_across(W: Row, Psi: Row, M: Row, Q: Row, f: Row) -> Row:
     """Return the condition carried outwards by `transition_rows`, f T^-1."""
+    f_W, f_Psi, f_M, f_Q = f
     return (
-        f[0] * W[0] + f[1] * Psi[0] + f[2] * M[0] + f[3] * Q[0],
-        f[0] * W[1] + f[1] * Psi[1] + f[2] * M[1] + f[3] * Q[1],
-        f[0] * W[2] + f[1] * Psi[2] + f[2] * M[2] + f[3] * Q[2],
-        f[0] * W[3] + f[1] * Psi[3] + f[2] * M[3] + f[3] * Q[3],
+        f_W * W[0] + f_Psi * Psi[0] + f_M * M[0] + f_Q * Q[0],
+        f_W * W[1] + f_Psi * Psi[1] + f_M * M[1] + f_Q * Q[1],
+        f_W * W[2] + f_Psi * Psi[2] + f_M * M[2] + f_Q * Q[2],
+        f_W * W[3] + f_Psi * Psi[3] + f_M * M[3] + f_Q * Q[3],
     )

@@ -100,12 +100,12 @@ class AxisSweep(Sweep):
     def __init__(self, system: System, omega: Ball, counting: bool) -> None:
         self._counting, self.number = counting, 0
         self._free = sum(not isinstance(end, float) for end in (system.tip_mass, system.tip_inertia))
-        super().__init__(readings(system, (), 0.0).layout, flint.arb(0), -omega * omega)
+        super().__init__(readings(system, (), 0.0), flint.arb(0), -omega * omega)
 
     @property
     def drive(self) -> Ball:
         """D(i omega)."""
-        return self.input + self.S * self.numbers.of_angle[2] * self.theta
+        return self.input + self.S * self.A[2] * self.theta
 
     def _inside(self, element: Any, p: Plane) -> Plane:
         if isinstance(element, Segment):
@@ -117,16 +117,15 @@ class AxisSweep(Sweep):
 
     def _joined(self, element: Any, p: Plane) -> Plane:
         a, b, g, *_ = element
-        S, EI, own = self.S, element.stiffness, real_waves(a, b, g, self.S)
+        own, EI, gS = real_waves(a, b, g, self.S), element.stiffness, self.S * element.of_chain[2]
         one, two = (in_chain(wave, element.length) for wave in own)
-        (a, b, g, _), gap = element.of_chain, one[2] - two[2]
-        gS, v_sum = S * g, S * (a / EI - b)
+        gap = one[2] - two[2]
         unit = 1 / (gS * EI * gap * gap)
-        inside = tuple(part * unit for part in across_waves(one, two, gS, EI, v_sum, p))
+        inside = tuple(part * unit for part in across_waves(one, two, gS, EI, p))
         if self._counting:
             zero = flint.arb(0)
             clamped = (zero, zero, zero, zero, flint.arb(1))
-            r = [part * unit for part in across_waves(one, two, gS, EI, v_sum, clamped)]
+            r = [part * unit for part in across_waves(one, two, gS, EI, clamped)]
             self._count_segment([wave[2] for wave in own], p, inside, r)
         self._free = 2
         return inside
