@@ -1,6 +1,5 @@
 """The chain against the plain product of transition matrices, against itself cut up, and against the paper's arm."""
 
-import math
 from dataclasses import replace
 from fractions import Fraction
 from itertools import product
@@ -10,23 +9,17 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.outputs import OF_ONE_LINK
 from tests.rigs import some_point, some_rig
 from tests.shared import thinned
-from tests.strategies import some_arm
 from tests.test_chain_elements import lossless
 from tests.test_transition import rig
 from tests.transition import determinant, response
 from tfarm import Hub
-from tfarm.arm import THEORIES, Attachment, Motor, RotarySpring
+from tfarm.arm import THEORIES, Motor, RotarySpring
 from tfarm.errors import ParameterError
-from tfarm.exact.layout import readings
 from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.exact.series import expansion_at_zero
-from tfarm.exact.sweep import AXIS, fill_free
-from tfarm.exact.system import Place, system_of
-from tfarm.exact.uniform import fill_ends
-from tfarm.exact.values import free_fields
+from tfarm.exact.system import system_of
 from tfarm.spectrum.frequencies import natural_frequencies
 
 EPS = np.finfo(float).eps
@@ -76,9 +69,14 @@ def test_every_output_of_a_rig_with_everything(drive, s):
     assert error(transfer_of(arm, 0.625), s, oracle(arm, s, 0.625)) < LOST
 
 
-@pytest.mark.parametrize("drive", ["hub_torque", "motor_voltage", "motor_current"])
-def test_the_current_of_the_motor(drive):
-    arm, s = rig(input=drive), -4 + 900j
+FLEX = tfarm.load("quanser-flexlink")
+
+
+@pytest.mark.parametrize(
+    "arm", [*(rig(input=drive) for drive in INPUTS[:3]), *(replace(FLEX, input=drive) for drive in INPUTS[:3])]
+)
+def test_the_current_of_the_motor(arm):
+    s = -4 + 900j
     exact = response(arm, s, ["motor_current"], 40)
     G = tfarm.transfer(arm, "motor_current")
     assert error(tfarm.transfer(arm, ["motor_current"]), s, list(exact.values())) < LOST
@@ -157,43 +155,24 @@ def test_digits_of_elastic_links_with_another_loss(loss):
         assert (mpmath.mpf(im) != 0) == (exact.imag != 0)
 
 
-@pytest.mark.parametrize("seed", thinned(range(8), 4))
+def rig_and_point(seed):
+    """A random rig with a point, or high up, where many waves stand along the rig."""
+    rng = np.random.default_rng([2, seed or 0])
+    arm = some_rig(rng) if seed is not None else rig()
+    return (arm, some_point(rng, arm), float(rng.uniform(0, arm.length))) if seed is not None else (arm, 40 + 6e4j, 0.4)
+
+
+@pytest.mark.parametrize("seed", thinned([*range(8), None], 4))
 def test_derivatives_are_differences_of_the_oracle(seed):
     """Cauchy's integral has the error of a value over the circle's radius, |s| over the phase of all waves."""
-    rng = np.random.default_rng([2, seed])
-    arm = some_rig(rng)
-    s, x = some_point(rng, arm), float(rng.uniform(0, arm.length))
+    arm, s, x = rig_and_point(seed)
     h = 2.0**-60 * abs(s)  # the square of 2^-60 is far below what is asked
-    with mpmath.workdps(60):
-        right, left = (oracle(arm, mpmath.mpc(s) + sign * h, x, 60) for sign in (1, -1))
+    with mpmath.workdps(80):
+        right, left = (oracle(arm, mpmath.mpc(s) + sign * h, x, 80) for sign in (1, -1))
         exact = np.array([complex((a - b) / (2 * h)) for a, b in zip(right, left, strict=True)])
         sizes = abs(exact) + abs(np.array([complex(value) for value in right])) / abs(s)
     found = transfer_of(arm, x).derivative(s)
     assert (abs(found - exact) <= 1e-12 * sizes + 1e-40).all()
-
-
-def test_derivatives_where_many_waves_stand_along_the_rig():
-    """High up the circle must shrink with the phase of the waves, or its 16 points no longer tell the slope."""
-    arm, s = rig(), 40 + 6e4j
-    h = 2.0**-60 * abs(s)
-    with mpmath.workdps(80):
-        right, left = (oracle(arm, mpmath.mpc(s) + sign * h, 0.4, 80) for sign in (1, -1))
-        exact = np.array([complex((a - b) / (2 * h)) for a, b in zip(right, left, strict=True)])
-    assert abs(transfer_of(arm, 0.4).derivative(s) / exact - 1).max() < 1e-9
-
-
-def test_fields_along_a_rig():
-    """W, Psi, M and Q at places against transition matrices: ratios of each, free of units; a joint has two sides."""
-    arm, s = rig(), 5 + 300j
-    shares = [Fraction(1, 8), Fraction(1, 3), Fraction(3, 4), Fraction(1)]
-    fields, theta, _ = free_fields(system_of(arm), np.array([s]), [Place(each) for each in shares])
-    names = ("displacement", "rotation", "moment", "shear")
-    wanted = [(name, point_of(arm, each)) for name in names for each in shares]
-    found = response(arm, s, [*wanted, "hub_angle"], 40)
-    exact = np.array([complex(found[each]) for each in wanted]).reshape(4, 4)
-    inside = slice(0, 3)  # at the tip moment and shear are what the payload takes
-    assert fields[:, 0, inside] / fields[:, 0, :1] == pytest.approx(exact[:, inside] / exact[:, :1], rel=1e-11)
-    assert fields[1, 0] / theta[0] == pytest.approx(exact[1] / complex(found["hub_angle"]), rel=1e-11)
 
 
 def free_rig(**changes):
@@ -277,36 +256,6 @@ def test_a_value_does_not_depend_on_the_points_beside_it(seed):
     s = rng.permutation(first * np.geomspace(1e-2, 1e2, 77)) * np.exp(1j * rng.uniform(0.3, 1.5))
     G = tfarm.transfer(arm, ["hub_angle", "root_moment", "tip_displacement"])
     np.testing.assert_array_equal(G(s), np.array([G(each) for each in s]).T)
-
-
-def test_what_is_zero_or_rigid_leaves_the_papers_arm():
-    arm = tfarm.load("sasaki2012-lab")
-    hub = Hub(inertia=arm.hub.inertia, radius=0.0, friction=0.0, stiffness=0.0)
-    same = replace(arm, hub=hub, clamp=RotarySpring(stiffness=math.inf), joint=RotarySpring(stiffness=math.inf))
-    assert system_of(same) == system_of(arm)
-    assert system_of(arm).is_uniform
-    heavier = replace(arm, attachments=(Attachment(x=0.1, mass=1.0),))
-    assert not system_of(heavier).is_uniform
-
-
-@pytest.mark.parametrize("seed", thinned(range(12), 6))
-def test_the_fused_kernel_of_one_link_says_what_the_sweep_says(seed):
-    """Drive and outputs at the ends of one uniform link, slow and fast: with the scale of each they are the same."""
-    rng = np.random.default_rng([3, seed])
-    arm = some_arm(rng)
-    wanted = tuple(OF_ONE_LINK[name] for name in ENDS if name in OF_ONE_LINK)
-    s = np.array([some_point(rng, arm) * 10 ** rng.uniform(-4, 0) for _ in range(40)])
-    layout, lost = readings(system_of(arm), wanted, 0.0), np.empty(s.size, bool)
-    fused, swept, per_input = np.empty((3, 2 + len(wanted), s.size), complex)
-    fill_ends(s, layout.rows, layout.ends, layout.ends_table, False, fused, lost)
-    fill_free(s, layout.rows, layout.ends, AXIS, layout.table, swept, lost)
-    swept[2:] = swept[2:] * np.exp(swept[1] - fused[1])
-    swept[0] = swept[0] * np.exp(swept[1] - fused[1])
-    here, there = fused[[0, *range(2, len(fused))]], swept[[0, *range(2, len(fused))]]
-    condition = 1 + abs(fused[1])  # the phase of all waves, whose last bits the scales have apart
-    assert (abs(here - there) <= 1e-14 * condition * (abs(there) + abs(here))).all()
-    fill_ends(s, layout.rows, layout.ends, layout.ends_table, True, per_input, lost)
-    assert (abs(per_input[2:] * fused[0] - fused[2:]) <= 16 * EPS * abs(fused[2:])).all()
 
 
 @pytest.mark.parametrize("theory", THEORIES)
