@@ -10,7 +10,7 @@ import pytest
 import tfarm
 from tfarm.arm import FED_BACK, Hub, HubFeedback, Law
 from tfarm.dsp import Chain, Converters, Sampling, circle, pulse_transfer, sampled_loop, sampled_verdict
-from tfarm.dsp.circle import Circle, Discs, _Arcs, complete_band, product
+from tfarm.dsp.circle import Arcs, Circle, Discs, complete_band, product
 from tfarm.dsp.crossings import crossing_factors, stable_windows
 from tfarm.dsp.edges import Figure, shown_delay, whole_loop
 from tfarm.dsp.verdict import Verdict
@@ -118,7 +118,7 @@ def test_a_disc_about_a_point_is_as_wide_as_rounding_next_to_a_pole_too():
     plant = loop.plant
     q = np.angle(loop.pulse.multipliers[0]) + np.array([1e-9, 1e-5, 0.3])
     circle = Circle(loop, np.ones(plant.poles.size, bool), np.zeros(3))
-    found = circle._summed(_Arcs(q, q), plant.poles, plant.residues)
+    found = circle.summed(Arcs(q, 0 * q), plant.residues)
     with mpmath.workdps(40):
         z = [mpmath.expj(mpmath.mpf(each)) for each in q]
         b = [mpmath.exp(mpmath.mpc(each) * T) for each in plant.poles]

@@ -122,7 +122,7 @@ def test_small_run_of_the_survey(number):
 
 def values_of(in_z, delta):
     """What each part multiplies each signal by (parts, signals, n), at z = 1 + delta."""
-    values = np.zeros((len(in_z.parts), len(in_z.signals), delta.size), complex)
+    values = np.zeros((len(in_z.part_poles), len(in_z.signals), delta.size), complex)
     for part, row, gain, zeros in in_z.terms:
         values[part, row] += gain * (delta[:, None] - zeros).prod(axis=1)
     return values / (delta[:, None] - in_z.poles).prod(axis=1)

@@ -16,7 +16,7 @@ from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.dsp import Chain, Sampling, sampled_loop, stable_windows
 from tfarm.dsp.circle import complete_band
 from tfarm.dsp.crossings import circle_grid, crossing_factors, number_crossings, stable_factors
-from tfarm.dsp.discretise import by_scipy, discretised, matched, tustin
+from tfarm.dsp.discretise import by_factors, by_scipy, discretised, tustin
 from tfarm.dsp.edges import whole_loop
 from tfarm.dsp.modes import mode_table
 from tfarm.dsp.verdict import sampled_numbers, sampled_verdict
@@ -258,7 +258,7 @@ def test_the_rules_are_those_of_python_control(name, rule):
         "tustin": lambda: tustin(block, T),
         "prewarped": lambda: tustin(block, T, warp),
         "zoh": lambda: by_scipy(block, T, "zoh"),
-        "matched": lambda: matched(block, T),
+        "matched": lambda: by_factors(block, "matched", T, 2 / T),
     }[rule]()
     method = {"tustin": "bilinear", "prewarped": "bilinear"}.get(rule, rule)
     others = {"prewarp_frequency": warp} if rule == "prewarped" else {}

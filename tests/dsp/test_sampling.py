@@ -11,8 +11,7 @@ from tests.odd_arms import odd_arms
 from tests.strategies import arm_of
 from tfarm.arm import FED_BACK, HubFeedback
 from tfarm.dsp import Chain, Sampling, pulse_transfer, sampled_loop
-from tfarm.dsp.plant import sensed_plant, undelayed_plant, with_filter
-from tfarm.dsp.sampling import PulseTransfer
+from tfarm.dsp.plant import PulseTransfer, sensed_plant, undelayed_plant, with_filter
 from tfarm.errors import ParameterError
 from tfarm.reduced import modal_model
 

@@ -17,9 +17,6 @@ from tfarm.dsp.modes import dominant
 from tfarm.dsp.results import (
     ideal_chain,
     limit_cycle,
-    residual_moment_rms,
-    residual_raw_moment_rms,
-    settling_time,
     simulated_run,
 )
 from tfarm.dsp.scenarios import SCENARIOS
@@ -271,19 +268,19 @@ def test_running_away_is_said_with_its_time_and_mode(lab):
 def test_settling_and_residual_by_hand(lab):
     run = simulator(lab).linear(GAINS)
     moment, vibration = abs(run.at_samples.root_moment), run.at_samples.root_moment - run.scenario.rigid_moment
-    assert residual_moment_rms(run) == pytest.approx(np.sqrt(np.mean(vibration[100:] ** 2)), rel=1e-12)
-    assert residual_raw_moment_rms(run) == pytest.approx(np.sqrt(np.mean(moment[100:] ** 2)), rel=1e-12)
-    k = round(settling_time(run) / T)
+    assert run.residual_moment == pytest.approx(np.sqrt(np.mean(vibration[100:] ** 2)), rel=1e-12)
+    assert run.residual_raw == pytest.approx(np.sqrt(np.mean(moment[100:] ** 2)), rel=1e-12)
+    k = round(run.settling_time / T)
     assert moment[k:].max() <= 0.05 * moment.max() < moment[k - 1]
 
 
 @pytest.mark.parametrize("more", [0, 1])
 def test_a_settling_time_has_a_tenth_of_the_record_after_it(lab, more):
     """The same run, ended a sample before nine tenths are over at the settling time, and right there."""
-    k = round(settling_time(simulator(lab).linear(GAINS)) / T)
+    k = round(simulator(lab).linear(GAINS).settling_time / T)
     n = math.ceil(k / 0.9) - 1 + more  # samples after the first
-    settled = settling_time(simulator(lab, duration=n * T).linear(GAINS))
-    assert settled == (pytest.approx(k * T, rel=1e-12) if more else math.inf)
+    settled = simulator(lab, duration=n * T).linear(GAINS).settling_time
+    assert settled == (pytest.approx(k * T, rel=1e-12) if more else None)
 
 
 def test_what_cannot_be_simulated_is_refused(lab):

@@ -158,15 +158,14 @@ def sampled_verdict(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count:
     band = complete_band(largest)
     full = largest if band is None else band.full
     proven, radius = None if band is None else band.circle().count(full.weights), full.poles.log_spectral_radius
-    number = min(FEWEST_COMPARED, full.plant.count // 2)
-    while True:
-        loop = resized(full, number) if 0 < number < full.plant.count else full
-        agrees = abs(loop.poles.log_spectral_radius - radius) <= RADIUS_AGREES * abs(radius) + RADIUS_NOISE
-        if agrees and loop.poles.unstable == full.poles.unstable and proven in (None, loop.poles.unstable):
-            break
-        if loop is full:
-            break
-        number *= 2
+
+    def agrees(fewer: Sampled) -> bool:
+        is_near = abs(fewer.poles.log_spectral_radius - radius) <= RADIUS_AGREES * abs(radius) + RADIUS_NOISE
+        return is_near and fewer.poles.unstable == full.poles.unstable and proven in (None, fewer.poles.unstable)
+
+    few, most = min(FEWEST_COMPARED, full.plant.count // 2), full.plant.count
+    loops = (resized(full, few << n) for n in range(most.bit_length()) if 0 < few << n < most)
+    loop = next(filter(agrees, loops), full)
     is_proven = proven is not None and loop.poles.is_determined and (proven == 0) == (loop.poles.unstable == 0)
     return Verdict(loop, band if is_proven else None, is_converged=loop is not full)
 
