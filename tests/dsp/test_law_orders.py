@@ -44,7 +44,7 @@ def test_five_poles_next_to_one_are_no_integrator():
     assert verdict.log_radius == pytest.approx(slowest * 0.0005, rel=1e-3)
     assert low == 0 < 1 < high
     assert [is_stable(SLOW.times(each * high), chain) for each in (1e-6, 1 - 1e-6, 1 + 1e-6)] == [True, True, False]
-    (number,) = analysis.numbers
+    (number,) = analysis.stability_intervals
     assert number.interval == pytest.approx((low, high), rel=1e-9)
 
 
