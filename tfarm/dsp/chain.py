@@ -175,10 +175,10 @@ class Chain:
 def chain_or_usual(chain: object) -> Chain:
     """Return the chain; for None 10 ms and ideal converters.  Raises ParameterError for anything else."""
     chain = Chain() if chain is None else chain
-    if not isinstance(chain, Chain):
-        remedy = "give a tfarm.dsp.Chain, as tfarm.dsp.load_chain reads one; nothing for 10 ms and ideal converters"
-        raise ParameterError(key="chain", value=chain, remedy=remedy)
-    return chain
+    if isinstance(chain, Chain):
+        return chain
+    remedy = "give a tfarm.dsp.Chain, as tfarm.dsp.load_chain reads one; nothing for 10 ms and ideal converters"
+    raise ParameterError(key="chain", value=chain, remedy=remedy)
 
 
 def _above_zero(key: str, value: object, remedy: str) -> float:

@@ -31,7 +31,7 @@ from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace
 from tfarm.arm.law import Law, Part, is_measured
 from tfarm.arrays import Complex, Real
 from tfarm.dsp.chain import MOST_DELAY, Chain
-from tfarm.errors import ParameterError
+from tfarm.errors import ParameterError, require
 from tfarm.exact.rationals import block_factors
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -48,13 +48,12 @@ def discretised(law: Law, period: float) -> Law:
     Raises ParameterError for a law in z with another period, and for a law that its rule is not defined for.
     """
     if law.period is not None:
-        if abs(law.period - period) > SAME_PERIOD * period:
-            remedy = f"the period of the law is {law.period:g} s, that of the chain {period:g} s; make them equal"
-            raise ParameterError(key="period", value=law.period, remedy=remedy)
+        remedy = f"the period of the law is {law.period:g} s, that of the chain {period:g} s; make them equal"
+        require(abs(law.period - period) <= SAME_PERIOD * period, "period", law.period, remedy)
         return law
-    if law.prewarp and (law.rule != "tustin" or law.prewarp * period >= math.pi):
-        remedy = f"tustin keeps the values at a frequency below half the sample rate, {math.pi / period:.4g} rad/s"
-        raise ParameterError(key="prewarp", value=law.prewarp, remedy=remedy)
+    remedy = f"tustin keeps the values at a frequency below half the sample rate, {math.pi / period:.4g} rad/s"
+    is_kept = not law.prewarp or (law.rule == "tustin" and law.prewarp * period < math.pi)
+    require(is_kept, "prewarp", law.prewarp, remedy)
     parts = tuple(Part(part.signals, _in_z(part, law, period)) for part in law.parts)
     return replace(law, parts=parts, period=period, prewarp=0.0)
 
@@ -69,20 +68,19 @@ def rule_in_words(law: Law) -> str:
 
 def _in_z(part: Part, law: Law, period: float) -> LawBlock:
     """A block of the law in z."""
-    block, key = part.block, f"law.{part.signals[0]}.num"
-    if block.excess > 0 and law.rule != "tustin":
-        remedy = f"the rule {law.rule} is not for a law that differentiates: add a pole to den, or take tustin"
-        raise ParameterError(key=key, value=law.name, remedy=remedy)
+    block, rule = part.block, law.rule
+    remedy = f"the rule {rule} is not for a law that differentiates: add a pole to den, or take tustin"
+    require(block.excess <= 0 or rule == "tustin", f"law.{part.signals[0]}.num", law.name, remedy)
     if not block.order and block.excess <= 0:
         return block
-    if law.rule == "matched":
-        if isinstance(block, StateSpace):
-            remedy = "matched is for zeros and poles of one signal; take tustin or zoh for matrices"
-            raise ParameterError(key="rule", value=law.rule, remedy=remedy)
-        return by_factors(block, "matched", period, prewarped(period, 0.0))
-    if law.rule == "zoh":
+    if rule == "tustin":
+        return tustin(block, period, law.prewarp)
+    if rule == "zoh":
         return by_scipy(block, period, "zoh")
-    return tustin(block, period, law.prewarp)
+    if isinstance(block, Rational):
+        return by_factors(block, "matched", period, prewarped(period, 0.0))
+    remedy = "matched is for zeros and poles of one signal; take tustin or zoh for matrices"
+    raise ParameterError(key="rule", value=rule, remedy=remedy)
 
 
 def tustin(block: LawBlock, period: float, prewarp: float = 0.0) -> LawBlock:
@@ -91,9 +89,8 @@ def tustin(block: LawBlock, period: float, prewarp: float = 0.0) -> LawBlock:
     if isinstance(block, Rational) and block.excess > 0:
         return by_factors(block, "tustin", period, c)
     A = block.matrices()[0]
-    if np.linalg.cond(np.eye(len(A)) - A / c) > 1 / np.finfo(float).eps:
-        remedy = f"the law has a pole at {c:g} 1/s, which this rule maps to infinity; take another rule or period"
-        raise ParameterError(key="rule", value="tustin", remedy=remedy)
+    remedy = f"the law has a pole at {c:g} 1/s, which this rule maps to infinity; take another rule or period"
+    require(np.linalg.cond(np.eye(len(A)) - A / c) <= 1 / np.finfo(float).eps, "rule", "tustin", remedy)
     return by_scipy(block, 2 / c, "bilinear")
 
 
@@ -124,8 +121,7 @@ def with_all_gains(arm: Arm, law: AnyLaw) -> Law:
     Raises ParameterError for the algebraic loop, I_h = 0 and K2 != 0, and for a gain that is too large.
     """
     law = as_law(law)
-    gains = law.gains if set(law.signals) <= set(law.references) else None
-    if gains is None:
+    if (gains := law.gains) is None or not set(law.signals) <= set(law.references):
         return law
     if gains.K2:
         must_not_be_algebraic(arm, MOMENT_GAIN, gains.K2)
@@ -141,9 +137,8 @@ def acting_law(arm: Arm, law: Law, chain: Chain) -> tuple[Law, Chain]:
     """
     T = chain.sampling.period
     samples = chain.sampling.delay_samples + law.delay / T
-    if samples > MOST_DELAY:
-        remedy = f"with the delay of the chain it is {samples:.4g} samples; at most {MOST_DELAY:g}"
-        raise ParameterError(key="delay", value=law.delay, remedy=remedy)
+    remedy = f"with the delay of the chain it is {samples:.4g} samples; at most {MOST_DELAY:g}"
+    require(samples <= MOST_DELAY, "delay", law.delay, remedy)
     if "root_moment" in law.signals and law.part_gains.get("root_moment", (0, 1.0))[1]:
         must_not_be_algebraic(arm, "signals", "root_moment")
     late = replace(chain, sampling=replace(chain.sampling, delay_samples=samples))

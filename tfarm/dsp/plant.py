@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
 
 from tfarm.arm import Arm
 from tfarm.arrays import Complex, Real
@@ -383,50 +384,34 @@ class PulseTransfer:
     @cached_property
     def _matrices(self) -> tuple[Real, Real, Real]:
         upper, real = self.kept()
-        n, d = self.integrals_at + 2, self.sampling.whole_delay
-        A, B = np.zeros((n + d + 1, n + d + 1)), np.zeros(n + d + 1)
-        C = np.zeros((len(self.plant.outputs), n + d + 1))
-        first, second, last = 2 * np.arange(upper.size), 2 * np.arange(upper.size) + 1, n + d
-        z = self.multipliers
-        A[first, first] = A[second, second] = z[upper].real
-        A[first, second], A[second, first] = -z[upper].imag, z[upper].imag
-        C[:, first], C[:, second] = 2 * self.residues[:, upper].real, -2 * self.residues[:, upper].imag
-        single = np.arange(2 * upper.size, n - 2)
-        A[single, single], C[:, single] = z[real].real, self.residues[:, real].real
-        A[n - 2, n - 2] = A[n - 1, n - 1] = 1.0
-        A[n - 2, n - 1] = self.sampling.period
-        C[:, n - 2 : n] = self.plant.rigid
-        C[:, last] = self.plant.static
-        pushes = (self.early, self.ramps[0]), (self.late, self.ramps[1])
+        T, d, z = self.sampling.period, self.sampling.whole_delay, self.multipliers
+        rotations = [[[each.real, -each.imag], [each.imag, each.real]] for each in z[upper]]
+        A = block_diag(*rotations, *z[real].real, [[1.0, T], [0.0, 1.0]], np.eye(d + 1, k=-1))
+        pairs = np.ascontiguousarray(2 * self.residues[:, upper].conj()).view(float)
+        C = np.c_[pairs, self.residues[:, real].real, self.plant.rigid, np.zeros((len(pairs), d)), self.plant.static]
         now, before = (
-            np.r_[np.c_[push[upper].real, push[upper].imag].ravel(), push[real].real, ramp, push[-1].real]
-            for push, ramp in pushes
+            np.r_[push[upper].view(float), push[real].real, ramp, push[-1].real]
+            for push, ramp in zip((self.early, self.late), self.ramps, strict=True)
         )
-        A[:n, last] = before
-        if d:
-            A[:n, last - 1] = now
-            A[np.arange(n + 1, n + d + 1), np.arange(n, n + d)] = 1.0
-        else:
-            B[:n] = now
-        B[n] = 1.0
+        n, B = now.size, np.zeros(len(A))
+        A[:n, -1], B[n] = before, 1.0
+        newest = A[:, -2] if d else B
+        newest[:n] = now
         if (braked := self.plant.braked(SLOW / self.sampling.period)) is not None:
             place, p = 2 * upper.size + int(np.flatnonzero(real == braked)[0]), float(self.plant.poles[braked].real)
-            self._integrate(A, B, p, (place, n - 1, last))
+            self._integrate(A, newest, p, (place, n - 1))
             C[:, place] += self.plant.rigid[:, 1]  # R/s + r/(s - p) = -R p/(s (s - p)) + (r + R)/(s - p)
             C[:, n - 1] = -p * self.plant.rigid[:, 1]
         return A, B, C
 
-    def _integrate(self, A: Real, B: Real, p: float, at: tuple[int, int, int]) -> None:
-        """Put the integral of the amplitude of a slow real pole p into a row; `at`: that pole, the row, the last u."""
+    def _integrate(self, A: Real, newest: Real, p: float, at: tuple[int, int]) -> None:
+        """Put the integral of the amplitude of a slow real pole p into a row; `at`: that pole, and the row."""
         T, late = self.sampling.period, self.sampling.fraction * self.sampling.period
-        (place, row, last), now = at, T - late
-        A[row] = 0.0
+        (place, row), now = at, T - late
+        A[row, :-1] = 0.0
         A[row, row], A[row, place] = 1.0, T * np.expm1(p * T) / (p * T)
-        A[row, last] = late**2 * phi(p * late) + np.expm1(p * late) / p * np.expm1(p * now) / p
-        if self.sampling.whole_delay:
-            A[row, last - 1] = now**2 * phi(p * now)
-        else:
-            B[row] = now**2 * phi(p * now)
+        A[row, -1] = late**2 * phi(p * late) + np.expm1(p * late) / p * np.expm1(p * now) / p
+        newest[row] = now**2 * phi(p * now)
 
     def kept(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Indices of the poles with Im p > 0 and of the real ones, without s = 0."""

@@ -29,7 +29,7 @@ from tfarm.dsp.chain import Chain
 from tfarm.dsp.discretise import acting_law, with_all_gains
 from tfarm.dsp.plant import RECORDED, USUAL_MODES, sensed_plant
 from tfarm.dsp.scenarios import Scenario
-from tfarm.errors import ParameterError, must_be_known
+from tfarm.errors import must_be_known, require
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -259,8 +259,8 @@ class Simulator:
         """
         n = self.scenario.feedforward.size
         gain = np.full(n, gains.K2) if K2 is None else np.array(K2, dtype=float)
-        if gain.shape != (n,) or not np.isfinite(gain).all():
-            raise ParameterError(key="K2", value=gain.shape, remedy=f"one finite gain a sample, {n} in all")
+        is_row = gain.shape == (n,) and np.isfinite(gain).all()
+        require(is_row, "K2", gain.shape, f"one finite gain a sample, {n} in all")
         return self._driven(with_all_gains(self.plant.arm, gains), gain)
 
     def _driven(self, law: Law, gain: Real | None) -> Simulation:
@@ -330,8 +330,7 @@ class Simulator:
             angle, rate, moment = kernel.converted(state.record[k], state.saturated[k], memory, of)
             values = angle, rate, moment, moment - references[k][-1], *references[k]
             u, K = rule(Measurement(k, k * task.period, *map(number, values)))
-            if not math.isfinite(u):
-                raise ParameterError(key="controller", value=u, remedy=f"its torque at sample {k} is not finite")
+            require(math.isfinite(u), "controller", u, f"its torque at sample {k} is not finite")
             kernel.after(k, number(u), model, state, forcing, of)
             if gain is not None:
                 gain[k] = K
@@ -359,9 +358,8 @@ class Simulator:
         if offset := self.scenario.tip_offset:
             tip = self.plant.residues[self.plant.outputs.index("tip_displacement")]
             first = np.flatnonzero((self.plant.mode == 1) & (self.plant.poles.imag > 0) & (tip != 0))[:1]
-            if not first.size:
-                remedy = "no free decay: the tip is pinned, or the first mode is overdamped; take another scenario"
-                raise ParameterError(key="scenario", value="decay", remedy=remedy)
+            remedy = "no free decay: the tip is pinned, or the first mode is overdamped; take another scenario"
+            require(first.size, "scenario", "decay", remedy)
             p, r = self.plant.poles[first], tip[first]
             amplitude[np.isin(self._kept, first)] = 1j * offset * abs(p) ** 2 / (2 * p.imag) / (p * r)
         return amplitude

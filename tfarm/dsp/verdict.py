@@ -291,15 +291,10 @@ class Analysis:
         return DelayMargin(self.delay.value, self.delay.is_bound)
 
     @cached_property
-    def damping(self) -> Figure:
-        """The damping C [s] from which on the loop is stable."""
-        return shown_damping(self.loop, self.damping_modes)
-
-    @property
     def minimum_damping(self) -> Annotated[Figure | None, Quantity("minimum structural damping for stability", "s",
             help="Kelvin-Voigt damping C of the link from which on the loop is stable")]:  # fmt: skip
-        """The same with its digits, for gains at the hub."""
-        return self.damping if self.loop.is_of_gains else None
+        """The damping C [s] from which on the loop is stable, for gains at the hub."""
+        return shown_damping(self.loop, self.damping_modes) if self.loop.is_of_gains else None
 
     @cached_property
     def factors(self) -> list[Window]:
