@@ -16,7 +16,7 @@ import tfarm.cli.running  # loads every command
 from tfarm.arm.law_tables import LawTable, SignalTable
 from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, StrictTable, file_keys
 from tfarm.cli.app import whole_command
-from tfarm.dsp.chain import ActuatorTable, ConvertersTable, SamplingTable, SlewTable
+from tfarm.dsp.chain import CHAIN_TABLES
 from tfarm.fitting.recording import RunTable
 from tfarm.schema.glossary import CERTAINTY, declared_records
 
@@ -47,10 +47,7 @@ FILE_TABLES: dict[str, type[StrictTable]] = {
     **{f'link.section] with shape = "{shape}': table for shape, table in SHAPE_TABLES.items()},
     "law": LawTable,
     "law.SIGNAL": SignalTable,
-    "sampling": SamplingTable,
-    "converters": ConvertersTable,
-    "actuator": ActuatorTable,
-    "slew": SlewTable,
+    **CHAIN_TABLES,
     "measured": RunTable,
 }
 

@@ -138,33 +138,31 @@ def some_roots(rng, order, w1):
     return zeros, poles
 
 
+def balls(values, kind=flint.arb):
+    """An array of doubles as balls of FLINT, exactly."""
+    return np.vectorize(kind, otypes=[object])(np.asarray(values))
+
+
+def by_flint(function, M):
+    """A function of a matrix in balls."""
+    return np.array(function(flint.arb_mat(M.tolist())).tolist(), object)
+
+
 def held(A, B, duration):
     """e^{A t} and its integral times B, for a time in balls."""
-    n, m = B.nrows(), B.ncols()
-    rows = [[A[i, j] * duration for j in range(n)] + [B[i, j] * duration for j in range(m)] for i in range(n)]
-    both = flint.arb_mat([*rows, *([[0] * (n + m)] * m)]).exp()
-    return part_of(both, range(n), range(n)), part_of(both, range(n), range(n, n + m))
-
-
-def part_of(M, rows, columns):
-    return flint.arb_mat([[M[i, j] for j in columns] for i in rows])
-
-
-def unit(n):
-    return flint.arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+    n, m = B.shape
+    both = by_flint(flint.arb_mat.exp, np.block([[A, B], [balls(np.zeros((m, n + m)))]]) * duration)
+    return both[:n, :n], both[:n, n:]
 
 
 def states_of(num, den):
     """A, B, C, D of num/den, polynomials in descending powers, exactly: first row of A, D apart."""
-    num, den = ([flint.arb(each) for each in of] for of in (num, den))
-    n = len(den) - 1
-    num = [flint.arb(0)] * (n + 1 - len(num)) + num
-    D = num[0] / den[0]
-    A = flint.arb_mat(
-        [[-den[j + 1] / den[0] if i == 0 else flint.arb(int(i == j + 1)) for j in range(n)] for i in range(n)]
-    )
-    B = flint.arb_mat([[int(i == 0)] for i in range(n)])
-    return A, B, flint.arb_mat([[(num[j + 1] - D * den[j + 1]) / den[0] for j in range(n)]]), flint.arb_mat([[D]])
+    num, den = (np.array([flint.arb(each) for each in of], object) / flint.arb(den[0]) for of in (num, den))
+    n = den.size - 1
+    num = np.r_[balls(np.zeros(n + 1 - num.size)), num] if num.size <= n else num
+    A = balls(np.eye(n, k=-1))
+    A[0] = -den[1:]
+    return A, balls(np.eye(n, 1)), (num[1:] - num[0] * den[1:])[None], num[0]
 
 
 def matched(num, den, T):
@@ -182,82 +180,63 @@ def matched(num, den, T):
 
 
 def law_in_balls(case):
-    """Of each part of the law its signal and A, B, C, D in z."""
+    """Of each part of the law its signal and A, B, C (None without states) and D in z."""
     T = flint.arb(case.chain.sampling.period)
     for part in case.law.parts:
         num, den = list(part.block.num), list(part.block.den)
+        rule = "none" if case.law.is_discrete else case.law.rule
         if len(den) == 1:
             yield part.signals[0], None, flint.arb(num[0]) / den[0]
             continue
-        if case.law.rule == "matched" and not case.law.is_discrete:
-            num, den = matched(num, den, T)
-        A, B, C, D = states_of(num, den)
-        if case.law.is_discrete or case.law.rule == "matched":
-            pass
-        elif case.law.rule == "zoh":
+        A, B, C, D = states_of(*(matched(num, den, T) if rule == "matched" else (num, den)))
+        if rule == "zoh":
             A, B = held(A, B, T)
-        else:
-            half = unit(A.nrows()) - A * (T / 2)
-            within = half.inv()
-            A, B, C, D = (
-                within * (unit(A.nrows()) + A * (T / 2)),
-                within * B * T,
-                C * within,
-                D + C * within * B * (T / 2),
-            )
-        yield part.signals[0], (A, B, C), D[0, 0]
+        elif rule == "tustin":
+            one, half = balls(np.eye(len(A))), A * (T / 2)
+            within = by_flint(flint.arb_mat.inv, one - half)
+            A, B, C, D = within @ (one + half), within @ B * T, C @ within, D + (C @ within @ B)[0, 0] * (T / 2)
+        yield part.signals[0], (A, B, C), D
 
 
 def stepped(poles, duration):
     """Over a time: the diagonal of the transition of a' = p a + u, and what a held u adds."""
-    step = [(p * duration).exp() for p in poles]
-    return step, [(e - 1) / p for e, p in zip(step, poles, strict=True)]
+    step = np.array([(p * duration).exp() for p in poles], object)
+    return step, (step - 1) / poles
 
 
 def transition(loop, case):
     """The closed loop's matrix in balls: amplitudes of the plant's poles, its two integrals, inputs before, the law."""
-    plant, sampling = loop.plant, case.chain.sampling
+    plant, sampling, read = loop.plant, case.chain.sampling, loop.sensed.read
     samples = sampling.delay_samples + case.law.delay / sampling.period
     T, whole = flint.arb(sampling.period), math.floor(samples)
     late = (flint.arb(samples) - whole) * T
-    poles = [flint.acb(p.real, p.imag) for p in plant.poles.tolist()]
-    n, blocks = len(poles) + 2, list(law_in_balls(case))
-    last = n + whole  # of the inputs before, the one that acts
-    size = last + 1 + sum(block[0].nrows() for _, block, _ in blocks if block)
-    M = flint.acb_mat(size, size)
-    read = loop.sensed.read
+    poles, blocks = balls(plant.poles, flint.acb), list(law_in_balls(case))
+    n, start = poles.size + 2, poles.size + whole + 3  # of the inputs before; the last of these acts
+    last, size = start - 1, start + sum(len(block[0]) for _, block, _ in blocks if block)
+    M, modes = balls(np.zeros((size, size)), flint.acb), np.arange(n - 2)
     rests = [order > read.system.at_rest for order in read.orders]  # which signals are 0 under a constant input
     (one, first), (two, second) = stepped(poles, late), stepped(poles, T - late)
-    early = [*second, (T - late) ** 2 / 2, T - late]
-    for i in range(n - 2):
-        M[i, i], M[i, last] = one[i] * two[i], two[i] * first[i]
-    M[n - 2, n - 2] = M[n - 1, n - 1] = 1
+    M[modes, modes], M[modes, last] = one * two, two * first
+    M[n - 2, n - 2] = M[n - 1, n - 1] = flint.acb(1)
     M[n - 2, n - 1], M[n - 2, last], M[n - 1, last] = T, late * (T - late) + late**2 / 2, late
-    start = last + 1
     for name, block, through in blocks:
         row = plant.outputs.index(name)
-        residues = [flint.acb(r.real, r.imag) for r in plant.residues[row].tolist()]
-        at_once = flint.acb(float(plant.static[row]))
+        residues, at_once = balls(plant.residues[row], flint.acb), flint.acb(float(plant.static[row]))
         if rests[row]:  # in all digits, as static and residues have it in theirs
-            at_once = sum((r / p for r, p in zip(residues, poles, strict=True)), flint.acb(0))
-        read = [*residues, *plant.rigid[row].tolist(), *[0] * whole, at_once]
-        for j, value in enumerate(read):
-            M[n, j] += case.law.sign * through * value
+            at_once = sum(residues / poles, flint.acb(0))
+        signal = np.r_[residues, balls(np.r_[plant.rigid[row], np.zeros(whole)], flint.acb), at_once]
+        M[n, : last + 1] += case.law.sign * through * signal
         if block:
-            a, b, c = block
-            for i in range(a.nrows()):
-                M[n, start + i] += case.law.sign * c[0, i]
-                for j in range(a.nrows()):
-                    M[start + i, start + j] = a[i, j]
-                for j, value in enumerate(read):
-                    M[start + i, j] += b[i, 0] * value
-            start += a.nrows()
-    for i, value in enumerate(early):
-        for j in range(size):
-            M[i, j] += value * (M[n, j] if whole == 0 else int(j == last - 1))
-    for i in range(n + 1, last + 1):
-        M[i, i - 1] = 1
-    return M
+            A, B, C = block
+            own = slice(start, start + len(A))
+            M[n, own] += case.law.sign * C[0]
+            M[own, own] = A
+            M[own, : last + 1] += np.outer(B[:, 0], signal)
+            start += len(A)
+    newest = M[n] if whole == 0 else balls(np.arange(size) == last - 1, lambda each: flint.acb(int(each)))
+    M[:n] += np.outer(np.r_[second, (T - late) ** 2 / 2, T - late], newest)
+    M[np.arange(n + 1, last + 1), np.arange(n, last)] = flint.acb(1)
+    return flint.acb_mat(M.tolist())
 
 
 def truth(loop, case):

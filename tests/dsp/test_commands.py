@@ -13,12 +13,11 @@ from scipy.io import loadmat
 import tfarm
 from tests.shared import remember, thinned
 from tests.shell import answer, refused, run
-from tests.synthesis.held_loop import HeldLoop
 from tfarm import HubFeedback, Law
 from tfarm.cli.app import load_chain
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling, chain_of_tables
-from tfarm.dsp.verdict import brief_of, sampled_brief
+from tfarm.dsp.verdict import brief_of
 from tfarm.errors import ConvergenceError
 from tfarm.plots import slew
 from tfarm.report.sampled_section import responses_table
@@ -94,17 +93,6 @@ BAD = [
 @pytest.mark.parametrize(("arguments", "message"), BAD)
 def test_bad_input_is_one_line_and_exit_2(capsys, arguments, message):
     assert message in refused(capsys, *arguments)
-
-
-@pytest.mark.parametrize(
-    ("K1", "K2", "period"), thinned([(26.0, -3.0, 0.01), (20.0, -0.5, 0.01), (20.0, -0.5, 5e-4), (0.3, 0.3, 0.01)], 2)
-)
-def test_the_radius_is_that_of_an_independent_model(K1, K2, period):
-    law = HubFeedback(K1=K1, K2=K2)
-    brief = sampled_brief(LAB, law, Chain(sampling=Sampling(period=period)))
-    radius = HeldLoop(LAB, period).radius(law)
-    assert brief.spectral_radius == pytest.approx(radius, rel=1e-5)  # of 12 Ritz modes
-    assert brief.is_stable == (radius < 1)
 
 
 def test_gains_that_fail_when_sampled_are_not_recommended_without_a_word(capsys, monkeypatch):

@@ -1,5 +1,6 @@
 """Curves in time: a line that resolves what rings, or a band around it; the file has what is drawn."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -18,10 +19,10 @@ from tfarm.dsp.traces import (
     POINTS_A_PERIOD,
     TimeCurve,
     curve,
+    curve_of,
     points_a_period,
     reference_angle,
     ringing,
-    root_moment,
 )
 from tfarm.report.sampled_section import responses_table
 from tfarm.spectrum.table import default_gains
@@ -48,7 +49,7 @@ def test_the_slew_of_a_stiff_arm_is_not_aliased_and_its_file_has_the_curve():
     records = run.between.t.size / run.t.size
     first = tfarm.modes(STEEL, 1).natural_frequency[-1] / (2 * np.pi)
     assert (records + 1) * 100 >= POINTS_A_PERIOD * first > 400  # 400 a second is what three records gave
-    curve, table = root_moment(run), responses_table("t", "t", STEEL, {"without": run})
+    curve, table = curve_of(run, "root_moment"), responses_table("t", "t", STEEL, {"without": run})
     columns = {column.key: np.array(column.values) for column in table.columns}
     assert curve.is_band
     rounded = 0.5e-6 * abs(curve.high).max()  # seven digits are in the file
@@ -74,7 +75,7 @@ def test_a_slew_under_any_law_is_resolved_too():
 def test_a_slow_arm_is_a_line_of_the_simulators_own_records():
     lab = tfarm.load("sasaki2012-lab")
     run = drawn(lab, default_gains(lab), Chain(), "slew", 3.0)
-    curve = root_moment(run)
+    curve = curve_of(run, "root_moment")
     assert not curve.is_band
     assert curve.t.size == run.t.size + run.between.t.size >= (LEAST_BETWEEN + 1) * 301
 
@@ -98,25 +99,14 @@ def test_at_other_times_a_curve_holds_what_it_last_was():
     assert own.at(np.array([3.0, 4.0, 5.0])) is own  # as many are its own
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.3, 1.6])
-def test_what_is_played_again_is_the_simulation(delay):
-    """A step without feedback or damping: one mode rings as far as the moment does, however late the step."""
+@pytest.mark.parametrize(("name", "delay"), [("step", 0.0), ("step", 0.3), ("step", 1.6), ("slew", 0.0), ("slew", 1.0)])
+def test_torques_applied_again_let_a_mode_ring_as_far_as_in_the_simulation(name, delay):
+    """Without feedback or damping, by the range of the moment within the sample where it is largest."""
     arm = replace(STEEL, link=replace(STEEL.link, damping=0.0))
     chain = Chain(sampling=Sampling(delay_samples=delay))
-    simulator = Simulator(arm, chain, scenario("step", arm, chain, 0.3), count=1, between=400)
+    simulator = Simulator(arm, chain, scenario(name, arm, chain, 0.3 if name == "step" else 1.5), count=1, between=400)
     run = simulator.linear(HubFeedback(K1=0.0, K2=0.0))
-    moment = run.between.root_moment[run.between.t > (delay + 1) * chain.sampling.period]
-    found = ringing(simulator, run)
-    assert found.frequency == pytest.approx(tfarm.modes(arm, 1).natural_frequency[-1:])
-    assert found.size[2, 0] == pytest.approx(np.ptp(moment) / 2, rel=2e-3)  # 400 records a sample: 96 a period
-
-
-@pytest.mark.parametrize("delay", [0.0, 1.0])
-def test_a_mode_rings_as_far_as_in_the_sample_where_it_rings_most(delay):
-    """A slew, whose torque changes at each sample; four periods of the mode fit into one."""
-    arm = replace(STEEL, link=replace(STEEL.link, damping=0.0))
-    chain = Chain(sampling=Sampling(delay_samples=delay))
-    simulator = Simulator(arm, chain, scenario("slew", arm, chain, 1.5), count=1, between=400)
-    run = simulator.linear(HubFeedback(K1=0.0, K2=0.0))
-    samples = run.between.root_moment.reshape(-1, 400)
-    assert ringing(simulator, run).size[2, 0] == pytest.approx(np.ptp(samples, axis=1).max() / 2, rel=2e-3)
+    moment = run.between.root_moment.reshape(-1, 400)[math.ceil(delay) :]  # 96 records a period, four periods a sample
+    frequency, size = ringing(simulator, run)
+    assert frequency == pytest.approx(tfarm.modes(arm, 1).natural_frequency[-1:])
+    assert size[2, 0] == pytest.approx(np.ptp(moment, axis=1).max() / 2, rel=2e-3)

@@ -5,7 +5,6 @@ from pathlib import Path
 import control
 import numpy as np
 import pytest
-from scipy.io import loadmat
 
 import tfarm
 from tests.dsp.roads import radius_of, stepped
@@ -80,24 +79,6 @@ def test_no_reference_is_made_up():
 
 def real(name):
     return load_law(DATA / f"{name}.toml")
-
-
-def test_the_columns_are_what_the_law_files_take_them_for():
-    """The estimator's gain is on the measured angles; the file's own model is stabilised and led to the reference."""
-    data = loadmat(DATA / "orr_controllers.mat")
-    own, system = data["lqg"][0, 0], data["lqg_ss"][0, 0]
-    np.testing.assert_allclose(system["B"][:, :2], own["L"], rtol=1e-12)
-    np.testing.assert_allclose(system["D"][0, 4], own["K"][0, 0], rtol=1e-12)
-    for name in ("lqg", "hinf"):
-        A, B, C, D = (data[f"{name}_ss"][0, 0][key] for key in "ABCD")
-        n = len(A)
-        loop = np.block([
-            [own["Ad"] + own["Bd"] @ D[:, :4], own["Bd"] @ C],
-            [B[:, :4], A],
-        ])  # fmt: skip
-        assert abs(np.linalg.eigvals(loop)).max() < 1
-        rest = np.linalg.solve(np.eye(4 + n) - loop, np.vstack([own["Bd"] @ D[:, 4:5], B[:, 4:5]]))
-        np.testing.assert_allclose(rest[:2, 0], [1.0, 0.0], atol=1e-6)  # hub angle at the reference, no deflection
 
 
 @pytest.mark.parametrize("late", thinned([0.0, 0.005, 0.01], 2))

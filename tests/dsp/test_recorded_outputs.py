@@ -27,37 +27,36 @@ from tfarm.tuner.trial import tip_off
 LAB = tfarm.load("sasaki2012-lab")
 GAINS = HubFeedback(K1=0.3, K2=0.3)
 OTHERS = ("tip_rotation", "tip_angle", "root_shear", "tip_acceleration")
-LATE = 0.4  # samples of delay
 SAME = 1e-11  # of the largest value: the same residues by two roads
 FITTED = 1e-7  # of a heavily damped arm: what its slow poles leave is shared out by a fit, which rounding moves
 
 
-def replayed(arm, names, run_, count, delay, period):
-    """The torques of a run held and given to the modal state space by the matrix exponential, read at each sample."""
-    model = modal_model(arm, names, count)
-    A, B, C, D = model.matrices()
-    n = len(A)
-
-    def step(x, u, t):
-        block = expm(np.block([[A, B], [np.zeros((1, n + 1))]]) * t)
-        return block[:n, :n] @ x + block[:n, n] * u
-
-    x, before, found = np.zeros(n), 0.0, []
-    for u in run_.torque:
-        found.append(C @ x + D[:, 0] * before)
-        x, before = step(step(x, before, delay * period), u, (1 - delay) * period), u
-    return np.array(found).T
-
-
+@pytest.mark.parametrize("delay", [0.0, 0.4, 1.6])
 @pytest.mark.parametrize("arm", [LAB, tfarm.load("sasaki2012")])
-def test_they_are_those_of_the_modal_state_space(arm):
-    chain = Chain(sampling=Sampling(delay_samples=LATE))
+def test_signals_are_those_of_the_modal_state_space(arm, delay):
+    """The torques and a disturbance replayed by matrix exponentials of a fifth of a sample; and the torques by hand."""
+    chain = Chain(sampling=Sampling(delay_samples=delay))
     task = scenario("slew", arm, chain, 0.3)
-    found = Simulator(arm, chain, task, count=4, outputs=OTHERS).linear(GAINS)
-    by_matrices = replayed(arm, OTHERS, found, 4, LATE, chain.sampling.period)
-    assert found.at_samples.names == (*RECORDED, *OTHERS)
-    for name, signal in zip(OTHERS, by_matrices, strict=True):
-        np.testing.assert_allclose(found.at_samples.signal(name), signal, atol=1e-9 * abs(signal).max())
+    task = replace(task, disturbance=np.random.default_rng(4).normal(size=task.t.size))
+    run = Simulator(arm, chain, task, count=4, between=4, outputs=OTHERS).linear(GAINS)
+    names = (*RECORDED, *OTHERS)
+    A, B, C, D = modal_model(arm, names, 4).matrices()
+    n = len(A)
+    step = expm(np.block([[A, B], [np.zeros((1, n + 1))]]) * chain.sampling.period / 5)
+    x, found = np.zeros(n), [np.zeros(len(names))]
+    for j in range(5 * task.t.size):
+        k, late = j // 5, (j - round(5 * delay)) // 5
+        held = task.disturbance[k] + (run.torque[late] if late >= 0 else 0.0)
+        x = step[:n, :n] @ x + step[:n, n] * held
+        found.append(C @ x + D[:, 0] * held)
+    assert run.at_samples.names == names
+    for name, signal in zip(names, np.array(found[:-1]).T.reshape(len(names), -1, 5), strict=True):
+        for trace, exact in ((run.at_samples, signal[:, 0]), (run.between, signal[:, 1:].ravel())):
+            np.testing.assert_allclose(trace.signal(name), exact, atol=1e-9 * abs(signal).max())
+    off, seen = task.hub_rate - run.at_samples.hub_rate, run.at_samples.root_moment - task.rigid_moment
+    np.testing.assert_allclose(
+        run.torque, task.feedforward + 0.3 * off - 0.3 * seen, atol=1e-12 * abs(run.torque).max()
+    )
 
 
 CHAINS = {
@@ -65,8 +64,6 @@ CHAINS = {
     "filtered": Chain(sampling=Sampling(antialias_corner=200.0, delay_samples=1.3)),
     "damped hub": Chain(actuator=Actuator(hub_damping=0.05)),
 }
-
-
 INSIDE = Law({"hub_rate": 0.3, "moment@0.2": ([0.02], [1.0, -0.5])}, period=0.01)  # which reads the rig at a point
 ARMS = [LAB, LAB.having(damping=0.01), replace(LAB, hub=replace(LAB.hub, radius=0.1))]
 

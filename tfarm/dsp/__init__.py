@@ -3,8 +3,8 @@
 from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew, load_chain
 from tfarm.dsp.crossings import GainMap, sampled_map, stable_windows
 from tfarm.dsp.edges import delay_margin, required_damping
+from tfarm.dsp.plant import PulseTransfer, pulse_transfer
 from tfarm.dsp.sampled import Sampled, sampled_loop
-from tfarm.dsp.sampling import PulseTransfer, pulse_transfer
 from tfarm.dsp.scenarios import Scenario, scenario
 from tfarm.dsp.simulate import Measurement, Simulation, Simulator
 from tfarm.dsp.verdict import Analysis, Verdict, sampled_verdict

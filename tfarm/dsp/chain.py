@@ -8,15 +8,15 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, Literal
 
 from tfarm.arm import Arm, schema, to_toml
-from tfarm.arm.checks import extended, not_negative, number, positive, whole
+from tfarm.arm.checks import check_fields, extended, not_negative, number, positive, whole
 from tfarm.arm.reading import load_tables
 from tfarm.arm.schema import ArmTable, TomlTable, validated
-from tfarm.errors import ParameterError, did_you_mean, must_be_known, naming
+from tfarm.errors import ParameterError, did_you_mean, must_be_known, naming, require
 from tfarm.schema import Quantity
 
 Reading = Literal["vibration", "total"]
@@ -44,11 +44,12 @@ class Sampling:
     def __post_init__(self) -> None:
         remedy = f"a computational delay is zero or positive, in samples, at most {MOST_DELAY:g}"
         period = "a sampling period is a positive, finite time in seconds, 0.01 for instance"
-        _checked(self, "sampling.period", positive, period)
-        _checked(self, "sampling.delay_samples", not_negative, remedy)
-        _checked(self, "sampling.antialias_corner", _above_zero, "a corner is positive in rad/s, or inf for no filter")
-        if self.delay_samples > MOST_DELAY:
-            raise ParameterError(key="sampling.delay_samples", value=self.delay_samples, remedy=remedy)
+        check_fields(self, "sampling", positive, period=period)
+        check_fields(self, "sampling", not_negative, delay_samples=remedy)
+        check_fields(
+            self, "sampling", _above_zero, antialias_corner="a corner is positive in rad/s, or inf for no filter"
+        )
+        require(self.delay_samples <= MOST_DELAY, "sampling.delay_samples", self.delay_samples, remedy)
 
     @property
     def whole_delay(self) -> int:
@@ -89,15 +90,15 @@ class Converters:
         must_be_known("converters.hub_rate", self.hub_rate, ("ideal", "difference"))
         must_be_known("converters.arithmetic", self.arithmetic, ("float64", "float32"))
         remedy = "the corner of the rate filter is positive in rad/s, or inf for a plain difference"
-        _checked(self, "converters.rate_filter", _above_zero, remedy)
+        check_fields(self, "converters", _above_zero, rate_filter=remedy)
         for signal, unit in RANGE_UNITS.items():
-            bits, key = getattr(self, f"{signal}_bits"), f"converters.{signal}_range"
+            bits, name = getattr(self, f"{signal}_bits"), f"{signal}_range"
             _whole(f"converters.{signal}_bits", bits, LEAST_BITS, MOST_BITS, "bits")
-            if getattr(self, f"{signal}_range") is not None:
-                _checked(self, key, positive, f"the range +-R of a converter is a positive, finite number{unit}")
-            elif bits is not None:
-                remedy = f"{bits} bits need a range +-R{unit}: give it, or leave converters.{signal}_bits out"
-                raise ParameterError(key=key, value=None, remedy=remedy)
+            if getattr(self, name) is not None:
+                remedy = f"the range +-R of a converter is a positive, finite number{unit}"
+                check_fields(self, "converters", positive, **{name: remedy})
+            remedy = f"{bits} bits need a range +-R{unit}: give it, or leave converters.{signal}_bits out"
+            require(bits is None or getattr(self, name), f"converters.{name}", None, remedy)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,12 +114,12 @@ class Actuator:
     hub_damping: float = 0.0
 
     def __post_init__(self) -> None:
-        remedy = "a torque limit is positive (in N m; in V or A where that is the arm's input), or inf for none"
-        _checked(self, "actuator.torque_limit", _above_zero, remedy)
-        _checked(self, "actuator.hub_damping", not_negative, "hub damping is zero or positive, in N m s/rad")
+        limit = "a torque limit is positive (in N m; in V or A where that is the arm's input), or inf for none"
+        constant = "a motor constant is a positive number of N m a volt; leave it out if there is none"
+        check_fields(self, "actuator", _above_zero, torque_limit=limit)
+        check_fields(self, "actuator", not_negative, hub_damping="hub damping is zero or positive, in N m s/rad")
         if self.motor_constant is not None:
-            remedy = "a motor constant is a positive number of N m a volt; leave it out if there is none"
-            _checked(self, "actuator.motor_constant", positive, remedy)
+            check_fields(self, "actuator", positive, motor_constant=constant)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,9 +137,9 @@ class Slew:
     def __post_init__(self) -> None:
         if self.travel is not None:
             remedy = "tip travel is a finite number of metres, other than zero"
-            _checked(self, "slew.travel", number, remedy)
+            check_fields(self, "slew", number, travel=remedy)
             positive("slew.travel", abs(self.travel), remedy)
-        _checked(self, "slew.rise_time", positive, "a rise time is a positive, finite number of seconds")
+        check_fields(self, "slew", positive, rise_time="a rise time is a positive, finite number of seconds")
         must_be_known("slew.reading", self.reading, ("vibration", "total"))
 
     def travel_of(self, reach: float) -> float:
@@ -174,23 +175,16 @@ class Chain:
 def chain_or_usual(chain: object) -> Chain:
     """Return the chain; for None 10 ms and ideal converters.  Raises ParameterError for anything else."""
     chain = Chain() if chain is None else chain
-    if not isinstance(chain, Chain):
-        remedy = "give a tfarm.dsp.Chain, as tfarm.dsp.load_chain reads one; nothing for 10 ms and ideal converters"
-        raise ParameterError(key="chain", value=chain, remedy=remedy)
-    return chain
+    if isinstance(chain, Chain):
+        return chain
+    remedy = "give a tfarm.dsp.Chain, as tfarm.dsp.load_chain reads one; nothing for 10 ms and ideal converters"
+    raise ParameterError(key="chain", value=chain, remedy=remedy)
 
 
-def _checked(record: object, key: str, check: Callable[[str, Any, str], float], remedy: str) -> None:
-    """Put the checked value of an entry into a frozen record; `key` is that of its file, "sampling.period"."""
-    name = key.partition(".")[2]
-    object.__setattr__(record, name, check(key, getattr(record, name), remedy))
-
-
-def _above_zero(key: str, value: Any, remedy: str) -> float:
-    value = extended(key, value, remedy)
-    if value == 0.0:
-        raise ParameterError(key=key, value=value, remedy=remedy)
-    return value
+def _above_zero(key: str, value: object, remedy: str) -> float:
+    found = extended(key, value, remedy)
+    require(found, key, found, remedy)
+    return found
 
 
 def _whole(key: str, value: object, least: int, most: int, unit: str) -> None:
@@ -199,31 +193,8 @@ def _whole(key: str, value: object, least: int, most: int, unit: str) -> None:
         whole(key, value, least, most, remedy)
 
 
-@schema.of(Sampling)
-class SamplingTable(TomlTable):
-    """[sampling]."""
-
-
-@schema.of(Converters)
-class ConvertersTable(TomlTable):
-    """[converters]."""
-
-
-@schema.of(Actuator)
-class ActuatorTable(TomlTable):
-    """[actuator]."""
-
-
-@schema.of(Slew)
-class SlewTable(TomlTable):
-    """[slew]."""
-
-
 CHAIN_TABLES: dict[str, type[TomlTable]] = {
-    "sampling": SamplingTable,
-    "converters": ConvertersTable,
-    "actuator": ActuatorTable,
-    "slew": SlewTable,
+    kind.__name__.lower(): schema.of(kind)(TomlTable) for kind in (Sampling, Converters, Actuator, Slew)
 }
 
 
@@ -239,12 +210,11 @@ def load_chain(name_or_path: str | os.PathLike[str]) -> Chain:
 
 def chain_of_tables(tables: Mapping[str, Any]) -> Chain:
     """The chain of a parsed file, which may also have the tables of an arm."""
-    unknown = [key for key in tables if key not in CHAIN_TABLES and key not in OF_AN_ARM]
-    if unknown:
-        remedy = f"unknown table; {did_you_mean(unknown[0], CHAIN_TABLES)}"
-        raise ParameterError(key=unknown[0], value=tables[unknown[0]], remedy=remedy)
-    given = {name: table for name, table in CHAIN_TABLES.items() if name in tables}
-    records = {name: validated(table, tables[name], name).build() for name, table in given.items()}
+    for key in tables:
+        known = key in CHAIN_TABLES or key in OF_AN_ARM
+        require(known, key, tables[key], f"unknown table; {did_you_mean(key, CHAIN_TABLES)}")
+    given = [name for name in CHAIN_TABLES if name in tables]
+    records = {name: validated(CHAIN_TABLES[name], tables[name], name).build() for name in given}
     return Chain(**records, period_from="the file's period" if "period" in tables.get("sampling", {}) else "")
 
 
@@ -253,13 +223,10 @@ def file_text(arm: Arm, chain: Chain | None = None) -> str:
 
     Python's shortest exact digits are TOML's too, and so is inf; a text needs its quotes.
     """
-    lines: list[str] = []
+    text = to_toml(arm)
     for table in () if chain is None else CHAIN_TABLES:
         record = getattr(chain, table)
-        default = type(record)()
-        given = {f.name: getattr(record, f.name) for f in fields(record)}
-        given = {name: value for name, value in given.items() if value != getattr(default, name)}
-        texts = (json.dumps(value) if isinstance(value, str) else repr(value) for value in given.values())
-        if given:
-            lines += ["", f"[{table}]", *map(" = ".join, zip(given, texts, strict=True))]
-    return to_toml(arm) + ("\n".join([*lines, ""]) if lines else "")
+        given = {f.name: value for f in fields(record) if (value := getattr(record, f.name)) != f.default}
+        lines = [f"{key} = {json.dumps(of) if isinstance(of, str) else repr(of)}\n" for key, of in given.items()]
+        text += "".join([f"\n[{table}]\n", *lines]) if lines else ""
+    return text

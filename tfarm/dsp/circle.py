@@ -37,16 +37,19 @@ there the undamped shear of this model has poles arbitrarily near to the imagina
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import takewhile
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real
+from tfarm.dsp.plant import SLOW, phi
 from tfarm.dsp.sampled import Sampled, resized
-from tfarm.dsp.sampling import SLOW, phi
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import modes
@@ -95,23 +98,20 @@ class Discs:
         return Discs(self.middle[row], self.radius[row])
 
 
-@dataclass(frozen=True)
-class _Arcs:
-    """Arcs of the circle between the angles `low` and `high` [rad]."""
+class Arcs(NamedTuple):
+    """Arcs of the circle: their `middle` angles and `half` lengths [rad]."""
 
-    low: Real
-    high: Real
+    middle: Real
+    half: Real
 
     @property
     def x(self) -> Discs:
         """1 - 1/z."""
-        middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
-        return Discs(-np.expm1(-1j * middle), half + MACHINE_EPS)
+        return Discs(-np.expm1(-1j * self.middle), self.half + MACHINE_EPS)
 
     def turned(self, n: int) -> Discs:
         """z^-n."""
-        middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
-        return Discs(np.exp(-1j * n * middle), n * (half + 4 * MACHINE_EPS))
+        return Discs(np.exp(-1j * n * self.middle), n * (self.half + 4 * MACHINE_EPS))
 
 
 @dataclass
@@ -178,32 +178,29 @@ class Circle:
 
     def _parts(self, low: Real, high: Real) -> Discs:
         """x, and the terms of F z^-n without powers of x, on arcs."""
-        arcs, order = _Arcs(low, high), self.loop.in_z.poles.size
-        sums, slow = self._sums(arcs), self._slow_sums(arcs)
-        signals = [self._output(row, arcs, sums[row], slow[row]) for row in range(len(self.orders) - 1)]
+        arcs, order = Arcs((low + high) / 2, (high - low) / 2), self.loop.in_z.poles.size
+        sums, n = self.summed(arcs, self.weights), len(self.orders) - 1
+        signals = [self._output(row, arcs, sums[row], sums[n + row], sums[2 * n + row], sums[-1]) for row in range(n)]
         found = [arcs.x]
         for _, row, _, roots in self.terms:
             term = product(arcs.x, roots[roots != 0]) * arcs.turned(order - roots.size)
             found.append(term if row < 0 else term * signals[row])
         return Discs(np.array([each.middle for each in found]), np.array([each.radius for each in found]))
 
-    def _output(self, row: int, arcs: _Arcs, poles: Discs, slow: Discs) -> Discs:
-        """x^n times an output's pulse transfer function, n its order at z = 1; `poles`, `slow`: sums over its poles."""
-        plant, pulse = self.loop.plant, self.loop.pulse
-        T, f = pulse.sampling.period, pulse.sampling.fraction
-        twice, once = plant.rigid[row]
-        order = 2 if twice else int(once != 0.0)
+    def _output(self, row: int, arcs: Arcs, fast: Discs, now: Discs, before: Discs, pair: Discs) -> Discs:
+        """x^n times an output's pulse transfer function, n its order at z = 1, from sums with `weights`."""
+        plant, pulse, order = self.loop.plant, self.loop.pulse, self.orders[row]
+        T, f, (twice, once) = pulse.sampling.period, pulse.sampling.fraction, plant.rigid[row]
         x, late = arcs.x, arcs.turned(1)
         at_rest = float(plant.static[row] - (plant.residues[row] / plant.poles)[~self.is_slow].real.sum())
-        sums = poles * x
-        held = Discs(sums.middle, sums.radius + self.missing[row]) + late.times(at_rest) + slow
+        held = fast * x + Discs(0 * x.middle, self.missing[row]) + late.times(at_rest) + now + before * late
         total = power(x, order) * held
         push = arcs.turned(0).times((1 - f) * T) + late.times(f * T)
-        if twice:  # then there is no 1/s: an arm that turns freely has no friction at the hub
+        if order == 2:  # then there is no 1/s: an arm that turns freely has no friction at the hub
             ramp = arcs.turned(0).times(pulse.ramps[0]) + late.times(pulse.ramps[1])
             total = total + ((push * late).times(T) + x * ramp).times(twice) * late
-        elif once:
-            total = total + (push * late if self.braked is None else self._braked_pair(arcs)).times(once)
+        elif order == 1:
+            total = total + (push * late if self.braked is None else pair * self._braked_pair(arcs)).times(once)
         return total * arcs.turned(pulse.sampling.whole_delay)
 
     # ------------------------------------------------------------ arcs
@@ -226,23 +223,21 @@ class Circle:
         """Whether each pole hardly decays in a sample, as that of friction at the hub."""
         return np.asarray(self.kept & (abs(self.loop.plant.poles) * self.loop.chain.sampling.period < SLOW))
 
-    def _sums(self, arcs: _Arcs) -> Discs:
-        """sum over all poles but slow ones of (r/p) a/(z - b) on arcs: discs (outputs, arcs)."""
-        plant, sampling, which = self.loop.plant, self.loop.chain.sampling, self.kept & ~self.is_slow
-        p = plant.poles[which]
-        remaining = (1 - sampling.fraction) * sampling.period
-        return self._summed(arcs, p, plant.residues[:, which] / p * np.exp(p * remaining))
+    @cached_property
+    def weights(self) -> Complex:
+        """Numerators of sums over the poles of weight/(z - b), (3 signals + 1, poles); 0 of those left out.
 
-    def _slow_sums(self, arcs: _Arcs) -> Discs:
-        """sum over slow poles of (r/p) (a - 1 + (b - a)/z)/(z - b), their whole share: discs (outputs, arcs)."""
+        (r/p) a of poles that are not slow, to be multiplied by x; of slow ones (r/p) (a - 1), and (r/p) (b - a) that is
+        to be multiplied by 1/z, their whole share; and -p of a braked hub.
+        """
         plant, sampling = self.loop.plant, self.loop.chain.sampling
-        p, T, f = plant.poles[self.is_slow], sampling.period, sampling.fraction
-        residues = plant.residues.copy()
-        if self.braked is not None:
-            residues[:, self.braked] += np.array([once for _, once in plant.rigid])  # the rest is in `_braked_pair`
-        at_rest = residues[:, self.is_slow] / p
-        now, late = at_rest * np.expm1(p * ((1 - f) * T)), at_rest * np.exp(p * ((1 - f) * T)) * np.expm1(p * (f * T))
-        return self._summed(arcs, p, now) + self._summed(arcs, p, late) * arcs.turned(1)
+        p, T, late = plant.poles, sampling.period, sampling.fraction * sampling.period
+        is_braked = np.arange(p.size) == (-1 if self.braked is None else self.braked)
+        share = (plant.residues + np.outer(plant.rigid[:, 1], is_braked)) / p  # the rest is in `_braked_pair`
+        a = np.exp(p * (T - late))
+        fast = np.where(self.kept & ~self.is_slow, share * a, 0.0)
+        slow = np.where(self.is_slow, [share * np.expm1(p * (T - late)), share * a * np.expm1(p * late)], 0.0)
+        return np.concatenate([fast, *slow, [np.where(is_braked, -p, 0.0)]])
 
     @cached_property
     def braked(self) -> int | None:
@@ -250,25 +245,22 @@ class Circle:
         found = self.loop.plant.braked(SLOW / self.loop.chain.sampling.period)
         return found if found is not None and self.is_slow[found] else None
 
-    def _braked_pair(self, arcs: _Arcs) -> Discs:
-        """x times the pulse transfer function of 1/s - 1/(s - p), p the braked hub's pole."""
+    def _braked_pair(self, arcs: Arcs) -> Discs:
+        """(c0 + c1/z + c2/z^2): x times the pulse transfer function of 1/s - 1/(s - p), without -p/(z - e^{pT})."""
         T, late = self.loop.chain.sampling.period, self.loop.chain.sampling.fraction * self.loop.chain.sampling.period
         p = float(self.loop.plant.poles[self.braked].real)
         first, last = (T - late) ** 2 * phi(p * (T - late)), late**2 * np.exp(p * T) * phi(-p * late)
-        whole = T * np.expm1(p * T) / p
-        over = self._summed(arcs, np.array([p + 0j]), np.array([[-p + 0j]]))[0]
-        sums = arcs.turned(0).times(first) + arcs.turned(1).times(whole - first - last) + arcs.turned(2).times(last)
-        return over * sums
+        middle = T * np.expm1(p * T) / p - first - last
+        return arcs.turned(0).times(first) + arcs.turned(1).times(middle) + arcs.turned(2).times(last)
 
-    def _summed(self, arcs: _Arcs, p: Complex, weights: Complex) -> Discs:
-        """sum over poles p of weight/(z - b) on arcs: discs (outputs, arcs)."""
-        low, high, T = arcs.low, arcs.high, self.loop.chain.sampling.period
+    def summed(self, arcs: Arcs, weights: Complex) -> Discs:
+        """sum over the poles p of the plant of weight/(z - b) on arcs: discs (weights, arcs)."""
+        p, T = self.loop.plant.poles, self.loop.chain.sampling.period
         b, room = np.exp(p * T), np.maximum(-np.expm1(p.real * T), ON_IT)
         blur = MACHINE_EPS * (4 + abs(p * T))
         middles, radii = [], []
-        for some in np.array_split(np.arange(low.size), 1 + low.size * p.size // TERMS_AT_A_TIME):
-            q, h = (low[some] + high[some]) / 2, (high[some] - low[some])[:, None] / 2
-            away = np.exp(1j * q)[:, None] - b
+        for some in np.array_split(np.arange(arcs.half.size), 1 + arcs.half.size * p.size // TERMS_AT_A_TIME):
+            away, h = np.exp(1j * arcs.middle[some])[:, None] - b, arcs.half[some][:, None]
             away = np.where(away == 0, ON_IT, away)
             near = 1 / abs(away)
             least = 1 / np.maximum(1 / near - h, room)
@@ -358,28 +350,21 @@ def _highest(loop: Sampled, line: float) -> float | None:
             return False
 
     heights = np.r_[0.0, np.sort(poles.imag[poles.imag > 0])]
-    tops = np.r_[(heights[1:] + heights[:-1]) / 2, ABOVE_MODEL * heights[-1] or line]
-    if is_complete(top := float(tops[-1])):
-        for factor in HIGHER:
-            if not is_complete(factor * tops[-1]):
-                break
-            top = float(factor * tops[-1])
-        return top
-    low, high = 0, tops.size - 1  # tops[low] may be complete, tops[high] is not
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if is_complete(float(tops[middle])) else (low, middle)
-    return float(tops[low]) if is_complete(float(tops[low])) else None
+    tops = [*((heights[1:] + heights[:-1]) / 2).tolist(), float(ABOVE_MODEL * heights[-1] or line)]
+    if is_complete(tops[-1]):
+        return tops[-1] * max([1.0, *takewhile(lambda factor: is_complete(factor * tops[-1]), HIGHER)])
+    number = bisect_left(tops[:-1], True, key=lambda top: not is_complete(top))
+    return tops[number - 1] if number else None
 
 
 def _left_of(loop: Sampled, line: float, top: float) -> Real | None:
     """The bound on all poles of the band left of the line; None where the integral does not converge."""
-    sampling, exact = loop.chain.sampling, loop.exact
+    sampling, exact, analog = loop.chain.sampling, loop.exact, np.array(loop.analog)[:, None]
     T, remaining = sampling.period, sampling.period * (1 - sampling.fraction)
 
     def sizes(s: Complex) -> Real:
         damped = np.exp(s.real * remaining) / -np.expm1(s.real * T)
-        return abs(exact(s) * _filter_factors(loop, s) / s) * damped
+        return abs(exact(s) * np.where(analog, 1 / (1 + s / sampling.antialias_corner), 1.0) / s) * damped
 
     up = _integral(lambda w: sizes(-line + 1j * w), np.r_[0.0, _graded(line / FINER, top)])
     away = _integral(
@@ -402,14 +387,6 @@ def _integral(size: Callable[[Real], Real], ends: Real) -> Real | None:
             return np.maximum(values, before)
         before, ends = values, np.sort(np.r_[ends, (ends[1:] + ends[:-1]) / 2])
     return None
-
-
-def _filter_factors(loop: Sampled, s: Complex) -> Complex:
-    """Transfer function of the analog filter of each output: wc/(s + wc) or 1."""
-    corner = loop.chain.sampling.antialias_corner
-    if np.isinf(corner):
-        return np.ones((len(loop.analog), 1), complex)
-    return np.array([corner / (s + corner) if analog else np.ones(s.size) for analog in loop.analog])
 
 
 def _of_the_filter(loop: Sampled, line: float) -> Real:

@@ -11,10 +11,10 @@ z = -1 a single pole crosses (see also Ackermann, Robust Control, 1993, ch. 4).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,43 +95,36 @@ class CircleGrid:
 
 def circle_grid(loop: Sampled) -> CircleGrid:
     """The grid that resolves every pole of the plant and every pole and zero of the law, for any weights."""
-    grid = _plant_grid(loop)
-    q, angles = [np.empty(0)], grid.q
-    roots = 1 + np.r_[loop.in_z.poles, loop.in_z.zeros]
-    for root in roots[(abs(roots) > BRIGHT) & (roots.imag >= 0)]:  # the upper of each pair
-        width, at = max(WIDTH_SHARE * abs(1 - abs(root)), NARROWEST_WIDTH), abs(np.angle(root))
-        near = geometric(math.pi, width)
-        q.append(np.r_[at - near, at + near])
-    more = np.concatenate(q)
-    more = np.unique(more[(more > 0) & (more < math.pi)])
-    nearest = np.clip(np.searchsorted(angles, more), 0, angles.size - 1)
-    base = np.r_[grid.base, grid.base[nearest]]
-    shift = np.r_[grid.shift, more - grid.angles[grid.base[nearest]]]
-    order = np.argsort(np.r_[angles, more], kind="stable")
-    return CircleGrid(loop, base[order], shift[order])
-
-
-def _plant_grid(loop: Sampled) -> CircleGrid:
-    """The grid that resolves every pole of the plant."""
     pulse = loop.pulse
     angles = np.angle(pulse.multipliers)
-    width = np.maximum(abs(pulse.poles.real) * pulse.sampling.period * WIDTH_SHARE, NARROWEST_WIDTH)
     felt = pulse.residues.any(axis=0) | (np.arange(angles.size) == angles.size - 1)
     bases = np.nonzero((angles >= 0) & (abs(pulse.multipliers) > BRIGHT) & felt)[0]
     bases = bases[np.argsort(angles[bases], kind="stable")]
     seams = np.r_[0.0, (angles[bases][1:] + angles[bases][:-1]) / 2, np.pi]
     base, shift = [], []
-    for i, pole in enumerate(bases):
-        for edge in (seams[i] - angles[pole], seams[i + 1] - angles[pole]):
-            s = geometric(abs(edge), width[pole]) * np.sign(edge)
-            base.append(np.full(s.size, pole))
-            shift.append(s)
-    grid = CircleGrid(loop, np.concatenate(base), np.concatenate(shift))
-    order = np.lexsort((grid.shift, np.searchsorted(seams, grid.q, side="left"), grid.q))
+    for pole, low, high in zip(bases, seams[:-1], seams[1:], strict=True):
+        width = max(abs(pulse.poles.real[pole]) * pulse.sampling.period * WIDTH_SHARE, NARROWEST_WIDTH)
+        for edge in (low - angles[pole], high - angles[pole]):
+            shift.append(geometric(abs(edge), width) * np.sign(edge))
+            base.append(np.full(shift[-1].size, pole))
+    near = [*_next_to_roots(1 + np.concatenate([loop.in_z.poles, *(zeros for *_, zeros in loop.in_z.columns)]))]
+    extra = np.unique(np.concatenate([np.empty(0), *near]))
+    base.append(bases[np.searchsorted(seams[1:-1], extra)])
+    shift.append(extra - angles[base[-1]])
+    whole = CircleGrid(loop, np.concatenate(base), np.concatenate(shift))
+    order = np.lexsort((whole.shift, np.searchsorted(seams, whole.q, side="left"), whole.q))
     away = abs(1 - pulse.multipliers[bases])  # 0 of the last, the pole of an arm that drifts
     lowest = 0.0 if loop.plant.rigid.any() else STILL * away[away > 0].min(initial=1.0)
-    inside = order[(grid.q[order] >= lowest) & (grid.q[order] < np.pi)]
-    return CircleGrid(loop, grid.base[inside], grid.shift[inside])
+    inside = order[(whole.q[order] >= lowest) & (whole.q[order] < np.pi)]
+    return CircleGrid(loop, whole.base[inside], whole.shift[inside])
+
+
+def _next_to_roots(roots: Complex) -> Iterator[Real]:
+    """Angles on the upper half of the circle at geometric distances from some roots."""
+    for root in roots[(abs(roots) > BRIGHT) & (roots.imag >= 0)]:  # the upper of each pair
+        near = geometric(math.pi, max(WIDTH_SHARE * abs(1 - abs(root)), NARROWEST_WIDTH))
+        q = abs(np.angle(root)) + np.r_[-near, near]
+        yield q[(q > 0) & (q < math.pi)]
 
 
 def geometric(edge: float, width: float) -> Real:
@@ -189,9 +182,7 @@ def _crossed(grid: CircleGrid, others: Real, alone: Real) -> list[list[Crossing]
     at_end = grid.loop.terms(np.array([-1.0 + 0j]), None, np.ones(1))[:, 0]
     least, moving = _lowest(grid.loop.near_one(alone))
     for here, row, first, last in zip(found, others, h[:, 0], h[:, -1], strict=True):
-        here.append(
-            Crossing(_real_gain(complex(row @ at_end), complex(alone @ at_end)), math.pi, 1 if last >= 0 else -1)
-        )
+        here.append(Crossing(_real_gain(row @ at_end, alone @ at_end), math.pi, 1 if last >= 0 else -1))
         lowest, at_one = _lowest(grid.loop.near_one(row))
         if least <= lowest:  # A and B are of the same order in x = 1 - 1/z, or A is of a higher one: it crosses at 0
             static = _real_gain(at_one, moving) if least == lowest else 0.0
@@ -205,7 +196,7 @@ def _lowest(terms: Sequence[tuple[int, float]]) -> tuple[float, float]:
     return lowest, sum(value for order, value in terms if order == lowest)
 
 
-def _real_gain(A: complex, B: complex) -> float:
+def _real_gain(A: Any, B: Any) -> float:
     """The real gain g of A + g B = 0 where A and B are real; inf where there is none."""
     return float(-A.real / B.real) if abs(B.real) > NO_EFFECT * abs(A.real) else math.inf
 

@@ -19,20 +19,20 @@ encoder, where a chain estimates the hub rate, is (1 - a)/T (z - 1)/(z - a) time
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import MOMENT_GAIN, AnyLaw, Arm, as_law, full_law, must_not_be_algebraic
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace
 from tfarm.arm.law import Law, Part, is_measured
 from tfarm.arrays import Complex, Real
 from tfarm.dsp.chain import MOST_DELAY, Chain
-from tfarm.errors import ParameterError
+from tfarm.errors import ParameterError, require
+from tfarm.exact.rationals import block_factors
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import check_gains
@@ -40,7 +40,6 @@ from tfarm.spectrum.table import check_gains
 SAME_PERIOD = 1e-9  # relative: 1/100 s in two files may differ in its last digits
 VANISHED = 1e-12  # of its terms: a sum over several signals that cancel
 RULE = Quantity("discretisation", help="rule by which the continuous-time controller is made discrete")
-NONE = np.empty(0, complex)
 
 
 def discretised(law: Law, period: float) -> Law:
@@ -49,13 +48,12 @@ def discretised(law: Law, period: float) -> Law:
     Raises ParameterError for a law in z with another period, and for a law that its rule is not defined for.
     """
     if law.period is not None:
-        if abs(law.period - period) > SAME_PERIOD * period:
-            remedy = f"the period of the law is {law.period:g} s, that of the chain {period:g} s; make them equal"
-            raise ParameterError(key="period", value=law.period, remedy=remedy)
+        remedy = f"the period of the law is {law.period:g} s, that of the chain {period:g} s; make them equal"
+        require(abs(law.period - period) <= SAME_PERIOD * period, "period", law.period, remedy)
         return law
-    if law.prewarp and (law.rule != "tustin" or law.prewarp * period >= math.pi):
-        remedy = f"tustin keeps the values at a frequency below half the sample rate, {math.pi / period:.4g} rad/s"
-        raise ParameterError(key="prewarp", value=law.prewarp, remedy=remedy)
+    remedy = f"tustin keeps the values at a frequency below half the sample rate, {math.pi / period:.4g} rad/s"
+    is_kept = not law.prewarp or (law.rule == "tustin" and law.prewarp * period < math.pi)
+    require(is_kept, "prewarp", law.prewarp, remedy)
     parts = tuple(Part(part.signals, _in_z(part, law, period)) for part in law.parts)
     return replace(law, parts=parts, period=period, prewarp=0.0)
 
@@ -70,31 +68,29 @@ def rule_in_words(law: Law) -> str:
 
 def _in_z(part: Part, law: Law, period: float) -> LawBlock:
     """A block of the law in z."""
-    block, key = part.block, f"law.{part.signals[0]}.num"
-    if block.excess > 0 and law.rule != "tustin":
-        remedy = f"the rule {law.rule} is not for a law that differentiates: add a pole to den, or take tustin"
-        raise ParameterError(key=key, value=law.name, remedy=remedy)
+    block, rule = part.block, law.rule
+    remedy = f"the rule {rule} is not for a law that differentiates: add a pole to den, or take tustin"
+    require(block.excess <= 0 or rule == "tustin", f"law.{part.signals[0]}.num", law.name, remedy)
     if not block.order and block.excess <= 0:
         return block
-    if law.rule == "matched":
-        if isinstance(block, StateSpace):
-            remedy = "matched is for zeros and poles of one signal; take tustin or zoh for matrices"
-            raise ParameterError(key="rule", value=law.rule, remedy=remedy)
-        return matched(block, period)
-    if law.rule == "zoh":
+    if rule == "tustin":
+        return tustin(block, period, law.prewarp)
+    if rule == "zoh":
         return by_scipy(block, period, "zoh")
-    return tustin(block, period, law.prewarp)
+    if isinstance(block, Rational):
+        return by_factors(block, "matched", period, prewarped(period, 0.0))
+    remedy = "matched is for zeros and poles of one signal; take tustin or zoh for matrices"
+    raise ParameterError(key="rule", value=rule, remedy=remedy)
 
 
 def tustin(block: LawBlock, period: float, prewarp: float = 0.0) -> LawBlock:
     """Return the block with s = c (z - 1)/(z + 1).  Raises ParameterError where it has a pole at s = c."""
     c = prewarped(period, prewarp)
     if isinstance(block, Rational) and block.excess > 0:
-        return substituted(block, c)
+        return by_factors(block, "tustin", period, c)
     A = block.matrices()[0]
-    if np.linalg.cond(np.eye(len(A)) - A / c) > 1 / np.finfo(float).eps:
-        remedy = f"the law has a pole at {c:g} 1/s, which this rule maps to infinity; take another rule or period"
-        raise ParameterError(key="rule", value="tustin", remedy=remedy)
+    remedy = f"the law has a pole at {c:g} 1/s, which this rule maps to infinity; take another rule or period"
+    require(np.linalg.cond(np.eye(len(A)) - A / c) <= 1 / np.finfo(float).eps, "rule", "tustin", remedy)
     return by_scipy(block, 2 / c, "bilinear")
 
 
@@ -110,38 +106,10 @@ def by_scipy(block: LawBlock, period: float, rule: Literal["zoh", "bilinear"]) -
     return StateSpace(*cont2discrete(block.matrices(), period, rule)[:4])
 
 
-def matched(block: Rational, period: float) -> Rational:
-    """The ratio with poles and zeros at e^{sT}; at rest both have the same power of s and of (z - 1)/T."""
-    num, zeros, at_zero = _roots(block.num, period)
-    den, poles, integrators = _roots(block.den, period)
-    gain = num / den * np.prod(1 - poles).real / np.prod(1 - zeros).real * period ** (integrators - at_zero)
-    ones = np.ones(at_zero), np.ones(integrators)
-    return Rational.of_roots([*zeros, *ones[0]], [*poles, *ones[1]], float(gain))
-
-
-def _roots(polynomial: tuple[float, ...], period: float) -> tuple[float, NDArray[np.complex128], int]:
-    """The lowest coefficient that is not 0, e^{sT} of the roots other than 0, and the number of roots 0."""
-    coefficients = np.trim_zeros(np.array(polynomial), "b")
-    if not coefficients.size:
-        return 0.0, NONE, 0
-    roots = np.exp(np.roots(coefficients).astype(complex) * period)
-    return float(coefficients[-1]), roots, len(polynomial) - coefficients.size
-
-
-def substituted(block: Rational, c: float) -> Rational:
-    """The ratio of polynomials with s = c (z - 1)/(z + 1), without loss of small coefficients."""
-    n = max(len(block.num), len(block.den)) - 1
-
-    def of(polynomial: tuple[float, ...]) -> Real:
-        total = np.zeros(n + 1)
-        for k, each in enumerate(reversed(polynomial)):
-            factor = np.ones(1)
-            for root in [1.0] * k + [-1.0] * (n - k):
-                factor = np.convolve(factor, [1.0, -root])
-            total += each * c**k * factor
-        return total
-
-    return Rational(tuple(of(block.num)), tuple(of(block.den)))
+def by_factors(block: Rational, rule: Literal["tustin", "matched"], period: float, c: float) -> Rational:
+    """The ratio in z of its exact factors; `matched` has at rest the same power of s and of (z - 1)/T."""
+    poles, ((gain, zeros),) = block_factors(block, rule, period, c)
+    return Rational.of_roots(1 + zeros, 1 + poles, gain)
 
 
 # ------------------------------------------------------------ the law in the computer
@@ -153,8 +121,7 @@ def with_all_gains(arm: Arm, law: AnyLaw) -> Law:
     Raises ParameterError for the algebraic loop, I_h = 0 and K2 != 0, and for a gain that is too large.
     """
     law = as_law(law)
-    gains = law.gains if set(law.signals) <= set(law.references) else None
-    if gains is None:
+    if (gains := law.gains) is None or not set(law.signals) <= set(law.references):
         return law
     if gains.K2:
         must_not_be_algebraic(arm, MOMENT_GAIN, gains.K2)
@@ -170,9 +137,8 @@ def acting_law(arm: Arm, law: Law, chain: Chain) -> tuple[Law, Chain]:
     """
     T = chain.sampling.period
     samples = chain.sampling.delay_samples + law.delay / T
-    if samples > MOST_DELAY:
-        remedy = f"with the delay of the chain it is {samples:.4g} samples; at most {MOST_DELAY:g}"
-        raise ParameterError(key="delay", value=law.delay, remedy=remedy)
+    remedy = f"with the delay of the chain it is {samples:.4g} samples; at most {MOST_DELAY:g}"
+    require(samples <= MOST_DELAY, "delay", law.delay, remedy)
     if "root_moment" in law.signals and law.part_gains.get("root_moment", (0, 1.0))[1]:
         must_not_be_algebraic(arm, "signals", "root_moment")
     late = replace(chain, sampling=replace(chain.sampling, delay_samples=samples))
@@ -193,9 +159,6 @@ def _differenced(part: Part, a: float, T: float) -> Part:
     if "hub_rate" not in part.signals:
         return part
     signals = tuple("hub_angle" if name == "hub_rate" else name for name in part.signals)
-    if isinstance(part.block, Rational):
-        num = np.convolve(part.block.num, [(1 - a) / T, -(1 - a) / T])
-        return Part(signals, Rational(tuple(num), tuple(np.convolve(part.block.den, [1.0, -a]))))
     A, B, C, D = part.block.matrices()
     rate = np.array([name == "hub_rate" for name in part.signals], dtype=float)
     through, kept = (1 - a) / T, 1.0 - rate
@@ -213,23 +176,7 @@ def _differenced(part: Part, a: float, T: float) -> Part:
 # ------------------------------------------------------------ factors
 
 
-@dataclass(frozen=True)
-@record
-class Column:
-    """g prod(delta - zeros): the entry of a part of a law for a signal, times the part's denominator."""
-
-    signal: str
-    gain: float
-    zeros: Complex
-
-
-@dataclass(frozen=True)
-@record
-class PartFactors:
-    """A part of a law: its `poles`, as delta, and a column for each signal that it feeds back."""
-
-    poles: Complex
-    columns: tuple[Column, ...]
+Column = tuple[int, int, float, Complex]  # part, row of the signal, and g and zeros of g prod(delta - zeros)
 
 
 @dataclass(frozen=True)
@@ -237,32 +184,27 @@ class PartFactors:
 class LawInZ:
     """The parts of a law in z, with the sign of u = -sum, over `signals`: factors, and states.
 
+    `part_poles`: the poles of each part, as delta; `columns`: the entry of a part for each signal that it feeds back,
+    times the part's denominator.
     `matrices`: A, B of x_{k+1} = A x_k + B y_k, and a row of C and of D for each part.
     """
 
     signals: tuple[str, ...]
-    parts: tuple[PartFactors, ...]
+    part_poles: tuple[Complex, ...]
+    columns: tuple[Column, ...]
     matrices: Matrices
 
     @cached_property
     def poles(self) -> Complex:
         """Its poles, as delta."""
-        return np.concatenate([each.poles for each in self.parts])
-
-    @property
-    def zeros(self) -> Complex:
-        """The zeros of all columns, as delta."""
-        return np.concatenate([NONE, *(column.zeros for part in self.parts for column in part.columns)])
+        return np.concatenate(self.part_poles)
 
     @cached_property
-    def terms(self) -> list[tuple[int, int, float, Complex]]:
-        """Part, row of the signal, gain and zeros of p_i for each column; the poles of other parts are zeros too."""
-        poles = [each.poles for each in self.parts]
-        return [
-            (n, self.signals.index(each.signal), each.gain, np.concatenate([each.zeros, *poles[:n], *poles[n + 1 :]]))
-            for n, part in enumerate(self.parts)
-            for each in part.columns
-        ]
+    def terms(self) -> list[Column]:
+        """The columns as p_i: the poles of other parts are zeros too."""
+        poles = [np.empty(0, complex), *self.part_poles]
+        others = [np.concatenate(poles[: n + 1] + poles[n + 2 :]) for n in range(len(self.part_poles))]
+        return [(part, row, gain, np.r_[zeros, others[part]]) for part, row, gain, zeros in self.columns]
 
     def under(self, weights: Sequence[float]) -> Matrices:
         """States of the law with a factor on each part."""
@@ -270,12 +212,12 @@ class LawInZ:
         row = np.array([weights])
         return A, B, row @ C, row @ D
 
-    def ignores(self, turned: Mapping[str, float], weights: Sequence[float]) -> bool:
-        """Whether its output tends to 0 where its signals stay at these values."""
+    def ignores(self, turned: Real, weights: Sequence[float]) -> bool:
+        """Whether its output tends to 0 where its signals stay at these values (signals,)."""
         out = []
-        for part, weight in zip(self.parts, weights, strict=True):
-            held, below = lowest_power(part.poles)
-            terms = [(*lowest_power(each.zeros), weight * each.gain * turned[each.signal]) for each in part.columns]
+        for part, (poles, weight) in enumerate(zip(self.part_poles, weights, strict=True)):
+            held, below = lowest_power(poles)
+            terms = [(*lowest_power(zeros), weight * g * turned[row]) for n, row, g, zeros in self.columns if n == part]
             by_order = [[value * factor for n, value, factor in terms if n == order] for order in range(held + 1)]
             is_reached = held and len(terms) == 1 and terms[0][2]  # an integrator of the only signal, cancelled or not
             if is_reached or not all(map(_cancel, by_order[:held])):
@@ -299,22 +241,21 @@ def law_in_z(law: Law, acting: Law, chain: Chain) -> LawInZ:
     acting = with_estimate(acting, chain)
     alone = [acting.weighted(row).matrices() for row in np.eye(len(acting.parts)).tolist()]
     (A, B, _, _), C, D = alone[0], *(np.vstack([each[n] for each in alone]) for n in (2, 3))
-    return LawInZ(acting.signals, tuple(_factors(part, law, chain) for part in law.parts), (A, B, C, D))
+    found = [_factors(part, law, chain) for part in law.parts]
+    columns = [(n, acting.signals.index(name), g, zeros) for n, (_, of) in enumerate(found) for name, g, zeros in of]
+    return LawInZ(acting.signals, tuple(poles for poles, _ in found), tuple(columns), (A, B, C, D))
 
 
-def _factors(part: Part, law: Law, chain: Chain) -> PartFactors:
-    """The factors of one part, in z."""
-    from tfarm.exact.rationals import block_factors  # FLINT, which few commands need
-
+def _factors(part: Part, law: Law, chain: Chain) -> tuple[Complex, list[tuple[str, float, Complex]]]:
+    """The poles of one part in z, and signal, gain and zeros of each column."""
     T = chain.sampling.period
-    rule = "none" if law.is_discrete else law.rule
-    poles, found = block_factors(part.block, rule, T, prewarped(T, law.prewarp))
-    is_difference = chain.converters.hub_rate == "difference" and "hub_rate" in part.signals
-    lag = float(np.expm1(-chain.converters.rate_filter * T))
-    columns = []
-    for name, (gain, zeros) in zip(part.signals, found, strict=True):
-        if is_measured(name) and is_difference and name == "hub_rate":  # -lag/T delta/(delta - lag) times the angle
-            columns.append(Column("hub_angle", law.sign * gain * lag / T, np.r_[zeros, 0.0]))
-        elif is_measured(name):
-            columns.append(Column(name, -law.sign * gain, np.r_[zeros, lag] if is_difference else zeros))
-    return PartFactors(np.r_[poles, lag] if is_difference else poles, tuple(columns))
+    poles, found = block_factors(part.block, "none" if law.is_discrete else law.rule, T, prewarped(T, law.prewarp))
+    columns = [(name, -law.sign * g, zeros) for name, (g, zeros) in zip(part.signals, found, strict=True)]
+    columns = [each for each in columns if is_measured(each[0])]
+    if chain.converters.hub_rate != "difference" or "hub_rate" not in part.signals:
+        return poles, columns
+    lag = float(np.expm1(-chain.converters.rate_filter * T))  # -lag/T delta/(delta - lag) times the angle
+    return np.r_[poles, lag], [
+        ("hub_angle", -g * lag / T, np.r_[zeros, 0.0]) if name == "hub_rate" else (name, g, np.r_[zeros, lag])
+        for name, g, zeros in columns
+    ]

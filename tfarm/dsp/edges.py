@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Annotated
+from itertools import pairwise
+from typing import Annotated, TypeVar
 
 import numpy as np
 from scipy.optimize import brentq
@@ -23,9 +24,8 @@ from tfarm.dsp.chain import Chain
 from tfarm.dsp.circle import Band, Circle, complete_band
 from tfarm.dsp.crossings import stable_windows
 from tfarm.dsp.discretise import acting_law, with_all_gains
-from tfarm.dsp.sampled import Sampled, resized, sampled_loop
-from tfarm.dsp.sampling import FORGOTTEN, held_amplitude
-from tfarm.errors import ConvergenceError
+from tfarm.dsp.plant import FORGOTTEN, held_amplitude
+from tfarm.dsp.sampled import Sampled, first_distinct, resized, sampled_loop
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes_below
@@ -53,6 +53,7 @@ DISTINCT_FROM_ZERO = 1e-6  # of the other edge of an interval: distance from 0 a
 
 Proof = tuple[bool | None, float]  # whether a loop is stable (None: not shown), and the band [rad/s] of that proof
 Test = Callable[[float], Proof]
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -85,10 +86,8 @@ def delay_margin(loop: Sampled) -> DelayMargin:
     risky = (reach > -plant.poles.real * T) & (plant.poles.imag > 0)  # the feedback may exceed their own damping
     fastest = (plant.poles.imag[risky] * T).max(initial=np.pi / 4)
     step = float(min(LONGEST_SCAN_STEP, 2 * np.pi / fastest / STEPS_A_TURN))  # samples
-    for i in range(1, MOST_STEPS + 1):
-        if i * step > LONGEST_DELAY_SAMPLES:
-            break
-        low, high = (i - 1) * step, i * step
+    scanned = step * np.arange(min(MOST_STEPS, int(LONGEST_DELAY_SAMPLES / step)) + 1)
+    for low, high in pairwise(scanned.tolist()):
         if grows(high):
             is_between = log_radius(low) < 0
             return DelayMargin(float(brentq(log_radius, low, high, xtol=DELAY_KNOWN)) if is_between else low, False)
@@ -118,48 +117,35 @@ def damping_edge(loop: Sampled) -> float:
     high = 2 * STRONGEST / first_frequency(loop.plant.arm)
     if log_radius(high) >= 0:
         return math.inf
-    for _ in range(DAMPING_DECADES):
-        low = high / 10
+    for low in high / 10.0 ** np.arange(1, DAMPING_DECADES + 1):
         if log_radius(low) >= 0:  # a radius is nearly linear in C where C is small
-            C = float(brentq(log_radius, low, high, xtol=DAMPING_XTOL * low, rtol=DAMPING_RTOL))
+            C = float(brentq(log_radius, low, 10 * low, xtol=DAMPING_XTOL * low, rtol=DAMPING_RTOL))
             return C * (1 + MADE_SURE)
-        high = low
-    return high
+    return float(low)
 
 
 def log_radius_with(loop: Sampled, C: float, count: int) -> float:
-    """The log spectral radius at C; where two damped modes are one there, at a C that differs by 1e-6.
+    """The log spectral radius at C; where two damped modes are one there, at a C that differs by 1e-6."""
 
-    Modes that decay within a sample, or are overdamped, are in the remainder, but for a few.
-    """
-    arm = loop.plant.arm
-    outliving = min(alive(arm.having(damping=C), loop.chain), modes_below(arm, SURELY_OVERDAMPED / C))
-    for nudge in NUDGES:
-        try:
-            damped = loop.on(arm.having(damping=C * (1 + nudge)), min(count, KEPT_BEYOND + outliving))
-        except ConvergenceError:
-            if nudge < 0:
-                raise
-            continue
-        return damped.poles.log_spectral_radius
-    raise AssertionError("unreachable")
+    def damped(nudge: float) -> Sampled:
+        arm = loop.plant.arm.having(damping=C * (1 + nudge))
+        return loop.on(arm, min(count, KEPT_BEYOND + outliving(arm, loop.chain)))
+
+    return first_distinct(damped, NUDGES).poles.log_spectral_radius
 
 
-def alive(arm: Arm, chain: Chain) -> int:
-    """Number of bending modes of a damped arm that do not decay within a sample: C w^2 T (1 - f)/2 below 40."""
-    remaining = chain.sampling.period * (1 - chain.sampling.fraction)
-    return modes_below(arm, math.sqrt(2 * FORGOTTEN / (arm.least_damping * remaining)))
-
-
-def most_modes(arm: Arm, chain: Chain) -> int:
-    """Largest number of modes of a loop: of a damped arm those that ring longer than a sample, and a few; at most 128.
+def outliving(arm: Arm, chain: Chain) -> int:
+    """Number of bending modes of a damped arm that outlive a sample, C w^2 T (1 - f)/2 below 40, and still ring.
 
     Overdamped modes have their slow poles next to -1/C, where those of the remainder are too.
     """
-    if not arm.least_damping:
-        return MOST_LOOP_MODES
-    outliving = min(alive(arm, chain), modes_below(arm, SURELY_OVERDAMPED / arm.least_damping))
-    return min(MOST_LOOP_MODES, MODES_BEYOND + outliving)
+    C, remaining = arm.least_damping, chain.sampling.period * (1 - chain.sampling.fraction)
+    return modes_below(arm, min(math.sqrt(2 * FORGOTTEN / (C * remaining)), SURELY_OVERDAMPED / C))
+
+
+def most_modes(arm: Arm, chain: Chain) -> int:
+    """Largest number of modes of a loop: of a damped arm those that outlive a sample, and a few; at most 128."""
+    return min(MOST_LOOP_MODES, MODES_BEYOND + outliving(arm, chain)) if arm.least_damping else MOST_LOOP_MODES
 
 
 def whole_loop(arm: Arm, law: AnyLaw, chain: Chain) -> Sampled:
@@ -239,60 +225,54 @@ def figure(value: float, digits: int, modes: int, proven: Test, other: Test, *, 
             rounded = float(f"{value:.{number}g}")
             half = 0.5 * 10.0 ** (math.floor(math.log10(abs(rounded))) - number + 1) if rounded else spare
             inside, outside = (rounded - half, rounded + half) if below else (rounded + half, rounded - half)
-            (stable, band), (still, narrower) = test(inside), (None, 0.0)
-            if stable:
-                still, narrower = test(outside)
+            stable, band = test(inside)
+            still, narrower = test(outside) if stable else (None, 0.0)
             return min(band, narrower) if still is False else 0.0
 
-        if turns(digits):
-            return digits, turns(digits)
-        number = least - 1 + bisect_right(range(least, digits), False, key=lambda each: not turns(each))
+        fewer = range(least, digits)
+        number = digits if turns(digits) else least - 1 + bisect_right(fewer, False, key=lambda each: not turns(each))
         return (number, turns(number)) if number >= least else (0, 0.0)
 
     number, band = most(proven, 2)
-    if number:
-        return Figure(value, number, band, None)
-    return Figure(value, most(other, 1)[0], None, modes)
+    return Figure(value, number, band, None) if number else Figure(value, most(other, 1)[0], None, modes)
 
 
 def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[Interval]:
     """Return the stability intervals of a number, with more and more modes until all digits are certified."""
-    circle, found = None if band is None else band.circle(), []
-    for each in _sizes(loop, band, MOST_EDGE_MODES):
-        found = _windows(each, band, circle, name)
-        if all(edge.is_sharp(GAIN_DIGITS) for pair in found for edge in pair):
-            break
-    return found
-
-
-def _sizes(loop: Sampled, band: Band | None, most: int) -> Iterator[Sampled]:
-    """The loop with at most MOST_EDGE_MODES of its modes, and in a certified band with 2, 4 ... times as many."""
-    loop = loop if loop.plant.count <= MOST_EDGE_MODES else resized(loop, MOST_EDGE_MODES)
-    yield loop
-    most = min(most, _most(loop)) if band is not None else 0
-    while loop.plant.count < most:
-        before, loop = loop.plant.count, resized(loop, min(2 * loop.plant.count, most))
-        if loop.plant.count <= before:  # two damped modes are one here
-            return
-        yield loop
-
-
-def _windows(loop: Sampled, band: Band | None, circle: Circle | None, name: str) -> list[Interval]:
-    """The stability intervals of a loop with its own number of modes."""
-    other = _with_others(loop)
+    circle = None if band is None else band.circle()
 
     def proof(value: float) -> Proof:
-        count = None if circle is None else circle.count(loop.having(**{name: value}).weights)
-        return None if count is None else count == 0, 0.0 if band is None else band.top
+        return _proof(band, circle, loop.having(**{name: value}))
 
-    def confirmed(value: float) -> Proof:
-        return other().having(**{name: value}).poles.is_stable, math.inf
+    def found(loop: Sampled) -> list[Interval]:
+        other, modes = _with_others(loop), loop.plant.count
 
-    def edge(value: float, opposite: float, *, below: bool) -> Figure:
-        spare = DISTINCT_FROM_ZERO * (abs(opposite) if opposite and math.isfinite(opposite) else 1.0)
-        return figure(value, GAIN_DIGITS, loop.plant.count, proof, confirmed, below=below, spare=spare)
+        def confirmed(value: float) -> Proof:
+            return other().having(**{name: value}).poles.is_stable, math.inf
 
-    return [(edge(low, high, below=False), edge(high, low, below=True)) for low, high in stable_windows(loop, name)]
+        def edge(value: float, opposite: float, *, below: bool) -> Figure:
+            spare = DISTINCT_FROM_ZERO * (abs(opposite) if opposite and math.isfinite(opposite) else 1.0)
+            return figure(value, GAIN_DIGITS, modes, proof, confirmed, below=below, spare=spare)
+
+        return [(edge(low, high, below=False), edge(high, low, below=True)) for low, high in stable_windows(loop, name)]
+
+    def is_sharp(windows: list[Interval]) -> bool:
+        return all(edge.is_sharp(GAIN_DIGITS) for pair in windows for edge in pair)
+
+    return _most_certain(loop, band, MOST_EDGE_MODES, found, is_sharp)
+
+
+def _most_certain(
+    loop: Sampled, band: Band | None, most: int, found: Callable[[Sampled], Found], is_sharp: Callable[[Found], bool]
+) -> Found:
+    """What is found with at most MOST_EDGE_MODES modes; in a certified band with twice as many until it `is_sharp`."""
+    loop = resized(loop, min(loop.plant.count, MOST_EDGE_MODES))
+    result, count = found(loop), loop.plant.count
+    most = min(most, _most(loop)) if band is not None else 0
+    while count < most and not is_sharp(result):
+        count = min(2 * count, most)
+        result = found(resized(loop, count))
+    return result
 
 
 def _with_others(loop: Sampled) -> Callable[[], Sampled]:
@@ -310,39 +290,44 @@ def _most(loop: Sampled) -> int:
     return min(MOST_EDGE_MODES, most_modes(loop.plant.arm, loop.chain))
 
 
-def _proof_of(loop: Sampled) -> Proof:
-    """Whether a loop is stable with every mode of its band."""
-    band = complete_band(loop)
-    count = None if band is None else band.circle().count(loop.weights)
+def _proof(band: Band | None, circle: Circle | None, loop: Sampled) -> Proof:
+    """Whether a loop is stable with every mode of a band, by its discs on the circle."""
+    count = None if circle is None else circle.count(loop.weights)
     return None if count is None else count == 0, 0.0 if band is None else band.top
 
 
+def _proof_of(loop: Sampled) -> Proof:
+    """Whether a loop is stable with every mode of its own band."""
+    band = complete_band(loop)
+    return _proof(band, None if band is None else band.circle(), loop)
+
+
 def shown_delay(loop: Sampled, band: Band | None) -> Figure:
-    """Return the delay margin [samples] as a figure, with more and more modes until all digits are certified."""
-    found = Figure(0.0, 0, None, 0)
-    for each in _sizes(loop, band, MOST_EDGE_MODES // 2):
-        found = _delay(each, band)
-        if found.is_bound or found.is_sharp(OTHER_DIGITS):
-            break
-    return found
+    """Return the delay margin [samples] as a figure, with more and more modes until all digits are certified.
 
-
-def _delay(loop: Sampled, band: Band | None) -> Figure:
-    """The delay margin of a loop with its own number of modes; 0 is as certain as the verdict that it is unstable."""
-    margin, now, modes = delay_margin(loop), loop.chain.sampling.delay_samples, loop.plant.count
-    if margin.samples == 0.0:
-        return Figure(0.0, OTHER_DIGITS, band.top if band else None, None if band else modes)
-    if margin.is_bound:
-        return Figure(margin.samples, OTHER_DIGITS, None, modes, is_bound=True)
-    other = _with_others(loop)
+    0 is as certain as the verdict that the loop is unstable.
+    """
+    now = loop.chain.sampling.delay_samples
 
     def proof(more: float) -> Proof:
         return (None, 0.0) if band is None or more < 0 else _proof_of(band.loop.with_delay(now + more))
 
-    def holds(more: float) -> Proof:
-        return None if more < 0 else other().with_delay(now + more).poles.is_stable, math.inf
+    def found(loop: Sampled) -> Figure:
+        margin, modes, other = delay_margin(loop), loop.plant.count, _with_others(loop)
 
-    return figure(margin.samples, OTHER_DIGITS, modes, proof, holds, below=True, spare=0.0)
+        def holds(more: float) -> Proof:
+            return None if more < 0 else other().with_delay(now + more).poles.is_stable, math.inf
+
+        if margin.samples == 0.0:
+            return Figure(0.0, OTHER_DIGITS, band.top if band else None, None if band else modes)
+        if margin.is_bound:
+            return Figure(margin.samples, OTHER_DIGITS, None, modes, is_bound=True)
+        return figure(margin.samples, OTHER_DIGITS, modes, proof, holds, below=True, spare=0.0)
+
+    def is_sharp(found: Figure) -> bool:
+        return found.is_bound or found.is_sharp(OTHER_DIGITS)
+
+    return _most_certain(loop, band, MOST_EDGE_MODES // 2, found, is_sharp)
 
 
 def shown_damping(loop: Sampled, count: int) -> Figure:

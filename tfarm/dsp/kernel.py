@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.dsp.chain import Sampling
-from tfarm.dsp.plant import Plant
-from tfarm.dsp.sampling import held_amplitude
+from tfarm.dsp.plant import Plant, held_amplitude
 from tfarm.exact.compiled import compiled, inlined
 
 ANGLE, RATE, MOMENT = 0, 1, 2  # of the outputs, which begin with what is fed back (`tfarm.arm.FED_BACK`)
@@ -32,7 +31,7 @@ class Model(NamedTuple):
 
     `turn`, `push` (pieces, m) are e^{p dt} and (e^{p dt} - 1)/p of each piece of a sample between two switches or
     records, `piece` (pieces, 3) its properties; `weights` (outputs, m), `rates` (outputs, 2), `static` (outputs,);
-    `hub` (2 + m,) is the hub angle's row, rates first, without its static remainder.
+    `hub` is the row of the hub angle.
     """
 
     turn: Complex
@@ -41,7 +40,7 @@ class Model(NamedTuple):
     weights: Complex
     rates: Real
     static: Real
-    hub: Complex
+    hub: int
 
 
 def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: int) -> Model:
@@ -50,15 +49,14 @@ def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: i
     records = T * (np.arange(between) + 1) / (between + 1)
     ends = np.unique(np.r_[records, [f * T] if f else [], T])
     starts = np.r_[0.0, ends[:-1]]
-    weights = np.ascontiguousarray(plant.residues[:, kept] * np.where(p.imag > 0, 2.0, 1.0))
     return Model(
         turn=np.exp(p * (ends - starts)[:, None]),
         push=np.array([held_amplitude(p, float(each)) for each in ends - starts]),
         piece=np.c_[ends - starts, starts >= f * T, np.isin(ends, records)].astype(float),
-        weights=weights,
+        weights=np.ascontiguousarray(plant.residues[:, kept] * np.where(p.imag > 0, 2.0, 1.0)),
         rates=np.array(plant.rigid),  # in one layout: the compiled loop is compiled anew for each
         static=np.array(plant.static),
-        hub=np.r_[plant.rigid[hub], weights[hub]].astype(complex),
+        hub=hub,
     )
 
 
@@ -105,19 +103,25 @@ class Electronics(NamedTuple):
     bound: float
 
 
+@inlined
+def reading(o: int, rates: Any, weights: Any, amplitude: Any, rigid: Any) -> float:
+    """Output o without its static remainder."""
+    value = rates[o, DOUBLY] * rigid[DOUBLY] + rates[o, ONCE] * rigid[ONCE]
+    for i in range(amplitude.size):
+        value += weights[o, i].real * amplitude[i].real - weights[o, i].imag * amplitude[i].imag
+    return value
+
+
 @compiled
 def read_outputs(weights: Any, rates: Any, static: Any, amplitude: Any, rigid: Any, torque: float, out: Any) -> None:
     """The outputs under the torque that acts now."""
-    for o in range(weights.shape[0]):
-        value = rates[o, DOUBLY] * rigid[DOUBLY] + rates[o, ONCE] * rigid[ONCE] + static[o] * torque
-        for i in range(amplitude.size):
-            value += weights[o, i].real * amplitude[i].real - weights[o, i].imag * amplitude[i].imag
-        out[o] = value
+    for o in range(out.size):
+        out[o] = reading(o, rates, weights, amplitude, rigid) + static[o] * torque
 
 
 @compiled
 def advance(
-    turn: Any, push: Any, piece: Any, weights: Any, rates: Any, static: Any, hub: Any, amplitude: Any, rigid: Any,
+    turn: Any, push: Any, piece: Any, weights: Any, rates: Any, static: Any, hub: int, amplitude: Any, rigid: Any,
     work: Any, fine: Any, old: float, new: float, push_on: float,
 ) -> None:  # fmt: skip
     """Advance by one sample: `old` torque up to the switch, `new` after it, `push_on` (a disturbance) throughout.
@@ -125,7 +129,7 @@ def advance(
     The first are those of a `Model`.  Fills a row of `fine` at each record, and adds to the work.
     """
     row = 0
-    before = _angle(hub, amplitude, rigid)
+    before = reading(hub, rates, weights, amplitude, rigid)
     for s in range(piece.shape[0]):
         torque = (new if piece[s, IS_NEW] > YES else old) + push_on
         dt = piece[s, DURATION]
@@ -133,7 +137,7 @@ def advance(
             amplitude[i] = turn[s, i] * amplitude[i] + push[s, i] * torque
         rigid[DOUBLY] += dt * rigid[ONCE] + 0.5 * dt * dt * torque
         rigid[ONCE] += dt * torque
-        after = _angle(hub, amplitude, rigid)
+        after = reading(hub, rates, weights, amplitude, rigid)
         done = torque * (after - before)
         work[DONE] += done
         work[MOVED] += abs(done)
@@ -144,27 +148,12 @@ def advance(
 
 
 @compiled
-def _angle(hub: Any, amplitude: Any, rigid: Any) -> float:
-    """The hub angle of the modes, without the static remainder."""
-    value = hub[DOUBLY].real * rigid[DOUBLY] + hub[ONCE].real * rigid[ONCE]
-    for i in range(amplitude.size):
-        value += hub[i + 2].real * amplitude[i].real - hub[i + 2].imag * amplitude[i].imag
-    return value
-
-
-@compiled
 def quantise(value: float, row: Any, saturated: Any, which: int) -> float:
     """`value` on the steps of a converter, clipped to its range and then marked in `saturated` (3,)."""
-    step, low, high = row[STEP], row[LOWEST], row[HIGHEST]
-    if step > 0.0:
-        value = np.rint(value / step) * step
-    if value > high:
-        saturated[which] = True
-        return high
-    if value < low:
-        saturated[which] = True
-        return low
-    return value
+    if row[STEP] > 0.0:
+        value = np.rint(value / row[STEP]) * row[STEP]
+    saturated[which] = value > row[HIGHEST] or value < row[LOWEST]
+    return min(max(value, row[LOWEST]), row[HIGHEST])
 
 
 @compiled
@@ -215,16 +204,17 @@ _before, _converted, _after = inlined(before), inlined(converted), inlined(after
 
 
 @compiled
+def rounded(value: float, single: bool) -> float:
+    """A number in the precision of the controller: float32 or float64."""
+    return float(np.float32(value)) if single else value
+
+
+@compiled
 def product(row: Any, values: Any, start: float, single: bool) -> float:
-    """start + row . values, in float64, or every product and sum rounded to float32."""
+    """start + row . values, every product and sum in the precision of the controller."""
     total = start
     for j in range(values.size):
-        term = row[j] * values[j]
-        if single:
-            term = float(np.float32(term))
-        total += term
-        if single:
-            total = float(np.float32(total))
+        total = rounded(total + rounded(row[j] * values[j], single), single)
     return total
 
 
@@ -247,12 +237,8 @@ def run(model: Any, state: Any, forcing: Any, electronics: Any, matrices: Any, s
         for j in range(e.size):
             source = sources[j]
             value = 0.0 if source < 0 else known[source] if source < known.size else record[source]
-            e[j] = references[k, j] - value
-            if single:
-                e[j] = float(np.float32(float(np.float32(references[k, j])) - float(np.float32(value))))
-        u = forcing.feedforward[k]
-        if single:
-            u = float(np.float32(u))
+            e[j] = rounded(rounded(references[k, j], single) - rounded(value, single), single)
+        u = rounded(forcing.feedforward[k], single)
         u = product(D[min(k, D.shape[0] - 1)], e, product(C[0], x, u, single), single)
         for i in range(x.size):
             following[i] = product(B[i], e, product(A[i], x, 0.0, single), single)

@@ -1,9 +1,20 @@
-"""The analog plant of a sampled loop: poles and residues of the modal model, with an analog filter.
+"""The plant of a sampled loop: poles and residues of the modal model with an analog filter, and its discretisation.
 
     G_o(s) = rigid[o,0]/s^2 + rigid[o,1]/s + static[o] + sum over poles of residues[o,i]/(s - poles[i])
 
 A first-order filter wc/(s + wc) on an output adds one pole and changes residues; the form is the same.  Analog damping
 of the hub is friction of the arm.
+
+The zero-order hold is exact, with any sampling period and any computational delay.  The torque u_k, computed from the
+sample at t_k, acts from t_k + tau to t_{k+1} + tau, tau = (d + f) T.  A pole p with the amplitude a' = p a + u then
+steps by
+
+    a_{k+1} = e^{pT} a_k + early u_{k-d} + late u_{k-d-1},
+    early = (e^{p(1-f)T} - 1)/p,   late = e^{p(1-f)T} (e^{pfT} - 1)/p
+
+and what is measured just before the update, y_k = Re(sum r a_k) + static u_{k-d-1}, sees the torque of the *preceding*
+interval: nothing of u_k comes through at once.  At C = 0 e^{pT} has modulus one to the last bit, and is never a
+quotient.
 """
 
 from __future__ import annotations
@@ -11,15 +22,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache, reduce
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
 
 from tfarm.arm import Arm
 from tfarm.arrays import Complex, Real
-from tfarm.dsp.chain import Chain
-from tfarm.errors import ParameterError
+from tfarm.dsp.chain import Chain, Sampling
+from tfarm.errors import require
 from tfarm.exact.outputs import Output
 from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
@@ -29,10 +42,16 @@ from tfarm.response.signals import Signals
 from tfarm.schema import Quantity
 from tfarm.spectrum.frequencies import LISTS_KEPT
 
+if TYPE_CHECKING:
+    import control
+
 AMPLIFIED = ("M", "Q", "strain", "current")  # quantities of strain gauges, load cells and shunts
 RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")  # of a simulation, not filtered
 MODES_USED = Quantity("flexible modes", help="number of flexible modes of the arm in the model of the sampled loop")
 USUAL_MODES = 20  # flexible, of a sampled loop or a simulation by default
+SLOW = 0.1  # |p| T below which a pole is slow: its two parts are then more than ten times their sum
+PHI_TERMS = 12  # of a series in |p| T, below `SLOW`: 0.1^12/14! is left
+FORGOTTEN = 40.0  # e^-40 = 4e-18: such a pole has settled before the next sample
 
 
 @dataclass(frozen=True)
@@ -58,12 +77,9 @@ class Plant:
         """G_o(s) of every output at one s."""
         return self.rigid @ np.array([1 / s**2, 1 / s]) + self.static + self.residues @ (1 / (s - self.poles))
 
-    def rows(self, names: Sequence[str]) -> Plant:
-        """The plant with these outputs alone, in this order."""
-        at = [self.outputs.index(name) for name in names]
-        return replace(
-            self, outputs=tuple(names), residues=self.residues[at], rigid=self.rigid[at], static=self.static[at]
-        )
+    def rows(self, at: Sequence[int], names: tuple[str, ...]) -> Plant:
+        """The plant with these of its outputs, in this order, under these names."""
+        return replace(self, outputs=names, residues=self.residues[at], rigid=self.rigid[at], static=self.static[at])
 
     def joined(self, more: Plant) -> Plant:
         """The plant with the outputs of another of the same arm after its own; the other may lack the filter's pole."""
@@ -100,17 +116,14 @@ class Plant:
 def damped_at_hub(arm: Arm, chain: Chain) -> Arm:
     """The arm with the actuator's analog hub damping, which is friction of its hub."""
     damping = chain.actuator.hub_damping
-    if damping > 0 and arm.has_massless_hub:
-        remedy = "a hub without inertia has no model of finite order under it; give hub.inertia, or leave it out"
-        raise ParameterError(key="actuator.hub_damping", value=damping, remedy=remedy)
+    remedy = "a hub without inertia has no model of finite order under it; give hub.inertia, or leave it out"
+    require(not (damping > 0 and arm.has_massless_hub), "actuator.hub_damping", damping, remedy)
     return arm if damping == 0 else replace(arm, hub=replace(arm.hub, friction=arm.hub.friction + damping))
 
 
 def undelayed_plant(arm: Arm, outputs: Sequence[str], count: int, x: float | None = None) -> Plant:
     """The arm with `count` flexible modes, its outputs not filtered; `x` [m] is the place of outputs along the arm."""
-    if arm.is_locked:
-        remedy = "a locked hub has no loop; give it a finite inertia"
-        raise ParameterError(key="hub.inertia", value=math.inf, remedy=remedy)
+    require(not arm.is_locked, "hub.inertia", math.inf, "a locked hub has no loop; give it a finite inertia")
     return with_modes(_modelled_once(arm, tuple(outputs), count, x), count)
 
 
@@ -158,22 +171,16 @@ def with_filter(plant: Plant, rows: Sequence[int], corner: float) -> Plant:
     Raises ParameterError for an output with the double integral of the torque, an angle or a displacement: encoders
     are digital and have no analog filter.
     """
-    for row in rows:
-        if plant.rigid[row, 0] != 0.0:
-            remedy = "it turns with the hub; an analog filter is for the gauge and the tachometer"
-            raise ParameterError(key="filtered output", value=plant.outputs[row], remedy=remedy)
-    residues = np.c_[plant.residues, np.zeros(len(plant.outputs), complex)]
-    static = plant.static.copy()
-    at_corner = plant(-corner)
-    for row in rows:
-        residues[row, :-1] *= corner / (plant.poles + corner)
-        residues[row, -1] = corner * at_corner[row].real
-        static[row] = 0.0
+    turning = [plant.outputs[row] for row in rows if plant.rigid[row, 0] != 0.0]
+    remedy = "it turns with the hub; an analog filter is for the gauge and the tachometer"
+    require(not turning, "filtered output", ", ".join(turning), remedy)
+    is_filtered = np.isin(np.arange(len(plant.outputs)), rows)
+    lag = np.where(is_filtered[:, None], corner / (plant.poles + corner), 1.0)
     return replace(
         plant,
         poles=np.r_[plant.poles, -corner],
-        residues=residues,
-        static=static,
+        residues=np.c_[plant.residues * lag, np.where(is_filtered, corner * plant(-corner).real, 0.0)],
+        static=np.where(is_filtered, 0.0, plant.static),
         mode=np.r_[plant.mode, 0],
     )
 
@@ -203,20 +210,16 @@ class SensedPlant:
     @property
     def unfiltered(self) -> Plant:
         """All signals in the order of their names, without filters."""
-        places = list(dict.fromkeys(self.read.places))
-        first, rows = self.plants[0], []
-        for wanted, place in zip(self.read.outputs, self.read.places, strict=True):
-            plant = self.plants[places.index(place)]
-            assert np.array_equal(plant.poles, first.poles)  # those of the arm, at every place
-            rows.append((plant, plant.outputs.index(wanted.name)))
-        return replace(
-            first,
-            arm=self.arm,
-            outputs=self.read.names,
-            residues=np.array([plant.residues[n] for plant, n in rows]),
-            rigid=np.array([plant.rigid[n] for plant, n in rows]),
-            static=np.array([plant.static[n] for plant, n in rows]),
-        )
+        places, whole = dict.fromkeys(self.read.places), reduce(Plant.joined, self.plants)
+        keys = [(place, name) for place, plant in zip(places, self.plants, strict=True) for name in plant.outputs]
+        at = [keys.index((place, each.name)) for each, place in zip(self.read.outputs, self.read.places, strict=True)]
+        return replace(whole.rows(at, self.read.names), arm=self.arm)
+
+    def own_moment(self, sampling: Sampling) -> Real:
+        """The row of C that reads the arm's own root moment, one of the signals, ahead of the anti-alias filter."""
+        alone = self.unfiltered.rows([self.read.names.index("root_moment")], ("root_moment",))
+        pulse = PulseTransfer(self.together.joined(alone), sampling).folded()
+        return np.asarray(pulse.matrices()[2][-1])
 
     def with_modes(self, count: int) -> SensedPlant:
         """The same with another number of modes; cheap where the models have as many."""
@@ -234,3 +237,221 @@ def sensed_plant(arm: Arm, chain: Chain, names: Sequence[str], count: int) -> Se
         along = any(each.place == "x" for each in read.outputs if each.name in wanted)
         plants.append(undelayed_plant(read.arm, wanted, count, share * arm.length if along else None))
     return SensedPlant(arm, read, chain, tuple(plants))
+
+
+# ------------------------------------------------------------ at the samples
+
+
+@dataclass(frozen=True)
+@record
+class PulseTransfer:
+    """H_o(z), the pulse transfer functions from the torque computed at a sample to the next samples.
+
+    Poles at e^{pT}, those of s = 0 at z = 1, and a delay z^-d.  Callable at complex z.
+    """
+
+    plant: Plant
+    sampling: Sampling
+
+    @cached_property
+    def poles(self) -> Complex:
+        """p [1/s] of each pole, and 0, that of the turning hub, as the last one."""
+        return np.r_[self.plant.poles, 0.0]
+
+    @cached_property
+    def mode(self) -> NDArray[np.int64]:
+        """The flexible mode of each pole, 0 for none."""
+        return np.r_[self.plant.mode, 0]
+
+    @cached_property
+    def residues(self) -> Complex:
+        """(outputs, poles) of the plant, those of 1/s in the last column."""
+        return np.c_[self.plant.residues, self.plant.rigid[:, 1]]
+
+    @cached_property
+    def multipliers(self) -> Complex:
+        """e^{pT}."""
+        x = self.poles * self.sampling.period
+        return np.exp(x.real) * (np.cos(x.imag) + 1j * np.sin(x.imag))
+
+    @cached_property
+    def shifts(self) -> Complex:
+        """e^{pT} - 1, to all digits next to z = 1."""
+        return np.expm1(self.poles * self.sampling.period)
+
+    @cached_property
+    def early(self) -> Complex:
+        """Share of u_{k-d} in an amplitude within a sample."""
+        return held_amplitude(self.poles, (1 - self.sampling.fraction) * self.sampling.period)
+
+    @cached_property
+    def late(self) -> Complex:
+        """Share of u_{k-d-1}, from before the switch."""
+        T, f = self.sampling.period, self.sampling.fraction
+        return np.exp(self.poles * ((1 - f) * T)) * held_amplitude(self.poles, f * T)
+
+    @property
+    def slopes_at_one(self) -> Real:
+        """dH/dz (outputs,) at z = 1, of the poles other than s = 0 and without the delay."""
+        gap, late = 1 - self.multipliers[:-1], self.late[:-1]
+        terms = late / gap + (self.early[:-1] + late) / gap**2
+        return -(self.plant.residues @ terms).real - self.plant.static
+
+    @property
+    def ramps(self) -> tuple[float, float]:
+        """Shares of u_{k-d} and u_{k-d-1} in the double integral of the torque within a sample."""
+        T, f = self.sampling.period, self.sampling.fraction
+        return (1 - f) ** 2 * T * T / 2, f * (1 - f / 2) * T * T
+
+    def __call__(self, z: ArrayLike) -> Complex:
+        """Values (outputs, *z.shape)."""
+        points = np.asarray(z, dtype=complex)
+        flat = self.scaled(points.ravel(), None, np.ones(points.size))
+        return flat.reshape(len(self.plant.outputs), *points.shape)
+
+    def scaled(
+        self, z: Complex, base: NDArray[np.int64] | None, offset: NDArray[Any], delta: Complex | None = None
+    ) -> Complex:
+        """offset H(z) at z = multipliers[base] + offset, without loss for any offset: (outputs, n).
+
+        With no `base`, or one of -1, it is offset H(z); `delta` is z - 1, where that has more digits than z.
+        """
+        gap = z[:, None] - self.multipliers if delta is None else delta[:, None] - self.shifts
+        rows = np.empty(0, np.int64) if base is None else np.flatnonzero(base >= 0)
+        near = (rows, rows if base is None else base[rows])
+        gap[near] = 1.0
+        push = self.early + self.late / z[:, None]
+        weights = push * (offset[:, None] / gap)
+        weights[near] = push[near]
+        value = self.residues @ weights.T + np.outer(self.plant.static, offset / z)
+        if self.plant.rigid[:, 0].any():
+            distance = z - 1.0 if delta is None else delta
+            distance = distance if base is None else np.where(base == self.poles.size - 1, offset, distance)
+            ramp = self.ramps[0] + self.ramps[1] / z
+            twice = (self.sampling.period * push[:, -1] / distance + ramp) / distance
+            value = value + np.outer(self.plant.rigid[:, 0], twice * offset)
+        return value * z ** (-self.sampling.whole_delay)
+
+    def sizes(self, base: NDArray[np.int64], offset: Complex, delta: Complex) -> Real:
+        """Sums (outputs, n) of the sizes of all terms of `scaled`, a bound on its rounding error in units of eps.
+
+        The rounding of z itself is in them: it is |z - 1|/|z - pole| in the term of a pole.
+        """
+        z = abs(1 + delta)
+        gap, own = abs(delta[:, None] - self.shifts), base[:, None] == np.arange(self.poles.size)
+        push = abs(self.early) + abs(self.late) / z[:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            weights = push * np.where(own, 1.0, abs(offset)[:, None] / gap * (1 + abs(delta)[:, None] / gap))
+        value = abs(self.residues) @ weights.T + np.outer(abs(self.plant.static), abs(offset) / z)
+        if self.plant.rigid[:, 0].any():
+            distance = abs(np.where(base == self.poles.size - 1, offset, delta))
+            twice = (self.sampling.period * push[:, -1] / distance + sum(self.ramps) / z) / distance
+            value = value + np.outer(abs(self.plant.rigid[:, 0]), twice * abs(offset))
+        return np.asarray(value * z ** (-self.sampling.whole_delay))
+
+    def folded(self) -> PulseTransfer:
+        """The same with every pole that decays within a sample as a static share."""
+        gone = self.plant.poles.real * (1 - self.sampling.fraction) * self.sampling.period < -FORGOTTEN
+        if not gone.any():
+            return self
+        static = self.plant.static - (self.plant.residues[:, gone] / self.plant.poles[gone]).real.sum(axis=1)
+        plant = replace(
+            self.plant,
+            poles=self.plant.poles[~gone],
+            residues=self.plant.residues[:, ~gone],
+            static=static,
+            mode=self.plant.mode[~gone],
+        )
+        return replace(self, plant=plant)
+
+    # ------------------------------------------------------------ state space
+
+    @property
+    def integrals_at(self) -> int:
+        """The index of the torque's two integrals among the states; the next state is the input of the last sample."""
+        upper, real = self.kept()
+        return int(2 * upper.size + real.size)
+
+    def matrices(self) -> tuple[Real, Real, Real]:
+        """A (n, n), B (n,), C (outputs, n) of x_{k+1} = A x_k + B u_k, y_k = C x_k, real.
+
+        States: real and imaginary part of the amplitude of each pole with Im p > 0, the amplitude of each real one, the
+        double integral and the integral of the torque, and u_{k-1} to u_{k-d-1}.  For a hub that friction brings to
+        rest slowly (`Plant.braked`) the last integral is that of that pole's amplitude.
+        """
+        return self._matrices
+
+    @cached_property
+    def _matrices(self) -> tuple[Real, Real, Real]:
+        upper, real = self.kept()
+        T, d, z = self.sampling.period, self.sampling.whole_delay, self.multipliers
+        rotations = [[[each.real, -each.imag], [each.imag, each.real]] for each in z[upper]]
+        A = block_diag(*rotations, *z[real].real, [[1.0, T], [0.0, 1.0]], np.eye(d + 1, k=-1))
+        pairs = np.ascontiguousarray(2 * self.residues[:, upper].conj()).view(float)
+        C = np.c_[pairs, self.residues[:, real].real, self.plant.rigid, np.zeros((len(pairs), d)), self.plant.static]
+        now, before = (
+            np.r_[push[upper].view(float), push[real].real, ramp, push[-1].real]
+            for push, ramp in zip((self.early, self.late), self.ramps, strict=True)
+        )
+        n, B = now.size, np.zeros(len(A))
+        A[:n, -1], B[n] = before, 1.0
+        newest = A[:, -2] if d else B
+        newest[:n] = now
+        if (braked := self.plant.braked(SLOW / self.sampling.period)) is not None:
+            place, p = 2 * upper.size + int(np.flatnonzero(real == braked)[0]), float(self.plant.poles[braked].real)
+            self._integrate(A, newest, p, (place, n - 1))
+            C[:, place] += self.plant.rigid[:, 1]  # R/s + r/(s - p) = -R p/(s (s - p)) + (r + R)/(s - p)
+            C[:, n - 1] = -p * self.plant.rigid[:, 1]
+        return A, B, C
+
+    def _integrate(self, A: Real, newest: Real, p: float, at: tuple[int, int]) -> None:
+        """Put the integral of the amplitude of a slow real pole p into a row; `at`: that pole, and the row."""
+        T, late = self.sampling.period, self.sampling.fraction * self.sampling.period
+        (place, row), now = at, T - late
+        A[row, :-1] = 0.0
+        A[row, row], A[row, place] = 1.0, T * np.expm1(p * T) / (p * T)
+        A[row, -1] = late**2 * phi(p * late) + np.expm1(p * late) / p * np.expm1(p * now) / p
+        newest[row] = now**2 * phi(p * now)
+
+    def kept(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Indices of the poles with Im p > 0 and of the real ones, without s = 0."""
+        p = self.plant.poles
+        return np.nonzero(p.imag > 0)[0], np.nonzero(p.imag == 0)[0]
+
+    def state_space(self) -> control.StateSpace:
+        """The same as a discrete `control.StateSpace` with dt = T and named signals, "moment@0_3" of moment@0.3."""
+        import control
+
+        A, B, C = self.matrices()
+        return control.StateSpace(
+            A,
+            B[:, None],
+            C,
+            np.zeros((len(C), 1)),
+            self.sampling.period,
+            inputs=["hub_torque"],
+            outputs=[name.replace(".", "_") for name in self.plant.outputs],  # a dot separates a system and its signal
+            name=f"{self.plant.arm.name} sampled",
+        )
+
+
+def pulse_transfer(
+    arm: Arm, outputs: tuple[str, ...] | list[str], sampling: Sampling | None = None, *, count: int = USUAL_MODES
+) -> PulseTransfer:
+    """Return the sampled arm with `count` flexible modes: exact for its modal model, callable at z, `.state_space()`.
+
+    Raises ParameterError for an unknown output, a locked hub or a count out of range.
+    """
+    return PulseTransfer(undelayed_plant(arm, outputs, count), sampling or Sampling())
+
+
+def phi(u: float) -> float:
+    """(e^u - 1 - u)/u^2, by its series: |u| is below `SLOW`."""
+    return math.fsum(u**k / math.factorial(k + 2) for k in range(PHI_TERMS))
+
+
+def held_amplitude(p: Complex, duration: float) -> Complex:
+    """(e^{p t} - 1)/p: the amplitude of a unit torque after `duration` t [s]."""
+    x = p * duration
+    safe = np.where(x == 0, 1.0, x)
+    return np.where(x == 0, duration, np.expm1(safe) / safe * duration)

@@ -17,8 +17,8 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 
 from tfarm.arm import AnyLaw, Arm, tracked
-from tfarm.arrays import Real
-from tfarm.dsp.chain import PERIOD, Chain, chain_or_usual
+from tfarm.arrays import LEAST_SIZE, Real
+from tfarm.dsp.chain import Chain, chain_or_usual
 from tfarm.dsp.discretise import RULE, rule_in_words, with_all_gains
 from tfarm.dsp.plant import MODES_USED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario
@@ -29,11 +29,8 @@ from tfarm.exact.outputs import OUTPUTS
 from tfarm.response.controller import Controller, controller
 from tfarm.schema import Column, Quantity, Table
 
-RESIDUAL = "residual root moment after the slew"
 MODE_COUNTS = (10, 20, 40)  # flexible modes; 80 would take a heavily damped arm 8 s of CPU time
 ENOUGH_CHANGE = 1e-4  # of each signal's largest value: the digits of a table of a simulation
-SETTLED_SHARE = 0.05  # of the largest root moment, within which a slew has settled
-LEFT_OF_RECORD = 10  # a tenth of a record has to follow a settling time
 CYCLE_LASTS = 0.7  # a limit cycle keeps at least this much of its amplitude over a quarter of the record
 BEYOND_IDEAL = 2.0  # and is this much larger than the vibration of an ideal chain at that time
 GROWS = 1.02  # in a quarter of the record, of an unstable ideal loop: a smaller change may be one of sampled peaks
@@ -42,10 +39,14 @@ FEWEST_SAMPLES = 40  # samples of a record with limit cycles
 
 
 class Enough(NamedTuple):
-    """The number of flexible `modes`, and the relative `change` of the signals when it was doubled to that."""
+    """The number of flexible `modes`, and the relative `change` of the signals when it was doubled to that.
 
-    modes: int
-    change: float
+    The change is relative to the largest value of each signal; None where the number of modes was given.
+    """
+
+    modes: Annotated[int, replace(MODES_USED, key="modes_used")]
+    change: Annotated[float | None, Quantity("change of signals from half of them", digits=2, key="modes_change",
+            help="largest relative change of a signal when the number of modes was doubled")]  # fmt: skip
 
 
 def enough_modes(simulate: Callable[[int], Simulation], count: int | None = None) -> Enough:
@@ -54,29 +55,26 @@ def enough_modes(simulate: Callable[[int], Simulation], count: int | None = None
     `simulate` makes the simulation with a number of modes, its converters ideal, as quantisation would hide the modes.
     """
     if count is not None:
-        return Enough(count, math.nan)
+        return Enough(count, None)
     before, found = simulate(MODE_COUNTS[0]), Enough(MODE_COUNTS[0], np.inf)
     for count in MODE_COUNTS[1:]:
         try:
             now = simulate(count)
         except ConvergenceError:  # two damped modes are not distinguished: the number before is used
-            return found
-        found = Enough(count, change(before.at_samples, now.at_samples))
-        if found.change <= ENOUGH_CHANGE:
-            return found
-        before = now
+            break
+        off = change(before.at_samples, now.at_samples)
+        before, found = now, Enough(count, off)
+        if off <= ENOUGH_CHANGE:
+            break
     return found
 
 
 def change(before: Trace, after: Trace) -> float:
     """The largest change of any signal at the samples of both, relative to that signal's largest value."""
-    n, changes = min(before.t.size, after.t.size), [0.0]
-    for name in after.names:
-        old, new = before.signal(name)[:n], after.signal(name)[:n]
-        largest = abs(new).max(initial=0.0)
-        if largest > 0:
-            changes.append(float(abs(new - old).max() / largest))
-    return max(changes)
+    n = min(before.t.size, after.t.size)
+    pairs = [(before.signal(name)[:n], after.signal(name)[:n]) for name in after.names]
+    return max(float(abs(new - old).max(initial=0.0) / max(abs(new).max(initial=0.0), LEAST_SIZE))
+               for old, new in pairs)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -105,8 +103,8 @@ class Run:
 
     arm: Arm
     law: AnyLaw
-    simulation: Simulation
-    used: Enough
+    simulation: Annotated[Simulation, Quantity(flat=True, help="figures of the signals")]
+    used: Annotated[Enough, Quantity(flat=True, help="flexible modes of the simulation")]
     scenario_in_words: Annotated[str, Quantity("scenario", key="scenario_in_words",
             help="reference or disturbance with its size")]  # fmt: skip
     tuner: Annotated[dict[str, Any] | None, Quantity("tuner", key="controller", help="that set the moment gain")] = None
@@ -127,51 +125,10 @@ class Run:
         return rule_in_words(with_all_gains(self.arm, self.law))
 
     @property
-    def scenario(self) -> Annotated[str, Quantity(help="name of the scenario")]:
-        """The name of the scenario."""
-        return self.simulation.scenario.name
-
-    @property
     def reading(self) -> Annotated[str, Quantity(
             help="moment that is fed back: vibration, without the rigid arm's, or total")]:  # fmt: skip
         """The moment that is fed back during a slew."""
         return self.simulation.chain.slew.reading
-
-    @property
-    def period(self) -> Annotated[float, PERIOD]:
-        """The sampling period."""
-        return self.simulation.scenario.period
-
-    @property
-    def modes_used(self) -> Annotated[int, MODES_USED]:
-        """The number of flexible modes."""
-        return self.used.modes
-
-    @property
-    def modes_change(self) -> Annotated[float | None, Quantity("change of signals from half of them", digits=2,
-            help="largest relative change of a signal when the number of modes was doubled")]:  # fmt: skip
-        """Relative to the largest value of each; None where the number of modes was given."""
-        return None if math.isnan(self.used.change) else self.used.change
-
-    @property
-    def residual_moment(self) -> Annotated[float | None, Quantity(
-            f"{RESIDUAL} less the rigid arm's", "N m rms", key="residual_moment_rms",
-            help="rms of the vibration from the end of the slew to the end of the record")]:  # fmt: skip
-        """The residual; None where the run stopped, or its record ends before the slew."""
-        return residual_moment_rms(self.simulation)
-
-    @property
-    def residual_raw(self) -> Annotated[float | None, Quantity(RESIDUAL, "N m rms", key="residual_raw_moment_rms",
-            help="rms of the root moment from the end of the slew to the end of the record")]:  # fmt: skip
-        """The same of the root moment itself."""
-        return residual_raw_moment_rms(self.simulation)
-
-    @property
-    def settling_time(self) -> Annotated[float | None, Quantity("settling time (5 %)", "s", 4,
-            help="time from which on the root moment stays within 5 % of its largest")]:  # fmt: skip
-        """The settling time; None where the moment does not settle within the record."""
-        settled = settling_time(self.simulation)
-        return settled if math.isfinite(settled) else None
 
     @property
     def note(self) -> Annotated[str | None, Quantity("not determined", key="note",
@@ -181,36 +138,22 @@ class Run:
         if run.stopped is not None:
             ends = f"the run stops at {self.stopped_at:.6g} s"
         reasons = {
-            f"residual root moment, as {ends}": self.residual_moment,
-            f"settling time: not settled within {run.t[-1]:.4g} s": self.settling_time,
+            f"residual root moment, as {ends}": run.residual_moment,
+            f"settling time: not settled within {run.t[-1]:.4g} s": run.settling_time,
         }
         return "; ".join(reason for reason, value in reasons.items() if value is None) or None
-
-    @property
-    def saturated(self) -> Annotated[dict[str, int], Quantity("saturated samples", key="saturated_samples",
-            help="samples at which encoder, strain amplifier and torque were clipped")]:  # fmt: skip
-        """Numbers of samples at which encoder, strain amplifier and torque were clipped."""
-        return self.simulation.saturated
-
-    @property
-    def energy_error(self) -> Annotated[float | None, Quantity(
-            help="energy gained less work done, over initial energy and work, without damping")]:  # fmt: skip
-        """The relative error of energy, of an arm without damping."""
-        return self.simulation.energy_error
 
     @property
     def stopped_at(self) -> Annotated[float | None, Quantity(key="stopped_at_s",
             help="time at which the simulation of an unstable loop was stopped")]:  # fmt: skip
         """The time at which an unstable loop was stopped [s]."""
-        stopped = self.simulation.stopped
-        return None if stopped is None else stopped.time
+        return None if (stop := self.simulation.stopped) is None else stop.time
 
     @property
     def growing_mode(self) -> Annotated[int | None, Quantity(
             help="mode with the largest share in the root moment at the stop, 0 for the hub")]:  # fmt: skip
         """The unstable mode, 0 for the hub."""
-        stopped = self.simulation.stopped
-        return None if stopped is None else stopped.mode
+        return None if (stop := self.simulation.stopped) is None else stop.mode
 
     @cached_property
     def limit_cycle(self) -> Annotated[LimitCycle | None, Quantity("limit cycle",
@@ -224,11 +167,6 @@ class Run:
         return limit_cycle(run, ideal.run())
 
     @property
-    def units(self) -> Annotated[dict[str, str], Quantity(key="outputs", help="SI unit of each further output")]:
-        """The SI unit of each further output."""
-        return dict(self.simulation.at_samples.units)
-
-    @property
     def torque_unit(self) -> Annotated[str, Quantity(help="unit of the input of the arm")]:
         """The unit of the input of the arm."""
         return self.arm.input_unit
@@ -239,12 +177,12 @@ class Run:
         run = self.simulation
         gain = np.empty(0) if run.gain is None else run.gain
         volts = {} if run.volts is None else {"volts": run.volts}
-        return _signals(run.at_samples) | {"torque": run.torque, "gain": gain} | volts
+        return run.at_samples.by_name | {"torque": run.torque, "gain": gain} | volts
 
     @property
     def between(self) -> Annotated[dict[str, Real] | None, Quantity(help="signals at the records between two samples")]:
         """The same between the samples, of the signals that change there."""
-        return None if self.simulation.between is None else _signals(self.simulation.between)
+        return None if (between := self.simulation.between) is None else between.by_name
 
     @property
     def csv_table(self) -> Table:
@@ -265,42 +203,6 @@ class Run:
                 title = known.get(name) or (f"{OUTPUTS[of].label}{at and f' = {at} m'}", OUTPUTS[of].unit)
                 columns.append(Column(name, *title, of=[joined[row] for row in order]))
         return Table(columns=tuple(columns))
-
-
-def residual_moment_rms(simulation: Simulation) -> float | None:
-    """Return the root mean square of the arm's own root moment less the rigid arm's [N m], from the end of the slew on.
-
-    The moment is that before the anti-alias filter.  None where the simulation stopped, or its record ends before the
-    slew.
-    """
-    return residual_left(simulation.scenario, simulation.at_samples.root_moment)
-
-
-def residual_raw_moment_rms(simulation: Simulation) -> float | None:
-    """The same of the root moment itself; its first sample is one of the slew's last torque."""
-    task, moment = simulation.scenario, simulation.at_samples.root_moment
-    return _rms(moment[task.is_after]) if moment.size == task.t.size else None
-
-
-def residual_left(task: Scenario, moment: Real) -> float | None:
-    """Root mean square of a root moment (n,) less the rigid arm's [N m] after a slew; None for a shorter record."""
-    return _rms(task.residual(moment)) if moment.size == task.t.size else None
-
-
-def _rms(signal: Real) -> float | None:
-    return float(np.sqrt(np.mean(signal**2))) if signal.size else None
-
-
-def settling_time(simulation: Simulation) -> float:
-    """Return the settling time [s]: from there on the root moment stays within 5 % of its largest.
-
-    inf where the simulation stopped, or less than a tenth of the record is left: the moment may exceed 5 % after it.
-    """
-    moment = abs(simulation.at_samples.root_moment)
-    (above,) = np.nonzero(moment > SETTLED_SHARE * moment.max(initial=0.0))
-    first = int(above[-1]) + 1 if above.size else 0
-    is_late = first > 0 and LEFT_OF_RECORD * (moment.size - 1 - first) < moment.size - 1
-    return math.inf if simulation.stopped or is_late else float(simulation.t[first])
 
 
 def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
@@ -341,10 +243,6 @@ def _left(ideal: Simulation, part: slice) -> float:
 
 def _half_range(signal: Real) -> float:
     return float(np.ptp(signal)) / 2 if signal.size else 0.0
-
-
-def _signals(trace: Trace) -> dict[str, Real]:
-    return {"t": trace.t} | {name: trace.signal(name) for name in trace.names}
 
 
 def ideal_chain(chain: Chain) -> Chain:

@@ -24,6 +24,7 @@ rounding error of F in W that bounds the error of the root: where |ln|z|| is les
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Any
@@ -36,8 +37,7 @@ from tfarm.arm.law import Law
 from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.dsp.chain import Chain, Sampling, chain_or_usual
 from tfarm.dsp.discretise import LawInZ, acting_law, law_in_z, lowest_power, with_all_gains
-from tfarm.dsp.plant import MODES_USED, USUAL_MODES, Plant, SensedPlant, is_analog, sensed_plant
-from tfarm.dsp.sampling import PulseTransfer
+from tfarm.dsp.plant import MODES_USED, USUAL_MODES, Plant, PulseTransfer, SensedPlant, is_analog, sensed_plant
 from tfarm.errors import ConvergenceError, ParameterError, did_you_mean
 from tfarm.records import record
 from tfarm.reduced.conversions import closed
@@ -45,7 +45,7 @@ from tfarm.response.controller import Controller, controller
 from tfarm.schema import Quantity
 
 STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes
-SMALLEST_LOG = -745.0  # of the smallest double: for the logarithm of 0
+SMALLEST_RADIUS = 5e-324  # the smallest double, for the logarithm of 0
 OFF_POLE = 1e-17  # for an offset of 0: next to 1 that is none
 MOST_STEPS = 200  # of all roots together: a cluster of nine takes 24
 LAST_STEP = 1e-12  # of the offset: below its rounding
@@ -116,12 +116,6 @@ class Sampled:
     def pulse(self) -> PulseTransfer:
         """The pulse transfer functions to the signals of the law."""
         return PulseTransfer(self.plant, self.chain.sampling).folded()
-
-    @cached_property
-    def own_moment(self) -> Real:
-        """The row of C that reads the arm's own root moment, a signal of the law, ahead of the anti-alias filter."""
-        plant = self.plant.joined(self.sensed.unfiltered.rows(["root_moment"]))
-        return np.asarray(PulseTransfer(plant, self.chain.sampling).folded().matrices()[2][-1])
 
     # ------------------------------------------------------------ its numbers, and other loops
 
@@ -242,7 +236,7 @@ class Sampled:
             is_of_law, delta = base >= self.pulse.poles.size, start + offset
             at, offset = np.where(is_of_law, -1, base), np.where(is_of_law, 1.0, offset)
         measured = self.pulse.scaled(z, at, offset, delta)
-        rows = np.zeros((1 + len(self.in_z.parts), z.size), complex)
+        rows = np.zeros((1 + len(self.weights), z.size), complex)
         rows[0] = offset * _product(start, self.in_z.poles, more)
         for part, row, gain, zeros in self.in_z.terms:
             rows[1 + part] += gain * _product(start, zeros, more) * measured[row]
@@ -278,7 +272,7 @@ class Sampled:
     @cached_property
     def has_free_angle(self) -> bool:
         """Whether the hub angle is a pole at z = 1 without feedback."""
-        turned = dict(zip(self.in_z.signals, self.plant.rigid[:, int(self.is_damped)], strict=True))
+        turned = self.plant.rigid[:, int(self.is_damped)]
         return bool(self.plant.arm.has_rigid_mode and self.in_z.ignores(turned, self.weights))
 
     def reduced_matrix(self) -> Real:
@@ -335,27 +329,23 @@ class Sampled:
         """The closed-loop poles, each polished as an offset from its nearest open-loop pole; `poles_at_one` are 1."""
         z, shifts, pulse = self.eigenvalues.copy(), self.open_loop, self.pulse
         z[np.argsort(abs(z - 1), kind="stable")[: self.poles_at_one]] = 1.0
-        delta = z - 1
-        base = _nearest(self, delta)
-        offset = delta - shifts[base]
-        bright = (abs(z) > FADED_RADIUS) & (delta != 0)
-        rows, error = np.flatnonzero(bright), np.zeros(z.size)
+        base = _nearest(self, z - 1)
+        offset, error = (z - 1) - shifts[base], np.zeros(z.size)
+        rows = np.flatnonzero((abs(z) > FADED_RADIUS) & (z != 1))
         if rows.size:
-            _settle(base, offset, rows, self)
+            error[rows] = _settle(base, offset, rows, self)
             moved = _nearest(self, shifts[base] + offset)
             if (moved[rows] != base[rows]).any():  # then all digits are kept from there
                 offset[rows] += shifts[base[rows]] - shifts[moved[rows]]
                 base[rows] = moved[rows]
-                _settle(base, offset, rows, self)
-            error[rows] = _errors(base, offset, rows, self)
-        at = base[bright]
-        with np.errstate(divide="ignore"):
-            log_radius = np.maximum(np.log(abs(z)), SMALLEST_LOG)
+                error[rows] = _settle(base, offset, rows, self)
+        log_radius = np.log(np.maximum(abs(z), SMALLEST_RADIUS))
         own = 2 * self.in_z.poles.real + abs(self.in_z.poles) ** 2
         start = np.r_[pulse.poles.real * pulse.sampling.period, np.log1p(np.maximum(own, LEAST_SQUARE)) / 2]
-        ratio = offset[bright] / (1 + shifts[at])
-        log_radius[bright] = start[at] + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
-        z[bright] = (1 + shifts[at]) + offset[bright]
+        at, o = base[rows], offset[rows]
+        ratio = o / (1 + shifts[at])
+        log_radius[rows] = start[at] + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
+        z[rows] = (1 + shifts[at]) + o
         log_radius[abs(log_radius) * abs(z) < error] = 0.0
         mode = pulse.mode[abs(z[:, None] - pulse.multipliers).argmin(axis=1)]
         return SampledPoles(z, log_radius, mode, error)
@@ -394,8 +384,11 @@ def _nearest(loop: Sampled, delta: Complex) -> Whole:
     return np.asarray(away.argmin(axis=1))
 
 
-def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> None:
-    """Iterate some roots, in place, until they converge or F is 0 but for rounding."""
+def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> Real:
+    """Iterate some roots, in place, until they converge or F is 0 but for rounding; return bounds on their errors.
+
+    These are the radii of Smith's discs, and the rounding of a pole of the law.
+    """
     offset[rows] = np.where(offset[rows] == 0, OFF_POLE, offset[rows])
     with np.errstate(all="ignore"):  # a root on an open-loop pole, and one that diverges
         for _ in range(MOST_STEPS):
@@ -406,16 +399,10 @@ def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> None:
             np.fill_diagonal(others, 0.0)
             step = np.nan_to_num(W / (1 + others.sum(axis=1)), posinf=0.0, neginf=0.0)
             moving = abs(step) > LAST_STEP * abs(o)
-            is_last = (abs(f[moving]) <= loop.rounding(base[rows[moving]], o[moving])).all()
             offset[rows] = np.where(abs(o - step) < UNMOVED, UNMOVED, o - step)
-            if is_last:
+            if (abs(f[moving]) <= loop.rounding(base[rows[moving]], o[moving])).all():
                 break
-    offset[abs(offset) <= UNMOVED] = 0.0
-
-
-def _errors(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> Real:
-    """Bounds on the errors of some roots (rows,): the radii of Smith's discs, and the rounding of a pole of the law."""
-    with np.errstate(all="ignore"):
+        offset[abs(offset) <= UNMOVED] = 0.0
         f, slope, _ = _weierstrass(base, offset, rows, loop)
         radius = offset.size * (abs(f) + loop.rounding(base[rows], offset[rows])) / abs(slope)
     own = np.where(base[rows] < loop.pulse.poles.size, 0.0, MACHINE_EPS * abs(loop.open_loop[base[rows]]))
@@ -479,11 +466,18 @@ def sampled_loop(
     return Sampled(sensed_plant(arm, chain, in_z.signals, count), chain, law, in_z, tuple(weights))
 
 
+def first_distinct(make: Callable[[float], Sampled], candidates: Sequence[float]) -> Sampled:
+    """The loop of the first of some candidates at which no two damped modes are one; the error of the last one."""
+    *others, last = candidates
+    for each in others:
+        with suppress(ConvergenceError):
+            return make(each)
+    return make(last)
+
+
 def resized(loop: Sampled, count: int) -> Sampled:
     """The loop with another number of flexible modes, or up to two more or less where two damped modes are one."""
-    for number in (count, count - 1, count + 1, count - 2, count + 2):
-        try:
-            return loop.with_modes(max(1, number))
-        except ConvergenceError as error:
-            lost = error
-    raise lost
+    if count == loop.plant.count:
+        return loop
+    counts = count, count - 1, count + 1, count - 2, count + 2
+    return first_distinct(lambda each: loop.with_modes(max(1, int(each))), counts)

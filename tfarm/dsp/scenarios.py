@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tfarm.arm import AT_HUB, FED_BACK, Arm, must_turn
+from tfarm.arm import AT_HUB, Arm, must_turn
 from tfarm.arm.checks import positive
 from tfarm.arrays import Real
-from tfarm.dsp.chain import TIME_ROUNDING, Chain, Reading
-from tfarm.errors import ParameterError, must_be_known
+from tfarm.dsp.chain import PERIOD, TIME_ROUNDING, Chain, Reading
+from tfarm.errors import must_be_known, require
 from tfarm.records import record
+from tfarm.schema import Quantity
 from tfarm.spectrum.table import turning_inertia
 
 MOST_TASK_SAMPLES = 4_000_000  # of a record, a few hundred MB of signals
@@ -22,6 +22,7 @@ STEP_TORQUE, IMPULSE, TIP_OFFSET = 0.1, 0.01, 0.01  # N m, N m s, m: sizes of th
 TRIAL_COST = (1.0, 2.6)  # 1/(N m)^2 s: weights a and b of the paper's (23), of vibration and of the law's own share
 TRIAL_SLEWS = 3.0  # times the slew: length of a trial for an arm and its chain
 TRIAL_DURATION = 3.0  # s, of a trial or a simulation by default: three times the paper's slew
+SCENARIOS = ("slew", "step", "decay", "impulse")
 PAPER_TORQUE = 3.0  # N m, of the slew of 1.15 m in 1 s of the preset sasaki2012
 
 
@@ -36,8 +37,8 @@ class Scenario:
     whether the moment feedback subtracts the rigid arm's moment.
     """
 
-    name: str
-    period: float
+    name: Annotated[str, Quantity(key="scenario", help="name of the scenario")]
+    period: Annotated[float, PERIOD]
     feedforward: Real
     hub_angle: Real
     hub_rate: Real
@@ -65,18 +66,12 @@ class Scenario:
 
     def residual(self, moment: Real) -> Real:
         """The root moment (samples, ...) less the rigid arm's [N m], at the samples from the end of the slew on."""
-        return np.asarray((moment.T - self.rigid_moment).T[self.is_after])
+        return np.asarray((moment.T - self.rigid_moment).T[self.t >= self.busy_until * (1 - TIME_ROUNDING)])
 
-    @property
-    def is_after(self) -> NDArray[np.bool_]:
-        """Whether each sample (n,) is from the end of the slew on."""
-        return np.asarray(self.t >= self.busy_until * (1 - TIME_ROUNDING))
-
-    @property
-    def wanted(self) -> Real:
-        """The references of the signals of all gains (n, gains), in the order of `GAINS`; 0 without one."""
-        known, none = self.references, np.zeros(self.feedforward.size)
-        return np.stack([known.get(output, none) for output in FED_BACK], axis=1)
+    def residual_rms(self, moment: Real) -> float | None:
+        """Root mean square of the residual of a root moment (n,) [N m]; None of a record that ends before."""
+        left = self.residual(moment) if moment.size == self.t.size else np.empty(0)
+        return float(np.sqrt(np.mean(left**2))) if left.size else None
 
 
 def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
@@ -119,61 +114,44 @@ def trial_weights(arm: Arm, chain: Chain) -> tuple[float, float]:
     return a / torque_unit(arm, chain) ** 2, b / torque_unit(arm, chain) ** 2
 
 
-def step(arm: Arm, chain: Chain, duration: float) -> Scenario:
-    """A step of the reference torque r at t = 0, of 0.1 of the arm's unit of torque."""
-    resting = _rest("step", chain, duration)
-    return replace(resting, feedforward=resting.feedforward + STEP_TORQUE * torque_unit(arm, chain))
+def resting(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
+    """Return a scenario without references.
 
-
-def decay(arm: Arm, chain: Chain, duration: float) -> Scenario:
-    """Free decay of the first mode from rest with the tip displaced by 0.01 L."""
-    return replace(_rest("decay", chain, duration), tip_offset=TIP_OFFSET * arm.length)
-
-
-def impulse(arm: Arm, chain: Chain, duration: float) -> Scenario:
-    """A disturbance impulse on the hub just after the sample at t = 0: 0.01 s of the arm's unit of torque.
-
-    So it is first measured a sample later.  (Just before a sample the moment of a damped arm would be measured where it
-    grows as t^-1/2, without bound, and no number of modes converges.)
+    A step of the torque r at t = 0, 0.1 of the arm's unit of torque; the decay of the first mode from rest with the tip
+    displaced by 0.01 L; or a disturbance impulse on the hub just after the sample at t = 0, 0.01 s of that unit.  So it
+    is first measured a sample later.  (Just before a sample the moment of a damped arm would be measured where it grows
+    as t^-1/2, without bound, and no number of modes converges.)
     """
-    return replace(_rest("impulse", chain, duration), impulse=IMPULSE * torque_unit(arm, chain))
-
-
-SCENARIOS: dict[str, Callable[[Arm, Chain, float], Scenario]] = {
-    "slew": slew,
-    "step": step,
-    "decay": decay,
-    "impulse": impulse,
-}
+    zero, unit = np.zeros(_samples(duration, chain.sampling.period)), torque_unit(arm, chain)
+    sizes: dict[str, dict[str, Any]] = {
+        "step": {"feedforward": zero + STEP_TORQUE * unit},
+        "decay": {"tip_offset": TIP_OFFSET * arm.length},
+        "impulse": {"impulse": IMPULSE * unit},
+    }
+    return replace(Scenario(name, chain.sampling.period, zero, zero, zero, zero, zero), **sizes[name])
 
 
 def described(task: Scenario, arm: Arm, chain: Chain) -> str:
     """A scenario with its size, in words."""
-    if task.name == "slew":
-        return f"a slew: the tip moves {chain.slew.travel_of(arm.reach):.4g} m in {chain.slew.rise_time:g} s"
-    if task.name == "step":
-        return f"a step of {task.feedforward[0]:.4g} {arm.input_unit}"
-    if task.name == "decay":
-        return f"the first mode released with the tip at {task.tip_offset:.4g} m"
-    return f"an impulse of {task.impulse:.4g} {arm.input_unit} s on the hub"
+    travel = chain.slew.travel_of(arm.reach)
+    words = {
+        "slew": f"a slew: the tip moves {travel:.4g} m in {chain.slew.rise_time:g} s",
+        "step": f"a step of {task.feedforward[0]:.4g} {arm.input_unit}",
+        "decay": f"the first mode released with the tip at {task.tip_offset:.4g} m",
+        "impulse": f"an impulse of {task.impulse:.4g} {arm.input_unit} s on the hub",
+    }
+    return words[task.name]
 
 
 def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
     """Return the scenario of that name with its usual size.  Raises ParameterError for an unknown one."""
     must_be_known("scenario", name, SCENARIOS)
-    return SCENARIOS[name](arm, chain, duration)
-
-
-def _rest(name: str, chain: Chain, duration: float) -> Scenario:
-    T = chain.sampling.period
-    zero = np.zeros(_samples(duration, T))
-    return Scenario(name, T, zero, zero, zero, zero, zero)
+    return slew(arm, chain, duration) if name == "slew" else resting(name, arm, chain, duration)
 
 
 def _samples(duration: float, period: float) -> int:
     """Number of samples in 0 .. duration, both ends included."""
     length = positive("duration", duration, "a duration is a positive, finite number of seconds")
-    if length / period >= MOST_TASK_SAMPLES:
-        remedy = f"at most {MOST_TASK_SAMPLES} samples of {period:g} s; a shorter one, or a longer period"
-        raise ParameterError(key="duration", value=length, remedy=remedy)
+    remedy = f"at most {MOST_TASK_SAMPLES} samples of {period:g} s; a shorter one, or a longer period"
+    require(length / period < MOST_TASK_SAMPLES, "duration", length, remedy)
     return math.floor(length / period * (1 + TIME_ROUNDING)) + 1

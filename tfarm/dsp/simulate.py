@@ -13,8 +13,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass, field
-from typing import NamedTuple, Self, cast
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Annotated, NamedTuple, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,15 +27,18 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import kernel
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.discretise import acting_law, with_all_gains
-from tfarm.dsp.kernel import DAC, HIGHEST, LOWEST
 from tfarm.dsp.plant import RECORDED, USUAL_MODES, sensed_plant
 from tfarm.dsp.scenarios import Scenario
-from tfarm.errors import ParameterError, must_be_known
+from tfarm.errors import must_be_known, require
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
+from tfarm.schema import Quantity
 
 FOLDED_UP = 10.0  # rad: the simulation stops at the root moment EI/L times this, far beyond small deflections
 MOST_BETWEEN = 1000  # records between two samples
+RESIDUAL = "residual root moment after the slew"
+SETTLED_SHARE = 0.05  # of the largest root moment, within which a slew has settled
+LEFT_OF_RECORD = 10  # a tenth of a record has to follow a settling time
 NO_GAINS = HubFeedback()
 
 
@@ -43,25 +47,16 @@ def quantisers(chain: Chain) -> Real:
 
     A step of 0 is ideal; the torque's range also respects the motor's limit.
     """
-    converters, limit = chain.converters, chain.actuator.torque_limit
-    counts = converters.encoder_counts
-    rows = np.array([
-        [0.0 if counts is None else 2 * math.pi / counts, -math.inf, math.inf],
-        _converter(converters.moment_bits, converters.moment_range),
-        _converter(converters.torque_bits, converters.torque_range),
-    ])  # fmt: skip
-    rows[DAC, LOWEST] = max(rows[DAC, LOWEST], -limit)
-    rows[DAC, HIGHEST] = min(rows[DAC, HIGHEST], limit)
-    return rows
+    of, limit = chain.converters, chain.actuator.torque_limit
+    encoder = [2 * math.pi / of.encoder_counts if of.encoder_counts else 0.0, -math.inf, math.inf]
+    step, low, high = _converter(of.torque_bits, of.torque_range)
+    return np.array([encoder, _converter(of.moment_bits, of.moment_range), [step, max(low, -limit), min(high, limit)]])
 
 
 def _converter(bits: int | None, span: float | None) -> list[float]:
-    if span is None:
-        return [0.0, -math.inf, math.inf]
-    if bits is None:
-        return [0.0, -span, span]
-    step = 2 * span / 2**bits
-    return [step, -span, span - step]
+    high = math.inf if span is None else span
+    step = 0.0 if bits is None else 2 * high / 2**bits
+    return [step, -high, high - step]
 
 
 class Measurement(NamedTuple):
@@ -111,7 +106,12 @@ class Trace:
         return self.others[name] if name in self.others else cast("Real", getattr(self, name))
 
     @property
-    def units(self) -> dict[str, str]:
+    def by_name(self) -> dict[str, Real]:
+        """Time and signals by name."""
+        return {"t": self.t} | {name: self.signal(name) for name in self.names}
+
+    @property
+    def units(self) -> Annotated[dict[str, str], Quantity(key="outputs", help="SI unit of each further output")]:
         """The SI units of the further outputs."""
         return {name: OUTPUTS[name.partition("@")[0]].unit for name in self.others}
 
@@ -138,19 +138,49 @@ class Simulation:
     without one), `measured` (n, 3) hub angle, hub rate and root moment behind the analog filters.  `saturated_at`
     (n, 3): whether the encoder, the strain amplifier and the torque were clipped at each sample.
     `energy_error` is |energy gained - work done| over initial energy and total work, for an arm without damping; None
-    with damping.
+    with damping.  Moments of the figures are those before the anti-alias filter.
     """
 
-    scenario: Scenario
+    scenario: Annotated[Scenario, Quantity(flat=True, help="scenario of the run")]
     chain: Chain
-    at_samples: Trace
+    at_samples: Annotated[Trace, Quantity(flat=True, help="signals at the samples")]
     between: Trace | None
     measured: Real
     torque: Real
     gain: Real | None
     saturated_at: NDArray[np.bool_]
-    energy_error: float | None
+    energy_error: Annotated[float | None, Quantity(
+            help="energy gained less work done, over initial energy and work, without damping")]  # fmt: skip
     stopped: Stop | None
+
+    @property
+    def residual_moment(self) -> Annotated[float | None, Quantity(
+            f"{RESIDUAL} less the rigid arm's", "N m rms", key="residual_moment_rms",
+            help="rms of the vibration from the end of the slew to the end of the record")]:  # fmt: skip
+        """The residual; None where the run stopped, or its record ends before the slew."""
+        return self.scenario.residual_rms(self.at_samples.root_moment)
+
+    @property
+    def residual_raw(self) -> Annotated[float | None, Quantity(RESIDUAL, "N m rms", key="residual_raw_moment_rms",
+            help="rms of the root moment from the end of the slew to the end of the record")]:  # fmt: skip
+        """The same of the root moment itself; its first sample is one of the slew's last torque."""
+        rigid = replace(self.scenario, rigid_moment=0 * self.scenario.rigid_moment)
+        return rigid.residual_rms(self.at_samples.root_moment)
+
+    @property
+    def settling_time(self) -> Annotated[float | None, Quantity("settling time (5 %)", "s", 4,
+            help="time from which on the root moment stays within 5 % of its largest")]:  # fmt: skip
+        """None where the simulation stopped, or less than a tenth of the record is left to show it."""
+        moment = abs(self.at_samples.root_moment)
+        first = 1 + np.flatnonzero(moment > SETTLED_SHARE * moment.max(initial=0.0)).max(initial=-1)
+        is_late = first > 0 and LEFT_OF_RECORD * (moment.size - 1 - first) < moment.size - 1
+        return None if self.stopped or is_late else float(self.t[first])
+
+    @property
+    def saturated(self) -> Annotated[dict[str, int], Quantity("saturated samples", key="saturated_samples",
+            help="samples at which encoder, strain amplifier and torque were clipped")]:  # fmt: skip
+        """Numbers of samples at which encoder, strain amplifier and torque were clipped."""
+        return dict(zip(("encoder", "moment", "torque"), self.saturated_at.sum(axis=0).tolist(), strict=True))
 
     @property
     def finding(self) -> str:
@@ -164,12 +194,6 @@ class Simulation:
     def t(self) -> Real:
         """The times of the samples [s]."""
         return self.at_samples.t
-
-    @property
-    def saturated(self) -> dict[str, int]:
-        """Numbers of samples at which encoder, strain amplifier and torque were clipped."""
-        counts = self.saturated_at.sum(axis=0)
-        return {name: int(n) for name, n in zip(("encoder", "moment", "torque"), counts, strict=True)}
 
     @property
     def volts(self) -> Real | None:
@@ -204,14 +228,13 @@ class Simulator:
         self.gains = given.gains if given.references == AT_HUB else None
         self.law, self.chain = acting_law(arm, given, chain)
         references_of(self.law, scenario)  # raises for one that is missing
-        self.scenario, self.between, self._wanted = scenario, between, scenario.wanted
+        self.scenario, self.between = scenario, between
         self.others = tuple(dict.fromkeys(name for name in outputs if name not in RECORDED))
         self.measured = tuple(dict.fromkeys((*AT_HUB, *self.law.signals)))
         self.plant = sensed_plant(arm, chain, self.measured, count).together
         for names in filter(None, (RECORDED, self.others)):
             self.plant = self.plant.joined(sensed_plant(arm, chain, names, count).unfiltered)
         self._kept = np.nonzero(self.plant.poles.imag >= 0)[0]
-        self._model = self._prepared()
         self._forcing = kernel.Forcing(scenario.feedforward, scenario.disturbance, float(scenario.impulse))
         c, sampling = self.chain.converters, self.chain.sampling
         self._electronics = kernel.Electronics(
@@ -236,8 +259,8 @@ class Simulator:
         """
         n = self.scenario.feedforward.size
         gain = np.full(n, gains.K2) if K2 is None else np.array(K2, dtype=float)
-        if gain.shape != (n,) or not np.isfinite(gain).all():
-            raise ParameterError(key="K2", value=gain.shape, remedy=f"one finite gain a sample, {n} in all")
+        is_row = gain.shape == (n,) and np.isfinite(gain).all()
+        require(is_row, "K2", gain.shape, f"one finite gain a sample, {n} in all")
         return self._driven(with_all_gains(self.plant.arm, gains), gain)
 
     def _driven(self, law: Law, gain: Real | None) -> Simulation:
@@ -273,7 +296,7 @@ class Simulator:
         """The same with `between` records in each sample."""
         other = copy(self)
         other.between = between
-        other._model = other._prepared()
+        vars(other).pop("_model", None)
         return other
 
     def modal(self) -> tuple[Complex, Complex]:
@@ -286,21 +309,29 @@ class Simulator:
 
     # ------------------------------------------------------------ inside
 
+    @cached_property
+    def _model(self) -> kernel.Model:
+        """The plant for the compiled loop, with the records between two samples."""
+        row = self.plant.outputs.index("hub_angle", len(self.measured))
+        return kernel.model_of(self.plant, self._kept, self.chain.sampling, self.between, row)
+
     def _stepped(self, rule: Callable[[Measurement], tuple[float, float]], gain: Real | None) -> Simulation:
         """The loop of `kernel.run` in Python."""
-        state, memory, of, forcing = self._start(), np.zeros(3), self._electronics, self._forcing
+        model, state, memory, of, forcing = self._model, self._start(), np.zeros(3), self._electronics, self._forcing
+        task = self.scenario
+        references = np.c_[task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference].tolist()
+
+        def number(value: float) -> float:
+            return float(np.float32(value)) if of.is_single else float(value)
+
         for k in range(state.torque.size):
-            if not kernel.before(k, self._model, state, forcing, of):
+            if not kernel.before(k, model, state, forcing, of):
                 return self._result(state, k, gain)
             angle, rate, moment = kernel.converted(state.record[k], state.saturated[k], memory, of)
-            *wanted, rigid = self._wanted[k, : len(AT_HUB)].tolist()
-            values = [angle, rate, moment, moment - rigid, float(forcing.feedforward[k]), *wanted, rigid]
-            if of.is_single:
-                values = [float(np.float32(value)) for value in values]
-            u, K = rule(Measurement(k, k * self.scenario.period, *values))
-            if not math.isfinite(u):
-                raise ParameterError(key="controller", value=u, remedy=f"its torque at sample {k} is not finite")
-            kernel.after(k, float(np.float32(u)) if of.is_single else u, self._model, state, forcing, of)
+            values = angle, rate, moment, moment - references[k][-1], *references[k]
+            u, K = rule(Measurement(k, k * task.period, *map(number, values)))
+            require(math.isfinite(u), "controller", u, f"its torque at sample {k} is not finite")
+            kernel.after(k, number(u), model, state, forcing, of)
             if gain is not None:
                 gain[k] = K
         return self._result(state, state.torque.size, gain)
@@ -325,13 +356,12 @@ class Simulator:
         """
         amplitude: Complex = np.zeros(self._kept.size, complex)
         if offset := self.scenario.tip_offset:
-            poles, tip = self.plant.poles[self._kept], self.plant.residues[self.plant.outputs.index("tip_displacement")]
-            first = np.flatnonzero((self.plant.mode[self._kept] == 1) & (poles.imag > 0) & (tip[self._kept] != 0))[:1]
-            if not first.size:
-                remedy = "no free decay: the tip is pinned, or the first mode is overdamped; take another scenario"
-                raise ParameterError(key="scenario", value="decay", remedy=remedy)
-            p, r = poles[first], tip[self._kept][first]
-            amplitude[first] = 1j * offset * abs(p) ** 2 / (2 * p.imag) / (p * r)
+            tip = self.plant.residues[self.plant.outputs.index("tip_displacement")]
+            first = np.flatnonzero((self.plant.mode == 1) & (self.plant.poles.imag > 0) & (tip != 0))[:1]
+            remedy = "no free decay: the tip is pinned, or the first mode is overdamped; take another scenario"
+            require(first.size, "scenario", "decay", remedy)
+            p, r = self.plant.poles[first], tip[first]
+            amplitude[np.isin(self._kept, first)] = 1j * offset * abs(p) ** 2 / (2 * p.imag) / (p * r)
         return amplitude
 
     def _energy(self, amplitude: Complex, rate: float) -> float:
@@ -350,8 +380,7 @@ class Simulator:
             before = self._energy(self.first_amplitudes(), self.scenario.impulse)
             after, (work, moved) = self._energy(state.amplitude, state.rigid[kernel.ONCE]), state.work
             error = float(abs(after - before - work) / max(before + moved, LEAST_SIZE))
-        T, m = self.scenario.period, self.between
-        between = None
+        T, m, between = self.scenario.period, self.between, None
         if m:
             at = T * (np.arange(done)[:, None] + (np.arange(m) + 1) / (m + 1))
             between = self._trace(at.ravel(), state.fine[:done].reshape(done * m, -1))
@@ -368,11 +397,6 @@ class Simulator:
             stopped=stopped,
         )
 
-    def _prepared(self) -> kernel.Model:
-        """The plant for the compiled loop, with the records between two samples."""
-        row = self.plant.outputs.index("hub_angle", len(self.measured))
-        return kernel.model_of(self.plant, self._kept, self.chain.sampling, self.between, row)
-
     def _trace(self, t: Real, record: Real) -> Trace:
         """The recorded outputs."""
         angle, rate, moment, tip, *more = (np.ascontiguousarray(column) for column in record[:, len(self.measured) :].T)
@@ -384,12 +408,10 @@ def references_of(law: Law, task: Scenario) -> Real:
 
     Raises ParameterError for a signal whose reference a scenario does not have.
     """
-    known = task.references
-    found = np.zeros((task.feedforward.size, len(law.signals) + len(law.wanted)))
-    for column, name in enumerate((*law.signals, *law.wanted)):
-        plain = name.removeprefix(REFERENCE)
-        if name == plain and name not in law.references:
-            continue
-        must_be_known("references", plain, known)
-        found[:, column] = known[plain] if name == plain else -known[plain]
-    return found
+    known = dict.fromkeys(law.signals, np.zeros(task.feedforward.size))
+    for names, prefix, sign in ((law.references, "", 1.0), (law.wanted, REFERENCE, -1.0)):
+        for name in names:
+            plain = name.removeprefix(prefix)
+            must_be_known("references", plain, task.references)
+            known[name] = sign * task.references[plain]
+    return np.stack([known[name] for name in (*law.signals, *law.wanted)], axis=1)

@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -28,7 +27,6 @@ from tfarm.schema import Column
 
 POINTS_A_PERIOD = 20  # of a curve in each period of the fastest visible mode
 VISIBLE = 1 / 300  # of the height of a curve: a pixel of a picture
-AnySimulator = TypeVar("AnySimulator", bound=Simulator)
 
 LEAST_BETWEEN = 3  # records between two samples at least
 MOST_LINE = 6000  # points of a line: at 20 a period still three pixels a period
@@ -38,20 +36,11 @@ MOST_RECORDS = 400_000  # of a simulation for a picture, some 30 MB
 RECORD_LENGTH = 3.0  # times the slew: length of a record
 
 
-class Ringing(NamedTuple):
-    """`frequency` (m,) [rad/s] of the modes that ring, and their amplitude in `RECORDED` (4, m)."""
+def ringing(simulator: Simulator, run: Simulation) -> tuple[Real, Real]:
+    """Return frequency (m,) [rad/s] and amplitude in `RECORDED` (4, m) of the modes that ring, with Im p > -Re p.
 
-    frequency: Real
-    size: Real
-
-    def fastest(self, signal: str, height: float) -> float:
-        """The highest visible frequency [rad/s] in a curve of that height; 0 without one."""
-        seen = self.size[RECORDED.index(signal)] > VISIBLE * height
-        return float(self.frequency[seen].max(initial=0.0))
-
-
-def ringing(simulator: Simulator, run: Simulation) -> Ringing:
-    """Return the ringing of a simulation by this simulator, its torques applied again, of modes with Im p > -Re p."""
+    The torques of the simulation, which is one by this simulator, are applied again.
+    """
     p, weights = simulator.modal()
     rings = p.imag > -p.real
     p, weights, amplitude = p[rings], weights[:, rings], simulator.first_amplitudes()[rings]
@@ -66,13 +55,17 @@ def ringing(simulator: Simulator, run: Simulation) -> Ringing:
             circle = amplitude + rest
             largest = np.maximum(largest, abs(circle))
             amplitude = turn * circle - rest
-    return Ringing(np.asarray(p.imag, dtype=float), np.asarray(abs(weights) * largest, dtype=float))
+    return np.asarray(p.imag, dtype=float), np.asarray(abs(weights) * largest, dtype=float)
 
 
-def records_between(simulator: Simulator, run: Simulation, heights: dict[str, float]) -> int:
-    """Number of records between two samples that resolve every visible mode in curves of these heights [SI]."""
-    found = ringing(simulator, run)
-    fastest = max((found.fastest(signal, height) for signal, height in heights.items()), default=0.0)
+def records_between(simulator: Simulator, arm: Arm, run: Simulation) -> int:
+    """Number of records between two samples that resolve every visible mode in the drawn curves."""
+    if run.t.size < 2:
+        return 0
+    frequency, size = ringing(simulator, run)
+    curves = {"root_moment": run.at_samples.root_moment, "tip_displacement": away(arm, run)}
+    seen = [size[RECORDED.index(name)] > VISIBLE * np.ptp(curve) for name, curve in curves.items()]
+    fastest = frequency[np.any(seen, axis=0)].max(initial=0.0)
     return max(0, math.ceil(POINTS_A_PERIOD * fastest * run.scenario.period / (2 * math.pi)) - 1)
 
 
@@ -104,12 +97,11 @@ class TimeCurve:
         )
 
 
-def resolved(simulator: AnySimulator, arm: Arm, *runs: Callable[[AnySimulator], Simulation]) -> list[Simulation]:
+def resolved(simulator: Simulator, arm: Arm, *runs: Callable[[Simulator], Simulation]) -> list[Simulation]:
     """Return the simulations of one picture, with enough records between their samples for its fastest visible mode."""
-    rough = [run(simulator) for run in runs]
-    needed = [records_between(simulator, each, _heights(arm, each)) for each in rough if each.t.size > 1]
+    needed = max(records_between(simulator, arm, run(simulator)) for run in runs)
     most = max(LEAST_BETWEEN, MOST_RECORDS // simulator.scenario.t.size)
-    finer = simulator.finer(min(max(LEAST_BETWEEN, *needed), most) if needed else LEAST_BETWEEN)
+    finer = simulator.finer(min(max(LEAST_BETWEEN, needed), most))
     return [run(finer) for run in runs]
 
 
@@ -118,15 +110,9 @@ def points_a_period(arm: Arm, run: Simulation) -> tuple[float, int]:
 
     That number is of records between two samples.
     """
-    simulator = Simulator(arm, run.chain, run.scenario)
-    needed = records_between(simulator, run, _heights(arm, run)) if run.t.size > 1 else 0
+    needed = records_between(Simulator(arm, run.chain, run.scenario), arm, run)
     there = 0 if run.between is None else run.between.t.size // max(1, run.t.size)
     return (POINTS_A_PERIOD * (there + 1) / (needed + 1) if needed else math.inf), needed
-
-
-def _heights(arm: Arm, run: Simulation) -> dict[str, float]:
-    """Heights of the drawn curves, by signal."""
-    return {"root_moment": float(np.ptp(run.at_samples.root_moment)), "tip_displacement": float(np.ptp(away(arm, run)))}
 
 
 def away(arm: Arm, simulation: Simulation) -> Real:
@@ -135,14 +121,9 @@ def away(arm: Arm, simulation: Simulation) -> Real:
     return simulation.at_samples.tip_displacement - reference
 
 
-def root_moment(simulation: Simulation) -> TimeCurve:
-    """The root moment [N m]."""
-    return curve(*continuous(simulation, "root_moment"))
-
-
-def tip(simulation: Simulation) -> TimeCurve:
-    """The tip displacement [m]."""
-    return curve(*continuous(simulation, "tip_displacement"))
+def curve_of(simulation: Simulation, signal: str) -> TimeCurve:
+    """A signal over time, "root_moment" [N m] or "tip_displacement" [m]."""
+    return curve(*continuous(simulation, signal))
 
 
 def tip_deviation(arm: Arm, simulation: Simulation) -> TimeCurve:

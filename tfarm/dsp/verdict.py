@@ -158,15 +158,14 @@ def sampled_verdict(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count:
     band = complete_band(largest)
     full = largest if band is None else band.full
     proven, radius = None if band is None else band.circle().count(full.weights), full.poles.log_spectral_radius
-    number = min(FEWEST_COMPARED, full.plant.count // 2)
-    while True:
-        loop = resized(full, number) if 0 < number < full.plant.count else full
-        agrees = abs(loop.poles.log_spectral_radius - radius) <= RADIUS_AGREES * abs(radius) + RADIUS_NOISE
-        if agrees and loop.poles.unstable == full.poles.unstable and proven in (None, loop.poles.unstable):
-            break
-        if loop is full:
-            break
-        number *= 2
+
+    def agrees(fewer: Sampled) -> bool:
+        is_near = abs(fewer.poles.log_spectral_radius - radius) <= RADIUS_AGREES * abs(radius) + RADIUS_NOISE
+        return is_near and fewer.poles.unstable == full.poles.unstable and proven in (None, fewer.poles.unstable)
+
+    few, most = min(FEWEST_COMPARED, full.plant.count // 2), full.plant.count
+    loops = (resized(full, few << n) for n in range(most.bit_length()) if 0 < few << n < most)
+    loop = next(filter(agrees, loops), full)
     is_proven = proven is not None and loop.poles.is_determined and (proven == 0) == (loop.poles.unstable == 0)
     return Verdict(loop, band if is_proven else None, is_converged=loop is not full)
 
@@ -200,12 +199,12 @@ class Analysis:
     verdict: Annotated[Verdict, Quantity(flat=True, help="stability of the loop")]
     damping_modes: int = UNDAMPED_MODES
 
-    @property
+    @cached_property
     def stability_intervals(self) -> Annotated[list[SampledNumber], Quantity("stability intervals",
             help="stability intervals of each number of the controller, the others constant")]:  # fmt: skip
         """One row for each gain at the hub, or number of another law, the others constant."""
         if not self.loop.is_of_gains:
-            return self.numbers
+            return sampled_numbers(self.loop)
         return [SampledNumber(n, self.loop.number(n), each, self.interval(n)) for n, each in self.shown.items()]
 
     @property
@@ -292,15 +291,10 @@ class Analysis:
         return DelayMargin(self.delay.value, self.delay.is_bound)
 
     @cached_property
-    def damping(self) -> Figure:
-        """The damping C [s] from which on the loop is stable."""
-        return shown_damping(self.loop, self.damping_modes)
-
-    @property
     def minimum_damping(self) -> Annotated[Figure | None, Quantity("minimum structural damping for stability", "s",
             help="Kelvin-Voigt damping C of the link from which on the loop is stable")]:  # fmt: skip
-        """The same with its digits, for gains at the hub."""
-        return self.damping if self.loop.is_of_gains else None
+        """The damping C [s] from which on the loop is stable, for gains at the hub."""
+        return shown_damping(self.loop, self.damping_modes) if self.loop.is_of_gains else None
 
     @cached_property
     def factors(self) -> list[Window]:
@@ -325,11 +319,6 @@ class Analysis:
         """Unstable poles of the law that its own zeros cancel."""
         return cancelled(self.loop.given)
 
-    @cached_property
-    def numbers(self) -> list[SampledNumber]:
-        """Stability intervals of the gain of each part of the law, with the modes of the verdict."""
-        return sampled_numbers(self.loop)
-
 
 def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | None = None) -> Analysis:
     """Return the verdict on the sampled loop, stability intervals, delay margin, modes and minimum structural damping.
@@ -341,7 +330,7 @@ def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | N
     return Analysis(sampled_verdict(arm, law, chain, count=count), count or UNDAMPED_MODES)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class SampledBrief:
     """Whether a loop is stable at a chain's sampling, without z = 1 of a free hub angle.
 
@@ -378,13 +367,6 @@ class SampledBrief:
         return None if size is None else math.exp(size) if size < LARGEST_LOG else math.inf
 
     @property
-    def at(self) -> str:
-        """Sampling period and delay in words, and the origin of the period."""
-        T, delay = self.sampling.period, self.sampling.delay_samples
-        late = f", {delay:g} samples late" if delay else ""
-        return f"sampled every {1e3 * T:g} ms{late}{self.period_from and f' ({self.period_from})'}"
-
-    @property
     def short(self) -> str:
         """The verdict in a few words, for a legend or a card."""
         verdict = "undecided" if self.is_stable is None else "stable" if self.is_stable else "UNSTABLE"
@@ -393,8 +375,10 @@ class SampledBrief:
     @property
     def words(self) -> Annotated[str, Quantity("sampled loop", key="in_words", help="verdict at the sampling period")]:
         """Sampling period and verdict, in capitals where the loop is not stable."""
-        word, _, rest = self.sentence.partition(" ")
-        return f"{word if self.is_stable else word.upper()} {rest}, {self.at}"
+        (word, _, rest), delay = self.sentence.partition(" "), self.delay_samples
+        late = f", {delay:g} samples late" if delay else ""
+        at = f"sampled every {1e3 * self.period:g} ms{late}{self.period_from and f' ({self.period_from})'}"
+        return f"{word if self.is_stable else word.upper()} {rest}, {at}"
 
 
 def sampled_brief(arm: Arm, law: AnyLaw, chain: Chain) -> SampledBrief:
@@ -408,14 +392,10 @@ def sampled_brief(arm: Arm, law: AnyLaw, chain: Chain) -> SampledBrief:
 def brief_of(found: Verdict | ConvergenceError, law: AnyLaw, chain: Chain) -> SampledBrief:
     """A verdict on a law in short, or the reason that there is none."""
     origin = chain.period_from or (DEFAULT_PERIOD if chain.sampling.period == Sampling().period else "")
-    verdict = None if isinstance(found, ConvergenceError) else found
-    return SampledBrief(
-        sampling=chain.sampling,
-        period_from=LAWS_PERIOD if as_law(law).is_discrete else origin,
-        is_stable=None if verdict is None else verdict.is_stable,
-        log_radius=None if verdict is None else float(verdict.log_radius),
-        sentence=f"undecided: {found}" if verdict is None else verdict.sentence,
-    )
+    known = chain.sampling, LAWS_PERIOD if as_law(law).is_discrete else origin
+    if isinstance(found, ConvergenceError):
+        return SampledBrief(*known, None, None, f"undecided: {found}")
+    return SampledBrief(*known, found.is_stable, float(found.log_radius), found.sentence)
 
 
 class AtPeriod(NamedTuple):

@@ -57,7 +57,7 @@ def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", 
     )  # fmt: skip
     colours = (ORANGE, BLUE, *COLOURS[2:]) if len(each) > 1 else (BLUE,)
     for (name, run), colour in zip(each.items(), cycle(colours), strict=False):
-        _draw_curve(traces.root_moment(run), moment, colour, label=name or None)
+        _draw_curve(traces.curve_of(run, "root_moment"), moment, colour, label=name or None)
         _draw_curve(traces.tip_deviation(arm, run), tip, colour, scale=1e3)
         values = run.torque if run.volts is None else run.volts
         _draw_curve(traces.curve(run.t, values), motor, colour, drawstyle="steps-post")

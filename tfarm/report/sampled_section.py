@@ -18,7 +18,7 @@ from tfarm.dsp import Analysis, Chain, Simulation, Verdict, sampled_verdict, tra
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.dsp.crossings import around
 from tfarm.dsp.modes import STRONGER, SampledLoci, sampled_loci
-from tfarm.dsp.results import drawn, residual_moment_rms, settling_time
+from tfarm.dsp.results import drawn
 from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.dsp.verdict import at_periods, sampled
 from tfarm.errors import ParameterError
@@ -268,9 +268,8 @@ def slew_row(name: str, run: Simulation) -> SlewRow:
     """The numbers of a slew."""
     if run.stopped is not None:
         return SlewRow(name, None, None, None, run.stopped.time)
-    time = settling_time(run)
     error = math.degrees(run.at_samples.hub_angle[-1] - run.scenario.hub_angle[-1])
-    return SlewRow(name, residual_moment_rms(run), time if math.isfinite(time) else None, error, None)
+    return SlewRow(name, run.residual_moment, run.settling_time, error, None)
 
 
 def slew(case: Case, controllers: Sequence[Controller]) -> tuple[list[Picture | Table], list[str]]:
@@ -303,7 +302,7 @@ def slew(case: Case, controllers: Sequence[Controller]) -> tuple[list[Picture | 
 
 def piece_of_bands(runs: Mapping[str, Simulation]) -> float | None:
     """The time [s] that each piece of a curve spans that is drawn as a band; None where all are lines."""
-    curves = map(traces.root_moment, runs.values())
+    curves = (traces.curve_of(run, "root_moment") for run in runs.values())
     return next((float(one.t[1] - one.t[0]) for one in curves if one.is_band), None)
 
 
@@ -313,7 +312,7 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
     Torques and gains are those held at that time, the rigid arm's moment that of the sample after it.  Numbers have
     `CURVE_DIGITS` digits: a page's folder is no place for six thousand rows of eleven columns to the last bit.
     """
-    moments = {key: traces.root_moment(run) for key, run in each.items()}
+    moments = {key: traces.curve_of(run, "root_moment") for key, run in each.items()}
     t = min((moment.t for moment in moments.values()), key=len)
     first = next(iter(each.values()))
     rigid = first.scenario.rigid_moment
@@ -324,7 +323,7 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
     driven, unit = "torque" if arm.input_unit == "N m" else "input", arm.input_unit
     for key, run in each.items():
         columns += moments[key].at(t).columns(f"root_moment_{key}", "root moment", "N m")
-        columns += traces.tip(run).at(t).columns(f"tip_{key}", "tip", "m")
+        columns += traces.curve_of(run, "tip_displacement").at(t).columns(f"tip_{key}", "tip", "m")
         columns += traces.tip_deviation(arm, run).at(t).columns(f"tip_error_{key}", "tip less reference", "m")
         name = f"{driven}_{key}_{unit.replace(' ', '_')}"
         columns.append(Column(name, driven, unit, of=traces.held_at(run, run.torque, t)))

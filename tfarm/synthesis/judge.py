@@ -30,7 +30,7 @@ from tfarm.arm.blocks import Rational
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp.edges import most_modes
-from tfarm.dsp.results import residual_moment_rms, simulated
+from tfarm.dsp.results import simulated
 from tfarm.dsp.verdict import UNDAMPED_MODES
 from tfarm.errors import ConvergenceError
 from tfarm.loop.margins import lowest
@@ -245,8 +245,7 @@ class Judge:
         if not self.is_sampled:
             return self.score(law)
         run, _ = simulated(*tracked(self.arm, law), self.chain, slew_and_after(self.arm, self.known, self.chain))
-        left = residual_moment_rms(run)
-        return np.inf if left is None else left
+        return np.inf if run.residual_moment is None else run.residual_moment
 
     def holds(self, law: AnyLaw) -> bool:
         """Whether the loop is stable by the exact verdicts, when sampled also with a reserve."""

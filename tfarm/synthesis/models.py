@@ -26,8 +26,7 @@ from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, Scenario, scenario
-from tfarm.dsp.plant import sensed_plant
-from tfarm.dsp.sampling import PulseTransfer
+from tfarm.dsp.plant import PulseTransfer, sensed_plant
 from tfarm.dsp.scenarios import TRIAL_SLEWS, trial_weights
 from tfarm.loop.loop import band_of, grid
 from tfarm.records import record
@@ -176,10 +175,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
     sensed = sensed_plant(arm, chain, read, count)
     pulse = PulseTransfer(sensed.together, chain.sampling).folded()
     A, B, C = pulse.matrices()
-    own = C[0] * 0.0
-    if "root_moment" in signals:
-        more = sensed.together.joined(sensed.unfiltered.rows(["root_moment"]))
-        own = np.asarray(PulseTransfer(more, chain.sampling).folded().matrices()[2][-1])
+    own = sensed.own_moment(chain.sampling) if "root_moment" in signals else 0.0 * C[0]
     first = pulse.integrals_at
     damped, turns = bool(sensed.read.arm.rate_loss), arm.has_rigid_mode
     gone = [first] if damped or not turns else []

@@ -35,7 +35,6 @@ from tfarm.arm.schema import StrictTable
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, Measurement, Sampled, Scenario, Simulation, Simulator, sampled_loop, scenario
 from tfarm.dsp.chain import Reading, chain_or_usual
-from tfarm.dsp.results import residual_left
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.dsp.simulate import FOLDED_UP
 from tfarm.errors import MISSING, ParameterError, TfarmError, must_be_known
@@ -119,7 +118,8 @@ class Trial:
         last = self.loop.pulse.integrals_at + 2  # the state with the torque of the last sample: B is 1 there
         servo = -self.loop.having(K2=0.0).matrix()[last]
         moment = -self.loop.having(Kp=0.0, K1=0.0, K2=1.0).matrix()[last]
-        drive, own = (np.pad(of, (0, len(A) - of.size)) for of in (self.loop.pulse.matrices()[1], self.loop.own_moment))
+        drive, own = self.loop.pulse.matrices()[1], self.loop.sensed.own_moment(self.loop.chain.sampling)
+        drive, own = (np.pad(of, (0, len(A) - of.size)) for of in (drive, own))
         return kernel.Model(*(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment, own)))
 
     @cached_property
@@ -239,7 +239,7 @@ def residual_rms(record: Record, task: Scenario) -> float | None:
 
     None of an unstable loop.
     """
-    return residual_left(task, record.moment)
+    return task.residual_rms(record.moment)
 
 
 FORMAT = "tfarm tuner 1"

@@ -15,8 +15,9 @@ from tfarm.arm.checks import whole
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, Simulator, scenario
 from tfarm.dsp.chain import Reading, chain_or_usual
-from tfarm.dsp.results import RESIDUAL, Run, enough_modes, ideal_chain, residual_moment_rms, residual_raw_moment_rms
+from tfarm.dsp.results import Run, enough_modes, ideal_chain
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, described, torque_unit
+from tfarm.dsp.simulate import RESIDUAL
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.schema import Quantity
@@ -243,7 +244,7 @@ class SlewEnd(NamedTuple):
         runs = gain.run(simulator), simulator.linear(tuning.constant), simulator.linear(gain.servo)
         tuned, _, without = runs
         return cls(
-            residual_moment_rms(tuned), residual_raw_moment_rms(tuned), residual_moment_rms(without),
+            tuned.residual_moment, tuned.residual_raw, without.residual_moment,
             *(tip_off(run, tuning.trial) for run in runs),
         )  # fmt: skip
 

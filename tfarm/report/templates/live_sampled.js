@@ -1,4 +1,4 @@
-// The sampled loop of any gains, and its slew, from the poles and residues of the modal plant: tfarm.dsp.sampling, loop, simulate.
+// The sampled loop of any gains, and its slew, from the poles and residues of the modal plant: tfarm.dsp.plant, loop, simulate.
 "use strict";
 const FAINT = 0.2; // a pole nearer to z = 0 decides nothing, and where many gather there none is distinct
 const doubles = packed => new Float64Array(Uint8Array.from(atob(packed), c => c.charCodeAt(0)).buffer);
