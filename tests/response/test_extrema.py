@@ -72,16 +72,6 @@ def test_a_damped_pole_past_which_the_magnitude_falls_is_no_peak():
     assert "no peaks" in prose("bode_alt", data=data, start=1.0)
 
 
-def test_the_highest_peak_of_a_page_is_the_largest_maximum():
-    data = tfarm.bode(FLEX, "tip_displacement", (1.0, 200.0))
-    (peak,), (dip,) = data.peaks, data.dips
-    inside = (data.omega > dip.omega) & (data.omega < 200.0)
-    assert peak.magnitude == pytest.approx(abs(data.value[inside]).max(), rel=1e-3)
-    words = prose("extrema", data=data)
-    assert words == "Highest peak: 0.02022 m/V at 140.285 rad/s; deepest dip: 8.597 × 10⁻⁴ m/V at 103.168 rad/s."
-    assert (f"{peak.omega:.6g}", f"{dip.omega:.6g}") == ("140.285", "103.168")
-
-
 def test_without_damping_the_dips_between_infinite_peaks_are_finite_where_there_is_no_zero():
     data = tfarm.bode(BARE, "tip_displacement")
     case = judged(data)
@@ -90,6 +80,11 @@ def test_without_damping_the_dips_between_infinite_peaks_are_finite_where_there_
     assert all(math.isinf(each.magnitude) for each in data.peaks)
     assert all(each.magnitude > 0 for each in data.dips)
     assert len(data.dips) == 10
+    moment = tfarm.bode(BARE, "root_moment")
+    assert moment.peaks == tuple((omega, math.inf) for omega in moment.infinite)
+    assert moment.dips == tuple((omega, 0.0) for omega in moment.vanishing)
+    assert np.isinf(moment.at_poles).all()
+    assert not moment.at_zeros.any()
 
 
 def test_none_is_false_and_none_missed_on_random_rigs():
@@ -106,7 +101,7 @@ def test_a_peak_that_is_moved_or_left_out_is_found_out():
     object.__setattr__(data, "peaks", (data.peaks[0], peak))
     case = judged(data)
     assert case.false == (peak.omega,)
-    assert len(case.missed) == 2
+    assert len(case.missed) == 3
 
 
 EVEN, AROUND = 8_000, 60  # points of the dense grid: of all, and on each side of a root
@@ -142,7 +137,13 @@ def judged(data):
         inside = on_axis[(on_axis > data.band[0]) & (on_axis < data.band[1])]
         missed += sorted(set(inside) - {each.omega for each in listed if each.magnitude == limit})
         missed += missing(G, data, sign, listed, roots)
+        missed += [each.omega for each in listed if each.magnitude != limit and not is_drawn(data, each)]
     return Case(data, tuple(false), tuple(missed))
+
+
+def is_drawn(data, each):
+    """Whether a point of the grid is so near that the curve has the extremum to 1 %."""
+    return abs(abs(data.value[abs(data.omega - each.omega).argmin()]) / each.magnitude - 1) < 0.01
 
 
 def is_extremum(G, each, sign, roots, on_axis, limit):

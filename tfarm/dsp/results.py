@@ -26,7 +26,7 @@ from tfarm.dsp.simulate import Simulation, Simulator, Trace
 from tfarm.dsp.traces import resolved
 from tfarm.errors import ConvergenceError
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.response.controller import Controller, controller
+from tfarm.response.signals import Controller, controller
 from tfarm.schema import Column, Quantity, Table
 
 RESIDUAL = "residual root moment after the slew"

@@ -9,7 +9,7 @@ random arms).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
 from tfarm.arrays import Complex, Real
-from tfarm.errors import ParameterError
+from tfarm.errors import require
 from tfarm.exact.outputs import Output
 from tfarm.records import record
 from tfarm.response import TransferFunction, Wanted, transfer
@@ -110,10 +110,8 @@ class PartialFractions:
     def __call__(self, s: ArrayLike) -> Complex:
         """Return values (outputs, *s.shape) at complex s [1/s].  Raises ParameterError at a pole of the model."""
         points = np.asarray(s, dtype=complex)
-        flat, values = points.ravel(), np.empty((len(self.outputs), points.size), complex)
-        step = max(1, TERMS_AT_ONCE // max(1, self.index.size))
-        for start in range(0, flat.size, step):
-            values[:, start : start + step] = self._sum(flat[start : start + step], np.asarray)
+        parts = np.array_split(points.ravel(), 1 + points.size * self.index.size // TERMS_AT_ONCE)
+        values = np.concatenate([self._sum(part, np.asarray) for part in parts], axis=1)
         return values.reshape(len(self.outputs), *points.shape)
 
     def magnitude(self, s: Complex) -> Real:
@@ -124,9 +122,9 @@ class PartialFractions:
         """Return the sum of all terms (outputs, s) at s (1-D), or with `part` abs that of their magnitudes."""
         p1, p2 = self.eigenvalues.T[:, :, None]
         product = (s - p1) * (s - p2)
-        if not product.all() or (self.has_rigid_states and not s.all()):
-            pole = s[(product == 0).any(axis=0)] if not product.all() else s[s == 0]
-            raise ParameterError(key="s", value=complex(pole[0]), remedy="a pole of the reduced model; move s")
+        is_pole = (product == 0).any(axis=0) | (self.has_rigid_states & (s == 0))
+        for pole in s[is_pole][:1].tolist():
+            require(False, "s", pole, "a pole of the reduced model; move s")
         (n1, n0), share = map(part, self.numerators), part(1 / product)
         total = part(s) * (n1 @ share) + n0 @ share + part(self.static)[:, None]
         if self.has_rigid_states:
@@ -165,6 +163,21 @@ class PartialFractions:
         if self.relaxation is not None:
             A[-1, -1], B[-1, 0], C[:, -1] = -1 / self.arm.damping, 1 / self.arm.damping, self.relaxation
         return A, B, C, self.static[:, None].copy()
+
+    def first(self, count: int) -> PartialFractions:
+        """Return the model with the first `count` of the arm's modes, the static gains of the others in `static`."""
+        beyond = self.index > count
+        beyond |= (self.index == 0) & (self.natural_frequency > self.natural_frequency[beyond].min(initial=np.inf))
+        kept = ~beyond
+        return replace(
+            self,
+            index=self.index[kept],
+            natural_frequency=self.natural_frequency[kept],
+            eigenvalues=self.eigenvalues[kept],
+            residues=self.residues[:, kept],
+            static=self.static - (self.residues[:, beyond] / self.eigenvalues[beyond]).real.sum(axis=(1, 2)),
+            participation=self.participation[kept],
+        )
 
     def closed(self, gains: ArrayLike) -> Matrices:
         """Return A, B, C, D under the law  u = r - gains . y, r the new input; gains are (outputs,) or (n, outputs).
@@ -218,10 +231,6 @@ class Ruler:
             w = w[self._is_clear(w)]
         self.w, (self._values, self._size) = w, self._exact(w)
 
-    def norm(self, w: Real) -> Real:
-        """Return |G| + |w dG/dw| (outputs, w) of the exact arm at w [rad/s], 1-D, off its natural frequencies."""
-        return norm(self.G, w, self.G(1j * w))
-
     def rough(self, model: PartialFractions) -> float:
         """Return the largest error at the samples, a little below the worst one."""
         return float(_errors(model, self.w, self._values, self._size).max())
@@ -252,12 +261,9 @@ class Ruler:
 
     def _error_at(self, model: PartialFractions, w: Real, row: int) -> Real:
         """Return the error of one output at w of any shape, zero next to a pole."""
-        flat = w.ravel()
-        clear = self._is_clear(flat)
-        errors = np.zeros(flat.size)
-        if clear.any():
-            errors[clear] = _errors(model, flat[clear], *self._exact(flat[clear]))[row]
-        return errors.reshape(w.shape)
+        errors, clear = np.zeros(w.shape), self._is_clear(w)
+        errors[clear] = _errors(model, w[clear], *self._exact(w[clear]))[row]
+        return errors
 
     def _exact(self, w: Real) -> tuple[Complex, Real]:
         values = self.G(1j * w)

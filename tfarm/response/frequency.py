@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.errors import CertificationError, ConvergenceError, ParameterError
+from tfarm.errors import CertificationError, ConvergenceError, require
 from tfarm.exact.outputs import Output, unit_over
 from tfarm.exact.rigid import rigid_response
 from tfarm.records import record
@@ -356,8 +356,7 @@ def known_band(band: tuple[float, float], remedy: str, widest: float = math.inf)
         low, high = map(float, band)
     except (TypeError, ValueError):
         low = high = math.nan
-    if not 0 < low < high < math.inf or high / low > widest:
-        raise ParameterError(key="band", value=band, remedy=remedy)
+    require(0 < low < high < math.inf and high / low <= widest, "band", band, remedy)
     return low, high
 
 
@@ -372,13 +371,11 @@ def _no_motion(arm: Arm, row: Output, x: float | None, band: tuple[float, float]
 
 def without_cancelled(poles: Complex, zeros: Complex) -> tuple[Complex, Complex]:
     """Return poles and zeros without the pairs that cancel."""
-    kept_poles, kept_zeros = [], list(zeros)
+    kept_poles, kept_zeros = list(poles), list(zeros)
     for pole in poles:
-        near = [i for i, zero in enumerate(kept_zeros) if abs(zero - pole) <= COINCIDE * abs(pole)]
-        if near:
-            del kept_zeros[near[0]]
-        else:
-            kept_poles.append(pole)
+        for zero in [zero for zero in kept_zeros if abs(zero - pole) <= COINCIDE * abs(pole)][:1]:
+            kept_poles.remove(pole)
+            kept_zeros.remove(zero)
     return np.array(kept_poles, complex), np.array(kept_zeros, complex)
 
 
