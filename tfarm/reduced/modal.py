@@ -152,21 +152,17 @@ def _around(
 
 def _from_shapes(table: Modes, wanted: Sequence[Output], k: System, x: float) -> Real:
     """Return c b (outputs, modes) of the flexible modes by the mode shapes."""
-    length = float(k.length)
-    drive = table.modal_moment if k.is_locked else table.hub_participation
-    theta = table.hub_participation
-
-    def value(each: Output) -> Real:
-        at = each.share(x) * length
-        if each.quantity == "theta":
-            return theta
-        if each.quantity in ("W", "Y"):
-            return table.shape(at) - (at + float(k.radius) * length) * theta * (each.quantity == "Y")
-        if each.quantity == "Phi":
-            return table.rotation(at) - theta
-        return table.moment(at) if each.quantity == "M" else table.shear(at)
-
-    return np.array([value(each) * drive for each in wanted])[:, table.index > 0]
+    length, theta = float(k.length), table.hub_participation
+    drive = table.modal_moment if k.is_locked else theta
+    of: dict[str, Callable[[float], Real]] = {
+        "theta": lambda _: theta,
+        "W": table.shape,
+        "Y": lambda at: table.shape(at) - (at + float(k.radius) * length) * theta,
+        "Phi": lambda at: table.rotation(at) - theta,
+        "M": table.moment,
+        "Q": table.shear,
+    }
+    return np.array([of[each.quantity](each.share(x) * length) * drive for each in wanted])[:, table.index > 0]
 
 
 MOST_MODELLED = 1000  # of a model: its matrices of 2000 states take 32 MB
@@ -210,7 +206,7 @@ def modal_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -
         rigid=expansion[:, :2],
         static=expansion[:, 2] + (r[:-1] / p).real.sum(axis=(1, 2)) + (alone / single)[:-1, kept].sum(axis=1),
         single=single,
-        single_residues=alone[:-1] if single.size else None,
+        single_residues=alone[:-1],
         participation=np.sqrt(abs((r[-1] * p[:, ::-1]).real.sum(axis=-1))),
     )
 
@@ -225,8 +221,7 @@ def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None)
     require(C, "link.damping", C, "without damping nothing relaxes; take modal_model")
     exact, kept = _at_rest(transfer(arm, model.rows, x=x), model.single, modes(arm, 1))
     slope = exact[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
-    if model.single_residues is not None:
-        slope = slope + (model.single_residues / model.single**2)[:, kept].sum(axis=1)
+    slope += (model.single_residues / model.single**2)[:, kept].sum(axis=1)
     return replace(model, static=model.static + slope / C, relaxation=-slope / C)
 
 

@@ -9,11 +9,12 @@ random arms).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
@@ -57,8 +58,8 @@ class PartialFractions:
     static: Real
     participation: Real
     relaxation: Real | None = None
-    single: Real = field(default_factory=lambda: np.empty(0))
-    single_residues: Real | None = None
+    single: Real
+    single_residues: Real
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -129,8 +130,7 @@ class PartialFractions:
         total = part(s) * (n1 @ share) + n0 @ share + part(self.static)[:, None]
         if self.has_rigid_states:
             total = total + part(self.rigid[:, :1] / (s * s)) + part(self.rigid[:, 1:] / s)
-        if self.single_residues is not None:
-            total = total + part(self.single_residues) @ part(1 / (s - self.single[:, None]))
+        total = total + part(self.single_residues) @ part(1 / (s - self.single[:, None]))
         if self.relaxation is not None:
             total = total + part(self.relaxation[:, None] / (1 + self.arm.damping * s))
         return total
@@ -141,28 +141,19 @@ class PartialFractions:
         Rigid body: angle and rate of an inertia J.  Each mode: (w q, q') with q'' + a q' + w^2 q = b u, that is the
         block [[0, w], [-w, -a]]; at C = 0 half the sum of their squares is the mode's energy [J].
         """
-        first, n = self.rigid_states, self.index.size
-        A, B = np.zeros((self.order, self.order)), np.zeros((self.order, 1))
-        C = np.zeros((len(self.outputs), self.order))
-        J = self.arm.total_inertia
-        if first:
-            B[first - 1, 0] = 1.0 / J
-            A[0, first - 1] += first - 1.0
-            C[:, :first] = self.rigid[:, 2 - first :] * J
-        position = first + 2 * np.arange(n)
+        first = self.rigid_states
         w = np.sqrt(self.stiffness)
-        A[position, position + 1], A[position + 1, position] = w, -w
-        A[position + 1, position + 1] = self.eigenvalues.sum(axis=1).real
         b = np.where(self.participation > 0, self.participation, 1.0)
         n1, n0 = self.numerators
-        B[position + 1, 0] = b
-        C[:, position], C[:, position + 1] = n0 / (w * b), n1 / b
-        if self.single_residues is not None:
-            alone = first + 2 * n + np.arange(self.single.size)
-            A[alone, alone], B[alone, 0], C[:, alone] = self.single, 1.0, self.single_residues
-        if self.relaxation is not None:
-            A[-1, -1], B[-1, 0], C[:, -1] = -1 / self.arm.damping, 1 / self.arm.damping, self.relaxation
-        return A, B, C, self.static[:, None].copy()
+        pairs = np.array([[0 * w, w], [-w, self.eigenvalues.sum(axis=1).real]]).transpose(2, 0, 1)
+        slow = np.empty(0) if self.relaxation is None else np.array([1 / self.arm.damping])
+        J = self.arm.total_inertia
+        A = block_diag(np.eye(first, k=1), *pairs, np.diag(self.single), np.diag(-slow))
+        B = np.r_[np.zeros(first)[1:], np.ones(first)[:1] / J, np.c_[0 * b, b].ravel(), np.ones(self.single.size), slow]
+        of_pairs = np.stack([n0 / (w * b), n1 / b], axis=-1).reshape(len(n0), -1)
+        of_slow = np.empty((len(n0), 0)) if self.relaxation is None else self.relaxation[:, None]
+        C = np.hstack([self.rigid[:, 2 - first :] * J, of_pairs, self.single_residues, of_slow])
+        return A, B[:, None], C, self.static[:, None].copy()
 
     def first(self, count: int) -> PartialFractions:
         """Return the model with the first `count` of the arm's modes, the static gains of the others in `static`."""

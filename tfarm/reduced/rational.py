@@ -207,4 +207,6 @@ def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares:
         rigid=inside.rigid[1:],
         static=np.where(strict, 0.0, static)[1:],
         participation=np.r_[inside.participation, np.sqrt(abs(in_S[0]))],
+        single=inside.single,
+        single_residues=inside.single_residues[1:],
     )
