@@ -273,11 +273,10 @@ class TransferFunction:
 
     def _values(self, s: Complex) -> Complex:
         if self.load is not None:
-            of_load = np.empty((len(self.rows), s.size), complex)
-            for row, each in enumerate(self.rows):
-                balls = (loaded_value(self.system, self.load, each, complex(at), self.share) for at in s)
-                of_load[row] = [nearest_float(ball) for ball in balls]
-            return of_load
+            balls = (
+                loaded_value(self.system, self.load, each, at, self.share) for each in self.rows for at in s.tolist()
+            )
+            return np.array(list(map(nearest_float, balls)), complex).reshape(len(self.rows), s.size)
         if self.method != "closed-form":
             return slow_values(self.method, self.arm, self.system, self.rows, s, self.share)
         if s.size <= POINTS_AT_ONCE:
