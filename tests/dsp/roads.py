@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 import tfarm
 from tfarm.dsp.plant import is_analog
-from tfarm.reduced.conversions import sensed_model
+from tfarm.reduced.modal import sensed_model
 from tfarm.response.signals import Signals
 
 MODES = 40

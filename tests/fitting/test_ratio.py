@@ -21,7 +21,8 @@ def test_over_the_measured_hub_angle_it_is_that_of_the_held_hub():
     assert direct(S) == pytest.approx(above(S) / below(S), rel=1e-12)
     found = direct.roots(300.0)
     held = below.zeros(up_to=300.0).values
-    assert np.sort_complex(found.poles) == pytest.approx(np.sort_complex(held[held != 0]), rel=1e-11)
+    held = held[(held != 0) & (held.imag >= 0)]
+    assert np.sort_complex(found.poles) == pytest.approx(np.sort_complex(held), rel=1e-11)
     assert found.at_zero == 2
 
 
@@ -29,7 +30,7 @@ def test_of_two_signals_it_has_their_zeros_and_none_of_the_arms_poles():
     """On a circle about each root the ratio turns once, and about the arm's own poles not at all."""
     ratio = Ratio(LAB, "moment@0.3", "hub_rate")
     found = ratio.roots(250.0)
-    everything = np.r_[found.poles, found.zeros, 0.0]
+    everything = np.r_[found.poles, found.zeros, found.poles.conj(), found.zeros.conj(), 0.0]
 
     def turns(centre):
         far = min((abs(centre - each) for each in everything if each != centre), default=1.0)
@@ -59,10 +60,8 @@ def test_residues_are_those_by_the_derivative():
     above, below = tfarm.transfer(LAB, "tip_acceleration"), tfarm.transfer(LAB, "hub_angle")
     ratio = Ratio(LAB, "tip_acceleration", "hub_angle")
     found = ratio.roots(600.0)
-    for pole in found.poles[found.poles.imag > 0]:
-        expected = above(pole) / below.derivative(pole)
-        others = np.r_[found.poles, found.zeros, 0.0]
-        assert ratio.residue(complex(pole), others) == pytest.approx(complex(expected), rel=1e-8)
+    for pole in found.poles[found.poles.imag > 0].tolist():
+        assert ratio.residue(pole, found) == pytest.approx(above(pole) / below.derivative(pole), rel=1e-8)
 
 
 @pytest.mark.parametrize(

@@ -121,12 +121,6 @@ def test_a_wrong_option_is_refused(options, message):
     assert message in str(error.value)
 
 
-def test_signals_along_the_link_and_inputs_of_the_hub_are_known(tmp_path):
-    path = tmp_path / "strain.csv"
-    path.write_text(WRITTEN["plain"])
-    assert data_of(f"strain@0.05/motor_voltage={path}").name == "strain@0.05/motor_voltage"
-
-
 def uff(values, start, step, function=4):
     """A data set 58 by the format's own table: complex, double precision, even spacing (4E20.12)."""
     flat = [f"{x:20.12E}" for value in values for x in (value.real, value.imag)]

@@ -84,11 +84,6 @@ def estimate(**how):
     return frequency_response(RECORD, *names, columns=("acceleration", "torque"), **how).measured
 
 
-def test_the_second_sweep_is_the_first_with_the_other_sign():
-    for signal in RECORD.signals.values():
-        assert np.std(signal[SWEEP:] + signal[:SWEEP]) < 0.1 * np.std(signal)
-
-
 def test_segments_of_a_sweep_are_coherent_and_tapered_ones_are_not():
     """What repeats leaks from no period; a window that tapers a sweep weighs its frequencies by when they come."""
     whole, tapered = estimate(segment=SWEEP, window="boxcar"), estimate()

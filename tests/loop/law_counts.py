@@ -157,7 +157,7 @@ def returned(arm, law, count):
 
 def model(arm, names, count):
     """The modal model of the signals, from the public reduced models, one output at a time."""
-    from tfarm.reduced.conversions import sensed_model
+    from tfarm.reduced.modal import sensed_model
 
     return sensed_model(arm, names, count)
 

@@ -20,7 +20,7 @@ from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.verdict import sampled
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.margins import margins
-from tfarm.reduced.conversions import closed, sensed_model
+from tfarm.reduced.modal import closed, sensed_model
 from tfarm.response.signals import Signals
 from tfarm.schema import to_dict, to_json
 from tfarm.spectrum.table import first_frequency

@@ -24,7 +24,7 @@ from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import Spill, stability
 from tfarm.loop.theorem import definite, is_hurwitz, on_axis, polynomial, signs_of
 from tfarm.loop.windows import through_infinity, unstable_below
-from tfarm.reduced.conversions import sensed_model
+from tfarm.reduced.modal import sensed_model
 from tfarm.response.signals import Signals
 
 LAB, BARE, RIG = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))

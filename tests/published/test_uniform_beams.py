@@ -111,17 +111,6 @@ def test_none_of_the_first_ten_is_left_out(key):
     assert np.count_nonzero(np.diff(signs)) == 10
 
 
-@pytest.mark.parametrize("key", ["bhat-wagner-1976", "bellezza-lanari-ulivi-1990"])
-def test_an_offset_is_felt(key):
-    """With the body's centre on the tip, or the clamp on the axis, every printed digit is missed."""
-    for case in SOURCES[key]:
-        arm = case.arm
-        plain = replace(arm, payload=replace(arm.payload, offset=0.0), hub=replace(arm.hub, radius=0.0))
-        if plain != arm:
-            away = computed(replace(case, arm=plain)) / np.array([float(text) for text in case.printed]) - 1
-            assert abs(away[0]) > 1e-3
-
-
 @pytest.mark.parametrize("case", SOURCES["wang-2017"][1:])
 def test_wang_2017_has_the_sign_of_the_tip_inertia_reversed(case):
     """Theirs are the roots for -I_c, and cannot be frequencies: inertia on the tip lowers them (Rayleigh)."""

@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import tfarm
@@ -29,6 +28,12 @@ def by_contour(G, p, radius, points=64):
     """(1 / 2 pi i) times the integral of G around p: the trapezoid rule, geometrically convergent."""
     arrow = radius * np.exp(2j * np.pi * (np.arange(points) + 0.5) / points)
     return (G(p + arrow) * arrow).mean(axis=-1)
+
+
+def by_matrices(model, s):
+    """C (s - A)^-1 B + D at s (n,): (outputs, n)."""
+    A, B, C, D = model.matrices()
+    return (C @ np.linalg.solve(s[:, None, None] * np.eye(len(A)) - A, B) + D)[..., 0].T
 
 
 def norm_error(model, w):
@@ -79,20 +84,15 @@ def test_state_space_and_partial_fractions_are_one_model(arm, lab):
     for each in (arm, lab, replace(arm, hub=Hub(inertia=math.inf))):
         names = [name for name in ENDS if not (each.is_locked and name == "hub_rate")]
         model = modal_model(each, names, 4)
-        A, B, C, D = model.matrices()
-        assert A.shape == (model.order, model.order)
         assert len(model.states) == model.order
-        for s in (0.3 + 57.1j, -2.0 + 400j, 12.0):
-            solved = C @ np.linalg.solve(s * np.eye(model.order) - A, B) + D
-            np.testing.assert_allclose(solved[:, 0], model(s), rtol=1e-10)
+        s = np.array([0.3 + 57.1j, -2.0 + 400j, 12.0])
+        np.testing.assert_allclose(by_matrices(model, s), model(s), rtol=1e-10)
         np.testing.assert_allclose(model(np.array([[1j, 2j]]))[:, 0, 1], model(2j))
 
 
 def test_lossless_to_the_bit_at_no_damping(arm):
     A, _, _, _ = modal_model(arm, "root_moment", 30).matrices()
     assert (A == -A.T).all()
-    rotation = expm(A * 0.01)
-    np.testing.assert_allclose(rotation @ rotation.T, np.eye(60), atol=1e-12)
 
 
 def test_order_of_convergence(arm):
@@ -162,11 +162,9 @@ def test_a_relaxed_model_is_exact_to_first_order(lab):
     slope = (model(h) - model(-h)) / (2 * h)
     np.testing.assert_allclose(model(1e-6), G.static, rtol=1e-9)
     np.testing.assert_allclose(slope, G.derivative(0.0), rtol=1e-4, atol=1e-9)
-    A, B, C, D = model.matrices()
-    assert model.order == len(A) == 9
-    assert model.states[-1] == "relaxation"
-    s = 3 + 200j
-    np.testing.assert_allclose((C @ np.linalg.solve(s * np.eye(9) - A, B) + D)[:, 0], model(s), rtol=1e-11)
+    assert (model.order, model.states[-1]) == (9, "relaxation")
+    s = np.array([3 + 200j])
+    np.testing.assert_allclose(by_matrices(model, s), model(s), rtol=1e-11)
 
 
 def test_relaxation_goes_where_the_static_remainder_cannot(lab):
@@ -174,11 +172,8 @@ def test_relaxation_goes_where_the_static_remainder_cannot(lab):
     plain, relaxed = (norm_error(make(lab, "root_moment", 20), w)[0] for make in (modal_model, relaxed_model))
     assert plain > 1e-5
     assert relaxed < 3e-7
-
-
-def test_nothing_relaxes_without_damping(arm):
-    with pytest.raises(ParameterError, match="damping"):
-        relaxed_model(arm, "root_moment", 3)
+    with pytest.raises(ParameterError, match="nothing relaxes"):
+        relaxed_model(lab.having(damping=0.0), "root_moment", 3)
 
 
 def test_slow_poles_stand_for_the_overdamped_modes_that_are_left_out():

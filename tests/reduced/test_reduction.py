@@ -9,7 +9,7 @@ import pytest
 
 import tfarm
 from tests.shell import refused, run
-from tfarm import ConvergenceError, Hub, ParameterError
+from tfarm import Hub, ParameterError
 from tfarm.reduced import reduce
 from tfarm.schema import to_dict
 
@@ -31,11 +31,6 @@ def test_by_error_the_smallest(arm, error, method):
     assert found.worst_error <= error
     smaller = reduce(arm, ["root_moment", "hub_rate"], order=found.order - 2, method=method)
     assert smaller.worst_error > error or smaller.method != method  # below the modes of the band AAA gives way
-
-
-def test_what_cannot_be_reached(arm):
-    with pytest.raises(ConvergenceError, match="no model of"):
-        reduce(arm, "root_moment", error=1e-14)  # the rounding that is part of every printed error
 
 
 def test_aaa_below_the_modes_of_the_band_gives_way(arm):
@@ -121,20 +116,9 @@ def test_by_error_with_a_band_and_a_file(capsys, tmp_path):
     assert (tmp_path / "arm.mat").exists()
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        [],
-        ["--order", "13"],
-        ["--order", "some"],
-        ["--order", "8", "--band", ""],
-        ["--order", "8", "--outputs", "tip"],
-        ["--order", "8", "--outputs", ""],
-        ["--order", "8", "--mat", "/nowhere/a.mat"],
-    ],
-)
+@pytest.mark.parametrize("arguments", ["--order some", "--order 8 --outputs tip", "--order 8 --mat /nowhere/a.mat"])
 def test_bad_input_is_one_line(capsys, arguments):
-    assert refused(capsys, "reduce", "sasaki2012", *arguments)
+    assert refused(capsys, "reduce", "sasaki2012", *arguments.split())
 
 
 def test_an_error_out_of_reach(capsys):

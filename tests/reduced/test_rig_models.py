@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.reduced.test_modal import by_matrices
 from tests.transition import determinant
 from tfarm import Hub, damped_modes, load, modes, transfer
 from tfarm.arm import FED_BACK, Motor
@@ -31,10 +32,7 @@ def test_a_model_with_friction_is_the_exact_rig_at_low_frequency(arm):
     model = modal_model(arm, MEASURED, 7)
     np.testing.assert_allclose(model(S), exact, rtol=1e-4)
     assert model.order == 14 + 1 + model.single.size == len(model.states)
-    A, B, C, D = model.matrices()
-    for s, values in zip(S, model(S).T, strict=True):
-        again = (C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D)[:, 0]
-        np.testing.assert_allclose(again, values, rtol=1e-9)
+    np.testing.assert_allclose(by_matrices(model, S), model(S), rtol=1e-9)
 
 
 def test_the_single_poles_are_eigenvalues_of_the_rig(arm):
@@ -77,9 +75,7 @@ def test_a_lossless_rig_behind_an_inductance_has_its_circuits_pole(radius):
     np.testing.assert_allclose(model(S)[2], circuit, rtol=1e-12)
     by_torque = modal_model(plain, outputs[:2], 40)(S) * circuit * motor.gear_ratio * motor.torque_constant
     np.testing.assert_allclose(model(S)[:2], by_torque, rtol=1e-5)
-    A, B, C, D = model.matrices()
-    again = [(C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D)[:, 0] for s in S]
-    np.testing.assert_allclose(np.array(again).T, exact, rtol=1e-6)
+    np.testing.assert_allclose(by_matrices(model, S), exact, rtol=1e-6)
     with pytest.raises(tfarm.ParameterError, match="no inductance"):
         tfarm.reduce(arm, "hub_angle", order=8, method="aaa")
 

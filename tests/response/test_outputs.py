@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 from itertools import product
-from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -11,9 +10,8 @@ from numpy.testing import assert_allclose
 
 import tfarm
 from tests.shared import thinned
-from tests.shell import answer
 from tfarm import Hub, Output, ParameterError, Payload
-from tfarm.exact import appendix, outputs
+from tfarm.exact import appendix
 
 EPS = np.finfo(float).eps
 LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
@@ -46,15 +44,6 @@ def test_call_digits_and_frequency_response_agree_with_the_paper(arm, wanted) ->
     data = G.frequency_response([57.1, 900.0])
     assert data.output_labels == [wanted.name]
     assert (data.frdata[0, 0] == G([57.1j, 900j])).all()
-
-
-@pytest.mark.parametrize("arm", ARMS.values(), ids=ARMS)
-def test_derivatives_obey_the_product_rule_of_the_power(arm) -> None:
-    for wanted in (JERK, SNAP, OWN[-1]):
-        G, base, n = tfarm.transfer(arm, wanted), tfarm.transfer(arm, wanted.base), wanted.power
-        for s in POINTS:
-            terms = n * s ** (n - 1) * base(s), s**n * base.derivative(s)
-            assert abs(G.derivative(s) - sum(terms)) <= 64 * EPS * sum(map(abs, terms))
 
 
 def test_the_payload_is_driven_by_what_acts_on_the_tip() -> None:
@@ -101,15 +90,6 @@ def test_reduced_models_take_them() -> None:
     assert model.worst_error < 1e-3
     with pytest.raises(ParameterError, match="lower derivative"):
         tfarm.reduce(STOCKY, JERK, order=10)
-
-
-def test_a_row_of_the_table_is_known_on_the_command_line(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outputs, "OUTPUTS", MappingProxyType({**outputs.OUTPUTS, TURN.name: TURN}))
-    found = answer(capsys, "response", "sasaki2012-lab", "--output", "tip_rotation", "--s", "0.3+57.1j")
-    assert (found["output"], found["unit"].split("/")[0]) == ("tip_rotation", "rad")
-    (value,) = found["value"]
-    expected = complex(appendix.response(LAB, TURN, 0.3 + 57.1j, 20))
-    assert abs(complex(*value) - expected) <= 1e-13 * abs(expected)
 
 
 HELD = [

@@ -7,7 +7,7 @@ each step a hundredth of the one before, the rigid response is to be within two 
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -78,28 +78,6 @@ NEXT = 0.02  # of the last step: the next ones
 ROUNDING = 1e-9  # of an output: of the stiffest links, whose waves are slow
 
 
-@dataclass(frozen=True)
-class Case:
-    """A rig at one frequency: of each output that has a limit the distance to it, over what it may be."""
-
-    arm: object
-    omega: float
-    x: float
-    departures: dict
-
-    @property
-    def wrong(self):
-        """The outputs that are not the limit."""
-        return {name: value for name, value in self.departures.items() if not value <= 1.0}
-
-
-def case_of(rng):
-    """A rig, and its responses at one frequency and place."""
-    arm = some_rig(rng)
-    omega, x = reached(arm, 10 ** rng.uniform(-3, 0.5)), float(rng.uniform(0, arm.length))
-    return Case(arm, omega, x, {} if contradicts(arm) else departures(arm, omega, x))
-
-
 def departures(arm, omega, x):
     """|rigid - limit| of each output, over what the limit is known to."""
     found, s = {}, np.array([1j * omega])
@@ -131,11 +109,14 @@ def stiffened(arm, factor):
 
 
 def rigs(rng):
-    """The finding on one rig."""
-    case = case_of(rng)
-    words = f"{case.wrong} at {case.omega!r} rad/s, x = {case.x!r} m\n    {case.arm}" if case.wrong else ""
-    outcome = "wrong" if words else "right" if case.departures else "held twice over"
-    return Finding(outcome, words, bool(words), {"responses": len(case.departures)})
+    """The finding on the outputs of one rig at one frequency and place."""
+    arm = some_rig(rng)
+    omega, x = reached(arm, 10 ** rng.uniform(-3, 0.5)), float(rng.uniform(0, arm.length))
+    found = {} if contradicts(arm) else departures(arm, omega, x)
+    wrong = {name: value for name, value in found.items() if not value <= 1.0}
+    words = f"{wrong} at {omega!r} rad/s, x = {x!r} m\n    {arm}" if wrong else ""
+    outcome = "wrong" if wrong else "right" if found else "held twice over"
+    return Finding(outcome, words, bool(wrong), {"responses": len(found)})
 
 
 if __name__ == "__main__":

@@ -56,10 +56,9 @@ def test_derivative_is_the_limit_of_differences_with_many_digits(arm: Arm, name:
 def test_expansion_at_zero_is_the_rigid_arm(arm: Arm) -> None:
     J, length = arm.total_inertia, arm.link.length
     flexible = replace(arm, hub=Hub(inertia=0.0)).total_inertia
-    assert_allclose(tfarm.transfer(arm, "hub_angle").rigid_body, 1 / J, rtol=8 * EPS)
-    assert_allclose(tfarm.transfer(arm, "tip_displacement").rigid_body, length / J, rtol=8 * EPS)
-    assert_allclose(tfarm.transfer(arm, "root_moment").static, -flexible / J, rtol=16 * EPS)
-    assert tfarm.transfer(arm, "root_moment").rigid_body == 0
+    G = tfarm.transfer(arm, ["hub_angle", "tip_displacement", "root_moment"])
+    assert_allclose(G.rigid_body, [1 / J, length / J, 0.0], rtol=8 * EPS)
+    assert_allclose(G.static[2], -flexible / J, rtol=16 * EPS)
     assert_allclose(tfarm.transfer(arm, "root_moment")(0), -flexible / J, rtol=16 * EPS)
 
 
@@ -116,12 +115,6 @@ def test_poles_without_damping_are_the_natural_frequencies() -> None:
     assert np.count_nonzero(poles.values == 0) == 2
 
 
-def test_the_tip_has_real_pairs_of_zeros() -> None:
-    zeros = tfarm.transfer(tfarm.load("sasaki2012"), "tip_displacement").zeros(up_to=3000.0).values
-    assert (zeros.imag == 0).all()
-    assert_allclose(np.sort(zeros.real), -np.sort(zeros.real)[::-1])
-
-
 def test_damped_poles_have_the_damping_of_the_first_order() -> None:
     arm = tfarm.load("sasaki2012-lab")
     poles = tfarm.transfer(arm, "hub_angle").poles(up_to=600.0)
@@ -169,7 +162,7 @@ def test_refusals(outputs: str, x: float | None, message: str) -> None:
         tfarm.transfer(tfarm.load("sasaki2012"), outputs, x=x)
 
 
-@pytest.mark.parametrize("s", [math.nan, complex(0, math.inf)])
-def test_s_is_finite(s: complex) -> None:
-    with pytest.raises(ParameterError, match="finite"):
-        tfarm.transfer(tfarm.load("sasaki2012"), "hub_rate")(s)
+@pytest.mark.parametrize("s", [math.nan, complex(3.0, math.nan), complex(0, math.inf), -2e20])
+def test_s_is_finite_and_in_the_range_of_powers(s: complex) -> None:
+    with pytest.raises(ParameterError, match="at most" if s == -2e20 else "finite"):
+        tfarm.transfer(tfarm.load("sasaki2012"), "hub_rate")([1.0, s])

@@ -120,7 +120,7 @@ def modes(
     count: flexible modes
     certify: prove each bracket, and that no mode is missing
     """
-    from tfarm.response.points import ByMethods
+    from tfarm.response.transfer import ByMethods
     from tfarm.spectrum.listing import listed_modes
 
     found = tfarm.modes(load_arm(arm, theory), count)
@@ -179,7 +179,7 @@ def response(
         emit(tfarm.overlay(load_arm(arm, theory), data_of(measured, "--measured")), json, csv=csv, png=png)
         return
     refuse({"--png": png}, "a picture needs --measured; tfarm bode draws the exact response")
-    from tfarm.response import points as results
+    from tfarm.response.transfer import ByMethods, values_at
 
     (wanted,) = outputs_on(["root_moment" if output is None else output], side)
     G = tfarm.transfer(load_arm(arm, theory, driven), wanted, x=x, method=cast("Any", method), input=driven)
@@ -187,9 +187,9 @@ def response(
     check_method(method, at.size, digits, compare)
     if compare:
         refuse({"--csv": csv, "--input": driven if G.load else None}, OWN_TABLE)
-        emit(results.ByMethods(G.arm.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)), json)
+        emit(ByMethods(G.arm.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)), json)
         return
-    emit(results.points(G, at, digits), json, csv=csv, rows=True)
+    emit(values_at(G, at, digits), json, csv=csv, rows=True)
 
 
 def places_of(s: Any, omega: Any, limits: tuple[float, float], points: int) -> Any:

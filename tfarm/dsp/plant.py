@@ -137,9 +137,8 @@ def with_modes(model: ModalModel, count: int) -> Plant:
     some, C = model.first(count), model.arm.damping
     poles, mode = some.eigenvalues.ravel(), np.repeat(some.index, 2)
     residues = some.residues.reshape(len(some.outputs), poles.size)
-    if some.single_residues is not None:
-        poles, residues = np.r_[poles, some.single], np.c_[residues, some.single_residues]
-        mode = np.r_[mode, np.zeros(some.single.size, np.int64)]
+    poles, residues = np.r_[poles, some.single], np.c_[residues, some.single_residues]
+    mode = np.r_[mode, np.zeros(some.single.size, np.int64)]
     plant = Plant(some.arm, some.outputs, poles, residues, some.rigid, some.static, mode, model)
     if C * some.natural_frequency.max(initial=0.0) < SLOW_POLES_FROM:
         return plant

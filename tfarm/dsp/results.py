@@ -26,7 +26,7 @@ from tfarm.dsp.simulate import Simulation, Simulator, Trace
 from tfarm.dsp.traces import resolved
 from tfarm.errors import ConvergenceError
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.response.controller import Controller, controller
+from tfarm.response.signals import Controller, controller
 from tfarm.schema import Column, Quantity, Table
 
 MODE_COUNTS = (10, 20, 40)  # flexible modes; 80 would take a heavily damped arm 8 s of CPU time

@@ -40,8 +40,8 @@ from tfarm.dsp.discretise import LawInZ, acting_law, law_in_z, lowest_power, wit
 from tfarm.dsp.plant import MODES_USED, USUAL_MODES, Plant, PulseTransfer, SensedPlant, is_analog, sensed_plant
 from tfarm.errors import ConvergenceError, ParameterError, did_you_mean
 from tfarm.records import record
-from tfarm.reduced.conversions import closed
-from tfarm.response.controller import Controller, controller
+from tfarm.reduced.modal import closed
+from tfarm.response.signals import Controller, controller
 from tfarm.schema import Quantity
 
 STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes

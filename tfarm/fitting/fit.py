@@ -49,6 +49,7 @@ from .solve import (
     is_explained,
     nearest_minimum,
     principal_axes,
+    sum_of_squares,
 )
 
 SENSOR_GAIN, SENSOR_DELAY = "gain", "delay"  # of a sensor, as `Response` has them: free like the arm's numbers
@@ -111,6 +112,7 @@ class Fit:
     interval_by: Annotated[
         str, Quantity("intervals by", help="profile likelihood, or covariance of the linearised residuals")
     ]
+    level: Annotated[float, Quantity(help="probability that an interval holds the true value")] = CONFIDENCE
 
     @property
     def arm_name(self) -> Annotated[str, Quantity("arm", help="arm at which the fit starts")]:
@@ -121,11 +123,6 @@ class Fit:
     def arm_table(self) -> Annotated[dict[str, Any], Quantity(key="arm", help="fitted arm as its TOML file has it")]:
         """The fitted arm as its file has it."""
         return tomllib.loads(to_toml(self.arm))
-
-    @property
-    def level(self) -> Annotated[float, Quantity(help="probability that an interval holds the true value")]:
-        """The probability of the intervals."""
-        return CONFIDENCE
 
     @property
     def finding(self) -> str:
@@ -328,14 +325,14 @@ def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: An
     own, responses = [*numbers], []
     for n, each in enumerate(data, start=1):
         ratio_of(arm, each)
-        places = {}
-        for kind in (kind for kind in (SENSOR_GAIN, SENSOR_DELAY) if kind in free):
-            places[kind] = len(own)
-            is_gain, key = kind == SENSOR_GAIN, kind if len(data) == 1 else f"{kind}:{n}"
-            size = 1.0 if is_gain else 1.0 / each.band[1]  # of a delay, over the inverse of the highest frequency
-            own.append(Parameter(
-                key=key, start=float(is_gain), low=-np.inf, high=np.inf, by_logarithm=is_gain, size=size,
-            ))  # fmt: skip
+        places, which = {}, "" if len(data) == 1 else f":{n}"
+        sensors = (
+            Parameter(SENSOR_GAIN, 1.0, -np.inf, np.inf, by_logarithm=True, size=1.0),
+            Parameter(SENSOR_DELAY, 0.0, -np.inf, np.inf, by_logarithm=False, size=1.0 / each.band[1]),
+        )
+        for sensor in (sensor for sensor in sensors if sensor.key in free):
+            places[sensor.key] = len(own)
+            own.append(replace(sensor, key=sensor.key + which))
         responses.append(Response(each, noise_of(each), **places))
     require(own, "free", "nothing", "name what is free, such as link.youngs_modulus")
     subject = Problem(family, tuple(own), tuple(responses), tuple(rings))
@@ -374,15 +371,11 @@ def possible(fit: Fit, count: int) -> Possible:
     most = found.chi_squared + apart + 2 * int((sizes < 1 / OPEN_DEVIATION).sum())
     kept: list[Real] = []
     for _ in range(DRAWS_EACH * count):
-        point = found.point + axes.T @ (spread * rng.standard_normal(spread.size))
-        point = found.problem.inside(point)
-        residuals = found.problem.residuals(point)
-        if float(residuals @ residuals) <= most:
-            kept.append(point)
+        point = found.problem.inside(found.point + axes.T @ (spread * rng.standard_normal(spread.size)))
+        kept += [point] * (sum_of_squares(found.problem, point) <= most)
         if len(kept) == count:
-            return Possible(fit, tuple(found.problem.arm(each) for each in kept), np.array(kept))
-    drawn = DRAWS_EACH * count
-    message = f"only {len(kept)} of {drawn} arms drawn explain the data: their likelihood is far from normal"
+            return Possible(fit, tuple(map(found.problem.arm, kept)), np.array(kept))
+    message = f"only {len(kept)} of {DRAWS_EACH * count} arms drawn explain the data: their likelihood is not normal"
     raise ConvergenceError(message, kept, len(kept))
 
 

@@ -16,7 +16,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, cast
 
@@ -42,7 +42,7 @@ COORDINATE_STEP = 2.0**-20  # of a derivative by differences: the rounding of a 
 NUDGE = 1e-6  # of s: for a slope along it by a difference, which is right to about as much
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 @record
 class Parameter:
     """A free number: its key, where the search starts, its bounds, all in SI units, and a prior (mean, deviation).
@@ -54,6 +54,7 @@ class Parameter:
     start: float
     low: float
     high: float
+    _: KW_ONLY
     by_logarithm: bool
     size: float
     prior: tuple[float, float] | None = None

@@ -51,14 +51,14 @@ SOMEWHERE = 0.37 + 0.73j  # 1/s: a response that is not 0 throughout is not 0 th
 @dataclass(frozen=True, slots=True, kw_only=True)
 @record
 class RatioRoots:
-    """Poles and zeros [1/s] of a ratio with |Im s| <= `up_to` [rad/s], none at s = 0: complete in these ranges.
+    """Poles and zeros [1/s] of a ratio with 0 <= Im s <= `up_to` [rad/s], none at s = 0: complete in this range.
 
     `common` are those that both signals have, which cancel; at s = 0 the ratio goes as s^`at_zero`.
     """
 
-    poles: Complex
-    zeros: Complex
-    common: Complex
+    poles: Annotated[Complex, Quantity("s", "1/s", help="poles of the ratio", key="poles")]
+    zeros: Annotated[Complex, Quantity("s", "1/s", help="zeros of the ratio", key="zeros")]
+    common: Annotated[Complex, Quantity("s", "1/s", 6, "common to both signals: they cancel", "common")]
     at_zero: Annotated[int, Quantity(key="power_at_zero", help="order n of the response s^n near s = 0")]
     up_to: Annotated[
         float,
@@ -71,27 +71,10 @@ class RatioRoots:
         ),
     ]
 
-    @property
-    def upper_poles(self) -> Annotated[Complex, Quantity("s", "1/s", help="poles of the ratio", key="poles")]:
-        """Those with Im s >= 0."""
-        return _upper(self.poles)
-
-    @property
-    def upper_zeros(self) -> Annotated[Complex, Quantity("s", "1/s", help="zeros of the ratio", key="zeros")]:
-        """Those with Im s >= 0."""
-        return _upper(self.zeros)
-
-    @property
-    def upper_common(
-        self,
-    ) -> Annotated[Complex, Quantity("s", "1/s", 6, "common to both signals: they cancel", "common")]:
-        """Those with Im s >= 0."""
-        return _upper(self.common)
-
 
 def _upper(roots: Complex) -> Complex:
-    """Those with Im s >= 0, ascending in size: the others are their mirror images."""
-    upper = roots[roots.imag >= 0]
+    """Those with Im s >= 0 but s = 0, ascending in size: the others are their mirror images."""
+    upper = roots[(roots.imag >= 0) & (roots != 0)]
     return np.asarray(upper[np.argsort(abs(upper), kind="stable")])
 
 
@@ -143,8 +126,7 @@ class Ratio:
 
     def roots(self, up_to: float) -> RatioRoots:
         """Poles and zeros with |Im s| <= up_to [rad/s], as each transfer function has them, complete."""
-        every = self.poles(up_to).values, self.above.zeros(up_to=up_to).values
-        own_poles, own_zeros = (roots[roots != 0] for roots in every)
+        own_poles, own_zeros = map(_upper, (self.poles(up_to).values, self.above.zeros(up_to=up_to).values))
         poles, zeros = without_cancelled(own_poles, own_zeros)
         below = self.above.system.at_rest if self.below is None else Signals(self.arm, (self.input,)).orders[0]
         return RatioRoots(
@@ -159,13 +141,14 @@ class Ratio:
         """Its poles if the output had them all; with those at s = 0."""
         return self.above.poles(up_to=up_to) if self.below is None else self.below.zeros(up_to=up_to)
 
-    def residue(self, pole: complex, others: Complex) -> complex:
+    def residue(self, pole: complex, roots: RatioRoots) -> complex:
         """The residue at a simple pole: the mean of H (s - p) on a circle that no other of the roots is within.
 
         By the trapezoidal rule, whose error is (radius/distance)^16, 1e-10 at a quarter of it.
         """
-        far = min((abs(pole - each) for each in others if each != pole), default=abs(pole))
-        radius = min(far, abs(pole)) / 4
+        upper = np.r_[roots.poles, roots.zeros, 0.0]
+        others = np.r_[upper, upper.conj()]
+        radius = abs(pole - others[others != pole]).min() / 4
         turn = radius * np.exp(2j * np.pi * (np.arange(16) + 0.5) / 16)
         return complex(np.mean(self(pole + turn) * turn))
 
@@ -197,7 +180,6 @@ class Counterpart:
     """
 
     pole: complex
-    residue: complex
     peak: float | None
     measured: Resonance | None
     frequency_ratio: float | None
@@ -402,28 +384,25 @@ def _counterparts(
     up_to = (1 + SAME_MODE) * max((abs(pole) for pole, _ in shown), default=0.0)
     are_modes = ratio.is_driven and up_to > 0 and modes_below(ratio.driven, up_to) > 0
     table = modes_of(ratio.driven, up_to=up_to) if are_modes else None
-    others, found = np.r_[roots.poles, roots.zeros, 0.0], []
+    found = []
     for pole, place in shown:
-        mode = None
+        mode, size = None, abs(pole)
         if table is not None:
-            away = abs(table.natural_frequency / abs(pole) - 1)
-            nearest = int(table.index[np.argmin(away)])
-            mode = nearest if away.min() < SAME_MODE and nearest > 0 else None
+            away = abs(table.natural_frequency / size - 1)
+            mode = int(table.index[np.argmin(away)]) if away.min() < SAME_MODE else None
         peak = None if place is None else float(measured.omega[place])
         own = None if place is None else resonance_at(measured, noise.sigma, place)
-        size = abs(pole)
-        residue = ratio.residue(pole, others)
+        residue = ratio.residue(pole, roots)
         at = abs(own.pole) if own is not None else peak
         level = own.residue / residue if own is not None and residue else None
         found.append(
             Counterpart(
                 pole=pole,
-                residue=residue,
                 peak=peak,
                 measured=own,
                 frequency_ratio=None if at is None else at / size,
                 level=level,
-                mode=mode,
+                mode=mode or None,
                 exact=size / HERTZ,
                 frequency=None if at is None else at / HERTZ,
                 frequency_std=None if own is None else float(own.std[1]) / HERTZ,

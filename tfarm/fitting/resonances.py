@@ -267,6 +267,9 @@ class Ring:
     ]
     notes: Annotated[tuple[str, ...], Quantity("notes", help="limits of the intervals")]
     modes: Annotated[tuple[DecayMode, ...], Quantity("modes", help="damped oscillations, that of most energy first")]
+    level: Annotated[
+        float, Quantity("probability of the intervals", help="share of intervals that hold the true value")
+    ] = CONFIDENCE
 
     @property
     def is_white(
@@ -276,13 +279,6 @@ class Ring:
     ]:
         """Whether the residuals look like white noise."""
         return self.white >= NOT_WHITE
-
-    @property
-    def level(
-        self,
-    ) -> Annotated[float, Quantity("probability of the intervals", help="share of intervals that hold the true value")]:
-        """The share of intervals that hold the true value."""
-        return CONFIDENCE
 
 
 def ring(

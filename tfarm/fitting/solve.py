@@ -191,7 +191,11 @@ class Solution:
 
 
 def best_solution(problem: Problem) -> Solution:
-    """The least sum of squares over all starts; those of noise alone end the search early."""
+    """The least sum of squares over all starts; those of noise alone end the search early.
+
+    Where something is left open the valleys are wide, and the equation errors may lead into the wrong one: a pole that
+    is there only between two lines.  Then the fit's own start is tried too.
+    """
     found: list[Solution] = []
     for subject, start in starts(problem):
         found.append(_rescaled(nearest_minimum(subject, start)))
@@ -199,6 +203,12 @@ def best_solution(problem: Problem) -> Solution:
         is_near = len(found) > len(LADDERS) and best.chi_squared < MUCH_MISFIT * best.freedom
         if best.converged and (is_near or is_explained(best)):
             break
+    if open_axes(best.jacobian).size:
+        at_start = _rescaled(nearest_minimum(*with_gains(problem, problem.inside(np.zeros(best.point.size)))))
+        found.append(at_start)
+        best = at_start if at_start.misfit < best.misfit - SAME_SUM else best
+    if not best.converged:
+        best = nearest_minimum(best.problem, best.point)
     return replace(_nearest(best), starts=len(found))
 
 
@@ -208,9 +218,8 @@ def _nearest(found: Solution) -> Solution:
     A valley may be open where the search began and closed where it ended, where noise exceeds an effect too small to be
     measured (the rotary inertia of E I).  The point moves only where the sum of squares stays what it is.
     """
-    sizes, axes = principal_axes(found.jacobian)
     for limit, most in ((OPEN_DEVIATION, SAME_SUM), (WEAK, EXCLUDED)):
-        some = axes[sizes < 1.0 / limit]
+        some = open_axes(found.jacobian, limit)
         if not some.size:
             continue
         start = found.point - some.T @ (some @ found.point)
@@ -219,8 +228,8 @@ def _nearest(found: Solution) -> Solution:
         if again.converged and again.chi_squared < found.chi_squared - SAME_SUM:
             return _nearest(again)
         back = replace(back, jacobian=found.problem.jacobian(back.point), converged=found.converged)
-        more = int((principal_axes(back.jacobian)[0] < 1.0 / OPEN_DEVIATION).sum())
-        if back.chi_squared < found.chi_squared + most and more >= max(1, int((sizes < 1.0 / OPEN_DEVIATION).sum())):
+        fewest = max(1, len(open_axes(found.jacobian)))
+        if back.chi_squared < found.chi_squared + most and len(open_axes(back.jacobian)) >= fewest:
             is_same = back.chi_squared < found.chi_squared + SAME_SUM
             return back if is_same else replace(found, jacobian=back.jacobian)
     return found
@@ -230,6 +239,12 @@ def principal_axes(jacobian: Real) -> tuple[Real, Real]:
     """The change of the residuals by a unit step along each axis (parameters,), largest first, and the axes (rows)."""
     padded = np.vstack([jacobian, np.zeros((jacobian.shape[1],) * 2)])
     return np.linalg.svd(padded, full_matrices=False)[1:]
+
+
+def open_axes(jacobian: Real, deviation: float = OPEN_DEVIATION) -> Real:
+    """The axes (rows) along which the data leave more than that deviation of ln p."""
+    sizes, axes = principal_axes(jacobian)
+    return axes[sizes < 1.0 / deviation]
 
 
 def is_explained(one: Solution) -> bool | None:
@@ -379,13 +394,13 @@ def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float | None, 
         point[n] = at
         return sum_of_squares(found.problem, point) - found.chi_squared - quantile**2
 
-    ends: list[float | None] = [None, None]
-    for side, way in enumerate((-1, 1)):
+    def end(way: int) -> float | None:
         steps = (float(found.point[n]) + way * reach for reach in REACHES)
         beyond = next((at for at in steps if low <= at <= high and excess(at) > 0), None)
-        if beyond is not None:
-            ends[side] = each.value(float(brentq(excess, found.point[n], beyond, xtol=1e-4)))
-    return (None, None) if ends == [None, None] else (ends[0] or 0.0, ends[1])
+        return None if beyond is None else each.value(float(brentq(excess, found.point[n], beyond, xtol=1e-4)))
+
+    lower, upper = end(-1), end(1)
+    return (None, None) if lower is None and upper is None else (lower or 0.0, upper)
 
 
 def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, held: dict[int, float]) -> float:

@@ -27,8 +27,8 @@ from tfarm.crossing import Crossing, crossed
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, ParameterError, must_be_known
 from tfarm.records import record
-from tfarm.response.controller import Controller, controller
 from tfarm.response.frequency import AXIS_SHARE
+from tfarm.response.signals import Controller, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.box import Box

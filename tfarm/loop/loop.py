@@ -29,8 +29,7 @@ from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, Feedback, LoopParts, deflated, difference_steps, feedback
 from tfarm.exact.system import System
 from tfarm.records import record
-from tfarm.response.controller import Controller, controller
-from tfarm.response.signals import Signals
+from tfarm.response.signals import Controller, Signals, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import flexible_frequencies, modes, modes_below
 from tfarm.spectrum.frequencies import ARMS_KEPT

@@ -31,7 +31,7 @@ from tfarm.crossing import Crossings, Window, ascending, counts_over, intervals
 from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
-from tfarm.response.controller import Controller, controller
+from tfarm.response.signals import Controller, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import PAPER_GAINS, default_gains, hub_locked, rate_unit

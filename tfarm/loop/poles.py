@@ -21,7 +21,7 @@ from tfarm.arrays import LEAST_SIZE, Complex
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.records import record
-from tfarm.reduced.conversions import closed, in_series, pade, sensed_model
+from tfarm.reduced.modal import closed, in_series, pade, sensed_model
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes_below

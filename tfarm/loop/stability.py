@@ -32,7 +32,7 @@ from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
-from tfarm.reduced.conversions import sensed_model
+from tfarm.reduced.modal import sensed_model
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes, modes_below
 

@@ -1,10 +1,9 @@
 """Reduced models of the exact arm, each with its error."""
 
-from tfarm.reduced.conversions import save_mat
 from tfarm.reduced.modal import ModalModel, modal_model, relaxed_model, slow_model
 from tfarm.reduced.partial_fractions import PartialFractions
 from tfarm.reduced.rational import rational_model
-from tfarm.reduced.reduction import BAND, ReducedModel, reduce
+from tfarm.reduced.reduction import BAND, ReducedModel, reduce, save_mat
 
 __all__ = [
     "BAND",

@@ -9,6 +9,8 @@ An output is G = N/D with N and the drive D analytic, so its residue at a simple
 angle or moment is a small difference there, it is computed from the balance of the hub.  At double frequencies the
 residue is c b of the mode shapes for C = 0 (Meirovitch, Fundamentals of Vibrations, 2001, ch. 7) and Cauchy's integral
 around p for C > 0.
+
+State spaces from the input to the signals of a controller, in series and in a loop with it.
 """
 
 from __future__ import annotations
@@ -19,17 +21,20 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from tfarm.arm import Arm
+from tfarm.arm.blocks import Matrices, Rational
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError, require
 from tfarm.exact.layout import constant_of, unit_scale
 from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.exact.series import without_slow_pole
 from tfarm.exact.system import System
 from tfarm.exact.values import evaluate_outputs, free_slopes
 from tfarm.response import TransferFunction, Wanted, transfer
+from tfarm.response.signals import Signals
 from tfarm.spectrum import Modes, modes
 from tfarm.spectrum.damped import damped_modes, entered
 from tfarm.spectrum.naming import single_zeros
@@ -147,21 +152,17 @@ def _around(
 
 def _from_shapes(table: Modes, wanted: Sequence[Output], k: System, x: float) -> Real:
     """Return c b (outputs, modes) of the flexible modes by the mode shapes."""
-    length = float(k.length)
-    drive = table.modal_moment if k.is_locked else table.hub_participation
-    theta = table.hub_participation
-
-    def value(each: Output) -> Real:
-        at = each.share(x) * length
-        if each.quantity == "theta":
-            return theta
-        if each.quantity in ("W", "Y"):
-            return table.shape(at) - (at + float(k.radius) * length) * theta * (each.quantity == "Y")
-        if each.quantity == "Phi":
-            return table.rotation(at) - theta
-        return table.moment(at) if each.quantity == "M" else table.shear(at)
-
-    return np.array([value(each) * drive for each in wanted])[:, table.index > 0]
+    length, theta = float(k.length), table.hub_participation
+    drive = table.modal_moment if k.is_locked else theta
+    of: dict[str, Callable[[float], Real]] = {
+        "theta": lambda _: theta,
+        "W": table.shape,
+        "Y": lambda at: table.shape(at) - (at + float(k.radius) * length) * theta,
+        "Phi": lambda at: table.rotation(at) - theta,
+        "M": table.moment,
+        "Q": table.shear,
+    }
+    return np.array([of[each.quantity](each.share(x) * length) * drive for each in wanted])[:, table.index > 0]
 
 
 MOST_MODELLED = 1000  # of a model: its matrices of 2000 states take 32 MB
@@ -170,26 +171,7 @@ LARGE_MODEL, NAMING_STEPS = 40, 1_000  # modes from which on a model has no need
 NEXT_TO_REST = 1e-3  # of the first frequency: a pole nearer to 0 leaves 1e-15 of itself five terms on
 
 
-class ModalModel(PartialFractions):
-    """The first flexible modes of the arm with their exact eigenvalues and residues (see `PartialFractions`).
-
-    Pairs assigned to no mode come last, with the index 0 and |s| for a frequency.
-    """
-
-    def first(self, count: int) -> ModalModel:
-        """Return the model with the first `count` of these modes, the static gains of the others in `static`."""
-        beyond = self.index > count
-        beyond |= (self.index == 0) & (self.natural_frequency > self.natural_frequency[beyond].min(initial=math.inf))
-        kept = ~beyond
-        return replace(
-            self,
-            index=self.index[kept],
-            natural_frequency=self.natural_frequency[kept],
-            eigenvalues=self.eigenvalues[kept],
-            residues=self.residues[:, kept],
-            static=self.static - (self.residues[:, beyond] / self.eigenvalues[beyond]).real.sum(axis=(1, 2)),
-            participation=self.participation[kept],
-        )
+ModalModel = PartialFractions  # pairs assigned to no mode come last, with the index 0 and |s| for a frequency
 
 
 def modal_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -> ModalModel:
@@ -202,7 +184,9 @@ def modal_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -
     G = transfer(arm, outputs, x=x)
     count = whole("count", count, 0, MOST_MODELLED, f"a whole number of flexible modes, 0 to {MOST_MODELLED}")
     k, share = G.system, G.share
-    wanted = [proper(k, each, share) for each in G.rows]
+    wanted = list(G.rows)
+    for each in wanted:
+        must_be_proper(k, each, share)
     table = modes(arm, max(1, int(count)))
     collocated = OUTPUTS["root_moment" if arm.is_locked else "hub_angle"]
     index, p, single = _eigenvalues(arm, table)
@@ -222,7 +206,7 @@ def modal_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -
         rigid=expansion[:, :2],
         static=expansion[:, 2] + (r[:-1] / p).real.sum(axis=(1, 2)) + (alone / single)[:-1, kept].sum(axis=1),
         single=single,
-        single_residues=alone[:-1] if single.size else None,
+        single_residues=alone[:-1],
         participation=np.sqrt(abs((r[-1] * p[:, ::-1]).real.sum(axis=-1))),
     )
 
@@ -234,12 +218,10 @@ def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None)
     the remainder is D + E/(1 + C s), from G and G' at 0.  Raises ParameterError at C = 0.
     """
     model, C = modal_model(arm, outputs, count, x), arm.damping
-    if C == 0:
-        raise ParameterError(key="link.damping", value=C, remedy="without damping nothing relaxes; take modal_model")
+    require(C, "link.damping", C, "without damping nothing relaxes; take modal_model")
     exact, kept = _at_rest(transfer(arm, model.rows, x=x), model.single, modes(arm, 1))
     slope = exact[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
-    if model.single_residues is not None:
-        slope = slope + (model.single_residues / model.single**2)[:, kept].sum(axis=1)
+    slope += (model.single_residues / model.single**2)[:, kept].sum(axis=1)
     return replace(model, static=model.static + slope / C, relaxation=-slope / C)
 
 
@@ -249,8 +231,7 @@ def slow_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) ->
     They are in pairs, with the index 0.  Raises ParameterError at C = 0.
     """
     model, C = modal_model(arm, outputs, count, x), arm.damping
-    if C == 0:
-        raise ParameterError(key="link.damping", value=C, remedy="without damping nothing is slow; take modal_model")
+    require(C, "link.damping", C, "without damping nothing is slow; take modal_model")
     exact = transfer(arm, outputs, x=x)
     corners, shares = slow_remainder(C, lambda s: exact(s).reshape(-1, s.size) - model(s))
     p, none = -corners.reshape(-1, 2), np.zeros(corners.size // 2, np.int64)
@@ -280,21 +261,12 @@ def _at_rest(G: TransferFunction, single: Real, table: Modes) -> tuple[Real, NDA
     return expansion, kept
 
 
-def proper(k: System, wanted: Output, share: float) -> Output:
-    """Return the output.  Raises ParameterError where no state space of finite order has it."""
-    if wanted.power and constant_of(k, wanted, share):
-        raise ParameterError(
-            key="outputs",
-            value=wanted.name,
-            remedy="a power of s times the input, which no state space has; choose another output",
-        )
-    if wanted.power > MOST_PROPER:
-        raise ParameterError(
-            key="outputs",
-            value=wanted.name,
-            remedy=f"s^{wanted.power} makes it improper, which no state space is; choose a lower derivative",
-        )
-    return wanted
+def must_be_proper(k: System, wanted: Output, share: float) -> None:
+    """Raise ParameterError for an output that no state space of finite order has."""
+    remedy = "a power of s times the input, which no state space has; choose another output"
+    require(not (wanted.power and constant_of(k, wanted, share)), "outputs", wanted.name, remedy)
+    remedy = f"s^{wanted.power} makes it improper, which no state space is; choose a lower derivative"
+    require(wanted.power <= MOST_PROPER, "outputs", wanted.name, remedy)
 
 
 def _eigenvalues(arm: Arm, table: Modes) -> tuple[NDArray[np.int64], Complex, Real]:
@@ -337,3 +309,56 @@ def _residues(
     if table.arm.is_undamped:  # only the pole of the circuit, where the current is 0 over 0
         return residues, contour_residues(k, wanted, at, share).real.astype(float)
     return residues, end_residues(k, wanted, at, share)[0].real.astype(float)
+
+
+ALGEBRAIC = 1e-9  # distance from -1 of a feedthrough of the loop that leaves its input undetermined
+
+
+def sensed_model(arm: Arm, signals: Sequence[str], count: int) -> Matrices:
+    """Return A, B, C, D from the input to the named signals, with `count` flexible modes and a static remainder.
+
+    Raises ParameterError for an unknown or improper signal and a count out of range.
+    """
+    read = Signals(arm, tuple(signals))
+    extra = [] if arm.is_locked else ["hub_angle"]  # so that every model has the states of the rigid body
+    rows: dict[int, Real] = {}  # of C and D side by side
+    A, B = np.empty((0, 0)), np.empty((0, 1))
+    for share in dict.fromkeys(read.places):
+        mine = [n for n, place in enumerate(read.places) if place == share]
+        wanted = [read.outputs[n] for n in mine]
+        along = any(each.place == "x" for each in wanted)
+        A, B, C, D = modal_model(arm, [*extra, *wanted], count, share * arm.length if along else None).matrices()
+        rows |= zip(mine, np.hstack([C, D])[len(extra) :], strict=True)
+    both = np.array([rows[n] for n in range(len(read.names))])
+    return A, B, both[:, :-1], both[:, -1:]
+
+
+def closed(plant: Matrices, law: Matrices) -> Real:
+    """Return the matrix of the loop v = -(law of y), the plant's states first.
+
+    Raises ParameterError for an algebraic loop.
+    """
+    A, B, C, D = plant
+    Ak, Bk, Ck, Dk = law
+    whole = 1.0 + (Dk @ D)[0, 0]
+    remedy = "the feedthroughs of the law and the model have the product -1: an algebraic loop"
+    require(abs(whole) >= ALGEBRAIC, "law", whole - 1.0, remedy)
+    v = np.hstack([-Dk @ C, -Ck]) / whole  # of plant and law states
+    y = np.hstack([C, np.zeros((len(C), len(Ak)))]) + D @ v
+    return block_diag(A, Ak) + np.vstack([B @ v, Bk @ y])
+
+
+def pade(delay: float, order: int) -> Rational:
+    """Return the Pade approximation of e^{-s delay}, numerator and denominator of that order."""
+    powers = np.arange(order, -1, -1)
+    sizes = [math.comb(order, k) * math.factorial(2 * order - k) / math.factorial(2 * order) for k in powers]
+    terms = np.array(sizes) * delay**powers
+    return Rational(tuple(terms * (-1.0) ** powers), tuple(terms))
+
+
+def in_series(first: Matrices, second: Matrices) -> Matrices:
+    """Return the series connection of two state spaces, the second of one signal."""
+    A, B, C, D = first
+    a, b, c, d = second
+    whole = np.block([[A, np.zeros((len(A), len(a)))], [b @ C, a]])
+    return whole, np.vstack([B, b @ D]), np.hstack([d @ C, c]), d @ D

@@ -9,16 +9,17 @@ random arms).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
 from tfarm.arrays import Complex, Real
-from tfarm.errors import ParameterError
+from tfarm.errors import require
 from tfarm.exact.outputs import Output
 from tfarm.records import record
 from tfarm.response import TransferFunction, Wanted, transfer
@@ -57,8 +58,8 @@ class PartialFractions:
     static: Real
     participation: Real
     relaxation: Real | None = None
-    single: Real = field(default_factory=lambda: np.empty(0))
-    single_residues: Real | None = None
+    single: Real
+    single_residues: Real
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -110,10 +111,8 @@ class PartialFractions:
     def __call__(self, s: ArrayLike) -> Complex:
         """Return values (outputs, *s.shape) at complex s [1/s].  Raises ParameterError at a pole of the model."""
         points = np.asarray(s, dtype=complex)
-        flat, values = points.ravel(), np.empty((len(self.outputs), points.size), complex)
-        step = max(1, TERMS_AT_ONCE // max(1, self.index.size))
-        for start in range(0, flat.size, step):
-            values[:, start : start + step] = self._sum(flat[start : start + step], np.asarray)
+        parts = np.array_split(points.ravel(), 1 + points.size * self.index.size // TERMS_AT_ONCE)
+        values = np.concatenate([self._sum(part, np.asarray) for part in parts], axis=1)
         return values.reshape(len(self.outputs), *points.shape)
 
     def magnitude(self, s: Complex) -> Real:
@@ -124,15 +123,14 @@ class PartialFractions:
         """Return the sum of all terms (outputs, s) at s (1-D), or with `part` abs that of their magnitudes."""
         p1, p2 = self.eigenvalues.T[:, :, None]
         product = (s - p1) * (s - p2)
-        if not product.all() or (self.has_rigid_states and not s.all()):
-            pole = s[(product == 0).any(axis=0)] if not product.all() else s[s == 0]
-            raise ParameterError(key="s", value=complex(pole[0]), remedy="a pole of the reduced model; move s")
+        is_pole = (product == 0).any(axis=0) | (self.has_rigid_states & (s == 0))
+        for pole in s[is_pole][:1].tolist():
+            require(False, "s", pole, "a pole of the reduced model; move s")
         (n1, n0), share = map(part, self.numerators), part(1 / product)
         total = part(s) * (n1 @ share) + n0 @ share + part(self.static)[:, None]
         if self.has_rigid_states:
             total = total + part(self.rigid[:, :1] / (s * s)) + part(self.rigid[:, 1:] / s)
-        if self.single_residues is not None:
-            total = total + part(self.single_residues) @ part(1 / (s - self.single[:, None]))
+        total = total + part(self.single_residues) @ part(1 / (s - self.single[:, None]))
         if self.relaxation is not None:
             total = total + part(self.relaxation[:, None] / (1 + self.arm.damping * s))
         return total
@@ -143,28 +141,34 @@ class PartialFractions:
         Rigid body: angle and rate of an inertia J.  Each mode: (w q, q') with q'' + a q' + w^2 q = b u, that is the
         block [[0, w], [-w, -a]]; at C = 0 half the sum of their squares is the mode's energy [J].
         """
-        first, n = self.rigid_states, self.index.size
-        A, B = np.zeros((self.order, self.order)), np.zeros((self.order, 1))
-        C = np.zeros((len(self.outputs), self.order))
-        J = self.arm.total_inertia
-        if first:
-            B[first - 1, 0] = 1.0 / J
-            A[0, first - 1] += first - 1.0
-            C[:, :first] = self.rigid[:, 2 - first :] * J
-        position = first + 2 * np.arange(n)
+        first = self.rigid_states
         w = np.sqrt(self.stiffness)
-        A[position, position + 1], A[position + 1, position] = w, -w
-        A[position + 1, position + 1] = self.eigenvalues.sum(axis=1).real
         b = np.where(self.participation > 0, self.participation, 1.0)
         n1, n0 = self.numerators
-        B[position + 1, 0] = b
-        C[:, position], C[:, position + 1] = n0 / (w * b), n1 / b
-        if self.single_residues is not None:
-            alone = first + 2 * n + np.arange(self.single.size)
-            A[alone, alone], B[alone, 0], C[:, alone] = self.single, 1.0, self.single_residues
-        if self.relaxation is not None:
-            A[-1, -1], B[-1, 0], C[:, -1] = -1 / self.arm.damping, 1 / self.arm.damping, self.relaxation
-        return A, B, C, self.static[:, None].copy()
+        pairs = np.array([[0 * w, w], [-w, self.eigenvalues.sum(axis=1).real]]).transpose(2, 0, 1)
+        slow = np.empty(0) if self.relaxation is None else np.array([1 / self.arm.damping])
+        J = self.arm.total_inertia
+        A = block_diag(np.eye(first, k=1), *pairs, np.diag(self.single), np.diag(-slow))
+        B = np.r_[np.zeros(first)[1:], np.ones(first)[:1] / J, np.c_[0 * b, b].ravel(), np.ones(self.single.size), slow]
+        of_pairs = np.stack([n0 / (w * b), n1 / b], axis=-1).reshape(len(n0), -1)
+        of_slow = np.empty((len(n0), 0)) if self.relaxation is None else self.relaxation[:, None]
+        C = np.hstack([self.rigid[:, 2 - first :] * J, of_pairs, self.single_residues, of_slow])
+        return A, B[:, None], C, self.static[:, None].copy()
+
+    def first(self, count: int) -> PartialFractions:
+        """Return the model with the first `count` of the arm's modes, the static gains of the others in `static`."""
+        beyond = self.index > count
+        beyond |= (self.index == 0) & (self.natural_frequency > self.natural_frequency[beyond].min(initial=np.inf))
+        kept = ~beyond
+        return replace(
+            self,
+            index=self.index[kept],
+            natural_frequency=self.natural_frequency[kept],
+            eigenvalues=self.eigenvalues[kept],
+            residues=self.residues[:, kept],
+            static=self.static - (self.residues[:, beyond] / self.eigenvalues[beyond]).real.sum(axis=(1, 2)),
+            participation=self.participation[kept],
+        )
 
     def closed(self, gains: ArrayLike) -> Matrices:
         """Return A, B, C, D under the law  u = r - gains . y, r the new input; gains are (outputs,) or (n, outputs).
@@ -218,10 +222,6 @@ class Ruler:
             w = w[self._is_clear(w)]
         self.w, (self._values, self._size) = w, self._exact(w)
 
-    def norm(self, w: Real) -> Real:
-        """Return |G| + |w dG/dw| (outputs, w) of the exact arm at w [rad/s], 1-D, off its natural frequencies."""
-        return norm(self.G, w, self.G(1j * w))
-
     def rough(self, model: PartialFractions) -> float:
         """Return the largest error at the samples, a little below the worst one."""
         return float(_errors(model, self.w, self._values, self._size).max())
@@ -252,12 +252,9 @@ class Ruler:
 
     def _error_at(self, model: PartialFractions, w: Real, row: int) -> Real:
         """Return the error of one output at w of any shape, zero next to a pole."""
-        flat = w.ravel()
-        clear = self._is_clear(flat)
-        errors = np.zeros(flat.size)
-        if clear.any():
-            errors[clear] = _errors(model, flat[clear], *self._exact(flat[clear]))[row]
-        return errors.reshape(w.shape)
+        errors, clear = np.zeros(w.shape), self._is_clear(w)
+        errors[clear] = _errors(model, w[clear], *self._exact(w[clear]))[row]
+        return errors
 
     def _exact(self, w: Real) -> tuple[Complex, Real]:
         values = self.G(1j * w)

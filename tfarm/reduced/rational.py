@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arrays import Real
-from tfarm.errors import ParameterError
+from tfarm.errors import require
 from tfarm.exact.series import expansion_at_zero
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import modes_below
@@ -58,11 +58,13 @@ class _Remainders:
 def modes_in(arm: Arm, high: float) -> int:
     """Return the number of exact modes of a model up to `high` [rad/s].  Raises ParameterError over 1000."""
     count = modes_below(arm, BEYOND_BAND * high)
-    if count > MOST_MODELLED:
-        raise ParameterError(
-            key="band", value=high, remedy=f"{count} modes lie below it, over {MOST_MODELLED}; lower it"
-        )
+    require(count <= MOST_MODELLED, "band", high, f"{count} modes lie below it, over {MOST_MODELLED}; lower it")
     return count
+
+
+def has_rational(arm: Arm) -> bool:
+    """Whether the poles are on one line in s^2."""
+    return arm.is_undamped and not arm.input_lags
 
 
 def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float | None = None) -> PartialFractions:
@@ -71,15 +73,10 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
     Pairs that would fit rounding become more exact modes.  There are fewer pairs where too few poles pass the checks.
     Raises ParameterError at C > 0, where poles are not on one line in s^2, and for too few pairs.
     """
-    if not arm.is_undamped or arm.input_lags:
-        raise ParameterError(key="method", value="aaa", remedy="AAA in s^2 is for C = 0; use modal")
+    require(has_rational(arm), "method", "aaa", "AAA in s^2 is for C = 0; use modal")
     exact = modes_in(arm, high)
-    if pairs <= exact:
-        raise ParameterError(
-            key="pairs",
-            value=pairs,
-            remedy=f"{exact} modes lie in the range, and AAA needs more pairs of poles; use modal",
-        )
+    remedy = f"{exact} modes lie in the range, and AAA needs more pairs of poles; use modal"
+    require(pairs > exact, "pairs", pairs, remedy)
     rows = transfer(arm, outputs, x=x).rows
     hub = "root_moment" if arm.is_locked else "hub_rate"
     G = transfer(arm, (hub, *rows), x=x)
@@ -210,4 +207,6 @@ def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares:
         rigid=inside.rigid[1:],
         static=np.where(strict, 0.0, static)[1:],
         participation=np.r_[inside.participation, np.sqrt(abs(in_S[0]))],
+        single=inside.single,
+        single_residues=inside.single_residues[1:],
     )

@@ -1,13 +1,15 @@
 """Reduced models of an order or within an error, each with its frequency range, worst error and first missing mode.
 
-The norm of an error is |dG| / (|G| + |w G'|).
+The norm of an error is |dG| / (|G| + |w G'|).  A model is written as a MATLAB file.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, get_args
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,8 +18,9 @@ from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import positive, whole
 from tfarm.arrays import Complex, Real
-from tfarm.errors import MISSING, ConvergenceError, ParameterError
+from tfarm.errors import MISSING, ConvergenceError, require
 from tfarm.exact.outputs import Output
+from tfarm.files import is_standard_output, write_file, write_mat
 from tfarm.records import record
 from tfarm.response import Wanted, transfer
 from tfarm.response.frequency import known_band
@@ -25,8 +28,16 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
 from .modal import SLOW_PAIRS, SLOW_POLES_FROM, modal_model, relaxed_model, slow_model
-from .partial_fractions import EXACT_ROUNDING, PartialFractions, Ruler
-from .rational import modes_in, rational_model
+from .partial_fractions import (
+    CLEAR_OF_POLES,
+    EXACT_ROUNDING,
+    PartialFractions,
+    Ruler,
+    distance,
+    frequencies_around,
+    norm,
+)
+from .rational import has_rational, modes_in, rational_model
 
 if TYPE_CHECKING:
     import control
@@ -160,14 +171,11 @@ class ReducedModel:
 
         omega [rad/s] is 1-D.  Raises ParameterError for frequencies out of the range.
         """
-        w = np.atleast_1d(np.asarray(omega, dtype=float))
-        if not ((w >= self.band[0]) & (w <= self.band[1])).all():
-            raise ParameterError(
-                key="omega",
-                value=omega,
-                remedy=f"the error is known from {self.band[0]:g} to {self.band[1]:g} rad/s; stay in this range",
-            )
-        return self.errors[:, None] * Ruler(self.arm, self.model.rows, self.band, self.model.x).norm(w)
+        w, (low, high) = np.atleast_1d(np.asarray(omega, dtype=float)), self.band
+        remedy = f"the error is known from {low:g} to {high:g} rad/s; stay in this range"
+        require(((w >= low) & (w <= high)).all(), "omega", omega, remedy)
+        G = transfer(self.arm, self.model.rows, x=self.model.x)
+        return self.errors[:, None] * norm(G, w, G(1j * w))
 
     def matrices(self) -> Matrices:
         """Return A, B, C, D as NumPy arrays (see `PartialFractions.matrices`)."""
@@ -200,32 +208,19 @@ def reduce(
     rows = transfer(arm, outputs, x=x).rows
     names = tuple(each.name for each in rows)
     band = known_band(band, REDUCTION_BAND, WIDEST_BAND)
-    if len(set(names)) < len(names):
-        raise ParameterError(key="outputs", value=names, remedy="name each output once")
-    if method is not None and method not in get_args(Reduction):
-        raise ParameterError(key="method", value=method, remedy="modal or aaa, or leave it out for the better one")
-    if method == "aaa" and (not arm.is_undamped or arm.input_lags):
-        raise ParameterError(
-            key="method",
-            value="aaa",
-            remedy="AAA in s^2 is for C = 0, no friction and no inductance; take modal, which has them",
-        )
-    if (order is None) == (error is None):
-        raise ParameterError(
-            key="order",
-            value=MISSING if order is None else order,
-            remedy="give either an order (a number of states) or an error",
-        )
-    if order is None:
-        error = positive("error", error, "a positive number, such as 1e-6")
-        if error < EXACT_ROUNDING:
-            raise ParameterError(
-                key="error",
-                value=error,
-                remedy=f"below the rounding of the exact values; give {EXACT_ROUNDING:g} or more",
-            )
-        return _Bench(arm, rows, band, x, method).within(error)
-    return _Bench(arm, rows, band, x, method).of_order(order)
+    require(len(set(names)) == len(names), "outputs", names, "name each output once")
+    is_known = method is None or method in get_args(Reduction)
+    require(is_known, "method", method, "modal or aaa, or leave it out for the better one")
+    remedy = "AAA in s^2 is for C = 0, no friction and no inductance; take modal, which has them"
+    require(method != "aaa" or has_rational(arm), "method", "aaa", remedy)
+    remedy = "give either an order (a number of states) or an error"
+    require((order is None) != (error is None), "order", MISSING if order is None else order, remedy)
+    if order is not None:
+        return _Bench(arm, rows, band, x, method).of_order(order)
+    error = positive("error", error, "a positive number, such as 1e-6")
+    remedy = f"below the rounding of the exact values; give {EXACT_ROUNDING:g} or more"
+    require(error >= EXACT_ROUNDING, "error", error, remedy)
+    return _Bench(arm, rows, band, x, method).within(error)
 
 
 class _Bench:
@@ -239,7 +234,7 @@ class _Bench:
         self.inside = modes_in(arm, band[1])
         self.most = (MOST_STATES - self.fixed) // 2  # pairs of poles
         self.by_modes = method != "aaa"
-        self.by_aaa = method != "modal" and arm.is_undamped and not arm.input_lags
+        self.by_aaa = method != "modal" and has_rational(arm)
         self.ruler = Ruler(arm, rows, band, x)
 
     def of_order(self, order: int) -> ReducedModel:
@@ -327,8 +322,7 @@ class _Bench:
         if not self.arm.is_undamped:
             remedy = f"two states a mode, {rigid}and one for relaxation where it is odd: from 2 to {MOST_STATES}"
         order = whole("order", order, 2, MOST_STATES, remedy)
-        if order % 2 and not self.arm.damping and self.arm.is_uniform:
-            raise ParameterError(key="order", value=order, remedy=remedy)
+        require(order % 2 == 0 or self.arm.damping or not self.arm.is_uniform, "order", order, remedy)
         return (order - self.fixed) // 2
 
 
@@ -339,3 +333,75 @@ def first_mode_lacking(model: PartialFractions) -> tuple[int, float]:
     has = (abs(model.natural_frequency[:, None] - omega) <= POLE_IS_MODE * omega).any(axis=0)
     first = int(np.argmin(has))
     return first + 1, float(omega[first])
+
+
+WRITTEN_BY = ": written by tfarm."  # ends the first line of every script
+MAT_POINTS = 1000  # of the exact response in the file, even in ln w
+
+
+def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[Path, Path]:
+    """Write a MATLAB file and in its folder a script that builds `sys` (ss) and `exact` (frd); return both paths.
+
+    The file has A, B, C, D, all names, the exact response over the frequency range, and the worst error.
+    Raises ParameterError, naming `key`, where they cannot be written, or a script of that name is another file's.
+    """
+    path = Path(path)
+    is_file = not is_standard_output(path) and (path.is_file() or not path.exists())
+    require(is_file, key, str(path), "is no regular file, and its script needs a folder")
+    path = path if path.suffix == ".mat" else path.with_name(path.name + ".mat")
+    script = path.with_name(f"load_{re.sub(r'[^A-Za-z0-9_]', '_', path.stem)}.m")
+    first, _, rest = (script.read_text("utf-8", errors="replace") if script.is_file() else "").partition("\n")
+    is_ours = not script.exists() or (first.endswith(WRITTEN_BY) and _loads(path) in rest)
+    remedy = f"{script.name} in that folder is not its script and would be replaced; choose another name"
+    require(is_ours, key, str(path), remedy)
+    write_file(script, _script(reduced, path).encode(), key=key)
+    write_mat(path, _contents(reduced), key=key, oned_as="row")
+    return path, script
+
+
+def _loads(path: Path) -> str:
+    """Return the line of the script that loads its file."""
+    file = path.name.replace("'", "''")
+    return f"data = load(fullfile(here, '{file}'));"
+
+
+def _contents(reduced: ReducedModel) -> dict[str, Any]:
+    """Return the variables of the MATLAB file."""
+    A, B, C, D = reduced.matrices()
+    model = reduced.model
+    omega = np.geomspace(*reduced.band, MAT_POINTS)
+    omega = omega[distance(omega, frequencies_around(model.arm, reduced.band[1])) > CLEAR_OF_POLES * omega]
+    response = transfer(model.arm, model.rows, x=model.x)(1j * omega)
+    return {
+        "A": A,
+        "B": B,
+        "C": C,
+        "D": D,
+        "omega": omega,
+        "response": response[:, None, :],
+        "input_name": np.array([model.input], dtype=object),
+        "output_names": np.array(model.outputs, dtype=object),
+        "state_names": np.array(model.states, dtype=object),
+        "name": reduced.name,
+        "worst_error": reduced.worst_error,
+        "band": np.array(reduced.band),
+    }
+
+
+def _script(reduced: ReducedModel, path: Path) -> str:
+    """Return the MATLAB script."""
+    name = reduced.name.replace("'", "''")
+    low, high = reduced.band
+    return f"""% {reduced.name}{WRITTEN_BY}
+% sys:   the reduced model (ss), worst |dG| / (|G| + |w dG/dw|) {reduced.worst_error:.3g} over {low:g} to {high:g} rad/s
+% exact: the exact frequency response (frd) over that band
+here = fileparts(mfilename('fullpath'));
+{_loads(path)}
+sys = ss(data.A, data.B, data.C, data.D, ...
+    'InputName', data.input_name, 'OutputName', data.output_names, 'StateName', data.state_names);
+exact = frd(data.response, data.omega, ...
+    'InputName', data.input_name, 'OutputName', data.output_names);
+sys.Name = '{name}';
+exact.Name = '{name}, exact';
+clear here data
+"""

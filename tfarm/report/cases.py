@@ -20,8 +20,7 @@ from tfarm.loop.margins import Margins, margins
 from tfarm.plots.style import gains_words
 from tfarm.records import record
 from tfarm.report.sections import prose
-from tfarm.response.controller import sign_of
-from tfarm.response.signals import Signals
+from tfarm.response.signals import Signals, sign_of
 from tfarm.spectrum.table import default_gains
 from tfarm.synthesis.design import Design, design
 

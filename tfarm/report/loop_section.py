@@ -20,8 +20,7 @@ from tfarm.loop.stability import spill
 from tfarm.plots.frequency import draw_loop, draw_nyquist
 from tfarm.report.cases import Case, Controller, brief_on, margins_of, why_no_loop
 from tfarm.report.sections import Fact, PageSection, Picture, prose, upper
-from tfarm.response.controller import sign_convention
-from tfarm.response.signals import Signals
+from tfarm.response.signals import Signals, sign_convention
 from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table
 
 MOST_SPILLED = 12  # flexible modes of the largest model that is compared with the exact loop

@@ -18,6 +18,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Annotated, Any, NamedTuple
@@ -27,7 +28,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.errors import CertificationError, ConvergenceError, ParameterError
+from tfarm.errors import CertificationError, ConvergenceError, require
 from tfarm.exact.outputs import Output, unit_over
 from tfarm.exact.rigid import rigid_response
 from tfarm.records import record
@@ -52,14 +53,11 @@ def worst_error(arm: Arm, output: str, band: tuple[float, float]) -> float | Non
         return None
     errors = []
     for point, value, slope in zip(s, values, slopes, strict=True):
-        try:
-            pair = G.digits(complex(point), RIGHT_DIGITS)
-        except (CertificationError, ConvergenceError):  # a zero of G, without a relative error
-            continue
-        parts = zip(pair, (value.real, value.imag), strict=True)
-        off = complex(*(float(Fraction(exact) - Fraction(float(part))) for exact, part in parts))
-        errors.append(abs(off) / (abs(value) + abs(point * slope)))
-    return float(max(errors)) if errors else None
+        with suppress(CertificationError, ConvergenceError):  # a zero of G, without a relative error
+            parts = zip(G.digits(complex(point), RIGHT_DIGITS), (value.real, value.imag), strict=True)
+            off = complex(*(float(Fraction(exact) - Fraction(float(part))) for exact, part in parts))
+            errors.append(float(abs(off) / (abs(value) + abs(point * slope))))
+    return max(errors, default=None)
 
 
 HERTZ = 2 * math.pi  # rad/s
@@ -356,8 +354,7 @@ def known_band(band: tuple[float, float], remedy: str, widest: float = math.inf)
         low, high = map(float, band)
     except (TypeError, ValueError):
         low = high = math.nan
-    if not 0 < low < high < math.inf or high / low > widest:
-        raise ParameterError(key="band", value=band, remedy=remedy)
+    require(0 < low < high < math.inf and high / low <= widest, "band", band, remedy)
     return low, high
 
 
@@ -372,13 +369,11 @@ def _no_motion(arm: Arm, row: Output, x: float | None, band: tuple[float, float]
 
 def without_cancelled(poles: Complex, zeros: Complex) -> tuple[Complex, Complex]:
     """Return poles and zeros without the pairs that cancel."""
-    kept_poles, kept_zeros = [], list(zeros)
+    kept_poles, kept_zeros = list(poles), list(zeros)
     for pole in poles:
-        near = [i for i, zero in enumerate(kept_zeros) if abs(zero - pole) <= COINCIDE * abs(pole)]
-        if near:
-            del kept_zeros[near[0]]
-        else:
-            kept_poles.append(pole)
+        for zero in [zero for zero in kept_zeros if abs(zero - pole) <= COINCIDE * abs(pole)][:1]:
+            kept_poles.remove(pole)
+            kept_zeros.remove(zero)
     return np.array(kept_poles, complex), np.array(kept_zeros, complex)
 
 
@@ -417,11 +412,10 @@ def phase_of(omega: Real, value: Complex, poles: Complex, zeros: Complex, *, is_
     if not is_real:
         phase = np.degrees(np.unwrap(np.angle(value)))
         return phase - 360.0 * np.round((phase[0] - start) / 360.0)
-    passed_poles = np.searchsorted(np.sort(poles.imag[_on_axis(poles)]), omega)
-    passed_zeros = np.searchsorted(np.sort(zeros.imag[_on_axis(zeros)]), omega)
+    passed = (np.searchsorted(np.sort(roots.imag[_on_axis(roots)]), omega) for roots in (zeros, poles))
     if abs(value[0].imag) > abs(value[0].real):
         start = 90.0 if value[0].imag > 0 else -90.0
-    return np.asarray(start + 180.0 * (passed_zeros - passed_poles), float)
+    return np.asarray(start + 180.0 * np.subtract(*passed), float)
 
 
 def _on_axis(roots: Complex) -> NDArray[np.bool_]:

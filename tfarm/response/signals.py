@@ -1,21 +1,22 @@
 """The signals of a controller: named outputs, along the link with their place, as one row of analytic functions.
 
 A transfer function is numerator over drive, both analytic.  The characteristic function of a loop is a sum of both.
+The results of loops describe their controller by its gains or transfer functions, signals, units, sign convention.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
+from tfarm.arm import LISTED, SPELT_OUT, Arm, Law, input_words, unit_of
 from tfarm.arm.checks import on_the_arm
 from tfarm.arrays import Complex
-from tfarm.errors import MISSING, ParameterError
+from tfarm.errors import MISSING, ParameterError, require
 from tfarm.exact.characteristic import LoopParts
 from tfarm.exact.outputs import Output
 from tfarm.exact.outputs import output as known_output
@@ -23,6 +24,7 @@ from tfarm.exact.series import order_at_zero
 from tfarm.exact.system import System, system_of
 from tfarm.exact.values import free_outputs
 from tfarm.records import read_only, record
+from tfarm.schema import Quantity
 
 GRIDS_KEPT = 24  # sets of points whose values are cached
 
@@ -39,8 +41,7 @@ class Signals:
     names: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        if not self._placed:
-            raise ParameterError(key="signals", value=[], remedy="name at least one output")
+        require(self._placed, "signals", [], "name at least one output")
 
     @property
     def outputs(self) -> tuple[Output, ...]:
@@ -112,15 +113,65 @@ def placed(name: str, length: float) -> tuple[Output, float]:
     plain, at, text = name.partition("@")
     wanted = known_output(plain)
     if wanted.place != "x":
-        if at:
-            raise ParameterError(key=name, value=text, remedy=f"{plain} has a fixed place; leave out {at}{text}")
+        require(not at, name, text, f"{plain} has a fixed place; leave out {at}{text}")
         return wanted, 0.0
-    if not at:
-        raise ParameterError(
-            key=f"{name}.x", value=MISSING, remedy=f"add the place: {plain}@x with x between 0 and {length:g} m"
-        )
+    require(at, f"{name}.x", MISSING, f"add the place: {plain}@x with x between 0 and {length:g} m")
     try:
         x = float(text)
     except ValueError:
         raise ParameterError(key=name, value=text, remedy=f"a number of metres, 0 to {length:g}") from None
     return wanted, float(on_the_arm(name, x, length))
+
+
+@dataclass(frozen=True)
+class Controller:
+    """A law on an arm.  `gains` are those at the hub, empty of another law; `signals` have their SI units."""
+
+    arm: Annotated[str, Quantity("arm", help="name of the arm")]
+    law: Annotated[str, Quantity("controller", help="its gains at the hub, or its name")]
+    gains: Annotated[dict[str, float], Quantity(help="gain at the hub", flat=True)]
+    gain_units: Annotated[dict[str, str], Quantity(help="SI unit of each gain")]
+    signals: Annotated[dict[str, str], Quantity("signals", help="outputs that are fed back, with their SI units")]
+    law_order: Annotated[int, Quantity("order of the controller", help="number of its states, without delays")]
+    delay: Annotated[float, Quantity(unit="s", help="delay of the controller")]
+    sign_convention: Annotated[str, Quantity("sign convention", help="control law from the signals to the input")]
+    input: Annotated[str, Quantity("input", help="actuating signal")]
+
+
+def controller(law: Law, arm: Arm) -> Controller:
+    """Return the description of a law on an arm."""
+    gains = {} if law.gains is None else law.gains.by_name
+    units = {gain.name: unit_of(gain.name, arm) for gain in LISTED} if gains else {}
+    return Controller(
+        arm=arm.name,
+        law=", ".join(f"{name} = {value:g}" for name, value in gains.items()) or law.name,
+        gains=gains,
+        gain_units=units,
+        signals=dict(zip(law.signals, Signals(arm, law.signals).units, strict=True)),
+        law_order=law.order,
+        delay=law.delay,
+        sign_convention=sign_convention(law, arm),
+        input=arm.input,
+    )
+
+
+def sign_convention(law: Law, arm: Arm) -> str:
+    """Return the control law in words; for gains at the hub with the moment of a static torque."""
+    if law.gains is not None:
+        return sign_of(arm)
+    sign, variable = "-" if law.sign < 0 else "+", "z" if law.is_discrete else "s"
+    late = f", delay {law.delay:g} s" if law.delay else ""
+    return f"v = {sign}sum of C_i({variable}) y_i{late}; v is {input_words(arm)}, y = ({', '.join(law.signals)})"
+
+
+def sign_of(arm: Arm) -> str:
+    """Return the law of gains at the hub in words, and the moment of a static torque, which fixes the sign of K2."""
+    words = f"u = -{SPELT_OUT} + r"
+    if arm.is_uniform and arm.has_rigid_mode:
+        return f"{words}; a static torque u gives the moment -(J - I_h)/J u"
+    if not arm.has_rigid_mode:
+        return f"{words}; u is {input_words(arm)}"
+    share = arm.gauged_inertia / arm.total_inertia
+    return (
+        f"{words}; u is {input_words(arm)}, and a static torque at the hub gives the moment {-share:.6g} times as much"
+    )

@@ -1,6 +1,7 @@
 """The exact transfer function, with the names of python-control.
 
-Its poles and zeros are complete: by a count for real spectra, else by a winding number.
+Its poles and zeros are complete: by a count for real spectra, else by a winding number.  `Points` are values of one
+response at points s, `ByMethods` those by each method.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from tfarm.arm import INPUT_UNITS, Arm, Input, must_be_arm
 from tfarm.arm.checks import number, on_the_arm, positive, whole
 from tfarm.arrays import Complex
-from tfarm.errors import MISSING, ParameterError
+from tfarm.digits import DOUBLE_DIGITS
+from tfarm.errors import MISSING, require
 from tfarm.exact.balls import nearest_float
 from tfarm.exact.characteristic import Analytic, characteristic, deflated, off_rest
 from tfarm.exact.layout import constant_of
@@ -28,6 +30,7 @@ from tfarm.exact.system import System, system_of
 from tfarm.exact.values import (
     ByMethod,
     Method,
+    MethodRow,
     by_method,
     differentiate_outputs,
     digits_of,
@@ -38,6 +41,7 @@ from tfarm.exact.values import (
     why_no_appendix,
 )
 from tfarm.records import record
+from tfarm.schema import Column, Quantity, Table, roots_table
 from tfarm.spectrum import flexible_frequencies
 from tfarm.spectrum.box import REAL_SHARE, TOWARD_SINGULAR, Box, Function, complete
 
@@ -185,16 +189,13 @@ class TransferFunction:
         self.arm = arm
         self.is_single = isinstance(outputs, str | Output)
         each = tuple(outputs) if isinstance(outputs, Iterable) and not isinstance(outputs, str) else (outputs,)
-        if not each:
-            raise ParameterError(key="outputs", value=outputs, remedy="name at least one output")
+        require(each, "outputs", outputs, "name at least one output")
         self.rows: tuple[Output, ...] = tuple(map(output, each))
         self.system: System = system_of(arm)
         along = [each.name for each in self.rows if each.place == "x"]
-        if along and x is None:
-            remedy = f"give the place of {along[0]}, 0 to {arm.length:g} m"
-            raise ParameterError(key="x", value=MISSING, remedy=remedy)
-        if x is not None and not along:
-            raise ParameterError(key="x", value=x, remedy=f"{self.outputs[0]} has a fixed place; leave x out")
+        remedy = f"give the place of {', '.join(along)}, 0 to {arm.length:g} m"
+        require(not along or x is not None, "x", MISSING, remedy)
+        require(along or x is None, "x", x, f"{self.outputs[0]} has a fixed place; leave x out")
         meaning = f"a point between 0 and {arm.length:g} m"
         self.x = None if x is None else float(on_the_arm("x", number("x", x, meaning), arm.length))
 
@@ -272,11 +273,10 @@ class TransferFunction:
 
     def _values(self, s: Complex) -> Complex:
         if self.load is not None:
-            of_load = np.empty((len(self.rows), s.size), complex)
-            for row, each in enumerate(self.rows):
-                balls = (loaded_value(self.system, self.load, each, complex(at), self.share) for at in s)
-                of_load[row] = [nearest_float(ball) for ball in balls]
-            return of_load
+            balls = (
+                loaded_value(self.system, self.load, each, at, self.share) for each in self.rows for at in s.tolist()
+            )
+            return np.array(list(map(nearest_float, balls)), complex).reshape(len(self.rows), s.size)
         if self.method != "closed-form":
             return slow_values(self.method, self.arm, self.system, self.rows, s, self.share)
         if s.size <= POINTS_AT_ONCE:
@@ -325,18 +325,15 @@ class TransferFunction:
         By a count for hub angle, hub rate and root moment at C = 0, else by the winding number.
         """
         self.must_be_of_the_hub("zeros")
-        if not self.is_single:
-            raise ParameterError(key="outputs", value=self.outputs, remedy="zeros are those of one output; give one")
+        require(self.is_single, "outputs", self.outputs, "zeros are those of one output; give one")
         return zeros_of(self.arm, self.rows[0], positive("up_to", up_to, A_FREQUENCY), self.share)
 
     # ------------------------------------------------------------ inside
 
     def must_be_of_the_hub(self, what: str) -> None:
         """Raise ParameterError where the input is a load on the link."""
-        if self.load is not None:
-            raise ParameterError(
-                key="input", value=self._input, remedy=f"{what} needs an input at the hub; a load has values G(s) only"
-            )
+        remedy = f"{what} needs an input at the hub; a load has values G(s) only"
+        require(self.load is None, "input", self._input, remedy)
 
     @property
     def share(self) -> float:
@@ -346,11 +343,82 @@ class TransferFunction:
 
 def _finite(s: ArrayLike) -> Complex:
     points = np.asarray(s, dtype=complex)
-    if not np.isfinite(points.sum()) and not np.isfinite(points).all():  # the sum is cheaper
-        bad = points[~np.isfinite(points)].ravel()[0]
-        raise ParameterError(key="s", value=complex(bad), remedy="a transfer function needs finite s in 1/s")
-    parts = (points.real, points.imag) if points.size else ()
-    if any(part.max() > LARGEST_S or part.min() < -LARGEST_S for part in parts):
-        bad = points.ravel()[abs(points.ravel()).argmax()]
-        raise ParameterError(key="s", value=complex(bad), remedy=f"at most {LARGEST_S:g} 1/s")
+    if not np.maximum(abs(points.real), abs(points.imag)).max(initial=0.0) <= LARGEST_S:  # NaN too
+        worst = complex(points.ravel()[abs(points.ravel()).argmax()])  # of NaN its first
+        require(np.isfinite(worst), "s", worst, "a transfer function needs finite s in 1/s")
+        require(False, "s", worst, f"at most {LARGEST_S:g} 1/s")
     return points
+
+
+@dataclass(frozen=True)
+@record
+class Points:
+    """G(s) of one output at `s`; `value` are pairs of texts for more than 15 digits."""
+
+    s: Annotated[Complex, Quantity("s", "1/s", help="Laplace variable", curve=True)]
+    value: Annotated[Any, Quantity(help="G(s), output over input", curve=True)]
+    arm: Annotated[str, Quantity("arm", help="name of the arm")]
+    input: Annotated[str, Quantity("input", help="input of the transfer function")]
+    input_unit: Annotated[str, Quantity(help="SI unit of the input")]
+    output: Annotated[str, Quantity("output", help="output of the transfer function")]
+    unit: Annotated[str, Quantity(help="SI unit of the output")]
+    x: Annotated[float | None, Quantity(help="place of the output [m]")]
+    method: Annotated[str, Quantity("method", help="closed form, ball arithmetic or the paper's appendix")]
+
+    @property
+    def gain_unit(self) -> Annotated[str, Quantity("unit", help="SI unit of G, output over input")]:
+        """The unit of G."""
+        return f"{self.unit} / {self.input_unit}"
+
+    @property
+    def largest(
+        self,
+    ) -> Annotated[float, Quantity("largest magnitude", help="largest |G| of these points", unit_of="gain_unit")]:
+        """The largest |G| at these points."""
+        return float(abs(self._numbers).max())
+
+    @property
+    def largest_at(self) -> Annotated[complex, Quantity("at s", "1/s", 10, "point of the largest magnitude")]:
+        """The point of the largest |G|."""
+        return complex(self.s[int(abs(self._numbers).argmax())])
+
+    @property
+    def _numbers(self) -> Complex:
+        if isinstance(self.value, np.ndarray):
+            return self.value
+        return np.array([complex(float(re), float(im)) for re, im in self.value])
+
+    @property
+    def csv_table(self) -> Table:
+        """A row for each point."""
+        first = roots_table(self.s, Quantity("s", "1 / s", 12)).columns
+        pairs = self.value if isinstance(self.value, list) else [(each.real, each.imag) for each in self.value.tolist()]
+        parts = zip(("re", "im"), zip(*pairs, strict=True), strict=True)
+        values = (
+            Column(f"{part}_{self.output}", f"{part} {self.output}", self.gain_unit, of=list(of)) for part, of in parts
+        )
+        names = (Column(f"{each.key}_s", each.title, "1/s", of=each.of, shown=each.shown) for each in first)
+        return Table(columns=(*names, *values))
+
+
+def values_at(G: TransferFunction, s: Complex, digits: int | None = None) -> Points:
+    """Return the response at s, with certified digits for more than 15 of them."""
+    right = digits or 0
+    value = np.asarray(G(s)) if right <= DOUBLE_DIGITS else [list(G.digits(complex(each), right)) for each in s]
+    return Points(s, value, G.arm.name, G.input, G.input_unit, G.outputs[0], G.units[0], G.x, G.method)
+
+
+@dataclass(frozen=True)
+class ByMethods:
+    """The same numbers of an arm by each method, a row for each mode or point of `at`."""
+
+    arm: Annotated[str, Quantity("arm", help="name of the arm")]
+    of: Annotated[str, Quantity("quantity", help="natural frequency, or the output of a response", key="output")]
+    unit: Annotated[str, Quantity("unit", help="SI unit of the values")]
+    at: Annotated[Sequence[Any], Quantity(help="numbers of the modes, or points s in 1/s")]
+    values: Annotated[ByMethod, Quantity(help="values by method", flat=True)]
+
+    @property
+    def rows(self) -> Annotated[list[MethodRow], Quantity("by method", help="a row a mode or point", key="rows")]:
+        """A row for each mode or point."""
+        return self.values.rows(self.at)

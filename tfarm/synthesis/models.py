@@ -30,7 +30,7 @@ from tfarm.dsp.plant import PulseTransfer, sensed_plant
 from tfarm.dsp.scenarios import TRIAL_SLEWS, trial_weights
 from tfarm.loop.loop import band_of, grid
 from tfarm.records import record
-from tfarm.reduced.conversions import ALGEBRAIC, sensed_model
+from tfarm.reduced.modal import ALGEBRAIC, sensed_model
 from tfarm.response.signals import Signals
 from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.structures import Entry
