@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from tfarm.arm.checks import check_fields, not_negative, number, positive
-from tfarm.errors import MISSING, ParameterError, did_you_mean, require
+from tfarm.errors import MISSING, must_be_known, require
 
 KEY = "link.section"  # before the names of its numbers in messages
 SLENDEREST = 1e9  # length over radius of gyration: above it the units are wrong
@@ -21,7 +21,6 @@ MEANINGS = {
     "youngs_modulus": "Young's modulus is a positive, finite number in Pa",
     "shear_modulus": "a shear modulus is a positive, finite number in Pa",
 }
-DAMPING = "damping C is zero or a positive time in seconds, as in E (1 + C s)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,18 +96,14 @@ class Section:
             kappa = positive(f"{KEY}.shear_factor", self.shear_factor, meaning)
             require(kappa <= 1.0, f"{KEY}.shear_factor", kappa, meaning)
             object.__setattr__(self, "shear_factor", kappa)
+        remedy = "a general section needs its own, e.g. 0.8333333333333334 for a rectangle"
+        require(self.shape != "general" or self.shear_factor is not None, f"{KEY}.shear_factor", MISSING, remedy)
         if self.shape != "general":
             require(
                 (self.area, self.second_moment) == _properties(self.shape, dict(self.dimensions)),
                 f"{KEY}.area",
                 self.area,
                 f"does not fit this {self.shape}; use Section.{self.shape}() or Section.general()",
-            )
-        elif self.shear_factor is None:
-            raise ParameterError(
-                key=f"{KEY}.shear_factor",
-                value=MISSING,
-                remedy="a general section needs its own, e.g. 0.8333333333333334 for a rectangle",
             )
 
     @classmethod
@@ -133,10 +128,11 @@ class Section:
 
     @classmethod
     def _named(cls, shape: str, shear_factor: float | None, **sizes: float) -> Section:
-        dimensions = {}
-        for name, value in sizes.items():
-            meaning = f"the {name.replace('_', ' ')} is a positive, finite number of metres"
-            dimensions[name] = positive(f"{KEY}.{name}", value, meaning)
+        meaning = "the {} is a positive, finite number of metres"
+        dimensions = {
+            name: positive(f"{KEY}.{name}", value, meaning.format(name.replace("_", " ")))
+            for name, value in sizes.items()
+        }
         area, second_moment = _properties(shape, dimensions)
         return cls(
             shape=shape,
@@ -165,8 +161,7 @@ class Section:
 
 def _properties(shape: str, dimensions: Mapping[str, float]) -> tuple[float, float]:
     """Return the area [m^2] and second moment [m^4] of a named shape.  Raises ParameterError for wrong dimensions."""
-    if shape not in SHAPES:
-        raise ParameterError(key=f"{KEY}.shape", value=shape, remedy=did_you_mean(str(shape), [*SHAPES, "general"]))
+    must_be_known(f"{KEY}.shape", shape, [*SHAPES, "general"])
     names = SHAPES[shape].dimensions
     require(
         set(dimensions) == set(names),
@@ -174,12 +169,10 @@ def _properties(shape: str, dimensions: Mapping[str, float]) -> tuple[float, flo
         tuple(dimensions),
         f"a {shape} has {' and '.join(names)}: build it with Section.{shape}()",
     )
-    if shape == "tube" and dimensions["inner_diameter"] >= dimensions["outer_diameter"]:
-        raise ParameterError(
-            key=f"{KEY}.inner_diameter",
-            value=dimensions["inner_diameter"],
-            remedy=f"a tube is hollow: less than its outer diameter, {dimensions['outer_diameter']:g} m",
-        )
+    if shape == "tube":
+        outer, inner = (dimensions[name] for name in names)
+        remedy = f"a tube is hollow: less than its outer diameter, {outer:g} m"
+        require(inner < outer, f"{KEY}.inner_diameter", inner, remedy)
     return SHAPES[shape].area(**dimensions), SHAPES[shape].second_moment(**dimensions)
 
 
@@ -200,10 +193,7 @@ class Link:
     def __post_init__(self) -> None:
         check_fields(self, "link", positive, **MEANINGS)
         check_fields(
-            self,
-            "link",
-            not_negative,
-            damping=DAMPING,
+            self, "link", not_negative, damping="damping C is zero or a positive time in seconds, as in E (1 + C s)"
         )
         require(
             self.slenderness <= SLENDEREST,
@@ -212,15 +202,13 @@ class Link:
             f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units",
         )
         nu = self.poissons_ratio  # the argument of Cowper's factor; the margins allow for a rounded G
-        if self.section.shear_factor is None and not -1 + 1e-9 <= nu <= 0.5 + 1e-12:
-            raise ParameterError(
-                key="link.shear_modulus",
-                value=self.shear_modulus,
-                remedy=(
-                    f"with this Young's modulus it means a Poisson's ratio of {nu:.4g}, outside (-1, 0.5]; "
-                    "correct it, or give link.section.shear_factor for a material that is not isotropic"
-                ),
-            )
+        require(
+            self.section.shear_factor is not None or -1 + 1e-9 <= nu <= 0.5 + 1e-12,
+            "link.shear_modulus",
+            self.shear_modulus,
+            f"with this Young's modulus it means a Poisson's ratio of {nu:.4g}, outside (-1, 0.5]; "
+            "correct it, or give link.section.shear_factor for a material that is not isotropic",
+        )
 
     @classmethod
     def isotropic(

@@ -10,7 +10,7 @@ from importlib.resources import files
 from typing import Any
 
 from tfarm.arm.records import Arm
-from tfarm.errors import ParameterError, did_you_mean, naming
+from tfarm.errors import ParameterError, did_you_mean, naming, require
 from tfarm.files import read_file
 
 PRESETS = files("tfarm.arm") / "presets"
@@ -44,17 +44,14 @@ def arm_in(table: dict[str, Any], file: str) -> Arm:
 def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
     """Return the parsed TOML of a preset's name or a path, and the file's name."""
     is_named = not isinstance(name_or_path, os.PathLike)
-    name: object = name_or_path if is_named else os.fspath(name_or_path)
-    if not isinstance(name, str) or not name.strip() or "\0" in name:
-        raise ParameterError(key="arm", value=name, remedy=f"give a preset ({', '.join(presets())}) or a path")
+    name: Any = name_or_path if is_named else os.fspath(name_or_path)
+    is_text = isinstance(name, str) and bool(name.strip()) and "\0" not in name
+    require(is_text, "arm", name, f"give a preset ({', '.join(presets())}) or a path")
     if is_named and name in presets():
         data, name = PRESETS.joinpath(f"{name}.toml").read_bytes(), f"{name}.toml"
     elif is_named and not ({"/", "\\", os.sep} & set(name) or name.endswith(".toml") or os.path.lexists(name)):
-        raise ParameterError(
-            key="arm",
-            value=name,
-            remedy=f"no such preset: {did_you_mean(name, presets())}; or give the path of a .toml file",
-        )
+        remedy = f"no such preset: {did_you_mean(name, presets())}; or give the path of a .toml file"
+        raise ParameterError(key="arm", value=name, remedy=remedy)
     else:
         data = read_file(name, MOST_ARM_BYTES, key="arm", what="a .toml file")
     with naming(name):
@@ -77,20 +74,17 @@ def _table_of(data: bytes) -> dict[str, Any]:
     line, the last one where the error has none.
     """
     text = decoded(data, "is not UTF-8; save the file as UTF-8")
-    lines, depth = text.split("\n"), 0
+    lines, depth, remedy = (
+        text.split("\n"),
+        0,
+        f"more than {MOST_BRACKETS} brackets open; an arm's file needs no nesting",
+    )
     for i, line in enumerate(lines, 1):
         for number, what, most in ((len(line), "characters", LONGEST_LINE), (line.count("."), "dots", MOST_DOTS)):
-            if number > most:
-                raise ParameterError(key=f"line {i}", value=line, remedy=f"{number} {what} in a line; at most {most}")
-    for bracket in re.finditer(r"[\[\]{}]", text):
-        depth = depth + 1 if bracket[0] in "[{" else max(depth - 1, 0)
-        if depth > MOST_BRACKETS:
-            i = text.count("\n", 0, bracket.start()) + 1
-            raise ParameterError(
-                key=f"line {i}",
-                value=lines[i - 1],
-                remedy=f"more than {MOST_BRACKETS} brackets open; an arm's file needs no nesting",
-            )
+            require(number <= most, f"line {i}", line, f"{number} {what} in a line; at most {most}")
+        for bracket in re.findall(r"[\[\]{}]", line):
+            depth = depth + 1 if bracket in "[{" else max(depth - 1, 0)
+            require(depth <= MOST_BRACKETS, f"line {i}", line, remedy)
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -99,6 +93,5 @@ def _table_of(data: bytes) -> dict[str, Any]:
         line = lines[int(at[1]) - 1 if at else -1]
         raise ParameterError(key=where or "TOML", value=line, remedy=f"is not TOML: {what}") from None
     except (ValueError, RecursionError):
-        raise ParameterError(
-            key="TOML", value=text, remedy="an integer of thousands of digits, or brackets nested too deep"
-        ) from None
+        remedy = "an integer of thousands of digits, or brackets nested too deep"
+        raise ParameterError(key="TOML", value=text, remedy=remedy) from None

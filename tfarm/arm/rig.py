@@ -11,7 +11,7 @@ from dataclasses import MISSING, dataclass, fields
 from typing import Any, Literal, cast
 
 from tfarm.arm.checks import check_fields, extended, not_negative, positive, signed
-from tfarm.errors import ParameterError, require
+from tfarm.errors import require
 
 
 def differing(record: Any, always: int) -> dict[str, Any]:
@@ -59,12 +59,12 @@ class Hub:
             stiffness="a spring from hub to ground is zero or positive, finite, in N m/rad (inertia = inf locks)",
         )
         for name in ("friction", "stiffness"):
-            if math.isinf(self.inertia) and getattr(self, name) > 0.0:
-                raise ParameterError(
-                    key=f"hub.{name}",
-                    value=getattr(self, name),
-                    remedy=f"no effect, as inertia = inf locks the hub; leave out the {name}, or give a finite inertia",
-                )
+            require(
+                math.isfinite(self.inertia) or not getattr(self, name),
+                f"hub.{name}",
+                getattr(self, name),
+                f"no effect, as inertia = inf locks the hub; leave out the {name}, or give a finite inertia",
+            )
 
     def __repr__(self) -> str:
         return brief_repr(self, always=1)
@@ -87,12 +87,12 @@ class RotarySpring:
             not_negative,
             damping="damping c is zero or a positive time in seconds, as in k (1 + c s)",
         )
-        if self.damping > 0.0 and self.is_rigid:
-            raise ParameterError(
-                key="spring.damping",
-                value=self.damping,
-                remedy="a rigid spring has no damping: give a finite stiffness in N m/rad, or leave the damping out",
-            )
+        require(
+            not (self.damping and self.is_rigid),
+            "spring.damping",
+            self.damping,
+            "a rigid spring has no damping: give a finite stiffness in N m/rad, or leave the damping out",
+        )
 
     @property
     def is_rigid(self) -> bool:
@@ -127,8 +127,7 @@ class Motor:
         }
         check_fields(self, "motor", positive, **meanings)
         require(self.gear_efficiency <= 1.0, "motor.gear_efficiency", self.gear_efficiency, meanings["gear_efficiency"])
-        back_emf: object = self.back_emf_constant
-        if back_emf is None:
+        if cast("float | None", self.back_emf_constant) is None:
             object.__setattr__(self, "back_emf_constant", self.torque_constant)
         check_fields(
             self,

@@ -25,6 +25,7 @@ from matplotlib.figure import Figure as Figure  # which pages name too
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tfarm.arm import GAINS, LISTED, PLANE, AnyLaw, Arm, as_law, shown_unit
+from tfarm.arm.law import NUMBER
 from tfarm.digits import plain
 from tfarm.errors import ParameterError
 from tfarm.exact.outputs import signal_words, unit_over
@@ -45,7 +46,6 @@ NOT_THE_PAPERS = ("hub_angle",)  # outputs whose gain is an extension of the pap
 UNNAMED = "law"  # of a law without a name
 FACTORS = ("gain", "all")  # on a whole controller
 OTHER_UNITS = ARM_PARAMETERS | {"delay": "s"}  # of numbers that vary
-NUMBER_OF_LAW = re.compile(r"(.*?)(?:\.(gain|num|den)(?:\.(\d+))?)?")  # signal, what of it, and a coefficient's place
 
 METADATA: dict[str, dict[str, str | None]] = {
     "svg": {"Date": None, "Creator": "tfarm"},
@@ -223,7 +223,7 @@ def number_label(name: str, arm: Arm, law: AnyLaw) -> str:
             return f"{name}, gain on the {signal_words(gain.output)[0]} [{shown_unit(name, arm) or '−'}]"
     if name in OTHER_UNITS:
         return f"{name.replace('_', ' ')} [{OTHER_UNITS[name]}]"
-    signal, of, place = NUMBER_OF_LAW.fullmatch(name).groups("")  # type: ignore[union-attr]
+    signal, of, place = NUMBER.fullmatch(name).groups("")  # type: ignore[union-attr]
     any_law = as_law(law)
     if not place and signal not in any_law.part_gains:
         return f"{name}, factor on the {'controller' if signal in FACTORS else signal_words(signal)[0]} [−]"
