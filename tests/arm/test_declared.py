@@ -40,9 +40,9 @@ def test_keys_and_defaults_are_those_of_the_record():
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ({}, "spring.stiffness is missing: [spring] needs it"),
-        (3, "spring = 3: give a table, headed [spring]"),
-        ({"stiffness": "2"}, "spring.stiffness = '2': wrong value; input should be a valid number"),
+        ({}, "spring.stiffness is missing: give a number"),
+        (3, "spring = 3: wrong type; give a table, headed [spring]"),
+        ({"stiffness": "2"}, "spring.stiffness = '2': wrong type; give a number without quotes"),
         ({"stifness": 2.0}, 'spring.stifness = 2.0: unknown key; did you mean "stiffness"?'),
     ],
 )
