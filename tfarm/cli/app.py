@@ -10,7 +10,7 @@ from cmath import inf, isnan
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from copy import copy
-from dataclasses import replace
+from dataclasses import is_dataclass, replace
 from functools import cache, wraps
 from inspect import Parameter, Signature, getdoc, signature
 from pathlib import Path
@@ -165,29 +165,38 @@ GAIN_OPTIONS = [
 def add_command(group: str, **how: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return the decorator that adds a command to a group of the help; `how` are its name and its example.
 
-    Its parameters are its arguments and options.  "name: text" below "Options:" in its docstring is the help of one; a
-    last parameter `gains` is the values of the options of the gains by name.
+    Its parameters are its arguments and options.  "name: text" below "Options:" in its docstring is the help of one.  A
+    parameter of type `Gains` has an option for each gain, one of a dataclass an option for each field.
     """
 
     def add(command: Callable[..., None]) -> Callable[..., None]:
         words, _, lines = (getdoc(command) or "").partition("\n\nOptions:\n")
         helps = dict(line.split(": ", 1) for line in re.split(r"\n(?=\w)", lines) if lines)
         own = dict(signature(command, eval_str=True).parameters)
-        gains = GAIN_OPTIONS if own.pop("gains", None) else []
+        groups = {name: (each.annotation, options_of(each.annotation)) for name, each in own.items()}
+        groups = {name: (kind, parts) for name, (kind, parts) in groups.items() if parts}
 
         @wraps(command)
         def called(**options: Any) -> None:
-            if gains:
-                options["gains"] = {each.name: options.pop(each.name) for each in gains}
+            for name, (kind, parts) in groups.items():
+                options[name] = kind(**{each.name: options.pop(each.name) for each in parts})
             command(**options)
 
-        parameters = [*(_with_help(each, helps.get(each.name, "")) for each in own.values()), *gains]
+        alone = [_with_help(each, helps.get(name, "")) for name, each in own.items() if name not in groups]
+        parameters = [*alone, *(_with_help(each, "") for _, parts in groups.values() for each in parts)]
         called.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
         called.__doc__ = words
         app.command(rich_help_panel=group, **how)(called)
         return command
 
     return add
+
+
+def options_of(kind: Any) -> list[Parameter]:
+    """Return the options that a parameter of that type collects: those of gains, or of the fields of a dataclass."""
+    if kind == Gains:
+        return GAIN_OPTIONS
+    return [*signature(kind, eval_str=True).parameters.values()] if is_dataclass(kind) else []  # type: ignore[arg-type]
 
 
 def _with_help(option: Parameter, text: str) -> Parameter:

@@ -1,15 +1,14 @@
-"""The commands that choose a law or compare: design, tuner, comparison."""
+"""The commands that choose a law or compare, write pages, give evidence, and help with the others."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial, wraps
-from inspect import Parameter, signature
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, Literal, cast
 
 import typer
+from typer.completion import get_completion_script  # type: ignore[attr-defined]  # Typer does not list it
 
 import tfarm
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, TWO_GAINS, as_law
@@ -41,6 +40,7 @@ from tfarm.cli.app import (
 )
 
 command = partial(add_command, "Design")
+report_command = partial(add_command, "Report")
 
 
 @command(epilog="design sasaki2012-lab --structure PD+notch --save notch.toml")
@@ -149,23 +149,7 @@ class TunerOptions:
         )  # fmt: skip
 
 
-def with_tuner_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of a tuning to a command, whose last parameter has them."""
-    own = signature(command, eval_str=True)
-    added = signature(TunerOptions, eval_str=True).parameters
-    first, *others, _ = own.parameters.values()
-
-    @wraps(command)
-    def called(**given: Any) -> None:
-        command(options=TunerOptions(**{name: given.pop(name) for name in added}), **given)
-
-    kept = [each.replace(kind=Parameter.KEYWORD_ONLY) for each in (first, *added.values(), *others)]
-    called.__signature__ = own.replace(parameters=kept)  # type: ignore[attr-defined]
-    return called
-
-
 @command(epilog="tune sasaki2012-lab --trials 100 --save tuned.json")
-@with_tuner_options
 def tune(
     arm: ArmName,
     curves: Annotated[
@@ -254,3 +238,109 @@ def compare(
 
         page = write_comparison(found, out)
     emit(found, json, png=png, also=(page,))
+
+
+@report_command(epilog="report sasaki2012-lab --out pages")
+def report(
+    arms: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[ARM ...]", help="presets or files; by default all", autocompletion=preset_names),
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="FOLDER")] = Path("reports"),
+    only: str | None = None,
+    law: LawFiles = None,
+    period: Period = None,
+    delay_samples: Delay = None,
+    dsp: DspFile = None,
+    theory: TheoryName = None,
+    measured: Annotated[list[str] | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
+    *,
+    gains: Gains,
+) -> None:
+    """Pages with pictures, tables and data: open index.html in a browser.
+
+    The pages are about the gains or the laws that are given, or the [law] of an arm's file, or the default gains.
+
+    Options:
+    out: the folder to write to
+    only: one page: bode, modes, margins, locus ...
+    measured: measured response; may be repeated
+    """
+    from tfarm.arm import law_tables
+    from tfarm.fitting import data, recording
+    from tfarm.report import cases, write
+
+    names: list[str] = arms or list(tfarm.presets())
+    files: list[Path | None] = [*(law or [])]
+    subjects = [load_arm(name, theory) for name in names]
+    laws = [
+        [
+            cases.GivenLaw(
+                load_law(arm, name, gains, file)[0],
+                file.name if file else "",
+                recording.load_run(file) if file else None,
+            )
+            for file in files or [None] * (set(gains.values()) != {None} or law_tables.load_law(name) is not None)
+        ]
+        for arm, name in zip(subjects, names, strict=True)
+    ]
+    print(write(
+        subjects, out, laws=laws, only=None if only is None else (only,), progress=advance, notice=print_line,
+        chains=[load_chain(dsp or name, period, delay_samples) for name in names],
+        measured=[data.data_of(text, "--measured") for text in measured or []],
+    ))  # fmt: skip
+
+
+@report_command(epilog="audit")
+def audit(json: Json = False) -> None:
+    """Every equation of the paper, as printed and as corrected, with the check of each."""
+    from tfarm import audit as paper
+
+    emit(paper.Audit(paper.PAPER, paper.audit()), json)
+
+
+@report_command(epilog="assumptions sasaki2012")
+def assumptions(
+    arm: ArmName,
+    count: Annotated[int, typer.Option(min=1, max=100)] = 4,
+    theory: TheoryName = None,
+    json: Json = False,
+) -> None:
+    """Effect of the assumed section and hub inertia: frequencies over the candidates, with exact sensitivities.
+
+    Options:
+    count: flexible modes
+    """
+    from tfarm.audit.assumptions import assumptions as find
+
+    emit(find(load_arm(arm, theory), count), json)
+
+
+@report_command(epilog="validate")
+def validate(json: Json = False) -> None:
+    """Natural frequencies of published tables compared with the exact ones, with the reason of each difference."""
+    from tfarm.audit import published
+
+    emit(published.Validation(published.validate()), json)
+
+
+@report_command(epilog="glossary margin")
+def glossary(
+    words: Annotated[str | None, typer.Argument(metavar="[TERM]", help="part of a term; by default all")] = None,
+    json: Json = False,
+) -> None:
+    """Words of certainty, terms, and the quantities of all results with their units."""
+    from tfarm.schema.glossary import glossary as find
+
+    emit(find(words), json)
+
+
+@report_command(epilog="completion bash")
+def completion(
+    shell: Annotated[
+        Literal["bash", "zsh", "fish", "powershell"],
+        typer.Argument(metavar="SHELL", help="the shell"),
+    ],
+) -> None:
+    """Script that completes commands, options and presets in a shell: eval "$(tfarm completion bash)"."""
+    print(get_completion_script(prog_name="tfarm", complete_var="_TFARM_COMPLETE", shell=shell))
