@@ -32,7 +32,7 @@ DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt")
 
 def number(key: str, value: object, meaning: str) -> float:
     """Return `value` as a float.  Raises ParameterError for a bool, a text or nan."""
-    is_number = isinstance(value, Real) and not isinstance(value, bool)
+    is_number = not isinstance(value, bool) and isinstance(value, Real)
     require(is_number, key, value, f"{meaning}; write a plain number, no text or true")
     try:
         x = float(cast("float", value))
@@ -47,9 +47,9 @@ def whole(key: str, value: object, least: int, most: float, remedy: str) -> int:
 
     Raises ParameterError with the `remedy` for any other value, also for a bool or a text.
     """
-    if isinstance(value, bool) or not isinstance(value, Integral) or not least <= int(value) <= most:
-        raise ParameterError(key=key, value=value, remedy=remedy)
-    return int(value)
+    is_whole = not isinstance(value, bool) and isinstance(value, Integral) and least <= int(value) <= most
+    require(is_whole, key, value, remedy)
+    return int(cast("int", value))
 
 
 def positive(key: str, value: object, meaning: str) -> float:

@@ -21,7 +21,7 @@ import typer
 
 import tfarm
 from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm, Theory, implausible
-from tfarm.errors import ParameterError, one_line
+from tfarm.errors import one_line, require
 from tfarm.files import is_standard_output
 from tfarm.schema import to_json, write_csv
 
@@ -246,8 +246,7 @@ def load_law(arm: Arm, name: str, gains: Gains, file: Path | None = None) -> tup
     own = None if typed else read(name if file is None else file)
     if own is not None:
         return own, {}
-    if file is not None:
-        raise ParameterError(key="--law", value=str(file), remedy="has no table [law]")
+    require(file is None, "--law", str(file), "has no table [law]")
     missing = [gain for gain in DEFAULT_GAINS if gain not in typed]
     words = default_words(arm, missing) if missing else None
     return replace(tfarm.default_gains(arm), **typed), {"default_gains": missing, "default_gains_in_words": words}
@@ -278,8 +277,7 @@ def outputs_on(names: Sequence[str], side: str | None) -> list[Any]:
 def refuse(others: Mapping[str, Any], remedy: str) -> None:
     """Raise ParameterError for an option that another one excludes."""
     for key, value in others.items():
-        if value is not None and value is not False:
-            raise ParameterError(key=key, value=value, remedy=remedy)
+        require(value is None or value is False, key, value, remedy)
 
 
 # ----------------------------------------------------------------------------------------------------------- outputs
@@ -320,12 +318,8 @@ def emit(
         return
     from tfarm.schema.terminal import show
 
-    table = curve_table(record) if rows and csv is None else None
-    show(
-        record,
-        table,
-        f"by default {defaults['default_gains_in_words']}" if defaults and defaults["default_gains"] else "",
-    )
+    words = f"by default {defaults['default_gains_in_words']}" if defaults and defaults["default_gains"] else ""
+    show(record, curve_table(record) if rows and csv is None else None, words)
 
 
 _state = ["running"]  # of the command, for the lines of progress

@@ -27,7 +27,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from tfarm.arm import GAINS, LISTED, PLANE, AnyLaw, Arm, as_law, shown_unit
 from tfarm.arm.law import NUMBER
 from tfarm.digits import plain
-from tfarm.errors import ParameterError
+from tfarm.errors import require
 from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.files import write_file
 from tfarm.loop.varied import ARM_PARAMETERS
@@ -91,8 +91,8 @@ def check_records(of: Sequence[tuple[Any, str]], found: Sequence[Any]) -> None:
     for (kind, origin), value in zip(of, found, strict=False):
         values = list(value.values()) if isinstance(value, Mapping) else value
         values = values if isinstance(values, list | tuple) else [values]
-        if not values or not all(isinstance(each, kind) for each in values):
-            raise ParameterError(key="plot", value=value, remedy=f"give what {origin}")
+        is_right = bool(values) and all(isinstance(each, kind) for each in values)
+        require(is_right, "plot", value, f"give what {origin}")
 
 
 def picture(
@@ -137,9 +137,8 @@ def picture(
                 axes = figure(*found, new=pyplot.figure, **how).axes
                 return axes[0] if is_one else tuple(axes)
             axes = list(np.ravel(np.asarray(ax, dtype=object)))
-            if grid is None and len(axes) != len(rows):
-                remedy = f"{len(rows)} axes, as figure.subplots({len(rows)}) makes them"
-                raise ParameterError(key="ax", value=len(axes), remedy=remedy)
+            remedy = f"{len(rows)} axes, as figure.subplots({len(rows)}) makes them"
+            require(grid is not None or len(axes) == len(rows), "ax", len(axes), remedy)
             with style():
                 draw(*found, ax=axes[0] if is_one else axes, **how)
             return axes[0] if is_one else tuple(axes)
