@@ -173,10 +173,6 @@ def test_assumptions_are_plain_texts(assumptions):
         replace(ARM, assumptions=assumptions)
 
 
-def test_assumptions_become_a_tuple_of_single_lines():
-    assert replace(ARM, assumptions=["two\n  lines", "one"]).assumptions == ("two lines", "one")
-
-
 @pytest.mark.parametrize(("name", "value"), [("damping", 1e-4), ("length", 2.0), ("hub_inertia", 0.3)])
 def test_an_arm_with_another_number_is_the_same_but_for_it(name: str, value: float) -> None:
     arm = tfarm.load("sasaki2012-lab")
@@ -193,8 +189,3 @@ def test_an_arm_with_another_number_is_the_same_but_for_it(name: str, value: flo
 def test_a_number_that_is_not_whole_or_out_of_range_is_refused(value: object) -> None:
     with pytest.raises(ParameterError, match="from 1 to 7"):
         whole("n", value, 1, 7, "a whole number from 1 to 7")
-
-
-def test_numpys_whole_numbers_are_pythons() -> None:
-    assert [whole("n", value, 1, math.inf, "") for value in (1, np.int64(7), np.uint8(3))] == [1, 7, 3]
-    assert type(whole("n", np.int64(7), 1, 7, "")) is int

@@ -14,7 +14,7 @@ import pytest
 
 import tfarm
 from tests.shared import thinned
-from tests.shell import answer, heard, run
+from tests.shell import answer, run
 from tfarm.arm.reading import PRESETS
 
 
@@ -59,14 +59,6 @@ def test_csv_is_the_same_table(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     value = tfarm.transfer(tfarm.load("sasaki2012"), "root_moment")(2j)
     assert [float(cell) for cell in rows[1]] == [0.0, 2.0, value.real, value.imag]
     assert list(tmp_path.iterdir()) == [file]
-
-
-def test_infinities_are_strings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    from tfarm.schema import to_json
-
-    assert to_json({"a": [float("inf"), {"b": -float("inf")}]}) == '{"a": ["inf", {"b": "-inf"}]}'
-    with pytest.raises(ValueError, match="NaN"):
-        to_json({"a": float("nan")})
 
 
 def test_presets_are_listed_with_their_assumptions(capsys: pytest.CaptureFixture[str]) -> None:
@@ -218,16 +210,6 @@ def test_commands_that_print_json_load_nothing_heavy(arguments: list[str]) -> No
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=os.environ, check=True)
     assert done.stderr.splitlines()[-1] == "[]"  # before it perhaps that kernels are compiled
-
-
-@pytest.mark.survey
-def test_a_reader_that_leaves_after_a_line_is_no_error() -> None:
-    """One that leaves before the first is in test_streams."""
-    command = (
-        f"{sys.executable} -c 'from tfarm.cli import main; main()' response sasaki2012 --output hub_rate | head -n 1"
-    )
-    done = subprocess.run(["bash", "-c", f"set -o pipefail; {command}"], capture_output=True, text=True, check=False)
-    assert heard(done.stderr) == ""
 
 
 def test_without_arguments_there_is_help(capsys: pytest.CaptureFixture[str]) -> None:

@@ -22,9 +22,9 @@ from tests.exact.accuracy import (
     next_to_the_singularity,
     run,
 )
+from tests.rigs import rig
 from tests.shared import sized
 from tests.strategies import some_arm
-from tests.test_transition import rig
 from tests.transition import response
 from tfarm.exact import balls
 from tfarm.exact.system import system_of

@@ -11,11 +11,9 @@ import pytest
 
 import tfarm
 from tests.outputs import OF_ONE_LINK
-from tests.rigs import some_point, some_rig
+from tests.rigs import lossless, rig, some_point, some_rig
 from tests.shared import thinned
 from tests.strategies import some_arm
-from tests.test_chain_elements import lossless
-from tests.test_transition import rig
 from tests.transition import determinant, response
 from tfarm import Hub
 from tfarm.arm import THEORIES, Attachment, Motor, RotarySpring
