@@ -164,11 +164,6 @@ class Arm:
         return self.is_undamped and not self.input_lags
 
     @property
-    def has_lyapunov_theorem(self) -> bool:
-        """Whether it is reactive with the gauge at the hub: then a theorem decides on each mode under any law."""
-        return self.is_reactive and self.reads_hub_moment
-
-    @property
     def is_uniform(self) -> bool:
         """Whether it is an arm as in the paper: one segment on a hub, a payload centred on the tip, no other part."""
         hub, spare = self.hub, (self.outer, self.motor, self.attachments, self.payload.offset, self.gauge.x)

@@ -64,7 +64,7 @@ def _of_records(one: Any, other: Any) -> Iterator[Difference]:
         is_short = of.is_number or len(str(value)) < LONGEST_COMPARED
         if label in others and is_short and not set(map(str, both)) <= EMPTY:
             yield Difference(label, of.unit, *both)
-    for (value, of), (match, _) in zip(with_flat(one), with_flat(other), strict=False):
+    for (value, of, _), (match, *_) in zip(with_flat(one), with_flat(other), strict=False):
         if of.label and is_list_of_records(value) and is_list_of_records(match):
             yield from _of_rows(value, match)
 

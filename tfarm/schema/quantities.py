@@ -111,19 +111,19 @@ def is_list_of_records(value: Any) -> bool:
     return is_some and all(map(is_declared, value))
 
 
-def with_flat(record: Any) -> Iterator[tuple[Any, Quantity]]:
-    """Values and quantities of a record, those of records that are flat in their place."""
+def with_flat(record: Any) -> Iterator[tuple[Any, Quantity, Any]]:
+    """Values and quantities of a record and the record itself, those of records that are flat in their place."""
     for name, of in quantities_of(record).items():
         value = getattr(record, name)
         if of.flat and is_declared(value):
             yield from with_flat(value)
         else:
-            yield value, of
+            yield value, of, record
 
 
 def entries(record: Any, under: str = "") -> Iterator[tuple[str, Quantity, Any]]:
     """Label, quantity and value of what has one value, in records inside the record too."""
-    for value, of in with_flat(record):
+    for value, of, _ in with_flat(record):
         label = f"{under}{of.label}"
         if hasattr(value, "as_text") and not isinstance(value, Percent):
             value = value.as_text(of.digits)
