@@ -19,8 +19,7 @@ from tfarm.arm.checks import (
     plain_name,
     plain_texts,
 )
-from tfarm.arm.link import Link
-from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring, brief_repr
+from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, brief_repr
 from tfarm.errors import ParameterError, must_be_known, require, shown
 
 MOST_PARTS = 64  # segments, and attachments: a check of the chain has 64 equal pieces

@@ -16,9 +16,8 @@ from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
-from tfarm.arm.link import Link, Section
+from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, Section
 from tfarm.arm.records import MOST_PARTS, Arm
-from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring
 from tfarm.errors import MISSING, ParameterError, did_you_mean, must_be_known, require
 from tfarm.schema import Quantity
 

@@ -13,9 +13,8 @@ from typing import Any
 
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Law, Part
-from tfarm.arm.link import Link
+from tfarm.arm.parts import Link, differing
 from tfarm.arm.records import Arm
-from tfarm.arm.rig import differing
 from tfarm.arm.schema import ARM_TABLES, arm_of_table
 from tfarm.errors import ParameterError, must_be_known, require
 from tfarm.files import write_file
