@@ -19,9 +19,9 @@ import numpy as np
 from tfarm.digits import TEXTS, CellsOf, within
 from tfarm.files import write_file
 
-from .differences import EMPTY
 from .quantities import (
     COMPLEX_ERROR,
+    EMPTY,
     NO_VALUE,
     At,
     Quantity,
