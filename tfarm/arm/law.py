@@ -249,18 +249,14 @@ class Law:
 
         Raises ParameterError where a part differentiates.
         """
+        from scipy.linalg import block_diag
+
         columns = self.signals if columns is None else tuple(columns)
-        n, m, start = self.order, len(columns), 0
-        A, B, C, D = np.zeros((n, n)), np.zeros((n, m)), np.zeros((1, n)), np.zeros((1, m))
-        for part in self.parts:
-            a, b, c, d = part.block.matrices()
-            states = slice(start, start + len(a))
-            A[states, states], C[:, states] = a, c
-            for j, name in enumerate(part.signals):
-                if name in columns:
-                    B[states, columns.index(name)] += b[:, j]
-                    D[:, columns.index(name)] += d[:, j]
-            start += len(a)
+        blocks = [part.block.matrices() for part in self.parts]
+        chosen = [np.array([[name == each for each in columns] for name in part.signals], float) for part in self.parts]
+        pairs = list(zip(blocks, chosen, strict=True))
+        A, C = block_diag(*(a for a, *_ in blocks)), np.hstack([c for _, _, c, _ in blocks])
+        B, D = np.vstack([b @ own for (_, b, _, _), own in pairs]), sum(d @ own for (*_, d), own in pairs)
         return A, B, -self.sign * C, -self.sign * D
 
     # ------------------------------------------------------------ other laws

@@ -14,14 +14,17 @@ from typing import Any
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Law, Part
 from tfarm.arm.parts import Link, differing
-from tfarm.arm.records import Arm
-from tfarm.arm.schema import ARM_TABLES, arm_of_table
+from tfarm.arm.records import MOST_PARTS, Arm
+from tfarm.arm.schema import arm_of_table
 from tfarm.errors import ParameterError, must_be_known, require
 from tfarm.files import write_file
 
 LAW_DEFAULTS: dict[str, Any] = {  # of the keys of [law]
     "input": None, "delay": 0.0, "period": None, "sign": -1, "references": (), "rule": "tustin", "prewarp": 0.0,
 }  # fmt: skip
+
+
+LINK_NUMBERS = ("length", "density", "youngs_modulus", "shear_modulus", "damping", "poissons_ratio")
 
 
 def to_toml(arm: Arm) -> str:
@@ -62,8 +65,7 @@ def _link_table(link: Link) -> dict[str, Any]:
     section = link.section
     numbers = dict(section.dimensions) or {"area": section.area, "second_moment": section.second_moment}
     factor = {} if section.shear_factor is None else {"shear_factor": section.shear_factor}
-    names = ("length", "density", "youngs_modulus", "shear_modulus", "damping")
-    own = {name: getattr(link, name) for name in names}
+    own = {name: getattr(link, name) for name in LINK_NUMBERS if name != "poissons_ratio"}
     return {**own, "section": {"shape": section.shape, **numbers, **factor}}
 
 
@@ -129,10 +131,9 @@ class KeyedArms:
 
     def __init__(self, arm: Arm, keys: Sequence[str], what: str = "free") -> None:
         self.arm, self.keys = arm, tuple(keys)
-        self._table = arm_table(arm)
-        known = list(_known(self._table))
+        self._table, self._numbers = arm_table(arm), _numbers(arm)
         for key in keys:
-            must_be_known(what, key, known)
+            must_be_known(what, key, self._numbers)
             require(keys.count(key) == 1, what, key, "is named twice; once is enough")
 
     def at(self, values: Mapping[str, float]) -> Arm:
@@ -150,29 +151,20 @@ class KeyedArms:
 
     def value(self, key: str) -> float:
         """Return a number of the arm, from its file or its default."""
-        place, name = _table_of(self._table, key)
-        if name == "poissons_ratio":
-            return float(place["youngs_modulus"] / (2 * place["shear_modulus"]) - 1)
-        if name in place:
-            return float(place[name])
-        if name == "back_emf_constant":
-            return float(place["torque_constant"])
-        words = key.split(".")
-        return float(ARM_TABLES[words[0]].model_fields[words[-1]].default)
+        return self._numbers[key]
 
 
-def _known(table: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the keys of all numbers of an arm's file, also of those at their defaults."""
-    alone = isinstance(table["link"], dict)
-    links = [table["link"]] if alone else table["link"]
-    for number, link in enumerate(links, start=1):
-        place = "link" if alone else f"link.{number}"
-        yield from (f"{place}.{name}" for name in ARM_TABLES["link"].model_fields if name != "section")
-        yield from (f"{place}.section.{name}" for name, value in link["section"].items() if not isinstance(value, str))
-    for number in range(1, 1 + len(table.get("attachment", ()))):
-        yield from (f"attachment.{number}.{name}" for name in ARM_TABLES["attachment"].model_fields)
-    for room in ("hub", "clamp", "joint", "payload", *(["motor"] if "motor" in table else [])):
-        yield from (f"{room}.{name}" for name in ARM_TABLES[room].model_fields)
+def _numbers(arm: Arm) -> dict[str, float]:
+    """Return all numbers of an arm by their keys, also those at their defaults."""
+    links = {f"link.{n}" if arm.outer else "link": link for n, link in enumerate(arm.links, 1)}
+    found = {f"{place}.{name}": getattr(link, name) for place, link in links.items() for name in LINK_NUMBERS}
+    sections = {f"{place}.section": _link_table(link)["section"] for place, link in links.items()}
+    names = ("hub", "clamp", "joint", "payload", *(["motor"] if arm.motor else []))
+    parts = {f"attachment.{n}": each for n, each in enumerate(arm.attachments, 1)}
+    parts |= {name: getattr(arm, name) for name in names}
+    tables = sections | {place: differing(part, always=MOST_PARTS) for place, part in parts.items()}
+    return found | {f"{place}.{name}": value for place, table in tables.items() for name, value in table.items()
+                    if name != "shape"}  # fmt: skip
 
 
 def _table_of(table: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:
