@@ -10,9 +10,9 @@ from cmath import inf, isnan
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from copy import copy
-from dataclasses import is_dataclass, replace
-from functools import cache, wraps
-from inspect import Parameter, Signature, getdoc, signature
+from dataclasses import replace
+from functools import cache, partial, wraps
+from inspect import Parameter, Signature, getdoc, isfunction, signature
 from pathlib import Path
 from threading import Event, Thread
 from typing import IO, Annotated, Any, cast, get_args, get_origin
@@ -166,25 +166,24 @@ def add_command(group: str, **how: Any) -> Callable[[Callable[..., None]], Calla
     """Return the decorator that adds a command to a group of the help; `how` are its name and its example.
 
     Its parameters are its arguments and options.  "name: text" below "Options:" in its docstring is the help of one.  A
-    parameter of type `Gains` has an option for each gain, one of a dataclass an option for each field.
+    parameter of type `Gains` has an option for each gain.  One whose default is a function has an option for each of
+    its keywords, and is that function with their values.
     """
 
     def add(command: Callable[..., None]) -> Callable[..., None]:
-        words, _, lines = (getdoc(command) or "").partition("\n\nOptions:\n")
-        helps = dict(line.split(": ", 1) for line in re.split(r"\n(?=\w)", lines) if lines)
-        own = dict(signature(command, eval_str=True).parameters)
-        groups = {name: (each.annotation, options_of(each.annotation)) for name, each in own.items()}
-        groups = {name: (kind, parts) for name, (kind, parts) in groups.items() if parts}
+        words, helps = help_of(command)
+        own = signature(command, eval_str=True).parameters
+        groups = {name: parts for name, each in own.items() if (parts := options_of(each))}
 
         @wraps(command)
         def called(**options: Any) -> None:
-            for name, (kind, parts) in groups.items():
-                options[name] = kind(**{each.name: options.pop(each.name) for each in parts})
+            for name, parts in groups.items():
+                values, default = {each.name: options.pop(each.name) for each in parts}, own[name].default
+                options[name] = partial(default, **values) if isfunction(default) else values
             command(**options)
 
         alone = [_with_help(each, helps.get(name, "")) for name, each in own.items() if name not in groups]
-        parameters = [*alone, *(_with_help(each, "") for _, parts in groups.values() for each in parts)]
-        called.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+        called.__signature__ = Signature([*alone, *(each for parts in groups.values() for each in parts)])  # type: ignore[attr-defined]
         called.__doc__ = words
         app.command(rich_help_panel=group, **how)(called)
         return command
@@ -192,11 +191,20 @@ def add_command(group: str, **how: Any) -> Callable[[Callable[..., None]], Calla
     return add
 
 
-def options_of(kind: Any) -> list[Parameter]:
-    """Return the options that a parameter of that type collects: those of gains, or of the fields of a dataclass."""
-    if kind == Gains:
+def help_of(function: Callable[..., Any]) -> tuple[str, dict[str, str]]:
+    """Return the docstring of a function without its options, and the help of each option."""
+    words, _, lines = (getdoc(function) or "").partition("\n\nOptions:\n")
+    return words, dict(line.split(": ", 1) for line in re.split(r"\n(?=\w)", lines) if lines)
+
+
+def options_of(parameter: Parameter) -> list[Parameter]:
+    """Return the options that a parameter collects: those of gains, or the keywords of the function that it is."""
+    if parameter.annotation == Gains:
         return GAIN_OPTIONS
-    return [*signature(kind, eval_str=True).parameters.values()] if is_dataclass(kind) else []  # type: ignore[arg-type]
+    if not isfunction(parameter.default):
+        return []
+    known, (_, helps) = signature(parameter.default, eval_str=True).parameters.values(), help_of(parameter.default)
+    return [_with_help(each, helps[each.name]) for each in known if each.kind is Parameter.KEYWORD_ONLY]
 
 
 def _with_help(option: Parameter, text: str) -> Parameter:

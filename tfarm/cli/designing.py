@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
@@ -90,96 +91,99 @@ def design(
     emit(found, json, also=(save,))
 
 
-def panelled(panel: str, name: str, text: str, **limits: Any) -> Any:
-    """Return the option of a name, in a panel of the help."""
-    return typer.Option(f"--{name}", help=text, rich_help_panel=panel, **limits)
+LearningWord = Annotated[str, typer.Option(rich_help_panel="Learning")]
+LearningNumber = Annotated[float, typer.Option(rich_help_panel="Learning")]
+CostWeight = Annotated[float, typer.Option(rich_help_panel="Cost")]
 
 
-learning = partial(panelled, "Learning")
-cost = partial(panelled, "Cost")
+def tuner_plan(
+    usual: Any,
+    gains: dict[str, float],
+    *,
+    trials: Annotated[int, typer.Option(min=1, max=1_000_000)] = 100,
+    signals: str | None = None,
+    guard: str = "time-varying",
+    duration: float | None = None,
+    hidden: Annotated[int, typer.Option(min=1, max=1000)] = 6,
+    seventh_input: bool = False,
+    modes: Annotated[int, typer.Option(min=1, max=48)] = 6,
+    mode: LearningWord = "trial",
+    seed: Annotated[int, typer.Option(min=0, max=2**53, rich_help_panel="Learning")] = 0,
+    rule: LearningWord = "dynamic",
+    sensitivity: LearningWord = "one-step",
+    eta: LearningNumber = 0.8,
+    alpha: LearningNumber = 0.6,
+    enough: LearningNumber = 0.0,
+    a: CostWeight = 1.0,
+    b: CostWeight = 2.6,
+) -> Any:
+    """Return the plan of a tuning with these gains, and of the usual one what is None.
 
+    Options:
+    trials: slews to learn from
+    signals: vibration or total, in x and u; by default that of [slew]
+    guard: time-varying (proven), frozen or none
+    duration: duration of a trial [s]; by default three slews
+    hidden: hidden neurons
+    seventh_input: feed K(t-1) to the network too
+    modes: flexible modes
+    mode: trial: after each slew; online: at every sample
+    seed: of the initial weights
+    rule: dynamic, clipped or plain: form of (21)
+    sensitivity: of the plant, online: one-step (the paper's) or whole
+    eta: learning rate
+    alpha: momentum, in [0, 1)
+    enough: stop once the rms of x is below this [N m]
+    a: weight of the root moment, in the arm's unit
+    b: weight of the control signal, likewise
+    """
+    from tfarm import tuner
 
-@dataclass(frozen=True, kw_only=True)
-class TunerOptions:
-    """Options of a tuning: trial, servo and network, learning, cost."""
-
-    trials: Annotated[int, typer.Option("--trials", min=1, max=1_000_000, help="slews to learn from")] = 100
-    mode: Annotated[str, learning("mode", "trial: after each slew; online: at every sample")] = "trial"
-    signals: Annotated[
-        str | None, typer.Option("--signals", help="vibration or total, in x and u; by default that of [slew]")
-    ] = None
-    seed: Annotated[int, learning("seed", "of the initial weights", min=0, max=2**53)] = 0
-    guard: Annotated[str, typer.Option("--guard", help="time-varying (proven), frozen or none")] = "time-varying"
-    rule: Annotated[str, learning("rule", "dynamic, clipped or plain: form of (21)")] = "dynamic"
-    sensitivity: Annotated[str, learning("sensitivity", "of the plant, online: one-step (the paper's) or whole")] = (
-        "one-step"
-    )
-    eta: Annotated[float, learning("eta", "learning rate")] = 0.8
-    alpha: Annotated[float, learning("alpha", "momentum, in [0, 1)")] = 0.6
-    a: Annotated[float, cost("a", "weight of the root moment, in the arm's unit")] = 1.0
-    b: Annotated[float, cost("b", "weight of the control signal, likewise")] = 2.6
-    k1: Annotated[
-        float | None,
-        panelled(
-            CONTROLLER, RATE_GAIN,
-            f"hub rate gain [N m s/rad]; by default 0.00642 J w1, 0.71 damping with {ANGLE_GAIN}",
-        ),
-    ] = None  # fmt: skip
-    kp: AngleGain = 0.0
-    duration: Annotated[
-        float | None, typer.Option("--duration", help="duration of a trial [s]; by default three slews")
-    ] = None
-    enough: Annotated[float, learning("enough", "stop once the rms of x is below this [N m]")] = 0.0
-    hidden: Annotated[int, typer.Option("--hidden", min=1, max=1000, help="hidden neurons")] = 6
-    seventh_input: Annotated[bool, typer.Option("--seventh-input", help="feed K(t-1) to the network too")] = False
-    modes: Annotated[int, typer.Option("--modes", min=1, max=48, help="flexible modes")] = 6
-
-    def plan(self, usual: Any, rate: float) -> Any:
-        """Return the plan of these options with this rate gain, and of the usual one what is not given."""
-        from tfarm import tuner
-
-        named: Any = {"mode": self.mode, "rule": self.rule, "sensitivity": self.sensitivity}
-        given = {name: getattr(self, name) for name in ("signals", "duration") if getattr(self, name) is not None}
-        return replace(
-            usual,
-            cost=tuner.Cost(a=self.a, b=self.b),
-            learning=tuner.Learning(**named, eta=self.eta, alpha=self.alpha, enough=self.enough),
-            trials=self.trials, seed=self.seed, count=self.modes, hidden=self.hidden, guard=self.guard,
-            seventh_input=self.seventh_input, **{RATE_GAIN: rate, ANGLE_GAIN: self.kp}, **given,
-        )  # fmt: skip
+    named: Any = {"mode": mode, "rule": rule, "sensitivity": sensitivity}
+    given = {name: value for name, value in (("signals", signals), ("duration", duration)) if value is not None}
+    return replace(
+        usual, cost=tuner.Cost(a=a, b=b), learning=tuner.Learning(**named, eta=eta, alpha=alpha, enough=enough),
+        trials=trials, seed=seed, count=modes, hidden=hidden, guard=guard, seventh_input=seventh_input,
+        **gains, **given,
+    )  # fmt: skip
 
 
 @command(epilog="tune sasaki2012-lab --trials 100 --save tuned.json")
 def tune(
     arm: ArmName,
-    curves: Annotated[
-        int, typer.Option("--curves", min=0, max=10_000, help="learning curves over N seeds (the paper's Figure 5)")
-    ] = 0,
+    k1: Annotated[float | None, typer.Option(f"--{RATE_GAIN}", rich_help_panel=CONTROLLER)] = None,
+    kp: AngleGain = 0.0,
+    curves: Annotated[int, typer.Option(min=0, max=10_000)] = 0,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
-    compare: Annotated[bool, typer.Option("--compare", help="with converters, delay, and on other arms too")] = False,
-    save: Annotated[
-        Path | None, typer.Option("--save", metavar="FILE", help="write the tuner to this JSON file")
-    ] = None,
+    compare: bool = False,
+    save: File = None,
     theory: TheoryName = None,
     json: Json = False,
     *,
-    options: TunerOptions,
+    plan: Callable[..., Any] = tuner_plan,
 ) -> None:
-    """Neural tuner of the moment gain during a slew, compared with simpler baselines."""
+    """Neural tuner of the moment gain during a slew, compared with simpler baselines.
+
+    Options:
+    k1: hub rate gain [N m s/rad]; by default 0.00642 J w1, 0.71 damping with Kp
+    curves: learning curves over N seeds (the paper's Figure 5)
+    compare: with converters, delay, and on other arms too
+    save: write the tuner to this JSON file
+    """
     from tfarm import tuner
     from tfarm.tuner.trial import usual_rate_gain
     from tfarm.tuner.tuning import usual_plan
 
     subject, chain = load_arm(arm, theory), load_chain(dsp or arm, period, delay_samples)
-    law, defaults = load_law(subject, arm, {RATE_GAIN: options.k1, MOMENT_GAIN: 0.0})
+    law, defaults = load_law(subject, arm, {RATE_GAIN: k1, MOMENT_GAIN: 0.0})
     rate = cast("tfarm.HubFeedback", law)[RATE_GAIN]
-    if options.k1 is None and options.kp:
-        rate = usual_rate_gain(subject, options.kp)
+    if k1 is None and kp:
+        rate = usual_rate_gain(subject, kp)
         words = f"{RATE_GAIN} = {rate:.4g} (damping ratio 0.71 of the rigid arm under Kp)"
         defaults = {"default_gains": [RATE_GAIN], "default_gains_in_words": words}
-    tuning = tuner.tune(subject, options.plan(usual_plan(subject, chain), rate), chain)
+    tuning = tuner.tune(subject, plan(usual_plan(subject, chain), {RATE_GAIN: rate, ANGLE_GAIN: kp}), chain)
     drawn = tuner.learning_curves(tuning, curves, advance) if curves else None
     compared = tuner.compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard) if compare else None
     if save is not None:
