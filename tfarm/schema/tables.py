@@ -83,7 +83,7 @@ class Column:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """Columns of one length; iterated, their rows as JSON has them.
+    """Columns of one length; a sequence of their rows as JSON has them.
 
     `stem` names its files; `title` and `caption` are those of the page.
     """
@@ -102,8 +102,11 @@ class Table:
         return len(self.columns[0].of)
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
-        keys = [column.key for column in self.columns]
-        return (dict(zip(keys, row, strict=True)) for row in zip(*(column.of for column in self.columns), strict=True))
+        return map(self.__getitem__, range(len(self)))
+
+    def __getitem__(self, row: int) -> dict[str, Any]:
+        """A row by its keys."""
+        return {column.key: column.of[row] for column in self.columns}
 
 
 def table(
