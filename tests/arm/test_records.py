@@ -144,21 +144,13 @@ def test_a_plate_or_an_endless_thread_is_no_beam(length):
 
 
 BAD_NAMES = ["", "../up", "a/b", "a\\b", ".hidden", "end.", "two\nlines", "\x1b[1m", "x" * 81, 3, "a:b"]
-DEVICES = [
-    "CON",
-    "nul",
-    "com1.old",
-    "LPT9",
-    "aux .x",
-    "\U0001d538" * 80,
-]  # and 80 letters of 4 bytes, longer than Linux's 255
+DEVICES = ["CON", "nul", "com1.old", "LPT9", "aux .x", "\U0001d538" * 80]  # and 320 bytes, more than Linux's 255
 
 
 @pytest.mark.parametrize("name", BAD_NAMES + DEVICES)
 def test_a_name_can_be_a_folder_on_any_machine(name):
-    with pytest.raises(
-        ParameterError, match=r"^name = " if name in DEVICES else r"^name = .*begins with a letter or digit"
-    ):
+    words = "" if name in DEVICES else ".*begins with a letter or digit"
+    with pytest.raises(ParameterError, match=f"^name = {words}"):
         replace(ARM, name=name)
 
 
