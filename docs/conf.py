@@ -103,7 +103,7 @@ def row_of(place: str, key: str, known: Any) -> list[str]:
     """Return the cells of one key of a file's table."""
     words = file_keys()[f"{place}.{key}"]
     made = known.annotation.__name__ if isinstance(known.annotation, type) else str(known.annotation)
-    is_table = "Table" in made or key == "section"
+    is_table = key in ARM_TABLES or key == "section"
     kind = "table" if is_table else made.replace("typing.", "").replace("|", "or")
     default = "" if known.default is PydanticUndefined or is_table else f"`{known.default!r}`"
     return [f"`{key}`", words.label, words.unit, kind, default, words.help]

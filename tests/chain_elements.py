@@ -24,9 +24,9 @@ FINER = 4  # times the frequency for which a response has its elements, since it
 HUB, LINK_SIDE = 0, 1  # the angles before and behind the joint; then w at every node, then psi
 
 
-def natural_frequencies(arm, count, *, locked=False):
-    """The first flexible frequencies [rad/s] of the rig without its damping, its hub as the arm leaves it or locked."""
-    held = locked or _is_held(arm)
+def natural_frequencies(arm, count):
+    """The first flexible frequencies [rad/s] of the rig without its damping."""
+    held = _is_held(arm)
     rigid = arm.has_rigid_mode and not held
     shift, up_to, found = _slowest(arm), reached(arm, count + 2), np.empty(0)
     for _ in range(8):

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+import tfarm
 from tests.chain_elements import reached
 from tfarm import Arm, Hub, Link, Payload, Section
 from tfarm.arm import Attachment, Motor, RotarySpring
@@ -163,3 +164,49 @@ def _maybe(rng, chance, value):
 
 def _log(rng, low, high):
     return float(10 ** rng.uniform(math.log10(low), math.log10(high)))
+
+
+def _link(length, depth, damping=0.0, E=7e10):
+    section = Section.rectangle(width=0.04, depth=depth)
+    return Link.isotropic(
+        length=length, density=2700.0, youngs_modulus=E, poissons_ratio=0.33, section=section, damping=damping
+    )
+
+
+def rig(**changes):
+    """Three segments with everything that a rig can have, lengths and places of few bits."""
+    arm = tfarm.load("sasaki2012")
+    rig = replace(
+        arm,
+        link=_link(0.25, 0.005, 1e-4),
+        outer=(_link(0.5, 0.003, 2e-4), _link(0.25, 0.02)),
+        hub=replace(arm.hub, radius=0.0625, friction=0.1, stiffness=0.5),
+        payload=replace(arm.payload, mass=0.2, inertia=1e-3, offset=0.03125),
+        clamp=RotarySpring(stiffness=300.0, damping=1e-3),
+        joint=RotarySpring(stiffness=200.0, damping=2e-3),
+        motor=Motor(
+            resistance=2.0,
+            torque_constant=0.05,
+            back_emf_constant=0.06,
+            inductance=0.01,
+            gear_ratio=14.0,
+            rotor_inertia=1e-5,
+            rotor_friction=1e-6,
+            gear_efficiency=0.9,
+        ),
+        attachments=(
+            Attachment(x=0.125, mass=0.03, inertia=1e-5),
+            Attachment(x=0.25, mass=0.1, inertia=1e-4, stiffness=100.0, rotational_stiffness=2.0),
+        ),
+    )
+    return replace(rig, **changes)
+
+
+def lossless(arm):
+    """The rig with nothing that dissipates."""
+    motor = None if arm.motor is None else replace(arm.motor, rotor_friction=0.0)
+    springs = {name: RotarySpring(stiffness=getattr(arm, name).stiffness) for name in ("clamp", "joint")}
+    links = [replace(link, damping=0.0) for link in arm.links]
+    drive = "hub_angle" if arm.input == "hub_angle" else "hub_torque"
+    hub = replace(arm.hub, friction=0.0)
+    return replace(arm, link=links[0], outer=tuple(links[1:]), hub=hub, motor=motor, input=drive, **springs)

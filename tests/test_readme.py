@@ -5,7 +5,6 @@ import re
 import shlex
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -122,11 +121,3 @@ def test_the_examples_of_an_arm_and_of_a_rig_are_arms(tmp_path):
         assert arm.name == name
         assert arm.is_uniform == (name == "my-arm")
         assert tfarm.modes(arm, 1).natural_frequency[1] > 0
-
-
-def test_every_dependency_has_its_line():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    extras = project["optional-dependencies"]
-    for requirement in [*project["dependencies"], *extras["dev"]]:
-        name = re.match(r"[A-Za-z0-9-]+", requirement).group()
-        assert re.search(rf"\b{name}\b", TEXT), name

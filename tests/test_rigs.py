@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from tests.chain_elements import eigenvalues, frequency_response, natural_frequencies, reached
-from tests.rigs import MOST_SEGMENTS, some_point, some_rig
+from tests.rigs import MOST_SEGMENTS, rig, some_point, some_rig
 from tests.shared import thinned
 from tests.transition import determinant, response
-from tfarm import Hub
-from tfarm.arm import RotarySpring
 from tfarm.exact.system import system_of
 
+EPS = np.finfo(float).eps
 FEATURES = {
     "radius": lambda arm: arm.hub.radius > 0,
     "hub friction": lambda arm: arm.hub.friction > 0,
@@ -48,13 +47,21 @@ def test_every_feature_comes_in_many_rigs():
         assert 4 <= sum(map(bool, map(has, rigs))) <= 396, name
 
 
-def test_a_massless_hub_behind_a_joint_only_follows():
-    """Between two springs it has no inertia to tell them apart: they act in series."""
-    arm = some_rig(np.random.default_rng(0), damped=False, segments=2, drive="hub_torque")
-    spring = arm.link.EI / arm.link.length
-    arm = replace(arm, motor=None, joint=RotarySpring(stiffness=spring), hub=Hub(inertia=0.0, stiffness=spring))
-    both = replace(arm, joint=RotarySpring(stiffness=spring / 2), hub=Hub(inertia=math.inf))
-    assert natural_frequencies(arm, 6) == pytest.approx(natural_frequencies(both, 6), rel=1e-9)
+def test_static_force_on_the_tip():
+    """W(L) of a unit force: beam in bending and shear, clamp, and hub spring and joint with the arm's whole lever."""
+    arm = rig(outer=(), attachments=(), theory="timoshenko")
+    beam, hub = arm.link, arm.hub
+    lever = arm.length + hub.radius
+    wanted = (
+        arm.length**3 / (3 * beam.EI)
+        + arm.length / beam.kGA
+        + arm.length**2 / arm.clamp.stiffness
+        + lever**2 * (1 / arm.joint.stiffness + 1 / hub.stiffness)
+    )
+    found = response(arm, 0, ["tip_displacement", "root_moment", "root_shear"], input=("force", arm.length))
+    assert complex(found["tip_displacement"]) == pytest.approx(wanted, rel=8 * EPS)
+    assert complex(found["root_moment"]) == pytest.approx(arm.length, rel=8 * EPS)
+    assert complex(found["root_shear"]) == pytest.approx(1.0, rel=8 * EPS)
 
 
 @pytest.mark.parametrize("seed", thinned(range(8), 3))

@@ -37,21 +37,12 @@ def general(x: float, digits: int) -> str:
 
 def significant(x: float, digits: int) -> str:
     """Return `x` with exactly `digits` significant digits: 71.505682, 1.800 × 10⁻⁹."""
-    if x == 0 or math.isinf(x):
-        return _special(x)
-    if not LEAST_PLAIN <= abs(x) < MOST_PLAIN:
-        return _power_of_ten(f"{x:.{digits - 1}e}")
-    decimals = max(0, digits - 1 - _exponent(x, digits))
-    return _signed(f"{x:.{decimals}f}")
+    return _written(x, digits, str)
 
 
 def plain(x: float, digits: int = 10) -> str:
     """Return `x` without trailing zeros: 2766.7, 6.8944 × 10¹⁰."""
-    if x == 0 or math.isinf(x):
-        return _special(x)
-    if not LEAST_PLAIN <= abs(x) < MOST_PLAIN:
-        return _power_of_ten(_bare(f"{x:.{digits - 1}e}"))
-    return _signed(_bare(f"{x:.{max(0, digits - 1 - _exponent(x, digits))}f}"))
+    return _written(x, digits, _bare)
 
 
 def aligned(values: Iterable[float], digits: int, *, least: int = 6) -> tuple[str, ...]:
@@ -113,6 +104,15 @@ def unit(text: str) -> str:
     return re.sub(r"\^(-?\d)", lambda power: power[1].translate(SUPERSCRIPT), text)
 
 
+def _written(x: float, digits: int, trim: Callable[[str], str]) -> str:
+    """Return a number with that many significant digits, trimmed, outside the plain range as a power of ten."""
+    if x == 0 or math.isinf(x):
+        return _special(x)
+    if not LEAST_PLAIN <= abs(x) < MOST_PLAIN:
+        return _power_of_ten(trim(f"{x:.{digits - 1}e}"))
+    return _signed(trim(f"{x:.{max(0, digits - 1 - _exponent(x, digits))}f}"))
+
+
 def _exponent(x: float, digits: int) -> int:
     """Return the power of ten of `x` rounded to `digits` digits."""
     return int(f"{x:.{digits - 1}e}".partition("e")[2])
@@ -125,8 +125,7 @@ def _special(x: float) -> str:
 
 def _signed(text: str) -> str:
     """Return a number with a true minus sign, none for zero."""
-    is_zero = not text.strip("-0.")
-    return text.lstrip("-") if is_zero else text.replace("-", "−")
+    return text.replace("-", "−" if text.strip("-0.") else "")
 
 
 def _bare(text: str) -> str:

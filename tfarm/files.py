@@ -20,7 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
-from tfarm.errors import ParameterError
+from tfarm.errors import ParameterError, require
 from tfarm.stopping import undone_if_stopped
 
 if sys.platform != "win32":
@@ -38,22 +38,15 @@ def read_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -
 
     Raises ParameterError, naming `key`; `what` names the kind of file in the remedy ("a .toml file").
     """
-    name = os.fspath(path)
-    try:
+    unreadable = "cannot be read ({}); check the path and its permissions"
+    with _refused(key, path, unreadable):
         status = os.stat(path)
-        if not stat.S_ISREG(status.st_mode):
-            found = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
-            raise ParameterError(key=key, value=name, remedy=f"is {found}; give {what}")
-        with open(path, "rb") as file:
-            data = file.read(most + 1)
-    except (OSError, ValueError) as error:
-        if isinstance(error, ParameterError):
-            raise
-        remedy = f"cannot be read ({_reason(error)}); check the path and its permissions"
-        raise ParameterError(key=key, value=name, remedy=remedy) from None
-    if len(data) > most:
-        size = max(len(data), status.st_size)
-        raise ParameterError(key="size in bytes", value=size, remedy=f"{what} of at most {most} is read", file=path)
+    found = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
+    require(stat.S_ISREG(status.st_mode), key, os.fspath(path), f"is {found}; give {what}")
+    with _refused(key, path, unreadable), open(path, "rb") as file:
+        data = file.read(most + 1)
+    size = max(len(data), status.st_size)
+    require(len(data) <= most, "size in bytes", size, f"{what} of at most {most} is read", os.fspath(path))
     return data
 
 
@@ -88,23 +81,16 @@ def write_file(path: Path, content: bytes, *, key: str) -> None:
     What is no regular file (a device, a pipe, /dev/stdout, or "-" for that) is written straight to.  Raises
     ParameterError, naming `key`, where that cannot be done, and BrokenPipeError where the reader of a pipe has left.
     """
-    try:
-        number = _descriptor(path)
+    number = _descriptor(path)
+    with _refused(key, path, "cannot be written ({}); choose another"):
         if number is None and not (path.exists() and not path.is_file()):
             _replace(Path(os.path.realpath(path)), content)
             return
-        if number is None:  # a pipe without a reader, and a folder, raise OSError at once
-            handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
-            os.set_blocking(handle, True)
-        else:
-            handle = os.dup(number)
+        # a pipe without a reader, and a folder, raise OSError at once
+        handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0)) if number is None else os.dup(number)
+        os.set_blocking(handle, True)
         with os.fdopen(handle, "wb") as file:
             file.write(content)
-    except BrokenPipeError:
-        raise
-    except (OSError, ValueError) as error:
-        remedy = f"cannot be written ({_reason(error)}); choose another"
-        raise ParameterError(key=key, value=str(path), remedy=remedy) from None
 
 
 def is_standard_output(path: Path) -> bool:
@@ -120,32 +106,42 @@ def temporary_folder(place: Path) -> Iterator[Path]:
         yield folder
 
 
+@contextmanager
+def _refused(key: str, path: str | os.PathLike[str], remedy: str) -> Iterator[None]:
+    """Turn errors of the system into ParameterError with their reason in the remedy; a broken pipe stays one."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise ParameterError(key=key, value=os.fspath(path), remedy=remedy.format(reason)) from None
+
+
 def _descriptor(path: Path) -> int | None:
     """Return the number of the open file of a path such as "-", /dev/stdout or /dev/fd/3."""
     if str(path) == STANDARD_OUTPUT:
         return 1
     name = os.path.abspath(path)
-    found = re.fullmatch(r"/dev/fd/(\d{1,9})|/proc/self/fd/(\d{1,9})", name)
-    if found:
-        return int(found[1] or found[2])
-    return {"/dev/stdout": 1, "/dev/stderr": 2}.get(name)
+    found = re.fullmatch(r"/(?:dev|proc/self)/fd/(\d{1,9})", name)
+    return int(found[1]) if found else {"/dev/stdout": 1, "/dev/stderr": 2}.get(name)
 
 
 def _replace(path: Path, content: bytes) -> None:
     """Write a regular file, new or in the place of another, whose mode and owner it keeps."""
-    if path.is_symlink():  # of a chain of links without an end
-        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
     old = path.stat() if path.exists() else None
-    if old is not None and not os.access(path, os.W_OK):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    for number, is_so in ((errno.ELOOP, path.is_symlink()), (errno.EACCES, old and not os.access(path, os.W_OK))):
+        if is_so:  # a chain of links without an end, and a file that is not the user's to write
+            raise OSError(number, os.strerror(number))
     prefix = f".{path.name[:40]}."
     _remove_leftovers(path.parent, re.escape(prefix) + SUFFIX + re.escape(PART))
-    with _temporary(path.parent, prefix, PART, partial(Path.touch, mode=0o600, exist_ok=False)) as temporary:
+    make = partial(Path.touch, mode=0o666 if old is None else 0o600, exist_ok=False)
+    with _temporary(path.parent, prefix, PART, make) as temporary:
         temporary.write_bytes(content)
-        if old is not None and hasattr(os, "chown"):
-            with suppress(OSError):
+        if old is not None:
+            with suppress(OSError, AttributeError):  # AttributeError: of a system without owners
                 os.chown(temporary, old.st_uid, old.st_gid)
-        temporary.chmod(0o666 & ~_umask() if old is None else stat.S_IMODE(old.st_mode))
+            temporary.chmod(stat.S_IMODE(old.st_mode))
         os.replace(temporary, path)
 
 
@@ -205,14 +201,3 @@ def _remove(path: Path) -> None:
     else:
         with suppress(OSError):
             path.unlink(missing_ok=True)
-
-
-def _reason(error: Exception) -> str:
-    return getattr(error, "strerror", None) or str(error)
-
-
-def _umask() -> int:
-    """Return the mode bits that new files go without; they can only be read by setting them."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from itertools import islice
-from multiprocessing import active_children, forkserver, get_context, parent_process, resource_tracker
+from multiprocessing import active_children, get_context, parent_process, resource_tracker
 from threading import Thread
 from typing import TypeVar
 
@@ -19,7 +18,6 @@ from tfarm.errors import ConvergenceError
 from tfarm.stopping import SIGNALS, undone_if_stopped
 
 BLAS = "OPENBLAS_NUM_THREADS"
-LOADS_ONCE = sys.platform == "linux"  # macOS' own libraries do not survive a fork, and Windows has none
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -28,19 +26,19 @@ Result = TypeVar("Result")
 def shared(
     tasks: Mapping[Task, Callable[[], Result]],
     count: int,
-    modules: Sequence[str] = (),
     begun: Callable[[Sequence[Task]], object] = lambda _: None,
 ) -> Iterator[tuple[Task, Result]]:
-    """Yield each task with its result as it comes, by `count` processes, which have imported the `modules`.
+    """Yield each task with its result as it comes, by `count` processes.
 
     `begun` is called with the running tasks whenever one is begun.  An error of a task is raised here once the running
     ones have ended; the others are not begun.  Raises ConvergenceError where a process dies.
     """
     waiting = iter(tasks)
     running: dict[Future[Result], Task] = {}
-    with _pool(count, modules) as pool:
+    with _pool(count) as pool:
         while True:
-            running |= {pool.submit(tasks[task]): task for task in islice(waiting, count - len(running))}
+            with _signals_blocked():  # of the process that this may start, as long as it lives
+                running |= {pool.submit(tasks[task]): task for task in islice(waiting, count - len(running))}
             if not running:
                 return
             begun(list(running.values()))
@@ -50,51 +48,45 @@ def shared(
 
 
 @contextmanager
-def _pool(count: int, modules: Sequence[str]) -> Iterator[ProcessPoolExecutor]:
+def _pool(count: int) -> Iterator[ProcessPoolExecutor]:
     """Yield processes with one thread of BLAS each, unless the user chose a number; killed where this one is stopped.
 
-    On matrices of a hundred rows more threads only wait for each other.  On Linux they are forked from a process that
-    has loaded the modules (none from the caller's own, whose threads it would lack), and inherit that signals are
-    blocked; elsewhere each one starts anew.
+    On matrices of a hundred rows more threads only wait for each other.  Each process starts anew: a fork would lack
+    the threads of this one.
     """
-    others, context = set(active_children()), get_context("forkserver" if LOADS_ONCE else "spawn")
-    with _environment(BLAS, os.environ.get(BLAS, "1")), undone_if_stopped(kill_workers):
-        if LOADS_ONCE:
-            context.set_forkserver_preload(["tfarm.grouped", *modules])
-            with _environment("PYTHONWARNINGS", "ignore:resource_tracker"):  # of semaphores of a stopped process
-                resource_tracker.ensure_running()
-            before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-            try:
-                forkserver.ensure_running()
-            finally:
-                signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        with ProcessPoolExecutor(count, context, initializer=leave_with_parent) as pool:
-            try:
-                yield pool
-            except BrokenProcessPool:
-                words = "a worker process ended before its work was done, perhaps for want of memory; ask for less"
-                raise ConvergenceError(words, None, None) from None
-            except KeyboardInterrupt:
-                for child in set(active_children()) - others:
-                    child.kill()
-                raise
+    others = set(active_children())
+
+    def kill() -> None:
+        for child in set(active_children()) - others:
+            child.kill()
+            child.join()
+
+    with _environment("PYTHONWARNINGS", "ignore:resource_tracker"):  # of semaphores of a stopped process
+        resource_tracker.ensure_running()
+    with (
+        _environment(BLAS, os.environ.get(BLAS, "1")),
+        undone_if_stopped(kill),
+        ProcessPoolExecutor(count, get_context("spawn"), initializer=leave_with_parent) as pool,
+    ):
+        try:
+            yield pool
+        except BrokenProcessPool:
+            words = "a worker process ended before its work was done, perhaps for want of memory; ask for less"
+            raise ConvergenceError(words, None, None) from None
+        except KeyboardInterrupt:
+            kill()
+            raise
 
 
-def kill_workers() -> None:
-    """Kill the process that workers are forked from, and all of these; they are gone when this returns."""
-    server = getattr(forkserver._forkserver, "_forkserver_pid", None)
-    for child in active_children() if server is None else []:
-        child.kill()
-    if server is None:
-        return
-    with suppress(ProcessLookupError):  # it has its group once it has begun to load
-        os.kill(server, signal.SIGKILL)
-        os.killpg(server, signal.SIGKILL)
-    with suppress(ChildProcessError, ProcessLookupError):
-        os.waitpid(server, 0)
-        for _ in range(50):
-            os.killpg(server, 0)
-            time.sleep(0.01)
+@contextmanager
+def _signals_blocked() -> Iterator[None]:
+    """Hold back Ctrl-C and SIGTERM, where the system can."""
+    change = getattr(signal, "pthread_sigmask", lambda *_: None)
+    change(signal.SIG_BLOCK, SIGNALS)
+    try:
+        yield
+    finally:
+        change(signal.SIG_UNBLOCK, SIGNALS)
 
 
 @contextmanager

@@ -5,11 +5,11 @@ A repr begins with the finding: the entries or properties of a record with a nam
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache, cached_property, wraps
 from html import escape
+from operator import is_
 from typing import Any, TypeVar
 
 import numpy as np
@@ -72,15 +72,13 @@ def read_only(value: Any) -> Any:
             value = value.view()
             value.flags.writeable = False
         return value
+    entries = value.values() if isinstance(value, dict) else value if isinstance(value, tuple | list) else ()
+    views = list(map(read_only, entries))
+    if all(map(is_, views, entries)):
+        return value
     if isinstance(value, dict):
-        views = {key: read_only(entry) for key, entry in value.items()}
-        return views if any(views[key] is not entry for key, entry in value.items()) else value
-    if isinstance(value, tuple | list):
-        entries = [read_only(entry) for entry in value]
-        if all(mine is theirs for mine, theirs in zip(entries, value, strict=True)):
-            return value
-        return type(value)(*entries) if hasattr(value, "_fields") else type(value)(entries)
-    return value
+        return dict(zip(value, views, strict=True))
+    return type(value)(*views) if hasattr(value, "_fields") else type(value)(views)
 
 
 def _read_only_result(function: Any) -> Any:
@@ -105,8 +103,7 @@ def _same(one: Any, other: Any) -> bool:
     if isinstance(one, tuple | list) and isinstance(other, tuple | list):
         pairs = zip(one, other, strict=False)
         return type(one) is type(other) and len(one) == len(other) and all(_same(*pair) for pair in pairs)
-    both_nan = one != one and other != other
-    return bool(both_nan or one == other)
+    return bool(one == other or (one != one and other != other))
 
 
 def _hash(self: Any) -> int:
@@ -115,13 +112,9 @@ def _hash(self: Any) -> int:
 
 def _key(value: Any) -> Any:
     """Return a hashable value that is equal for equal entries."""
-    if isinstance(value, np.ndarray):
-        return value.shape
-    if isinstance(value, dict):
-        return frozenset(value)
     if isinstance(value, tuple | list):
         return tuple(map(_key, value))
-    return None if isinstance(value, float) and math.isnan(value) else value
+    return None if isinstance(value, np.ndarray | dict) or value != value else value
 
 
 def _repr(self: Any) -> str:

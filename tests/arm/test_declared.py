@@ -1,56 +1,12 @@
 """A table of the file is what its record's constructor asks for: keys, types and defaults, each declared once."""
 
-from dataclasses import dataclass
-
 import pytest
 
 from tfarm.arm import load, schema
 from tfarm.arm.law_tables import LawTable, SignalTable
 from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, ArmTable, LinkTable, file_keys
 from tfarm.dsp.chain import CHAIN_TABLES
-from tfarm.errors import ParameterError
 from tfarm.fitting.recording import RunTable
-
-
-@dataclass(frozen=True, kw_only=True)
-class Spring:
-    stiffness: float
-    coils: int = 7
-
-    def __post_init__(self):
-        if self.stiffness < 0:
-            raise ParameterError(key="spring.stiffness", value=self.stiffness, remedy="zero or more")
-
-
-@schema.of(Spring)
-class SpringTable(schema.TomlTable):
-    """[spring], with a colour that no spring asks for."""
-
-    colour: str = "grey"
-
-
-def test_keys_and_defaults_are_those_of_the_record():
-    assert list(SpringTable.model_fields) == ["colour", "stiffness", "coils"]
-    assert SpringTable.__doc__.startswith("[spring], with a colour")
-    assert SpringTable.model_validate({"stiffness": 2.0, "colour": "red"}).build() == Spring(stiffness=2.0, coils=7)
-    with pytest.raises(ParameterError, match="zero or more"):
-        SpringTable.model_validate({"stiffness": -1.0}).build()
-
-
-@pytest.mark.parametrize(
-    ("table", "words"),
-    [
-        ({}, "spring.stiffness is missing: [spring] needs it"),
-        (3, "spring = 3: give a table, headed [spring]"),
-        ({"stiffness": "2"}, "spring.stiffness = '2': wrong value; input should be a valid number"),
-        ({"stifness": 2.0}, 'spring.stifness = 2.0: unknown key; did you mean "stiffness"?'),
-    ],
-)
-def test_one_wrong_key_is_named_in_a_line(table, words):
-    with pytest.raises(ParameterError) as refused:
-        schema.validated(SpringTable, table, "spring")
-    assert str(refused.value).startswith(words)
-
 
 FILE_TABLES = {
     "top": [ArmTable], "link": [LinkTable], "link.section": SHAPE_TABLES.values(), "law": [LawTable],

@@ -66,15 +66,6 @@ def test_a_slip_of_units_is_named(change, key):
     assert not any("\n" in text for text in texts)
 
 
-def test_a_length_in_millimetres_is_named_in_the_link_alone():
-    """The section in metres, so nothing else looks odd; infinite inertias are no slip."""
-    arm = tfarm.Arm(
-        link=replace(beam("steel"), length=800.0), hub=Hub(inertia=math.inf), payload=Payload(mass=math.inf)
-    )
-    (text,) = implausible(arm)
-    assert text.startswith("link.length")
-
-
 def test_the_damping_ratio_is_that_of_the_exact_clamped_link():
     """C w/2 by the formula against the exact eigenvalue of the arm with its hub locked."""
     arm = tfarm.Arm(link=beam("steel", slenderness=200.0, damping=0.02), hub=Hub(inertia=math.inf))

@@ -132,7 +132,7 @@ BAD_EDITS = {
     # what: (in the example, instead, what the message says)
     "missing key": ("length = 1.0 ", "# ", "link.length is missing: give a number without quotes"),
     "missing table": ("[hub]\ninertia = 0.1", "", "hub is missing: give a table, headed [hub]"),
-    "missing name": ('name = "sasaki2012"', "", "name is missing: give a text such as"),
+    "missing name": ('name = "sasaki2012"', "", "name is missing: give a text in double quotes"),
     "missing shape": ('shape = "general"', "", "link.section.shape is missing: give one of rectangle, round"),
     "no shear modulus": ("shear_modulus = 2.6517e10", "", "link.shear_modulus is missing: give it in Pa, or"),
     "unknown key": ("density =", "densty =", 'link.densty = 2766.7: unknown key; did you mean "density"?'),
@@ -142,7 +142,7 @@ BAD_EDITS = {
     "true for a number": ("length = 1.0 ", "length = true ", "link.length = true: wrong type; give a number"),
     "number for a table": ("[payload]", "payload = 1\n[other]", "unknown key"),
     "number for a text": ('name = "sasaki2012"', "name = 1", "name = 1: wrong type; give a text"),
-    "number for an assumption": ('"..."', "3", "assumptions.1 = 3: wrong type; give a text in double quotes"),
+    "number for an assumption": ('"..."', "3", "assumptions.1 = 3: wrong type; give a list of texts in double quotes"),
     "negative length": ("length = 1.0 ", "length = -1.0 ", "link.length = -1.0: a length is a positive, finite"),
     "both": ("damping", "poissons_ratio = 0.3\ndamping", "link.poissons_ratio = 0.3: shear_modulus is given too"),
     "long number": ("length = 1.0 ", f"length = 1{'0' * 5000} ", "TOML = "),

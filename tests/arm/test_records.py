@@ -144,21 +144,13 @@ def test_a_plate_or_an_endless_thread_is_no_beam(length):
 
 
 BAD_NAMES = ["", "../up", "a/b", "a\\b", ".hidden", "end.", "two\nlines", "\x1b[1m", "x" * 81, 3, "a:b"]
-DEVICES = [
-    "CON",
-    "nul",
-    "com1.old",
-    "LPT9",
-    "aux .x",
-    "\U0001d538" * 80,
-]  # and 80 letters of 4 bytes, longer than Linux's 255
+DEVICES = ["CON", "nul", "com1.old", "LPT9", "aux .x", "\U0001d538" * 80]  # and 320 bytes, more than Linux's 255
 
 
 @pytest.mark.parametrize("name", BAD_NAMES + DEVICES)
 def test_a_name_can_be_a_folder_on_any_machine(name):
-    with pytest.raises(
-        ParameterError, match=r"^name = " if name in DEVICES else r"^name = .*begins with a letter or digit"
-    ):
+    words = "" if name in DEVICES else ".*begins with a letter or digit"
+    with pytest.raises(ParameterError, match=f"^name = {words}"):
         replace(ARM, name=name)
 
 
@@ -171,10 +163,6 @@ def test_names_that_are_allowed(name):
 def test_assumptions_are_plain_texts(assumptions):
     with pytest.raises(ParameterError, match=r"^assumptions = .*list of plain texts"):
         replace(ARM, assumptions=assumptions)
-
-
-def test_assumptions_become_a_tuple_of_single_lines():
-    assert replace(ARM, assumptions=["two\n  lines", "one"]).assumptions == ("two lines", "one")
 
 
 @pytest.mark.parametrize(("name", "value"), [("damping", 1e-4), ("length", 2.0), ("hub_inertia", 0.3)])
@@ -193,8 +181,3 @@ def test_an_arm_with_another_number_is_the_same_but_for_it(name: str, value: flo
 def test_a_number_that_is_not_whole_or_out_of_range_is_refused(value: object) -> None:
     with pytest.raises(ParameterError, match="from 1 to 7"):
         whole("n", value, 1, 7, "a whole number from 1 to 7")
-
-
-def test_numpys_whole_numbers_are_pythons() -> None:
-    assert [whole("n", value, 1, math.inf, "") for value in (1, np.int64(7), np.uint8(3))] == [1, 7, 3]
-    assert type(whole("n", np.int64(7), 1, 7, "")) is int

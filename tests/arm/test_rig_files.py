@@ -105,8 +105,8 @@ REFUSED = {
     "attachment.1.x is missing: give a number": ("x = 0.02\n", ""),
     'attachment.1.mas = 0.005: unknown key; did you mean "mass"': ("mass = 0.005", "mas = 0.005"),
     "payload.input = 'hub_angle': unknown key; input belongs at the top": ("offset = -0.01", 'input = "hub_angle"'),
-    "theory = 3: wrong type; give one of timoshenko, shear": ('"rayleigh"', "3"),
-    "input = ['hub_torque', 'motor_voltage']: wrong type; give one of": (
+    "theory = 3: wrong type; give a text in double quotes": ('"rayleigh"', "3"),
+    "input = ['hub_torque', 'motor_voltage']: wrong type; give a text": (
         '"motor_voltage"',
         '["hub_torque", "motor_voltage"]',
     ),
@@ -130,7 +130,7 @@ SHAPED = {
     ),
     "no segments": ("link is missing", {"link": []}, "headed [link], or [[link]] for each"),
     "a number for the link": ("link = 3", {"link": 3}, "headed [link], or [[link]] for each"),
-    "a number among the segments": ("link.2 = 3", {"link": [{}, 3]}, "headed [link], or [[link]] for each"),
+    "a number among the segments": ("link.2 = 3", {"link": [{}, 3]}, "give a table, headed [link]"),
     "65 attachments": ("attachment = 65", {"attachment": [{"x": 0.0, "mass": 1.0}] * 65}, "at most 64"),
     "65 segments": ("link = 65", {"link": tomllib.loads(RIG)["link"][:1] * 65}, "at most 64"),
 }

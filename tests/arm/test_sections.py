@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from tfarm.arm import Link, Section
+from tfarm.arm import Section
 from tfarm.errors import ParameterError
 
 EPS = 2.0**-52
@@ -57,14 +57,6 @@ def kappa(section, nu):
     return section.cowper_factor(nu)
 
 
-def test_cowper_s_factor_of_common_sections():
-    """Fractions: 5/6, 6/7 and 9/10 are the textbook values of the rectangle and the round bar."""
-    rectangle, disc = Section.rectangle(width=1, depth=2), Section.round(diameter=1)
-    assert kappa(rectangle, 0.0) == pytest.approx(5 / 6, rel=EPS)
-    assert kappa(disc, 0.0) == pytest.approx(6 / 7, rel=EPS)
-    assert kappa(disc, 0.5) == pytest.approx(9 / 10, rel=EPS)
-
-
 @pytest.mark.parametrize("nu", [-0.9, 0.0, 0.25, 0.5])
 def test_a_tube_lies_between_the_solid_bar_and_the_thin_wall(nu):
     solid = kappa(Section.round(diameter=1), nu)
@@ -72,13 +64,6 @@ def test_a_tube_lies_between_the_solid_bar_and_the_thin_wall(nu):
     thin = kappa(Section.tube(outer_diameter=1, inner_diameter=1 - 1e-9), nu)
     assert thin == pytest.approx(2 * (1 + nu) / (4 + 3 * nu), rel=1e-15)
     assert thin < kappa(Section.tube(outer_diameter=1, inner_diameter=0.5), nu) < solid
-
-
-def test_a_given_shear_factor_wins_over_cowper():
-    section = Section.rectangle(width=0.1, depth=0.2, shear_factor=5 / 6)
-    link = Link(length=2, density=7800, youngs_modulus=2.1e11, shear_modulus=8e10, section=section)
-    assert link.shear_factor == 5 / 6
-    assert replace(link, section=Section.rectangle(width=0.1, depth=0.2)).shear_factor == kappa(section, 0.3125)
 
 
 rectangle_of, tube_of, general_of = Section.rectangle, Section.tube, Section.general

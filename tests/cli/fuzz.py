@@ -15,7 +15,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -43,16 +42,6 @@ WORDS = (
     "2,1", "0,0", "nan,inf", "1e-12,1e12", "1j", "1e300j", "0.3+57.1j,10j", "-", "--", "é", "\x00", "a" * 5000, "/",
     "..", "0.01", "0.1", "10", "100",
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Found:
-    """What came of a command."""
-
-    arguments: tuple[str, ...]
-    code: int | None  # None where it was ended for its CPU time
-    seconds: float
-    wrong: str
 
 
 # ---------------------------------------------------------------- drawing
@@ -199,26 +188,28 @@ class Worker:
 
 
 def judge(arguments, code, out, err, seconds):
-    """The case with what is wrong with it, or with an empty text."""
+    """What is wrong with a command, or an empty text."""
     lines = [line for line in err.splitlines() if line and not line.startswith("written: ")]
     errors = [line for line in heard("\n".join([*lines, ""])).splitlines() if not line.startswith("tfarm: warning:")]
-    wrong = ""
-    if code is None or seconds > CPU_SECONDS:
-        wrong = f"more than {CPU_SECONDS} CPU seconds"
-    elif code not in (0, 2, 3):
-        wrong = f"exit {code}: {err.strip()[-200:]}"
-    elif strangers := [line for line in lines if not line.startswith("tfarm: ")]:
-        wrong = f"prints {strangers[0][:200]}"
-    elif len(errors) > 1:
-        wrong = f"{len(errors)} errors: {errors[1][:200]}"
-    elif code and not errors:
-        wrong = f"exit {code} without a word"
-    elif "--json" in arguments and code == 0:
-        try:
-            json.loads(out)
-        except ValueError as error:
-            wrong = f"no JSON: {error}"
-    return Found(tuple(arguments), code, seconds, wrong)
+    strangers = [line for line in lines if not line.startswith("tfarm: ")]
+    checks = {
+        f"more than {CPU_SECONDS} CPU seconds": code is None or seconds > CPU_SECONDS,
+        f"exit {code}: {err.strip()[-200:]}": code not in (0, 2, 3),
+        f"prints {strangers[:1]}": strangers,
+        f"{len(errors)} errors: {errors[1:2]}": len(errors) > 1,
+        f"exit {code} without a word": code and not errors,
+        f"no JSON: {out[:200]}": "--json" in arguments and code == 0 and not is_json(out),
+    }
+    return next((words for words, is_so in checks.items() if is_so), "")
+
+
+def is_json(text):
+    """Whether a text is one JSON value."""
+    try:
+        json.loads(text)
+    except ValueError:
+        return False
+    return True
 
 
 def commands(size, seed):
@@ -227,21 +218,13 @@ def commands(size, seed):
         worker = Worker(name)
         try:
             for arguments in cases(size, seed, Path(name)):
-                found = judge(arguments, *worker.run(arguments))
-                words = in_full(found) if found.wrong else ""
-                yield Finding(f"exit {found.code}", words, bool(found.wrong), {"CPU seconds": found.seconds})
+                code, out, err, seconds = worker.run(arguments)
+                wrong = judge(arguments, code, out, err, seconds)
+                files = [Path(word).read_bytes() for word in arguments if word.startswith(name)] if wrong else []
+                words = f"{wrong} | {' '.join(map(repr, arguments))[:300]} {files}" if wrong else ""
+                yield Finding(f"exit {code}", words, bool(wrong), {"CPU seconds": seconds})
         finally:
             worker.end()
-
-
-def in_full(found):
-    """A command that did wrong, with its file."""
-    lines = [f"{found.wrong} | {' '.join(map(repr, found.arguments))[:300]}"]
-    for argument in found.arguments:
-        if argument.endswith(".toml") and os.path.exists(argument):
-            text = Path(argument).read_bytes().splitlines()
-            lines.append(f"    {[line for line in text if line[:1] not in (b' ', b'#', b'')]}")
-    return "\n".join(lines)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ import signal
 import sys
 import tempfile
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,17 +37,9 @@ COMMANDS = {
 }
 
 
-@dataclass
-class Files:
-    """A folder's files: name to content."""
-
-    content: dict[str, bytes] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, folder):
-        """All below a folder but the arm itself."""
-        found = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != "arm.toml.given")
-        return cls({str(path.relative_to(folder)): path.read_bytes() for path in found})
+def files_of(folder):
+    """The content of all files below a folder by name."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
 def started(arguments, folder):
@@ -100,14 +92,14 @@ def killed(arguments, folder, after, from_writing):
 
 def wrong_with(found, old, new):
     """What is wrong with the files after a kill, or an empty text."""
-    for name, content in found.content.items():
+    for name, content in found.items():
         if any(part.startswith(".") for part in Path(name).parts):
             continue  # what the next run has to remove
-        if content not in (old.content.get(name), new.content.get(name)):
+        if content not in (old.get(name), new.get(name)):
             return f"{name} is neither the old file nor the new one"
         if name.endswith(".html"):
             for target in re.findall(rb'(?:src|href)="([^"#:?]+)"', content):
-                if os.path.normpath(Path(name).parent / target.decode()) not in found.content:
+                if os.path.normpath(Path(name).parent / target.decode()) not in found:
                     return f"{name} names {target.decode()}, which is not there"
     return ""
 
@@ -122,7 +114,7 @@ def _here(arguments, folder, arm):
     _given(folder, arm)
     with contextlib.chdir(folder), contextlib.redirect_stdout(io.StringIO()):
         run(list(arguments))
-    return Files.of(folder)
+    return files_of(folder)
 
 
 def kills(size, seed):
@@ -150,10 +142,10 @@ def kills_of(name, number, folder, arm, other, rng):
         for _ in range(min(share, KILLS_A_RUN)):
             late = bool(rng.random() < 0.5)
             killed(arguments, folder / "now", rng.uniform(0, 1.1 * (spent - first if late else spent)), late)
-            wrong = wrong_with(Files.of(folder / "now"), old, new)
+            wrong = wrong_with(files_of(folder / "now"), old, new)
             yield Finding("wrong" if wrong else "whole", wrong, bool(wrong))
         ended = completed(arguments, folder / "now") is not None
-        is_clean = ended and Files.of(folder / "now").content == new.content
+        is_clean = ended and files_of(folder / "now") == new
         words = "" if is_clean else f"{name}: a run after kills leaves other files"
         yield Finding("clean" if is_clean else "wrong", words, not is_clean)
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from tests import survey
-from tests.cli.kills import Files
+from tests.cli.kills import files_of
 from tests.shell import heard
 from tests.survey import Finding
 
@@ -74,7 +74,7 @@ def handles_signals(process):
 
 def outcome(stop, folder):
     """ "clean", "ended before", or what is wrong."""
-    before = Files.of(folder), sorted(folder.rglob("*"))
+    before = files_of(folder), sorted(folder.rglob("*"))
     process = subprocess.Popen(
         COMMAND, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
         env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
@@ -95,7 +95,7 @@ def outcome(stop, folder):
             time.sleep(0.01)
         lines = heard(err).splitlines()
         return wrong_with(process.returncode, out, lines, took, members(process.pid), stop) or (
-            "clean" if (Files.of(folder), sorted(folder.rglob("*"))) == before else f"files are left: {stop}"
+            "clean" if (files_of(folder), sorted(folder.rglob("*"))) == before else f"files are left: {stop}"
         )
     except subprocess.TimeoutExpired:
         return f"does not end: {stop}"

@@ -2,14 +2,9 @@
 
 import math
 import re
-import subprocess
-import sys
 from dataclasses import replace
 
-import pytest
-
 import tfarm
-from tests.shell import heard
 from tests.shell import run as shell
 from tfarm.arm import to_toml
 
@@ -35,13 +30,3 @@ def test_a_locked_hub_has_none_to_choose(capsys, tmp_path):
     code, out, _ = run(capsys, str(tmp_path / "held.toml"))
     assert code == 0
     assert "hub inertias" not in out
-
-
-@pytest.mark.survey
-def test_it_loads_neither_matplotlib_nor_control():
-    code = (
-        "import sys; from tfarm.cli.running import run; run(['assumptions', 'sasaki2012', '--count', '1', '--json']);"
-    )
-    code += "sys.exit(bool({'matplotlib', 'control'} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert (done.returncode, heard(done.stderr)) == (0, "")

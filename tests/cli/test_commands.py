@@ -14,7 +14,7 @@ import pytest
 
 import tfarm
 from tests.shared import thinned
-from tests.shell import answer, heard, run
+from tests.shell import answer, run
 from tfarm.arm.reading import PRESETS
 
 
@@ -61,14 +61,6 @@ def test_csv_is_the_same_table(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_infinities_are_strings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    from tfarm.schema import to_json
-
-    assert to_json({"a": [float("inf"), {"b": -float("inf")}]}) == '{"a": ["inf", {"b": "-inf"}]}'
-    with pytest.raises(ValueError, match="NaN"):
-        to_json({"a": float("nan")})
-
-
 def test_presets_are_listed_with_their_assumptions(capsys: pytest.CaptureFixture[str]) -> None:
     listed = answer(capsys, "presets")["presets"]
     assert {arm["name"] for arm in listed} == set(tfarm.presets())
@@ -90,11 +82,9 @@ BAD = [
     (["modes", "sasaki2021"], 'did you mean "sasaki2012"'),
     (["modes", "sasaki2012", "--count", "0"], "--count = '0'"),
     (["modes", "sasaki2012", "--count", "1001"], "less than or equal to 1000"),
-    (["modes", "sasaki2012", "--count", "nan"], "--count = 'nan'"),
     (["modes", "sasaki2012", "--count", "2.5"], "--count = '2.5'"),
     (["modes", "sasaki2012", "--count", "5_0"], "--count = '5_0'"),
     (["modes", "sasaki2012", "--count=5_0"], "--count = '5_0'"),
-    (["margins", "sasaki2012", "--K1", "1_0"], "write numbers as 50"),
     (["margins", "sasaki2012", "--law="], "--law = '': give a path"),
     (["bode", "sasaki2012", "--png", ""], "--png = '': give a path"),
     (["report", "sasaki2012", "--out= "], "--out = ' ': give a path"),
@@ -110,13 +100,11 @@ BAD = [
     (["mode", "sasaki2012"], "Did you mean 'modes'"),
     (["modes"], "ARM"),
     (["modes", "./no-such-file.toml"], "No such file"),
-    (["response", "sasaki2012", "--output", "root_momnt"], 'did you mean "root_moment"'),
     (["response", "sasaki2012", "--output", "moment"], "x is missing"),
     (["response", "sasaki2012", "--output", "moment", "--x", "3"], "between 0 and 1 m"),
     (["response", "sasaki2012", "--output", "root_moment", "--points", "1e12"], "a valid integer"),
     (["response", "sasaki2012", "--output", "root_moment", "--from", "10", "--to", "1"], "--to = 1.0"),
     (["response", "sasaki2012", "--output", "root_moment", "--from", "0"], "--from = 0.0"),
-    (["response", "sasaki2012", "--output", "root_moment", "--from", "abc"], "--from"),
     (["response", "sasaki2012", "--output", "root_moment", "--to", "inf"], "--to = inf"),
     (["response", "sasaki2012", "--output", "root_moment", "--s", "abc"], "--s: 'abc': write"),
     (["response", "sasaki2012", "--output", "root_moment", "--s", "nan"], "write numbers in 1/s"),
@@ -126,34 +114,17 @@ BAD = [
     (["response", "sasaki2012", "--output", "hub_angle", "--s", "-1e300", "--digits", "20"], "at most 1e+20 1/s"),
     (["response", "sasaki2012", "--output", "root_moment", "--s", "71.50568246689015j"], "a natural frequency"),
     (["response", "sasaki2012", "--output", "root_moment", "--csv", "/no/such/folder/a.csv"], "--csv"),
-    (["bode", "sasaki2012-lab", "--output", "root_momnt"], 'did you mean "root_moment"'),
     (["bode", "sasaki2012-lab", "--from", "-1"], "--from = -1.0: a positive frequency"),
-    (["bode", "sasaki2012-lab", "--from", "10", "--to", "1"], "--to = 1.0: a frequency above --from"),
-    (["bode", "sasaki2012-lab", "--to", "nan"], "--to = nan"),
     (["bode", "sasaki2012-lab", "--to", "100", "--png", "no/such/folder/b.png"], "--png"),
-    (["nyquist", "sasaki2012-lab", "--K1", "nan"], "K1"),
     (["nyquist", "sasaki2012-lab", "--law", "no-such.toml"], "no-such.toml"),
     (["margins", "sasaki2012", "--K1", "nan"], "K1 = nan"),
-    (["margins", "sasaki2012", "--K2", "inf"], "K2 = inf"),
     (["margins", "sasaki2012", "--Kp", "1e30"], "Kp = 1e+30"),
     (["margins", "sasaki2012", "--K1", "much"], "--K1 = 'much'"),
-    (["poles", "sasaki2012", "--count", "0"], "--count = '0'"),
-    (["poles", "sasaki2012", "--K1", "-inf"], "K1 = -inf"),
-    (["map", "sasaki2012", "--K1", "1,1"], "'1,1': write LOW,HIGH"),
     (["map", "sasaki2012", "--K1", "3,-1"], "'3,-1': write LOW,HIGH"),
-    (["map", "sasaki2012", "--K2", "0,inf"], "'0,inf': write LOW,HIGH"),
-    (["map", "sasaki2012", "--K2", "-inf,0"], "'-inf,0': write LOW,HIGH"),
     (["map", "sasaki2012", "--K2", "nan,1"], "'nan,1': write LOW,HIGH"),
-    (["map", "sasaki2012", "--K2", "1"], "'1': write LOW,HIGH"),
     (["map", "sasaki2012", "--K1", "-1e300,1e300"], "at most 1e+150"),
-    (["map", "sasaki2012", "--points", "1"], "--points = '1'"),
-    (["map", "sasaki2012", "--Kp", "nan"], "Kp = nan"),
     (["design", "sasaki2012", "--objective", "beauty"], "'beauty'"),
     (["design", "sasaki2012", "--K1", "0,1e300"], "K1"),
-    (["design", "sasaki2012", "--K2", "2"], "'2': write LOW,HIGH"),
-    (["design", "sasaki2012", "--modes", "0"], "--modes = '0'"),
-    (["assumptions", "sasaki2012", "--count", "0"], "--count = '0': should be "),
-    (["assumptions", "sasaki2012", "--count", "101"], "--count = '101': should be "),
     (["assumptions", "sasaki2012", "--count", "many"], "--count = 'many': should be "),
     (["assumptions", BENCH], "one Timoshenko beam on a hub"),
     (["modes", BENCH, "--method", "appendix"], "one Timoshenko beam on a hub"),
@@ -162,7 +133,6 @@ BAD = [
     (["compare", "sasaki2012"], "give a second arm, or --law FILE twice"),
     (["compare", "sasaki2012", "sasaki2012-lab", "stocky-steel"], "two at most"),
     (["compare", "sasaki2012", "--law", "a.toml"], "does not exist"),
-    (["compare", "sasaki2012", "sasaki2021"], 'did you mean "sasaki2012"'),
     (["compare", "sasaki2012", "sasaki2012-lab", "--modes", "31"], "1 to 30"),
     (["compare", "sasaki2012", "quanser-2dsfl"], "gains of sasaki2012 are in another unit"),
 ]
@@ -218,16 +188,6 @@ def test_commands_that_print_json_load_nothing_heavy(arguments: list[str]) -> No
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=os.environ, check=True)
     assert done.stderr.splitlines()[-1] == "[]"  # before it perhaps that kernels are compiled
-
-
-@pytest.mark.survey
-def test_a_reader_that_leaves_after_a_line_is_no_error() -> None:
-    """One that leaves before the first is in test_streams."""
-    command = (
-        f"{sys.executable} -c 'from tfarm.cli import main; main()' response sasaki2012 --output hub_rate | head -n 1"
-    )
-    done = subprocess.run(["bash", "-c", f"set -o pipefail; {command}"], capture_output=True, text=True, check=False)
-    assert heard(done.stderr) == ""
 
 
 def test_without_arguments_there_is_help(capsys: pytest.CaptureFixture[str]) -> None:

@@ -100,15 +100,6 @@ def test_a_dash_is_standard_output(verb, option, capfdbinary, tmp_path, monkeypa
     assert (tmp_path / "file").read_bytes() == out
 
 
-def test_a_dash_is_the_standard_output_of_a_shell(capfdbinary, tmp_path):
-    verb, option = DASHED[0]
-    code, out, err = shell(f"cd {tmp_path} && tfarm {verb} {option} -")
-    assert (code, err, list(tmp_path.iterdir())) == (0, "", [])
-    with pytest.raises(SystemExit):
-        main([*verb.split(), option, str(tmp_path / "file")])
-    assert (tmp_path / "file").read_bytes() == out
-
-
 @pytest.mark.parametrize(
     ("words", "why"),
     [

@@ -24,14 +24,15 @@ def test_odd_files_and_options_end_in_one_line():
         (1, "ValueError: x\n", "exit 1"),
         (2, "", "without a word"),
         (2, "tfarm: a\ntfarm: b\n", "2 errors"),
-        (0, "RuntimeWarning: overflow\n", "prints RuntimeWarning"),
+        (0, "RuntimeWarning: overflow\n", "prints ['RuntimeWarning"),
         (None, "", "more than 20 CPU seconds"),
         (0, "tfarm: warning: a\ntfarm: b\n", ""),
     ],
 )
 def test_the_survey_sees_what_is_wrong(code, err, wrong):
-    assert wrong in fuzz.judge(("modes",), code, "", err, 1.0).wrong
-    assert bool(fuzz.judge(("modes",), code, "", err, 1.0).wrong) == bool(wrong)
+    found = fuzz.judge(("modes",), code, "", err, 1.0)
+    assert wrong in found
+    assert bool(found) == bool(wrong)
 
 
 def test_kills_leave_whole_files_and_the_next_run_leaves_nothing_else():

@@ -82,17 +82,6 @@ def test_a_jump_at_a_joint_is_read_on_the_side_of_the_option(stepped, output, ju
     assert outer * felt - inner == pytest.approx(taken, rel=1e-9)
 
 
-def test_a_reduced_model_reads_the_side_of_the_option(stepped, capsys):
-    file, _ = stepped
-    found = {
-        side: answer(capsys, "reduce", file, "--outputs", "moment", "--x", "0.4", "--side", side, "--order", "8")
-        for side in ("outer", "inner")
-    }
-    (inner,), (outer,) = (found[side]["channels"] for side in ("inner", "outer"))
-    assert (inner["output"], outer["output"]) == ("moment_inner", "moment")
-    assert inner["error"] != outer["error"]
-
-
 @pytest.mark.parametrize(
     ("output", "side", "words"), [("root_moment", "inner", "has a fixed place"), ("moment", "left", "outer, inner")]
 )

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.rigs import some_point, some_rig
+from tests.rigs import lossless, rig, some_point, some_rig
 from tests.shared import thinned
-from tests.test_chain_elements import lossless
-from tests.test_transition import rig
 from tests.transition import determinant, response
 from tfarm import Hub
 from tfarm.arm import THEORIES, Motor, RotarySpring

@@ -71,7 +71,7 @@ def response(case, answer, rough, fine):
 def poles(case, answer, rough, fine):
     """Each printed pole is one of the model's, and none of the model's in the box is missing."""
     printed = np.array([complex(*pair) for pair in answer["poles"]])
-    near, far = (RitzLoop(case.beam, ritz.terms).eigenvalues(case.law) for ritz in (fine, rough))
+    near, far = (RitzLoop(case.arm, ritz.terms).eigenvalues(case.law) for ritz in (fine, rough))
     moving = printed[abs(printed) > 1e-7 * case.first]
     own, other = (each[abs(each - moving[:, None]).argmin(axis=1)] for each in (near, far))
     words, known = compared("poles", moving, own, other)
@@ -95,7 +95,7 @@ def margins(case, answer, rough, fine):
             tried += [(replace(case.law, **{name: value}), is_inside) for value, is_inside in values]
     words, known = [], 0
     for law, is_stable in tried:
-        growth = [RitzLoop(case.beam, ritz.terms).rightmost(law) / case.first for ritz in (rough, fine)]
+        growth = [RitzLoop(case.arm, ritz.terms).rightmost(law) / case.first for ritz in (rough, fine)]
         if abs(growth[0] - growth[1]) < 1e-3 * abs(growth[1]) and abs(growth[1]) > CLEAR:
             known += 1
             if is_stable and growth[1] > 0:
@@ -110,11 +110,16 @@ def along(case):
     return ["--output", "tip_displacement", "--s=" + ",".join(f"{p.real!r}{p.imag:+.17g}j" for p in points)]
 
 
+def gains(case):
+    """The law as the command line takes it."""
+    return [f"--{name}={value!r}" for name, value in case.law.by_name.items()]
+
+
 VERBS = {  # what a command is asked, and its judge
     "modes": (lambda case: ["--count", "20"], modes),
     "response": (along, response),
-    "poles": (lambda case: case.law.options, poles),
-    "margins": (lambda case: case.law.options, margins),
+    "poles": (gains, poles),
+    "margins": (gains, margins),
 }
 
 
@@ -131,7 +136,7 @@ def judged(verb, number, seed, terms=(ROUGH, FINE)):
         return Finding("refused", f"{error.strip()} {where}")
     if code or noise:
         return Finding("wrong", f"exit {code}: {' | '.join(noise[-3:])} {where}", is_wrong=True)
-    words, known = judge(case, answer, *(Ritz(case.beam, each) for each in terms))
+    words, known = judge(case, answer, *(Ritz(case.arm, each) for each in terms))
     text = f"{'; '.join(words[:3])} {where}" if words else ""
     return Finding("wrong" if words else "answered", text, bool(words), {"checks": float(known)})
 

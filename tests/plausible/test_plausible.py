@@ -5,7 +5,7 @@ import pytest
 
 from tests.models import Ritz
 from tests.plausible.arms import draw
-from tests.plausible.survey import VERBS, judged, poles, run
+from tests.plausible.survey import VERBS, gains, judged, poles, run
 from tests.shared import thinned
 
 
@@ -19,9 +19,9 @@ def test_plausible_arms_are_answered_and_right(verb, number):
 
 def test_the_survey_sees_a_wrong_digit_and_a_missing_pole(tmp_path):
     case, path = draw(1, 2012), tmp_path / "arm.toml"
-    models = Ritz(case.beam, 24), Ritz(case.beam, 32)
+    models = Ritz(case.arm, 24), Ritz(case.arm, 32)
     path.write_text(case.toml)
-    _, answer, _ = run(["poles", str(path), *case.law.options])
+    _, answer, _ = run(["poles", str(path), *gains(case)])
     assert poles(case, answer, *models)[0] == []
     right = answer["poles"]
     middle = len(right) // 2

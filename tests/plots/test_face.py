@@ -338,16 +338,6 @@ def test_tuned_gain_draws_the_gain_in_its_guard(records):
     assert ("[s]" in ax.get_xlabel(), ax.get_ylabel()[-3:]) == (True, "[−]")
 
 
-def test_several_slews_are_told_apart_by_their_names():
-    runs = {str(K2): tfarm.simulate(LAB, LAW.having("K2", K2), duration=1.5, count=6) for K2 in (0.0, 0.3, 0.6)}
-    moment, *_ = tfarm.plots.slew(LAB, runs, ax=axes_for(3))
-    lines = {line.get_label(): line for line in moment.lines if line.get_label() in runs}
-    assert lines.keys() == runs.keys()
-    assert len({line.get_color() for line in lines.values()}) == 3
-    for name, run in runs.items():
-        assert lines[name].get_ydata().tolist() == run.at_samples.root_moment.tolist()
-
-
 def test_of_more_modes_than_axes_the_first_are_drawn_with_the_digits_of_their_nodes():
     """Of an arm of 5 cm a node lies less than 0.1 mm from the hub."""
     axes, small = axes_for(4), tfarm.modes(tfarm.load(MICRO), count=5)

@@ -10,7 +10,6 @@ from tfarm.dsp.modes import sampled_loci
 from tfarm.loop.locus import locus, rounded
 from tfarm.loop.loop import Loop
 from tfarm.loop.plane import moment_axis, rate_axis
-from tfarm.loop.poles import poles_below
 from tfarm.plots import locus as locus_plot
 from tfarm.plots.regions import sampled_region
 from tfarm.plots.roots import draw_sampled_loci
@@ -67,19 +66,6 @@ def test_no_branch_turns_by_more_than_five_degrees(make, width, corners):
         assert corners is None or sum(count for _, count in turns) == corners
         assert corners == 0 or sum(turn.size for turn, _ in turns) > 5
         assert max(turn.max(initial=0.0) for turn, _ in turns) <= MOST
-
-
-def test_the_values_between_are_poles_too():
-    """Road: the winding number's complete list at each of the values that were added."""
-    found = locus(LAB, default_gains(LAB), "K2", -1.0, 1.6, points=20, branches=3)
-    fine = rounded(found)
-    more = np.nonzero(~np.isin(fine.gain, found.gain))[0]
-    assert np.isin(found.gain, fine.gain).all()
-    assert more.size > 20
-    for n in more[::12]:
-        branch = fine.branches[2, n]
-        poles = poles_below(fine.varied.at(fine.gain[n]), 150.0).values
-        assert abs(poles - branch).min() <= 1e-9 * abs(branch)
 
 
 def test_the_outline_of_a_sampled_region_is_that_of_its_poles():

@@ -7,8 +7,8 @@ import tfarm
 from tfarm.digits import plain
 from tfarm.dsp import load_chain
 from tfarm.plots.frequency import bode as bode_plot
+from tfarm.plots.motion import modes
 from tfarm.plots.regions import draw_overlay, stable_regions
-from tfarm.plots.shapes import modes
 from tfarm.plots.style import save_figure
 from tfarm.response.frequency import bode, resonant_band
 from tfarm.spectrum.table import default_gains

@@ -14,7 +14,7 @@ from tfarm import plots
 from tfarm.arm import Gauge, written_unit
 from tfarm.dsp import Chain
 from tfarm.dsp.crossings import sampled_map
-from tfarm.plots.shapes import sketch
+from tfarm.plots.motion import sketch
 from tfarm.report.arm_section import arm_section, assumptions_section
 from tfarm.report.cases import Case, has_loop, sign_words
 from tfarm.report.modes_section import locked_table

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.rigs import some_rig
+from tests.rigs import lossless, rig, some_rig
 from tests.shared import sized, thinned
 from tests.spectrum.chains import judge
-from tests.test_chain_elements import lossless
-from tests.test_transition import rig
 from tests.transition import response
 from tfarm import Attachment, Hub, Payload, RotarySpring
 from tfarm.exact.outputs import OUTPUTS

@@ -12,7 +12,7 @@ from tests.rigs import some_rig
 from tests.shared import thinned
 from tfarm import Hub, Payload
 from tfarm.arm import Attachment, Motor, RotarySpring
-from tfarm.arm.link import Section
+from tfarm.arm.parts import Section
 
 EPS = np.finfo(float).eps
 COUNT = 4

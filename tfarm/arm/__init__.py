@@ -23,11 +23,9 @@ from tfarm.arm.feedback import (
     written_unit,
 )
 from tfarm.arm.law import AnyLaw, Law, arm_and_law, as_law, cancelled, full_law, must_not_be_algebraic, tracked
-from tfarm.arm.link import Link, Section
-from tfarm.arm.plausible import implausible
-from tfarm.arm.reading import load, presets
+from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, Section
+from tfarm.arm.reading import implausible, load, presets
 from tfarm.arm.records import Arm, must_be_arm, must_turn
-from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring
 from tfarm.arm.writing import to_toml
 
 __all__ = [

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -101,8 +101,7 @@ class Rational:
         num = np.r_[np.zeros(-self.excess), np.array(self.num) / self.den[0]]
         n = self.order
         A, B = np.eye(n, k=-1), np.eye(n, 1)
-        if n:
-            A[0] = -den[1:]
+        A[:1] = -den[1:]
         C = (num[1:] - num[0] * den[1:])[None]
         return balanced(A, B, C, np.array([[num[0]]]))
 
@@ -284,6 +283,4 @@ def _of_roots(name: str, roots: ArrayLike) -> Real:
         [f"{each:g}" for each in found],
         "a complex root without its conjugate: real coefficients need both",
     )
-    pairs = [np.array([1.0, -2 * each.real, abs(each) ** 2]) for each in upper]
-    alone = [np.array([1.0, -each.real]) for each in found[found.imag == 0]]
-    return reduce(np.convolve, [*pairs, *alone], np.ones(1))
+    return np.atleast_1d(np.poly(np.r_[upper, upper.conj(), found[found.imag == 0]]).real)

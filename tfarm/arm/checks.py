@@ -6,9 +6,10 @@ Each check runs once, where a record is built.  `key` is the name in the TOML fi
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from numbers import Integral, Real
-from typing import Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from tfarm.errors import ParameterError, require
 
 SMALLEST_NUMBER = 1e-40  # far outside any arm, yet no product of a few such numbers underflows
 LARGEST_NUMBER = 1e40  # nor overflows
+OUT_OF_RANGE = f"beyond any arm ({SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}); check the unit: m, kg, s, Pa throughout"
 Input = Literal["hub_torque", "motor_voltage", "motor_current", "hub_angle"]
 INPUTS: tuple[Input, ...] = get_args(Input)
 INPUT_UNITS = {"hub_torque": "N m", "motor_voltage": "V", "motor_current": "A", "hub_angle": "rad"}
@@ -30,12 +32,12 @@ DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt")
 
 def number(key: str, value: object, meaning: str) -> float:
     """Return `value` as a float.  Raises ParameterError for a bool, a text or nan."""
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise ParameterError(key=key, value=value, remedy=f"{meaning}; write a plain number, no text or true")
+    is_number = not isinstance(value, bool) and isinstance(value, Real)
+    require(is_number, key, value, f"{meaning}; write a plain number, no text or true")
     try:
-        x = float(value)
+        x = float(cast("float", value))
     except OverflowError:
-        raise _too_far(key, value) from None
+        raise ParameterError(key=key, value=value, remedy=OUT_OF_RANGE) from None
     require(not math.isnan(x), key, value, f"{meaning}; nan is none")
     return x
 
@@ -45,17 +47,16 @@ def whole(key: str, value: object, least: int, most: float, remedy: str) -> int:
 
     Raises ParameterError with the `remedy` for any other value, also for a bool or a text.
     """
-    if isinstance(value, bool) or not isinstance(value, Integral) or not least <= int(value) <= most:
-        raise ParameterError(key=key, value=value, remedy=remedy)
-    return int(value)
+    is_whole = not isinstance(value, bool) and isinstance(value, Integral) and least <= int(value) <= most
+    require(is_whole, key, value, remedy)
+    return int(cast("int", value))
 
 
 def positive(key: str, value: object, meaning: str) -> float:
     """Return a finite number above zero, from 1e-40 to 1e40."""
     x = number(key, value, meaning)
     require(x > 0.0 and not math.isinf(x), key, x, meaning)
-    if not SMALLEST_NUMBER <= x <= LARGEST_NUMBER:
-        raise _too_far(key, x)
+    require(SMALLEST_NUMBER <= x <= LARGEST_NUMBER, key, x, OUT_OF_RANGE)
     return x
 
 
@@ -69,8 +70,7 @@ def signed(key: str, value: object, meaning: str) -> float:
     """Return zero or a finite number of either sign."""
     x = number(key, value, meaning)
     require(not math.isinf(x), key, x, meaning)
-    if x != 0.0 and not SMALLEST_NUMBER <= abs(x) <= LARGEST_NUMBER:
-        raise _too_far(key, x)
+    require(x == 0.0 or SMALLEST_NUMBER <= abs(x) <= LARGEST_NUMBER, key, x, OUT_OF_RANGE)
     return x + 0.0  # -0.0 becomes 0.0
 
 
@@ -94,33 +94,22 @@ def check_fields(record: object, kind: str, check: Callable[[str, object, str], 
         object.__setattr__(record, name, check(key, getattr(record, name), meaning))
 
 
-def _too_far(key: str, value: object) -> ParameterError:
-    remedy = f"beyond any arm ({SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}); check the unit: m, kg, s, Pa throughout"
-    return ParameterError(key=key, value=value, remedy=remedy)
-
-
-def plain_name(name: object) -> str:
+def plain_name(name: Any) -> str:
     """Return a name that is also a legal folder name on every file system."""
     remedy = 'a name has 1 to 80 characters, begins with a letter or digit and has no / \\ : * ? " < > |'
-    if not isinstance(name, str) or not 1 <= len(name) <= 80 or not name.isprintable():
-        raise ParameterError(key="name", value=name, remedy=remedy)
-    require(name[0].isalnum() and name[-1] not in " ." and not set(name) & set('/\\:*?"<>|'), "name", name, remedy)
-    if len(name.encode()) > MOST_NAME_BYTES:
-        raise ParameterError(key="name", value=name, remedy=f"{len(name.encode())} bytes; at most {MOST_NAME_BYTES}")
-    require(
-        name.partition(".")[0].rstrip().casefold() not in DEVICES,
-        "name",
-        name,
-        "is a device to Windows; give the arm another name",
-    )
-    return name
+    is_name = isinstance(name, str) and re.fullmatch(r'[^\W_]([^/\\:*?"<>|]{0,78}[^/\\:*?"<>| .])?', name)
+    require(is_name and name.isprintable(), "name", name, remedy)
+    size = len(name.encode())
+    require(size <= MOST_NAME_BYTES, "name", name, f"{size} bytes; at most {MOST_NAME_BYTES}")
+    is_device = name.partition(".")[0].rstrip().casefold() in DEVICES
+    require(not is_device, "name", name, "is a device to Windows; give the arm another name")
+    return str(name)
 
 
-def plain_texts(assumptions: object) -> tuple[str, ...]:
+def plain_texts(assumptions: Any) -> tuple[str, ...]:
     """Return the assumptions, each with single spaces between its words."""
     remedy = "assumptions are a list of plain texts"
-    if not isinstance(assumptions, list | tuple):
-        raise ParameterError(key="assumptions", value=assumptions, remedy=remedy)
+    require(isinstance(assumptions, list | tuple), "assumptions", assumptions, remedy)
     texts = tuple(" ".join(text.split()) if isinstance(text, str) else text for text in assumptions)
     for text in texts:
         require(isinstance(text, str) and text.isprintable(), "assumptions", text, remedy)

@@ -8,7 +8,6 @@ hub rate and root moment.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -28,6 +27,7 @@ from tfarm.records import record
 MOST_SIGNALS = 12  # of a law, for time and memory
 CANCELLED = 1e-6  # of its size: distance within which a zero cancels an unstable pole
 REFERENCE = "reference:"  # before the name of a signal: its reference
+NUMBER = re.compile(r"(.*?)(?:\.(gain|num|den)(?:\.(\d+))?)?", re.DOTALL)  # signal, what of it, a coefficient's place
 SAMPLING_RULES = ("tustin", "zoh", "matched")  # by which a continuous-time law is discretised
 
 
@@ -71,13 +71,7 @@ class Law:
         parts, periods = (self.parts, ()) if self.parts else _parts_of(self.entries)
         object.__setattr__(self, "parts", parts)
         object.__setattr__(self, "entries", {})
-        check_fields(
-            self,
-            "",
-            not_negative,
-            delay="a delay in s, 0 or more",
-            prewarp="a frequency in rad/s, or 0",
-        )
+        check_fields(self, "", not_negative, delay="a delay in s, 0 or more", prewarp="a frequency in rad/s, or 0")
         known = {float(each) for each in periods}
         if self.period is not None:
             known.add(positive("period", self.period, "a sampling period in s; leave it out for a continuous-time law"))
@@ -85,7 +79,7 @@ class Law:
         object.__setattr__(self, "period", known.pop() if known else None)
         object.__setattr__(self, "references", tuple(self.references))
         require(
-            not isinstance(self.sign, bool) and self.sign in (-1, 1),
+            self.sign in (-1, 1) and self.sign is not True,
             "sign",
             self.sign,
             "-1 (v = -C y, the default) or 1 (v = C y)",
@@ -96,10 +90,8 @@ class Law:
         require(len(self.signals) <= MOST_SIGNALS, "signals", len(self.signals), f"at most {MOST_SIGNALS} signals")
         for each in self.references:
             must_be_known("references", each, self.signals)
-        if self.period is not None and self.is_improper:
-            raise ParameterError(
-                key="num", value=self.name, remedy="a discrete-time law is causal: give num at most the degree of den"
-            )
+        remedy = "a discrete-time law is causal: give num at most the degree of den"
+        require(self.period is None or not self.is_improper, "num", self.name, remedy)
 
     @classmethod
     def of_matrices(cls, A: Any, B: Any, C: Any, D: Any, signals: Sequence[str], **others: Any) -> Law:
@@ -257,18 +249,14 @@ class Law:
 
         Raises ParameterError where a part differentiates.
         """
+        from scipy.linalg import block_diag
+
         columns = self.signals if columns is None else tuple(columns)
-        n, m, start = self.order, len(columns), 0
-        A, B, C, D = np.zeros((n, n)), np.zeros((n, m)), np.zeros((1, n)), np.zeros((1, m))
-        for part in self.parts:
-            a, b, c, d = part.block.matrices()
-            states = slice(start, start + len(a))
-            A[states, states], C[:, states] = a, c
-            for j, name in enumerate(part.signals):
-                if name in columns:
-                    B[states, columns.index(name)] += b[:, j]
-                    D[:, columns.index(name)] += d[:, j]
-            start += len(a)
+        blocks = [part.block.matrices() for part in self.parts]
+        chosen = [np.array([[name == each for each in columns] for name in part.signals], float) for part in self.parts]
+        pairs = list(zip(blocks, chosen, strict=True))
+        A, C = block_diag(*(a for a, *_ in blocks)), np.hstack([c for _, _, c, _ in blocks])
+        B, D = np.vstack([b @ own for (_, b, _, _), own in pairs]), sum(d @ own for (*_, d), own in pairs)
         return A, B, -self.sign * C, -self.sign * D
 
     # ------------------------------------------------------------ other laws
@@ -295,13 +283,10 @@ class Law:
             return replace(self, delay=value)
         if key == "gain":
             return self.times(value)
-        signal, _, rest = key.partition(".")
-        if "@" in key:  # "strain@0.05.num.1": the place has a dot of its own
-            match = re.fullmatch(r"(.*@[0-9.eE+-]*?[0-9])(?:\.((?:num|den|gain).*))?", key)
-            signal, rest = (match[1], match[2] or "") if match else (key, "")
+        signal, of, place = NUMBER.fullmatch(key).groups("")  # type: ignore[union-attr]
         for n, part in enumerate(self.parts):
             if part.signals == (signal,):
-                changed = Part(part.signals, _varied(part.block, rest, value, key))
+                changed = Part(part.signals, _varied(part.block, of, place, value, key))
                 return replace(self, parts=(*self.parts[:n], changed, *self.parts[n + 1 :]))
         known = ["gain", "delay", *(part.signals[0] for part in self.parts if len(part.signals) == 1)]
         raise ParameterError(key="law", value=key, remedy=did_you_mean(key, known))
@@ -312,16 +297,12 @@ def _parts_of(entries: Mapping[str, Any]) -> tuple[tuple[Part, ...], tuple[float
     require(
         isinstance(entries, Mapping) and entries, "law", entries, 'name at least one signal, such as {"hub_rate": 0.3}'
     )
-    found: list[Part] = []
-    periods: list[float] = []
-    for name, entry in entries.items():
-        block, period = block_of(_signal(name), entry)
-        require(
-            block.signals == 1, name, type(entry).__name__, "has several signals: use Law.of_matrices and name them"
-        )
-        found.append(Part((name,), block))
-        periods += [] if period is None else [period]
-    return tuple(found), tuple(periods)
+    blocks = {name: block_of(_signal(name), entry) for name, entry in entries.items()}
+    for name, (block, _) in blocks.items():
+        remedy = "has several signals: use Law.of_matrices and name them"
+        require(block.signals == 1, name, type(entries[name]).__name__, remedy)
+    parts = tuple(Part((name,), block) for name, (block, _) in blocks.items())
+    return parts, tuple(period for _, period in blocks.values() if period is not None)
 
 
 def _signal(name: Any, *, of_reference: bool = False) -> str:
@@ -341,23 +322,15 @@ def is_measured(name: str) -> bool:
     return bool(name) and not name.startswith(REFERENCE)
 
 
-def _varied(block: LawBlock, rest: str, value: float, key: str) -> LawBlock:
-    """Return a block with another factor, or coefficient."""
-    if rest in ("", "gain"):
-        if isinstance(block, Rational) and not block.order and len(block.num) == 1:
-            return Rational((value,))  # a constant gain
-        return block.times(value)
-    polynomial, _, place = rest.partition(".")
-    if isinstance(block, Rational) and polynomial in ("num", "den") and place.isdecimal():
-        numbers = list(getattr(block, polynomial))
-        if int(place) < len(numbers):
-            numbers[int(place)] = value
-            return replace(block, **{polynomial: tuple(numbers)})
-    raise ParameterError(
-        key="law",
-        value=key,
-        remedy="a number of the law is named signal, signal.num.N or signal.den.N with N counted from 0",
-    )
+def _varied(block: LawBlock, of: str, place: str, value: float, key: str) -> LawBlock:
+    """Return a block with another factor, or another coefficient of its numerator or denominator."""
+    if of in ("", "gain") and not place:
+        is_gain = isinstance(block, Rational) and not block.order and len(block.num) == 1
+        return Rational((value,)) if is_gain else block.times(value)
+    numbers, remedy = list(getattr(block, of, ())), "a number of the law is named signal, signal.num.N or signal.den.N"
+    require(place and int(place) < len(numbers), "law", key, f"{remedy} with N counted from 0")
+    numbers[int(place)] = value
+    return replace(block, **{of: tuple(numbers)})  # type: ignore[arg-type]  # of a Rational
 
 
 AnyLaw = HubFeedback | Law
@@ -418,11 +391,8 @@ def cancelled(law: Law) -> tuple[str, ...]:
     for part in law.parts:
         zeros = getattr(part.block, "zeros", np.empty(0, complex))
         for pole in part.block.poles:
-            gap = abs(zeros - pole).min() if zeros.size else math.inf
-            grows = abs(pole) >= 1 if law.is_discrete else pole.real >= 0
-            if grows and gap <= CANCELLED * max(abs(pole), 1e-12):
+            is_cancelled = (abs(zeros - pole) <= CANCELLED * max(abs(pole), 1e-12)).any()
+            if is_cancelled and (abs(pole) >= 1 if law.is_discrete else pole.real >= 0):
                 where = f"z = {pole:.6g}" if law.is_discrete else f"{pole:.6g} 1/s"
-                found.append(
-                    f"the law cancels its own unstable pole {where} on {', '.join(part.signals)}: it is not stable"
-                )
-    return tuple(found)
+                found.append(f"{where} on {', '.join(part.signals)}")
+    return tuple(f"the law cancels its own unstable pole {each}: it is not stable" for each in found)

@@ -85,12 +85,9 @@ def law_of_table(table: Any, folder: Path) -> Law:
     signals = {key: value for key, value in table.items() if isinstance(value, dict)}
     others = {key: value for key, value in table.items() if key not in signals}
     for key, value in others.items():  # hub_angle = 2.0, and no misspelt delay
-        if type(value) in (int, float) and not close_to(key, LawTable.model_fields):
-            raise ParameterError(
-                key=f"{LAW_TABLE}.{key}",
-                value=value,
-                remedy=f"a signal has a table of its own: [{LAW_TABLE}.{key}] with gain = {value:g}",
-            )
+        is_signal = type(value) in (int, float) and not close_to(key, LawTable.model_fields)
+        remedy = f"a signal has a table of its own: [{LAW_TABLE}.{key}] with gain = {value}"
+        require(not is_signal, f"{LAW_TABLE}.{key}", value, remedy)
     head = validated(LawTable, others, LAW_TABLE)
     common = head.model_dump(include={"name", "input", "delay", "period", "sign", "references", "rule", "prewarp"})
     try:
@@ -114,13 +111,12 @@ def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
     """Return the law of a .mat file with A, B, C and D, or of its structure named `system`."""
     import numpy as np
 
-    assert head.matrices is not None
-    if head.signals is None:
-        raise ParameterError(key="signals", value=MISSING, remedy="name a signal for each column of B")
-    found, _ = read_mat(folder / head.matrices, MOST_MAT_BYTES, key="matrices")
+    signals = head.signals or []
+    require(signals, "signals", MISSING, "name a signal for each column of B")
+    found, _ = read_mat(folder / str(head.matrices), MOST_MAT_BYTES, key="matrices")
     holder, names = found, tuple(found)
     if head.system is not None:
-        structs = [key for key, value in found.items() if getattr(getattr(value, "dtype", None), "names", None)]
+        structs = [key for key, value in found.items() if getattr(value, "dtype", np.dtype(float)).names]
         must_be_known("system", head.system, structs)
         holder = found[head.system][0, 0]
         names = holder.dtype.names
@@ -132,6 +128,6 @@ def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
     except (TypeError, ValueError):
         raise ParameterError(key="matrices", value=head.matrices, remedy="A, B, C and D hold numbers") from None
     if head.scales is not None:
-        require(len(head.scales) == len(head.signals), "scales", head.scales, "one number for each signal")
+        require(len(head.scales) == len(signals), "scales", head.scales, "one number for each signal")
         B, D = B * head.scales, D * head.scales
-    return Law.of_matrices(A, B, C, D, head.signals, **common)
+    return Law.of_matrices(A, B, C, D, signals, **common)

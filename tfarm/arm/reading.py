@@ -1,16 +1,22 @@
-"""Arms of presets and TOML files.  The size and nesting of a file are checked before it is parsed."""
+"""Arms of presets and TOML files, and warnings of legal values that may have a wrong unit.
+
+The size and nesting of a file are checked before it is parsed.
+"""
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import tomllib
+from collections.abc import Iterator
 from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from tfarm.arm.parts import Link
 from tfarm.arm.records import Arm
-from tfarm.errors import ParameterError, did_you_mean, naming
+from tfarm.errors import ParameterError, did_you_mean, naming, require, shown
 from tfarm.files import read_file
 
 PRESETS = files("tfarm.arm") / "presets"
@@ -44,17 +50,14 @@ def arm_in(table: dict[str, Any], file: str) -> Arm:
 def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
     """Return the parsed TOML of a preset's name or a path, and the file's name."""
     is_named = not isinstance(name_or_path, os.PathLike)
-    name: object = name_or_path if is_named else os.fspath(name_or_path)
-    if not isinstance(name, str) or not name.strip() or "\0" in name:
-        raise ParameterError(key="arm", value=name, remedy=f"give a preset ({', '.join(presets())}) or a path")
+    name: Any = name_or_path if is_named else os.fspath(name_or_path)
+    is_text = isinstance(name, str) and bool(name.strip()) and "\0" not in name
+    require(is_text, "arm", name, f"give a preset ({', '.join(presets())}) or a path")
     if is_named and name in presets():
         data, name = PRESETS.joinpath(f"{name}.toml").read_bytes(), f"{name}.toml"
     elif is_named and not ({"/", "\\", os.sep} & set(name) or name.endswith(".toml") or os.path.lexists(name)):
-        raise ParameterError(
-            key="arm",
-            value=name,
-            remedy=f"no such preset: {did_you_mean(name, presets())}; or give the path of a .toml file",
-        )
+        remedy = f"no such preset: {did_you_mean(name, presets())}; or give the path of a .toml file"
+        raise ParameterError(key="arm", value=name, remedy=remedy)
     else:
         data = read_file(name, MOST_ARM_BYTES, key="arm", what="a .toml file")
     with naming(name):
@@ -77,20 +80,17 @@ def _table_of(data: bytes) -> dict[str, Any]:
     line, the last one where the error has none.
     """
     text = decoded(data, "is not UTF-8; save the file as UTF-8")
-    lines, depth = text.split("\n"), 0
+    lines, depth, remedy = (
+        text.split("\n"),
+        0,
+        f"more than {MOST_BRACKETS} brackets open; an arm's file needs no nesting",
+    )
     for i, line in enumerate(lines, 1):
         for number, what, most in ((len(line), "characters", LONGEST_LINE), (line.count("."), "dots", MOST_DOTS)):
-            if number > most:
-                raise ParameterError(key=f"line {i}", value=line, remedy=f"{number} {what} in a line; at most {most}")
-    for bracket in re.finditer(r"[\[\]{}]", text):
-        depth = depth + 1 if bracket[0] in "[{" else max(depth - 1, 0)
-        if depth > MOST_BRACKETS:
-            i = text.count("\n", 0, bracket.start()) + 1
-            raise ParameterError(
-                key=f"line {i}",
-                value=lines[i - 1],
-                remedy=f"more than {MOST_BRACKETS} brackets open; an arm's file needs no nesting",
-            )
+            require(number <= most, f"line {i}", line, f"{number} {what} in a line; at most {most}")
+        for bracket in re.findall(r"[\[\]{}]", line):
+            depth = depth + 1 if bracket in "[{" else max(depth - 1, 0)
+            require(depth <= MOST_BRACKETS, f"line {i}", line, remedy)
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -99,6 +99,93 @@ def _table_of(data: bytes) -> dict[str, Any]:
         line = lines[int(at[1]) - 1 if at else -1]
         raise ParameterError(key=where or "TOML", value=line, remedy=f"is not TOML: {what}") from None
     except (ValueError, RecursionError):
-        raise ParameterError(
-            key="TOML", value=text, remedy="an integer of thousands of digits, or brackets nested too deep"
-        ) from None
+        remedy = "an integer of thousands of digits, or brackets nested too deep"
+        raise ParameterError(key="TOML", value=text, remedy=remedy) from None
+
+
+# ------------------------------------------------------------ plausible values
+
+# Each bound is far outside the range of materials and mechanisms.  A wrong unit (GPa for Pa, mm for m, g/cm^3 for
+# kg/m^3, a damping ratio for seconds) changes a value by a factor of 50 or more.
+SOFTEST = 1e5  # Pa; soft silicone has 3e5
+STIFFEST = 2e12  # Pa; diamond has 1.2e12
+LIGHTEST = 25.0  # kg/m^3; light foam has 30, and in g/cm^3 everything is below 25
+DENSEST = 25_000.0  # kg/m^3; osmium has 22,600
+LONGEST_ARM = 100.0  # m; the arm of the space station has 17
+MOST_DAMPED = 0.1  # damping ratio of the clamped link; rubber has about 0.05
+MODULUS = (SOFTEST, "softer than any rubber; its unit is Pa, not in GPa",
+           STIFFEST, "stiffer than diamond; its unit is Pa")  # fmt: skip
+USUAL = {  # of a segment: least and largest value, and the warning below and above
+    "youngs_modulus": MODULUS,
+    "shear_modulus": MODULUS,
+    "density": (LIGHTEST, "lighter than foam; its unit is kg/m^3, not in g/cm^3",
+                DENSEST, "denser than osmium; its unit is kg/m^3"),
+    "length": (0.0, "", LONGEST_ARM, "longer than any arm; its unit is m, not in mm"),
+}  # fmt: skip
+HEAVIEST = 1e5  # times the link's own mass or inertia
+FARTHEST_OFFSET = 10.0  # times the link's length; a hub's radius and a payload's offset are a fraction of it
+YIELDING = 10.0  # times the link's own flexibility L/(3 EI); a usual clamp has a tenth of it
+MOST_FRICTION = 50.0  # times 2 sqrt(3 EI/L J), beyond which the link cannot turn the hub; a harmonic drive reaches 1
+FIRST_CLAMPED = 1.8751040687119611  # first root of 1 + cos(b) cosh(b) = 0, for the clamped Euler-Bernoulli beam
+
+
+def implausible(arm: Arm) -> tuple[str, ...]:
+    """Return a warning for each value that may have a wrong unit: its key in the TOML file, the value, and the reason.
+
+    Empty for a plausible arm.
+    """
+    keys = [f"link.{i}" for i in range(1, len(arm.links) + 1)] if arm.outer else ["link"]
+    segments = [text for key, link in zip(keys, arm.links, strict=True) for text in _segment(key, link, arm.length)]
+    return (*segments, *_parts(arm))
+
+
+def _segment(key: str, link: Link, length: float) -> Iterator[str]:
+    """Yield the warnings of a segment of an arm of that length [m], each beginning with its key in the file.
+
+    They are of material, size, and the damping ratio C w/2 of the clamped arm in its first mode,
+    w = (b/L)^2 sqrt(EI/rhoA).
+    """
+    for name, (least, below, most, above) in USUAL.items():
+        value = getattr(link, name)
+        if not least <= value <= most:
+            yield f"{key}.{name} = {shown(value)}: {below if value < least else above}"
+    sides = link.section.dimensions or (("second_moment", math.sqrt(12) * link.section.radius_of_gyration),)
+    for name, side in sides:
+        if name != "inner_diameter" and side > length:
+            what = "means a depth of" if name == "second_moment" else "is"
+            yield f"{key}.section.{name} {what} {side:.4g} m, above the length of {length:.4g} m: no slender link"
+    ratio = link.damping * (FIRST_CLAMPED / length) ** 2 * math.sqrt(link.EI / link.rhoA) / 2
+    if ratio > MOST_DAMPED:
+        yield (
+            f"{key}.damping = {shown(link.damping)}: a damping ratio of {ratio:.2g} in the first mode "
+            "of the clamped link; its unit is s, as in E (1 + C s)"
+        )
+
+
+def _parts(arm: Arm) -> Iterator[str]:
+    """Yield the warnings of hub, payload, clamp, motor and attachments: values by a ratio to those of the link."""
+    hub, payload, motor, length, mass = arm.hub, arm.payload, arm.motor, arm.length, arm.own_mass
+    beam, bending = mass * length**2 / 3, 3 * arm.bending_scale  # kg m^2, spread evenly from the axis; N m
+    radius = math.sqrt(payload.inertia / payload.mass) if 0.0 < payload.mass < math.inf else 0.0
+    critical = 2 * math.sqrt(bending * arm.total_inertia)
+    rotor = (motor.rotor_inertia, motor.reflected_inertia / beam) if motor else (0.0, 0.0)
+    heavy, far = "{:.1g} times the link's; in kg?", "{:.3g} times the link's length; its unit is m, not mm"
+    limits = (  # key, value, its ratio, the largest ratio, and the warning
+        ("hub.inertia", hub.inertia, hub.inertia / beam, HEAVIEST, "{:.1g} times the link's; in kg m^2?"),
+        ("payload.mass", payload.mass, payload.mass / mass, HEAVIEST, heavy),
+        ("payload.inertia", payload.inertia, radius / length, 1.0,
+         f"a radius of gyration of {radius:.3g} m, above the link's length; in kg m^2?"),
+        ("hub.radius", hub.radius, hub.radius / length, FARTHEST_OFFSET, far),
+        ("payload.offset", abs(payload.offset), abs(payload.offset) / length, FARTHEST_OFFSET, far),
+        ("clamp.stiffness", arm.clamp.stiffness, bending / arm.clamp.stiffness, YIELDING,
+         "a clamp {:.2g} times as flexible as its link; its unit is N m/rad"),
+        ("hub.friction", hub.friction, hub.friction / critical, MOST_FRICTION,
+         "{:.2g} times the critical damping of the first mode; its unit is N m s/rad, on the hub's side of a gear"),
+        ("motor.rotor_inertia", *rotor, HEAVIEST,
+         "through the gear {:.1g} times the link's; its unit is kg m^2, before the gear"),
+        *((f"attachment.{i}.mass", each.mass, each.mass / mass, HEAVIEST, heavy)
+          for i, each in enumerate(arm.attachments, 1)),
+    )  # fmt: skip
+    for key, value, ratio, most, text in limits:
+        if most < ratio < math.inf:
+            yield f"{key} = {shown(value)}: {text.format(ratio)}"

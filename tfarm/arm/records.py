@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from tfarm.arm.checks import (
     INPUT_UNITS,
@@ -19,13 +19,13 @@ from tfarm.arm.checks import (
     plain_name,
     plain_texts,
 )
-from tfarm.arm.link import Link
-from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring, brief_repr
+from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, brief_repr
 from tfarm.errors import ParameterError, must_be_known, require, shown
 
 MOST_PARTS = 64  # segments, and attachments: a check of the chain has 64 equal pieces
 FLATTEST = 1e-3  # arm's length over a segment's radius of gyration: below it the units are wrong
 LENGTH_ROUNDING = 1e-12  # of the length: rounding of a sum of up to 64 decimal lengths
+IDEAL_MOTOR = Motor(resistance=1.0, torque_constant=1.0, back_emf_constant=0.0)  # without inertia, friction and gear
 
 _Part = TypeVar("_Part")
 
@@ -70,18 +70,18 @@ class Arm:
             f"{slenderness:.3g} times the section's radius of gyration is no beam; check the units",
         )
         self._check_places()
-        if self.motor is None and self.input in ("motor_voltage", "motor_current"):
-            raise ParameterError(
-                key="input",
-                value=self.input,
-                remedy="there is no motor; describe it under [motor], or take hub_torque or hub_angle",
-            )
-        if self.motor is not None and math.isinf(self.hub.inertia):
-            raise ParameterError(
-                key="hub.inertia",
-                value=self.hub.inertia,
-                remedy="locks the hub, so the motor has no effect; leave out the motor, or give the hub's own inertia",
-            )
+        require(
+            self.motor is not None or self.input not in ("motor_voltage", "motor_current"),
+            "input",
+            self.input,
+            "there is no motor; describe it under [motor], or take hub_torque or hub_angle",
+        )
+        require(
+            self.motor is None or math.isfinite(self.hub.inertia),
+            "hub.inertia",
+            self.hub.inertia,
+            "locks the hub, so the motor has no effect; leave out the motor, or give the hub's own inertia",
+        )
 
     def __repr__(self) -> str:
         return brief_repr(self, always=4)
@@ -99,12 +99,12 @@ class Arm:
             )
         on_it = tuple(each if each.x <= self.length else replace(each, x=self.length) for each in self.attachments)
         object.__setattr__(self, "attachments", on_it)
-        if math.isinf(self.payload.mass) and abs(self.centre_distance) < 1e-9 * (self.hub.radius + self.length):
-            raise ParameterError(
-                key="payload.offset",
-                value=self.payload.offset,
-                remedy="puts the pinned centre of mass on the axis, which is fixed anyway; give a finite payload.mass",
-            )
+        require(
+            math.isfinite(self.payload.mass) or abs(self.centre_distance) >= 1e-9 * self.reach,
+            "payload.offset",
+            self.payload.offset,
+            "puts the pinned centre of mass on the axis, which is fixed anyway; give a finite payload.mass",
+        )
 
     @property
     def links(self) -> tuple[Link, ...]:
@@ -154,21 +154,13 @@ class Arm:
     @property
     def is_undamped(self) -> bool:
         """Whether nothing dissipates: then every natural frequency is real."""
-        springs, motor = (self.clamp.damping, self.joint.damping), self.motor
-        losses = [self.damping, *springs, self.hub.friction]
-        if motor is not None:
-            losses += [motor.rotor_friction, motor.back_emf_constant * (self.input == "motor_voltage")]
-        return not any(losses)
+        at_hub = (self.hub.friction, self._drive.rotor_friction, self._back_emf)
+        return not any((self.damping, self.clamp.damping, self.joint.damping, *at_hub))
 
     @property
     def is_reactive(self) -> bool:
         """Whether nothing dissipates and no input lags: at s = i w all but odd powers of s is real."""
         return self.is_undamped and not self.input_lags
-
-    @property
-    def has_lyapunov_theorem(self) -> bool:
-        """Whether it is reactive with the gauge at the hub: then a theorem decides on each mode under any law."""
-        return self.is_reactive and self.reads_hub_moment
 
     @property
     def is_uniform(self) -> bool:
@@ -190,10 +182,9 @@ class Arm:
     @property
     def has_massless_hub(self) -> bool:
         """Whether the hub has no inertia, friction or stiffness, and r = 0: then the root moment is -u."""
-        friction = self.hub.friction + (self.motor.rotor_friction if self.motor else 0.0)
-        back_emf = self.motor is not None and self.input == "motor_voltage" and self.motor.back_emf_constant > 0.0
-        elsewhere = self.hub.radius or self.gauge.x  # the gauge measures another moment
-        return not (self.hub_side_inertia or friction or self.hub.stiffness or elsewhere or back_emf)
+        losses = (self.hub.friction, self._drive.rotor_friction, self._back_emf)
+        elsewhere = (self.hub.radius, self.gauge.x)  # the gauge measures another moment
+        return not any((self.hub_side_inertia, self.hub.stiffness, *losses, *elsewhere))
 
     @property
     def bending_scale(self) -> float:
@@ -265,7 +256,7 @@ class Arm:
     @property
     def hub_side_inertia(self) -> float:
         """I_h + N^2 J_m [kg m^2], of hub and rotor."""
-        return self.hub.inertia + (self.motor.reflected_inertia if self.motor else 0.0)
+        return self.hub.inertia + self._drive.reflected_inertia
 
     @property
     def carried_inertia(self) -> float:
@@ -281,15 +272,14 @@ class Arm:
     @property
     def input_per_torque(self) -> float:
         """The input for a torque of 1 N m at the hub: 1, or a motor's current [A] or voltage [V]."""
-        if self.motor is None or self.input not in ("motor_current", "motor_voltage"):
-            return 1.0
-        per_ampere = self.motor.gear_efficiency * self.motor.gear_ratio * self.motor.torque_constant
-        return (self.motor.resistance if self.input == "motor_voltage" else 1.0) / per_ampere
+        motor = self._drive
+        per_ampere = motor.gear_efficiency * motor.gear_ratio * motor.torque_constant
+        return {"motor_current": 1.0 / per_ampere, "motor_voltage": motor.resistance / per_ampere}.get(self.input, 1.0)
 
     @property
     def input_lags(self) -> bool:
         """Whether the input is the voltage of a motor with an inductance."""
-        return self.input == "motor_voltage" and self.motor is not None and self.motor.inductance > 0
+        return self.input == "motor_voltage" and self._drive.inductance > 0
 
     @property
     def loses_at_hub_alone(self) -> bool:
@@ -299,22 +289,28 @@ class Arm:
     @property
     def _turning_friction(self) -> float:
         """b + N^2 b_m [N m s/rad], of hub and rotor at the hub."""
-        return self.hub.friction + (self.motor.gear_ratio**2 * self.motor.rotor_friction if self.motor else 0.0)
+        return self.hub.friction + self._drive.gear_ratio**2 * self._drive.rotor_friction
+
+    @property
+    def _back_emf(self) -> float:
+        """N Ke [V s/rad] where a voltage is the input, else 0."""
+        return self._drive.gear_ratio * self._drive.back_emf_constant * (self.input == "motor_voltage")
+
+    @property
+    def _drive(self) -> Motor:
+        """The motor; without one an ideal one."""
+        return self.motor or IDEAL_MOTOR
 
     @property
     def rate_loss(self) -> float:
         """The input for a rate of 1 rad/s: that for b + N^2 b_m and, of a voltage, N Ke for the back-EMF."""
-        if self.motor is None:
-            return self.hub.friction
-        back_emf = self.motor.gear_ratio * self.motor.back_emf_constant if self.input == "motor_voltage" else 0.0
-        return self.input_per_torque * self._turning_friction + back_emf
+        return self.input_per_torque * self._turning_friction + self._back_emf
 
     @property
     def turned_inertia(self) -> float:
         """J in units of the input [N m s^2, A s^2 or V s^2]; with an inductance plus L_a/R times the friction."""
-        lag = 0.0
-        if self.motor is not None and self.input == "motor_voltage":
-            lag = self.motor.inductance / self.motor.resistance * self._turning_friction
+        motor = self._drive
+        lag = motor.inductance / motor.resistance * self._turning_friction if self.input_lags else 0.0
         return self.input_per_torque * (self.total_inertia + lag)
 
     @property
@@ -345,22 +341,20 @@ class Arm:
         """
         arm = self
         for name, value in numbers.items():
-            room, number = ADJUSTABLE[name]
+            part, number = ADJUSTABLE[name]
+            require(
+                name != "length" or not arm.outer,
+                name,
+                value,
+                f"ambiguous, as there are {len(arm.links)} segments: change their [[link]] tables",
+            )
             if name == "damping" and arm.outer:
-                others = tuple(replace(link, damping=value) for link in arm.outer)
-                arm = replace(arm, link=replace(arm.link, damping=value), outer=others)
-                continue
-            if room == "link" and arm.outer:
-                raise ParameterError(
-                    key=name,
-                    value=value,
-                    remedy=f"ambiguous, as there are {len(arm.links)} segments: change their [[link]] tables",
-                )
+                arm = replace(arm, outer=tuple(replace(link, damping=value) for link in arm.outer))
             if name == "hub_inertia" and value == math.inf:
                 idle = replace(arm.hub, friction=0.0, stiffness=0.0)
                 driven: Input = "hub_angle" if arm.input == "hub_angle" else "hub_torque"
                 arm = replace(arm, hub=idle, motor=None, input=driven)
-            arm = replace(arm, **{room: replace(getattr(arm, room), **{number: value})})
+            arm = replace(arm, **{part: replace(getattr(arm, part), **{number: value})})
         return arm
 
     def under(self, theory: Theory) -> Arm:
@@ -414,9 +408,9 @@ def must_turn(arm: Arm) -> None:
         require(value <= 0.0, key, value, "an arm with a spring to ground has no slew; leave the spring out")
 
 
-def _parts(key: str, parts: object, kind: type[_Part], most: int) -> tuple[_Part, ...]:
+def _parts(key: str, parts: Any, kind: type[_Part], most: int) -> tuple[_Part, ...]:
     """Return a tuple of at most `most` records of one kind.  Raises ParameterError for anything else."""
-    if not isinstance(parts, list | tuple) or not all(isinstance(part, kind) for part in parts):
-        raise ParameterError(key=key, value=parts, remedy=f"give a tuple of {kind.__name__} records")
+    is_list = isinstance(parts, list | tuple) and all(isinstance(part, kind) for part in parts)
+    require(is_list, key, parts, f"give a tuple of {kind.__name__} records")
     require(len(parts) <= most, key, len(parts), f"at most {most}")
     return tuple(parts)

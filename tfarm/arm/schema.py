@@ -7,28 +7,31 @@ Label, unit and meaning of every key are in `keys.toml` and read by `file_key`.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from inspect import Parameter, signature
-from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_type_hints
+from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
-from pydantic_core import ErrorDetails
 
-from tfarm.arm.checks import INPUTS, THEORIES
-from tfarm.arm.link import Link, Section
+from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, Section
 from tfarm.arm.records import MOST_PARTS, Arm
-from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring
-from tfarm.errors import MISSING, ParameterError, did_you_mean, require
+from tfarm.errors import MISSING, ParameterError, did_you_mean, must_be_known, require
 from tfarm.schema import Quantity
 
 _Strict = TypeVar("_Strict", bound="StrictTable")
 _Table = TypeVar("_Table", bound="TomlTable")
-_Part = TypeVar("_Part")
 LOOP_TABLES = ("sampling", "converters", "actuator", "slew", "law")  # of the loop: read by other rooms
 OF_INPUT = "N m, V or A"  # unit of a limit of the input
+LINKS = "a table, headed [link], or [[link]] for each of several"
+EXPECTED: dict[Any, str] = {
+    float: "a number without quotes, in SI units",
+    str: "a text in double quotes",
+    list[str]: "a list of texts in double quotes",
+    dict[str, Any]: "a table, headed [link.section]",
+}
 AT_THE_TOP = ("name", "assumptions", "theory", "input")  # keys before the first table
 
 
@@ -53,25 +56,26 @@ class TomlTable(StrictTable):
         return type(self).makes(**{name: value for name, value in self.given().items() if name in self.parameters})
 
 
-def validated(model: type[_Strict], table: object, place: str) -> _Strict:
-    """Return the table headed [place] of a file.
+def validated(model: type[_Strict], table: Any, place: str) -> _Strict:
+    """Return the table headed [place] of a file, "" for its top.
 
     Raises ParameterError for anything but a table and for one wrong key, an unknown one before a missing one.
     """
-    if not isinstance(table, dict):
-        raise ParameterError(key=place, value=table, remedy=f"give a table, headed [{place}]")
+    require(isinstance(table, dict), place, table, f"wrong type; give a table, headed [{place}]")
     try:
         return model.model_validate(table)
     except ValidationError as error:
         problem = min(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
-    word, value = str(problem["loc"][0]), problem["input"]
-    if problem["type"] == "extra_forbidden":
-        remedy = f"unknown key; {did_you_mean(word, model.model_fields)}"
-    elif problem["type"] == "missing":
-        value, remedy = MISSING, f"[{place}] needs it"
+    word, value, known = str(problem["loc"][0]), problem["input"], model.model_fields
+    if word not in known:
+        is_of_top = place and word in AT_THE_TOP
+        remedy = f"unknown key; {f'{word} belongs at the top of the file' if is_of_top else did_you_mean(word, known)}"
     else:
-        remedy = f"wrong value; {problem['msg'][:1].lower()}{problem['msg'][1:]}"
-    raise ParameterError(key=f"{place}.{word}", value=value, remedy=remedy)
+        expected = f"a table, headed [{word}]" if word in ARM_TABLES else EXPECTED.get(known[word].annotation)
+        remedy = f"give {expected}" if expected else f"{problem['msg'][:1].lower()}{problem['msg'][1:]}"
+        is_missing = problem["type"] == "missing"
+        value, remedy = (MISSING, remedy) if is_missing else (value, f"wrong type; {remedy}")
+    raise ParameterError(key=".".join(filter(None, (place, *map(str, problem["loc"])))), value=value, remedy=remedy)
 
 
 def of(makes: Callable[..., Any]) -> Callable[[type[_Table]], type[_Table]]:
@@ -94,32 +98,10 @@ def of(makes: Callable[..., Any]) -> Callable[[type[_Table]], type[_Table]]:
     return with_keys
 
 
-@of(Section.rectangle)
-class Rectangle(TomlTable):
-    """[link.section] with shape = "rectangle"."""
+class SectionTable(TomlTable):
+    """[link.section]: its shape, and the numbers of that."""
 
-    shape: Literal["rectangle"]
-
-
-@of(Section.round)
-class Round(TomlTable):
-    """[link.section] with shape = "round"."""
-
-    shape: Literal["round"]
-
-
-@of(Section.tube)
-class Tube(TomlTable):
-    """[link.section] with shape = "tube"."""
-
-    shape: Literal["tube"]
-
-
-@of(Section.general)
-class General(TomlTable):
-    """[link.section] with shape = "general"."""
-
-    shape: Literal["general"]
+    shape: str
 
 
 @of(Link)
@@ -128,86 +110,72 @@ class LinkTable(TomlTable):
 
     shear_modulus: float | None = None
     poissons_ratio: float | None = None
-    section: Annotated[Rectangle | Round | Tube | General, Field(discriminator="shape")]
+    section: dict[str, Any]
 
     def build(self) -> Link:
-        given = {**self.given(), "section": self.section.build()}
-        nu = self.poissons_ratio
-        require(
-            self.shear_modulus is not None or nu is not None,
-            "link.shear_modulus",
-            MISSING,
-            "give it in Pa, or give poissons_ratio",
-        )
+        nu, shape = self.poissons_ratio, self.section.get("shape", MISSING)
+        key, remedy = "link.section.shape", f"give one of {', '.join(SHAPE_TABLES)}"
+        require(shape is not MISSING, key, shape, remedy)
+        must_be_known(key, shape, list(SHAPE_TABLES))
+        section = validated(SHAPE_TABLES[shape], self.section, "link.section").build()
+        remedy = "give it in Pa, or give poissons_ratio"
+        require(self.shear_modulus is not None or nu is not None, "link.shear_modulus", MISSING, remedy)
         remedy = "shear_modulus is given too, and one follows from the other; leave one out"
         require(self.shear_modulus is None or nu is None, "link.poissons_ratio", nu, remedy)
-        return Link(**given) if nu is None else Link.isotropic(**given)
+        return (Link if nu is None else Link.isotropic)(**{**self.given(), "section": section})
 
 
-@of(Hub)
-class HubTable(TomlTable):
-    """[hub]."""
-
-
-@of(RotarySpring)
-class SpringTable(TomlTable):
-    """[clamp] and [joint], optional."""
-
-
-@of(Motor)
-class MotorTable(TomlTable):
-    """[motor], optional."""
-
-
-@of(Attachment)
-class AttachmentTable(TomlTable):
-    """One [[attachment]]."""
-
-
-@of(Gauge)
-class GaugeTable(TomlTable):
-    """[gauge], optional."""
-
-
-@of(Payload)
-class PayloadTable(TomlTable):
-    """[payload], optional."""
-
-
-class ArmTable(TomlTable):
-    """The whole file, its [link] as a list of one."""
+class ArmTable(StrictTable):
+    """The whole file; its tables are read one by one."""
 
     name: str
     assumptions: list[str] = Field([])
     theory: str = "timoshenko"
     input: str = "hub_torque"
-    link: Annotated[list[LinkTable], Field(min_length=1, max_length=MOST_PARTS)]
-    hub: HubTable
-    clamp: SpringTable = SpringTable()
-    joint: SpringTable = SpringTable()
-    motor: MotorTable | None = None
-    attachment: Annotated[list[AttachmentTable], Field(max_length=MOST_PARTS)] = Field([])
-    gauge: GaugeTable = GaugeTable()
-    payload: PayloadTable = PayloadTable()
+    link: Any
+    hub: Any
+    clamp: Any = None
+    joint: Any = None
+    motor: Any = None
+    attachment: Any = Field([])
+    gauge: Any = None
+    payload: Any = None
 
-    def build(self) -> Arm:
-        alone = len(self.link) == 1
-        link, *outer = (_within("link" if alone else f"link.{i}", table.build) for i, table in enumerate(self.link, 1))
-        attachments = (_within(f"attachment.{i}", table.build) for i, table in enumerate(self.attachment, 1))
-        texts: dict[str, Any] = self.model_dump(include={"name", "theory", "input"})  # checked by the record
-        return Arm(
-            **texts,
-            assumptions=tuple(self.assumptions),
-            link=link,
-            outer=tuple(outer),
-            hub=self.hub.build(),
-            clamp=_within("clamp", self.clamp.build),
-            joint=_within("joint", self.joint.build),
-            motor=None if self.motor is None else self.motor.build(),
-            attachments=tuple(attachments),
-            gauge=self.gauge.build(),
-            payload=self.payload.build(),
-        )
+
+SHAPE_TABLES: dict[str, type[TomlTable]] = {
+    shape: of(getattr(Section, shape))(SectionTable) for shape in ("rectangle", "round", "tube", "general")
+}
+PARTS = {"hub": Hub, "clamp": RotarySpring, "joint": RotarySpring, "motor": Motor, "gauge": Gauge, "payload": Payload}
+PART_TABLES: dict[str, type[TomlTable]] = {
+    "link": LinkTable,
+    "attachment": of(Attachment)(TomlTable),
+    **{name: of(makes)(TomlTable) for name, makes in PARTS.items()},
+}
+ARM_TABLES: dict[str, type[StrictTable]] = {"": ArmTable, **PART_TABLES}
+
+
+def arm_of_table(table: dict[str, Any]) -> Arm:
+    """Return the arm of a parsed TOML table.  Raises ParameterError for the first problem."""
+    head = validated(ArmTable, {key: value for key, value in table.items() if key not in LOOP_TABLES}, "")
+    own = head.model_dump(exclude_unset=True)
+    links = [head.link] if isinstance(head.link, dict) else head.link
+    link, *outer = _built("link", links, LINKS) or [None]
+    require(link, "link", MISSING, f"give {LINKS}")
+    return Arm(
+        **{name: value for name, value in own.items() if name in AT_THE_TOP},
+        link=link,
+        outer=tuple(outer),
+        attachments=tuple(_built("attachment", head.attachment, "a table for each, headed [[attachment]]")),
+        **{name: _within(name, name, own[name]) for name in PARTS if name in own},
+    )
+
+
+def _built(name: str, tables: Any, wanted: str) -> list[Any]:
+    """Return the records of a list of tables, which have a number in messages; a single link has none."""
+    require(isinstance(tables, list), name, tables, f"wrong type; give {wanted}")
+    require(len(tables) <= MOST_PARTS, name, len(tables), f"at most {MOST_PARTS}")
+    alone = name == "link" and len(tables) == 1
+    return [_within(name, name if alone else f"{name}.{i}", table) for i, table in enumerate(tables, 1)]
 
 
 @cache
@@ -228,89 +196,10 @@ def file_key(key: str, arm: Arm | None = None) -> Quantity:
     return replace(found, unit=arm.input_unit) if arm is not None and found.unit == OF_INPUT else found
 
 
-def _within(place: str, build: Callable[[], _Part]) -> _Part:
-    """Return `build()`; the key of a ParameterError begins with the table's place in the file."""
+def _within(name: str, place: str, table: Any) -> Any:
+    """Return the record of a table; the key of a ParameterError begins with its place in the file."""
     try:
-        return build()
+        return validated(PART_TABLES[name], table, name).build()
     except ParameterError as error:
         key = ".".join((place, *error.key.split(".")[1:]))
         raise ParameterError(key=key, value=error.value, remedy=error.remedy) from None
-
-
-SHAPE_TABLES: dict[str, type[TomlTable]] = {"rectangle": Rectangle, "round": Round, "tube": Tube, "general": General}
-ARM_TABLES: dict[str, type[TomlTable]] = {
-    "": ArmTable,
-    "link": LinkTable,
-    "hub": HubTable,
-    "clamp": SpringTable,
-    "joint": SpringTable,
-    "motor": MotorTable,
-    "attachment": AttachmentTable,
-    "gauge": GaugeTable,
-    "payload": PayloadTable,
-}
-
-
-def arm_of_table(table: dict[str, Any]) -> Arm:
-    """Return the arm of a parsed TOML table.  Raises ParameterError for the first problem."""
-    own = {key: value for key, value in table.items() if key not in LOOP_TABLES}
-    if isinstance(own.get("link"), dict):
-        own["link"] = [own["link"]]
-    try:
-        return ArmTable.model_validate(own).build()
-    except ValidationError as error:
-        links = own.get("link")
-        alone = not isinstance(links, list) or len(links) < 2
-        raise _in_one_line(error.errors(include_url=False), alone) from None
-
-
-def _in_one_line(problems: Sequence[ErrorDetails], alone: bool) -> ParameterError:
-    """Return the error of the first problem, an unknown key before a missing one.
-
-    `alone` is whether there is one link, which has no number.
-    """
-    problem = min(problems, key=lambda problem: problem["type"] != "extra_forbidden")
-    place, kind = problem["loc"], problem["type"]
-    numbered = len(place) > 1 and (place[0] == "attachment" or (place[0] == "link" and not alone))
-    words = (place[0], *([int(place[1]) + 1] if numbered else []), *_without_shape(place)[1:])  # counted from 1
-    key, value = ".".join(map(str, words if place[0] in ("link", "attachment") else place)), problem["input"]
-    if kind in ("missing", "too_short"):
-        return ParameterError(key=key, value=MISSING, remedy=f"give {_expected(place)}")
-    if kind == "union_tag_not_found":
-        return ParameterError(key=f"{key}.shape", value=MISSING, remedy=f"give one of {', '.join(SHAPE_TABLES)}")
-    if kind == "extra_forbidden":
-        word, names = str(place[-1]), [name for name in place[:-1] if isinstance(name, str)]
-        table = SHAPE_TABLES[names[2]] if names[:2] == ["link", "section"] else ARM_TABLES[names[0] if names else ""]
-        meant = did_you_mean(word, table.model_fields)
-        if names and word in AT_THE_TOP:
-            meant = f"{word} belongs at the top of the file, before its first table"
-        return ParameterError(key=key, value=value, remedy=f"unknown key; {meant}")
-    if kind == "union_tag_invalid":
-        shape = str(problem["ctx"]["tag"])
-        remedy = f"unknown shape; {did_you_mean(shape, SHAPE_TABLES)}"
-        return ParameterError(key=f"{key}.shape", value=shape, remedy=remedy)
-    if kind == "too_long":
-        return ParameterError(key=key, value=problem["ctx"]["actual_length"], remedy=f"at most {MOST_PARTS}")
-    return ParameterError(key=key, value=value, remedy=f"wrong type; give {_expected(place)}")
-
-
-def _without_shape(place: Sequence[str | int]) -> tuple[str, ...]:
-    """Return the names of a pydantic location, without list numbers and without the shape between section and key."""
-    names = tuple(name for name in place if isinstance(name, str))
-    return names[:2] + names[3:] if names[:2] == ("link", "section") else names
-
-
-def _expected(place: Sequence[str | int]) -> str:
-    """Return the expected value of a key in words."""
-    key = ".".join(_without_shape(place))
-    known = {
-        "name": 'a text such as name = "my-arm"',
-        "assumptions": "a text in double quotes" if place[1:] else 'a list of texts such as ["density from a table"]',
-        "theory": f"one of {', '.join(THEORIES)}, in double quotes",
-        "input": f"one of {', '.join(INPUTS)}, in double quotes",
-        "link.section.shape": f"one of {', '.join(SHAPE_TABLES)}",
-        "link": "a table, headed [link], or [[link]] for each of several",
-        "attachment": "a table for each, headed [[attachment]]",
-        **dict.fromkeys(("hub", "clamp", "joint", "motor", "payload", "link.section"), f"a table, headed [{key}]"),
-    }
-    return known.get(key, "a number without quotes, in SI units")

@@ -6,7 +6,6 @@ The numbers of an arm have keys, those of its TOML file, such as "link.2.section
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
@@ -14,11 +13,10 @@ from typing import Any
 
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Law, Part
-from tfarm.arm.link import Link
-from tfarm.arm.records import Arm
-from tfarm.arm.rig import differing
-from tfarm.arm.schema import ARM_TABLES, arm_of_table
-from tfarm.errors import ParameterError, must_be_known
+from tfarm.arm.parts import Link, differing
+from tfarm.arm.records import MOST_PARTS, Arm
+from tfarm.arm.schema import arm_of_table
+from tfarm.errors import ParameterError, must_be_known, require
 from tfarm.files import write_file
 
 LAW_DEFAULTS: dict[str, Any] = {  # of the keys of [law]
@@ -26,55 +24,49 @@ LAW_DEFAULTS: dict[str, Any] = {  # of the keys of [law]
 }  # fmt: skip
 
 
+LINK_NUMBERS = ("length", "density", "youngs_modulus", "shear_modulus", "damping", "poissons_ratio")
+
+
 def to_toml(arm: Arm) -> str:
     """Return the arm as a TOML file; equal arms have equal texts.
 
     The numbers of the paper's arm are always there, others only where they differ from their defaults.
     """
-    named = {"theory": arm.theory, "input": arm.input}
-    defaults = {"theory": "timoshenko", "input": None if arm.motor else "hub_torque"}  # required with a motor
-    springs = {"clamp": arm.clamp, "joint": arm.joint}
-    motor = {} if arm.motor is None else differing(arm.motor, always=2)
-    if arm.motor is not None and arm.motor.back_emf_constant == arm.motor.torque_constant:  # its default
-        del motor["back_emf_constant"]
-    tables = [
-        [
-            f"name = {_text(arm.name)}",
-            "assumptions = [",
-            *(f"    {_text(assumption)}," for assumption in arm.assumptions),
-            "]",
-            *(f"{key} = {_text(value)}" for key, value in named.items() if value != defaults[key]),
-        ],
-        *(table for link in arm.links for table in _link(link, "[[link]]" if arm.outer else "[link]")),
-        ["[hub]", *_lines(differing(arm.hub, always=1))],
-        *([f"[{key}]", *_lines(differing(spring, always=0))] for key, spring in springs.items() if not spring.is_rigid),
-        *([["[motor]", *_lines(motor)]] if motor else []),
-        *(["[[attachment]]", *_lines(differing(each, always=1))] for each in arm.attachments),
-        *([["[gauge]", f"x = {arm.gauge.x!r}", f"side = {_text(arm.gauge.side)}"]] if arm.gauge.x else []),
-        ["[payload]", *_lines(differing(arm.payload, always=2))],
-    ]
-    return "\n\n".join("\n".join(table) for table in tables) + "\n"
+    return _text(_tables(arm_table(arm)))
 
 
-def _lines(numbers: Mapping[str, float]) -> Iterable[str]:
-    """Return lines of a table; the repr of a float, inf too, is valid TOML."""
-    return (f"{name} = {value!r}" for name, value in numbers.items())
+def arm_table(arm: Arm) -> dict[str, Any]:
+    """Return the tables of the arm's file, as `arm_of_table` reads them."""
+    links, motor = [_link_table(link) for link in arm.links], arm.motor
+    tables = {
+        "name": arm.name,
+        "assumptions": list(arm.assumptions),
+        "theory": None if arm.theory == "timoshenko" else arm.theory,
+        "input": None if arm.input == "hub_torque" and motor is None else arm.input,  # required with a motor
+        "link": links if arm.outer else links[0],
+        "hub": differing(arm.hub, always=1),
+        "clamp": differing(arm.clamp, always=0) or None,
+        "joint": differing(arm.joint, always=0) or None,
+        "motor": motor
+        and {
+            key: value
+            for key, value in differing(motor, always=2).items()
+            if key != "back_emf_constant" or value != motor.torque_constant  # its default
+        },
+        "attachment": [differing(each, always=1) for each in arm.attachments] or None,
+        "gauge": {"x": arm.gauge.x, "side": arm.gauge.side} if arm.gauge.x else None,
+        "payload": differing(arm.payload, always=2),
+    }
+    return {key: value for key, value in tables.items() if value is not None}
 
 
-def _link(link: Link, heading: str) -> Iterable[list[str]]:
-    """Yield the tables of a link and of its section, that with its dimensions or else its area and second moment."""
-    names = ("length", "density", "youngs_modulus", "shear_modulus", "damping")
-    yield [heading, *_lines({name: getattr(link, name) for name in names})]
+def _link_table(link: Link) -> dict[str, Any]:
+    """Return the table of a link, in it that of its section: its dimensions, or else its area and second moment."""
     section = link.section
     numbers = dict(section.dimensions) or {"area": section.area, "second_moment": section.second_moment}
-    if section.shear_factor is not None:
-        numbers["shear_factor"] = section.shear_factor
-    yield ["[link.section]", f"shape = {_text(section.shape)}", *_lines(numbers)]
-
-
-def _text(text: str) -> str:
-    """Return a TOML basic string, with the escapes of JSON."""
-    return json.dumps(text, ensure_ascii=False)
+    factor = {} if section.shear_factor is None else {"shear_factor": section.shear_factor}
+    own = {name: getattr(link, name) for name in LINK_NUMBERS if name != "poissons_ratio"}
+    return {**own, "section": {"shape": section.shape, **numbers, **factor}}
 
 
 def law_toml(law: Law) -> str:
@@ -82,14 +74,11 @@ def law_toml(law: Law) -> str:
 
     Raises ParameterError for a law with a state space, whose form is a .mat file, and for two blocks on one signal.
     """
-    head = [f"name = {_text(law.name)}"]
-    keys = ((key, getattr(law, key), usual) for key, usual in LAW_DEFAULTS.items())
-    head += [f"{key} = {_value(value)}" for key, value, usual in keys if value != usual]
     names = [name for part in law.parts for name in part.signals]
-    if len(set(names)) < len(names):
-        raise ParameterError(key="law", value=law.name, remedy="two blocks on one signal: add them up first")
-    tables = [["[law]", *head], *(list(_signal(part)) for part in law.parts)]
-    return "\n\n".join("\n".join(table) for table in tables) + "\n"
+    require(len(set(names)) == len(names), "law", law.name, "two blocks on one signal: add them up first")
+    own = {key: getattr(law, key) for key, usual in LAW_DEFAULTS.items() if getattr(law, key) != usual}
+    signals = {part.signals[0]: _signal_table(part) for part in law.parts}
+    return _text(_tables({"name": law.name, **own, **signals}, "law"))
 
 
 def save_law(law: Law, path: Path) -> None:
@@ -97,28 +86,40 @@ def save_law(law: Law, path: Path) -> None:
     write_file(path, law_toml(law).encode(), key="--save")
 
 
-def _signal(part: Part) -> Iterable[str]:
-    """Yield the lines of the table of one signal; a name with a place is quoted."""
-    block, name = part.block, part.signals[0]
+def _signal_table(part: Part) -> dict[str, Any]:
+    """Return the table of one signal."""
+    block = part.block
     if not isinstance(block, Rational) or len(part.signals) > 1:
-        raise ParameterError(
-            key="law",
-            value=name,
-            remedy="save a state space as a .mat file: scipy.io.savemat(file, {'A': ..}), matrices = file in [law]",
-        )
-    yield f"[law.{json.dumps(name) if '@' in name else name}]"
-    if len(block.num) == len(block.den) == 1 and block.den[0] == 1.0:
-        yield f"gain = {block.num[0]!r}"
-    else:
-        yield f"num = {_value(block.num)}"
-        yield f"den = {_value(block.den)}"
+        remedy = "save a state space as a .mat file: scipy.io.savemat(file, {'A': ..}), matrices = file in [law]"
+        raise ParameterError(key="law", value=part.signals[0], remedy=remedy)
+    is_gain = len(block.num) == 1 and block.den == (1.0,)
+    return {"gain": block.num[0]} if is_gain else {"num": block.num, "den": block.den}
+
+
+def _text(tables: Iterable[list[str]]) -> str:
+    """Return the lines of tables, with an empty one between two."""
+    return "\n\n".join("\n".join(table) for table in tables) + "\n"
+
+
+def _tables(table: Mapping[str, Any], place: str = "", heading: str = "[{}]") -> Iterator[list[str]]:
+    """Yield the lines of a table with its heading, then those of the tables in it."""
+    lists = {key: value if isinstance(value, list) else [value] for key, value in table.items()}
+    inner = {key: each for key, each in lists.items() if each and isinstance(each[0], dict)}
+    head = [heading.format(place)] if place else []
+    yield [*head, *(f"{key} = {_value(value)}" for key, value in table.items() if key not in inner)]
+    for key, tables in inner.items():
+        where = ".".join(filter(None, (place, json.dumps(key) if "@" in key else key)))
+        for each in tables:
+            yield from _tables(each, where, "[[{}]]" if tables is table[key] else "[{}]")
 
 
 def _value(value: Any) -> str:
-    """Return a TOML value; the repr of a float is valid TOML."""
-    if isinstance(value, tuple):
-        return f"[{', '.join(map(_value, value))}]"
-    return json.dumps(value) if isinstance(value, str) else repr(value)
+    """Return a TOML value, a list with a line an entry; the repr of a float, inf too, is valid TOML."""
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, list):
+        return "\n".join(["[", *(f"    {_value(each)}," for each in value), "]"])
+    return f"[{', '.join(map(_value, value))}]" if isinstance(value, tuple) else repr(value)
 
 
 class KeyedArms:
@@ -130,12 +131,10 @@ class KeyedArms:
 
     def __init__(self, arm: Arm, keys: Sequence[str], what: str = "free") -> None:
         self.arm, self.keys = arm, tuple(keys)
-        self._table = tomllib.loads(to_toml(arm))
-        known = list(_known(self._table))
+        self._table, self._numbers = arm_table(arm), _numbers(arm)
         for key in keys:
-            must_be_known(what, key, known)
-        if repeated := {key for key in keys if keys.count(key) > 1}:
-            raise ParameterError(key=what, value=min(repeated), remedy="is named twice; once is enough")
+            must_be_known(what, key, self._numbers)
+            require(keys.count(key) == 1, what, key, "is named twice; once is enough")
 
     def at(self, values: Mapping[str, float]) -> Arm:
         """Return the arm with other values of numbers.  Raises ParameterError for an illegal value."""
@@ -152,29 +151,20 @@ class KeyedArms:
 
     def value(self, key: str) -> float:
         """Return a number of the arm, from its file or its default."""
-        place, name = _table_of(self._table, key)
-        if name == "poissons_ratio":
-            return float(place["youngs_modulus"] / (2 * place["shear_modulus"]) - 1)
-        if name in place:
-            return float(place[name])
-        if name == "back_emf_constant":
-            return float(place["torque_constant"])
-        words = key.split(".")
-        return float(ARM_TABLES[words[0]].model_fields[words[-1]].default)
+        return self._numbers[key]
 
 
-def _known(table: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the keys of all numbers of an arm's file, also of those at their defaults."""
-    alone = isinstance(table["link"], dict)
-    links = [table["link"]] if alone else table["link"]
-    for number, link in enumerate(links, start=1):
-        place = "link" if alone else f"link.{number}"
-        yield from (f"{place}.{name}" for name in ARM_TABLES["link"].model_fields if name != "section")
-        yield from (f"{place}.section.{name}" for name, value in link["section"].items() if not isinstance(value, str))
-    for number in range(1, 1 + len(table.get("attachment", ()))):
-        yield from (f"attachment.{number}.{name}" for name in ARM_TABLES["attachment"].model_fields)
-    for room in ("hub", "clamp", "joint", "payload", *(["motor"] if "motor" in table else [])):
-        yield from (f"{room}.{name}" for name in ARM_TABLES[room].model_fields)
+def _numbers(arm: Arm) -> dict[str, float]:
+    """Return all numbers of an arm by their keys, also those at their defaults."""
+    links = {f"link.{n}" if arm.outer else "link": link for n, link in enumerate(arm.links, 1)}
+    found = {f"{place}.{name}": getattr(link, name) for place, link in links.items() for name in LINK_NUMBERS}
+    sections = {f"{place}.section": _link_table(link)["section"] for place, link in links.items()}
+    names = ("hub", "clamp", "joint", "payload", *(["motor"] if arm.motor else []))
+    parts = {f"attachment.{n}": each for n, each in enumerate(arm.attachments, 1)}
+    parts |= {name: getattr(arm, name) for name in names}
+    tables = sections | {place: differing(part, always=MOST_PARTS) for place, part in parts.items()}
+    return found | {f"{place}.{name}": value for place, table in tables.items() for name, value in table.items()
+                    if name != "shape"}  # fmt: skip
 
 
 def _table_of(table: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:

@@ -18,8 +18,8 @@ from tfarm.crossing import Window
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.crossings import circle_grid, stable_factors
-from tfarm.dsp.verdict import Analysis, SampledBrief, brief_of, sampled_verdict
-from tfarm.errors import ConvergenceError, ParameterError, one_line
+from tfarm.dsp.verdict import Analysis, SampledBrief, Verdict, brief_of, sampled_verdict
+from tfarm.errors import ConvergenceError, one_line, require
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import Margins, dense
 from tfarm.loop.margins import margins as margins_of
@@ -353,12 +353,10 @@ def compare(
     pairs = _pairs(arms, laws)
     modes = whole("modes", modes, 1, MOST_COMPARED, f"a whole number from 1 to {MOST_COMPARED}")
     called = tuple(one_line(name, LONGEST_SIDE_NAME) for name in names) or _names(pairs)
-    if len(called) != 2:
-        raise ParameterError(key="names", value=list(called), remedy="two names")
+    require(len(called) == 2, "names", list(called), "two names")
     (first, _), (second, _) = pairs
-    if first.input_unit != second.input_unit:
-        remedy = f"gains of {called[0]} are in another unit, its input being {first.input}: give both one input"
-        raise ParameterError(key="input", value=second.input, remedy=remedy)
+    remedy = f"gains of {called[0]} are in another unit, its input being {first.input}: give both one input"
+    require(first.input_unit == second.input_unit, "input", second.input, remedy)
     is_sampled, chain = any(as_law(law).is_discrete for _, law in pairs), chain_or_usual(chain)
     one, other = (_side(name, *pair, modes, chain, is_sampled) for name, pair in zip(called, pairs, strict=True))
     return Comparison(one, other, output)
@@ -370,11 +368,11 @@ def _pairs(arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None) ->
     for arm in given:
         must_be_arm(arm)
     some: list[Any] = [] if laws is None else list(laws) if isinstance(laws, list | tuple) else [laws]
-    if not (1 <= len(given) <= 2 and len(some) <= 2 and max(len(given), len(some)) == 2):
-        counts = f"{len(given)} arms, {len(some)} laws"
-        raise ParameterError(key="compare", value=counts, remedy="give two arms, or one arm and two laws")
-    pair = given if len(given) == 2 else given * 2
-    each = [default_gains(arm) for arm in pair] if not some else some if len(some) == 2 else some * 2
+    is_two = 1 <= len(given) <= 2 and len(some) <= 2 and max(len(given), len(some)) == 2
+    counts = f"{len(given)} arms, {len(some)} laws"
+    require(is_two, "compare", counts, "give two arms, or one arm and two laws")
+    pair = given * (2 // len(given))
+    each = some * (2 // len(some)) if some else [default_gains(arm) for arm in pair]
     return [arm_and_law(arm, law) for arm, law in zip(pair, each, strict=True)]
 
 
@@ -393,19 +391,16 @@ def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_sampled
     """All that is compared of one arm under its law; a sampled verdict that cannot be settled is left open."""
     most = count + POLES_BEYOND_MODES
     rows, open_loop = _modes_of_arm(arm, count, most)
-    try:
-        verdict = sampled_verdict(arm, as_law(law) if is_sampled else law, chain)
-        sampled = brief_of(verdict, law, chain)
-    except ConvergenceError as error:
-        if is_sampled:
-            raise
-        sampled = brief_of(error, law, chain)
     loop: Margins | Analysis
+    verdict: Verdict | ConvergenceError
     if is_sampled:
-        loop = Analysis(verdict)
-        poles, open_loop = _sampled_poles(loop)
-        poles = poles[:most]
+        loop = Analysis(verdict := sampled_verdict(arm, as_law(law), chain))
+        poles, open_loop = _sampled_poles(loop, most)
     else:
+        try:
+            verdict = sampled_verdict(arm, law, chain)
+        except ConvergenceError as error:
+            verdict = error
         loop = margins_of(arm, law)
         poles = closed_loop_poles(arm, law, most).values
     return ComparedSide(
@@ -416,7 +411,7 @@ def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_sampled
         poles=poles,
         open_loop={n: s for n, s in open_loop.items() if n and s.imag > 0},
         loop=loop,
-        sampled=sampled,
+        sampled=brief_of(verdict, law, chain),
     )
 
 
@@ -438,8 +433,8 @@ def _modes_of_arm(arm: Arm, count: int, most: int) -> tuple[list[ArmMode], dict[
     return rows, poles
 
 
-def _sampled_poles(found: Analysis) -> tuple[Complex, dict[int, complex]]:
-    """The poles s = ln(z)/T [1/s] of a sampled loop with Im s >= 0, ascending in Im s, of all that outlives a sample.
+def _sampled_poles(found: Analysis, most: int) -> tuple[Complex, dict[int, complex]]:
+    """The first poles s = ln(z)/T [1/s] of a sampled loop with Im s >= 0, ascending in Im s, that outlive a sample.
 
     And those of the rig by itself with Im z > 0, by flexible mode.
     """
@@ -449,4 +444,4 @@ def _sampled_poles(found: Analysis) -> tuple[Complex, dict[int, complex]]:
     upper = np.nonzero((pulse.mode > 0) & (pulse.poles.imag > 0))[0]
     own = np.log(pulse.multipliers[upper]) / T
     by_mode = zip(pulse.mode[upper].tolist(), (own.real + 1j * abs(own.imag)).tolist(), strict=True)
-    return np.asarray(s[np.lexsort((s.real, s.imag))]), dict(by_mode)
+    return np.asarray(s[np.lexsort((s.real, s.imag))][:most]), dict(by_mode)

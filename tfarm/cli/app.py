@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from copy import copy
 from dataclasses import replace
-from functools import cache, wraps
-from inspect import Parameter, Signature, getdoc, signature
+from functools import cache, partial, wraps
+from inspect import Parameter, Signature, getdoc, isfunction, signature
 from pathlib import Path
 from threading import Event, Thread
 from typing import IO, Annotated, Any, cast, get_args, get_origin
@@ -21,7 +21,7 @@ import typer
 
 import tfarm
 from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm, Theory, implausible
-from tfarm.errors import ParameterError, one_line
+from tfarm.errors import one_line, require
 from tfarm.files import is_standard_output
 from tfarm.schema import to_json, write_csv
 
@@ -165,29 +165,46 @@ GAIN_OPTIONS = [
 def add_command(group: str, **how: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return the decorator that adds a command to a group of the help; `how` are its name and its example.
 
-    Its parameters are its arguments and options.  "name: text" below "Options:" in its docstring is the help of one; a
-    last parameter `gains` is the values of the options of the gains by name.
+    Its parameters are its arguments and options.  "name: text" below "Options:" in its docstring is the help of one.  A
+    parameter of type `Gains` has an option for each gain.  One whose default is a function has an option for each of
+    its keywords, and is that function with their values.
     """
 
     def add(command: Callable[..., None]) -> Callable[..., None]:
-        words, _, lines = (getdoc(command) or "").partition("\n\nOptions:\n")
-        helps = dict(line.split(": ", 1) for line in re.split(r"\n(?=\w)", lines) if lines)
-        own = dict(signature(command, eval_str=True).parameters)
-        gains = GAIN_OPTIONS if own.pop("gains", None) else []
+        words, helps = help_of(command)
+        own = signature(command, eval_str=True).parameters
+        groups = {name: parts for name, each in own.items() if (parts := options_of(each))}
 
         @wraps(command)
         def called(**options: Any) -> None:
-            if gains:
-                options["gains"] = {each.name: options.pop(each.name) for each in gains}
+            for name, parts in groups.items():
+                values, default = {each.name: options.pop(each.name) for each in parts}, own[name].default
+                options[name] = partial(default, **values) if isfunction(default) else values
             command(**options)
 
-        parameters = [*(_with_help(each, helps.get(each.name, "")) for each in own.values()), *gains]
-        called.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+        alone = [_with_help(each, helps.get(name, "")) for name, each in own.items() if name not in groups]
+        called.__signature__ = Signature([*alone, *(each for parts in groups.values() for each in parts)])  # type: ignore[attr-defined]
         called.__doc__ = words
         app.command(rich_help_panel=group, **how)(called)
         return command
 
     return add
+
+
+def help_of(function: Callable[..., Any]) -> tuple[str, dict[str, str]]:
+    """Return the docstring of a function without its options, and the help of each option."""
+    words, _, lines = (getdoc(function) or "").partition("\n\nOptions:\n")
+    return words, dict(line.split(": ", 1) for line in re.split(r"\n(?=\w)", lines) if lines)
+
+
+def options_of(parameter: Parameter) -> list[Parameter]:
+    """Return the options that a parameter collects: those of gains, or the keywords of the function that it is."""
+    if parameter.annotation == Gains:
+        return GAIN_OPTIONS
+    if not isfunction(parameter.default):
+        return []
+    known, (_, helps) = signature(parameter.default, eval_str=True).parameters.values(), help_of(parameter.default)
+    return [_with_help(each, helps[each.name]) for each in known if each.kind is Parameter.KEYWORD_ONLY]
 
 
 def _with_help(option: Parameter, text: str) -> Parameter:
@@ -237,8 +254,7 @@ def load_law(arm: Arm, name: str, gains: Gains, file: Path | None = None) -> tup
     own = None if typed else read(name if file is None else file)
     if own is not None:
         return own, {}
-    if file is not None:
-        raise ParameterError(key="--law", value=str(file), remedy="has no table [law]")
+    require(file is None, "--law", str(file), "has no table [law]")
     missing = [gain for gain in DEFAULT_GAINS if gain not in typed]
     words = default_words(arm, missing) if missing else None
     return replace(tfarm.default_gains(arm), **typed), {"default_gains": missing, "default_gains_in_words": words}
@@ -269,8 +285,7 @@ def outputs_on(names: Sequence[str], side: str | None) -> list[Any]:
 def refuse(others: Mapping[str, Any], remedy: str) -> None:
     """Raise ParameterError for an option that another one excludes."""
     for key, value in others.items():
-        if value is not None and value is not False:
-            raise ParameterError(key=key, value=value, remedy=remedy)
+        require(value is None or value is False, key, value, remedy)
 
 
 # ----------------------------------------------------------------------------------------------------------- outputs
@@ -311,12 +326,8 @@ def emit(
         return
     from tfarm.schema.terminal import show
 
-    table = curve_table(record) if rows and csv is None else None
-    show(
-        record,
-        table,
-        f"by default {defaults['default_gains_in_words']}" if defaults and defaults["default_gains"] else "",
-    )
+    words = f"by default {defaults['default_gains_in_words']}" if defaults and defaults["default_gains"] else ""
+    show(record, curve_table(record) if rows and csv is None else None, words)
 
 
 _state = ["running"]  # of the command, for the lines of progress

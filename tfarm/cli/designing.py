@@ -1,15 +1,15 @@
-"""The commands that choose a law or compare: design, tuner, comparison."""
+"""The commands that choose a law or compare, write pages, give evidence, and help with the others."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import partial, wraps
-from inspect import Parameter, signature
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, Literal, cast
 
 import typer
+from typer.completion import get_completion_script  # type: ignore[attr-defined]  # Typer does not list it
 
 import tfarm
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, TWO_GAINS, as_law
@@ -41,6 +41,7 @@ from tfarm.cli.app import (
 )
 
 command = partial(add_command, "Design")
+report_command = partial(add_command, "Report")
 
 
 @command(epilog="design sasaki2012-lab --structure PD+notch --save notch.toml")
@@ -90,112 +91,99 @@ def design(
     emit(found, json, also=(save,))
 
 
-def panelled(panel: str, name: str, text: str, **limits: Any) -> Any:
-    """Return the option of a name, in a panel of the help."""
-    return typer.Option(f"--{name}", help=text, rich_help_panel=panel, **limits)
+LearningWord = Annotated[str, typer.Option(rich_help_panel="Learning")]
+LearningNumber = Annotated[float, typer.Option(rich_help_panel="Learning")]
+CostWeight = Annotated[float, typer.Option(rich_help_panel="Cost")]
 
 
-learning = partial(panelled, "Learning")
-cost = partial(panelled, "Cost")
+def tuner_plan(
+    usual: Any,
+    gains: dict[str, float],
+    *,
+    trials: Annotated[int, typer.Option(min=1, max=1_000_000)] = 100,
+    signals: str | None = None,
+    guard: str = "time-varying",
+    duration: float | None = None,
+    hidden: Annotated[int, typer.Option(min=1, max=1000)] = 6,
+    seventh_input: bool = False,
+    modes: Annotated[int, typer.Option(min=1, max=48)] = 6,
+    mode: LearningWord = "trial",
+    seed: Annotated[int, typer.Option(min=0, max=2**53, rich_help_panel="Learning")] = 0,
+    rule: LearningWord = "dynamic",
+    sensitivity: LearningWord = "one-step",
+    eta: LearningNumber = 0.8,
+    alpha: LearningNumber = 0.6,
+    enough: LearningNumber = 0.0,
+    a: CostWeight = 1.0,
+    b: CostWeight = 2.6,
+) -> Any:
+    """Return the plan of a tuning with these gains, and of the usual one what is None.
 
+    Options:
+    trials: slews to learn from
+    signals: vibration or total, in x and u; by default that of [slew]
+    guard: time-varying (proven), frozen or none
+    duration: duration of a trial [s]; by default three slews
+    hidden: hidden neurons
+    seventh_input: feed K(t-1) to the network too
+    modes: flexible modes
+    mode: trial: after each slew; online: at every sample
+    seed: of the initial weights
+    rule: dynamic, clipped or plain: form of (21)
+    sensitivity: of the plant, online: one-step (the paper's) or whole
+    eta: learning rate
+    alpha: momentum, in [0, 1)
+    enough: stop once the rms of x is below this [N m]
+    a: weight of the root moment, in the arm's unit
+    b: weight of the control signal, likewise
+    """
+    from tfarm import tuner
 
-@dataclass(frozen=True, kw_only=True)
-class TunerOptions:
-    """Options of a tuning: trial, servo and network, learning, cost."""
-
-    trials: Annotated[int, typer.Option("--trials", min=1, max=1_000_000, help="slews to learn from")] = 100
-    mode: Annotated[str, learning("mode", "trial: after each slew; online: at every sample")] = "trial"
-    signals: Annotated[
-        str | None, typer.Option("--signals", help="vibration or total, in x and u; by default that of [slew]")
-    ] = None
-    seed: Annotated[int, learning("seed", "of the initial weights", min=0, max=2**53)] = 0
-    guard: Annotated[str, typer.Option("--guard", help="time-varying (proven), frozen or none")] = "time-varying"
-    rule: Annotated[str, learning("rule", "dynamic, clipped or plain: form of (21)")] = "dynamic"
-    sensitivity: Annotated[str, learning("sensitivity", "of the plant, online: one-step (the paper's) or whole")] = (
-        "one-step"
-    )
-    eta: Annotated[float, learning("eta", "learning rate")] = 0.8
-    alpha: Annotated[float, learning("alpha", "momentum, in [0, 1)")] = 0.6
-    a: Annotated[float, cost("a", "weight of the root moment, in the arm's unit")] = 1.0
-    b: Annotated[float, cost("b", "weight of the control signal, likewise")] = 2.6
-    k1: Annotated[
-        float | None,
-        panelled(
-            CONTROLLER, RATE_GAIN,
-            f"hub rate gain [N m s/rad]; by default 0.00642 J w1, 0.71 damping with {ANGLE_GAIN}",
-        ),
-    ] = None  # fmt: skip
-    kp: AngleGain = 0.0
-    duration: Annotated[
-        float | None, typer.Option("--duration", help="duration of a trial [s]; by default three slews")
-    ] = None
-    enough: Annotated[float, learning("enough", "stop once the rms of x is below this [N m]")] = 0.0
-    hidden: Annotated[int, typer.Option("--hidden", min=1, max=1000, help="hidden neurons")] = 6
-    seventh_input: Annotated[bool, typer.Option("--seventh-input", help="feed K(t-1) to the network too")] = False
-    modes: Annotated[int, typer.Option("--modes", min=1, max=48, help="flexible modes")] = 6
-
-    def plan(self, usual: Any, rate: float) -> Any:
-        """Return the plan of these options with this rate gain, and of the usual one what is not given."""
-        from tfarm import tuner
-
-        named: Any = {"mode": self.mode, "rule": self.rule, "sensitivity": self.sensitivity}
-        given = {name: getattr(self, name) for name in ("signals", "duration") if getattr(self, name) is not None}
-        return replace(
-            usual,
-            cost=tuner.Cost(a=self.a, b=self.b),
-            learning=tuner.Learning(**named, eta=self.eta, alpha=self.alpha, enough=self.enough),
-            trials=self.trials, seed=self.seed, count=self.modes, hidden=self.hidden, guard=self.guard,
-            seventh_input=self.seventh_input, **{RATE_GAIN: rate, ANGLE_GAIN: self.kp}, **given,
-        )  # fmt: skip
-
-
-def with_tuner_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of a tuning to a command, whose last parameter has them."""
-    own = signature(command, eval_str=True)
-    added = signature(TunerOptions, eval_str=True).parameters
-    first, *others, _ = own.parameters.values()
-
-    @wraps(command)
-    def called(**given: Any) -> None:
-        command(options=TunerOptions(**{name: given.pop(name) for name in added}), **given)
-
-    kept = [each.replace(kind=Parameter.KEYWORD_ONLY) for each in (first, *added.values(), *others)]
-    called.__signature__ = own.replace(parameters=kept)  # type: ignore[attr-defined]
-    return called
+    named: Any = {"mode": mode, "rule": rule, "sensitivity": sensitivity}
+    given = {name: value for name, value in (("signals", signals), ("duration", duration)) if value is not None}
+    return replace(
+        usual, cost=tuner.Cost(a=a, b=b), learning=tuner.Learning(**named, eta=eta, alpha=alpha, enough=enough),
+        trials=trials, seed=seed, count=modes, hidden=hidden, guard=guard, seventh_input=seventh_input,
+        **gains, **given,
+    )  # fmt: skip
 
 
 @command(epilog="tune sasaki2012-lab --trials 100 --save tuned.json")
-@with_tuner_options
 def tune(
     arm: ArmName,
-    curves: Annotated[
-        int, typer.Option("--curves", min=0, max=10_000, help="learning curves over N seeds (the paper's Figure 5)")
-    ] = 0,
+    k1: Annotated[float | None, typer.Option(f"--{RATE_GAIN}", rich_help_panel=CONTROLLER)] = None,
+    kp: AngleGain = 0.0,
+    curves: Annotated[int, typer.Option(min=0, max=10_000)] = 0,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
-    compare: Annotated[bool, typer.Option("--compare", help="with converters, delay, and on other arms too")] = False,
-    save: Annotated[
-        Path | None, typer.Option("--save", metavar="FILE", help="write the tuner to this JSON file")
-    ] = None,
+    compare: bool = False,
+    save: File = None,
     theory: TheoryName = None,
     json: Json = False,
     *,
-    options: TunerOptions,
+    plan: Callable[..., Any] = tuner_plan,
 ) -> None:
-    """Neural tuner of the moment gain during a slew, compared with simpler baselines."""
+    """Neural tuner of the moment gain during a slew, compared with simpler baselines.
+
+    Options:
+    k1: hub rate gain [N m s/rad]; by default 0.00642 J w1, 0.71 damping with Kp
+    curves: learning curves over N seeds (the paper's Figure 5)
+    compare: with converters, delay, and on other arms too
+    save: write the tuner to this JSON file
+    """
     from tfarm import tuner
     from tfarm.tuner.trial import usual_rate_gain
     from tfarm.tuner.tuning import usual_plan
 
     subject, chain = load_arm(arm, theory), load_chain(dsp or arm, period, delay_samples)
-    law, defaults = load_law(subject, arm, {RATE_GAIN: options.k1, MOMENT_GAIN: 0.0})
+    law, defaults = load_law(subject, arm, {RATE_GAIN: k1, MOMENT_GAIN: 0.0})
     rate = cast("tfarm.HubFeedback", law)[RATE_GAIN]
-    if options.k1 is None and options.kp:
-        rate = usual_rate_gain(subject, options.kp)
+    if k1 is None and kp:
+        rate = usual_rate_gain(subject, kp)
         words = f"{RATE_GAIN} = {rate:.4g} (damping ratio 0.71 of the rigid arm under Kp)"
         defaults = {"default_gains": [RATE_GAIN], "default_gains_in_words": words}
-    tuning = tuner.tune(subject, options.plan(usual_plan(subject, chain), rate), chain)
+    tuning = tuner.tune(subject, plan(usual_plan(subject, chain), {RATE_GAIN: rate, ANGLE_GAIN: kp}), chain)
     drawn = tuner.learning_curves(tuning, curves, advance) if curves else None
     compared = tuner.compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard) if compare else None
     if save is not None:
@@ -254,3 +242,109 @@ def compare(
 
         page = write_comparison(found, out)
     emit(found, json, png=png, also=(page,))
+
+
+@report_command(epilog="report sasaki2012-lab --out pages")
+def report(
+    arms: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[ARM ...]", help="presets or files; by default all", autocompletion=preset_names),
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="FOLDER")] = Path("reports"),
+    only: str | None = None,
+    law: LawFiles = None,
+    period: Period = None,
+    delay_samples: Delay = None,
+    dsp: DspFile = None,
+    theory: TheoryName = None,
+    measured: Annotated[list[str] | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
+    *,
+    gains: Gains,
+) -> None:
+    """Pages with pictures, tables and data: open index.html in a browser.
+
+    The pages are about the gains or the laws that are given, or the [law] of an arm's file, or the default gains.
+
+    Options:
+    out: the folder to write to
+    only: one page: bode, modes, margins, locus ...
+    measured: measured response; may be repeated
+    """
+    from tfarm.arm import law_tables
+    from tfarm.fitting import data, recording
+    from tfarm.report import cases, write
+
+    names: list[str] = arms or list(tfarm.presets())
+    files: list[Path | None] = [*(law or [])]
+    subjects = [load_arm(name, theory) for name in names]
+    laws = [
+        [
+            cases.GivenLaw(
+                load_law(arm, name, gains, file)[0],
+                file.name if file else "",
+                recording.load_run(file) if file else None,
+            )
+            for file in files or [None] * (set(gains.values()) != {None} or law_tables.load_law(name) is not None)
+        ]
+        for arm, name in zip(subjects, names, strict=True)
+    ]
+    print(write(
+        subjects, out, laws=laws, only=None if only is None else (only,), progress=advance, notice=print_line,
+        chains=[load_chain(dsp or name, period, delay_samples) for name in names],
+        measured=[data.data_of(text, "--measured") for text in measured or []],
+    ))  # fmt: skip
+
+
+@report_command(epilog="audit")
+def audit(json: Json = False) -> None:
+    """Every equation of the paper, as printed and as corrected, with the check of each."""
+    from tfarm import audit as paper
+
+    emit(paper.Audit(paper.PAPER, paper.audit()), json)
+
+
+@report_command(epilog="assumptions sasaki2012")
+def assumptions(
+    arm: ArmName,
+    count: Annotated[int, typer.Option(min=1, max=100)] = 4,
+    theory: TheoryName = None,
+    json: Json = False,
+) -> None:
+    """Effect of the assumed section and hub inertia: frequencies over the candidates, with exact sensitivities.
+
+    Options:
+    count: flexible modes
+    """
+    from tfarm.audit.assumptions import assumptions as find
+
+    emit(find(load_arm(arm, theory), count), json)
+
+
+@report_command(epilog="validate")
+def validate(json: Json = False) -> None:
+    """Natural frequencies of published tables compared with the exact ones, with the reason of each difference."""
+    from tfarm.audit import published
+
+    emit(published.Validation(published.validate()), json)
+
+
+@report_command(epilog="glossary margin")
+def glossary(
+    words: Annotated[str | None, typer.Argument(metavar="[TERM]", help="part of a term; by default all")] = None,
+    json: Json = False,
+) -> None:
+    """Words of certainty, terms, and the quantities of all results with their units."""
+    from tfarm.schema.glossary import glossary as find
+
+    emit(find(words), json)
+
+
+@report_command(epilog="completion bash")
+def completion(
+    shell: Annotated[
+        Literal["bash", "zsh", "fish", "powershell"],
+        typer.Argument(metavar="SHELL", help="the shell"),
+    ],
+) -> None:
+    """Script that completes commands, options and presets in a shell: eval "$(tfarm completion bash)"."""
+    print(get_completion_script(prog_name="tfarm", complete_var="_TFARM_COMPLETE", shell=shell))

@@ -13,9 +13,9 @@ from typing import Any
 import typer
 from typer.exceptions import TyperException
 
-from tfarm.cli import commands, control, designing, trust  # noqa: F401  each adds its commands
+from tfarm.cli import commands, control, designing  # noqa: F401  each adds its commands
 from tfarm.cli.app import discard, print_line, progress, whole_command
-from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError
+from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, require
 from tfarm.files import STANDARD_OUTPUT
 
 STREAMED = ("--csv", "--png", "--mat", "--save")  # of files that may go to standard output instead, called "-"
@@ -84,17 +84,14 @@ def check_words(arguments: list[str]) -> None:
     options = [(option, text) for option, text in pairwise(words) if option.startswith("--")]
     takers = [option for option, text in options if text == STANDARD_OUTPUT] + ["--json"] * ("--json" in words)
     for option, text in options:
-        if option not in PATHS and any(map(ODD_NUMBER.fullmatch, re.split("[,=]", text))):
-            raise ParameterError(key=option, value=text, remedy="write numbers as 50, 0.5 or 5e1")
-        if option in PATHS and not text.strip():
-            raise ParameterError(key=option, value=text, remedy="give a path")
-        if text == STANDARD_OUTPUT and option not in STREAMED:
-            remedy = f"- is standard output, and only {', '.join(STREAMED)} may go there: give a name"
-            raise ParameterError(key=option, value=text, remedy=remedy)
-        if text == STANDARD_OUTPUT and len(takers) > 1:
-            raise ParameterError(
-                key=option, value=text, remedy="standard output takes one thing at a time: name a file"
-            )
+        is_path, is_output = option in PATHS, text == STANDARD_OUTPUT
+        is_odd = not is_path and any(map(ODD_NUMBER.fullmatch, re.split("[,=]", text)))
+        require(not is_odd, option, text, "write numbers as 50, 0.5 or 5e1")
+        require(not is_path or text.strip(), option, text, "give a path")
+        remedy = f"- is standard output, and only {', '.join(STREAMED)} may go there: give a name"
+        require(not is_output or option in STREAMED, option, text, remedy)
+        remedy = "standard output takes one thing at a time: name a file"
+        require(not is_output or len(takers) == 1, option, text, remedy)
 
 
 def usage(error: Any) -> str:

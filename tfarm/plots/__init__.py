@@ -7,10 +7,9 @@ In the look of the report's pages, whose pictures these are.  This is the only r
 """
 
 from tfarm.plots.frequency import bode, measured, nyquist
-from tfarm.plots.motion import slew, tuned_gain
+from tfarm.plots.motion import modes, sketch, slew, tuned_gain
 from tfarm.plots.regions import comparison, gain_map, overlay
 from tfarm.plots.roots import locus
-from tfarm.plots.shapes import modes, sketch
 
 __all__ = [
     "bode",

@@ -25,8 +25,9 @@ from matplotlib.figure import Figure as Figure  # which pages name too
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tfarm.arm import GAINS, LISTED, PLANE, AnyLaw, Arm, as_law, shown_unit
+from tfarm.arm.law import NUMBER
 from tfarm.digits import plain
-from tfarm.errors import ParameterError
+from tfarm.errors import require
 from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.files import write_file
 from tfarm.loop.varied import ARM_PARAMETERS
@@ -45,7 +46,6 @@ NOT_THE_PAPERS = ("hub_angle",)  # outputs whose gain is an extension of the pap
 UNNAMED = "law"  # of a law without a name
 FACTORS = ("gain", "all")  # on a whole controller
 OTHER_UNITS = ARM_PARAMETERS | {"delay": "s"}  # of numbers that vary
-NUMBER_OF_LAW = re.compile(r"(.*?)(?:\.(gain|num|den)(?:\.(\d+))?)?")  # signal, what of it, and a coefficient's place
 
 METADATA: dict[str, dict[str, str | None]] = {
     "svg": {"Date": None, "Creator": "tfarm"},
@@ -91,8 +91,8 @@ def check_records(of: Sequence[tuple[Any, str]], found: Sequence[Any]) -> None:
     for (kind, origin), value in zip(of, found, strict=False):
         values = list(value.values()) if isinstance(value, Mapping) else value
         values = values if isinstance(values, list | tuple) else [values]
-        if not values or not all(isinstance(each, kind) for each in values):
-            raise ParameterError(key="plot", value=value, remedy=f"give what {origin}")
+        is_right = bool(values) and all(isinstance(each, kind) for each in values)
+        require(is_right, "plot", value, f"give what {origin}")
 
 
 def picture(
@@ -137,9 +137,8 @@ def picture(
                 axes = figure(*found, new=pyplot.figure, **how).axes
                 return axes[0] if is_one else tuple(axes)
             axes = list(np.ravel(np.asarray(ax, dtype=object)))
-            if grid is None and len(axes) != len(rows):
-                remedy = f"{len(rows)} axes, as figure.subplots({len(rows)}) makes them"
-                raise ParameterError(key="ax", value=len(axes), remedy=remedy)
+            remedy = f"{len(rows)} axes, as figure.subplots({len(rows)}) makes them"
+            require(grid is not None or len(axes) == len(rows), "ax", len(axes), remedy)
             with style():
                 draw(*found, ax=axes[0] if is_one else axes, **how)
             return axes[0] if is_one else tuple(axes)
@@ -223,7 +222,7 @@ def number_label(name: str, arm: Arm, law: AnyLaw) -> str:
             return f"{name}, gain on the {signal_words(gain.output)[0]} [{shown_unit(name, arm) or '−'}]"
     if name in OTHER_UNITS:
         return f"{name.replace('_', ' ')} [{OTHER_UNITS[name]}]"
-    signal, of, place = NUMBER_OF_LAW.fullmatch(name).groups("")  # type: ignore[union-attr]
+    signal, of, place = NUMBER.fullmatch(name).groups("")  # type: ignore[union-attr]
     any_law = as_law(law)
     if not place and signal not in any_law.part_gains:
         return f"{name}, factor on the {'controller' if signal in FACTORS else signal_words(signal)[0]} [−]"

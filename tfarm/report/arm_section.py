@@ -14,7 +14,7 @@ from tfarm.arm.schema import file_key
 from tfarm.audit.assumptions import Study, has_hub_inertia, hub_study, section_study
 from tfarm.digits import fixed, plain, significant, singly, unit
 from tfarm.dsp.chain import file_text
-from tfarm.plots.shapes import sketch
+from tfarm.plots.motion import sketch
 from tfarm.plots.style import COLOURS, GREY, page
 from tfarm.report.cases import Case
 from tfarm.report.sections import Fact, PageSection, Picture, prose

@@ -203,7 +203,7 @@ def _known(arm: Arm, is_quiet: bool) -> dict[str, Any]:
     kind = "reactive" if arm.is_reactive else "quiet" if is_quiet else "band"
     by_energy = "C = 0: every mode beyond the frequency range is damped (Lyapunov), with a decay rate that tends to 0"
     beyond = "|L| < 0.5 beyond the frequency range at all gains of this page: no unstable pole there (small gain)"
-    if arm.is_reactive and not arm.has_lyapunov_theorem:
+    if arm.is_reactive and not arm.reads_hub_moment:
         by_energy = "C = 0: no mode of the frequency range is driven; not determined beyond"
     moments = _stable_moments(arm) if arm.is_reactive else (-math.inf, math.inf)
     return {

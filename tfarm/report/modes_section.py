@@ -16,8 +16,8 @@ from tfarm.arm import Arm, Theory
 from tfarm.arrays import Real
 from tfarm.digits import fixed, kept_digits, lined, plain, significant
 from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.plots.shapes import SHAPE_POINTS, draw_differences, scaled, theory_name
-from tfarm.plots.shapes import modes as shapes_plot
+from tfarm.plots.motion import SHAPE_POINTS, draw_differences, scaled, theory_name
+from tfarm.plots.motion import modes as shapes_plot
 from tfarm.report.cases import Case
 from tfarm.report.sections import PageSection, Picture, prose
 from tfarm.schema import Column, Quantity, Table, table

@@ -87,7 +87,7 @@ def make_all(
             begun([task.name])
             done[task.name] = task.call()
     else:
-        for name, result in shared({task.name: task.call for task in tasks}, MOST_WORKERS, [__name__], begun):
+        for name, result in shared({task.name: task.call for task in tasks}, MOST_WORKERS, begun):
             done[name] = result  # noqa: PERF403  `begun` counts them meanwhile
     begun(["pages"])
     sections = [

@@ -9,8 +9,19 @@ meaning from here.  `to_dict` and `sections` read a record, `table` records of o
 `schema.terminal` and `schema.html` render tables, `schema.glossary` has every declared quantity.
 """
 
-from .differences import Difference, Differences, compare
-from .quantities import At, Percent, Quantity, entries, quantities, text, to_dict, with_unit
+from .quantities import (
+    At,
+    Difference,
+    Differences,
+    Percent,
+    Quantity,
+    compare,
+    entries,
+    quantities,
+    text,
+    to_dict,
+    with_unit,
+)
 from .tables import (
     Column,
     Section,

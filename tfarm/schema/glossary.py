@@ -44,7 +44,7 @@ GLOSSARY_TERMS = tuple(sorted((*CERTAINTY, *TERMS), key=lambda term: term.name.c
 def declared_records() -> Iterator[tuple[type, dict[str, Quantity]]]:
     """Return every class of records with its quantities by attribute; imports the whole package."""
     for module in pkgutil.walk_packages([str(Path(__file__).parents[1])], "tfarm."):
-        if module.name in ("tfarm.__main__", "tfarm.grouped"):  # these act when they are imported
+        if module.name == "tfarm.__main__":  # it acts when it is imported
             continue
         for kind in vars(import_module(module.name)).values():
             with suppress(NameError):  # of a class whose annotations are for type checkers alone

@@ -1,12 +1,12 @@
-"""The declaration of a quantity, and its values in JSON and as a person reads them."""
+"""The declaration of a quantity, its values in JSON and as a person reads them, and two records compared."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass, replace
 from functools import cache, cached_property
-from typing import Any, NamedTuple, get_args, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 
@@ -15,6 +15,10 @@ from tfarm.digits import general, within
 SLUGS = {"s": "s", "m": "m", "rad/s": "rad_s", "Hz": "hz", "deg": "deg", "samples": "samples"}  # of units in keys
 COMPLEX_ERROR = 2e-14  # of the size of a pole or zero: what rounding leaves in its parts (tests: 1e-14 to 50 digits)
 NO_VALUE = "-"
+LONGEST_COMPARED = 28  # characters of a text that is compared: a word or an interval, and no sentence
+EMPTY = {"None", "", "[]", "()"}  # what is compared where neither has a value
+SAME = 4e-14  # of a value: what two computations of it may differ by
+NAMES = ("first", "second")  # of two records that have none
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,19 +115,19 @@ def is_list_of_records(value: Any) -> bool:
     return is_some and all(map(is_declared, value))
 
 
-def with_flat(record: Any) -> Iterator[tuple[Any, Quantity]]:
-    """Values and quantities of a record, those of records that are flat in their place."""
+def with_flat(record: Any) -> Iterator[tuple[Any, Quantity, Any]]:
+    """Values and quantities of a record and the record itself, those of records that are flat in their place."""
     for name, of in quantities_of(record).items():
         value = getattr(record, name)
         if of.flat and is_declared(value):
             yield from with_flat(value)
         else:
-            yield value, of
+            yield value, of, record
 
 
 def entries(record: Any, under: str = "") -> Iterator[tuple[str, Quantity, Any]]:
     """Label, quantity and value of what has one value, in records inside the record too."""
-    for value, of in with_flat(record):
+    for value, of, _ in with_flat(record):
         label = f"{under}{of.label}"
         if hasattr(value, "as_text") and not isinstance(value, Percent):
             value = value.as_text(of.digits)
@@ -212,3 +216,75 @@ def parts(value: complex, digits: int) -> tuple[str, str]:
     error = COMPLEX_ERROR * abs(value)
     re, im = (within(part, error, digits) if error else "0" for part in (value.real, value.imag))
     return re, im
+
+
+# ------------------------------------------------------------------------------------------------------- comparison
+
+
+class PercentagePoints(Percent):
+    """The difference of two ratios that a person reads in per cent."""
+
+    unit = "percentage points"
+
+
+class Difference(NamedTuple):
+    """One quantity of two records."""
+
+    quantity: Annotated[str, Quantity("quantity", help="quantity of both records, in a table after its row")]
+    unit: Annotated[str, Quantity("unit", help="unit of both values and of their difference")]
+    one: Annotated[Any, Quantity("first", digits=8, help="value of the first record")]
+    other: Annotated[Any, Quantity("second", digits=8, help="value of the second record")]
+
+    @property
+    def difference(self) -> Annotated[float | None, Quantity("difference", digits=4, help="second less first")]:
+        """Second less first, in the unit; what rounding may leave is 0, and what is no number has none."""
+        one, other = self.one, self.other
+        if any(isinstance(each, bool) or not isinstance(each, int | float) for each in (one, other)):
+            return None
+        gap = 0.0 if one == other else float(other - one)
+        if not math.isfinite(gap):
+            return None
+        gap = 0.0 if abs(gap) <= SAME * abs(one) else gap
+        return PercentagePoints(gap) if isinstance(one, Percent) else gap
+
+
+class Differences(list[Difference]):
+    """Quantities of two records, which are named in the table."""
+
+    def __init__(self, rows: Iterable[Difference], names: tuple[str, str]) -> None:
+        super().__init__(rows)
+        self.titles = dict(zip(("one", "other"), names, strict=True))
+
+
+def compare(one: Any, other: Any, names: tuple[str, str] = NAMES) -> Differences:
+    """The quantities that two records have, or the records in two lists, row by row.
+
+    Records in lists, and rows of tables, are paired by their first quantity, a name or a number.
+    """
+    return Differences((_of_rows if isinstance(one, list) else _of_records)(one, other), names)
+
+
+def _of_records(one: Any, other: Any) -> Iterator[Difference]:
+    others = {label: value for label, _, value in entries(other)}
+    for label, of, value in entries(one):
+        both = [each.value if isinstance(each, At) else each for each in (value, others.get(label))]
+        is_short = of.is_number or len(str(value)) < LONGEST_COMPARED
+        if label in others and is_short and not set(map(str, both)) <= EMPTY:
+            yield Difference(label, of.unit, *both)
+    for (value, of, _), (match, *_) in zip(with_flat(one), with_flat(other), strict=False):
+        if of.label and is_list_of_records(value) and is_list_of_records(match):
+            yield from _of_rows(value, match)
+
+
+def _of_rows(some: Sequence[Any], others: Sequence[Any]) -> Iterator[Difference]:
+    """Differences of rows; a text that is the same in both rows is none."""
+    if not some:
+        return
+    key, of = next(iter(quantities(type(some[0])).items()))
+    by_key = {getattr(row, key): row for row in others}
+    for row in some:
+        at = getattr(row, key)
+        name = at if isinstance(at, str) else f"{of.label} {text(at)}"
+        for each in _of_records(row, by_key[at]) if at in by_key else ():
+            if each.quantity != of.label and not (isinstance(each.one, str) and each.one == each.other):
+                yield each._replace(quantity=f"{name}: {each.quantity}")

@@ -19,9 +19,9 @@ import numpy as np
 from tfarm.digits import TEXTS, CellsOf, within
 from tfarm.files import write_file
 
-from .differences import EMPTY
 from .quantities import (
     COMPLEX_ERROR,
+    EMPTY,
     NO_VALUE,
     At,
     Quantity,
@@ -174,7 +174,7 @@ def curve_table(record: Any, *, stem: str = "", title: str = "") -> Table:
         own: Table = record.csv_table
         return own
     columns: list[Column] = []
-    for value, of in with_flat(record):
+    for value, of, _ in with_flat(record):
         if of.curve and np.iscomplexobj(value):
             for number, values in enumerate(np.atleast_2d(value)):
                 after = f"_{number}" if np.ndim(value) > 1 else ""
@@ -204,18 +204,13 @@ class Section:
 def sections(record: Any, title: str = "") -> list[Section]:
     """A record as a person reads it: its single values first, then its tables and the records inside it."""
     own, later = Section(title), []
-    for name, of in quantities_of(record).items():
-        value = getattr(record, name)
-        if of.flat and is_declared(value):
-            first, *rest = sections(value)
-            own.pairs.extend(first.pairs)
-            later += rest
-        elif not of.label or ((value is None or of.curve) and not of.is_number):
+    for value, of, owner in with_flat(record):
+        if not of.label or ((value is None or of.curve) and not of.is_number):
             continue
-        elif value is None or of.curve:
+        if value is None or of.curve:
             own.pairs.append((of.label, NO_VALUE))
         elif is_table(value) or is_list_of_records(value):
-            later.append(Section(of.label, table=table(value, parent=record)))
+            later.append(Section(of.label, table=table(value, parent=owner)))
         elif is_declared(value) and not isinstance(value, At) and not hasattr(value, "as_text"):
             later += sections(value, of.label)
         elif isinstance(value, np.ndarray) and np.iscomplexobj(value) and value.size:
