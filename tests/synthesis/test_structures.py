@@ -17,7 +17,7 @@ from tfarm.arm import as_law
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Converters
-from tfarm.synthesis import search
+from tfarm.synthesis import judge, search
 from tfarm.synthesis.design import design
 from tfarm.synthesis.judge import LOST, RESERVE, entries_of
 from tfarm.synthesis.structures import STRUCTURES, structure_of
@@ -83,11 +83,11 @@ def test_what_is_found_holds_and_has_the_radius_of_another_model(found):
 
 
 def test_it_damps_better_than_where_the_search_began(found):
-    judge, form = judge_of(LAB, found.law, "damping"), form_of("strain-rate", found.coefficients["Kp"])
-    assert found.value == pytest.approx(-judge.score(found.law), rel=1e-9)
+    own, form = judge_of(LAB, found.law, "damping"), form_of("strain-rate", found.coefficients["Kp"])
+    assert found.value == pytest.approx(-own.score(found.law), rel=1e-9)
     low, high = form.box
     x = low + (high - low) * np.random.default_rng(3).random((200, 3))
-    assert (-judge.scores(form, x.T) <= found.value).all()
+    assert (-own.scores(form, x.T) <= found.value).all()
 
 
 def test_a_design_is_saved_and_read_back(capsys, monkeypatch, tmp_path):
@@ -154,7 +154,7 @@ def least_of(function, low, high, near=None):
     form = SimpleNamespace(name="test", size=low.size, box=(low, high), origin=low)
     lines = []
     found, of_runs = search.minimised(
-        lambda points: np.array([function(each) for each in points.T]), form, form.box, 1.0, lines.append, near
+        lambda points, *_: np.array([function(each) for each in points.T]), form, form.box, 1.0, lines.append, near
     )
     assert list(found.scores) == sorted(found.scores)
     assert found.scores[0] == min(of_runs)
@@ -211,11 +211,30 @@ def test_the_lowest_of_many_valleys_is_found():
     assert score == pytest.approx(0.0, abs=1e-5)
 
 
+@pytest.mark.parametrize("objective", ["damping", "residual"])
+def test_a_score_up_to_its_limit_is_whole_and_one_above_stays_above(objective):
+    form, rng = form_of("strain-rate"), np.random.default_rng(4)
+    arms = (LAB, LAB.having(payload_mass=0.3))
+    worst = search.Worst(tuple(judge.judge_of(arm, LAB, Chain(), objective, form.signals, 2, 8) for arm in arms))
+    low, high = form.box
+    x = np.c_[
+        form.origin[:, None] + 0.3 * rng.normal(size=(3, 40)),
+        low[:, None] + (high - low)[:, None] * rng.random((3, 60)),
+    ]
+    whole = worst.scores(form, x)
+    limits = np.where(rng.random(whole.size) < 0.3, np.inf, rng.permutation(whole))
+    found, is_within = worst.scores(form, x, limits), whole <= limits
+    assert 0.1 < is_within.mean() < 0.9
+    assert (whole[is_within] < LOST).any()
+    np.testing.assert_array_equal(found[is_within], whole[is_within])
+    assert (found[~is_within] > limits[~is_within]).all()
+
+
 def test_poles_of_a_rate_that_is_a_difference_are_those_of_the_sampled_loop():
     chain = Chain(converters=Converters(hub_rate="difference", rate_filter=80.0))
     for law in (tfarm.HubFeedback(K1=2.0, K2=0.2), tfarm.HubFeedback(K1=2.0, K2=0.2, Kp=4.0)):
-        judge = judge_of(LAB, law, "damping", chain)
-        z = abs(judge.model.poles(entries_of(law))).max()
+        own = judge_of(LAB, law, "damping", chain)
+        z = abs(own.model.poles(entries_of(law))).max()
         assert np.log(z) == pytest.approx(tfarm.sampled(LAB, law, chain).verdict.log_radius, rel=1e-6)
 
 

@@ -33,7 +33,7 @@ from tfarm.report.sections import PageSection, Picture, prose
 from tfarm.schema import Column, Quantity, Table, across, table, text
 from tfarm.spectrum.table import default_gains, default_words, first_frequency, rate_unit
 from tfarm.synthesis.design import Design
-from tfarm.synthesis.judge import least_damping
+from tfarm.synthesis.judge import damping_of
 from tfarm.synthesis.models import continuous_model
 from tfarm.synthesis.structures import ONE, Entry
 
@@ -103,7 +103,7 @@ def map_of_arm(arm: Arm, chain: Chain) -> MapOfArm:
     points = np.reshape(np.meshgrid(across, up), (2, -1))
     parts = np.array_split(points, math.ceil(points.shape[1] / GAINS_AT_ONCE), axis=1)
     laws = ([Entry(name, row[None], ONE) for name, row in zip(signals, part, strict=True)] for part in parts)
-    damping = np.concatenate([least_damping(model, law) for law in laws]).reshape(up.size, across.size)
+    damping = np.concatenate([damping_of(model, model.poles(law)) for law in laws]).reshape(up.size, across.size)
     named = Case(arm, chain).in_s
     briefs = tuple(brief_on(arm, each.law, chain) for each in named)
     sampled = sampled_region(arm, x, y, chain)

@@ -7,7 +7,7 @@ has the number of searches that agreed, the width of the optimum, and whether th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from operator import itemgetter
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -25,7 +25,7 @@ from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.synthesis.judge import LOST, OBJECTIVES, Judge, judge_of, model_sizes
 from tfarm.synthesis.models import slew_and_after, trial_slew
-from tfarm.synthesis.search import CANDIDATES, Search, Worst, flat_part, search
+from tfarm.synthesis.search import Search, Worst, flat_part, search
 from tfarm.synthesis.structures import Bounds, Structure, check_bounds, structure_of
 from tfarm.synthesis.worst_case import ArmBox, NamedArm, Tell, WorstCase, arms_of, for_the_worst, same_input
 
@@ -251,7 +251,6 @@ class _Task:
         """Return the best law that is stable on all arms, near the one `before` the last of them was added, if any.
 
         Raises ConvergenceError where none is found.
-        If the best law under fewer conditions is stable, it is the best under all: so that one is tried first.
         """
         nearest: tuple[float, Any] | None = None
         sizes = [self.sizes(each.arm) for each in named]
@@ -260,16 +259,12 @@ class _Task:
             several = tuple(
                 self.judge(each.arm, own[min(step, len(own) - 1)]) for each, own in zip(named, sizes, strict=True)
             )
-            relaxed = tuple(replace(each, is_relaxed=True) for each in several)
-            for judges, most in [*([(relaxed, 1)] if self.loop == "sampled" else []), (several, CANDIDATES)]:
-                found = search(Worst(judges), self.form, self.tell, near)
-                nearest = min([*([nearest] if nearest else []), found.found[0]], key=itemgetter(0))
-                for score, x in found.found[:most]:
-                    law = found.form.record_at(x)
-                    if score < LOST and all(judge.holds(law) for judge in several):
-                        return _Choice(Worst(several), found, score, x, law)
-                if found.found[0][0] >= LOST:  # nothing is stable under fewer conditions
-                    break
+            found = search(Worst(several), self.form, self.tell, near)
+            nearest = min([*([nearest] if nearest else []), found.found[0]], key=itemgetter(0))
+            for score, x in found.found:
+                law = found.form.record_at(x)
+                if score < LOST and all(judge.holds(law) for judge in several):
+                    return _Choice(Worst(several), found, score, x, law)
         assert nearest is not None  # there is at least one judge
         law = self.form.record_at(nearest[1])
         chain = self.chain if self.loop == "sampled" else None

@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,31 +45,14 @@ LONGEST_MARGIN = 100.0  # samples, or s: the delay margin where |L| is nowhere 1
 TIE = 1e-3  # weight of the damping ratio in a disk margin: without sampling rate feedback alone has margin 2
 
 
-@dataclass(frozen=True)
-@record
-class Reading:
-    """Laws in a model: their `entries` and closed-loop poles (laws, n)."""
-
-    model: Model
-    slews: Slews
-    entries: Sequence[Entry]
-    poles: Complex
-
-    @cached_property
-    def loop(self) -> Complex:
-        """L (laws, m) on the model's grid."""
-        return self.model.loop(self.entries)
-
-
-@dataclass(frozen=True)
-@record
-class Objective:
+class Objective(NamedTuple):
     """Its `scores` (laws,), small where laws are good, and the `value` of one law by a judge.
 
-    `is_negated`: whether the value is the negated score; `of_slew`: whether it is of a slew.
+    Scores are of a judge, the entries of laws, and their poles (laws, n) in its model.  `is_negated`: whether the value
+    is the negated score; `of_slew`: whether it is of a slew.
     """
 
-    scores: Callable[[Reading], Real]
+    scores: Callable[[Any, Sequence[Entry], Complex], Real]
     value: Callable[[Any, AnyLaw], float]
     is_negated: bool = False
     of_slew: bool = False
@@ -93,48 +76,52 @@ def damping_of(model: Model, poles: Complex) -> Real:
     return np.where(counted, -s.real / np.maximum(abs(s), LEAST_SIZE), 1.0).min(axis=1, initial=1.0)
 
 
-def least_damping(model: Model, entries: Sequence[Entry]) -> Real:
-    """The least damping ratio (laws,) of the first modes, of stable laws and others; 1 where no pole oscillates."""
-    return damping_of(model, model.poles(entries))
-
-
 def disk_of(L: Complex) -> Real:
     """2 |1 + L|/|1 - L|."""
     return np.asarray(2 * abs(1 + L) / np.maximum(abs(1 - L), LEAST_SIZE))
 
 
-def sensitivity(now: Reading) -> Real:
-    """The largest |S|; in continuous time at least 1, as L -> 0 beyond the grid."""
-    least = 0.0 if now.model.period is not None else 1.0
-    return np.maximum(1 / np.maximum(abs(1 + now.loop).min(axis=1), LEAST_SIZE), least)
-
-
-def delay(now: Reading) -> Real:
-    """-delay [s] where |L| passes 1, between two points along straight lines."""
-    q, L, unit = now.model.angles, now.loop, now.model.period or 1.0
+def delay(model: Model, L: Complex) -> Real:
+    """The delay [s] that turns L to -1 where |L| passes 1, between two points of the grid along straight lines."""
+    q = model.angles
     size, turn = np.log(np.maximum(abs(L), LEAST_SIZE)), np.mod(np.pi + np.unwrap(np.angle(L)), 2 * np.pi)
     passes = (size[:, 1:] * size[:, :-1] <= 0) & (size[:, 1:] != size[:, :-1])
     share = size[:, :-1] / np.where(passes, size[:, :-1] - size[:, 1:], 1.0)
     step = np.mod(turn[:, 1:] - turn[:, :-1] + np.pi, 2 * np.pi) - np.pi
     late = np.mod(turn[:, :-1] + share * step, 2 * np.pi) / (q[:-1] + share * np.diff(q))
-    return -unit * np.where(passes, late, LONGEST_MARGIN).min(axis=1, initial=LONGEST_MARGIN)
+    return (model.period or 1.0) * np.where(passes, late, LONGEST_MARGIN).min(axis=1, initial=LONGEST_MARGIN)
 
 
 OBJECTIVES = {
     "damping": Objective(
-        lambda now: -damping_of(now.model, now.poles), lambda judge, law: judge.exact_damping(law), is_negated=True
+        lambda judge, entries, poles: -damping_of(judge.model, poles),
+        lambda judge, law: judge.exact_damping(law),
+        is_negated=True,
     ),
     "margin": Objective(
-        lambda now: -(disk_of(now.loop).min(axis=1) + TIE * damping_of(now.model, now.poles)),
+        lambda judge, entries, poles: (
+            -disk_of(judge.model.loop(entries)).min(axis=1) - TIE * damping_of(judge.model, poles)
+        ),
         lambda judge, law: judge.lowest(law, disk_of),
         is_negated=True,
     ),
-    "sensitivity": Objective(sensitivity, lambda judge, law: judge.peak(law)),
-    "delay": Objective(delay, lambda judge, law: -judge.score(law), is_negated=True),
-    "residual": Objective(
-        lambda now: now.slews.residual(now.entries), lambda judge, law: judge.simulated_residual(law), of_slew=True
+    "sensitivity": Objective(
+        lambda judge, entries, poles: judge.peak(abs(1 + judge.model.loop(entries)).min(axis=1)),
+        lambda judge, law: float(judge.peak(judge.lowest(law, lambda L: np.asarray(abs(1 + L))))),
     ),
-    "cost": Objective(lambda now: now.slews.cost(now.entries), lambda judge, law: judge.score(law), of_slew=True),
+    "delay": Objective(
+        lambda judge, entries, poles: -delay(judge.model, judge.model.loop(entries)),
+        lambda judge, law: -judge.score(law),
+        is_negated=True,
+    ),
+    "residual": Objective(
+        lambda judge, entries, poles: judge.slews.residual(entries),
+        lambda judge, law: judge.simulated_residual(law),
+        of_slew=True,
+    ),
+    "cost": Objective(
+        lambda judge, entries, poles: judge.slews.cost(entries), lambda judge, law: judge.score(law), of_slew=True
+    ),
 }
 
 
@@ -152,8 +139,7 @@ LOST = 1e30  # score where a loop is unstable, and as much for each later condit
 class Judge:
     """The objective of laws on an arm, by a `model` of few modes; the models `also` have to be stable, too.
 
-    Slews are those of the arm `known`, and damping is that of the first `modes` modes.  `is_relaxed`: the sampled loop
-    has to be stable with larger gains alone, which nearly always decides, at half the work.
+    Slews are those of the arm `known`, and damping is that of the first `modes` modes.
     """
 
     arm: Arm
@@ -163,17 +149,11 @@ class Judge:
     modes: int
     model: Model
     also: tuple[Model, ...]
-    is_relaxed: bool = False
 
     @property
     def is_sampled(self) -> bool:
         """Whether the loop is the sampled one."""
         return self.model.period is not None
-
-    @property
-    def aim(self) -> Objective:
-        """The objective."""
-        return OBJECTIVES[self.objective]
 
     @cached_property
     def slews(self) -> Slews:
@@ -183,54 +163,67 @@ class Judge:
     @cached_property
     def conditions(self) -> list[tuple[Model, float]]:
         """The models that have to be stable, each with a factor on the law: most unstable laws fail the first."""
-        own = [(self.model, 1.0)]
-        if not self.is_sampled:
-            return own
-        fewer = [(self.model, SEARCH_RESERVE)]
-        more = [(self.model, 1 / SEARCH_RESERVE), *((each, 1.0) for each in self.also)]
-        return [*fewer, *([] if self.is_relaxed else more), *own]
+        own = (SEARCH_RESERVE, 1 / SEARCH_RESERVE) if self.is_sampled else ()
+        return [*((self.model, share) for share in own), *((each, 1.0) for each in self.also)]
 
     # ------------------------------------------------------------ in the model
 
-    def scores(self, form: Structure, x: Real) -> Real:
-        """The function to be minimised, at points x (n, laws); `LOST` and more where the loop is unstable."""
-        parts = [x[:, i : i + LAWS_AT_ONCE] for i in range(0, x.shape[1], LAWS_AT_ONCE)]
-        return np.concatenate([self.scores_of(form.entries(form.coefficients(part)), part.shape[1]) for part in parts])
+    def scores(self, form: Structure, x: Real, limits: Real | None = None) -> Real:
+        """The function to be minimised, at points x (n, laws); `LOST` and more where the loop is unstable.
+
+        A law whose score is above its one of the `limits` (laws,) may have any value above it.
+        """
+        limits = np.full(x.shape[1], np.inf) if limits is None else limits
+        starts = range(0, x.shape[1], LAWS_AT_ONCE)
+        parts = [(x[:, i : i + LAWS_AT_ONCE], limits[i : i + LAWS_AT_ONCE]) for i in starts]
+        return np.concatenate([self.scores_of(form.entries(form.coefficients(at)), ends) for at, ends in parts])
 
     def score(self, law: AnyLaw) -> float:
         """The same of one law."""
-        return float(self.scores_of(entries_of(law), 1)[0])
+        return float(self.scores_of(entries_of(law), np.array([np.inf]))[0])
 
-    def scores_of(self, entries: Sequence[Entry], number: int) -> Real:
-        """The same of the entries of `number` laws."""
-        conditions = self.conditions
-        scores, alive, poles = np.empty(number), np.arange(number), np.empty(0, complex)
-        for left, (model, share) in zip(range(len(conditions), 0, -1), conditions, strict=True):
-            poles = model.poles(entries, share)
-            growth = model.growth(poles).max(axis=1)
-            stable = growth < 0.0
-            scores[alive[~stable]] = LOST * (left + growth[~stable] / (1 + growth[~stable]))
-            alive, poles, entries = alive[stable], poles[stable], chosen(entries, stable)
-            if not alive.size:
-                return scores
-        scores[alive] = self.aim.scores(Reading(self.model, self.slews, entries, poles))
+    def scores_of(self, entries: Sequence[Entry], limits: Real) -> Real:
+        """The same of the entries of laws, one for each limit.
+
+        Where the limit is the score of a stable law, the objective is first: most laws have lost by it.
+        """
+        scores, first = np.full(limits.size, -np.inf), np.flatnonzero(limits < LOST)
+        if first.size:
+            scores[first] = self._aims(chosen(entries, first))
+        left = np.flatnonzero(scores <= limits)
+        for stage, (model, share) in enumerate(self.conditions, -len(self.conditions)):
+            if left.size:
+                growth = model.growth(model.poles(chosen(entries, left), share)).max(axis=1)
+                scores[left[growth >= 0]] = lost(1 - stage, growth[growth >= 0])
+                left = left[growth < 0]
+        last = left[np.isneginf(scores[left])]
+        if last.size:
+            scores[last] = self._aims(chosen(entries, last))
+        return scores
+
+    def _aims(self, entries: Sequence[Entry]) -> Real:
+        """The objective by the judge's own model alone, `LOST` and more where that is unstable."""
+        poles = self.model.poles(entries)
+        growth = self.model.growth(poles).max(axis=1)
+        scores, stable = lost(1, growth), growth < 0
+        if stable.any():
+            scores[stable] = OBJECTIVES[self.objective].scores(self, chosen(entries, stable), poles[stable])
         return scores
 
     # ------------------------------------------------------------ beyond it
 
     def value(self, law: AnyLaw) -> float:
         """The objective of one law, by the best available method."""
-        return self.aim.value(self, law)
+        return OBJECTIVES[self.objective].value(self, law)
 
     def lowest(self, law: AnyLaw, of: Callable[[Complex], Real]) -> float:
         """The least of a function of the loop function, between the points of the grid too."""
         entries = entries_of(law)
         return lowest(lambda angles: of(self.model.loop(entries, angles)[0]), self.model.angles)[0]
 
-    def peak(self, law: AnyLaw) -> float:
-        """The largest |S|; in continuous time at least 1."""
-        largest = 1 / self.lowest(law, lambda L: np.asarray(abs(1 + L)))
-        return largest if self.is_sampled else max(1.0, largest)
+    def peak(self, distance: Any) -> Any:
+        """The largest |S| of the least |1 + L|; in continuous time at least 1, as L -> 0 beyond the grid."""
+        return np.maximum(1 / np.maximum(distance, LEAST_SIZE), 0.0 if self.is_sampled else 1.0)
 
     def exact_damping(self, law: AnyLaw) -> float:
         """The least damping ratio; of the continuous-time loop that of its exact poles."""
@@ -285,6 +278,11 @@ def judge_of(
     )
     models = [own] if continuous else [sampled_model(arm, chain, signals, modes, count), own]
     return Judge(arm, known, chain, objective, modes, models[0], tuple(models[1:]))
+
+
+def lost(stage: int, growth: Real) -> Real:
+    """Scores of laws with a growth (laws,) of their fastest pole, above those of laws lost at a later stage."""
+    return LOST * (stage + growth / (1 + abs(growth)))
 
 
 def chosen(entries: Sequence[Entry], rows: Real) -> list[Entry]:

@@ -241,6 +241,36 @@ def circle_angles(pulse: PulseTransfer) -> Real:
     return np.unique(np.r_[np.linspace(0, np.pi, EVEN_ANGLES + 1)[1:], close[(close > 0) & (close <= np.pi)]])
 
 
+DOUBLINGS = 5  # of the samples of a block
+
+
+def outputs(A: Real, B: Real, C: Real, signals: Real, first: int) -> Real:
+    """C x_k (outputs, samples, laws), k >= `first`, of x_{k+1} = A x_k + B r_k, x_0 = 0, signals r (inputs, samples).
+
+    A block of samples is one product with its first state and its signals.  The last block has zeros at its end.
+    """
+    (laws, n, inputs), seen, size = B.shape, C.shape[1], 2**DOUBLINGS
+    blocks = signals.shape[1] // size + 1
+    r = np.zeros((inputs, blocks * size))
+    r[:, : signals.shape[1]] = signals
+    r = r.reshape(inputs, blocks, size).transpose(2, 0, 1).reshape(-1, blocks)
+    rows, columns, power = C, B, A
+    for _ in range(DOUBLINGS):  # C, C A, ...; ..., A B, B
+        rows = np.concatenate([rows, rows @ power], axis=1)
+        columns = np.concatenate([power @ columns, columns], axis=2)
+        power = power @ power
+    x, push = np.zeros((blocks, laws, n, 1)), np.moveaxis(columns @ r, 2, 0)[..., None]
+    for k in range(1, blocks):
+        x[k] = power @ x[k - 1] + push[k - 1]
+    echo = np.zeros((laws, size + 1, seen, inputs))  # after so many samples
+    echo[:, 1:] = (rows @ B).reshape(laws, size, seen, inputs)
+    late = np.maximum(np.subtract.outer(np.arange(size), np.arange(size)), 0)
+    through = np.moveaxis(echo[:, late], 3, 2).reshape(laws, -1, size * inputs)
+    own = slice(first // size, None)
+    found = rows @ np.moveaxis(x[own, ..., 0], 0, 2) + through @ r[:, own]
+    return found.reshape(laws, size, seen, -1).transpose(2, 3, 1, 0).reshape(seen, -1, laws)[:, first % size :]
+
+
 SAMPLES_LEFT = 16  # of the record after the slew, where a period of the first mode has fewer
 PERIOD_POINTS = 64  # of the period after the slew, in continuous time
 
@@ -271,42 +301,39 @@ class Slews:
         if self.model.period is None:
             left = self._left_in_time(entries)
         else:
-            left = self._slew.residual(self._run(self._slew, entries, self.model.own_moment)[0])
+            task = self._slew
+            first = int(task.is_after.argmax())
+            (moment,) = self._outputs(task, entries, [self.model.own_moment], first)
+            left = moment[: len(task.t) - first] - task.rigid_moment[first:, None]
         return np.sqrt((left**2).mean(axis=0))
 
     def cost(self, entries: Sequence[Entry]) -> Real:
         """T sum of (a x^2 + b e^2)/2 (laws,)."""
-        task, (a, b) = trial_slew(self.known, self.chain), trial_weights(self.known, self.chain)
-        sense = self.model.plant[2][self.model.signals.index("root_moment")]
-        moment, u = self._run(task, entries, sense)
-        off = moment - task.moment_reference[:, None]
-        added = u - (self.chain.slew.reading == "vibration") * task.feedforward[:, None]
+        model, task, (a, b) = self.model, trial_slew(self.known, self.chain), trial_weights(self.known, self.chain)
+        n = len(task.t)
+        rows = [model.plant[2][model.signals.index("root_moment")], np.eye(len(model.plant[0]))[model.last]]
+        moment, before = self._outputs(task, entries, rows)
+        off = moment[:n] - task.moment_reference[:, None]
+        added = before[1 : n + 1] - (self.chain.slew.reading == "vibration") * task.feedforward[:, None]
         return task.period * (a * off**2 + b * added**2).sum(axis=0) / 2
 
     @cached_property
     def _slew(self) -> Scenario:
         return slew_and_after(self.arm, self.known, self.chain)
 
-    # ------------------------------------------------------------ at samples
+    def _outputs(self, task: Scenario, entries: Sequence[Entry], rows: Sequence[Real], first: int = 0) -> Real:
+        """Outputs (rows, samples, laws), by rows of the plant's states, at the samples from `first` on, and some more.
 
-    def _run(self, task: Scenario, entries: Sequence[Entry], sense: Real) -> tuple[Real, Real]:
-        """A root moment, by the row `sense` of the states, and the input at the samples, (samples, laws)."""
-        model = self.model
+        The signals are the feed-forward and the references.
+        """
+        model, n = self.model, len(self.model.plant[0])
         A, (_, Bk, _, Dk) = model.closed(entries), model.states(entries)
-        wanted = {name: task.references[name] for name in model.signals if name in task.references}
-        references = np.array([wanted.get(name, 0.0 * task.feedforward) for name in model.signals])
-        push = task.feedforward + (Dk[:, 0] @ references)  # (laws, samples)
-        n = len(model.plant[0])
-        forced = np.zeros((len(task.t), *A.shape[:2], 1))
-        forced[:, :, :n, 0] = push.T[:, :, None] * model.plant[1][:, 0]
-        forced[:, :, n:, 0] = -np.moveaxis(Bk @ references, 2, 0)
-        x, moment = np.zeros((*A.shape[:2], 1)), np.zeros((len(task.t), len(A)))
-        u = moment.copy()
-        for k, force in enumerate(forced):
-            moment[k] = x[:, :n, 0] @ sense
-            x = A @ x + force
-            u[k] = x[:, model.last, 0]
-        return moment, u
+        none = 0.0 * task.feedforward
+        signals = np.array([task.feedforward, *(task.references.get(name, none) for name in model.signals)])
+        B, C = np.zeros((*A.shape[:2], len(signals))), np.zeros((len(A), len(rows), A.shape[1]))
+        B[:, :n, :1], B[:, :n, 1:], B[:, n:, 1:] = model.plant[1], model.plant[1] @ Dk, -Bk
+        C[:, :, :n] = rows
+        return outputs(A, B, C, signals, first)
 
     # ------------------------------------------------------------ in continuous time
 

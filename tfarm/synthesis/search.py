@@ -11,10 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from scipy.optimize import bisect, differential_evolution, minimize
+from scipy.optimize import differential_evolution, minimize
 
 from tfarm.arm import PLANE
 from tfarm.arrays import Real
@@ -24,7 +25,7 @@ from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Tell
 
 FEWEST_RUNS, MOST_RUNS = 2, 8  # one more than coefficients within these: some minima are found by one of five alone
-USUAL_WORK = 4 * 20**2  # conditions times squared states of one arm's first model: with twice as much half the runs
+USUAL_WORK = 4 * 20**2  # squared states of one arm's first model, twice when sampled: with twice as much half the runs
 FEWEST_POINTS, POINTS_EACH = 32, 15  # of a run, at least, and for each coefficient: the next power of two
 LAWS_EACH, MOST_LAWS = 800, 4000  # of a run for each coefficient, and at most; twice as many from the best points
 STRATEGIES = (("best1bin", 0.7), ("currenttobest1bin", 0.9))  # in turn, and the share of coefficients changed at once
@@ -40,6 +41,10 @@ AGREES = 5e-3  # relative: a run agrees if its score is worse than the best by l
 FLAT_WITHIN = 0.01  # laws whose score is worse by less than this share bound the flat part
 FLAT_STEPS = 60  # of the way to the bounds, each 1.4 times the one before
 AT_ORIGIN = 1e-9  # of that way: the first step
+FLAT_HALVINGS = 30  # of the step that leaves the flat part
+
+
+Score = Callable[..., Real]  # of points (n, k), and of limits
 
 
 class Points(NamedTuple):
@@ -82,15 +87,19 @@ class Worst:
     @property
     def work(self) -> float:
         """The work of a law, relative to that of one arm and its first model."""
-        return sum(len(judge.conditions) * len(judge.model.plant[0]) ** 2 for judge in self.judges) / USUAL_WORK
+        return sum((1 + judge.is_sampled) * len(judge.model.plant[0]) ** 2 for judge in self.judges) / USUAL_WORK
 
-    def scores(self, form: Structure, x: Real) -> Real:
-        """The function to be minimised, at points x (n, laws); arms after one with an unstable loop are left out."""
-        worst = self.judges[0].scores(form, x)
+    def scores(self, form: Structure, x: Real, limits: Real | None = None) -> Real:
+        """The function to be minimised, at points x (n, laws), any value above the limit of a law (see `Judge`).
+
+        Arms after one with an unstable loop, or a score above the limit, are left out.
+        """
+        limits = np.full(x.shape[1], np.inf) if limits is None else limits
+        worst = self.judges[0].scores(form, x, limits)
         for judge in self.judges[1:]:
-            stable = worst < LOST
-            if stable.any():
-                worst[stable] = np.maximum(worst[stable], judge.scores(form, x[:, stable]))
+            left = np.flatnonzero((worst < LOST) & (worst <= limits))
+            if left.size:
+                worst[left] = np.maximum(worst[left], judge.scores(form, x[:, left], limits[left]))
         return worst
 
 
@@ -103,7 +112,7 @@ def search(judge: Worst, form: Structure, tell: Tell, near: Real | None = None) 
     ends = [(place, end) for place in range(form.size) for end in (0, 1)]
     places = [each for each in ends if not (given[each[0]] or form.is_physical(*each))]
     region = form.wider(places, BEYOND)
-    (x, scores), of_runs = minimised(lambda at: judge.scores(region, at), form, region.box, judge.work, tell, near)
+    (x, scores), of_runs = minimised(partial(judge.scores, region), form, region.box, judge.work, tell, near)
     for place, end in (each for each in ends if region.is_physical(*each)):  # there if the score is as good
         moved = x[:, :1].copy()
         moved[place] = region.box[end][place]
@@ -118,14 +127,14 @@ def search(judge: Worst, form: Structure, tell: Tell, near: Real | None = None) 
 
 
 def minimised(
-    score: Callable[[Real], Real], form: Structure, box: tuple[Real, Real], work: float, tell: Tell, near: Real | None
+    score: Score, form: Structure, box: tuple[Real, Real], work: float, tell: Tell, near: Real | None
 ) -> tuple[Points, list[float]]:
     """Return the last points of all runs, and the best score of each.
 
-    `score` takes points (n, k) of the box; `work` is that of a law, relative to the usual one.  Runs begin within the
-    bounds of `form`, the first also with its start, and are more where no loop is stable yet; then follow one with the
-    best points of all, one near the best of those, and a simplex at the best of that.  With a point `near` the best one
-    run begins with it, and the next near the best.
+    `score` takes points (n, k) of the box, and limits (k,) above which any value will do; `work` is that of a law,
+    relative to the usual one.  Runs begin within the bounds of `form`, the first also with its start, and are more
+    where no loop is stable yet; then follow one with the best points of all, one near the best of those, and a simplex
+    at the best of that.  With a point `near` the best one run begins with it, and the next near the best.
     """
     runs = 1 if near is not None else min(max(int((form.size + 1) / max(1.0, work)), FEWEST_RUNS), MOST_RUNS)
     number = 1 << (max(FEWEST_POINTS, POINTS_EACH * form.size) - 1).bit_length()
@@ -155,18 +164,24 @@ def minimised(
     return found, [float(found.scores[0]), *(float(each.scores[0]) for each in ended[:runs])]
 
 
-def evolved(score: Callable[[Real], Real], box: tuple[Real, Real], points: Real, rounds: int, seed: int) -> Points:
+def evolved(score: Score, box: tuple[Real, Real], points: Real, rounds: int, seed: int) -> Points:
     """The last points of a run of differential evolution that begins with `points` (n, m)."""
     strategy, recombination = STRATEGIES[seed % len(STRATEGIES)]
+    limits = np.full(points.shape[1], np.inf)
+
+    def after(intermediate_result: Any) -> None:
+        """A point is replaced by one whose score is not above its own."""
+        limits[:] = intermediate_result.population_energies
+
     done = cast("Any", differential_evolution)(
-        lambda x: score(x.reshape(len(points), -1)), list(zip(*box, strict=True)), init=points.T, strategy=strategy,
-        recombination=recombination, maxiter=rounds, tol=CONVERGED, rng=seed, polish=False, vectorized=True,
-        updating="deferred",
+        lambda x: score(x.reshape(len(points), -1), limits), list(zip(*box, strict=True)), init=points.T,
+        strategy=strategy, recombination=recombination, maxiter=rounds, tol=CONVERGED, rng=seed, polish=False,
+        vectorized=True, updating="deferred", callback=after,
     )  # fmt: skip
     return Points.of([(done.population.T, done.population_energies)])
 
 
-def simplex(score: Callable[[Real], Real], box: tuple[Real, Real], start: Real) -> Points:
+def simplex(score: Score, box: tuple[Real, Real], start: Real) -> Points:
     """The last point of a simplex of Nelder and Mead that begins at `start` (n,)."""
     low, high = box
     step = SIMPLEX * (high - low)
@@ -206,27 +221,27 @@ def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str,
 
     The search goes outwards in growing steps, then by halving: narrow ranges are found as well as wide ones.
     """
-    limit = score + FLAT_WITHIN * abs(score)
-    shares = np.geomspace(AT_ORIGIN, 1.0, FLAT_STEPS)
+    n, limit = form.size, score + FLAT_WITHIN * abs(score)
+    ways = np.concatenate([np.diag(end - x) for end in form.box]).T
 
-    def reach(way: Real) -> float:
-        """The share of a way (n,) from x that is within the limit."""
+    def is_within(shares: Real) -> Any:
+        """Whether the law at a share (2 n, m) of each way from x to an end is within the limit."""
+        points = (x[:, None, None] + ways[:, :, None] * shares).reshape(n, -1)
+        return (judge.scores(form, points, np.full(shares.size, limit)) <= limit).reshape(shares.shape)
 
-        def excess(share: Any) -> Real:
-            return judge.scores(form, x[:, None] + way[:, None] * np.atleast_1d(share)) - limit
-
-        is_beyond = excess(shares) > 0
-        first = int(is_beyond.argmax())
-        if not is_beyond[first]:
-            return 1.0
-        return float(bisect(lambda share: float(excess(share)[0]), shares[first - 1] if first else 0.0, shares[first]))
-
-    found = {}
+    outwards = np.geomspace(AT_ORIGIN, 1.0, FLAT_STEPS)
+    is_beyond = ~is_within(np.tile(outwards, (2 * n, 1)))
+    first = is_beyond.argmax(axis=1)
+    low, high = np.where(first > 0, outwards[first - 1], 0.0), outwards[first]
+    for _ in range(FLAT_HALVINGS):
+        middle = (low + high) / 2
+        inside = is_within(middle[:, None])[:, 0]
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+    ends, found = form.coefficients(x[:, None] + ways * low), {}
     for place, each in enumerate(form.free):
-        ways = [np.eye(form.size)[place] * (end - x) for end in form.box]
-        low, high = (
-            bound if share == 1.0 else float(form.coefficients(x + share * way)[place])
-            for bound, way, share in zip(each.bounds, ways, map(reach, ways), strict=True)
+        least, largest = (
+            float(ends[place, side]) if is_beyond[side].any() else bound
+            for side, bound in zip((place, n + place), each.bounds, strict=True)
         )
-        found[each.name] = (low, high)
+        found[each.name] = (least, largest)
     return found

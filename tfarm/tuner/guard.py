@@ -145,12 +145,12 @@ class MovingGain:
     @cached_property
     def open(self) -> Real:
         """The matrix with rate feedback alone."""
-        return self.at(0.0)
+        return self.loop.having(**{MOMENT_GAIN: 0.0}).reduced_matrix()
 
     @cached_property
     def _fed_back(self) -> Real:
         """drive sense^T: the change of the matrix by a gain of -1."""
-        return self.open - self.at(1.0)
+        return self.open - self.loop.having(**{MOMENT_GAIN: 1.0}).reduced_matrix()
 
     @cached_property
     def sense(self) -> Real:
@@ -165,7 +165,7 @@ class MovingGain:
 
     def at(self, K: float) -> Real:
         """The closed-loop matrix at a gain."""
-        return self.loop.having(**{MOMENT_GAIN: K}).reduced_matrix()
+        return self.open - K * self._fed_back
 
     def radius(self, m: float) -> float:
         """Half the width of the widest sector around m; 0 where m itself is unstable."""
@@ -287,8 +287,7 @@ def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
 
 def _guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard | None:
     """The guard that holds in a loop and in a larger model; None where there is none."""
-    loops = _larger(loop)
-    return _frozen(loops, best_constant) if kind == "frozen" else _moving(loops, best_constant)
+    return (_frozen if kind == "frozen" else _moving)(_larger(loop), best_constant)
 
 
 def constant_windows(loop: Sampled) -> list[tuple[float, float]]:
@@ -326,8 +325,8 @@ def _moving(loops: list[Sampled], best_constant: float) -> Guard | None:
         if half < NARROWEST_SECTOR:
             return None
         proofs = [model.proof(lo, hi) for model in models]
-        if all(proofs):
-            whole = tuple(proof for proof in proofs if proof is not None)
+        if None not in proofs:
+            whole = tuple(filter(None, proofs))
             return Guard("time-varying", lo, hi, loops[-1].plant.count, _settled(loops, found), whole)
         share *= SECTOR_SHRINKS
     return None

@@ -139,14 +139,16 @@ def network_gain(weights: Real, inputs: Real, hidden: Real, limits: Limits) -> t
 
 
 @compiled
-def gain_gradient(weights: Real, inputs: Real, hidden: Real, by_sum: float, out: Real) -> None:
-    """Add by_sum times the derivative of the output neuron's sum by every weight to `out`."""
+def gain_gradient(weights: Real, inputs: Real, hidden: Real, by_sum: float, out: Real, by_input: Real) -> None:
+    """Add by_sum times the derivative of the output neuron's sum by every weight to `out`; set that by each input."""
     m, h = inputs.size, hidden.size
+    by_input.fill(0.0)
     for j in range(h):
         out[h * m + j] += by_sum * hidden[j]
         by_net = by_sum * weights[h * m + j] * hidden[j] * (1.0 - hidden[j])
         for i in range(m):
             out[j * m + i] += by_net * inputs[i]
+            by_input[i] += by_net * weights[j * m + i]
 
 
 @compiled
@@ -237,8 +239,8 @@ def backward(setting: Setting, weights: Real, run: Run, work: Work, gradient: Re
     `back` is the derivative by the state of the next sample.  `late_e`, `late_u`, `late_x`, `late_K` are derivatives
     by e, u, x and K of this sample through the inputs of later ones, `later_e` by e of the sample before.
     """
-    model, scales, (a, b, T, _, _) = setting.model, setting.scales, setting.numbers
-    (n, m), h = run.inputs.shape, run.hidden.shape[1]
+    model, (a, b, T, _, _) = setting.model, setting.numbers
+    n, m = run.inputs.shape
     back, spare, by_input = work
     late_e = later_e = late_u = late_x = late_K = 0.0
     gradient.fill(0.0)
@@ -246,12 +248,9 @@ def backward(setting: Setting, weights: Real, run: Run, work: Work, gradient: Re
     for k in range(n - 1, -1, -1):
         by_e = T * b * run.e[k] + dot(model.B, back) + late_e
         by_sum = (late_K - run.x[k] * by_e) * run.slope[k]
-        gain_gradient(weights, run.inputs[k], run.hidden[k], by_sum, gradient)
-        by_input.fill(0.0)
-        for j in range(h):
-            by_net = by_sum * weights[h * m + j] * run.hidden[k, j] * (1.0 - run.hidden[k, j])
-            for i in range(m):
-                by_input[i] += by_net * weights[j * m + i] / scales[i]
+        gain_gradient(weights, run.inputs[k], run.hidden[k], by_sum, gradient, by_input)
+        for i in range(m):
+            by_input[i] /= setting.scales[i]
         by_u = by_e + by_input[U_NOW] + late_u
         by_x = T * a * run.x[k] - run.K[k] * by_e + by_input[X_NOW] + late_x
         turn(model.A, back, spare)
@@ -263,11 +262,13 @@ def backward(setting: Setting, weights: Real, run: Run, work: Work, gradient: Re
 
 
 @compiled
-def sample_gradient(k: int, numbers: Numbers, reply: float, x_next: float, run: Run, weights: Real, out: Real) -> None:
+def sample_gradient(
+    k: int, numbers: Numbers, reply: float, x_next: float, run: Run, weights: Real, out: Real, by_input: Real
+) -> None:
     """Set the gradient of a x_next^2/2 + b e^2/2 by the weights of K at sample k; `reply` is dx_next/d(torque)."""
     by_gain = -run.x[k] * (numbers.a * x_next * reply + numbers.b * run.e[k])
     out.fill(0.0)
-    gain_gradient(weights, run.inputs[k], run.hidden[k], by_gain * run.slope[k], out)
+    gain_gradient(weights, run.inputs[k], run.hidden[k], by_gain * run.slope[k], out, by_input)
 
 
 MOST_HIDDEN = 1000  # neurons; the paper has 6

@@ -28,10 +28,8 @@ from tfarm.exact.compiled import compiled, inlined
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.tuner.guard import Guard
-from tfarm.tuner.kernel import Network
-from tfarm.tuner.trial import Record, Trial
-
-from .kernel import (
+from tfarm.tuner.kernel import (
+    Network,
     Run,
     Setting,
     Work,
@@ -44,6 +42,7 @@ from .kernel import (
     sense,
     trial_cost,
 )
+from tfarm.tuner.trial import Record, Trial
 
 NEVER, ENOUGH = -1, -2  # instead of the sample where a trial was stopped: none was, or x was small enough
 X, U, E, K = range(4)  # rows of the derivatives that `derive` carries, of the signals now
@@ -128,12 +127,12 @@ def learn_by_trials(
 
 
 @inlined
-def derive(k: int, setting: Setting, weights: Real, run: Run, S: Real, spare: Real, D: Real) -> None:
+def derive(k: int, setting: Setting, weights: Real, run: Run, work: Work, S: Real, spare: Real, D: Real) -> None:
     """Set derivatives at sample k by every weight, forward: rows of D are those of x, u, e, K now and 1, 2 samples ago.
 
     S (n, weights) is that of the state, and advances by one sample.
     """
-    model, hidden, m, h = setting.model, run.hidden[k], run.inputs.shape[1], run.hidden.shape[1]
+    model, by_input = setting.model, work.by_input
     for row in range(D.shape[0] - 1, BEFORE - 1, -1):
         copied(D[row - BEFORE], D[row])
     for row in range(BEFORE):
@@ -142,14 +141,10 @@ def derive(k: int, setting: Setting, weights: Real, run: Run, S: Real, spare: Re
         for p in range(S.shape[1]):
             D[X, p] += model.moment[i] * S[i, p]
             D[U, p] -= model.servo[i] * S[i, p]
-    gain_gradient(weights, run.inputs[k], hidden, run.slope[k], D[K])
-    for i in range(m):
-        by_input = 0.0
-        for j in range(h):
-            by_input += weights[h * m + j] * hidden[j] * (1.0 - hidden[j]) * weights[j * m + i]
-        share = run.slope[k] * by_input / setting.scales[i]
+    gain_gradient(weights, run.inputs[k], run.hidden[k], run.slope[k], D[K], by_input)
+    for i in range(by_input.size):
         for p in range(S.shape[1]):
-            D[K, p] += share * D[INPUT_ROWS[i], p]
+            D[K, p] += by_input[i] / setting.scales[i] * D[INPUT_ROWS[i], p]
     for p in range(S.shape[1]):
         D[E, p] = D[U, p] - run.K[k] * D[X, p] - run.x[k] * D[K, p]
     spare.fill(0.0)
@@ -189,14 +184,14 @@ def learn_by_samples(
                 return trial + 1, k
             if is_whole:
                 act(k, setting, weights, run, work)
-                derive(k, setting, weights, run, S, room, D)
+                derive(k, setting, weights, run, work, S, room, D)
                 for p in range(size):
                     gradient[p] = numbers.a * run.x[k] * D[X, p] + numbers.b * run.e[k] * D[E, p]
                 _step(weights, change, gradient, steps, 1.0)
                 continue
             made = past[k % numbers.lag]  # the weights of the torque that x follows now
             if k >= numbers.lag:
-                sample_gradient(k - numbers.lag, numbers, reply, run.x[k], run, made, gradient)
+                sample_gradient(k - numbers.lag, numbers, reply, run.x[k], run, made, gradient, work.by_input)
                 _step(weights, change, gradient, steps, 1.0)
             copied(weights, made)
             act(k, setting, weights, run, work)

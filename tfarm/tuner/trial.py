@@ -155,10 +155,9 @@ class Trial:
         )  # fmt: skip
         return replace(here, task=self.task)
 
-    def simulator(self, *, chain: Chain | None = None, task: Scenario | None = None) -> Simulator:
-        """A simulator of the loop, with the converters of a chain, by default that of the trial."""
-        chain, task = chain or self.loop.chain, task or self.task
-        return Simulator(self.arm, chain, task, count=self.loop.plant.count)
+    def simulator(self, task: Scenario | None = None) -> Simulator:
+        """A simulator of the loop with its converters, of the trial's task or another."""
+        return Simulator(self.arm, self.loop.chain, task or self.task, count=self.loop.plant.count)
 
     def room(self, network: Network) -> tuple[kernel.Run, kernel.Work]:
         """Empty record and buffers of a trial with that network."""
@@ -299,36 +298,15 @@ def tip_off(simulation: Simulation, trial: Trial) -> float | None:
     return float(simulation.at_samples.tip_displacement[-1] - chain.slew.travel_of(arm.reach))
 
 
-@dataclass(frozen=True)
-@record
-class SavedTuner:
-    """A tuner: network, guard, K1, Kp, the reading of the signals, and the arm and period of its training.
+class SavedTuner(StrictTable):
+    """A tuner, as in its file: K1 and Kp of the servo, weights of the network, arm and period of the training.
 
-    `cost` is of moments and torques in units of the first of the network's scales [N m].
+    `guard` is the interval of its gain, None without one; `a` and `b` weigh moments and torques in units of the first
+    of the `scales` [N m].
     """
 
-    network: Network
-    guard_kind: GuardKind
-    lo: float
-    hi: float
-    K1: float
-    signals: Reading
-    cost: Cost
-    arm: str
-    period: float
-    Kp: float = 0.0
-
-    def gain(self) -> TunedGain:
-        """The controller."""
-        servo = HubFeedback(K1=self.K1, Kp=self.Kp)
-        return TunedGain(self.network, Limits(self.lo, self.hi), servo, self.signals)
-
-
-class TunerFile(StrictTable):
-    """The file of a tuner."""
-
     format: Literal["tfarm tuner 1"]
-    arm: Annotated[str, Field(max_length=80)]
+    arm: str
     period: Annotated[Finite, Field(gt=0)]
     K1: Finite
     Kp: Annotated[Finite, Field(ge=0)] = 0.0  # absent in files of tuners without a servo
@@ -341,37 +319,28 @@ class TunerFile(StrictTable):
     W1: list[list[Finite]]
     w2: list[Finite]
 
-    def build(self) -> SavedTuner:
-        """Return the tuner.  Raises ParameterError where its parts do not match."""
-        if (self.guard is None) != (self.guard_kind == "none"):
-            raise ParameterError(key="guard", value=self.guard, remedy="two ends, or null with guard_kind none")
-        lo, hi = (0.0, math.inf) if self.guard is None else self.guard
-        if not 0 <= lo < hi:
-            raise ParameterError(key="guard", value=self.guard, remedy="its lower end, from 0 on, comes first")
+    @property
+    def network(self) -> Network:
+        """The network.  Raises ParameterError where its parts do not match."""
         widths = {len(row) for row in self.W1}
         if widths != {len(self.scales)}:
             remedy = f"rows of {len(self.scales)}, one weight an input"
             raise ParameterError(key="W1", value=sorted(widths), remedy=remedy)
-        network = Network(np.array(self.W1), np.array(self.w2), np.array(self.scales))
-        cost = Cost(a=self.a, b=self.b)
-        return SavedTuner(network, self.guard_kind, lo, hi, self.K1, self.signals, cost, self.arm, self.period, self.Kp)
+        return Network(np.array(self.W1), np.array(self.w2), np.array(self.scales))
+
+    def gain(self) -> TunedGain:
+        """The controller.  Raises ParameterError where the parts of the tuner do not match."""
+        if (self.guard is None) != (self.guard_kind == "none"):
+            raise ParameterError(key="guard", value=self.guard, remedy="two ends, or null with guard_kind none")
+        limits = Limits(*(self.guard or (0.0, math.inf)))
+        if not 0 <= limits.lo < limits.hi:
+            raise ParameterError(key="guard", value=self.guard, remedy="its lower end, from 0 on, comes first")
+        return TunedGain(self.network, limits, HubFeedback(K1=self.K1, Kp=self.Kp), self.signals)
 
 
 def to_text(tuner: SavedTuner) -> str:
     """Text of a tuner's file; equal tuners give equal text, and it loads to the same bits."""
-    content = {
-        "format": FORMAT,
-        "arm": tuner.arm,
-        "period": tuner.period,
-        "K1": tuner.K1,
-        **({"Kp": tuner.Kp} if tuner.Kp else {}),
-        "signals": tuner.signals,
-        "a": tuner.cost.a,
-        "b": tuner.cost.b,
-        "guard_kind": tuner.guard_kind,
-        "guard": None if tuner.guard_kind == "none" else [tuner.lo, tuner.hi],
-        **weights_of(tuner.network),
-    }
+    content = tuner.model_dump(exclude_defaults=True)
     return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
@@ -389,7 +358,9 @@ def load_tuner(path: str | os.PathLike[str]) -> SavedTuner:
     """Read the tuner of a file.  Raises ParameterError, in one line, for the first problem of the file."""
     text = read_file(path, MOST_TUNER_BYTES, key="controller", what="a tuner's file")
     try:
-        return TunerFile.model_validate_json(text).build()
+        found = SavedTuner.model_validate_json(text)
+        found.gain()  # refuses parts that do not match
+        Cost(a=found.a, b=found.b)
     except ValidationError as error:
         problem = error.errors(include_url=False)[0]
         key = ".".join(map(str, problem["loc"])) or "file"
@@ -399,3 +370,4 @@ def load_tuner(path: str | os.PathLike[str]) -> SavedTuner:
         raise ParameterError(key=key, value=value, remedy=remedy, file=path) from None
     except TfarmError as error:
         raise error.in_file(path) if isinstance(error, ParameterError) else error from None
+    return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple
 
@@ -27,6 +27,7 @@ from tfarm.tuner.guard import Guard, GuardKind, find_guard
 from tfarm.tuner.kernel import PAPER_HIDDEN, PAPER_INPUTS, initial_network
 from tfarm.tuner.training import Learning, LearningCurves, Training, train
 from tfarm.tuner.trial import (
+    FORMAT,
     TRIAL_MODES,
     Cost,
     Record,
@@ -119,10 +120,11 @@ class Tuning:
 
     def saved(self) -> SavedTuner:
         """The record that `save_tuner` writes."""
-        guard, plan, trial = self.training.guard, self.plan, self.trial
+        guard, plan = self.training.guard, self.plan
         return SavedTuner(
-            self.training.network, guard.kind, guard.lo, guard.hi, plan.K1, plan.signals, plan.cost, trial.arm.name,
-            trial.task.period, plan.Kp,
+            format=FORMAT, arm=self.trial.arm.name, period=self.trial.task.period, K1=plan.K1, Kp=plan.Kp,
+            signals=plan.signals, a=plan.cost.a, b=plan.cost.b, guard_kind=guard.kind,
+            guard=None if guard.kind == "none" else (guard.lo, guard.hi), **weights_of(self.training.network),
         )  # fmt: skip
 
     def gain(self) -> TunedGain:
@@ -383,20 +385,14 @@ def controlled_run(
 
     Its guard is certified for the loop of its training, not for another arm or chain.
     """
-    chain = with_signals(chain, saved.signals)
+    chain, gain = with_signals(chain, saved.signals), saved.gain()
     task = scenario(name, arm, chain, duration)
     ideal = ideal_chain(chain)
-    used = enough_modes(lambda n: saved.gain().run(Simulator(arm, ideal, task, count=n, outputs=outputs)), count)
-    run = saved.gain().run(Simulator(arm, chain, task, count=used.modes, between=between, outputs=outputs))
+    used = enough_modes(lambda n: gain.run(Simulator(arm, ideal, task, count=n, outputs=outputs)), count)
+    run = gain.run(Simulator(arm, chain, task, count=used.modes, between=between, outputs=outputs))
     trained = {
-        "trained_on": saved.arm,
-        "guard_kind": saved.guard_kind,
-        "guard": [saved.lo, saved.hi],
-        "K1": saved.K1,
-        "Kp": saved.Kp,
-        "signals": saved.signals,
-        "period_s": saved.period,
-        **asdict(saved.cost),
-        "cost_unit_N_m": float(saved.network.scales[0]),
-    }
-    return Run(arm, saved.gain().servo, run, used, described(task, arm, chain), tuner=trained)
+        "trained_on": saved.arm, "guard_kind": saved.guard_kind, "guard": list(gain.guard), "K1": saved.K1,
+        "Kp": saved.Kp, "signals": saved.signals, "period_s": saved.period, "a": saved.a, "b": saved.b,
+        "cost_unit_N_m": saved.scales[0],
+    }  # fmt: skip
+    return Run(arm, gain.servo, run, used, described(task, arm, chain), tuner=trained)
