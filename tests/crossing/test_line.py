@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.optimize.elementwise import find_root
 
 from tfarm.crossing import (
     Crossings,
@@ -18,7 +17,6 @@ from tfarm.crossing import (
     joined,
     zeros_between,
 )
-from tfarm.crossing.line import LAST_BIT
 
 CURVES = {
     "axis": (lambda x: 1j * x, np.linspace(1e-3, 40.0, 4001), lambda s: s.real > 0),
@@ -140,29 +138,6 @@ def test_zeros_are_the_closed_ones_to_the_last_bit_and_soon(number, most):
     found = zeros_between(f, np.zeros(number), np.full(number, 3.0))
     np.testing.assert_allclose(found, ZEROS[:number], rtol=0, atol=4 * np.finfo(float).eps)
     assert len(asked) <= most
-
-
-@pytest.mark.parametrize(
-    ("f", "low"),
-    [
-        *((each, 0.0) for each in HARD),
-        (lambda x: x**3 - 27.0 * (1 - 2e-16), 0.0),  # in the last bit before the upper end
-        (lambda x: np.sign(x - 1e-3), -3.0),  # far smaller than its bracket
-    ],
-)
-def test_every_place_that_is_asked_for_is_that_of_another_chandrupatla(f, low):
-    """SciPy's, from the same two ends, the upper one 3, and with as narrow a last bracket."""
-    ours, theirs, width = [], [], 3.0 - low
-
-    def asked(by):
-        return lambda x: by.append(float(x[0])) or f(x)
-
-    found = zeros_between(asked(ours), np.array([low]), np.array([3.0]))
-    limits = {"xatol": 2 * LAST_BIT * width, "xrtol": 2 * LAST_BIT, "fatol": 0.0, "frtol": 0.0}
-    other = find_root(asked(theirs), (np.array([3.0]), np.array([low])), tolerances=limits)
-    assert len(ours) == len(theirs)
-    np.testing.assert_allclose(ours, theirs, rtol=1e-14)
-    np.testing.assert_array_equal(found, other.x)
 
 
 @pytest.mark.parametrize(

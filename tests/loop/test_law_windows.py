@@ -14,11 +14,12 @@ from tests.shared import sized, thinned
 from tfarm import ConvergenceError, Hub, Law, Link, Payload, RotarySpring, Section
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
-from tfarm.loop import windows as windows_module
+from tfarm.loop import lines as lines_module
+from tfarm.loop.lines import unstable_below
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import unstable_below, windows_of
+from tfarm.loop.windows import windows_of
 from tfarm.response.signals import Signals
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -76,14 +77,14 @@ def test_a_law_that_differentiates_may_be_late(delay):
 
 
 def test_a_number_whose_poles_cannot_be_counted_is_named(monkeypatch):
-    line_crossings = windows_module.line_crossings
+    with_real_poles = lines_module._with_real_poles
 
-    def lost(loop, name, *others):
-        if name == "hub_angle.num.1":
+    def lost(line, *others):
+        if line.name == "hub_angle.num.1":
             raise ConvergenceError("a zero lies on the contour", 0.0, 0.0)
-        return line_crossings(loop, name, *others)
+        return with_real_poles(line, *others)
 
-    monkeypatch.setattr(windows_module, "line_crossings", lost)
+    monkeypatch.setattr(lines_module, "_with_real_poles", lost)
     found = tfarm.margins(LAB, LAW)
     assert LAW.numbers.keys() - found.windows.keys() == {"hub_angle.num.1"}
     assert found.intervals_note.endswith("poles not counted along hub_angle.num.1")

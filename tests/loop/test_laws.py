@@ -17,13 +17,13 @@ from tests.loop.law_counts import judge, some_delay, some_law
 from tests.shared import remember, sized, thinned
 from tests.shell import run
 from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
+from tfarm.loop.lines import through_infinity, unstable_below
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import loop_margins
 from tfarm.loop.plane import between, plane
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import Spill, stability
 from tfarm.loop.theorem import definite, is_hurwitz, on_axis, polynomial, signs_of
-from tfarm.loop.windows import through_infinity, unstable_below
 from tfarm.reduced.modal import sensed_model
 from tfarm.response.signals import Signals
 

@@ -18,11 +18,11 @@ from tests.shared import thinned
 from tests.shell import run
 from tfarm import Arm, Hub, HubFeedback, Law, Link, ParameterError, Payload, Section
 from tfarm.arm import Attachment, Motor
+from tfarm.loop.lines import line_crossings
 from tfarm.loop.loci import damping_ratios, held_branches, loci, most_damped, reduced_locus
 from tfarm.loop.locus import CONTROLLER, RIGID, frame, locus, origin_name, rounded
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
-from tfarm.loop.windows import line_crossings
 from tfarm.schema import curve_table
 from tfarm.spectrum.damped import damped_modes
 from tfarm.spectrum.proofs import enclosed

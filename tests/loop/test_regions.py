@@ -15,7 +15,7 @@ from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.errors import ParameterError
 from tfarm.loop.loop import Loop
-from tfarm.loop.plane import INFINITE, LINEAR_SCALE, Axis, between, edge, gain_map, ranges_of, seen, static_edges
+from tfarm.loop.plane import INFINITE, LINEAR_SCALE, Axis, between, edge, gain_map, ranges_of, static_edges
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
@@ -187,15 +187,6 @@ def test_a_grid_finds_its_own_axis():
     assert Axis.of(np.linspace(-1.0, 3.0, 41)) == Axis(-1.0, 3.0)
     assert Axis.of(np.geomspace(0.02, 3.0, 41)) == Axis(0.02, 3.0, 0.02)
     assert Axis.of(np.array([-3.0, -1.0, -0.5, 0.0, 2.0, 6.0])) == Axis(-3.0, 6.0, 0.5)
-
-
-def test_what_is_seen_is_the_nearest_count():
-    plane = tfarm.map(LAB, np.geomspace(0.02, 3.0, 9), np.linspace(-1.0, 2.0, 7))
-    found = seen(plane, Axis(0.02, 3.0), Axis(-1.0, 2.0))
-    for row, K2 in enumerate(found.K2):
-        for column, K1 in enumerate(found.K1):
-            nearest = abs(plane.K2 - K2).argmin(), abs(plane.K1 - K1).argmin()
-            assert found.unstable[row, column] == plane.unstable[nearest]
 
 
 @pytest.mark.parametrize("Kp", [0.0, 5.0])

@@ -15,14 +15,12 @@ from tests.loop.arms import window_arm
 from tests.loop.test_lossless import RIGS as REACTIVE
 from tests.loop.test_lossless import edges_of
 from tests.shared import thinned
-from tests.similar import EITHER
 from tfarm import Hub, HubFeedback, Law, Payload
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.exact.characteristic import loop_parts
 from tfarm.loop import panels
 from tfarm.loop.locus import BranchCrossing, Locus
 from tfarm.loop.loop import Loop
-from tfarm.loop.nyquist import compressed, poles_on_axis, upper_contour
+from tfarm.loop.nyquist import compressed, poles_on_axis
 from tfarm.loop.panels import CHEBYSHEV, Positions, loop_panels, positions, sensed_places
 from tfarm.loop.plane import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.poles import Poles, count_with_mirrors, first_poles, poles_below, quiet_edge
@@ -163,15 +161,6 @@ def test_the_moment_axis_holds_the_default_range_and_all_that_is_unstable_below(
     assert not tfarm.map(arm, x.grid(3), np.linspace(-42.0, -4.0, 40)).stable.all()
 
 
-@pytest.mark.parametrize("units", EITHER.values(), ids=EITHER)
-def test_the_moment_axis_is_of_no_unit(units):
-    """With the rate axis in the same units."""
-    arm, x = window_arm(), Axis(0.5, 1.5)
-    low, high = (units.law(arm, HubFeedback(K1=each)).K1 for each in (x.low, x.high))
-    here, there = moment_axis(arm, x), moment_axis(units.arm(arm), Axis(low, high))
-    assert (there.low, there.high) == (pytest.approx(here.low, rel=1e-9), here.high)
-
-
 def test_the_stable_edge_is_the_boundary_with_stable_points_on_one_side():
     """Of points of the D-decomposition those where the count of the map is 0 above or below, but not both."""
     x, y = Axis(0.02, 3.0, 0.02), Axis(-4.0, 2.0)
@@ -290,37 +279,6 @@ def test_the_plane_is_drawn_in_a_disc():
     assert (abs(drawn) < 1).all()
     np.testing.assert_allclose(drawn / (1 - abs(drawn)), L, rtol=1e-7)
     assert compressed(np.array([complex(np.inf, 3.0)])).tolist() == [1.0]
-
-
-def test_the_contour_ends_at_the_band_wherever_the_law_has_poles():
-    """One below the band has points all around it, one above it has none; and at -1 +- 1/2 of its distance too."""
-    band = 300.0
-    for ringing, is_near in ((0.6 * band, True), (1.004 * band, False)):
-        damped = 0.01 * ringing
-        den = [1.0, 2 * damped, damped**2 + ringing**2]
-        loop = Loop(LAB, Law({"hub_rate": ([ringing**2], den)}))
-        s, is_arc = upper_contour(loop, np.array([0.0]), band, np.array([-1 + 20j]))
-        w = s.imag[~is_arc]
-        assert w.max() == pytest.approx(band, rel=1e-12)
-        assert (np.diff(s.imag) >= 0).all()
-        near = np.sort(w[abs(w - ringing) <= 4 * damped])
-        if is_near:
-            assert np.diff(near).max() < 0.5 * damped
-            assert near[-1] > ringing + 3.5 * damped
-            assert near[0] < ringing - 3.5 * damped
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_the_function_of_a_law_is_the_rig_s_drive_times_one_plus_l(name):
-    """D s^n/(q drive) is 1 + L, up to the time that waves take and one factor."""
-    loop = Loop(LAB, LAWS[name])
-    s = np.array([0.3 + 2j, -5 + 40j, 2.0 + 9j])
-    at = loop.function(s)
-    drive, _, scale = loop_parts(loop.k, s)
-    whole = np.prod([s[:, None] - loop.law.poles], axis=2)[0]
-    mine = at.value * np.exp(at.scale) * s**loop.zeros_at_origin * np.exp(loop.delay_of_waves * s)
-    ratio = mine / (drive * np.exp(scale) * whole * (1 + loop.loop_function(s)))
-    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-8)
 
 
 @pytest.mark.parametrize("C", [1e-4, 0.01, 0.1])

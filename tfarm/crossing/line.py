@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize.elementwise import find_root
 
 from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.errors import ParameterError
@@ -27,11 +28,10 @@ from tfarm.records import record
 Places = NDArray[Any]  # of a curve, in any coordinate
 Parts = Callable[[Real], tuple[Complex, Complex]]  # A and B at places of a curve
 
-LAST_BIT = 2.0**-53  # of a place, and of its bracket, which is narrower
+LAST_BIT = 2.0**-53  # of a place, and of the narrowest bracket
 DIP_STEPS = 14  # of a golden section: a thousandth of two steps of the grid is left
 GOLDEN = (5.0**0.5 - 1.0) / 2.0
 ROUNDED = 1e-11  # of |A| |B|: an imaginary part that may be rounding
-MOST_HALVINGS = 200  # a zero takes ten evaluations; three times 53 where every step is a halving
 Window = tuple[float, float]  # two values of a gain, the lower first
 SAME_EDGE = 1e-9  # relative: next to z = 1 one static crossing is read several times, each with an error near 1e-12
 
@@ -96,32 +96,20 @@ def brackets(h: Real) -> tuple[tuple[Whole, ...], Whole]:
 def zeros_between(f: Callable[[Real], Real], low: Real, high: Real) -> Real:
     """Return the zeros of functions f (n,) that change sign between `low` and `high` (n,), to the last bit.
 
-    By Chandrupatla (1997): inverse quadratic interpolation through the last three points where it is safe, else the
-    middle.
+    By SciPy's Chandrupatla (1997); `low` of one that has one sign at both.
     """
     if not low.size:
         return low
-    x1, x2 = high, low
-    f1, f2 = f(x1), f(x2)
-    share, narrow = np.full(low.size, 0.5), LAST_BIT * abs(high - low)
-    for _ in range(MOST_HALVINGS):
-        x = x1 + share * (x2 - x1)
-        y = f(x)
-        is_beyond = np.sign(y) == np.sign(f1)
-        x3, f3 = np.where(is_beyond, x1, x2), np.where(is_beyond, f1, f2)
-        x2, f2 = np.where(is_beyond, x2, x1), np.where(is_beyond, f2, f1)
-        x1, f1 = x, y
-        best = np.where(abs(f1) < abs(f2), x1, x2)
-        width, wanted = abs(x2 - x1), narrow + LAST_BIT * abs(best)
-        with np.errstate(all="ignore"):  # points that coincide, or have one value, give NaN, which is not used
-            least = np.where(width > 2 * wanted, wanted / width, 0.5)
-            xi, phi = (x1 - x2) / (x3 - x2), (f1 - f2) / (f3 - f2)
-            at = f1 / (f2 - f1) * f3 / (f2 - f3) + (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (f3 - f2)
-            is_safe = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi) & np.isfinite(at)
-            share = np.clip(np.where(is_safe, at, 0.5), least, 1 - least)
-        if ((least == 0.5) | (f1 == 0)).all():
-            break
-    return np.asarray(best)
+    x = low.copy()
+
+    def some(at: Real, which: Whole) -> Real:
+        x[which] = at
+        return np.asarray(f(x)[which])
+
+    limits = {"xatol": LAST_BIT * float(abs(high - low).min()), "xrtol": 2 * LAST_BIT, "fatol": 0.0, "frtol": 0.0}
+    which = np.arange(low.size)
+    found = find_root(some, (low, high), args=(which,), tolerances=limits)  # type: ignore[call-overload]  # of its stubs
+    return np.where(found.success, found.x, low)
 
 
 def crossed(places: Real, parts: Parts) -> tuple[Real, Real, Whole]:

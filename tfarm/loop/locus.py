@@ -35,9 +35,9 @@ from tfarm.spectrum.box import Box
 from tfarm.spectrum.following import assigned, between, follow
 from tfarm.spectrum.naming import single_zeros
 
+from .lines import line_crossings
 from .loop import Loop, grid
 from .varied import ARM_PARAMETERS, OF_THE_LAW, Title, Varied
-from .windows import line_crossings
 
 LOCUS_VALUES, LAW_LOCUS_VALUES = 500, 100  # values of a locus by default: of gains, of any other law
 MOST_LOCUS_POINTS = 100_000  # values, those between that make it round among them

@@ -195,16 +195,21 @@ class Loop:
             cancels = abs(right + left) <= 2 * ROUNDING_AT_REST and abs(right) < 1  # else odd terms dominate
         return round(float(np.log2(abs(farther / nearer)))) if cancels else 0
 
+    def characteristic(self, s: Complex) -> tuple[Complex, Complex]:
+        """D e^{-scale} and scale at s."""
+        of_rig = self.signals.parts(s)
+        drive, fed_back = self._parts(s, of_rig)
+        return drive + fed_back, of_rig.scale
+
     def function(self, s: Complex) -> Analytic:
-        """D/s^n, n = `zeros_at_origin`, with slopes from differences."""
+        """D e^{-s T}/s^n, n = `zeros_at_origin` and T = `delay_of_waves`, with slopes from differences."""
         s = np.where(s == 0, NEAREST_TO_ORIGIN * first_frequency(self.arm), np.asarray(s, dtype=complex))
 
-        def characteristic(at: Complex) -> tuple[Complex, Complex]:
-            of_rig = self.signals.parts(at)
-            drive, fed_back = self._parts(at, of_rig)
-            return drive + fed_back, of_rig.scale - self.delay_of_waves * at
+        def clipped(at: Complex) -> tuple[Complex, Complex]:
+            D, scale = self.characteristic(at)
+            return D, scale - self.delay_of_waves * at
 
-        return by_differences(self.k, characteristic, s, self.zeros_at_origin)
+        return by_differences(self.k, clipped, s, self.zeros_at_origin)
 
     @cached_property
     def delay_of_waves(self) -> float:

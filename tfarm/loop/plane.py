@@ -19,6 +19,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -36,22 +37,22 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.table import PAPER_GAINS, default_gains, hub_locked, rate_unit
 
-from .loop import Loop, grid
-from .stability import band_of_family, verdict_on
-from .windows import (
+from .lines import (
     ROUNDED,
+    Line,
+    along,
     columns,
     critical,
     crossed,
     line_crossings,
-    rows,
     static_edge,
-    theorem_edges,
-    theorem_windows,
     turns_over,
     unstable_below,
     with_numbers,
 )
+from .loop import Loop, grid
+from .stability import band_of_family, verdict_on
+from .windows import theorem_edges, theorem_windows
 
 COUNTS = Quantity(key="unstable_roots", help="unstable poles at each point, rows upwards; inf where infinitely many")
 BOUNDARY = Quantity(key="boundary", help="both gains and the frequency [rad/s] with poles on the imaginary axis")
@@ -218,9 +219,9 @@ def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real, band: float | Non
     if band is None:
         band, is_quiet = band_of_family(corners)
     omega = np.asarray(grid(loop.arm, band))
-    members = [lambda value=value: loop.having(vary[0], value) for value in x.tolist()]
-    lines = columns(loop, vary, x, (max(map(abs, across)), max(map(abs, up))))
-    found = crossed(loop, lines, vary[1], up, omega, members)
+    lines = [Line(partial(loop.having, vary[0], value), vary[1], *up) for value in x.tolist()]
+    family = columns(loop, vary, x, max(map(abs, across)))
+    found = [column() for column in crossed(loop.arm, family, lines, omega)]
     crossing = np.concatenate([y[:0], *(each.gain for each in found)])
     at = 0.0 if vary == PLANE else float(y[_farthest(y, crossing)])  # at K2 = 0 the hub is passive
     there = _counts_across(loop.having(vary[1], at), vary[0], x, band, one_by_one=is_counted)
@@ -246,15 +247,14 @@ def _known_counts(loop: Loop, K1: Real, K2: Real) -> NDArray[np.int64]:
     """Unstable poles without damping: one count for each side of each line on which modes meet the axis."""
     limits = float(K2[0]), float(K2[-1])
     static = static_edge(loop.having(RATE_GAIN, default_gains(loop.arm).K1), MOMENT_GAIN, limits)
-    side = np.zeros(K2.size, bool) if static is None else static.t < K2
     unstable = np.zeros((K2.size, K1.size), dtype=np.int64)
-    of_K1, of_K2 = np.sign(K1 + loop.arm.rate_loss), np.sign(K2 - loop.arm.input_per_torque)
-    for of_column, of_row, each in itertools.product((-1, 0, 1), (-1, 0, 1), (True, False)):
-        (where,), (here,) = np.nonzero(of_K1 == of_column), np.nonzero((of_K2 == of_row) & (side == each))
-        if here.size and where.size:
-            found = verdict_on(_at(loop, PLANE, (float(K1[where[where.size // 2]]), float(K2[here[here.size // 2]]))))
-            count = INFINITE if found.unstable_roots_infinite else found.unstable_roots
-            unstable[np.ix_(here, where)] = count
+    of_columns, of_rows = np.sign(K1 + loop.arm.rate_loss), np.sign(K2 - loop.arm.input_per_torque)
+    of_rows = of_rows if static is None else of_rows + 3 * (static.t < K2)
+    for across, up in itertools.product(np.unique(of_columns), np.unique(of_rows)):
+        columns, rows = np.flatnonzero(of_columns == across), np.flatnonzero(of_rows == up)
+        middle = float(K1[columns[columns.size // 2]]), float(K2[rows[rows.size // 2]])
+        found = verdict_on(_at(loop, PLANE, middle))
+        unstable[np.ix_(rows, columns)] = INFINITE if found.unstable_roots_infinite else found.unstable_roots
     return unstable
 
 
@@ -294,9 +294,8 @@ def boundary(loop: Loop, omega: Real) -> Real:
     """K1 and K2 with poles at +-i w, the other gains those of the loop, and w: (n, 3), in the order of omega."""
     if loop.arm.loses_at_hub_alone:
         return np.empty((0, 3))  # both equations are one
-    terms, one = rows(loop, 1j * omega), np.ones(1, complex)
-    N = terms[0] + loop.having(RATE_GAIN, 0.0).having(MOMENT_GAIN, 0.0).law.polynomials(one)[0][:, 0] @ terms[1:]
-    a, b = (terms[1 + loop.law.signals.index(name)] for name in ("hub_rate", "root_moment"))
+    apart = loop.under(with_numbers(loop.law, dict.fromkeys(PLANE, 0.0)))
+    (N, _), (a, b) = along(apart, PLANE).on(1j * omega)
     determinant = (a * b.conj()).imag
     with np.errstate(all="ignore"):  # where both equations are one, the point is far away
         K1 = -(N * b.conj()).imag / determinant
@@ -343,16 +342,16 @@ class Axis:
         y = between(low, high, number)
         if self.is_linear:
             return y
-        beyond = self.linear * np.exp((abs(y) / self.linear - LINEAR_SHARE) * LOG_BASE)
-        return np.asarray(np.where(abs(y) <= self.linear * LINEAR_SHARE, y / LINEAR_SHARE, np.sign(y) * beyond))
+        beyond = np.maximum(abs(y) - LINEAR_SHARE, 0.0)
+        return np.asarray(self.linear * np.where(beyond > 0, np.sign(y) * np.exp(beyond * LOG_BASE), y / LINEAR_SHARE))
 
     def _stretched(self, x: Real) -> Real:
-        """Proportional to x up to `linear`, then a decade as long as `linear`: matplotlib's "symlog"."""
+        """x where linear; else x over `linear` up to 1, then decades: matplotlib's "symlog"."""
         if self.is_linear:
             return x
-        decades = np.log(np.maximum(abs(x), self.linear)) / LOG_BASE
-        beyond = self.linear * (LINEAR_SHARE - math.log(self.linear) / LOG_BASE + decades)
-        return np.asarray(np.where(abs(x) <= self.linear, x * LINEAR_SHARE, np.sign(x) * beyond))
+        size = abs(x) / self.linear
+        decades = np.log(np.maximum(size, 1.0)) / LOG_BASE
+        return np.asarray(np.sign(x) * (LINEAR_SHARE * np.minimum(size, 1.0) + decades))
 
     @classmethod
     def of(cls, values: Real) -> Axis:
@@ -409,13 +408,9 @@ def edge(found: Plane, x: Axis, y: Axis) -> Real:
         points = np.concatenate([points, boundary(loop, middle)])
         points = points[np.unique(points[:, 2], return_index=True)[1]]
     length, is_seen = _segments(points, x, y)
-    kept = is_seen & (length < LONG_SEGMENT)
-    rows: list[Real] = []
-    for i in np.nonzero(np.r_[kept, False] | np.r_[False, kept])[0]:  # points of a segment that is kept
-        rows.append(points[i])
-        if i == len(points) - 1 or not kept[i]:
-            rows.append(np.full(3, np.nan))
-    return np.array(rows).reshape(-1, 3)
+    parts = np.split(points, np.flatnonzero(~is_seen | (length >= LONG_SEGMENT)) + 1)
+    gap = np.full((1, 3), np.nan)
+    return np.concatenate([gap[:0], *(np.concatenate([part, gap]) for part in parts if len(part) > 1)])
 
 
 def _segments(points: Real, x: Axis, y: Axis) -> tuple[Real, NDArray[np.bool_]]:
@@ -432,23 +427,12 @@ def stable_edge(found: Plane, points: Real, x: Axis, y: Axis) -> Real:
         return points
     across, up = x.place(points[:, 0]), y.place(points[:, 1])
     columns, rows = (axis.place(values) for axis, values in zip((x, y), found.axes, strict=True))
-    column, row = np.searchsorted(_middles(columns), across), np.interp(up, rows, np.arange(rows.size))
+    column, row = np.searchsorted((columns[1:] + columns[:-1]) / 2, across), np.interp(up, rows, np.arange(rows.size))
     below, above = (
         np.clip(np.round(row + way).astype(int), 0, rows.size - 1) for way in (-ROWS_FROM_EDGE, ROWS_FROM_EDGE)
     )
     differ = (found.unstable[below, column] == 0) != (found.unstable[above, column] == 0)
     return np.asarray(points[differ & (up >= 0) & (up <= 1) & (across <= 1) & (points[:, 0] > 0)])
-
-
-def _middles(values: Real) -> Real:
-    return np.asarray((values[1:] + values[:-1]) / 2)
-
-
-def seen(found: Plane, x: Axis, y: Axis) -> Plane:
-    """The counts of a map on a grid with even places: at each of its points those of the nearest one computed."""
-    across, up = (axis.grid(values.size) for axis, values in zip((x, y), found.axes, strict=True))
-    columns, rows = (np.searchsorted(_middles(old), new) for old, new in zip(found.axes, (across, up), strict=True))
-    return replace(found, x=across, y=up, unstable=found.unstable[np.ix_(rows, columns)])
 
 
 def resting_frequencies(found: Plane, count: int) -> Real:

@@ -177,7 +177,7 @@ def band_of_loop(loop: Loop, theorem: Theorem | None = None) -> tuple[float, boo
     if arm.loses_at_hub_alone or is_decided or fastest > highest:
         return least, False
     band = least
-    while modes_below(arm, band) <= MOST_BAND_MODES:
+    while band <= highest or modes_below(arm, band) <= MOST_BAND_MODES:
         if has_fallen(loop, band):
             return band, arm.least_damping > 0
         band *= WIDENED

@@ -17,14 +17,14 @@ import numpy as np
 from tfarm.arm import LISTED, NAMES, RATE_GAIN, AnyLaw, Arm, Law, arm_and_law, full_law, unit_of
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.exact.characteristic import Analytic
+from tfarm.exact.characteristic import Analytic, LoopParts
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
-from tfarm.response.signals import Signals
 from tfarm.spectrum.box import Box, winding_number, zeros_in_box
 from tfarm.spectrum.naming import settled
 from tfarm.spectrum.table import first_frequency
 
+from .lines import Place, parts_of, place_of
 from .loop import NEAREST_TO_ORIGIN, ORDER_READ_AT, Loop, band_of, by_differences
 from .poles import SLOW_SHARE, box_of, slow_poles, starting_points
 
@@ -116,26 +116,21 @@ class Varied:
         """The loop where the number has that value."""
         if not self.is_of_arm:
             return self.first.under(self.law_at(value))
-        signals = self._signals(value)
-        return Loop(signals.arm, self.full, signals)
+        if value not in self._arms:
+            if len(self._arms) > ARMS_KEPT:
+                self._arms.clear()
+            arm, _ = arm_and_law(self.arm.having(**{self.vary: value}), self.law)
+            self._arms[value] = Loop(arm, self.full)
+        return self._arms[value]
+
+    @cached_property
+    def _arms(self) -> dict[float, Loop]:
+        return {}
 
     @cached_property
     def first(self) -> Loop:
         """The loop at the first value."""
         return self.at(self.start) if self.is_of_arm else Loop(self.arm, self.law_at(self.start))
-
-    def _signals(self, value: float) -> Signals:
-        """The signals of the arm whose number has that value."""
-        if value not in self._arms:
-            if len(self._arms) > ARMS_KEPT:
-                self._arms.clear()
-            arm, _ = arm_and_law(self.arm.having(**{self.vary: value}), self.law)
-            self._arms[value] = Signals(arm, self.full.signals)
-        return self._arms[value]
-
-    @cached_property
-    def _arms(self) -> dict[float, Signals]:
-        return {}
 
     @cached_property
     def pinned(self) -> int:
@@ -148,9 +143,9 @@ class Varied:
         return self.start, self.start + (self.stop - self.start) / math.e, self.stop
 
     @cached_property
-    def _corners(self) -> tuple[Law, Law]:
-        """The law with the number 0, and with 1."""
-        return self.law_at(0.0), self.law_at(1.0)
+    def place(self) -> Place:
+        """The place of the number in the law."""
+        return place_of(self.full, "gain" if self.vary == "all" else self.vary)
 
     def function(self, s: Complex, values: Real) -> Analytic:
         """D/s^n at s (n,), each at a value of its own (n,), n = `pinned`, with slopes from differences."""
@@ -159,22 +154,17 @@ class Varied:
 
     def _characteristic(self, s: Complex, values: Real) -> tuple[Complex, Complex]:
         """D e^{-scale} and scale at s (k, n), each column at a value of its own (n,)."""
-        delay = values if self.vary == "delay" else np.full(values.shape, self.full.delay)
-        if self.is_of_arm or self.vary == "delay":
-            p, q = self.full.polynomials(s)
-        else:
-            (p0, q0), (p1, q1) = (law.polynomials(s) for law in self._corners)
-            p, q = p0 + values * (p1 - p0), q0 + values * (q1 - q0)
-        if not self.is_of_arm:
-            drive, numerators, scale = self.first.signals.parts(s)
-        else:
-            found = np.empty((2 + len(self.full.signals), *s.shape), complex)
+        if self.is_of_arm:
+            found = np.empty((2, *s.shape), complex)
             for value in np.unique(values):
                 here = values == value
-                part = self._signals(float(value)).parts(s[:, here])
-                found[0, :, here], found[1, :, here], found[2:, :, here] = part.drive.T, part.scale.T, part.numerators
-            drive, scale, numerators = found[0], found[1], found[2:]
-        return drive * q + np.exp(-s * delay) * (p * numerators).sum(axis=0), scale
+                found[:, :, here] = self.at(float(value)).characteristic(s[:, here])
+            return found[0], found[1]
+        rig = self.first.signals.parts(s)
+        parts = parts_of(self.full, rig, s)
+        if self.vary == "delay":
+            return parts._replace(f=parts.f * np.exp(-s * (values - self.full.delay))).whole, rig.scale
+        return parts.having(self.place, values).whole, rig.scale
 
     @cached_property
     def frequency(self) -> float:
@@ -205,14 +195,12 @@ class Varied:
 
         There drive and numerators are real, or imaginary with an odd power of s: the other part is rounding, and 0.
         """
-        s, odd = 1j * omega[None], np.array([[[each.power % 2]] for each in self.first.signals.outputs])
+        s, odd = 1j * omega, np.array([[each.power % 2] for each in self.first.signals.outputs])
         drive, numerators, scale = self.first.signals.parts(s)
         turn = np.exp(1j * scale.imag)
-        drive, numerators = (drive * turn).real, numerators * turn
+        drive, numerators = (drive * turn).real + 0j, numerators * turn
         numerators = np.where(odd, 1j * numerators.imag, numerators.real)
-        (p0, q0), (p1, q1) = (law.polynomials(s) for law in self._corners)
-        A, B = (drive * q + (p * numerators).sum(axis=0) for p, q in ((p0, q0), (p1 - p0, q1 - q0)))
-        return A[0], B[0]
+        return parts_of(self.full, LoopParts(drive, numerators, scale), s).line(self.place)
 
     # ------------------------------------------------------------ interface of `spectrum.following`
 
@@ -256,7 +244,7 @@ class Varied:
         """-1/C of the damped segments, at m values (m, p)."""
         if not self.is_of_arm:
             return np.tile(np.array(self.first.k.singular), (values.size, 1))
-        return np.array([self._signals(float(value)).system.singular for value in values])
+        return np.array([self.at(float(value)).k.singular for value in values])
 
     # ------------------------------------------------------------ complete in a box
 
