@@ -233,19 +233,11 @@ def findings(points):
         yield Finding(outcome, words, is_wrong, figures)
 
 
-def link_at_random(size, seed):
-    return findings(run(link_anywhere, size, seed))
-
-
-def rig_at_random(size, seed):
-    return findings(run(rig_anywhere, size // 2, seed))
-
-
-def in_danger(size, seed):
-    """At each of the other places."""
-    others = [place for name, place in PLACES.items() if "anywhere" not in name]
-    return (found for place in others for found in findings(run(place, size // 10, seed)))
+def at_every_place(size, seed):
+    """Where the last digits are in danger a tenth as often as anywhere."""
+    sizes = {name: size if "anywhere" in name else size // 10 for name in PLACES}
+    return (found for name, place in PLACES.items() for found in findings(run(place, sizes[name], seed)))
 
 
 if __name__ == "__main__":
-    survey.main(link_at_random, rig_at_random, in_danger, size=10_000, seed=0)
+    survey.main(at_every_place, size=10_000, seed=0)

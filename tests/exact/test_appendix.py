@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.exact.test_chain import ALONG
 from tests.outputs import OF_ONE_LINK
 from tests.shared import thinned
 from tests.strategies import BOUNDARY_CASES, some_arm, some_s
@@ -43,13 +44,6 @@ def test_forty_digits_are_those_of_the_balls(case):
             assert abs(value / middle(exact, 50) - 1) < mpmath.mpf(10) ** -39
         compared += 1
     assert compared > 6
-
-
-def states(arm, s, x, digits):
-    """(w, psi, M, Q) at the root, at x [m] and at the tip, by transition matrices."""
-    names = ("displacement", "rotation", "moment", "shear")
-    found = list(response(arm, s, [(name, at) for at in (0.0, x, math.inf) for name in names], digits).values())
-    return found[:4], found[4:8], found[8:]
 
 
 def test_delta_is_the_characteristic_function_without_its_artefacts():
@@ -100,12 +94,9 @@ def powers_of_two(*, damping=0.0, hub=0.25, mass=0.5, inertia=0.125):
 def test_where_two_waves_coincide_to_the_last_bit(name, s):
     """The cut-off, and the real s of equal waves: the appendix is 0/0, float64 flags it, and all give the value."""
     arm, output, x = powers_of_two(), OF_ONE_LINK[name], 0.4
-    root, inside, tip = states(arm, s, x, 30)
-    place, state = {"root": (0.0, root), "tip": (1.0, tip), "x": (mpmath.mpf(x), inside)}[output.place]
+    wanted = (ALONG[name], mpmath.mpf(x)) if output.place == "x" else name
+    expected = response(arm, s, [wanted], 30)[wanted]
     with mpmath.workdps(30):
-        w, psi, M, Q = state
-        fields = {"theta": psi, "W": w, "Y": w - place * root[1], "Phi": psi - root[1], "M": M, "Q": Q}
-        expected = fields[output.quantity] * mpmath.mpc(s) ** output.power
         assert abs(appendix.response(arm, name, s, 25, x=x) / expected - 1) < mpmath.mpf(10) ** -25
     G = tfarm.transfer(arm, name, x=x if output.place == "x" else None)
     slope = abs(s * G.derivative(s) / complex(expected))

@@ -302,10 +302,11 @@ def _row_by_series(points: Any, row: Any, series: Any, f: Any) -> None:
 
 
 @inlined
-def finish(points: Any, power: int, unit: float, C: float, value: Any) -> None:
-    """Compute the values of an output times  unit s^power/(1 + C s),  in place."""
-    for _ in range(power):
-        for i in range(value.size):
-            value[i] *= points[i]
+def finish(points: Any, source: Any, power: int, unit: float, C: float, value: Any) -> None:
+    """Compute the values of an output, those of its source times  unit s^power/(1 + C s),  power at most 4."""
     for i in range(value.size):
-        value[i] = times(value[i] * reciprocal(1.0 + C * points[i]), unit) if C else times(value[i], unit)
+        s, found = points[i], source[i]
+        found = found * s if power % 2 == 1 else found
+        found = found * (s * s) if power > 1 else found
+        found = found * (s * s) if power > 3 else found
+        value[i] = times(found * reciprocal(1.0 + C * s), unit) if C else times(found, unit)

@@ -33,7 +33,7 @@ def rigid_response(arm: Arm, wanted: Output, s: Complex, x: float = 0.0) -> Comp
         return np.zeros(s.size, complex)
     layout = readings(system_of(arm), (wanted,), x)
     sweep, one = RigidSweep(layout), layout.each[0]
-    above, below = sweep.numerator(one), sweep.input
+    above, below = (each + 0 * sweep.s for each in (sweep.numerator(one), sweep.input))
     if not below:
         return np.zeros(s.size, complex)
     with np.errstate(all="ignore"):

@@ -282,7 +282,10 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
 @inlined
 def innermost(rows: Any) -> Any:
     """Return the row of the segment at the hub."""
-    return rows[np.nonzero(rows[:, ROW_KIND] == SEGMENT)[0][-1]]
+    j = len(rows) - 1
+    while rows[j, ROW_KIND] != SEGMENT:
+        j -= 1
+    return rows[j]
 
 
 @compiled
@@ -316,4 +319,4 @@ def _output(points: Any, want: Any, work: Work, drive: Any, value: Any, lost: An
                     value[i] = states[LIFT + field + i]
                 else:
                     lost[i] = lost[i] or magnitude(value[i]) < SMALL_DIFFERENCE * size
-    finish(points, int(want[3]), want[4], want[5], value)
+    finish(points, value, int(want[3]), want[4], want[5], value)

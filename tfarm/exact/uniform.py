@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .compiled import compiled, inlined
-from .layout import OF_ANGLE, OF_MOMENT
+from .layout import OF_ANGLE
 from .pieces import (
     BLOCK,
     FUNCTIONS_SIZE,
@@ -103,9 +103,8 @@ def fill_ends(s: Any, rows: Any, ends: Any, table: Any, per_input: bool, found: 
     """
     points, low, flags = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_), np.empty(BLOCK, np.bool_)
     numbers, functions = np.empty(NUMBERS_SIZE, np.complex128), np.empty(FUNCTIONS_SIZE, np.complex128)
-    parts, of_slow = np.empty(PARTS * BLOCK, np.complex128), np.empty(PARTS * BLOCK, np.complex128)
-    row = innermost(rows)
-    small = 1.0 / max(1.0, np.abs(ends[OF_ANGLE:OF_MOMENT]).max())  # against overflow of squares of a heavy hub's drive
+    parts, row = np.empty(PARTS * BLOCK, np.complex128), innermost(rows)
+    small = 1.0 / max(1.0, ends[OF_ANGLE + 1], ends[OF_ANGLE + 2])  # against overflow of squares of a heavy hub's drive
     for first in range(0, s.size, BLOCK):
         n = min(BLOCK, s.size - first)
         here = slice(first, first + n)
@@ -116,7 +115,7 @@ def fill_ends(s: Any, rows: Any, ends: Any, table: Any, per_input: bool, found: 
             all_wave_functions(numbers, functions)
             _by_waves(ends, numbers, functions, parts)
         if slow:
-            other = parts if slow == BLOCK else of_slow
+            other = parts.copy() if slow < BLOCK else parts
             _by_series(points, row, ends, other)
             if slow < BLOCK:
                 take_where(low, other, parts)
@@ -126,10 +125,9 @@ def fill_ends(s: Any, rows: Any, ends: Any, table: Any, per_input: bool, found: 
         lost[here] = flags[:n]
         found[0, here], found[1, here] = parts[DRIVE * BLOCK :][:n], parts[SCALE * BLOCK :][:n]
         for o in range(len(table)):
-            value = found[2 + o, here]
-            value[:] = parts[BLOCK * int(table[o, 0]) :][:n]
+            source, power = parts[BLOCK * int(table[o, 0]) :], int(table[o, 1])
             unit = table[o, 2] / LIFT if table[o, 0] == TIP else table[o, 2]
-            finish(points, int(table[o, 1]), unit, table[o, 3], value)
+            finish(points, source, power, unit, table[o, 3], found[2 + o, here])
 
 
 @compiled

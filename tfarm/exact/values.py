@@ -63,15 +63,23 @@ def free_outputs(chain: System, wanted: Sequence[Output], s: Complex, x: float) 
     return _free(readings(chain, tuple(wanted), x), s)
 
 
-def _free(layout: Layout, s: Complex, *, per_input: bool = False) -> Free:
-    """Return the free response, by the fast path where it applies, with outputs for a unit input if `per_input`."""
+def _free(layout: Layout, s: Complex) -> Free:
+    """Return the free response of a layout."""
+    found, lost = _filled(layout, s)
+    return Free(found[0], found[2:], found[1], lost)
+
+
+def _filled(layout: Layout, s: Complex, *, per_input: bool = False) -> tuple[Complex, NDArray[np.bool_]]:
+    """Return drive, scale and outputs (rows), for a unit input if `per_input`; the fast path where it applies."""
     found, lost = np.empty((2 + len(layout.each), s.size), complex), np.empty(s.size, bool)
-    s = np.ascontiguousarray(s, dtype=complex)
-    if layout.ends_table is not None:
-        fill_ends(s, layout.rows, layout.ends, layout.ends_table, per_input, found, lost)
-        return Free(found[0], found[2:], found[1], lost)
-    fill_free(s, layout.rows, layout.ends, AXIS, layout.table, found, lost)
-    return Free(found[0], found[2:] / found[0] if per_input else found[2:], found[1], lost)
+    s, ends = np.ascontiguousarray(s, dtype=complex), layout.ends_table
+    if ends is None:
+        fill_free(s, layout.rows, layout.ends, AXIS, layout.table, found, lost)
+        if per_input:
+            found[2:] /= found[0]
+    else:
+        fill_ends(s, layout.rows, layout.ends, ends, per_input, found, lost)
+    return found, lost
 
 
 def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -> tuple[Free, Free]:
@@ -130,8 +138,8 @@ def evaluate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float =
     Raises ParameterError at a pole, naming it.
     """
     with np.errstate(all="ignore"):
-        free = _free(readings(k, tuple(wanted), x), s, per_input=True)
-    return _with_care(k, wanted, s, x, free.outputs, free.lost, of_slope=False)
+        found, lost = _filled(readings(k, tuple(wanted), x), s, per_input=True)
+    return _with_care(k, wanted, s, x, found[2:], lost, of_slope=False)
 
 
 def differentiate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float = 0.0) -> Complex:
