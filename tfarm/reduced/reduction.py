@@ -35,7 +35,7 @@ from .partial_fractions import (
     Ruler,
     distance,
     frequencies_around,
-    norm,
+    values_and_norm,
 )
 from .rational import has_rational, modes_in, rational_model
 
@@ -175,7 +175,7 @@ class ReducedModel:
         remedy = f"the error is known from {low:g} to {high:g} rad/s; stay in this range"
         require(((w >= low) & (w <= high)).all(), "omega", omega, remedy)
         G = transfer(self.arm, self.model.rows, x=self.model.x)
-        return self.errors[:, None] * norm(G, w, G(1j * w))
+        return self.errors[:, None] * values_and_norm(G, w)[1]
 
     def matrices(self) -> Matrices:
         """Return A, B, C, D as NumPy arrays (see `PartialFractions.matrices`)."""
