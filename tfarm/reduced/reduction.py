@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
@@ -350,7 +351,10 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     require(is_file, key, str(path), "is no regular file, and its script needs a folder")
     path = path if path.suffix == ".mat" else path.with_name(path.name + ".mat")
     script = path.with_name(f"load_{re.sub(r'[^A-Za-z0-9_]', '_', path.stem)}.m")
-    first, _, rest = (script.read_text("utf-8", errors="replace") if script.is_file() else "").partition("\n")
+    text = ""
+    with suppress(OSError):  # a file that cannot be read is not ours
+        text = script.read_text("utf-8", errors="replace") if script.is_file() else ""
+    first, _, rest = text.partition("\n")
     is_ours = not script.exists() or (first.endswith(WRITTEN_BY) and _loads(path) in rest)
     remedy = f"{script.name} in that folder is not its script and would be replaced; choose another name"
     require(is_ours, key, str(path), remedy)
