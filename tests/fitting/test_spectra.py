@@ -143,14 +143,6 @@ def test_a_record_becomes_a_file_that_the_other_commands_read(record, tmp_path, 
     assert abs(data.values / H - 1)[inside].max() < 0.05  # what hann segments of 200 samples leave of a ring of ten
 
 
-def test_the_table_is_printed_without_a_file(record, capsys):
-    code, out, _ = run(capsys, "frf", str(record), *NAMED, "--segment", "0.2", "--estimator", "Hv")
-    assert code == 0
-    table = out[out.index("frequency [Hz]") :].splitlines()
-    assert len(table) == 1 + 9
-    assert re.search(r"^segments +159$", out, re.MULTILINE)
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -19,12 +19,12 @@ from tests.shared import thinned
 from tests.strategies import some_arm
 from tests.survey import Finding, each_of
 from tfarm.reduced import modal_model, reduce
-from tfarm.reduced.partial_fractions import EXACT_ROUNDING, FOUND_TO_WORST, Ruler, norm
+from tfarm.reduced.partial_fractions import EXACT_ROUNDING, FOUND_TO_WORST, Ruler, values_and_norm
 
 
 def norm_of(ruler, w):
     """|G| + |w G'| of the only output."""
-    return norm(ruler.G, w, ruler.G(1j * w))[0]
+    return values_and_norm(ruler.G, w)[1][0]
 
 
 def test_a_planted_error_is_found_whole(arm):

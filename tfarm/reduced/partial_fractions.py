@@ -220,7 +220,7 @@ class Ruler:
         for _ in range(2):
             w = np.union1d(w, self._dips(w))
             w = w[self._is_clear(w)]
-        self.w, (self._values, self._size) = w, self._exact(w)
+        self.w, (self._values, self._size) = w, values_and_norm(self.G, w)
 
     def rough(self, model: PartialFractions) -> float:
         """Return the largest error at the samples, a little below the worst one."""
@@ -235,12 +235,11 @@ class Ruler:
             for _ in range(REFINEMENTS):
                 inner = np.linspace(low, high, REFINED_POINTS)
                 found = self._error_at(model, inner, row)
-                top = found.argmax(axis=0)
-                columns = np.arange(low.size)
-                best = int(found.max(axis=0).argmax())
-                if found[top[best], best] > worst[row]:
-                    worst[row], at[row] = found[top[best], best], inner[top[best], best]
-                low, high = (inner[np.clip(top + way, 0, REFINED_POINTS - 1), columns] for way in (-1, 1))
+                best = np.unravel_index(found.argmax(), found.shape)
+                if found[best] > worst[row]:
+                    worst[row], at[row] = found[best], inner[best]
+                around = np.clip(np.add(found.argmax(axis=0), [[-1], [1]]), 0, REFINED_POINTS - 1)
+                low, high = np.take_along_axis(inner, around, axis=0)
         return worst * FOUND_TO_WORST + EXACT_ROUNDING, at
 
     def _brackets(self, error: Real) -> tuple[Real, Real]:
@@ -253,12 +252,8 @@ class Ruler:
     def _error_at(self, model: PartialFractions, w: Real, row: int) -> Real:
         """Return the error of one output at w of any shape, zero next to a pole."""
         errors, clear = np.zeros(w.shape), self._is_clear(w)
-        errors[clear] = _errors(model, w[clear], *self._exact(w[clear]))[row]
+        errors[clear] = _errors(model, w[clear], *values_and_norm(self.G, w[clear]))[row]
         return errors
-
-    def _exact(self, w: Real) -> tuple[Complex, Real]:
-        values = self.G(1j * w)
-        return values, norm(self.G, w, values)
 
     def _dips(self, w: Real) -> Real:
         """Return points around the dips of |G| and |G'|, where the norm is small."""
@@ -273,9 +268,10 @@ class Ruler:
         return distance(w, self._poles) > CLEAR_OF_POLES * w
 
 
-def norm(G: TransferFunction, w: Real, values: Complex) -> Real:
-    """Return |G| + |w dG/dw| (outputs, w) on the imaginary axis, from G(i w)."""
-    return abs(values) + abs(w * np.atleast_2d(G.derivative(1j * w)))
+def values_and_norm(G: TransferFunction, w: Real) -> tuple[Complex, Real]:
+    """Return G(i w) and |G| + |w dG/dw| (outputs, w)."""
+    values = G(1j * w)
+    return values, abs(values) + abs(w * np.atleast_2d(G.derivative(1j * w)))
 
 
 def distance(w: Real, poles: Real) -> Real:

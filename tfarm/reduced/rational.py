@@ -26,7 +26,7 @@ from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import modes_below
 
 from .modal import MOST_MODELLED, modal_model
-from .partial_fractions import PartialFractions, distance, frequencies_around, norm
+from .partial_fractions import PartialFractions, distance, frequencies_around, values_and_norm
 
 BEYOND_BAND = 1.02  # times the end of the range: up to there modes are exact
 REMAINDER_POINTS = 300  # of the range, denser towards its end, where poles above have most effect
@@ -104,11 +104,10 @@ def _remainders(G: TransferFunction, inside: PartialFractions, high: float, freq
     square = inside.natural_frequency**2
     p = inside.eigenvalues[:, 0]
     r = (inside.residues[..., 0] * 2 * p / p**power).real  # of each output over its power of s, in the variable S
-    values = G(1j * w)
+    values, size = values_and_norm(G, w)
     base = (values / (1j * w) ** power).real
     shared = 1 / (S + square[:, None])
     F = np.where(by_S, base * S - at_zero[:, :1] - (r @ shared) * S, base - at_zero[:, 2:3] + (r / square @ shared) * S)
-    size = norm(G, w, values)
     weight = np.divide(w**power, size, out=np.zeros_like(size), where=size > 0) / np.where(by_S, abs(S), 1.0)
     kinds = [(each.quantity, each.place, kind) for each, kind in zip(bases, by_S[:, 0], strict=True)]
     for kind in set(kinds):  # one fit for powers of s of one quantity: the rate stays that of the angle

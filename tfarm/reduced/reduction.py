@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
@@ -35,7 +36,7 @@ from .partial_fractions import (
     Ruler,
     distance,
     frequencies_around,
-    norm,
+    values_and_norm,
 )
 from .rational import has_rational, modes_in, rational_model
 
@@ -175,7 +176,7 @@ class ReducedModel:
         remedy = f"the error is known from {low:g} to {high:g} rad/s; stay in this range"
         require(((w >= low) & (w <= high)).all(), "omega", omega, remedy)
         G = transfer(self.arm, self.model.rows, x=self.model.x)
-        return self.errors[:, None] * norm(G, w, G(1j * w))
+        return self.errors[:, None] * values_and_norm(G, w)[1]
 
     def matrices(self) -> Matrices:
         """Return A, B, C, D as NumPy arrays (see `PartialFractions.matrices`)."""
@@ -350,7 +351,10 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     require(is_file, key, str(path), "is no regular file, and its script needs a folder")
     path = path if path.suffix == ".mat" else path.with_name(path.name + ".mat")
     script = path.with_name(f"load_{re.sub(r'[^A-Za-z0-9_]', '_', path.stem)}.m")
-    first, _, rest = (script.read_text("utf-8", errors="replace") if script.is_file() else "").partition("\n")
+    text = ""
+    with suppress(OSError):  # a file that cannot be read is not ours
+        text = script.read_text("utf-8", errors="replace") if script.is_file() else ""
+    first, _, rest = text.partition("\n")
     is_ours = not script.exists() or (first.endswith(WRITTEN_BY) and _loads(path) in rest)
     remedy = f"{script.name} in that folder is not its script and would be replaced; choose another name"
     require(is_ours, key, str(path), remedy)
