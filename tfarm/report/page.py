@@ -54,7 +54,7 @@ class Piece:
     word of its sections' anchors; its `title` is that of one of them, and `is_also_on` picks the other pages of that
     kind that have the section.  The full page has all, and at its top the answers of those that have one.
     `seconds` is about how long a section takes to make, where that is long: the longest are begun first.  Sections of
-    one `task` are made one after the other in one process, as they share a design.
+    one `task` are made one after the other in one process, as they share a design or the damped modes of the arm.
     """
 
     name: str
@@ -105,10 +105,10 @@ PIECES = (
     Piece("stability margins", "margins", margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
     Piece("root loci", "locus", locus_section, _in_s, "Root loci", seconds=7.0, task=LOOP_TASK),
     Piece("Nyquist plot", "margins-nyquist", nyquist_section, _in_s, task=LOOP_TASK),
-    Piece("sampled loop", "sampled", sampled_section, lambda case: case.has_loop, "The sampled loop", seconds=9.0),
+    Piece("sampled loop", "sampled", sampled_section, lambda case: case.has_loop, "The sampled loop", seconds=8.0),
     Piece("controllers", "law", law_section, lambda case: case.laws and not case.arm.is_locked,
            is_also_on=LOOP_PAGES.__contains__),
-    Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", seconds=10.0),
+    Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", seconds=6.0, task="sampled loop"),
     Piece("assumptions", "assumptions", assumptions_section, title="What the assumptions do"),
 )  # fmt: skip
 QUESTIONS = {piece.page: piece.title for piece in PIECES if piece.title}  # pages that may be asked for alone

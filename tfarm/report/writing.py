@@ -201,7 +201,7 @@ def _written(
 ) -> list[tuple[Case, list[PageSection]]]:
     """Make all pages in `place`, move them to `out`, and the index last; the sections of each case."""
     folders = {case.arm.name: place / str(i) for i, case in enumerate(cases)}
-    jobs = [] if only else [Job(EVIDENCE, gather)]
+    jobs = [] if only else [Job(EVIDENCE, gather, seconds=8.0)]
     jobs += [Job(SCRIPTS, partial(write_assets, place / ASSETS))] if not only and any(map(is_live, cases)) else []
     for case in cases:
         folders[case.arm.name].mkdir()
