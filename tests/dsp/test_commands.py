@@ -20,7 +20,7 @@ from tfarm.dsp.chain import Sampling, chain_of_tables
 from tfarm.dsp.verdict import brief_of
 from tfarm.errors import ConvergenceError
 from tfarm.plots import slew
-from tfarm.report.sampled_section import responses_table
+from tfarm.report.sampled_section import response_columns
 from tfarm.synthesis import design
 
 
@@ -140,8 +140,7 @@ def test_the_unit_stands_at_the_axis_and_in_the_table(run_of):
     *_, motor = slew(arm, done)
     assert motor.get_ylabel().endswith(f"[{unit}]")
     matplotlib.pyplot.close(motor.figure)
-    table = responses_table("x", "y", arm, {"run": done})
-    (column,) = (each for each in table.columns if each.key.startswith(("torque_", "input_")))
+    (column,) = (each for each in response_columns(arm, {"run": done}) if each.key.startswith(("torque_", "input_")))
     assert column.unit == unit
     assert column.key == ("torque_run_N_m" if unit == "N m" else f"input_run_{unit}")
 

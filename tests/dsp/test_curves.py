@@ -24,7 +24,7 @@ from tfarm.dsp.traces import (
     reference_angle,
     ringing,
 )
-from tfarm.report.sampled_section import responses_table
+from tfarm.report.sampled_section import response_columns
 from tfarm.spectrum.table import default_gains
 
 STEEL = tfarm.load("stocky-steel")
@@ -49,8 +49,8 @@ def test_the_slew_of_a_stiff_arm_is_not_aliased_and_its_file_has_the_curve():
     records = run.between.t.size / run.t.size
     first = tfarm.modes(STEEL, 1).natural_frequency[-1] / (2 * np.pi)
     assert (records + 1) * 100 >= POINTS_A_PERIOD * first > 400  # 400 a second is what three records gave
-    curve, table = curve_of(run, "root_moment"), responses_table("t", "t", STEEL, {"without": run})
-    columns = {column.key: np.array(column.values) for column in table.columns}
+    curve, table = curve_of(run, "root_moment"), response_columns(STEEL, {"without": run})
+    columns = {column.key: np.array(column.values) for column in table}
     assert curve.is_band
     rounded = 0.5e-6 * abs(curve.high).max()  # seven digits are in the file
     assert columns["root_moment_without_N_m_low"] == pytest.approx(curve.low, abs=rounded)

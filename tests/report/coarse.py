@@ -17,7 +17,7 @@ COARSE = (
     (sampled_loci, "SAMPLED_LOCUS_VALUES", 31),
     (verdict, "PERIOD_SHARES", (1.0, 5.0)),
     (writing, "MOST_WORKERS", 1),  # a second process would have its own grids
-    (gains_section, "sampled_region", regions.sampled_region.__wrapped__),  # what is kept of it is of other grids
+    (regions, "sampled_region", regions.sampled_region.__wrapped__),  # what is kept of it is of other grids
     (live, "sampled_region", regions.sampled_region.__wrapped__),
 )
 

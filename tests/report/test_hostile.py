@@ -43,6 +43,6 @@ def test_of_a_section_and_a_live_page_that_cannot_be_made(tmp_path, monkeypatch)
     save_live(Case(LAB, Chain()), tmp_path)
     check_page((tmp_path / "live.html").read_text(encoding="utf-8"), NAME, TEXT)
     saved = writing.make_section("stability region of both gains", "margins-map", fails, Case(LAB, Chain()), tmp_path)
-    assert saved.section.failure
+    assert saved.failure
     writing._write_pages(Case(LAB, Chain()), tmp_path, [saved], None, "", tmp_path)
     check_page((tmp_path / "index.html").read_text(encoding="utf-8"), NAME, TEXT.partition(" & ")[0])

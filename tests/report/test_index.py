@@ -5,7 +5,7 @@ import pytest
 import tfarm
 from tfarm.dsp import Chain, load_chain
 from tfarm.report.cases import Case, GivenLaw
-from tfarm.report.page import index_page, save_card, written_cards
+from tfarm.report.page import Card, index_page, kept, save_card
 
 LAB = tfarm.load("sasaki2012-lab")
 FAST = tfarm.Law({"hub_angle": ((2.0, 30.0), (0.002, 1.0)), "root_moment": -0.2}, delay=0.002, name="PD, fast")
@@ -19,8 +19,8 @@ def rows_of(tmp_path, laws, chain):
     folder.mkdir()
     save_card(Case(LAB, chain, tuple(laws)), folder)
     (folder / "index.html").write_text("a page")
-    (card,) = written_cards(tmp_path)
-    return card["loops"], index_page([card], trust="")
+    (card,) = kept(tmp_path, "card", Card).values()
+    return card.rows, index_page(tmp_path, trust="")
 
 
 @pytest.mark.parametrize("law", [FAST, SLOW])

@@ -27,6 +27,7 @@ from tfarm.report.loop_section import margin_table, margins_section, nyquist_sec
 from tfarm.report.modes_section import damped_tables, modal_table
 from tfarm.report.page import pieces_of
 from tfarm.report.response_sections import bode_section
+from tfarm.report.sections import prose
 from tfarm.spectrum import DampedModes
 from tfarm.spectrum.table import default_gains
 
@@ -213,8 +214,8 @@ def test_branches_that_cannot_be_followed_are_left_out_with_a_word(monkeypatch):
 def test_a_free_pin_has_its_rate_loop(monkeypatch):
     """K1 at K2 = 0: verdict, windows and locus; no K2, and the gauge as it is."""
     arm = ARMS["free-pin"]
-    assert "−u/(1 + C s)" in cases.why_no_loop(arm)
-    assert "at every instant" in cases.why_no_loop(replace(arm, link=replace(arm.link, damping=0.0)))
+    assert "−u/(1 + C s)" in prose("no_loop", arm=arm)
+    assert "at every instant" in prose("no_loop", arm=replace(arm, link=replace(arm.link, damping=0.0)))
     section = margins_section(Case(arm, Chain()))
     assert section.facts[0].value == "STABLE"
     (windows,) = (block for block in section.blocks if block.stem == "default-windows")

@@ -2,23 +2,23 @@
 
 import re
 
-from tfarm.report.sections import TEMPLATES, prose
+from tfarm.report.sections import TEMPLATES, prose, sheet
+from tfarm.schema import Column
 
 TEXTS = (TEMPLATES / "prose.txt").read_text(encoding="utf-8")
 NAMES = set(re.findall(r"{% macro (\w+)\(", TEXTS))
-SHARED = {"clipped", "bands", "extrema", "beyond_left"}  # which other texts have in them
+OF_TRUST = {f"trust_{name}" for name in ("proofs", "accuracy", "published")}  # which its template asks for
 
 
-def test_every_text_has_one_place_that_asks_for_it():
+def test_every_text_has_a_place_that_asks_for_it():
     code = "\n".join(file.read_text(encoding="utf-8") for file in TEMPLATES.parent.glob("*.py"))
-    asked = set(re.findall(r'prose\(\s*["\'](\w+)', code)) | {"measured_modes", "measured_required"}
-    asked |= {f"trust_{name}" for name in ("proofs", "accuracy", "published")} | {"gain_crossovers", "phase_crossovers"}
-    assert asked == NAMES - SHARED
-    assert all(TEXTS.count(f"{name}(") > 1 for name in SHARED)
+    assert set(re.findall(r'(?:prose|picture|sheet)\(\s*"(\w+)"', code)) <= NAMES
+    asked = {name for name in NAMES if f'"{name}"' in code} | OF_TRUST
+    assert all(TEXTS.count(f"{name}(") > 1 for name in NAMES - asked)  # which other texts have in them
 
 
-def test_line_breaks_of_a_text_are_spaces():
-    assert prose("spill", found="the loop is stable") == (
-        "Models of few flexible modes under the same controller: the number of unstable poles, and the rightmost. "
-        "The loop is stable."
-    )
+def test_line_breaks_of_a_text_are_spaces_and_a_table_has_title_and_caption():
+    assert prose("fit", verdict="fitted", found="3 numbers").startswith("Fitted: 3 numbers. The interval holds")
+    table = sheet("matrices", [Column("row", "", of=["x1"])], stem="of-a-law", name="A ¶ <law>")
+    assert (table.stem, table.title) == ("of-a-law", "Matrices of A ¶ <law>")
+    assert table.caption.startswith("A ¶ <law>: A and C under the states, B and D under")

@@ -12,14 +12,15 @@ from tests.odd_arms import odd_arms
 from tests.report.written import blocks_of, values_of
 from tfarm.arm import HubFeedback
 from tfarm.digits import kept_digits, plain, significant
-from tfarm.dsp import Chain, Simulator, sampled_loop, sampled_verdict, scenario, stable_windows
+from tfarm.dsp import Chain, Simulator, sampled_loop, sampled_verdict, scenario, stable_windows, verdict
 from tfarm.dsp.chain import Converters, Sampling
 from tfarm.dsp.modes import dominant, mode_table
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
+from tfarm.plots import regions
 from tfarm.plots.regions import CUT_RANGE, K2_RANGE, draw_overlay, stable_regions
 from tfarm.report import sampled_section as page
-from tfarm.report.cases import Case, what_holds
+from tfarm.report.cases import Case
 from tfarm.report.sampled_section import CURVE_DIGITS, sampled_section
 from tfarm.report.sections import prose
 from tfarm.spectrum.table import default_gains
@@ -34,8 +35,8 @@ analysed = cache(tfarm.sampled)
 def section():
     """With the map of both regions that the tests of it have."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(page, "stable_regions", lambda *what: {(LAB, GAINS, Chain()): PLANE()}[what])
-        patch.setattr(page, "sampled", analysed)
+        patch.setattr(regions, "stable_regions", lambda *what: {(LAB, GAINS, Chain()): PLANE()}[what])
+        patch.setattr(verdict, "sampled", analysed)
         return sampled_section(Case(LAB, Chain()))
 
 
@@ -118,9 +119,9 @@ def test_facts_and_words_are_the_analysis(section):
 def test_the_table_of_periods_is_each_period_by_itself(section):
     table = values_of(blocks_of(section)["sampled-periods"])
     assert table["period_ms"] == [1.0, 5.0, 10.0, 20.0, 50.0]
-    verdict = sampled_verdict(LAB, GAINS, Chain(sampling=Sampling(period=0.05)))
-    assert table["time_constant_s"][-1] == -0.05 / verdict.log_radius
-    assert table["stable_K2"][-1] in stable_windows(verdict.full, "K2")
+    late = sampled_verdict(LAB, GAINS, Chain(sampling=Sampling(period=0.05)))
+    assert table["time_constant_s"][-1] == -0.05 / late.log_radius
+    assert table["stable_K2"][-1] in stable_windows(late.full, "K2")
 
 
 def test_a_delay_margin_that_is_a_lower_bound_is_shown_so():
@@ -197,5 +198,6 @@ def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
 
 def test_an_arm_on_springs_is_not_held_at_its_tip():
     sprung = replace(LAB, hub=replace(LAB.hub, stiffness=3.0))
-    assert what_holds(sprung) == "Springs hold this arm"
-    assert what_holds(replace(sprung, payload=replace(LAB.payload, mass=np.inf))) == "The tip of this arm is held"
+    pinned = replace(sprung, payload=replace(LAB.payload, mass=np.inf))
+    held = [prose("what_holds", arm=arm) for arm in (sprung, pinned)]
+    assert held == ["Springs hold this arm", "The tip of this arm is held"]

@@ -14,16 +14,14 @@ from tests.report import full
 from tfarm.arm import to_toml
 from tfarm.audit import published
 from tfarm.audit.published import PublishedRow
+from tfarm.report import modes_section, write, writing
 from tfarm.report import trust as trust_proofs
-from tfarm.report import write, writing
 from tfarm.report.modes_section import how_proven, modal_table, rounds_to
 from tfarm.report.trust import (
-    Evidence,
     proof_tables,
     prove,
     published_tables,
     save_proof,
-    shared_digits,
     write_trust,
     written_proofs,
 )
@@ -62,14 +60,14 @@ def evidence(audit_rows):
         )
         for mode, why in ((1, ""), (2, "a misprint"))
     ]  # fmt: skip
-    return Evidence(audit=rows, published=tuple(printed))
+    return rows, tuple(printed)
 
 
 @pytest.fixture
 def page(evidence, proof, tmp_path):
     """The page of one proven arm and one that is not."""
     unproven = replace(proof, name="other", brackets=(), count=0, below="", failure="a double frequency near 7 rad/s")
-    write_trust(evidence, [proof, unproven], tmp_path / "trust")
+    write_trust(*evidence, [proof, unproven], tmp_path / "trust")
     return (tmp_path / "trust" / "index.html").read_text(encoding="utf-8")
 
 
@@ -79,9 +77,9 @@ def page(evidence, proof, tmp_path):
 def test_the_brackets_hold_what_mpmath_finds_in_the_paper_s_determinant(proof):
     texts = tfarm.modes(ARM, count=10).digits(30)[1:]
     assert len(proof.brackets) == len(texts) == 10
-    for (lower, upper), text in zip(proof.brackets, texts, strict=True):
+    for row, ((lower, upper), text) in enumerate(zip(proof.brackets, texts, strict=True)):
         assert Fraction(lower) <= Fraction(text) <= Fraction(upper)
-        assert text.startswith(shared_digits((lower, upper), 20))
+        assert text.startswith(proof.leading_digits[row])
     assert proof.count == 11
     assert not proof.failure
 
@@ -94,8 +92,8 @@ def test_the_brackets_hold_what_mpmath_finds_in_the_paper_s_determinant(proof):
         ("1200000", "1200000.0000000000000"),
     ],
 )
-def test_twenty_digits_with_their_zeros(lower, text):
-    assert shared_digits((lower, ""), 20) == text
+def test_twenty_digits_with_their_zeros(proof, lower, text):
+    assert replace(proof, brackets=((lower, ""),)).leading_digits == [text]
 
 
 @pytest.mark.parametrize(
@@ -124,6 +122,7 @@ def test_the_modal_table_has_the_proof_of_its_digits(proven_modes, monkeypatch):
         raise tfarm.CertificationError("a double frequency near 7 rad/s")
 
     monkeypatch.setattr(type(modes), "certify", fail)
+    modes_section.proven_modes.cache_clear()
     assert how_proven(modes, omega, hertz).endswith("not proven: a double frequency near 7 rad/s.")
     monkeypatch.setattr(trust_proofs, "boxed", lambda *_: ())  # which are proven, or not, apart from these
     unproven = prove(ARM)
@@ -191,7 +190,7 @@ def test_long_tables_and_claims_are_folded_below_their_answers(page):
 def test_a_failed_proof_is_noted(page, proof):
     assert "Not so for other" in page
     assert "not proven: a double frequency near 7 rad/s" in page
-    assert f"{shared_digits(proof.brackets[0], 20)}…" in page
+    assert f"{proof.leading_digits[0]}…" in page
 
 
 def test_published_numbers_stand_with_their_reasons_and_are_text(page):
@@ -235,7 +234,7 @@ def test_one_page_of_an_arm_does_not_wait_for_the_audit(tmp_path, monkeypatch, e
     assert 'href="proof.json"' in text
     assert (tmp_path / "mine" / "arm.toml").read_text(encoding="utf-8") == to_toml(arm)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["index.html", "mine"]
-    write_trust(evidence, written_proofs(tmp_path), tmp_path / "trust")
+    write_trust(*evidence, written_proofs(tmp_path), tmp_path / "trust")
     write([arm], tmp_path, only=("locus",))
     assert "../trust/index.html" in page.read_text(encoding="utf-8")
     assert "trust/index.html" in (tmp_path / "index.html").read_text(encoding="utf-8")

@@ -2,7 +2,6 @@
 
 import math
 import pickle
-import re
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
@@ -11,17 +10,15 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.report.walked import Walk, read, told, untraced_cells
 from tests.report.written import blocks_of, values_of
 from tests.shared import once
+from tests.shell import answer
 from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.traces import away
 from tfarm.errors import CertificationError
 from tfarm.report import tuner_section as tuner_section_room
 from tfarm.report.cases import Case
-from tfarm.report.sections import save_section
 from tfarm.report.tuner_section import section_of, tuner_section
-from tfarm.report.writing import _write_pages
 from tfarm.schema.html import with_symbols
 from tfarm.tuner import Learning, LearningCurves, Plan, initial_network, train, tune
 from tfarm.tuner import tuning as tuning_room
@@ -43,7 +40,6 @@ def each_loop_once():
 def small(each_loop_once, tmp_path_factory):
     """The section and its numbers with few seeds and the first four conditions."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tuner_section_room, "LONG_TRIAL", 300)
         patch.setattr(tuner_section_room, "LONG_TRIAL", 300)
         patch.setattr(tuner_section_room, "CURVE_SAMPLES", SEEDS * Plan().trials * 301)
         data = pickle.loads(once(tmp_path_factory, "tuner", save_study).read_bytes())
@@ -158,21 +154,6 @@ def test_a_slew_that_runs_away_and_a_guard_that_fails_are_a_sentence(monkeypatch
     assert "K1 = 3.21 × 10⁶, C = 6.94 × 10⁻⁵ s" in with_symbols(words)
 
 
-# ------------------------------------------------------------ a walk of every number
-
-
-@pytest.fixture(scope="module")
-def walked(small, tmp_path_factory):
-    """The page of the tuner without its drawings, its section walked, and its folder."""
-    folder = tmp_path_factory.mktemp("tuned")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tfarm.report.sections.save_figure", lambda *_, **__: None)
-        saved = save_section(small[1], folder)
-    _write_pages(Case(LAB, Chain()), folder, [saved], ("tune",), "", folder)
-    page = Walk((folder / "tune.html").read_text(encoding="utf-8"))
-    return next(part for part in page.parts if part.anchor == "tune"), folder
-
-
 def test_limits_of_long_trials_are_stated(small):
     assert "Learning curves: 3 seeds instead of 20. Comparison: 4 conditions" in " ".join(small[1].words)
 
@@ -192,22 +173,9 @@ def test_a_slew_of_too_many_samples_has_no_study_but_its_number(monkeypatch):
     assert "tfarm tune" in words
 
 
-def test_no_letters_of_the_code_are_on_the_page(walked):
-    part, _ = walked
-    assert [text for text in part.texts if re.search(r"[a-z]_[a-z]", text)] == []
-
-
-def test_the_rows_of_the_table_are_the_costs_of_the_command(walked):
-    part, folder = walked
-    for name in ("comparison", "residual", "servo"):
-        sheet, rows = part.tables[f"tune-{name}"], read(folder / "data" / f"tune-{name}.json")["rows"]
-        assert untraced_cells(sheet, rows, []) == []
-    own, (first, *_) = told("tune", LAB.name), read(folder / "data" / "tune-comparison.json")["rows"]
-    for key, name in (
-        ("tuner", "tuned"),
-        ("without", "without"),
-        ("best_constant", "best_constant"),
-        ("bound", "lq_bound"),
-    ):
-        assert first[f"{key}_cost"] == pytest.approx(own[f"cost_{name}"], rel=1e-9)
-    assert first["EI_cost"] == pytest.approx(own["shaped"]["EI"]["cost"], rel=1e-9)
+def test_the_rows_of_the_table_are_the_costs_of_the_command(small, capsys):
+    own, drawn = answer(capsys, "tune", LAB.name), values_of(blocks_of(small[1])["tune-comparison"])
+    names = {"tuner": "tuned", "without": "without", "best_constant": "best_constant", "bound": "lq_bound"}
+    for key, name in names.items():
+        assert drawn[f"{key}_cost"][0] == pytest.approx(own[f"cost_{name}"], rel=1e-9)
+    assert drawn["EI_cost"][0] == pytest.approx(own["shaped"]["EI"]["cost"], rel=1e-9)

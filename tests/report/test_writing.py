@@ -21,8 +21,8 @@ from tests.report.written import HELD, Links, files_of, ids_of, links_of, valida
 from tfarm.dsp import Chain
 from tfarm.report import write, writing
 from tfarm.report.cases import Case
-from tfarm.report.page import PIECES, index_page, pieces_of, written_cards
-from tfarm.report.trust import Evidence, write_trust, written_proofs
+from tfarm.report.page import PIECES, index_page, pieces_of
+from tfarm.report.trust import write_trust, written_proofs
 from tfarm.schema.html import with_symbols
 from tfarm.spectrum.table import default_gains
 
@@ -45,9 +45,9 @@ def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_ro
         files_of(made)
     )
     assert {name: there[name] == content for name, content in files_of(made).items() if there[name] != content} == {}
-    write_trust(Evidence(audit=audit_rows, published=validated()), written_proofs(pages), tmp_path / "trust")
+    write_trust(audit_rows, validated(), written_proofs(pages), tmp_path / "trust")
     assert files_of(tmp_path / "trust") == files_of(pages / "trust")
-    index = index_page(written_cards(pages), trust="trust/index.html")
+    index = index_page(pages, trust="trust/index.html")
     assert (pages / "index.html").read_text(encoding="utf-8") == index
 
 

@@ -1,4 +1,4 @@
-"""The tables of written pages: their CSV and JSON are one, and their numbers those of the API."""
+"""The tables of written pages: their CSV and JSON are one, their cells roundings of these, their numbers the API's."""
 
 import csv
 import json
@@ -9,16 +9,19 @@ import pytest
 import tfarm
 from tests.hostile import NAME
 from tests.report.full import ARM
+from tests.report.walked import read, shown_in, tables_in, untraced_cells
 from tfarm.dsp import Chain
 from tfarm.report.arm_section import is_from_paper, paper_section
 from tfarm.report.cases import Case
+from tfarm.report.modes_section import sensitivity_table
+from tfarm.spectrum.table import default_gains
 
 
 def tables(pages, stem):
     """The rows of a table's CSV and JSON file."""
     with open(pages / NAME / "data" / f"{stem}.csv", encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    return rows, json.loads((pages / NAME / "data" / f"{stem}.json").read_text(encoding="utf-8"))["rows"]
+    return rows, read(pages / NAME / "data" / f"{stem}.json")["rows"]
 
 
 def from_csv(text):
@@ -50,6 +53,15 @@ def test_csv_and_json_hold_the_same_numbers(pages):
         assert not re.search(r"\bnan\b", file.read_text(encoding="utf-8").lower())
 
 
+def test_every_cell_rounds_the_value_under_its_key(pages):
+    law, count = [default_gains(ARM).K1, default_gains(ARM).K2], 0
+    for stem, (keys, cells) in tables_in((pages / NAME / "index.html").read_text(encoding="utf-8")).items():
+        assert len(keys) == len(cells[0])
+        assert untraced_cells(keys, cells, tables(pages, stem)[1], law) == [], stem
+        count += sum(len(shown_in(cell)) for row in cells for cell in row)
+    assert count > 700
+
+
 def test_the_modal_table_is_the_api_to_the_digits_that_hold_everywhere(pages):
     """Frequencies to the last bit; what shapes are needed for to ten digits, as on every processor."""
     _, records = tables(pages, "modal-table")
@@ -64,8 +76,6 @@ def test_the_modal_table_is_the_api_to_the_digits_that_hold_everywhere(pages):
 
 
 def test_parameters_that_change_nothing_are_left_out_with_a_word():
-    from tfarm.report.modes_section import sensitivity_table
-
     table = sensitivity_table(tfarm.modes(tfarm.load("sasaki2012"), count=3))
     assert not any("payload" in name for name in table.columns[0].values)
     assert (

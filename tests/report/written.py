@@ -3,9 +3,9 @@
 import math
 from dataclasses import replace
 from functools import cache
-from html.parser import HTMLParser
 
 import tfarm
+from tests.hostile import Read
 from tests.report.full import ARM
 from tfarm.audit.published import validate
 from tfarm.report.page import PIECES
@@ -21,8 +21,8 @@ def blocks_of(section):
 
 
 def values_of(table):
-    """The values of a table by the keys of its columns."""
-    return {column.key: list(column.values) for column in table.columns}
+    """The values of a table, or of the columns of a picture, by the keys of its columns."""
+    return {column.key: list(column.values) for column in getattr(table, "columns", table)}
 
 
 def files_of(folder):
@@ -40,23 +40,16 @@ def ids_of(page):
     return set(links_of(page).ids)
 
 
-class Links(HTMLParser):
-    """Every href, src, id and tag of a page."""
+LEADING = ("href", "src", "srcset", "action", "data")  # attributes that lead somewhere
+
+
+class Links:
+    """Every href, src, id, tag and alternative text of a page."""
 
     def __init__(self, page):
-        super().__init__()
-        self.targets, self.ids, self.tags, self.alts = [], [], set(), []
-        self.feed(page.read_text(encoding="utf-8"))
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.add(tag)
-        for key, value in attrs:
-            if key in ("href", "src", "srcset", "action", "data"):
-                self.targets.append(value)
-            elif key == "id":
-                self.ids.append(value)
-        if tag == "img":
-            self.alts.append(dict(attrs).get("alt"))
+        read = Read(page.read_text(encoding="utf-8"))
+        self.tags, self.targets = read.tags, [value for key, value in read.attributes if key in LEADING]
+        self.ids, self.alts = ([value for name, value in read.attributes if name == key] for key in ("id", "alt"))
 
 
 class Unmakeable:

@@ -6,7 +6,7 @@ import math
 import tomllib
 from collections.abc import Iterator, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import tfarm
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, implausible, input_words, unit_of
@@ -15,13 +15,10 @@ from tfarm.audit.assumptions import Study, has_hub_inertia, hub_study, section_s
 from tfarm.digits import fixed, plain, significant, singly, unit
 from tfarm.dsp.chain import file_text
 from tfarm.plots.motion import sketch
-from tfarm.plots.style import COLOURS, GREY, page
+from tfarm.plots.style import COLOURS, GREY, Figure, page
 from tfarm.report.cases import Case
-from tfarm.report.sections import Fact, PageSection, Picture, prose
+from tfarm.report.sections import Fact, PageSection, Picture, picture, prose, sheet
 from tfarm.schema import Column, Quantity, Table, table
-
-if TYPE_CHECKING:
-    from tfarm.plots.style import Figure
 
 HEADLINE_MODES = 3  # natural frequencies among the headline numbers, the rigid body's 0 not shown
 MOST_POISSON = 0.5  # of an isotropic material; a larger E/2G - 1 is none's ratio
@@ -30,48 +27,42 @@ TEXTS = ("name", "assumptions")  # of the file, which are in other places of the
 
 def arm_section(case: Case) -> PageSection:
     """The first part of every page: headline numbers, slips of units, the theory, and the parameters."""
-    arm = case.arm
-    words = [prose("units", odd=odd) for odd in ["; ".join(implausible(arm))] if odd]
-    if not arm.is_uniform:
-        words.append(prose("rig", arm=arm, input=input_words(arm)))
-    words += ["This arm states no assumptions."] * (not arm.assumptions)
+    arm, input = case.arm, input_words(case.arm)
+    words = (
+        prose("units", odd="; ".join(implausible(arm))), prose("rig", arm=arm, input=input),
+        "" if arm.assumptions else "This arm states no assumptions.",
+    )  # fmt: skip
     rows = list(parameters(arm, tomllib.loads(file_text(arm, case.chain))))
-    given = table(rows, stem="parameters", title="Parameters", caption=prose("parameters", is_rig=not arm.is_uniform))
-    tip = "a payload" if arm.payload.mass or arm.payload.inertia else "nothing"
-    tip = "a pin" if math.isinf(arm.payload.mass) else tip
-    picture = Picture(
-        stem="arm",
-        title="The arm, its link to scale",
-        caption=prose("sketch", arm=arm, input=input_words(arm)),
-        alt=f"Side view of the arm: hub at the left, a link {plain(arm.length, 6)} m long, {tip} at the tip.",
-        figure=sketch.figure(arm),
-    )
-    blocks, facts = (picture, given, derived_table(arm)), headline_numbers(arm)
-    return PageSection(anchor="arm", title="The arm", facts=facts, words=words, items=arm.assumptions, blocks=blocks)
+    return PageSection(
+        anchor="arm", title="The arm", facts=headline_numbers(arm), words=list(filter(None, words)),
+        items=arm.assumptions,
+        blocks=(
+            picture("arm", sketch.figure(arm), arm=arm, input=input),
+            sheet("parameters", table(rows).columns, is_rig=not arm.is_uniform),
+            derived_table(arm),
+        ),
+    )  # fmt: skip
 
 
 def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
     """First natural frequencies (at C = 0), total inertia, slenderness, shear cut-off, damping."""
 
     def frequency(label: str, omega: float, digits: int) -> Fact:
-        hertz = significant(omega / (2 * math.pi), digits)
-        return Fact(label=label, value=significant(omega, 8), unit="rad/s", note=f"{hertz} Hz")
+        return Fact(label, significant(omega, 8), "rad/s", f"{significant(omega / (2 * math.pi), digits)} Hz")
 
     modes = tfarm.modes(arm, count=HEADLINE_MODES)
-    inertia, how = significant(arm.total_inertia, 8), "the arm cannot turn as a rigid body" * (not arm.has_rigid_mode)
     slenderness = arm.link.slenderness if arm.is_uniform else arm.length / arm.link.section.radius_of_gyration
     depth = f"depth/length {significant(math.sqrt(12) / slenderness, 3)} as a rectangle"
-    lossless = "none: resonances are infinite" if arm.is_undamped else "none in the link: hub, clamp or joint lose"
-    differs = "of the most damped segment" * (len({link.damping for link in arm.links}) > 1)
     numbered = zip(modes.index, modes.natural_frequency, strict=True)
     return (
         *(frequency(f"natural frequency {number}", omega, 8) for number, omega in numbered if number > 0),
-        Fact(label="total inertia J about the hub", value=inertia, unit="kg m²", note=how),
-        Fact(label="slenderness L/√(I/A)", value=significant(slenderness, 5), note=depth),
-        *([frequency("shear cut-off √(κGA/ρI)", arm.shear_cutoff, 6)] * arm.has_cutoff),
-        Fact(label="mass of the link", value=significant(arm.own_mass, 5), unit="kg"),
-        Fact(label="damping C", value=plain(arm.damping), unit="s", note=differs if arm.damping else lossless),
-    )
+        Fact("total inertia J about the hub", significant(arm.total_inertia, 8), "kg m²",
+             "the arm cannot turn as a rigid body" * (not arm.has_rigid_mode)),
+        Fact("slenderness L/√(I/A)", significant(slenderness, 5), note=depth),
+        *([frequency("shear cut-off √(κGA/ρI)", arm.shear_cutoff, 6)] if arm.has_cutoff else []),
+        Fact("mass of the link", significant(arm.own_mass, 5), "kg"),
+        Fact("damping C", plain(arm.damping), "s", prose("damping_note", arm=arm)),
+    )  # fmt: skip
 
 
 class Parameter(NamedTuple):
@@ -86,59 +77,56 @@ class Parameter(NamedTuple):
 def parameters(arm: Arm, table: Mapping[str, Any], under: str = "") -> Iterator[Parameter]:
     """The numbers of a table of an arm's file by their keys, those of tables in it too."""
     for key, value in table.items():
-        name = f"{under}{key}"
         if isinstance(value, dict):
-            yield from parameters(arm, value, f"{name}.")
+            yield from parameters(arm, value, f"{under}{key}.")
         elif isinstance(value, list) and all(isinstance(each, dict) for each in value):
-            for number, each in enumerate(value, 1):
-                yield from parameters(arm, each, f"{name}.{number}.")
+            yield from parameters(arm, {str(number): each for number, each in enumerate(value, 1)}, f"{under}{key}.")
         elif key not in TEXTS:
-            of = file_key(name, arm)
-            yield Parameter(of.label, value, unit(of.unit), name)
+            of = file_key(f"{under}{key}", arm)
+            yield Parameter(of.label, value, unit(of.unit), f"{under}{key}")
 
 
 class Derived(NamedTuple):
-    """A number that follows from the parameters."""
+    """A number that follows from the parameters; False where an arm has none."""
 
     quantity: Annotated[str, Quantity("quantity", help="number that the parameters determine")]
     symbol: Annotated[str, Quantity("symbol", help="letter or formula of the quantity")]
-    value: Annotated[float, Quantity("value", digits=8, help="from the parameters alone")]
+    value: Annotated[float | Literal[False], Quantity("value", digits=8, help="from the parameters alone")]
     unit: Annotated[str, Quantity("unit", help="SI unit of the value")]
 
 
 def derived_table(arm: Arm) -> Table:
     """The numbers that follow from the parameters alone."""
-    rows: list[Derived] = []
-    for i, link in enumerate(arm.links, 1):
-        prefix = f"segment {i}: " * bool(arm.outer)
-        kappa = "given" if link.section.shear_factor is not None else "Cowper (1966)"
-        rows += [
-            Derived(f"{prefix}area of the section", "A", link.section.area, "m²"),
-            Derived(f"{prefix}second moment of area", "I", link.section.second_moment, "m⁴"),
-            Derived(f"{prefix}shear factor, {kappa}", "κ", link.shear_factor, ""),
-            Derived(f"{prefix}mass", "ρAL", link.rhoA * link.length, "kg"),
-            Derived(f"{prefix}bending stiffness", "EI", link.EI, "N m²"),
-            Derived(f"{prefix}shear stiffness", "κGA", link.kGA, "N"),
-            Derived(f"{prefix}Poisson's ratio of an isotropic material", "E/2G − 1", link.poissons_ratio, ""),
-            Derived(f"{prefix}radius of gyration", "√(I/A)", link.section.radius_of_gyration, "m"),
-            Derived(f"{prefix}slenderness", "L/√(I/A)", link.slenderness, ""),
-        ]
-    rows = [row for row in rows if row.symbol != "E/2G − 1" or -1 < row.value <= MOST_POISSON]
-    rows.append(Derived("total inertia about the axis", "J", arm.total_inertia, "kg m²"))
-    if arm.motor is not None:
-        rows.append(Derived("rotor inertia at the hub", "N² J_m", arm.motor.reflected_inertia, "kg m²"))
-    if arm.has_rigid_mode and not arm.is_locked:
-        symbol, ratio = "−(J − I_h)/J" * arm.is_uniform, -arm.gauged_inertia / arm.total_inertia
-        rows.append(Derived("root moment per torque at rest", symbol, ratio, "N m/(N m)"))
-    if arm.input_per_torque != 1.0:
-        rows.append(Derived("input for a torque of 1 N m", "", arm.input_per_torque, unit_of(MOMENT_GAIN, arm)))
-    if arm.rate_loss:
-        rows.append(Derived(f"losses at the hub, in {RATE_GAIN}", "", arm.rate_loss, unit_of(RATE_GAIN, arm)))
-    if arm.has_cutoff:
-        lowest = ", of several segments the lowest" * bool(arm.outer)
-        rows.append(Derived(f"shear cut-off{lowest}", "√(κGA/ρI)", arm.shear_cutoff, "rad/s"))
-        rows.append(Derived("shear cut-off", "", arm.shear_cutoff / (2 * math.pi), "Hz"))
-    return table(rows, stem="derived", title="Derived parameters", caption=prose("derived", has_cutoff=arm.has_cutoff))
+    turns, cutoff = arm.has_rigid_mode and not arm.is_locked, arm.has_cutoff and arm.shear_cutoff
+    rows = [
+        Derived(f"segment {i}: " * bool(arm.outer) + quantity, symbol, value, unit)
+        for i, link in enumerate(arm.links, 1)
+        for quantity, symbol, value, unit in (
+            ("area of the section", "A", link.section.area, "m²"),
+            ("second moment of area", "I", link.section.second_moment, "m⁴"),
+            (f"shear factor, {'Cowper (1966)' if link.section.shear_factor is None else 'given'}", "κ",
+             link.shear_factor, ""),
+            ("mass", "ρAL", link.rhoA * link.length, "kg"),
+            ("bending stiffness", "EI", link.EI, "N m²"),
+            ("shear stiffness", "κGA", link.kGA, "N"),
+            ("Poisson's ratio of an isotropic material", "E/2G − 1",
+             -1 < link.poissons_ratio <= MOST_POISSON and link.poissons_ratio, ""),
+            ("radius of gyration", "√(I/A)", link.section.radius_of_gyration, "m"),
+            ("slenderness", "L/√(I/A)", link.slenderness, ""),
+        )
+    ] + [
+        Derived("total inertia about the axis", "J", arm.total_inertia, "kg m²"),
+        Derived("rotor inertia at the hub", "N² J_m", arm.motor is not None and arm.motor.reflected_inertia, "kg m²"),
+        Derived("root moment per torque at rest", "−(J − I_h)/J" * arm.is_uniform,
+                turns and -arm.gauged_inertia / arm.total_inertia, "N m/(N m)"),
+        Derived("input for a torque of 1 N m", "", arm.input_per_torque != 1.0 and arm.input_per_torque,
+                unit_of(MOMENT_GAIN, arm)),
+        Derived(f"losses at the hub, in {RATE_GAIN}", "", arm.rate_loss != 0.0 and arm.rate_loss,
+                unit_of(RATE_GAIN, arm)),
+        Derived("shear cut-off" + ", of several segments the lowest" * bool(arm.outer), "√(κGA/ρI)", cutoff, "rad/s"),
+        Derived("shear cut-off", "", cutoff and cutoff / (2 * math.pi), "Hz"),
+    ]  # fmt: skip
+    return sheet("derived", table([row for row in rows if row.value is not False]).columns, arm=arm)
 
 
 # ------------------------------------------------------------ the paper
@@ -159,12 +147,12 @@ class PaperValue(NamedTuple):
     @property
     def remark(self) -> Annotated[str, Quantity("remark", help="reason where the value used is not the printed one")]:
         """The reason why the value used is not the printed one, or is an odd one; empty of any other."""
-        if self.symbol == "C":
-            return prose("paper_damping", used=self.used)
-        if self.printed is None:
-            return "needed, but not in the paper: an assumption"
-        is_as_printed = self.symbol != "ρ" and math.isclose(self.used, self.printed)
-        return "" if is_as_printed else prose("paper_value", row=self)
+        return prose("paper_remark", row=self)
+
+    @property
+    def is_as_printed(self) -> bool:
+        """Whether the number used is the printed one."""
+        return self.printed is not None and math.isclose(self.used, self.printed)
 
 
 def paper_values(arm: Arm) -> tuple[PaperValue, ...]:
@@ -187,19 +175,14 @@ def paper_values(arm: Arm) -> tuple[PaperValue, ...]:
 
 def is_from_paper(arm: Arm) -> bool:
     """Whether length, section and moduli are those of Table 1."""
-    return all(math.isclose(row.used, row.printed or 0.0) for row in paper_values(arm) if row.symbol in "L A E κ G")
+    return all(row.is_as_printed for row in paper_values(arm) if row.symbol in "L A E κ G")
 
 
 def paper_section(case: Case) -> PageSection:
     """Table 1 and its corrections."""
-    values = table(
-        paper_values(case.arm),
-        stem="paper-values",
-        title="Table 1 of the paper, and the values used here",
-        caption=prose("paper_table"),
-    )
-    words = (prose("paper"),)
-    return PageSection(anchor="paper", title="The paper's values, corrected", words=words, blocks=(values,))
+    values = sheet("paper_values", table(paper_values(case.arm)).columns)
+    title, words = "The paper's values, corrected", (prose("paper"),)
+    return PageSection(anchor="paper", title=title, words=words, blocks=(values,))
 
 
 # ------------------------------------------------------------ assumptions
@@ -211,44 +194,30 @@ LOOP_COLUMNS = ("verdict", "K2_below", "K2_below_is_edge")
 
 def assumptions_section(case: Case) -> PageSection:
     """Frequencies over the sections and the hub inertias that could be chosen, with sensitivities."""
-    arm, title, blocks = case.arm, "What the assumptions do", list[Picture | Table]()
-    if not arm.is_uniform:
-        return PageSection(anchor="assumptions", title=title, words=(prose("assumptions_rig"),))
-    blocks += candidate_blocks(
-        section_study(arm), "section", "Candidate sections: rectangles of this area", "depth of the section [m]",
-        prose("assumed_section"),
-    )  # fmt: skip
-    if has_hub := has_hub_inertia(arm):
-        hub = hub_study(arm)
-        blocks += candidate_blocks(
-            hub, "hub", "Candidate hub inertias", "hub inertia [kg m²]",
-            prose("assumed_hub", locked=float(hub.locked[0]), pinned=float(hub.pinned[0])),
-        )  # fmt: skip
-    words = (prose("assumptions", arm=arm, is_from_paper=is_from_paper(arm), has_hub=has_hub),)
-    return PageSection(anchor="assumptions", title=title, words=words, blocks=blocks)
+    arm, blocks = case.arm, list[Picture | Table]()
+    if arm.is_uniform:
+        blocks += candidate_blocks(section_study(arm), "assumptions_section", "depth of the section [m]")
+    if arm.is_uniform and has_hub_inertia(arm):
+        blocks += candidate_blocks(hub_study(arm), "assumptions_hub", "hub inertia [kg m²]")
+    words = (prose("assumptions", arm=arm, is_from_paper=is_from_paper(arm), has_hub=has_hub_inertia(arm)),)
+    return PageSection(anchor="assumptions", title="What the assumptions do", words=words, blocks=blocks)
 
 
-def candidate_blocks(study: Study, stem: str, title: str, label: str, caption: str) -> Iterator[Picture | Table]:
+def candidate_blocks(study: Study, kind: str, label: str) -> Iterator[Picture | Table]:
     """Natural frequencies over the candidates as a picture, and with the sensitivities, a column a mode, as a table."""
-    low, high = (significant(float(omega), 5) for omega in study.natural_frequency[[0, -1], 0])
-    yield Picture(
-        stem=f"assumptions-{stem}-frequencies",
-        title=f"Natural frequencies over the {label.partition(' [')[0]}",
-        caption=prose("assumed_frequencies"),
-        alt=f"Natural frequencies over the {label}; the first goes from {low} to {high} rad/s.",
-        figure=draw_candidates(study, label),
-    )
-    rows, columns = study.candidates, list[Column]()
-    columns += table(rows, [name for name in CANDIDATE_COLUMNS if getattr(rows[0], name) is not None]).columns
-    for number, omega in enumerate(study.natural_frequency.T, 1):
-        columns.append(
-            Column(f"mode_{number}_rad_s", f"mode {number}", "rad/s", of=omega, digits=singly(significant, 6))
-        )
-    for number, slope in enumerate(study.sensitivity.T, 1):
-        name = f"sensitivity of mode {number}"
-        columns.append(Column(f"sensitivity_{number}", name, "%/%", of=slope, digits=partial(fixed, decimals=3)))
-    columns += table(rows, LOOP_COLUMNS).columns
-    yield Table(stem=f"assumptions-{stem}", title=title, caption=caption, columns=tuple(columns))
+    stem, rows = f"{kind.replace('_', '-')}-frequencies", study.candidates
+    yield picture("assumed_frequencies", draw_candidates(study, label), stem=stem, label=label,
+                  omega=study.natural_frequency)  # fmt: skip
+    own = [name for name in CANDIDATE_COLUMNS if getattr(rows[0], name) is not None]
+    columns = (
+        *table(rows, own).columns,
+        *(Column(f"mode_{n}_rad_s", f"mode {n}", "rad/s", of=each, digits=singly(significant, 6))
+          for n, each in enumerate(study.natural_frequency.T, 1)),
+        *(Column(f"sensitivity_{n}", f"sensitivity of mode {n}", "%/%", of=each, digits=partial(fixed, decimals=3))
+          for n, each in enumerate(study.sensitivity.T, 1)),
+        *table(rows, LOOP_COLUMNS).columns,
+    )  # fmt: skip
+    yield sheet(kind, columns, study=study)
 
 
 def draw_candidates(study: Study, label: str) -> Figure:

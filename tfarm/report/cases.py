@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
 from tfarm.arm import AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law
-from tfarm.dsp import Chain
-from tfarm.dsp.discretise import discretised, with_all_gains
-from tfarm.dsp.verdict import sampled_brief
+from tfarm.dsp import Chain, discretise, verdict
 from tfarm.errors import ConvergenceError, one_line
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
@@ -24,7 +21,6 @@ from tfarm.response.signals import Signals, sign_of
 from tfarm.spectrum.table import default_gains
 from tfarm.synthesis.design import Design, design
 
-GIVEN_GAINS = "the gains given"
 LONGEST_LAW_NAME = 60  # characters of a law's name in a heading
 DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
 
@@ -96,9 +92,8 @@ class Case(NamedTuple):
         found: list[Controller] = []
         for number, given in enumerate(self.laws, 1):
             law = as_law(given.law)
-            name = one_line(law.name, LONGEST_LAW_NAME) if law.gains is None else GIVEN_GAINS
-            if name in {each.name for each in found}:
-                name = f"{name} ({number})"
+            name = given.name if law.gains is None else "the gains given"
+            name += f" ({number})" * (name in {each.name for each in found})
             key = f"law_{number}" if len(self.laws) > 1 else "law"
             found.append(Controller(arm_and_law(self.arm, law)[0], law, given, name, key))
         return tuple(found)
@@ -123,14 +118,12 @@ def on_hub(arm: Arm, gains: HubFeedback, name: str, key: str) -> Controller:
 
 def check_laws(case: Case) -> None:
     """Raise ParameterError for a law that does not suit this arm or the sampling period of its chain."""
-    if case.arm.is_locked:
-        return  # it has no loop
-    for each in case.controllers if case.laws else ():
-        law = with_all_gains(*arm_and_law(each.arm, each.law))
+    for each in case.controllers if case.laws and not case.arm.is_locked else ():
+        law = discretise.with_all_gains(*arm_and_law(each.arm, each.law))
         Signals(each.arm, law.signals)
         if not law.is_discrete:
             Loop(each.arm, law)
-        discretised(law, case.chain.sampling.period)
+        discretise.discretised(law, case.chain.sampling.period)
 
 
 def has_loop(arm: Arm) -> bool:
@@ -138,34 +131,22 @@ def has_loop(arm: Arm) -> bool:
     return not (arm.is_locked or arm.has_massless_hub)
 
 
-def why_no_loop(arm: Arm) -> str:
-    """The reason why the gains of an arm cannot both be closed."""
-    return prose("no_loop", arm=arm)
-
-
 def sign_words(arm: Arm) -> str:
     """The law, and the sign of its moment gain."""
     return prose("signs", law=sign_of(arm))
 
 
-def what_holds(arm: Arm) -> str:
-    """The support of an arm without a rigid mode."""
-    return "The tip of this arm is held" if math.isinf(arm.payload.mass) else "Springs hold this arm"
-
-
 @lru_cache(maxsize=16)
 def best(arm: Arm, chain: Chain) -> Design | None:
     """The optimum of `tfarm design ARM`; None where no gains within its bounds hold, or the moment has no place."""
-    if not has_loop(arm):
-        return None
     try:
-        found = design(arm, modes=DESIGNED_MODES, chain=chain)
+        found = design(arm, modes=DESIGNED_MODES, chain=chain) if has_loop(arm) else None
     except ConvergenceError:
         return None
-    return None if found.at_limit else found  # the gain at which the hub does not move is no law to draw
+    return None if found is None or found.at_limit else found  # where the hub does not move there is no law to draw
 
 
-brief_on = lru_cache(maxsize=64)(sampled_brief)  # each computed once for all sections of a page
+brief_on = lru_cache(maxsize=64)(verdict.sampled_brief)  # each computed once for all sections of a page
 _margins = lru_cache(maxsize=64)(margins)
 
 

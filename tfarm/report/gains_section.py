@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,34 +14,20 @@ from numpy.typing import NDArray
 from tfarm.arm import GAINS, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit, unit_of
 from tfarm.arrays import Real
 from tfarm.digits import plain, significant
-from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
-from tfarm.dsp.verdict import SampledBrief
 from tfarm.errors import ConvergenceError
-from tfarm.loop.loci import Loci, held_branches, loci
-from tfarm.loop.loop import band_of
-from tfarm.loop.plane import DEEPEST_MOMENT_GAIN, Axis, Plane, edge, gain_map, moment_axis, rate_axis
-from tfarm.loop.stability import MARGIN_OF_ZERO, stability
-from tfarm.plots import regions as plane
-from tfarm.plots.regions import sampled_region
-from tfarm.plots.roots import draw_loci
-from tfarm.plots.style import page
+from tfarm.loop import loci, loop, plane, stability
+from tfarm.plots import regions, roots, style
 from tfarm.records import record
-from tfarm.report.cases import DESIGNED_MODES, Case, Controller, best, brief_on, has_loop, margins_of
+from tfarm.report.cases import DESIGNED_MODES, Case, best, brief_on, has_loop, margins_of
 from tfarm.report.loop_section import poles_tables
-from tfarm.report.sections import PageSection, Picture, prose
+from tfarm.report.sections import PageSection, Picture, picture, prose, sheet
 from tfarm.schema import Column, Quantity, Table, across, table, text
 from tfarm.spectrum.table import default_gains, default_words, first_frequency, rate_unit
-from tfarm.synthesis.design import Design
-from tfarm.synthesis.judge import damping_of
-from tfarm.synthesis.models import continuous_model
-from tfarm.synthesis.structures import ONE, Entry
-
-if TYPE_CHECKING:
-    from tfarm.plots.style import Figure
+from tfarm.synthesis import judge, models, structures
 
 GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
-MARKERS = {"default": plane.DIAMOND, "best": plane.STAR}
+MARKERS = {"default": regions.DIAMOND, "best": regions.STAR}
 DAMPING_EVERY = 4  # of them, the damping is computed at one in four
 DAMPING_MODES = 8  # of the model whose poles that is of: it is right to a few digits, more than a contour shows
 GAINS_AT_ONCE = 500  # of them: memory, whatever the grid
@@ -60,119 +46,109 @@ class MapOfArm:
 
     `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary, both gains and w, within the
     picture with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first
-    `DESIGNED_MODES` modes at `axes`, every fourth value of each gain on the grid and the frame's; `design` the best
-    gains for the sampled loop.  `sampled` is the region of the loop sampled by `chain`, None where that is not
-    determined; `briefs` are the sampled verdicts on the laws.
+    `DESIGNED_MODES` modes at `axes`, every fourth value of each gain on the grid and the frame's.  `sampled` is the
+    region of the loop sampled by the case's chain, None where that is not determined.
     """
 
-    arm: Arm
-    x: Axis
-    y: Axis
-    region: Plane
+    case: Case
+    x: plane.Axis
+    y: plane.Axis
+    region: plane.Plane
     edge: Real
     axes: tuple[Real, Real]
     damping: Real
-    laws: tuple[Controller, ...]
-    design: Design | None
-    chain: Chain
     sampled: SampledMap | None
-    briefs: tuple[SampledBrief, ...]
 
     @cached_property
     def counts(self) -> NDArray[np.int64]:
         """Unstable poles on the grid of the damping."""
-        return np.asarray(gain_map(self.arm, *self.axes).unstable)
-
-    @property
-    def band(self) -> float:
-        """Below which [rad/s] the damping is the least."""
-        return band_of(self.arm, DESIGNED_MODES)
+        return np.asarray(plane.gain_map(self.case.arm, *self.axes).unstable)
 
 
-def map_of_arm(arm: Arm, chain: Chain) -> MapOfArm:
+def map_of_arm(case: Case) -> MapOfArm:
     """The map of an arm, its ranges chosen by J w1 and by its stability intervals."""
-    x = rate_axis(arm)
-    y = moment_axis(arm, x)
-    found = gain_map(arm, x.grid(GRID_COLUMNS), y.grid(GRID_ROWS))
+    arm, x = case.arm, plane.rate_axis(case.arm)
+    y = plane.moment_axis(arm, x)
+    found = plane.gain_map(arm, x.grid(GRID_COLUMNS), y.grid(GRID_ROWS))
     half = DAMPING_EVERY // 2
     across, up = (
         np.r_[axis.low, each[half::DAMPING_EVERY], axis.high] for axis, each in zip((x, y), found.axes, strict=True)
     )
+    sampled = regions.sampled_region(arm, x, y, case.chain)
+    return MapOfArm(case, x, y, found, plane.edge(found, x, y), (across, up), damping_over(arm, across, up), sampled)
+
+
+def damping_over(arm: Arm, across: Real, up: Real) -> Real:
+    """The least damping ratio (rows, columns) of the first modes over both gains."""
     signals = tuple(each.output for name in PLANE for each in GAINS if each.name == name)
-    model = continuous_model(arm, signals, DESIGNED_MODES, DAMPING_MODES, first_frequency(arm))
+    model = models.continuous_model(arm, signals, DESIGNED_MODES, DAMPING_MODES, first_frequency(arm))
     points = np.reshape(np.meshgrid(across, up), (2, -1))
     parts = np.array_split(points, math.ceil(points.shape[1] / GAINS_AT_ONCE), axis=1)
-    laws = ([Entry(name, row[None], ONE) for name, row in zip(signals, part, strict=True)] for part in parts)
-    damping = np.concatenate([damping_of(model, model.poles(law)) for law in laws]).reshape(up.size, across.size)
-    named = Case(arm, chain).in_s
-    briefs = tuple(brief_on(arm, each.law, chain) for each in named)
-    sampled = sampled_region(arm, x, y, chain)
-    return MapOfArm(
-        arm, x, y, found, edge(found, x, y), (across, up), damping, named, best(arm, chain), chain, sampled, briefs
+    laws = (
+        [structures.Entry(name, row[None], structures.ONE) for name, row in zip(signals, part, strict=True)]
+        for part in parts
     )
+    return np.concatenate([judge.damping_of(model, model.poles(law)) for law in laws]).reshape(up.size, across.size)
 
 
-def draw_map_of_arm(data: MapOfArm) -> Figure:
+def draw_map_of_arm(data: MapOfArm) -> style.Figure:
     """Both gains: the count, its boundary, the damping, the sampled region, Lyapunov's frame, and the laws."""
-    found, x, y = data.region, data.x, data.y
-    with page(9.0, 6.2, f"{data.arm.name}: stability region of both gains") as (figure, ax):
-        plane.ground(found, x, y, ax)
-        plane.contours(*data.axes, np.where(data.counts == 0, data.damping, np.nan), ax)
-        plane.draw_boundary(found, data.edge, x, y, ax)
-        plane.draw_sampled(data.sampled, ax)
-        if data.arm.is_uniform:
-            plane.draw_proven(data.arm, x, y, ax)
-        points = (default_gains(data.arm), *([] if data.design is None else [data.design.law]))
-        for law, gains, brief in zip(data.laws, points, data.briefs, strict=True):
-            plane.law_mark(gains, MARKERS[law.key], f"{law.title};\n{brief.short}", ax)
-        if data.design is not None:
-            plane.search_frame(data.design.bounds, ax)
+    case, found, x, y = data.case, data.region, data.x, data.y
+    designed = best(case.arm, case.chain)
+    with style.page(9.0, 6.2, f"{case.arm.name}: stability region of both gains") as (figure, ax):
+        regions.ground(found, x, y, ax)
+        regions.contours(*data.axes, np.where(data.counts == 0, data.damping, np.nan), ax)
+        regions.draw_boundary(found, data.edge, x, y, ax)
+        regions.draw_sampled(data.sampled, ax)
+        if case.arm.is_uniform:
+            regions.draw_proven(case.arm, x, y, ax)
+        points = (default_gains(case.arm), *([] if designed is None else [designed.law]))
+        for each, gains in zip(case.in_s, points, strict=True):
+            brief = brief_on(case.arm, each.law, case.chain)
+            regions.law_mark(gains, MARKERS[each.key], f"{each.title};\n{brief.short}", ax)
+        if designed is not None:
+            regions.search_frame(designed.bounds, ax)
     return figure
 
 
-def map_data(data: MapOfArm) -> Table:
+def map_data(data: MapOfArm) -> Sequence[Column]:
     """The grid with counts and damping, the boundary with its frequencies, then the ends of the sampled intervals.
 
     Ends that are cut by the picture are left out.
     """
-    counts = [math.inf if count < 0 else int(count) for count in data.counts.ravel()]
-    grid = zip(*(each.ravel().tolist() for each in np.meshgrid(*data.axes)), counts, data.damping.ravel().tolist(),
-               strict=True)  # fmt: skip
-    rows: list[tuple[Any, ...]] = [("grid", *each, "") for each in grid]
-    rows += [("boundary", K1, K2, "", "", omega) for K1, K2, omega in data.edge.tolist() if not math.isnan(K1)]
-    if data.sampled is not None:
-        for across, windows in zip(data.sampled.axes[0].tolist(), data.sampled.stable_intervals, strict=True):
-            ends = [end for window in windows for end in window if data.y.low <= end <= data.y.high]
-            rows += [("sampled boundary", across, end, "", "", "") for end in ends]
-    units = [shown_unit(name, data.arm) for name in PLANE]
+    points = zip(*map(np.ravel, np.meshgrid(*data.axes)), data.counts.ravel(), data.damping.ravel(), strict=True)
+    grid = [("grid", K1, K2, math.inf if count < 0 else int(count), damping, "") for K1, K2, count, damping in points]
+    line = [("boundary", K1, K2, "", "", omega) for K1, K2, omega in data.edge.tolist() if not math.isnan(K1)]
+    columns = () if data.sampled is None else zip(data.sampled.axes[0], data.sampled.stable_intervals, strict=True)
+    sampled = [
+        ("sampled boundary", across, end, "", "", "")
+        for across, windows in columns for window in windows for end in window if data.y.low <= end <= data.y.high
+    ]  # fmt: skip
+    units = [shown_unit(name, data.case.arm) for name in PLANE]
     keys = "_".join([PLANE[0], *units[0].replace("/", " ").split()]), PLANE[1]
     titles = (
         ("what", "what", ""), *zip(keys, PLANE, units, strict=True), ("unstable_poles", "unstable poles", ""),
         ("least_damping_ratio", "least damping ratio", ""), ("omega_rad_s", "frequency", "rad/s"),
     )  # fmt: skip
-    columns = [Column(*title, of=cells) for title, cells in zip(titles, zip(*rows, strict=True), strict=True)]
-    return Table(stem="map-data", title="The map of both gains", columns=tuple(columns))
+    cells = zip(*grid, *line, *sampled, strict=True)
+    return [Column(*title, of=own) for title, own in zip(titles, cells, strict=True)]
 
 
 def map_section(case: Case) -> PageSection:
     """The stability regions of both gains, continuous and sampled, and the gains that damp best."""
-    data = map_of_arm(case.arm, case.chain)
-    arm, found = data.arm, data.design
-    unit, deepest = f"{plain(rate_unit(arm), 4)} {unit_of(RATE_GAIN, arm)}", DEEPEST_MOMENT_GAIN * arm.input_per_torque
-    picture = Picture(
-        stem="map",
-        title="The plane of both gains",
-        caption=prose("map", data=data, arm=arm, unit=unit, deepest=deepest),
-        alt="Map of K1 and K2: the stable gains, and the number of unstable poles elsewhere.",
-        figure=draw_map_of_arm(data),
-        data=map_data(data),
-    )
+    arm, data, found = case.arm, map_of_arm(case), best(case.arm, case.chain)
+    drawn = picture(
+        "map", draw_map_of_arm(data), data=map_data(data), found=data, arm=arm, band=loop.band_of(arm, DESIGNED_MODES),
+        unit=f"{plain(rate_unit(arm), 4)} {unit_of(RATE_GAIN, arm)}",
+        deepest=plane.DEEPEST_MOMENT_GAIN * arm.input_per_torque,
+    )  # fmt: skip
     answer = intervals(arm)
     if found is not None:
         gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), arm) for name in PLANE)
-        answer += " " + prose("best_gains", data=data, found=found, modes=DESIGNED_MODES, gains=gains)
+        brief = brief_on(arm, case.in_s[-1].law, case.chain)
+        answer += " " + prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains, brief=brief)
     title = "Stability region of both gains"
-    return PageSection(anchor="margins-map", title=title, answer=answer, blocks=(picture,))
+    return PageSection(anchor="margins-map", title=title, answer=answer, blocks=(drawn,))
 
 
 def intervals(arm: Arm) -> str:
@@ -212,57 +188,47 @@ def locus_section(case: Case) -> PageSection:
     if case.laws:
         return PageSection(anchor="locus", title="Closed-loop poles", words=words, blocks=tables)
     arm, gains, blocks = case.arm, default_gains(case.arm), list[Picture | Table]()
-    low, high = (share * arm.input_per_torque for share in RANGE_OF_K2)
-    ranges = {RATE_GAIN: (0.0, 2.0 * rate_unit(arm)), **({MOMENT_GAIN: (low, high)} if has_loop(arm) else {})}
-    found: dict[str, Loci] = {}
+    ranges = {RATE_GAIN: (0.0, 2.0 * rate_unit(arm))}
+    if has_loop(arm):
+        ranges[MOMENT_GAIN] = RANGE_OF_K2[0] * arm.input_per_torque, RANGE_OF_K2[1] * arm.input_per_torque
+    found: dict[str, loci.Loci] = {}
     for name, (start, stop) in ranges.items():
         try:
-            found[name] = loci(arm, gains, name, start, stop)
+            found[name] = loci.loci(arm, gains, name, start, stop)
             blocks += locus_blocks(found[name])
         except ConvergenceError:
             words.append(prose("not_followed", name=name))
             blocks += [rates_table(arm, gains)] * (name == RATE_GAIN)
     if found:
-        title, caption = "Root loci in numbers", prose("loci")
-        keys = {f"along {name}": each for name, each in found.items()}
-        blocks.append(across(keys, keys=list(found), stem="loci", title=title, caption=caption))
-    if has_loop(arm):
-        blocks.append(beyond_table(arm, gains))
+        along = {f"along {name}": each for name, each in found.items()}
+        blocks.append(sheet("loci", across(along, keys=list(found)).columns))
+    blocks += [beyond_table(arm, gains)] if has_loop(arm) else []
     others = {name: gains.gain_text(other, shortly, arm) for name, other in zip(PLANE, reversed(PLANE), strict=True)}
     answer = prose("locus_lead", found=found, gains=others)
     return PageSection(anchor="locus", title="Root loci", answer=answer, words=words, blocks=[*blocks, *tables])
 
 
-def locus_blocks(data: Loci) -> Iterator[Picture | Table]:
+def locus_blocks(data: loci.Loci) -> Iterator[Picture | Table]:
     """The picture of a locus, its branches, and their crossings of the imaginary axis."""
-    name, reduced = data.name, data.reduced
-    stem, columns = f"locus-{name}", [Column(data.name, data.name, data.unit, of=data.exact.gain)]
-    for which, branches in {"exact": data.exact.branches, "reduced": reduced.branches}.items():
-        for n, row in enumerate(held_branches(branches)):  # to the digits that hold on every processor
-            for part, values in (("re", row.real), ("im", row.imag)):
-                cells = ["" if np.isnan(value) else value for value in values.tolist()]
-                columns.append(Column(f"{which}_{n}_{part}", f"{which} branch {n}, {part}", "1/s", of=cells))
-    yield Picture(
-        stem=stem,
-        title=f"Closed-loop poles along {name}",
-        caption=prose("locus", name=name, reduced=reduced),
-        alt=prose("locus_alt", name=name, exact=data.exact, reduced=reduced),
-        figure=draw_loci(data),
-        data=Table(stem=f"{stem}-data", title=f"Loci along {name}", columns=tuple(columns)),
-    )
-    yield table(
-        data.rows,
-        stem=f"{stem}-branches",
-        title=f"Branches along {name}",
-        caption=prose("branches", order=reduced.order),
-    )
-    if data.exact.crossings:
-        yield table(
-            data.exact.crossings,
-            stem=f"{stem}-crossings",
-            title=f"Crossings of the imaginary axis along {name}",
-            caption=prose("crossings", name=name),
-        )
+    stem = f"locus-{data.name}"
+    yield picture("locus", roots.draw_loci(data), stem=stem, data=locus_data(data), found=data)
+    yield sheet("branches", table(data.rows).columns, stem=f"{stem}-branches", found=data)
+    yield sheet("crossings", table(data.exact.crossings).columns, stem=f"{stem}-crossings", found=data)
+
+
+def locus_data(data: loci.Loci) -> Sequence[Column]:
+    """The poles of the exact and of the reduced locus, to the digits that hold on every processor."""
+    parts = [
+        (f"{which}_{n}_{part}", f"{which} branch {n}, {part}", values)
+        for which, branches in {"exact": data.exact.branches, "reduced": data.reduced.branches}.items()
+        for n, row in enumerate(loci.held_branches(branches))
+        for part, values in (("re", row.real), ("im", row.imag))
+    ]
+    cells = [["" if math.isnan(value) else value for value in values.tolist()] for *_, values in parts]
+    return [
+        Column(data.name, data.name, data.unit, of=data.exact.gain),
+        *(Column(key, title, "1/s", of=own) for (key, title, _), own in zip(parts, cells, strict=True)),
+    ]
 
 
 def beyond_table(arm: Arm, gains: HubFeedback) -> Table:
@@ -272,14 +238,9 @@ def beyond_table(arm: Arm, gains: HubFeedback) -> Table:
     more = [float(f"{share * edge:.3g}") for share in AROUND_EDGE if edge > last]
     values = [*(share * unit for share in LISTED_MOMENT_GAINS), *(value for value in more if last < value)]
     undecided = [] if arm.is_undamped else [edge]  # no list of poles ends there
-    rows = [at_gain(arm, gains.having(MOMENT_GAIN, value), value, undecided) for value in values]
     one = gains.having(MOMENT_GAIN, unit).gain_text(MOMENT_GAIN, shortly, arm)
-    return table(
-        rows,
-        stem="beyond",
-        title=f"{one} and beyond, at {gains.gain_text(RATE_GAIN, shortly)}",
-        caption=prose("beyond", arm=arm, J=arm.total_inertia, hub=arm.hub.inertia),
-    )
+    rows = [at_gain(arm, gains.having(MOMENT_GAIN, value), value, undecided) for value in values]
+    return sheet("beyond", table(rows).columns, arm=arm, one=one, at=gains.gain_text(RATE_GAIN, shortly))
 
 
 def edge_of_K2(arm: Arm, law: HubFeedback) -> float | None:
@@ -292,24 +253,19 @@ def rates_table(arm: Arm, gains: HubFeedback) -> Table:
     """Verdict and poles of the exact loop for a few rate gains."""
     values = [float(f"{share * rate_unit(arm):.3g}") for share in LISTED_RATE_GAINS]
     rows = [at_gain(arm, gains.having(RATE_GAIN, value), value) for value in values]
-    return table(
-        rows,
-        stem="rates",
-        title=f"Poles at a few {RATE_GAIN}, at {gains.gain_text(MOMENT_GAIN, shortly)}",
-        caption="Exact poles, each list complete in its box.",
-    )
+    return sheet("rates", table(rows).columns, at=gains.gain_text(MOMENT_GAIN, shortly))
 
 
 def at_gain(arm: Arm, law: HubFeedback, value: float, undecided: Sequence[float] = ()) -> AtGain:
     """The row of one value; a pole may be on the axis to working precision, and is on it at those undecided."""
     try:
-        found = None if np.isclose(value, undecided, rtol=1e-9, atol=0.0).any() else stability(arm, law)
+        found = None if np.isclose(value, undecided, rtol=1e-9, atol=0.0).any() else stability.stability(arm, law)
     except ConvergenceError:
         found = None
     if found is None:
         return AtGain(value, "on the axis, not determined", None, None, "")
     poles, moving, rightmost = found.poles.values, found.poles.moving, found.poles.spectral_abscissa
-    rounding = MARGIN_OF_ZERO * abs(moving[moving.real == rightmost]).max(initial=0.0)
+    rounding = stability.MARGIN_OF_ZERO * abs(moving[moving.real == rightmost]).max(initial=0.0)
     pairs = text(poles[poles.imag > 0][:FIRST_PAIRS].tolist(), 5)
     count = "infinitely many" if found.unstable_roots_infinite else found.unstable_roots
     return AtGain(value, found.verdict, count, rightmost if abs(rightmost) > rounding else 0.0, pairs)

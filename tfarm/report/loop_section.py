@@ -13,13 +13,10 @@ from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.digits import plain, singly
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import TfarmError
-from tfarm.loop.margins import Margins, loop_curve
-from tfarm.loop.nyquist import nyquist_of
-from tfarm.loop.poles import Poles, closed_loop_poles
-from tfarm.loop.stability import spill
-from tfarm.plots.frequency import draw_loop, draw_nyquist
-from tfarm.report.cases import Case, Controller, brief_on, margins_of, why_no_loop
-from tfarm.report.sections import Fact, PageSection, Picture, prose, upper
+from tfarm.loop import margins, nyquist, poles, stability
+from tfarm.plots import frequency
+from tfarm.report.cases import Case, Controller, brief_on, margins_of
+from tfarm.report.sections import Fact, PageSection, Picture, picture, prose, sheet, upper
 from tfarm.response.signals import Signals, sign_convention
 from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table
 
@@ -28,7 +25,7 @@ MOST_SPILLED = 12  # flexible modes of the largest model that is compared with t
 
 def no_loop_section(case: Case) -> PageSection:
     """One sentence for an arm that has no loop."""
-    return PageSection(anchor="no-loop", title="The loop", answer=why_no_loop(case.arm))
+    return PageSection(anchor="no-loop", title="The loop", answer=prose("no_loop", arm=case.arm))
 
 
 # ------------------------------------------------------------ margins
@@ -37,75 +34,53 @@ def no_loop_section(case: Case) -> PageSection:
 def margins_section(case: Case) -> PageSection:
     """Verdict, margins, crossings and spillover of each controller, with the verdict on its sampled loop."""
     found = [(each, margins_of(each.arm, each.law)) for each in case.in_s]
-    sampled = [brief_on(each.arm, each.law, case.chain).short for each, _ in found]
+    briefs = [(*pair, brief_on(pair[0].arm, pair[0].law, case.chain).short) for pair in found]
     words: list[str] = []
     blocks: list[Picture | Table] = [*(_bode_picture(*pair) for pair in found), margin_table(found)]
     for each, it in found:
         blocks += tables_of(each, it)
         try:
-            spilled = spill(each.arm, each.law, MOST_SPILLED)
+            few = stability.spill(each.arm, each.law, MOST_SPILLED)
+            blocks.append(sheet("spill", table(few.models).columns, stem=each.stem("spill"), each=each, found=few))
         except TfarmError as error:
             words.append(f"Spillover of {each.name} is not determined: {error}.")
-            continue
-        blocks.append(
-            table(
-                spilled.models,
-                stem=each.stem("spill"),
-                title=f"Models of few modes under {each.name}",
-                caption=prose("spill", found=spilled.in_words),
-            )
-        )
     return PageSection(
-        anchor="margins",
-        title="Stability and stability margins",
-        answer=prose("margins_lead", found=[(*pair, brief) for pair, brief in zip(found, sampled, strict=True)]),
-        facts=[verdict_fact(*pair, brief) for pair, brief in zip(found, sampled, strict=True)],
-        words=words,
-        blocks=[block for block in blocks if not isinstance(block, Table) or block.columns],
-    )
-
-
-def verdict_fact(each: Controller, found: Margins, sampled: str) -> Fact:
-    """The verdict, the number of unstable poles in the frequency range, and the verdict on the sampled loop."""
-    it = found.stability
-    return Fact(label=each.title, value=it.verdict.upper(), note=prose("verdict", it=it, sampled=sampled))
-
-
-def margin_table(found: Sequence[tuple[Controller, Margins]]) -> Table:
-    """A row a quantity, a column a controller."""
-    leads = [each.name for each, it in found if it.in_band is not None and it.in_band.phase < 0]
-    undamped = any(it.stability.loop.arm.is_undamped for _, it in found)
-    return across(
-        {each.title: it for each, it in found}, keys=[each.key for each, _ in found], stem="margins",
-        title="Verdict and margins", caption=prose("margins", undamped=undamped, leads=leads),
+        anchor="margins", title="Stability and stability margins", answer=prose("margins_lead", found=briefs),
+        facts=[verdict_fact(*each) for each in briefs], words=words, blocks=blocks,
     )  # fmt: skip
 
 
-def _bode_picture(each: Controller, found: Margins) -> Picture:
-    omega, L = loop_curve(found)
-    title, stem = f"The loop function of {each.name}", each.stem("bode")
+def verdict_fact(each: Controller, found: margins.Margins, sampled: str) -> Fact:
+    """The verdict, the number of unstable poles in the frequency range, and the verdict on the sampled loop."""
+    it = found.stability
+    return Fact(each.title, it.verdict.upper(), note=prose("verdict", it=it, sampled=sampled))
+
+
+def margin_table(found: Sequence[tuple[Controller, margins.Margins]]) -> Table:
+    """A row a quantity, a column a controller."""
+    leads = [each.name for each, it in found if it.in_band is not None and it.in_band.phase < 0]
+    undamped = any(it.stability.loop.arm.is_undamped for _, it in found)
+    own = across({each.title: it for each, it in found}, keys=[each.key for each, _ in found])
+    return sheet("margins", own.columns, undamped=undamped, leads=leads)
+
+
+def _bode_picture(each: Controller, found: margins.Margins) -> Picture:
+    omega, L = margins.loop_curve(found)
     columns = (
         Column("omega_rad_s", "angular frequency", "rad/s", of=omega),
         Column("re_L", "Re L", of=L.real),
         Column("im_L", "Im L", of=L.imag),
     )
-    return Picture(
-        stem=stem,
-        title=title,
-        caption=prose("loop_function", has_margins=found.in_band is not None),
-        alt=f"Bode plot of the loop function of {each.name}, {found.stability.verdict}.",
-        figure=draw_loop(found, each.name),
-        data=Table(stem=f"{stem}-data", title=title, columns=columns),
-    )
+    figure, stem = frequency.draw_loop(found, each.name), each.stem("bode")
+    return picture("loop_function", figure, stem=stem, data=columns, each=each, found=found)
 
 
-def tables_of(each: Controller, found: Margins) -> Iterator[Table]:
+def tables_of(each: Controller, found: margins.Margins) -> Iterator[Table]:
     """Every crossing of |L| = 1 and of L < 0 in the range, ascending, and the stability interval of each number."""
-    for kind, rows in {"gain": found.gain_crossovers, "phase": found.phase_crossovers}.items():
-        title, caption = f"{upper(kind)} crossovers of {each.name}", prose(f"{kind}_crossovers")
-        yield table(rows, stem=each.stem(f"{kind}-crossovers"), title=title, caption=caption)
-    title, caption = f"Stability intervals of {each.name}", prose("intervals", note=upper(found.intervals_note or ""))
-    yield table(found.stability_intervals, stem=each.stem("windows"), title=title, caption=caption)
+    for kind, rows in (("gain_crossovers", found.gain_crossovers), ("phase_crossovers", found.phase_crossovers)):
+        yield sheet(kind, table(rows).columns, stem=each.stem(kind.replace("_", "-")), each=each)
+    columns = table(found.stability_intervals).columns
+    yield sheet("intervals", columns, stem=each.stem("windows"), each=each, note=found.intervals_note)
 
 
 # ------------------------------------------------------------ Nyquist
@@ -113,29 +88,16 @@ def tables_of(each: Controller, found: Margins) -> Iterator[Table]:
 
 def nyquist_section(case: Case) -> PageSection:
     """The loop function of each controller on a contour that hides nothing, its encirclements counted."""
-    plots = [(each, nyquist_of(margins_of(each.arm, each.law).stability)) for each in case.in_s]
+    plots = [(each, nyquist.nyquist_of(margins_of(each.arm, each.law).stability)) for each in case.in_s]
     own = any(found.unstable_open for _, found in plots)
-    pictures = [
-        Picture(
-            stem=each.stem("nyquist"),
-            title=f"Nyquist plot of the exact loop function, {each.name}",
-            caption=prose("nyquist_rings"),
-            alt=prose("nyquist_alt", name=each.name, found=found),
-            figure=draw_nyquist(case.arm.name, {each.name: found}),
-            data=curve_table(found, stem=each.stem("nyquist-data"), title="The loop function on the contour"),
-        )
+    blocks: list[Picture | Table] = [
+        picture("nyquist_plot", frequency.draw_nyquist(case.arm.name, {each.name: found}), stem=each.stem("nyquist"),
+                data=curve_table(found).columns, each=each, found=found)
         for each, found in plots
-    ]
-    counts = across(
-        {each.title: found for each, found in plots}, stem="nyquist-count",
-        title="Encirclements and unstable poles", caption=prose("nyquist_count", own=own),
-    )  # fmt: skip
-    return PageSection(
-        anchor="margins-nyquist",
-        title="Nyquist plot: encirclements of −1",
-        words=[prose("nyquist", own=own)],
-        blocks=[*pictures, counts],
-    )
+    ]  # fmt: skip
+    blocks.append(sheet("nyquist_count", across({each.title: found for each, found in plots}).columns, own=own))
+    title, words = "Nyquist plot: encirclements of −1", [prose("nyquist", own=own)]
+    return PageSection(anchor="margins-nyquist", title=title, words=words, blocks=blocks)
 
 
 # ------------------------------------------------------------ poles
@@ -143,16 +105,14 @@ def nyquist_section(case: Case) -> PageSection:
 
 def poles_tables(case: Case) -> tuple[list[str], list[Table]]:
     """The first closed-loop poles of each controller, complete in a box; a sentence where they are not determined."""
-    words, tables = [], []
+    words, tables, of = list[str](), list[Table](), quantities(poles.Poles)["values"]
     for each in case.in_s:
         try:
-            poles = closed_loop_poles(each.arm, each.law)
+            found = poles.closed_loop_poles(each.arm, each.law)
+            columns = roots_table(found.values, of).columns
+            tables.append(sheet("poles", columns, stem=each.stem("poles"), each=each, box=found.box))
         except TfarmError as error:
             words.append(f"{upper(each.name)}: poles not determined, {error}.")
-            continue
-        title, caption = f"Closed-loop poles under {each.name}", prose("poles", box=poles.box)
-        of = quantities(Poles)["values"]
-        tables.append(roots_table(poles.values, of, stem=each.stem("poles"), title=title, caption=caption))
     return words, tables
 
 
@@ -169,8 +129,7 @@ def law_section(case: Case) -> PageSection:
     ]  # fmt: skip
     words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete]))
     entries = [entry for each in named for entry in entries_of(each)]
-    blocks = [table(entries, stem="law-entries", title="Transfer function from each signal", caption=prose("entries"))]
-    blocks += [matrices for each in named for matrices in matrices_tables(each)]
+    blocks = [sheet("law_entries", table(entries).columns), *(own for each in named for own in matrices_tables(each))]
     title = "The controller" if len(named) == 1 else "The controllers"
     return PageSection(anchor="law", title=title, answer=prose("laws", each=named), words=words, blocks=blocks)
 
@@ -217,11 +176,10 @@ def matrices_tables(each: Controller) -> Iterator[Table]:
         states = [f"x{i}" for i in range(1, len(A) + 1)]
         titles = {x: x for x in states} | {f"{i + 1}_{part.signals[i]}": part.signals[i] for i in led}
         step = "next " if each.law.is_discrete else "d/dt "
-        columns = [Column("row", "", of=[*(step + x for x in states), "input"])]
-        columns += [
-            Column(key, title, of=values, digits=singly(plain, 5))
-            for (key, title), values in zip(titles.items(), whole.T, strict=True)
-        ]
+        columns = (
+            Column("row", "", of=[*(step + x for x in states), "input"]),
+            *(Column(key, title, of=values, digits=singly(plain, 5))
+              for (key, title), values in zip(titles.items(), whole.T, strict=True)),
+        )  # fmt: skip
         stem = each.stem("matrices") + f"-{number}" * (number > 1)
-        title, caption = f"Matrices of {each.name}", prose("matrices", name=each.name)
-        yield Table(stem=stem, title=title, caption=caption, columns=tuple(columns))
+        yield sheet("matrices", columns, stem=stem, name=each.name)

@@ -8,12 +8,13 @@ import re
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
 from markupsafe import Markup
+from pydantic import TypeAdapter
 
 from tfarm.arm import PLANE, Arm, as_law, load, presets
 from tfarm.arm.writing import law_toml
@@ -29,7 +30,7 @@ from tfarm.report.loop_section import law_section, margins_section, no_loop_sect
 from tfarm.report.modes_section import modes_section
 from tfarm.report.response_sections import bode_section, fit_section, measured_section
 from tfarm.report.sampled_section import sampled_section
-from tfarm.report.sections import PICTURES, Fact, PageSection, SavedSection, prose, render
+from tfarm.report.sections import PICTURES, Fact, PageSection, prose, render
 from tfarm.report.tuner_section import tuner_section
 from tfarm.response.frequency import bode
 from tfarm.schema.glossary import GLOSSARY_TERMS
@@ -53,7 +54,7 @@ class Piece:
     word of its sections' anchors; its `title` is that of one of them, and `is_also_on` picks the other pages of that
     kind that have the section.  The full page has all, and at its top the answers of those that have one.
     `seconds` is about how long a section takes to make, where that is long: the longest are begun first.  Sections of
-    one `task` are made one after the other in one process, as they share a design.
+    one `task` are made one after the other in one process, as they share a design or the damped modes of the arm.
     """
 
     name: str
@@ -104,10 +105,10 @@ PIECES = (
     Piece("stability margins", "margins", margins_section, _in_s, "Gains and margins", task=LOOP_TASK),
     Piece("root loci", "locus", locus_section, _in_s, "Root loci", seconds=7.0, task=LOOP_TASK),
     Piece("Nyquist plot", "margins-nyquist", nyquist_section, _in_s, task=LOOP_TASK),
-    Piece("sampled loop", "sampled", sampled_section, lambda case: case.has_loop, "The sampled loop", seconds=9.0),
+    Piece("sampled loop", "sampled", sampled_section, lambda case: case.has_loop, "The sampled loop", seconds=8.0),
     Piece("controllers", "law", law_section, lambda case: case.laws and not case.arm.is_locked,
            is_also_on=LOOP_PAGES.__contains__),
-    Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", seconds=10.0),
+    Piece("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", seconds=6.0, task="sampled loop"),
     Piece("assumptions", "assumptions", assumptions_section, title="What the assumptions do"),
 )  # fmt: skip
 QUESTIONS = {piece.page: piece.title for piece in PIECES if piece.title}  # pages that may be asked for alone
@@ -124,11 +125,9 @@ def explained(text: str) -> Markup:
     seen: set[str] = set()
 
     def linked(found: re.Match[str]) -> str:
-        word = found[0].lower()
-        if word in seen:
-            return found[0]
+        word, before = found[0].lower(), len(seen)
         seen.add(word)
-        return f'<a class="term" href="#{word_id(word)}">{found[0]}</a>'
+        return found[0] if len(seen) == before else f'<a class="term" href="#{word_id(word)}">{found[0]}</a>'
 
     return Markup(PROMISE.sub(linked, str(with_symbols(text))))
 
@@ -138,16 +137,15 @@ def word_id(name: str) -> str:
     return f"word-{name.lower().replace(' ', '-')}"
 
 
-def other_pages(folder: Path, writing: Sequence[str], page: str) -> Sequence[tuple[str, str]]:
-    """(file, title) of the arm's other pages: those in its folder, and those written with this one."""
-    names = {"index": "full report", **QUESTIONS}
-    there = [name for name in names if name in writing or (folder / f"{name}.html").is_file()]
-    return [(f"{name}.html", names[name]) for name in there if name != page]
+def pages_in(folder: Path, written: Sequence[str] = ()) -> list[tuple[str, str]]:
+    """(file, title) of the pages in an arm's folder, and of those that are being written."""
+    there = {name: title for name, title in PAGES.items() if name in written or (folder / f"{name}.html").is_file()}
+    return [(f"{name}.html", title) for name, title in there.items()]
 
 
 def arm_page(
     case: Case,
-    sections: Sequence[SavedSection],
+    sections: Sequence[PageSection],
     only: str | None,
     *,
     trust: str,
@@ -172,7 +170,7 @@ def arm_page(
         glossary=[term for term in GLOSSARY_TERMS if term.name in PROMISES],
         trust=trust,
         live=live,
-        summary=summary(arm, [each.name for each in case.laws]),
+        summary=summary(case),
         sha256=hashlib.sha256(file_of(case).encode()).hexdigest(),
         command=command_of(case, only),
         has_proof=not (case.laws and only),
@@ -181,9 +179,12 @@ def arm_page(
     )
 
 
-def index_page(cards: Sequence[Mapping[str, Any]], *, trust: str, compared: str = "") -> str:
-    """The page that leads to all others; `compared` is the title of the comparison in the folder, if there is one."""
-    return render("index.html", title="tfarm reports", cards=cards, trust=trust, compared=compared, looks=BADGES)
+def summary(case: Case) -> str:
+    """The arm in one sentence, and the laws that its page is about in another."""
+    return prose("summary", arm=case.arm, laws=[each.name for each in case.laws])
+
+
+# ------------------------------------------------------------ files and commands
 
 
 def file_of(case: Case) -> str:
@@ -194,12 +195,10 @@ def file_of(case: Case) -> str:
 
 def own_law(case: Case) -> str | None:
     """The table [law] of the one law of a page; None of none or several, or of one with files of its own."""
-    if len(case.laws) != 1 or case.laws[0].measured is not None:
-        return None
-    try:
-        return law_toml(as_law(case.laws[0].law))
-    except ParameterError:
-        return None
+    with suppress(ParameterError):
+        if len(case.laws) == 1 and case.laws[0].measured is None:
+            return law_toml(as_law(case.laws[0].law))
+    return None
 
 
 def command_of(case: Case, only: str | None) -> str:
@@ -212,13 +211,6 @@ def command_of(case: Case, only: str | None) -> str:
     return " ".join(["tfarm report", name, *options, "--out reports"])
 
 
-def command_for_all(arms: Sequence[tuple[str, bool]]) -> str:
-    """The command that writes the pages of these arms, each a name and whether it is a preset."""
-    if sorted(name for name, preset in arms if preset) == sorted(presets()) and all(preset for _, preset in arms):
-        return "tfarm report --out reports"
-    return f"tfarm report {' '.join(argument(name, preset) for name, preset in arms)} --out reports"
-
-
 def is_preset(arm: Arm, chain: Chain) -> bool:
     """Whether the arm comes with tfarm, and its chain is the one that comes with it."""
     return arm.name in presets() and (load(arm.name), load_chain(arm.name)) == (arm, chain)
@@ -229,18 +221,38 @@ def argument(name: str, preset: bool) -> str:
     return shlex.quote(name if preset else f"{name}.toml")
 
 
-def summary(arm: Arm, laws: Sequence[str] = ()) -> str:
-    """The arm in one sentence, and the laws that its page is about in another."""
-    return prose("summary", arm=arm, laws=laws)
+# ------------------------------------------------------------ the index, and what it reads in the folders of arms
 
 
-COMPARISON_KIND = "compare"  # what is kept of a comparison
 COMPARISON_PAGE = "compare.html"
-LARGEST_READ = 1 << 20  # bytes of a file worth reading
-T = TypeVar("T")
 FACTS = 4  # of the headline numbers
 INDEX_COLUMNS = ("law", "verdict", *PLANE, "sampled")  # columns of the index's table of arms
 PAGES = {"index": "full report", "live": "live loop", **QUESTIONS}
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Card:
+    """An arm as the index shows it; `picture` is empty where there is none."""
+
+    name: str
+    summary: str
+    facts: list[Fact]
+    picture: str
+    loops: list[dict[str, str]]
+
+    @property
+    def rows(self) -> list[dict[str, str]]:
+        """The rows of the table of arms by INDEX_COLUMNS: one a loop, an empty one without a loop."""
+        return [dict.fromkeys(INDEX_COLUMNS, "") | row for row in self.loops or [{}]]
+
+
+@dataclass(frozen=True)
+class KeptComparison:
+    """The title of the comparison in a folder of reports, and the arms that it compares."""
+
+    title: str = ""
+    arms: tuple[str, ...] = ()
 
 
 def keep(folder: Path, kind: str, content: Mapping[str, Any]) -> None:
@@ -249,30 +261,25 @@ def keep(folder: Path, kind: str, content: Mapping[str, Any]) -> None:
     (folder / f"{kind}.json").write_text(text, encoding="utf-8", newline="")
 
 
-def kept_in(folder: Path, kind: str, made_of: Callable[[dict[str, Any]], T | None]) -> T | None:
-    """What `made_of` makes of a folder's kind.json; None where there is none, or none of ours."""
-    file = folder / f"{kind}.json"
+def kept_in(folder: Path, kind: str, record: type[T]) -> T | None:
+    """The record in a folder's kind.json; None where there is none, or none of ours."""
     try:
-        read = json.loads(file.read_text(encoding="utf-8")) if file.stat().st_size <= LARGEST_READ else {}
-        return made_of(read) if read.pop(f"tfarm_{kind}") == 1 else None
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return TypeAdapter(record).validate_json((folder / f"{kind}.json").read_bytes())
+    except (OSError, ValueError):
         return None
 
 
-def kept_comparison(out: Path) -> tuple[str, tuple[str, ...]]:
-    """The title of compare.html in a folder of reports, and the arms that it compares; ("", ()) where there is none."""
-    found = kept_in(out, COMPARISON_KIND, lambda read: (str(read["title"]), tuple(map(str, read["arms"]))))
-    return found if found is not None and (out / COMPARISON_PAGE).is_file() else ("", ())
-
-
-def kept(out: Path, kind: str, made_of: Callable[[dict[str, Any], Path], T | None]) -> list[T]:
-    """What `made_of` makes of each folder's kind.json, by name; what is none of ours is passed over."""
-
-    def made(folder: Path) -> T | None:
-        return kept_in(folder, kind, lambda read: made_of(read, folder) if read["name"] == folder.name else None)
-
+def kept(out: Path, kind: str, record: type[T]) -> dict[Path, T]:
+    """The records of that kind in the folders of arms, by folder; what is none of ours is passed over."""
     folders = sorted((f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name)
-    return [each for each in map(made, folders) if each is not None]
+    found = ((folder, kept_in(folder, kind, record)) for folder in folders)
+    return {folder: each for folder, each in found if each is not None and getattr(each, "name", "") == folder.name}
+
+
+def kept_comparison(out: Path) -> KeptComparison:
+    """The comparison in a folder of reports; an empty one where there is none."""
+    found = kept_in(out, "compare", KeptComparison) if (out / COMPARISON_PAGE).is_file() else None
+    return found or KeptComparison()
 
 
 def save_card(case: Case, folder: Path) -> None:
@@ -282,14 +289,9 @@ def save_card(case: Case, folder: Path) -> None:
     with suppress(TfarmError):
         save_figure(draw_card(bode(arm, "root_moment")), folder / PICTURES, "card", formats=("svg",))
         picture = "card.svg"
-    what = {
-        "name": arm.name,
-        "summary": summary(arm, [each.name for each in case.laws]),
-        "facts": [[f.label, f.value, f.unit, f.note] for f in headline_numbers(arm)[:FACTS]],
-        "picture": picture,
-        "loops": [loop_cells(each, case.chain) for each in case.controllers if case.laws or has_loop(arm)],
-    }
-    keep(folder, "card", what)
+    loops = [loop_cells(each, case.chain) for each in case.controllers if case.laws or has_loop(arm)]
+    facts = list(headline_numbers(arm)[:FACTS])
+    keep(folder, "card", asdict(Card(arm.name, summary(case), facts, picture, loops)))
 
 
 def loop_cells(each: Controller, chain: Chain) -> dict[str, str]:
@@ -307,20 +309,11 @@ def loop_cells(each: Controller, chain: Chain) -> dict[str, str]:
     return cells
 
 
-def written_cards(out: Path) -> Sequence[Mapping[str, Any]]:
-    """The cards of all arms in the folder of reports, by name; what is no card of ours is passed over."""
-    return kept(out, "card", _card)
-
-
-def _card(read: dict[str, Any], folder: Path) -> Mapping[str, Any] | None:
-    """An arm as the index shows it, `loops` being rows of the table of arms; None for an arm that has no page."""
-    pages = tuple((f"{page}.html", title) for page, title in PAGES.items() if (folder / f"{page}.html").is_file())
-    card = {
-        "name": folder.name,
-        "summary": str(read["summary"]),
-        "facts": [Fact(label=str(a), value=str(b), unit=str(c), note=str(d)) for a, b, c, d in read["facts"]],
-        "pages": pages,
-        "picture": "pictures/card.svg" if read.get("picture", "card.svg") else "",
-        "loops": [{key: str(row.get(key, "")) for key in INDEX_COLUMNS} for row in read.get("loops") or [{}]],
-    }
-    return card if pages else None
+def index_page(out: Path, *, trust: str) -> str:
+    """The page that leads to all others in a folder of reports."""
+    cards = [
+        asdict(card) | {"pages": pages, "loops": card.rows} for folder, card in kept(out, "card", Card).items()
+        if (pages := pages_in(folder))
+    ]  # fmt: skip
+    compared = kept_comparison(out).title
+    return render("index.html", title="tfarm reports", cards=cards, trust=trust, compared=compared, looks=BADGES)

@@ -6,11 +6,11 @@ Texts are in templates/prose.txt, pages in the other templates; here is how both
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
@@ -19,7 +19,7 @@ import tfarm
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN
 from tfarm.digits import how_many, listed, plain, scientific, significant
 from tfarm.plots.style import save_figure
-from tfarm.schema import Table, save_table, text
+from tfarm.schema import Column, Table, save_table, text
 from tfarm.schema.html import as_html, with_symbols
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 TEMPLATES = Path(__file__).parent / "templates"
 PICTURES, DATA = "pictures", "data"  # folders in that of an arm
+PART = "\ue000"  # between title and caption, which no name has in it
 
 
 def upper(text: str) -> str:
@@ -49,7 +50,7 @@ def templates() -> Environment:
                             "plane": " and ".join(PLANE)}  # fmt: skip
     environment.filters.update(
         symbol=with_symbols, text=text, plain=plain, significant=significant, scientific=scientific, upper_first=upper,
-        listed=listed, how_many=how_many,
+        listed=listed, how_many=how_many, as_html=as_html,
     )  # fmt: skip
     return environment
 
@@ -57,7 +58,8 @@ def templates() -> Environment:
 @cache
 def _texts() -> Any:
     """All texts by name; a line break behind a tag is a space in them."""
-    return templates().overlay(trim_blocks=False).get_template("prose.txt").module
+    source = (TEMPLATES / "prose.txt").read_text(encoding="utf-8").replace("¶", PART)
+    return templates().overlay(trim_blocks=False).from_string(source).module
 
 
 def prose(name: str, /, **values: Any) -> str:
@@ -65,13 +67,16 @@ def prose(name: str, /, **values: Any) -> str:
     return " ".join(getattr(_texts(), name)(**values).split())
 
 
+def _parts(name: str, values: dict[str, Any]) -> list[str]:
+    return [part.strip() for part in prose(name, **values).split(PART)]
+
+
 def render(template: str, **values: Any) -> str:
     """A page from its template."""
     return templates().get_template(template).render(version=tfarm.__version__, **values)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Fact:
+class Fact(NamedTuple):
     """One headline number, or the word for it."""
 
     label: str
@@ -80,8 +85,7 @@ class Fact:
     note: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Picture:
+class Picture(NamedTuple):
     """A finished figure with its words.  `stem` names its files; `data` are the numbers that it draws."""
 
     stem: str
@@ -89,7 +93,7 @@ class Picture:
     caption: str
     alt: str
     figure: Figure
-    data: Table | None = None
+    data: tuple[Column, ...] = ()
 
     @property
     def size(self) -> tuple[int, int]:
@@ -98,11 +102,32 @@ class Picture:
         return round(width), round(height)
 
 
+def picture(kind: str, figure: Figure, *, data: Iterable[Column] = (), stem: str = "", **values: Any) -> Picture:
+    """A picture with the title, the caption and the alternative text of its kind; `stem` names its files."""
+    title, caption, alt = _parts(kind, values)
+    return Picture(stem or kind.replace("_", "-"), title, caption, alt, figure, tuple(data))
+
+
+def sheet(kind: str, columns: Iterable[Column], *, stem: str = "", **values: Any) -> Table:
+    """A table with the title and the caption of its kind; `stem` names its files."""
+    title, caption = _parts(kind, values)
+    return Table(columns=tuple(columns), stem=stem or kind.replace("_", "-"), title=title, caption=caption)
+
+
+class SavedBlock(NamedTuple):
+    """A picture or table as the page shows it, its files saved."""
+
+    stem: str
+    title: str
+    is_table: bool
+    html: Markup
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PageSection:
     """A part of a page.  `answer` is its result in a sentence or two, at the top of the full page too.
 
-    `words` are paragraphs, `items` a list; `blocks` pictures and tables.
+    `words` are paragraphs, `items` a list; `blocks` pictures and tables, of which a table without columns is left out.
     `failure` is the reason why the section could not be made, which its words have too; empty otherwise.
     """
 
@@ -112,45 +137,30 @@ class PageSection:
     words: Sequence[str] = ()
     items: Sequence[str] = ()
     facts: Sequence[Fact] = ()
-    blocks: Sequence[Picture | Table] = ()
+    blocks: Sequence[Any] = ()
     failure: str = ""
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SavedBlock:
-    """A picture or table as the page refers to it, its files saved."""
-
-    stem: str
-    title: str
-    caption: str
-    table: Markup | None = None
-    alt: str = ""
-    size: tuple[int, int] = (0, 0)
-    files: tuple[str, ...] = ()
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "blocks", [block for block in self.blocks if getattr(block, "columns", True)])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SavedSection:
-    """A section without its figures: what remains to be written are words."""
-
-    section: PageSection
-    blocks: tuple[SavedBlock, ...]
-
-
-def save_section(section: PageSection, folder: Path) -> SavedSection:
-    """Every picture as pictures/*.svg, its numbers as data/*.csv; every table as data/*.csv and .json."""
+def save_section(section: PageSection, folder: Path) -> PageSection:
+    """The section with its blocks saved: what remains to be written are words."""
     for name in (PICTURES, DATA):
         (folder / name).mkdir(exist_ok=True)
-    blocks = []
-    for block in section.blocks:
-        words: dict[str, Any] = {"stem": block.stem, "title": block.title, "caption": block.caption}
-        if isinstance(block, Table):
-            files = [f"{DATA}/{name}" for name in save_table(block, folder / DATA)]
-            blocks.append(SavedBlock(**words, table=as_html(block), files=tuple(files)))
-            continue
+    return replace(section, blocks=[save_block(block, folder) for block in section.blocks])
+
+
+def save_block(block: Picture | Table, folder: Path) -> SavedBlock:
+    """A picture as pictures/*.svg, its numbers as data/*.csv; a table as data/*.csv and .json."""
+    is_table = isinstance(block, Table)
+    if isinstance(block, Table):
+        files = [f"{DATA}/{name}" for name in save_table(block, folder / DATA)]
+    else:
         save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
-        files = [f"{PICTURES}/{block.stem}.svg"]
-        if block.data is not None:
-            files += [f"{DATA}/{name}" for name in save_table(block.data, folder / DATA, kinds=("csv",))]
-        blocks.append(SavedBlock(**words, alt=block.alt, size=block.size, files=tuple(files)))
-    return SavedSection(section=replace(section, blocks=()), blocks=tuple(blocks))
+        numbers = Table(columns=block.data, stem=f"{block.stem}-data")
+        saved = save_table(numbers, folder / DATA, kinds=("csv",)) if block.data else ()
+        files = [f"{PICTURES}/{block.stem}.svg", *(f"{DATA}/{name}" for name in saved)]
+    shape: Any = templates().get_template("blocks.html").module
+    html = shape.table(block, files) if is_table else shape.picture(block, files)
+    return SavedBlock(block.stem, block.title, is_table, html)

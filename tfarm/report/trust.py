@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, field
 from decimal import Decimal, localcontext
 from difflib import SequenceMatcher
 from importlib.metadata import version
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 from xml.etree import ElementTree
@@ -30,9 +31,9 @@ from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.plots.style import gains_words
 from tfarm.report.cases import has_loop
-from tfarm.report.modes_section import BRACKET_DIGITS, PROVEN_DIGITS, PROVEN_MODES, proven_damped_modes
-from tfarm.report.page import command_for_all, keep, kept
-from tfarm.report.sections import DATA, PageSection, prose, render, save_section
+from tfarm.report.modes_section import BRACKET_DIGITS, PROVEN_DIGITS, PROVEN_MODES, proven_damped_modes, proven_modes
+from tfarm.report.page import argument, keep, kept
+from tfarm.report.sections import DATA, PageSection, render, save_section, sheet
 from tfarm.response.frequency import BAND_POINTS, worst_error
 from tfarm.schema import Column, Quantity, Table, save_table, table
 from tfarm.schema.html import GREEK, LETTER
@@ -115,12 +116,14 @@ class ArmProof:
     @property
     def source(self) -> Annotated[str, Quantity("source", help="preset, where the file is that of one byte for byte")]:
         """Whether the arm's file is, byte for byte, that of a preset."""
-        return "preset" if self.is_preset else "file"
+        return "preset" if self.name in presets() and hash_of(load(self.name)) == self.sha256 else "file"
 
     @property
-    def is_preset(self) -> bool:
-        """The same."""
-        return self.name in presets() and hash_of(load(self.name)) == self.sha256
+    def leading_digits(self) -> list[str]:
+        """The proven digits of each bracket: its lower end cut off, with its zeros."""
+        with localcontext(prec=self.digits + 5):
+            lower = [Decimal(bracket[0]) for bracket in self.brackets]
+            return [f"{each.quantize(Decimal(1).scaleb(each.adjusted() - self.digits + 1)):f}" for each in lower]
 
 
 def prove(arm: Arm, chain: Chain | None = None) -> ArmProof:
@@ -128,9 +131,10 @@ def prove(arm: Arm, chain: Chain | None = None) -> ArmProof:
     modes = tfarm.modes(arm, count=PROVEN_MODES)
     flexible = modes.natural_frequency[modes.index > 0]
     band = float(0.1 * flexible[0]), float(1.1 * flexible[-1])
-    found: dict[str, Any] = {}
+    errors = ((output, worst_error(arm, output, band)) for output in PROVEN_OUTPUTS)
+    found: dict[str, Any]
     try:
-        proof = modes.certify(BRACKET_DIGITS)
+        proof = proven_modes(arm, PROVEN_MODES)
         found = {"brackets": proof.brackets, "count": proof.count, "below": proof.below}
     except CertificationError as error:
         found = {"failure": str(error)}
@@ -139,9 +143,7 @@ def prove(arm: Arm, chain: Chain | None = None) -> ArmProof:
         sha256=hash_of(arm, chain),
         has_rigid_mode=arm.has_rigid_mode,
         band=band,
-        errors=tuple(
-            (output, worst) for output in PROVEN_OUTPUTS if (worst := worst_error(arm, output, band)) is not None
-        ),
+        errors=tuple((output, worst) for output, worst in errors if worst is not None),
         boxes=tuple(boxed(arm)),
         **found,
     )
@@ -149,13 +151,13 @@ def prove(arm: Arm, chain: Chain | None = None) -> ArmProof:
 
 def boxed(arm: Arm) -> Iterator[Boxed]:
     """Damped modes and the default loop's poles, each enclosed and counted; a failed proof is noted."""
-    boxes: list[tuple[str, Callable[[], DampedModes | Poles]]] = []
+    boxes: dict[str, Callable[[], DampedModes | Poles]] = {}
     if not arm.is_undamped:
-        boxes.append((f"damped modes, C = {arm.damping:g} s", lambda: proven_damped_modes(arm, PROVEN_MODES)))
+        boxes[f"damped modes, C = {arm.damping:g} s"] = lambda: proven_damped_modes(arm, PROVEN_MODES)
     if has_loop(arm):
         law = default_gains(arm)
-        boxes.append((f"closed loop, {gains_words(law, 6)}", lambda: _proven_poles(arm, law)))
-    for what, proven in boxes:
+        boxes[f"closed loop, {gains_words(law, 6)}"] = lambda: _proven_poles(arm, law)
+    for what, proven in boxes.items():
         try:
             found = proven()
             yield Boxed(arm=arm.name, what=what, count=found.count, box=list(map(float, found.box)))
@@ -181,60 +183,40 @@ def save_proof(arm: Arm, folder: Path, chain: Chain | None = None) -> None:
 
 def written_proofs(out: Path) -> Sequence[ArmProof]:
     """The proofs of all arms in the folder of reports, by name; what is none of ours is passed over."""
-    return kept(out, "proof", _proof)
+    return list(kept(out, "proof", ArmProof).values())
 
 
-def _proof(read: dict[str, Any], _: Path) -> ArmProof:
-    read["brackets"] = tuple((str(lower), str(upper)) for lower, upper in read["brackets"])
-    read["band"] = float(read["band"][0]), float(read["band"][1])
-    read["errors"] = tuple((str(output), float(error)) for output, error in read["errors"])
-    read["boxes"] = tuple(Boxed(**each | {"box": list(map(float, each["box"]))}) for each in read["boxes"])
-    return ArmProof(**read)
-
-
-# ------------------------------------------------------------ digits
-def shared_digits(bracket: tuple[str, str], digits: int) -> str:
-    """The leading digits that all numbers in a bracket share: its lower end, with its zeros."""
-    lower = Decimal(bracket[0])
-    with localcontext(prec=digits + 5):
-        return f"{lower.quantize(Decimal(1).scaleb(lower.adjusted() - digits + 1)):f}"
+# ------------------------------------------------------------ tables
 
 
 def proof_tables(proofs: Sequence[ArmProof]) -> list[Table]:
     """The counts of natural frequencies, all proven digits of these, and the boxes of other eigenvalues, if any."""
     names = ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict")
-    columns = [Column("mode", "mode", of=range(1, PROVEN_MODES + 1))]
-    for proof in proofs:
-        digits = [shared_digits(bracket, proof.digits) for bracket in proof.brackets] or [""] * PROVEN_MODES
-        cells = [f"{text}…" if text else UNPROVEN for text in digits]
-        columns.append(Column(f"{proof.name}_rad_s", proof.name, "rad/s", of=digits, shown=cells))
-    title = f"Natural frequencies, {BRACKET_DIGITS} digits"
-    caption = prose("digits", modes=PROVEN_MODES, digits=BRACKET_DIGITS)
+    digits = {proof.name: proof.leading_digits or [""] * PROVEN_MODES for proof in proofs}
+    columns = (
+        Column("mode", "mode", of=range(1, PROVEN_MODES + 1)),
+        *(Column(f"{name}_rad_s", name, "rad/s", of=own, shown=[f"{text}…" if text else UNPROVEN for text in own])
+          for name, own in digits.items()),
+    )  # fmt: skip
     boxes = [each for proof in proofs for each in proof.boxes]
-    of_boxes = {"title": "Damped modes and closed-loop poles", "caption": prose("boxes", digits=PROVEN_DIGITS)}
     return [
-        table(proofs, names, stem="counts", title="None missing", caption=prose("counts")),
-        Table(stem="digits", title=title, caption=caption, columns=tuple(columns)),
-        *([table(boxes, stem="boxes", **of_boxes)] if boxes else []),
+        sheet("counts", table(proofs, names).columns),
+        sheet("digits", columns, modes=PROVEN_MODES, digits=BRACKET_DIGITS),
+        sheet("boxes", table(boxes).columns, digits=PROVEN_DIGITS),
     ]
 
 
 def accuracy_table(proofs: Sequence[ArmProof]) -> Table:
     """The worst error of each arm's two responses."""
-    columns = [
+    errors = {output: [dict(proof.errors).get(output) for proof in proofs] for output in PROVEN_OUTPUTS}
+    columns = (
         Column("arm", "arm", of=[proof.name for proof in proofs]),
         Column("band_rad_s", "from … to, rad/s", of=[" … ".join(significant(x, 4) for x in p.band) for p in proofs]),
-    ]
-    for output in PROVEN_OUTPUTS:
-        errors = [dict(proof.errors).get(output) for proof in proofs]
-        cells = ["zero throughout" if error is None else scientific(error, 2) for error in errors]
-        columns.append(Column(output, output.replace("_", " "), of=errors, shown=cells))
-    return Table(
-        stem="accuracy",
-        title="Double precision against proven digits",
-        caption=prose("accuracy"),
-        columns=tuple(columns),
-    )
+        *(Column(output, output.replace("_", " "), of=own,
+                 shown=["zero throughout" if error is None else scientific(error, 2) for error in own])
+          for output, own in errors.items()),
+    )  # fmt: skip
+    return sheet("accuracy", columns)
 
 
 def published_tables(found: published.Validation) -> list[Table]:
@@ -243,26 +225,22 @@ def published_tables(found: published.Validation) -> list[Table]:
     counts = Column("numbers", "numbers", of=map(len, agrees)), Column("agree", "agree", of=map(sum, agrees))
     columns = (*table(found.sources).columns, *counts)
     return [
-        Table(stem="sources", title="Sources", caption=prose("sources"), columns=columns),
-        table(found.differences, stem="differences", title="Differences, with the reason", caption=prose("differing")),
-        table(found.rows, stem="published", title="All printed numbers, and ours", caption=prose("printed")),
+        sheet("sources", columns),
+        sheet("differences", table(found.differences).columns),
+        sheet("published", table(found.rows).columns),
     ]
 
 
 def again_tables(proofs: Sequence[ArmProof]) -> list[Table]:
     """The hashes of the arms' files, and the versions that computed this."""
-    found = {"tfarm": tfarm.__version__, "python": platform.python_version()}
-    found |= {package: version(package) for package in PACKAGES}
+    found = {"tfarm": tfarm.__version__, "python": platform.python_version(), **{p: version(p) for p in PACKAGES}}
     columns = Column("package", "package", of=list(found)), Column("version", "version", of=list(found.values()))
     return [
-        table(proofs, ("name", "source", "sha256"), stem="inputs", title="Inputs", caption=prose("inputs")),
-        Table(stem="versions", title="Versions", caption=prose("versions"), columns=columns),
+        sheet("inputs", table(proofs, ("name", "source", "sha256")).columns),
+        sheet("versions", columns),
     ]
 
 
-TITLES = {
-    "proofs": "Proofs", "accuracy": "Measured accuracy", "published": "Published numbers", "again": "Make it again",
-}  # fmt: skip
 AUDIT_COLUMNS = (
     "equation", "verdict", "printed", "corrected", "residual_printed", "residual_corrected", "evidence",
 )  # fmt: skip
@@ -317,7 +295,7 @@ def anchor(equation: str) -> str:
 
 
 def _left(residual: str) -> Markup:
-    """What a formula leaves in the check, in words and letters."""
+    """The residual of a formula in the check, in words and letters."""
     if residual == "0":
         return Markup("nothing")
     return in_letters(f"nothing but rounding at 50 digits, {residual}" if is_zero(residual) else residual)
@@ -337,63 +315,55 @@ def compared_formulas(printed: str, corrected: str) -> tuple[list[Markup], list[
 
 def _set(tex: str) -> list[MathElement]:
     """A formula a line, without the name space that a file of XML would need and a page of HTML does not."""
-    found = []
-    for line in STATEMENT_END.split(tex):
+    found, lines = [], STATEMENT_END.split(tex)
+    for line in lines:
         upright = re.sub(r"\\mathrm\{(\w)\}", r"\\text{\1}", line.strip())  # a single letter would be slanted
         root = ElementTree.fromstring(re.sub(r' xmlns="[^"]*"', "", convert(upright, display="block"), count=1))
-        if len(line) > LONG_TEX:
-            root.set("class", "long")
-        _corrected(root)
+        root.attrib |= {"class": "long"} if len(line) > LONG_TEX else {}
+        for row in root.iter("mrow"):
+            for before, leaf in pairwise([ElementTree.Element("mo"), *row]):
+                _correct(leaf, before)
         found.append(root)
     return found
 
 
-def _corrected(root: MathElement) -> None:
-    """Where the converter errs: plus-minus is an operator, infinity is none, a determinant's bars are as high as it."""
-    for row in root.iter("mrow"):
-        before = None
-        for leaf in row:
-            if leaf.text == "±":
-                leaf.tag = "mo"
-                leaf.set("form", "prefix" if before is None or before.tag == "mo" else "infix")
-            elif leaf.text == "∞":
-                leaf.tag = "mi"
-            elif leaf.text == "|":
-                is_right = before is not None and before.tag == "mtable"
-                leaf.attrib = {"form": "postfix" if is_right else "prefix", "stretchy": "true", "symmetric": "true"}
-            before = leaf
+def _correct(leaf: MathElement, before: MathElement) -> None:
+    """Plus-minus is an operator, infinity is none, and a determinant's bars are as high as it, by what is `before`."""
+    if leaf.text == "±":
+        leaf.tag = "mo"
+        leaf.set("form", "prefix" if before.tag == "mo" else "infix")
+    elif leaf.text == "∞":
+        leaf.tag = "mi"
+    elif leaf.text == "|":
+        is_right = before.tag == "mtable"
+        leaf.attrib = {"form": "postfix" if is_right else "prefix", "stretchy": "true", "symmetric": "true"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Evidence:
-    """What the whole package shows for itself: the audit of the paper, and the tables of others."""
-
-    audit: tuple[audit.AuditRow, ...]
-    published: tuple[published.PublishedRow, ...]
-
-
-def gather() -> Evidence:
-    """Run the audit and the comparison with published tables: some seconds.
+def gather() -> tuple[Sequence[AuditRow], Sequence[published.PublishedRow]]:
+    """What the whole package shows for itself: the audit of the paper, and the tables of others.  Some seconds.
 
     Raises CertificationError where one of them fails.
     """
-    return Evidence(audit=audit.audit(), published=published.validate())
+    return audit.audit(), published.validate()
 
 
-def write_trust(evidence: Evidence, proofs: Sequence[ArmProof], folder: Path) -> None:
+def write_trust(
+    audited: Sequence[AuditRow], printed: Sequence[published.PublishedRow], proofs: Sequence[ArmProof], folder: Path
+) -> None:
     """index.html and its tables, into a folder of their own."""
     folder.mkdir()
-    found = published.Validation(evidence.published)
+    found = published.Validation(tuple(printed))
     tables = {"proofs": proof_tables(proofs), "accuracy": [accuracy_table(proofs)],
               "published": published_tables(found), "again": again_tables(proofs)}  # fmt: skip
-    sections = {
-        anchor: save_section(PageSection(anchor=anchor, title=TITLES[anchor], blocks=blocks), folder)
-        for anchor, blocks in tables.items()
-    }
-    plain = table(evidence.audit, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation")
+    sections = {name: save_section(PageSection(anchor=name, title="", blocks=own), folder)
+                for name, own in tables.items()}  # fmt: skip
+    plain = table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation")
     save_table(plain, folder / DATA)
     errors = [error for proof in proofs for _, error in proof.errors]
-    verdicts = Counter(row.verdict for row in evidence.audit)
+    verdicts = Counter(row.verdict for row in audited)
+    preset = {proof.name: proof.source == "preset" for proof in proofs}
+    is_usual = set(preset) == set(presets()) and all(preset.values())
+    names = "" if is_usual else "".join(f" {argument(*each)}" for each in preset.items())
     page = render(
         "trust.html",
         title="Why trust this",
@@ -405,7 +375,7 @@ def write_trust(evidence: Evidence, proofs: Sequence[ArmProof], folder: Path) ->
         found=found,
         verdicts={verdict: verdicts[verdict] for verdict in VERDICT_MARKS},
         marks=VERDICT_MARKS,
-        equations=[shown_row(row) for row in evidence.audit],
-        command=command_for_all([(proof.name, proof.is_preset) for proof in proofs]),
+        equations=[shown_row(row) for row in audited],
+        command=f"tfarm report{names} --out reports",
     )
     (folder / "index.html").write_text(page, encoding="utf-8", newline="")

@@ -9,25 +9,19 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, NamedTuple
 
-import numpy as np
-
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
-from tfarm.digits import how_many, lined, plain, significant
-from tfarm.dsp import Chain, Simulation
-from tfarm.dsp.results import ideal_chain
-from tfarm.dsp.traces import away, resolved
+from tfarm.digits import lined, plain, significant
+from tfarm.dsp import Chain, Simulation, results, scenarios, traces
 from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.plots.motion import draw_curves, draw_gain, slew
-from tfarm.plots.regions import stable_regions
+from tfarm.plots import motion, regions
 from tfarm.records import record
-from tfarm.report.cases import Case, has_loop, what_holds, why_no_loop
-from tfarm.report.sampled_section import chain_words, piece_of_bands, responses_table
-from tfarm.report.sections import Fact, PageSection, Picture, prose
+from tfarm.report.cases import Case, has_loop
+from tfarm.report.sampled_section import chain_words, piece_of_bands, response_columns
+from tfarm.report.sections import Fact, PageSection, Picture, picture, prose, sheet
 from tfarm.schema import Column, Quantity, Table, table
 from tfarm.spectrum.table import first_frequency
 from tfarm.tuner import LearningCurves, Plan, Tuning, compare_controllers, learning_curves, tried_loops, tune
 from tfarm.tuner.baselines import CONSTANT_GAINS, Outcomes, quantised_chain, tried_gains
-from tfarm.tuner.training import QUARTILES
 from tfarm.tuner.tuning import SlewEnd, usual_plan
 
 WITHOUT = f"without moment feedback, {MOMENT_GAIN} = 0"
@@ -40,11 +34,37 @@ SERVO_SPEED = 1 / 20  # of the first frequency: the servo's angle loop is so slo
 SERVO_TURN = 0.03  # rad a sample, where that is slower
 ON_TARGET = 1e-10  # of the tip's travel: no slew ends nearer its target than rounding
 SAME_COST = 1e-4  # relative difference of two costs below which they are called the same
-TUNER_TITLE = "The gain tuner against baselines"
 CONTROLLERS = {
     "without": "none", "best_constant": "constant", "own_constant": "own constant", "tuner": "tuner", "bound": "bound",
     "ZV": "ZV", "EI": "EI",
 }  # fmt: skip
+
+
+TITLE = "The gain tuner against baselines"
+
+
+def tuner_section(case: Case) -> PageSection:
+    """The tuner with the paper's figures on a damped arm and its own chain; one sentence for any other."""
+    answer = why_not(case.arm, case.chain)
+    try:
+        if not answer:
+            data = tuner_numbers(case.arm, case.chain)
+            if math.isfinite(data.tuning.without.cost):
+                return section_of(data)
+            answer = prose("tuner_unstable")
+    except CertificationError as error:
+        answer = prose("tuner_unproven", error=error)
+    return PageSection(anchor="tune", title=TITLE, answer=answer)
+
+
+def why_not(arm: Arm, chain: Chain) -> str:
+    """The sentence for an arm or a chain on which no tuner is trained; empty of any other."""
+    period = chain.sampling.period
+    samples = 1 + round(scenarios.TRIAL_SLEWS * chain.slew.rise_time / period)  # of each trial
+    return prose("no_tuner", arm=arm, has_loop=has_loop(arm), samples=samples, most=LONGEST_TRIAL, period=period)
+
+
+# ------------------------------------------------------------ numbers
 
 
 @dataclass(frozen=True)
@@ -72,19 +92,18 @@ def tuner_numbers(arm: Arm, chain: Chain) -> TunerNumbers:
     Raises ParameterError for an arm without a loop or a slew, CertificationError where no range of gains is proven.
     """
     plan = usual_plan(arm, chain)
-    tuning = tune(arm, plan, ideal_chain(chain))
-    ideal = tuning.trial.loop.chain
-    conditions = QUANTISED_AND_LATE + 1 if tuning.trial.n > LONG_TRIAL else None
+    tuning = tune(arm, plan, results.ideal_chain(chain))
+    trial, ideal, guard = tuning.trial, tuning.trial.loop.chain, tuning.training.guard
+    conditions = QUANTISED_AND_LATE + 1 if trial.n > LONG_TRIAL else None
     listed = tried_loops(arm, ideal, quantised_chain(arm, chain))[:conditions]
-    rows = compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard, listed, tuning.best_constant.gain)
     return TunerNumbers(
         arm=arm,
         tuning=tuning,
         slews=_simulated(tuning, ideal),
-        constant=tuning.trial.simulator(chain=ideal).linear(tuning.constant),
+        constant=trial.simulator(chain=ideal).linear(tuning.constant),
         coarse=_simulated(tuning, listed[QUANTISED_AND_LATE].chain),
-        curves=learning_curves(tuning, curve_seeds(plan.trials * tuning.trial.n)),
-        rows=tuple(rows),
+        curves=learning_curves(tuning, curve_seeds(plan.trials * trial.n)),
+        rows=tuple(compare_controllers(trial, tuning.gain(), guard, listed, tuning.best_constant.gain)),
         servo=_servo_tuning(arm, plan, ideal),
     )
 
@@ -97,15 +116,14 @@ def curve_seeds(samples: int) -> int:
 def _servo_tuning(arm: Arm, plan: Plan, chain: Chain) -> Tuning | None:
     """The same tuning with an angle loop a twentieth as fast as the first mode, or slower at a long period."""
     speed = min(SERVO_SPEED * first_frequency(arm), SERVO_TURN / chain.sampling.period)
-    on_angle = float(f"{arm.turned_inertia * speed**2:.2g}")
     try:
-        return tune(arm, plan.holding(arm, on_angle), chain)
+        return tune(arm, plan.holding(arm, float(f"{arm.turned_inertia * speed**2:.2g}")), chain)
     except (CertificationError, ConvergenceError):
         return None
 
 
 def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
-    without, tuned = resolved(
+    without, tuned = traces.resolved(
         tuning.trial.simulator(chain=chain),
         tuning.trial.arm,
         lambda each: each.linear(tuning.gain().servo),
@@ -114,18 +132,66 @@ def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
     return {WITHOUT: without, "with the tuner": tuned}
 
 
+# ------------------------------------------------------------ the section
+
+
+def section_of(data: TunerNumbers) -> PageSection:
+    """The section on numbers that were computed already."""
+    n = data.tuning.trial.n
+    limits = prose("tuner_limits", data=data, usual_seeds=CURVE_SEEDS, long=LONG_TRIAL, usual_gains=CONSTANT_GAINS,
+                   gains=tried_gains(n))  # fmt: skip
+    words = [prose("tuner", guard=data.tuning.training.guard.sentence), *filter(None, [limits])]
+    servo = [] if data.servo is None else [servo_table(data, data.servo)]
+    blocks = [_gain_picture(data), *slew_pictures(data), *cost_tables(data), *servo, _curves_picture(data)]
+    answer, facts = tuner_in_short(data), tuner_facts(data)
+    return PageSection(anchor="tune", title=TITLE, answer=answer, facts=facts, words=words, blocks=blocks)
+
+
+def saved_cost(data: TunerNumbers) -> float:
+    """How much the median cost of the tuner is below that of the best constant gain [%]."""
+    return 100 * (1 - data.curves.final_quantile(0.5) / data.tuning.best_constant.cost)
+
+
 def tuner_in_short(data: TunerNumbers) -> str:
     """The median cost of the tuner over its seeds, compared with the best constant gain."""
-    final, best, median = data.curves.final, data.tuning.best_constant.cost, data.curves.final_quantile(0.5)
-    gain = 100 * (1 - median / best)
-    return prose("tuner_in_short", gain=gain, same=100 * SAME_COST, median=median, best=best, seeds=final.size,
-                 below=int((final < best).sum()))  # fmt: skip
+    return prose("tuner_in_short", gain=saved_cost(data), same=100 * SAME_COST, median=data.curves.final_quantile(0.5),
+                 best=data.tuning.best_constant.cost, final=data.curves.final)  # fmt: skip
 
 
 def off_target(data: TunerNumbers, error: float) -> str:
     """How far from its target the tip ends [mm]; 0 where rounding is all there is of it."""
     travel = data.arm.reach * float(abs(data.constant.scenario.hub_angle).max())
     return significant(1e3 * abs(error) * (abs(error) > ON_TARGET * travel), 2)
+
+
+def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
+    """The costs, from no moment feedback to the bound."""
+    tuning, seeds, guard = data.tuning, data.curves.seeds, data.tuning.training.guard
+    low, median, high = (significant(cost, 4) for cost in data.curves.final_quartiles)
+    ends = [
+        off_target(data, float(traces.away(data.arm, run)[-1])) for run in (data.slews["with the tuner"], data.constant)
+    ]
+    late, costs = tuning.shaped_delays, tuning.shaped_costs
+    shaped = [f"{kind} {significant(cost, 2)}, {significant(1e3 * late[kind], 3)} ms later"
+              for kind, cost in costs.items() if late[kind]]  # fmt: skip
+    certainty = "certified stable" if guard.is_proven else f"certified for the first {guard.modes_used} modes"
+    saved = saved_cost(data)
+    less = f"{significant(saved, 2)} % less cost" if saved > 100 * SAME_COST else "no improvement"
+    return (
+        Fact("tuner against the best constant gain", less, note=f"median of {seeds} seeds"),
+        Fact("cost without moment feedback", significant(tuning.without.cost, 4)),
+        Fact("best constant gain", significant(tuning.best_constant.cost, 4),
+             note=f"{MOMENT_GAIN} = {significant(tuning.best_constant.gain, 3)}"),
+        Fact("tuner", median, note=f"half between {low} and {high}"),
+        Fact("bound", significant(tuning.bound.cost, 4), note="linear-quadratic optimum"),
+        Fact("input shaping", significant(min(costs.values()), 3),
+             note="; ".join(shaped) or "no mode slow enough to shape"),
+        Fact("tip error at the end", ends[0], "mm", f"constant gain: {ends[1]} mm"),
+        Fact("guard", f"{guard.lo:.3f} … {guard.hi:.3f}", note=f"any K(t) in it: {certainty}"),
+    )  # fmt: skip
+
+
+# ------------------------------------------------------------ tables
 
 
 class Cost(NamedTuple):
@@ -146,167 +212,18 @@ def servo_table(data: TunerNumbers, servo: Tuning) -> Table:
         Cost("bound", servo.bound.cost),
     ]
     gains = ", ".join(law.gain_text(name, partial(significant, digits=3), data.arm) for name in (ANGLE_GAIN, RATE_GAIN))
-    caption = prose("tuner_servo", gains=gains, guard=servo.training.guard,
-                    error=None if error is None else off_target(data, error))  # fmt: skip
-    return table(rows, stem="tune-servo", title="Cost of the slew with the angle regulated", caption=caption)
-
-
-def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
-    """The costs, from no moment feedback to the bound."""
-    tuning, final, guard = data.tuning, data.curves.final, data.tuning.training.guard
-    low, median, high = (data.curves.final_quantile(share) for share in QUARTILES)
-    gain = 100 * (1 - median / tuning.best_constant.cost)
-    tuned, constant = (
-        off_target(data, float(away(data.arm, run)[-1])) for run in (data.slews["with the tuner"], data.constant)
-    )
-    late = tuning.shaped_delays
-    shaped = [f"{kind} {significant(cost, 2)}, {significant(1e3 * late[kind], 3)} ms later"
-              for kind, cost in tuning.shaped_costs.items() if late[kind]]  # fmt: skip
-    certainty = "certified stable" if guard.is_proven else f"certified for the first {guard.modes_used} modes"
-    return (
-        Fact(label="tuner against the best constant gain", note=f"median of {final.size} seeds",
-             value=f"{significant(gain, 2)} % less cost" if gain > 100 * SAME_COST else "no improvement"),
-        Fact(label="cost without moment feedback", value=significant(tuning.without.cost, 4)),
-        Fact(label="best constant gain", value=significant(tuning.best_constant.cost, 4),
-             note=f"{MOMENT_GAIN} = {significant(tuning.best_constant.gain, 3)}"),
-        Fact(label="tuner", value=significant(median, 4),
-             note=f"half between {significant(low, 4)} and {significant(high, 4)}"),
-        Fact(label="bound", value=significant(tuning.bound.cost, 4), note="linear-quadratic optimum"),
-        Fact(label="input shaping", value=significant(min(tuning.shaped_costs.values()), 3),
-             note="; ".join(shaped) or "no mode slow enough to shape"),
-        Fact(label="tip error at the end", value=tuned, unit="mm", note=f"constant gain: {constant} mm"),
-        Fact(label="guard", value=f"{guard.lo:.3f} … {guard.hi:.3f}", note=f"any K(t) in it: {certainty}"),
-    )  # fmt: skip
-
-
-def tuner_section(case: Case) -> PageSection:
-    """The tuner with the paper's figures on a damped arm and its own chain; one sentence for any other."""
-    reason = why_not(case.arm, case.chain)
-    if not reason:
-        try:
-            data = tuner_numbers(case.arm, case.chain)
-            if math.isfinite(data.tuning.without.cost):
-                return section_of(data)
-            reason = prose("tuner_unstable")
-        except CertificationError as error:
-            reason = prose("tuner_unproven", error=error)
-    return PageSection(anchor="tune", title=TUNER_TITLE, answer=reason)
-
-
-def section_of(data: TunerNumbers) -> PageSection:
-    """The section on numbers that were computed already."""
-    guard, n = data.tuning.training.guard.sentence, data.tuning.trial.n
-    words = [prose("tuner", guard=guard)]
-    if limits := limits_of(data):
-        words.append(f"A trial has {n:,} samples. {'. '.join(limits)}.")
-    servo = [] if data.servo is None else [servo_table(data, data.servo)]
-    blocks: list[Picture | Table] = [
-        _gain_picture(data),
-        *slew_pictures(data),
-        *cost_tables(data),
-        *servo,
-        _curves_picture(data),
-    ]
-    return PageSection(
-        anchor="tune", title=TUNER_TITLE, answer=tuner_in_short(data), facts=tuner_facts(data), words=words,
-        blocks=blocks,
-    )  # fmt: skip
-
-
-def why_not(arm: Arm, chain: Chain) -> str:
-    """The sentence for an arm or a chain on which no tuner is trained; empty of any other."""
-    if not has_loop(arm):
-        return why_no_loop(arm)
-    if not arm.has_rigid_mode:
-        return f"{what_holds(arm)}: it makes no slew, and there is nothing for the tuner to learn from."
-    if arm.has_elastic_link:
-        return prose("tuner_undamped", arm=arm)
-    samples = 1 + round(usual_plan(arm, chain).duration / chain.sampling.period)  # of each trial
-    return "" if samples <= LONGEST_TRIAL else prose("tuner_too_long", samples=samples, period=chain.sampling.period)
-
-
-def limits_of(data: TunerNumbers) -> list[str]:
-    """The extent of learning curves and comparison that long trials limit, none where nothing does."""
-    n, seeds, gains = data.tuning.trial.n, data.curves.final.size, tried_gains(data.tuning.trial.n)
-    limits = {
-        f"Learning curves: {seeds} seeds instead of {CURVE_SEEDS}": seeds < CURVE_SEEDS,
-        f"Comparison: {len(data.rows)} conditions, all on this arm": n > LONG_TRIAL,
-        f"Constant gains: {gains} instead of {CONSTANT_GAINS}": gains < CONSTANT_GAINS,
-    }
-    return [words for words, is_limit in limits.items() if is_limit]
-
-
-# ------------------------------------------------------------ pictures
-
-
-def _gain_picture(data: TunerNumbers) -> Picture:
-    tuning = data.tuning
-    plane = stable_regions(data.arm, tuning.constant, tuning.trial.loop.chain)
-    result = tuning.training.result
-    columns = (
-        Column("t_s", "time", "s", of=result.t),
-        Column("K", "gain", of=result.K),
-        Column("x_N_m", "x, as the controller reads it", "N m", of=result.x),
-    )
-    return Picture(
-        stem="tune-gain",
-        title="The tuner's path and its guard on the map",
-        caption=prose("tuner_gain", guard=tuning.training.guard, low=float(result.K.min()), high=float(result.K.max()),
-                      gain=tuning.constant.gain_text(RATE_GAIN, plain), seed=tuning.plan.seed),
-        alt="Map of both gains with the tuner's guard, and its gain over time.",
-        figure=draw_gain(tuning, *plane),
-        data=Table(stem="tune-gain-data", title="The tuner's gain", columns=columns),
-    )  # fmt: skip
-
-
-def slew_pictures(data: TunerNumbers) -> Iterator[Picture]:
-    """The slew without and with the tuner: through ideal converters, then with those and the delay of its chain."""
-    chain = chain_words(data.arm, next(iter(data.coarse.values())).chain)
-    coarse = prose("tuner_dsp", chain=chain, runs=data.coarse, piece=piece_of_bands(data.coarse))
-    for stem, title, runs, how, caption in (
-        ("tune-slew", "The slew without and with the tuner", data.slews, "ideal converters",
-         prose("tuner_slew", piece=piece_of_bands(data.slews))),
-        ("tune-dsp", "The same with converters and delay", data.coarse, "with converters and delay", coarse),
-    ):  # fmt: skip
-        yield Picture(
-            stem=stem,
-            title=title,
-            caption=caption,
-            alt=f"Root moment, tip and motor torque of the slew, {how}, without and with the tuner.",
-            figure=slew.figure(data.arm, runs, f"the slew, {how}"),
-            data=responses_table(f"{stem}-data", "The slew", data.arm,
-                                 dict(zip(("without", "tuner"), runs.values(), strict=True))),
-        )  # fmt: skip
-
-
-def _curves_picture(data: TunerNumbers) -> Picture:
-    curves = data.curves
-    seeds, trials = curves.costs.shape
-    columns = [Column("trial", "trial", of=np.arange(1, trials + 1))]
-    for name, share in zip(("lower_quartile", "median", "upper_quartile"), QUARTILES, strict=True):
-        columns.append(Column(name, name, of=curves.quantile(share)))
-    columns += [Column(f"seed_{seed}", f"seed {seed}", of=costs) for seed, costs in enumerate(curves.costs)]
-    return Picture(
-        stem="tune-curves",
-        title="Learning",
-        caption=prose("tuner_curves", seeds=seeds, curves=curves),
-        alt=f"Learning curves of {how_many(seeds, 'seed')}, the best constant gain and the bound.",
-        figure=draw_curves(curves, data.tuning),
-        data=Table(stem="tune-curves-data", title="Learning curves", columns=tuple(columns)),
-    )
+    left = None if error is None else off_target(data, error)
+    return sheet("tune_servo", table(rows).columns, gains=gains, guard=servo.training.guard, error=left)
 
 
 def cost_tables(data: TunerNumbers) -> list[Table]:
     """Cost of a slew and root moment after it: a row a condition, a column a controller, and where the guard holds."""
     proven = Column("guard_proven", "guard proven", of=["yes" if row.proven else "no" for row in data.rows])
-    caption = prose("tuner_comparison", data=data)
-    after = prose("tuner_residual", is_unstable=any(row.tuner.residual is None for row in data.rows))
+    is_unstable = any(row.tuner.residual is None for row in data.rows)
     return [
-        Table(stem="tune-comparison", title="Cost of the slew, compared with baselines", caption=caption,
-              columns=(*_of_each(data.rows, "cost", 4), proven)),
-        Table(stem="tune-residual", title="Root moment left after the slew", caption=after,
-              columns=_of_each(data.rows, "residual", 3)),
-    ]  # fmt: skip
+        sheet("tune_comparison", (*_of_each(data.rows, "cost", 4), proven), data=data),
+        sheet("tune_residual", _of_each(data.rows, "residual", 3), is_unstable=is_unstable),
+    ]
 
 
 def _of_each(rows: Sequence[Outcomes], name: str, digits: int) -> tuple[Column, ...]:
@@ -316,8 +233,44 @@ def _of_each(rows: Sequence[Outcomes], name: str, digits: int) -> tuple[Column, 
         shown = iter(lined(digits, 2)([value for value in values if value is not None]))
         return ["–" if value is None else next(shown) for value in values]
 
-    columns = [Column("condition", "condition", of=[row.condition for row in rows])]
-    for key, title in CONTROLLERS.items():
-        values = [getattr(getattr(row, key), name) for row in rows]
-        columns.append(Column(f"{key}_{name}", title, of=values, digits=cells))
-    return tuple(columns)
+    return (
+        Column("condition", "condition", of=[row.condition for row in rows]),
+        *(Column(f"{key}_{name}", title, of=[getattr(getattr(row, key), name) for row in rows], digits=cells)
+          for key, title in CONTROLLERS.items()),
+    )  # fmt: skip
+
+
+# ------------------------------------------------------------ pictures
+
+
+def _gain_picture(data: TunerNumbers) -> Picture:
+    tuning, result = data.tuning, data.tuning.training.result
+    plane = regions.stable_regions(data.arm, tuning.constant, tuning.trial.loop.chain)
+    columns = (
+        Column("t_s", "time", "s", of=result.t),
+        Column("K", "gain", of=result.K),
+        Column("x_N_m", "x, as the controller reads it", "N m", of=result.x),
+    )
+    gain = tuning.constant.gain_text(RATE_GAIN, plain)
+    return picture("tune_gain", motion.draw_gain(tuning, *plane), data=columns, tuning=tuning, gain=gain)
+
+
+def slew_pictures(data: TunerNumbers) -> Iterator[Picture]:
+    """The slew without and with the tuner: through ideal converters, then with those and the delay of its chain."""
+    chain = chain_words(data.arm, data.coarse[WITHOUT].chain)
+    for kind, runs, how in (
+        ("tune_slew", data.slews, "ideal converters"), ("tune_dsp", data.coarse, "with converters and delay"),
+    ):  # fmt: skip
+        figure = motion.slew.figure(data.arm, runs, f"the slew, {how}")
+        columns = response_columns(data.arm, dict(zip(("without", "tuner"), runs.values(), strict=True)))
+        yield picture(kind, figure, data=columns, runs=runs, piece=piece_of_bands(runs), how=how, chain=chain)
+
+
+def _curves_picture(data: TunerNumbers) -> Picture:
+    curves = data.curves
+    columns = (
+        Column("trial", "trial", of=range(1, curves.costs.shape[1] + 1)),
+        *(Column(name, name, of=costs) for name, costs in curves.quartile_curves.items()),
+        *(Column(f"seed_{seed}", f"seed {seed}", of=costs) for seed, costs in enumerate(curves.costs)),
+    )
+    return picture("tune_curves", motion.draw_curves(curves, data.tuning), data=columns, curves=curves)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -21,22 +21,20 @@ from tfarm.processes import may_start_processes, shared
 from tfarm.report.cases import Case, GivenLaw, check_laws
 from tfarm.report.live import ASSETS, LIVE_PAGE, is_live, save_live, write_assets
 from tfarm.report.page import (
-    COMPARISON_KIND,
     COMPARISON_PAGE,
+    LOOP_TASK,
     QUESTIONS,
-    Piece,
     arm_page,
     file_of,
     index_page,
     keep,
     kept_comparison,
-    other_pages,
+    pages_in,
     pieces_of,
     save_card,
-    written_cards,
 )
-from tfarm.report.sections import PageSection, Picture, SavedSection, prose, render, save_section, upper
-from tfarm.report.trust import TRUST_FOLDER, Evidence, gather, save_proof, write_trust, written_proofs
+from tfarm.report.sections import PageSection, picture, prose, render, save_section, sheet, upper
+from tfarm.report.trust import TRUST_FOLDER, gather, save_proof, write_trust, written_proofs
 from tfarm.schema import quantities, table
 from tfarm.stopping import undone_if_stopped
 
@@ -51,99 +49,12 @@ RESERVED_NAMES = {  # of folders that no arm may have
 TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
 
 
-class Task(NamedTuple):
-    """What one process makes at a time, and about how long that takes [s] where it is long."""
+class Job(NamedTuple):
+    """A piece of a report: jobs of one task are done in turn by one process, and the longest tasks are begun first."""
 
-    name: str
+    task: str
     call: Callable[[], Any]
     seconds: float = 0.0
-
-
-def make_all(
-    cases: Sequence[Case],
-    folders: Sequence[Path],
-    only: tuple[str, ...],
-    scripts: Path | None,
-    progress: ReportProgress | None,
-) -> tuple[list[list[SavedSection]], Evidence | None]:
-    """The sections of each arm's page, in their order, and the evidence of a full report.
-
-    `scripts` is the folder that the live pages' scripts are made in.
-    """
-    tasks = [] if only else [Task(EVIDENCE, gather)]
-    tasks += [] if scripts is None else [Task(SCRIPTS, partial(write_assets, scripts))]
-    pages = [[piece for piece in pieces_of(case) if not only or any(map(piece.is_on, only))] for case in cases]
-    for case, folder, pieces in zip(cases, folders, pages, strict=True):
-        tasks += tasks_of(case, folder, pieces, is_whole=not only)
-    tasks.sort(key=lambda task: -task.seconds)  # the longest first
-    done: dict[str, Any] = {}
-
-    def begun(running: Sequence[str]) -> None:
-        if progress is not None:
-            progress(len(done), len(tasks), ", ".join(running))
-
-    if len(tasks) < WORTH_A_PROCESS or MOST_WORKERS == 1 or not may_start_processes():
-        for task in tasks:
-            begun([task.name])
-            done[task.name] = task.call()
-    else:
-        for name, result in shared({task.name: task.call for task in tasks}, MOST_WORKERS, begun):
-            done[name] = result  # noqa: PERF403  `begun` counts them meanwhile
-    begun(["pages"])
-    sections = [
-        [done[task_name(case, piece)][piece.anchor] for piece in pieces]
-        for case, pieces in zip(cases, pages, strict=True)
-    ]
-    return sections, done.get(EVIDENCE)
-
-
-def task_name(case: Case, piece: Piece) -> str:
-    """The name of the task that makes a section of an arm's page."""
-    return f"{case.arm.name}: {piece.task or piece.name}"
-
-
-def tasks_of(case: Case, folder: Path, pieces: Sequence[Piece], *, is_whole: bool) -> Iterator[Task]:
-    """The tasks of one arm: its sections, its card and proof, and of a full report its live page.
-
-    Proof and live page are made by the process of the section that has computed most of them: the proof certifies the
-    modes that are listed, the live page has the regions of the map.
-    """
-    of = f"{case.arm.name}: "
-    more: dict[str, Task] = {}
-    if is_whole or not case.laws:
-        more["modes"] = Task(f"{of}proof", partial(save_proof, case.arm, folder, case.chain))
-    if is_whole and is_live(case):
-        more["margins-map"] = Task(f"{of}live loop", partial(save_live, case, folder))
-    for name in dict.fromkeys(task_name(case, piece) for piece in pieces):
-        parts = [piece for piece in pieces if task_name(case, piece) == name]
-        makers = [(piece.name, piece.anchor, piece.make) for piece in parts]
-        also = [more.pop(piece.anchor).call for piece in parts if piece.anchor in more]
-        yield Task(name, partial(make_sections, makers, case, folder, also), sum(piece.seconds for piece in parts))
-    yield Task(f"{of}card", partial(save_card, case, folder))
-    yield from more.values()
-
-
-def make_sections(
-    makers: Sequence[tuple[str, str, Any]], case: Case, folder: Path, also: Sequence[Callable[[], None]]
-) -> dict[str, SavedSection]:
-    """Sections by anchor, made one after the other, and what is `also` made in the same process.
-
-    Each section is given by its name, its anchor and how to make it of a case.
-    """
-    sections = {anchor: make_section(name, anchor, make, case, folder) for name, anchor, make in makers}
-    for call in also:
-        call()
-    return sections
-
-
-def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], case: Case, folder: Path) -> SavedSection:
-    """A section saved in the arm's folder, or in its place why tfarm could not make it; a bug of ours stays loud."""
-    try:
-        section = make(case)
-    except TfarmError as error:
-        answer = f"This section could not be made for this arm: {error}."
-        section = PageSection(anchor=anchor, title=upper(name), answer=answer, failure=str(error))
-    return save_section(section, folder)
 
 
 def write(
@@ -170,69 +81,40 @@ def write(
     any work if `out` cannot be written, two arms share a name or there is none, or an arm or its chain does not suit a
     law; ConvergenceError if a process dies.  If the work itself fails, `out` is as it was.
     """
-    out, n = Path(out), len(arms)
-    _check([arm.name for arm in arms], only or ())
+    out, n, names = Path(out), len(arms), [arm.name for arm in arms]
+    _check(names, only or ())
     each = zip(arms, chains or [Chain()] * n, laws or [()] * n, fits or [None] * n, strict=True)
     cases = [Case(arm, chain, tuple(own), fit, tuple(measured)) for arm, chain, own, fit in each]
     for case in cases:
         check_laws(case)
-    with _temporary(out, [arm.name for arm in arms] + [TRUST_FOLDER, ASSETS] * (not only)) as folder:
-        failed = _written(cases, out, folder, only, progress)
-    for name, section in failed:
-        if notice is not None:
+    with _temporary(out, "out", names + [TRUST_FOLDER, ASSETS] * (not only)) as place:
+        sections = _written(cases, out, place, only or (), progress)
+    for name, section in ((case.arm.name, section) for case, own in sections for section in own):
+        if section.failure and notice is not None:
             notice(f"{name}: the page leaves out “{section.title}”: {section.failure}")
-    alone = f"{arms[0].name}/{only[0]}.html" if n == 1 and only and len(only) == 1 else "index.html"
+    alone = f"{names[0]}/{only[0]}.html" if n == 1 and only and len(only) == 1 else "index.html"
     return out / alone
 
 
-def _written(
-    cases: Sequence[Case], out: Path, place: Path, only: tuple[str, ...] | None, progress: ReportProgress | None
-) -> list[tuple[str, PageSection]]:
-    """Make all pages in `place`, move them to `out`, and the index last; the sections that failed, by their arms."""
-    trust = TRUST_PAGE if not only or (out / TRUST_PAGE).is_file() else ""
-    folders = [place / str(i) for i in range(len(cases))]
-    for folder in folders:
-        folder.mkdir()
-    scripts = place / ASSETS if not only and any(map(is_live, cases)) else None
-    sections, evidence = make_all(cases, folders, only or (), scripts, progress)
-    for case, folder, parts in zip(cases, folders, sections, strict=True):
-        _write_pages(case, folder, parts, only, trust, out / case.arm.name)
-    if scripts is not None:
-        move_into(scripts, out / ASSETS)
-    for case, folder in zip(cases, folders, strict=True):
-        move_into(folder, out / case.arm.name)
-    if evidence is not None:
-        write_trust(evidence, written_proofs(out), place / TRUST_FOLDER)
-        move_into(place / TRUST_FOLDER, out / TRUST_FOLDER)
-    _write_index(place, out, trust, kept_comparison(out)[0])
-    os.replace(place / "index.html", out / "index.html")
-    named = [(case.arm.name, part.section) for case, parts in zip(cases, sections, strict=True) for part in parts]
-    return [(name, section) for name, section in named if section.failure]
-
-
-def _write_index(place: Path, out: Path, trust: str, compared: str) -> None:
-    """The index of the arms in a folder of reports, made in another place."""
-    page = index_page(written_cards(out), trust=trust, compared=compared)
-    (place / "index.html").write_text(page, encoding="utf-8", newline="")
-
-
 def _check(names: Sequence[str], only: tuple[str, ...]) -> None:
+    """Raise ParameterError for a page that there is none of, and where an arm would have no folder of its own."""
     if not names:
         raise ParameterError(key="arms", value=(), remedy="name at least one arm to report on")
     for question in only:
         must_be_known("only", question, QUESTIONS)
-    for number, name in enumerate(names):
-        if name.casefold() in (other.casefold() for other in names[:number]):
-            remedy = "two arms of this name would share one folder; give one of them another name"
-            raise ParameterError(key="name", value=name, remedy=remedy)
-        if name.casefold() in RESERVED_NAMES:
-            remedy = "the folder of reports has a file of this name; give the arm another name"
-            raise ParameterError(key="name", value=name, remedy=remedy)
+    taken = dict.fromkeys(RESERVED_NAMES, "the folder of reports has a file of this name; give the arm another name")
+    for name in names:
+        if name.casefold() in taken:
+            raise ParameterError(key="name", value=name, remedy=taken[name.casefold()])
+        taken[name.casefold()] = "two arms of this name would share one folder; give one of them another name"
 
 
 @contextmanager
-def _temporary(out: Path, names: Sequence[str]) -> Iterator[Path]:
-    """A temporary folder in `out`, gone afterwards; what was made for it goes too if the work fails."""
+def _temporary(out: Path, key: str, names: Sequence[str] = ()) -> Iterator[Path]:
+    """A temporary folder in `out`, gone afterwards; what was made for it goes too if the work fails.
+
+    Raises ParameterError, naming `key`, before any work where `out` or a folder of these names in it cannot be written.
+    """
     folders = [out, *(out / name for name in names)]
     missing = [part for folder in folders for part in (*reversed(folder.parents), folder) if not part.exists()]
 
@@ -251,15 +133,108 @@ def _temporary(out: Path, names: Sequence[str]) -> Iterator[Path]:
                 yield place
     except OSError as error:
         remedy = f"cannot be written to ({error.strerror or error}); give a folder that can"
-        raise ParameterError(key="out", value=str(out), remedy=remedy) from None
+        raise ParameterError(key=key, value=str(out), remedy=remedy) from None
     finally:
         remove_empty()
+
+
+# ------------------------------------------------------------ the work
+
+
+def jobs_of(case: Case, folder: Path, only: tuple[str, ...]) -> Iterator[Job]:
+    """The jobs of one arm: its sections, its card and proof, and of a full report its live page.
+
+    Card, proof and live page are made by the process of the section that has computed most of them: the card has the
+    verdicts, the proof certifies the modes that are listed, the live page has the regions of the map.
+    """
+    of = f"{case.arm.name}: "
+    pieces = [piece for piece in pieces_of(case) if not only or any(map(piece.is_on, only))]
+    for piece in pieces:
+        make = partial(make_section, piece.name, piece.anchor, piece.make, case, folder)
+        yield Job(of + (piece.task or piece.name), make, piece.seconds)
+    has_loop = any(piece.task == LOOP_TASK for piece in pieces)
+    yield Job(of + (LOOP_TASK if has_loop else "card"), partial(save_card, case, folder))
+    if not (only and case.laws):
+        yield Job(f"{of}modes", partial(save_proof, case.arm, folder, case.chain))
+    if not only and is_live(case):
+        yield Job(of + LOOP_TASK, partial(save_live, case, folder))
+
+
+def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], case: Case, folder: Path) -> PageSection:
+    """A section saved in the arm's folder, or in its place why tfarm could not make it; a bug of ours stays loud."""
+    try:
+        section = make(case)
+    except TfarmError as error:
+        answer = f"This section could not be made for this arm: {error}."
+        section = PageSection(anchor=anchor, title=upper(name), answer=answer, failure=str(error))
+    return save_section(section, folder)
+
+
+def make_all(jobs: Sequence[Job], progress: ReportProgress | None) -> Mapping[str, Sequence[Any]]:
+    """The results of all jobs, by task."""
+    own = {name: [job for job in jobs if job.task == name] for name in (job.task for job in jobs)}
+    longest = sorted(own, key=lambda name: -sum(job.seconds for job in own[name]))
+    tasks = {name: partial(_in_turn, [job.call for job in own[name]]) for name in longest}
+    done: dict[str, Sequence[Any]] = {}
+
+    def begun(running: Sequence[str]) -> None:
+        if progress is not None:
+            progress(len(done), len(tasks), ", ".join(running))
+
+    if len(tasks) < WORTH_A_PROCESS or MOST_WORKERS == 1 or not may_start_processes():
+        for name, task in tasks.items():
+            begun([name])
+            done[name] = task()
+    else:
+        for name, result in shared(tasks, MOST_WORKERS, [__name__], begun):
+            done[name] = result  # noqa: PERF403  `begun` counts them meanwhile
+    begun(["pages"])
+    return done
+
+
+def _in_turn(calls: Sequence[Callable[[], Any]]) -> list[Any]:
+    return [call() for call in calls]
+
+
+def _written(
+    cases: Sequence[Case], out: Path, place: Path, only: tuple[str, ...], progress: ReportProgress | None
+) -> list[tuple[Case, list[PageSection]]]:
+    """Make all pages in `place`, move them to `out`, and the index last; the sections of each case."""
+    folders = {case.arm.name: place / str(i) for i, case in enumerate(cases)}
+    jobs = [] if only else [Job(EVIDENCE, gather, seconds=8.0)]
+    jobs += [Job(SCRIPTS, partial(write_assets, place / ASSETS))] if not only and any(map(is_live, cases)) else []
+    for case in cases:
+        folders[case.arm.name].mkdir()
+        jobs += jobs_of(case, folders[case.arm.name], only)
+    done = make_all(jobs, progress)
+    trust = TRUST_PAGE if not only or (out / TRUST_PAGE).is_file() else ""
+    sections = [(case, _sections_of(case, done)) for case in cases]
+    for case, own in sections:
+        _write_pages(case, folders[case.arm.name], own, only or None, trust, out / case.arm.name)
+    if (place / ASSETS).is_dir():
+        move_into(place / ASSETS, out / ASSETS)
+    for name, folder in folders.items():
+        move_into(folder, out / name)
+    if not only:
+        audited, printed = done[EVIDENCE][0]
+        write_trust(audited, printed, written_proofs(out), place / TRUST_FOLDER)
+        move_into(place / TRUST_FOLDER, out / TRUST_FOLDER)
+    _write(place / "index.html", index_page(out, trust=trust))
+    os.replace(place / "index.html", out / "index.html")
+    return sections
+
+
+def _sections_of(case: Case, done: Mapping[str, Sequence[Any]]) -> list[PageSection]:
+    """The sections of a page that were made, in their order."""
+    tasks = {f"{case.arm.name}: {piece.task or piece.name}" for piece in pieces_of(case)}
+    made = {each.anchor: each for task in tasks & done.keys() for each in done[task] if each is not None}
+    return [made[piece.anchor] for piece in pieces_of(case) if piece.anchor in made]
 
 
 def _write_pages(
     case: Case,
     folder: Path,
-    sections: Sequence[SavedSection],
+    sections: Sequence[PageSection],
     only: tuple[str, ...] | None,
     trust: str,
     earlier: Path,
@@ -268,16 +243,26 @@ def _write_pages(
 
     These lead to each other, and to what is in the `earlier` folder of the arm.
     """
-    (folder / "arm.toml").write_text(file_of(case), encoding="utf-8", newline="")
-    title, compared = kept_comparison(earlier.parent)
+    _write(folder / "arm.toml", file_of(case))
+    compared = kept_comparison(earlier.parent)
     for question in only or (None,):
-        anchors = {piece.anchor for piece in pieces_of(case) if question and piece.is_on(question)}
-        wanted = [each for each in sections if question is None or each.section.anchor in anchors]
-        live = (folder / LIVE_PAGE).is_file()
-        others = list(other_pages(earlier, only or ("index",), question or "index"))
-        others += [(f"../{COMPARISON_PAGE}", title)] if case.arm.name in compared else []
-        page = arm_page(case, wanted, question, trust=f"../{trust}" if trust else "", live=live, others=others)
-        (folder / f"{question or 'index'}.html").write_text(page, encoding="utf-8", newline="")
+        anchors = {piece.anchor for piece in pieces_of(case) if not question or piece.is_on(question)}
+        name = f"{question or 'index'}.html"
+        others = [page for page in pages_in(earlier, only or ("index",)) if page[0] not in (name, LIVE_PAGE)]
+        others += [(f"../{COMPARISON_PAGE}", compared.title)] if case.arm.name in compared.arms else []
+        page = arm_page(
+            case,
+            [each for each in sections if each.anchor in anchors],
+            question,
+            trust=f"../{trust}" if trust else "",
+            live=(folder / LIVE_PAGE).is_file(),
+            others=others,
+        )
+        _write(folder / name, page)
+
+
+def _write(file: Path, text: str) -> None:
+    file.write_text(text, encoding="utf-8", newline="")
 
 
 def move_into(made: Path, folder: Path) -> None:
@@ -289,6 +274,9 @@ def move_into(made: Path, folder: Path) -> None:
         os.replace(file, place)
 
 
+# ------------------------------------------------------------ a comparison
+
+
 def write_comparison(found: Comparison, out: Path) -> Path:
     """Write compare.html with its picture and tables to a folder: the page.  Raises ParameterError where it cannot.
 
@@ -297,36 +285,24 @@ def write_comparison(found: Comparison, out: Path) -> Path:
     """
     title = f"{found.one.name} and {found.other.name} compared"
     arms = list(dict.fromkeys(side.arm.name for side in found.sides))
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        with temporary_folder(out) as made:
-            saved = save_section(_comparison_section(found), made)
-            others = [("index.html", "all arms"), *((f"{name}/index.html", name) for name in arms)]
-            pages = [(file, name) for file, name in others if (out / file).is_file()]
-            page = render(COMPARISON_PAGE, title=title, saved=saved, pages=pages)
-            (made / COMPARISON_PAGE).write_text(page, encoding="utf-8", newline="")
-            keep(made, COMPARISON_KIND, {"title": title, "arms": arms})
-            if (out / "index.html").is_file():
-                _write_index(made, out, TRUST_PAGE if (out / TRUST_PAGE).is_file() else "", title)
+    with _temporary(out, "--out") as made:
+        saved = save_section(_comparison_section(found), made)
+        others = [("index.html", "all arms"), *((f"{name}/index.html", name) for name in arms)]
+        pages = [(file, name) for file, name in others if (out / file).is_file()]
+        _write(made / COMPARISON_PAGE, render(COMPARISON_PAGE, title=title, saved=saved, pages=pages))
+        keep(made, "compare", {"title": title, "arms": arms})
+        move_into(made, out)
+        if (out / "index.html").is_file():
+            _write(made / "index.html", index_page(out, trust=TRUST_PAGE if (out / TRUST_PAGE).is_file() else ""))
             move_into(made, out)
-    except OSError as error:
-        remedy = f"cannot be written to ({error.strerror or error}); give a folder that can"
-        raise ParameterError(key="--out", value=str(out), remedy=remedy) from None
     return out / COMPARISON_PAGE
 
 
 def _comparison_section(found: Comparison) -> PageSection:
     """The verdicts and the picture of a comparison, then its tables of differences."""
-    picture = Picture(
-        stem="comparison", title="Frequency response and stability region",
-        alt=f"{found.verdict.replace(chr(10), '; ')}.",
-        caption=prose("compared_picture", found=found), figure=comparison.figure(found),
-    )  # fmt: skip
+    drawn = picture("comparison_picture", comparison.figure(found), stem="comparison", found=found)
     quantities_of = quantities(type(found)).items()
     rows = ((of, getattr(found, name)) for name, of in quantities_of if of.label and name != "is_sampled")
-    tables = [
-        table(each, stem=f"compare-{of.key}", title=upper(of.label), caption=prose("compared", key=of.key))
-        for of, each in rows if each
-    ]  # fmt: skip
-    return PageSection(anchor="compared", title="Compared", words=[prose("comparison", found=found)],
-                       blocks=[tables[0], picture, *tables[1:]])  # fmt: skip
+    first, *tables = (sheet("compared", table(each).columns, stem=f"compare-{of.key}", of=of) for of, each in rows)
+    words = [prose("comparison", found=found)]
+    return PageSection(anchor="compared", title="Compared", words=words, blocks=[first, drawn, *tables])
