@@ -88,10 +88,6 @@ class HubFeedback:
         across, up = (self[name] for name in PLANE)
         return across, up
 
-    def at(self, across: float, up: float) -> HubFeedback:
-        """Return the law with its gains of the plane at this point of it."""
-        return replace(self, **dict(zip(PLANE, (across, up), strict=True)))
-
     def gain_text(self, name: str, how: Callable[[float], str], arm: Arm | None = None) -> str:
         """Return `K1 = 0.3`: the gain of that name, its value written by `how`, with its unit on an arm."""
         return f"{name} = {how(self[name])}{'' if arm is None else written_unit(name, arm)}"

@@ -22,8 +22,6 @@ from tfarm.files import write_file
 LAW_DEFAULTS: dict[str, Any] = {  # of the keys of [law]
     "input": None, "delay": 0.0, "period": None, "sign": -1, "references": (), "rule": "tustin", "prewarp": 0.0,
 }  # fmt: skip
-
-
 LINK_NUMBERS = ("length", "density", "youngs_modulus", "shear_modulus", "damping", "poissons_ratio")
 
 

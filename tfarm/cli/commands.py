@@ -53,11 +53,7 @@ ComplexPoints = Annotated[
     ),
 ]
 Frequencies = Annotated[Any, typer.Option(metavar="W,W", parser=numbers("frequencies in rad/s such as 1,10,100"))]
-FirstValues = Annotated[list[Any] | None, typer.Option(metavar="KEY=VALUE", parser=named(numbers("KEY=NUMBER", 1)))]
-Bounds = Annotated[list[Any] | None, typer.Option(metavar="KEY=LO,HI", parser=named(numbers("KEY=NUMBER,NUMBER", 2)))]
-Priors = Annotated[
-    list[Any] | None, typer.Option(metavar="KEY=MEAN,STD", parser=named(numbers("KEY=NUMBER,NUMBER", 2)))
-]
+pair = named(numbers("KEY=NUMBER,NUMBER", 2))
 OWN_TABLE = "--compare prints a table of its own: ask for one of them"
 MOST_SLOW = 2000  # points by balls or by the appendix, at some milliseconds each
 
@@ -289,9 +285,11 @@ def fit(
     arm: ArmName,
     data: Annotated[list[str] | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
     free: Annotated[str, typer.Option(metavar="KEY,KEY")] = "",
-    start: FirstValues = None,
-    bounds: Bounds = None,
-    prior: Priors = None,
+    start: Annotated[
+        list[Any] | None, typer.Option(metavar="KEY=VALUE", parser=named(numbers("KEY=NUMBER", 1)))
+    ] = None,
+    bounds: Annotated[list[Any] | None, typer.Option(metavar="KEY=LO,HI", parser=pair)] = None,
+    prior: Annotated[list[Any] | None, typer.Option(metavar="KEY=MEAN,STD", parser=pair)] = None,
     mode: Annotated[list[str] | None, typer.Option(metavar="N=HZ,RATIO")] = None,
     covariance: bool = False,
     save: File = None,

@@ -137,9 +137,8 @@ def theory_name(theory: str) -> str:
 
 def _depth(link: Link) -> float:
     """The depth [m] of one segment: that of its shape, or sqrt(12) times the radius of gyration, as of a rectangle."""
-    sizes = dict(link.section.dimensions)
-    own = sizes.get("depth") or sizes.get("diameter") or sizes.get("outer_diameter")
-    return own or math.sqrt(12) / link.slenderness * link.length
+    own = link.section.half_depth
+    return math.sqrt(12) * link.section.radius_of_gyration if own is None else 2 * own
 
 
 def _frame(arm: Arm) -> tuple[float, float, float]:

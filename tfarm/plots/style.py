@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial, wraps
 from pathlib import Path
-from typing import Any, Protocol, cast, get_args
+from typing import Any, get_args
 
 import matplotlib.style
 import numpy as np
@@ -74,15 +74,6 @@ def page(
         headline(figure, title)
 
 
-class Drawing(Protocol):
-    """A picture of a record: in the axes given, which it returns, or in new ones; `figure` makes one to be saved."""
-
-    figure: Callable[..., Figure]
-
-    def __call__(self, *found: Any, ax: Any = None, **how: Any) -> Any:
-        """Draw it."""
-
-
 FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the class of a record the picture of it as a figure of its own
 
 
@@ -98,8 +89,10 @@ def check_records(of: Sequence[tuple[Any, str]], found: Sequence[Any]) -> None:
 def picture(
     *of: tuple[Any, str], title: Callable[..., str], size: Any = (7.0, 5.4), rows: Sequence[float] = (1.0,),
     grid: Callable[..., Any] | None = None,
-) -> Callable[[Callable[..., None]], Drawing]:  # fmt: skip
-    """Make of a function that draws records in `ax` (its axes, or a list of several) a `Drawing`.
+) -> Callable[[Callable[..., None]], Any]:  # fmt: skip
+    """Make of a function that draws records in `ax` (its axes, or a list of several) one that also makes new axes.
+
+    It returns the axes, those given or new ones; its attribute `figure` makes a figure to be saved.
 
     Parameters
     ----------
@@ -114,14 +107,13 @@ def picture(
         Relative heights of axes above each other; a `grid` of axes is a function of the figure and the records.
     """
 
-    def decorated(draw: Callable[..., None]) -> Drawing:
+    def decorated(draw: Callable[..., None]) -> Any:
         is_one = grid is None and len(rows) == 1
 
         def figure(*found: Any, new: Callable[..., Figure] = Figure, **how: Any) -> Figure:
             width, height = size(*found) if callable(size) else size
-            made: dict[str, Any] = {"nrows": len(rows), "sharex": True, "height_ratios": rows}
-            if grid is not None:
-                made = {"make": lambda figure: grid(figure, *found)}
+            above: dict[str, Any] = {"nrows": len(rows), "sharex": True, "height_ratios": rows}
+            made = above if grid is None else {"make": lambda figure: grid(figure, *found)}
             with page(width, height, title(*found), new, **made) as (drawn, _):
                 draw(*found, ax=drawn.axes[0] if is_one else drawn.axes, **how)
                 for ax in drawn.axes[:-1] if grid is None else []:
@@ -135,18 +127,18 @@ def picture(
                 from matplotlib import pyplot  # not needed, and not loaded, for a page
 
                 axes = figure(*found, new=pyplot.figure, **how).axes
-                return axes[0] if is_one else tuple(axes)
-            axes = list(np.ravel(np.asarray(ax, dtype=object)))
-            remedy = f"{len(rows)} axes, as figure.subplots({len(rows)}) makes them"
-            require(grid is not None or len(axes) == len(rows), "ax", len(axes), remedy)
-            with style():
-                draw(*found, ax=axes[0] if is_one else axes, **how)
+            else:
+                axes = list(np.ravel(np.asarray(ax, dtype=object)))
+                remedy = f"{len(rows)} axes, as figure.subplots({len(rows)}) makes them"
+                require(grid is not None or len(axes) == len(rows), "ax", len(axes), remedy)
+                with style():
+                    draw(*found, ax=axes[0] if is_one else axes, **how)
             return axes[0] if is_one else tuple(axes)
 
         for kind in get_args(of[0][0]) or (of[0][0],) if len(of) == 1 else ():
             FIGURES[kind] = figure
         shown.figure = figure  # type: ignore[attr-defined]
-        return cast("Drawing", shown)
+        return shown
 
     return decorated
 
