@@ -170,7 +170,7 @@ def test_a_better_residual_holds_is_what_a_simulation_finds_and_no_less_than_a_d
     assert judge.score(law) == pytest.approx(residual, rel=1e-5)
     period = 2 * np.pi / tfarm.modes(arm, 1).natural_frequency[-1]
     found = simulated_run(arm, law, Chain(), "slew", 1.0 + max(period, 0.16))
-    assert found.residual_moment == pytest.approx(residual, rel=1e-5)
+    assert found.simulation.residual_moment == pytest.approx(residual, rel=1e-5)
     assert tfarm.design(arm, "residual", structure=structure).value <= residual * (1 + AS_GOOD)
 
 

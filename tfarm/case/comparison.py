@@ -333,7 +333,7 @@ class Comparison:
     @cached_property
     def reaches(self) -> tuple[Reach, Reach]:
         """Of each loop the factors on its law that keep it stable, over further delays."""
-        T = self.one.sampled.sampling.period
+        T = self.one.sampled.period
         longest = max([LONGEST_WAIT * T, *(BORNE * (each.delay_margin or 0.0) for each in self.sides)])
         delay = np.linspace(0.0, min(longest, MOST_DELAYED * T), FURTHER_DELAYS)
         return self.one.reach(delay), self.other.reach(delay)

@@ -40,7 +40,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import takewhile
 from typing import NamedTuple
 
@@ -166,15 +166,14 @@ class Circle:
 
     def characteristic(self, weights: Sequence[float]) -> Discs:
         """x^k F z^-n on every arc, k the least that leaves no pole at z = 1."""
-        row, used = (*weights, 1.0), []
-        for n, (part, signal, gain, roots) in enumerate(self.terms, start=1):
-            if factor := row[part] * gain:
-                used.append((factor, int((roots == 0).sum()) - self.orders[signal], self.parts[n]))
-        least, x = min(exponent for _, exponent, _ in used), self.parts[0]
-        total = x.times(0.0)
-        for factor, exponent, disc in used:
-            total = total + (power(x, exponent - least) * disc).times(factor)
-        return total
+        row, x = (*weights, 1.0), self.parts[0]
+        used = [
+            (row[part] * gain, int((roots == 0).sum()) - self.orders[signal], self.parts[n])
+            for n, (part, signal, gain, roots) in enumerate(self.terms, start=1)
+            if row[part] * gain
+        ]
+        least = min(exponent for _, exponent, _ in used)
+        return reduce(Discs.__add__, ((power(x, n - least) * disc).times(factor) for factor, n, disc in used))
 
     def _parts(self, low: Real, high: Real) -> Discs:
         """x, and the terms of F z^-n without powers of x, on arcs."""
@@ -272,10 +271,8 @@ class Circle:
 
 def power(x: Discs, n: int) -> Discs:
     """x^n."""
-    total = Discs(np.ones_like(x.middle), np.zeros_like(x.radius))
-    for _ in range(n):
-        total = total * x
-    return total
+    one = Discs(np.ones_like(x.middle), np.zeros_like(x.radius))
+    return reduce(Discs.__mul__, [x] * n, one)
 
 
 def product(x: Discs, roots: Complex) -> Discs:

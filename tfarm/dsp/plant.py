@@ -27,7 +27,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import block_diag
 
 from tfarm.arm import Arm
 from tfarm.arrays import Complex, Real
@@ -159,9 +158,8 @@ def is_analog(wanted: Output, chain: Chain) -> bool:
     Strain, moment and shear, current, accelerations and rates do, as they leave analog amplifiers.  Angles and
     displacements do not, nor does the hub's rate where it is the difference of an encoder.
     """
-    if wanted.quantity == "theta" and wanted.power and chain.converters.hub_rate == "difference":
-        return False
-    return wanted.quantity in AMPLIFIED or wanted.power > 0
+    is_encoder = wanted.quantity == "theta" and chain.converters.hub_rate == "difference"
+    return wanted.quantity in AMPLIFIED or (wanted.power > 0 and not is_encoder)
 
 
 def with_filter(plant: Plant, rows: Sequence[int], corner: float) -> Plant:
@@ -384,16 +382,18 @@ class PulseTransfer:
     def _matrices(self) -> tuple[Real, Real, Real]:
         upper, real = self.kept()
         T, d, z = self.sampling.period, self.sampling.whole_delay, self.multipliers
-        rotations = [[[each.real, -each.imag], [each.imag, each.real]] for each in z[upper]]
-        A = block_diag(*rotations, *z[real].real, [[1.0, T], [0.0, 1.0]], np.eye(d + 1, k=-1))
+        first, n = 2 * np.arange(upper.size), self.integrals_at + 2
+        A = np.diag(np.r_[np.repeat(z[upper].real, 2), z[real].real, 1.0, 1.0, np.zeros(d + 1)])
+        A[first, first + 1], A[first + 1, first] = -z[upper].imag, z[upper].imag
+        A[n - 2, n - 1], A[n:, n:] = T, np.eye(d + 1, k=-1)
         pairs = np.ascontiguousarray(2 * self.residues[:, upper].conj()).view(float)
         C = np.c_[pairs, self.residues[:, real].real, self.plant.rigid, np.zeros((len(pairs), d)), self.plant.static]
         now, before = (
             np.r_[push[upper].view(float), push[real].real, ramp, push[-1].real]
             for push, ramp in zip((self.early, self.late), self.ramps, strict=True)
         )
-        n, B = now.size, np.zeros(len(A))
-        A[:n, -1], B[n] = before, 1.0
+        B = np.eye(len(A))[n]
+        A[:n, -1] = before
         newest = A[:, -2] if d else B
         newest[:n] = now
         if (braked := self.plant.braked(SLOW / self.sampling.period)) is not None:
@@ -451,6 +451,5 @@ def phi(u: float) -> float:
 
 def held_amplitude(p: Complex, duration: float) -> Complex:
     """(e^{p t} - 1)/p: the amplitude of a unit torque after `duration` t [s]."""
-    x = p * duration
-    safe = np.where(x == 0, 1.0, x)
-    return np.where(x == 0, duration, np.expm1(safe) / safe * duration)
+    safe = np.where(p * duration == 0, 1.0, p)
+    return np.where(p * duration == 0, duration, np.expm1(p * duration) / safe)

@@ -217,15 +217,13 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     last, before = slice(n - n // 4, n), slice(n - n // 2, n - n // 4)
     moment = simulation.at_samples.root_moment
     size, earlier = _half_range(moment[last]), _half_range(moment[before])
-    is_clipped = bool(simulation.saturated_at[last].any())
-    if size == 0.0 or size < CYCLE_LASTS * earlier or (is_clipped and earlier < CYCLE_LASTS * size):
-        return None
-    is_unstable = ideal.stopped is not None or _left(ideal, last) > GROWS * _left(ideal, before)
-    if not (is_clipped and is_unstable) and size <= BEYOND_IDEAL * _left(ideal, last):
-        return None
     about = moment[last] - moment[last].mean()
     turns = np.count_nonzero(np.diff(np.signbit(about))) / 2
-    if is_clipped and turns < FEWEST_TURNS:
+    is_clipped = bool(simulation.saturated_at[last].any())
+    is_transient = is_clipped and (earlier < CYCLE_LASTS * size or turns < FEWEST_TURNS)
+    is_unstable = ideal.stopped is not None or _left(ideal, last) > GROWS * _left(ideal, before)
+    is_own = (is_clipped and is_unstable) or size > BEYOND_IDEAL * _left(ideal, last)
+    if size == 0.0 or size < CYCLE_LASTS * earlier or is_transient or not is_own:
         return None
     return LimitCycle(
         root_moment=size,

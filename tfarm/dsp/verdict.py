@@ -92,8 +92,8 @@ class Verdict(OfLoop):
     @property
     def spectral_radius(self) -> Annotated[float, Quantity("spectral radius", digits=12,
             help="largest |z| of the closed-loop poles but z = 1 of a free hub angle; below 1 if stable")]:  # fmt: skip
-        """Largest |z|."""
-        return math.exp(self.log_radius)
+        """Largest |z|; infinity where it overflows."""
+        return math.exp(self.log_radius) if self.log_radius < LARGEST_LOG else math.inf
 
     @property
     def unstable_poles(self) -> Annotated[int, Quantity("unstable poles",
@@ -273,8 +273,7 @@ class Analysis:
     def first_unstable_mode(self) -> Annotated[int | None, Quantity("first unstable mode",
             help="lowest mode whose closed-loop pole lies outside the unit circle")]:  # fmt: skip
         """The lowest unstable mode."""
-        grows = self.modes.index[self.modes.log_radius > 0]
-        return int(grows[0]) if grows.size else None
+        return min(self.modes.index[self.modes.log_radius > 0].tolist(), default=None)
 
     @cached_property
     def delay(self) -> Annotated[Figure, Quantity("delay margin in samples", key="delay_margin",
@@ -330,24 +329,21 @@ def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | N
     return Analysis(sampled_verdict(arm, law, chain, count=count), count or UNDAMPED_MODES)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SampledBrief:
     """Whether a loop is stable at a chain's sampling, without z = 1 of a free hub angle.
 
-    `is_stable` and `log_radius`, ln of the spectral radius, are None where that is not determined; `sentence` then has
-    the reason.  `period_from` is the origin of the sampling period, "" where that is not known.
+    `is_stable` and `spectral_radius` are None where that is not determined; `words` then have the reason.
+    `period_from` is the origin of the sampling period, "" where that is not known.
     """
 
-    sampling: Sampling
+    period: Annotated[float, Quantity(unit="s", help="sampling period of the controller")]
+    delay_samples: Annotated[float, Quantity(help="delay of the loop in samples")]
     period_from: str
     is_stable: Annotated[bool | None, Quantity(key="stable", help="whether every pole lies inside the unit circle")]
-    log_radius: float | None
-    sentence: str
-
-    @property
-    def period(self) -> Annotated[float, Quantity(unit="s", help="sampling period of the controller")]:
-        """The sampling period."""
-        return self.sampling.period
+    spectral_radius: Annotated[float | None, Quantity("spectral radius",
+            help="largest |z| of the closed-loop poles; below 1 of a stable loop")]  # fmt: skip
+    words: Annotated[str, Quantity("sampled loop", key="in_words", help="verdict at the sampling period")]
 
     @property
     def period_is_default(self) -> Annotated[bool, Quantity(help="whether the sampling period is tfarm's own")]:
@@ -355,30 +351,10 @@ class SampledBrief:
         return self.period_from == DEFAULT_PERIOD
 
     @property
-    def delay_samples(self) -> Annotated[float, Quantity(help="delay of the loop in samples")]:
-        """The delay of the chain."""
-        return self.sampling.delay_samples
-
-    @property
-    def spectral_radius(self) -> Annotated[float | None, Quantity("spectral radius",
-            help="largest |z| of the closed-loop poles; below 1 of a stable loop")]:  # fmt: skip
-        """Largest |z|; infinity where it overflows."""
-        size = self.log_radius
-        return None if size is None else math.exp(size) if size < LARGEST_LOG else math.inf
-
-    @property
     def short(self) -> str:
         """The verdict in a few words, for a legend or a card."""
         verdict = "undecided" if self.is_stable is None else "stable" if self.is_stable else "UNSTABLE"
-        return f"{verdict} when sampled every {1e3 * self.sampling.period:g} ms"
-
-    @property
-    def words(self) -> Annotated[str, Quantity("sampled loop", key="in_words", help="verdict at the sampling period")]:
-        """Sampling period and verdict, in capitals where the loop is not stable."""
-        (word, _, rest), delay = self.sentence.partition(" "), self.delay_samples
-        late = f", {delay:g} samples late" if delay else ""
-        at = f"sampled every {1e3 * self.period:g} ms{late}{self.period_from and f' ({self.period_from})'}"
-        return f"{word if self.is_stable else word.upper()} {rest}, {at}"
+        return f"{verdict} when sampled every {1e3 * self.period:g} ms"
 
 
 def sampled_brief(arm: Arm, law: AnyLaw, chain: Chain) -> SampledBrief:
@@ -390,12 +366,22 @@ def sampled_brief(arm: Arm, law: AnyLaw, chain: Chain) -> SampledBrief:
 
 
 def brief_of(found: Verdict | ConvergenceError, law: AnyLaw, chain: Chain) -> SampledBrief:
-    """A verdict on a law in short, or the reason that there is none."""
-    origin = chain.period_from or (DEFAULT_PERIOD if chain.sampling.period == Sampling().period else "")
-    known = chain.sampling, LAWS_PERIOD if as_law(law).is_discrete else origin
-    if isinstance(found, ConvergenceError):
-        return SampledBrief(*known, None, None, f"undecided: {found}")
-    return SampledBrief(*known, found.is_stable, float(found.log_radius), found.sentence)
+    """A verdict on a law in short, or the reason that there is none; in capitals where the loop is not stable."""
+    T, delay = chain.sampling.period, chain.sampling.delay_samples
+    origin = chain.period_from or (DEFAULT_PERIOD if Sampling().period == T else "")
+    origin = LAWS_PERIOD if as_law(law).is_discrete else origin
+    verdict = None if isinstance(found, ConvergenceError) else found
+    word, _, rest = (f"undecided: {found}" if verdict is None else verdict.sentence).partition(" ")
+    is_stable, late = None if verdict is None else verdict.is_stable, f", {delay:g} samples late" if delay else ""
+    at = f"sampled every {1e3 * T:g} ms{late}{origin and f' ({origin})'}"
+    return SampledBrief(
+        period=T,
+        delay_samples=delay,
+        period_from=origin,
+        is_stable=is_stable,
+        spectral_radius=None if verdict is None else verdict.spectral_radius,
+        words=f"{word if is_stable else word.upper()} {rest}, {at}",
+    )
 
 
 class AtPeriod(NamedTuple):
