@@ -186,7 +186,7 @@ def make_all(jobs: Sequence[Job], progress: ReportProgress | None) -> Mapping[st
             begun([name])
             done[name] = task()
     else:
-        for name, result in shared(tasks, MOST_WORKERS, [__name__], begun):
+        for name, result in shared(tasks, MOST_WORKERS, begun):
             done[name] = result  # noqa: PERF403  `begun` counts them meanwhile
     begun(["pages"])
     return done
