@@ -286,7 +286,7 @@ def lost(stage: int, growth: Real) -> Real:
     return LOST * (stage + growth / (1 + abs(growth)))
 
 
-def chosen(entries: Sequence[Entry], rows: Real) -> list[Entry]:
+def chosen(entries: Sequence[Entry], rows: Any) -> list[Entry]:
     """The entries of some of the laws; polynomials that are common to all laws stay."""
     return [
         Entry(each.signal, *(of[:, rows] if of.shape[1] > 1 else of for of in (each.num, each.den))) for each in entries
