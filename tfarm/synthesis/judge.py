@@ -261,10 +261,8 @@ def model_sizes(arm: Arm, chain: Chain, modes: int, *, continuous: bool) -> list
     if continuous or arm.has_elastic_link:
         return [max(FEWEST_MODES if continuous else UNDAMPED_MODES, fewest)]
     most = min(most_modes(arm, chain), SEARCHED_MODES)
-    sizes = [max(FEWEST_MODES, fewest)]
-    while sizes[-1] < most:
-        sizes.append(2 * sizes[-1])
-    return [*sizes[:-1], most]
+    doubled = (max(FEWEST_MODES, fewest) << n for n in range(most.bit_length()))
+    return [*(size for size in doubled if size < most), most]
 
 
 def judge_of(
