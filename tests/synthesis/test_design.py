@@ -180,11 +180,6 @@ def test_empty_bounds_are_refused(K1) -> None:
         design(LAB, "damping", K1=K1)
 
 
-def test_an_unknown_objective_is_refused() -> None:
-    with pytest.raises(ParameterError, match="objective"):
-        design(LAB, "beauty")
-
-
 @pytest.mark.parametrize("part", ["mass", "inertia"])
 def test_an_arm_that_cannot_turn_has_no_slew_to_leave_a_residual(part) -> None:
     held = replace(LAB, payload=tfarm.Payload(**{part: float("inf")}))

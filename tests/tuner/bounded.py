@@ -38,8 +38,8 @@ def some_trial(rng):
 def moment_bound(trial, guard):
     """What the moment may reach at each sample: the norm of P shrinks by itself, the references add to it."""
     proof, loop = guard.proofs[0], MovingGain(trial.loop)
-    push = np.linalg.norm(proof.root.T @ loop.drive)
-    reading = np.linalg.norm(np.linalg.solve(proof.root, loop.sense))
+    root = np.linalg.cholesky(proof.P)
+    push, reading = np.linalg.norm(root.T @ loop.drive), np.linalg.norm(np.linalg.solve(root, loop.sense))
     servo, counted, rest, rigid = trial.reference
     steady = counted + rest + servo
     torque = np.maximum(abs(steady + guard.lo * rigid), abs(steady + guard.hi * rigid))
@@ -108,7 +108,7 @@ def runs(size, seed):
         if sequences < size // 5:
             sequences += 1
             loop, patience = MovingGain(trial.loop), int(rng.integers(1, 6))
-            grows = bool(adversary(loop, guard.lo, guard.hi, rng, patience, guard.proofs[0].root) >= 0)
+            grows = bool(adversary(loop, guard.lo, guard.hi, rng, patience, np.linalg.cholesky(guard.proofs[0].P)) >= 0)
             yield Finding("sequence", f"grows {guard.sentence} {trial.arm}" if grows else "", grows)
 
 

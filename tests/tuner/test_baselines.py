@@ -72,8 +72,7 @@ def left(impulses, z):
 def test_zero_vibration_is_zero_at_the_pole(z):
     impulses = zero_vibration(z)
     assert impulses.sum() == pytest.approx(1, rel=1e-14)
-    assert left(impulses, z) < 1e-14
-    assert left(impulses, z.conjugate()) < 1e-14
+    assert max(left(impulses, z), left(impulses, z.conjugate())) < 1e-14
     assert impulses.size == math.floor(math.pi / abs(np.angle(z)) * (1 + 1e-12)) + 2
 
 

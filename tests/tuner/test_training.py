@@ -74,7 +74,6 @@ def test_the_dynamic_rule_takes_back_what_costs_more(trial, guards, kind, eta):
 
 @pytest.mark.parametrize(("kind", "worst"), [("time-varying", BEST_CONSTANT), ("frozen", 0.90)])
 def test_some_seeds_beat_every_constant_gain(trial, guards, kind, worst):
-    """`python -m tests.tuner.seeds 20` does all twenty."""
     without = residual_rms(trial.with_constant(0.0), trial.task)
     for seed in range(5):
         result = train(trial, initial_network(seed), guards[kind], Learning(), 100).result

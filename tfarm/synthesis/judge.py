@@ -260,10 +260,8 @@ def model_sizes(arm: Arm, chain: Chain, modes: int, *, continuous: bool) -> list
     if continuous or arm.has_elastic_link:
         return [max(FEWEST_MODES if continuous else UNDAMPED_MODES, fewest)]
     most = min(most_modes(arm, chain), SEARCHED_MODES)
-    sizes = [max(FEWEST_MODES, fewest)]
-    while sizes[-1] < most:
-        sizes.append(2 * sizes[-1])
-    return [*sizes[:-1], most]
+    doubled = (max(FEWEST_MODES, fewest) << n for n in range(most.bit_length()))
+    return [*(size for size in doubled if size < most), most]
 
 
 def judge_of(
@@ -285,7 +283,7 @@ def lost(stage: int, growth: Real) -> Real:
     return LOST * (stage + growth / (1 + abs(growth)))
 
 
-def chosen(entries: Sequence[Entry], rows: Real) -> list[Entry]:
+def chosen(entries: Sequence[Entry], rows: Any) -> list[Entry]:
     """The entries of some of the laws; polynomials that are common to all laws stay."""
     return [
         Entry(each.signal, *(of[:, rows] if of.shape[1] > 1 else of for of in (each.num, each.den))) for each in entries

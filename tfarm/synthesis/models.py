@@ -183,10 +183,15 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
     angle = first + damped
     response: Callable[[Complex], Complex] = pulse
     if by_difference:
-        estimate, n = _Difference(float(np.exp(-chain.converters.rate_filter * T)), T), read.index("hub_angle")
-        A, B, C = estimate.states(A, B, C, n, signals.index("hub_rate"), angle if turns else None)
+        a, n, row = float(np.exp(-chain.converters.rate_filter * T)), read.index("hub_angle"), signals.index("hub_rate")
+        A, B, C = differenced(A, B, C, (n, row), (a, T), angle if turns else None)
         own = np.append(own, 0.0)
-        response = estimate.response(pulse, n, signals.index("hub_rate"))
+
+        def response(z: Complex) -> Complex:
+            found = pulse(z)
+            found[row] = (1 - a) / T * (z - 1) / (z - a) * found[n]
+            return found
+
     if turns and "hub_angle" not in signals:
         gone.append(angle)
     A, B, C = np.delete(np.delete(A, gone, 0), gone, 1), np.delete(B, gone), np.delete(C, gone, 1)[: len(signals)]
@@ -199,39 +204,25 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Difference:
-    """The rate as the filtered difference of the angle, (1 - a)/T (z - 1)/(z - a), `a` the pole of its filter."""
+def differenced(
+    A: Real, B: Real, C: Real, rows: tuple[int, int], numbers: tuple[float, float], angle: int | None
+) -> tuple[Real, Real, Real]:
+    """The plant with the rate as the filtered difference of the angle, (1 - a)/T (z - 1)/(z - a); numbers a and T.
 
-    a: float
-    period: float
-
-    def states(self, A: Real, B: Real, C: Real, n: int, row: int, angle: int | None) -> tuple[Real, Real, Real]:
-        """The matrices with one more state g, a g + theta of the next sample, less its share of the turning state.
-
-        `n` is the row of the angle, `row` that of the rate; then the angle alone depends on the state `angle`.
-        """
-        through, size = (1 - self.a) / self.period, len(A)
-        A, B, C = np.pad(A, (0, 1)), np.append(B, 0.0), np.pad(C, ((0, 0), (0, 1)))
-        A[size, :size], A[size, size] = C[n, :size], self.a
-        C[row] = through * C[n]
-        C[row, size] = through * (self.a - 1)
-        if angle is not None:
-            turned = np.eye(size + 1)
-            turned[size, angle] = -C[n, angle] / (1 - self.a)
-            back = 2 * np.eye(size + 1) - turned
-            A, B, C = turned @ A @ back, turned @ B, C @ back
-        return A, B, C
-
-    def response(self, pulse: PulseTransfer, n: int, row: int) -> Callable[[Complex], Complex]:
-        """The response of the plant in z, with that rate."""
-
-        def values(z: Complex) -> Complex:
-            found = pulse(z)
-            found[row] = (1 - self.a) / self.period * (z - 1) / (z - self.a) * found[n]
-            return found
-
-        return values
+    It has one more state g, a g + theta of the next sample, less its share of the turning state.  `rows` are those of
+    angle and rate; only the angle depends on the state `angle` then.
+    """
+    (n, row), (a, T), size = rows, numbers, len(A)
+    A, B, C = np.pad(A, (0, 1)), np.append(B, 0.0), np.pad(C, ((0, 0), (0, 1)))
+    A[size, :size], A[size, size] = C[n, :size], a
+    C[row] = (1 - a) / T * C[n]
+    C[row, size] = -((1 - a) ** 2) / T
+    if angle is not None:
+        turned = np.eye(size + 1)
+        turned[size, angle] = -C[n, angle] / (1 - a)
+        back = 2 * np.eye(size + 1) - turned
+        A, B, C = turned @ A @ back, turned @ B, C @ back
+    return A, B, C
 
 
 def circle_angles(pulse: PulseTransfer) -> Real:
@@ -241,7 +232,7 @@ def circle_angles(pulse: PulseTransfer) -> Real:
     return np.unique(np.r_[np.linspace(0, np.pi, EVEN_ANGLES + 1)[1:], close[(close > 0) & (close <= np.pi)]])
 
 
-DOUBLINGS = 5  # of the samples of a block
+DOUBLINGS = 6  # of the samples of a block
 
 
 def outputs(A: Real, B: Real, C: Real, signals: Real, first: int) -> Real:

@@ -25,11 +25,12 @@ from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Tell
 
 FEWEST_RUNS, MOST_RUNS = 2, 8  # one more than coefficients within these: some minima are found by one of five alone
-USUAL_WORK = 4 * 20**2  # squared states of one arm's first model, twice when sampled: with twice as much half the runs
+USUAL_WORK = 4 * 20**2  # models times squared states of one arm's first model: with twice as much half the runs
 FEWEST_POINTS, POINTS_EACH = 32, 15  # of a run, at least, and for each coefficient: the next power of two
 LAWS_EACH, MOST_LAWS = 800, 4000  # of a run for each coefficient, and at most; twice as many from the best points
 STRATEGIES = (("best1bin", 0.7), ("currenttobest1bin", 0.9))  # in turn, and the share of coefficients changed at once
-AROUND = 0.5  # of x: the spread of the points of the last run, around the best
+AROUND = 0.5  # of x: the spread of the points of a run around the best, half as wide in each one after
+MOST_REFINED, WORTH = 5, 2e-3  # such runs, and the relative gain of one after which another follows
 CONVERGED = 1e-9  # of the scores: the spread of a run's points at which it ends
 SIMPLEX = 0.005  # of the region: the first edges of the simplex
 STEPS_EACH = 100  # of the simplex, for each coefficient
@@ -87,7 +88,7 @@ class Worst:
     @property
     def work(self) -> float:
         """The work of a law, relative to that of one arm and its first model."""
-        return sum((1 + judge.is_sampled) * len(judge.model.plant[0]) ** 2 for judge in self.judges) / USUAL_WORK
+        return sum((1 + len(judge.conditions)) * len(judge.model.plant[0]) ** 2 for judge in self.judges) / USUAL_WORK
 
     def scores(self, form: Structure, x: Real, limits: Real | None = None) -> Real:
         """The function to be minimised, at points x (n, laws), any value above the limit of a law (see `Judge`).
@@ -133,8 +134,8 @@ def minimised(
 
     `score` takes points (n, k) of the box, and limits (k,) above which any value will do; `work` is that of a law,
     relative to the usual one.  Runs begin within the bounds of `form`, the first also with its start, and are more
-    where no loop is stable yet; then follow one with the best points of all, one near the best of those, and a simplex
-    at the best of that.  With a point `near` the best one run begins with it, and the next near the best.
+    where no loop is stable yet; then follow one with the best points of all, some near the best as long as that gains,
+    and a simplex at the best of all.  With a point `near` the best one run begins with it, and the next near the best.
     """
     runs = 1 if near is not None else min(max(int((form.size + 1) / max(1.0, work)), FEWEST_RUNS), MOST_RUNS)
     number = 1 << (max(FEWEST_POINTS, POINTS_EACH * form.size) - 1).bit_length()
@@ -156,9 +157,12 @@ def minimised(
     if near is None:
         run(Points.of(ended).x[:, :number], 2 * rounds)
     if form.size > len(PLANE):
-        best = Points.of(ended).x[:, 0]
-        spread = AROUND * np.random.default_rng(runs).standard_normal((number, form.size))
-        run(np.clip(best + spread, *box).T, rounds)
+        for n in range(MOST_REFINED):
+            (best, *_), (least, *_) = Points.of(ended).x.T, Points.of(ended).scores
+            spread = AROUND / 2**n * np.random.default_rng(runs + n).standard_normal((number, form.size))
+            run(np.clip(best + spread, *box).T, rounds)
+            if not ended[-1].scores[0] < least - WORTH * abs(least):
+                break
     ended.append(simplex(score, box, Points.of(ended).x[:, 0]))
     found = Points.of(ended)
     return found, [float(found.scores[0]), *(float(each.scores[0]) for each in ended[:runs])]

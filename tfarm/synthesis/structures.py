@@ -176,15 +176,12 @@ def structure_of(
         must_not_be_algebraic(arm, "structure", name)
     given = {key: pair for key, pair in bounds.items() if pair is not None}
     for key, pair in given.items():
-        if key not in form.names or name != TWO_GAINS:
+        if name != TWO_GAINS:
             raise ParameterError(key=key, value=pair, remedy=f"goes with the structure {TWO_GAINS} alone")
-        low, high = pair
-        if not (np.isfinite([low, high]).all() and low < high):
+        if not -np.inf < pair[0] < pair[1] < np.inf:
             raise ParameterError(key=key, value=pair, remedy="bounds are two finite numbers, the lower first")
-    free = tuple(
-        each._replace(bounds=(float(given[each.name][0]), float(given[each.name][1]))) if each.name in given else each
-        for each in form.free
-    )
+    ends = {key: (float(low), float(high)) for key, (low, high) in given.items()}
+    free = tuple(each._replace(bounds=ends.get(each.name, each.bounds)) for each in form.free)
     return replace(form, free=free, given=tuple(given))
 
 

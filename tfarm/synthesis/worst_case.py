@@ -76,8 +76,7 @@ class ArmBox:
             remedy = f"at most {MOST_RANGES} ranges, which have {2**MOST_RANGES} corners"
             raise ParameterError(key="range", value=len(self.ranges), remedy=remedy)
         for key, ends in self.ranges.items():
-            low, high = ends
-            if not -math.inf < low < high < math.inf:
+            if not -math.inf < ends[0] < ends[1] < math.inf:
                 remedy = "two finite numbers, the lower first, such as 0.1,0.5"
                 raise ParameterError(key=f"range {key}", value=ends, remedy=remedy)
         _ = self.corners
@@ -127,9 +126,8 @@ def arms_of(arm: Arm, also: Sequence[Arm], box: ArmBox | None) -> list[NamedArm]
     """The arm, those of the list, and the corners of the box.  Raises ParameterError for too many in the list."""
     if len(also) > MOST_ARMS:
         raise ParameterError(key="also", value=len(also), remedy=f"at most {MOST_ARMS} further arms")
-    listed = [NamedArm(each.name, each, {}) for each in (arm, *also)]
-    corners = [] if box is None else box.corners
-    return [*listed, *(each for each in corners if each.arm != arm)]
+    corners = [] if box is None else [each for each in box.corners if each.arm != arm]
+    return [*(NamedArm(each.name, each, {}) for each in (arm, *also)), *corners]
 
 
 @dataclass(frozen=True)

@@ -147,18 +147,9 @@ def shaper(loop: Sampled, kind: Shaper, modes: int = SHAPED_MODES) -> Real:
 
 def shaped(task: Scenario, impulses: Real) -> Scenario:
     """The scenario with every reference passed through the impulses; its slew ends later by their length."""
-
-    def through(signal: Real) -> Real:
-        return np.convolve(signal, impulses)[: signal.size]
-
-    return replace(
-        task,
-        feedforward=through(task.feedforward),
-        hub_angle=through(task.hub_angle),
-        hub_rate=through(task.hub_rate),
-        rigid_moment=through(task.rigid_moment),
-        busy_until=task.busy_until + (impulses.size - 1) * task.period,
-    )
+    names = ("feedforward", "hub_angle", "hub_rate", "rigid_moment")
+    through: dict[str, Any] = {name: np.convolve(getattr(task, name), impulses)[: task.t.size] for name in names}
+    return replace(task, busy_until=task.busy_until + (impulses.size - 1) * task.period, **through)
 
 
 def shaped_trial(trial: Trial, kind: Shaper) -> Trial:
@@ -225,8 +216,7 @@ class Outcomes:
     proven: Annotated[bool, Quantity("guard certified", help="whether the guard of the training is certified here too")]
 
 
-@dataclass(frozen=True)
-class NamedLoop:
+class NamedLoop(NamedTuple):
     """An arm and a chain under their name."""
 
     name: str
@@ -255,22 +245,20 @@ def tried_loops(arm: Arm, chain: Chain, quantised: Chain | None = None) -> list[
     quantised = quantised_chain(arm, chain) if quantised is None else quantised
     sampling = replace(chain.sampling, delay_samples=chain.sampling.delay_samples + COMPUTER_DELAY)
     late = f"one {'more ' * bool(chain.sampling.delay_samples)}sample of delay"
-    listed = [
-        NamedLoop("as trained", arm, chain),
-        NamedLoop("quantised", arm, quantised),
-        NamedLoop(late, arm, replace(chain, sampling=sampling)),
-        NamedLoop(f"quantised, {late}", arm, replace(quantised, sampling=sampling)),
-    ]
+    chains = {
+        "as trained": chain, "quantised": quantised,
+        late: replace(chain, sampling=sampling), f"quantised, {late}": replace(quantised, sampling=sampling),
+    }  # fmt: skip
     mass, own = arm.payload_mass, arm.damping
     masses = [share * mass for share in PAYLOAD_SHARES] if mass else [share * arm.own_mass for share in ADDED_MASSES]
     payloads = [float(f"{each:.2g}") for each in masses]
-    if own:
-        dampings = [0.0, *(float(f"{share * own:.3g}") for share in DAMPING_SHARES)]
-    else:
+    dampings = [0.0, *(float(f"{share * own:.3g}") for share in DAMPING_SHARES)]
+    if not own:
         dampings = [float(f"{2 * zeta / first_frequency(arm):.1g}") for zeta in GIVEN_RATIOS]
     others = {f"payload {each:g} kg": arm.having(payload_mass=each) for each in payloads}
     others |= {f"hub {share - 1:+.0%}": arm.having(hub_inertia=share * arm.hub_inertia) for share in HUB_SHARES}
     others |= {f"C = {C:g} s": arm.having(damping=C) for C in dampings}
+    listed = [NamedLoop(name, arm, each) for name, each in chains.items()]
     return listed + [NamedLoop(name, other, chain) for name, other in others.items()]
 
 

@@ -80,11 +80,6 @@ class CommonLyapunov:
     P: Real
     contraction: float
 
-    @cached_property
-    def root(self) -> Real:
-        """L with P = L L^T: the norm is |L^T s|."""
-        return np.asarray(np.linalg.cholesky(self.P), dtype=float)
-
     def is_proven(self) -> bool:
         """Whether P > 0 and both inequalities hold in exact arithmetic.
 

@@ -24,7 +24,7 @@ import os
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -155,9 +155,9 @@ class Trial:
         )  # fmt: skip
         return replace(here, task=self.task)
 
-    def simulator(self, task: Scenario | None = None) -> Simulator:
-        """A simulator of the loop with its converters, of the trial's task or another."""
-        return Simulator(self.arm, self.loop.chain, task or self.task, count=self.loop.plant.count)
+    def simulator(self, *, chain: Chain | None = None, task: Scenario | None = None) -> Simulator:
+        """A simulator of the loop, with the converters of a chain, by default that of the trial."""
+        return Simulator(self.arm, chain or self.loop.chain, task or self.task, count=self.loop.plant.count)
 
     def room(self, network: Network) -> tuple[kernel.Run, kernel.Work]:
         """Empty record and buffers of a trial with that network."""
@@ -241,7 +241,7 @@ def residual_rms(record: Record, task: Scenario) -> float | None:
     return task.residual_rms(record.moment)
 
 
-FORMAT = "tfarm tuner 1"
+FORMAT: Literal["tfarm tuner 1"] = "tfarm tuner 1"
 MOST_TUNER_BYTES = 4_000_000  # bytes of a tuner's file: more than a network of MOST_HIDDEN neurons takes
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -344,7 +344,7 @@ def to_text(tuner: SavedTuner) -> str:
     return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def weights_of(network: Network) -> dict[str, list[float] | list[list[float]]]:
+def weights_of(network: Network) -> dict[str, Any]:
     """scales, W1 and w2 as lists."""
     return {name: getattr(network, name).tolist() for name in ("scales", "W1", "w2")}
 
