@@ -17,6 +17,7 @@ from tests.survey import Finding, each_of
 from tfarm.arm import Law
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.stability import stability
+from tfarm.reduced.modal import sensed_model
 from tfarm.response.signals import Signals
 from tfarm.spectrum.table import first_frequency
 
@@ -70,7 +71,7 @@ def _roots(rng, count, w1):
 
 def by_eigenvalues(arm, law, count, band):
     """Unstable poles of a modal model under the law below the band, or None where one is too near to it or the axis."""
-    A, B, C, D = model(arm, law.signals, count)
+    A, B, C, D = sensed_model(arm, law.signals, count)
     Ak, Bk, Ck, Dk = law.matrices()
     whole = 1 + (Dk @ D)[0, 0]
     closed = np.block([
@@ -141,7 +142,7 @@ def exact(arm, law):
 
 def returned(arm, law, count):
     """1 + L of a modal model under the law, as a function of s, and the poles of the model."""
-    A, B, C, D = model(arm, law.signals, count)
+    A, B, C, D = sensed_model(arm, law.signals, count)
     turns_freely = A[0, 1] == 1 and not A[1].any()  # the first two states are then a double integrator: no eigenvectors
     first = 2 * turns_freely
     p, R = np.linalg.eig(A[first:, first:])
@@ -153,13 +154,6 @@ def returned(arm, law, count):
         return 1 + np.exp(-s * law.delay) * (law.values(s) * G).sum(axis=0)
 
     return value, p
-
-
-def model(arm, names, count):
-    """The modal model of the signals, from the public reduced models, one output at a time."""
-    from tfarm.reduced.modal import sensed_model
-
-    return sensed_model(arm, names, count)
 
 
 def judge(arm, law):

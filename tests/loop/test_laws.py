@@ -13,7 +13,7 @@ import pytest
 
 import tfarm
 from tests.loop.arms import some_loop
-from tests.loop.law_counts import judge, some_delay, some_law
+from tests.loop.law_counts import judge, returned, some_delay, some_law
 from tests.shared import remember, sized, thinned
 from tests.shell import run
 from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
@@ -24,7 +24,6 @@ from tfarm.loop.plane import between, plane
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import Spill, stability
 from tfarm.loop.theorem import definite, is_hurwitz, on_axis, polynomial, signs_of
-from tfarm.reduced.modal import sensed_model
 from tfarm.response.signals import Signals
 
 LAB, BARE, RIG = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))
@@ -45,13 +44,8 @@ def test_margins_of_a_law_are_those_of_python_control_on_a_model(delay):
     """Order 40, the loop function's own values on a fine grid, so that the delay is exact."""
     s = control.tf("s")
     law = Law({"hub_angle": (2 * s + 1) / (0.01 * s + 1), "tip_acceleration": 0.05 / (s / 50 + 1)}, delay=delay)
-    A, B, C, D = sensed_model(LAB, law.signals, 20)
     omega = np.unique(np.r_[np.geomspace(0.05, 1000, 900), np.linspace(40, 260, 1200)])
-    p, R = np.linalg.eig(A[2:, 2:])
-    residues = (C[:, 2:] @ R) * np.linalg.solve(R, B[2:].astype(complex))[:, 0]
-    at = 1j * omega
-    G = D + residues @ (1 / (at - p[:, None])) + B[1, 0] * C[:, :2] @ np.array([1 / at**2, 1 / at])
-    L = np.exp(-at * delay) * (law.values(at) * G).sum(axis=0)
+    L = returned(LAB, law, 20)[0](1j * omega) - 1
     gm, pm, _, wpc, wgc, _ = control.stability_margins(control.FRD(L, omega), returnall=True)
     mine = loop_margins(stability(LAB, law))
     by_phase = [pair for pair in mine.phase_crossovers if omega[0] < pair[0] < omega[-1]]

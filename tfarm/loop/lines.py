@@ -100,8 +100,11 @@ class Parts(NamedTuple):
     @property
     def whole(self) -> Complex:
         """D."""
-        others = [np.delete(self.q, j, axis=0).prod(axis=0) for j in range(len(self.q))]
-        return np.asarray(self.drive * self.q.prod(axis=0) + (self.f * others).sum(axis=0))
+        q, f = self.q[0], self.f[0]
+        for next_q, next_f in zip(self.q[1:], self.f[1:], strict=True):
+            f = f * next_q + next_f * q  # f/q + next_f/next_q
+            q = q * next_q
+        return np.asarray(self.drive * q + f)
 
     def having(self, place: Place, value: float | Real) -> Parts:
         """The same with another value of one number of the law."""

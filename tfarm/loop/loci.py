@@ -7,7 +7,6 @@ loop at a few values.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -16,9 +15,8 @@ from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import FED_BACK, NAMES, Arm, HubFeedback
 from tfarm.arm.blocks import Matrices
-from tfarm.arm.checks import whole
 from tfarm.arrays import LEAST_SIZE, Complex, Real
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.reduced import modal_model
 from tfarm.schema import Quantity
@@ -75,19 +73,12 @@ class ReducedLocus:
 
 
 def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
-    """Return the locus by python-control on a modal model of that order, or of one two modes beyond the last branch.
+    """Return the locus by python-control on a modal model of that even order, or two modes beyond the last branch.
 
-    Raises ParameterError if the order is odd or has no room for as many poles as there are branches, ConvergenceError
-    if the model is beyond python-control.
+    Raises ConvergenceError if the model is beyond python-control.
     """
     arm, rigid = exact.arm, exact.arm.has_rigid_mode
-    least = int(exact.mode.max()) + rigid
-    if order is None:
-        order = max(LEAST_ORDER, 2 * (least + MODES_BEYOND_BRANCHES))
-    remedy = f"an even number from {2 * least}: two a mode"
-    order = whole("order", order, 2 * least, math.inf, remedy)
-    if order % 2:
-        raise ParameterError(key="order", value=order, remedy=remedy)
+    order = order or max(LEAST_ORDER, 2 * (int(exact.mode.max()) + rigid + MODES_BEYOND_BRANCHES))
     count = order // 2 - rigid
     if exact.vary in OF_THE_LAW:
         import control

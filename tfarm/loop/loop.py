@@ -51,6 +51,7 @@ SLOWEST = 1e-6  # of the first steep place: where a grid begins, as nothing bend
 POINTS_BELOW_STEEP = 60  # from there to that place, ten a decade
 QUIET_REACH = 100.0  # times a band: the end of the range beyond it in which |L| is evaluated, two decades of its fall
 MOST_RESONANCES = 2000  # evaluated in it: 20 ms
+LONG_PATH = 1000  # points, and three at each: a contour that the loops of other laws have too, whose values are kept
 MOST_BAND_MODES = 150  # flexible: in a band; beyond, poles are not determined without a theorem or small gain
 
 
@@ -197,7 +198,7 @@ class Loop:
 
     def characteristic(self, s: Complex) -> tuple[Complex, Complex]:
         """D e^{-scale} and scale at s."""
-        of_rig = self.signals.parts(s)
+        of_rig = (self.signals.kept if s.size >= LONG_PATH else self.signals.parts)(s)
         drive, fed_back = self._parts(s, of_rig)
         return drive + fed_back, of_rig.scale
 

@@ -333,19 +333,18 @@ def phase_crossovers(loop: Loop, omega: Real) -> tuple[tuple[float, float], ...]
     the place itself is not known.
     """
 
-    def h(parts: tuple[Complex, Complex]) -> Real:
-        return np.asarray((parts[0] * parts[1].conj()).imag)
+    def h(w: Real) -> Real:
+        drive, fed_back = loop.parts(1j * w)
+        return np.asarray((drive * fed_back.conj()).imag)
 
     factor, place, _ = crossed(omega, lambda w: loop.parts(1j * w))
-    noise = _spread(lambda w: h(loop.parts(1j * w)), place)
-    turns, is_open = np.ones((2, place.size), bool)
-    for share in FARTHER:
-        before, after = (loop.parts(1j * place * (1 + side * share)) for side in (-1, 1))
-        is_clear = np.minimum(abs(h(before)), abs(h(after))) > ABOVE_NOISE * noise
-        decided = is_open & (h(before) * h(after) < 0) & is_clear
-        ways = [(each * other.conj()).real for each, other in zip(before, after, strict=True)]
-        turns = np.where(decided, np.less(ways, 0.0).any(axis=0), turns)
-        is_open &= ~decided
+    sides = place * (1 + np.multiply.outer([-1.0, 1.0], FARTHER)[..., None])  # (2, shares, n)
+    parts = np.array(loop.parts(1j * sides))
+    before, after = (parts[0] * parts[1].conj()).imag
+    decided = (before * after < 0) & (np.minimum(abs(before), abs(after)) > ABOVE_NOISE * _spread(h, place))
+    turned = ((parts[:, 0] * parts[:, 1].conj()).real < 0).any(axis=0)
+    nearest = decided.argmax(axis=0)[None]
+    turns = np.take_along_axis(turned, nearest, 0)[0] | ~decided.any(axis=0)
     crosses = (factor > AT_POLE) & (factor < 1 / AT_POLE) & ~turns
     place, factor = place[crosses], factor[crosses]
     factor = held(factor, _spread(lambda w: _factor(loop, w), place), CROSSOVER_DIGITS)

@@ -55,7 +55,6 @@ class Panels:
     is n of the drive's s^n.  `error` is the largest miss between samples, as a share of a part's size on its panel.
     """
 
-    arm: Arm
     band: float
     low: Real
     high: Real
@@ -88,7 +87,7 @@ def loop_panels(arm: Arm, band: float) -> Panels:
         if len(done) + len(waiting) > MOST_PANELS:
             raise ConvergenceError("polynomials do not follow the loop's parts along the axis", high, error)
     lows, highs, parts, errors = zip(*sorted(done, key=lambda each: each[1]), strict=True)
-    return Panels(arm, band, np.array(lows), np.array(highs), np.stack(parts, axis=1), order, max(errors))
+    return Panels(band, np.array(lows), np.array(highs), np.stack(parts, axis=1), order, max(errors))
 
 
 def _panel(arm: Arm, order: int, low: float, high: float) -> tuple[Complex, float]:

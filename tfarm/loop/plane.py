@@ -194,7 +194,7 @@ def gain_map(
     return plane(loop, (vary[0], vary[1]), K1, K2)
 
 
-def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real, band: float | None = None) -> Plane:
+def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real) -> Plane:
     """Return the map over two numbers of the law of a loop, x and y (1-D, ascending), the others constant.
 
     Raises ParameterError for an unknown number, an invalid loop or range; ConvergenceError where poles cannot be
@@ -213,11 +213,9 @@ def plane(loop: Loop, vary: tuple[str, str], x: Real, y: Real, band: float | Non
         return Plane(loop.arm, loop.law, vary, x, y, counts, np.empty((0, 3)), 0.0, [])
     is_counted = vary[0] == "delay" or turns_over(loop, vary[0], across)
     if vary[1] == "delay" or (not is_counted and turns_over(loop, vary[1], up)):
-        turned = plane(loop, (vary[1], vary[0]), y, x, band)
+        turned = plane(loop, (vary[1], vary[0]), y, x)
         return replace(turned, vary=vary, x=x, y=y, unstable=turned.unstable.T.copy(), crossings=[])
-    is_quiet = False
-    if band is None:
-        band, is_quiet = band_of_family(corners)
+    band, is_quiet = band_of_family(corners)
     omega = np.asarray(grid(loop.arm, band))
     lines = [Line(partial(loop.having, vary[0], value), vary[1], *up) for value in x.tolist()]
     family = columns(loop, vary, x, max(map(abs, across)))

@@ -64,12 +64,11 @@ class Varied:
     blur = 0.0
 
     def __post_init__(self) -> None:
-        for key, value in (("from", self.start), ("to", self.stop)):
-            if not math.isfinite(value):
-                raise ParameterError(key=key, value=value, remedy="a finite number")
         if self.start == self.stop:
             raise ParameterError(key="to", value=self.stop, remedy="the range is empty: a locus runs to another value")
         for key, value in (("from", self.start), ("to", self.stop)):
+            if not math.isfinite(value):
+                raise ParameterError(key=key, value=value, remedy="a finite number")
             loop = self.at(value)
             arm, K1 = loop.arm, loop.gains[RATE_GAIN] if loop.gains else 0.0
             if arm.rate_loss and arm.lossless_hub.has_massless_hub and -arm.rate_loss >= K1:
