@@ -22,7 +22,7 @@ from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum.box import Box, winding_number, zeros_in_box
-from tfarm.spectrum.naming import settled
+from tfarm.spectrum.following import settled
 from tfarm.spectrum.table import first_frequency
 
 from .loop import NEAREST_TO_ORIGIN, ORDER_READ_AT, Loop, band_of, by_differences
