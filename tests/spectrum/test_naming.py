@@ -24,6 +24,7 @@ class Known:
     most_halvings: int = 200
 
     least_step = 1e-9
+    plain = 0.1
     blur = alone = 0.0
 
     def near(self, values, guess):

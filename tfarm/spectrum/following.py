@@ -28,8 +28,7 @@ PAST = 4  # values of the predicting polynomials
 MOST_AHEAD = 64  # values predicted at once, at most: memory and time alone
 MOST_DISTANCES = 4_000_000  # between roots at these values: memory alone
 FIRST_STEP = 1e-4  # of the first step: the distance of the value that determines the first slopes
-PLAIN_MOVE = 0.1  # of the distance to the next root: largest distance from the prediction
-PLAIN_IN_COUPLE = 0.2  # the same, for two roots that meet or separate
+IN_COUPLE = 2  # times the largest share of `Family.plain`, for two roots that meet or separate
 ENDS_BEFORE = 0.05  # of its size: distance of a singular point at which a real root right of it ends
 JUMP = 0.5  # of its size: a root found no nearer with the shortest step is lost
 SAME_ROOT = 1e-9  # of its size: distance of two copies of one root
@@ -59,12 +58,14 @@ def settled(function: Callable[..., Analytic], guess: Complex, *values: Real) ->
 class Family(Protocol):
     """A family of functions: `least_step` is the shortest step, as a share of the way, `blur` a negligible distance.
 
+    `plain` is the largest distance of a root from its prediction, as a share of that to the next root.
     There are at most `most_halvings` of steps; a branch that meets the axis needs some 40.  Stray roots, up to the
     share `alone` of all, are followed alone in shorter steps; above 0 there may be real roots that are not listed.
     """
 
     least_step: float
     most_halvings: int
+    plain: float
     alone: float
     blur: float
 
@@ -271,10 +272,10 @@ def which_plain(family: Family, values: Real, guess: Complex, found: Complex, ba
         room = np.minimum(room, abs(found - point[:, None]))
     has_mirror = (base[:, None] == base.conj()).any(axis=1) | (base.imag == 0)
     room = np.where(has_mirror, room, np.minimum(room, 2 * np.minimum(abs(found.imag), abs(base.imag))))
-    near = (moved <= np.where(is_couple, PLAIN_IN_COUPLE, PLAIN_MOVE) * own) & (
+    near = (moved <= np.where(is_couple, IN_COUPLE * family.plain, family.plain) * own) & (
         np.sign(found.imag) == np.sign(guess.imag)
     )
     if family.alone:  # others may be unlisted
         near &= (found.imag != 0) | (moved <= REAL_MOVE * abs(found))
-    same = (near | (guess == 0) | (found == 0)) & (moved <= PLAIN_MOVE * room)
+    same = (near | (guess == 0) | (found == 0)) & (moved <= family.plain * room)
     return np.asarray(np.isnan(guess) | same | (moved <= family.blur))

@@ -89,6 +89,7 @@ class Damping:
 
     least_step = 1e-7
     blur = 0.0
+    plain = 0.05
     alone = 0.15
 
     def __post_init__(self) -> None:
