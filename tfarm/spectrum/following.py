@@ -32,7 +32,7 @@ IN_COUPLE = 2  # times the largest share of `Family.plain`, for two roots that m
 ENDS_BEFORE = 0.05  # of its size: distance of a singular point at which a real root right of it ends
 JUMP = 0.5  # of its size: a root found no nearer with the shortest step is lost
 SAME_ROOT = 1e-9  # of its size: distance of two copies of one root
-NEXT_TO_IT = np.array([0.8, 0.9, 0.95, 0.98, 1.02, 1.05, 1.1, 1.2])  # starts next to a stray real root, of it
+LEFT_OF_IT = np.array([1.02, 1.05, 1.1, 1.2])  # starts left of a real root, of it
 REAL_MOVE = 0.02  # of its size: largest distance of a real root from its prediction next to unlisted ones
 UNLISTED, FARTHEST_UNLISTED = 1e-6, 0.3  # of its size: least and largest distance of an unlisted root
 TURNED = 0.5  # cosine below which the two of a couple have met between two values
@@ -146,18 +146,18 @@ def are_alone(
 
 
 def unlisted(family: Family, value: float, row: Complex, ended: NDArray[np.bool_]) -> Complex:
-    """Return the root next to the one real root that has ended of these (b,), at a value; none if it is among them.
+    """Return the root left of the one real root that has ended of these (b,), at a value; none if it is among them.
 
     The two meet and separate at a right angle: together they are followed in a few steps.
     """
     real = row[ended & (row.imag == 0) & (row != 0)]
     if not family.alone or real.size != 1:
         return row[:0]
-    found = family.near(np.array([value]), real * NEXT_TO_IT[None])[0]
+    found = family.near(np.array([value]), real * LEFT_OF_IT[None])[0]
     found = found[found.imag == 0]
     away = abs(found[:, None] - row[~np.isnan(row)]).min(axis=1)
-    found = found[(away > UNLISTED * abs(found)) & (abs(found - real) < FARTHEST_UNLISTED * abs(real))]
-    return found[np.argsort(abs(found - real))[:1]]
+    left = (real - found).real / abs(real)
+    return np.asarray(found[(away > UNLISTED * abs(found)) & (left > 0) & (left < FARTHEST_UNLISTED)][:1])
 
 
 def with_partners(stray: NDArray[np.bool_], last: Complex) -> NDArray[np.bool_]:
