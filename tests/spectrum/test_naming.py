@@ -124,3 +124,5 @@ def test_a_long_list_of_modes_keeps_their_names():
     long, short = (damped_modes(tfarm.modes(lab, count)) for count in (40, 20))
     assert long.is_assigned.all()
     np.testing.assert_allclose(long.eigenvalues[: len(short.index)], short.eigenvalues, rtol=1e-9)
+    spacing = np.diff(long.eigenvalues[long.index > 23, 0].imag)  # of waves of shear, none of which is left out
+    assert spacing.max() < 2 * spacing.min()
