@@ -21,7 +21,7 @@ from tfarm.exact.characteristic import Analytic, LoopParts
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
 from tfarm.spectrum.box import Box, winding_number, zeros_in_box
-from tfarm.spectrum.naming import settled
+from tfarm.spectrum.following import settled
 from tfarm.spectrum.table import first_frequency
 
 from .lines import Place, parts_of, place_of
@@ -60,6 +60,7 @@ class Varied:
 
     least_step = 1e-10
     most_halvings = 600
+    plain = 0.1
     alone = 0.0
     blur = 0.0
 

@@ -28,8 +28,9 @@ from tfarm.records import record
 from tfarm.schema import Quantity
 
 from .box import TOWARD_SINGULAR, Box, complete_box, filled_box, is_among
+from .following import LOST
 from .frequencies import LISTS_KEPT
-from .naming import LOST, function_of, named
+from .naming import function_of, named
 from .proofs import Disc, disjoint, enclosed, proven_count
 from .shapes import mode_field
 from .table import Modes, first_frequency, modes

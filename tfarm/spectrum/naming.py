@@ -8,29 +8,31 @@ meets the fast zero of the overdamped mode, and the two oscillate again, in shea
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
-from tfarm.exact.characteristic import Analytic, quick_characteristics
-from tfarm.exact.system import System
+from tfarm.exact.characteristic import DIFFERENCE_STEP, quick_characteristics
+from tfarm.exact.compiled import compiled
+from tfarm.exact.layout import readings
+from tfarm.exact.sweep import AXIS, fill_free
+from tfarm.exact.system import Spring, System
+from tfarm.exact.uniform import fill_ends
 
 from .box import REAL_SHARE, Function, newton
-from .following import follow
+from .following import LOST, NEWTON_STEPS, SETTLED, follow
 from .table import Modes, modes
 
 FIRST_SHARE = 1e-3  # of all damping, at most: there an eigenvalue is close to its undamped value
-NEWTON_STEPS = 8  # from a close guess: others are followed in shorter steps
-SETTLED = 1e-10  # of its size: the largest last step of a converged zero
 DECADES = 3  # of the share at a time, which scale the shortest step
 HALVINGS = (250, *[80] * 8)  # of steps, after which stray branches are lost and the others followed
 LATE_HALVINGS = 8  # after the steps that there are in all: roots that are stray are soon lost
 AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])  # starts next to a guess, of it
 NEAR_REAL = 1e-7  # of its size: the imaginary part of a double zero is rounding
-LOST = complex(np.nan, np.nan)
+NO_ENDS, NO_OUTPUT = np.empty((0, 4)), np.empty((0, 9))  # tables of no output, of a uniform link and of a chain
 
 
 def function_of(k: System) -> Function:
@@ -38,21 +40,39 @@ def function_of(k: System) -> Function:
     return lambda s: quick_characteristics(k, s, k.at_rest)
 
 
-def settled(function: Callable[..., Analytic], guess: Complex, *values: Real) -> Complex:
-    """Return the zero next to each guess (n,) by Newton's method, a real one for a real guess, or NaN.
-
-    The function is of s and, where these are given, of `values` (n,).
-    """
-    s, still = guess.copy(), ~np.isnan(guess)
-    with np.errstate(all="ignore"):
-        for _ in range(NEWTON_STEPS):
-            if not still.any():
-                break
-            there = function(s[still], *(each[still] for each in values))
-            move = there.value / there.slope
-            s[still] -= np.where(s[still].imag == 0, move.real, move)
-            still[still] = ~(abs(move) <= SETTLED * abs(s[still]))
-    return np.where(still | ~np.isfinite(s), LOST, s)
+@compiled
+def _newton(s: Any, rows: Any, ends: Any, is_uniform: bool, at_rest: int, singular: Any) -> None:
+    """Replace guesses s (n,) by the zeros of D/s^at_rest next to them, or NaN, as `following.settled` does."""
+    moving, count = np.arange(s.size), s.size
+    at, h = np.empty(3 * s.size, np.complex128), np.empty(s.size)
+    found, lost = np.empty((2, 3 * s.size), np.complex128), np.empty(3 * s.size, np.bool_)
+    for _ in range(NEWTON_STEPS):
+        for i in range(count):
+            here, near = s[moving[i]], 1.0
+            for each in singular:
+                near = min(near, abs(1.0 - here / each))
+            h[i] = DIFFERENCE_STEP * max(abs(here) * near, 1e-300)
+            at[3 * i], at[3 * i + 1], at[3 * i + 2] = here, here + h[i], here - h[i]
+        if is_uniform:
+            fill_ends(at[: 3 * count], rows, ends, NO_ENDS, False, found, lost)
+        else:
+            fill_free(at[: 3 * count], rows, ends, AXIS, NO_OUTPUT, found, lost)
+        kept = 0
+        for i in range(count):
+            n, j = moving[i], 3 * i
+            value = found[0, j] / at[j] ** at_rest
+            up = found[0, j + 1] * np.exp(found[1, j + 1] - found[1, j]) / at[j + 1] ** at_rest
+            down = found[0, j + 2] * np.exp(found[1, j + 2] - found[1, j]) / at[j + 2] ** at_rest
+            move = 2.0 * h[i] * value / (up - down)
+            s[n] -= move.real if s[n].imag == 0.0 else move
+            if not abs(move) <= SETTLED * abs(s[n]):
+                moving[kept] = n
+                kept += 1
+        count = kept
+        if count == 0:
+            break
+    for i in range(count):
+        s[moving[i]] = LOST
 
 
 @dataclass
@@ -69,17 +89,31 @@ class Damping:
 
     least_step = 1e-7
     blur = 0.0
+    plain = 0.05
     alone = 0.15
+
+    def __post_init__(self) -> None:
+        """Lay the system out without its damping, and the difference that the whole of it makes."""
+        still, layout = (readings(k, (), 0.0).layout for k in (self.k.with_damping(0.0), self.k))
+        self.rows = still.rows, layout.rows - still.rows
+        self.ends = still.ends, layout.ends - still.ends
+        self.is_uniform = readings(self.k, (), 0.0).ends_table is not None
 
     def near(self, values: Real, guess: Complex) -> Complex:
         """Return the roots next to the guesses (see `Family`)."""
         self.steps_left -= 1
         if self.steps_left < 0:
             self.most_halvings = min(self.most_halvings, LATE_HALVINGS)
-        units = values * self.level
-        systems = [self.k.with_damping(float(share)) for share in values]
-        found = [settled(function_of(k), row / unit) for k, row, unit in zip(systems, guess, units, strict=True)]
-        return np.array(found) * units[:, None]
+        units = (values * self.level)[:, None]
+        found, wanted, singular = guess / units, ~np.isnan(guess), np.array(self.k.singular)
+        (rows, of_rows), (ends, of_ends) = self.rows, self.ends
+        for n, share in enumerate(values.tolist()):
+            here = found[n, wanted[n]]
+            _newton(
+                here, rows + share * of_rows, ends + share * of_ends, self.is_uniform, self.k.at_rest, singular / share
+            )
+            found[n, wanted[n]] = here
+        return found * units
 
     def complete(self, value: float, guess: Complex) -> Complex:
         """Return the roots next to the guesses, with mirror images for guesses below the real axis."""
@@ -105,6 +139,12 @@ def single_zeros(undamped: Modes, share: float = 1.0) -> list[float]:
     return turning + ([-1.0 / float(k.drive.lag)] if k.drive.lag else [])
 
 
+def has_other_damping(k: System) -> bool:
+    """Whether a part other than a segment dissipates."""
+    dashpots = any(each.damping for each in k.elements if isinstance(each, Spring))
+    return bool(dashpots or k.drive.friction or k.drive.back_emf)
+
+
 def named(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
     """Return the eigenvalues of `single_zeros` (m,) and of the first `count` flexible modes (count, 2), NaN if lost.
 
@@ -117,11 +157,12 @@ def named(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
     if k.is_undamped:
         return np.array(alone, complex), 1j * np.outer(omega, [1, -1])
     family = Damping(k, k.damping or 1.0, HALVINGS[0], steps)
-    slowest = [omega[0] / abs(each) for each in alone]
-    share = FIRST_SHARE * min(1.0, 1 / (family.level * omega[-1]) if k.damping else 1.0, *slowest)
-    upper = settled(function_of(k.with_damping(share)), np.r_[single_zeros(undamped, share), 1j * omega])
+    sizes = [omega[-1] * k.damping, *(abs(each) / omega[0] for each in alone), *[1.0] * has_other_damping(k)]
+    share = min(1.0, FIRST_SHARE / max(sizes))
+    unit = share * family.level
+    (upper,) = family.near(np.array([share]), unit * np.r_[single_zeros(undamped, share), 1j * omega][None])
     pairs = np.stack([upper[len(alone) :], upper[len(alone) :].conj()], axis=1)
-    start = np.r_[upper[: len(alone)], pairs.ravel()] * (share * family.level)
+    start = np.r_[upper[: len(alone)], pairs.ravel()]
     ends = np.geomspace(share, 1.0, 1 + math.ceil(-math.log10(share) / DECADES))[1:].tolist()
     for family.most_halvings in HALVINGS:
         try:
@@ -132,7 +173,7 @@ def named(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
         except ConvergenceError as lost:
             (share, start), stray = lost.best, lost.residual
             start = np.where(stray, LOST, start)
-    found = np.full(start.size, LOST) if ends else settled(function_of(k), start / family.level)
+    found = np.full(start.size, LOST) if ends else family.near(np.ones(1), start[None])[0] / family.level
     again = np.triu(abs(found[:, None] - found) <= REAL_SHARE * abs(found), 1).any(axis=0)
     found[again] = LOST
     return in_pairs(found[: len(alone)], found[len(alone) :].reshape(-1, 2))
