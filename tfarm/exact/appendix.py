@@ -79,10 +79,8 @@ class Appendix:
 
     def Delta_k(self, i: int) -> Number:
         """Return Delta with (0, 0, 0, U) for its column i."""
-        a = [row.copy() for row in self.a]
-        for row, right_side in zip(a, (0, 0, 0, 1), strict=True):
-            row[i - 1] = mpf(right_side)
-        return _determinant(a)
+        rows = zip(self.a, (0, 0, 0, 1), strict=True)
+        return _determinant([[*row[: i - 1], mpf(right_side), *row[i:]] for row, right_side in rows])
 
     @cached_property
     def k(self) -> list[Number]:

@@ -26,7 +26,7 @@ import math
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from functools import cached_property, reduce
-from operator import add, mul
+from operator import mul
 from typing import Any, NamedTuple
 
 import flint
@@ -41,7 +41,7 @@ from .layout import UNIT, Layout, laid_out, readings
 from .outputs import OUTPUTS, Output
 from .rationals import polynomials
 from .system import Place, Segment, System
-from .values import free_outputs, free_slopes
+from .values import free_of, free_slopes
 from .waves import Plane, Row
 
 FED = tuple(OUTPUTS[gain.output] for gain in GAINS)
@@ -110,8 +110,9 @@ def difference_steps(k: System, s: Complex) -> Real:
 
 def loop_parts(k: System, s: NDArray[Any]) -> LoopParts:
     """Return drive, numerators and scale at s, with D = drive + gains . numerators."""
-    free = free_outputs(k, FED, np.asarray(s, dtype=complex).ravel(), 0.0)
-    numerators = free.outputs / float_units(k)
+    layout = readings(k, FED, 0.0)
+    free = free_of(layout, np.asarray(s, dtype=complex).ravel())
+    numerators = free.outputs / layout.table[:, UNIT, None]
     return LoopParts(*(part.reshape(*part.shape[:-1], *s.shape) for part in (free.drive, numerators, free.scale)))
 
 
@@ -246,8 +247,7 @@ def _fed_back(sweep: Sweep, law: Feedback | None) -> Any:
         for polynomial in (law.whole, *law.entries)
     )
     parts = [p * sweep.output(one) for p, one in zip(entries, law.read.each, strict=True)]
-    value = sweep.input * whole
-    return value + (s * rational(-law.delay)).exp() * reduce(add, parts) if parts else value
+    return sweep.input * whole + (s * rational(-law.delay)).exp() * sum(parts, 0 * s)
 
 
 def feedback(k: System, law: Law, outputs: Sequence[Output], shares: Sequence[float]) -> Feedback:

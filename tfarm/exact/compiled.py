@@ -19,6 +19,7 @@ from numba.core.extending import intrinsic
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _HERE = Path(__file__).parent
+OPTIONS = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
 
 
 def compiled(function: _Function) -> _Function:
@@ -29,16 +30,16 @@ def compiled(function: _Function) -> _Function:
     parent = config.CACHE_DIR
     config.CACHE_DIR = str(Path(parent or _HERE / "__pycache__") / f"tfarm-{_SOURCE_HASH}")
     try:
-        return njit(cache=True, error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
+        return njit(cache=True, **OPTIONS)(function)
     except (RuntimeError, OSError):  # no folder for the cache can be written
-        return njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
+        return njit(**OPTIONS)(function)
     finally:
         config.CACHE_DIR = parent
 
 
 def inlined(function: _Function) -> _Function:
     """Return a small function compiled and inlined into its callers, so that loops over it vectorise."""
-    return njit(error_model="numpy", forceinline=True, no_cfunc_wrapper=True)(function)
+    return njit(forceinline=True, **OPTIONS)(function)
 
 
 def python_of(function: Any) -> Callable[..., Any]:

@@ -230,13 +230,7 @@ def constant_of(k: System, wanted: Output, x: float) -> int | None:
         return {"M": -1 if free_pin else None, "Q": None, "Psi": 1 if locked else None}.get(wanted.quantity, 0)
     if at != 1:
         return None
-    tip = {
-        "M": 0 if k.tip_inertia == 0 else None,
-        "Q": 0 if k.tip_mass == 0 else None,
-        "W": 0 if pinned else None,
-        "centre": 0 if pinned else None,
-        "Y": -1 if pinned and locked else None,
-        "Phi": -1 if clamped and locked else None,
-        "Psi": 0 if clamped else None,
-    }
-    return tip.get(wanted.quantity)
+    is_zero = {"M": k.tip_inertia == 0, "Q": k.tip_mass == 0, "W": pinned, "centre": pinned, "Psi": clamped}
+    if is_zero.get(wanted.quantity, False):
+        return 0
+    return -1 if locked and {"Y": pinned, "Phi": clamped}.get(wanted.quantity, False) else None

@@ -176,7 +176,8 @@ def cut(elements: Sequence[Placed]) -> tuple[Element, ...]:
         else:
             found.append(each)
         if inner_end < position:
-            found.append(segment.piece((position - inner_end) / segment.length))
+            length = position - inner_end
+            found.append(segment if length == segment.length else segment.piece(length / segment.length))
     return tuple(found)
 
 

@@ -60,10 +60,10 @@ class Free(NamedTuple):
 
 def free_outputs(chain: System, wanted: Sequence[Output], s: Complex, x: float) -> Free:
     """Return the free response at s (1-D), with outputs in SI for one unit of the drive."""
-    return _free(readings(chain, tuple(wanted), x), s)
+    return free_of(readings(chain, tuple(wanted), x), s)
 
 
-def _free(layout: Layout, s: Complex) -> Free:
+def free_of(layout: Layout, s: Complex) -> Free:
     """Return the free response of a layout."""
     found, lost = _filled(layout, s)
     return Free(found[0], found[2:], found[1], lost)
@@ -85,11 +85,11 @@ def _filled(layout: Layout, s: Complex, *, per_input: bool = False) -> tuple[Com
 def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -> tuple[Free, Free]:
     """Return the free response and its derivative at s (1-D), by Cauchy's integral on a circle, to rounding."""
     layout = readings(chain, tuple(wanted), x)
-    here = _free(layout, s)
+    here = free_of(layout, s)
     radius = SLOPE_RADIUS * np.maximum(abs(s), 1e-150) / np.maximum(1.0, abs(here.scale))
     for C in {each.damping for each in chain.segments if each.damping}:
         radius = np.minimum(radius, CLEAR_OF_SINGULAR * abs(s + 1.0 / C))
-    circle = _free(layout, (s[:, None] + radius[:, None] * SLOPE_CIRCLE).ravel())
+    circle = free_of(layout, (s[:, None] + radius[:, None] * SLOPE_CIRCLE).ravel())
     scales = circle.scale.reshape(-1, SLOPE_CIRCLE.size)
     here = here._replace(scale=np.where(np.isfinite(here.scale), here.scale, scales[:, 0]))
     values, slope = np.exp(scales - here.scale[:, None]), 1.0 / SLOPE_CIRCLE / radius[:, None]
@@ -235,9 +235,10 @@ def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0
             return None
         parts = zip(vanish, (value.real, value.imag), strict=True)
         known = [flint.arb(0) if is_zero else part for is_zero, part in parts]
+        if not all(each.is_zero() or each.rel_accuracy_bits() >= 3.33 * digits + 8 for each in known):
+            return None
         re, im = ("0.0" if each.is_zero() else str(each.mid().str(digits, radius=False)) for each in known)
-        enough = 3.33 * digits + 8
-        return (re, im) if all(each.is_zero() or each.rel_accuracy_bits() >= enough for each in known) else None
+        return re, im
 
     return certified(4 * digits, attempt, f"{digits} digits", s)
 

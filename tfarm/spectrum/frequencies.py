@@ -117,8 +117,9 @@ class AxisSweep(Sweep):
 
     def _joined(self, element: Any, p: Plane) -> Plane:
         a, b, g, *_ = element
-        own, EI, gS = real_waves(a, b, g, self.S), element.stiffness, self.S * element.of_chain[2]
-        one, two = (in_chain(wave, element.length) for wave in own)
+        own, l, EI = real_waves(a, b, g, self.S), element.length, element.stiffness
+        one, two = (in_chain(wave, l) for wave in own)
+        gS = self.S * g * EI / l**4
         gap = one[2] - two[2]
         unit = 1 / (gS * EI * gap * gap)
         inside = tuple(part * unit for part in across_waves(one, two, gS, EI, p))
