@@ -32,7 +32,7 @@ HALVINGS = (250, *[80] * 8)  # of steps, after which stray branches are lost and
 LATE_HALVINGS = 8  # after the steps that there are in all: roots that are stray are soon lost
 AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])  # starts next to a guess, of it
 NEAR_REAL = 1e-7  # of its size: the imaginary part of a double zero is rounding
-NO_ENDS, NO_OUTPUT = np.empty((0, 4)), np.empty((0, 9))  # tables of no output, of a uniform link and of a chain
+NO_ENDS, NO_OUTPUT = np.empty((0, 4)), np.empty((0, 8))  # tables of no output, of a uniform link and of a chain
 
 
 def function_of(k: System) -> Function:
@@ -94,7 +94,7 @@ class Damping:
 
     def __post_init__(self) -> None:
         """Lay the system out without its damping, and the difference that the whole of it makes."""
-        still, layout = (readings(k, (), 0.0).layout for k in (self.k.with_damping(0.0), self.k))
+        still, layout = (readings(k, (), 0.0) for k in (self.k.with_damping(0.0), self.k))
         self.rows = still.rows, layout.rows - still.rows
         self.ends = still.ends, layout.ends - still.ends
         self.is_uniform = readings(self.k, (), 0.0).ends_table is not None
