@@ -33,7 +33,8 @@ from tfarm.spectrum.table import first_frequency
 
 LONGEST_DELAY_SAMPLES = 20.0  # samples: end of the search of a delay margin
 MOST_STEPS = 2000  # of a scan of the delay
-LONGEST_SCAN_STEP, STEPS_A_TURN = 0.05, 12  # samples, and steps in a turn of the fastest mode that may be unstable
+LONGEST_SCAN_STEP = 0.1  # samples: 18 degrees of a pole at z = -1
+STEPS_A_TURN = 12  # of the fastest mode that may be unstable
 PUSH_ROOM = 4  # times the first-order shift of a pole by the feedback: a mode with more damping stays stable
 DELAY_KNOWN = 1e-10  # samples: tolerance of a delay margin
 CLEARLY = 1e-6  # within the circle: an eigenvalue there is not polished, as even a double one has an error of 1e-7

@@ -394,17 +394,17 @@ def _settle(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> Real:
         for _ in range(MOST_STEPS):
             o = offset[rows]
             f, slope, apart = _weierstrass(base, offset, rows, loop)
-            rounding = loop.rounding(base[rows], o)
             W = np.nan_to_num(f / slope, posinf=0.0, neginf=0.0)
             others = W / apart[:, rows]
             np.fill_diagonal(others, 0.0)
             step = np.nan_to_num(W / (1 + others.sum(axis=1)), posinf=0.0, neginf=0.0)
             moving = abs(step) > LAST_STEP * abs(o)
-            if not (moving & (abs(f) > rounding)).any():
-                break
             offset[rows] = np.where(abs(o - step) < UNMOVED, UNMOVED, o - step)
-        radius = offset.size * (abs(f) + rounding) / abs(slope)
-    offset[abs(offset) <= UNMOVED] = 0.0
+            if (abs(f[moving]) <= loop.rounding(base[rows[moving]], o[moving])).all():
+                break
+        offset[abs(offset) <= UNMOVED] = 0.0
+        f, slope, _ = _weierstrass(base, offset, rows, loop)
+        radius = offset.size * (abs(f) + loop.rounding(base[rows], offset[rows])) / abs(slope)
     own = np.where(base[rows] < loop.pulse.poles.size, 0.0, MACHINE_EPS * abs(loop.open_loop[base[rows]]))
     return np.asarray(np.nan_to_num(radius, posinf=0.0) + own)  # of a pole that the loop does not move 0/0
 
