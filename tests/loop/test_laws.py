@@ -17,7 +17,7 @@ from tests.loop.law_counts import judge, returned, some_delay, some_law
 from tests.shared import remember, sized, thinned
 from tests.shell import run
 from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
-from tfarm.loop.lines import through_infinity, unstable_below
+from tfarm.loop.lines import through_infinity, unstable_below, with_numbers
 from tfarm.loop.loop import Loop
 from tfarm.loop.margins import loop_margins
 from tfarm.loop.plane import between, plane
@@ -306,6 +306,7 @@ LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], 
             (("delay", "gain"), (0, 0.03), (-1, 9)),
             (("gain", "delay"), (-1, 9), (0, 0.03)),
             (("hub_angle.den.0", "gain"), (0.001, 0.1), (-1, 60)),
+            (("gain", "hub_angle.num.0"), (-1, 9), (-1, 10)),
         ],
         2,
     ),
@@ -315,7 +316,7 @@ def test_counts_are_those_of_full_searches(vary, x, y, points):
     found = plane(Loop(LAB, LAW), vary, between(*x, 8), between(*y, 10))
     assert len(np.unique(found.unstable)) > 2
     for i, j in np.random.default_rng(1).integers((8, 10), size=(points, 2)):
-        law = LAW.having(vary[0], found.x[i]).having(vary[1], found.y[j])
+        law = with_numbers(LAW, dict(zip(vary, (found.x[i], found.y[j]), strict=True)))
         assert stability(LAB, law, found.band).unstable_roots == found.unstable[j, i], law
 
 
