@@ -232,21 +232,20 @@ def circle_angles(pulse: PulseTransfer) -> Real:
     return np.unique(np.r_[np.linspace(0, np.pi, EVEN_ANGLES + 1)[1:], close[(close > 0) & (close <= np.pi)]])
 
 
-DOUBLINGS = 6  # of the samples of a block
-
-
 def outputs(A: Real, B: Real, C: Real, signals: Real, first: int) -> Real:
     """C x_k (outputs, samples, laws), k >= `first`, of x_{k+1} = A x_k + B r_k, x_0 = 0, signals r (inputs, samples).
 
-    A block of samples is one product with its first state and its signals.  The last block has zeros at its end.
+    A block of samples, half the root of their number, is one product with its first state and its signals.  The last
+    block has zeros at its end.
     """
-    (laws, n, inputs), seen, size = B.shape, C.shape[1], 2**DOUBLINGS
+    (laws, n, inputs), seen, doublings = B.shape, C.shape[1], max(int(np.log2(signals.shape[1]) / 2) - 1, 0)
+    size = 2**doublings
     blocks = signals.shape[1] // size + 1
     r = np.zeros((inputs, blocks * size))
     r[:, : signals.shape[1]] = signals
     r = r.reshape(inputs, blocks, size).transpose(2, 0, 1).reshape(-1, blocks)
     rows, columns, power = C, B, A
-    for _ in range(DOUBLINGS):  # C, C A, ...; ..., A B, B
+    for _ in range(doublings):  # C, C A, ...; ..., A B, B
         rows = np.concatenate([rows, rows @ power], axis=1)
         columns = np.concatenate([power @ columns, columns], axis=2)
         power = power @ power

@@ -2,9 +2,10 @@
 
 SciPy's differential evolution (Storn and Price, 1997) uses no slopes, so that it works along edges, where the largest
 of several values has none.  Each run begins with other points of Sobol's sequence, which leaves no large gap; one more
-begins with the best points of all, and of more than two coefficients another near the best.  The simplex of Nelder and
-Mead is the end.  Runs may leave bounds that are neither given nor physical ends; where the best law is beyond a bound,
-that of the wider region is returned.
+begins with the best points of all, and of more than two coefficients others near the best, as long as that gains.  The
+simplex of Nelder and Mead is the end.  A law is left as soon as its score is above that of the point it is to replace.
+Runs may leave bounds that are neither given nor physical ends; where the best law is beyond a bound, that of the wider
+region is returned.
 """
 
 from __future__ import annotations
