@@ -89,7 +89,6 @@ class Damping:
 
     least_step = 1e-7
     blur = 0.0
-    plain = 0.1
     alone = 0.15
 
     def __post_init__(self) -> None:
