@@ -13,9 +13,9 @@ enough values to be smooth, and each branch is named after the mode where it beg
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
@@ -29,8 +29,8 @@ from tfarm.dsp.sampled import Sampled
 from tfarm.records import record
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
-from tfarm.spectrum.following import assigned, follow
 
+FOLLOWING_STEPS = 24  # of the continuation from zero gain
 FIRST_SCALE = 1e-6  # of the gains: there each pole is still at that of the plant
 LOOPS_KEPT = 4  # whose origins are kept: memory against time, of no effect on a result
 SAMPLED_LOCUS_VALUES = 61  # of a gain along its locus, to begin with
@@ -115,29 +115,15 @@ def mode_table(loop: Sampled) -> ModeTable:
     )
 
 
-@dataclass
-class Eigenvalues:
-    """The family of sampled loops as one number varies (see `following.Family`): all `poles` z at each value."""
+def followed_branches(poles: Sequence[Complex], values: Real) -> Complex:
+    """The poles at each of the values, in any order, as branches (values, poles): each column is continuous.
 
-    poles: Callable[[float], Complex]
-
-    least_step = 1e-10
-    most_halvings = 600
-    plain = 0.3
-    alone = 0.0
-    blur = 1e-4  # between poles that decay within a sample the order is of no effect
-
-    def near(self, values: Real, guess: Complex) -> Complex:
-        """Return the poles (m, b) in the order of the guesses, by the assignment of least total distance."""
-        return np.array([assigned(self, value, row) for value, row in zip(values.tolist(), guess, strict=True)])
-
-    def complete(self, value: float, guess: Complex) -> Complex:
-        """Return all poles at a value."""
-        return self.poles(value)
-
-    def singular(self, values: Real) -> Real:
-        """Return no points."""
-        return np.empty((values.size, 0))
+    The values must be close enough for branches to be distinguished.
+    """
+    rows: list[Complex] = []
+    for number, z in enumerate(poles):
+        rows.append(z if not rows else z[_matched(_ahead(rows, values[max(0, number - 2) : number + 1]), z)])
+    return np.array(rows)
 
 
 @lru_cache(maxsize=LOOPS_KEPT)
@@ -149,12 +135,15 @@ def origins(loop: Sampled) -> NDArray[np.int64]:
     """
     open_loop = np.r_[loop.pulse.multipliers, 1 + loop.in_z.poles]
     labels = np.nonzero(np.r_[loop.pulse.poles != 0, loop.in_z.poles + 1 != 0])[0]
-    family = Eigenvalues(lambda scale: loop.times(scale).eigenvalues)
-    start = assigned(family, FIRST_SCALE, open_loop[labels])
-    ahead, z = follow(family, np.array([FIRST_SCALE, 1.0]), start)[1], family.poles(1.0)
-    rows, order = linear_sum_assignment(abs(ahead[:, None] - z))
+    ahead, rows = open_loop[labels], []
+    scales = np.r_[FIRST_SCALE, np.arange(1, FOLLOWING_STEPS + 1) / FOLLOWING_STEPS, 1.0]
+    for number, scale in enumerate(scales[:-1]):
+        z = loop.times(float(scale)).eigenvalues
+        order = _matched(ahead, z)
+        rows.append(z[order])
+        ahead = _ahead(rows, scales[max(0, number - 1) : number + 2])
     origin = np.full(z.size, -1)
-    origin[order] = labels[rows]
+    origin[order] = labels
     origin.flags.writeable = False
     return origin
 
@@ -169,6 +158,20 @@ def dominant(loop: Sampled) -> str:
         return "a pole of the law"
     mode, rings = (int(loop.pulse.mode[origin]), loop.pulse.poles[origin].imag != 0) if origin >= 0 else (0, False)
     return f"mode {mode}" if mode else "an unassigned mode" if rings else "the hub"
+
+
+def _ahead(rows: list[Complex], values: Real) -> Complex:
+    """Extrapolation of the branches to the last of the values, from the rows at the others."""
+    if len(rows) < 3:
+        return rows[-1]
+    before, last, wanted = values
+    return rows[-1] + (wanted - last) / (last - before) * (rows[-1] - rows[-2])
+
+
+def _matched(ahead: Complex, z: Complex) -> NDArray[np.int64]:
+    """The poles in the order of the branches that they continue: the assignment of least total distance."""
+    _, order = linear_sum_assignment(abs(ahead[:, None] - z))
+    return order
 
 
 # ------------------------------------------------------------ loci
@@ -221,19 +224,21 @@ def sampled_loci(loop: Sampled, top: float, moments: tuple[float, float]) -> Sam
 def sampled_locus(loop: Sampled, gain: str, values: Real) -> SampledLocus:
     """Return the locus of a number at these values, at that of the loop, and between where a branch turns."""
 
-    @cache
     def poles(value: float) -> Complex:
         z = loop.having(**{gain: value}).poles.z
         return np.where(abs(z.imag) <= IMAGINARY_ROUNDING, z.real, z)
 
+    known: dict[float, Complex] = {}
     own = loop.number(gain)
-    values = np.union1d(values, own) if values[0] < own < values[-1] else values
+    wanted = np.union1d(values, own) if values[0] < own < values[-1] else values
     for _ in range(BRANCH_ROUNDS):
-        z = follow(Eigenvalues(poles), values, poles(float(values[0])))
+        known |= {value: poles(value) for value in wanted.tolist() if value not in known}
+        values = np.array(sorted(known))
+        z = followed_branches([known[value] for value in values.tolist()], values)
         bent = loose(np.where((z.imag >= 0) & (abs(z) < DRAWN_RADIUS), z, np.nan).T, 2 * RIM, 2 * RIM)
         if not bent.any():
             break
-        values = np.union1d(values, (values[:-1] + values[1:])[bent] / 2)
+        wanted = (values[:-1] + values[1:])[bent] / 2
     first = loop.having(**{gain: float(values[0])})
     origin = origins(first)
     modes = np.r_[loop.pulse.mode, np.zeros(loop.in_z.poles.size, np.int64)]

@@ -60,7 +60,6 @@ class Varied:
 
     least_step = 1e-10
     most_halvings = 600
-    plain = 0.1
     alone = 0.0
     blur = 0.0
 

@@ -12,7 +12,7 @@ The functions are real on the real axis: both of a conjugate pair have a column,
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,13 +28,11 @@ PAST = 4  # values of the predicting polynomials
 MOST_AHEAD = 64  # values predicted at once, at most: memory and time alone
 MOST_DISTANCES = 4_000_000  # between roots at these values: memory alone
 FIRST_STEP = 1e-4  # of the first step: the distance of the value that determines the first slopes
-IN_COUPLE = 2  # times the largest share of `Family.plain`, for two roots that meet or separate
+PLAIN_MOVE = 0.1  # of the distance to the next root: largest distance from the prediction
+PLAIN_IN_COUPLE = 0.2  # the same, for two roots that meet or separate
 ENDS_BEFORE = 0.05  # of its size: distance of a singular point at which a real root right of it ends
 JUMP = 0.5  # of its size: a root found no nearer with the shortest step is lost
 SAME_ROOT = 1e-9  # of its size: distance of two copies of one root
-LEFT_OF_IT = np.array([1.02, 1.05, 1.1, 1.2])  # starts left of a real root, of it
-REAL_MOVE = 0.02  # of its size: largest distance of a real root from its prediction next to unlisted ones
-UNLISTED, FARTHEST_UNLISTED = 1e-6, 0.3  # of its size: least and largest distance of an unlisted root
 TURNED = 0.5  # cosine below which the two of a couple have met between two values
 
 
@@ -58,14 +56,12 @@ def settled(function: Callable[..., Analytic], guess: Complex, *values: Real) ->
 class Family(Protocol):
     """A family of functions: `least_step` is the shortest step, as a share of the way, `blur` a negligible distance.
 
-    `plain` is the largest distance of a root from its prediction, as a share of that to the next root.
     There are at most `most_halvings` of steps; a branch that meets the axis needs some 40.  Stray roots, up to the
-    share `alone` of all, are followed alone in shorter steps; above 0 there may be real roots that are not listed.
+    share `alone` of all, are followed alone in shorter steps.
     """
 
     least_step: float
     most_halvings: int
-    plain: float
     alone: float
     blur: float
 
@@ -104,20 +100,14 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
         are_plain = which_plain(family, at, guess, found, last)
         good = int(np.argmin(np.r_[are_plain.all(axis=1), False]))
         if not good and len(block) == 1:
-            more = unlisted(family, before, last, np.isnan(found[0]))
-            if more.size and last.size == start.size:
-                past = [(value, np.r_[row, np.full(more.size, np.nan)]) for value, row in past[:-1]]
-                past.append((before, np.r_[last, more]))
-                continue
             stray = ~are_plain[0]
-            known = before, last[: start.size], stray[: start.size]
             if stray.mean() <= family.alone:
-                good = int(are_alone(family, np.array([before, at[0]]), last, found[0], stray, known))
+                good = int(are_alone(family, before, float(at[0]), last, found[0], stray))
             if not good and abs(at[0] - before) > family.least_step * span:
                 ahead.append(((before + float(at[0])) / 2, 0))
                 halvings += 1
                 if halvings > family.most_halvings:
-                    raise ConvergenceError(f"branches are not separable beyond {before:.10g}", known[:2], known[2])
+                    raise ConvergenceError(f"branches are not separable beyond {before:.10g}", past[-1], stray)
             elif not good:
                 near, good = assigned(family, float(at[0]), guess[0]), 1
                 found = np.where((abs(near - last) > JUMP * abs(last)) & (last != 0), np.nan, near)[None]
@@ -125,39 +115,24 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
         del ahead[len(ahead) - good :]
         for (value, n), row in zip(block[:good], found[:good], strict=True):
             if n:
-                rows[n] = row[: start.size]
+                rows[n] = row
             past = [*past, (value, np.where(is_over(family, value, row), np.nan, row))][-PAST:]
     return rows
 
 
 def are_alone(
-    family: Family, values: Real, last: Complex, found: Complex, stray: NDArray[np.bool_], known: Any
+    family: Family, before: float, value: float, last: Complex, found: Complex, stray: NDArray[np.bool_]
 ) -> bool:
-    """Whether stray roots and their partners, followed alone between two values into `found`, differ from others.
+    """Whether stray roots and their partners, followed alone from `before` to a value into `found`, differ from others.
 
-    Raises ConvergenceError with what is `known` where one of them is lost.
+    Raises ConvergenceError as `follow` where one of them is lost.
     """
     stray = with_partners(stray, last)
     try:
-        found[stray] = follow(family, values, last[stray])[1]
+        found[stray] = follow(family, np.array([before, value]), last[stray])[1]
     except ConvergenceError as lost:
-        raise ConvergenceError(str(lost), known[:2], stray[: known[2].size]) from None
+        raise ConvergenceError(str(lost), (before, last), stray) from None
     return not (distances(found).min(axis=1) <= SAME_ROOT * abs(found)).any()
-
-
-def unlisted(family: Family, value: float, row: Complex, ended: NDArray[np.bool_]) -> Complex:
-    """Return the root left of the one real root that has ended of these (b,), at a value; none if it is among them.
-
-    The two meet and separate at a right angle: together they are followed in a few steps.
-    """
-    real = row[ended & (row.imag == 0) & (row != 0)]
-    if not family.alone or real.size != 1:
-        return row[:0]
-    found = family.near(np.array([value]), real * LEFT_OF_IT[None])[0]
-    found = found[found.imag == 0]
-    away = abs(found[:, None] - row[~np.isnan(row)]).min(axis=1)
-    left = (real - found).real / abs(real)
-    return np.asarray(found[(away > UNLISTED * abs(found)) & (left > 0) & (left < FARTHEST_UNLISTED)][:1])
 
 
 def with_partners(stray: NDArray[np.bool_], last: Complex) -> NDArray[np.bool_]:
@@ -272,10 +247,8 @@ def which_plain(family: Family, values: Real, guess: Complex, found: Complex, ba
         room = np.minimum(room, abs(found - point[:, None]))
     has_mirror = (base[:, None] == base.conj()).any(axis=1) | (base.imag == 0)
     room = np.where(has_mirror, room, np.minimum(room, 2 * np.minimum(abs(found.imag), abs(base.imag))))
-    near = (moved <= np.where(is_couple, IN_COUPLE * family.plain, family.plain) * own) & (
+    near = (moved <= np.where(is_couple, PLAIN_IN_COUPLE, PLAIN_MOVE) * own) & (
         np.sign(found.imag) == np.sign(guess.imag)
     )
-    if family.alone:  # others may be unlisted
-        near &= (found.imag != 0) | (moved <= REAL_MOVE * abs(found))
-    same = (near | (guess == 0) | (found == 0)) & (moved <= family.plain * room)
+    same = (near | (guess == 0) | (found == 0)) & (moved <= PLAIN_MOVE * room)
     return np.asarray(np.isnan(guess) | same | (moved <= family.blur))

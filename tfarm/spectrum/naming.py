@@ -23,7 +23,7 @@ from tfarm.exact.system import Spring, System
 from tfarm.exact.uniform import fill_ends
 
 from .box import REAL_SHARE, Function, newton
-from .following import LOST, NEWTON_STEPS, SETTLED, follow
+from .following import LOST, NEWTON_STEPS, SETTLED, follow, settled
 from .table import Modes, modes
 
 FIRST_SHARE = 1e-3  # of all damping, at most: there an eigenvalue is close to its undamped value
@@ -89,7 +89,6 @@ class Damping:
 
     least_step = 1e-7
     blur = 0.0
-    plain = 0.05
     alone = 0.15
 
     def __post_init__(self) -> None:
@@ -173,7 +172,7 @@ def named(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
         except ConvergenceError as lost:
             (share, start), stray = lost.best, lost.residual
             start = np.where(stray, LOST, start)
-    found = np.full(start.size, LOST) if ends else family.near(np.ones(1), start[None])[0] / family.level
+    found = np.full(start.size, LOST) if ends else settled(function_of(k), start / family.level)
     again = np.triu(abs(found[:, None] - found) <= REAL_SHARE * abs(found), 1).any(axis=0)
     found[again] = LOST
     return in_pairs(found[: len(alone)], found[len(alone) :].reshape(-1, 2))
