@@ -46,7 +46,7 @@ MAKERS = {  # of a record: how it is made, and how its repr begins: with the fin
     "margins": (lambda: tfarm.margins(LAB, LAW), "Margins(stability='stable', "),
     "locus": (lambda: locus(LAB, LAW, "K2", 0.0, 2.0, 5, 4), "Locus(finding='a pole becomes unstable at K2 = 1.03054'"),
     "region": (lambda: gain_map(LAB, np.linspace(0.1, 1, 3), np.linspace(0.5, 1.5, 4)), "Plane(finding='stable at 6"),
-    "model": (lambda: modal_model(LAB, ["root_moment"], 4), "ModalModel(arm='sasaki2012-lab', "),
+    "model": (lambda: modal_model(LAB, ["root_moment"], 4), "PartialFractions(arm='sasaki2012-lab', "),
     "sampled": (lambda: tfarm.sampled(LAB, LAW, count=4), "Analysis(verdict='stable', "),
     "sampled map": (small_map, "GainMap(finding='stable at 4 of 4 points', "),
     "slew": (lambda: Simulator(LAB, Chain(), slew(LAB, Chain(), 0.5), count=3).linear(LAW),
