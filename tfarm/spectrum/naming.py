@@ -60,9 +60,15 @@ def _newton(s: Any, rows: Any, ends: Any, is_uniform: bool, at_rest: int, singul
         kept = 0
         for i in range(count):
             n, j = moving[i], 3 * i
+            if at[j] == 0.0:
+                s[n] = LOST
+                continue
             value = found[0, j] / at[j] ** at_rest
             up = found[0, j + 1] * np.exp(found[1, j + 1] - found[1, j]) / at[j + 1] ** at_rest
             down = found[0, j + 2] * np.exp(found[1, j + 2] - found[1, j]) / at[j + 2] ** at_rest
+            if up == down:  # complex division by zero is an error in compiled code
+                s[n] = LOST
+                continue
             move = 2.0 * h[i] * value / (up - down)
             s[n] -= move.real if s[n].imag == 0.0 else move
             if not abs(move) <= SETTLED * abs(s[n]):
