@@ -2,7 +2,7 @@
 
 Whatever tfarm keeps outlives its call in `functools` caches of functions, and in cached properties of systems and
 records, which only those caches and the caller hold on to.  So with the caches emptied, and records made inside the
-call, a call begins as the first one of a process did.
+call, a call begins as the first one of a process did.  The tree of commands, which holds no result, is kept.
 """
 
 import functools
@@ -25,7 +25,8 @@ def _of_module(module):
     for owner in owners:
         for value in vars(owner).values():
             function = getattr(value, "__func__", value)  # of a class method
-            if hasattr(function, "cache_info") and function.__module__ == module.__name__:
+            is_own = hasattr(function, "cache_info") and function.__module__ == module.__name__
+            if is_own and function.__name__ != "whole_command":
                 yield function
 
 
