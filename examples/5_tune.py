@@ -1,4 +1,4 @@
-"""Does a self-tuning neural gain help?  A short training beside the best constant gain and two input shapers."""
+"""Does a self-tuning neural gain help?  A short training compared with the best constant gain and two input shapers."""
 
 import tfarm
 from tfarm.tuner import Plan

@@ -1,4 +1,4 @@
-"""Which gains?  The best damping of two modes that the sampled loop allows, at two clocks."""
+"""Which gains?  The best damping of two modes that the sampled loop allows, at two sampling periods."""
 
 import tfarm
 from tfarm.dsp import Chain, Sampling
@@ -9,4 +9,4 @@ chosen = {chain: tfarm.design(arm, chain=chain) for chain in (slow, fast)}
 for chain, found in chosen.items():
     law, ms = found.law, 1e3 * chain.sampling.period
     print(f"{ms:g} ms: K1 = {law.K1:.4g}, K2 = {law.K2:.4g}, damping {100 * found.value:.4g} %")
-print("the second, at the slower clock:", tfarm.sampled(arm, chosen[fast].law, slow).verdict.word)
+print("the second, at the longer sampling period:", tfarm.sampled(arm, chosen[fast].law, slow).verdict.word)

@@ -307,7 +307,7 @@ def _slowest(arm):
 
 
 def reached(arm, count):
-    """The frequency [rad/s] below which there are about so many: the waves turn by pi times that on their way."""
+    """The frequency [rad/s] below which about `count` lie: the waves turn by pi times that on their way."""
 
     def turns(omega):
         return sum(_wave(link, omega) * link.length for link in arm.links) / math.pi

@@ -21,7 +21,7 @@ from tests.shared import once
 
 SLOW = [HealthCheck.too_slow]
 # Few examples, the same ones each time; `python -m tests.properties SIZE SEED` has others.  How long drawing them takes
-# says something about a busy machine, and nothing about tfarm.
+# depends on how busy the machine is, not on tfarm.
 settings.register_profile(
     "reproducible", deadline=None, derandomize=True, database=None, max_examples=25, suppress_health_check=SLOW
 )
@@ -77,7 +77,7 @@ main()
 def audit_file(tmp_path_factory):
     """The pickled rows of the audit of the paper: some ten seconds of SymPy, once a session.
 
-    By `tfarm audit --json` in a process of its own, whose answer lies beside them as audit.json.
+    By `tfarm audit --json` in a process of its own, whose output is audit.json in the same folder.
     """
     return once(tmp_path_factory, "audit", save_audit)
 
@@ -95,7 +95,7 @@ def audit_rows(audit_file):
 
 @pytest.fixture
 def audited(audit_rows, monkeypatch):
-    """Whoever asks for the audit gets the rows that this session has."""
+    """The audit's rows are those that this session has."""
     for room in ("tfarm.audit", "tfarm.audit.paper"):
         monkeypatch.setattr(f"{room}.audit", lambda: audit_rows)
     return audit_rows

@@ -35,7 +35,7 @@ class Read(HTMLParser):
 
 
 def check_page(page, *wanted, scripts=0):
-    """Each of the texts stands on the page, as text, and nothing on it was made by one."""
+    """Each of the texts is on the page, as text, and none of them made an element."""
     found = Read(page)
     assert found.tags.isdisjoint({"evil", "script" if not scripts else "evil"})
     assert page.count("<script") == page.count("</script") == scripts

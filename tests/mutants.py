@@ -1,6 +1,6 @@
 """Do the tests of a room see a mistake?  python -m tests.mutants SIZE [SEED] [room ...]
 
-In each room SIZE places are drawn where an operator, a comparison or a number stands; one after the other is changed,
+In each room SIZE places are drawn of an operator, a comparison or a number; one after the other is changed,
 in a copy of the project, and the room's own tests are run until one fails, those first that call the changed function.
 Survivors are printed, to be read: some change nothing that matters (a number of steps, a tolerance with room), the
 others want a test.  A change in `exact` costs the compilation of its kernels.
@@ -37,7 +37,7 @@ def places(tree):
 
 
 def change(node):
-    """Change a node in place; the line that it stands on, and what it was and is."""
+    """Change a node in place; return its line, and the text before and after."""
     before = ast.unparse(node)
     if isinstance(node, ast.Constant):
         node.value = node.value + 1 if isinstance(node.value, int) else node.value * 1.5 + (node.value == 0)
@@ -51,12 +51,12 @@ def change(node):
 def mutant(path, number):
     """The text of a file with its place of that number changed, the line, and the change."""
     tree = ast.parse(path.read_text())
-    line, said = change(places(tree)[number])
-    return ast.unparse(tree), line, said
+    line, change_made = change(places(tree)[number])
+    return ast.unparse(tree), line, change_made
 
 
 def function_of(path, line):
-    """The innermost function that a line stands in: its file from the root and its first line, with its decorators."""
+    """The innermost function around a line: its file from the root and its first line, with its decorators."""
     defined = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)]
     around = [node for node in defined if node.lineno <= line <= node.end_lineno]
     inner = max(around, key=lambda node: node.lineno)
@@ -93,14 +93,14 @@ def survey(size, seed, rooms):
                 raise SystemExit(f"tests/{room} fail before anything is changed")
             chosen, killed = drawn(copy / "tfarm" / room, size, rng), 0
             for path, number in chosen:
-                whole, (text, line, said) = path.read_text(), mutant(path, number)
+                whole, (text, line, change_made) = path.read_text(), mutant(path, number)
                 called = function_of(path, line)
                 path.write_text(text)
                 alive = all_pass(copy, room, CALLS_FROM=calls, CALLED=called)
                 path.write_text(whole)
                 killed += not alive
                 if alive:
-                    print(f"survives: {path.relative_to(copy)}:{line} {said}", flush=True)
+                    print(f"survives: {path.relative_to(copy)}:{line} {change_made}", flush=True)
             tally[room] = killed, len(chosen)
             print(f"{room}: {killed} of {len(chosen)} killed", flush=True)
     return tally

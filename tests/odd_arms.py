@@ -1,4 +1,4 @@
-"""Eight legal arms unlike the paper's: what is said of every arm is tried on these.
+"""Eight legal arms unlike the paper's: general claims are tested on these.
 
 Materials and sizes are plausible; C gives 0.1 to 3 % of critical damping in the first mode.
 """

@@ -1,4 +1,4 @@
-"""The outputs that the oracles of the single arm know: those of the closed form that had a name before rigs."""
+"""The outputs of the oracles of the single arm: those of the closed form that had a name before rigs."""
 
 from tfarm.exact.outputs import OUTPUTS
 

@@ -39,7 +39,7 @@ def sized(small, full):
 
 
 def remembered(function):
-    """The function, called once for the same arguments, as they are printed; where a test asks for an answer twice."""
+    """The function, called once for the same arguments, as they are printed; where a test needs an answer twice."""
     answers = {}
 
     def again(*given, **named):
@@ -52,8 +52,6 @@ def remembered(function):
 
 
 def remember(monkeypatch, module, name):
-    """For one test `remembered` stands in the place of a module's function, where several commands ask for the same."""
-    getattr(
-        tfarm, name, None
-    )  # which tfarm keeps once it was asked for: the function, not what stands in its place here
+    """Replace a module's function by its `remembered` form for one test, where several commands call it alike."""
+    getattr(tfarm, name, None)  # tfarm keeps the function once it is read: not the replacement
     monkeypatch.setattr(module, name, remembered(getattr(module, name)))

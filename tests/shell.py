@@ -25,7 +25,7 @@ def heard(err):
 
 
 def refused(capsys, *arguments, code=2):
-    """The one line that a command says where it cannot go on; it prints nothing."""
+    """The one line on standard error of a command that fails; standard output is empty."""
     stopped, out, err = run(capsys, *arguments)
     assert (stopped, out, err.count("\n")) == (code, "", 1)
     return err

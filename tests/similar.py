@@ -1,4 +1,4 @@
-"""The same rig in other units of mass, length and time: dimensional analysis is a second road to every answer.
+"""The same rig in other units of mass, length and time: dimensional analysis is a second method for every answer.
 
 Units that are powers of two change no digit, so that whatever compares a quantity with a plain number shows.
 """

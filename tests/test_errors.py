@@ -18,11 +18,11 @@ def test_a_parameter_error_names_file_key_value_and_remedy():
     assert isinstance(error(), TfarmError)
 
 
-@pytest.mark.parametrize(("own", "told"), [(None, "arm.toml: link"), ("c.mat", "c.mat: link")])
-def test_what_is_read_of_a_file_is_refused_with_its_name_unless_another_is_meant(own, told):
+@pytest.mark.parametrize(("own", "start"), [(None, "arm.toml: link"), ("c.mat", "c.mat: link")])
+def test_an_error_in_a_file_names_that_file_or_its_own(own, start):
     with pytest.raises(ParameterError) as refused, naming("arm.toml"):
         raise error(file=own)
-    assert str(refused.value).startswith(told)
+    assert str(refused.value).startswith(start)
     assert refused.value.__suppress_context__
     with pytest.raises(ConvergenceError), naming("arm.toml"):
         raise ConvergenceError("stopped", 1.0, 0.0)

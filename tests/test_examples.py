@@ -1,4 +1,4 @@
-"""The scripts of examples/, each run as it stands; what it finds is held against another road."""
+"""The scripts of examples/, each run unchanged; its results are compared with a second method."""
 
 import runpy
 from pathlib import Path
@@ -91,12 +91,12 @@ def test_a_fit_finds_the_numbers_that_were_measured(example):
     assert out.startswith("fitted")
 
 
-def test_a_design_for_one_clock_need_not_hold_at_another(example):
+def test_a_design_for_one_sampling_period_may_be_unstable_at_another(example):
     names, out = example(7)
     slow, fast = names["chosen"].values()
     assert slow.value < fast.value
     assert sampled_verdict(names["arm"], slow.law).word == "stable"
-    assert out.endswith("at the slower clock: unstable\n")
+    assert out.endswith("at the longer sampling period: unstable\n")
 
 
 def test_what_is_exported_is_the_rig_and_a_law_that_holds_on_it(example, tmp_path):

@@ -1,4 +1,4 @@
-"""Files as they are found afterwards: whole, in their own place, with nothing beside them."""
+"""Written files are whole, in their own place, and leave no other file."""
 
 import os
 import signal

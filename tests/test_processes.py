@@ -31,7 +31,7 @@ def test_an_error_of_a_task_is_raised_and_the_rest_is_not_begun(tmp_path):
     assert len(os.listdir(tmp_path)) < 9
 
 
-def test_a_process_that_dies_is_an_error_of_one_line():
+def test_a_killed_process_is_an_error_of_one_line():
     with pytest.raises(tfarm.ConvergenceError, match="worker process ended before its work was done") as caught:
         list(shared({"dies": partial(os._exit, 9), "other": time.time}, 2))
     assert "\n" not in str(caught.value)

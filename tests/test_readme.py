@@ -52,7 +52,7 @@ def by_a_shell(line, folder):
     return done.returncode, done.stdout, heard(done.stderr)
 
 
-DEAR = (  # half a second to several, and told elsewhere in nearly the same words
+DEAR = (  # half a second to several, with nearly the same command elsewhere
     "PD+notch", "--digits 30 --certify", "--count 12 --certify", "tfarm compare ", "tfarm bode ", "tfarm locus ",
     "tfarm spill ", "tfarm sampled ", "tfarm assumptions ", "--objective damping",
 )  # fmt: skip

@@ -72,8 +72,8 @@ def inside(value):
 
 
 @pytest.mark.parametrize("name", MAKERS)
-def test_what_the_package_answers_is_frozen_compared_and_short(name) -> None:
-    """A notebook shows what the repr says where it is not cut, an entry a row, and the same entry first."""
+def test_records_are_frozen_comparable_and_short(name) -> None:
+    """A notebook shows the uncut repr, an entry a row, and the same entry first."""
     make, start = MAKERS[name]
     answer, again = make(), make()
     found = list(inside(answer))

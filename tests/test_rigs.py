@@ -1,4 +1,4 @@
-"""Random rigs are legal, various, and as wide as they say; the two oracles agree on them."""
+"""Random rigs are legal, various, and as wide as stated; the two oracles agree on them."""
 
 import math
 from dataclasses import replace
@@ -87,5 +87,5 @@ def test_damped_eigenvalues_are_zeros_of_the_determinant(seed):
             continue  # the rigid body's zero, and the crowd of poles at -1/C
         with mpmath.workdps(60):
             h = mpmath.mpf("1e-20") * abs(s)
-            at, beside = determinant(arm, s), determinant(arm, s + h)
-            assert abs(at * h / (beside - at)) < 1e-7 * abs(s)
+            at, shifted = determinant(arm, s), determinant(arm, s + h)
+            assert abs(at * h / (shifted - at)) < 1e-7 * abs(s)

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).parents[1] / "tfarm"
-UNUSED = re.compile(
-    r"\b(beside|told|tells?|said|says|road|clock|stands|so many|cures?|runs? away|nobody|mend(s|ed)?|bears?|led by|"
-    r"leaves? apart)\b",
-    re.IGNORECASE,
-)
+UNUSED_WORDS = (
+    "beside", "told", "tells?", "said", "says", "road", "clock", "stands", "so many", "cures?", "runs? away", "nobody",
+    "mend(s|ed)?", "bears?", "led by", "leaves? apart",
+)  # fmt: skip
+UNUSED = re.compile(rf"\b({'|'.join(UNUSED_WORDS)})\b", re.IGNORECASE)
 TEMPLATES = [path for path in PACKAGE.rglob("*") if path.suffix in (".html", ".js", ".css", ".md", ".txt")]
 MODULES = sorted(PACKAGE.rglob("*.py"))
 

@@ -30,7 +30,7 @@ ALIASES = {
 
 
 def response(arm, s, outputs, digits=60, input=None):
-    """The outputs (dict of mpc) per unit of an input at one s [1/s], right to about so many digits.
+    """The outputs (dict of mpc) per unit of an input at one s [1/s], right to about `digits` digits.
 
     An output is a name of `ALIASES` (x = inf is the tip), hub_angle, hub_rate, link_angle (behind the joint),
     hub_torque, motor_current or payload_displacement (its centre), or (quantity, x) or (quantity, x, side) with x [m]
@@ -162,7 +162,7 @@ class _Chain:
         return {HUB: -Z, TORQUE: mpf(1), **at_axis}, mpf(0)
 
     def _drive(self):
-        """What the input says of the torque or the angle; its right side is 1, or 0 where the load is elsewhere."""
+        """The input's condition on the torque or the angle; its right side is 1, or 0 where the load is elsewhere."""
         own = mpf(0 if isinstance(self.load, tuple) else 1)
         if self.locked or self.held == "hub_angle":
             return {HUB: mpf(1)}, own

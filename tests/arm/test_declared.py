@@ -1,4 +1,4 @@
-"""A table of the file is what its record's constructor asks for: keys, types and defaults, each declared once."""
+"""A table of the file has the arguments of its record's constructor: keys, types and defaults, each declared once."""
 
 import pytest
 

@@ -18,7 +18,7 @@ from tfarm.arm.writing import law_toml, save_law
 S = np.array([0.3j, 2 + 3j, -1.5 + 40j])
 
 
-def test_what_a_signal_is_multiplied_by_is_what_python_control_says():
+def test_the_transfer_function_of_a_signal_is_that_of_python_control():
     s = control.tf("s")
     notch = 3 * (s**2 + 0.2 * 57 * s + 57**2) / (s + 57) ** 2
     lag = control.ss([[-1.0, 2.0], [0.0, -4.0]], [[0.0], [1.0]], [[2.0, 1.0]], [[0.5]])
@@ -46,7 +46,7 @@ def test_matrices_from_several_signals_are_their_transfer_functions():
         np.testing.assert_allclose(law.values(np.array([s]))[:, 0], expected, rtol=1e-11)  # cond of s - A: 1e3
 
 
-def test_a_sign_and_references_do_what_they_say():
+def test_a_sign_and_references_have_their_effect():
     law = Law({"hub_angle": 2.0}, sign=1)
     assert law.values(S)[0, 0] == -2.0
     matrices = [[-1.0]], [[1.0, 2.0, 3.0]], [[1.0]], [[0.0, 0.0, 0.0]]
@@ -177,7 +177,7 @@ def test_a_mat_file_holds_matrices_or_a_structure_of_them(tmp_path):
         ("[law]", "name at least one signal"),
     ],
 )
-def test_what_a_file_says_wrongly_is_refused_in_a_line_with_its_name(tmp_path, text, words):
+def test_a_wrong_entry_of_a_file_is_refused_in_a_line_with_its_name(tmp_path, text, words):
     scipy.io.savemat(tmp_path / "empty.mat", {"X": [[1.0]]})
     with pytest.raises(ParameterError) as error:
         load_law(written(tmp_path / "law.toml", text))

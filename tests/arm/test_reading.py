@@ -129,7 +129,7 @@ def test_whole_numbers_infinities_and_foreign_line_ends(accepted):
 
 
 BAD_EDITS = {
-    # what: (in the example, instead, what the message says)
+    # what: (in the example, instead, part of the message)
     "missing key": ("length = 1.0 ", "# ", "link.length is missing: give a number without quotes"),
     "missing table": ("[hub]\ninertia = 0.1", "", "hub is missing: give a table, headed [hub]"),
     "missing name": ('name = "sasaki2012"', "", "name is missing: give a text in double quotes"),
@@ -229,7 +229,7 @@ def test_a_file_without_permission(tmp_path, monkeypatch):
     assert "cannot be read (Permission denied); check the path and its permissions" in refusal(path)
 
 
-def test_a_file_without_the_ending_and_a_preset_beside_a_file_of_its_name(tmp_path, monkeypatch):
+def test_a_file_needs_no_ending_and_a_preset_precedes_a_file_of_its_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     other = EXAMPLE.replace("sasaki2012", "other")
     Path("my-arm").write_text(other)

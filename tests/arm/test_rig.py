@@ -115,7 +115,7 @@ LOSSES = {
 
 
 @pytest.mark.parametrize("part", LOSSES)
-def test_undamped_is_said_of_the_whole_rig(part):
+def test_a_rig_is_undamped_only_without_any_loss(part):
     change, undamped = LOSSES[part]
     assert replace(IDLE, **change).is_undamped is undamped
 
@@ -147,7 +147,7 @@ HELD = {
 
 
 @pytest.mark.parametrize("key", HELD)
-def test_a_rig_that_is_held_does_not_turn_and_the_message_says_by_what(key):
+def test_a_held_rig_does_not_turn_and_the_message_names_the_cause(key):
     must_turn(RIG)
     assert RIG.has_rigid_mode
     held = replace(PLAIN, **HELD[key])

@@ -1,4 +1,4 @@
-"""A rig's TOML file: what it may hold, what is refused, and that it says the same after a round trip."""
+"""A rig's TOML file: contents, refusals and round trip."""
 
 import math
 import tomllib
@@ -85,7 +85,7 @@ def test_a_file_holds_all_that_a_rig_has():
     assert arm.payload == Payload(mass=0.1, inertia=3e-5, offset=-0.01)
 
 
-def test_the_loop_s_tables_stand_beside_the_rig_s():
+def test_a_rig_file_may_have_the_tables_of_the_loop():
     assert chain_of_tables(tomllib.loads(RIG + "[sampling]\nperiod = 0.002\n")).sampling.period == 0.002
 
 
@@ -115,7 +115,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("message", REFUSED)
-def test_what_a_rig_s_file_may_not_say_is_refused_with_its_place(message):
+def test_a_wrong_entry_of_a_rig_s_file_is_refused_with_its_place(message):
     with pytest.raises(ParameterError) as caught:
         rig(*REFUSED[message])
     assert str(caught.value).startswith(message)

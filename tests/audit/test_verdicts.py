@@ -46,7 +46,7 @@ def test_there_is_a_row_for_each_and_no_other(rows, audit_rows):
 
 
 @pytest.mark.parametrize("name", VERDICTS)
-def test_residuals_tell_printed_from_corrected(rows, name):
+def test_residuals_distinguish_printed_from_corrected(rows, name):
     row = rows[name]
     assert audit.is_zero(row.residual_corrected)
     assert audit.is_zero(row.residual_printed) == (row.verdict == "ok")

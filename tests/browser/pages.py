@@ -62,7 +62,7 @@ def browser() -> Iterator[Browser]:
 
 
 class Opened:
-    """A page with what it asked for; it may say nothing."""
+    """A page with its requests; any message is an error."""
 
     def __init__(
         self, browser: Browser, file: Path, width: int = 1400, scheme: Any = "light", motion: Any = "no-preference"
@@ -71,12 +71,12 @@ class Opened:
             viewport={"width": width, "height": 900}, color_scheme=scheme, reduced_motion=motion
         )
         self.page: Page = self.context.new_page()
-        self.said: list[str] = []
-        self.asked: list[str] = []
-        self.page.on("console", lambda message: self.said.append(f"{message.type}: {message.text}"))
-        self.page.on("pageerror", lambda error: self.said.append(str(error)))
-        self.page.on("request", lambda request: self.asked.append(request.url))
-        self.page.on("requestfailed", lambda request: self.said.append(f"not there: {request.url}"))
+        self.messages: list[str] = []
+        self.requests: list[str] = []
+        self.page.on("console", lambda message: self.messages.append(f"{message.type}: {message.text}"))
+        self.page.on("pageerror", lambda error: self.messages.append(str(error)))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.on("requestfailed", lambda request: self.messages.append(f"not there: {request.url}"))
         self.page.goto(file.as_uri())
         if file.name == "live.html":
             self.page.wait_for_selector("body[data-ready]", timeout=20_000)
@@ -85,9 +85,9 @@ class Opened:
         return self
 
     def __exit__(self, failed: object, *_: object) -> None:
-        """Close it; a page that said something is wrong."""
+        """Close it; a page with any message fails."""
         self.context.close()
-        assert failed or not self.said, self.asked[0]
+        assert failed or not self.messages, self.requests[0]
 
 
 def set_gains(page: Page, law: HubFeedback) -> None:
@@ -197,9 +197,9 @@ def seen_turns(rows: list[dict[str, float]], frame: dict[str, list[float]], char
         step = np.diff(chart[0] * x + 1j * chart[1] * y)
         is_real = abs(s.imag) < 1e-9 * (high - low)
         inside = (x > 0) & (x < 1) & (y >= 0) & (y < 1)
-        told = inside[1:-1] & ~is_real[1:-1] & ~is_real[:-2] & ~is_real[2:]
+        compared = inside[1:-1] & ~is_real[1:-1] & ~is_real[:-2] & ~is_real[2:]
         seen = np.maximum(abs(step[1:]), abs(step[:-1])) > SEEN
-        found.append(abs(np.degrees(np.angle(step[1:] * step[:-1].conj())))[told & seen])
+        found.append(abs(np.degrees(np.angle(step[1:] * step[:-1].conj())))[compared & seen])
     return np.concatenate(found)
 
 
@@ -255,7 +255,7 @@ def test_the_region_of_a_hub_that_is_held_is_the_librarys(browser, folder, name)
 
 
 @pytest.mark.parametrize("kind", ["displacement", "moment"])
-def test_a_sensor_sees_the_modes_and_has_the_zeros_of_its_place(browser, folder, kind):
+def test_a_sensor_has_the_modes_and_zeros_of_its_place(browser, folder, kind):
     arm = tfarm.load(ARMS[0])
     with Opened(browser, folder / ARMS[0] / "live.html") as opened:
         page = opened.page
@@ -280,7 +280,7 @@ def test_a_sensor_sees_the_modes_and_has_the_zeros_of_its_place(browser, folder,
 
 
 @pytest.mark.parametrize("motion", ["no-preference", "reduce"])
-def test_the_player_plays_when_asked_and_is_still_for_who_wants_that(browser, folder, motion):
+def test_the_player_starts_on_request_and_respects_reduced_motion(browser, folder, motion):
     with Opened(browser, folder / ARMS[0] / "live.html", motion=motion) as opened:
         page = opened.page
         began = page.evaluate("live.player.time")

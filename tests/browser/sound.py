@@ -124,7 +124,7 @@ def test_nothing_is_hidden_and_axe_finds_nothing(browser, request, site, width, 
             assert axe(page) == [], file
             page.emulate_media(color_scheme="light" if scheme == "dark" else "dark")
             assert axe(page, "color-contrast") == [], file
-            assert all(url.startswith(("file://", "data:")) for url in opened.asked), file
+            assert all(url.startswith(("file://", "data:")) for url in opened.requests), file
 
 
 @pytest.mark.parametrize("site", [pytest.param("few", marks=pytest.mark.quick), "full"])
@@ -140,13 +140,13 @@ def test_the_nu_checker_finds_no_error(request, site):
     assert [(each["url"][-60:], each.get("lastLine"), each["message"]) for each in wrong] == []
 
 
-def test_what_a_hostile_text_says_is_read_and_not_run(browser, few):  # noqa: F811
+def test_a_hostile_text_is_shown_and_not_run(browser, few):  # noqa: F811
     for file in sorted(few.rglob("*.html")):
         with Opened(browser, file) as opened:
-            asked: list[str] = []
-            opened.page.on("dialog", lambda dialog, asked=asked: asked.append(dialog.message))
+            dialogs: list[str] = []
+            opened.page.on("dialog", lambda dialog, dialogs=dialogs: dialogs.append(dialog.message))
             opened.page.reload()
-            assert not asked
+            assert not dialogs
             assert (
                 opened.page.evaluate("document.querySelectorAll('evil, body script:not([src]):not([type])').length")
                 == 0

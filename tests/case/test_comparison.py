@@ -1,4 +1,4 @@
-"""Two arms or two laws beside each other: differences known in closed form, and each side what it is alone."""
+"""Comparison of two arms or two laws: differences known in closed form; each side as it is alone."""
 
 from dataclasses import replace
 
@@ -101,7 +101,7 @@ def test_a_loop_of_the_hub_is_paired_with_the_other_hub():
 
 
 def test_a_pole_of_the_law_is_no_mode():
-    """A resonance of the law at 1.15 of mode 1, which feeds back little: the mode keeps its number beside it."""
+    """A resonance of the law at 1.15 of mode 1, which feeds back little: the mode keeps its number."""
     w = 1.15 * float(tfarm.modes(LAB, 1).natural_frequency[-1])
     tuned = tfarm.Law({"hub_rate": ([0.3 * w**2], [1.0, 0.02 * w, w**2]), "hub_angle": 1e-3})
     found = tfarm.compare(LAB, [tfarm.HubFeedback(K1=0.3, Kp=1e-3), tuned], modes=2)
@@ -170,7 +170,7 @@ def test_a_law_of_other_signals_is_mapped_over_factor_and_delay():
 
 
 def test_gains_as_a_law_in_z_are_the_same_loop_at_the_samples():
-    """The same numbers act at the same samples, by another road: poles, factors and delay differ in nothing."""
+    """The same numbers act at the same samples, by another method: poles, factors and delay are equal."""
     found = tfarm.compare(LAB, [LAW, tfarm.Law({"hub_rate": 0.3, "root_moment": 0.3}, period=0.01)], modes=2)
     assert found.is_sampled
     assert [side.verdict for side in found.sides] == ["stable", "stable"]

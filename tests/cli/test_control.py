@@ -94,7 +94,7 @@ def test_what_cannot_be_decided_is_exit_3_with_its_reason(capsys) -> None:
     assert "widen the bounds" in err
 
 
-def test_a_list_of_poles_that_ends_at_the_shear_cut_off_says_so(capsys, tmp_path) -> None:
+def test_a_list_of_poles_names_the_shear_cut_off_where_it_ends(capsys, tmp_path) -> None:
     file = tmp_path / "arm.toml"
     stocky = Path(tfarm.__file__).parent / "arm" / "presets" / "stocky-steel.toml"
     file.write_text(stocky.read_text().replace("damping = 0.0 ", "damping = 1e-5 "))

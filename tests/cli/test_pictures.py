@@ -93,7 +93,7 @@ def test_bode_prints_what_the_record_holds(capsys, tmp_path):
     assert header[1:5] == ["re_value", "im_value", "phase_deg [deg]", "magnitude"]
 
 
-def test_bode_says_that_an_output_is_zero_and_draws_that(capsys, tmp_path):
+def test_bode_reports_and_draws_an_output_that_is_zero(capsys, tmp_path):
     """Nothing is beyond the free tip to shear it: G is 0, which has no logarithm."""
     there = ("bode", LAB, "--output", "shear", "--x", "1", "--to", "300")
     code, out, err = run(capsys, *there, "--png", str(tmp_path / "zero.png"))

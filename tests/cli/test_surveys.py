@@ -29,7 +29,7 @@ def test_odd_files_and_options_end_in_one_line():
         (0, "tfarm: warning: a\ntfarm: b\n", ""),
     ],
 )
-def test_the_survey_sees_what_is_wrong(code, err, wrong):
+def test_the_survey_detects_an_error(code, err, wrong):
     found = fuzz.judge(("modes",), code, "", err, 1.0)
     assert wrong in found
     assert bool(found) == bool(wrong)

@@ -1,4 +1,4 @@
-"""D-decomposition on either curve, against the roots of polynomials: the room knows nothing else of A and B either."""
+"""D-decomposition on either curve, against the roots of polynomials: the room needs nothing else of A and B either."""
 
 import math
 
@@ -99,9 +99,9 @@ def test_intervals_are_where_nothing_is_beyond():
     ],
 )
 def test_windows_are_those_of_routh_and_hurwitz(A, B, ends, crossings, windows, unit):
-    """No count is given: the roots themselves say in which gap there is none beyond the axis.
+    """No count is given: by the roots themselves one gap has none beyond the axis.
 
-    Gains have any unit, and are asked for not far beyond the last crossing.
+    Gains have any unit, and are requested not far beyond the last crossing.
     """
     found = Crossings.of((unit * gain, 1.0, change) for gain, change in crossings)
 
@@ -129,15 +129,15 @@ ZEROS = np.array([2.0, 2.0**0.5, 1.2, 0.7, 1.7, 0.1, 0.9, 1e-9])
 @pytest.mark.parametrize(("number", "most"), [(2, 12), (len(HARD), 160)])
 def test_zeros_are_the_closed_ones_to_the_last_bit_and_soon(number, most):
     """The first two are smooth: halving took 54 evaluations of them.  The others are like no parabola."""
-    asked = []
+    evaluations = []
 
     def f(x):
-        asked.append(x)
+        evaluations.append(x)
         return np.array([each(place) for each, place in zip(HARD, x, strict=False)])
 
     found = zeros_between(f, np.zeros(number), np.full(number, 3.0))
     np.testing.assert_allclose(found, ZEROS[:number], rtol=0, atol=4 * np.finfo(float).eps)
-    assert len(asked) <= most
+    assert len(evaluations) <= most
 
 
 @pytest.mark.parametrize(
@@ -202,14 +202,14 @@ def found(grid, parts, with_dips=True):
 
 
 def counted(h):
-    """The same, and a list of how many places were asked for at a time."""
-    asked, parts = [], of(h)
+    """The same, and a list of the number of places of each evaluation."""
+    sizes, parts = [], of(h)
 
-    def told(place):
-        asked.append(place.size)
+    def recorded(place):
+        sizes.append(place.size)
         return parts(place)
 
-    return told, asked
+    return recorded, sizes
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -225,18 +225,18 @@ def test_two_zeros_in_one_dip_are_both_found(half, middle, sign):
     np.testing.assert_array_equal(change, [2 * sign, -2 * sign])
 
 
-def test_dips_are_searched_together_the_first_and_the_last_that_have_two_neighbours_among_them():
-    """A wave with its zeros 0.05 beside 1.1, 4.1 and 7.1, up and down by turns on nine points."""
+def test_all_dips_between_two_neighbours_are_searched_together():
+    """A wave with its zeros 0.05 from 1.1, 4.1 and 7.1, up and down by turns on nine points."""
     places, turn = np.arange(9.0), np.pi / 3
 
     def h(x):
         return np.cos(turn * (x - 4.1)) ** 2 - np.cos(turn * 0.05) ** 2
 
-    parts, asked = counted(lambda x: -h(x))
+    parts, sizes = counted(lambda x: -h(x))
     _, at, _ = found(places, parts)
     zeros = [each + off for each in (1.1, 4.1, 7.1) for off in (-0.05, 0.05)]
     np.testing.assert_allclose(at, zeros, rtol=1e-13)
-    assert set(asked[1:15]) == {6}  # two places of each dip a step
+    assert set(sizes[1:15]) == {6}  # two places of each dip a step
 
 
 @pytest.mark.parametrize(
@@ -252,8 +252,8 @@ def test_dips_are_searched_together_the_first_and_the_last_that_have_two_neighbo
     ],
 )
 def test_what_is_no_dip_is_not_searched(h):
-    grid, (parts, asked) = np.arange(7.0), counted(h)
+    grid, (parts, sizes) = np.arange(7.0), counted(h)
     found(grid, parts, with_dips=False)
-    without = list(asked)
+    without = list(sizes)
     found(grid, parts)
-    assert asked[len(without) :] == without
+    assert sizes[len(without) :] == without

@@ -28,7 +28,7 @@ def test_turns_are_those_of_the_picture():
     assert loose(np.r_[steep, flat], sizes, 1.0).tolist() == [False, False]
 
 
-def test_only_the_pieces_beside_a_corner_are_halved_and_only_while_they_are_seen():
+def test_only_visible_pieces_next_to_a_corner_are_halved():
     corner = np.array([[0, 1, 2, 3, 3 + 1j, 3 + 2j, 3 + 3j]]) + 5j
     assert loose(corner, 4.0, 4.0).tolist() == [False, False, True, True, False, False]
     assert loose(corner, 501.0, 501.0).tolist() == [False] * 6  # each piece is 1/501 of the picture
@@ -44,7 +44,7 @@ def test_curves_that_stay_on_the_axis_or_end_want_nothing():
     assert not loose(ended, 1.0, 1.0)[1:3].any()
 
 
-def test_two_zeros_that_part_on_the_axis_are_approached_where_they_part_and_nowhere_else():
+def test_only_the_piece_where_two_zeros_leave_the_axis_is_refined():
     """sqrt(gain): real and then a pair, at a right angle; only the piece in which it leaves the axis."""
     gain = np.linspace(1.0, -1.0, 101) + 1e-3
     pair = np.emath.sqrt(gain)[None, :]
@@ -62,7 +62,7 @@ def wanted(part, across, drawn=lambda x, y: (x + 1j * y) / 10):
     return loose_columns(np.array(across), [part], drawn).tolist()
 
 
-def test_a_regions_corner_halves_the_sides_beside_it():
+def test_a_regions_corner_halves_the_sides_next_to_it():
     """A roof over 1 ... 9 with its ridge at 4; the corners of its foot are at the frame's lower edge, unseen."""
     across = [1.0, 4.0, 9.0]
     roof = piece(across, [0.0, 0.0, 0.0], [0.0, 6.0, 0.0])
@@ -90,7 +90,7 @@ def test_an_outline_that_turns_by_less_than_five_degrees_is_round():
         assert bool(halves) == rough
 
 
-def test_an_upright_side_is_approached_from_the_columns_beside_it():
+def test_a_vertical_side_is_approached_from_the_columns_next_to_it():
     """A box from 4 to 6 among columns 1, 4, 6, 9: its corners are on upright sides."""
     box = piece([4.0, 6.0], [2.0, 2.0], [8.0, 8.0])
     assert wanted(box, [1.0, 4.0, 6.0, 9.0]) == pytest.approx([2.35, 4.9, 7.35])
@@ -100,10 +100,10 @@ def test_an_upright_side_is_approached_from_the_columns_beside_it():
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
-def test_columns_laid_to_both_sides_of_an_edge_are_never_the_edge_nor_in_its_rounding(unit):
+def test_columns_on_both_sides_of_an_edge_stay_distinct_from_it(unit):
     """A side at 4 among columns a billionth of it to either side, after as many rounds as a picture takes.
 
-    Whatever unit the gain has: what is told apart is a share of it.
+    The resolution is relative, whatever the unit of the gain.
     """
     across = [1.0 * unit, 4.0 * (1 - 1e-9) * unit, 4.0 * (1 + 1e-9) * unit, 9.0 * unit]
     for _ in range(20):

@@ -174,7 +174,7 @@ def matched(num, den, T):
         whole = flint.acb_poly.from_roots([(flint.acb(root) * T).exp() for root in roots])
         lowest, below = next(flint.arb(each) for each in reversed(of) if each), flint.acb(1)
         for root in roots:
-            below *= T if root == 0 else 1 - (flint.acb(root) * T).exp()  # (z - 1)/T stands for s
+            below *= T if root == 0 else 1 - (flint.acb(root) * T).exp()  # (z - 1)/T replaces s
         factors.append([whole[k].real * (lowest / below).real for k in range(whole.degree() + 1)][::-1])
     return factors
 

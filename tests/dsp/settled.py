@@ -4,7 +4,7 @@
 
 To hurt: hubs of 1e-4 to 1e-1 of the beam's inertia or none, first modes with 1e-6 to 1e-3 of critical damping, periods
 that put one of the modes 10 to 60 where sampled rate feedback destabilises it, delays.  Two sizes of the hold model
-must agree, or one of 240 polynomials decides; where the growth is below 1e-7 a sample nobody can tell.
+must agree, or one of 240 polynomials decides; a growth below 1e-7 a sample is not decided.
 """
 
 from dataclasses import dataclass, replace
@@ -73,7 +73,7 @@ def hurting_case(rng):
 
 
 def oracle(case):
-    """Whether a loop is stable; None where it cannot be told."""
+    """Whether a loop is stable; None where it is not determined."""
     found = [HoldModel(case.arm, terms).log_radius(case.gains, case.chain) for terms in (80, 140)]
     if min(found) <= 0 <= max(found):
         found = [HoldModel(case.arm, 240).log_radius(case.gains, case.chain)]
@@ -81,12 +81,12 @@ def oracle(case):
 
 
 def large_enough(verdict):
-    """How many polynomials have the mode that is said to grow, three times its number: half of them are modes."""
+    """Number of polynomials for three times the number of the unstable mode: half of them are modes."""
     return max(240, 6 * int(dominant(verdict.loop).partition("mode ")[2] or 0)) if not verdict.is_stable else 240
 
 
 def settled(case):
-    """The finding on one loop; what the oracle cannot tell is "unclear", what it contradicts is looked at again."""
+    """The finding on one loop; what the oracle does not decide is "unclear", what it contradicts is looked at again."""
     try:
         verdict = sampled_verdict(case.arm, case.gains, case.chain)
     except ConvergenceError as error:
@@ -117,7 +117,7 @@ class HoldModel:
     `terms`/2 modes, that is: those are right to 1e-13, the last of them to 1e-9; higher ones are the polynomials' own.
 
     States: w q and q_t of each mode, the angle and rate of the rigid arm, and the gauge's moment g, from the hub's
-    balance  g + C g_t = I_h theta_tt - u,  which also has what the modes left out would bear at once.
+    balance  g + C g_t = I_h theta_tt - u,  which includes the static share of the modes left out.
     """
 
     def __init__(self, arm, terms=80):

@@ -90,7 +90,7 @@ def test_a_disc_holds_every_value_on_its_arc_and_is_no_larger_than_its_terms(nam
 
 
 def test_a_disc_about_a_point_is_as_wide_as_rounding_next_to_a_pole_too():
-    """The sum of r/(z - e^{pT}) with forty digits, z from 1e-9 rad beside a pole on."""
+    """The sum of r/(z - e^{pT}) with forty digits, z from 1e-9 rad next to a pole on."""
     arm, T = tfarm.load("sasaki2012-lab"), 0.01
     loop = sampled_loop(arm, HubFeedback(), Chain(), count=3)
     plant = loop.plant

@@ -40,7 +40,7 @@ reading = "total"
 """
 
 
-def test_all_is_ideal_unless_it_is_said_otherwise():
+def test_a_chain_is_ideal_by_default():
     chain = load_chain("sasaki2012")
     assert chain == Chain()
     assert (chain.sampling.period, chain.sampling.delay_samples) == (0.01, 0.0)
@@ -109,7 +109,7 @@ def test_bad_tables_are_named(table, content, message):
     assert "\n" not in str(refused.value)
 
 
-def test_quantise_rounds_clips_and_says_so():
+def test_quantise_rounds_clips_and_reports_it():
     given, row = (0.2, 0.3, -0.74, 1.6, 1.8, -2.3, 0.25), np.array([0.5, -2.0, 1.5])
     saturated = np.zeros((len(given), 3), np.bool_)
     values = [quantise(x, row, flags, 1) for x, flags in zip(given, saturated, strict=True)]

@@ -1,4 +1,4 @@
-"""tfarm sampled and tfarm simulate as a shell sees them: words, files, units, the sampled verdict beside a design."""
+"""tfarm sampled and tfarm simulate as a shell sees them: words, files, units, the sampled verdict of a design."""
 
 import csv
 import re
@@ -62,7 +62,7 @@ def test_simulate_writes_what_it_prints(capsys, tmp_path, scenario):
     assert mat.read_bytes() == first
 
 
-def test_a_dsp_file_beside_the_arm(capsys, tmp_path):
+def test_a_dsp_file_given_with_the_arm(capsys, tmp_path):
     file = tmp_path / "loop.toml"
     file.write_text(
         "[sampling]\nperiod = 0.02\n[converters]\ntorque_bits = 8\ntorque_range = 2.0\n"
@@ -96,8 +96,8 @@ def test_bad_input_is_one_line_and_exit_2(capsys, arguments, message):
 
 
 def test_gains_that_fail_when_sampled_are_not_recommended_without_a_word(capsys, monkeypatch):
-    """At 10 ms, which no file of a preset says and which is said to be a default."""
-    remember(monkeypatch, design, "design")  # two commands ask for the same
+    """At 10 ms, which no file of a preset sets and which is reported as a default."""
+    remember(monkeypatch, design, "design")  # two commands call it alike
     found = answer(capsys, "design", "sasaki2012-lab", "--continuous")
     sampled = found["sampled"]
     assert (sampled["period_s"], sampled["period_is_default"], sampled["stable"]) == (0.01, True, False)

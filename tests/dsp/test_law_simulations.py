@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.dsp.roads import radius_of, stepped
+from tests.dsp.independent import radius_of, stepped
 from tests.shared import thinned
 from tfarm import Law, ParameterError
 from tfarm.arm.law_tables import load_law
@@ -54,7 +54,7 @@ def test_a_law_with_states_is_a_controller_that_remembers():
     )
 
 
-def test_a_servo_follows_as_python_control_says():
+def test_a_servo_follows_as_in_python_control():
     """A lead on hub angle less its reference, with a moment filter: the sampled plant and the law closed by hand."""
     law = Law(
         {"hub_angle": ([6.0, -5.4], [1.0, -0.5]), "moment@0.3": ([0.05], [1.0, -0.5])},

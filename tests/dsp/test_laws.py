@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.dsp.independent import stepped
 from tests.dsp.law_orders import some_case
-from tests.dsp.roads import stepped
 from tests.odd_arms import odd_arms
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
@@ -52,7 +52,7 @@ def test_what_stays_at_one_is_left_out_of_what_is_proven():
     assert verdict.slowest == "a pole of the law"
 
 
-def test_an_unstable_cancellation_in_the_law_is_said_and_grows(capsys, tmp_path):
+def test_an_unstable_cancellation_in_the_law_is_reported_and_grows(capsys, tmp_path):
     law = Law({"hub_angle": {"zeros": [1.2], "poles": [1.2, 0.5], "gain": 0.1}, "hub_rate": 0.3}, period=T)
     found = tfarm.sampled(LAB, law, count=4)
     (words,) = found.warnings
@@ -105,7 +105,7 @@ def test_poles_cross_the_circle_at_the_factors_that_are_named(law):
 
 
 @pytest.mark.parametrize(("entry", "factor", "change"), [(-1.0, 2.0, 1), (([1.0], [1.0, -0.5]), 1.0, -1)])
-def test_a_real_pole_crosses_at_rest_where_the_law_is_as_stiff_as_the_hubs_spring(entry, factor, change):
+def test_a_real_pole_crosses_where_the_law_s_stiffness_is_the_hub_spring_s(entry, factor, change):
     """2 N m/rad hold the hub: k + g C(0) = 0, and one pole passes z = 1, out or in."""
     held = replace(LAB, hub=replace(LAB.hub, stiffness=2.0))
     loop = sampled_loop(held, Law({"hub_angle": entry}), Chain(), count=6)
@@ -155,7 +155,7 @@ def test_no_sampled_loop_is_refused_by_its_key(entries, others, key):
 @pytest.mark.parametrize("arm", ["free", "damped", "held"])
 @pytest.mark.parametrize("law", ["lead", "integrator", "acceleration"])
 def test_next_to_z_1_the_loop_goes_as_the_powers_that_are_named(arm, law):
-    """whole/fed back at z = 1/(1 - x), x small, is what the lowest terms say: their error is of the order of x."""
+    """whole/fed back at z = 1/(1 - x), x small, is that of the lowest terms: their error is of the order of x."""
     arms = {"free": LAB, "damped": replace(LAB, hub=replace(LAB.hub, friction=0.3)), "held": odd_arms()["pinned"]}
     entries = LAWS | {"integrator": Law({"hub_angle": ([1.0, 3.0], [1.0, 40.0, 0.0])})}
     loop = sampled_loop(arms[arm], entries[law], Chain(), count=6)
@@ -225,7 +225,7 @@ def test_several_signals_at_once_are_discretised_as_each_alone():
         np.testing.assert_allclose(values, alone.values(z)[0], rtol=1e-12)
 
 
-def test_between_crossings_along_one_part_the_count_is_what_they_say():
+def test_between_crossings_along_one_part_the_count_is_theirs():
     """Random laws, integrators and unstable ones among them, at random factors of either sign."""
     rng, compared = np.random.default_rng(77), 0
     for _ in range(6):
@@ -242,7 +242,7 @@ def test_between_crossings_along_one_part_the_count_is_what_they_say():
     assert compared > 5
 
 
-def test_of_a_stiff_arm_angle_and_rate_gain_reach_as_far_as_jury_says():
+def test_gains_of_a_stiff_arm_have_the_jury_limits():
     """z^2 - 2z + 1 + Kp T^2 (z + 1)/2J + K1 T (z - 1)/J: Kp > 0, K1 > Kp T/2 and K1 < 2J/T."""
     stiff = LAB.having(length=0.1)
     gains = HubFeedback(K1=0.4 * stiff.turned_inertia / T, Kp=1.0)

@@ -91,7 +91,7 @@ CHAINS = {
 
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("arm", ["sasaki2012-lab", "quanser-flexlink"])
-def test_to_first_order_a_gain_adds_what_the_poles_say_at_a_tiny_one(arm, name):
+def test_the_first_order_effect_of_a_gain_is_that_of_a_tiny_gain(arm, name):
     """Through delay, filter, difference and a lag of the motor; an arm's own damping is taken for what it is."""
     arm, chain = tfarm.load(arm), CHAINS[name]
     loop = sampled_loop(arm, HubFeedback(K1=0.02, K2=0.3), chain, count=5)
@@ -148,7 +148,7 @@ def test_a_hub_that_cannot_drift_has_the_poles_of_its_modes_alone():
 
 @pytest.mark.parametrize("period", [0.003, 0.01, 0.04])
 def test_each_mode_is_seen_where_its_samples_turn(lossless, period):
-    """cos(w T) is all that samples know of a mode: it is seen at arccos of it over T, folded as its band says."""
+    """Samples have cos(w T) of a mode alone: it appears at arccos(cos(w T))/T, the aliased frequency."""
     table = mode_table(sampled_loop(lossless, HubFeedback(K1=0.1), Chain(sampling=Sampling(period=period)), count=8))
     turned = table.natural_frequency * period
     np.testing.assert_allclose(table.aliased, np.arccos(np.cos(turned)) / period, rtol=1e-6)

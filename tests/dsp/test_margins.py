@@ -1,4 +1,4 @@
-"""Edges of the gains, the map, the delay margin and the damping that cures: each against poles on both of its sides."""
+"""Stability intervals, map, delay margin and required damping, each against poles on both of its sides."""
 
 import re
 from dataclasses import replace
@@ -87,7 +87,7 @@ def test_the_delay_margin_is_where_the_verdict_turns(lab, K2):
 
 
 def test_the_required_damping_is_where_the_verdict_turns(lossless):
-    """At C = 0 modes grow by 1e-9 a sample; hardly any damping cures that, and the formula says how little."""
+    """At C = 0 modes grow by 1e-9 a sample; very little damping stabilises that, and a formula gives it."""
     chain = Chain()
     C = required_damping(lossless, GAINS, chain, count=20)
     growth, w = 8.6238e-9, tfarm.modes(lossless, 13).natural_frequency[13]
@@ -143,7 +143,7 @@ def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossl
     assert sampled_verdict(lossless, HubFeedback(K1=0, K2=0)).sentence.startswith("marginal")
 
 
-def test_converged_is_said_where_fewer_modes_agree_alone(lab, monkeypatch):
+def test_the_verdict_is_converged_where_only_fewer_modes_agree(lab, monkeypatch):
     monkeypatch.setattr(room, "complete_band", lambda loop: None)
     assert re.fullmatch(
         r"converged for the first \d+ modes, not determined beyond", sampled_verdict(lab, GAINS).holds_for
@@ -168,7 +168,7 @@ def test_a_count_of_modes_is_checked(lab):
 
 @pytest.mark.parametrize("friction", [0.02, 1e-5])
 def test_windows_of_the_rate_gain_of_a_damped_hub_begin_where_its_losses_are_taken(lab, friction):
-    """There the hub drifts, a pole at z = 1; below it runs away.  However slowly the hub stops, to the last digits."""
+    """There the hub drifts, a pole at z = 1; below it the loop is unstable, however small the friction."""
     arm = replace(lab, hub=replace(lab.hub, friction=friction))
     loop = sampled_loop(arm, GAINS, count=8)
     ((low, high),) = stable_windows(loop, "K1")
@@ -181,7 +181,7 @@ STILL_RIG = (6, 28)  # held by a spring near its root: the hub's rate next to z 
 
 
 def some_sampled(seed):
-    """A rig that turns under a law, gains about its own, and a clock about its first mode's period."""
+    """A rig that turns under a law, gains about its own, and a sampling period about its first mode's period."""
     rng = np.random.default_rng(seed)
     rigs = (some_rig(rng) for _ in range(20))
     arm = next(arm for arm in rigs if arm.input != "hub_angle" and not arm.is_locked)
@@ -193,7 +193,7 @@ def some_sampled(seed):
 
 
 def answers(arm, law, chain, units):
-    """Windows of K1 and K2 in units of those of the law, delay margin, poles in z; None where modes are not told."""
+    """Intervals of K1 and K2 in units of the law's, delay margin, poles in z; None where modes are not determined."""
     try:
         loop = sampled_loop(arm, law, chain, count=6)
     except ConvergenceError:

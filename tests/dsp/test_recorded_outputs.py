@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import expm
 
 import tfarm
-from tests.dsp.roads import stepped
+from tests.dsp.independent import stepped
 from tests.rigs import some_rig
 from tests.shared import thinned
 from tfarm.arm import HubFeedback, Law, RotarySpring
@@ -27,7 +27,7 @@ from tfarm.tuner.trial import tip_off
 LAB = tfarm.load("sasaki2012-lab")
 GAINS = HubFeedback(K1=0.3, K2=0.3)
 OTHERS = ("tip_rotation", "tip_angle", "root_shear", "tip_acceleration")
-SAME = 1e-11  # of the largest value: the same residues by two roads
+SAME = 1e-11  # of the largest value: the same residues by two methods
 FITTED = 1e-7  # of a heavily damped arm: what its slow poles leave is shared out by a fit, which rounding moves
 
 
@@ -70,7 +70,7 @@ ARMS = [LAB, LAB.having(damping=0.01), replace(LAB, hub=replace(LAB.hub, radius=
 
 @pytest.mark.parametrize(("arm", "law", "kind"), thinned(product(ARMS, [GAINS, INSIDE], CHAINS), 4))
 def test_what_is_read_at_an_end_is_what_is_recorded_there(arm, law, kind):
-    """Along the arm the fields are another road than the closed forms at its ends; no filter changes what is shown."""
+    """Fields along the arm against the closed forms at its ends; no filter changes either."""
     names = ("moment@0", f"displacement@{arm.length!r}", "tip_displacement", "tip_rotation")
     found = tfarm.simulate(arm, law, CHAINS[kind], duration=0.5, count=6, between=2, outputs=names)
     plain = tfarm.simulate(arm, law, CHAINS[kind], duration=0.5, count=6, between=2)
@@ -90,15 +90,15 @@ def test_every_output_there_is_can_be_recorded_or_is_refused_in_a_line():
     rig = replace(rig, clamp=RotarySpring(), joint=RotarySpring(), hub=replace(rig.hub, inertia=1.0))
     task, refused = scenario("step", rig, chain, 0.05), []
     for name, each in OUTPUTS.items():
-        asked = f"{name}@{0.4 * rig.length!r}" if each.place == "x" else name
+        requested = f"{name}@{0.4 * rig.length!r}" if each.place == "x" else name
         try:
-            found = Simulator(rig, chain, task, count=3, outputs=[asked]).linear(HubFeedback(K1=0.1, K2=0.0))
+            found = Simulator(rig, chain, task, count=3, outputs=[requested]).linear(HubFeedback(K1=0.1, K2=0.0))
         except ParameterError as error:
             refused.append((name, str(error)))
             continue
-        assert np.isfinite(found.at_samples.signal(asked)).all()
-        assert found.at_samples.units == ({} if name in RECORDED else {asked: each.unit})
-    assert [name for name, _ in refused] == ["strain"]  # its section does not say how deep it is
+        assert np.isfinite(found.at_samples.signal(requested)).all()
+        assert found.at_samples.units == ({} if name in RECORDED else {requested: each.unit})
+    assert [name for name, _ in refused] == ["strain"]  # its section has no given depth
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_what_cannot_be_read_is_refused(name, why):
         Simulator(LAB, Chain(), scenario("step", LAB, Chain(), 0.1), outputs=[name])
 
 
-def test_what_was_not_asked_for_is_named_with_what_there_is():
+def test_an_output_that_was_not_requested_is_refused_with_the_known_ones():
     trace = tfarm.simulate(LAB, GAINS, duration=0.1, count=2, outputs=["tip_angle"]).at_samples
     with pytest.raises(ParameterError, match=r"known are: hub_angle, .*tip_angle"):
         trace.signal("tip_rotation")
@@ -166,7 +166,7 @@ def test_the_verdict_on_a_damped_rig_is_proven(name, factor):
     assert (grow > 0) == (factor < 0)
 
 
-def test_the_tip_of_a_slew_goes_where_a_rigid_arm_on_the_hub_s_radius_has_it():
+def test_a_slew_ends_at_the_tip_position_of_the_rigid_arm():
     """G_tip/G_angle at rest is r + L: with the angle held the slew ends on its travel, as it does without a radius."""
     bench = tfarm.load("tests/rigs/bench-rig.toml")
     r, L = bench.hub.radius, bench.length

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.dsp.roads import aliased, aliased_loop
+from tests.dsp.independent import aliased, aliased_loop
 from tests.odd_arms import odd_arms
 from tests.strategies import arm_of
 from tfarm.arm import FED_BACK, HubFeedback
@@ -109,7 +109,7 @@ def test_a_filter_is_for_what_does_not_drift(lab):
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.4])
-def test_slopes_at_z_1_are_those_of_differences_beside_it(delay):
+def test_slopes_at_z_1_are_those_of_finite_differences(delay):
     """Of an arm that cannot drift, by the differences of two steps and Richardson's rule."""
     H = pulse_transfer(odd_arms()["pinned"], ["hub_angle", "root_moment"], Sampling(delay_samples=delay), count=4)
     h = 1e-4

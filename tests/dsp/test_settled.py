@@ -1,4 +1,4 @@
-"""A verdict that says "settled" is proven in its band: loops that eight and sixteen modes agree to call stable."""
+"""A "settled" verdict is proven in its band: loops that eight and sixteen modes both make stable."""
 
 import math
 from dataclasses import replace
@@ -42,7 +42,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", thinned(CASES, 2))
 def test_modes_beyond_the_sixteenth_can_be_the_unstable_ones(name):
-    """Sixteen modes are stable, forty are not; the verdict says so, and so does a hold model that shares no code."""
+    """Sixteen modes are stable, forty are not; verdict and an independent hold model agree."""
     arm, gains, chain = CASES[name]
     assert sampled_loop(arm, gains, chain, count=16).poles.is_stable
     verdict = sampled_verdict(arm, gains, chain)
@@ -64,7 +64,7 @@ STRIP = Arm(
 
 
 def test_the_radius_is_that_of_every_mode_of_the_band():
-    """The verdict stops at sixteen modes, where the radius still has four digits: the hold model knows more."""
+    """The verdict stops at sixteen modes, where the radius still has four digits: the hold model has more."""
     gains, chain = HubFeedback(K1=0.0033, K2=0.855), Chain(sampling=Sampling(period=2.6e-3))
     verdict = sampled_verdict(STRIP, gains, chain)
     coarse, fine = (HoldModel(STRIP, terms).log_radius(gains, chain) for terms in (60, 80))
@@ -72,7 +72,7 @@ def test_the_radius_is_that_of_every_mode_of_the_band():
 
 
 def test_an_edge_has_the_digits_that_more_modes_leave():
-    """Sixteen modes see the edge of K1 at 0.62; it is near 0.50, and both ends of what is shown are what it says."""
+    """Sixteen modes put the edge of K1 at 0.62; it is near 0.50, as in the shown interval."""
     gains, chain = HubFeedback(K1=0.1, K2=0.3), Chain(sampling=Sampling(period=9e-5))
     loop, band = sampled_loop(LIGHT, gains, chain, count=16), complete_band(whole_loop(LIGHT, gains, chain))
     assert stable_windows(loop, "K1")[0][1] > 0.6
@@ -105,7 +105,7 @@ def test_the_band_holds_every_pole_of_twice_as_many_modes_there():
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.4, 1.7])
-def test_what_is_left_of_the_line_weighs_no_more_than_is_said(delay):
+def test_poles_left_of_the_line_weigh_no_more_than_the_bound(delay):
     """Pulse transfer functions of the band's poles, and those of sixty modes, on the circle."""
     gains, chain = HubFeedback(K1=0.3, K2=0.3), Chain(sampling=Sampling(delay_samples=delay))
     band, many = complete_band(whole_loop(RINGING, gains, chain)), sampled_loop(RINGING, gains, chain, count=60)
@@ -188,7 +188,7 @@ def test_what_is_left_of_the_line_is_bounded_by_the_integrals_of_both_edges():
     assert 1.0 <= found / ((up + away) * 2 / np.pi) <= 1 + 4 * circle_module.SURE
 
 
-def test_where_all_oscillating_modes_are_held_the_band_goes_on_to_where_shear_waves_are():
+def test_with_much_damping_the_band_extends_to_the_shear_waves():
     """Much damping leaves four modes of bending; what oscillates above them dies within a sample."""
     arm = tfarm.load("sasaki2012-lab").having(damping=1e-3)
     loop = sampled_loop(arm, HubFeedback(K1=0.3, K2=0.3), count=4)

@@ -75,7 +75,7 @@ def test_a_python_controller_does_what_the_compiled_law_does(lab, hub_rate, dela
 
 
 def test_free_decay_is_the_damping_of_the_first_mode(lab):
-    """Without gains the released mode decays with its own eigenvalue, and starts where it was told to, at rest."""
+    """Without gains the released mode decays with its own eigenvalue, and starts at the given deflection, at rest."""
     run = simulator(lab, "decay", 2.0).linear(HubFeedback(K1=0, K2=0))
     tip = run.at_samples.tip_displacement
     p = modal_model(lab, "hub_rate", 1).eigenvalues[0, 0]
@@ -152,8 +152,8 @@ def test_an_unstable_loop_that_its_motor_limits_rings_for_ever(lab):
     assert answer["limit_cycle"]["kept_up_by"] == "saturation"
 
 
-def test_a_simulation_takes_the_modes_that_its_digits_need_or_says_what_it_is_off(lab, lossless):
-    """After a slew, and with damping after an impulse, 20 modes do; without it 40 do not, and what is said is right."""
+def test_a_simulation_uses_enough_modes_or_reports_its_error(lab, lossless):
+    """20 modes do after a slew, and with damping after an impulse; without it 40 do not, and the error is right."""
     for task, duration in (("slew", 1.5), ("impulse", 0.5)):
         enough = to_dict(simulated_run(lab, GAINS, Chain(), task, duration))
         assert (enough["modes_used"], enough["modes_change"] < 1e-4) == (20, True)
@@ -165,8 +165,8 @@ def test_a_simulation_takes_the_modes_that_its_digits_need_or_says_what_it_is_of
     more = simulator(lossless, "impulse", 0.5, count=160).linear(GAINS).at_samples
     off = abs(sudden["root_moment"] - more.root_moment).max() / abs(more.root_moment).max()
     assert 1e-4 < off < 2 * sudden["modes_change"]
-    asked = to_dict(simulated_run(lab, GAINS, Chain(), "slew", 0.1, count=3))
-    assert (asked["modes_used"], asked["modes_change"]) == (3, None)
+    limited = to_dict(simulated_run(lab, GAINS, Chain(), "slew", 0.1, count=3))
+    assert (limited["modes_used"], limited["modes_change"]) == (3, None)
 
 
 def time_function(G, t, terms=400):
@@ -189,7 +189,7 @@ def test_an_impulse_is_first_seen_a_sample_later_and_20_modes_have_it(lab):
         np.testing.assert_allclose(signal[1:], own, atol=1e-6 * abs(own).max())
 
 
-def test_running_away_is_said_with_its_time_and_mode(lab):
+def test_divergence_is_reported_with_its_time_and_mode(lab):
     run = simulator(lab, duration=5.0).linear(HubFeedback(K1=0.3, K2=1.5))
     assert run.stopped is not None
     assert run.stopped.time == pytest.approx(run.t.size * T)
@@ -245,7 +245,7 @@ def test_what_cannot_be_simulated_is_refused(lab):
 
 def test_what_an_ideal_chain_leaves_decides_while_signals_are_clipped(lab):
     """A steady ringing that is clipped: kept up where the ideal loop grows, if not beyond bounds, and not where it has
-    died down to no less than half of it; an ideal loop that has died down further tells it either way."""
+    died down to no less than half of it; an ideal loop that has died down further decides either way."""
     chain = Chain(actuator=Actuator(torque_limit=3.0))
     run = simulator(lab, "impulse", 4.0, chain).linear(GAINS)
 
@@ -260,7 +260,7 @@ def test_what_an_ideal_chain_leaves_decides_while_signals_are_clipped(lab):
     assert limit_cycle(steady, ringing(1.0, 0.0)) is None
 
 
-def test_a_filtered_difference_is_the_filter_that_is_said_from_an_angle_that_stood_still():
+def test_a_filtered_difference_is_the_documented_filter_from_an_angle_at_rest():
     """(1 - a)/T (1 - 1/z)/(1 - a/z), by SciPy's filter: of a random walk, wherever it begins."""
     a = math.exp(-120.0 * T)
     angle = 0.7 + np.cumsum(np.random.default_rng(2).normal(size=50))

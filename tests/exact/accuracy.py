@@ -39,7 +39,7 @@ MOST_BITS = 1 << 14  # an output that has no digit by then is zero
 
 @dataclass(frozen=True)
 class Point:
-    """One output of one arm at one s: its error, and whether the code itself asks for balls there."""
+    """One output of one arm at one s: its error, and whether the code itself requests balls there."""
 
     name: str
     error: float
@@ -213,7 +213,7 @@ PLACES = {
 
 
 def run(place, count, seed=0):
-    """The Points of so many arms, `place` drawing an arm and its s."""
+    """The Points of `count` arms, `place` drawing an arm and its s."""
     points = []
     for n in range(count):
         rng = np.random.default_rng([seed, n])
@@ -223,7 +223,7 @@ def run(place, count, seed=0):
 
 
 def findings(points):
-    """Of each value: flagged, where the kernel asks for balls, or its error."""
+    """Of each value: flagged, where the kernel requests balls, or its error."""
     for point in points:
         is_wrong = not (point.flagged or point.error <= BOUND)
         arm, s, x = point.where

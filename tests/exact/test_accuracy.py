@@ -46,7 +46,7 @@ def test_no_error_above_the_bound_that_is_not_flagged(place):
     ("number", "seed"), [(75, 8), pytest.param(300, 3, marks=pytest.mark.survey)]
 )  # few are flagged: of seed 8 two of 75
 def test_points_are_flagged_only_where_they_could_be_poles(number, seed):
-    """The kernel may flag what it cannot tell from a natural frequency, but only within 1e-9 of it."""
+    """The kernel may flag what it cannot distinguish from a natural frequency, but only within 1e-9 of it."""
     rng, flagged = np.random.default_rng(seed), 0
     for _ in range(number):
         arm, s = link_by_a_frequency(rng)

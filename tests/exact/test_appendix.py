@@ -61,7 +61,7 @@ def test_delta_is_the_characteristic_function_without_its_artefacts():
 
 
 @pytest.mark.parametrize("digits", thinned([15, 5, 150, 40], 2))
-def test_as_many_digits_as_are_asked_for(digits):
+def test_as_many_digits_as_requested(digits):
     arm = tfarm.load("sasaki2012-lab")
     for name in ("hub_angle", "tip_deflection", "root_moment"):
         for s in (0.3 + 57.1j, 1e-6j, 1e6j, 1e-3 + 1e5j):
@@ -105,7 +105,7 @@ def test_where_two_waves_coincide_to_the_last_bit(name, s):
 
 @pytest.mark.parametrize("omega", [71.505682466890, 204.333139363807, 537.952620541657, 1046.821121534289])
 def test_the_published_roots_of_the_default_arm(omega):
-    """Frequencies known to 13 digits from three solutions: the determinant has one root there, and none beside."""
+    """Frequencies known to 13 digits from three solutions: the determinant has one root there, and none next to it."""
     arm = tfarm.load("sasaki2012-lab")
     assert appendix.roots_near(arm, omega, 13) == 1
     assert appendix.roots_near(arm, omega * (1 + 1e-11), 12) == 0

@@ -25,7 +25,7 @@ LOST = 1e-13  # error over 1 + condition: 20 times what 5,000 rigs of `accuracy`
 EXACT = mpmath.mpf("1e-29")  # of 30 digits, rounded
 INPUTS = ("hub_torque", "motor_voltage", "motor_current", "hub_angle")
 ENDS = [name for name, each in OUTPUTS.items() if each.place != "x" and name != "motor_current"]
-ALONG = {  # as the oracle says
+ALONG = {  # the oracle's names
     **{name: name for name in ("displacement", "velocity", "acceleration", "deflection", "shear")},
     "rotation": "twist",
     "moment": "gauge",
@@ -141,7 +141,7 @@ LOSSES = {
 
 @pytest.mark.parametrize("loss", LOSSES)
 def test_digits_of_elastic_links_with_another_loss(loss):
-    """No part vanishes on the axis but where nothing dissipates or lags: C = 0 alone does not say so."""
+    """No part vanishes on the axis but where nothing dissipates or lags: C = 0 alone is not enough."""
     arm = replace(lossless(rig()), **LOSSES[loss])
     for name, (re, im) in zip(
         ("hub_angle", "hub_rate"), tfarm.transfer(arm, ["hub_angle", "hub_rate"]).digits(99j, 30), strict=True
@@ -164,7 +164,7 @@ def rig_and_point(seed):
 def test_derivatives_are_differences_of_the_oracle(seed):
     """Cauchy's integral has the error of a value over the circle's radius, |s| over the phase of all waves."""
     arm, s, x = rig_and_point(seed)
-    h = 2.0**-60 * abs(s)  # the square of 2^-60 is far below what is asked
+    h = 2.0**-60 * abs(s)  # the square of 2^-60 is far below the requested error
     with mpmath.workdps(80):
         right, left = (oracle(arm, mpmath.mpc(s) + sign * h, x, 80) for sign in (1, -1))
         exact = np.array([complex((a - b) / (2 * h)) for a, b in zip(right, left, strict=True)])
@@ -243,7 +243,7 @@ def test_a_segment_of_next_to_no_length(place):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_value_does_not_depend_on_the_points_beside_it(seed):
+def test_a_value_does_not_depend_on_the_other_points(seed):
     """Points go through in blocks, each segment by waves or by series: 77 in any order are those one at a time.
 
     The lowest are slow in every segment, the highest in none, and between them some segments are and others not.

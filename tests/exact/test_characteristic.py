@@ -10,7 +10,7 @@ import pytest
 
 import tfarm
 from tests.shared import sized, thinned
-from tests.spectrum.damped_roads import delta
+from tests.spectrum.independent import delta
 from tests.strategies import ENDS, some_arm, some_s
 from tests.transition import determinant
 from tfarm import HubFeedback

@@ -27,7 +27,7 @@ from tfarm.spectrum.table import first_frequency
 
 ALWAYS = ("link.youngs_modulus", "hub.inertia", "link.damping")
 SOMETIMES = ("payload.mass", "payload.inertia", "clamp.stiffness", "gain", "delay", "link.section.second_moment")
-PAIRS = (  # of the arm's numbers, of which these responses know but one combination
+PAIRS = (  # of the arm's numbers, of which these responses determine but one combination
     ("tip_acceleration", "hub_angle"),
     ("tip_acceleration", "hub_torque"),
     ("hub_rate", "hub_torque"),

@@ -6,14 +6,14 @@ python -m tests.golden --keep [WORDS]   # of the commands that begin so
 
 import sys
 
-from tests.golden.answers import asked, commands, differences, file_of, keep, kept
+from tests.golden.answers import answer_of, commands, differences, file_of, keep, kept
 
 
 def main(words):
     if words[:1] == ["--keep"]:
         chosen = [line for line in commands() if line.startswith(" ".join(words[1:]))]
         for line in chosen:
-            keep(line, asked(line))
+            keep(line, answer_of(line))
         names = {file_of(line) for line in commands()}
         for path in (file_of("x").parent).glob("*.json"):
             if path not in names:
@@ -21,7 +21,7 @@ def main(words):
         return 0
     failed = 0
     for line in commands():
-        found = differences(line, kept(line), asked(line))
+        found = differences(line, kept(line), answer_of(line))
         failed += bool(found)
         if found:
             print(line, *found, sep="\n    ")

@@ -1,7 +1,7 @@
 """The answers of some hundred commands, kept in answers/, and how far another answer may lie from them.
 
-Keys, units, verdicts and whole numbers are compared exactly, prose not at all, a float to `TOLERANCE` unless `LOOSER`
-says otherwise.  Of a search (design, fit, tune) only the verdict and the score count: where the optimum lies hangs on
+Keys, units, verdicts and whole numbers are compared exactly, prose not at all, a float to `TOLERANCE` or that of
+`LOOSER`.  Of a search (design, fit, tune) only the verdict and the score count: where the optimum lies hangs on
 the last bits.
 """
 
@@ -54,7 +54,7 @@ def words_of(line):
         yield f"{option}{equals}{of_data}" if of_data.is_file() else word
 
 
-def asked(line):
+def answer_of(line):
     """What the command prints with --json, long lists thinned.  AssertionError where it fails."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
@@ -162,7 +162,7 @@ def _is_number(value):
 
 
 def _are_alike(path, before, now):
-    """Whether two values that are no floats say the same; of prose, whether there is some."""
+    """Whether two values that are no floats are equal; of prose, whether there is some."""
     if isinstance(before, str) and isinstance(now, str) and " " in before and not PHRASES.search(path):
         return bool(now)
     return type(before) is type(now) and before == now

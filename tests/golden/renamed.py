@@ -1,6 +1,6 @@
 """JSON keys of version 1.0 by those that answers were kept under: the same numbers are compared.
 
-A row is command, path that was, path that is (None: it went, as CHANGELOG.md says); the first that matches counts.
+A row is command, path that was, path that is (None: it went, see CHANGELOG.md); the first that matches counts.
 """
 
 import re

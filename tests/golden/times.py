@@ -22,14 +22,14 @@ ROOT = Path(__file__).parents[2]
 def serve():
     """Answer each line on standard input by the CPU seconds of that command, or by what went wrong."""
     from tests import caches
-    from tests.golden.answers import asked
+    from tests.golden.answers import answer_of
 
     for line in sys.stdin:
         try:
-            asked(line.strip())  # compiles, reads what is on disk
+            answer_of(line.strip())  # compiles, reads what is on disk
             caches.empty()
             begin = time.process_time()
-            asked(line.strip())
+            answer_of(line.strip())
             print(json.dumps(time.process_time() - begin), flush=True)
         except Exception as error:  # of a revision that lacks the command
             print(json.dumps(str(error)), flush=True)

@@ -1,4 +1,4 @@
-"""Lists of closed-loop poles, counted again by another road:  python -m tests.loop.counts SIZE SEED
+"""Lists of closed-loop poles, counted by a second method:  python -m tests.loop.counts SIZE SEED
 
 Random arms (slenderness L/h 5 to 100, any payload, C = 0 or up to a fifth of critical in the first mode) and gains of
 any sign; three to fifteen poles each.  The number listed must be, by Nyquist, the winding number of 1 + L(s) around the
@@ -15,7 +15,7 @@ import numpy as np
 import tfarm
 from tests import survey
 from tests.loop.arms import some_loop
-from tests.spectrum.damped_roads import newton_step
+from tests.spectrum.independent import newton_step
 from tests.survey import Finding
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.system import system_of
@@ -96,7 +96,7 @@ def own_poles(arm, box) -> int:
 
 
 def loops(size, seed):
-    """Of each loop the finding; every so many are counted in balls too."""
+    """The finding of each loop; every `PROVEN`-th is counted in balls too."""
     rng = np.random.default_rng(seed)
     drawn = [(*some_loop(rng), int(rng.integers(3, 16))) for _ in range(size)]
     yield from (judge(*case, balls=n % PROVEN == 0) for n, case in enumerate(drawn))

@@ -1,4 +1,4 @@
-"""Unstable poles under random laws, counted again by another road:  python -m tests.loop.law_counts SIZE SEED
+"""Unstable poles under random laws, counted by a second method:  python -m tests.loop.law_counts SIZE SEED
 
 Random arms (as in `tests.loop.arms`), one to three signals, rational entries of order 8 at most in all, some with
 unstable poles and zeros, delays of 0 to 50 ms at C > 0.  Without damping the count is that of modal models of 30 and 40
@@ -157,24 +157,24 @@ def returned(arm, law, count):
 
 
 def judge(arm, law):
-    """ "right", "refused: ...", "wrong: ..." or "no second road"."""
+    """ "right", "refused: ...", "wrong: ..." or "no second count"."""
     try:
         found = stability(arm, law)
     except (ConvergenceError, ParameterError) as error:
         return f"refused: {str(error).splitlines()[0]}"
     if found.unstable_roots_infinite:
-        return "no second road"
+        return "no second count"
     try:
         if arm.damping:
             other = [each for each in by_nyquist(arm, law, found.band) if each is not None] or [None]
         else:
             other = [by_eigenvalues(arm, law, count, found.band) for count in MODELS]
     except (ConvergenceError, ParameterError):  # residues of two eigenvalues that nearly coincide; a point on a pole
-        return "no second road"
+        return "no second count"
     if None in other or other[0] != other[-1]:
-        return "no second road"
+        return "no second count"
     if (abs(found.poles.values[found.poles.values.real > 0]) > found.band).any():  # further right than the models reach
-        return "no second road"
+        return "no second count"
     return "right" if other[0] == found.unstable_roots else f"wrong: {found.unstable_roots}, by models {other}"
 
 

@@ -17,7 +17,7 @@ from tfarm.loop.poles import poles_below
 
 SHARES = {"K1": 0.35, "K2": 0.25, "Kp": 0.05, "all": 0.1, "damping": 0.1, "length": 0.05, "hub_inertia": 0.05,
           "payload_mass": 0.05}  # fmt: skip
-SAME = 1e-7  # of its size: a pole by two roads, where no other is near
+SAME = 1e-7  # of its size: a pole by two methods, where no other is near
 CLOSE = 1e-4  # of its size: poles so near to each other are not compared, nor those nearer to 0 than that of the first
 
 

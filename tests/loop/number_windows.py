@@ -15,8 +15,8 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 
-BESIDE = 1e-5  # of an edge: how far from it the verdict is asked
-LEAST = 1e-6  # of the width of a window: what an edge beside 0 is taken to be in size
+OFF_EDGE = 1e-5  # of an edge: distance at which the verdict is evaluated
+LEAST = 1e-6  # of the width of a window: the least size of an edge near 0
 
 
 def places(rng, window, low, high):
@@ -24,7 +24,7 @@ def places(rng, window, low, high):
     yield low + (high - low) * rng.uniform(), True
     for edge, inwards in ((low, 1), (high, -1)):
         if window.end(edge) == "edge":
-            step = BESIDE * max(abs(edge), LEAST * (high - low))
+            step = OFF_EDGE * max(abs(edge), LEAST * (high - low))
             yield edge + inwards * step, True
             yield edge - inwards * step, False
 
@@ -60,7 +60,7 @@ def judge(rng, arm, law):
 
 
 def places_of_windows(size, seed):
-    """The findings at places in and beside a window of each loop."""
+    """The findings at places in and next to a window of each loop."""
     rng, number = np.random.default_rng(seed), 0
     while number < size:
         arm = some_loop(rng)[0]

@@ -1,4 +1,4 @@
-"""Turns around -1 beside poles in a box, of random loops:  python -m tests.loop.nyquist_counts SIZE SEED
+"""Encirclements of -1 against poles in a box, of random loops:  python -m tests.loop.nyquist_counts SIZE SEED
 
 Arms and gains of `tests.loop.arms.some_loop`, Kp of either sign; `nyquist_of` compares its two counts and refuses where
 they differ, so what is counted here are refusals, by reason.  A small negative Kp leaves one real unstable pole near 0.

@@ -58,7 +58,7 @@ class RitzLoop:
         return float(s.real[abs(s) < 8 * self.ritz.natural_frequencies(1)[0]].max())
 
     def energy_growth(self, law, rate, rng, time_constants=20):
-        """ln of the energy after so many time constants 1/|rate|, over that at half the time: simulated.
+        """ln of the energy after `time_constants` times 1/|rate|, over that at half the time: simulated.
 
         One step's matrix exponential, squared until the end: the state every 2^k steps, exactly.
         """

@@ -14,7 +14,7 @@ import pytest
 import tfarm
 from tests.shared import thinned
 from tests.shell import run
-from tests.spectrum.damped_roads import delta
+from tests.spectrum.independent import delta
 from tfarm import Hub, HubFeedback, Law, Payload
 from tfarm.arm import as_law
 from tfarm.arm.blocks import Rational
@@ -59,7 +59,7 @@ def closed(arm, law, s):
 
 
 def zeros_in(arm, law, middle, radius, away=0, points=16):
-    """By how often it turns along a circle, whose middle is so many radii away."""
+    """Winding number along a circle whose middle is `away` radii off."""
     with mpmath.workdps(90):
         circle = [middle + away * radius + radius * mpmath.expjpi(2 * mpmath.mpf(n) / points) for n in range(points)]
         values = [closed(arm, law, s) for s in circle]
@@ -68,7 +68,7 @@ def zeros_in(arm, law, middle, radius, away=0, points=16):
 
 
 @pytest.mark.parametrize("name", thinned(LAWS, 5))
-def test_in_each_disc_the_papers_determinant_has_one_zero_and_beside_it_none(name):
+def test_each_disc_holds_one_zero_of_the_papers_determinant_and_its_neighbour_none(name):
     law = LAWS[name]
     poles = tfarm.closed_loop_poles(LAB, law, 5)
     discs = poles.certify(18)
@@ -133,7 +133,7 @@ def test_friction_at_the_hub_alone_damps_every_mode_that_the_hub_takes_part_in(f
         assert zeros_in(BARE, law, mpmath.mpc(pole), -pole.real / 9) == 1  # left of the axis, on which roots are cut
 
 
-def test_without_friction_nothing_is_damped_and_where_the_tip_is_held_friction_leaves_no_pole_at_0():
+def test_without_losses_the_verdict_is_marginal_and_friction_at_a_held_tip_is_stable():
     assert stability(BARE, HubFeedback()).verdict == "marginal"
     held = replace(BARE, hub=Hub(inertia=0.1, friction=0.5), payload=Payload(mass=math.inf))
     found = stability(held, HubFeedback())

@@ -1,4 +1,4 @@
-"""How far each number of a law may go alone: against windows of gains, verdicts beside each end, and closed forms."""
+"""Stability interval of each number of a law: against those of gains, verdicts at each end, and closed forms."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ from tfarm.response.signals import Signals
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)
-BESIDE, BESIDE_ZERO = 1e-7, 1e-3  # of a window: so far from its end a verdict is asked for; there a pole may be far out
+OFF_END, OFF_ZERO = 1e-7, 1e-3  # of a window: distance from its end of a verdict; there a pole may be far out
 
 
 @pytest.mark.parametrize(("law", "every"), thinned([(LAW, 3), (LAW, 1), (LAW.having("gain", 7.0), 1)], 3))
@@ -36,7 +36,7 @@ def test_verdicts_turn_at_each_end(law, every):
     for name, each in list(found.items())[::every]:
         for low, high in each.all:
             for end, side in ((low, 1), (high, -1)):
-                inward = side * (BESIDE if end else BESIDE_ZERO) * (high - low)
+                inward = side * (OFF_END if end else OFF_ZERO) * (high - low)
                 assert stability(LAB, law.having(name, end + inward)).is_stable
                 if each.end(end) == "edge":
                     edges += 1
@@ -117,7 +117,7 @@ def test_below_a_band_through_whose_top_poles_pass_each_interval_is_counted(name
 
 
 def test_no_number_of_a_signal_in_two_parts_has_a_window():
-    """`having` would not know which; of the rest each has its own."""
+    """`having` could not choose; of the rest each has its own."""
     parts = [Part(("hub_angle",), Rational((3.0,), (0.1, 1.0))), Part(("hub_angle",), Rational((-0.5,), (0.1, 1.0)))]
     law = Law({}, parts=(*parts, Part(("hub_rate",), Rational((0.3,), (0.001, 1.0)))))
     assert list(law.numbers) == ["gain", "hub_rate.num.0", "hub_rate.den.0", "hub_rate.den.1"]
@@ -156,7 +156,7 @@ def lifted_arm():
     return replace(LAB, link=link, hub=Hub(inertia=0.00083), payload=Payload(mass=0.27))
 
 
-def test_counts_are_not_carried_through_0_of_a_leading_coefficient_below_a_band_that_does_not_tell_all_there() -> None:
+def test_counts_are_not_carried_through_a_zero_leading_coefficient() -> None:
     """Next to 0 high modes are driven, and poles come to a lower band from above: the window was wrong."""
     arm = lifted_arm()
     found = windows_of(stability(arm, LIFTED))["tip_acceleration.den.0"]
@@ -175,12 +175,12 @@ def test_a_leading_coefficient_without_which_there_is_no_loop_keeps_its_sign() -
 
 
 @pytest.mark.parametrize("number", thinned([128, 72, 120, 133], 2))
-def test_margins_of_a_law_ask_little_of_the_exact_rig(monkeypatch, number):
+def test_margins_of_a_law_need_few_evaluations_of_the_rig(monkeypatch, number):
     """Poles that meet at rest, and strong damping: with poles found one by one to be counted it was ten times more."""
-    case, asked, parts = some_case(1, number), [], Signals.parts
+    case, sizes, parts = some_case(1, number), [], Signals.parts
 
     def counted(self, s):
-        asked.append(np.size(s))
+        sizes.append(np.size(s))
         return parts(self, s)
 
     def never(*_):
@@ -190,8 +190,8 @@ def test_margins_of_a_law_ask_little_of_the_exact_rig(monkeypatch, number):
     monkeypatch.setattr("tfarm.spectrum.naming.follow", never)
     caches.empty()
     of_margins(*case)
-    assert len(asked) < 3000
-    assert sum(asked) < 1_200_000
+    assert len(sizes) < 3000
+    assert sum(sizes) < 1_200_000
 
 
 @pytest.mark.parametrize("number", sized(3, 12))

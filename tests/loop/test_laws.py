@@ -58,16 +58,16 @@ def test_margins_of_a_law_are_those_of_python_control_on_a_model(delay):
 
 
 @pytest.mark.parametrize("number", sized(2, 5))
-def test_random_loops_have_as_many_unstable_poles_by_another_road(number):
+def test_random_loops_have_as_many_unstable_poles_by_a_second_method(number):
     rng, words = np.random.default_rng(5), []
     for _ in range(number):
         arm = some_loop(rng)[0]
         words.append(judge(arm, some_law(rng, arm, delay=some_delay(rng, arm) if arm.damping else 0.0)))
-    assert set(words) <= {"right", "no second road"}
+    assert set(words) <= {"right", "no second count"}
     assert words.count("right") >= 2
 
 
-def test_delays_add_up_poles_as_the_lambert_function_says():
+def test_poles_of_a_delayed_integrator_are_those_of_the_lambert_function():
     """A rigid hub of great inertia: J s + K e^{-s tau} has its poles at W_n(-K tau/J)/tau."""
     from scipy.special import lambertw
 
@@ -180,7 +180,7 @@ def test_no_loop_is_refused_by_its_key(entries, others, key):
     assert error.value.key == key
 
 
-def test_an_unstable_cancellation_in_the_law_is_said():
+def test_an_unstable_cancellation_in_the_law_is_reported():
     law = Law({"hub_angle": {"zeros": [2.0], "poles": [2.0, -5.0], "gain": 1.0}, "hub_rate": 0.3})
     (words,) = Loop(LAB, law).warnings
     assert "cancels its own unstable pole" in words
@@ -188,7 +188,7 @@ def test_an_unstable_cancellation_in_the_law_is_said():
 
 
 def test_commands_take_a_law_from_a_file_or_the_arm_s_own(capsys, tmp_path, monkeypatch):
-    remember(monkeypatch, import_module("tfarm.loop.margins"), "margins")  # three commands ask for the same
+    remember(monkeypatch, import_module("tfarm.loop.margins"), "margins")  # three commands call it alike
     text = "[law]\nname = 'PD'\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
     (tmp_path / "law.toml").write_text(text)
     (tmp_path / "arm.toml").write_text(tfarm.arm.to_toml(LAB) + "\n" + text)
@@ -209,13 +209,13 @@ def test_commands_take_a_law_from_a_file_or_the_arm_s_own(capsys, tmp_path, monk
 
 
 def with_a_notch():
-    """Tip feedback with its notch above mode 1: a design that two modes bear, and the third does not."""
+    """Tip feedback with its notch above mode 1: stable with two modes, unstable with the third."""
     s, w = control.tf("s"), float(tfarm.modes(BARE, 1).natural_frequency[-1])
     notch = (s**2 + 0.02 * w * s + (1.08 * w) ** 2) / (s**2 + 1.4 * w * s + w**2)
     return Law({"tip_displacement": 3.0 * notch * (0.3 * s + 1) / (0.015 * s + 1)})
 
 
-def test_a_law_that_two_modes_bear_drives_the_third():
+def test_a_law_stable_on_two_modes_drives_the_third():
     found = tfarm.spill(BARE, with_a_notch(), 6)
     assert found.unstable[:2].tolist() == [0, 0]
     assert (found.unstable[2:] > 0).all()
@@ -225,7 +225,7 @@ def test_a_law_that_two_modes_bear_drives_the_third():
     assert "models of 1 to 2 modes are stable" in found.in_words
 
 
-FOUND = {  # unstable poles of each model; driven poles of the exact loop; what is said
+FOUND = {  # unstable poles of each model; driven poles of the exact loop; printed text
     "some": ([0, 0, 2], [-0.1 + 9j, 1 + 204j], "mode 2 is unstable in the exact loop, at 204.002 rad/s; "
              "models of 1 to 2 modes are stable, those from 3 modes on are not"),
     "one": ([0, 2, 2], [1 + 204j], "the model of 1 mode is stable, those from 2 modes on are not"),
@@ -331,7 +331,7 @@ def test_where_a_filter_turns_over_a_pole_has_passed_infinity(vary):
         assert unstable_below(loop, found.band) == found.unstable[j, i]
 
 
-def test_the_gain_that_takes_up_all_waves_of_an_arm_without_a_hub_brings_a_pole_to_infinity():
+def test_the_impedance_matching_gain_of_a_massless_hub_moves_a_pole_to_infinity():
     """At C = 0 a hub without inertia feels the impedance of an endless beam far right: I sqrt(E rho)."""
     arm = BARE.having(hub_inertia=0.0)
     far = np.array([1e6, 1e7, 1e8], complex) * tfarm.modes(arm, 1).natural_frequency[1]
@@ -375,7 +375,7 @@ def test_a_map_whose_counts_do_not_hold_at_its_corners_is_refused(monkeypatch):
         plane(Loop(LAB, LAW), ("gain", "hub_angle.den.1"), np.array([1.0, 5.0, 20.0]), np.array([0.5, 1.0, 3.0]))
 
 
-def test_where_two_poles_meet_at_rest_their_count_goes_on_as_the_lag_says():
+def test_the_count_of_two_poles_that_meet_at_rest_follows_the_lag():
     """J s^2 + g (1 - 0.1 s): one pole right of the axis for g < 0, and both for g > 0."""
     law, gains = Law({"hub_angle": ([-0.1, 1.0], [1e-3, 1.0])}), np.array([-0.02, 0.02])
     found = tfarm.map(LAB, np.array([1e-3, 2e-3]), gains, law=law, vary=("hub_angle.den.0", "gain"))
@@ -437,6 +437,6 @@ def test_what_is_no_law_is_refused_everywhere(name, law):
         (lambda: tfarm.plots.gain_map(LAB), "what tfarm.map returns"),
     ],
 )
-def test_what_a_function_cannot_take_it_says_how_to_give(call, words):
+def test_a_wrong_argument_is_refused_with_the_form_to_give(call, words):
     with pytest.raises(ParameterError, match=words):
         call()

@@ -1,4 +1,4 @@
-"""Root loci: complete by winding number, the same in both directions; ends, crossings and meetings by other roads."""
+"""Root loci: complete by winding number, the same in both directions; ends, crossings and meetings by other methods."""
 
 import json
 import math
@@ -77,7 +77,7 @@ def upper(zeros):
 
 
 def must_be_complete(found, nodes, tolerance):
-    """Road: winding numbers, which know of no continuation; a pole that comes in from infinity has no branch."""
+    """By winding numbers, without continuation; a pole that comes in from infinity has no branch."""
     for n in nodes:
         zeros = found.branches[:, n]
         poles = poles_below(found.varied.at(float(found.gain[n])), zeros.imag.max() * (1 + 1e-6))
@@ -179,7 +179,7 @@ CHANGED = {"hub_inertia": (0.02, 3.0), "payload_mass": (0.0, 2.0), "payload_iner
 
 @pytest.mark.parametrize(("arm", "vary"), thinned(product((PAPER, LAB), CHANGED), 3))
 def test_without_a_law_both_ends_are_the_arms_own_modes(arm, vary):
-    """Road: modes by counting at C = 0, damped modes complete by winding number, each in its own order."""
+    """By modes counted at C = 0, damped modes complete by winding number, each in its own order."""
     start, stop = CHANGED[vary]
     found = locus(arm, HubFeedback(), vary, start, stop, 15, 8)
     for end, value in ((0, start), (-1, stop)):
@@ -200,7 +200,7 @@ def test_the_circuits_pole_and_the_turning_hubs_are_one_pair_at_a_high_gain():
     assert not np.isnan(found.branches).any()
 
 
-def test_of_a_pair_that_meets_on_the_axis_both_are_listed_and_mirror_images_where_they_ring():
+def test_a_pair_that_meets_on_the_axis_is_listed_as_conjugates():
     """To the last digit, and each a zero of the loop."""
     found = locus(LAB, HubFeedback(K1=0.3, Kp=0.5), "K1", 0.05, 4.0, points=30, branches=4)
     lower = np.argwhere(found.branches.imag < 0)
@@ -236,7 +236,7 @@ def test_a_branch_that_comes_to_the_accumulation_point_ends_there_and_the_others
     assert back.origin is None
 
 
-def test_modes_that_meet_on_the_axis_and_leave_it_as_a_quadruple_are_followed_around_that():
+def test_modes_that_leave_the_imaginary_axis_as_a_quadruple_are_followed():
     """Without losses, K2 > 1 and Kp let the hub's mode meet the first one; the winding number has four poles off it."""
     found = locus(PAPER, HubFeedback(K2=1.3, Kp=334.0593798812562), "K1", 0.0, 1e-6, 3, 4)
     first = found.branches[:, 0]
@@ -246,7 +246,7 @@ def test_modes_that_meet_on_the_axis_and_leave_it_as_a_quadruple_are_followed_ar
 
 
 def test_the_known_edge_of_the_lab_arm_to_its_last_digits():
-    """K1 = 0.3: K2 = 1.0305, at 27.8 rad/s.  Road: proven 30-digit discs around the pole there and beside it."""
+    """K1 = 0.3: K2 = 1.0305, at 27.8 rad/s.  By proven 30-digit discs around the pole on either side."""
     (found,) = locus(LAB, K1, "K2", 0.5, 1.1, 40, 8).crossings
     assert (round(found.gain, 4), round(found.omega, 1), found.direction) == (1.0305, 27.8, "unstable")
     side = []
@@ -272,7 +272,7 @@ LINES = {  # arm, law, what varies, ends, values
 
 @pytest.mark.parametrize("name", LINES)
 def test_crossings_are_those_of_the_line_of_laws(name):
-    """Road: D-decomposition, which scans frequencies and knows of no branches; some go out and back between values."""
+    """By D-decomposition, which scans frequencies and has no branches; some go out and back between values."""
     arm, law, vary, start, stop, points = LINES[name]
     found = locus(arm, law, vary, start, stop, points, 9)
     low, high = sorted((start, stop))
@@ -331,7 +331,7 @@ AT_REST = {  # where a real pole passes through 0: arm, law, what varies, ends, 
 
 
 @pytest.mark.parametrize("name", AT_REST)
-def test_a_real_pole_passes_through_0_where_its_closed_form_says(name):
+def test_a_real_pole_passes_through_0_at_its_closed_form(name):
     arm, law, vary, start, stop, expected, way = AT_REST[name]
     found = locus(arm, law, vary, start, stop, 27, 4)
     (crossing,) = (each for each in found.crossings if each.omega == 0)
@@ -374,15 +374,15 @@ def test_the_gap_to_the_reduced_locus_shrinks_with_its_order(law, vary, stop):
 
 
 @pytest.mark.parametrize(("branches", "order"), [(3, 20), (10, 22), (12, 26)])
-def test_unless_asked_otherwise_a_reduced_model_has_two_modes_beyond_the_last_branch(branches, order):
+def test_by_default_a_reduced_model_has_two_modes_beyond_the_last_branch(branches, order):
     """Two poles a mode: those of the branches, one of them rigid, and two more; 20 at least."""
     found = locus(PAPER, HubFeedback(), "K1", 0.0, 2.0, 3, branches)
     assert order == max(20, 2 * (len(np.unique(found.mode)) + 2)) == reduced_locus(found).order
 
 
 @pytest.mark.parametrize("vary", ["K1", "K2"])
-def test_a_reduced_locus_knows_the_angle_s_pole_at_0_although_no_gain_sees_it(vary):
-    """Friction leaves a pole at 0 and one beside it; the model of python-control has the second alone."""
+def test_a_reduced_locus_includes_the_unobservable_pole_at_0(vary):
+    """Friction leaves a pole at 0 and one near it; the model of python-control has the second alone."""
     arm = tfarm.load("tests/rigs/bench-rig.toml")
     law = default_gains(arm)
     found = locus(arm, law, vary, 0.0, 2 * law[vary], branches=5, points=6)
@@ -439,7 +439,7 @@ def test_the_frame_of_a_picture_touches_its_outermost_points_and_holds_the_axis(
 
 
 def test_ten_digits_of_its_size_are_shown_and_a_gain_has_its_unit():
-    """A small real part beside a large frequency has the digits that |s| leaves it."""
+    """A small real part at a large frequency has the digits that |s| leaves it."""
     pole = np.array([-0.123456789012345 + 98.7654321098765j, 0.0])
     assert held_branches(pole) == pytest.approx([-0.12345679 + 98.76543211j, 0.0], rel=1e-15)
     assert abs(held_branches(1e5 * pole) - 1e5 * held_branches(pole)).max() <= 1e-15 * 1e7

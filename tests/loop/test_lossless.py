@@ -164,7 +164,7 @@ LAGGING = replace(
 @pytest.mark.parametrize("arm", [ROOT, CLAMP], ids=lambda arm: arm.name)
 @pytest.mark.parametrize("K2", thinned([-0.5, 0.3], 2))
 def test_the_window_of_K1_ends_where_the_hub_loses_nothing(arm, K2):
-    """Not at ends torn by rounding: beside it elements have every mode of the first six right or left of the axis."""
+    """Next to the end a finite-element model has each of the first six modes right or left of the axis."""
     windows = margins(arm, HubFeedback(K1=1.0, K2=K2)).windows["K1"]
     top = np.inf if arm is ROOT else windows.looked_at[1]  # no theorem on a gauge that reads another moment
     assert windows.all == ((-LOSS, top),)
@@ -181,7 +181,7 @@ def test_where_nothing_is_lost_the_loop_is_marginal(arm):
 
 
 @pytest.mark.parametrize("arm", [ROOT, CLAMP, LAGGING], ids=lambda arm: arm.name)
-def test_the_map_is_what_the_verdict_says(arm):
+def test_the_map_agrees_with_the_verdict(arm):
     """Of finitely many unstable poles too: behind an inductance friction damps the modes that no gain reaches."""
     K1, K2 = np.array([-0.7, -0.3, 0.5]), np.array([0.3, 1.2, 10.5, 14.0])
     found = gain_map(arm, K1, K2)

@@ -11,7 +11,7 @@ import tfarm
 from tests.loop.arms import some_loop, window_arm
 from tests.loop.counts import loops, nyquist_count
 from tests.shared import thinned
-from tests.spectrum.damped_roads import newton_step
+from tests.spectrum.independent import newton_step
 from tests.survey import tally
 from tfarm import Hub, HubFeedback, Law, ParameterError
 from tfarm.errors import ConvergenceError
@@ -148,8 +148,8 @@ def test_counts_that_are_refused(count) -> None:
 
 
 @pytest.mark.parametrize("C", [1e-5, 1e-3])
-def test_a_list_without_a_count_ends_at_the_shear_cut_off_where_fewer_than_ten_lie_below(C) -> None:
-    """As many as turns of 1 + L around the box say; a count goes on above the same poles."""
+def test_a_list_of_fewer_than_ten_poles_ends_at_the_shear_cut_off(C) -> None:
+    """As many as encirclements of 1 + L around the box; a count goes on above the same poles."""
     arm, law = STOCKY.having(damping=C), HubFeedback(K1=300.0, K2=0.3)
     few, ten = closed_loop_poles(arm, law), closed_loop_poles(arm, law, 10)
     assert few.ends_at_shear_cutoff
@@ -175,7 +175,7 @@ def test_a_count_goes_on_into_shear_where_bending_is_overdamped() -> None:
 
 @pytest.mark.parametrize("K2", [0.0, -3.0])
 @pytest.mark.parametrize("K1", [1e-7, -1e-12, 1e-60, 1e-99])
-def test_a_gain_far_too_small_for_the_flexible_arm_moves_the_pole_of_the_rigid_one(K1, K2) -> None:
+def test_a_very_small_gain_moves_the_rigid_body_pole_alone(K1, K2) -> None:
     """J s^2 + K1 s with J the effective inertia; the others are those at K1 = 0."""
     J = LAB.hub.inertia + (1 - K2) * (LAB.total_inertia - LAB.hub.inertia)
     zero, slow, *others = closed_loop_poles(LAB, HubFeedback(K1=K1, K2=K2), 5).values
@@ -220,7 +220,7 @@ def test_acceleration_fed_forward_beyond_the_hubs_inertia_is_unstable_far_beyond
 
 
 @pytest.mark.parametrize("corner", [1e3, 1e9])
-def test_wherever_the_corner_of_such_a_law_is_each_turn_of_the_real_axis_is_a_pole(corner):
+def test_far_real_poles_are_the_sign_changes_on_the_real_axis(corner):
     """1 + L at 400 places up to ten corners: as many turns of its sign as poles are listed there."""
     arm = LAB.having(hub_inertia=J)
     law = Law({"hub_rate": ((0.05 - 2 * J * corner, 0.05 * corner), (1.0, corner)), "hub_angle": 0.2})
@@ -233,7 +233,7 @@ def test_wherever_the_corner_of_such_a_law_is_each_turn_of_the_real_axis_is_a_po
 
 @pytest.mark.parametrize(("share", "number"), [(0.5, 0), (1.5, 1)])
 def test_a_rate_gain_beyond_the_links_impedance_drives_a_pin_without_inertia(share, number):
-    """The impedance of a link without losses goes to a constant: more than that taken off, and one pole runs away."""
+    """The impedance of a link without losses goes to a constant; with more than that subtracted a pole is unstable."""
     arm = BARE.having(hub_inertia=0.0)
     rate = tfarm.transfer(arm, "hub_rate", method="appendix")
     impedance = 1 / complex(rate(1e12 + 0j)).real
@@ -245,7 +245,7 @@ def test_a_rate_gain_beyond_the_links_impedance_drives_a_pin_without_inertia(sha
 
 
 @pytest.mark.parametrize("corner", [1e9, 1e100])
-def test_where_powers_of_s_are_no_doubles_nothing_is_warned_of_and_nothing_is_far(corner):
+def test_a_corner_beyond_double_range_leaves_the_gain_alone(corner):
     """A gain on the rate through a corner so fast is that gain alone."""
     law = Law({"hub_rate": ((0.1 * corner,), (1.0, corner)), "hub_angle": 0.1})
     found, alone = stability(LAB, law), stability(LAB, Law({"hub_rate": 0.1, "hub_angle": 0.1}))

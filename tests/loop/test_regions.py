@@ -55,7 +55,7 @@ def test_counts_of_a_held_arm_step_where_its_stiffness_vanishes(Kp) -> None:
 
 
 def test_a_column_without_rate_feedback_steps_where_the_effective_inertia_vanishes() -> None:
-    """At K1 = Kp = 0 a real pole passes the two at 0 where J = K2 (J - I_h): no crossing at w > 0 tells of it."""
+    """At K1 = Kp = 0 a real pole passes the two at 0 where J = K2 (J - I_h): no crossing at w > 0 shows it."""
     J = LAB.total_inertia
     limit = J / (J - LAB.hub.inertia)
     K2 = np.array([-20.0, -2.0, 0.5, limit * (1 - 1e-6), limit * (1 + 1e-6), 40.0])
@@ -128,7 +128,7 @@ def test_an_empty_or_unordered_range_is_refused(K1) -> None:
 
 
 def test_the_intervals_of_a_column_are_the_windows_along_it() -> None:
-    """Road: `gain_windows`, from a verdict of its own; between the edges the map's own counts."""
+    """By `gain_windows`, from a verdict of its own; between the edges by the map's own counts."""
     plane = gain_map(LAB, np.array([0.05, 0.3, 2.0]), np.linspace(-2.0, 1.5, 29))
     for n, (K1, column) in enumerate(zip(plane.K1, plane.stable_intervals, strict=True)):
         windows = windows_of(stability(LAB, HubFeedback(K1=float(K1), K2=0.1)), ["K2"])["K2"].all
@@ -141,7 +141,7 @@ def test_the_intervals_of_a_column_are_the_windows_along_it() -> None:
 
 
 def test_without_damping_the_intervals_of_a_held_arm_end_where_it_falls_statically() -> None:
-    """An angle pushed away by less than the arm's own stiffness: the map's counts tell the same, point by point."""
+    """An angle pushed away by less than the arm's own stiffness: the map's counts are the same, point by point."""
     held = BARE.having(payload_mass=math.inf)
     assert held.is_undamped
     plane = gain_map(held, np.array([-0.3, 0.3]), np.linspace(-2.5, 1.9, 41), -150.0)
@@ -153,11 +153,11 @@ def test_without_damping_the_intervals_of_a_held_arm_end_where_it_falls_statical
 
 
 @pytest.mark.parametrize(("arm", "reach"), [(BARE, "every mode, by a theorem"), (LAB, "up to 12196.9 rad/s")])
-def test_a_map_says_of_which_poles_it_is(arm, reach) -> None:
+def test_a_map_has_the_reach_of_its_poles(arm, reach) -> None:
     assert gain_map(arm, np.array([0.1, 0.3]), np.array([0.0, 0.5])).reach == reach
 
 
-def test_unless_asked_otherwise_a_map_is_around_the_papers_gains_in_the_rigs_own_units() -> None:
+def test_by_default_a_map_is_around_the_papers_gains_in_the_rigs_units() -> None:
     """The paper's 0.3 and 0 lie in -1 ... 3 and -2 ... 2; of a rig the first as its own K1, the second as its input."""
     assert ranges_of(LAB) == ((-1.0, 3.0), (-2.0, 2.0))
     rig = RIGS["r = 0.05"]

@@ -139,7 +139,7 @@ def test_a_slow_pair_is_no_real_pole_to_a_locus():
 
 
 def test_without_losses_no_law_is_quiet_however_little_it_feeds_back(monkeypatch):
-    """At each of its modes |L| is infinite, though between them it is 1e-12: what is exact is not told."""
+    """At each of its modes |L| is infinite, though between them it is 1e-12: exact margins are not reported."""
     monkeypatch.setattr("tfarm.loop.margins.windows_of", lambda _: {})  # which take longest
     found = tfarm.margins(BARE, Law({"hub_rate": ([1e-12, 1e-12], [1.0, 2.0])}), band=1000.0)
     assert found.stability.is_stable

@@ -59,7 +59,7 @@ def test_verdicts_at_no_damping_are_those_of_theory(K1, K2, Kp, verdict) -> None
 
 @pytest.mark.parametrize("K1", [1e-9, 0.3, 1e4])
 def test_what_lyapunov_proves_is_stable_however_slowly_it_decays(K1) -> None:
-    """Of a stocky arm some modes decay by less than 1e-11 of their frequency, which no double can tell from none."""
+    """Of a stocky arm some modes decay by less than 1e-11 of their frequency, too little for double precision."""
     found = stability(STOCKY, HubFeedback(K1=K1, K2=0.3))
     assert found.verdict == "stable"
 
@@ -100,7 +100,7 @@ def exceptional() -> Arm:
     return arm(brentq(participation, 1 / 2.6, 1 / 2.6238, xtol=1e-15, rtol=1e-15))
 
 
-def test_a_mode_that_the_hub_does_not_feel_stays_undamped_under_any_law() -> None:
+def test_a_mode_without_hub_participation_stays_undamped_under_any_law() -> None:
     arm = exceptional()
     assert not is_controllable(arm, 3e4)
     assert is_controllable(arm, 2e4)
@@ -112,7 +112,7 @@ def test_a_mode_that_the_hub_does_not_feel_stays_undamped_under_any_law() -> Non
     assert is_controllable(light, 1e4)
 
 
-def test_a_light_hub_feels_rotation_and_a_heavy_one_the_moment_as_a_slender_beam_has_them() -> None:
+def test_hub_shares_of_a_slender_beam_are_those_of_euler_bernoulli_modes() -> None:
     """Pinned-free and clamped-free Euler-Bernoulli modes: slope sqrt(2/m) k and curvature 2 k^2/sqrt m at the root."""
     section = Section.rectangle(width=0.02, depth=0.001)
     slender = replace(BARE, link=replace(BARE.link, section=section))
@@ -145,7 +145,7 @@ def test_beyond_the_band_the_loop_is_quiet_far_up_between_shear_resonances_too()
         assert abs(loop.loop_function(1j * np.geomspace(band, 1e9 * band, 4000))).max() < 0.5
 
 
-def test_where_the_tail_needs_too_many_modes_it_says_so() -> None:
+def test_a_tail_that_needs_too_many_modes_is_reported() -> None:
     thin = Link.isotropic(
         length=1.0, density=2700.0, youngs_modulus=7e10, poissons_ratio=0.3,
         section=Section.rectangle(width=0.1, depth=0.002), damping=1e-12,
@@ -181,7 +181,7 @@ def test_the_verdict_is_marginal_and_its_pole_listed_at_0(law):
 
 
 @pytest.mark.parametrize(("more", "verdict"), [(1e-6, "unstable"), (-1e-6, "stable")])
-def test_beside_it_they_are_told_apart(more, verdict):
+def test_next_to_it_stable_and_unstable_are_distinguished(more, verdict):
     for law in (HubFeedback(Kp=-SPRING * (1 + more)), PUSHES.having("gain", 1 + more)):
         assert tfarm.margins(HELD, law).stability.verdict == verdict
 
@@ -201,7 +201,7 @@ def test_a_map_may_have_it_among_its_points():
     np.testing.assert_array_equal(found.unstable[clear], (product > 1)[clear])
 
 
-def test_a_sampled_loop_beside_it_bears_a_delay_that_changes_nothing_at_rest():
+def test_near_it_a_sampled_loop_has_a_delay_margin():
     assert tfarm.sampled(HELD, PUSHES.having("gain", 1 - 1e-11)).delay_margin.is_bound
     for less in (1e-13, 1e-14, 0.0):  # rounding decides on which side of the circle it is, and is no error
         assert tfarm.sampled(HELD, PUSHES.having("gain", 1 - less)).delay_margin.samples >= 0

@@ -169,11 +169,11 @@ def test_the_stable_edge_is_the_boundary_with_stable_points_on_one_side():
     assert 3 < len(points) < len(plane.boundary)
     assert ((points[:, 0] > 0) & (points[:, 0] <= 3.0) & (points[:, 1] >= -4.0) & (points[:, 1] <= 2.0)).all()
     half = 3 * 6.0 / 90  # rows on either side
-    told = 0
+    different = 0
     for K1, K2, _ in points[:: max(1, len(points) // 6)]:
         sides = [stability(LAB, HubFeedback(K1=K1, K2=K2 + way * half)).is_stable for way in (-1, 1)]
-        told += sides[0] != sides[1]
-    assert told >= 5
+        different += sides[0] != sides[1]
+    assert different >= 5
     blank = np.full((2, 3), np.nan)
     assert stable_edge(plane, blank, x, y).size == 0
 
@@ -282,7 +282,7 @@ def test_at_each_zero_of_a_sensor_its_response_vanishes(C, sensor, share):
 
 
 @pytest.mark.parametrize("name", ["sasaki2012", "quanser-2dsfl"])
-def test_a_sensor_at_a_node_has_the_mode_for_a_zero_and_sees_none_of_it(name):
+def test_a_sensor_at_a_node_has_a_zero_at_the_mode(name):
     arm = tfarm.load(name)
     modes = tfarm.modes(arm, count=3)
     node = modes.nodes[-1][0]

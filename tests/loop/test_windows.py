@@ -62,7 +62,7 @@ def test_the_window_of_the_counterexample_and_those_beyond_it() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_random_windows_hold_what_the_model_says(seed) -> None:
+def test_random_stability_intervals_agree_with_the_model(seed) -> None:
     rng = np.random.default_rng(100 + seed)
     arm = some_free_arm(rng, damped=True)
     K1, K2, Kp = some_gains(rng, arm, 3)
@@ -146,7 +146,7 @@ def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():
 
 
 @pytest.mark.parametrize(("name", "reach"), [("sasaki2012", math.inf), ("sasaki2012-lab", None)])
-def test_where_all_is_known_nothing_is_said(name, reach):
+def test_exact_intervals_have_no_note(name, reach):
     arm = tfarm.load(name)
     found = margins(arm, default_gains(arm))
     assert found.intervals_note is None
@@ -168,7 +168,7 @@ EMPTY = {(LAB, "Kp"), (held(), "K2"), (held(), "Kp")}
 
 
 @pytest.mark.parametrize(("arm", "name"), CASES)
-def test_at_each_crossing_a_pole_of_that_frequency_is_on_the_axis_and_goes_the_way_it_says(arm, name) -> None:
+def test_at_each_crossing_a_pole_crosses_the_axis_in_the_given_direction(arm, name) -> None:
     law = HubFeedback(K1=0.3 if arm is not window_arm() else 1.0, K2=-9.0)
     found = [each for each in crossings(arm, law, name, 1e5) if each.at][:6]
     assert bool(found) != ((arm, name) in EMPTY)

@@ -1,6 +1,6 @@
-"""Is anybody turned away, or told something wrong?  Plausible arms through every verb: `python -m tests.plausible`.
+"""Refusals and wrong results for plausible arms, by every command: `python -m tests.plausible`.
 
-Linear algebra runs on one thread here, which has to be said before NumPy is imported: arms are shared out over
+Linear algebra runs on one thread here, which has to be set before NumPy is imported: arms are shared out over
 processes.
 """
 

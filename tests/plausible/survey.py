@@ -4,8 +4,8 @@
 
 Steel to rubber, 5 cm to 10 m, L/h 5 to 300, rectangles, rods and tubes, hub 1e-2 to 1e2 and payload 0 to 1e2 times the
 beam's, first damping ratio 1e-4 to 2e-2 or C = 0.  Natural frequencies, responses, poles, verdict and windows have to
-be the model's where two models of it agree; a command that crashes, or says on standard error what is not tfarm's, is
-wrong too.  Budget: 2 CPU s an arm.
+be the model's where two models of it agree; a command that crashes, or prints on standard error what is not tfarm's,
+is wrong too.  Budget: 2 CPU s an arm.
 """
 
 import contextlib
@@ -28,9 +28,9 @@ from tfarm.cli import main
 
 ROUGH, FINE = 56, 72  # Legendre terms of the two models: right to 1e-9 up to modes 27 and 36 (rounding apart)
 SAFETY = 20  # times the difference of two models
-BLIND = 1e-3  # relative: models that differ by more say nothing
-BESIDE = 1e-3  # share of a printed edge on either side of which the loop is looked at
-CLEAR = 1e-7  # of |s|: a real part that is smaller says nothing of stability
+BLIND = 1e-3  # relative: models that differ by more decide nothing
+OFF_EDGE = 1e-3  # share of a printed edge on either side of which the loop is checked
+CLEAR = 1e-7  # of |s|: a smaller real part does not decide stability
 
 
 def run(arguments):
@@ -49,7 +49,7 @@ def run(arguments):
 
 
 def compared(what, printed, model, rough):
-    """Words where numbers (n,) differ by more than two models do, and how many these know."""
+    """Words where numbers (n,) differ by more than two models do, and how many these have."""
     size = np.maximum(abs(model), 1e-300)
     known = abs(model - rough) < BLIND / SAFETY * size
     off = abs(np.asarray(printed) - model) > SAFETY * abs(model - rough) + 1e-8 * size
@@ -90,7 +90,7 @@ def margins(case, answer, rough, fine):
         low, high = row["search_range"]
         windows = [(float(each["low"]), float(each["high"])) for each in row["intervals"]]
         for end in [end for pair in windows for end in pair if low < end < high][:4]:
-            step = BESIDE * (abs(end) or abs(getattr(case.law, name)) or 1.0)
+            step = OFF_EDGE * (abs(end) or abs(getattr(case.law, name)) or 1.0)
             values = [(value, any(a < value < b for a, b in windows)) for value in (end - step, end + step)]
             tried += [(replace(case.law, **{name: value}), is_inside) for value, is_inside in values]
     words, known = [], 0
@@ -115,7 +115,7 @@ def gains(case):
     return [f"--{name}={value!r}" for name, value in case.law.by_name.items()]
 
 
-VERBS = {  # what a command is asked, and its judge
+VERBS = {  # options of a command, and its judge
     "modes": (lambda case: ["--count", "20"], modes),
     "response": (along, response),
     "poles": (gains, poles),
@@ -124,13 +124,13 @@ VERBS = {  # what a command is asked, and its judge
 
 
 def judged(verb, number, seed, terms=(ROUGH, FINE)):
-    """The finding on the arm of that number, by models of so many Legendre terms."""
-    case, (asked, judge) = draw(number, seed), VERBS[verb]
+    """The finding on the arm of that number, by models of `terms` Legendre terms."""
+    case, (options, judge) = draw(number, seed), VERBS[verb]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "arm.toml"
         path.write_text(case.toml)
-        code, answer, error = run([verb, str(path), *asked(case)])
-    where = f"arm {number} of seed {seed}: tfarm {verb} arm.toml {' '.join(asked(case))}\n{case.toml}"
+        code, answer, error = run([verb, str(path), *options(case)])
+    where = f"arm {number} of seed {seed}: tfarm {verb} arm.toml {' '.join(options(case))}\n{case.toml}"
     noise = [line for line in error.splitlines() if not line.startswith("tfarm: ")]
     if code in (2, 3) and not noise:
         return Finding("refused", f"{error.strip()} {where}")

@@ -17,7 +17,7 @@ def test_plausible_arms_are_answered_and_right(verb, number):
     assert found.figures["checks"] > (2 if verb == "margins" else 5)
 
 
-def test_the_survey_sees_a_wrong_digit_and_a_missing_pole(tmp_path):
+def test_the_survey_detects_a_wrong_digit_and_a_missing_pole(tmp_path):
     case, path = draw(1, 2012), tmp_path / "arm.toml"
     models = Ritz(case.arm, 24), Ritz(case.arm, 32)
     path.write_text(case.toml)

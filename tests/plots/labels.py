@@ -17,24 +17,24 @@ from matplotlib.transforms import Bbox
 
 from tfarm.plots.style import FAINT, GREY, style
 
-ROOM = 1.0  # pixels around the letters of a text that its box holds beside them: what two may share
+ROOM = 1.0  # pixels around the letters of a text that its box includes: two may share them
 Words = list[tuple[Text, Bbox]]
 
 
 def complaints(figure: Figure) -> list[str]:
     """A line for each pair of words that overlap, for words across a frame or out of the picture, and on a curve."""
     words = drawn(figure)
-    told = [f"{_said(a)} on {_said(b)}" for (a, one), (b, other) in combinations(words, 2) if one.overlaps(other)]
-    told += [f"{_said(text)} leaves the picture" for text, box in words if not _holds(figure.bbox, box)]
+    found = [f"{_quoted(a)} on {_quoted(b)}" for (a, one), (b, other) in combinations(words, 2) if one.overlaps(other)]
+    found += [f"{_quoted(text)} leaves the picture" for text, box in words if not _holds(figure.bbox, box)]
     for ax in figure.axes:
         if ax.get_visible() and ax.axison:
-            told += [f"{_said(text)} across a frame" for text, box in words if _is_cut(box, ax)]
-        told += [
-            f"{_said(text)} on a curve"
+            found += [f"{_quoted(text)} across a frame" for text, box in words if _is_cut(box, ax)]
+        found += [
+            f"{_quoted(text)} on a curve"
             for text, box in words
             if text in ax.texts and not text.get_path_effects() and _is_on_curve(text, box, ax)
         ]  # a halo hides the line below a number
-    return told
+    return found
 
 
 def drawn(figure: Figure) -> Words:
@@ -85,5 +85,5 @@ def _is_on_curve(text: Text, box: Bbox, ax: Axes) -> bool:
     return False
 
 
-def _said(text: Text) -> str:
+def _quoted(text: Text) -> str:
     return repr(text.get_text())

@@ -147,8 +147,8 @@ def test_a_number_of_a_law_has_its_unit(number, label):
 
 
 @pytest.mark.parametrize("name", tfarm.plots.__all__)
-def test_what_is_no_record_of_it_is_refused_by_the_name_of_what_returns_one(name, records):
-    """The first and the last argument of each picture, one at a time; what is drawn beside is left alone."""
+def test_a_wrong_argument_of_a_picture_is_refused_with_the_function_to_use(name, records):
+    """The first and the last argument of each picture, one at a time; other figures are left alone."""
     right = records[name]
     for place in {0, len(right) - 1}:
         for wrong in (3, LAW, tfarm.transfer(LAB, "root_moment")):
@@ -158,17 +158,17 @@ def test_what_is_no_record_of_it_is_refused_by_the_name_of_what_returns_one(name
     assert pyplot.get_fignums() == []
 
 
-def test_words_that_do_overlap_are_told():
-    """Of which the tests above say that there are none."""
+def test_overlapping_words_are_reported():
+    """The tests above find none."""
     figure = Figure(figsize=(4.0, 3.0))
     ax = figure.add_axes((0.1, 0.1, 0.8, 0.8))
     ax.plot([0, 1, np.nan, 1, 1], [0, 1, np.nan, 0, 1], color="#0060a8")
     ax.set(xlim=(0, 1), ylim=(0, 1))
     for x, y, text in ((0.5, 0.5, "on the line"), (0.1, 0.8, "one"), (0.12, 0.81, "other"), (0.97, 0.3, "frame")):
         ax.text(x, y, text)
-    told = complaints(figure)
-    assert {"'on the line' on a curve", "'one' on 'other'", "'frame' across a frame"} <= set(told)
-    assert "'one' on a curve" not in told
+    found = complaints(figure)
+    assert {"'on the line' on a curve", "'one' on 'other'", "'frame' across a frame"} <= set(found)
+    assert "'one' on a curve" not in found
 
 
 def test_bode_draws_the_response(records):
@@ -257,7 +257,7 @@ def test_locus_draws_the_branches_and_their_crossings(records):
 
 
 @pytest.mark.parametrize(("vary", "stop"), [("K1", 0.6), ("payload_mass", 0.1)])
-def test_a_reduced_locus_lies_beside_the_exact_one(vary, stop):
+def test_a_reduced_locus_is_drawn_with_the_exact_one(vary, stop):
     """Dashed, at its own values: fewer where a parameter of the arm varies."""
     found = tfarm.locus(LAB, LAW, vary, 0.01, stop, points=30, branches=3)
     reduced = reduced_locus(found)

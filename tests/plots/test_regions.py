@@ -27,9 +27,9 @@ def region_of(arm):
 
 @pytest.mark.parametrize("arm", [tfarm.load("quanser-flexlink"), LOSSY], ids=lambda arm: arm.name)
 def test_a_hub_that_loses_something_is_stable_below_no_rate_gain_too(arm):
-    """Back-EMF or friction, and a gain that takes less than they: drawn, and so the eigenvalues of the loop say."""
+    """Back-EMF or friction, and a gain that takes less than they: drawn, as by the eigenvalues of the loop."""
     plane = region_of(arm)
-    below = np.flatnonzero((plane.K1 < 0) & (plane.K1 / arm.rate_loss > -0.99))  # eigenvalues tell nothing at the edge
+    below = np.flatnonzero((plane.K1 < 0) & (plane.K1 / arm.rate_loss > -0.99))  # not at the edge: rounding
     assert below.size
     for n in below[:: max(1, below.size // 3)]:
         windows = plane.stable_intervals[n]
@@ -48,7 +48,7 @@ def test_its_least_rate_gain_is_an_upright_edge_of_the_picture():
     assert min(row["K1"] for row in areas) >= -FRICTION
 
 
-def test_a_free_hub_that_loses_nothing_has_no_column_below_0_and_a_held_one_has():
+def test_only_a_held_tip_has_columns_below_0_on_a_lossless_hub():
     x = rate_axis(LAB)
     assert rate_columns(LAB, x, 40).min() > 0
     held = replace(LAB, payload=replace(LAB.payload, mass=np.inf))

@@ -69,7 +69,7 @@ def test_no_branch_turns_by_more_than_five_degrees(make, width, corners):
 
 
 def test_the_outline_of_a_sampled_region_is_that_of_its_poles():
-    """Road: eigenvalues a little inside and outside the middle of each piece of the outline that is drawn, and no turn
+    """By eigenvalues a little inside and outside the middle of each piece of the outline that is drawn, and no turn
     beyond 5 degrees but where it is no longer than a pixel."""
     x = rate_axis(LAB)
     y = moment_axis(LAB, x)

@@ -100,7 +100,7 @@ AT_ENDS = [name for name, each in OF_ONE_LINK.items() if each.place != "x"]
 
 
 def measure(rng, points, *, damping=0.0):
-    """One random arm reduced, and the largest error found at so many frequencies, with its place."""
+    """One random arm reduced, and the largest error at `points` frequencies, with its place."""
     arm = some_arm(rng, damping=damping)
     first = tfarm.modes(arm, 1).natural_frequency[-1]
     high = float(first * 10 ** rng.uniform(-0.5, 1.2))
@@ -115,7 +115,7 @@ def measure(rng, points, *, damping=0.0):
     reduced = reduce(arm, names, order=order, method=method, band=band, x=x)
     w = grid(rng, band, points)
     found, at = true_error(reduced, w)
-    if found > reduced.worst_error:  # rounding of the exact values, or a real miss: proven digits tell
+    if found > reduced.worst_error:  # rounding of the exact values, or a real miss: proven digits decide
         found, at = true_error(reduced, np.array([at]), proven=True)
     return reduced, found, at
 
@@ -129,7 +129,7 @@ def grid(rng, band, points):
 
 
 def true_error(reduced, w, *, proven=False):
-    """The largest |dG| / (|G| + |w G'|) on the grid, and where; G to proven digits if asked."""
+    """The largest |dG| / (|G| + |w G'|) on the grid, and where; G to proven digits if requested."""
     G = tfarm.transfer(reduced.arm, reduced.outputs, x=reduced.model.x)
     exact = G(1j * w)
     if proven:

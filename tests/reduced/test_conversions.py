@@ -38,9 +38,9 @@ def test_mat_file_and_its_script(reduced, tmp_path):
     np.testing.assert_array_equal(data["response"], tfarm.transfer(reduced.arm, reduced.outputs)(1j * w))
     text = script.read_text()
     assert "load(fullfile(here, 'my-arm.mat'))" in text
-    asked = set(re.findall(r"data\.(\w+)", text))
-    assert asked <= set(data)
-    assert {"A", "B", "C", "D", "omega", "response"} <= asked
+    used = set(re.findall(r"data\.(\w+)", text))
+    assert used <= set(data)
+    assert {"A", "B", "C", "D", "omega", "response"} <= used
     assert sorted(path.name for path in tmp_path.iterdir()) == ["load_my_arm.m", "my-arm.mat"]
 
 
@@ -56,7 +56,7 @@ def test_a_folder_that_is_not_there(reduced, tmp_path):
 
 
 def test_a_script_that_is_another_files_is_left_alone(reduced, tmp_path):
-    """load_a_b.m is the script of a-b.mat and would be that of a_b.mat; one written by hand is nobody's."""
+    """load_a_b.m is the script of a-b.mat and would be that of a_b.mat; one written by hand belongs to no file."""
     save_mat(reduced, tmp_path / "a-b.mat")
     save_mat(reduced, tmp_path / "a-b.mat")
     (tmp_path / "load_c.m").write_text("x = 1;\n")

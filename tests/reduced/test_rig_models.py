@@ -81,7 +81,7 @@ def test_a_lossless_rig_behind_an_inductance_has_its_circuits_pole(radius):
 
 
 LAB = load("sasaki2012-lab")
-LEFT_OUT = 2e-3  # of a response: what the modes left out add beside their static share at C = 0
+LEFT_OUT = 2e-3  # of a response: what the modes left out add to their static share at C = 0
 
 
 def rubbing(inertia, friction, *, theory="timoshenko", C=1e-4):
@@ -93,8 +93,8 @@ def rubbing(inertia, friction, *, theory="timoshenko", C=1e-4):
 def test_the_pole_is_one_of_the_exact_arm(theory, inertia):
     arm = rubbing(inertia, 5.0, theory=theory)
     (pole,) = entered(damped_modes(modes(arm, 6)))
-    beside = [determinant(arm, mpmath.mpf(pole * (1 + side)), digits=30).real for side in (-1e-9, 1e-9)]
-    assert beside[0] * beside[1] < 0
+    either_side = [determinant(arm, mpmath.mpf(pole * (1 + side)), digits=30).real for side in (-1e-9, 1e-9)]
+    assert either_side[0] * either_side[1] < 0
     assert -140 < pole < -130
 
 

@@ -1,4 +1,4 @@
-"""The arithmetic of the live page in Python, from the numbers in the page alone: the second road of its tests."""
+"""The arithmetic of the live page in Python, from the numbers in the page alone: the second method of its tests."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Page:
 
 
 def complex_rows(text, rows):
-    """The complex numbers of packed doubles, in so many rows."""
+    """The complex numbers of packed doubles, in `rows` rows."""
     return np.frombuffer(base64.b64decode(text), "<f8").view(complex).reshape(rows, -1)
 
 

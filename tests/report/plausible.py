@@ -38,7 +38,7 @@ LONGEST = 1800.0  # s that one arm may take, on a machine that others use too
 
 
 def contradictions(folder: Path) -> list[str]:
-    """What is wrong with an arm's pages: sentences against the tables beside them."""
+    """Contradictions on an arm's pages between sentences and tables."""
     found = []
     for page in sorted(folder.glob("*.html")):
         pictures = [each for each in Links(page).targets if each.endswith(".svg")]

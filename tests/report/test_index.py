@@ -10,7 +10,7 @@ from tfarm.report.page import Card, index_page, kept, save_card
 LAB = tfarm.load("sasaki2012-lab")
 FAST = tfarm.Law({"hub_angle": ((2.0, 30.0), (0.002, 1.0)), "root_moment": -0.2}, delay=0.002, name="PD, fast")
 SLOW = tfarm.Law({"hub_angle": ((0.2, 0.3), (0.1, 1.0))}, name="PD, slow")
-AT_CLOCK = tfarm.Law({"hub_rate": ((0.3,), (1.0,))}, period=0.01, name="at the clock")
+SAMPLED = tfarm.Law({"hub_rate": ((0.3,), (1.0,))}, period=0.01, name="sampled")
 
 
 def rows_of(tmp_path, laws, chain):
@@ -39,7 +39,7 @@ def test_a_law_has_its_own_verdicts_and_nothing_of_the_default_gains(tmp_path, l
 
 
 def test_each_law_has_a_row_and_one_in_z_no_continuous_verdict(tmp_path):
-    rows, page = rows_of(tmp_path, [GivenLaw(AT_CLOCK), GivenLaw(tfarm.HubFeedback(K1=0.3, K2=0.3))], Chain())
+    rows, page = rows_of(tmp_path, [GivenLaw(SAMPLED), GivenLaw(tfarm.HubFeedback(K1=0.3, K2=0.3))], Chain())
     assert [row["verdict"] for row in rows] == ["", "stable"]
     assert [row["sampled"] for row in rows] == ["stable when sampled every 10 ms"] * 2
     assert page.count(f'{LAB.name}/index.html">{LAB.name}</a></td>') == 2

@@ -113,7 +113,7 @@ def test_a_page_is_about_its_law_and_its_file_repeats_it(file, tmp_path, monkeyp
     (tmp_path / "again").mkdir()
     assert run(capsys, "report", str(made), "--only", "margins", "--out", str(tmp_path / "again"))[0] == 0
     again = (tmp_path / "again" / LAB.name / "margins.html").read_text(encoding="utf-8")
-    assert again == page.replace(" (law.toml)", "")  # a law of the arm's own file has no file beside it
+    assert again == page.replace(" (law.toml)", "")  # a law of the arm's own file has no other file
 
 
 def test_gains_typed_are_in_the_file_of_the_page():
@@ -169,7 +169,7 @@ def real(name):
 
 @pytest.mark.parametrize("name", ["lqg", "hinf"])
 def test_a_step_over_the_measured_one_is_that_of_python_control(name):
-    """The sampled plant and the controller's matrices closed by hand, led by the reference as it was recorded."""
+    """The sampled plant and the controller's matrices closed by hand, driven by the recorded reference."""
     law, measured = real(name)
     mine = compare_run(PRESET, law, Chain(), measured)
     count = 8

@@ -1,4 +1,4 @@
-"""Sections that cannot be made say why; which sections a page has; what cannot be written is named."""
+"""Sections that cannot be made have their reason; sections of each page; files that cannot be written are named."""
 
 import hashlib
 import sys
@@ -25,7 +25,7 @@ from tfarm.report.sections import PageSection
 
 
 def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
-    """Its sampling, converters and motor are those of the page, of the arm.toml beside it, and of the hash."""
+    """Its sampling, converters and motor are those of the page, of its arm.toml, and of the hash."""
     seen = []
 
     def section(case):
@@ -41,10 +41,10 @@ def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
     code, _, _ = run(capsys, "report", str(file), "--only", "sampled", "--out", str(tmp_path / "out"))
     chain = load_chain(file)
     assert (code, seen) == (0, [(ARM.name, chain)])
-    beside = tmp_path / "out" / ARM.name / "arm.toml"
-    assert (tfarm.load(beside), load_chain(beside)) == (ARM, chain)
+    written = tmp_path / "out" / ARM.name / "arm.toml"
+    assert (tfarm.load(written), load_chain(written)) == (ARM, chain)
     page = (tmp_path / "out" / ARM.name / "sampled.html").read_text(encoding="utf-8")
-    assert hashlib.sha256(beside.read_bytes()).hexdigest() in page
+    assert hashlib.sha256(written.read_bytes()).hexdigest() in page
 
 
 def without_a_section(monkeypatch, error):
@@ -66,12 +66,12 @@ def without_a_section(monkeypatch, error):
 )
 def test_a_section_that_cannot_be_made_has_its_reason_in_its_place(tmp_path, monkeypatch, error):
     without_a_section(monkeypatch, error)
-    told = []
-    page = write([ARM], tmp_path, only=("locus",), notice=told.append).read_text(encoding="utf-8")
+    notices = []
+    page = write([ARM], tmp_path, only=("locus",), notice=notices.append).read_text(encoding="utf-8")
     assert "stopped short of the pole" in page.partition('id="locus"')[2]
     assert "Parameters" in page
-    assert len(told) == 1
-    assert "stopped short of the pole" in told[0]
+    assert len(notices) == 1
+    assert "stopped short of the pole" in notices[0]
 
 
 def test_an_index_without_the_picture_of_an_arm_names_it(tmp_path, monkeypatch):
@@ -87,9 +87,9 @@ def test_a_section_left_out_is_one_line_on_standard_error(tmp_path, monkeypatch,
     without_a_section(monkeypatch, tfarm.ConvergenceError("stopped\nshort", None, None))
     code, out, err = run(capsys, "report", "stocky-steel", "--only", "locus", "--out", str(tmp_path))
     assert (code, out.strip()) == (0, str(tmp_path / "stocky-steel" / "locus.html"))
-    said = [line for line in err.splitlines() if " done" not in line]  # but for progress, on a slow machine
-    assert len(said) == 1
-    assert said[0].startswith("tfarm: stocky-steel: ")
+    lines = [line for line in err.splitlines() if " done" not in line]  # but for progress, on a slow machine
+    assert len(lines) == 1
+    assert lines[0].startswith("tfarm: stocky-steel: ")
 
 
 def test_a_bug_of_ours_stays_loud(tmp_path, monkeypatch):
@@ -99,13 +99,13 @@ def test_a_bug_of_ours_stays_loud(tmp_path, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
-def test_every_piece_knows_the_anchor_of_its_section(pages):
+def test_every_piece_has_the_anchor_of_its_section(pages):
     ids = links_of(pages / NAME / "index.html").ids
     assert [piece.anchor for piece in pieces_of(Case(ARM, Chain()))] == [i for i in ids if i in ANCHORS]
 
 
 def test_a_page_has_the_same_sections_whatever_is_written_with_it(tmp_path, monkeypatch):
-    """Of an arm without a loop: what says so stands on the pages of the loop, and on no other."""
+    """The note on an arm without a loop is on the pages of the loop alone."""
     kept = tuple(replace(each, make=partial(bare, each.anchor)) for each in PIECES)
     monkeypatch.setattr("tfarm.report.page.PIECES", kept)
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)
@@ -117,7 +117,7 @@ def test_a_page_has_the_same_sections_whatever_is_written_with_it(tmp_path, monk
 
 
 def bare(anchor, *_):
-    """A section that says nothing."""
+    """A section without content."""
     return PageSection(anchor=anchor, title=anchor)
 
 

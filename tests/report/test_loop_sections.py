@@ -1,4 +1,4 @@
-"""The loop on an arm's page: what is drawn is what the loop room computes, by another road where there is one."""
+"""The loop on an arm's page: what is drawn is what the loop room computes, by a second method where there is one."""
 
 import math
 from dataclasses import replace
@@ -92,7 +92,7 @@ def test_the_edge_is_smooth_and_inside_the_picture(lab):
 
 
 def test_no_part_of_the_edge_is_missing(lab):
-    """Wherever the count changes between two neighbours of the grid, above or beside, the line passes between them."""
+    """Where the count changes between neighbours of the grid in a row or column, the line passes between them."""
     edge = np.stack([lab.x.place(lab.edge[:, 0]), lab.y.place(lab.edge[:, 1])], axis=1)
     edge = edge[~np.isnan(edge[:, 0])]
     across, up = lab.x.place(lab.region.K1), lab.y.place(lab.region.K2)
@@ -255,7 +255,7 @@ def test_the_sampled_edge_on_the_map_is_where_a_pole_meets_the_circle(lab):
 
 
 def test_the_star_is_stable_at_the_period_of_its_page(lab, section):
-    """The best gains of a page are those of its own chain, and stable there; a law that is not says so in its card."""
+    """The best gains of a page are those of its own chain, and stable there; an unstable law has it in its card."""
     assert all(brief_on(LAB, each.law, Chain()).is_stable for each in lab.case.in_s)
     labels = [text.get_text() for text in draw_map_of_arm(lab).legends[0].get_texts()]
     assert any(label.startswith("best damping") and "stable when sampled every 10 ms" in label for label in labels)
@@ -268,7 +268,7 @@ def test_the_star_is_stable_at_the_period_of_its_page(lab, section):
     )
     slow, fast = (Case(LAB, each).in_s[1].law.gains.K1 for each in (Chain(), quick))
     assert fast > slow
-    lost = on_hub(LAB, HubFeedback(K1=26.0, K2=-3.0), "best without a clock", "best")
+    lost = on_hub(LAB, HubFeedback(K1=26.0, K2=-3.0), "best in continuous time", "best")
     fact = verdict_fact(lost, margins_of(LAB, lost.law), sampled_brief(LAB, lost.law, Chain()).short)
     assert fact.note.endswith("UNSTABLE when sampled every 10 ms")
     assert set(map_data(lab)[0].values) == {"grid", "boundary", "sampled boundary"}
@@ -300,8 +300,8 @@ def test_random_loops_have_as_many_turns_as_unstable_poles():
     assert wrong == 0
 
 
-def test_poles_on_the_axis_but_for_a_theorem_may_be_on_either_side_of_the_curve():
-    """On a hub of 10,000 beams modes grow by 1e-9 of a rad/s at 1e5: the verdict knows, the turns may not."""
+def test_poles_within_rounding_of_the_axis_may_count_on_either_side():
+    """On a hub of 10,000 beams modes grow by 1e-9 of a rad/s at 1e5: the verdict has them, encirclements may not."""
     arm = PURE.having(hub_inertia=1e4 * PURE.carried_inertia)
     plot = nyquist(arm, HubFeedback(K1=-0.05 * arm.total_inertia))
     assert plot.verdict.unstable_roots_infinite

@@ -1,4 +1,4 @@
-"""What the pages say of eight legal arms unlike the paper's: each sentence against the numbers of its own page."""
+"""Pages of eight legal arms unlike the paper's: each sentence against the numbers of its page."""
 
 import json
 import math
@@ -73,7 +73,7 @@ def test_cells_of_the_modal_table_are_its_numbers_with_a_few_digits(name):
 
 @pytest.mark.parametrize("name", DAMPED)
 def test_rows_outside_the_certified_box_are_marked(name, monkeypatch):
-    """The box and the count that the caption prints hold just the rows that are said to be in it."""
+    """The box and the count that the caption prints hold just the rows marked as inside."""
     monkeypatch.setattr(DampedModes, "certify", lambda self, digits: ())  # seconds, and its own tests
     arm = ARMS[name]
     table, *_ = damped_tables(tfarm.modes(arm, count=6))
@@ -131,12 +131,12 @@ LOOPS = [name for name, arm in ARMS.items() if has_loop(arm)]
 
 
 def is_stable(arm, law, up_to):
-    """By finding every pole below a frequency: a road that knows no windows."""
+    """By finding every pole below a frequency: a method without stability intervals."""
     return poles_below(Loop(arm, law), up_to).unstable == 0
 
 
 @pytest.mark.parametrize("name", thinned(LOOPS, 2))
-def test_how_far_K2_may_go_is_what_the_poles_say(name):
+def test_the_interval_of_K2_is_that_of_the_poles(name):
     """On either side of an edge; at the end of a search nothing happens, and no edge is claimed."""
     arm, law = ARMS[name], default_gains(ARMS[name])
     words = gains_section.intervals(arm).partition("; K2")[2]

@@ -1,4 +1,4 @@
-"""The texts of pages: each that is asked for is there, and none is left that no page has."""
+"""The texts of pages: each one used exists, and each one there is used."""
 
 import re
 
@@ -7,14 +7,14 @@ from tfarm.schema import Column
 
 TEXTS = (TEMPLATES / "prose.txt").read_text(encoding="utf-8")
 NAMES = set(re.findall(r"{% macro (\w+)\(", TEXTS))
-OF_TRUST = {f"trust_{name}" for name in ("proofs", "accuracy", "published")}  # which its template asks for
+OF_TRUST = {f"trust_{name}" for name in ("proofs", "accuracy", "published")}  # used by its template
 
 
-def test_every_text_has_a_place_that_asks_for_it():
+def test_every_text_is_used():
     code = "\n".join(file.read_text(encoding="utf-8") for file in TEMPLATES.parent.glob("*.py"))
     assert set(re.findall(r'(?:prose|picture|sheet)\(\s*"(\w+)"', code)) <= NAMES
-    asked = {name for name in NAMES if f'"{name}"' in code} | OF_TRUST
-    assert all(TEXTS.count(f"{name}(") > 1 for name in NAMES - asked)  # which other texts have in them
+    used = {name for name in NAMES if f'"{name}"' in code} | OF_TRUST
+    assert all(TEXTS.count(f"{name}(") > 1 for name in NAMES - used)  # which other texts have in them
 
 
 def test_line_breaks_of_a_text_are_spaces_and_a_table_has_title_and_caption():

@@ -1,4 +1,4 @@
-"""Pages of rigs: every part is in a table and in the sketch, hub-locked frequencies stand beside the free ones."""
+"""Pages of rigs: every part is in a table and in the sketch, hub-locked frequencies are listed with the free ones."""
 
 import math
 from dataclasses import replace
@@ -43,15 +43,15 @@ def test_every_number_of_the_file_is_in_the_table_of_parameters(name):
     assert values_of(derived)["total inertia about the axis"] == arm.total_inertia
 
 
-def test_the_gauge_stands_there_where_it_is_not_at_the_root_and_a_cut_off_where_the_theory_has_one():
+def test_the_page_has_the_gauge_s_place_and_the_shear_cut_off():
     """The second pair of waves travels in Timoshenko's theory alone (tests/spectrum/test_tables.py)."""
     rig = RIGS["bench-rig"]
     for arm in (rig, replace(rig, gauge=Gauge(x=0.013)), rig.under("rayleigh")):
         section = arm_section(Case(arm, Chain()))
         _, given, derived = section.blocks
         assert values_of(given).get("gauge.x", 0.0) == arm.gauge.x
-        said = [fact.label for fact in section.facts] + list(values_of(derived))
-        assert any("shear cut-off" in each for each in said) == (arm.theory == "timoshenko")
+        labels = [fact.label for fact in section.facts] + list(values_of(derived))
+        assert any("shear cut-off" in each for each in labels) == (arm.theory == "timoshenko")
         assert ("no shear cut-off" in derived.caption) == (arm.theory == "rayleigh")
 
 

@@ -1,4 +1,4 @@
-"""The sampled loop on the page: drawn numbers are those of the rooms, verdicts say for how many modes, same bytes."""
+"""The sampled loop on the page: drawn numbers are those of the rooms, verdicts name their modes, same bytes."""
 
 import math
 from dataclasses import replace
@@ -61,7 +61,7 @@ def test_the_picture_of_a_rig_is_as_high_as_its_own_gains(monkeypatch):
     assert low < bottom < top < high
 
 
-def test_the_map_of_both_regions_is_what_poles_say():
+def test_the_map_of_both_regions_is_that_of_the_poles():
     data = PLANE()
     random = np.random.default_rng(5)
     loop = sampled_loop(LAB, GAINS, Chain(), count=16)
@@ -85,7 +85,7 @@ def test_the_edges_at_the_default_gains_are_published_ones(section):
     assert edges == pytest.approx([1.0305, -0.1526, 1.1639], abs=2e-3)  # linear between columns 12 % apart
 
 
-def test_without_damping_the_layers_are_nested_at_the_gains_and_say_for_how_many_modes(monkeypatch):
+def test_without_damping_the_layers_are_nested_and_name_their_number_of_modes(monkeypatch):
     monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)
     data = stable_regions(PAPER, GAINS, Chain())
@@ -135,7 +135,7 @@ def test_a_delay_margin_that_is_a_lower_bound_is_shown_so():
 
 
 def test_at_zero_damping_the_verdict_names_its_modes_and_the_damping_that_it_needs():
-    """The number is where the poles say so: a little more damping is stable."""
+    """By the poles: a little more damping is stable."""
     (each,) = Case(PAPER, Chain()).controllers
     first, *_, damping = page.facts_on(each, tfarm.sampled(PAPER, GAINS))
     assert "model of the first 20 modes" in first.note

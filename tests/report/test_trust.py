@@ -180,7 +180,7 @@ def test_the_page_shows_verdicts_in_words_and_formulas_as_mathml(page):
 
 
 def test_long_tables_and_claims_are_folded_below_their_answers(page):
-    """What stands unfolded: how many are counted, how exact curves are, and numbers; a chip for every claim."""
+    """Unfolded are the counts, the accuracy of curves, and numbers; a chip for every claim."""
     unfolded = re.sub(r"<details.*?</details>", "", page, flags=re.DOTALL)
     assert re.findall(r'id="(table-[^"]*)"', unfolded) == ["table-counts", "table-accuracy"]
     assert "<article" not in unfolded

@@ -12,7 +12,7 @@ from tfarm.schema.html import GREEK
 
 CLAIMS = claims()
 TEXTS = [(claim, text) for claim in CLAIMS for text in (claim.printed, claim.corrected) if text]
-WITH_DW = {"(21)", "(22)"}  # their plain text says dw for the increment
+WITH_DW = {"(21)", "(22)"}  # their plain text has dw for the increment
 
 
 def leaves(markup):

@@ -29,7 +29,7 @@ SEEDS = 3
 
 @pytest.fixture(scope="module", autouse=True)
 def each_loop_once():
-    """The guard and the best constant gain of a loop, which every tuning asks for, are found once."""
+    """The guard and the best constant gain of a loop, which every tuning needs, are found once."""
     with pytest.MonkeyPatch.context() as patch:
         for name in ("find_guard", "best_constant"):
             patch.setattr(tuning_room, name, cache(getattr(tuning_room, name)))
@@ -59,7 +59,7 @@ def test_what_is_drawn_is_the_tuning(small):
 
 
 def test_the_simulated_slew_costs_as_much_as_the_trial(small):
-    """Two roads: the simulator with the network as a gain schedule, and the trial that the tuner learns from."""
+    """Two methods: the simulator with the network as a gain schedule, and the trial that the tuner learns from."""
     data = small[0]
     simulation, result = data.slews["with the tuner"], data.tuning.training.result
     x = simulation.at_samples.root_moment - simulation.scenario.rigid_moment
@@ -100,12 +100,12 @@ def test_the_words_begin_with_the_answer_and_the_facts_carry_the_numbers(small):
     ("tuner", "words"),
     [(0.9, "10 % below"), (1.15, "15 % above"), (0.8, "20 % below"), (1.0, "1.00, the cost of the best constant gain")],
 )
-def test_the_answer_is_what_the_costs_say(tuner, words):
+def test_the_answer_compares_the_costs(tuner, words):
     curves = LearningCurves(np.full((5, 1), tuner), np.full(5, tuner), 0, 0)
     tuning = SimpleNamespace(best_constant=SimpleNamespace(cost=1.0))
-    told = tuner_section_room.tuner_in_short(SimpleNamespace(curves=curves, tuning=tuning))
-    assert words in told
-    assert told.endswith(f"{5 * (tuner < 1)} of 5 seeds end below that.")
+    text = tuner_section_room.tuner_in_short(SimpleNamespace(curves=curves, tuning=tuning))
+    assert words in text
+    assert text.endswith(f"{5 * (tuner < 1)} of 5 seeds end below that.")
 
 
 def test_the_angle_that_a_moving_gain_leaves_is_its_integral_over_K1(small):

@@ -54,9 +54,9 @@ def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_ro
 @pytest.mark.survey
 def test_two_processes_write_what_one_does(pages, tmp_path):
     """The modes, the card and the proof: by two processes, each with hashes of its own, and by the one of `pages`."""
-    told = []
+    reports = []
     other = replace(HELD, name="other")
-    page = write([ARM, other], tmp_path, only=("modes",), progress=lambda *what: told.append(what))
+    page = write([ARM, other], tmp_path, only=("modes",), progress=lambda *what: reports.append(what))
     assert page == tmp_path / "index.html"
     alone = files_of(pages / NAME)
     for name, content in files_of(tmp_path / NAME).items():
@@ -66,10 +66,10 @@ def test_two_processes_write_what_one_does(pages, tmp_path):
     assert "Bode" not in text
     assert "second assumption" in text
     assert {"other/modes.html", "other/pictures/card.svg"} <= set(Links(tmp_path / "index.html").targets)
-    dones = [done for done, _, _ in told]
+    dones = [done for done, _, _ in reports]
     assert dones == sorted(dones)
-    assert told[-1] == (told[0][1], told[0][1], "pages")
-    running = [names.split(", ") for _, _, names in told[:-1]]
+    assert reports[-1] == (reports[0][1], reports[0][1], "pages")
+    running = [names.split(", ") for _, _, names in reports[:-1]]
     assert max(map(len, running)) == 2
     assert {name for names in running for name in names} >= {f"{NAME}: modes", "other: modes", "other: card"}
 
@@ -145,7 +145,7 @@ def test_the_sign_of_the_gains_is_there_once_and_the_words_are_explained(pages):
     assert 'href="#word-default-gains">default gains</a>' in answers
 
 
-def test_long_matter_is_folded_away_and_answers_stand_first(pages):
+def test_long_matter_is_folded_and_answers_come_first(pages):
     """No table outside <details>; the verdict in the contents; each answer at the top leads to its section."""
     text = (pages / NAME / "index.html").read_text(encoding="utf-8")
     assert "<table" not in re.sub(r"<details>.*?</details>", "", text, flags=re.DOTALL)
@@ -160,7 +160,7 @@ def test_long_matter_is_folded_away_and_answers_stand_first(pages):
 
 
 def test_every_cell_of_a_narrow_page_has_its_title(pages):
-    """A table is stacked on a phone: each cell bears the title that stands above its column."""
+    """A table is stacked on a phone: each cell has the title of its column."""
     text = (pages / NAME / "index.html").read_text(encoding="utf-8")
     assert "<td" in text
     body = "".join(re.findall(r"<tbody>.*?</tbody>", text, flags=re.DOTALL))

@@ -16,7 +16,7 @@ NUMBER = re.compile(
     r"(?: × 10(?P<power>⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]+)|e(?P<e>[-+]?\d+))?(?![\w/²³]|\.\d)(?P<unit> ?(?:%|[a-zA-Z]+)(?![\w/]))?"
 )
 SCALES = {"Hz": (1.0, 1 / (2 * math.pi)), "%": (1.0, 100.0), "ms": (1.0, 1e3), "mm": (1.0, 1e3), "samples": (1.0,)}
-ROUNDED = 1e-9  # of a number: what a double may miss of a tie, and two roads to it of each other
+ROUNDED = 1e-9  # of a number: what a double may miss of a tie, or two methods of each other
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Shown:
     unit: str
 
     def is_rounding_of(self, values):
-        """Whether it is one of these values, in some unit that its own stands for, to the digits shown."""
+        """Whether it is one of these values, in some unit that its own may mean, to the digits shown."""
         off = np.abs(np.multiply.outer(SCALES.get(self.unit, (1.0,)), values) - self.value)
         return bool((off <= self.half + ROUNDED * abs(self.value)).any())
 
@@ -70,7 +70,7 @@ def numbers_of(answer):
 def untraced_cells(keys, cells, rows, law):
     """The numbers in a table's cells that are no rounding of the value under their column's key in their row.
 
-    A cell may name a gain of the `law` beside its value ("0 … 5, not 77.7").
+    A cell may name a gain of the `law` with its value ("0 … 5, not 77.7").
     """
     left = []
     for own, row in zip(cells, rows, strict=True):

@@ -36,7 +36,7 @@ PLACES = [("root_moment", None), ("tip_displacement", None), ("hub_rate", None),
 
 @pytest.mark.parametrize(("arm", "place"), thinned(product([UNDAMPED, STOCKY], PLACES), 2))
 def test_the_counted_phase_is_the_limit_of_small_damping(arm, place):
-    """A road the code does not take: G at s = epsilon + i omega, unwrapped on a grid that resolves epsilon."""
+    """A method the code does not use: G at s = epsilon + i omega, unwrapped on a grid that resolves epsilon."""
     output, x = place
     data = bode(arm, output, resonant_band(arm, 6), x=x and x * arm.length)
     epsilon = 1e-4 * data.band[0]
@@ -53,7 +53,7 @@ def test_the_counted_phase_is_the_limit_of_small_damping(arm, place):
     ("along", "x", "own"), [("moment", 0.0, "root_moment"), ("displacement", 1.0, "tip_displacement")]
 )
 def test_along_the_arm_it_begins_and_ends_as_at_root_and_tip(along, x, own):
-    """Other formulas: fields along the arm beside the closed form of its ends."""
+    """Fields along the arm against the closed forms of its ends."""
     arm = UNDAMPED.having(damping=1e-4)
     mine, theirs = bode(arm, along, (2.0, 300.0), x=x * arm.length), bode(arm, own, (2.0, 300.0))
     assert mine.poles == pytest.approx(theirs.poles, rel=1e-12)
@@ -80,7 +80,7 @@ def test_from_another_input_it_is_the_ratio_of_two_responses():
 
 
 @pytest.mark.parametrize(
-    ("asked", "words"),
+    ("arguments", "words"),
     [
         ({"output": "root_moment", "x": 0.5}, "leave x out"),
         ({"output": "root_moment", "input": "force@0.3"}, "needs an input at the hub"),
@@ -90,9 +90,9 @@ def test_from_another_input_it_is_the_ratio_of_two_responses():
         ({"output": "root_moment", "band": ("low", "high")}, "two frequencies in rad/s"),
     ],
 )
-def test_what_is_no_bode_plot_is_refused(asked, words):
+def test_what_is_no_bode_plot_is_refused(arguments, words):
     with pytest.raises(tfarm.ParameterError, match=words):
-        bode(UNDAMPED, **asked)
+        bode(UNDAMPED, **arguments)
 
 
 def test_a_pole_and_a_zero_that_coincide_cancel():

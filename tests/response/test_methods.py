@@ -1,4 +1,4 @@
-"""The closed form, balls and the paper's appendix beside each other, as a reader can take them."""
+"""Agreement of the closed form, ball arithmetic and the paper's appendix."""
 
 import json
 import re
@@ -29,8 +29,8 @@ def test_three_methods_give_one_number(preset):
     assert table.natural_frequency == pytest.approx(balls, rel=FLOAT64, abs=0)
 
 
-def test_a_road_that_is_broken_shows(monkeypatch, capsys):
-    """The appendix shares no formula with the closed form: with another wave number in (A.2) it parts, and says so."""
+def test_a_method_with_an_error_is_detected(monkeypatch, capsys):
+    """The appendix shares no formula with the closed form: an error in (A.2) is reported as a difference."""
     from tfarm.exact.appendix import Appendix
 
     right = Appendix.wave_numbers
@@ -46,7 +46,7 @@ def test_a_road_that_is_broken_shows(monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(
-    "asked",
+    "command",
     [
         "modes quanser-2dsfl --count 2",
         "modes sasaki2012 --count 2 --theory shear",
@@ -54,20 +54,20 @@ def test_a_road_that_is_broken_shows(monkeypatch, capsys):
         "response sasaki2012 --output tip_angle --omega 10,100",
     ],
 )
-def test_where_the_appendix_does_not_apply_two_roads_are_left_and_it_is_said_why(asked, capsys):
-    code, out, _ = run(capsys, *asked.split(), "--compare")
+def test_where_the_appendix_does_not_apply_two_methods_remain_with_the_reason(command, capsys):
+    code, out, _ = run(capsys, *command.split(), "--compare")
     assert code == 0
     assert "closed-form, balls: agree to rounding" in out
     assert re.search(r"left out +appendix the paper's appendix (is of one|has no )", out)
     assert "difference of the appendix" not in out
-    found = json.loads(run(capsys, *asked.split(), "--compare", "--json")[1])
+    found = json.loads(run(capsys, *command.split(), "--compare", "--json")[1])
     assert list(found["methods"]) == list(METHODS[:2])
     assert list(found["differences"]) == ["balls"]
     assert list(found["left_out"]) == ["appendix"]
 
 
-def test_python_has_the_roads_beside_each_other():
-    """What is printed is what each road says when it is asked alone."""
+def test_by_methods_returns_every_method_and_their_differences():
+    """Each method's values are those it gives alone."""
     arm = tfarm.load("sasaki2012")
     outputs = ["root_moment", "tip_displacement"]
     found = tfarm.transfer(arm, outputs).by_methods(S)
@@ -101,5 +101,5 @@ def test_python_has_the_roads_beside_each_other():
         (("response", "sasaki2012", "--output", "hub_rate", "--points", "3000", "--compare"), "at most 2000 by balls"),
     ],
 )
-def test_what_cannot_be_asked_for_is_one_line(capsys, arguments, words):
+def test_an_impossible_request_is_refused_in_one_line(capsys, arguments, words):
     assert words in refused(capsys, *arguments)

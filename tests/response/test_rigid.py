@@ -100,7 +100,7 @@ def contradicts(arm):
 
 
 def stiffened(arm, factor):
-    """The arm with E and G of each link so many times as large."""
+    """The arm with E and G of each link times `factor`."""
     first, *outer = (
         replace(link, youngs_modulus=factor * link.youngs_modulus, shear_modulus=factor * link.shear_modulus)
         for link in arm.links

@@ -16,7 +16,7 @@ COLUMNS = (
     Column("mode", "mode", of=["1", "2"]),
     Column("omega", "natural frequency rad/s", of=["71.505682466890", "204.33313936381"]),
     Column("eigenvalue", "eigenvalue", of=["-0.2556+71.505i", "-2.0869+204.32i"]),
-    Column("said", "what is said of it", of=["lightly damped, and the first of all there are", "-"], folds=True),
+    Column("note", "what is noted on it", of=["lightly damped, and the first of all there are", "-"], folds=True),
 )
 
 

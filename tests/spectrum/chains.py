@@ -43,7 +43,7 @@ def judge(arm, *, certify=False, count=MODES):
         count_below(table.system.with_damping(0.0), float(w + 1e-3 * step)) for w, step in zip(omega, gap, strict=True)
     ]
     if below != list(range(1 + arm.has_rigid_mode, len(table) + 1)):
-        wrong.append(f"the count says {below}")
+        wrong.append(f"the count is {below}")
     distance = abs(natural_frequencies(arm, count) / omega - 1)
     off = [
         float(w) for w, away in zip(omega, distance, strict=True) if away > AGREED and not changes_sign(arm, float(w))

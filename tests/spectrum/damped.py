@@ -1,8 +1,8 @@
-"""Damped modes of random arms, counted by four roads:  python -m tests.spectrum.damped SIZE SEED
+"""Damped modes of random arms, counted by four methods:  python -m tests.spectrum.damped SIZE SEED
 
 Arms of slenderness L/h 5 to 500 with C = 1e-7 to 1e-3 s, hub, payload mass and inertia each 0, inf or anything between;
 1 to 24 flexible modes.  In the printed box there must be as many eigenvalues by the list, by the winding number in
-float64, by the proof in ball arithmetic and by a Galerkin model (`damped_roads`), whose own must be the listed ones.
+float64, by the proof in ball arithmetic and by a Galerkin model (`independent`), whose own must be the listed ones.
 
 As many damped rigs (`tests.rigs`) with 1 to 8 modes: every eigenvalue that finite elements (`tests.chain_elements`)
 have in the box is listed, assigned to a mode or not, and there are no others; a list of fewer modes than were asked for
@@ -17,7 +17,7 @@ import tfarm
 from tests import survey
 from tests.chain_elements import eigenvalues
 from tests.rigs import some_rig
-from tests.spectrum.damped_roads import ritz_eigenvalues
+from tests.spectrum.independent import ritz_eigenvalues
 from tests.strategies import some_arm
 from tests.survey import Finding, each_of
 from tfarm.errors import CertificationError, ConvergenceError
@@ -34,7 +34,7 @@ ROUNDING = 64 * np.finfo(float).eps  # of the model's flexibilities 1/w^2, in un
 
 
 def some_damped_arm(rng):
-    """A random arm with C = 1e-7..1e-3 s, and a number of modes to ask for."""
+    """A random arm with C = 1e-7..1e-3 s, and a number of modes."""
     arm = some_arm(rng, damping=float(10 ** rng.uniform(-7, -3)))
     return arm, int(rng.integers(1, MOST_MODES + 1))
 
@@ -82,7 +82,7 @@ def pairs(damped):
 
 
 def some_damped_rig(rng):
-    """A random rig that loses something, and a number of modes to ask for."""
+    """A random rig with losses, and a number of modes."""
     while (arm := some_rig(rng)).is_undamped:
         pass
     return arm, int(rng.integers(1, MOST_RIG_MODES + 1))
@@ -101,7 +101,7 @@ def judge_rig(arm, count, *, certify=True):
     every = np.unique(every[np.isfinite(every) & (every != 0)])
     inside = every[damped.box.holds(every)]
     at_rest = damped.undamped.system.at_rest
-    wrong = [] if inside.size + at_rest == damped.count else ["not so many are listed"]
+    wrong = [] if inside.size + at_rest == damped.count else ["another number is listed"]
     largest = abs(damped.box.corners).max()
     mine, theirs = inside[inside.imag >= 0], eigenvalues(arm, largest)
     rounding = NEXT_TO_REST[at_rest] * largest

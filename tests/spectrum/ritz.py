@@ -1,7 +1,7 @@
 """Listed frequencies against a Ritz model, the count and ball arithmetic:  python -m tests.spectrum.ritz SIZE SEED
 
 Random arms with every combination of zero, finite and infinite inertias in turn.  Of each the first twelve flexible
-frequencies are those of a Ritz model, and no others; thirty are what the count says under one of the four theories; and
+frequencies are those of a Ritz model, and no others; thirty are those of the count under one of the four theories; and
 between floats next to the first twelve, D changes sign in balls.
 """
 

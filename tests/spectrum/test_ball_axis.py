@@ -30,12 +30,12 @@ def some_systems():
 
 
 @pytest.mark.parametrize("arm", list(some_systems()))
-def test_the_count_in_balls_is_the_list_and_its_parity_the_sign_of_the_drive(arm):
+def test_the_count_in_ball_arithmetic_is_that_of_the_list(arm):
     """Between the nth frequency and the next n lie below, and D has changed its sign n times."""
     table = tfarm.modes(arm, COUNT)
     k, omega = undamped(arm), table.natural_frequency[table.index > 0]
     between = np.sqrt(omega[1:] * omega[:-1])[np.diff(omega) > 1e-9 * omega[1:]]
-    with balls.precision(512):  # of six segments far below the first frequency 200 bits do not tell
+    with balls.precision(512):  # of six segments far below the first frequency 200 bits do not suffice
         axis = RealAxis(k)
         for point in (0.5 * omega[0], *between):
             below = int((table.natural_frequency < point).sum())

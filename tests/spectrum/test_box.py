@@ -151,7 +151,7 @@ def test_a_zero_of_high_order_is_there_as_often(unit):
 
 
 def test_a_known_zero_is_taken_as_it_is_and_once():
-    """Near 0 Newton's method is not believed: what is found beside a known one is that one, and others are kept."""
+    """Near 0 Newton's method is not believed: a zero found next to a known one is that one; others are kept."""
     tiny, zeros = 3e-10, np.array([2.0 + 3.0j, 2.0 - 3.0j, -1.0])
     function, box = polynomial(*zeros, tiny), Box(-5.0, 5.0, -4.0, 4.0)
     rough = np.array([tiny * 1.01], dtype=complex)

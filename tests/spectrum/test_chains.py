@@ -110,7 +110,7 @@ def test_residues_and_shapes_of_a_damped_rig(drive):
         assert moments[n] / shapes[n] == pytest.approx(M / W, rel=1e-8)
 
 
-def test_the_tip_of_a_damped_rig_moves_upwards_wherever_its_shape_is_asked_for():
+def test_the_tip_of_a_damped_rig_moves_upwards_in_its_shape_at_any_place():
     """Near the root, where modes have either sign, and along with the tip: Re w(1) > 0."""
     damped = tfarm.damped_modes(tfarm.modes(rig(input="hub_torque"), 4))
     along = damped.shape(np.array([0.1, 0.375, 0.7, 1.0]))
@@ -138,7 +138,7 @@ def test_a_spring_on_the_axis_holds_nothing():
 
 
 @pytest.mark.parametrize("name", ["tests/rigs/bench-rig.toml", "quanser-flexlink"])
-def test_a_rigid_body_turns_about_the_axis_and_the_root_moment_is_that_of_the_field(name):
+def test_a_rigid_body_turns_about_the_axis_with_the_field_s_root_moment(name):
     """The turning rig moves its tip by (r + L + ...): the residue at 0 of tip over torque, without friction."""
     arm = tfarm.load(name).elastic.lossless_hub
     arm = replace(arm, clamp=replace(arm.clamp, damping=0.0), input="hub_torque")

@@ -10,7 +10,7 @@ import pytest
 import tfarm
 from tests.shared import thinned
 from tests.spectrum.damped import judge, pairs, some_damped_arm
-from tests.spectrum.damped_roads import newton_step, pinned, ritz_eigenvalues, sine_waves
+from tests.spectrum.independent import newton_step, pinned, ritz_eigenvalues, sine_waves
 from tests.strategies import arm_of, some_arm
 from tfarm import Arm
 from tfarm.spectrum.damped import DampedModes, damped_modes

@@ -1,4 +1,4 @@
-"""A Ritz model that knows nothing of the exact solution converges to it, at the rate of its theory."""
+"""A Ritz model that shares nothing with the exact solution converges to it, at the rate of its theory."""
 
 import math
 

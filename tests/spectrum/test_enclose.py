@@ -11,7 +11,7 @@ import pytest
 import tfarm
 from tests.shared import sized, thinned
 from tests.spectrum.damped import pairs
-from tests.spectrum.damped_roads import newton_root, newton_step, pinned, ritz_eigenvalues, sine_waves
+from tests.spectrum.independent import newton_root, newton_step, pinned, ritz_eigenvalues, sine_waves
 from tests.spectrum.test_damped import damped_arm, listed
 from tfarm import CertificationError
 from tfarm.exact.balls import point, precision
@@ -104,11 +104,11 @@ def test_touching_discs_are_seen() -> None:
 
 
 def test_rouches_theorem_is_right_about_discs_of_any_size() -> None:
-    """Where it says one there is one: none beside a zero, nor two together; and small discs around one are proven."""
+    """A disc it accepts has exactly one zero; small discs around a zero are accepted."""
     rng = np.random.default_rng(6)
     k = system_of(LAB)
     zeros = listed(LAB, 12).eigenvalues[1:].ravel()
-    said = 0
+    accepted = 0
     with precision(200):
         for _ in range(150):
             zero = zeros[rng.integers(8)]
@@ -116,9 +116,9 @@ def test_rouches_theorem_is_right_about_discs_of_any_size() -> None:
             middle = complex(zero + radius * rng.uniform(0, 1.5) * np.exp(2j * math.pi * rng.random()))
             if _holds_one(k, None, point(middle), flint.arb(float(radius))):
                 assert (abs(zeros - middle) <= radius).sum() == 1
-                said += 1
+                accepted += 1
         assert all(_holds_one(k, None, point(complex(z)), flint.arb(float(1e-3 * abs(z)))) for z in zeros[:8])
-    assert said > 20
+    assert accepted > 20
 
 
 @pytest.mark.parametrize("boxes", sized(1, 2))
@@ -212,7 +212,7 @@ def test_a_wrong_count_or_box_is_refused() -> None:
 
 
 @pytest.mark.parametrize("turn", [1, 1j])
-def test_an_eigenvalue_beside_its_zero_is_refused(turn: complex) -> None:
+def test_an_inexact_eigenvalue_is_refused(turn: complex) -> None:
     """A number that is 1e-9 off is not proven by a disc elsewhere."""
     damped = listed(LAB, 4)
     zeros = damped.eigenvalues.copy()
@@ -223,7 +223,7 @@ def test_an_eigenvalue_beside_its_zero_is_refused(turn: complex) -> None:
 
 
 def test_a_contour_that_takes_too_many_pieces_is_given_up(monkeypatch):
-    """One arm's proof took 27,000 evaluations for a third of one side; a proof ends, or says that it does not."""
+    """One arm's proof took 27,000 evaluations for a third of one side; a proof ends, or reports that it does not."""
     k = system_of(tfarm.load("sasaki2012-lab"))
     box = Box(-300.0, 100.0, -400.0, 400.0)
     assert proven_count(k, box) > 0

@@ -32,7 +32,7 @@ def test_random_arms_have_the_frequencies_of_a_ritz_model():
 
 
 @pytest.mark.parametrize("theory", THEORIES)
-def test_the_list_is_what_the_count_says(theory):
+def test_the_list_has_as_many_as_the_count(theory):
     """Below each frequency lie as many as its number less one; just above it as many as its number."""
     for arm in random_arms(100, 27):
         assert not against_count(arm, theory), arm

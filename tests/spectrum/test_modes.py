@@ -1,4 +1,4 @@
-"""Mode shapes, hub participation, energies, nodes and sensitivities, each by a road the code does not take."""
+"""Mode shapes, hub participation, energies, nodes and sensitivities, each by a method the code does not use."""
 
 import math
 from dataclasses import replace
@@ -157,7 +157,7 @@ def test_shapes_and_nodes_are_those_of_a_ritz_model(case):
     """As many nodes as the shape of a model of polynomials changes sign, and zeros of the shape each of them."""
     arm = arm_for(case)
     beam = arm.link.rhoA * arm.link.length
-    bodies = {"zero": 0.0, "some": 0.7, "infinite": math.inf}  # heavier ones have a node too near an end to tell
+    bodies = {"zero": 0.0, "some": 0.7, "infinite": math.inf}  # heavier ones have a node too near an end
     hub, mass, inertia = (bodies[kind] for kind in case)
     unit = beam * arm.link.length**2
     arm = replace(arm, hub=Hub(inertia=hub * unit), payload=Payload(mass=mass * beam, inertia=0.01 * inertia * unit))

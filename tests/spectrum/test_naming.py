@@ -75,10 +75,10 @@ def test_what_jumps_is_lost_and_the_others_are_kept():
     found = follow(Known(roots), np.array([0.0, 1.0]), roots(0.0))[1]
     np.testing.assert_array_equal(found[:3], roots(1.0)[:3])
     assert np.isnan(found[3])
-    with pytest.raises(ConvergenceError, match=r"beyond 0\.3") as told:
+    with pytest.raises(ConvergenceError, match=r"beyond 0\.3") as stopped:
         follow(Known(roots, most_halvings=5), np.array([0.0, 1.0]), roots(0.0))
-    np.testing.assert_array_equal(told.value.best[1], roots(0.0))
-    assert told.value.residual[3]
+    np.testing.assert_array_equal(stopped.value.best[1], roots(0.0))
+    assert stopped.value.residual[3]
 
 
 RINGS, OTHER = -2 + 5j, -2 - 5j
@@ -87,7 +87,7 @@ RINGS, OTHER = -2 + 5j, -2 - 5j
 @pytest.mark.parametrize(
     ("single", "pairs", "expected_single", "expected"),
     [
-        ([], [[-1, RINGS]], [], [[RINGS, OTHER]]),  # the fast zero has met one that nobody follows
+        ([], [[-1, RINGS]], [], [[RINGS, OTHER]]),  # the fast zero has met one that is not followed
         ([OTHER], [[-7, RINGS]], [-7], [[RINGS, OTHER]]),
         ([], [[-1, RINGS], [OTHER, -30]], [], [[-1, -30], [RINGS, OTHER]]),
         ([], [[-1, RINGS], [OTHER, -9 + 4j]], [], [[-9 + 4j, -9 - 4j], [RINGS, OTHER]]),

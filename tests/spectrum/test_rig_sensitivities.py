@@ -135,7 +135,7 @@ def unit_of(name):
 
 
 @pytest.mark.parametrize("seed", thinned(range(12), 4))
-def test_units_that_a_frequency_does_not_know(seed):
+def test_sensitivities_have_the_dimensions_of_a_frequency(seed):
     """Metres are in no frequency; of stiffnesses half a power, of inertias half a power less; segments add up.
 
     To the rounding of the fields, whose energies cancel in these sums: 2e-14 of their sizes on the worst of 200 rigs.

@@ -50,7 +50,7 @@ def test_the_papers_arms_keep_the_papers_gains():
 
 
 def test_a_gain_is_too_large_for_an_arm_and_not_by_itself():
-    """K1 = 2e9 N m s/rad is ordinary for an arm of J w1 = 5e9; LAB has a limit of its own, and is told it."""
+    """K1 = 2e9 N m s/rad is ordinary for an arm of J w1 = 5e9; LAB has a limit of its own, which is reported."""
     large, time, _ = similar(LAB, 100.0, 1.0, 1.0)
     assert rate_unit(large) > 1e9
     law = HubFeedback(K1=0.5 * rate_unit(large), K2=0.3, Kp=0.1 * angle_unit(large))
@@ -88,7 +88,7 @@ def test_parts_that_do_not_turn_are_left_out():
 
 
 def test_a_hub_without_inertia_has_no_moment_gain(capsys, tmp_path):
-    """A K2 would be an algebraic loop; so every verb answers for such an arm without being told K2 = 0."""
+    """A K2 would be an algebraic loop; so K2 = 0 is the default of every command for such an arm."""
     pin = replace(LAB, hub=Hub(inertia=0.0), name="pin")
     assert default_gains(pin).K2 == 0.0
     file = tmp_path / "pin.toml"

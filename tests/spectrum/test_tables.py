@@ -1,4 +1,4 @@
-"""The modal table in other words: its rows and columns, the same numbers by other roads, and what it says of itself."""
+"""The modal table: rows and columns, the same numbers by other methods, and its notes."""
 
 import math
 from dataclasses import replace
@@ -56,8 +56,8 @@ def test_digits_beyond_a_double_are_strings_of_them(digits):
     assert answer.proof.count == len(table)
 
 
-def test_every_road_to_the_frequencies_ends_at_them():
-    """Balls and the appendix; the table of all methods says by how little they part."""
+def test_every_method_has_the_same_frequencies():
+    """Balls and the appendix; the table of all methods has their differences."""
     table = tfarm.modes(STEEL, 4)
     for method in ("closed-form", "balls", "appendix"):
         found = table.frequencies(method)
@@ -91,7 +91,7 @@ def test_as_many_modes_as_lie_below():
         ({"up_to": math.inf}, "positive, finite"),
     ],
 )  # fmt: skip
-def test_what_is_asked_for_makes_sense(given, words):
+def test_a_count_or_frequency_out_of_range_is_refused(given, words):
     with pytest.raises(ParameterError, match=words):
         tfarm.modes(LAB, **given)
 
@@ -176,18 +176,18 @@ def least_damped(arm, wavelengths):
 def test_short_waves_are_overdamped_without_shear_and_hardly_damped_with_it(theory):
     arm = LAB.under(theory)
     ratio = least_damped(arm, [1e5, 1e6, 1e7])
-    said = beyond_the_box(arm)
+    note = beyond_the_box(arm)
     if theory in WITH_SHEAR:
         assert ratio[-1] < 1e-3
         assert (np.diff(ratio) < 0).all()
-        assert "lightly damped modes exist at ever higher frequency" in said
+        assert "lightly damped modes exist at ever higher frequency" in note
     else:
         np.testing.assert_allclose(ratio, 1.0, rtol=1e-12)
-        assert "all of them are overdamped" in said
-    assert "-1/C, -10000 1/s" in said
+        assert "all of them are overdamped" in note
+    assert "-1/C, -10000 1/s" in note
 
 
-def test_segments_of_their_own_damping_are_told_apart():
+def test_segments_of_different_damping_are_distinguished():
     assert "-1/C of the most damped segment, -3333.33 1/s" in beyond_the_box(TWO)
     partly = replace(LAB, outer=(STIFF,), theory="rayleigh")
     assert "segments without damping have lightly damped modes" in beyond_the_box(partly)

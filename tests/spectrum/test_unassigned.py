@@ -25,7 +25,7 @@ from tfarm.spectrum import damped as damped_module
 from tfarm.spectrum.damped import NOT_ASSIGNED, origin_of
 
 STIFF_FRICTION = Path("tests/data/reproductions/stiff-friction.toml")
-REFUSED_ONCE = {28: 2, 83: 2, 227: 8}  # rigs of `some_rig` at seed 1, and how many modes were asked for
+REFUSED_ONCE = {28: 2, 83: 2, 227: 8}  # rigs of `some_rig` at seed 1, and their requested number of modes
 
 
 def refused_once() -> dict[int, tuple[Arm, int]]:
@@ -130,8 +130,8 @@ def test_tables_of_them_hold_every_eigenvalue_and_no_nan(number: int) -> None:
 
 @pytest.mark.parametrize("proof", sized((), ("--certify",)))
 def test_the_command_lists_them(capsys: pytest.CaptureFixture[str], proof: tuple[str, ...]) -> None:
-    asked = ["modes", str(STIFF_FRICTION), "--count", "2", *proof]
-    assert run([*asked, "--json"]) == 0
+    command = ["modes", str(STIFF_FRICTION), "--count", "2", *proof]
+    assert run([*command, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     apart = answer["unassigned_eigenvalues"]
     assert [each["origin"] for each in apart] == ["hub friction"] * 3
@@ -141,7 +141,7 @@ def test_the_command_lists_them(capsys: pytest.CaptureFixture[str], proof: tuple
     assert answer["eigenvalues_in_box"] == sum(1 + is_pair for is_pair in inside) == 3
     assert [mode["damping_ratio"] for mode in answer["modes"]] == [None, None]
     assert answer["damped_note"] == "no eigenvalue is assigned for certain to mode 1, 2"
-    assert run(asked) == 0
+    assert run(command) == 0
     out = capsys.readouterr().out
     assert re.search(r"hub friction +-9.269825", out)
     assert re.search(rf"^damped modes +{answer['damped_note']}$", out, re.MULTILINE)
@@ -150,7 +150,7 @@ def test_the_command_lists_them(capsys: pytest.CaptureFixture[str], proof: tuple
 def test_the_undamped_table_is_printed_whatever_happens_to_the_damped_one(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One line says why, and the exit code is that of what could not be solved."""
+    """One line has the reason; the exit code is that of a search that did not converge."""
 
     def lose(*_: object) -> None:
         raise ConvergenceError("no end of cuts", None, 0)

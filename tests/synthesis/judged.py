@@ -6,6 +6,6 @@ from tfarm.synthesis import judge
 
 
 def judge_of(arm, law, objective, chain=None, *, modes=2, count=8, continuous=False):
-    """The judge of a law's signals with so many modes."""
+    """The judge of a law's signals with `modes` modes."""
     signals = as_law(law).signals
     return judge.judge_of(arm, arm, chain or Chain(), objective, signals, modes, count, continuous=continuous)

@@ -22,7 +22,7 @@ from tfarm.synthesis.models import PERIOD_POINTS
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 BOUNDS = {"K1": (0.0, 20.0), "K2": (-2.0, 1.0)}
 MODEL, TOP = RitzLoop(LAB, 12), band_of(LAB, 2)
-RISE, TURN = 1.0, 1.15  # s, rad: the slew of a chain that says none
+RISE, TURN = 1.0, 1.15  # s, rad: the default slew of a chain
 
 
 def slew(model, law):
@@ -156,7 +156,7 @@ def test_random_gains_have_no_better_disk_margin(number) -> None:
     assert found.value == pytest.approx(loop_margins(stability(LAB, found.law, TOP)).disk, rel=1e-3)
 
 
-def test_a_law_of_another_structure_for_the_continuous_loop_holds_and_damps_as_its_poles_do() -> None:
+def test_a_continuous_time_design_of_another_structure_has_the_damping_of_its_poles() -> None:
     found = design(LAB, "damping", structure="lead", continuous=True)
     assert found.verdict.is_stable
     s = tfarm.closed_loop_poles(LAB, found.law, 6).values

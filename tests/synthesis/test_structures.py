@@ -59,8 +59,8 @@ def test_a_law_of_each_structure_is_judged_as_by_another_model(name):
     assert -judges["sensitivity"].score(law) >= -judges["sensitivity"].value(law) * (1 + 1e-9)  # of a grid, and between
 
 
-def test_the_delay_is_what_the_loop_bears():
-    """Beside the whole sampled loop with ever more delay; a held torque is not quite delayed as a sample is."""
+def test_the_delay_objective_is_the_delay_margin():
+    """Against the whole sampled loop with ever more delay; a held torque is not quite delayed as a sample is."""
     law = start_of("lead")
     found = judge_of(LAB, law, "delay").value(law)
     assert found == pytest.approx(T * tfarm.sampled(LAB, law).delay_margin.samples, rel=0.05)

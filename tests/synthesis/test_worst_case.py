@@ -112,14 +112,14 @@ NARROW = ("sasaki2012-lab", "--K1", "0.1,2", "--K2=-0.1,0.1")
 
 
 def test_the_answer_names_every_arm(capsys, monkeypatch):
-    monkeypatch.setattr(worst_case, "ARMS_TRIED", 4)  # inside: whether one is worse is not asked here
+    monkeypatch.setattr(worst_case, "ARMS_TRIED", 4)  # inside: a worse one is not searched here
     code, out, err = run(capsys, "design", *NARROW, "--modes", "1", "--range", "payload.mass=0.0,0.2")
     assert (code, err) == (0, "")
     assert "payload.mass = 0.2" in out
     assert "no proof over the box" in out
 
 
-def test_of_one_arm_the_answer_says_as_much_and_keeps_the_bounds_given(capsys):
+def test_a_design_of_one_arm_has_no_worst_case_and_the_given_bounds(capsys):
     found = answer(capsys, "design", *NARROW)
     (own,) = found["arms"]
     assert (own["name"], own["value"]) == ("sasaki2012-lab", found["value"])
@@ -132,7 +132,7 @@ def test_of_one_arm_the_answer_says_as_much_and_keeps_the_bounds_given(capsys):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "words"),
     [
         (["--range", "payload.mas=0.1,0.5"], "payload.mass"),
         (["--range", "payload.mass=0.5,0.1"], "the lower number first"),
@@ -143,5 +143,5 @@ def test_of_one_arm_the_answer_says_as_much_and_keeps_the_bounds_given(capsys):
         (["--also", "quanser-srvms"], "no such preset"),
     ],
 )  # fmt: skip
-def test_ranges_that_are_none_are_one_line(capsys, arguments, told):
-    assert told in refused(capsys, "design", "sasaki2012-lab", *arguments)
+def test_invalid_ranges_are_refused_in_one_line(capsys, arguments, words):
+    assert words in refused(capsys, "design", "sasaki2012-lab", *arguments)

@@ -1,6 +1,6 @@
 """Guarded runs of random seeds and arms stay in the guard and bounded; so do adversarial sequences inside a sector.
 
-`python -m tests.tuner.bounded SIZE SEED` for so many runs and a fifth as many sequences.
+`python -m tests.tuner.bounded SIZE SEED` for SIZE runs and a fifth as many sequences.
 """
 
 import numpy as np
@@ -92,7 +92,7 @@ def adversary(loop, lo, hi, rng, patience, root=None):
 
 
 def runs(size, seed):
-    """So many guarded runs, several an arm, and a fifth as many sequences, one an arm."""
+    """`size` guarded runs, several an arm, and a fifth as many sequences, one an arm."""
     rng, made, sequences = np.random.default_rng(seed), 0, 0
     while made < size:
         trial = some_trial(rng)

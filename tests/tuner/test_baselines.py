@@ -45,7 +45,7 @@ def test_the_lowest_of_two_valleys_is_found_though_it_is_the_narrower(monkeypatc
     assert found == (pytest.approx(0.8, abs=1e-7), pytest.approx(-0.1, rel=1e-12))
 
 
-def test_no_gain_is_tried_where_the_loop_is_not_stable_and_the_last_window_is_as_good_as_the_first(monkeypatch):
+def test_only_gains_inside_the_stability_intervals_are_tried(monkeypatch):
     found, tried = best_of(monkeypatch, lambda K: (K - 1.2) ** 2, [(0.0, 0.5), (1.0, 1.5)])
     assert found.gain == pytest.approx(1.2, abs=1e-7)
     assert all(0 <= K < 0.5 or 1.0 < K < 1.5 for K in tried)
@@ -54,7 +54,7 @@ def test_no_gain_is_tried_where_the_loop_is_not_stable_and_the_last_window_is_as
 
 
 @pytest.mark.parametrize("windows", [[(0.0, 1.0)], []])
-def test_nothing_fed_back_is_a_gain_too_and_all_there_is_where_none_is_stable(monkeypatch, windows):
+def test_zero_gain_is_tried_too_and_alone_where_none_is_stable(monkeypatch, windows):
     found, tried = best_of(monkeypatch, lambda K: 2.0 + K, windows)
     assert found == (0.0, 2.0)
     assert len(tried) > 1 or not windows
@@ -124,7 +124,7 @@ TURNING = [name for name, arm in ARMS.items() if arm.has_rigid_mode and arm.hub.
 
 
 @pytest.mark.parametrize("name", TURNING)
-def test_a_shaper_of_one_impulse_is_an_arm_without_a_mode_below_half_the_sample_rate(name):
+def test_a_shaper_has_one_impulse_where_no_mode_lies_below_nyquist_frequency(name):
     """What the sentence about shaping rests on, by the poles of the loop itself."""
     arm, chain = ARMS[name], Chain()
     loop = sampled_loop(arm, default_gains(arm), chain, count=3)

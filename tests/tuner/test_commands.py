@@ -48,15 +48,15 @@ def test_tune_lab(capsys, tmp_path):
 
 
 def lateness(arm, period):
-    """Half a damped period of either mode of the exact loop in whole samples and one more; EI's are beside it."""
+    """Half a damped period of either mode of the exact loop in whole samples and one more; EI has two a mode."""
     poles = tfarm.closed_loop_poles(arm, tfarm.HubFeedback(K1=0.3), 4).values
     first, second = sorted(pole.imag for pole in poles if pole.imag > 0)[:2]
-    beside = math.acos(0.95 / 1.05) / math.pi
+    width = math.acos(0.95 / 1.05) / math.pi
 
     def samples(*frequencies):
         return sum(math.floor(math.pi / (omega * period)) + 1 for omega in frequencies)
 
-    apart = [omega * factor for omega in (first, second) for factor in (1 - beside, 1 + beside)]
+    apart = [omega * factor for omega in (first, second) for factor in (1 - width, 1 + width)]
     return {"ZV": period * samples(first, second), "EI": period * samples(*apart)}
 
 
@@ -115,7 +115,7 @@ def test_a_bad_controller_is_one_line(capsys, tmp_path):
 
 
 def test_the_comparison_is_of_one_run():
-    """On the arm as trained it repeats what the tuning says, by the simulator; the bound bounds every unshaped row."""
+    """On the arm as trained it repeats the tuning's costs, by the simulator; the bound bounds every unshaped row."""
     lab = tfarm.load("sasaki2012-lab")
     tuning = tune(lab, Plan(trials=40, guard="frozen"))
     listed = [each for each in tried_loops(lab, tuning.trial.loop.chain) if "C =" not in each.name]

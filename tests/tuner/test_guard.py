@@ -68,7 +68,7 @@ def test_the_peak_of_one_pole_is_at_its_own_angle(angle):
 
 @pytest.mark.parametrize(("m", "servo"), [(0.2, {}), (0.47, {}), (0.3, {"K1": 3.6, "Kp": 10.0})])
 def test_what_the_criterion_allows_is_proven_and_nothing_beyond(lab, m, servo):
-    """And any sequence of its gains contracts as it says, the held angle among the states."""
+    """Any sequence of its gains contracts by that factor, the held angle among the states."""
     loop = moving(lab, **servo)
     assert (len(loop.open) == len(loop.loop.matrix())) == bool(servo)
     ends = [m + share * loop.radius(m) for share in (-RADIUS_SHARE, RADIUS_SHARE)]
@@ -105,7 +105,7 @@ def test_a_planted_unstable_end_is_not_proven(loop):
 
 
 @pytest.mark.parametrize("fastest", [1.0, 1.2])
-def test_a_middle_that_is_not_stable_has_no_lyapunov_function_and_says_so_quietly(fastest):
+def test_an_unstable_middle_has_no_lyapunov_function_and_no_warning(fastest):
     """No overflow on the way: warnings are errors here."""
     A, b = np.diag([fastest, 0.3]), np.ones(2)
     assert common_lyapunov(A, b, b, A, A) is None

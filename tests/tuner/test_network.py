@@ -127,7 +127,7 @@ def test_a_broken_file_is_one_line(tuning, tmp_path, broken):
 
 
 def test_no_file(tmp_path):
-    """Nothing, a folder, and a pipe that nobody writes to, which is not waited for."""
+    """Nothing, a folder, and a pipe without a writer, which is not waited for."""
     pipe = tmp_path / "pipe.json"
     os.mkfifo(pipe)
     for path, why in ((tmp_path / "nothing.json", "cannot be read"), (tmp_path, "a folder"), (pipe, "no regular file")):

@@ -22,7 +22,7 @@ def guards(trial):
 
 
 def by_hand(trial, guard, seed, trials, eta=0.8, alpha=0.6, clip=np.inf, takes_back=False):
-    """(21), and (22) with its sign mended; perhaps what costs more than the last accepted trial is taken back.
+    """(21), and (22) with its sign corrected; perhaps what costs more than the last accepted trial is taken back.
 
     Its step is halved then, and others lengthen it again.
     """
@@ -83,7 +83,7 @@ def test_some_seeds_beat_every_constant_gain(trial, guards, kind, worst):
 
 
 def test_plain_momentum_is_fragile(trial, guards):
-    """Without a guard, of the first twelve seeds most die or run away under (21) as it stands."""
+    """Without a guard, of the first twelve seeds most die or diverge under (21) as printed."""
     trained = [train(trial, initial_network(seed), guards["none"], Learning(rule="plain"), 100) for seed in range(12)]
     lost = [each.died or each.stopped is not None or each.result.cost > 2 for each in trained]
     assert sum(lost) >= 6

@@ -1,6 +1,6 @@
-"""Trials and their yardsticks by second roads: NumPy, the simulator, batch least squares, prototype figures.
+"""Trials and their yardsticks by second methods: NumPy, the simulator, batch least squares, prototype figures.
 
-With a servo: the guard by second roads, and where the slew ends.
+With a servo: the guard by second methods, and where the slew ends.
 """
 
 from dataclasses import replace
@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import toeplitz
 
 import tfarm
-from tests.dsp.roads import aliased, aliased_loop
+from tests.dsp.independent import aliased, aliased_loop
 from tests.shell import answer, refused
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Chain, Converters, Sampling, Simulator, pulse_transfer, sampled_loop
@@ -48,7 +48,7 @@ SECTOR = Limits(0.3, 0.64)
 )
 @pytest.mark.parametrize(("K1", "Kp"), [(0.3, 0.0), (3.6, 10.0)])
 def test_a_trial_is_that_of_the_simulator(lab, inputs, signals, chain, K1, Kp):
-    """The tuner as a controller of `tfarm.dsp.Simulator`, which knows nothing of this room."""
+    """The tuner as a controller of `tfarm.dsp.Simulator`, which is independent of this room."""
     trial = slew_trial(lab, chain, K1=K1, Kp=Kp, signals=signals)
     network = initial_network(3, scales=np.full(inputs, 1.3))
     record = trial.with_network(network, SECTOR)
@@ -100,7 +100,7 @@ def test_the_bound_is_batch_least_squares(lab, signals, delay, a, b):
     np.testing.assert_allclose(bound.e, e, atol=1e-6 * abs(e).max())
 
 
-def test_a_trial_that_runs_away_stops_and_says_where(lab):
+def test_a_diverging_trial_stops_and_reports_where(lab):
     record = slew_trial(lab).with_constant(3.0)
     assert record.stopped == record.K.size > 5
     assert record.cost == np.inf
@@ -114,7 +114,7 @@ def test_hubs_that_cannot_be_tuned_are_refused(lab, inertia):
         slew_trial(replace(lab, hub=Hub(inertia=inertia)))
 
 
-def test_the_same_slew_asked_of_another_arm_is_as_long_and_made_for_the_first(lab):
+def test_a_slew_on_another_arm_keeps_its_length_and_its_design(lab):
     """Sample by sample, at periods that no double holds too."""
     for period in (0.01, 0.007):
         trial = slew_trial(lab, Chain(sampling=Sampling(period=period)), K1=0.3)
@@ -185,7 +185,7 @@ def test_the_servo_of_a_page_is_slow_for_the_first_mode_and_the_period(monkeypat
         assert usual_rate_gain(LAB, plan.Kp) == plan.K1
 
 
-def test_the_command_says_where_the_tip_ends(capsys):
+def test_the_command_reports_where_the_tip_ends(capsys):
     found = answer(capsys, "tune", "sasaki2012-lab", "--Kp", "10", "--trials", "5")
     assert found["Kp"] == 10.0
     assert abs(found["tip_error_m"]) < 1e-3

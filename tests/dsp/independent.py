@@ -1,4 +1,4 @@
-"""Roads to the sampled arm that share no code with tfarm.dsp: the exact transfer function, aliased; expm.
+"""Methods for the sampled arm that share no code with tfarm.dsp: the exact transfer function, aliased; expm.
 
 A sample sees every frequency s + 2 pi i n/T at once: with a zero-order hold and a delay tau the pulse transfer function
 is
@@ -99,7 +99,7 @@ def stepped(arm, law, chain, count=MODES):
 
 
 def radius_of(M, at_one=0):
-    """ln of the spectral radius, but for so many poles at z = 1, that of a free hub angle among them."""
+    """ln of the spectral radius without `at_one` poles at z = 1, that of a free hub angle among them."""
     z = np.linalg.eigvals(M)
     near = np.argsort(abs(z - 1), kind="stable")[:at_one]
     assert (abs(z[near] - 1) < AT_ONE).all()

@@ -1,4 +1,4 @@
-"""Eigenvalues of damped arms by roads that share nothing with tfarm's characteristic function.
+"""Eigenvalues of damped arms by methods that share nothing with tfarm's characteristic function.
 
 `ritz_eigenvalues`: a Galerkin model's quadratic eigenvalue problem.  `sine_waves`: the pinned-pinned arm's closed form.
 `delta`: the paper's 4x4 determinant, its hub row changed by feedback.
@@ -77,7 +77,7 @@ def newton_step(arm, s, digits=50, **gains):
 
 
 def newton_root(arm, s, digits):
-    """The zero of the paper's Delta next to s, to so many digits."""
+    """The zero of the paper's Delta next to s, to `digits` digits."""
     with mpmath.workdps(2 * digits + 30 + _guard(arm, s)):
         s = mpmath.mpc(s)
         for _ in range(12):
