@@ -23,7 +23,7 @@ from tfarm.loop.margins import loop_margins
 from tfarm.loop.plane import between, plane
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import Spill, stability
-from tfarm.loop.theorem import definite, is_hurwitz, on_axis, polynomial, signs_of
+from tfarm.loop.theorem import absorbed, definite, is_hurwitz, on_axis, polynomial, signs_of
 from tfarm.response.signals import Signals
 
 LAB, BARE, RIG = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))
@@ -440,3 +440,10 @@ def test_what_is_no_law_is_refused_everywhere(name, law):
 def test_a_wrong_argument_is_refused_with_the_form_to_give(call, words):
     with pytest.raises(ParameterError, match=words):
         call()
+
+
+def test_the_moment_that_a_static_law_cancels_is_its_gain_over_its_denominator():
+    """A half over two is a quarter, and the rest of the law stays."""
+    share, rest = absorbed(BARE, Law({"hub_rate": 0.3, "root_moment": ([0.5], [2.0])}))
+    assert share == pytest.approx(0.25, rel=1e-15)
+    assert rest.signals == ("hub_rate",)

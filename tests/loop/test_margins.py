@@ -253,3 +253,10 @@ def test_where_an_angle_is_held_alone_L_settles_nowhere_at_rest(Kp) -> None:
     for w, factor in margins(LAB, law).in_band.phase_crossovers:
         assert w > 0
         assert abs(1 + factor * Loop(LAB, law).loop_function(np.array([1j * w]))[0]) < 1e-6
+
+
+@pytest.mark.parametrize("share", [1e-3, 1e-5])
+def test_the_peak_of_the_sensitivity_next_to_a_pole_near_the_axis_is_found(share):
+    """With both gains just below the gain margin, L is that share from -1 at its frequency."""
+    gain = margins(LAB, LAW).in_band.gain[1] * (1 - share)
+    assert margins(LAB, HubFeedback(K1=0.3 * gain, K2=0.3 * gain)).exact_peak >= 1 / share * (1 - 1e-6)
