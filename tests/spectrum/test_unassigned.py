@@ -22,7 +22,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.loop.locus import open_poles
 from tfarm.report.modes_section import damped_tables, locked_table
 from tfarm.spectrum import damped as damped_module
-from tfarm.spectrum.damped import NOT_ASSIGNED, origin_of
+from tfarm.spectrum.damped import NOT_ASSIGNED, origins_of
 
 STIFF_FRICTION = Path("tests/data/reproductions/stiff-friction.toml")
 REFUSED_ONCE = {28: 2, 83: 2, 227: 8}  # rigs of `some_rig` at seed 1, and their requested number of modes
@@ -78,14 +78,15 @@ def test_origins_are_those_of_closed_forms() -> None:
         near = eigenvalues(arm, 2 * abs(value))
         exact = near[abs(near / value - 1).argmin()]
         assert exact == pytest.approx(value, rel=1e-2)
-        assert origin_of(k, complex(exact)) == origin
+        assert origins_of(k, np.array([complex(exact)])) == [origin]
     ringing = replace(stiff, motor=replace(motor, inductance=1.0), input="motor_voltage")
     near = eigenvalues(ringing, 100.0)
     pair = complex(near[near.imag > 0][0])
     inertia = ringing.total_inertia
     assert abs(pair) ** 2 == pytest.approx((50 * 0.05) ** 2 / (inertia * 1.0), rel=1e-3)
-    assert origin_of(tfarm.modes(ringing, 1).system, pair) == "back-EMF and electrical pole"
-    assert origin_of(tfarm.modes(slow, 1).system, 1j * tfarm.modes(slow, 1).natural_frequency[-1]) == NOT_ASSIGNED
+    assert origins_of(tfarm.modes(ringing, 1).system, np.array([pair])) == ["back-EMF and electrical pole"]
+    mode = 1j * tfarm.modes(slow, 1).natural_frequency[-1:]
+    assert origins_of(tfarm.modes(slow, 1).system, mode) == [NOT_ASSIGNED]
 
 
 def test_without_any_name_the_box_is_searched(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -51,7 +51,7 @@ PLAIN_SHARE = 0.2  # largest distance of an eigenvalue from its frequency, in di
 
 
 class Unassigned(NamedTuple):
-    """An eigenvalue [1/s] of no mode, Im >= 0, a complex one with its conjugate; see `origin_of`."""
+    """An eigenvalue [1/s] of no mode, Im >= 0, a complex one with its conjugate; see `origins_of`."""
 
     origin: Annotated[str, Quantity("origin", help="part of the drive that determines it")]
     eigenvalue: Annotated[complex, Quantity("eigenvalue", "1/s", 10, "one of the damped arm, Im >= 0")]
@@ -247,7 +247,7 @@ def _searched(undamped: Modes, steps: float) -> DampedModes:
         more = found[(found.imag >= 0) & ~is_among(found, np.r_[single, pairs.ravel()])]
         inside, free = found.size, np.r_[free, more]
     if free.size:  # zeros of the drive may be in the place of modes
-        of_drive = np.array([any(origin_of(k, s) != NOT_ASSIGNED for s in pair[np.isfinite(pair)]) for pair in pairs])
+        of_drive = np.reshape([each != NOT_ASSIGNED for each in origins_of(k, pairs.ravel())], pairs.shape).any(axis=1)
         free, pairs[of_drive] = np.r_[free, pairs[of_drive].ravel()], LOST
     for row in lost.tolist():
         if (near := _plainly(omega, row, found, free)) is not None:
@@ -258,7 +258,8 @@ def _searched(undamped: Modes, steps: float) -> DampedModes:
     rigid[:, 1] = single[0] if slow else 0.0
     others = tuple(each for each in single[slow:].tolist() if np.isfinite(each))
     upper = sorted(free[np.isfinite(free) & (free.imag >= 0)].tolist(), key=abs)
-    eigenvalues, unassigned = np.concatenate([rigid, pairs]), tuple(Unassigned(origin_of(k, s), s) for s in upper)
+    unassigned = tuple(map(Unassigned, origins_of(k, np.array(upper, complex)), upper))
+    eigenvalues = np.concatenate([rigid, pairs])
     return DampedModes(undamped, eigenvalues, box, inside + k.at_rest, others=others, unassigned=unassigned)
 
 
@@ -273,21 +274,23 @@ def _plainly(omega: Real, mode: int, found: Complex, free: Complex) -> complex |
     return near if abs(near - start) < PLAIN_SHARE * min(apart) else None
 
 
-def origin_of(k: System, s: complex) -> str:
-    """Return the parts p of the drive with |d ln s/d ln p| > 0.3 of an eigenvalue; "not assigned" without any.
+def origins_of(k: System, s: Complex) -> list[str]:
+    """Return the parts p of the drive with |d ln s/d ln p| > 0.3 of each eigenvalue (n,); else "not assigned".
 
     By differences: ds = -dD/D'(s).  It is 1 for b in -b/J and -k/b and for the lag in -R/L_a, and 1/2 for both parts of
     a pair s^2 = -K^2/(J L_a).  For a mode it is as small as the effect of the dissipation on its frequency.
     """
-    at, found = np.array([s]), []
-    here = function_of(k)(at)
-    for part, name in DRIVE_PARTS.items():
+    found: list[list[str]] = [[] for _ in s]
+    for part in filter(partial(getattr, k.drive), DRIVE_PARTS):
+        here = function_of(k)(s)
         larger = k.drive._replace(**{part: getattr(k.drive, part) * (1 + PART_STEP)})
-        there = function_of(replace(k, drive=larger))(at)
-        change = there.value * np.exp(there.scale - here.scale) - here.value
-        if abs(change[0] / (here.slope[0] * s)) > LEAST_INFLUENCE * PART_STEP:
-            found.append(name)
-    return " and ".join(found) or NOT_ASSIGNED
+        there = function_of(replace(k, drive=larger))(s)
+        with np.errstate(invalid="ignore"):  # of zeros that are not known
+            change = there.value * np.exp(there.scale - here.scale) - here.value
+            is_large = abs(change / (here.slope * s)) > LEAST_INFLUENCE * PART_STEP
+        for n in np.flatnonzero(is_large).tolist():
+            found[n].append(DRIVE_PARTS[part])
+    return [" and ".join(names) or NOT_ASSIGNED for names in found]
 
 
 def entered(damped: DampedModes) -> Real:
