@@ -140,6 +140,9 @@ def entries(record: Any, under: str = "") -> Iterator[tuple[str, Quantity, Any]]
 # ------------------------------------------------------------------------------------------------------------- JSON
 
 
+SCALARS = (float, int, str, bool, type(None))  # of JSON
+
+
 def to_dict(record: Any) -> dict[str, Any]:
     """The quantities of a record by their keys, as JSON has them: a complex number is [real, imaginary]."""
     found: dict[str, Any] = {}
@@ -157,6 +160,8 @@ def to_dict(record: Any) -> dict[str, Any]:
 
 def to_json_value(value: Any) -> Any:
     """One entry of `to_dict`.  Infinities stay; they are texts in `to_json`."""
+    if type(value) in SCALARS:
+        return value
     if is_table(value):
         declared = quantities(type(value))
         columns = [to_json_value(getattr(value, name)) for name in declared]

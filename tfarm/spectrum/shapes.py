@@ -73,6 +73,7 @@ class Shapes:
         inner = list(reversed(system.segments))
         edges = np.cumsum([0.0, *(float(each.length) for each in inner)])
         self._segments, self._edges = inner, edges / edges[-1]
+        self._rows = [np.array(kernel_row(each)) for each in inner]
         # Each mode is a sum of four responses, two of its own and two of a close neighbour below, for orthogonality:
         # frequency, condition on the axis (`_condition`), scale and factor of each, of shape (4, modes).
         gap = np.r_[np.inf, np.diff(omega) / omega[1:], np.inf]
@@ -209,7 +210,7 @@ class Shapes:
             (used,) = np.nonzero(self._factors[row])
             if used.size:
                 states, _ = self._raw(row, used, places)
-                result[:, used] += _of_segment(segment, self._omegas[row, used], states, own, x)
+                result[:, used] += _of_segment(segment, self._rows[number], self._omegas[row, used], states, own, x)
         return result
 
     def _moving(self) -> list[tuple[Real, Real]]:
@@ -258,10 +259,13 @@ class Shapes:
         self._factors = self._factors * np.where(motion < 0, -1.0, 1.0)
 
 
-def _of_segment(segment: Segment, omega: Real, ends: Real, own: Real, x: Real) -> Real:
-    """Return W, Psi, M, Q (4, modes, x) from the states (4, modes, 2) at both ends; `own` are the segment's units."""
+def _of_segment(segment: Segment, row: Real, omega: Real, ends: Real, own: Real, x: Real) -> Real:
+    """Return W, Psi, M, Q (4, modes, x) from the states (4, modes, 2) at both ends.
+
+    `row` is the segment for compiled code, `own` are its units.
+    """
     numbers = np.empty((6, omega.size), complex)
-    fill_wave_numbers(1j * omega, np.array(kernel_row(segment)), numbers)
+    fill_wave_numbers(1j * omega, row, numbers)
     inner, outer = ends[..., 0] * own, ends[..., 1] * own
     low = np.maximum(abs(numbers[0]), abs(numbers[3])) < SERIES_RADIUS
     result = np.empty((4, omega.size, x.size))

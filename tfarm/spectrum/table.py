@@ -220,9 +220,12 @@ class Modes:
         (start,) = np.nonzero(W[:-1] * W[1:] < 0)
         low, high = grid[start], grid[start + 1]
         x = low + (high - low) * W[start] / (W[start] - W[start + 1])
-        for _ in range(NODE_STEPS if x.size else 0):
+        before = low
+        for _ in range(NODE_STEPS):
+            if (abs(x - before) <= np.spacing(1.0)).all():
+                break
             W, Psi, _, Q = shape(x)[:, 0]
-            x = np.clip(x - W / (Psi + shear_flexibility(self._k, x) * Q), low, high)
+            before, x = x, np.clip(x - W / (Psi + shear_flexibility(self._k, x) * Q), low, high)
         return x
 
 
