@@ -246,3 +246,14 @@ def test_the_cost_is_that_of_the_tuners_trial_with_a_constant_gain(arm, gain):
     trial = slew_trial(arm, K1=2.0, Kp=4.0, cost=plan.cost.in_units_of(plan.scale), duration=plan.duration)
     score = judge_of(arm, law, "cost", count=6).score(law)
     assert score == pytest.approx(trial.with_constant(gain).cost, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "signal"), [("strain-rate", "root_moment"), ("lead", "hub_angle"), ("PD+notch", "hub_angle")]
+)
+def test_a_filter_has_its_pole_at_the_frequency_of_its_coefficient(name, signal):
+    form = form_of(name, Kp=0.5 * (name == "lead"))
+    x = np.clip(form.origin + 0.3, *form.box)
+    pole = form.coefficients(x)[[each.name for each in form.free].index("pole_rad_s")]
+    poles = next(part.block.poles for part in as_law(form.record_at(x)).parts if part.signals == (signal,))
+    assert abs(poles + pole).min() == pytest.approx(0.0, abs=1e-9 * pole)

@@ -252,7 +252,7 @@ def outputs(A: Real, B: Real, C: Real, signals: Real, first: int) -> Real:
     x, push = np.zeros((blocks, laws, n, 1)), np.moveaxis(columns @ r, 2, 0)[..., None]
     for k in range(1, blocks):
         x[k] = power @ x[k - 1] + push[k - 1]
-    echo = np.zeros((laws, size + 1, seen, inputs))  # after so many samples
+    echo = np.zeros((laws, size + 1, seen, inputs))  # after each number of samples
     echo[:, 1:] = (rows @ B).reshape(laws, size, seen, inputs)
     late = np.maximum(np.subtract.outer(np.arange(size), np.arange(size)), 0)
     through = np.moveaxis(echo[:, late], 3, 2).reshape(laws, -1, size * inputs)
