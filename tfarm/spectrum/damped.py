@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -280,9 +280,12 @@ def origins_of(k: System, s: Complex) -> list[str]:
     By differences: ds = -dD/D'(s).  It is 1 for b in -b/J and -k/b and for the lag in -R/L_a, and 1/2 for both parts of
     a pair s^2 = -K^2/(J L_a).  For a mode it is as small as the effect of the dissipation on its frequency.
     """
+    parts = [part for part in DRIVE_PARTS if getattr(k.drive, part)]
+    if not parts:
+        return [NOT_ASSIGNED] * s.size
     found: list[list[str]] = [[] for _ in s]
-    for part in filter(partial(getattr, k.drive), DRIVE_PARTS):
-        here = function_of(k)(s)
+    here = function_of(k)(s)
+    for part in parts:
         larger = k.drive._replace(**{part: getattr(k.drive, part) * (1 + PART_STEP)})
         there = function_of(replace(k, drive=larger))(s)
         with np.errstate(invalid="ignore"):  # of zeros that are not known

@@ -17,7 +17,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import DIFFERENCE_STEP, quick_characteristics
 from tfarm.exact.compiled import compiled
-from tfarm.exact.layout import readings
+from tfarm.exact.layout import Reading, readings
 from tfarm.exact.sweep import AXIS, fill_free
 from tfarm.exact.system import Spring, System
 from tfarm.exact.uniform import fill_ends
@@ -32,7 +32,8 @@ HALVINGS = (250, *[80] * 8)  # of steps, after which stray branches are lost and
 LATE_HALVINGS = 8  # after the steps that there are in all: roots that are stray are soon lost
 AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])  # starts next to a guess, of it
 NEAR_REAL = 1e-7  # of its size: the imaginary part of a double zero is rounding
-NO_ENDS, NO_OUTPUT = np.empty((0, 4)), np.empty((0, 8))  # tables of no output, of a uniform link and of a chain
+NO_ENDS = np.empty((0, 4))  # the table of no output of a uniform link
+NO_OUTPUT = np.empty((0, len(Reading._fields)))  # and that of a chain
 
 
 def function_of(k: System) -> Function:
@@ -102,7 +103,7 @@ class Damping:
         still, layout = (readings(k, (), 0.0) for k in (self.k.with_damping(0.0), self.k))
         self.rows = still.rows, layout.rows - still.rows
         self.ends = still.ends, layout.ends - still.ends
-        self.is_uniform = readings(self.k, (), 0.0).ends_table is not None
+        self.is_uniform = layout.ends_table is not None
 
     def near(self, values: Real, guess: Complex) -> Complex:
         """Return the roots next to the guesses (see `Family`)."""
