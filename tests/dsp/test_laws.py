@@ -26,6 +26,7 @@ LAWS = {
     "lead": Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "root_moment": 0.1}, delay=0.004),
     "acceleration": Law({"hub_rate": ([0.3], [0.02, 1.0]), "tip_acceleration": ([0.002], [0.02, 1.0])}),
     "along": Law({"hub_rate": 0.3, "moment@0.3": ([0.1], [0.05, 1.0])}, delay=0.013),
+    "zero at 2/T": Law({"hub_rate": ([-0.15, 30.0], [1.0, 200.0]), "root_moment": 0.1}),
     "in z": Law({"hub_angle": ([0.4, -0.3], [1.0, -0.5]), "root_moment": ([0.1, 0.0], [1.0, -0.9])}, period=T),
 }
 
@@ -207,6 +208,28 @@ def test_the_rules_are_those_of_python_control(name, rule, warp):
         np.exp(1j * np.array([0.1, 0.7, 2.0, 3.0])),
     )
     np.testing.assert_allclose(values(z)[0], theirs(z), rtol=1e-9)  # polynomials of python-control lose some digits
+
+
+@pytest.mark.parametrize("zero", [200.0, 200.0 * (1 - 2**-52), 200.0 * (1 + 1e-9)])
+@pytest.mark.parametrize("num", [[-0.5], [0.01, 0.0]], ids=["proper", "improper"])
+def test_tustins_rule_keeps_a_zero_at_two_over_the_period(num, zero):
+    """Which is at z = infinity; next to it the coefficients are no difference of rounded numbers."""
+    law = Law({"hub_rate": (np.polymul(num, [1.0, -zero]).tolist(), [1.0, 200.0])})
+    block, z = discretised(law, T).parts[0].block, np.exp(1j * np.array([0.1, 1.0, 3.0]))
+    s = 2 / T * (z - 1) / (z + 1)
+    A, B, C, D = block.matrices()
+    found = [(C @ np.linalg.solve(each * np.eye(len(A)) - A, B) + D)[0, 0] for each in z]
+    np.testing.assert_allclose(found, np.polyval(num, s) * (s - zero) / (s + 200.0), rtol=1e-12)
+    weights = sampled_loop(LAB, law, count=4).in_z
+    ((_, _, gain, zeros),) = weights.columns
+    own = gain * np.prod(z[:, None] - 1 - zeros, axis=1) / np.prod(z[:, None] - 1 - weights.poles, axis=1)
+    np.testing.assert_allclose(own, found, rtol=1e-12)
+
+
+def test_a_pole_where_tustins_rule_has_none_is_refused():
+    for num in ([1.0], [1.0, 2.0, 3.0]):
+        with pytest.raises(ParameterError, match="a pole at 200 1/s"):
+            discretised(Law({"hub_rate": (num, [1.0, -200.0])}), T)
 
 
 def test_tustins_derivative_is_the_trapezoidal_rule_backwards():

@@ -86,10 +86,12 @@ def _in_z(part: Part, law: Law, period: float) -> LawBlock:
 def tustin(block: LawBlock, period: float, prewarp: float = 0.0) -> LawBlock:
     """Return the block with s = c (z - 1)/(z + 1).  Raises ParameterError where it has a pole at s = c."""
     c = prewarped(period, prewarp)
+    remedy = f"the law has a pole at {c:g} 1/s, which this rule maps to infinity; take another rule or period"
     if isinstance(block, Rational) and block.excess > 0:
+        least = np.finfo(float).eps * np.polyval(np.abs(block.den), c)
+        require(abs(np.polyval(block.den, c)) > least, "rule", "tustin", remedy)
         return by_factors(block, "tustin", period, c)
     A = block.matrices()[0]
-    remedy = f"the law has a pole at {c:g} 1/s, which this rule maps to infinity; take another rule or period"
     require(np.linalg.cond(np.eye(len(A)) - A / c) <= 1 / np.finfo(float).eps, "rule", "tustin", remedy)
     return by_scipy(block, 2 / c, "bilinear")
 

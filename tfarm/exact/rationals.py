@@ -2,7 +2,7 @@
 
 A matrix is one of whole numbers over a power of two.  Zeros and poles in z of a block are in delta = z - 1:
 
-    tustin   s - r = (c - r)(delta - 2 r/(c - r))/(delta + 2)
+    tustin   s - r = (c - r)(delta - 2 r/(c - r))/(delta + 2), and s - c = -2 c/(delta + 2)
     matched  delta = e^{rT} - 1, with the same value at rest
     zoh      poles so; zeros of C(z): det(z - Phi + Gamma C) + (D - 1) det(z - Phi), in balls
     none     a block in z: roots of num(1 + delta) and den(1 + delta)
@@ -131,10 +131,15 @@ def _leading(num: Any, den: Any) -> float:
 
 
 def _of_tustin(num: Any, den: Any, c: float, most: int) -> Gained:
-    """Return gain and zeros of num/den with s = c delta/(delta + 2), both times (delta + 2)^most."""
+    """Return gain and zeros of num/den with s = c delta/(delta + 2), both times (delta + 2)^most.
+
+    A zero at s = c, which is at z = infinity, is the factor -2 c/(delta + 2).
+    """
     zeros, poles = _roots(num), _roots(den)
-    gain = _leading(num, den) * np.prod(1 - zeros / c) / np.prod(1 - poles / c) * c ** (zeros.size - poles.size)
+    sizes, of_poles = np.where(zeros == c, -2.0, (c - zeros) / c), (c - poles) / c  # exact differences next to c
+    gain = _leading(num, den) * np.prod(sizes) / np.prod(of_poles) * c ** (zeros.size - poles.size)
     at_end = np.full(most - zeros.size, AT_MINUS_ONE) if num else np.empty(0)
+    zeros = zeros[zeros != c]
     return float(gain.real), np.r_[2 * zeros / (c - zeros), at_end]
 
 

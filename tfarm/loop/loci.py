@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 LOCUS_POINTS, LOCUS_BRANCHES = 300, 7  # values of the gain, and branches
 POLE_DIGITS = 10  # digits of |s| that are drawn and written: poles differ from processor to processor by 1e-14 at most
-GAPS_HELD = 3  # digits of a gap, 1e-5 of |s| or less: a reduced pole has an error of 1e-12 of that
 GAP_NOTE = (
     "largest distance of a branch from the reduced one, over |s| or the arm's first flexible frequency, the larger"
 )
