@@ -50,9 +50,10 @@ def test_same_inputs_same_bytes(reduced, tmp_path):
     assert save_mat(reduced, tmp_path / "a")[0].read_bytes() == content
 
 
-def test_a_folder_that_is_not_there(reduced, tmp_path):
+@pytest.mark.parametrize("name", ["none/a.mat", "a" * 300, "b" * 252])
+def test_a_folder_that_is_not_there_and_a_name_that_is_too_long(reduced, tmp_path, name):
     with pytest.raises(ParameterError, match="cannot be written"):
-        save_mat(reduced, tmp_path / "none" / "a.mat")
+        save_mat(reduced, tmp_path / name)
 
 
 def test_a_script_that_is_another_files_is_left_alone(reduced, tmp_path):

@@ -106,6 +106,7 @@ BROKEN = [
     change("format", "tfarm tuner 99"),
     change("a", -1.0),
     change("period", 0.0),
+    change("arm", "x" * 81),
     change("extra", 1),
     lambda content: {name: value for name, value in content.items() if name != "K1"},
     lambda content: [content],

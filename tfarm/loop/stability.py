@@ -328,7 +328,7 @@ def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
     loop, numbers, unstable, rightmost = verdict.loop, np.arange(1, most + 1), [], []
     slowest = REST_SHARE * float(modes(loop.arm, 1).natural_frequency[-1])
     for number in numbers.tolist():
-        A, B, C, D = sensed_model(loop.arm, loop.law.signals, number, most)
+        A, B, C, D = sensed_model(loop.arm, loop.law.signals, number)
         poles = poles_of_model(loop, (A, B, C, 0 * D))
         moving = poles[abs(poles) > slowest]
         unstable.append(int((moving.real > UNDAMPED_SHARE * abs(moving)).sum()))

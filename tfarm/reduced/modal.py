@@ -314,10 +314,9 @@ def _residues(
 ALGEBRAIC = 1e-9  # distance from -1 of a feedthrough of the loop that leaves its input undetermined
 
 
-def sensed_model(arm: Arm, signals: Sequence[str], count: int, of: int = 0) -> Matrices:
+def sensed_model(arm: Arm, signals: Sequence[str], count: int) -> Matrices:
     """Return A, B, C, D from the input to the named signals, with `count` flexible modes and a static remainder.
 
-    Models of several counts share one search, that of the first `of` modes.
     Raises ParameterError for an unknown or improper signal and a count out of range.
     """
     read = Signals(arm, tuple(signals))
@@ -328,8 +327,7 @@ def sensed_model(arm: Arm, signals: Sequence[str], count: int, of: int = 0) -> M
         mine = [n for n, place in enumerate(read.places) if place == share]
         wanted = [read.outputs[n] for n in mine]
         along = any(each.place == "x" for each in wanted)
-        x = share * arm.length if along else None
-        A, B, C, D = modal_model(arm, [*extra, *wanted], max(count, of), x).first(count).matrices()
+        A, B, C, D = modal_model(arm, [*extra, *wanted], count, share * arm.length if along else None).matrices()
         rows |= zip(mine, np.hstack([C, D])[len(extra) :], strict=True)
     both = np.array([rows[n] for n in range(len(read.names))])
     return A, B, both[:, :-1], both[:, -1:]

@@ -5,6 +5,7 @@ The norm of an error is |dG| / (|G| + |w G'|).  A model is written as a MATLAB f
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable
 from contextlib import suppress
@@ -347,7 +348,7 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     Raises ParameterError, naming `key`, where they cannot be written, or a script of that name is another file's.
     """
     path = Path(path)
-    is_file = not is_standard_output(path) and (path.is_file() or not path.exists())
+    is_file = not is_standard_output(path) and (os.path.isfile(path) or not os.path.exists(path))
     require(is_file, key, str(path), "is no regular file, and its script needs a folder")
     path = path if path.suffix == ".mat" else path.with_name(path.name + ".mat")
     script = path.with_name(f"load_{re.sub(r'[^A-Za-z0-9_]', '_', path.stem)}.m")
@@ -355,7 +356,7 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     with suppress(OSError):  # a file that cannot be read is not ours
         text = script.read_text("utf-8", errors="replace") if script.is_file() else ""
     first, _, rest = text.partition("\n")
-    is_ours = not script.exists() or (first.endswith(WRITTEN_BY) and _loads(path) in rest)
+    is_ours = not os.path.exists(script) or (first.endswith(WRITTEN_BY) and _loads(path) in rest)
     remedy = f"{script.name} in that folder is not its script and would be replaced; choose another name"
     require(is_ours, key, str(path), remedy)
     write_file(script, _script(reduced, path).encode(), key=key)

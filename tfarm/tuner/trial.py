@@ -306,7 +306,7 @@ class SavedTuner(StrictTable):
     """
 
     format: Literal["tfarm tuner 1"]
-    arm: str
+    arm: Annotated[str, Field(max_length=80)]
     period: Annotated[Finite, Field(gt=0)]
     K1: Finite
     Kp: Annotated[Finite, Field(ge=0)] = 0.0  # absent in files of tuners without a servo
