@@ -10,8 +10,6 @@
 Each name below is imported at its first use.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING
 

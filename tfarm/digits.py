@@ -1,14 +1,12 @@
 """Numbers as text: significant digits, a true minus sign, powers of ten."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
 
-POWER_OF_TEN = re.compile(r"(?<![\w.])(\d(?:\.\d+)?)e([-+]?\d{1,2})(?!\w|\.\d)")
+POWER_OF_TEN = re.compile(r"(?<![\w.])(\d(?:\.\d+)?)e([-+]?\d{1,3})(?!\w|\.\d)")
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 DOUBLE_DIGITS = 15  # of a decimal number that a double preserves
 LEAST_PLAIN, MOST_PLAIN = 1e-3, 1e7  # outside, numbers have powers of ten
@@ -37,12 +35,20 @@ def general(x: float, digits: int) -> str:
 
 def significant(x: float, digits: int) -> str:
     """Return `x` with exactly `digits` significant digits: 71.505682, 1.800 × 10⁻⁹."""
-    return _written(x, digits, str)
+    if x and not LEAST_PLAIN <= abs(x) < MOST_PLAIN:
+        return scientific(x, digits)
+    return _typeset(f"{x:.{max(0, digits - 1 - _exponent(x, digits))}f}") if x else "0"
 
 
 def plain(x: float, digits: int = 10) -> str:
     """Return `x` without trailing zeros: 2766.7, 6.8944 × 10¹⁰."""
-    return _written(x, digits, _bare)
+    number, times, power = significant(x, digits).partition(" ×")
+    return f"{number.rstrip('0').rstrip('.') if '.' in number else number}{times}{power}"
+
+
+def scientific(x: float, digits: int) -> str:
+    """Return `x` as a power of ten: 5.7456 × 10⁶."""
+    return _typeset(f"{x:.{digits - 1}e}") if x else "0"
 
 
 def aligned(values: Iterable[float], digits: int, *, least: int = 6) -> tuple[str, ...]:
@@ -50,20 +56,18 @@ def aligned(values: Iterable[float], digits: int, *, least: int = 6) -> tuple[st
 
     Where that needs too many decimals, each number has `digits` digits of its own (`significant`).
     """
-    column = [float(x) for x in values]
-    finite = [abs(x) for x in column if x != 0 and math.isfinite(x)]
-    if not finite:
-        return tuple(_special(x) for x in column)
-    top, bottom = _exponent(max(finite), digits), _exponent(min(finite), least)
+    column = list(values)
+    sizes = [abs(x) for x in column if x and math.isfinite(x)] or [1.0]
+    top, bottom = _exponent(max(sizes), digits), _exponent(min(sizes), least)
     decimals = max(0, digits - 1 - top, least - 1 - bottom)
     if top + 1 + decimals > digits + SPARE_DIGITS or decimals > MOST_DECIMALS or top > 7:
         return tuple(significant(x, digits) for x in column)
-    return tuple(_special(x) if x == 0 or math.isinf(x) else _signed(f"{x:.{decimals}f}") for x in column)
+    return tuple(_typeset(f"{x:.{decimals}f}") if x else "0" for x in column)
 
 
 def fixed(values: Iterable[float], decimals: int) -> tuple[str, ...]:
     """Return a column with that many decimals; zero has no sign."""
-    return tuple(_signed(f"{x:.{decimals}f}") for x in values)
+    return tuple(_typeset(f"{x:.{decimals}f}") for x in values)
 
 
 def kept_digits(values: Iterable[float], digits: int) -> list[float]:
@@ -77,11 +81,6 @@ def within(value: float, error: float, most: int) -> str:
         return "0"
     digits = math.floor(math.log10(abs(value) / error))
     return general(value, min(digits, most)) if digits > 0 else f"0 (+-{error:.0e})"
-
-
-def scientific(x: float, digits: int) -> str:
-    """Return `x` as a power of ten: 5.7456 × 10⁶."""
-    return _special(x) if x == 0 or math.isinf(x) else _power_of_ten(f"{x:.{digits - 1}e}")
 
 
 def how_many(count: float, what: str) -> str:
@@ -104,37 +103,11 @@ def unit(text: str) -> str:
     return re.sub(r"\^(-?\d)", lambda power: power[1].translate(SUPERSCRIPT), text)
 
 
-def _written(x: float, digits: int, trim: Callable[[str], str]) -> str:
-    """Return a number with that many significant digits, trimmed, outside the plain range as a power of ten."""
-    if x == 0 or math.isinf(x):
-        return _special(x)
-    if not LEAST_PLAIN <= abs(x) < MOST_PLAIN:
-        return _power_of_ten(trim(f"{x:.{digits - 1}e}"))
-    return _signed(trim(f"{x:.{max(0, digits - 1 - _exponent(x, digits))}f}"))
-
-
 def _exponent(x: float, digits: int) -> int:
     """Return the power of ten of `x` rounded to `digits` digits."""
     return int(f"{x:.{digits - 1}e}".partition("e")[2])
 
 
-def _special(x: float) -> str:
-    """Return zero or an infinity as text."""
-    return "0" if x == 0 else _signed("-∞" if x < 0 else "∞")
-
-
-def _signed(text: str) -> str:
-    """Return a number with a true minus sign, none for zero."""
-    return text.replace("-", "−" if text.strip("-0.") else "")
-
-
-def _bare(text: str) -> str:
-    """Return a number without trailing zeros."""
-    mantissa, e, exponent = text.partition("e")
-    return (mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa) + e + exponent
-
-
-def _power_of_ten(text: str) -> str:
-    """Return a number such as 1.8e-9 as 1.8 × 10⁻⁹."""
-    mantissa, _, exponent = text.partition("e")
-    return f"{_signed(mantissa)} × 10{str(int(exponent)).translate(SUPERSCRIPT)}"
+def _typeset(text: str) -> str:
+    """Return a number with a true minus sign, none of zero, and a power of ten."""
+    return powers(text if text.strip("-0.") else text.lstrip("-")).replace("-", "−").replace("inf", "∞")

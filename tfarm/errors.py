@@ -1,23 +1,13 @@
 """Errors: bad input, a search without convergence, a failed certification."""
 
-from __future__ import annotations
-
 import difflib
 import os
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
-from enum import Enum
 from functools import partial
-from typing import Any, Final
+from typing import Any, Self
 
-
-class Missing(Enum):
-    """The value of a missing key."""
-
-    MISSING = "missing"
-
-
-MISSING: Final = Missing.MISSING
+MISSING = ...  # the value of a missing key
 
 
 class TfarmError(Exception):
@@ -42,7 +32,7 @@ class ParameterError(TfarmError, ValueError):
         again = partial(type(self), key=self.key, value=self.value, remedy=self.remedy, file=self.file)
         return again, ()
 
-    def in_file(self, file: str | os.PathLike[str]) -> ParameterError:
+    def in_file(self, file: str | os.PathLike[str]) -> Self:
         """Return the same error with a file."""
         return type(self)(key=self.key, value=self.value, remedy=self.remedy, file=file)
 

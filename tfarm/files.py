@@ -4,8 +4,6 @@ A file is written under a temporary name in its folder and renamed.  Leftovers o
 one: each temporary file or folder is locked while its writer lives, so one that can be locked has no writer.
 """
 
-from __future__ import annotations
-
 import errno
 import io
 import os

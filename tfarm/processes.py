@@ -1,7 +1,5 @@
 """Tasks on a pool of a few processes, which end with the one that started them."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

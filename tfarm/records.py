@@ -3,11 +3,9 @@
 A repr begins with the finding: the entries or properties of a record with a name in `SHOWN_FIRST`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields, is_dataclass
-from functools import cache, cached_property, wraps
+from functools import cached_property, wraps
 from html import escape
 from operator import is_
 from typing import Any, TypeVar
@@ -37,8 +35,7 @@ def record(cls: _Class) -> _Class:
     def after_init(self: Any) -> None:
         if after is not None:
             after(self)
-        kind: Any = type(self)
-        for name in _names_of(kind):
+        for name in self.__dataclass_fields__:
             if type(value := getattr(self, name)) in PLAIN:
                 continue
             if (view := read_only(value)) is not value:
@@ -57,12 +54,6 @@ def record(cls: _Class) -> _Class:
     for name, method in methods.items():
         setattr(cls, name, method)
     return cls
-
-
-@cache
-def _names_of(cls: type[Any]) -> tuple[str, ...]:
-    """Return the names of the fields of a record."""
-    return tuple(each.name for each in fields(cls))
 
 
 def read_only(value: Any) -> Any:
@@ -158,7 +149,7 @@ def _shown(value: Any, longest: int = LONGEST_ENTRY) -> str:
     if isinstance(value, np.ndarray):
         small = value.ndim == 1 and value.size <= SHOWN_SINGLY
         return f"[{', '.join(map(_shown, value.tolist()))}]" if small else f"<array {value.shape}>"
-    if isinstance(value, float | complex) and not isinstance(value, bool):
+    if isinstance(value, float | complex):
         return f"{value:.6g}"
     if isinstance(value, dict):
         numbers = 0 < len(value) <= SHOWN_SINGLY and all(isinstance(each, float) for each in value.values())

@@ -5,8 +5,6 @@ between two steps of Python in the main thread, calls the registered functions a
 thread is in a long compiled loop, which writes no files, a second thread does so after a moment.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

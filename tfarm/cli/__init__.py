@@ -1,7 +1,5 @@
 """The command line: arguments in, one call, output.  No arithmetic."""
 
-from __future__ import annotations
-
 import atexit
 import gc
 import os

@@ -1,7 +1,5 @@
 """The application: options that commands share, the arm and the law that they name, and the output of a record."""
 
-from __future__ import annotations
-
 import os
 import re
 import sys
@@ -172,7 +170,7 @@ def add_command(group: str, **how: Any) -> Callable[[Callable[..., None]], Calla
 
     def add(command: Callable[..., None]) -> Callable[..., None]:
         words, helps = help_of(command)
-        own = signature(command, eval_str=True).parameters
+        own = signature(command).parameters
         groups = {name: parts for name, each in own.items() if (parts := options_of(each))}
 
         @wraps(command)
@@ -203,7 +201,7 @@ def options_of(parameter: Parameter) -> list[Parameter]:
         return GAIN_OPTIONS
     if not isfunction(parameter.default):
         return []
-    known, (_, helps) = signature(parameter.default, eval_str=True).parameters.values(), help_of(parameter.default)
+    known, (_, helps) = signature(parameter.default).parameters.values(), help_of(parameter.default)
     return [_with_help(each, helps[each.name]) for each in known if each.kind is Parameter.KEYWORD_ONLY]
 
 

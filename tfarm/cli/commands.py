@@ -1,7 +1,5 @@
 """The commands on an arm and on measured data.  Packages are imported inside them: `tfarm --help` needs none."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import partial
@@ -170,8 +168,10 @@ def response(
     if measured is not None:
         from tfarm.fitting.data import data_of
 
-        own = {"--s": s, "--omega": omega, "--output": output, "--x": x, "--side": side, "--digits": digits}
-        refuse(own, "a measured response has its own outputs and frequencies; leave this out")
+        refuse(
+            {"--s": s, "--omega": omega, "--output": output, "--x": x, "--side": side, "--digits": digits},
+            "a measured response has its own outputs and frequencies; leave this out",
+        )
         emit(tfarm.overlay(load_arm(arm, theory), data_of(measured, "--measured")), json, csv=csv, png=png)
         return
     refuse({"--png": png}, "a picture needs --measured; tfarm bode draws the exact response")

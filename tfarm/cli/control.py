@@ -1,7 +1,5 @@
 """The commands on the continuous-time loop and on the sampled one."""
 
-from __future__ import annotations
-
 import re
 from functools import partial
 from pathlib import Path
@@ -175,10 +173,14 @@ def gain_map(
     subject, typed = load_arm(arm, theory), {RATE_GAIN: k1, MOMENT_GAIN: k2}
     of_law, ranges = bool(vary or law), vary or []
     if of_law:
-        gains = {f"--{name}": value for name, value in (typed | {ANGLE_GAIN: kp or None}).items()}
-        refuse(gains, "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice")
-        not_two = {"--vary": [name for name, _ in ranges] if len(ranges) != 2 else None}
-        refuse(not_two, "give two numbers of the law, such as --vary hub_angle=0,10 --vary delay=0,0.02")
+        refuse(
+            {f"--{name}": value for name, value in (typed | {ANGLE_GAIN: kp or None}).items()},
+            "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice",
+        )
+        refuse(
+            {"--vary": [name for name, _ in ranges] if len(ranges) != 2 else None},
+            "give two numbers of the law, such as --vary hub_angle=0,10 --vary delay=0,0.02",
+        )
         controller, _ = load_law(subject, arm, {}, law)
     else:
         ranges = [(name, typed[name] or usual) for name, usual in zip(PLANE, ranges_of(subject), strict=True)]

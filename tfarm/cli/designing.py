@@ -1,7 +1,5 @@
 """The commands that choose a law or compare, write pages, give evidence, and help with the others."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -80,11 +78,11 @@ def design(
     """
     from tfarm.arm.writing import save_law
 
-    bounds: Any = {RATE_GAIN: k1, MOMENT_GAIN: k2, ANGLE_GAIN: kp}
     found = tfarm.design(
-        load_arm(arm, theory), objective, structure=structure, **bounds, modes=modes,
+        load_arm(arm, theory), objective, structure=structure, modes=modes,
         chain=load_chain(dsp or arm, period, delay_samples), continuous=continuous, progress=partial(advance, 0, 0),
         also=[load_arm(name, theory) for name in also or []], ranges=dict(over or []),
+        **{RATE_GAIN: k1, MOMENT_GAIN: k2, ANGLE_GAIN: kp},
     )  # fmt: skip
     if save is not None:
         save_law(as_law(found.law), save)
@@ -181,8 +179,10 @@ def tune(
     rate = cast("tfarm.HubFeedback", law)[RATE_GAIN]
     if k1 is None and kp:
         rate = usual_rate_gain(subject, kp)
-        words = f"{RATE_GAIN} = {rate:.4g} (damping ratio 0.71 of the rigid arm under Kp)"
-        defaults = {"default_gains": [RATE_GAIN], "default_gains_in_words": words}
+        defaults = {
+            "default_gains": [RATE_GAIN],
+            "default_gains_in_words": f"{RATE_GAIN} = {rate:.4g} (damping ratio 0.71 of the rigid arm under Kp)",
+        }
     tuning = tuner.tune(subject, plan(usual_plan(subject, chain), {RATE_GAIN: rate, ANGLE_GAIN: kp}), chain)
     drawn = tuner.learning_curves(tuning, curves, advance) if curves else None
     compared = tuner.compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard) if compare else None

@@ -1,7 +1,5 @@
 """One command from its arguments to its exit code: errors and broken streams become one line on standard error."""
 
-from __future__ import annotations
-
 import os
 import re
 import sys
@@ -19,6 +17,7 @@ from tfarm.errors import CertificationError, ConvergenceError, ParameterError, T
 from tfarm.files import STANDARD_OUTPUT
 
 STREAMED = ("--csv", "--png", "--mat", "--save")  # of files that may go to standard output instead, called "-"
+ONLY_STREAMED = f"- is standard output, and only {', '.join(STREAMED)} may go there: give a name"
 PATHS = (*STREAMED, "--out", "--dsp", "--law", "--controller")  # may be called 1_0
 ODD_NUMBER = re.compile(r"(?=.*(_|[^\x00-\x7f]))[-+.\d_eEij]*\d[-+.\d_eEij]*")  # to Python alone: 5_0, or other digits
 
@@ -68,11 +67,9 @@ def open_streams() -> None:
 
     A closed standard error swallows its lines: Python would print them on standard output.
     """
-    if sys.stderr is None:
-        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115  for as long as the process lives
-    if sys.stdout is None:
-        # writing to what is open for reading raises OSError
-        sys.stdout = open(os.open(os.devnull, os.O_RDONLY), "w", encoding="utf-8")  # noqa: SIM115
+    # for as long as the process lives; writing to what is open for reading raises OSError
+    sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    sys.stdout = sys.stdout or open(os.open(os.devnull, os.O_RDONLY), "w", encoding="utf-8")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
@@ -84,14 +81,15 @@ def check_words(arguments: list[str]) -> None:
     options = [(option, text) for option, text in pairwise(words) if option.startswith("--")]
     takers = [option for option, text in options if text == STANDARD_OUTPUT] + ["--json"] * ("--json" in words)
     for option, text in options:
-        is_path, is_output = option in PATHS, text == STANDARD_OUTPUT
-        is_odd = not is_path and any(map(ODD_NUMBER.fullmatch, re.split("[,=]", text)))
-        require(not is_odd, option, text, "write numbers as 50, 0.5 or 5e1")
-        require(not is_path or text.strip(), option, text, "give a path")
-        remedy = f"- is standard output, and only {', '.join(STREAMED)} may go there: give a name"
-        require(not is_output or option in STREAMED, option, text, remedy)
-        remedy = "standard output takes one thing at a time: name a file"
-        require(not is_output or len(takers) == 1, option, text, remedy)
+        is_odd = option not in PATHS and any(map(ODD_NUMBER.fullmatch, re.split("[,=]", text)))
+        is_output = text == STANDARD_OUTPUT
+        for is_wrong, remedy in (
+            (is_odd, "write numbers as 50, 0.5 or 5e1"),
+            (option in PATHS and not text.strip(), "give a path"),
+            (is_output and option not in STREAMED, ONLY_STREAMED),
+            (is_output and len(takers) > 1, "standard output takes one thing at a time: name a file"),
+        ):
+            require(not is_wrong, option, text, remedy)
 
 
 def usage(error: Any) -> str:

@@ -3,8 +3,6 @@
 The quantities of all results, with label, unit and meaning, are read where each record declares them.
 """
 
-from __future__ import annotations
-
 import pkgutil
 import tomllib
 from collections.abc import Iterator

@@ -1,14 +1,14 @@
 """A table on a page: titles with units, cells with their tints."""
 
-from __future__ import annotations
-
 import re
+from itertools import repeat
 
+from jinja2 import Environment
 from markupsafe import Markup, escape
 
 from tfarm.digits import powers, unit
 
-from .tables import Column, Table
+from .tables import Table
 
 COMPLEX = re.compile(r"(?<=[\d)])([+-])(\d[\d.]*(?:e[+-]?\d+)?)i\b")  # the imaginary part of a number
 SIGN, INFINITE = re.compile(r"(?<![\w.)])-(?=[\d.]|inf\b)"), re.compile(r"\binf\b")  # of a number in a cell
@@ -27,42 +27,35 @@ MINUS = re.compile(r"(?<= )-(?= ?[\w(])")  # of a formula in a sentence
 WIDE_CELL = 44  # characters of a text from which its cell is a wide one
 
 
+TABLE = Environment(autoescape=True).from_string("""<table aria-label="{{ table.title }}">
+<thead>
+<tr>
+{%- for column, kinds in columns %}
+{%- set tag = "th" if column.title else "td" %}<{{ tag }}{% if column.title %} scope="col"{% endif %}
+{{- "" }} class="{{ kinds|join }}" data-key="{{ column.key }}"{% if column.help %} title="{{ column.help }}"{% endif %}>
+{{- symbols(column.title) }}{% if column.unit %}<span class="unit">{{ unit(column.unit) }}</span>{% endif %}</{{ tag }}>
+{%- endfor %}</tr>
+</thead>
+<tbody>
+{% for row in rows %}<tr>
+{%- for words, tint, help in row %}
+{%- set column, kinds = columns[loop.index0] %}<td class="{{ kinds|join(" wide" if words|length > wide else "") }}"
+{{- "" }} data-label="{{ column.heading }}"{% if tint %} style="background:{{ tint }}"{% endif %}
+{%- if help %} title="{{ help }}"{% endif %}>{{ symbols(words) }}</td>
+{%- endfor %}</tr>
+{% endfor %}</tbody>
+</table>""")
+
+
 def as_html(table: Table) -> Markup:
-    """The table element, named by the table's title."""
+    """The table element, named by the table's title: words to the left, long ones wide, some with a background."""
     if not table.columns:
         return Markup('<p class="caption">none</p>')
-    rows = zip(*map(_column, table.columns), strict=True)
-    head, *body = (Markup("<tr>{}</tr>").format(Markup("").join(row)) for row in rows)
-    shape = Markup('<table aria-label="{}">\n<thead>\n{}\n</thead>\n<tbody>\n{}\n</tbody>\n</table>')
-    return shape.format(table.title, head, Markup("\n").join(body))
-
-
-def _column(column: Column) -> list[Markup]:
-    """The heading with its key in JSON, then the cells: words to the left, long ones wide, some with a background."""
-    text, tinted, cells = "text" * column.is_text, " tinted" * bool(column.tint), column.cells
-    of = Markup('<span class="unit">{}</span>').format(unit(column.unit)) if column.unit else ""
-    tag, scope = ("th", Markup(' scope="col"')) if column.title else ("td", "")
-    shape = Markup('<{0}{1} class="{2}{3}" data-key="{4}"{5}>{6}{7}</{0}>')
-    head = shape.format(tag, scope, text, tinted, column.key, _tooltip(column.help), with_symbols(column.title), of)
-    styles = (
-        Markup(' style="background:{}"').format(tint) if tint else "" for tint in column.tint or [""] * len(cells)
-    )
-    label = f"{column.title} [{column.unit}]" if column.unit else column.title
-    cell = Markup('<td class="{}{}{}" data-label="{}"{}{}>{}</td>')
-    helps = column.helps or [""] * len(cells)
-    return [
-        head,
-        *(
-            cell.format(
-                text, " wide" * (len(words) > WIDE_CELL), tinted, label, style, _tooltip(meaning), with_symbols(words)
-            )
-            for words, style, meaning in zip(cells, styles, helps, strict=True)
-        ),
-    ]
-
-
-def _tooltip(meaning: str) -> Markup:
-    return Markup(' title="{}"').format(meaning) if meaning else Markup()
+    columns = [(each, ("text" * each.is_text, " tinted" * bool(each.tint))) for each in table.columns]
+    cells = (zip(each.cells, each.tint or repeat(""), each.helps or repeat(""), strict=False) for each in table.columns)
+    return Markup(TABLE.render(
+        table=table, columns=columns, rows=zip(*cells, strict=True), symbols=with_symbols, unit=unit, wide=WIDE_CELL
+    ))  # fmt: skip
 
 
 def with_symbols(text: str) -> Markup:

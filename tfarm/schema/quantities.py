@@ -1,7 +1,5 @@
 """The declaration of a quantity, its values in JSON and as a person reads them, and two records compared."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass, replace

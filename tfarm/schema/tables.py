@@ -3,8 +3,6 @@
 Files have every digit of a double, infinities as "inf" and "-inf"; NaN does not occur.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -75,6 +73,11 @@ class Column:
         return self.digits(self.of) if self.shown is None else self.shown
 
     @property
+    def heading(self) -> str:
+        """The title with the unit."""
+        return f"{self.title} [{self.unit}]" if self.unit else self.title
+
+    @property
     def is_text(self) -> bool:
         """Whether it is set flush left: words, or lists of words."""
         first = [value[0] if isinstance(value, list) and value else value for value in self.of]
@@ -98,15 +101,9 @@ class Table:
         assert len(set(keys)) == len(keys), f"{self.stem}: two columns of one key in {keys}"
         assert len({len(column.of) for column in self.columns}) <= 1, f"{self.stem}: columns of different lengths"
 
-    def __len__(self) -> int:
-        return len(self.columns[0].of)
-
     def __iter__(self) -> Iterator[dict[str, Any]]:
-        return map(self.__getitem__, range(len(self)))
-
-    def __getitem__(self, row: int) -> dict[str, Any]:
-        """A row by its keys."""
-        return {column.key: column.of[row] for column in self.columns}
+        keys = [column.key for column in self.columns]
+        return (dict(zip(keys, row, strict=True)) for row in zip(*(column.of for column in self.columns), strict=True))
 
 
 def table(
@@ -171,8 +168,7 @@ def roots_table(values: Any, of: Quantity, *, stem: str = "", title: str = "", c
 def curve_table(record: Any, *, stem: str = "", title: str = "") -> Table:
     """The curves of a record, a row a point; complex ones in two columns.  Without any, the first list of records."""
     if hasattr(record, "csv_table"):
-        own: Table = record.csv_table
-        return own
+        return record.csv_table
     columns: list[Column] = []
     for value, of, _ in with_flat(record):
         if of.curve and np.iscomplexobj(value):
@@ -235,7 +231,7 @@ def json_value(value: Any) -> Any:
     if isinstance(value, float):
         if math.isnan(value):
             raise ValueError("an answer or a table holds a NaN")
-        return float(value) if not math.isinf(value) else "inf" if value > 0 else "-inf"
+        return float(value) if math.isfinite(value) else str(value)
     if isinstance(value, dict):
         return {key: json_value(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple | Table):
@@ -244,14 +240,10 @@ def json_value(value: Any) -> Any:
 
 
 def as_json(table: Table) -> str:
-    """{"table", "units", "rows": [{key: value}, ...]}, a line a row."""
+    """{"table", "units", "rows": [{key: value}, ...]}."""
     units = {column.key: column.unit for column in table.columns if column.unit}
-    head, *rows = (
-        json.dumps(json_value(each), ensure_ascii=False, allow_nan=False)
-        for each in ({"table": table.title, "units": units}, *(table if table.columns else ()))
-    )
-    lines = ",\n  ".join(rows)
-    return f'{head[:-1]}, "rows": [\n  {lines}\n]}}\n'
+    whole = {"table": table.title, "units": units, "rows": table}
+    return f"{json.dumps(json_value(whole), ensure_ascii=False, allow_nan=False)}\n"
 
 
 def as_csv(table: Table, *, units: bool = False) -> str:

@@ -4,8 +4,6 @@ Where the terminal is too narrow, titles and long texts are folded.  If that is 
 follow in a block below, after the first column again.
 """
 
-from __future__ import annotations
-
 import io
 import shutil
 import sys
@@ -63,11 +61,11 @@ def terminal_width() -> int:
 def table_lines(table: Table, width: int) -> list[str]:
     """Return the lines of a table, each within `width` as far as its widest column allows."""
     columns = table.columns
-    widths = [max(cell_len(heading(each)), widest(each)) for each in columns]
+    widths = [max(cell_len(each.heading), widest(each)) for each in columns]
     if sum(widths) + COLUMN_GAP * (len(widths) - 1) <= width:  # rich would take a second for two thousand rows
         aligned = [
             [set_cell_size(cell, size) if each.is_text else " " * (size - cell_len(cell)) + cell
-             for cell in (heading(each), *each.cells)]
+             for cell in (each.heading, *each.cells)]
             for each, size in zip(columns, widths, strict=True)
         ]  # fmt: skip
         return [(" " * COLUMN_GAP).join(row).rstrip() for row in zip(*aligned, strict=True)]
@@ -82,7 +80,7 @@ def table_lines(table: Table, width: int) -> list[str]:
         for column in block:
             size, side = least(column), "left" if column.is_text else "right"
             fixed = None if column.folds else size
-            grid.add_column(Text(heading(column)), justify=cast("Any", side), width=fixed, min_width=size)
+            grid.add_column(Text(column.heading), justify=cast("Any", side), width=fixed, min_width=size)
         for row in zip(*(column.cells for column in block), strict=True):
             grid.add_row(*map(Text, row))
         lines += [""] * bool(lines) + rendered(grid, max(width, least_width(block)))
@@ -97,11 +95,6 @@ def rendered(shown: RenderableType, width: int) -> list[str]:
     return [line.rstrip() for line in captured.get().splitlines()]
 
 
-def heading(column: Column) -> str:
-    """Return the title of a column with its unit."""
-    return f"{column.title} [{column.unit}]" if column.unit else column.title
-
-
 def least_width(columns: Sequence[Column]) -> int:
     """Return the characters that columns take at least."""
     return sum(map(least, columns)) + COLUMN_GAP * (len(columns) - 1)
@@ -110,7 +103,7 @@ def least_width(columns: Sequence[Column]) -> int:
 def least(column: Column) -> int:
     """Return the characters below which a word or a number of a column would be broken."""
     cells = max(LEAST_FOLDED, *map(widest_word, column.cells)) if column.folds else widest(column)
-    return max(cells, widest_word(heading(column)))
+    return max(cells, widest_word(column.heading))
 
 
 def widest(column: Column) -> int:
