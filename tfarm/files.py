@@ -150,47 +150,42 @@ def _temporary(folder: Path, prefix: str, suffix: str, make: Callable[[Path], ob
         path = folder / f"{prefix}{secrets.token_hex(4)}{suffix}"
         with undone_if_stopped(partial(_remove, path)):
             make(path)
-            handle = _locked(path, wait=True)
-            try:
-                if path.exists():
-                    yield path
-                    return
-            finally:
-                _remove(path)
-                if handle is not None:
-                    os.close(handle)
+            with _locked(path, wait=True):
+                try:
+                    if path.exists():
+                        yield path
+                        return
+                finally:
+                    _remove(path)
 
 
 def _remove_leftovers(folder: Path, pattern: str) -> None:
     """Remove temporary files of that name that are not locked: their writers are gone."""
     with suppress(PermissionError):  # of a folder that cannot be listed, and may yet be written to
         for name in filter(re.compile(pattern).fullmatch, os.listdir(folder)):
-            with suppress(OSError):
-                handle = _locked(folder / name, wait=False)
+            with suppress(OSError), _locked(folder / name, wait=False):
                 _remove(folder / name)
-                if handle is not None:
-                    os.close(handle)
 
 
-def _locked(path: Path, *, wait: bool) -> int | None:
-    """Return an open file that holds the lock; None where there are no locks or the path is gone.
+@contextmanager
+def _locked(path: Path, *, wait: bool) -> Iterator[None]:
+    """Hold the lock of a temporary file or folder; none where it is gone, or where the file system has no locks.
 
     Raises BlockingIOError where another process has it and `wait` is false.
     """
-    if sys.platform == "win32":  # no such locks, but what is open cannot be removed either
-        return None
     try:
-        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
+        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW) if sys.platform != "win32" else None
     except FileNotFoundError:
-        return None
+        handle = None
+    if handle is None:  # on Windows: no such locks, but what is open cannot be removed either
+        yield
+        return
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
+        with suppress(*[OSError] * wait):
+            fcntl.flock(handle, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
         os.close(handle)
-        if not wait:
-            raise
-        return None  # a file system without locks
-    return handle
 
 
 def _remove(path: Path) -> None:

@@ -20,8 +20,8 @@ import typer
 import tfarm
 from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm, Theory, implausible
 from tfarm.errors import one_line, require
-from tfarm.files import is_standard_output
-from tfarm.schema import to_json, write_csv
+from tfarm.files import is_standard_output, write_file
+from tfarm.schema import as_csv, to_json
 
 app = typer.Typer(name="tfarm", rich_markup_mode="rich", pretty_exceptions_enable=False)
 GROUPS = ("Arm", "Loop", "Sampled loop", "Design", "Measurement", "Report")  # of commands in the help, in its order
@@ -308,7 +308,7 @@ def emit(
     from tfarm.schema import curve_table, to_dict
 
     if csv is not None:
-        write_csv(curve_table(record), csv)
+        write_file(csv, as_csv(curve_table(record), units=True).encode(), key="--csv")
     if png is not None:
         import tfarm.plots  # noqa: F401  every picture is registered once they are loaded
         from tfarm.plots.style import FIGURES, save_png

@@ -36,7 +36,6 @@ from .tables import (
     sections,
     table,
     to_json,
-    write_csv,
 )
 
 __all__ = [
@@ -64,5 +63,4 @@ __all__ = [
     "to_dict",
     "to_json",
     "with_unit",
-    "write_csv",
 ]

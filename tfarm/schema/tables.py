@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from tfarm.digits import TEXTS, CellsOf, within
-from tfarm.files import write_file
 
 from .quantities import (
     COMPLEX_ERROR,
@@ -153,12 +152,13 @@ def across(
 
 def roots_table(values: Any, of: Quantity, *, stem: str = "", title: str = "", caption: str = "") -> Table:
     """A row a complex number: its real and imaginary part, and of a pole or zero in 1/s its damping ratio."""
-    roots = list(map(complex, values))
-    columns = []
-    for n, (key, unit) in enumerate({"re": of.unit, "im": of.unit.replace("1/s", "rad/s")}.items()):
-        cells = [parts(root, of.digits)[n] for root in roots]
-        columns.append(Column(key, f"{key.title()} {of.label}", unit, of=[(root.real, root.imag)[n] for root in roots],
-                              shown=cells))  # fmt: skip
+    roots = [complex(value) for value in values]
+    shown = [parts(root, of.digits) for root in roots]
+    columns = [
+        Column("re", f"Re {of.label}", of.unit, of=[s.real for s in roots], shown=[re for re, _ in shown]),
+        Column("im", f"Im {of.label}", of.unit.replace("1/s", "rad/s"), of=[s.imag for s in roots],
+               shown=[im for _, im in shown]),
+    ]  # fmt: skip
     if of.unit == "1/s":
         ratios = [within(-s.real / abs(s), COMPLEX_ERROR, RATIO_DIGITS) if s.imag else NO_VALUE for s in roots]
         columns.append(Column("damping_ratio", "damping ratio", of=ratios))
@@ -270,16 +270,9 @@ def _holds_records(value: Any) -> bool:
     return isinstance(value, dict) or (isinstance(value, list) and any(map(_holds_records, value)))
 
 
-def write_csv(table: Table, path: Path) -> None:
-    """A command's table to the file asked for, in one step."""
-    write_file(path, as_csv(table, units=True).encode(), key="--csv")
-
-
-RENDERERS = {"csv": as_csv, "json": as_json}
-
-
-def save_table(table: Table, folder: Path, kinds: Sequence[str] = tuple(RENDERERS)) -> tuple[str, ...]:
+def save_table(table: Table, folder: Path, kinds: Sequence[str] = ("csv", "json")) -> tuple[str, ...]:
     """A report's table as CSV and JSON, or one of these: the names of the files."""
     for kind in kinds:
-        (folder / f"{table.stem}.{kind}").write_text(RENDERERS[kind](table), encoding="utf-8", newline="")
+        content = as_csv(table) if kind == "csv" else as_json(table)
+        (folder / f"{table.stem}.{kind}").write_text(content, encoding="utf-8", newline="")
     return tuple(f"{table.stem}.{kind}" for kind in kinds)
