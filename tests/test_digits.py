@@ -3,7 +3,7 @@ from functools import partial
 
 import pytest
 
-from tfarm.digits import aligned, fixed, how_many, listed, plain, scientific, significant, unit
+from tfarm.digits import aligned, fixed, how_many, listed, plain, scientific, significant, unit, within
 
 
 @pytest.mark.parametrize(
@@ -25,6 +25,11 @@ from tfarm.digits import aligned, fixed, how_many, listed, plain, scientific, si
         (aligned, ([1e-9, 1e9, 0.0, math.inf], 3), ("1.00 × 10⁻⁹", "1.00 × 10⁹", "0", "∞")),  # over many decades
         (fixed, ([-1e-9, -0.25], 3), ("0.000", "−0.250")),  # what rounds to zero has no sign
         (scientific, (94.96, 4), "9.496 × 10¹"),
+        (scientific, (-6.8e-300, 2), "−6.8 × 10⁻³⁰⁰"),
+        (within, (0.0, 1e-9, 12), "0"),
+        (within, (-1.57e-15, 1e-12, 12), "0 (+-1e-12)"),
+        (within, (-0.004825413349860159, 2e-11, 12), "-0.0048254133"),  # the digits that its error leaves
+        (within, (123.456789, 1e-20, 6), "123.457"),
         (unit, ("kg m^2",), "kg m²"),
         (unit, ("m^-3",), "m⁻³"),
         *((how_many, (n, "pole"), text) for n, text in ((0, "no poles"), (1, "1 pole"), (2, "2 poles"))),

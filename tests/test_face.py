@@ -7,7 +7,7 @@ import pytest
 import tfarm
 from tests.shared import thinned
 
-HEAVY = ("control", "matplotlib", "matplotlib.pyplot", "sympy", "scipy.signal", "scipy.stats")
+HEAVY = ("control", "matplotlib", "matplotlib.pyplot", "sympy", "scipy.signal", "scipy.stats", "scipy.optimize")
 
 
 def loaded_after(*codes):
@@ -19,7 +19,15 @@ def loaded_after(*codes):
     return found if len(codes) > 1 else found[0]
 
 
-@pytest.mark.parametrize("code", thinned(["import tfarm; tfarm.load('sasaki2012'), dir(tfarm)", "import tfarm"], 2))
+QUIETLY = (  # a command that prints JSON
+    "from tfarm.cli.running import run; from contextlib import redirect_stdout; from io import StringIO\n"
+    "with redirect_stdout(StringIO()): assert run(['modes', 'sasaki2012', '--count', '3', '--json']) == 0\n"
+)
+
+
+@pytest.mark.parametrize(
+    "code", thinned(["import tfarm; tfarm.load('sasaki2012'), dir(tfarm)", "import tfarm", QUIETLY], 2)
+)
 def test_importing_tfarm_and_reading_an_arm_load_nothing_heavy(code):
     assert loaded_after(code) == set()
 

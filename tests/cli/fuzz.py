@@ -5,27 +5,25 @@ one verb with its defaults, and SIZE/17 sets of odd options on the presets.  Eac
 nothing on standard error but lines that begin with `tfarm:`, at most one of them an error and none a traceback, and
 take no more than 20 CPU seconds; with --json it prints one object or nothing.
 
-A worker process runs the commands; one that exceeds its CPU time ends its worker, and another takes over.
+Each runs in a fork of this process, which the system ends at that time.
 """
 
 import json
 import os
 import resource
-import subprocess
-import sys
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
 
 import tfarm
 from tests import survey
+from tests.cli.kills import started
 from tests.shell import heard
 from tests.survey import Finding
+from tfarm.cli.running import whole_command
 
 CPU_SECONDS = 20
-STARTING = 5  # CPU seconds that imports and kernels from the cache may take the first command of a worker
 OPTIONS_PER_FILE = 17  # 5,000 files go with 300 sets of options
 PRESETS = Path(tfarm.__file__).parent / "arm" / "presets"
 VERBS = (
@@ -101,14 +99,11 @@ def odd_options(rng, options):
 
 def options_of_the_verbs():
     """Of each verb but those that take minutes by their purpose: its options, and whether each is a flag."""
-    from tfarm.cli.running import whole_command
-
-    verbs = whole_command().commands
     return {
         name: [
             (param.opts[0], bool(getattr(param, "is_flag", False))) for param in verb.params if param.opts[0][:1] == "-"
         ]
-        for name, verb in verbs.items()
+        for name, verb in whole_command().commands.items()
         if name not in ("report", "tune")
     }
 
@@ -129,62 +124,14 @@ def cases(number, seed, folder):
 # ---------------------------------------------------------------- running
 
 
-def work():
-    """A worker: commands from standard input, a line of JSON each; exit code, output, seconds back the same way."""
-    import contextlib
-    import io
-
-    from tfarm.cli import main
-
-    limit = STARTING
-    for line in sys.stdin:
-        limit += CPU_SECONDS
-        spent = time.process_time()
-        resource.setrlimit(resource.RLIMIT_CPU, (int(spent) + limit, resource.RLIM_INFINITY))
-        limit = 1
-        out, err = io.StringIO(), io.StringIO()
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            try:
-                main(json.loads(line))
-                code = 0
-            except SystemExit as stop:
-                code = int(stop.code or 0)
-            except BaseException as error:  # what would be a traceback
-                code = 1
-                print(f"{type(error).__name__}: {error}", file=sys.stderr)
-        answer = [code, out.getvalue(), err.getvalue(), time.process_time() - spent]
-        print(json.dumps(answer), flush=True)
-
-
-class Worker:
-    """A process that runs commands one after the other, started again after each that it does not survive."""
-
-    def __init__(self, folder):
-        self.folder, self.process = folder, None
-
-    def run(self, arguments):
-        """Exit code (None: ended), output, errors and CPU seconds of one command."""
-        if self.process is None or self.process.poll() is not None:
-            command = [sys.executable, "-m", "tests.cli.fuzz", "--work"]
-            path = os.pathsep.join([os.getcwd(), os.environ.get("PYTHONPATH", "")])
-            self.process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=self.folder,
-                env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"},
-            )  # fmt: skip
-        self.process.stdin.write(json.dumps(arguments) + "\n")
-        self.process.stdin.flush()
-        line = self.process.stdout.readline()
-        if not line:
-            self.process.wait()
-            return None, "", "", float(CPU_SECONDS)
-        return tuple(json.loads(line))
-
-    def end(self):
-        """Let the process end."""
-        if self.process is not None:
-            self.process.stdin.close()
-            self.process.stdout.close()
-            self.process.wait()
+def outcome(arguments, folder):
+    """Exit code (None: ended by the system), output, errors and CPU seconds of one command."""
+    files = folder / "out", folder / "err"
+    child = started(arguments, folder, *files)
+    resource.prlimit(child, resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS))
+    _, status, used = os.wait4(child, 0)
+    code = os.waitstatus_to_exitcode(status)
+    return code if code >= 0 else None, *(file.read_text("utf-8", "replace") for file in files), used.ru_utime
 
 
 def judge(arguments, code, out, err, seconds):
@@ -215,20 +162,13 @@ def is_json(text):
 def commands(size, seed):
     """What came of every command."""
     with tempfile.TemporaryDirectory() as name:
-        worker = Worker(name)
-        try:
-            for arguments in cases(size, seed, Path(name)):
-                code, out, err, seconds = worker.run(arguments)
-                wrong = judge(arguments, code, out, err, seconds)
-                files = [Path(word).read_bytes() for word in arguments if word.startswith(name)] if wrong else []
-                words = f"{wrong} | {' '.join(map(repr, arguments))[:300]} {files}" if wrong else ""
-                yield Finding(f"exit {code}", words, bool(wrong), {"CPU seconds": seconds})
-        finally:
-            worker.end()
+        for arguments in cases(size, seed, Path(name)):
+            code, out, err, seconds = outcome(arguments, Path(name))
+            wrong = judge(arguments, code, out, err, seconds)
+            files = [Path(word).read_bytes() for word in arguments if word.startswith(name)] if wrong else []
+            words = f"{wrong} | {' '.join(map(repr, arguments))[:300]} {files}" if wrong else ""
+            yield Finding(f"exit {code}", words, bool(wrong), {"CPU seconds": seconds})
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] == ["--work"]:
-        work()
-    else:
-        survey.main(commands, size=300)
+    survey.main(commands, size=300)

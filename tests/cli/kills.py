@@ -42,25 +42,25 @@ def files_of(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
-def started(arguments, folder):
-    """The process id of a fork that runs the command in that folder, silently."""
+def started(arguments, folder, *files):
+    """The process id of a fork that runs the command in that folder, with files for its output and errors."""
     child = os.fork()
     if child:
         return child
     try:
         os.chdir(folder)
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, 1)
+        for number, file in enumerate(files, 1):
+            os.dup2(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
         os._exit(run(list(arguments)))
     except BaseException as error:
-        print(f"{type(error).__name__}: {error}", file=sys.stderr)
+        print(f"{type(error).__name__}: {error}", file=sys.stderr, flush=True)
     finally:
         os._exit(1)
 
 
 def completed(arguments, folder):
     """Run it to its end; the seconds that it took and those until the first temporary file, or None where it failed."""
-    begun, child, first = time.perf_counter(), started(arguments, folder), None
+    begun, child, first = time.perf_counter(), started(arguments, folder, os.devnull), None
     while True:
         done, status = os.waitpid(child, os.WNOHANG)
         if first is None and _is_writing(folder):
@@ -79,7 +79,7 @@ def _is_writing(folder):
 
 def killed(arguments, folder, after, from_writing):
     """Kill a run some seconds after its start or, with `from_writing`, after its first temporary file."""
-    child = started(arguments, folder)
+    child = started(arguments, folder, os.devnull)
     while from_writing and not _is_writing(folder) and not os.waitpid(child, os.WNOHANG)[0]:
         time.sleep(1e-3)
     time.sleep(after)

@@ -6,75 +6,50 @@ process of the session is left, and the folder holds what it held before; a run 
 """
 
 import os
+import re
 import signal
 import subprocess
 import sys
 import tempfile
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 
 from tests import survey
-from tests.cli.kills import files_of
 from tests.shell import heard
 from tests.survey import Finding
 
 COMMAND = (sys.executable, "-m", "tfarm", "report", "sasaki2012-lab", "--out", "pages")
 WITHIN = 2.0  # seconds
-LONGEST = 12.0  # seconds after the start, for the last moments
+LONGEST = 12.0  # seconds after the handlers are set, for the last moments
 HANDLED = 1 << signal.SIGTERM - 1  # in the mask of signals that a process handles: from then on it can be stopped
-
-
-@dataclass(frozen=True)
-class Stop:
-    """Signals, the seconds between them, to the process or its group, and how long after its handlers are set."""
-
-    signals: tuple[int, ...]
-    apart: float
-    to_group: bool
-    after: float
-
-
-def some_stops(number, seed, longest=LONGEST):
-    """Stops drawn at random: one and two signals, each kind, to the process and to its group."""
-    rng = np.random.default_rng(seed)
-    kinds = [(each,) for each in (signal.SIGINT, signal.SIGTERM)]
-    kinds += [(first, second) for (first,) in kinds for (second,) in kinds]
-    return [
-        Stop(kinds[i % 6], float(rng.choice([0.0, rng.uniform(0, 0.02)])), bool(i // 6 % 2), rng.uniform(0, longest))
-        for i in range(number)
-    ]
+BOTH = signal.SIGINT, signal.SIGTERM
+SIGNALS = [*((each,) for each in BOTH), *product(BOTH, BOTH)]
 
 
 def members(session):
-    """The processes of a session that run, by number: name."""
-    found = {}
+    """The processes of a session that run."""
+    found = []
     for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            name, _, rest = stat.read_text().partition("(")[2].rpartition(")")
-        except (FileNotFoundError, ProcessLookupError):
-            continue
-        if rest.split()[3] == str(session) and rest.split()[0] != "Z":
-            found[int(stat.parent.name)] = name
+        with suppress(FileNotFoundError, ProcessLookupError):
+            state, _, _, own = stat.read_text().rpartition(")")[2].split()[:4]
+            found += [int(stat.parent.name)] * (own == str(session) and state != "Z")
     return found
 
 
 def handles_signals(process):
     """Whether its handlers are set."""
-    try:
+    with suppress(FileNotFoundError):
         status = Path(f"/proc/{process}/status").read_text()
-    except FileNotFoundError:
-        return False
-    (caught,) = (line.split()[1] for line in status.splitlines() if line.startswith("SigCgt:"))
-    return bool(int(caught, 16) & HANDLED)
+        return bool(int(re.search(r"SigCgt:\s*(\w+)", status)[1], 16) & HANDLED)
+    return False
 
 
-def outcome(stop, folder):
-    """ "clean", "ended before", or what is wrong."""
-    before = files_of(folder), sorted(folder.rglob("*"))
+def outcome(signals, apart, send, after, folder):
+    """What is wrong with the end of a run in an empty folder, "clean", or "ended before"; `after` [s] it is stopped."""
     process = subprocess.Popen(
         COMMAND, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
         env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
@@ -82,53 +57,45 @@ def outcome(stop, folder):
     try:
         while not handles_signals(process.pid) and process.poll() is None:
             time.sleep(1e-3)
-        time.sleep(stop.after)
+        time.sleep(after)
         if process.poll() is not None:
             return "ended before"
         sent = time.monotonic()
-        for i, number in enumerate(stop.signals):
-            time.sleep(stop.apart * bool(i))
-            send(process.pid, number, stop.to_group)
+        for number in signals:
+            with suppress(ProcessLookupError):  # it has gone
+                send(process.pid, number)
+            time.sleep(apart)
         out, err = process.communicate(timeout=30)
-        took = time.monotonic() - sent
+        took = time.monotonic() - sent - apart
         while members(process.pid) and time.monotonic() - sent < WITHIN:
             time.sleep(0.01)
-        lines = heard(err).splitlines()
-        return wrong_with(process.returncode, out, lines, took, members(process.pid), stop) or (
-            "clean" if (files_of(folder), sorted(folder.rglob("*"))) == before else f"files are left: {stop}"
-        )
+        checks = {
+            f"exit code {process.returncode}": process.returncode not in {128 + each for each in signals},
+            f"prints {out!r} {err!r}": (out, heard(err)) != ("", "tfarm: stopped\n"),
+            f"took {took:.2f} s": took > WITHIN,
+            f"left {members(process.pid)}": members(process.pid),
+            "files are left": list(folder.iterdir()),
+        }
+        return next((words for words, is_so in checks.items() if is_so), "clean")
     except subprocess.TimeoutExpired:
-        return f"does not end: {stop}"
+        return "does not end"
     finally:
         for each in members(process.pid):
             os.kill(each, signal.SIGKILL)
         process.wait()
 
 
-def send(process, number, to_group):
-    """The signal; nothing where the process has gone."""
-    with suppress(ProcessLookupError):
-        (os.killpg if to_group else os.kill)(process, number)
-
-
-def wrong_with(code, out, lines, took, left, stop):
-    """What is wrong with the end of a run, or an empty text."""
-    if code not in {128 + each for each in stop.signals}:
-        return f"exit code {code}: {lines} {stop}"
-    if lines != ["tfarm: stopped"] or out:
-        return f"prints {lines} {out!r}: {stop}"
-    if took > WITHIN or left:
-        return f"took {took:.2f} s, left {left}: {stop}"
-    return ""
-
-
 def stops(size, seed):
-    """The outcome of each stop, in an empty folder."""
-    for stop in some_stops(size, seed):
+    """The outcome of each stop: one and two signals, each kind, to the process and to its group."""
+    rng = np.random.default_rng(seed)
+    for i in range(size):
+        signals, send = SIGNALS[i % 6], (os.kill, os.killpg)[i // 6 % 2]
+        apart, after = float(rng.choice([0.0, rng.uniform(0, 0.02)])), rng.uniform(0, LONGEST)
         with tempfile.TemporaryDirectory() as place:
-            found = outcome(stop, Path(place))
+            found = outcome(signals, apart, send, after, Path(place))
         is_wrong = found not in ("clean", "ended before")
-        yield Finding("wrong" if is_wrong else found, found if is_wrong else "", is_wrong)
+        words = f"{found}: {signals} {apart} {send.__name__} {after}" if is_wrong else ""
+        yield Finding("wrong" if is_wrong else found, words, is_wrong)
 
 
 if __name__ == "__main__":

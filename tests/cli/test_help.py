@@ -98,3 +98,4 @@ def test_both_ways_to_start_print_the_version(capsys):
     done = subprocess.run([sys.executable, "-m", "tfarm", "--version"], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == (f"tfarm {tfarm.__version__}\n", "")
     assert "--version" in run(capsys, "--help")[1]
+    assert run(capsys) == run(capsys, "--help")
