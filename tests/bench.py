@@ -17,8 +17,6 @@ from pathlib import Path
 import control
 import mpmath
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 import tfarm
 from tests import caches
@@ -55,7 +53,7 @@ class Row:
 
 
 def timed(calls, rounds, *, warm=False):
-    """Seconds a call of each, one entry a round."""
+    """Seconds a call (calls, rounds)."""
 
     def seconds(call):
         if not warm:
@@ -64,17 +62,14 @@ def timed(calls, rounds, *, warm=False):
         call()
         return time.process_time() - start
 
-    number = {name: math.ceil(TURN / max(min(seconds(call), seconds(call)), 1e-9)) for name, call in calls.items()}
-    found = {name: [] for name in calls}
-    for _ in range(rounds):
-        for name, call in calls.items():
-            found[name].append(sum(seconds(call) for _ in range(number[name])) / number[name])
-    return {name: np.array(each) for name, each in found.items()}
+    number = [math.ceil(TURN / max(min(seconds(call), seconds(call)), 1e-9)) for call in calls]
+    turns = list(zip(calls, number, strict=True))
+    return np.array([[sum(seconds(call) for _ in range(many)) / many for call, many in turns] for _ in range(rounds)]).T
 
 
 def alone(what, call, n, rounds, *, warm=False):
     """The row of a call that is compared with nothing."""
-    return Row(what, n, float(np.median(timed({what: call}, rounds, warm=warm)[what])) / n)
+    return Row(what, n, float(np.median(timed([call], rounds, warm=warm))) / n)
 
 
 def response_error(arm, s, values):
@@ -100,12 +95,12 @@ def responses():
             def floor(exponents=exponents, room=room):
                 return [np.exp(each, out=room) for each in exponents]
 
-            times = timed({"floor": floor, "tfarm": lambda G=G, s=s: G(s)}, rounds, warm=True)
+            floors, ours = timed([floor, lambda G=G, s=s: G(s)], rounds, warm=True)
             some = s[np.linspace(0, n - 1, 100).astype(int)]
-            ratio, error = np.median(times["tfarm"] / times["floor"]), response_error(arm, some, G(some))
-            yield Row(f"response, warm: {arm.name}", n, np.median(times["tfarm"]) / n, ratio, "two exponentials", error)
+            ratio, error = np.median(ours / floors), response_error(arm, some, G(some))
+            yield Row(f"response, warm: {arm.name}", n, np.median(ours) / n, ratio, "two exponentials", error)
     s = 1j * np.geomspace(0.1, 1e4, 100)
-    wanted, ours = [output(name) for name in OUTPUTS], timed({"tfarm": lambda: G(s)}, 50, warm=True)["tfarm"]
+    wanted = [output(name) for name in OUTPUTS]
 
     def appendix():
         with mpmath.workdps(30):
@@ -114,10 +109,8 @@ def responses():
                 for at in (Appendix(LAB, each) for each in s)
             ]
 
-    theirs = timed({"mpmath": appendix}, 1, warm=True)["mpmath"]
-    yield Row(
-        f"response by mpmath, 30 digits: {LAB.name}", s.size, theirs[0] / s.size, theirs[0] / np.median(ours), "tfarm"
-    )
+    ours, (theirs,) = timed([lambda: G(s)], 50, warm=True), timed([appendix], 1, warm=True)[0]
+    yield Row(f"response by mpmath, 30 digits: {LAB.name}", s.size, theirs / s.size, theirs / np.median(ours), "tfarm")
 
 
 def spectra():
@@ -148,12 +141,13 @@ def loops():
 def loci(branches=20, points=500, order=20, stop=10.0):
     """The exact root locus and python-control's on a model of the same number of poles, against 50 digits."""
     gains, system = np.linspace(0.0, stop, points), open_loop(BARE, HubFeedback(), "K1", order // 2 - 1)
-    calls = {
-        "tfarm": lambda: locus(BARE, HubFeedback(), "K1", 0.0, stop, points, branches),
-        "control": lambda: control.root_locus_map(system, gains),
-    }
-    times, n = timed(calls, 20), branches * points
-    exact, upper = calls["tfarm"](), locus(BARE, HubFeedback(), "K1", 0.0, stop, points, order // 2 + 1)
+
+    def along(number):
+        return locus(BARE, HubFeedback(), "K1", 0.0, stop, points, number)
+
+    exact, upper = along(branches), along(order // 2 + 1)
+    ours, theirs = timed([lambda: along(branches), lambda: control.root_locus_map(system, gains)], 20)
+    n = branches * points
 
     def error(found, values):
         worst = 0.0
@@ -165,12 +159,9 @@ def loci(branches=20, points=500, order=20, stop=10.0):
                     worst = max(worst, abs(value / complex(float(disc.re), float(disc.im)) - 1))
         return worst
 
-    ratio = np.median(times["tfarm"] / times["control"])
-    yield Row(
-        "root locus", n, np.median(times["tfarm"]) / n, ratio, "control.root_locus_map", error(exact, exact.branches)
-    )
-    theirs = error(upper, reduced_locus(upper, order).branches)
-    yield Row("control.root_locus_map, order 20", n, np.median(times["control"]) / n, error=theirs)
+    own, reduced = error(exact, exact.branches), error(upper, reduced_locus(upper, order).branches)
+    yield Row("root locus", n, np.median(ours) / n, np.median(ours / theirs), "control.root_locus_map", own)
+    yield Row("control.root_locus_map, order 20", n, np.median(theirs) / n, error=reduced)
 
 
 def tuner():
@@ -183,13 +174,11 @@ def tuner():
 
 def main(path):
     """Measure, print, keep."""
-    table = Table("what", "n", "us each", "ratio", "largest error")
     rows = [row for group in (responses, spectra, loops, loci, tuner) for row in group()]
     for row in rows:
-        ratio = "" if row.ratio is None else f"{row.ratio:.3g} x {row.to}"
-        error = "" if row.error is None else f"{row.error:.1e}"
-        table.add_row(row.what, f"{row.n}", f"{1e6 * row.seconds:.3g}", ratio, error)
-    Console(width=None if sys.stdout.isatty() else 150).print(table)
+        ratio = "" if row.ratio is None else f", {row.ratio:.3g} x {row.to}"
+        error = "" if row.error is None else f", largest error {row.error:.1e}"
+        print(f"{row.what:45}{row.n:9} of {1e6 * row.seconds:9.3g} us{ratio}{error}")
     versions = {"python": platform.python_version(), **{name: version(name) for name in PACKAGES}}
     path.parent.mkdir(exist_ok=True)
     kept = {"versions": versions, "rows": [asdict(row) for row in rows]}

@@ -4,16 +4,24 @@ In each room SIZE places are drawn of an operator, a comparison or a number; one
 in a copy of the project, and the room's own tests are run until one fails, those first that call the changed function.
 Survivors are printed, to be read: some change nothing that matters (a number of steps, a tolerance with room), the
 others want a test.  A change in `exact` costs the compilation of its kernels.
+
+To pytest this module is a plugin: with CALLS_TO each test's seconds and the functions of tfarm that it calls go to that
+file, with CALLS_FROM the tests that call the function CALLED ("tfarm/room/file.py:LINE", its first line) come first,
+short ones before long ones.  What numba has compiled calls unseen.
 """
 
 import ast
+import json
 import os
 import random
 import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 ROOMS = ("spectrum", "crossing", "loop", "dsp", "synthesis", "tuner", "exact")
@@ -65,8 +73,8 @@ def function_of(path, line):
 
 
 def all_pass(copy, room, **named):
-    """Whether the room's tests in the copy all pass; `named` are the variables of `tests.callers`."""
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider", "-p", "tests.callers"]
+    """Whether the room's tests in the copy all pass; `named` are variables of the plugin."""
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider", "-p", "tests.mutants"]
     command.append(f"tests/{room}")
     environment = os.environ | {"PYTHONPATH": str(copy), "OPENBLAS_NUM_THREADS": "1"} | named
     try:
@@ -104,6 +112,38 @@ def survey(size, seed, rooms):
             tally[room] = killed, len(chosen)
             print(f"{room}: {killed} of {len(chosen)} killed", flush=True)
     return tally
+
+
+TO, FROM = os.environ.get("CALLS_TO"), os.environ.get("CALLS_FROM")
+calls = {}  # of each test's name: its seconds, and the functions that it calls
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item):
+    codes, begun = set(), time.perf_counter()
+    if TO:
+        sys.setprofile(lambda frame, event, _: codes.add(frame.f_code) if event == "call" else None)
+    try:
+        return (yield)
+    finally:
+        sys.setprofile(None)
+        own = {f"{code.co_filename.removeprefix(f'{ROOT}{os.sep}')}:{code.co_firstlineno}" for code in codes}
+        calls[item.nodeid] = time.perf_counter() - begun, sorted(each for each in own if each.startswith("tfarm"))
+
+
+def pytest_sessionfinish():
+    if TO:
+        Path(TO).write_text(json.dumps(calls), encoding="utf-8")
+
+
+def pytest_collection_modifyitems(items):
+    if FROM:
+        known = json.loads(Path(FROM).read_text(encoding="utf-8"))
+        items.sort(key=lambda item: order(*known.get(item.nodeid, (0.0, []))))
+
+
+def order(seconds, functions):
+    return os.environ["CALLED"] not in functions, seconds
 
 
 if __name__ == "__main__":
