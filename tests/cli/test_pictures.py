@@ -71,26 +71,14 @@ def test_bode_looks_along_the_arm_at_either_side_of_a_joint_and_from_another_inp
     ratio = factors[0] / factors[1]
     assert ratio == pytest.approx(np.full(ratio.size, ratio[0]), rel=1e-6)
     assert abs(ratio[0] - 1) > 0.1
-    code, out, _ = run(capsys, "bode", LAB, "--output", "moment", "--x", "0.4", "--to", "300")
-    assert code == 0
-    assert re.search(r"^frequency range +\(2, 300\) rad/s$", out, re.MULTILINE)
 
 
-def test_bode_prints_what_the_record_holds(capsys, tmp_path):
-    """On the undamped arm: |G| is infinite at each mode, and the zeros are the clamped arm's frequencies."""
-    found = answer(capsys, "bode", "sasaki2012", "--output", "hub_angle", "--to", "300")
-    arm = tfarm.load("sasaki2012")
-    data = tfarm.bode(arm, "hub_angle", (found["range_rad_s"][0], 300.0))
-    modes, locked = tfarm.modes(arm, 2), tfarm.modes(arm.having(hub_inertia=np.inf), 3).natural_frequency
-    assert found["omega_rad_s"] == data.omega.tolist()
-    assert [complex(*pair) for pair in found["value"]] == data.value.tolist()
-    assert [pole["s"][1] for pole in found["poles"]] == pytest.approx(modes.natural_frequency[1:], rel=1e-13)
-    assert {pole["magnitude"] for pole in found["poles"]} == {"inf"}
-    assert [zero["s"][1] for zero in found["zeros"]] == pytest.approx(locked[locked < 300.0], rel=1e-13)
-    code, _, _ = run(capsys, "bode", "sasaki2012", "--to", "300", "--csv", str(tmp_path / "bode.csv"))
+def test_the_file_of_a_bode_plot_has_what_is_drawn(capsys, tmp_path):
+    code, out, _ = run(capsys, "bode", "sasaki2012", "--to", "300", "--csv", str(tmp_path / "bode.csv"))
     header, *rows = csv.reader((tmp_path / "bode.csv").read_text().splitlines())
     assert (code, header[0], float(rows[-1][0])) == (0, "omega_rad_s [rad/s]", 300.0)
     assert header[1:5] == ["re_value", "im_value", "phase_deg [deg]", "magnitude"]
+    assert re.search(r"^frequency range +\([\d.]+, 300\) rad/s$", out, re.MULTILINE)
 
 
 def test_bode_reports_and_draws_an_output_that_is_zero(capsys, tmp_path):

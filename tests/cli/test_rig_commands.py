@@ -31,13 +31,6 @@ def test_hub_locked_frequencies_are_listed_with_the_free_ones_and_interlace_them
     assert "dry friction" in found["hub_locked_note"]
 
 
-def test_a_locked_hub_has_digits_as_the_free_one(rig, capsys):
-    found = answer(capsys, "modes", rig, "--count", "2", "--digits", "25", "--theory", "rayleigh")
-    assert found["theory"] == "rayleigh"
-    for row in found["modes"][1:]:
-        assert len(row["hub_locked_rad_s"].replace(".", "")) >= 25
-
-
 def test_what_friction_makes_of_a_rigid_body_is_its_second_eigenvalue(capsys):
     found = answer(capsys, "modes", RIGS["quanser-flexlink"], "--count", "2", "--certify")
     turning = found["modes"][0]["second_eigenvalue"]
