@@ -12,7 +12,6 @@ meaning from here.  `to_dict` and `sections` read a record, `table` records of o
 from .quantities import (
     At,
     Difference,
-    Differences,
     Percent,
     Quantity,
     compare,
@@ -42,7 +41,6 @@ __all__ = [
     "At",
     "Column",
     "Difference",
-    "Differences",
     "Percent",
     "Quantity",
     "Section",

@@ -1,7 +1,7 @@
 """The declaration of a quantity, its values in JSON and as a person reads them, and two records compared."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass, replace
 from functools import cache, cached_property
 from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
@@ -237,6 +237,12 @@ class Difference(NamedTuple):
     unit: Annotated[str, Quantity("unit", help="unit of both values and of their difference")]
     one: Annotated[Any, Quantity("first", digits=8, help="value of the first record")]
     other: Annotated[Any, Quantity("second", digits=8, help="value of the second record")]
+    names: tuple[str, str] = NAMES  # of the records
+
+    @property
+    def titles(self) -> dict[str, tuple[str, str]]:
+        """Those of the values are the names of the records."""
+        return {"one": (self.names[0], ""), "other": (self.names[1], "")}
 
     @property
     def difference(self) -> Annotated[float | None, Quantity("difference", digits=4, help="second less first")]:
@@ -251,20 +257,13 @@ class Difference(NamedTuple):
         return PercentagePoints(gap) if isinstance(one, Percent) else gap
 
 
-class Differences(list[Difference]):
-    """Quantities of two records, which are named in the table."""
-
-    def __init__(self, rows: Iterable[Difference], names: tuple[str, str]) -> None:
-        super().__init__(rows)
-        self.titles = dict(zip(("one", "other"), names, strict=True))
-
-
-def compare(one: Any, other: Any, names: tuple[str, str] = NAMES) -> Differences:
+def compare(one: Any, other: Any, names: tuple[str, str] = NAMES) -> list[Difference]:
     """The quantities that two records have, or the records in two lists, row by row.
 
     Records in lists, and rows of tables, are paired by their first quantity, a name or a number.
     """
-    return Differences((_of_rows if isinstance(one, list) else _of_records)(one, other), names)
+    rows = (_of_rows if isinstance(one, list) else _of_records)(one, other)
+    return [each._replace(names=names) for each in rows]
 
 
 def _of_records(one: Any, other: Any) -> Iterator[Difference]:
@@ -273,7 +272,7 @@ def _of_records(one: Any, other: Any) -> Iterator[Difference]:
         both = [each.value if isinstance(each, At) else each for each in (value, others.get(label))]
         is_short = of.is_number or len(str(value)) < LONGEST_COMPARED
         if label in others and is_short and not set(map(str, both)) <= EMPTY:
-            yield Difference(label, of.unit, *both)
+            yield Difference(label, of.unit, both[0], both[1])
     for (value, of, _), (match, *_) in zip(with_flat(one), with_flat(other), strict=False):
         if of.label and is_list_of_records(value) and is_list_of_records(match):
             yield from _of_rows(value, match)

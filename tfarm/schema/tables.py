@@ -110,8 +110,7 @@ def table(
 ) -> Table:
     """A row a record (or an entry of a record of columns), a column a quantity: those with a label, or these.
 
-    A column without any value is left out unless it is named.  `parent` is the record that has these rows; a list of
-    them may have `titles` of columns by attribute.
+    A column without any value is left out unless it is named.  `parent` is the record that has these rows.
     """
     columns: list[Column] = []
     declared = quantities_of(rows if is_table(rows) else rows[0], parent) if is_table(rows) or rows else {}
@@ -122,9 +121,8 @@ def table(
             cells = [
                 NO_VALUE if isinstance(each, list | tuple) and not each else text(each, of.digits) for each in values
             ]
-            label = getattr(rows, "titles", {}).get(name, of.label)
             folds = max(map(len, cells), default=0) > LONGEST_LINE
-            columns.append(Column(of.key, label, of.unit, of=list(map(to_json_value, values)), shown=cells,
+            columns.append(Column(of.key, of.label, of.unit, of=list(map(to_json_value, values)), shown=cells,
                                   folds=folds, help=of.help))  # fmt: skip
     return Table(columns=tuple(columns), stem=stem, title=title, caption=caption)
 
