@@ -28,7 +28,8 @@ def show(record: Any, rows: Table | None = None, last: str = "") -> None:
         if number and (each.pairs or each.table or each.drawing):
             print()
             show_text(each.title)
-        show_pairs(each.pairs)
+        if each.pairs:
+            print("\n".join(pair_lines(each.pairs, terminal_width())))
         if each.table is not None:
             print("\n".join(table_lines(each.table, terminal_width())))
         if each.drawing:
@@ -42,15 +43,11 @@ def show_text(text: str) -> None:
         print("\n".join(rendered(Text(text), terminal_width())))
 
 
-def show_pairs(pairs: Sequence[tuple[str, str]]) -> None:
-    """Print labels and values one below the other; a long value is folded on a terminal."""
-    grid = RichTable.grid(padding=(0, COLUMN_GAP, 0, 0))
-    grid.add_column(no_wrap=True)
-    grid.add_column(min_width=max((widest_word(value) for _, value in pairs), default=0))
-    for label, value in pairs:
-        grid.add_row(Text(label), Text(value))
-    if pairs:
-        print("\n".join(rendered(grid, terminal_width())))
+def pair_lines(pairs: Sequence[tuple[str, str]], width: int) -> list[str]:
+    """Return the lines of labels and values one below the other; long values are folded."""
+    labels, values = zip(*pairs, strict=True)
+    columns = Column("label", of=labels), Column("value", of=values, folds=True)
+    return table_lines(Table(columns=columns), width)[1:]  # without their titles
 
 
 def terminal_width() -> int:
