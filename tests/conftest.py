@@ -7,7 +7,6 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pickle
-import subprocess
 import sys
 from collections.abc import Iterator
 
@@ -58,34 +57,25 @@ def lossless():
     return tfarm.load("sasaki2012")
 
 
-KEPT = """
-import pickle, sys
-from tfarm.audit import paper
-from tfarm.cli import main
-audit, out = paper.audit, sys.argv.pop()
-def kept():
-    rows = audit()
-    with open(out, "wb") as file:
-        pickle.dump(rows, file)
-    return rows
-paper.audit = kept
-main()
-"""
-
-
 @pytest.fixture(scope="session")
 def audit_file(tmp_path_factory):
     """The pickled rows of the audit of the paper: some ten seconds of SymPy, once a session.
 
-    By `tfarm audit --json` in a process of its own, whose output is audit.json in the same folder.
+    What `tfarm audit --json` prints of them is audit.json in the same folder.
     """
     return once(tmp_path_factory, "audit", save_audit)
 
 
 def save_audit(file):
-    command = [sys.executable, "-c", KEPT, "audit", "--json", str(file)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    file.with_suffix(".json").write_text(done.stdout, encoding="utf-8")
+    from tfarm.audit import paper
+    from tfarm.cli.running import run
+
+    rows = paper.audit()
+    file.write_bytes(pickle.dumps(rows))
+    with pytest.MonkeyPatch.context() as patch, open(file.with_suffix(".json"), "w", encoding="utf-8") as printed:
+        patch.setattr(paper, "audit", lambda: rows)
+        patch.setattr(sys, "stdout", printed)
+        assert run(["audit", "--json"]) == 0
 
 
 @pytest.fixture(scope="session")

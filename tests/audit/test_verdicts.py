@@ -91,7 +91,7 @@ def test_numbers_of_the_evidence_are_those_of_other_methods(rows):
 
 @pytest.mark.usefixtures("audited")
 def test_json_has_the_keys_of_the_issue(audit_file):
-    """The answer is what the command has printed, in a process of its own."""
+    """The answer is what the command has printed."""
     answer = json.loads(to_json(to_dict(audit.Audit(audit.PAPER, audit.audit()))))
     assert json.loads(audit_file.with_suffix(".json").read_text(encoding="utf-8")) == answer
     assert "852780" in answer["paper"]

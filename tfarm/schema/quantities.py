@@ -161,10 +161,8 @@ def to_json_value(value: Any) -> Any:
     if type(value) in SCALARS:
         return value
     if is_table(value):
-        declared = quantities(type(value))
-        columns = [to_json_value(getattr(value, name)) for name in declared]
-        keys = [of.key for of in declared.values()]
-        return [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)]
+        columns = {of.key: to_json_value(getattr(value, name)) for name, of in quantities(type(value)).items()}
+        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     if is_declared(value):
         return to_dict(value)
     if isinstance(value, np.ndarray | np.generic):
