@@ -88,6 +88,8 @@ BAD = [
     (["modes", "./no-such-file.toml"], "No such file"),
     (["response", "sasaki2012", "--output", "moment"], "x is missing"),
     (["response", "sasaki2012", "--output", "moment", "--x", "3"], "between 0 and 1 m"),
+    (["response", "sasaki2012", "--output", "root_moment", "--side", "inner", "--s", "1j"], "has a fixed place"),
+    (["response", "sasaki2012", "--output", "moment", "--x", "0.4", "--side", "left", "--s", "1j"], "outer, inner"),
     (["response", "sasaki2012", "--output", "root_moment", "--points", "1e12"], "a valid integer"),
     (["response", "sasaki2012", "--output", "root_moment", "--from", "10", "--to", "1"], "--to = 1.0"),
     (["response", "sasaki2012", "--output", "root_moment", "--from", "0"], "--from = 0.0"),

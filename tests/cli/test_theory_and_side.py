@@ -6,7 +6,7 @@ import pytest
 
 import tfarm
 from tests.shared import thinned
-from tests.shell import answer, run
+from tests.shell import answer
 from tfarm.arm.reading import PRESETS
 from tfarm.arm.writing import to_toml
 from tfarm.cli.running import whole_command
@@ -80,13 +80,3 @@ def test_a_jump_at_a_joint_is_read_on_the_side_of_the_option(stepped, output, ju
         taken = jump * s**2 * (tfarm.transfer(rig, "rotation", x=0.4)(s) + tfarm.transfer(rig, "hub_angle")(s))
     felt = 1 + 2e-4 * s if output == "moment" else 1.0  # the outer gauge does not feel its segment's C
     assert outer * felt - inner == pytest.approx(taken, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("output", "side", "words"), [("root_moment", "inner", "has a fixed place"), ("moment", "left", "outer, inner")]
-)
-def test_sides_that_there_are_not(stepped, output, side, words, capsys):
-    code, _, error = run(capsys, "response", stepped[0], "--output", output, "--x", "0.4", "--side", side, "--s", "1j")
-    assert code == 2
-    assert words in error
-    assert len(error.splitlines()) == 1
