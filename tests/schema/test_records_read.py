@@ -13,6 +13,7 @@ from tfarm.loop.margins import Margins, margins
 from tfarm.loop.nyquist import Nyquist, nyquist
 from tfarm.schema import (
     At,
+    Percent,
     Quantity,
     across,
     as_csv,
@@ -138,6 +139,7 @@ def test_records_are_columns_of_one_table():
         (1e-18 + 5j, "0 (+-1e-13)+5i"),
         ((0.0, 934.3), "(0, 934.3)"),
         ([(0.0, 1.0), (2.0, math.inf)], "(0, 1), (2, inf)"),
+        (Percent(0.05), "5 %"),
         ({"hub_rate": "rad/s"}, "hub_rate rad/s"),
         ([], ""),
     ],

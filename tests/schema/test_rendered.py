@@ -52,6 +52,11 @@ def test_csv_has_every_digit(table):
     assert [tuple(map(float, row[4].split())) for row in rows] == [(0.1, 0.25), (), (1e-300,)]
 
 
+def test_records_in_a_cell_of_csv_are_their_text():
+    intervals = Column("k", of=[[{"low": 0.0, "high": 1.0}], []], shown=["(0, 1)", "-"])
+    assert as_csv(Table(columns=(intervals,))) == 'k\n"(0, 1)"\n""\n'
+
+
 def test_units_stand_behind_the_keys_of_a_command_s_file(table):
     assert next(csv.reader(io.StringIO(as_csv(table, units=True))))[:2] == ["index", "omega_rad_s [rad/s]"]
 

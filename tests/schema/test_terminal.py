@@ -45,6 +45,7 @@ def test_no_word_is_cut_and_no_line_is_too_long(width):
 
 def test_columns_that_do_not_fit_are_below_with_the_first_one():
     lines = printed(50, (*COLUMNS[:3], replace(COLUMNS[3], folds=False)))
+    assert lines.count("") == 1
     blank = lines.index("")
     assert [line.split()[0] for line in lines[blank - 2 : blank]] == ["1", "2"]
     assert [line.split()[0] for line in lines[-2:]] == ["1", "2"]

@@ -202,7 +202,7 @@ def options_of(parameter: Parameter) -> list[Parameter]:
     if not isfunction(parameter.default):
         return []
     known, (_, helps) = signature(parameter.default).parameters.values(), help_of(parameter.default)
-    return [_with_help(each, helps[each.name]) for each in known if each.kind is Parameter.KEYWORD_ONLY]
+    return [_with_help(each, helps.get(each.name, "")) for each in known if each.kind is Parameter.KEYWORD_ONLY]
 
 
 def _with_help(option: Parameter, text: str) -> Parameter:
@@ -264,11 +264,11 @@ def load_loop(name: str, theory: Theory | None, gains: Gains, law: Path | None) 
     return arm, *load_law(arm, name, gains, law)
 
 
-def load_chain(name: str, period: float | None, delay_samples: float | None) -> Any:
-    """Return the sampled chain of a file, with the period and the delay that are given instead."""
+def load_chain(arm: str, *, period: Period = None, delay_samples: Delay = None, dsp: DspFile = None) -> Any:
+    """Return the sampled chain of a file, or of the arm's, with the period and the delay that are given instead."""
     from tfarm.dsp.chain import load_chain as read
 
-    chain, typed = read(name), {"period": period, "delay_samples": delay_samples}
+    chain, typed = read(dsp or arm), {"period": period, "delay_samples": delay_samples}
     sampling = replace(chain.sampling, **{key: value for key, value in typed.items() if value is not None})
     return replace(chain, sampling=sampling, period_from=chain.period_from if period is None else "--period")
 

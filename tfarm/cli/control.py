@@ -13,13 +13,10 @@ from tfarm.cli.app import (
     AngleGain,
     ArmName,
     Csv,
-    Delay,
-    DspFile,
     File,
     Gains,
     Json,
     LawFile,
-    Period,
     Png,
     TheoryName,
     add_command,
@@ -150,9 +147,7 @@ def gain_map(
     png: Png = None,
     law: LawFile = None,
     vary: Annotated[list[Any] | None, typer.Option(parser=named(interval), metavar="NAME=LO,HI")] = None,
-    period: Period = None,
-    delay_samples: Delay = None,
-    dsp: DspFile = None,
+    chain: Any = load_chain,
     theory: TheoryName = None,
     json: Json = False,
 ) -> None:
@@ -188,21 +183,18 @@ def gain_map(
     (first, across), (second, up) = ranges
     number = points or (60 if of_law else 101)
     x, y = between(across[0], across[1], number), between(up[0], up[1], number)
-    if (period, delay_samples, dsp) == (None, None, None):
+    if all(value is None for value in chain.keywords.values()):
         found: Any = tfarm.map(subject, x, y, law=controller, vary=(first, second))
     else:
         full = controller if of_law else tfarm.default_gains(subject).having(ANGLE_GAIN, kp)
-        chain = load_chain(dsp or arm, period, delay_samples)
-        found = crossings.sampled_map(verdict.sampled_verdict(subject, full, chain).full, x, y, (first, second))
+        found = crossings.sampled_map(verdict.sampled_verdict(subject, full, chain(arm)).full, x, y, (first, second))
     emit(found, json, csv=csv, png=png)
 
 
 @sampled_command(epilog="sampled sasaki2012-lab --K1 0.3 --K2 0.3 --period 0.01")
 def sampled(
     arm: ArmName,
-    period: Period = None,
-    delay_samples: Delay = None,
-    dsp: DspFile = None,
+    chain: Any = load_chain,
     modes: ModeCount = None,
     law: LawFile = None,
     theory: TheoryName = None,
@@ -215,8 +207,7 @@ def sampled(
     A law of a file acts with its own period, which has to be that of the chain; one in s is made discrete by its rule.
     """
     subject, controller, defaults = load_loop(arm, theory, gains, law)
-    chain = load_chain(dsp or arm, period, delay_samples)
-    emit(tfarm.sampled(subject, controller, chain, count=modes), json, defaults)
+    emit(tfarm.sampled(subject, controller, chain(arm), count=modes), json, defaults)
 
 
 @sampled_command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")
@@ -224,9 +215,7 @@ def simulate(
     arm: ArmName,
     scenario: str = "slew",
     duration: float = 3.0,
-    period: Period = None,
-    delay_samples: Delay = None,
-    dsp: DspFile = None,
+    chain: Any = load_chain,
     modes: ModeCount = None,
     output: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
     between: Annotated[int, typer.Option(min=0, max=1000)] = 0,
@@ -250,17 +239,17 @@ def simulate(
     controller: tuner of `tfarm tune --save`: it sets K2, with its own K1
     """
     how: Any = {"count": modes, "between": between, "outputs": output or ()}
-    chain, defaults = load_chain(dsp or arm, period, delay_samples), None
+    defaults = None
     if controller is None:
         from tfarm.dsp.results import simulated_run
 
         subject, control, defaults = load_loop(arm, theory, gains, law)
-        found = simulated_run(subject, control, chain, scenario, duration, **how)
+        found = simulated_run(subject, control, chain(arm), scenario, duration, **how)
     else:
         from tfarm.tuner.trial import load_tuner
         from tfarm.tuner.tuning import controlled_run
 
-        found = controlled_run(load_arm(arm, theory), load_tuner(controller), chain, scenario, duration, **how)
+        found = controlled_run(load_arm(arm, theory), load_tuner(controller), chain(arm), scenario, duration, **how)
     if mat is not None:
         name = partial(re.sub, r"\W", "_")  # as MATLAB takes it: strain_0_05 of strain@0.05
         signals: dict[str, Any] = {name(key): values for key, values in found.signals.items() if len(values)}

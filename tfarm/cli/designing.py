@@ -15,14 +15,11 @@ from tfarm.cli.app import (
     CONTROLLER,
     AngleGain,
     ArmName,
-    Delay,
-    DspFile,
     File,
     Gains,
     Json,
     LawFiles,
     ModeCount,
-    Period,
     Png,
     TheoryName,
     add_command,
@@ -58,9 +55,7 @@ def design(
     kp: AngleGain = 0.0,
     modes: ModeCount = 2,
     continuous: bool = False,
-    period: Period = None,
-    delay_samples: Delay = None,
-    dsp: DspFile = None,
+    chain: Any = load_chain,
     also: Annotated[list[str] | None, typer.Option(metavar="ARM")] = None,
     over: Annotated[list[Any] | None, typer.Option("--range", parser=named(interval), metavar="KEY=LO,HI")] = None,
     save: File = None,
@@ -80,7 +75,7 @@ def design(
 
     found = tfarm.design(
         load_arm(arm, theory), objective, structure=structure, modes=modes,
-        chain=load_chain(dsp or arm, period, delay_samples), continuous=continuous, progress=partial(advance, 0, 0),
+        chain=chain(arm), continuous=continuous, progress=partial(advance, 0, 0),
         also=[load_arm(name, theory) for name in also or []], ranges=dict(over or []),
         **{RATE_GAIN: k1, MOMENT_GAIN: k2, ANGLE_GAIN: kp},
     )  # fmt: skip
@@ -152,9 +147,7 @@ def tune(
     k1: Annotated[float | None, typer.Option(f"--{RATE_GAIN}", rich_help_panel=CONTROLLER)] = None,
     kp: AngleGain = 0.0,
     curves: Annotated[int, typer.Option(min=0, max=10_000)] = 0,
-    period: Period = None,
-    delay_samples: Delay = None,
-    dsp: DspFile = None,
+    chain: Any = load_chain,
     compare: bool = False,
     save: File = None,
     theory: TheoryName = None,
@@ -174,7 +167,7 @@ def tune(
     from tfarm.tuner.trial import usual_rate_gain
     from tfarm.tuner.tuning import usual_plan
 
-    subject, chain = load_arm(arm, theory), load_chain(dsp or arm, period, delay_samples)
+    subject, sampling = load_arm(arm, theory), chain(arm)
     law, defaults = load_law(subject, arm, {RATE_GAIN: k1, MOMENT_GAIN: 0.0})
     rate = cast("tfarm.HubFeedback", law)[RATE_GAIN]
     if k1 is None and kp:
@@ -183,7 +176,7 @@ def tune(
             "default_gains": [RATE_GAIN],
             "default_gains_in_words": f"{RATE_GAIN} = {rate:.4g} (damping ratio 0.71 of the rigid arm under Kp)",
         }
-    tuning = tuner.tune(subject, plan(usual_plan(subject, chain), {RATE_GAIN: rate, ANGLE_GAIN: kp}), chain)
+    tuning = tuner.tune(subject, plan(usual_plan(subject, sampling), {RATE_GAIN: rate, ANGLE_GAIN: kp}), sampling)
     drawn = tuner.learning_curves(tuning, curves, advance) if curves else None
     compared = tuner.compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard) if compare else None
     if save is not None:
@@ -205,9 +198,7 @@ def compare(
     law: LawFiles = None,
     modes: ModeCount = 10,
     output: str = "root_moment",
-    period: Period = None,
-    delay_samples: Delay = None,
-    dsp: DspFile = None,
+    chain: Any = load_chain,
     theory: TheoryName = None,
     png: Png = None,
     out: Annotated[Path | None, typer.Option(metavar="FOLDER")] = None,
@@ -230,13 +221,12 @@ def compare(
         "give a second arm, or --law FILE twice",
     )
     subjects = [load_arm(name, theory) for name in arms]
-    chain = load_chain(dsp or arms[0], period, delay_samples)
     wanted: list[Path | None] = [*files * (2 // len(files))] if files else [None, None]
     pairs = zip(subjects * (2 // len(arms)), arms * (2 // len(arms)), wanted, strict=True)
     laws = [load_law(subject, name, gains, file)[0] for subject, name, file in pairs]
     candidates = ([each.name for each in subjects], [each.stem for each in files], list(map(str, files)))
     names = next((each for each in candidates if len(set(each)) == 2), ["first", "second"])
-    found = tfarm.compare(subjects, laws, names=names, modes=modes, output=output, chain=chain)
+    found = tfarm.compare(subjects, laws, names=names, modes=modes, output=output, chain=chain(arms[0]))
     if out is not None:
         from tfarm.report.writing import write_comparison
 
@@ -253,9 +243,7 @@ def report(
     out: Annotated[Path, typer.Option(metavar="FOLDER")] = Path("reports"),
     only: str | None = None,
     law: LawFiles = None,
-    period: Period = None,
-    delay_samples: Delay = None,
-    dsp: DspFile = None,
+    chain: Any = load_chain,
     theory: TheoryName = None,
     measured: Annotated[list[str] | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
     *,
@@ -290,7 +278,7 @@ def report(
     ]
     print(write(
         subjects, out, laws=laws, only=None if only is None else (only,), progress=advance, notice=print_line,
-        chains=[load_chain(dsp or name, period, delay_samples) for name in names],
+        chains=[chain(name) for name in names],
         measured=[data.data_of(text, "--measured") for text in measured or []],
     ))  # fmt: skip
 
