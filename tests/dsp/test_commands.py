@@ -113,7 +113,7 @@ def test_gains_that_fail_when_sampled_are_not_recommended_without_a_word(capsys,
     [
         (Chain(), HubFeedback(K1=0.3), "tfarm's default period"),
         (Chain(), Law({"hub_rate": 0.3}, period=0.01), "the controller's period"),
-        (load_chain("sasaki2012-lab", 0.01, None), HubFeedback(K1=0.3), "--period"),
+        (load_chain("sasaki2012-lab", period=0.01), HubFeedback(K1=0.3), "--period"),
         (chain_of_tables({"sampling": {"period": 0.01}}), HubFeedback(K1=0.3), "the file's period"),
         (Chain(sampling=Sampling(period=0.02)), HubFeedback(K1=0.3), ""),
     ],
