@@ -5,11 +5,11 @@ from tfarm.dsp import modes as sampled_loci
 from tfarm.dsp import verdict
 from tfarm.loop import loci
 from tfarm.plots import regions
-from tfarm.report import gains_section, live, page, writing
+from tfarm.report import live, loop_section, writing
 
 COARSE = (
-    (gains_section, "GRID_COLUMNS", 48),
-    (gains_section, "GRID_ROWS", 40),
+    (loop_section, "GRID_COLUMNS", 48),
+    (loop_section, "GRID_ROWS", 40),
     (regions, "SAMPLED_COLUMNS", 24),
     (regions, "OVERLAY_COLUMNS", 8),
     (sampled_regions, "MOST_COLUMNS", 0),  # with the corners that so few have
@@ -30,6 +30,6 @@ def coarsen(put=setattr):
 
 def plain_cards(put):
     """Cards of the index with an empty picture, for tests that are not about it: a response and a drawing each."""
-    put(page, "bode", lambda *_: None)
-    put(page, "draw_card", lambda _: None)
-    put(page, "save_figure", lambda _, folder, stem, formats: (folder / f"{stem}.svg").write_text("<svg/>"))
+    put(writing, "bode", lambda *_: None)
+    put(writing, "draw_card", lambda _: None)
+    put(writing, "save_figure", lambda _, folder, stem, formats: (folder / f"{stem}.svg").write_text("<svg/>"))

@@ -24,8 +24,8 @@ from tfarm.fitting.recording import compare_run, load_run, overshoot
 from tfarm.report import writing
 from tfarm.report.cases import Case, GivenLaw
 from tfarm.report.loop_section import law_section, margins_section
-from tfarm.report.page import PIECES, file_of, pieces_of
 from tfarm.report.sampled_section import measured_step, sampled_section
+from tfarm.report.writing import PIECES, file_of, pieces_of
 from tfarm.schema import to_json
 
 LAB, BARE, PRESET = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))
@@ -95,7 +95,7 @@ def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
 
 def test_a_page_is_about_its_law_and_its_file_repeats_it(file, tmp_path, monkeypatch, capsys):
     plain_cards(monkeypatch.setattr)
-    monkeypatch.setattr("tfarm.report.page.PIECES", [piece for piece in PIECES if piece.anchor == "law"])
+    monkeypatch.setattr("tfarm.report.writing.PIECES", [piece for piece in PIECES if piece.anchor == "law"])
     code, out, err = run(
         capsys, "report", LAB.name, "--law", str(file), "--period", "0.004", "--only", "margins", "--out", str(tmp_path)
     )

@@ -17,11 +17,11 @@ from tests.shell import run
 from tfarm import processes
 from tfarm.arm import to_toml
 from tfarm.dsp import Chain, load_chain
-from tfarm.report import page as card_room
 from tfarm.report import write, writing
+from tfarm.report import writing as card_room
 from tfarm.report.cases import Case
-from tfarm.report.page import PIECES, Piece, pieces_of
 from tfarm.report.sections import PageSection
+from tfarm.report.writing import PIECES, Piece, pieces_of
 
 
 def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
@@ -32,7 +32,7 @@ def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
         seen.append((case.arm.name, case.chain))
         return PageSection(anchor="sampled", title="The sampled loop")
 
-    monkeypatch.setattr("tfarm.report.page.PIECES", (Piece("s", "sampled", section),))
+    monkeypatch.setattr("tfarm.report.writing.PIECES", (Piece("s", "sampled", section),))
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
     file = tmp_path / "bench.toml"
@@ -51,7 +51,7 @@ def without_a_section(monkeypatch, error):
     """A report of two sections, the second of which meets that error."""
     pieces = {piece.name: piece for piece in PIECES}
     broken = replace(pieces["root loci"], make=Unmakeable(error))
-    monkeypatch.setattr("tfarm.report.page.PIECES", (pieces["the arm"], broken))
+    monkeypatch.setattr("tfarm.report.writing.PIECES", (pieces["the arm"], broken))
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
 
@@ -107,7 +107,7 @@ def test_every_piece_has_the_anchor_of_its_section(pages):
 def test_a_page_has_the_same_sections_whatever_is_written_with_it(tmp_path, monkeypatch):
     """The note on an arm without a loop is on the pages of the loop alone."""
     kept = tuple(replace(each, make=partial(bare, each.anchor)) for each in PIECES)
-    monkeypatch.setattr("tfarm.report.page.PIECES", kept)
+    monkeypatch.setattr("tfarm.report.writing.PIECES", kept)
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
     for only in (("modes",), ("locus",), ("modes", "locus")):
@@ -151,7 +151,7 @@ STRANGE_CARDS = (
 
 @pytest.mark.usefixtures("audited")
 def test_other_files_in_the_folder_are_kept_and_strange_cards_passed_over(tmp_path, monkeypatch):
-    monkeypatch.setattr("tfarm.report.page.PIECES", ())
+    monkeypatch.setattr("tfarm.report.writing.PIECES", ())
     (tmp_path / NAME).mkdir()
     (tmp_path / NAME / "mine.txt").write_text("mine")
     for i, card in enumerate(STRANGE_CARDS):

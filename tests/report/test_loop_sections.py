@@ -28,10 +28,18 @@ from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 from tfarm.plots.roots import zoomed
 from tfarm.report import cases, write, writing
-from tfarm.report import gains_section as map_room
+from tfarm.report import loop_section as map_room
 from tfarm.report.cases import DESIGNED_MODES, Case, brief_on, has_loop, margins_of, on_hub
-from tfarm.report.gains_section import beyond_table, draw_map_of_arm, map_data, map_of_arm, map_section
-from tfarm.report.loop_section import margin_table, margins_section, verdict_fact
+from tfarm.report.loop_section import (
+    beyond_table,
+    draw_map_of_arm,
+    map_data,
+    map_of_arm,
+    map_section,
+    margin_table,
+    margins_section,
+    verdict_fact,
+)
 from tfarm.report.sections import prose
 from tfarm.spectrum.table import PAPER_GAINS, default_gains
 

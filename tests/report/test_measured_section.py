@@ -2,7 +2,7 @@
 
 from tests.shell import run
 from tfarm.report import writing
-from tfarm.report.page import PIECES
+from tfarm.report.writing import PIECES
 
 FILE = "tests/data/sweep/tip.csv"
 GIVEN = f"tip_acceleration/hub_torque={FILE}"
@@ -11,7 +11,7 @@ GIVEN = f"tip_acceleration/hub_torque={FILE}"
 def test_the_page_has_the_command_that_makes_it(tmp_path, capsys, monkeypatch):
     for kept in ("save_proof", "save_card"):  # which have their own tests
         monkeypatch.setattr(writing, kept, lambda *_: None)
-    monkeypatch.setattr("tfarm.report.page.PIECES", [each for each in PIECES if each.name == "measured responses"])
+    monkeypatch.setattr("tfarm.report.writing.PIECES", [each for each in PIECES if each.name == "measured responses"])
     given = ("report", "sasaki2012-lab", "--only", "bode", "--measured", GIVEN, "--out", str(tmp_path))
     code, out, _ = run(capsys, *given)
     assert code == 0

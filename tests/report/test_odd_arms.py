@@ -19,15 +19,20 @@ from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
-from tfarm.report import cases, gains_section
+from tfarm.report import cases, loop_section
 from tfarm.report.arm_section import arm_section, assumptions_section, derived_table
 from tfarm.report.cases import Case, GivenLaw, has_loop, on_hub
-from tfarm.report.gains_section import beyond_table, edge_of_K2, locus_section
-from tfarm.report.loop_section import margin_table, margins_section, nyquist_section
-from tfarm.report.modes_section import damped_tables, modal_table
-from tfarm.report.page import pieces_of
-from tfarm.report.response_sections import bode_section
+from tfarm.report.loop_section import (
+    beyond_table,
+    edge_of_K2,
+    locus_section,
+    margin_table,
+    margins_section,
+    nyquist_section,
+)
+from tfarm.report.response_sections import bode_section, damped_tables, modal_table
 from tfarm.report.sections import prose
+from tfarm.report.writing import pieces_of
 from tfarm.spectrum import DampedModes
 from tfarm.spectrum.table import default_gains
 
@@ -139,7 +144,7 @@ def is_stable(arm, law, up_to):
 def test_the_interval_of_K2_is_that_of_the_poles(name):
     """On either side of an edge; at the end of a search nothing happens, and no edge is claimed."""
     arm, law = ARMS[name], default_gains(ARMS[name])
-    words = gains_section.intervals(arm).partition("; K2")[2]
+    words = loop_section.intervals(arm).partition("; K2")[2]
     down, up = (number(end.strip("<> ()")) for end in re.search(r"\(.+?\)", words)[0].split(", "))
     band = 3 * tfarm.modes(arm, 3).natural_frequency[-1]
     assert is_stable(arm, replace(law, K2=0.999 * up), band)

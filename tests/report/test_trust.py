@@ -14,9 +14,9 @@ from tests.report import full
 from tfarm.arm import to_toml
 from tfarm.audit import published
 from tfarm.audit.published import PublishedRow
-from tfarm.report import modes_section, write, writing
+from tfarm.report import response_sections, write, writing
 from tfarm.report import trust as trust_proofs
-from tfarm.report.modes_section import how_proven, modal_table, rounds_to
+from tfarm.report.response_sections import how_proven, modal_table, rounds_to
 from tfarm.report.trust import (
     proof_tables,
     prove,
@@ -122,7 +122,7 @@ def test_the_modal_table_has_the_proof_of_its_digits(proven_modes, monkeypatch):
         raise tfarm.CertificationError("a double frequency near 7 rad/s")
 
     monkeypatch.setattr(type(modes), "certify", fail)
-    modes_section.proven_modes.cache_clear()
+    response_sections.proven_modes.cache_clear()
     assert how_proven(modes, omega, hertz).endswith("not proven: a double frequency near 7 rad/s.")
     monkeypatch.setattr(trust_proofs, "boxed", lambda *_: ())  # which are proven, or not, apart from these
     unproven = prove(ARM)

@@ -13,7 +13,7 @@ from tests.report.full import ARM
 from tests.report.written import files_of
 from tfarm.cli import app as cli_app
 from tfarm.report import write, writing
-from tfarm.report.page import PIECES
+from tfarm.report.writing import PIECES
 
 # ------------------------------------------------------------ all or nothing
 
@@ -50,7 +50,7 @@ def test_work_that_fails_leaves_nothing(tmp_path, monkeypatch):
         folder.mkdir()
         (folder / "half.js").write_text("half")
 
-    monkeypatch.setattr("tfarm.report.page.PIECES", ())
+    monkeypatch.setattr("tfarm.report.writing.PIECES", ())
     monkeypatch.setattr(writing, "write_assets", scripts)
     monkeypatch.setattr(writing, "save_card", fail)
     with pytest.raises(tfarm.ConvergenceError):
@@ -64,7 +64,7 @@ def test_work_that_fails_leaves_an_earlier_report_as_it_was(pages, tmp_path, mon
 
     before, out = files_of(pages), tmp_path / "out"
     shutil.copytree(pages, out)
-    monkeypatch.setattr("tfarm.report.page.PIECES", [piece for piece in PIECES if piece.name == "the arm"])
+    monkeypatch.setattr("tfarm.report.writing.PIECES", [piece for piece in PIECES if piece.name == "the arm"])
     monkeypatch.setattr(writing, "save_card", fail)
     with pytest.raises(tfarm.ConvergenceError):
         write([ARM], out, only=("modes",))

@@ -21,8 +21,8 @@ from tests.report.written import HELD, Links, files_of, ids_of, links_of, valida
 from tfarm.dsp import Chain
 from tfarm.report import write, writing
 from tfarm.report.cases import Case
-from tfarm.report.page import PIECES, index_page, pieces_of
 from tfarm.report.trust import write_trust, written_proofs
+from tfarm.report.writing import PIECES, index_page, pieces_of
 from tfarm.schema.html import with_symbols
 from tfarm.spectrum.table import default_gains
 
@@ -170,7 +170,7 @@ def test_every_cell_of_a_narrow_page_has_its_title(pages):
 
 def test_the_pages_of_an_arm_lead_to_each_other(tmp_path, monkeypatch):
     piece = next(piece for piece in PIECES if piece.name == "the arm")
-    monkeypatch.setattr("tfarm.report.page.PIECES", (piece,))
+    monkeypatch.setattr("tfarm.report.writing.PIECES", (piece,))
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
     write([replace(ARM, name="plain")], tmp_path, only=("modes", "bode"))
@@ -219,7 +219,7 @@ POOL = """
 import os, time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from tfarm.report.page import PIECES
+from tfarm.report.writing import PIECES
 from tfarm.processes import leave_with_parent
 if __name__ == "__main__":
     pool = ProcessPoolExecutor(1, get_context("forkserver"), leave_with_parent)

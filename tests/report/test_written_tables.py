@@ -13,7 +13,7 @@ from tests.report.walked import read, shown_in, tables_in, untraced_cells
 from tfarm.dsp import Chain
 from tfarm.report.arm_section import is_from_paper, paper_section
 from tfarm.report.cases import Case
-from tfarm.report.modes_section import sensitivity_table
+from tfarm.report.response_sections import sensitivity_table
 from tfarm.spectrum.table import default_gains
 
 

@@ -8,7 +8,7 @@ import tfarm
 from tests.hostile import Read
 from tests.report.full import ARM
 from tfarm.audit.published import validate
-from tfarm.report.page import PIECES
+from tfarm.report.writing import PIECES
 
 ANCHORS = {piece.anchor for piece in PIECES}
 HELD = replace(ARM, hub=tfarm.Hub(inertia=math.inf))  # no loop: its proofs are quick

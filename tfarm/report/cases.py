@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
-from tfarm.arm import AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law
-from tfarm.dsp import Chain, discretise, verdict
+from tfarm.arm import AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law, load, presets
+from tfarm.dsp import Chain, discretise, load_chain, verdict
 from tfarm.errors import ConvergenceError, one_line
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
@@ -153,3 +154,13 @@ _margins = lru_cache(maxsize=64)(margins)
 def margins_of(arm: Arm, law: AnyLaw) -> Margins:
     """Verdict and margins, computed once for all sections."""
     return _margins(arm, as_law(law))
+
+
+def is_preset(arm: Arm, chain: Chain) -> bool:
+    """Whether the arm comes with tfarm, and its chain is the one that comes with it."""
+    return arm.name in presets() and (load(arm.name), load_chain(arm.name)) == (arm, chain)
+
+
+def argument(name: str, preset: bool) -> str:
+    """The name of an arm in a command."""
+    return shlex.quote(name if preset else f"{name}.toml")

@@ -30,9 +30,8 @@ from tfarm.loop.plane import gain_map, moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots.regions import BEYOND_PICTURE, sampled_region
-from tfarm.report.cases import Case, has_loop, sign_words
-from tfarm.report.page import argument, is_preset
-from tfarm.report.sections import TEMPLATES, render
+from tfarm.report.cases import Case, argument, has_loop, is_preset, sign_words
+from tfarm.report.sections import TEMPLATES, render, write_text
 from tfarm.response import transfer
 from tfarm.spectrum.table import angle_unit, default_gains
 
@@ -295,24 +294,24 @@ def save_live(case: Case, folder: Path) -> None:
     try:
         data = live_data(arm, chain, given[0] if given else None)
     except TfarmError as error:
-        out.write_text(render("live_failed.html", title=title, why=str(error)), encoding="utf-8", newline="")
+        write_text(out, render("live_failed.html", title=title, why=str(error)))
         return
     data["command_name"] = argument(arm.name, is_preset(arm, chain))
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
     page = render("live.html", title=title, data=data, text=text, sign=sign_words(arm), columns=LIVE_COLUMNS,
                   samples=PANEL_SAMPLES * len(data["low"]), error=scientific(data["error"], 1),
                   assets=f"../{ASSETS}", runtime=RUNTIME, script=SCRIPT)  # fmt: skip
-    out.write_text(page, encoding="utf-8", newline="")
+    write_text(out, page)
 
 
 def write_assets(folder: Path) -> None:
     """Vega's runtime, as vl-convert carries it, and this page's own script with its charts."""
     folder.mkdir(exist_ok=True)
-    (folder / RUNTIME).write_text(vl_convert.javascript_bundle(BUNDLED), encoding="utf-8", newline="")
+    write_text(folder / RUNTIME, vl_convert.javascript_bundle(BUNDLED))
     drawn = json.loads((TEMPLATES / CHARTS).read_text(encoding="utf-8"))
     config = drawn.pop("config")  # of every chart; its colours are set by the page, for a light screen or a dark one
     charts = {name: vl_convert.vegalite_to_vega({**chart, "config": config}) for name, chart in drawn.items()}
     named = json.dumps(charts, separators=(",", ":"), sort_keys=True)
     scripts = "".join((TEMPLATES / name).read_text(encoding="utf-8") for name in SCRIPT_PARTS)
     own = f"(() => {{\nconst LIVE_CHARTS = {named};\n{scripts}}})();\n"  # the runtime has names of its own
-    (folder / SCRIPT).write_text(own, encoding="utf-8", newline="")
+    write_text(folder / SCRIPT, own)

@@ -5,28 +5,28 @@ Texts are in templates/prose.txt, pages in the other templates; here is how both
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
+from pydantic import TypeAdapter
 
 import tfarm
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN
 from tfarm.digits import how_many, listed, plain, scientific, significant
-from tfarm.plots.style import save_figure
+from tfarm.plots.style import Figure, save_figure
 from tfarm.schema import Column, Table, save_table, text
 from tfarm.schema.html import as_html, with_symbols
 
-if TYPE_CHECKING:
-    from tfarm.plots.style import Figure
-
 TEMPLATES = Path(__file__).parent / "templates"
 PICTURES, DATA = "pictures", "data"  # folders in that of an arm
+T = TypeVar("T")
 PART = "\ue000"  # between title and caption, which no name has in it
 
 
@@ -164,3 +164,32 @@ def save_block(block: Picture | Table, folder: Path) -> SavedBlock:
     shape: Any = templates().get_template("blocks.html").module
     html = shape.table(block, files) if is_table else shape.picture(block, files)
     return SavedBlock(block.stem, block.title, is_table, html)
+
+
+def write_text(file: Path, text: str) -> None:
+    """A file of text, the same bytes on every system."""
+    file.write_text(text, encoding="utf-8", newline="")
+
+
+# ------------------------------------------------------------ what an index reads in the folders of arms
+
+
+def keep(folder: Path, kind: str, content: Mapping[str, Any]) -> None:
+    """kind.json, with a mark of what it is."""
+    text = json.dumps({f"tfarm_{kind}": 1, **content}, ensure_ascii=False, indent=1) + "\n"
+    write_text(folder / f"{kind}.json", text)
+
+
+def kept_in(folder: Path, kind: str, record: type[T]) -> T | None:
+    """The record in a folder's kind.json; None where there is none, or none of ours."""
+    try:
+        return TypeAdapter(record).validate_json((folder / f"{kind}.json").read_bytes())
+    except (OSError, ValueError):
+        return None
+
+
+def kept(out: Path, kind: str, record: type[T]) -> dict[Path, T]:
+    """The records of that kind in the folders of arms, by folder; what is none of ours is passed over."""
+    folders = sorted((f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name)
+    found = ((folder, kept_in(folder, kind, record)) for folder in folders)
+    return {folder: each for folder, each in found if each is not None and getattr(each, "name", "") == folder.name}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import platform
 import re
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from decimal import Decimal, localcontext
@@ -30,10 +29,15 @@ from tfarm.dsp.chain import file_text
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.plots.style import gains_words
-from tfarm.report.cases import has_loop
-from tfarm.report.modes_section import BRACKET_DIGITS, PROVEN_DIGITS, PROVEN_MODES, proven_damped_modes, proven_modes
-from tfarm.report.page import argument, keep, kept
-from tfarm.report.sections import DATA, PageSection, render, save_section, sheet
+from tfarm.report.cases import argument, has_loop
+from tfarm.report.response_sections import (
+    BRACKET_DIGITS,
+    PROVEN_DIGITS,
+    PROVEN_MODES,
+    proven_damped_modes,
+    proven_modes,
+)
+from tfarm.report.sections import DATA, PageSection, keep, kept, render, save_section, sheet, write_text
 from tfarm.response.frequency import BAND_POINTS, worst_error
 from tfarm.schema import Column, Quantity, Table, save_table, table
 from tfarm.schema.html import GREEK, LETTER
@@ -244,7 +248,6 @@ def again_tables(proofs: Sequence[ArmProof]) -> list[Table]:
 AUDIT_COLUMNS = (
     "equation", "verdict", "printed", "corrected", "residual_printed", "residual_corrected", "evidence",
 )  # fmt: skip
-VERDICT_MARKS = {"ok": ("✓", "right as printed"), "corrected": ("≠", "corrected"), "undecided": ("?", "undecided")}
 MathElement = ElementTree.Element
 STATEMENT_END = re.compile(r"(?<=[,;])\\quad\s*")
 LEAVES = ("mi", "mo", "mn", "mtext")
@@ -264,23 +267,6 @@ PACKAGES = (
 )
 
 
-def shown_row(row: AuditRow) -> dict[str, Any]:
-    """A row of the audit, typeset; `corrected` is empty where the print is right."""
-    printed, corrected = compared_formulas(row.printed_tex, row.corrected_tex)
-    return {
-        "anchor": anchor(row.equation),
-        "equation": in_letters(row.equation),
-        "verdict": row.verdict,
-        "mark": VERDICT_MARKS[row.verdict][0],
-        "words": VERDICT_MARKS[row.verdict][1],
-        "printed": printed,
-        "corrected": [] if row.printed == row.corrected else corrected,
-        "left_printed": _left(row.residual_printed),
-        "left_corrected": _left(row.residual_corrected),
-        "evidence": in_letters(row.evidence),
-    }
-
-
 def in_letters(text: str) -> Markup:
     """The audit's plain text with Greek letters, subscripts and exponents: theta_t^2 becomes θ<sub>t</sub>²."""
     greek = LETTER.sub(lambda name: GREEK[name[1]], powers(unit(str(escape(text)))))
@@ -292,13 +278,6 @@ def in_letters(text: str) -> Markup:
 def anchor(equation: str) -> str:
     """A name for links: "(A.1)" becomes "eq-a-1"."""
     return "eq-" + re.sub(r"[^a-z0-9]+", "-", equation.lower()).strip("-")
-
-
-def _left(residual: str) -> Markup:
-    """The residual of a formula in the check, in words and letters."""
-    if residual == "0":
-        return Markup("nothing")
-    return in_letters(f"nothing but rounding at 50 digits, {residual}" if is_zero(residual) else residual)
 
 
 def compared_formulas(printed: str, corrected: str) -> tuple[list[Markup], list[Markup]]:
@@ -360,7 +339,6 @@ def write_trust(
     plain = table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation")
     save_table(plain, folder / DATA)
     errors = [error for proof in proofs for _, error in proof.errors]
-    verdicts = Counter(row.verdict for row in audited)
     preset = {proof.name: proof.source == "preset" for proof in proofs}
     is_usual = set(preset) == set(presets()) and all(preset.values())
     names = "" if is_usual else "".join(f" {argument(*each)}" for each in preset.items())
@@ -373,9 +351,10 @@ def write_trust(
         points=BAND_POINTS,
         worst=scientific(max(errors), 2) if errors else "",
         found=found,
-        verdicts={verdict: verdicts[verdict] for verdict in VERDICT_MARKS},
-        marks=VERDICT_MARKS,
-        equations=[shown_row(row) for row in audited],
+        equations=[(row, *compared_formulas(row.printed_tex, row.corrected_tex)) for row in audited],
+        anchor=anchor,
+        in_letters=in_letters,
+        is_zero=is_zero,
         command=f"tfarm report{names} --out reports",
     )
-    (folder / "index.html").write_text(page, encoding="utf-8", newline="")
+    write_text(folder / "index.html", page)
