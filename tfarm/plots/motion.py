@@ -48,14 +48,8 @@ from .style import (
 
 SHAPE_POINTS = 401  # of a drawn mode: about one to a pixel of its picture
 ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [−]"
-HUB_RADIUS = 0.055  # radius of the drawn hub, and half the payload's side, as shares of the length
-SEGMENT_COLOURS = ("#cfe0ee", "#e3ecd5")  # colours of neighbours
-BESIDE_ARM, HALF_HEIGHT = 0.2, 0.12  # shares of the length left of the hub and right of the tip; above, at least
-AROUND_SKETCH = 1.15  # inches above and below it: three lines, and the axis
+BESIDE_ARM = 0.2  # share of the length left of the hub and right of the tip
 HUB_WIDTH = 0.06  # width of the drawn hub, as a share of the length
-K_RANGE = (-0.25, 1.25)  # of the moment gain: from 0 to the continuous loop's bound, 1, and a quarter to either side
-GUARD = "#bfe3d6"
-MOST_COST = 1.25  # of the cost without feedback: higher ones are drawn at the top edge
 TIME = "time [s]"
 DASHED, DOTTED, LONG_DASHED = (0, (4, 3)), (0, (1, 2)), (0, (5, 3))
 
@@ -144,7 +138,7 @@ def _depth(link: Link) -> float:
 def _frame(arm: Arm) -> tuple[float, float, float]:
     """Left end, right end and half the height [m] of the picture."""
     tip = arm.length + arm.hub.radius + max(0.0, arm.payload.offset)
-    return -BESIDE_ARM * arm.length, tip + BESIDE_ARM * arm.length, max(HALF_HEIGHT * arm.length, 0.6 * _deepest(arm))
+    return -BESIDE_ARM * arm.length, tip + BESIDE_ARM * arm.length, max(0.12 * arm.length, 0.6 * _deepest(arm))
 
 
 def _deepest(arm: Arm) -> float:
@@ -153,7 +147,7 @@ def _deepest(arm: Arm) -> float:
 
 def _sketch_size(arm: Arm) -> tuple[float, float]:
     left, right, half = _frame(arm)
-    return 9.0, AROUND_SKETCH + 8.6 * 2 * half / (right - left)
+    return 9.0, 1.15 + 8.6 * 2 * half / (right - left)  # with three lines above, and the axis below
 
 
 @picture((Arm, "tfarm.load returns"), size=_sketch_size, title=lambda _: "")
@@ -161,12 +155,12 @@ def sketch(arm: Arm, *, ax: Axes) -> None:
     """Hub, link and payload from the side, to scale [m], in the axes given or in new ones; the axes."""
     left, right, half = _frame(arm)
     root = arm.hub.radius
-    bore = HUB_RADIUS * arm.length
+    bore = 0.055 * arm.length
     ax.set(aspect="equal", xlim=(left, right), ylim=(-half, half), yticks=[], xlabel="distance from the hub's axis [m]")
     ax.spines[["left", "right", "top"]].set_visible(False)
     ax.axhline(0, color=FAINT, lw=0.8, ls=(0, (6, 3, 1, 3)), zorder=0)
     start = root
-    for link, colour in zip(arm.links, cycle(SEGMENT_COLOURS), strict=False):
+    for link, colour in zip(arm.links, cycle(("#cfe0ee", "#e3ecd5")), strict=False):
         deep = _depth(link)
         ax.add_patch(Rectangle((start, -deep / 2), link.length, deep, fc=colour, ec=BLUE, lw=1.0, zorder=2))
         start += link.length
@@ -286,7 +280,7 @@ def draw_measured_runs(title: str, each: Mapping[str, RunComparison]) -> Figure:
 def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     """A tuned gain over time (from `tfarm.tune`) in its guard, in the axes given or new ones; the axes."""
     guard, result = found.training.guard, found.training.result
-    ax.axhspan(guard.lo, guard.hi, color=GUARD, lw=0, zorder=0.5, label="guard: proven for any K(t) in it")
+    ax.axhspan(guard.lo, guard.hi, color="#bfe3d6", lw=0, zorder=0.5, label="guard: proven for any K(t) in it")
     ax.step(result.t, result.K, where="post", color=INK, lw=1.4, label="the tuner's gain K(t)")
     best = found.best_constant.gain
     ax.axhline(best, color=PURPLE, lw=1.2, ls=LONG_DASHED, label=f"best constant gain, {significant(best, 3)}")
@@ -310,7 +304,7 @@ def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap]) -> 
         ):
             left.plot([at, at], [low, high], solid_capstyle="butt", zorder=6, **looks)
         tuned_gain(tuning, ax=right)
-        left.set_ylim(*K_RANGE)
+        left.set_ylim(-0.25, 1.25)  # from 0 to the continuous loop's bound, 1, and a quarter to either side
         right.set_ylabel("")
     return figure
 
@@ -318,7 +312,7 @@ def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap]) -> 
 def draw_curves(curves: LearningCurves, tuning: Tuning) -> Figure:
     """Learning curves: each seed, median and quartiles, and the baselines; diverged ones leave through the top."""
     trial, seeds = np.arange(1, curves.costs.shape[1] + 1), len(curves.costs)
-    top = MOST_COST * tuning.without.cost
+    top = 1.25 * tuning.without.cost  # higher costs are drawn at the top edge
     low, middle, high = (np.minimum(curves.quantile(share), 2 * top) for share in QUARTILES)
     with page(9.0, 4.4, f"{tuning.trial.arm.name}: learning, {how_many(seeds, 'seed')}") as (figure, ax):
         ax.plot(trial, np.minimum(curves.costs, 2 * top).T, color="#b9b9b9", lw=0.6, zorder=1)

@@ -19,25 +19,20 @@ from tfarm.loop.locus import CONTROLLER, OTHER, Locus, frame, origin_name, round
 
 from .style import BLUE, FIGURES, GREEN, GREY, INK, ORANGE, PURPLE, gains_words, page, picture
 
-ZOOMED = 4  # modes drawn on their own
 MODE_COLOURS = (INK, BLUE, GREEN, PURPLE, "#7a5a00", "#d81b60", "#1a9ec0", "#6d9b1f")  # one a mode, none twice
 OTHER_COLOURS = {CONTROLLER: "#5b7083", OTHER: "#c48a9a"}
-HIGHER_COLOUR = "#9a9a9a"  # of all higher modes alike
 ROOM_AROUND = 0.12  # around a branch, as a share of its extent
 CROSS_AT_ZERO: dict[str, Any] = {"ls": "none", "marker": "x", "ms": 6, "mew": 1.4}  # without the varying feedback
 CIRCLE_AT_FIRST: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6, "mfc": "white", "mew": 1.2}  # at the start
 DOT: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 3.2}
 THIN: dict[str, Any] = {"lw": 0.9, "ls": (0, (2, 1.5)), "zorder": 3}  # of the reduced model
-LONGEST_LAW = 40  # characters of the controller in a title
-PARTS = 4  # of the range of the varied number: at their ends dots are on each branch
-MOST_NAMED = 6  # crossings in a legend
 
 
 def zoomed(exact: Locus) -> list[int]:
     """The branches drawn on their own: the first that swings of each mode."""
     imag, mode = exact.branches.imag, exact.mode
     first = {int(mode[n]): n for n in reversed(range(mode.size)) if (imag[n] > 0).any()}
-    return [first[number] for number in sorted(first)][:ZOOMED]
+    return [first[number] for number in sorted(first)][:4]
 
 
 def draw_loci(data: Loci) -> Figure:
@@ -61,7 +56,7 @@ def draw_loci(data: Loci) -> Figure:
 
 def _title(exact: Locus, *_: object) -> str:
     first, last = (plain(float(exact.gain[i]), 4) for i in (0, -1))
-    law = one_line(gains_words(exact.law, but=exact.vary).partition(", of ")[0], LONGEST_LAW)
+    law = one_line(gains_words(exact.law, but=exact.vary).partition(", of ")[0], 40)
     values = f"{exact.vary} goes from {first} to {last} {exact.varied.title[1]}".rstrip()
     return f"{exact.arm.name}: closed-loop poles as {values} with {law}"
 
@@ -72,7 +67,7 @@ def _mode_looks(exact: Locus, branch: int) -> dict[str, Any]:
     if origin in OTHER_COLOURS:
         return {"color": OTHER_COLOURS[origin], "label": origin_name(origin)}
     if origin >= len(MODE_COLOURS):
-        return {"color": HIGHER_COLOUR, "label": f"modes {len(MODE_COLOURS)} and higher"}
+        return {"color": "#9a9a9a", "label": f"modes {len(MODE_COLOURS)} and higher"}
     return {"color": MODE_COLOURS[origin], "label": origin_name(origin)}
 
 
@@ -84,7 +79,7 @@ def _panel(fine: Locus, exact: Locus, reduced: ReducedLocus | None, numbers: Seq
     branches, gain, last = held_branches(fine.branches), exact.gain, float(exact.gain[-1])
     is_factor = not exact.varied.is_of_arm and exact.vary != "delay"
     begins = 0.0 if is_factor and min(gain[0], last) <= 0 <= max(gain[0], last) else float(gain[0])
-    values = [float(f"{value:.3g}") for value in np.linspace(begins, last, PARTS + 1)]
+    values = [float(f"{value:.3g}") for value in np.linspace(begins, last, 5)]
     first, *others = (plain(value, 3) for value in values)
     way = np.sign(last - gain[0])
     ax.axvline(0, color=INK, lw=0.9, zorder=1)
@@ -109,7 +104,7 @@ def _panel(fine: Locus, exact: Locus, reduced: ReducedLocus | None, numbers: Seq
         label = f"crosses the axis at {exact.vary} = {plain(each.gain, 5)}, {significant(each.omega, 4)} rad/s"
         (omega,) = kept_digits([each.omega], POLE_DIGITS)
         ax.plot([0], [omega], "D", ls="none", ms=6, mfc=ORANGE, mec="white", mew=0.8, zorder=6,
-                label=label if number < MOST_NAMED else "further crossings of the axis")  # fmt: skip
+                label=label if number < 6 else "further crossings of the axis")  # fmt: skip
     shown = branches[list(numbers)]
     left, right, low, high = frame(shown if everything else shown[shown.imag >= 0])
     wide, tall = ROOM_AROUND * (right - left), ROOM_AROUND * (high - low)

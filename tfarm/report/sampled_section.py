@@ -137,7 +137,7 @@ def overlay_picture(both: regions.StableRegions, found: Analysis) -> Picture:
     return picture(
         "sampled_overlay",
         regions.draw_overlay(both),
-        data=regions.regions_table(both, "").columns,
+        data=regions.region_columns(both),
         arm=arm,
         low=float(both.continuous.axes[0][0]),
         nested=len(both.sampled) > 1,
