@@ -20,7 +20,7 @@ from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback, shown_unit
+from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback
 from tfarm.arrays import Real
 from tfarm.case import Comparison
 from tfarm.crossing import Window, pieces
@@ -321,8 +321,8 @@ def region_columns(data: StableRegions) -> list[Column]:
         for C, plane in planes.items()
     }
     return [
-        Column(PLANE[0], PLANE[0], shown_unit(PLANE[0], arm), of=data.continuous.axes[0]),
-        *(Column(key, key, of=[tuple(map(float, np.ravel(column))) for column in own]) for key, own in each.items()),
+        Column(PLANE[0], of=data.continuous.axes[0]),
+        *(Column(key, of=[tuple(map(float, np.ravel(column))) for column in own]) for key, own in each.items()),
     ]
 
 

@@ -86,11 +86,7 @@ def margin_table(found: Sequence[tuple[Controller, margins.Margins]]) -> Table:
 
 def _bode_picture(each: Controller, found: margins.Margins) -> Picture:
     omega, L = margins.loop_curve(found)
-    columns = (
-        Column("omega_rad_s", "angular frequency", "rad/s", of=omega),
-        Column("re_L", "Re L", of=L.real),
-        Column("im_L", "Im L", of=L.imag),
-    )
+    columns = Column("omega_rad_s", of=omega), Column("re_L", of=L.real), Column("im_L", of=L.imag)
     figure, stem = frequency.draw_loop(found, each.name), each.stem("bode")
     return picture("loop_function", figure, stem=stem, data=columns, each=each, found=found)
 
@@ -293,14 +289,9 @@ def map_data(data: MapOfArm) -> Sequence[Column]:
         ("sampled boundary", across, end, "", "", "")
         for across, windows in columns for window in windows for end in window if data.y.low <= end <= data.y.high
     ]  # fmt: skip
-    units = [shown_unit(name, data.case.arm) for name in PLANE]
-    keys = "_".join([PLANE[0], *units[0].replace("/", " ").split()]), PLANE[1]
-    titles = (
-        ("what", "what", ""), *zip(keys, PLANE, units, strict=True), ("unstable_poles", "unstable poles", ""),
-        ("least_damping_ratio", "least damping ratio", ""), ("omega_rad_s", "frequency", "rad/s"),
-    )  # fmt: skip
-    cells = zip(*grid, *line, *sampled, strict=True)
-    return [Column(*title, of=own) for title, own in zip(titles, cells, strict=True)]
+    rate = "_".join([PLANE[0], *shown_unit(PLANE[0], data.case.arm).replace("/", " ").split()])
+    keys = ("what", rate, PLANE[1], "unstable_poles", "least_damping_ratio", "omega_rad_s")
+    return [Column(key, of=own) for key, own in zip(keys, zip(*grid, *line, *sampled, strict=True), strict=True)]
 
 
 def map_section(case: Case) -> PageSection:
@@ -387,16 +378,14 @@ def locus_blocks(data: loci.Loci) -> Iterator[Picture | Table]:
 
 def locus_data(data: loci.Loci) -> Sequence[Column]:
     """The poles of the exact and of the reduced locus, to the digits that hold on every processor."""
-    parts = [
-        (f"{which}_{n}_{part}", f"{which} branch {n}, {part}", values)
-        for which, branches in {"exact": data.exact.branches, "reduced": data.reduced.branches}.items()
-        for n, row in enumerate(loci.held_branches(branches))
-        for part, values in (("re", row.real), ("im", row.imag))
-    ]
-    cells = [["" if math.isnan(value) else value for value in values.tolist()] for *_, values in parts]
     return [
-        Column(data.name, data.name, data.unit, of=data.exact.gain),
-        *(Column(key, title, "1/s", of=own) for (key, title, _), own in zip(parts, cells, strict=True)),
+        Column(data.name, of=data.exact.gain),
+        *(
+            Column(f"{which}_{n}_{part}", of=["" if math.isnan(value) else value for value in values.tolist()])
+            for which, branches in (("exact", data.exact.branches), ("reduced", data.reduced.branches))
+            for n, row in enumerate(loci.held_branches(branches))
+            for part, values in (("re", row.real), ("im", row.imag))
+        ),
     ]
 
 

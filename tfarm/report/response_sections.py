@@ -181,10 +181,9 @@ def locked_table(found: Modes) -> Table:
 def _shapes(modes: Modes) -> Picture:
     shapes = motion.scaled(modes, DRAWN_MODES)
     columns = (
-        Column("x_m", "x", "m", of=np.linspace(0.0, modes.arm.length, motion.SHAPE_POINTS)),
-        *(Column(f"mode_{number}", f"mode {number}", of=np.round(w, SHAPE_DIGITS - 1) + 0.0)
-          for number, w in shapes.items()),
-    )  # fmt: skip
+        Column("x_m", of=np.linspace(0.0, modes.arm.length, motion.SHAPE_POINTS)),
+        *(Column(f"mode_{number}", of=np.round(w, SHAPE_DIGITS - 1) + 0.0) for number, w in shapes.items()),
+    )
     nodes = [own for number, own in zip(modes.index, modes.nodes, strict=True) if number in shapes]
     return picture("mode_shapes", motion.modes.figure(modes), data=columns, nodes=nodes)
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, shown_unit
 from tfarm.digits import kept_digits, plain, significant, singly
-from tfarm.dsp import Analysis, Chain, Simulation, Verdict, crossings, modes, results, sampled_verdict, traces, verdict
+from tfarm.dsp import Analysis, Chain, Simulation, crossings, modes, results, sampled_verdict, traces, verdict
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.errors import ParameterError
 from tfarm.fitting.recording import RunComparison, compare_run, overshoot
@@ -43,7 +43,7 @@ def sampled_section(case: Case) -> PageSection:
         planes = [overlay_picture(regions.stable_regions(arm, first.loop.gains, chain), first)]
         along = [periods_table(arm, first.loop.gains, chain), loci_picture(first)]
     numbers = across({each.title: it for each, it in found}, keys=[each.key for each, _ in found])
-    slews, words = slew_of(case)
+    pictures, words = slews(case)
     return PageSection(
         anchor="sampled",
         title=f"The sampled loop, {plain(1e3 * chain.sampling.period)} ms",
@@ -59,7 +59,7 @@ def sampled_section(case: Case) -> PageSection:
             *along,
             *(modes_table(*each) for each in found),
             *measured_blocks(case),
-            *slews,
+            *pictures,
         ],
     )  # fmt: skip
 
@@ -97,15 +97,14 @@ def modes_table(each: Controller, found: Analysis) -> Table:
 
 def delays_table(found: Analysed, chain: Chain) -> Table:
     """The verdict on each controller as it is, and with half a sample and a whole one of further delay."""
-    rows: list[tuple[str, float, Verdict]] = []
     T, own = chain.sampling.period, chain.sampling.delay_samples
-    for each, it in found:
-        for more in MORE_DELAY:
-            if not more:
-                rows.append((each.name, 0.0, it.verdict))
-            elif own + more + each.law.delay / T <= MOST_DELAY:
-                late = replace(chain, sampling=replace(chain.sampling, delay_samples=own + more))
-                rows.append((each.name, 1e3 * T * more, sampled_verdict(each.arm, each.law, late)))
+    late = {more: replace(chain, sampling=replace(chain.sampling, delay_samples=own + more)) for more in MORE_DELAY[1:]}
+    rows = [
+        (each.name, 1e3 * T * more, sampled_verdict(each.arm, each.law, late[more]) if more else it.verdict)
+        for each, it in found
+        for more in MORE_DELAY
+        if not more or own + more + each.law.delay / T <= MOST_DELAY
+    ]
     names, delays, verdicts = zip(*rows, strict=True)
     first = Column("law", "controller", of=names), Column("further_delay_ms", "further delay", "ms", of=delays)
     is_free = any(verdict.loop.has_free_angle for verdict in verdicts)
@@ -167,8 +166,8 @@ def loci_data(data: modes.SampledLoci) -> Sequence[Column]:
             loop = locus.loop.having(**{locus.gain: value})
             each = zip(locus.mode.tolist(), poles, strict=True)
             rows += [(name, *map(loop.number, PLANE), mode, z.real, z.imag) for mode, z in each if not z.imag < 0]
-    titles = {"locus": "locus", **{name: name for name in PLANE}, "mode": "mode", "real": "Re z", "imaginary": "Im z"}
-    return [Column(*title, of=cells) for title, cells in zip(titles.items(), zip(*rows, strict=True), strict=True)]
+    keys = ("locus", *PLANE, "mode", "real", "imaginary")
+    return [Column(key, of=cells) for key, cells in zip(keys, zip(*rows, strict=True), strict=True)]
 
 
 # ------------------------------------------------------------ in time
@@ -214,7 +213,7 @@ def slew_row(name: str, run: Simulation) -> SlewRow:
     return SlewRow(name, run.residual_moment, run.settling_time, error, None)
 
 
-def slew_of(case: Case) -> tuple[list[Picture | Table], list[str]]:
+def slews(case: Case) -> tuple[list[Picture | Table], list[str]]:
     """The slew of the chain under each controller, and why one is not simulated; without one where runs are measured.
 
     Of an arm's own gains the slew without moment feedback is there too.
@@ -224,12 +223,7 @@ def slew_of(case: Case) -> tuple[list[Picture | Table], list[str]]:
     if all(each.given.measured is not None for each in case.controllers):
         return [], []
     bare = [] if case.laws else [default_gains(case.arm).having(MOMENT_GAIN, 0.0)]
-    without = [on_hub(case.arm, gains, f"{MOMENT_GAIN} = 0", "without") for gains in bare]
-    return slew(case, [*without, *case.controllers])
-
-
-def slew(case: Case, controllers: Sequence[Controller]) -> tuple[list[Picture | Table], list[str]]:
-    """The slew of the chain under each controller, and why one is not simulated."""
+    controllers = *(on_hub(case.arm, gains, f"{MOMENT_GAIN} = 0", "without") for gains in bare), *case.controllers
     runs: dict[str, Simulation] = {}
     words, task = [], case.chain.slew
     for each in controllers:
@@ -239,11 +233,11 @@ def slew(case: Case, controllers: Sequence[Controller]) -> tuple[list[Picture | 
             )
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {error}.")
-    simulated = [each for each in controllers if each.name in runs]
     if len({each.arm.input_unit for each in controllers}) > 1:
         return [], [*words, "The controllers drive inputs of different units: their slews are not drawn together."]
-    if not simulated:
+    if not runs:
         return [], words
+    simulated = [each for each in controllers if each.name in runs]
     arm, title = simulated[0].arm, prose("slew_title", task=task, reach=case.arm.reach)
     figure = motion.slew.figure(arm, {style.safe(name): run for name, run in runs.items()}, title)
     columns = response_columns(arm, {each.key: runs[each.name] for each in simulated})
@@ -269,19 +263,16 @@ def response_columns(arm: Arm, each: Mapping[str, Simulation]) -> Sequence[Colum
     moments = {key: traces.curve_of(run, "root_moment") for key, run in each.items()}
     t, first = min((moment.t for moment in moments.values()), key=len), next(iter(each.values()))
     rigid = np.r_[first.scenario.rigid_moment[1:], first.scenario.rigid_moment[-1:]]
-    columns: list[Column] = [
-        Column("t_s", "time", "s", of=t),
-        Column("rigid_moment_N_m", "rigid arm", "N m", of=traces.held_at(first, rigid, t)),
-    ]
+    columns: list[Column] = [Column("t_s", of=t), Column("rigid_moment_N_m", of=traces.held_at(first, rigid, t))]
     driven, unit = "torque" if arm.input_unit == "N m" else "input", arm.input_unit
     for key, run in each.items():
-        columns += moments[key].at(t).columns(f"root_moment_{key}", "root moment", "N m")
-        columns += traces.curve_of(run, "tip_displacement").at(t).columns(f"tip_{key}", "tip", "m")
-        columns += traces.tip_deviation(arm, run).at(t).columns(f"tip_error_{key}", "tip less reference", "m")
+        columns += moments[key].at(t).columns(f"root_moment_{key}", "N m")
+        columns += traces.curve_of(run, "tip_displacement").at(t).columns(f"tip_{key}", "m")
+        columns += traces.tip_deviation(arm, run).at(t).columns(f"tip_error_{key}", "m")
         name = f"{driven}_{key}_{unit.replace(' ', '_')}"
-        columns.append(Column(name, driven, unit, of=traces.held_at(run, run.torque, t)))
+        columns.append(Column(name, unit=unit, of=traces.held_at(run, run.torque, t)))
         if run.gain is not None and np.ptp(run.gain):
-            columns.append(Column(f"K_{key}", "gain", of=traces.held_at(run, run.gain, t)))
+            columns.append(Column(f"K_{key}", of=traces.held_at(run, run.gain, t)))
     return [replace(each, of=kept_digits(map(float, each.values), CURVE_DIGITS)) for each in columns]
 
 
@@ -347,15 +338,15 @@ def measured_blocks(case: Case) -> Iterator[Picture | Table]:
 def compared_data(found: Mapping[str, RunComparison]) -> Iterator[Column]:
     """The curves of the picture: a row a sample, measured values taken between their rows."""
     t = min((it.run.t for it in found.values()), key=len)
-    yield Column("t_s", "time", "s", of=t)
+    yield Column("t_s", of=t)
     for key, it in found.items():
-        measured, computed = it.measured, it.run.at_samples.root_moment
-        yield Column(f"reference_{key}_rad", "reference", "rad", of=np.interp(t, measured.t, measured.reference))
-        if measured.hub_angle.size:
-            there = np.interp(t, measured.t, measured.hub_angle)
-            yield Column(f"hub_angle_measured_{key}_rad", "hub angle", "rad", of=there)
-        yield Column(f"hub_angle_computed_{key}_rad", "hub angle", "rad", of=it.hub_angle[: t.size])
-        if measured.root_moment.size:
-            there = np.interp(t, measured.t, measured.root_moment)
-            yield Column(f"root_moment_measured_{key}_N_m", "root moment", "N m", of=there)
-        yield Column(f"root_moment_computed_{key}_N_m", "root moment", "N m", of=computed[: t.size])
+        measured, run = it.measured, it.run
+        for name, at, values in (
+            (f"reference_{key}_rad", measured.t, measured.reference),
+            (f"hub_angle_measured_{key}_rad", measured.t, measured.hub_angle),
+            (f"hub_angle_computed_{key}_rad", run.t, it.hub_angle),
+            (f"root_moment_measured_{key}_N_m", measured.t, measured.root_moment),
+            (f"root_moment_computed_{key}_N_m", run.t, run.at_samples.root_moment),
+        ):
+            if values.size:
+                yield Column(name, of=np.interp(t, at, values))

@@ -95,12 +95,6 @@ class Picture(NamedTuple):
     figure: Figure
     data: tuple[Column, ...] = ()
 
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height on the page [CSS pixels], at 96 an inch."""
-        width, height = self.figure.get_size_inches() * 96
-        return round(width), round(height)
-
 
 def picture(kind: str, figure: Figure, *, data: Iterable[Column] = (), stem: str = "", **values: Any) -> Picture:
     """A picture with the title, the caption and the alternative text of its kind; `stem` names its files."""
@@ -127,7 +121,7 @@ class SavedBlock(NamedTuple):
 class PageSection:
     """A part of a page.  `answer` is its result in a sentence or two, at the top of the full page too.
 
-    `words` are paragraphs, `items` a list; `blocks` pictures and tables, of which a table without columns is left out.
+    `words` are paragraphs, `items` a list; `blocks` pictures and tables, of which one without columns is not shown.
     `failure` is the reason why the section could not be made, which its words have too; empty otherwise.
     """
 
@@ -140,29 +134,26 @@ class PageSection:
     blocks: Sequence[Any] = ()
     failure: str = ""
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "blocks", [block for block in self.blocks if getattr(block, "columns", True)])
-
 
 def save_section(section: PageSection, folder: Path) -> PageSection:
     """The section with its blocks saved: what remains to be written are words."""
     for name in (PICTURES, DATA):
         (folder / name).mkdir(exist_ok=True)
-    return replace(section, blocks=[save_block(block, folder) for block in section.blocks])
+    shown = [block for block in section.blocks if getattr(block, "columns", True)]
+    return replace(section, blocks=[save_block(block, folder) for block in shown])
 
 
 def save_block(block: Picture | Table, folder: Path) -> SavedBlock:
     """A picture as pictures/*.svg, its numbers as data/*.csv; a table as data/*.csv and .json."""
+    shape: Any = templates().get_template("blocks.html").module
     is_table = isinstance(block, Table)
     if isinstance(block, Table):
-        files = [f"{DATA}/{name}" for name in save_table(block, folder / DATA)]
+        html = shape.table(block, [f"{DATA}/{name}" for name in save_table(block, folder / DATA)])
     else:
         save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
         numbers = Table(columns=block.data, stem=f"{block.stem}-data")
         saved = save_table(numbers, folder / DATA, kinds=("csv",)) if block.data else ()
-        files = [f"{PICTURES}/{block.stem}.svg", *(f"{DATA}/{name}" for name in saved)]
-    shape: Any = templates().get_template("blocks.html").module
-    html = shape.table(block, files) if is_table else shape.picture(block, files)
+        html = shape.picture(block, [f"{PICTURES}/{block.stem}.svg", *(f"{DATA}/{name}" for name in saved)])
     return SavedBlock(block.stem, block.title, is_table, html)
 
 

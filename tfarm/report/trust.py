@@ -195,18 +195,17 @@ def written_proofs(out: Path) -> Sequence[ArmProof]:
 
 def proof_tables(proofs: Sequence[ArmProof]) -> list[Table]:
     """The counts of natural frequencies, all proven digits of these, and the boxes of other eigenvalues, if any."""
-    names = ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict")
     digits = {proof.name: proof.leading_digits or [""] * PROVEN_MODES for proof in proofs}
     columns = (
         Column("mode", "mode", of=range(1, PROVEN_MODES + 1)),
         *(Column(f"{name}_rad_s", name, "rad/s", of=own, shown=[f"{text}…" if text else UNPROVEN for text in own])
           for name, own in digits.items()),
     )  # fmt: skip
-    boxes = [each for proof in proofs for each in proof.boxes]
+    counts = table(proofs, ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict"))
     return [
-        sheet("counts", table(proofs, names).columns),
+        sheet("counts", counts.columns),
         sheet("digits", columns, modes=PROVEN_MODES, digits=BRACKET_DIGITS),
-        sheet("boxes", table(boxes).columns, digits=PROVEN_DIGITS),
+        sheet("boxes", table([each for proof in proofs for each in proof.boxes]).columns, digits=PROVEN_DIGITS),
     ]
 
 
@@ -238,20 +237,17 @@ def published_tables(found: published.Validation) -> list[Table]:
 def again_tables(proofs: Sequence[ArmProof]) -> list[Table]:
     """The hashes of the arms' files, and the versions that computed this."""
     found = {"tfarm": tfarm.__version__, "python": platform.python_version(), **{p: version(p) for p in PACKAGES}}
-    columns = Column("package", "package", of=list(found)), Column("version", "version", of=list(found.values()))
     return [
         sheet("inputs", table(proofs, ("name", "source", "sha256")).columns),
-        sheet("versions", columns),
+        sheet(
+            "versions", [Column("package", "package", of=list(found)), Column("version", "version", of=found.values())]
+        ),
     ]
 
 
 AUDIT_COLUMNS = (
     "equation", "verdict", "printed", "corrected", "residual_printed", "residual_corrected", "evidence",
 )  # fmt: skip
-MathElement = ElementTree.Element
-STATEMENT_END = re.compile(r"(?<=[,;])\\quad\s*")
-LEAVES = ("mi", "mo", "mn", "mtext")
-LONG_TEX = 300  # characters of a line from which it is set smaller
 TRUST_FOLDER = "trust"
 PACKAGES = (
     "numpy",
@@ -283,7 +279,7 @@ def anchor(equation: str) -> str:
 def compared_formulas(printed: str, corrected: str) -> tuple[list[Markup], list[Markup]]:
     """Both as MathML, a line each, the symbols in which they differ of the class "changed"."""
     both = _set(printed), _set(corrected)
-    a, b = ([leaf for line in each for leaf in line.iter() if leaf.tag in LEAVES] for each in both)
+    a, b = ([leaf for line in each for leaf in line.iter() if leaf.tag in ("mi", "mo", "mn", "mtext")] for each in both)
     matcher = SequenceMatcher(a=[leaf.text for leaf in a], b=[leaf.text for leaf in b], autojunk=False)
     for what, i, j, k, m in matcher.get_opcodes():
         for leaf in (*a[i:j], *b[k:m]) if what != "equal" else ():
@@ -292,13 +288,13 @@ def compared_formulas(printed: str, corrected: str) -> tuple[list[Markup], list[
     return left, right
 
 
-def _set(tex: str) -> list[MathElement]:
+def _set(tex: str) -> list[ElementTree.Element]:
     """A formula a line, without the name space that a file of XML would need and a page of HTML does not."""
-    found, lines = [], STATEMENT_END.split(tex)
-    for line in lines:
+    found = []
+    for line in re.split(r"(?<=[,;])\\quad\s*", tex):
         upright = re.sub(r"\\mathrm\{(\w)\}", r"\\text{\1}", line.strip())  # a single letter would be slanted
         root = ElementTree.fromstring(re.sub(r' xmlns="[^"]*"', "", convert(upright, display="block"), count=1))
-        root.attrib |= {"class": "long"} if len(line) > LONG_TEX else {}
+        root.attrib |= {"class": "long"} if len(line) > 300 else {}  # which is set smaller
         for row in root.iter("mrow"):
             for before, leaf in pairwise([ElementTree.Element("mo"), *row]):
                 _correct(leaf, before)
@@ -306,7 +302,7 @@ def _set(tex: str) -> list[MathElement]:
     return found
 
 
-def _correct(leaf: MathElement, before: MathElement) -> None:
+def _correct(leaf: ElementTree.Element, before: ElementTree.Element) -> None:
     """Plus-minus is an operator, infinity is none, and a determinant's bars are as high as it, by what is `before`."""
     if leaf.text == "±":
         leaf.tag = "mo"
@@ -336,8 +332,7 @@ def write_trust(
               "published": published_tables(found), "again": again_tables(proofs)}  # fmt: skip
     sections = {name: save_section(PageSection(anchor=name, title="", blocks=own), folder)
                 for name, own in tables.items()}  # fmt: skip
-    plain = table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation")
-    save_table(plain, folder / DATA)
+    save_table(table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation"), folder / DATA)
     errors = [error for proof in proofs for _, error in proof.errors]
     preset = {proof.name: proof.source == "preset" for proof in proofs}
     is_usual = set(preset) == set(presets()) and all(preset.values())

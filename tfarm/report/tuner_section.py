@@ -38,8 +38,6 @@ CONTROLLERS = {
     "without": "none", "best_constant": "constant", "own_constant": "own constant", "tuner": "tuner", "bound": "bound",
     "ZV": "ZV", "EI": "EI",
 }  # fmt: skip
-
-
 TITLE = "The gain tuner against baselines"
 
 
@@ -246,11 +244,7 @@ def _of_each(rows: Sequence[Outcomes], name: str, digits: int) -> tuple[Column, 
 def _gain_picture(data: TunerNumbers) -> Picture:
     tuning, result = data.tuning, data.tuning.training.result
     plane = regions.stable_regions(data.arm, tuning.constant, tuning.trial.loop.chain)
-    columns = (
-        Column("t_s", "time", "s", of=result.t),
-        Column("K", "gain", of=result.K),
-        Column("x_N_m", "x, as the controller reads it", "N m", of=result.x),
-    )
+    columns = Column("t_s", of=result.t), Column("K", of=result.K), Column("x_N_m", of=result.x)
     gain = tuning.constant.gain_text(RATE_GAIN, plain)
     return picture("tune_gain", motion.draw_gain(tuning, *plane), data=columns, tuning=tuning, gain=gain)
 
@@ -269,8 +263,8 @@ def slew_pictures(data: TunerNumbers) -> Iterator[Picture]:
 def _curves_picture(data: TunerNumbers) -> Picture:
     curves = data.curves
     columns = (
-        Column("trial", "trial", of=range(1, curves.costs.shape[1] + 1)),
-        *(Column(name, name, of=costs) for name, costs in curves.quartile_curves.items()),
-        *(Column(f"seed_{seed}", f"seed {seed}", of=costs) for seed, costs in enumerate(curves.costs)),
+        Column("trial", of=range(1, curves.costs.shape[1] + 1)),
+        *(Column(name, of=costs) for name, costs in curves.quartile_curves.items()),
+        *(Column(f"seed_{seed}", of=costs) for seed, costs in enumerate(curves.costs)),
     )
     return picture("tune_curves", motion.draw_curves(curves, data.tuning), data=columns, curves=curves)
