@@ -229,3 +229,23 @@ def test_laws_of_one_name_are_numbered_and_a_signal_that_no_arm_has_is_refused()
     assert to_json({"rows": law_section(Case(LAB, Chain(), two)).blocks[0]}).count("PD (2)") == 1
     with pytest.raises(ParameterError, match="hub_spin"):
         writing.write([LAB], Path("nowhere"), laws=[(GivenLaw(Law({"hub_spin": 1.0})),)])
+
+
+# ------------------------------------------------------------ measured responses
+
+
+FILE = "tests/data/sweep/tip.csv"
+GIVEN = f"tip_acceleration/hub_torque={FILE}"
+
+
+def test_the_page_has_the_command_that_makes_it(tmp_path, capsys, monkeypatch):
+    for kept in ("save_proof", "save_card"):  # which have their own tests
+        monkeypatch.setattr(writing, kept, lambda *_: None)
+    monkeypatch.setattr("tfarm.report.writing.PIECES", [each for each in PIECES if each.name == "measured responses"])
+    given = ("report", "sasaki2012-lab", "--only", "bode", "--measured", GIVEN, "--out", str(tmp_path))
+    code, out, _ = run(capsys, *given)
+    assert code == 0
+    page = (tmp_path / "sasaki2012-lab" / "bode.html").read_text()
+    assert out.strip().endswith("bode.html")
+    assert f"--measured {GIVEN} --only bode" in page
+    assert "Single changes that explain a mode" in page

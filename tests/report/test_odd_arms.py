@@ -180,20 +180,6 @@ def test_rows_of_K2_beyond_1_agree_with_its_edge(name):
     assert "∞" not in column(table, "spectral_abscissa").cells
 
 
-def test_the_answer_of_a_static_crossing_is_in_the_locus():
-    """The pinned tip at K2 = 1 exactly: one pole at 0, by the static torque; the others as found in a box."""
-    arm = ARMS["pinned"]
-    law = HubFeedback(K1=0.3, K2=0.3)
-    found = locus(arm, law, "K2", -1.0, 1.6, 300, 4)
-    at = int(np.flatnonzero(found.gain == 1.0)[0])
-    assert np.isfinite(found.branches).all()
-    assert 0 in found.branches[:, at]
-    assert not (found.branches[:, at + 1] == 0).any()
-    poles = poles_below(Loop(arm, replace(law, K2=float(found.gain[at + 1]))), 500.0).values
-    for branch in found.branches[:3, at + 1]:
-        assert abs(poles - branch).min() < 1e-9 * abs(branch)
-
-
 def test_branches_that_cannot_be_followed_are_left_out_with_a_word(monkeypatch):
     """And never a text of the search."""
     arm = ARMS["rubber"]

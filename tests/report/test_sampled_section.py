@@ -74,17 +74,6 @@ def test_the_map_of_both_regions_is_that_of_the_poles():
             assert inside == [stability(LAB, law).is_stable, loop.having(K1=K1, K2=float(K2)).poles.is_stable]
 
 
-def test_the_edges_at_the_default_gains_are_published_ones(section):
-    data = PLANE()
-    edges = [np.interp(math.log(0.3), np.log(data.continuous.K1), [c[0][1] for c in data.continuous.stable_intervals])]
-    sampled = data.sampled[0]
-    stable = slice(0, int(np.searchsorted(sampled.K1, 5.0)))
-    for side in (0, 1):
-        ends = [column[0][side] for column in sampled.stable_intervals[stable]]
-        edges.append(np.interp(0.3, sampled.K1[stable], ends))
-    assert edges == pytest.approx([1.0305, -0.1526, 1.1639], abs=2e-3)  # linear between columns 12 % apart
-
-
 def test_without_damping_the_layers_are_nested_and_name_their_number_of_modes(monkeypatch):
     monkeypatch.setattr("tfarm.plots.regions.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.crossings.MOST_COLUMNS", 0)

@@ -58,16 +58,6 @@ def test_what_is_drawn_is_the_tuning(small):
     assert [tuple(bar.get_xdata()) for bar in bars] == [(0.3, 0.3)]
 
 
-def test_the_simulated_slew_costs_as_much_as_the_trial(small):
-    """Two methods: the simulator with the network as a gain schedule, and the trial that the tuner learns from."""
-    data = small[0]
-    simulation, result = data.slews["with the tuner"], data.tuning.training.result
-    x = simulation.at_samples.root_moment - simulation.scenario.rigid_moment
-    scale = abs(result.x).max()
-    assert abs(x - result.x).max() < 1e-9 * scale
-    assert abs(simulation.gain - result.K).max() < 1e-9
-
-
 def test_curves_are_trainings_of_their_seeds(small):
     data = small[0]
     tuning = data.tuning
