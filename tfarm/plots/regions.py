@@ -304,7 +304,7 @@ def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
     low, top = own / 15.0, 1.7 * max([own, *ends])  # beyond all that is stable
     across = with_both_sides(np.geomspace(low, top, OVERLAY_COLUMNS), ends)
     across = across[(low <= across) & (top >= across)]
-    wide = 1.8 / np.log(top / low)  # the picture is about so many times as wide as high
+    wide = 1.8 / np.log(top / low)  # about the width of the picture over its height
     planes = [
         rounded_map(sampled_map(loop, across, cut), lambda x, y: np.asarray(wide * np.log(x) + 1j * y / np.ptp(span)))
         for loop in loops

@@ -20,10 +20,6 @@ from tfarm.report.cases import Case
 from tfarm.report.sections import Fact, PageSection, Picture, picture, prose, sheet
 from tfarm.schema import Column, Quantity, Table, table
 
-HEADLINE_MODES = 3  # natural frequencies among the headline numbers, the rigid body's 0 not shown
-MOST_POISSON = 0.5  # of an isotropic material; a larger E/2G - 1 is none's ratio
-TEXTS = ("name", "assumptions")  # of the file, which are in other places of the page
-
 
 def arm_section(case: Case) -> PageSection:
     """The first part of every page: headline numbers, slips of units, the theory, and the parameters."""
@@ -50,7 +46,7 @@ def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
     def frequency(label: str, omega: float, digits: int) -> Fact:
         return Fact(label, significant(omega, 8), "rad/s", f"{significant(omega / (2 * math.pi), digits)} Hz")
 
-    modes = tfarm.modes(arm, count=HEADLINE_MODES)
+    modes = tfarm.modes(arm, count=3)  # the rigid body's 0 is not shown
     slenderness = arm.link.slenderness if arm.is_uniform else arm.length / arm.link.section.radius_of_gyration
     depth = f"depth/length {significant(math.sqrt(12) / slenderness, 3)} as a rectangle"
     numbered = zip(modes.index, modes.natural_frequency, strict=True)
@@ -81,7 +77,7 @@ def parameters(arm: Arm, table: Mapping[str, Any], under: str = "") -> Iterator[
             yield from parameters(arm, value, f"{under}{key}.")
         elif isinstance(value, list) and all(isinstance(each, dict) for each in value):
             yield from parameters(arm, {str(number): each for number, each in enumerate(value, 1)}, f"{under}{key}.")
-        elif key not in TEXTS:
+        elif key not in ("name", "assumptions"):  # which are in other places of the page
             of = file_key(f"{under}{key}", arm)
             yield Parameter(of.label, value, unit(of.unit), f"{under}{key}")
 
@@ -110,7 +106,7 @@ def derived_table(arm: Arm) -> Table:
             ("bending stiffness", "EI", link.EI, "N m²"),
             ("shear stiffness", "κGA", link.kGA, "N"),
             ("Poisson's ratio of an isotropic material", "E/2G − 1",
-             -1 < link.poissons_ratio <= MOST_POISSON and link.poissons_ratio, ""),
+             -1 < link.poissons_ratio <= 0.5 and link.poissons_ratio, ""),
             ("radius of gyration", "√(I/A)", link.section.radius_of_gyration, "m"),
             ("slenderness", "L/√(I/A)", link.slenderness, ""),
         )

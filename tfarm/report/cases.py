@@ -22,7 +22,6 @@ from tfarm.response.signals import Signals, sign_of
 from tfarm.spectrum.table import default_gains
 from tfarm.synthesis.design import Design, design
 
-LONGEST_LAW_NAME = 60  # characters of a law's name in a heading
 DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
 
 
@@ -39,7 +38,7 @@ class GivenLaw:
     def name(self) -> str:
         """Its own name, or its gains with their values."""
         law = as_law(self.law)
-        return one_line(law.name, LONGEST_LAW_NAME) if law.gains is None else gains_words(law)
+        return one_line(law.name, 60) if law.gains is None else gains_words(law)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -29,17 +29,13 @@ from tfarm.schema import Column, Quantity, Table, across, curve_table, quantitie
 from tfarm.spectrum.table import default_gains, default_words, first_frequency, rate_unit
 from tfarm.synthesis import judge, models, structures
 
-MOST_SPILLED = 12  # flexible modes of the largest model that is compared with the exact loop
 GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
 MARKERS = {"default": regions.DIAMOND, "best": regions.STAR}
 DAMPING_EVERY = 4  # of them, the damping is computed at one in four
 DAMPING_MODES = 8  # of the model whose poles that is of: it is right to a few digits, more than a contour shows
-GAINS_AT_ONCE = 500  # of them: memory, whatever the grid
 LISTED_MOMENT_GAINS = (0.9, 1.0, 1.01, 1.1, 1.5)  # values of K2 whose exact poles are listed
-AROUND_EDGE = (0.9, 1.1)  # times the edge, if that lies above all of them
 LISTED_RATE_GAINS = (0.0, 0.05, 0.2, 0.5, 1.0, 2.0)  # times J w1: values of K1 whose poles are listed without a locus
 RANGE_OF_K2 = (-1.0, 1.6)  # of the locus, times what balances a torque: both sides of 0, and beyond 1
-FIRST_PAIRS = 3  # pairs of poles in a row of the list
 shortly = partial(plain, digits=4)  # how a gain is written in a title
 
 
@@ -60,7 +56,7 @@ def margins_section(case: Case) -> PageSection:
     for each, it in found:
         blocks += tables_of(each, it)
         try:
-            few = stability.spill(each.arm, each.law, MOST_SPILLED)
+            few = stability.spill(each.arm, each.law, 12)
             blocks.append(sheet("spill", table(few.models).columns, stem=each.stem("spill"), each=each, found=few))
         except TfarmError as error:
             words.append(f"Spillover of {each.name} is not determined: {error}.")
@@ -211,7 +207,8 @@ class MapOfArm:
 
     `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary, both gains and w, within the
     picture with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first
-    `DESIGNED_MODES` modes at `axes`, every fourth value of each gain on the grid and the frame's.  `sampled` is the
+    `DESIGNED_MODES` modes at `axes`, every fourth value of each gain on the grid and the frame's, and `counts` the
+    unstable poles there.  `sampled` is the
     region of the loop sampled by the case's chain, None where that is not determined.
     """
 
@@ -222,12 +219,8 @@ class MapOfArm:
     edge: Real
     axes: tuple[Real, Real]
     damping: Real
+    counts: NDArray[np.int64]
     sampled: SampledMap | None
-
-    @cached_property
-    def counts(self) -> NDArray[np.int64]:
-        """Unstable poles on the grid of the damping."""
-        return np.asarray(plane.gain_map(self.case.arm, *self.axes).unstable)
 
 
 def map_of_arm(case: Case) -> MapOfArm:
@@ -240,7 +233,8 @@ def map_of_arm(case: Case) -> MapOfArm:
         np.r_[axis.low, each[half::DAMPING_EVERY], axis.high] for axis, each in zip((x, y), found.axes, strict=True)
     )
     sampled = regions.sampled_region(arm, x, y, case.chain)
-    return MapOfArm(case, x, y, found, plane.edge(found, x, y), (across, up), damping_over(arm, across, up), sampled)
+    damping, counts = damping_over(arm, across, up), plane.gain_map(arm, across, up).unstable
+    return MapOfArm(case, x, y, found, plane.edge(found, x, y), (across, up), damping, counts, sampled)
 
 
 def damping_over(arm: Arm, across: Real, up: Real) -> Real:
@@ -248,7 +242,7 @@ def damping_over(arm: Arm, across: Real, up: Real) -> Real:
     signals = tuple(each.output for name in PLANE for each in GAINS if each.name == name)
     model = models.continuous_model(arm, signals, DESIGNED_MODES, DAMPING_MODES, first_frequency(arm))
     points = np.reshape(np.meshgrid(across, up), (2, -1))
-    parts = np.array_split(points, math.ceil(points.shape[1] / GAINS_AT_ONCE), axis=1)
+    parts = np.array_split(points, math.ceil(points.shape[1] / 500), axis=1)  # for memory, whatever the grid
     laws = (
         [structures.Entry(name, row[None], structures.ONE) for name, row in zip(signals, part, strict=True)]
         for part in parts
@@ -393,7 +387,7 @@ def beyond_table(arm: Arm, gains: HubFeedback) -> Table:
     """Verdict and poles of the exact loop for a few K2 around 1 and beyond."""
     edge, unit = edge_of_K2(arm, gains) or 0.0, arm.input_per_torque
     last = LISTED_MOMENT_GAINS[-1] * unit
-    more = [float(f"{share * edge:.3g}") for share in AROUND_EDGE if edge > last]
+    more = [float(f"{share * edge:.3g}") for share in (0.9, 1.1) if edge > last]
     values = [*(share * unit for share in LISTED_MOMENT_GAINS), *(value for value in more if last < value)]
     undecided = [] if arm.is_undamped else [edge]  # no list of poles ends there
     one = gains.having(MOMENT_GAIN, unit).gain_text(MOMENT_GAIN, shortly, arm)
@@ -424,6 +418,6 @@ def at_gain(arm: Arm, law: HubFeedback, value: float, undecided: Sequence[float]
         return AtGain(value, "on the axis, not determined", None, None, "")
     poles, moving, rightmost = found.poles.values, found.poles.moving, found.poles.spectral_abscissa
     rounding = stability.MARGIN_OF_ZERO * abs(moving[moving.real == rightmost]).max(initial=0.0)
-    pairs = text(poles[poles.imag > 0][:FIRST_PAIRS].tolist(), 5)
+    pairs = text(poles[poles.imag > 0][:3].tolist(), 5)
     count = "infinitely many" if found.unstable_roots_infinite else found.unstable_roots
     return AtGain(value, found.verdict, count, rightmost if abs(rightmost) > rounding else 0.0, pairs)

@@ -39,10 +39,8 @@ DAMPED_COLUMNS = ("index", "eigenvalue", "second_eigenvalue", "damping_ratio")
 MODAL_COLUMNS = (
     "index", "natural_frequency", "natural_frequency_hz", "hub_participation", "modal_moment", "nodes",
 )  # fmt: skip
-BOX_WORDS = "in the box", "outside"
 TABLED_MODES, DRAWN_MODES, LOCKED_MODES = 10, 6, 6  # as `tfarm modes` lists them; shapes in three rows of two
 SIMPLER: tuple[Theory, ...] = ("shear", "rayleigh", "euler-bernoulli")
-NEGLECTED = 5e-7  # a sensitivity that never exceeds this reads as zero
 RISE_COLOUR, FALL_COLOUR = (196, 80, 10), (0, 96, 168)  # red, green, blue: the orange and blue of the pictures
 SPANS_ON_ALL = {"phase": ("phase margin", "deg"), "delay": ("delay margin", "s"), "disk": ("disk margin", "")}
 
@@ -132,7 +130,7 @@ def damped_tables(undamped: Modes) -> list[Table]:
     every = np.concatenate([damped.eigenvalues, damped.unassigned_pairs])
     inside = np.all(damped.box.holds(every) | np.isnan(every), axis=1)
     number = len(damped.index)
-    is_there = Column("complete", "list complete", of=np.where(inside, *BOX_WORDS)[:number])
+    is_there = Column("complete", "list complete", of=np.where(inside, "in the box", "outside")[:number])
     return [
         sheet(
             "damped_modes", [*table(found.modes[:number], DAMPED_COLUMNS).columns, is_there], arm=arm, damped=damped,
@@ -215,7 +213,7 @@ def sensitivity_table(modes: Modes) -> Table:
         name.replace("youngs", "Young's").replace("_", " "): np.round(values[flexible], SHAPE_DIGITS - 1) + 0.0
         for name, values in modes.sensitivity.items()
     }
-    shown = {name: values for name, values in rows.items() if abs(values).max() > NEGLECTED}
+    shown = {name: values for name, values in rows.items() if abs(values).max() > 5e-7}  # which do not read as zero
     by_mode = zip(modes.index[flexible], np.array(list(shown.values())).T, strict=True)
     columns = (
         Column("parameter", "parameter", of=list(shown)),

@@ -25,12 +25,9 @@ from tfarm.schema import Column, Quantity, Table, across, quantities, table, tex
 from tfarm.spectrum.table import default_gains
 
 MORE_DELAY = (0.0, 0.5, 1.0)  # samples of further delay for which the verdict is given
-PAST_HUB = 1.25  # times the rate gain at which sampling alone makes the hub unstable: the end of its locus
-LOCUS_K2 = (-0.5, 1.5)  # of its locus: the stability interval of most arms, and a little to either side
 VERDICT_COLUMNS = ("word", "spectral_radius", "time_constant", "slowest", "holds_for")
 WHOLE_LAW_COLUMNS = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
 CURVE_DIGITS = 7  # digits of a curve in its file: a hundredth of the width of a line is four
-Analysed = Sequence[tuple[Controller, Analysis]]
 
 
 def sampled_section(case: Case) -> PageSection:
@@ -57,7 +54,8 @@ def sampled_section(case: Case) -> PageSection:
                     found=it) for each, it in found),
             delays_table(found, chain),
             *along,
-            *(modes_table(*each) for each in found),
+            *(sheet("sampled_modes", table(it.modes, () if it.loop.is_of_gains else WHOLE_LAW_COLUMNS).columns,
+                    stem=_stem("modes", each), each=each, found=it) for each, it in found),
             *measured_blocks(case),
             *pictures,
         ],
@@ -89,13 +87,7 @@ def _stem(name: str, each: Controller) -> str:
     return f"sampled-{name}" if each.key in ("default", "law") else f"sampled-{name}-{each.key.replace('_', '-')}"
 
 
-def modes_table(each: Controller, found: Analysis) -> Table:
-    """The modes of the sampled loop one by one; the parts of K1 and K2 are those of gains at the hub."""
-    columns = table(found.modes, () if found.loop.is_of_gains else WHOLE_LAW_COLUMNS).columns
-    return sheet("sampled_modes", columns, stem=_stem("modes", each), each=each, found=found)
-
-
-def delays_table(found: Analysed, chain: Chain) -> Table:
+def delays_table(found: Sequence[tuple[Controller, Analysis]], chain: Chain) -> Table:
     """The verdict on each controller as it is, and with half a sample and a whole one of further delay."""
     T, own = chain.sampling.period, chain.sampling.delay_samples
     late = {more: replace(chain, sampling=replace(chain.sampling, delay_samples=own + more)) for more in MORE_DELAY[1:]}
@@ -150,8 +142,9 @@ def loci_picture(found: Analysis) -> Picture:
     """Root loci of the sampled loop in the z-plane, along each gain."""
     loop, arm = found.loop, found.loop.plant.arm
     turning = arm.hub_side_inertia * arm.input_per_torque  # at the hub, in the unit of the input times s^2
-    top = max(PAST_HUB * 2 * turning / loop.chain.sampling.period, modes.STRONGER * loop.gains[RATE_GAIN])
-    loci = modes.sampled_loci(loop, top, LOCUS_K2)
+    # past the rate gain at which sampling alone makes the hub unstable; K2 over the stable interval of most arms
+    top = max(1.25 * 2 * turning / loop.chain.sampling.period, modes.STRONGER * loop.gains[RATE_GAIN])
+    loci = modes.sampled_loci(loop, top, (-0.5, 1.5))
     aliased = int((found.modes.band > 0).sum())
     return picture(
         "sampled_loci", roots.draw_sampled_loci(loci), data=loci_data(loci), half=loci.half_rate, aliased=aliased

@@ -30,9 +30,6 @@ CURVE_SAMPLES = 80_000_000  # that their trials may have together, some 35 s of 
 LONG_TRIAL = 16_000  # samples: the comparison of a longer one is of the arm itself alone
 LONGEST_TRIAL = 70_000  # samples: a page has no longer one
 QUANTISED_AND_LATE = 3  # row of the comparison, which begins with those of the arm itself
-SERVO_SPEED = 1 / 20  # of the first frequency: the servo's angle loop is so slow that it leaves the mode alone
-SERVO_TURN = 0.03  # rad a sample, where that is slower
-ON_TARGET = 1e-10  # of the tip's travel: no slew ends nearer its target than rounding
 SAME_COST = 1e-4  # relative difference of two costs below which they are called the same
 CONTROLLERS = {
     "without": "none", "best_constant": "constant", "own_constant": "own constant", "tuner": "tuner", "bound": "bound",
@@ -113,7 +110,7 @@ def curve_seeds(samples: int) -> int:
 
 def _servo_tuning(arm: Arm, plan: Plan, chain: Chain) -> Tuning | None:
     """The same tuning with an angle loop a twentieth as fast as the first mode, or slower at a long period."""
-    speed = min(SERVO_SPEED * first_frequency(arm), SERVO_TURN / chain.sampling.period)
+    speed = min(first_frequency(arm) / 20, 0.03 / chain.sampling.period)  # it leaves the mode alone; rad a sample
     try:
         return tune(arm, plan.holding(arm, float(f"{arm.turned_inertia * speed**2:.2g}")), chain)
     except (CertificationError, ConvergenceError):
@@ -159,7 +156,7 @@ def tuner_in_short(data: TunerNumbers) -> str:
 def off_target(data: TunerNumbers, error: float) -> str:
     """How far from its target the tip ends [mm]; 0 where rounding is all there is of it."""
     travel = data.arm.reach * float(abs(data.constant.scenario.hub_angle).max())
-    return significant(1e3 * abs(error) * (abs(error) > ON_TARGET * travel), 2)
+    return significant(1e3 * abs(error) * (abs(error) > 1e-10 * travel), 2)
 
 
 def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:

@@ -93,13 +93,11 @@ RESERVED_NAMES = {  # of folders that no arm may have
 }  # fmt: skip
 BADGES = {"stable": "ok", "yes": "ok", "unstable": "corrected", "no": "corrected", "marginal": "undecided",
             "undecided": "undecided"}  # fmt: skip
-OPEN_PICTURES = 2  # of a section: those that answer its question; the rest is a click away
 PROMISES = (
     "certified", "complete", "converged", "default gains", "enclosed", "Lyapunov region", "not determined", "proven",
     "small gain", "winding number",
 )  # fmt: skip
 PROMISE = re.compile(rf"\b(?:{'|'.join(PROMISES)})\b", re.IGNORECASE)
-FACTS = 4  # of the headline numbers in the index
 
 
 # ------------------------------------------------------------ the sections of a page
@@ -366,7 +364,7 @@ def _write_pages(
             title=f"{arm.name}: {QUESTIONS[question]}" if question else arm.name,
             sections=[by_anchor[anchor] for anchor in anchors if anchor in by_anchor],
             looks=BADGES,
-            open_pictures=OPEN_PICTURES,
+            open_pictures=2,  # of a section: those that answer its question; the rest is a click away
             only=question,
             others=[page for page in pages if page[0] != name],
             signs="" if arm.is_locked else sign_words(arm),
@@ -457,7 +455,7 @@ def save_card(case: Case, folder: Path) -> None:
         save_figure(draw_card(bode(arm, "root_moment")), folder / PICTURES, "card", formats=("svg",))
         picture = "card.svg"
     loops = [loop_cells(each, case.chain) for each in case.controllers if case.laws or has_loop(arm)]
-    facts = list(headline_numbers(arm)[:FACTS])
+    facts = list(headline_numbers(arm)[:4])
     keep(folder, "card", asdict(Card(arm.name, summary(case), facts, picture, loops)))
 
 
