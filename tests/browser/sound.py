@@ -20,7 +20,7 @@ import pytest
 import tfarm
 from tests.browser.pages import Opened, browser  # noqa: F401, a fixture
 from tests.hostile import NAME, TEXT
-from tests.report.full import ARM, report_elsewhere
+from tests.report.written import ARM, report_elsewhere
 from tests.shared import once
 from tfarm.dsp import load_chain
 from tfarm.fitting.fit import fit

@@ -14,9 +14,7 @@ import pytest
 
 import tfarm
 from tests.hostile import NAME, TEXT, check_drawing, check_page
-from tests.report.coarse import plain_cards
-from tests.report.full import ARM
-from tests.report.written import ANCHORS, HELD, Links, Unmakeable, files_of, links_of
+from tests.report.written import ANCHORS, ARM, HELD, Links, Unmakeable, files_of, links_of, plain_cards
 from tests.shell import run
 from tfarm import processes
 from tfarm.arm import to_toml

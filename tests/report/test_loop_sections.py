@@ -10,7 +10,7 @@ from matplotlib.contour import QuadContourSet
 import tfarm
 from tests.loop.nyquist_counts import plots
 from tests.plots.labels import complaints
-from tests.report.coarse import coarsen
+from tests.report.written import coarsen
 from tests.survey import each_of, tally
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Chain

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.report import full
+from tests.report import written
 from tfarm.arm import to_toml
 from tfarm.audit import claims, published
 from tfarm.audit.published import PublishedRow
@@ -43,7 +43,7 @@ CHEAP = ("(8)", "Table 1 (rho)", "Table 1 (I_h)", "section 5: inputs", "(22)", "
 def proof(pages):
     """The proof that a session's report was made with, as it is read again: that of ARM under another name."""
     (found,) = written_proofs(pages)
-    assert found.sha256 == trust_proofs.hash_of(full.ARM)
+    assert found.sha256 == trust_proofs.hash_of(written.ARM)
     return replace(found, name=ARM.name, sha256=trust_proofs.hash_of(ARM))
 
 

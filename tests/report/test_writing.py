@@ -14,10 +14,8 @@ import pytest
 
 import tfarm
 from tests.hostile import LONG, NAME, PRINTED, check_drawing, check_page
-from tests.report.coarse import coarsen, plain_cards
-from tests.report.full import ARM
 from tests.report.readme import PICTURES, write_pictures
-from tests.report.written import HELD, Links, files_of, ids_of, links_of, validated
+from tests.report.written import ARM, HELD, Links, coarsen, files_of, ids_of, links_of, plain_cards, validated
 from tfarm.dsp import Chain, load_chain
 from tfarm.report import write, writing
 from tfarm.report.cases import Case, GivenLaw

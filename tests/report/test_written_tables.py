@@ -14,7 +14,7 @@ import pytest
 
 import tfarm
 from tests.hostile import NAME
-from tests.report.full import ARM
+from tests.report.written import ARM
 from tfarm.dsp import Chain
 from tfarm.report.arm_section import is_from_paper, paper_section
 from tfarm.report.cases import Case
