@@ -21,14 +21,13 @@ from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.report import cases, loop_section
 from tfarm.report.arm_section import arm_section, assumptions_section, derived_table
-from tfarm.report.cases import Case, GivenLaw, has_loop, on_hub
+from tfarm.report.cases import Case, has_loop, on_hub
 from tfarm.report.loop_section import (
     beyond_table,
     edge_of_K2,
     locus_section,
     margin_table,
     margins_section,
-    nyquist_section,
 )
 from tfarm.report.response_sections import bode_section, damped_tables, modal_table
 from tfarm.report.sections import prose
@@ -215,22 +214,6 @@ def test_a_free_pin_has_its_rate_loop(monkeypatch):
     pieces = pieces_of(Case(arm, Chain()))
     names = [each.name for each in pieces if any(map(each.is_on, ("margins", "locus", "sampled", "tune")))]
     assert names == ["the arm", "the loop", "stability margins", "root loci", "Nyquist plot"]
-
-
-def test_a_free_pin_has_its_nyquist_plot():
-    """Under the default K1, and a negative one: as many encirclements as poles in a box."""
-    arm = ARMS["free-pin"]
-    law = default_gains(arm)
-    laws = (GivenLaw(law), GivenLaw(replace(law, K1=-law.K1 / 10)))
-    table = nyquist_section(Case(arm, Chain(), laws)).blocks[-1]
-    quantity, _, *laws = table.columns
-    counts = []
-    for each in laws:
-        found = dict(zip(quantity.values, each.values, strict=True))
-        counts.append(found["unstable poles"])
-        assert found["unstable poles by Nyquist's criterion"] == counts[-1] == -found["encirclements of -1"]
-        assert "K2 = 0" in each.title
-    assert counts[0] == 0 < counts[1]
 
 
 def test_a_margin_without_end_has_no_frequency(monkeypatch):

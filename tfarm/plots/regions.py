@@ -63,7 +63,6 @@ from .style import (
 
 MOST_COLOUR = "#eebd95"  # of as many unstable poles as any gains have
 NUMBERS_ACROSS = 0.14  # share of the picture's width between two frequencies
-DIAMOND, STAR = "D", "*"  # of controllers
 HALO: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]  # around numbers on a line
 K2_RANGE = (-1.0, 1.5)  # of the gain that balances a torque: 1 where the input is one, less for a motor's current
 CUT_RANGE = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
@@ -268,10 +267,10 @@ def draw_proven(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
         ax.plot([0, x.high], [0, 0], color=PURPLE, lw=1.6, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven")
 
 
-def law_mark(law: HubFeedback, marker: str, label: str, ax: Axes) -> None:
-    """One controller, as a point."""
+def law_mark(law: HubFeedback, is_best: bool, label: str, ax: Axes) -> None:
+    """One controller, as a diamond, or as a star."""
     ax.plot(
-        *law.point, marker, ms=13.0 if marker == STAR else 8.0, mfc=ORANGE, mec="white", mew=1.0, zorder=7,
+        *law.point, "*" if is_best else "D", ms=13.0 if is_best else 8.0, mfc=ORANGE, mec="white", mew=1.0, zorder=7,
         ls="none", label=label,
     )  # fmt: skip
 

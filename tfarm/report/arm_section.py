@@ -184,10 +184,6 @@ def paper_section(case: Case) -> PageSection:
 # ------------------------------------------------------------ assumptions
 
 
-CANDIDATE_COLUMNS = ("is_own", "depth", "width", "second_moment", "hub_inertia")
-LOOP_COLUMNS = ("verdict", "K2_below", "K2_below_is_edge")
-
-
 def assumptions_section(case: Case) -> PageSection:
     """Frequencies over the sections and the hub inertias that could be chosen, with sensitivities."""
     arm, blocks = case.arm, list[Picture | Table]()
@@ -204,14 +200,14 @@ def candidate_blocks(study: Study, kind: str, label: str) -> Iterator[Picture | 
     stem, rows = f"{kind.replace('_', '-')}-frequencies", study.candidates
     yield picture("assumed_frequencies", draw_candidates(study, label), stem=stem, label=label,
                   omega=study.natural_frequency)  # fmt: skip
-    own = [name for name in CANDIDATE_COLUMNS if getattr(rows[0], name) is not None]
+    own = ("is_own", "depth", "width", "second_moment", "hub_inertia")
     columns = (
-        *table(rows, own).columns,
+        *table(rows, [name for name in own if getattr(rows[0], name) is not None]).columns,
         *(Column(f"mode_{n}_rad_s", f"mode {n}", "rad/s", of=each, digits=singly(significant, 6))
           for n, each in enumerate(study.natural_frequency.T, 1)),
         *(Column(f"sensitivity_{n}", f"sensitivity of mode {n}", "%/%", of=each, digits=partial(fixed, decimals=3))
           for n, each in enumerate(study.sensitivity.T, 1)),
-        *table(rows, LOOP_COLUMNS).columns,
+        *table(rows, ("verdict", "K2_below", "K2_below_is_edge")).columns,
     )  # fmt: skip
     yield sheet(kind, columns, study=study)
 

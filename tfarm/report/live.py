@@ -40,8 +40,7 @@ LIVE_COLUMNS = 90  # values of the gain across at which the continuous region is
 SENSED_MODES = 6  # whose frequencies and zeros the chart of sensors has
 SENSOR_DIGITS = 6  # of the numbers of that chart: far more than a screen has
 LIVE_PAGE, ASSETS = "live.html", "assets"
-CHARTS, RUNTIME, SCRIPT = "live_charts.json", f"vega-{vl_convert.get_vega_version()}.js", "live.js"
-SCRIPT_PARTS = tuple(f"live_{name}.js" for name in ("loop", "sampled", "locus", "sets", "player", "sensor", "page"))
+RUNTIME, SCRIPT = f"vega-{vl_convert.get_vega_version()}.js", "live.js"
 
 
 def packed(values: Any) -> str:
@@ -295,10 +294,11 @@ def write_assets(folder: Path) -> None:
     """Vega's runtime, as vl-convert carries it, and this page's own script with its charts."""
     folder.mkdir(exist_ok=True)
     write_text(folder / RUNTIME, vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;"))
-    drawn = json.loads((TEMPLATES / CHARTS).read_text(encoding="utf-8"))
+    drawn = json.loads((TEMPLATES / "live_charts.json").read_text(encoding="utf-8"))
     config = drawn.pop("config")  # of every chart; its colours are set by the page, for a light screen or a dark one
     charts = {name: vl_convert.vegalite_to_vega({**chart, "config": config}) for name, chart in drawn.items()}
     named = json.dumps(charts, separators=(",", ":"), sort_keys=True)
-    scripts = "".join((TEMPLATES / name).read_text(encoding="utf-8") for name in SCRIPT_PARTS)
+    parts = ("loop", "sampled", "locus", "sets", "player", "sensor", "page")
+    scripts = "".join((TEMPLATES / f"live_{name}.js").read_text(encoding="utf-8") for name in parts)
     own = f"(() => {{\nconst LIVE_CHARTS = {named};\n{scripts}}})();\n"  # the runtime has names of its own
     write_text(folder / SCRIPT, own)

@@ -30,11 +30,9 @@ from tfarm.spectrum.table import default_gains, default_words, first_frequency, 
 from tfarm.synthesis import judge, models, structures
 
 GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
-MARKERS = {"default": regions.DIAMOND, "best": regions.STAR}
 DAMPING_EVERY = 4  # of them, the damping is computed at one in four
 DAMPING_MODES = 8  # of the model whose poles that is of: it is right to a few digits, more than a contour shows
 LISTED_MOMENT_GAINS = (0.9, 1.0, 1.01, 1.1, 1.5)  # values of K2 whose exact poles are listed
-LISTED_RATE_GAINS = (0.0, 0.05, 0.2, 0.5, 1.0, 2.0)  # times J w1: values of K1 whose poles are listed without a locus
 RANGE_OF_K2 = (-1.0, 1.6)  # of the locus, times what balances a torque: both sides of 0, and beyond 1
 shortly = partial(plain, digits=4)  # how a gain is written in a title
 
@@ -264,7 +262,7 @@ def draw_map_of_arm(data: MapOfArm) -> style.Figure:
         points = (default_gains(case.arm), *([] if designed is None else [designed.law]))
         for each, gains in zip(case.in_s, points, strict=True):
             brief = brief_on(case.arm, each.law, case.chain)
-            regions.law_mark(gains, MARKERS[each.key], f"{each.title};\n{brief.short}", ax)
+            regions.law_mark(gains, each.key == "best", f"{each.title};\n{brief.short}", ax)
         if designed is not None:
             regions.search_frame(designed.bounds, ax)
     return figure
@@ -403,7 +401,7 @@ def edge_of_K2(arm: Arm, law: HubFeedback) -> float | None:
 
 def rates_table(arm: Arm, gains: HubFeedback) -> Table:
     """Verdict and poles of the exact loop for a few rate gains."""
-    values = [float(f"{share * rate_unit(arm):.3g}") for share in LISTED_RATE_GAINS]
+    values = [float(f"{share * rate_unit(arm):.3g}") for share in (0.0, 0.05, 0.2, 0.5, 1.0, 2.0)]
     rows = [at_gain(arm, gains.having(RATE_GAIN, value), value) for value in values]
     return sheet("rates", table(rows).columns, at=gains.gain_text(MOMENT_GAIN, shortly))
 

@@ -35,14 +35,8 @@ from tfarm.spectrum.table import default_gains, hub_locked
 PROVEN_MODES, BRACKET_DIGITS = 10, 20  # flexible modes of each arm, as its page lists them; beyond a double's digits
 PROVEN_DIGITS = 12  # of an eigenvalue: more than a page prints of any
 TWO_PI = Decimal("6.2831853071795864769252867665590057683943387987502")
-DAMPED_COLUMNS = ("index", "eigenvalue", "second_eigenvalue", "damping_ratio")
-MODAL_COLUMNS = (
-    "index", "natural_frequency", "natural_frequency_hz", "hub_participation", "modal_moment", "nodes",
-)  # fmt: skip
 TABLED_MODES, DRAWN_MODES, LOCKED_MODES = 10, 6, 6  # as `tfarm modes` lists them; shapes in three rows of two
 SIMPLER: tuple[Theory, ...] = ("shear", "rayleigh", "euler-bernoulli")
-RISE_COLOUR, FALL_COLOUR = (196, 80, 10), (0, 96, 168)  # red, green, blue: the orange and blue of the pictures
-SPANS_ON_ALL = {"phase": ("phase margin", "deg"), "delay": ("delay margin", "s"), "disk": ("disk margin", "")}
 
 
 def modes_section(case: Case) -> PageSection:
@@ -71,7 +65,8 @@ def _flexible(modes: Modes) -> Real:
 def modal_table(modes: Modes) -> Table:
     """Frequencies, hub participation, modal moment and nodes."""
     rows = [_rounded(row, modes.arm.length) for row in listed_modes(modes).modes]
-    columns = table(rows, MODAL_COLUMNS).columns
+    names = ("index", "natural_frequency", "natural_frequency_hz", "hub_participation", "modal_moment", "nodes")
+    columns = table(rows, names).columns
     proof = how_proven(modes, columns[1].cells, columns[2].cells)
     return sheet("modal_table", columns, arm=modes.arm, proof=proof)
 
@@ -130,10 +125,11 @@ def damped_tables(undamped: Modes) -> list[Table]:
     every = np.concatenate([damped.eigenvalues, damped.unassigned_pairs])
     inside = np.all(damped.box.holds(every) | np.isnan(every), axis=1)
     number = len(damped.index)
+    names = ("index", "eigenvalue", "second_eigenvalue", "damping_ratio")
     is_there = Column("complete", "list complete", of=np.where(inside, "in the box", "outside")[:number])
     return [
         sheet(
-            "damped_modes", [*table(found.modes[:number], DAMPED_COLUMNS).columns, is_there], arm=arm, damped=damped,
+            "damped_modes", [*table(found.modes[:number], names).columns, is_there], arm=arm, damped=damped,
             note=found.damped_note, is_inside=bool(inside.all()), beyond=beyond_the_box(arm),
             edges=[plain(round(x)) if abs(x) >= 100 else plain(x, 3) for x in damped.box],
         ),
@@ -143,8 +139,6 @@ def damped_tables(undamped: Modes) -> list[Table]:
 
 FREE = "natural frequency, the hub free to turn and without losses"
 LOCKED = "natural frequency, the hub fixed"
-WITH_LOSSES = "frequency of the free hub with its own friction and back-EMF"
-SHARE = "share of critical damping by the losses of the hub alone"
 
 
 class LockedMode(NamedTuple):
@@ -153,8 +147,22 @@ class LockedMode(NamedTuple):
     mode: Annotated[int, Quantity("mode", help="number of the flexible mode")]
     free: Annotated[float, Quantity("hub free", "rad/s", 8, FREE, "hub_free_rad_s")]
     free_hz: Annotated[float, Quantity("hub free", "Hz", 8, FREE, "hub_free_hz")]
-    with_losses: Annotated[float | None, Quantity("with its own losses, Im s", "rad/s", 8, WITH_LOSSES)]
-    damping: Annotated[float | None, Quantity("damping ratio", "%", 4, SHARE, "with_losses_damping_percent")]
+    with_losses: Annotated[
+        float | None,
+        Quantity(
+            "with its own losses, Im s", "rad/s", 8, "frequency of the free hub with its own friction and back-EMF"
+        ),
+    ]
+    damping: Annotated[
+        float | None,
+        Quantity(
+            "damping ratio",
+            "%",
+            4,
+            "share of critical damping by the losses of the hub alone",
+            "with_losses_damping_percent",
+        ),
+    ]
     locked: Annotated[float, Quantity("hub locked", "rad/s", 8, LOCKED, "hub_locked_rad_s")]
     locked_hz: Annotated[float, Quantity("hub locked", "Hz", 8, LOCKED, "hub_locked_hz")]
 
@@ -228,7 +236,7 @@ def tint(x: float) -> str:
     """Orange for a rise, blue for a fall, full at 2 %/%; light enough for dark print."""
     strength = 0.45 * min(1.0, abs(x) / 2.0) ** 0.6
     return "#" + "".join(
-        f"{round(255 - strength * (255 - part)):02x}" for part in (RISE_COLOUR if x > 0 else FALL_COLOUR)
+        f"{round(255 - strength * (255 - part)):02x}" for part in ((196, 80, 10) if x > 0 else (0, 96, 168))
     )
 
 
@@ -315,7 +323,8 @@ def _of_all_arms(those: Possible, every: list[Margins]) -> Iterator[Picture | Ta
     stable = [each for each in every if each.in_band is not None]
     ends = (each.windows[MOMENT_GAIN].around for each in stable)
     found = {(f"{MOMENT_GAIN} up to", ""): [pair[1] for pair in ends if pair is not None]}
-    found |= {title: [getattr(each.in_band, name) for each in stable] for name, title in SPANS_ON_ALL.items()}
+    titles = {"phase": ("phase margin", "deg"), "delay": ("delay margin", "s"), "disk": ("disk margin", "")}
+    found |= {title: [getattr(each.in_band, name) for each in stable] for name, title in titles.items()}
     known = {title: [value for value in values if value is not None] for title, values in found.items()}
     rows = [MarginSpan(*title, min(values), max(values)) for title, values in known.items() if values]
     gains = gains_words(default_gains(those.fit.arm))

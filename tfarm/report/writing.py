@@ -97,7 +97,6 @@ PROMISES = (
     "certified", "complete", "converged", "default gains", "enclosed", "Lyapunov region", "not determined", "proven",
     "small gain", "winding number",
 )  # fmt: skip
-PROMISE = re.compile(rf"\b(?:{'|'.join(PROMISES)})\b", re.IGNORECASE)
 
 
 # ------------------------------------------------------------ the sections of a page
@@ -383,14 +382,11 @@ def _write_pages(
 
 def explained(text: str) -> Markup:
     """A sentence as a page shows it; a word that promises something leads to its meaning at its first place."""
-    seen: set[str] = set()
-
-    def linked(found: re.Match[str]) -> str:
-        word, before = found[0].lower(), len(seen)
-        seen.add(word)
-        return found[0] if len(seen) == before else f'<a class="term" href="#{word_id(word)}">{found[0]}</a>'
-
-    return Markup(PROMISE.sub(linked, str(with_symbols(text))))
+    shown = str(with_symbols(text))
+    for word in PROMISES:
+        linked = rf'<a class="term" href="#{word_id(word)}">\g<0></a>'
+        shown = re.sub(rf"\b{word}\b", linked, shown, count=1, flags=re.IGNORECASE)
+    return Markup(shown)
 
 
 def word_id(name: str) -> str:
