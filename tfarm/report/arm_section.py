@@ -34,7 +34,7 @@ def arm_section(case: Case) -> PageSection:
         items=arm.assumptions,
         blocks=(
             picture("arm", sketch.figure(arm), arm=arm, input=input),
-            sheet("parameters", table(rows).columns, is_rig=not arm.is_uniform),
+            sheet("parameters", table(rows), is_rig=not arm.is_uniform),
             derived_table(arm),
         ),
     )  # fmt: skip
@@ -122,7 +122,7 @@ def derived_table(arm: Arm) -> Table:
         Derived("shear cut-off" + ", of several segments the lowest" * bool(arm.outer), "√(κGA/ρI)", cutoff, "rad/s"),
         Derived("shear cut-off", "", cutoff and cutoff / (2 * math.pi), "Hz"),
     ]  # fmt: skip
-    return sheet("derived", table([row for row in rows if row.value is not False]).columns, arm=arm)
+    return sheet("derived", table([row for row in rows if row.value is not False]), arm=arm)
 
 
 # ------------------------------------------------------------ the paper
@@ -176,7 +176,7 @@ def is_from_paper(arm: Arm) -> bool:
 
 def paper_section(case: Case) -> PageSection:
     """Table 1 and its corrections."""
-    values = sheet("paper_values", table(paper_values(case.arm)).columns)
+    values = sheet("paper_values", table(paper_values(case.arm)))
     title, words = "The paper's values, corrected", (prose("paper"),)
     return PageSection(anchor="paper", title=title, words=words, blocks=(values,))
 

@@ -55,7 +55,7 @@ def margins_section(case: Case) -> PageSection:
         blocks += tables_of(each, it)
         try:
             few = stability.spill(each.arm, each.law, 12)
-            blocks.append(sheet("spill", table(few.models).columns, stem=each.stem("spill"), each=each, found=few))
+            blocks.append(sheet("spill", table(few.models), stem=each.stem("spill"), each=each, found=few))
         except TfarmError as error:
             words.append(f"Spillover of {each.name} is not determined: {error}.")
     return PageSection(
@@ -75,7 +75,7 @@ def margin_table(found: Sequence[tuple[Controller, margins.Margins]]) -> Table:
     leads = [each.name for each, it in found if it.in_band is not None and it.in_band.phase < 0]
     undamped = any(it.stability.loop.arm.is_undamped for _, it in found)
     own = across({each.title: it for each, it in found}, keys=[each.key for each, _ in found])
-    return sheet("margins", own.columns, undamped=undamped, leads=leads)
+    return sheet("margins", own, undamped=undamped, leads=leads)
 
 
 def _bode_picture(each: Controller, found: margins.Margins) -> Picture:
@@ -88,7 +88,7 @@ def _bode_picture(each: Controller, found: margins.Margins) -> Picture:
 def tables_of(each: Controller, found: margins.Margins) -> Iterator[Table]:
     """Every crossing of |L| = 1 and of L < 0 in the range, ascending, and the stability interval of each number."""
     for kind, rows in (("gain_crossovers", found.gain_crossovers), ("phase_crossovers", found.phase_crossovers)):
-        yield sheet(kind, table(rows).columns, stem=each.stem(kind.replace("_", "-")), each=each)
+        yield sheet(kind, table(rows), stem=each.stem(kind.replace("_", "-")), each=each)
     columns = table(found.stability_intervals).columns
     yield sheet("intervals", columns, stem=each.stem("windows"), each=each, note=found.intervals_note)
 
@@ -102,10 +102,10 @@ def nyquist_section(case: Case) -> PageSection:
     own = any(found.unstable_open for _, found in plots)
     blocks: list[Picture | Table] = [
         picture("nyquist_plot", frequency.draw_nyquist(case.arm.name, {each.name: found}), stem=each.stem("nyquist"),
-                data=curve_table(found).columns, each=each, found=found)
+                data=curve_table(found), each=each, found=found)
         for each, found in plots
     ]  # fmt: skip
-    blocks.append(sheet("nyquist_count", across({each.title: found for each, found in plots}).columns, own=own))
+    blocks.append(sheet("nyquist_count", across({each.title: found for each, found in plots}), own=own))
     title, words = "Nyquist plot: encirclements of −1", [prose("nyquist", own=own)]
     return PageSection(anchor="margins-nyquist", title=title, words=words, blocks=blocks)
 
@@ -139,7 +139,7 @@ def law_section(case: Case) -> PageSection:
     ]  # fmt: skip
     words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete]))
     entries = [entry for each in named for entry in entries_of(each)]
-    blocks = [sheet("law_entries", table(entries).columns), *(own for each in named for own in matrices_tables(each))]
+    blocks = [sheet("law_entries", table(entries)), *(own for each in named for own in matrices_tables(each))]
     title = "The controller" if len(named) == 1 else "The controllers"
     return PageSection(anchor="law", title=title, answer=prose("laws", each=named), words=words, blocks=blocks)
 
@@ -353,7 +353,7 @@ def locus_section(case: Case) -> PageSection:
             blocks += [rates_table(arm, gains)] * (name == RATE_GAIN)
     if found:
         along = {f"along {name}": each for name, each in found.items()}
-        blocks.append(sheet("loci", across(along, keys=list(found)).columns))
+        blocks.append(sheet("loci", across(along, keys=list(found))))
     blocks += [beyond_table(arm, gains)] if has_loop(arm) else []
     others = {name: gains.gain_text(other, shortly, arm) for name, other in zip(PLANE, reversed(PLANE), strict=True)}
     answer = prose("locus_lead", found=found, gains=others)
@@ -364,8 +364,8 @@ def locus_blocks(data: loci.Loci) -> Iterator[Picture | Table]:
     """The picture of a locus, its branches, and their crossings of the imaginary axis."""
     stem = f"locus-{data.name}"
     yield picture("locus", roots.draw_loci(data), stem=stem, data=locus_data(data), found=data)
-    yield sheet("branches", table(data.rows).columns, stem=f"{stem}-branches", found=data)
-    yield sheet("crossings", table(data.exact.crossings).columns, stem=f"{stem}-crossings", found=data)
+    yield sheet("branches", table(data.rows), stem=f"{stem}-branches", found=data)
+    yield sheet("crossings", table(data.exact.crossings), stem=f"{stem}-crossings", found=data)
 
 
 def locus_data(data: loci.Loci) -> Sequence[Column]:
@@ -390,7 +390,7 @@ def beyond_table(arm: Arm, gains: HubFeedback) -> Table:
     undecided = [] if arm.is_undamped else [edge]  # no list of poles ends there
     one = gains.having(MOMENT_GAIN, unit).gain_text(MOMENT_GAIN, shortly, arm)
     rows = [at_gain(arm, gains.having(MOMENT_GAIN, value), value, undecided) for value in values]
-    return sheet("beyond", table(rows).columns, arm=arm, one=one, at=gains.gain_text(RATE_GAIN, shortly))
+    return sheet("beyond", table(rows), arm=arm, one=one, at=gains.gain_text(RATE_GAIN, shortly))
 
 
 def edge_of_K2(arm: Arm, law: HubFeedback) -> float | None:
@@ -403,7 +403,7 @@ def rates_table(arm: Arm, gains: HubFeedback) -> Table:
     """Verdict and poles of the exact loop for a few rate gains."""
     values = [float(f"{share * rate_unit(arm):.3g}") for share in (0.0, 0.05, 0.2, 0.5, 1.0, 2.0)]
     rows = [at_gain(arm, gains.having(RATE_GAIN, value), value) for value in values]
-    return sheet("rates", table(rows).columns, at=gains.gain_text(MOMENT_GAIN, shortly))
+    return sheet("rates", table(rows), at=gains.gain_text(MOMENT_GAIN, shortly))
 
 
 def at_gain(arm: Arm, law: HubFeedback, value: float, undecided: Sequence[float] = ()) -> AtGain:

@@ -133,7 +133,7 @@ def damped_tables(undamped: Modes) -> list[Table]:
             note=found.damped_note, is_inside=bool(inside.all()), beyond=beyond_the_box(arm),
             edges=[plain(round(x)) if abs(x) >= 100 else plain(x, 3) for x in damped.box],
         ),
-        *([sheet("unassigned_eigenvalues", table(found.unassigned).columns)] if found.unassigned else []),
+        *([sheet("unassigned_eigenvalues", table(found.unassigned))] if found.unassigned else []),
     ]  # fmt: skip
 
 
@@ -178,7 +178,7 @@ def locked_table(found: Modes) -> Table:
         losses = [each[lossy.index > 0].tolist() for each in (lossy.eigenvalues[:, 0].imag, 100 * lossy.damping_ratio)]
     columns = zip(numbers, free, free / (2 * math.pi), *losses, held, held / (2 * math.pi), strict=True)
     rows = [LockedMode(*row) for row in columns]
-    return sheet("hub_locked", table(rows).columns, has_losses=lossy is not None)
+    return sheet("hub_locked", table(rows), has_losses=lossy is not None)
 
 
 # ------------------------------------------------------------ shapes, theories, sensitivities
@@ -252,7 +252,7 @@ def bode_section(case: Case, output: str) -> PageSection:
         return PageSection(anchor=anchor, title=f"From {what}", words=(none,))
     roots, facts = table([*data.pole_list, *data.zero_list], parent=data).columns, {"data": data, "boxes": _boxes(data)}
     blocks = (
-        picture("bode", frequency.bode.figure(data), stem=anchor, data=curve_table(data).columns, **bode_facts(data)),
+        picture("bode", frequency.bode.figure(data), stem=anchor, data=curve_table(data), **bode_facts(data)),
         sheet("bode_table", roots, stem=f"{anchor}-roots", **facts),
     )
     words = () if roots else (f"{prose('bode_roots', **facts)} There are none.",)
@@ -289,8 +289,8 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
         names = listed([f"{each.label} [{each.unit}]" for each in fit.responses])
         blocks.append(picture("fit_overlay", frequency.fitted.figure(fit), names=names))
     blocks += [
-        sheet("fitted", table(fit.parameters).columns, stem="fit"),
-        sheet("fit_resonances", table(fit.resonances).columns),
+        sheet("fitted", table(fit.parameters), stem="fit"),
+        sheet("fit_resonances", table(fit.resonances)),
     ]
     try:
         those = possible(fit, count)
@@ -328,7 +328,7 @@ def _of_all_arms(those: Possible, every: list[Margins]) -> Iterator[Picture | Ta
     known = {title: [value for value in values if value is not None] for title, values in found.items()}
     rows = [MarginSpan(*title, min(values), max(values)) for title, values in known.items() if values]
     gains = gains_words(default_gains(those.fit.arm))
-    yield sheet("fit_margins", table(rows).columns, gains=gains, stable=stable)
+    yield sheet("fit_margins", table(rows), gains=gains, stable=stable)
 
 
 # ------------------------------------------------------------ measured
@@ -342,9 +342,9 @@ def measured_section(case: Case) -> PageSection:
         name = found.measured.label
         words.append(prose("measured_response", name=name, found=found, peaks=found.unmatched / (2 * math.pi)))
         blocks += [
-            picture("measured", frequency.measured.figure(found), stem=f"measured{label}", data=found.csv_table.columns,
+            picture("measured", frequency.measured.figure(found), stem=f"measured{label}", data=found.csv_table,
                     name=name),
-            sheet("measured_modes", table(found.modes).columns, stem=f"measured-modes{label}"),
-            sheet("measured_required", table(found.required_changes).columns, stem=f"measured-required{label}"),
+            sheet("measured_modes", table(found.modes), stem=f"measured-modes{label}"),
+            sheet("measured_required", table(found.required_changes), stem=f"measured-required{label}"),
         ]  # fmt: skip
     return PageSection(anchor="bode-measured", title="Measured over exact", words=words, blocks=blocks)

@@ -49,12 +49,12 @@ def sampled_section(case: Case) -> PageSection:
         words=[chain_words(arm, chain), *words],
         blocks=[
             *planes,
-            sheet("sampled", numbers.columns),
-            *(sheet("sampled_numbers", table(it.stability_intervals).columns, stem=_stem("numbers", each), each=each,
+            sheet("sampled", numbers),
+            *(sheet("sampled_numbers", table(it.stability_intervals), stem=_stem("numbers", each), each=each,
                     found=it) for each, it in found),
             delays_table(found, chain),
             *along,
-            *(sheet("sampled_modes", table(it.modes, () if it.loop.is_of_gains else WHOLE_LAW_COLUMNS).columns,
+            *(sheet("sampled_modes", table(it.modes, () if it.loop.is_of_gains else WHOLE_LAW_COLUMNS),
                     stem=_stem("modes", each), each=each, found=it) for each, it in found),
             *measured_blocks(case),
             *pictures,
@@ -237,7 +237,7 @@ def slews(case: Case) -> tuple[list[Picture | Table], list[str]]:
     rows = [slew_row(name, run) for name, run in runs.items()]
     return [
         picture("sampled_slew", figure, data=columns, runs=runs, piece=piece_of_bands(runs), task=title),
-        sheet("slew_numbers", table(rows).columns, stem="sampled-slew-numbers"),
+        sheet("slew_numbers", table(rows), stem="sampled-slew-numbers"),
     ], words
 
 
@@ -325,7 +325,7 @@ def measured_blocks(case: Case) -> Iterator[Picture | Table]:
     columns = compared_data({each.key: found[each.name] for each, _ in runs})
     yield picture("sampled_measured", figure, data=columns, found=found)
     rows = [measured_step(name, it) for name, it in found.items() if it.measured.hub_angle.size]
-    yield sheet("sampled_overshoot", table(rows).columns)
+    yield sheet("sampled_overshoot", table(rows))
 
 
 def compared_data(found: Mapping[str, RunComparison]) -> Iterator[Column]:

@@ -96,16 +96,22 @@ class Picture(NamedTuple):
     data: tuple[Column, ...] = ()
 
 
-def picture(kind: str, figure: Figure, *, data: Iterable[Column] = (), stem: str = "", **values: Any) -> Picture:
+def picture(
+    kind: str, figure: Figure, *, data: Table | Iterable[Column] = (), stem: str = "", **values: Any
+) -> Picture:
     """A picture with the title, the caption and the alternative text of its kind; `stem` names its files."""
     title, caption, alt = _parts(kind, values)
-    return Picture(stem or kind.replace("_", "-"), title, caption, alt, figure, tuple(data))
+    return Picture(stem or kind.replace("_", "-"), title, caption, alt, figure, _columns(data))
 
 
-def sheet(kind: str, columns: Iterable[Column], *, stem: str = "", **values: Any) -> Table:
+def sheet(kind: str, columns: Table | Iterable[Column], /, *, stem: str = "", **values: Any) -> Table:
     """A table with the title and the caption of its kind; `stem` names its files."""
     title, caption = _parts(kind, values)
-    return Table(columns=tuple(columns), stem=stem or kind.replace("_", "-"), title=title, caption=caption)
+    return Table(columns=_columns(columns), stem=stem or kind.replace("_", "-"), title=title, caption=caption)
+
+
+def _columns(of: Table | Iterable[Column]) -> tuple[Column, ...]:
+    return of.columns if isinstance(of, Table) else tuple(of)
 
 
 class SavedBlock(NamedTuple):

@@ -203,9 +203,9 @@ def proof_tables(proofs: Sequence[ArmProof]) -> list[Table]:
     )  # fmt: skip
     counts = table(proofs, ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict"))
     return [
-        sheet("counts", counts.columns),
+        sheet("counts", counts),
         sheet("digits", columns, modes=PROVEN_MODES, digits=BRACKET_DIGITS),
-        sheet("boxes", table([each for proof in proofs for each in proof.boxes]).columns, digits=PROVEN_DIGITS),
+        sheet("boxes", table([each for proof in proofs for each in proof.boxes]), digits=PROVEN_DIGITS),
     ]
 
 
@@ -229,8 +229,8 @@ def published_tables(found: published.Validation) -> list[Table]:
     columns = (*table(found.sources).columns, *counts)
     return [
         sheet("sources", columns),
-        sheet("differences", table(found.differences).columns),
-        sheet("published", table(found.rows).columns),
+        sheet("differences", table(found.differences)),
+        sheet("published", table(found.rows)),
     ]
 
 
@@ -238,7 +238,7 @@ def again_tables(proofs: Sequence[ArmProof]) -> list[Table]:
     """The hashes of the arms' files, and the versions that computed this."""
     found = {"tfarm": tfarm.__version__, "python": platform.python_version(), **{p: version(p) for p in PACKAGES}}
     return [
-        sheet("inputs", table(proofs, ("name", "source", "sha256")).columns),
+        sheet("inputs", table(proofs, ("name", "source", "sha256"))),
         sheet(
             "versions", [Column("package", "package", of=list(found)), Column("version", "version", of=found.values())]
         ),

@@ -208,7 +208,7 @@ def servo_table(data: TunerNumbers, servo: Tuning) -> Table:
     ]
     gains = ", ".join(law.gain_text(name, partial(significant, digits=3), data.arm) for name in (ANGLE_GAIN, RATE_GAIN))
     left = None if error is None else off_target(data, error)
-    return sheet("tune_servo", table(rows).columns, gains=gains, guard=servo.training.guard, error=left)
+    return sheet("tune_servo", table(rows), gains=gains, guard=servo.training.guard, error=left)
 
 
 def cost_tables(data: TunerNumbers) -> list[Table]:

@@ -521,6 +521,6 @@ def _comparison_section(found: Comparison) -> PageSection:
     rows = (
         (of, getattr(found, name)) for name, of in quantities(Comparison).items() if of.label and name != "is_sampled"
     )
-    first, *tables = (sheet("compared", table(each).columns, stem=f"compare-{of.key}", of=of) for of, each in rows)
+    first, *tables = (sheet("compared", table(each), stem=f"compare-{of.key}", of=of) for of, each in rows)
     words = [prose("comparison", found=found)]
     return PageSection(anchor="compared", title="Compared", words=words, blocks=[first, drawn, *tables])
