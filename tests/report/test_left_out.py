@@ -25,7 +25,7 @@ from tfarm.report import write, writing
 from tfarm.report.cases import Case
 from tfarm.report.live import save_live
 from tfarm.report.response_sections import fit_section
-from tfarm.report.sections import PageSection, save_section
+from tfarm.report.sections import PageSection
 from tfarm.report.writing import PIECES, Piece, pieces_of
 
 
@@ -271,12 +271,13 @@ def test_of_a_fit(tmp_path):
     H = tfarm.transfer(LAB, "root_moment")(1j * OMEGA)
     seen = tfarm.Measured(output="root_moment", input="hub_torque", omega=OMEGA, values=H, sigma=abs(H), source=TEXT)
     found = fit(LAB, [seen], free=["hub.inertia"], profile=False)
-    saved = save_section(fit_section(Case(found.arm, Chain(), (), found), 2), tmp_path)
+    case = Case(found.arm, Chain(), (), found)
+    saved = writing.make_section("fit", "fit", partial(fit_section, count=2), case, tmp_path)
     for suffix in ("svg", "json"):
         assert list(tmp_path.rglob(f"*.{suffix}"))
     for drawing in tmp_path.rglob("*.svg"):
         check_drawing(drawing.read_text(encoding="utf-8"))
-    writing._write_pages(Case(found.arm, Chain(), (), found), tmp_path, [saved], None, "", tmp_path)
+    writing._write_pages(case, tmp_path, [saved], None, "", tmp_path)
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     check_page(page, NAME)
     assert "\u202e" not in page

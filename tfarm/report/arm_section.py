@@ -30,7 +30,7 @@ def arm_section(case: Case) -> PageSection:
     )  # fmt: skip
     rows = list(parameters(arm, tomllib.loads(file_text(arm, case.chain))))
     return PageSection(
-        anchor="arm", title="The arm", facts=headline_numbers(arm), words=list(filter(None, words)),
+        title="The arm", facts=headline_numbers(arm), words=list(filter(None, words)),
         items=arm.assumptions,
         blocks=(
             picture("arm", sketch.figure(arm), arm=arm, input=input),
@@ -177,8 +177,7 @@ def is_from_paper(arm: Arm) -> bool:
 def paper_section(case: Case) -> PageSection:
     """Table 1 and its corrections."""
     values = sheet("paper_values", table(paper_values(case.arm)))
-    title, words = "The paper's values, corrected", (prose("paper"),)
-    return PageSection(anchor="paper", title=title, words=words, blocks=(values,))
+    return PageSection(title="The paper's values, corrected", words=(prose("paper"),), blocks=(values,))
 
 
 # ------------------------------------------------------------ assumptions
@@ -192,7 +191,7 @@ def assumptions_section(case: Case) -> PageSection:
     if arm.is_uniform and has_hub_inertia(arm):
         blocks += candidate_blocks(hub_study(arm), "assumptions_hub", "hub inertia [kg m²]")
     words = (prose("assumptions", arm=arm, is_from_paper=is_from_paper(arm), has_hub=has_hub_inertia(arm)),)
-    return PageSection(anchor="assumptions", title="What the assumptions do", words=words, blocks=blocks)
+    return PageSection(title="What the assumptions do", words=words, blocks=blocks)
 
 
 def candidate_blocks(study: Study, kind: str, label: str) -> Iterator[Picture | Table]:

@@ -39,7 +39,7 @@ shortly = partial(plain, digits=4)  # how a gain is written in a title
 
 def no_loop_section(case: Case) -> PageSection:
     """One sentence for an arm that has no loop."""
-    return PageSection(anchor="no-loop", title="The loop", answer=prose("no_loop", arm=case.arm))
+    return PageSection(title="The loop", answer=prose("no_loop", arm=case.arm))
 
 
 # ------------------------------------------------------------ margins
@@ -59,7 +59,7 @@ def margins_section(case: Case) -> PageSection:
         except TfarmError as error:
             words.append(f"Spillover of {each.name} is not determined: {error}.")
     return PageSection(
-        anchor="margins", title="Stability and stability margins", answer=prose("margins_lead", found=briefs),
+        title="Stability and stability margins", answer=prose("margins_lead", found=briefs),
         facts=[verdict_fact(*each) for each in briefs], words=words, blocks=blocks,
     )  # fmt: skip
 
@@ -106,8 +106,7 @@ def nyquist_section(case: Case) -> PageSection:
         for each, found in plots
     ]  # fmt: skip
     blocks.append(sheet("nyquist_count", across({each.title: found for each, found in plots}), own=own))
-    title, words = "Nyquist plot: encirclements of −1", [prose("nyquist", own=own)]
-    return PageSection(anchor="margins-nyquist", title=title, words=words, blocks=blocks)
+    return PageSection(title="Nyquist plot: encirclements of −1", words=[prose("nyquist", own=own)], blocks=blocks)
 
 
 # ------------------------------------------------------------ poles
@@ -141,7 +140,7 @@ def law_section(case: Case) -> PageSection:
     entries = [entry for each in named for entry in entries_of(each)]
     blocks = [sheet("law_entries", table(entries)), *(own for each in named for own in matrices_tables(each))]
     title = "The controller" if len(named) == 1 else "The controllers"
-    return PageSection(anchor="law", title=title, answer=prose("laws", each=named), words=words, blocks=blocks)
+    return PageSection(title=title, answer=prose("laws", each=named), words=words, blocks=blocks)
 
 
 class Entry(NamedTuple):
@@ -299,8 +298,7 @@ def map_section(case: Case) -> PageSection:
         gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), arm) for name in PLANE)
         brief = brief_on(arm, case.in_s[-1].law, case.chain)
         answer += " " + prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains, brief=brief)
-    title = "Stability region of both gains"
-    return PageSection(anchor="margins-map", title=title, answer=answer, blocks=(drawn,))
+    return PageSection(title="Stability region of both gains", answer=answer, blocks=(drawn,))
 
 
 def intervals(arm: Arm) -> str:
@@ -338,7 +336,7 @@ def locus_section(case: Case) -> PageSection:
     """Poles of the controllers; of an arm's own page root loci along each gain too, and poles at K2 = 1 and beyond."""
     words, tables = poles_tables(case)
     if case.laws:
-        return PageSection(anchor="locus", title="Closed-loop poles", words=words, blocks=tables)
+        return PageSection(title="Closed-loop poles", words=words, blocks=tables)
     arm, gains, blocks = case.arm, default_gains(case.arm), list[Picture | Table]()
     ranges = {RATE_GAIN: (0.0, 2.0 * rate_unit(arm))}
     if has_loop(arm):
@@ -357,7 +355,7 @@ def locus_section(case: Case) -> PageSection:
     blocks += [beyond_table(arm, gains)] if has_loop(arm) else []
     others = {name: gains.gain_text(other, shortly, arm) for name, other in zip(PLANE, reversed(PLANE), strict=True)}
     answer = prose("locus_lead", found=found, gains=others)
-    return PageSection(anchor="locus", title="Root loci", answer=answer, words=words, blocks=[*blocks, *tables])
+    return PageSection(title="Root loci", answer=answer, words=words, blocks=[*blocks, *tables])
 
 
 def locus_blocks(data: loci.Loci) -> Iterator[Picture | Table]:

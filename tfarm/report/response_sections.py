@@ -52,7 +52,7 @@ def modes_section(case: Case) -> PageSection:
         except (ConvergenceError, CertificationError) as error:
             words.append(prose("no_damped_table", why=error))
     blocks += [_shapes(tfarm.modes(arm, count=DRAWN_MODES)), *theories(arm), sensitivity_table(found)]
-    return PageSection(anchor="modes", title="Modes", words=words, blocks=blocks)
+    return PageSection(title="Modes", words=words, blocks=blocks)
 
 
 def _flexible(modes: Modes) -> Real:
@@ -246,17 +246,17 @@ def tint(x: float) -> str:
 def bode_section(case: Case, output: str) -> PageSection:
     """One output: picture, its meaning, poles and zeros."""
     data = bode(case.arm, output)
-    anchor, what = f"bode-{output.replace('_', '-')}", f"{data.input_label} to {data.label}"
+    stem, what = f"bode-{output.replace('_', '-')}", f"{data.input_label} to {data.label}"
     if data.is_zero:
         none = f"The {data.label} is zero at every frequency: this arm's tip is pinned."
-        return PageSection(anchor=anchor, title=f"From {what}", words=(none,))
+        return PageSection(title=f"From {what}", words=(none,))
     roots, facts = table([*data.pole_list, *data.zero_list], parent=data).columns, {"data": data, "boxes": _boxes(data)}
     blocks = (
-        picture("bode", frequency.bode.figure(data), stem=anchor, data=curve_table(data), **bode_facts(data)),
-        sheet("bode_table", roots, stem=f"{anchor}-roots", **facts),
+        picture("bode", frequency.bode.figure(data), stem=stem, data=curve_table(data), **bode_facts(data)),
+        sheet("bode_table", roots, stem=f"{stem}-roots", **facts),
     )
     words = () if roots else (f"{prose('bode_roots', **facts)} There are none.",)
-    return PageSection(anchor=anchor, title=f"From {what}", words=words, blocks=blocks)
+    return PageSection(title=f"From {what}", words=words, blocks=blocks)
 
 
 def bode_facts(data: Bode) -> dict[str, Any]:
@@ -301,7 +301,7 @@ def fit_section(case: Case, count: int = ARMS) -> PageSection:
         words += [prose("fit_share", gains=gains_words(default_gains(fit.arm)), every=every)] if every else []
         blocks += _of_all_arms(those, every)
     answer = prose("fit", verdict=fit.verdict, found=fit.in_words)
-    return PageSection(anchor="fit", title="Fitted to measurements", answer=answer, words=words, blocks=blocks)
+    return PageSection(title="Fitted to measurements", answer=answer, words=words, blocks=blocks)
 
 
 class MarginSpan(NamedTuple):
@@ -347,4 +347,4 @@ def measured_section(case: Case) -> PageSection:
             sheet("measured_modes", table(found.modes), stem=f"measured-modes{label}"),
             sheet("measured_required", table(found.required_changes), stem=f"measured-required{label}"),
         ]  # fmt: skip
-    return PageSection(anchor="bode-measured", title="Measured over exact", words=words, blocks=blocks)
+    return PageSection(title="Measured over exact", words=words, blocks=blocks)

@@ -42,7 +42,6 @@ def sampled_section(case: Case) -> PageSection:
     numbers = across({each.title: it for each, it in found}, keys=[each.key for each, _ in found])
     pictures, words = slews(case)
     return PageSection(
-        anchor="sampled",
         title=f"The sampled loop, {plain(1e3 * chain.sampling.period)} ms",
         answer=prose("sampled_lead", found=found, period=chain.sampling.period),
         facts=[fact for each in found for fact in facts_on(*each)],

@@ -131,8 +131,8 @@ class PageSection:
     `failure` is the reason why the section could not be made, which its words have too; empty otherwise.
     """
 
-    anchor: str
-    title: str
+    anchor: str = ""
+    title: str = ""
     answer: str = ""
     words: Sequence[str] = ()
     items: Sequence[str] = ()

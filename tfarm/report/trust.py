@@ -330,7 +330,7 @@ def write_trust(
     found = published.Validation(tuple(printed))
     tables = {"proofs": proof_tables(proofs), "accuracy": [accuracy_table(proofs)],
               "published": published_tables(found), "again": again_tables(proofs)}  # fmt: skip
-    sections = {name: save_section(PageSection(anchor=name, title="", blocks=own), folder)
+    sections = {name: save_section(PageSection(blocks=own), folder)
                 for name, own in tables.items()}  # fmt: skip
     save_table(table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation"), folder / DATA)
     errors = [error for proof in proofs for _, error in proof.errors]

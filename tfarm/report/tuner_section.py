@@ -49,7 +49,7 @@ def tuner_section(case: Case) -> PageSection:
             answer = prose("tuner_unstable")
     except CertificationError as error:
         answer = prose("tuner_unproven", error=error)
-    return PageSection(anchor="tune", title=TITLE, answer=answer)
+    return PageSection(title=TITLE, answer=answer)
 
 
 def why_not(arm: Arm, chain: Chain) -> str:
@@ -139,7 +139,7 @@ def section_of(data: TunerNumbers) -> PageSection:
     servo = [] if data.servo is None else [servo_table(data, data.servo)]
     blocks = [_gain_picture(data), *slew_pictures(data), *cost_tables(data), *servo, _curves_picture(data)]
     answer, facts = tuner_in_short(data), tuner_facts(data)
-    return PageSection(anchor="tune", title=TITLE, answer=answer, facts=facts, words=words, blocks=blocks)
+    return PageSection(title=TITLE, answer=answer, facts=facts, words=words, blocks=blocks)
 
 
 def saved_cost(data: TunerNumbers) -> float:

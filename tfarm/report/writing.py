@@ -12,7 +12,7 @@ import shlex
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -178,7 +178,7 @@ def pieces_of(case: Case) -> list[Piece]:
 def make_section(name: str, anchor: str, make: Callable[[Case], PageSection], case: Case, folder: Path) -> PageSection:
     """A section saved in the arm's folder, or in its place why tfarm could not make it; a bug of ours stays loud."""
     try:
-        section = make(case)
+        section = replace(make(case), anchor=anchor)
     except TfarmError as error:
         answer = f"This section could not be made for this arm: {error}."
         section = PageSection(anchor=anchor, title=upper(name), answer=answer, failure=str(error))
@@ -522,5 +522,4 @@ def _comparison_section(found: Comparison) -> PageSection:
         (of, getattr(found, name)) for name, of in quantities(Comparison).items() if of.label and name != "is_sampled"
     )
     first, *tables = (sheet("compared", table(each), stem=f"compare-{of.key}", of=of) for of, each in rows)
-    words = [prose("comparison", found=found)]
-    return PageSection(anchor="compared", title="Compared", words=words, blocks=[first, drawn, *tables])
+    return PageSection(words=[prose("comparison", found=found)], blocks=[first, drawn, *tables])
