@@ -95,7 +95,7 @@ def test_no_part_of_the_edge_is_missing(lab):
 
 def test_contours_reach_the_frame_and_words_overlap_nothing(lab):
     """A line of equal damping ends at the frame, at the stability boundary, or where it began."""
-    figure = draw_map_of_arm(lab)
+    figure = draw_map_of_arm.figure(lab)
     assert complaints(figure) == []
     assert (*lab.axes[0][[0, -1]], *lab.axes[1][[0, -1]]) == (lab.x.low, lab.x.high, lab.y.low, lab.y.high)
     (contours,) = (each for each in figure.axes[0].collections if isinstance(each, QuadContourSet))
@@ -197,7 +197,7 @@ def test_the_map_shows_its_proof(coarse, section):
 def test_the_star_is_stable_at_the_period_of_its_page(lab, section):
     """The best gains of a page are those of its own chain, and stable there; an unstable law has it in its card."""
     assert all(brief_on(LAB, each.law, Chain()).is_stable for each in lab.case.in_s)
-    labels = [text.get_text() for text in draw_map_of_arm(lab).legends[0].get_texts()]
+    labels = [text.get_text() for text in draw_map_of_arm.figure(lab).legends[0].get_texts()]
     assert any(label.startswith("best damping") and "stable when sampled every 10 ms" in label for label in labels)
     assert "stable when sampled every 10 ms" in section.answer
     facts = margins_section(Case(LAB, Chain())).facts

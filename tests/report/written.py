@@ -11,6 +11,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import tfarm
 from tests.hostile import LONG, NAME, PRINTED, Read
@@ -48,7 +49,7 @@ def coarsen(put=setattr):
 def plain_cards(put):
     """Cards of the index with an empty picture, for tests that are not about it: a response and a drawing each."""
     put(writing, "bode", lambda *_: None)
-    put(writing, "draw_card", lambda _: None)
+    put(writing, "draw_card", SimpleNamespace(figure=lambda _: None))
     put(writing, "save_figure", lambda _, folder, stem, formats: (folder / f"{stem}.svg").write_text("<svg/>"))
 
 

@@ -43,7 +43,6 @@ from .style import (
     by_name,
     gains_words,
     name_axes,
-    page,
     picture,
     plain_ticks,
     safe,
@@ -79,14 +78,13 @@ def bode(data: Bode | Mapping[str, Bode], *, ax: Sequence[Axes]) -> None:
     draw_phase(data, ax=ax[1])
 
 
-def draw_card(data: Bode) -> Figure:
+@picture(size=(4.4, 2.5), title=lambda _: "")
+def draw_card(data: Bode, *, ax: Axes) -> None:
     """The magnitude alone, small, for the index."""
-    with page(4.4, 2.5, "") as (figure, ax):
-        draw_magnitude(data, ax=ax)
-        ax.set_ylabel(f"|{data.label}| [{data.gain_unit}]", fontsize=8.5)
-        for each in (ax.legend(), *ax.texts, *ax.child_axes):
-            each.set_visible(False)
-    return figure
+    draw_magnitude(data, ax=ax)
+    ax.set_ylabel(f"|{data.label}| [{data.gain_unit}]", fontsize=8.5)
+    for each in (ax.legend(), *ax.texts, *ax.child_axes):
+        each.set_visible(False)
 
 
 def draw_magnitude(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
@@ -199,15 +197,16 @@ def draw_loops(each: Mapping[str, tuple[Real, Complex]], upper: Axes, lower: Axe
     hertz_axis(upper, 1.0)
 
 
-def draw_loop(found: Margins, name: str) -> Figure:
+@picture(
+    size=(9.0, 5.8), rows=(1.5, 1.0),
+    title=lambda found, name: f"{found.stability.loop.arm.name}: the loop function L(iω) of {name}",
+)  # fmt: skip
+def draw_loop(found: Margins, name: str, *, ax: Sequence[Axes]) -> None:
     """|L| above the phase from -180 to 180 deg; |L| = 1 and L < 0 marked where they are crossed."""
     omega, L = loop_curve(found)
-    title = f"{found.stability.loop.arm.name}: the loop function L(iω) of {name}"
-    with page(9.0, 5.8, title, nrows=2, sharex=True, height_ratios=[1.5, 1.0]) as (figure, (upper, lower)):
-        draw_loops({name: (omega, L)}, upper, lower)
-        if found.in_band is not None:
-            _mark_margins(found.in_band, omega, upper, lower)
-    return figure
+    draw_loops({name: (omega, L)}, *ax)
+    if found.in_band is not None:
+        _mark_margins(found.in_band, omega, *ax)
 
 
 def _mark_margins(margins: LoopMargins, omega: Real, upper: Axes, lower: Axes) -> None:
@@ -261,14 +260,14 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     ax.set_title(lines, fontsize=9.0, loc="center")
 
 
-def draw_nyquist(title: str, plots: Mapping[str, Nyquist]) -> Figure:
-    """One disc a controller, of at most two, by name."""
-    band = significant(max(data.verdict.band for data in plots.values()), 5)
-    title = f"{title}: the loop function L(iω) up to {band} rad/s"
-    with page(9.0 if len(plots) > 1 else 5.6, 5.3, title, ncols=len(plots), squeeze=False) as (figure, axes):
-        for ax, (name, data) in zip(axes[0], plots.items(), strict=True):
-            nyquist(data, ax=ax, name=name)
-    return figure
+@picture(
+    size=(5.6, 5.3),
+    title=lambda data, _: f"{data.verdict.loop.arm.name}: the loop function L(iω) up to "
+                          f"{significant(data.verdict.band, 5)} rad/s",
+)  # fmt: skip
+def draw_nyquist(data: Nyquist, name: str, *, ax: Axes) -> None:
+    """The disc of a controller, for its page."""
+    nyquist(data, ax=ax, name=name)
 
 
 def _curve(data: Nyquist, ax: Axes) -> None:
@@ -359,35 +358,39 @@ def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
         upper.set(title=one.label, xlabel="", ylabel=f"magnitude [{one.unit}]")
 
 
-def draw_band(those: Possible, output: str) -> Figure:
+@picture(
+    size=(9.0, 4.6),
+    title=lambda those, output: f"{those.fit.before.name}: {signal_words(output)[0]} of the arms "
+                                "that the data leave possible",
+)  # fmt: skip
+def draw_band(those: Possible, output: str, *, ax: Axes) -> None:
     """Magnitude of a response of the arm that fits best, in the band of all arms that the data leave possible."""
     ends = [end for each in those.fit.responses for end in each.omega[[0, -1]]]
     omega = np.geomspace(min(ends), max(ends), 800)  # about one to a pixel
     least, most, best = response_band(those, output, omega)
     name, unit = signal_words(output)
-    unit = unit_over(unit, those.fit.arm.input_unit)
-    with page(9.0, 4.6, f"{those.fit.before.name}: {name} of the arms that the data leave possible") as (figure, ax):
-        label = f"all of {len(those.arms)} arms that the data leave possible"
-        ax.fill_between(omega / RAD_PER_CYCLE, least, most, color=BLUE, alpha=0.3, lw=0, label=label)
-        ax.plot(omega / RAD_PER_CYCLE, best, color=BLUE, lw=1.3, label="the arm that fits best")
-        ax.set(xscale="log", yscale="log", xlabel=FREQUENCY_HZ, ylabel=f"|{name}| [{unit}]")
-        plain_ticks(ax.xaxis, subs=TICKS_A_DECADE)
-    return figure
+    label = f"all of {len(those.arms)} arms that the data leave possible"
+    ax.fill_between(omega / RAD_PER_CYCLE, least, most, color=BLUE, alpha=0.3, lw=0, label=label)
+    ax.plot(omega / RAD_PER_CYCLE, best, color=BLUE, lw=1.3, label="the arm that fits best")
+    ax.set(xscale="log", yscale="log", xlabel=FREQUENCY_HZ)
+    ax.set_ylabel(f"|{name}| [{unit_over(unit, those.fit.arm.input_unit)}]")
+    plain_ticks(ax.xaxis, subs=TICKS_A_DECADE)
 
 
-def draw_share(those: Possible, ranges: Sequence[tuple[float, float]]) -> Figure:
+@picture(
+    size=(8.0, 5.0),
+    title=lambda those, _: f"{those.fit.before.name}: stabilising gains for the arms that the data leave possible",
+)  # fmt: skip
+def draw_share(those: Possible, ranges: Sequence[tuple[float, float]], *, ax: Axes) -> None:
     """The share of the possible arms that each pair of gains stabilises in continuous time; `ranges` of both gains."""
     across, up = (np.linspace(*ends, 60) for ends in ranges)
-    title = f"{those.fit.before.name}: stabilising gains for the arms that the data leave possible"
-    with page(8.0, 5.0, title) as (figure, ax):
-        mesh = ax.pcolormesh(
-            across, up, share_stable(those, across, up), cmap="Blues", vmin=0.0, vmax=1.0, shading="nearest",
-            rasterized=True,
-        )  # fmt: skip
-        figure.colorbar(mesh, ax=ax).set_label("share of the arms with a stable loop [−]")
-        name_axes(PLANE, those.fit.arm, HubFeedback(), ax)
-        ax.grid(False)
-    return figure
+    mesh = ax.pcolormesh(
+        across, up, share_stable(those, across, up), cmap="Blues", vmin=0.0, vmax=1.0, shading="nearest",
+        rasterized=True,
+    )  # fmt: skip
+    ax.figure.colorbar(mesh, ax=ax).set_label("share of the arms with a stable loop [−]")
+    name_axes(PLANE, those.fit.arm, HubFeedback(), ax)
+    ax.grid(False)
 
 
 @picture(

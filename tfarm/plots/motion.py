@@ -103,22 +103,21 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
             one.set(xlabel=ALONG, ylabel=DISPLACEMENT)
 
 
-def draw_differences(name: str, differences: Mapping[str, Real]) -> Figure:
+@picture(
+    size=(9.0, 3.6), title=lambda name, _: f"{name}: simpler beam theories against the Timoshenko theory",
+)  # fmt: skip
+def draw_differences(name: str, differences: Mapping[str, Real], *, ax: Axes) -> None:
     """How far each simpler theory's frequencies lie above the Timoshenko theory's [%], mode by mode."""
     looks = {"euler-bernoulli": (ORANGE, "s"), "rayleigh": (PURPLE, "D"), "shear": (GREEN, "o")}
-    with page(9.0, 3.6, f"{name}: simpler beam theories against the Timoshenko theory") as (figure, ax):
-        for theory, values in differences.items():
-            color, marker = looks[theory]
-            ax.plot(
-                np.arange(1, len(values) + 1), values, marker=marker, ms=5, lw=1.2, color=color,
-                label=theory_name(theory),
-            )  # fmt: skip
-        if all((values > 0).all() for values in differences.values()):
-            ax.set_yscale("log")
-            plain_ticks(ax.yaxis)
-        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-        ax.set(xlabel="mode number", ylabel="frequency above Timoshenko's [%]")
-    return figure
+    for theory, values in differences.items():
+        color, marker = looks[theory]
+        number = np.arange(1, len(values) + 1)
+        ax.plot(number, values, marker=marker, ms=5, lw=1.2, color=color, label=theory_name(theory))
+    if all((values > 0).all() for values in differences.values()):
+        ax.set_yscale("log")
+        plain_ticks(ax.yaxis)
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.set(xlabel="mode number", ylabel="frequency above Timoshenko's [%]")
 
 
 def theory_name(theory: str) -> str:
@@ -289,40 +288,42 @@ def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     ax.set(xlim=(0.0, float(result.t[-1])), xlabel=TIME, ylabel=f"gain on the root moment, {MOMENT_GAIN} [−]")
 
 
-def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap]) -> Figure:
+@picture(
+    size=(9.0, 5.2),
+    title=lambda tuning, *_: f"{tuning.trial.arm.name}: the tuner's gain, and where it is proven stable",
+    grid=lambda figure, *_: figure.subplots(1, 2, sharey=True, width_ratios=[1.0, 1.35]),
+)  # fmt: skip
+def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, ax: Sequence[Axes]) -> None:
     """Left the map with the guard as a bar and in it the gains that the tuner takes, right the gain over time."""
-    title = f"{tuning.trial.arm.name}: the tuner's gain, and where it is proven stable"
-    with page(9.0, 5.2, title, ncols=2, sharey=True, width_ratios=[1.0, 1.35]) as (figure, (left, right)):
-        overlay(continuous, sampled, ax=left)
-        left.set_title("", loc="right")
-        left.lines[-1].remove()  # the mark of one controller: the bar is at its rate gain
-        guard, K = tuning.training.guard, tuning.training.result.K
-        at, _ = tuning.trial.loop.gains.point
-        for (low, high), looks in (
-            ((guard.lo, guard.hi), {"color": GREEN, "lw": 9, "alpha": 0.75}),
-            ((float(K.min()), float(K.max())), {"color": INK, "lw": 2.4}),
-        ):
-            left.plot([at, at], [low, high], solid_capstyle="butt", zorder=6, **looks)
-        tuned_gain(tuning, ax=right)
-        left.set_ylim(-0.25, 1.25)  # from 0 to the continuous loop's bound, 1, and a quarter to either side
-        right.set_ylabel("")
-    return figure
+    left, right = ax
+    overlay(continuous, sampled, ax=left)
+    left.set_title("", loc="right")
+    left.lines[-1].remove()  # the mark of one controller: the bar is at its rate gain
+    guard, K = tuning.training.guard, tuning.training.result.K
+    at, _ = tuning.trial.loop.gains.point
+    for ends, colour, width, alpha in ((guard.lo, guard.hi), GREEN, 9, 0.75), ((K.min(), K.max()), INK, 2.4, None):
+        left.plot([at, at], ends, solid_capstyle="butt", zorder=6, color=colour, lw=width, alpha=alpha)
+    tuned_gain(tuning, ax=right)
+    left.set_ylim(-0.25, 1.25)  # from 0 to the continuous loop's bound, 1, and a quarter to either side
+    right.set_ylabel("")
 
 
-def draw_curves(curves: LearningCurves, tuning: Tuning) -> Figure:
+@picture(
+    size=(9.0, 4.4),
+    title=lambda curves, tuning: f"{tuning.trial.arm.name}: learning, {how_many(curves.seeds, 'seed')}",
+)  # fmt: skip
+def draw_curves(curves: LearningCurves, tuning: Tuning, *, ax: Axes) -> None:
     """Learning curves: each seed, median and quartiles, and the baselines; diverged ones leave through the top."""
-    trial, seeds = np.arange(1, curves.costs.shape[1] + 1), len(curves.costs)
+    trial = np.arange(1, curves.costs.shape[1] + 1)
     top = 1.25 * tuning.without.cost  # higher costs are drawn at the top edge
     low, middle, high = (np.minimum(curves.quantile(share), 2 * top) for share in QUARTILES)
-    with page(9.0, 4.4, f"{tuning.trial.arm.name}: learning, {how_many(seeds, 'seed')}") as (figure, ax):
-        ax.plot(trial, np.minimum(curves.costs, 2 * top).T, color="#b9b9b9", lw=0.6, zorder=1)
-        ax.fill_between(trial, low, high, color=BLUE, alpha=0.22, lw=0, zorder=2, label="middle half of the seeds")
-        ax.plot(trial, middle, color=BLUE, lw=1.8, zorder=3, label="median")
-        for cost, colour, label in (
-            (tuning.without.cost, ORANGE, "no moment feedback"),
-            (tuning.best_constant.cost, PURPLE, "best constant gain"),
-            (tuning.bound.cost, INK, "linear-quadratic optimum: lower bound"),
-        ):
-            ax.axhline(cost, color=colour, lw=1.2, ls=LONG_DASHED, zorder=2.5, label=f"{label}, {significant(cost, 3)}")
-        ax.set(xlim=(1, max(2, trial[-1])), xlabel="trial number", ylim=(0.0, top), ylabel="cost of a trial [−]")
-    return figure
+    ax.plot(trial, np.minimum(curves.costs, 2 * top).T, color="#b9b9b9", lw=0.6, zorder=1)
+    ax.fill_between(trial, low, high, color=BLUE, alpha=0.22, lw=0, zorder=2, label="middle half of the seeds")
+    ax.plot(trial, middle, color=BLUE, lw=1.8, zorder=3, label="median")
+    for cost, colour, label in (
+        (tuning.without.cost, ORANGE, "no moment feedback"),
+        (tuning.best_constant.cost, PURPLE, "best constant gain"),
+        (tuning.bound.cost, INK, "linear-quadratic optimum: lower bound"),
+    ):
+        ax.axhline(cost, color=colour, lw=1.2, ls=LONG_DASHED, zorder=2.5, label=f"{label}, {significant(cost, 3)}")
+    ax.set(xlim=(1, max(2, trial[-1])), xlabel="trial number", ylim=(0.0, top), ylabel="cost of a trial [−]")

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
@@ -17,7 +16,7 @@ from tfarm.errors import one_line
 from tfarm.loop.loci import POLE_DIGITS, Loci, ReducedLocus, held_branches
 from tfarm.loop.locus import CONTROLLER, OTHER, Locus, frame, origin_name, rounded
 
-from .style import BLUE, FIGURES, GREEN, GREY, INK, ORANGE, PURPLE, gains_words, page, picture
+from .style import BLUE, FIGURES, GREEN, GREY, INK, ORANGE, PURPLE, gains_words, picture
 
 MODE_COLOURS = (INK, BLUE, GREEN, PURPLE, "#7a5a00", "#d81b60", "#1a9ec0", "#6d9b1f")  # one a mode, none twice
 OTHER_COLOURS = {CONTROLLER: "#5b7083", OTHER: "#c48a9a"}
@@ -35,23 +34,24 @@ def zoomed(exact: Locus) -> list[int]:
     return [first[number] for number in sorted(first)][:4]
 
 
-def draw_loci(data: Loci) -> Figure:
+@picture(
+    size=(9.0, 5.8), title=lambda data: _title(data.exact),
+    grid=lambda figure, _: figure.subplot_mosaic("AABC;AADE", width_ratios=[1.7, 1.7, 1.3, 1.3]),
+)  # fmt: skip
+def draw_loci(data: Loci, *, ax: Sequence[Axes]) -> None:
     """All branches in one panel, and each mode enlarged in one of its own."""
     exact, fine, chosen = data.exact, rounded(data.exact), zoomed(data.exact)
-    grid: dict[str, Any] = {"mosaic": "AABC;AADE", "width_ratios": [1.7, 1.7, 1.3, 1.3]}
-    with page(9.0, 5.8, _title(exact), make=Figure.subplot_mosaic, **grid) as (figure, axes):
-        whole, *panels = axes.values()
-        _panel(fine, exact, data.reduced, range(len(exact.branches)), whole)
-        whole.set_title("all branches", fontsize=9.0)
-        for n, ax in zip(chosen, panels, strict=False):
-            _panel(fine, exact, data.reduced, [n], ax)
-            ax.set_title(_mode_looks(exact, n)["label"], fontsize=9.0)
-            ax.tick_params(labelsize=7.0)
-            ax.xaxis.label.set_size(8.0)
-            ax.yaxis.label.set_size(8.0)
-        for ax in panels[len(chosen) :]:
-            ax.remove()
-    return figure
+    whole, *panels = ax
+    _panel(fine, exact, data.reduced, range(len(exact.branches)), whole)
+    whole.set_title("all branches", fontsize=9.0)
+    for n, one in zip(chosen, panels, strict=False):
+        _panel(fine, exact, data.reduced, [n], one)
+        one.set_title(_mode_looks(exact, n)["label"], fontsize=9.0)
+        one.tick_params(labelsize=7.0)
+        one.xaxis.label.set_fontsize(8.0)
+        one.yaxis.label.set_fontsize(8.0)
+    for one in panels[len(chosen) :]:
+        one.remove()
 
 
 def _title(exact: Locus, *_: object) -> str:
@@ -127,13 +127,16 @@ def locus(exact: Locus, reduced: ReducedLocus | None = None, *, ax: Axes) -> Non
 FIGURES[Loci] = lambda data: locus.figure(data.exact, data.reduced)
 
 
-def draw_sampled_loci(data: SampledLoci) -> Figure:
+def _z_title(data: SampledLoci) -> str:
+    ms = plain(1e3 * data.loop.chain.sampling.period)
+    return f"{data.loop.plant.arm.name}: poles of the loop sampled every {ms} ms"
+
+
+@picture(size=(9.0, 3.6), title=_z_title, grid=lambda figure, _: figure.subplots(1, 2))
+def draw_sampled_loci(data: SampledLoci, *, ax: Sequence[Axes]) -> None:
     """The z-plane with the locus along each gain."""
-    arm, ms = data.loop.plant.arm.name, plain(1e3 * data.loop.chain.sampling.period)
-    with page(9.0, 3.6, f"{arm}: poles of the loop sampled every {ms} ms", ncols=2) as (figure, axes):
-        for along, ax in zip(data.by.values(), axes, strict=True):
-            _z_plane(data, along, ax)
-    return figure
+    for along, one in zip(data.by.values(), ax, strict=True):
+        _z_plane(data, along, one)
 
 
 def _z_plane(data: SampledLoci, along: SampledLocus, ax: Axes) -> None:

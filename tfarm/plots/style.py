@@ -19,7 +19,7 @@ from typing import Any, get_args
 
 import matplotlib.style
 import numpy as np
-from matplotlib.axes import Axes
+from matplotlib.axes import Axes as Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure as Figure  # which pages name too
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -98,7 +98,7 @@ def picture(
     ----------
     of
         Class of each record, and its origin ("tfarm.bode returns"): other objects are refused by ParameterError.  Of
-        several records, in a list or by name, each is checked.
+        several records, in a list or by name, each is checked.  A picture of a page alone has none.
     title
         A function of the records: the headline of that figure.
     size

@@ -14,8 +14,9 @@ from tfarm.arm.schema import file_key
 from tfarm.audit.assumptions import Study, has_hub_inertia, hub_study, section_study
 from tfarm.digits import fixed, plain, significant, singly, unit
 from tfarm.dsp.chain import file_text
+from tfarm.plots import style
 from tfarm.plots.motion import sketch
-from tfarm.plots.style import COLOURS, GREY, Figure, page
+from tfarm.plots.style import COLOURS, GREY, Axes
 from tfarm.report.cases import Case
 from tfarm.report.sections import Fact, PageSection, Picture, picture, prose, sheet
 from tfarm.schema import Column, Quantity, Table, table
@@ -197,7 +198,7 @@ def assumptions_section(case: Case) -> PageSection:
 def candidate_blocks(study: Study, kind: str, label: str) -> Iterator[Picture | Table]:
     """Natural frequencies over the candidates as a picture, and with the sensitivities, a column a mode, as a table."""
     stem, rows = f"{kind.replace('_', '-')}-frequencies", study.candidates
-    yield picture("assumed_frequencies", draw_candidates(study, label), stem=stem, label=label,
+    yield picture("assumed_frequencies", draw_candidates.figure(study, label), stem=stem, label=label,
                   omega=study.natural_frequency)  # fmt: skip
     own = ("is_own", "depth", "width", "second_moment", "hub_inertia")
     columns = (
@@ -211,13 +212,15 @@ def candidate_blocks(study: Study, kind: str, label: str) -> Iterator[Picture | 
     yield sheet(kind, columns, study=study)
 
 
-def draw_candidates(study: Study, label: str) -> Figure:
+@style.picture(
+    size=(9.0, 4.6),
+    title=lambda study, label: f"{study.arm.name}: natural frequencies over the {label.partition(' [')[0]}",
+)  # fmt: skip
+def draw_candidates(study: Study, label: str, *, ax: Axes) -> None:
     """Natural frequencies over the candidates of an assumed parameter, both axes logarithmic; the arm's own filled."""
     own = study.is_own
-    with page(9.0, 4.6, f"{study.arm.name}: natural frequencies over the {label.partition(' [')[0]}") as (figure, ax):
-        ax.axvline(study.values[own][0], color=GREY, lw=1.0, ls=(0, (4, 3)))
-        for number, (colour, omega) in enumerate(zip(COLOURS, study.natural_frequency.T, strict=False), 1):
-            ax.plot(study.values, omega, "o-", color=colour, mfc="white", label=f"mode {number}")
-            ax.plot(study.values[own], omega[own], "o", color=colour, ms=7.0, zorder=4)
-        ax.set(xscale="log", yscale="log", xlabel=label, ylabel="natural frequency [rad/s]")
-    return figure
+    ax.axvline(study.values[own][0], color=GREY, lw=1.0, ls=(0, (4, 3)))
+    for number, (colour, omega) in enumerate(zip(COLOURS, study.natural_frequency.T, strict=False), 1):
+        ax.plot(study.values, omega, "o-", color=colour, mfc="white", label=f"mode {number}")
+        ax.plot(study.values[own], omega[own], "o", color=colour, ms=7.0, zorder=4)
+    ax.set(xscale="log", yscale="log", xlabel=label, ylabel="natural frequency [rad/s]")

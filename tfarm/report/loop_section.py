@@ -21,6 +21,7 @@ from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import ConvergenceError, TfarmError
 from tfarm.loop import loci, loop, margins, nyquist, plane, poles, stability
 from tfarm.plots import frequency, regions, roots, style
+from tfarm.plots.style import Axes
 from tfarm.records import record
 from tfarm.report.cases import DESIGNED_MODES, Case, Controller, best, brief_on, has_loop, margins_of
 from tfarm.report.sections import Fact, PageSection, Picture, picture, prose, sheet, upper
@@ -81,7 +82,7 @@ def margin_table(found: Sequence[tuple[Controller, margins.Margins]]) -> Table:
 def _bode_picture(each: Controller, found: margins.Margins) -> Picture:
     omega, L = margins.loop_curve(found)
     columns = Column("omega_rad_s", of=omega), Column("re_L", of=L.real), Column("im_L", of=L.imag)
-    figure, stem = frequency.draw_loop(found, each.name), each.stem("bode")
+    figure, stem = frequency.draw_loop.figure(found, each.name), each.stem("bode")
     return picture("loop_function", figure, stem=stem, data=columns, each=each, found=found)
 
 
@@ -101,7 +102,7 @@ def nyquist_section(case: Case) -> PageSection:
     plots = [(each, nyquist.nyquist_of(margins_of(each.arm, each.law).stability)) for each in case.in_s]
     own = any(found.unstable_open for _, found in plots)
     blocks: list[Picture | Table] = [
-        picture("nyquist_plot", frequency.draw_nyquist(case.arm.name, {each.name: found}), stem=each.stem("nyquist"),
+        picture("nyquist_plot", frequency.draw_nyquist.figure(found, each.name), stem=each.stem("nyquist"),
                 data=curve_table(found), each=each, found=found)
         for each, found in plots
     ]  # fmt: skip
@@ -247,24 +248,25 @@ def damping_over(arm: Arm, across: Real, up: Real) -> Real:
     return np.concatenate([judge.damping_of(model, model.poles(law)) for law in laws]).reshape(up.size, across.size)
 
 
-def draw_map_of_arm(data: MapOfArm) -> style.Figure:
+@style.picture(
+    size=(9.0, 6.2), title=lambda data: f"{data.case.arm.name}: stability region of both gains",
+)  # fmt: skip
+def draw_map_of_arm(data: MapOfArm, *, ax: Axes) -> None:
     """Both gains: the count, its boundary, the damping, the sampled region, Lyapunov's frame, and the laws."""
     case, found, x, y = data.case, data.region, data.x, data.y
     designed = best(case.arm, case.chain)
-    with style.page(9.0, 6.2, f"{case.arm.name}: stability region of both gains") as (figure, ax):
-        regions.ground(found, x, y, ax)
-        regions.contours(*data.axes, np.where(data.counts == 0, data.damping, np.nan), ax)
-        regions.draw_boundary(found, data.edge, x, y, ax)
-        regions.draw_sampled(data.sampled, ax)
-        if case.arm.is_uniform:
-            regions.draw_proven(case.arm, x, y, ax)
-        points = (default_gains(case.arm), *([] if designed is None else [designed.law]))
-        for each, gains in zip(case.in_s, points, strict=True):
-            brief = brief_on(case.arm, each.law, case.chain)
-            regions.law_mark(gains, each.key == "best", f"{each.title};\n{brief.short}", ax)
-        if designed is not None:
-            regions.search_frame(designed.bounds, ax)
-    return figure
+    regions.ground(found, x, y, ax)
+    regions.contours(*data.axes, np.where(data.counts == 0, data.damping, np.nan), ax)
+    regions.draw_boundary(found, data.edge, x, y, ax)
+    regions.draw_sampled(data.sampled, ax)
+    if case.arm.is_uniform:
+        regions.draw_proven(case.arm, x, y, ax)
+    points = (default_gains(case.arm), *([] if designed is None else [designed.law]))
+    for each, gains in zip(case.in_s, points, strict=True):
+        brief = brief_on(case.arm, each.law, case.chain)
+        regions.law_mark(gains, each.key == "best", f"{each.title};\n{brief.short}", ax)
+    if designed is not None:
+        regions.search_frame(designed.bounds, ax)
 
 
 def map_data(data: MapOfArm) -> Sequence[Column]:
@@ -289,7 +291,8 @@ def map_section(case: Case) -> PageSection:
     """The stability regions of both gains, continuous and sampled, and the gains that damp best."""
     arm, data, found = case.arm, map_of_arm(case), best(case.arm, case.chain)
     drawn = picture(
-        "map", draw_map_of_arm(data), data=map_data(data), found=data, arm=arm, band=loop.band_of(arm, DESIGNED_MODES),
+        "map", draw_map_of_arm.figure(data), data=map_data(data), found=data, arm=arm,
+        band=loop.band_of(arm, DESIGNED_MODES),
         unit=f"{plain(rate_unit(arm), 4)} {unit_of(RATE_GAIN, arm)}",
         deepest=plane.DEEPEST_MOMENT_GAIN * arm.input_per_torque,
     )  # fmt: skip
@@ -361,7 +364,7 @@ def locus_section(case: Case) -> PageSection:
 def locus_blocks(data: loci.Loci) -> Iterator[Picture | Table]:
     """The picture of a locus, its branches, and their crossings of the imaginary axis."""
     stem = f"locus-{data.name}"
-    yield picture("locus", roots.draw_loci(data), stem=stem, data=locus_data(data), found=data)
+    yield picture("locus", roots.draw_loci.figure(data), stem=stem, data=locus_data(data), found=data)
     yield sheet("branches", table(data.rows), stem=f"{stem}-branches", found=data)
     yield sheet("crossings", table(data.exact.crossings), stem=f"{stem}-crossings", found=data)
 

@@ -209,7 +209,7 @@ def theories(arm: Arm) -> tuple[Table, Picture]:
     )  # fmt: skip
     return (
         sheet("theories", columns, worst=differences["euler-bernoulli"]),
-        picture("theory_differences", motion.draw_differences(arm.name, dict(reversed(differences.items()))),
+        picture("theory_differences", motion.draw_differences.figure(arm.name, dict(reversed(differences.items()))),
                 differences=named),
     )  # fmt: skip
 
@@ -316,10 +316,10 @@ class MarginSpan(NamedTuple):
 def _of_all_arms(those: Possible, every: list[Margins]) -> Iterator[Picture | Table]:
     """The band of a response, and of an arm with a loop the share of arms over its gains, and the margins over all."""
     if those.fit.responses:
-        yield picture("fit_band", frequency.draw_band(those, "root_moment"), arms=those.arms)
+        yield picture("fit_band", frequency.draw_band.figure(those, "root_moment"), arms=those.arms)
     if not every:
         return
-    yield picture("fit_map", frequency.draw_share(those, ranges_of(those.fit.arm)))
+    yield picture("fit_map", frequency.draw_share.figure(those, ranges_of(those.fit.arm)))
     stable = [each for each in every if each.in_band is not None]
     ends = (each.windows[MOMENT_GAIN].around for each in stable)
     found = {(f"{MOMENT_GAIN} up to", ""): [pair[1] for pair in ends if pair is not None]}

@@ -146,7 +146,7 @@ def loci_picture(found: Analysis) -> Picture:
     loci = modes.sampled_loci(loop, top, (-0.5, 1.5))
     aliased = int((found.modes.band > 0).sum())
     return picture(
-        "sampled_loci", roots.draw_sampled_loci(loci), data=loci_data(loci), half=loci.half_rate, aliased=aliased
+        "sampled_loci", roots.draw_sampled_loci.figure(loci), data=loci_data(loci), half=loci.half_rate, aliased=aliased
     )
 
 

@@ -243,7 +243,7 @@ def _gain_picture(data: TunerNumbers) -> Picture:
     plane = regions.stable_regions(data.arm, tuning.constant, tuning.trial.loop.chain)
     columns = Column("t_s", of=result.t), Column("K", of=result.K), Column("x_N_m", of=result.x)
     gain = tuning.constant.gain_text(RATE_GAIN, plain)
-    return picture("tune_gain", motion.draw_gain(tuning, *plane), data=columns, tuning=tuning, gain=gain)
+    return picture("tune_gain", motion.draw_gain.figure(tuning, *plane), data=columns, tuning=tuning, gain=gain)
 
 
 def slew_pictures(data: TunerNumbers) -> Iterator[Picture]:
@@ -264,4 +264,4 @@ def _curves_picture(data: TunerNumbers) -> Picture:
         *(Column(name, of=costs) for name, costs in curves.quartile_curves.items()),
         *(Column(f"seed_{seed}", of=costs) for seed, costs in enumerate(curves.costs)),
     )
-    return picture("tune_curves", motion.draw_curves(curves, data.tuning), data=columns, curves=curves)
+    return picture("tune_curves", motion.draw_curves.figure(curves, data.tuning), data=columns, curves=curves)

@@ -448,7 +448,7 @@ def save_card(case: Case, folder: Path) -> None:
     (folder / PICTURES).mkdir(exist_ok=True)
     arm, picture = case.arm, ""
     with suppress(TfarmError):
-        save_figure(draw_card(bode(arm, "root_moment")), folder / PICTURES, "card", formats=("svg",))
+        save_figure(draw_card.figure(bode(arm, "root_moment")), folder / PICTURES, "card", formats=("svg",))
         picture = "card.svg"
     loops = [loop_cells(each, case.chain) for each in case.controllers if case.laws or has_loop(arm)]
     facts = list(headline_numbers(arm)[:4])
