@@ -116,7 +116,7 @@ def picture(
             made = above if grid is None else {"make": lambda figure: grid(figure, *found)}
             with page(width, height, title(*found), new, **made) as (drawn, _):
                 draw(*found, ax=drawn.axes[0] if is_one else drawn.axes, **how)
-                for ax in drawn.axes[:-1] if grid is None else []:
+                for ax in drawn.axes[: len(rows) - 1] if grid is None else []:
                     ax.set_xlabel("")
             return drawn
 
