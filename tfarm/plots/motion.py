@@ -40,7 +40,6 @@ from .style import (
     ORANGE,
     PURPLE,
     by_name,
-    page,
     picture,
     plain_ticks,
     safe,
@@ -249,27 +248,33 @@ def _draw_curve(curve: TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, 
         ax.plot(curve.t, low, color=colour, lw=1.3, **looks)
 
 
-def draw_measured_runs(title: str, each: Mapping[str, RunComparison]) -> Figure:
+def _measured_rows(each: Mapping[str, RunComparison]) -> int:
+    return 1 + any(found.measured.root_moment.size for found in each.values())
+
+
+@picture(
+    size=lambda each: (max(4.7 * len(each), 6.0), 6.0 if _measured_rows(each) > 1 else 3.6),
+    title=lambda _: "Measured steps, and the exact sampled loop",
+    grid=lambda figure, each: figure.subplots(_measured_rows(each), len(each), sharex="col", sharey="row"),
+)  # fmt: skip
+def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes]) -> None:
     """A column a controller: hub angle above, root moment below where it was measured."""
-    moment = any(found.measured.root_moment.size for found in each.values())
-    grid: dict[str, Any] = {"nrows": 1 + moment, "ncols": len(each), "sharex": "col", "sharey": "row", "squeeze": False}
-    with page(max(4.7 * len(each), 6.0), 6.0 if moment else 3.6, title, **grid) as (figure, axes):
-        for column, (name, found) in zip(axes.T, each.items(), strict=True):
-            measured, run = found.measured, found.run
-            column[0].plot(measured.t, np.degrees(measured.reference), color=GREY, lw=1.0, ls=DASHED, label="reference")
-            column[0].set(title=safe(name), xlim=(0.0, float(measured.t[-1])))
-            column[-1].set_xlabel(TIME)
-            signals = (
-                (np.degrees(measured.hub_angle), np.degrees(found.hub_angle)),
-                (measured.root_moment, run.at_samples.root_moment),
-            )
-            for ax, (seen, computed) in zip(column, signals, strict=False):
-                if seen.size:
-                    ax.plot(measured.t, seen, color=ORANGE, label="measured")
-                ax.plot(run.t, computed, color=BLUE, lw=1.2, label="exact sampled loop")
-        for ax, label in zip(axes[:, 0], ("hub angle [deg]", "root moment [N m]"), strict=False):
-            ax.set_ylabel(label)
-    return figure
+    axes = np.reshape(np.array(ax), (-1, len(each)))
+    for column, (name, found) in zip(axes.T, each.items(), strict=True):
+        measured, run = found.measured, found.run
+        column[0].plot(measured.t, np.degrees(measured.reference), color=GREY, lw=1.0, ls=DASHED, label="reference")
+        column[0].set(title=safe(name), xlim=(0.0, float(measured.t[-1])))
+        column[-1].set_xlabel(TIME)
+        signals = (
+            (np.degrees(measured.hub_angle), np.degrees(found.hub_angle)),
+            (measured.root_moment, run.at_samples.root_moment),
+        )
+        for one, (seen, computed) in zip(column, signals, strict=False):
+            if seen.size:
+                one.plot(measured.t, seen, color=ORANGE, label="measured")
+            one.plot(run.t, computed, color=BLUE, lw=1.2, label="exact sampled loop")
+    for one, label in zip(axes[:, 0], ("hub angle [deg]", "root moment [N m]"), strict=False):
+        one.set_ylabel(label)
 
 
 @picture(

@@ -12,7 +12,6 @@ import re
 import textwrap
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from functools import partial, wraps
 from pathlib import Path
 from typing import Any, get_args
@@ -61,19 +60,6 @@ STYLE = Path(__file__).with_name("tfarm.mplstyle")
 style = partial(matplotlib.style.context, ["default", STYLE])  # whatever the user's own settings are
 
 
-@contextmanager
-def page(
-    width: float, height: float, title: str, new: Callable[..., Figure] = Figure,
-    make: Callable[..., Any] = Figure.subplots, **grid: Any,
-) -> Iterator[tuple[Figure, Any]]:  # fmt: skip
-    """A figure of that size [inches] with the axes that `make` makes of `grid`; after drawing, legend and title."""
-    with style():
-        figure = new(figsize=(width, height), layout="constrained")  # so that no label is clipped
-        yield figure, make(figure, **grid)
-        legend_below(figure)
-        headline(figure, title)
-
-
 FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the class of a record the picture of it as a figure of its own
 
 
@@ -111,13 +97,17 @@ def picture(
         is_one = grid is None and len(rows) == 1
 
         def figure(*found: Any, new: Callable[..., Figure] = Figure, **how: Any) -> Figure:
-            width, height = size(*found) if callable(size) else size
-            above: dict[str, Any] = {"nrows": len(rows), "sharex": True, "height_ratios": rows}
-            made = above if grid is None else {"make": lambda figure: grid(figure, *found)}
-            with page(width, height, title(*found), new, **made) as (drawn, _):
+            with style():
+                drawn = new(figsize=size(*found) if callable(size) else size, layout="constrained")  # no label clipped
+                if grid is None:
+                    drawn.subplots(len(rows), sharex=True, height_ratios=rows)
+                else:
+                    grid(drawn, *found)
                 draw(*found, ax=drawn.axes[0] if is_one else drawn.axes, **how)
                 for ax in drawn.axes[: len(rows) - 1] if grid is None else []:
                     ax.set_xlabel("")
+                legend_below(drawn)
+                headline(drawn, title(*found))
             return drawn
 
         @wraps(draw)

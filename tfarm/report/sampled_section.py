@@ -320,7 +320,7 @@ def measured_blocks(case: Case) -> Iterator[Picture | Table]:
     found = {each.name: compare_run(each.arm, each.law, case.chain, run) for each, run in runs}
     if not found:
         return
-    figure = motion.draw_measured_runs("Measured steps, and the exact sampled loop", found)
+    figure = motion.draw_measured_runs.figure(found)
     columns = compared_data({each.key: found[each.name] for each, _ in runs})
     yield picture("sampled_measured", figure, data=columns, found=found)
     rows = [measured_step(name, it) for name, it in found.items() if it.measured.hub_angle.size]
