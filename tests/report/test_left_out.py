@@ -243,6 +243,16 @@ def test_work_that_fails_leaves_an_earlier_report_as_it_was(pages, tmp_path, mon
     assert files_of(out) == before
 
 
+def test_pages_are_moved_after_what_they_name(tmp_path, monkeypatch):
+    (tmp_path / "made" / "data").mkdir(parents=True)
+    for name in ("a.html", "data/x.csv"):
+        (tmp_path / "made" / name).touch()
+    moved = []
+    monkeypatch.setattr(writing.os, "replace", lambda _, place: moved.append(place.name))
+    writing.move_into(tmp_path / "made", tmp_path / "out")
+    assert moved == ["x.csv", "a.html"]
+
+
 def test_the_folder_of_an_arm_is_small(pages):
     """Four arms have 20 MB; this one is made on coarse grids."""
     assert sum(len(content) for content in files_of(pages / NAME).values()) < 4e6

@@ -300,6 +300,7 @@ def test_a_law_has_its_own_verdicts_and_nothing_of_the_default_gains(tmp_path, l
     assert row["verdict"] == tfarm.margins(LAB, law).stability.verdict == "stable"
     assert row["sampled"].lower() == f"{word} when sampled every 10 ms"
     assert row["sampled"].startswith("UNSTABLE") == (law is FAST)
+    assert f">{row['sampled']}</td>" in page
     assert not {"K1", "K2"} & row.keys()
     assert law.name in page
     assert "K1 = 0.3" not in page
