@@ -173,7 +173,7 @@ def test_the_page_shows_verdicts_in_words_and_formulas_as_mathml(page):
     assert 'href="#eq-8"' in page
     assert "A*G*Φ<sub>x</sub>*κ" in page  # the residual of (8) as printed
     assert page.count('class="claim"') == len(CHEAP)
-    assert page.count("printed, and used here") == page.count('✓ right as printed</span></h3>') > 0
+    assert page.count("printed, and used here") == page.count("✓ right as printed</span></h3>") > 0
 
 
 def test_long_tables_and_claims_are_folded_below_their_answers(page):
