@@ -25,8 +25,8 @@ from tests.shared import once
 from tfarm.dsp import load_chain
 from tfarm.fitting.fit import fit
 from tfarm.report import write, writing
-from tfarm.report.cases import Case, GivenLaw
 from tfarm.report.live import ASSETS, save_live, write_assets
+from tfarm.report.page import Case, GivenLaw
 from tfarm.report.writing import PIECES, pieces_of, write_comparison
 
 LAB = replace(tfarm.load("sasaki2012-lab"), name=NAME, assumptions=ARM.assumptions)

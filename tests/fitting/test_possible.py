@@ -13,7 +13,7 @@ from tests.fitting.test_fit import LAB, PAIRS, measured
 from tests.shared import thinned
 from tfarm.dsp import Chain
 from tfarm.fitting.fit import fit, possible, repeats, response_band, share_stable
-from tfarm.report.cases import Case
+from tfarm.report.page import Case
 from tfarm.report.response_sections import fit_section
 from tfarm.spectrum.table import default_gains
 

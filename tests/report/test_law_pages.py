@@ -21,8 +21,8 @@ from tfarm.dsp.sampled import sampled_loop
 from tfarm.errors import one_line
 from tfarm.fitting.recording import compare_run, load_run, overshoot
 from tfarm.report import writing
-from tfarm.report.cases import Case, GivenLaw
 from tfarm.report.loop_section import law_section, margins_section
+from tfarm.report.page import Case, GivenLaw
 from tfarm.report.sampled_section import measured_step, sampled_section
 from tfarm.report.writing import PIECES, file_of, pieces_of
 from tfarm.schema import to_json

@@ -22,10 +22,9 @@ from tfarm.cli import app as cli_app
 from tfarm.dsp import Chain, load_chain
 from tfarm.fitting.fit import fit
 from tfarm.report import write, writing
-from tfarm.report.cases import Case
 from tfarm.report.live import save_live
+from tfarm.report.page import Case, PageSection
 from tfarm.report.response_sections import fit_section
-from tfarm.report.sections import PageSection
 from tfarm.report.writing import PIECES, Piece, pieces_of
 
 

@@ -23,8 +23,8 @@ from tfarm.exact.system import system_of
 from tfarm.loop.loop import Loop
 from tfarm.loop.panels import MOST_MISS, loop_panels
 from tfarm.loop.stability import stability
-from tfarm.report.cases import Case
 from tfarm.report.live import live_data, save_live, sensor_numbers, slew_numbers
+from tfarm.report.page import Case
 
 SIGNALS = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
 ARMS = ("sasaki2012-lab", "stocky-steel", "quanser-flexlink")

@@ -23,9 +23,9 @@ from tfarm.loop.loop import band_of
 from tfarm.loop.nyquist import nyquist, nyquist_of
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
-from tfarm.report import cases, write, writing
 from tfarm.report import loop_section as map_room
-from tfarm.report.cases import DESIGNED_MODES, Case, brief_on, has_loop, margins_of, on_hub
+from tfarm.report import page as cases
+from tfarm.report import write, writing
 from tfarm.report.loop_section import (
     beyond_table,
     draw_map_of_arm,
@@ -36,7 +36,7 @@ from tfarm.report.loop_section import (
     margins_section,
     verdict_fact,
 )
-from tfarm.report.sections import prose
+from tfarm.report.page import DESIGNED_MODES, Case, brief_on, has_loop, margins_of, on_hub, prose
 from tfarm.spectrum.table import PAPER_GAINS, default_gains
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))

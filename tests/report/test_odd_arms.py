@@ -19,9 +19,9 @@ from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus
 from tfarm.loop.loop import Loop
 from tfarm.loop.poles import poles_below
-from tfarm.report import cases, loop_section
+from tfarm.report import loop_section
+from tfarm.report import page as cases
 from tfarm.report.arm_section import arm_section, assumptions_section, derived_table
-from tfarm.report.cases import Case, has_loop, on_hub
 from tfarm.report.loop_section import (
     beyond_table,
     edge_of_K2,
@@ -29,8 +29,8 @@ from tfarm.report.loop_section import (
     margin_table,
     margins_section,
 )
+from tfarm.report.page import Case, has_loop, on_hub, prose
 from tfarm.report.response_sections import bode_section, damped_tables, modal_table
-from tfarm.report.sections import prose
 from tfarm.report.writing import pieces_of
 from tfarm.spectrum import DampedModes
 from tfarm.spectrum.table import default_gains

@@ -20,9 +20,8 @@ from tfarm.loop.windows import windows_of
 from tfarm.plots import regions
 from tfarm.plots.regions import CUT_RANGE, K2_RANGE, draw_overlay, stable_regions
 from tfarm.report import sampled_section as page
-from tfarm.report.cases import Case
+from tfarm.report.page import Case, prose
 from tfarm.report.sampled_section import CURVE_DIGITS, sampled_section
-from tfarm.report.sections import prose
 from tfarm.spectrum.table import default_gains
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")

@@ -17,7 +17,7 @@ from tfarm.dsp import Chain, Sampling
 from tfarm.dsp.traces import away
 from tfarm.errors import CertificationError
 from tfarm.report import tuner_section as tuner_section_room
-from tfarm.report.cases import Case
+from tfarm.report.page import Case
 from tfarm.report.tuner_section import section_of, tuner_section
 from tfarm.schema.html import with_symbols
 from tfarm.tuner import Learning, LearningCurves, Plan, initial_network, train, tune

@@ -18,8 +18,7 @@ from tests.report.readme import PICTURES, write_pictures
 from tests.report.written import ARM, HELD, Links, coarsen, files_of, ids_of, links_of, plain_cards, validated
 from tfarm.dsp import Chain, load_chain
 from tfarm.report import write, writing
-from tfarm.report.cases import Case, GivenLaw
-from tfarm.report.sections import TEMPLATES, prose, sheet
+from tfarm.report.page import TEMPLATES, Case, GivenLaw, prose, sheet
 from tfarm.report.trust import write_trust, written_proofs
 from tfarm.report.writing import PIECES, Card, index_page, kept, pieces_of, save_card
 from tfarm.schema import Column

@@ -17,7 +17,7 @@ from tests.hostile import NAME
 from tests.report.written import ARM
 from tfarm.dsp import Chain
 from tfarm.report.arm_section import is_from_paper, paper_section
-from tfarm.report.cases import Case
+from tfarm.report.page import Case
 from tfarm.report.response_sections import sensitivity_table
 from tfarm.spectrum.table import default_gains
 

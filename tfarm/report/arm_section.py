@@ -17,8 +17,7 @@ from tfarm.dsp.chain import file_text
 from tfarm.plots import style
 from tfarm.plots.motion import sketch
 from tfarm.plots.style import COLOURS, GREY, Axes
-from tfarm.report.cases import Case
-from tfarm.report.sections import Fact, PageSection, Picture, picture, prose, sheet
+from tfarm.report.page import Case, Fact, PageSection, Picture, picture, prose, sheet
 from tfarm.schema import Column, Quantity, Table, table
 
 

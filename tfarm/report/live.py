@@ -30,8 +30,7 @@ from tfarm.loop.plane import gain_map, moment_axis, rate_axis, rate_columns
 from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots.regions import BEYOND_PICTURE, sampled_region
-from tfarm.report.cases import Case, argument, has_loop, is_preset, sign_words
-from tfarm.report.sections import TEMPLATES, render, write_text
+from tfarm.report.page import TEMPLATES, Case, argument, has_loop, is_preset, render, sign_words, write_text
 from tfarm.response import transfer
 from tfarm.spectrum.table import angle_unit, default_gains
 

@@ -23,8 +23,22 @@ from tfarm.loop import loci, loop, margins, nyquist, plane, poles, stability
 from tfarm.plots import frequency, regions, roots, style
 from tfarm.plots.style import Axes
 from tfarm.records import record
-from tfarm.report.cases import DESIGNED_MODES, Case, Controller, best, brief_on, has_loop, margins_of
-from tfarm.report.sections import Fact, PageSection, Picture, picture, prose, sheet, upper
+from tfarm.report.page import (
+    DESIGNED_MODES,
+    Case,
+    Controller,
+    Fact,
+    PageSection,
+    Picture,
+    best,
+    brief_on,
+    has_loop,
+    margins_of,
+    picture,
+    prose,
+    sheet,
+    upper,
+)
 from tfarm.response.signals import Signals, sign_convention
 from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table, text
 from tfarm.spectrum.table import default_gains, default_words, first_frequency, rate_unit

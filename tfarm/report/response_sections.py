@@ -22,8 +22,7 @@ from tfarm.loop.margins import Margins, margins
 from tfarm.loop.plane import ranges_of
 from tfarm.plots import frequency, motion
 from tfarm.plots.style import gains_words
-from tfarm.report.cases import Case, has_loop
-from tfarm.report.sections import PageSection, Picture, picture, prose, sheet, upper
+from tfarm.report.page import Case, PageSection, Picture, has_loop, picture, prose, sheet, upper
 from tfarm.response.frequency import AXIS_SHARE, Bode, bode
 from tfarm.schema import Column, Quantity, Table, curve_table, table
 from tfarm.spectrum import DampedModes, Modes, damped_modes, modes

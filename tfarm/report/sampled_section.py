@@ -19,8 +19,7 @@ from tfarm.dsp.chain import MOST_DELAY
 from tfarm.errors import ParameterError
 from tfarm.fitting.recording import RunComparison, compare_run, overshoot
 from tfarm.plots import motion, regions, roots, style
-from tfarm.report.cases import Case, Controller, margins_of, on_hub
-from tfarm.report.sections import Fact, PageSection, Picture, picture, prose, sheet
+from tfarm.report.page import Case, Controller, Fact, PageSection, Picture, margins_of, on_hub, picture, prose, sheet
 from tfarm.schema import Column, Quantity, Table, across, quantities, table, text, with_unit
 from tfarm.spectrum.table import default_gains
 

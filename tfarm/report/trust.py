@@ -29,7 +29,7 @@ from tfarm.dsp.chain import file_text
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.plots.style import gains_words
-from tfarm.report.cases import argument, has_loop
+from tfarm.report.page import DATA, PageSection, argument, has_loop, keep, kept, render, save_section, sheet, write_text
 from tfarm.report.response_sections import (
     BRACKET_DIGITS,
     PROVEN_DIGITS,
@@ -37,7 +37,6 @@ from tfarm.report.response_sections import (
     proven_damped_modes,
     proven_modes,
 )
-from tfarm.report.sections import DATA, PageSection, keep, kept, render, save_section, sheet, write_text
 from tfarm.response.frequency import BAND_POINTS, worst_error
 from tfarm.schema import Column, Quantity, Table, save_table, table
 from tfarm.schema.html import GREEK, LETTER

@@ -15,9 +15,8 @@ from tfarm.dsp import Chain, Simulation, results, scenarios, traces
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.plots import motion, regions
 from tfarm.records import record
-from tfarm.report.cases import Case, has_loop
+from tfarm.report.page import Case, Fact, PageSection, Picture, has_loop, picture, prose, sheet
 from tfarm.report.sampled_section import chain_words, piece_of_bands, response_columns
-from tfarm.report.sections import Fact, PageSection, Picture, picture, prose, sheet
 from tfarm.schema import Column, Quantity, Table, table
 from tfarm.spectrum.table import first_frequency
 from tfarm.tuner import LearningCurves, Plan, Tuning, compare_controllers, learning_curves, tried_loops, tune

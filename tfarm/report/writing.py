@@ -33,18 +33,6 @@ from tfarm.plots.regions import comparison
 from tfarm.plots.style import save_figure
 from tfarm.processes import shared
 from tfarm.report.arm_section import arm_section, assumptions_section, headline_numbers, is_from_paper, paper_section
-from tfarm.report.cases import (
-    Case,
-    Controller,
-    GivenLaw,
-    argument,
-    brief_on,
-    check_laws,
-    has_loop,
-    is_preset,
-    margins_of,
-    sign_words,
-)
 from tfarm.report.live import ASSETS, LIVE_PAGE, is_live, save_live, write_assets
 from tfarm.report.loop_section import (
     law_section,
@@ -54,23 +42,33 @@ from tfarm.report.loop_section import (
     no_loop_section,
     nyquist_section,
 )
-from tfarm.report.response_sections import bode_section, fit_section, measured_section, modes_section
-from tfarm.report.sampled_section import sampled_section
-from tfarm.report.sections import (
+from tfarm.report.page import (
     PICTURES,
+    Case,
+    Controller,
     Fact,
+    GivenLaw,
     PageSection,
+    argument,
+    brief_on,
+    check_laws,
+    has_loop,
+    is_preset,
     keep,
     kept,
     kept_in,
+    margins_of,
     picture,
     prose,
     render,
     save_section,
     sheet,
+    sign_words,
     upper,
     write_text,
 )
+from tfarm.report.response_sections import bode_section, fit_section, measured_section, modes_section
+from tfarm.report.sampled_section import sampled_section
 from tfarm.report.trust import TRUST_FOLDER, gather, save_proof, write_trust, written_proofs
 from tfarm.report.tuner_section import tuner_section
 from tfarm.response.frequency import bode
