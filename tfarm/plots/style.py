@@ -95,14 +95,12 @@ def picture(
 
     def decorated(draw: Callable[..., None]) -> Any:
         is_one = grid is None and len(rows) == 1
+        make = grid or (lambda figure, *_: figure.subplots(len(rows), sharex=True, height_ratios=rows))
 
         def figure(*found: Any, new: Callable[..., Figure] = Figure, **how: Any) -> Figure:
             with style():
                 drawn = new(figsize=size(*found) if callable(size) else size, layout="constrained")  # no label clipped
-                if grid is None:
-                    drawn.subplots(len(rows), sharex=True, height_ratios=rows)
-                else:
-                    grid(drawn, *found)
+                make(drawn, *found)
                 draw(*found, ax=drawn.axes[0] if is_one else drawn.axes, **how)
                 for ax in drawn.axes[: len(rows) - 1] if grid is None else []:
                     ax.set_xlabel("")
